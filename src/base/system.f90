@@ -1,0 +1,86 @@
+!> The contract between a model and an integrator: a first-order system on a block of lanes.
+!>
+!> A block holds `lanes` copies of one system with different numbers. Every array has the lane as its first,
+!> contiguous index, so that each operation is a loop over lanes; one machine is a block of one lane. A lane
+!> never reads another lane's numbers.
+!>
+!> The last `quadratures` components of a state are pure integrals: nothing depends on them, and they do not take
+!> part in error control. An integrator solves linear systems only for the first `states` components.
+module nocdyn_system
+  use nocdyn_kinds, only: wp
+  implicit none
+  private
+
+  integer, parameter, public :: evaluation_fine = 0       !! the values are good
+  integer, parameter, public :: evaluation_shorten = 1    !! not admissible here: take a shorter step
+  integer, parameter, public :: evaluation_give_up = 2    !! no shorter step will help
+
+  !> An ordinary differential equation y' = f(t, y) on a block of lanes, with its derivatives.
+  type, abstract, public :: system_t
+    integer :: lanes = 1         !! copies of the system in the block
+    integer :: states = 0        !! components under error control
+    integer :: quadratures = 0   !! components that follow them and only accumulate
+  contains
+    procedure(derivative_interface), deferred :: derivative
+    procedure(jacobian_interface), deferred :: jacobian
+    procedure(component_name_interface), deferred :: component_name
+  end type system_t
+
+  !> Receives the solution at the requested times, and may stop the integration.
+  type, abstract, public :: observer_t
+  contains
+    procedure(record_interface), deferred :: record
+    procedure(stops_interface), deferred :: stops
+  end type observer_t
+
+  abstract interface
+
+    !> dydt = f(t, y); y and dydt have the shape [lanes, states + quadratures].
+    subroutine derivative_interface(self, t, y, dydt, status)
+      import :: system_t, wp
+      class(system_t), intent(inout) :: self
+      real(wp), contiguous, intent(in) :: t(:)           !! time of each lane
+      real(wp), contiguous, intent(in) :: y(:, :)
+      real(wp), contiguous, intent(inout) :: dydt(:, :)
+      integer, contiguous, intent(inout) :: status(:)    !! evaluation_... of each lane
+    end subroutine derivative_interface
+
+    !> Partial derivatives of f with respect to the states and to the time.
+    subroutine jacobian_interface(self, t, y, dfdy, dfdt, status)
+      import :: system_t, wp
+      class(system_t), intent(inout) :: self
+      real(wp), contiguous, intent(in) :: t(:)
+      real(wp), contiguous, intent(in) :: y(:, :)
+      real(wp), contiguous, intent(inout) :: dfdy(:, :, :)   !! [lanes, states + quadratures, states]
+      real(wp), contiguous, intent(inout) :: dfdt(:, :)      !! [lanes, states + quadratures]
+      integer, contiguous, intent(inout) :: status(:)
+    end subroutine jacobian_interface
+
+    !> What component `index` is called in a message, e.g. "speed of 'motor'".
+    function component_name_interface(self, index) result(name)
+      import :: system_t
+      class(system_t), intent(in) :: self
+      integer, intent(in) :: index
+      character(len=:), allocatable :: name
+    end function component_name_interface
+
+    !> One requested time of one lane; the calls of a lane come in the order of its times.
+    subroutine record_interface(self, lane, t, y)
+      import :: observer_t, wp
+      class(observer_t), intent(inout) :: self
+      integer, intent(in) :: lane
+      real(wp), intent(in) :: t
+      real(wp), contiguous, intent(in) :: y(:)   !! [states + quadratures]
+    end subroutine record_interface
+
+    !> Asked after every step: true ends the integration.
+    function stops_interface(self, t) result(stops)
+      import :: observer_t, wp
+      class(observer_t), intent(inout) :: self
+      real(wp), intent(in) :: t   !! time reached by the slowest lane
+      logical :: stops
+    end function stops_interface
+
+  end interface
+
+end module nocdyn_system

@@ -1,0 +1,136 @@
+!> Text that people and programs read: numbers that round-trip, names that nearly match.
+module nocdyn_text
+  use, intrinsic :: iso_c_binding, only: c_char, c_double, c_int, c_size_t
+  use nocdyn_kinds, only: wp
+  implicit none
+  private
+
+  public :: to_text, write_number, lower_case, quoted, joined, nearest_word
+
+  integer, parameter, public :: number_width = 32   !! no number of `write_number` is longer
+
+  !> A text of any length, for arrays of texts.
+  type, public :: string_t
+    character(len=:), allocatable :: text
+  end type string_t
+
+  !> The shortest text that reads back as the same value.
+  interface to_text
+    module procedure integer_to_text
+    module procedure real_to_text
+  end interface to_text
+
+  interface
+    !> Shortest round-trip decimal of `value` by std::to_chars (number_text.cpp); returns the length written.
+    function shortest_decimal(value, buffer, capacity) result(length) bind(c, name='nocdyn_shortest_decimal')
+      import :: c_char, c_double, c_int, c_size_t
+      real(c_double), value, intent(in) :: value
+      character(kind=c_char), intent(out) :: buffer(*)
+      integer(c_size_t), value, intent(in) :: capacity
+      integer(c_int) :: length
+    end function shortest_decimal
+  end interface
+
+contains
+
+  !> Writes `value` at the start of `buffer`, left-justified; `length` characters are used.
+  subroutine write_number(value, buffer, length)
+    real(wp), intent(in) :: value
+    character(len=*), intent(inout) :: buffer   !! at least `number_width` long
+    integer, intent(out) :: length
+
+    length = int(shortest_decimal(value, buffer, int(len(buffer), c_size_t)))
+    if (length == 0) error stop 'nocdyn_text: the buffer of write_number is shorter than number_width'
+  end subroutine write_number
+
+  function real_to_text(value) result(text)
+    real(wp), intent(in) :: value
+    character(len=:), allocatable :: text
+    character(len=number_width) :: buffer
+    integer :: length
+
+    call write_number(value, buffer, length)
+    text = buffer(:length)
+  end function real_to_text
+
+  pure function integer_to_text(value) result(text)
+    integer, intent(in) :: value
+    character(len=:), allocatable :: text
+    character(len=number_width) :: buffer
+
+    write (buffer, '(i0)') value
+    text = trim(buffer)
+  end function integer_to_text
+
+  !> ASCII letters in lower case, everything else as it is.
+  elemental function lower_case(text) result(lower)
+    character(len=*), intent(in) :: text
+    character(len=len(text)) :: lower
+    integer :: i
+
+    lower = text
+    do i = 1, len(text)
+      if (text(i:i) >= 'A' .and. text(i:i) <= 'Z') lower(i:i) = achar(iachar(text(i:i)) + 32)
+    end do
+  end function lower_case
+
+  pure function quoted(text)
+    character(len=*), intent(in) :: text
+    character(len=:), allocatable :: quoted
+
+    quoted = "'" // text // "'"
+  end function quoted
+
+  !> The texts in quotes, separated by `separator`.
+  pure function joined(texts, separator)
+    type(string_t), intent(in) :: texts(:)
+    character(len=*), intent(in) :: separator
+    character(len=:), allocatable :: joined
+    integer :: i
+
+    joined = ''
+    do i = 1, size(texts)
+      if (i > 1) joined = joined // separator
+      joined = joined // quoted(texts(i)%text)
+    end do
+  end function joined
+
+  !> Index of the candidate that `word` was probably meant to be, 0 if none is near.
+  pure function nearest_word(word, candidates) result(nearest)
+    character(len=*), intent(in) :: word
+    type(string_t), intent(in) :: candidates(:)
+    integer :: nearest
+    integer :: i, distance, smallest
+
+    nearest = 0
+    smallest = max(1, len(word) / 3) + 1
+    do i = 1, size(candidates)
+      distance = edit_distance(lower_case(word), lower_case(candidates(i)%text))
+      if (distance < smallest) then
+        smallest = distance
+        nearest = i
+      end if
+    end do
+  end function nearest_word
+
+  !> Optimal string alignment distance: insertions, deletions, substitutions, swaps of neighbours.
+  pure function edit_distance(a, b) result(distance)
+    character(len=*), intent(in) :: a, b
+    integer :: distance
+    integer :: d(0:len(a), 0:len(b))
+    integer :: i, j
+
+    d(:, 0) = [(i, i=0, len(a))]
+    d(0, :) = [(j, j=0, len(b))]
+    do j = 1, len(b)
+      do i = 1, len(a)
+        d(i, j) = min(d(i - 1, j) + 1, d(i, j - 1) + 1, d(i - 1, j - 1) + merge(0, 1, a(i:i) == b(j:j)))
+        if (i > 1 .and. j > 1) then
+          if (a(i:i) == b(j - 1:j - 1) .and. a(i - 1:i - 1) == b(j:j)) d(i, j) = min(d(i, j), d(i - 2, j - 2) + 1)
+        end if
+      end do
+    end do
+    distance = d(len(a), len(b))
+  end function edit_distance
+
+end module nocdyn_text
