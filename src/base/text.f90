@@ -118,16 +118,17 @@ contains
     character(len=*), intent(in) :: a, b
     integer :: distance
     integer :: d(0:len(a), 0:len(b))
-    integer :: i, j
+    integer :: h, i, j, k
 
     d(:, 0) = [(i, i=0, len(a))]
     d(0, :) = [(j, j=0, len(b))]
     do j = 1, len(b)
       do i = 1, len(a)
         d(i, j) = min(d(i - 1, j) + 1, d(i, j - 1) + 1, d(i - 1, j - 1) + merge(0, 1, a(i:i) == b(j:j)))
-        if (i > 1 .and. j > 1) then
-          if (a(i:i) == b(j - 1:j - 1) .and. a(i - 1:i - 1) == b(j:j)) d(i, j) = min(d(i, j), d(i - 2, j - 2) + 1)
-        end if
+        if (min(i, j) < 2) cycle
+        h = i - 1
+        k = j - 1
+        if (a(i:i) == b(k:k) .and. a(h:h) == b(j:j)) d(i, j) = min(d(i, j), d(h - 1, k - 1) + 1)
       end do
     end do
     distance = d(len(a), len(b))
