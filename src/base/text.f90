@@ -5,7 +5,7 @@ module nocdyn_text
   implicit none
   private
 
-  public :: to_text, write_number, lower_case, quoted, joined, nearest_word
+  public :: to_text, rounded_text, write_number, lower_case, quoted, joined, nearest_word
 
   integer, parameter, public :: number_width = 32   !! no number of `write_number` is longer
 
@@ -52,6 +52,22 @@ contains
     call write_number(value, buffer, length)
     text = buffer(:length)
   end function real_to_text
+
+  !> The value to `digits` significant digits, as short as it can be written.
+  function rounded_text(value, digits) result(text)
+    real(wp), intent(in) :: value
+    integer, intent(in) :: digits   !! 1 to 17
+    character(len=:), allocatable :: text
+    character(len=number_width) :: buffer
+    character(len=12) :: edit
+    real(wp) :: near
+
+    write (edit, '(a, i0, a)') '(es32.', digits - 1, 'e4)'
+    write (buffer, edit) value
+    read (buffer, *) near
+    if (abs(near) <= 0.0_wp) near = 0.0_wp   ! no "-0"
+    text = to_text(near)
+  end function rounded_text
 
   pure function integer_to_text(value) result(text)
     integer, intent(in) :: value

@@ -1,0 +1,157 @@
+!> The summary of a run: what summary.json and the printed table tell.
+module nocdyn_run_summary
+  use nocdyn_input, only: group_t, input_t
+  use nocdyn_json, only: json_t
+  use nocdyn_kinds, only: wp
+  use nocdyn_machine, only: machine_t
+  use nocdyn_machine_report, only: coordinate_names
+  use nocdyn_outcome, only: outcome_t
+  use nocdyn_text, only: string_t
+  use nocdyn_version, only: compiler_text, version
+  implicit none
+  private
+
+  public :: start_extremes, update_extremes, summary_json
+
+  !> Smallest and largest values of the columns of the table among its rows, with their times.
+  type, public :: extremes_t
+    integer :: rows = 0
+    real(wp), allocatable :: lowest(:), lowest_time(:), highest(:), highest_time(:), last(:)   !! [columns]
+  end type extremes_t
+
+  type, public :: run_summary_t
+    character(len=11) :: status = 'done'            !! done, failed, interrupted
+    character(len=:), allocatable :: message        !! why, if it is not done
+    type(string_t), allocatable :: notes(:)         !! what is worth knowing of the machine
+    type(string_t), allocatable :: labels(:)        !! of the columns
+    type(extremes_t) :: extremes
+    type(outcome_t) :: outcome
+    real(wp) :: wall_time = 0.0_wp                  !! of integration and writing of the trajectory [s]
+  end type run_summary_t
+
+contains
+
+  subroutine start_extremes(extremes, columns)
+    type(extremes_t), intent(out) :: extremes
+    integer, intent(in) :: columns
+
+    allocate (extremes%lowest(columns), source=huge(1.0_wp))
+    allocate (extremes%highest(columns), source=-huge(1.0_wp))
+    allocate (extremes%lowest_time(columns), extremes%highest_time(columns), extremes%last(columns), source=0.0_wp)
+  end subroutine start_extremes
+
+  !> Takes in one row; its first value is the time.
+  pure subroutine update_extremes(extremes, row)
+    type(extremes_t), intent(inout) :: extremes
+    real(wp), intent(in) :: row(:)
+    integer :: i
+
+    do i = 1, size(row)
+      if (row(i) < extremes%lowest(i)) then
+        extremes%lowest(i) = row(i)
+        extremes%lowest_time(i) = row(1)
+      end if
+      if (row(i) > extremes%highest(i)) then
+        extremes%highest(i) = row(i)
+        extremes%highest_time(i) = row(1)
+      end if
+    end do
+    extremes%last(:) = row
+    extremes%rows = extremes%rows + 1
+  end subroutine update_extremes
+
+  function summary_json(input, machine, summary) result(text)
+    type(input_t), intent(in) :: input
+    type(machine_t), intent(in) :: machine
+    type(run_summary_t), intent(in) :: summary
+    character(len=:), allocatable :: text
+    type(json_t) :: json
+    type(group_t) :: about
+
+    call json%open()
+    call json%put('program', 'nocdyn')
+    call json%put('version', version)
+    call json%put('compiler', compiler_text())
+    call json%put('status', trim(summary%status))
+    if (allocated(summary%message)) call json%put('message', summary%message)
+    call json%put('input', input%file)
+    about = input%single('case')
+    call json%put('title', about%text('title'))
+    call put_machine(json, machine, summary)
+    call put_settings(json, input%single('run'))
+    call put_counts(json, summary)
+    call put_columns(json, summary)
+    call json%close()
+    text = json%text()
+  end function summary_json
+
+  subroutine put_machine(json, machine, summary)
+    type(json_t), intent(inout) :: json
+    type(machine_t), intent(in) :: machine
+    type(run_summary_t), intent(in) :: summary
+
+    call json%open('machine')
+    call json%put('bodies', machine%bodies)
+    call json%put('gears', machine%constraints%rows())
+    call json%put('degrees_of_freedom', machine%coordinates%freedoms)
+    call json%put('independent', coordinate_names(machine))
+    call json%put('notes', summary%notes)
+    call json%close()
+  end subroutine put_machine
+
+  subroutine put_settings(json, run)
+    type(json_t), intent(inout) :: json
+    type(group_t), intent(in) :: run
+
+    call json%open('settings')
+    call json%put('t_start', run%number('t_start'))
+    call json%put('t_end', run%number('t_end'))
+    call json%put('method', run%text('method'))
+    call json%put('rtol', run%number('rtol'))
+    call json%put('atol', run%number('atol'))
+    call json%put('formulation', run%text('formulation'))
+    call json%put('complement', run%text('complement'))
+    call json%put('max_steps', run%whole_number('max_steps'))
+    call json%close()
+  end subroutine put_settings
+
+  subroutine put_counts(json, summary)
+    type(json_t), intent(inout) :: json
+    type(run_summary_t), intent(in) :: summary
+
+    associate (outcome => summary%outcome)
+      call json%open('counts')
+      call json%put('accepted_steps', outcome%accepted(1))
+      call json%put('rejected_steps', outcome%rejected(1))
+      call json%put('evaluations', outcome%evaluations(1))
+      call json%put('jacobians', outcome%jacobians(1))
+      call json%put('factorisations', outcome%factorisations(1))
+      call json%put('rows', summary%extremes%rows)
+      call json%close()
+      call json%put('time_reached', outcome%t(1))
+    end associate
+    call json%put('wall_time_s', summary%wall_time)
+  end subroutine put_counts
+
+  !> Extremes and last value of every column but the time.
+  subroutine put_columns(json, summary)
+    type(json_t), intent(inout) :: json
+    type(run_summary_t), intent(in) :: summary
+    integer :: i
+
+    call json%open('columns')
+    associate (extremes => summary%extremes)
+      do i = 2, merge(size(summary%labels), 1, extremes%rows > 0)
+        call json%open(summary%labels(i)%text)
+        call json%put('min', extremes%lowest(i))
+        call json%put('time_of_min', extremes%lowest_time(i))
+        call json%put('max', extremes%highest(i))
+        call json%put('time_of_max', extremes%highest_time(i))
+        call json%put('last', extremes%last(i))
+        call json%close()
+      end do
+    end associate
+    call json%close()
+  end subroutine put_columns
+
+end module nocdyn_run_summary

@@ -1,0 +1,82 @@
+!> The summary of a run as a person reads it.
+module nocdyn_summary_table
+  use nocdyn_input, only: group_t, input_t
+  use nocdyn_kinds, only: wp
+  use nocdyn_run_summary, only: run_summary_t
+  use nocdyn_text, only: rounded_text, to_text
+  implicit none
+  private
+
+  public :: summary_line, summary_table
+
+  integer, parameter :: most_rows = 60    ! a larger machine has its table in summary.json
+  integer, parameter :: digits = 7        ! significant digits shown
+  integer, parameter :: width = 15        ! of a column
+
+contains
+
+  !> One line: what was done, and where the results are.
+  function summary_line(input, summary, folder) result(text)
+    type(input_t), intent(in) :: input
+    type(run_summary_t), intent(in) :: summary
+    character(len=*), intent(in) :: folder
+    character(len=:), allocatable :: text
+
+    text = input%file // ': done at t = ' // to_text(summary%outcome%t(1)) // ' s, ' // &
+           to_text(summary%outcome%accepted(1)) // ' steps (' // to_text(summary%outcome%rejected(1)) // ' rejected), ' // &
+           to_text(summary%extremes%rows) // ' rows, ' // rounded_text(1000.0_wp * summary%wall_time, 3) // &
+           ' ms; results in ' // folder
+  end function summary_line
+
+  !> Title, and last, smallest and largest value of every column with the times of the extremes.
+  function summary_table(input, summary) result(text)
+    type(input_t), intent(in) :: input
+    type(run_summary_t), intent(in) :: summary
+    character(len=:), allocatable :: text
+    type(group_t) :: about
+    integer :: i, label_width, rows
+
+    about = input%single('case')
+    text = about%text('title')
+    if (len(text) > 0) text = text // new_line('a')
+    rows = min(size(summary%labels), most_rows)
+    label_width = maxval([(len(summary%labels(i)%text), i=2, rows)])
+    text = text // padded('', label_width) // right('at the end') // right('smallest') // right('at t [s]') // &
+           right('largest') // right('at t [s]')
+    associate (extremes => summary%extremes)
+      do i = 2, rows
+        text = text // new_line('a') // padded(summary%labels(i)%text, label_width) // cell(extremes%last(i)) // &
+               cell(extremes%lowest(i)) // cell(extremes%lowest_time(i)) // cell(extremes%highest(i)) // &
+               cell(extremes%highest_time(i))
+      end do
+    end associate
+    if (rows < size(summary%labels)) text = text // new_line('a') // '(' // to_text(size(summary%labels) - rows) // &
+                                            ' more columns in summary.json)'
+  end function summary_table
+
+  function cell(value)
+    real(wp), intent(in) :: value
+    character(len=width) :: cell
+
+    cell = right(rounded_text(value, digits))
+  end function cell
+
+  pure function right(text) result(aligned)
+    character(len=*), intent(in) :: text
+    character(len=width) :: aligned
+
+    aligned = adjustr(repeat(' ', max(0, width - len(text))) // text)
+  end function right
+
+  !> Text followed by blanks; bytes of a character beyond its first in UTF-8 take no room.
+  pure function padded(text, length)
+    character(len=*), intent(in) :: text
+    integer, intent(in) :: length
+    character(len=:), allocatable :: padded
+    integer :: continuation_bytes, i
+
+    continuation_bytes = count([(iachar(text(i:i)) >= 128 .and. iachar(text(i:i)) < 192, i=1, len(text))])
+    padded = text // repeat(' ', max(0, length - len(text) + continuation_bytes))
+  end function padded
+
+end module nocdyn_summary_table

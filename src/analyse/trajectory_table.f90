@@ -1,0 +1,170 @@
+!> The columns of trajectory.csv: labels, and the values of a machine at a time and state.
+module nocdyn_trajectory_table
+  use nocdyn_bank, only: quantity_t
+  use nocdyn_formulation, only: formulation_t
+  use nocdyn_kinds, only: wp
+  use nocdyn_machine, only: machine_t
+  use nocdyn_text, only: string_t
+  implicit none
+  private
+
+  public :: new_trajectory_table
+
+  type :: bank_columns_t
+    type(quantity_t), allocatable :: quantities(:)
+  end type bank_columns_t
+
+  !> Evaluates one lane; it keeps a machine of its own, so that a running integration is not disturbed.
+  type, public :: trajectory_table_t
+    type(string_t), allocatable :: labels(:)
+    class(formulation_t), allocatable :: formulation
+    type(bank_columns_t), allocatable, private :: columns(:)   !! of each bank
+    real(wp), allocatable, private :: y(:, :)      !! [1, states + quadratures]
+    real(wp), allocatable, private :: values(:)    !! of one quantity of a bank, work space
+    real(wp), private :: start_energy = 0.0_wp
+  contains
+    procedure :: fill
+    procedure, private :: audit
+  end type trajectory_table_t
+
+contains
+
+  function new_trajectory_table(formulation, t_start) result(table)
+    class(formulation_t), intent(in) :: formulation   !! of one lane
+    real(wp), intent(in) :: t_start
+    type(trajectory_table_t) :: table
+    integer :: i
+
+    allocate (table%formulation, source=formulation)
+    associate (banks => formulation%machine%banks)
+      allocate (table%columns(size(banks)))
+      do i = 1, size(banks)
+        table%columns(i)%quantities = banks(i)%bank%quantities()
+      end do
+      allocate (table%values(maxval([(size(banks(i)%bank%to), i=1, size(banks))])))
+    end associate
+    table%labels = column_labels(formulation%machine, table%columns)
+    table%y = formulation%start()
+    call table%formulation%observe([t_start], table%y)
+    table%start_energy = kinetic_energy(table%formulation) + table%formulation%machine%stored_energy(1)
+  end function new_trajectory_table
+
+  !> Labels in the order in which `fill` gives the values.
+  function column_labels(machine, columns) result(labels)
+    type(machine_t), intent(in) :: machine
+    type(bank_columns_t), intent(in) :: columns(:)
+    type(string_t), allocatable :: labels(:)
+    integer :: i, next
+
+    allocate (labels(column_count(machine, columns)))
+    labels(1)%text = 't [s]'
+    do i = 1, machine%bodies
+      labels(1 + i)%text = 'phi_' // machine%names(i)%text // ' [rad]'
+      labels(1 + machine%bodies + i)%text = 'omega_' // machine%names(i)%text // ' [rad/s]'
+    end do
+    next = 2 + 2 * machine%bodies
+    do i = 1, size(columns)
+      call label_bank(machine%banks(i)%bank%names, columns(i)%quantities, labels, next)
+    end do
+    do i = 1, machine%constraints%rows()
+      labels(next)%text = 'reaction_' // machine%constraints%names(i)%text // ' [' // machine%constraints%units(i)%text // ']'
+      next = next + 1
+    end do
+    labels(next:) = [string_t('kinetic_energy [J]'), string_t('elastic_energy [J]'), string_t('work_in [J]'), &
+                     string_t('work_out [J]'), string_t('energy_residual [J]')]
+  end function column_labels
+
+  subroutine label_bank(names, quantities, labels, next)
+    type(string_t), intent(in) :: names(:)
+    type(quantity_t), intent(in) :: quantities(:)
+    type(string_t), intent(inout) :: labels(:)
+    integer, intent(inout) :: next
+    integer :: e, q
+
+    do q = 1, size(quantities)
+      do e = 1, size(quantities(q)%elements)
+        labels(next)%text = trim(quantities(q)%name) // '_' // names(quantities(q)%elements(e))%text // &
+                            ' [' // trim(quantities(q)%unit) // ']'
+        next = next + 1
+      end do
+    end do
+  end subroutine label_bank
+
+  pure integer function column_count(machine, columns)
+    type(machine_t), intent(in) :: machine
+    type(bank_columns_t), intent(in) :: columns(:)
+    integer :: i, q
+
+    column_count = 1 + 2 * machine%bodies + machine%constraints%rows() + 5
+    do i = 1, size(columns)
+      do q = 1, size(columns(i)%quantities)
+        column_count = column_count + size(columns(i)%quantities(q)%elements)
+      end do
+    end do
+  end function column_count
+
+  !> The row of the table at time t and state y.
+  subroutine fill(self, t, y, row)
+    class(trajectory_table_t), intent(inout) :: self
+    real(wp), intent(in) :: t
+    real(wp), contiguous, intent(in) :: y(:)   !! [states + quadratures]
+    real(wp), intent(out) :: row(:)            !! [labels]
+    integer :: next, q, i
+
+    self%y(1, :) = y
+    call self%formulation%observe([t], self%y)
+    associate (machine => self%formulation%machine)
+      row(1) = t
+      row(2:1 + machine%bodies) = self%formulation%phi(1, 1:)
+      row(2 + machine%bodies:1 + 2 * machine%bodies) = self%formulation%omega(1, 1:)
+      next = 2 + 2 * machine%bodies
+      do i = 1, size(self%columns)
+        do q = 1, size(self%columns(i)%quantities)
+          associate (elements => self%columns(i)%quantities(q)%elements, values => self%values(:size(machine%banks(i)%bank%to)))
+            call machine%banks(i)%bank%observe(q, 1, values)
+            row(next:next + size(elements) - 1) = values(elements)
+            next = next + size(elements)
+          end associate
+        end do
+      end do
+      call self%formulation%reactions(1, row(next:next + machine%constraints%rows() - 1))
+      call self%audit(row(size(row) - 4:))
+    end associate
+  end subroutine fill
+
+  !> Kinetic and elastic energy, work put in, work taken out, and what does not add up.
+  subroutine audit(self, energies)
+    class(trajectory_table_t), intent(inout) :: self
+    real(wp), intent(out) :: energies(5)
+    real(wp) :: work_in, work_out
+    integer :: i, last, next
+
+    work_in = 0.0_wp
+    work_out = 0.0_wp
+    next = self%formulation%states + 1
+    do i = 1, size(self%formulation%machine%banks)
+      associate (bank => self%formulation%machine%banks(i)%bank)
+        last = next + size(bank%accounted) - 1
+        if (bank%is_source()) then
+          work_in = work_in + sum(self%y(1, next:last))
+        else
+          work_out = work_out - sum(self%y(1, next:last))
+        end if
+        next = last + 1
+      end associate
+    end do
+    energies(1) = kinetic_energy(self%formulation)
+    energies(2) = self%formulation%machine%stored_energy(1)
+    energies(3) = work_in
+    energies(4) = work_out
+    energies(5) = (energies(1) + energies(2) - self%start_energy) - (work_in - work_out)
+  end subroutine audit
+
+  pure function kinetic_energy(formulation) result(energy)
+    class(formulation_t), intent(in) :: formulation
+    real(wp) :: energy
+
+    energy = formulation%machine%kinetic_energy(1, formulation%omega(1, 1:))
+  end function kinetic_energy
+
+end module nocdyn_trajectory_table

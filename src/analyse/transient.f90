@@ -1,0 +1,207 @@
+!> What does the machine do over time: integrates an input and writes its results.
+module nocdyn_transient
+  use, intrinsic :: iso_fortran_env, only: int64
+  use nocdyn_assembly, only: assemble_machine, new_formulation
+  use nocdyn_csv, only: write_header, write_row
+  use nocdyn_errors, only: error_t, exit_failed, raise
+  use nocdyn_formulation, only: formulation_t
+  use nocdyn_input, only: group_t, input_t
+  use nocdyn_input_text, only: input_text
+  use nocdyn_integration, only: integrate
+  use nocdyn_integration_settings, only: integration_settings_t
+  use nocdyn_kinds, only: wp
+  use nocdyn_machine, only: machine_t
+  use nocdyn_machine_report, only: redundancy_notes
+  use nocdyn_outcome, only: failure_sentence, integration_done, integration_interrupted, outcome_t
+  use nocdyn_output_file, only: output_file_t, write_whole
+  use nocdyn_posix, only: is_interrupted, remove_file
+  use nocdyn_run_summary, only: run_summary_t, start_extremes, summary_json, update_extremes
+  use nocdyn_system, only: observer_t
+  use nocdyn_trajectory_table, only: new_trajectory_table, trajectory_table_t
+  implicit none
+  private
+
+  public :: run_transient, output_times
+
+  character(len=*), parameter, public :: trajectory_file = 'trajectory.csv', partial_file = 'trajectory.partial.csv'
+  character(len=*), parameter, public :: summary_file = 'summary.json', input_file = 'input.nml'
+
+  !> Told how far a run has come, after every step.
+  type, abstract, public :: progress_t
+  contains
+    procedure(update_interface), deferred :: update
+  end type progress_t
+
+  abstract interface
+    subroutine update_interface(self, fraction)
+      import :: progress_t, wp
+      class(progress_t), intent(inout) :: self
+      real(wp), intent(in) :: fraction   !! of the time span, 0 to 1
+    end subroutine update_interface
+  end interface
+
+  !> Writes the rows and keeps their extremes.
+  type, extends(observer_t) :: recorder_t
+    type(trajectory_table_t) :: table
+    type(output_file_t) :: file
+    type(run_summary_t) :: summary
+    real(wp), allocatable :: row(:)
+    real(wp) :: t_start, t_end
+    class(progress_t), pointer :: progress => null()
+  contains
+    procedure :: record
+    procedure :: stops
+  end type recorder_t
+
+contains
+
+  !> Runs an input and leaves trajectory.csv, summary.json and input.nml in `folder`; a run that fails leaves
+  !> trajectory.partial.csv instead of trajectory.csv.
+  subroutine run_transient(input, folder, progress, summary, error)
+    type(input_t), intent(in) :: input
+    character(len=*), intent(in) :: folder
+    class(progress_t), target, intent(inout) :: progress
+    type(run_summary_t), intent(out) :: summary
+    type(error_t), allocatable, intent(out) :: error
+    type(machine_t) :: machine
+    class(formulation_t), allocatable :: formulation
+    type(recorder_t) :: recorder
+    type(group_t) :: run
+    type(outcome_t) :: outcome
+    type(error_t), allocatable :: write_error
+    real(wp), allocatable :: times(:)
+
+    call assemble_machine(input, machine, error)
+    if (allocated(error)) return
+    run = input%single('run')
+    call new_formulation(run%text('formulation'), machine, formulation)
+    times = output_times(run%number('t_start'), run%number('t_end'), input%single('output'))
+    call start_recorder(recorder, formulation, times, folder, progress)
+    call solve(formulation, run, times, recorder, outcome, error)
+    call conclude(outcome, error, recorder%summary)
+    call write_results(input, machine, recorder, folder, write_error)
+    if (allocated(write_error)) call move_alloc(write_error, error)
+    summary = recorder%summary
+  end subroutine run_transient
+
+  !> The requested times: a row at t_start, one every `interval`, and one at t_end; or `points` rows evenly spaced.
+  pure function output_times(t_start, t_end, output) result(times)
+    real(wp), intent(in) :: t_start, t_end   !! [s]
+    type(group_t), intent(in) :: output      !! the &output group
+    real(wp), allocatable :: times(:)
+    real(wp), parameter :: sliver = 1.0e-9_wp   ! of an interval: a last row nearer to t_end than that is t_end
+    integer :: i, intervals
+
+    if (output%has_value('interval')) then
+      associate (interval => output%number('interval'))
+        intervals = max(1, ceiling((t_end - t_start) / interval - sliver))
+        times = [(t_start + i * interval, i=0, intervals)]
+      end associate
+    else
+      intervals = output%whole_number('points') - 1
+      times = [(t_start + (t_end - t_start) * i / intervals, i=0, intervals)]
+    end if
+    times(size(times)) = t_end
+  end function output_times
+
+  subroutine start_recorder(recorder, formulation, times, folder, progress)
+    type(recorder_t), intent(inout) :: recorder
+    class(formulation_t), intent(in) :: formulation
+    real(wp), intent(in) :: times(:)
+    character(len=*), intent(in) :: folder
+    class(progress_t), target, intent(inout) :: progress
+
+    recorder%table = new_trajectory_table(formulation, times(1))
+    recorder%t_start = times(1)
+    recorder%t_end = times(size(times))
+    recorder%progress => progress
+    recorder%summary%labels = recorder%table%labels
+    recorder%summary%notes = redundancy_notes(formulation%machine)
+    allocate (recorder%row(size(recorder%table%labels)))
+    call start_extremes(recorder%summary%extremes, size(recorder%row))
+    call recorder%file%open(folder, trajectory_file)
+    call write_header(recorder%file, recorder%table%labels)
+  end subroutine start_recorder
+
+  !> Integrates; an integration that does not reach the end is an error that says why.
+  subroutine solve(formulation, run, times, recorder, outcome, error)
+    class(formulation_t), intent(inout) :: formulation
+    type(group_t), intent(in) :: run
+    real(wp), intent(in) :: times(:)
+    type(recorder_t), intent(inout) :: recorder
+    type(outcome_t), intent(out) :: outcome
+    type(error_t), allocatable, intent(out) :: error
+    type(integration_settings_t) :: settings
+    real(wp), allocatable :: y(:, :)
+    integer(int64) :: began, ended, rate
+
+    settings%method = run%text('method')
+    settings%rtol = run%number('rtol')
+    settings%atol = run%number('atol')
+    settings%max_steps = run%whole_number('max_steps')
+    y = formulation%start()
+    call system_clock(began, rate)
+    call integrate(formulation, settings, times, y, recorder, outcome, error)
+    call system_clock(ended)
+    if (allocated(error)) return
+    recorder%summary%wall_time = real(ended - began, wp) / real(rate, wp)
+    if (outcome%status(1) /= integration_done) &
+      call raise(error, exit_failed, failure_sentence(outcome, 1, formulation, settings%rtol, settings%atol))
+  end subroutine solve
+
+  subroutine conclude(outcome, error, summary)
+    type(outcome_t), intent(in) :: outcome
+    type(error_t), allocatable, intent(in) :: error
+    type(run_summary_t), intent(inout) :: summary
+
+    summary%outcome = outcome
+    if (.not. allocated(error)) return
+    summary%message = error%message
+    summary%status = 'failed'
+    if (outcome%status(1) == integration_interrupted) summary%status = 'interrupted'
+  end subroutine conclude
+
+  !> Gives the files their names; what an earlier run left there and this one does not replace is removed.
+  subroutine write_results(input, machine, recorder, folder, error)
+    type(input_t), intent(in) :: input
+    type(machine_t), intent(in) :: machine
+    type(recorder_t), intent(inout) :: recorder
+    character(len=*), intent(in) :: folder
+    type(error_t), allocatable, intent(out) :: error
+
+    call remove_file(folder // '/' // summary_file)
+    if (recorder%summary%status == 'done') then
+      call recorder%file%finish(trajectory_file, error)
+      call remove_file(folder // '/' // partial_file)
+    else
+      call recorder%file%finish(partial_file, error)
+      call remove_file(folder // '/' // trajectory_file)
+    end if
+    if (.not. allocated(error)) call write_whole(folder, input_file, input_text(input), error)
+    if (.not. allocated(error)) call write_whole(folder, summary_file, summary_json(input, machine, recorder%summary), error)
+  end subroutine write_results
+
+  !> One requested time: a row of the table.
+  subroutine record(self, lane, t, y)
+    class(recorder_t), intent(inout) :: self
+    integer, intent(in) :: lane
+    real(wp), intent(in) :: t
+    real(wp), contiguous, intent(in) :: y(:)
+
+    if (lane /= 1) error stop 'nocdyn_transient: a run is one lane'
+    call self%table%fill(t, y, self%row)
+    call update_extremes(self%summary%extremes, self%row)
+    call write_row(self%file, self%row)
+  end subroutine record
+
+  !> Stops on Ctrl-C and when the file cannot be written.
+  function stops(self, t)
+    class(recorder_t), intent(inout) :: self
+    real(wp), intent(in) :: t
+    logical :: stops
+
+    call self%progress%update((t - self%t_start) / (self%t_end - self%t_start))
+    stops = is_interrupted() .or. self%file%has_failed
+  end function stops
+
+end module nocdyn_transient

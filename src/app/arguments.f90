@@ -1,0 +1,173 @@
+!> The command line: command, files and options.
+module nocdyn_arguments
+  use nocdyn_errors, only: error_t, exit_input, raise
+  use nocdyn_text, only: joined, nearest_word, quoted, string_t
+  implicit none
+  private
+
+  public :: command_line, parse_arguments, command_names
+
+  type, public :: arguments_t
+    character(len=:), allocatable :: command
+    type(string_t), allocatable :: operands(:)    !! files, or the topic of `help`
+    character(len=:), allocatable :: out          !! --out, not allocated if absent
+    type(string_t), allocatable :: overrides(:)   !! PATH=VALUE of every --set
+    logical :: is_quiet = .false.
+  end type arguments_t
+
+contains
+
+  !> The words after the program's name.
+  function command_line() result(words)
+    type(string_t), allocatable :: words(:)
+    integer :: i, length
+
+    allocate (words(command_argument_count()))
+    do i = 1, size(words)
+      call get_command_argument(i, length=length)
+      allocate (character(len=length) :: words(i)%text)
+      if (length > 0) call get_command_argument(i, words(i)%text)
+    end do
+  end function command_line
+
+  function command_names() result(names)
+    type(string_t), allocatable :: names(:)
+
+    names = [string_t('run'), string_t('check'), string_t('matrices'), string_t('new'), string_t('help')]
+  end function command_names
+
+  !> Takes the words apart; wrong usage is an error with exit code 2.
+  subroutine parse_arguments(words, arguments, error)
+    type(string_t), intent(in) :: words(:)
+    type(arguments_t), intent(out) :: arguments
+    type(error_t), allocatable, intent(out) :: error
+    integer :: i
+    logical :: takes_options
+
+    allocate (arguments%operands(0), arguments%overrides(0))
+    call find_command(words, arguments, error)
+    takes_options = .true.
+    i = 2
+    do while (i <= size(words) .and. .not. allocated(error))
+      if (words(i)%text == '--') then
+        takes_options = .false.
+      else if (takes_options .and. index(words(i)%text, '-') == 1 .and. len(words(i)%text) > 1) then
+        call take_option(words, i, arguments, error)
+      else
+        arguments%operands = [arguments%operands, words(i)]
+      end if
+      i = i + 1
+    end do
+    if (.not. allocated(error)) call check_usage(arguments, error)
+  end subroutine parse_arguments
+
+  subroutine find_command(words, arguments, error)
+    type(string_t), intent(in) :: words(:)
+    type(arguments_t), intent(inout) :: arguments
+    type(error_t), allocatable, intent(out) :: error
+    type(string_t), allocatable :: names(:)
+    integer :: i
+
+    arguments%command = ''
+    if (size(words) == 0) then
+      call raise(error, exit_input, "a command is missing: nocdyn run FILE..., or 'nocdyn help' for all of them")
+      return
+    end if
+    arguments%command = words(1)%text
+    select case (arguments%command)
+    case ('--help', '-h')
+      arguments%command = 'help'
+    case ('--version', '-V')
+      arguments%command = 'version'
+    case default
+      names = command_names()
+      if (any([(names(i)%text == arguments%command, i=1, size(names))])) return
+      call raise(error, exit_input, unknown_word(arguments%command, 'a command', names))
+    end select
+  end subroutine find_command
+
+  !> The option at word `i`, with its value in the same word after '=' or in the next one.
+  subroutine take_option(words, i, arguments, error)
+    type(string_t), intent(in) :: words(:)
+    integer, intent(inout) :: i
+    type(arguments_t), intent(inout) :: arguments
+    type(error_t), allocatable, intent(out) :: error
+    character(len=:), allocatable :: name, value
+    type(string_t), allocatable :: options(:)
+    integer :: equals
+
+    equals = index(words(i)%text // '=', '=')
+    name = words(i)%text(:equals - 1)
+    select case (name)
+    case ('--quiet', '-q')
+      arguments%is_quiet = .true.
+      if (equals <= len(words(i)%text)) call raise(error, exit_input, '--quiet takes no value')
+    case ('--out', '--set')
+      if (equals <= len(words(i)%text)) then
+        value = words(i)%text(equals + 1:)
+      else if (i < size(words)) then
+        i = i + 1
+        value = words(i)%text
+      else
+        value = ''
+      end if
+      call take_value(name, value, arguments, error)
+    case ('--help', '-h')
+      arguments%operands = [string_t(arguments%command)]
+      arguments%command = 'help'
+    case default
+      options = [string_t('--out'), string_t('--set'), string_t('--quiet'), string_t('--help')]
+      call raise(error, exit_input, unknown_word(name, 'an option', options))
+    end select
+  end subroutine take_option
+
+  subroutine take_value(name, value, arguments, error)
+    character(len=*), intent(in) :: name, value
+    type(arguments_t), intent(inout) :: arguments
+    type(error_t), allocatable, intent(out) :: error
+
+    if (value == '') then
+      call raise(error, exit_input, name // ' needs a value: ' // &
+                 merge('--out DIR       ', '--set PATH=VALUE', name == '--out'))
+    else if (name == '--set') then
+      arguments%overrides = [arguments%overrides, string_t(value)]
+    else if (allocated(arguments%out)) then
+      call raise(error, exit_input, '--out is given twice')
+    else
+      arguments%out = value
+    end if
+  end subroutine take_value
+
+  !> "'rnu' is not a command; allowed: 'run', ...; did you mean 'run'?"
+  function unknown_word(word, what, known) result(message)
+    character(len=*), intent(in) :: word, what
+    type(string_t), intent(in) :: known(:)
+    character(len=:), allocatable :: message
+    integer :: nearest
+
+    message = quoted(word) // ' is not ' // what // '; allowed: ' // joined(known, ', ')
+    nearest = nearest_word(word, known)
+    if (nearest > 0) message = message // '; did you mean ' // quoted(known(nearest)%text) // '?'
+  end function unknown_word
+
+  !> Options and numbers of operands that a command does not take.
+  subroutine check_usage(arguments, error)
+    type(arguments_t), intent(in) :: arguments
+    type(error_t), allocatable, intent(out) :: error
+    integer :: operands
+
+    operands = size(arguments%operands)
+    if (allocated(arguments%out) .and. arguments%command /= 'run') then
+      call raise(error, exit_input, '--out is an option of nocdyn run')
+    else if (size(arguments%overrides) > 0 .and. all(arguments%command /= ['run     ', 'check   ', 'matrices'])) then
+      call raise(error, exit_input, '--set is an option of nocdyn run, check and matrices')
+    else if (any(arguments%command == ['run     ', 'check   ']) .and. operands == 0) then
+      call raise(error, exit_input, 'an input file is missing: nocdyn ' // arguments%command // ' FILE...')
+    else if (any(arguments%command == ['matrices', 'new     ']) .and. operands /= 1) then
+      call raise(error, exit_input, 'exactly one file is needed: nocdyn ' // arguments%command // ' FILE')
+    else if (arguments%command == 'version' .and. operands > 0) then
+      call raise(error, exit_input, '--version takes no arguments')
+    end if
+  end subroutine check_usage
+
+end module nocdyn_arguments

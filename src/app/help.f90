@@ -1,0 +1,54 @@
+!> The help texts of the command line.
+module nocdyn_help
+  implicit none
+  private
+
+  public :: command_help
+
+  character(len=*), parameter :: nl = new_line('a')
+
+contains
+
+  !> Help on a command, on the program if `command` is empty; empty if there is no such command.
+  pure function command_help(command) result(text)
+    character(len=*), intent(in) :: command
+    character(len=:), allocatable :: text
+
+    select case (command)
+    case ('')
+      text = 'nocdyn: dynamics of drivetrains: rotating bodies, nonlinear elastic couplings, gears.' // nl // nl // &
+             '  nocdyn run FILE...       integrate machines and write their results' // nl // &
+             '  nocdyn check FILE...     read and analyse, integrate nothing' // nl // &
+             '  nocdyn matrices FILE     print the matrices of the method for a machine' // nl // &
+             '  nocdyn new FILE          write a commented input to start from' // nl // &
+             '  nocdyn help [COMMAND]    help on a command' // nl // &
+             '  nocdyn help input        the groups and keys of an input file' // nl // &
+             '  nocdyn --version' // nl // nl // &
+             'Exit codes: 0 done, 1 a computation failed, 2 wrong usage or input, 3 a file cannot be read or written.'
+    case ('run')
+      text = 'nocdyn run FILE... [--out DIR] [--set PATH=VALUE]... [--quiet]' // nl // nl // &
+             'Integrates every input file and writes trajectory.csv, summary.json and input.nml.' // nl // nl // &
+             '  --out DIR          write to DIR, with several files to DIR/<name of the file>;' // nl // &
+             '                     without it &output directory counts, else results/<name of the file>' // nl // &
+             '  --set PATH=VALUE   override a key: run.rtol=1e-9, load.work.viscous=80, gear.reducer.radii=2,3' // nl // &
+             '  --quiet            print nothing but errors' // nl // nl // &
+             'A bad file does not stop the others; the exit code is the worst of all. Ctrl-C ends the run and keeps' // nl // &
+             'what there is as trajectory.partial.csv; so does a computation that fails.'
+    case ('check')
+      text = 'nocdyn check FILE... [--set PATH=VALUE]...' // nl // nl // &
+             'Reads the files and analyses the machines: every mistake with its line, degrees of freedom,' // nl // &
+             'independent coordinates, ratios between geared bodies, redundant gears.'
+    case ('matrices')
+      text = 'nocdyn matrices FILE [--set PATH=VALUE]...' // nl // nl // &
+             'Prints every matrix and vector of the method for the machine at its start, with the number of' // nl // &
+             'its equation.'
+    case ('new')
+      text = 'nocdyn new FILE' // nl // nl // 'Writes a commented input file; a file that exists is left alone.'
+    case ('help')
+      text = 'nocdyn help [COMMAND], nocdyn help input [GROUP]'
+    case default
+      text = ''
+    end select
+  end function command_help
+
+end module nocdyn_help

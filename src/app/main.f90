@@ -1,0 +1,34 @@
+!> nocdyn: dynamics of drivetrains from namelist files.
+program nocdyn
+  use nocdyn_arguments, only: arguments_t, command_line, parse_arguments
+  use nocdyn_commands, only: check_command, help_command, matrices_command, new_command, version_command
+  use nocdyn_console, only: complain
+  use nocdyn_errors, only: error_t
+  use nocdyn_run_command, only: run_command
+  implicit none
+
+  type(arguments_t) :: arguments
+  type(error_t), allocatable :: error
+  integer :: code
+
+  call parse_arguments(command_line(), arguments, error)
+  if (allocated(error)) then
+    call complain(error)
+    stop error%code, quiet=.true.
+  end if
+  select case (arguments%command)
+  case ('run')
+    call run_command(arguments, code)
+  case ('check')
+    call check_command(arguments, code)
+  case ('matrices')
+    call matrices_command(arguments, code)
+  case ('new')
+    call new_command(arguments, code)
+  case ('version')
+    call version_command(code)
+  case default
+    call help_command(arguments, code)
+  end select
+  stop code, quiet=.true.
+end program nocdyn

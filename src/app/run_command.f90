@@ -1,0 +1,143 @@
+!> nocdyn run: integrates every file, goes on past a bad one, and tells what came out.
+module nocdyn_run_command
+  use nocdyn_arguments, only: arguments_t
+  use nocdyn_console, only: complain, console_progress_t, new_console_progress, say
+  use nocdyn_errors, only: error_t, exit_done, exit_failed, exit_input, raise
+  use nocdyn_input, only: group_t, input_t
+  use nocdyn_input_reader, only: read_input
+  use nocdyn_posix, only: is_interrupted, watch_interrupts
+  use nocdyn_run_summary, only: run_summary_t
+  use nocdyn_summary_table, only: summary_line, summary_table
+  use nocdyn_text, only: quoted, string_t, to_text
+  use nocdyn_transient, only: run_transient
+  implicit none
+  private
+
+  public :: run_command
+
+contains
+
+  subroutine run_command(arguments, code)
+    type(arguments_t), intent(in) :: arguments
+    integer, intent(out) :: code   !! the worst of all files
+    type(input_t), allocatable :: inputs(:)
+    type(string_t), allocatable :: folders(:)
+    type(error_t), allocatable :: error
+    logical :: is_good(size(arguments%operands))
+    integer :: i
+
+    code = exit_done
+    allocate (inputs(size(arguments%operands)), folders(size(arguments%operands)))
+    do i = 1, size(inputs)
+      call read_input(arguments%operands(i)%text, arguments%overrides, inputs(i), error)
+      is_good(i) = .not. allocated(error)
+      folders(i)%text = ''
+      if (is_good(i)) folders(i)%text = result_folder(arguments, inputs(i))
+      if (.not. is_good(i)) call count_failure(error, code)
+    end do
+    call refuse_shared_folders(arguments%operands, folders, is_good, error)
+    if (allocated(error)) then
+      call count_failure(error, code)
+      return
+    end if
+    call watch_interrupts()
+    do i = 1, size(inputs)
+      if (is_good(i)) call run_file(arguments, inputs(i), folders(i)%text, code)
+      if (is_interrupted()) exit
+    end do
+    if (i < size(inputs)) then
+      call raise(error, exit_failed, to_text(count(is_good(i + 1:))) // ' more files were not run')
+      call count_failure(error, code)
+    end if
+  end subroutine run_command
+
+  subroutine count_failure(error, code)
+    type(error_t), intent(in) :: error
+    integer, intent(inout) :: code
+
+    call complain(error)
+    code = max(code, error%code)
+  end subroutine count_failure
+
+  subroutine run_file(arguments, input, folder, code)
+    type(arguments_t), intent(in) :: arguments
+    type(input_t), intent(in) :: input
+    character(len=*), intent(in) :: folder
+    integer, intent(inout) :: code
+    type(console_progress_t) :: progress
+    type(run_summary_t) :: summary
+    type(error_t), allocatable :: error
+    integer :: i
+
+    progress = new_console_progress(input%file, arguments%is_quiet)
+    call run_transient(input, folder, progress, summary, error)
+    call progress%clear()
+    if (allocated(error)) then
+      call count_failure(error, code)
+    else if (.not. arguments%is_quiet) then
+      do i = 1, size(summary%notes)
+        call say(input%file // ': note: ' // summary%notes(i)%text)
+      end do
+      if (size(arguments%operands) == 1) call say(summary_table(input, summary))
+      call say(summary_line(input, summary, folder))
+    end if
+  end subroutine run_file
+
+  !> --out, in which each of several files gets a folder of its own; else what the input says; else results/<its name>.
+  function result_folder(arguments, input) result(folder)
+    type(arguments_t), intent(in) :: arguments
+    type(input_t), intent(in) :: input
+    character(len=:), allocatable :: folder
+    type(group_t) :: output
+
+    output = input%single('output')
+    folder = output%text('directory')
+    if (allocated(arguments%out)) then
+      folder = without_last_slash(arguments%out)
+      if (size(arguments%operands) > 1) folder = folder // '/' // stem(input%file)
+    else if (folder == '') then
+      folder = 'results/' // stem(input%file)
+    else
+      folder = without_last_slash(folder)
+    end if
+  end function result_folder
+
+  pure function without_last_slash(path) result(shorter)
+    character(len=*), intent(in) :: path
+    character(len=:), allocatable :: shorter
+    integer :: last
+
+    last = verify(path, '/', back=.true.)
+    shorter = path(:max(1, last))
+  end function without_last_slash
+
+  !> The file's name without its folders and its last ending.
+  pure function stem(path)
+    character(len=*), intent(in) :: path
+    character(len=:), allocatable :: stem
+    integer :: dot
+
+    stem = path(index(path, '/', back=.true.) + 1:)
+    dot = index(stem, '.', back=.true.)
+    if (dot > 1) stem = stem(:dot - 1)
+  end function stem
+
+  !> Two files of one call must not write over each other.
+  subroutine refuse_shared_folders(files, folders, is_good, error)
+    type(string_t), intent(in) :: files(:), folders(:)
+    logical, intent(in) :: is_good(:)
+    type(error_t), allocatable, intent(out) :: error
+    integer :: i, k
+
+    do i = 2, size(folders)
+      if (.not. is_good(i)) cycle
+      do k = 1, i - 1
+        if (.not. is_good(k) .or. folders(k)%text /= folders(i)%text) cycle
+        call raise(error, exit_input, quoted(files(k)%text) // ' and ' // quoted(files(i)%text) // &
+                   ' would both write to ' // quoted(folders(i)%text) // '; nothing was run')
+        return
+      end do
+    end do
+  end subroutine refuse_shared_folders
+
+end module nocdyn_run_command

@@ -1,0 +1,135 @@
+!> The dense linear algebra of the constraint analysis, by LAPACK.
+module nocdyn_lapack
+  use nocdyn_kinds, only: wp
+  use nocdyn_lapack_lu, only: lu_factor
+  implicit none
+  private
+
+  public :: pivoted_rank, invert, solve_positive_definite, pseudo_inverse
+
+  interface
+    subroutine dgeqp3(m, n, a, lda, jpvt, tau, work, lwork, info)
+      import :: wp
+      integer, intent(in) :: m, n, lda, lwork
+      real(wp), intent(inout) :: a(lda, *)
+      integer, intent(inout) :: jpvt(*)
+      real(wp), intent(out) :: tau(*), work(*)
+      integer, intent(out) :: info
+    end subroutine dgeqp3
+
+    subroutine dgetri(n, a, lda, ipiv, work, lwork, info)
+      import :: wp
+      integer, intent(in) :: n, lda, lwork
+      real(wp), intent(inout) :: a(lda, *)
+      integer, intent(in) :: ipiv(*)
+      real(wp), intent(out) :: work(*)
+      integer, intent(out) :: info
+    end subroutine dgetri
+
+    subroutine dposv(uplo, n, nrhs, a, lda, b, ldb, info)
+      import :: wp
+      character(len=1), intent(in) :: uplo
+      integer, intent(in) :: n, nrhs, lda, ldb
+      real(wp), intent(inout) :: a(lda, *), b(ldb, *)
+      integer, intent(out) :: info
+    end subroutine dposv
+
+    subroutine dgelsy(m, n, nrhs, a, lda, b, ldb, jpvt, rcond, rank, work, lwork, info)
+      import :: wp
+      integer, intent(in) :: m, n, nrhs, lda, ldb, lwork
+      real(wp), intent(inout) :: a(lda, *), b(ldb, *)
+      integer, intent(inout) :: jpvt(*)
+      real(wp), intent(in) :: rcond
+      integer, intent(out) :: rank, info
+      real(wp), intent(out) :: work(*)
+    end subroutine dgelsy
+  end interface
+
+contains
+
+  !> Numerical rank by QR with column pivoting (DGEQP3): the diagonal elements of R above `tolerance` times the first.
+  subroutine pivoted_rank(matrix, tolerance, rank, pivots)
+    real(wp), intent(in) :: matrix(:, :)
+    real(wp), intent(in) :: tolerance      !! relative to the largest column
+    integer, intent(out) :: rank
+    integer, intent(out) :: pivots(:)      !! columns in the order of pivoting, shape [columns]; the first `rank` are independent
+    real(wp), allocatable :: a(:, :), tau(:), work(:)
+    integer :: info, k, m, n
+
+    m = size(matrix, 1)
+    n = size(matrix, 2)
+    pivots = [(k, k=1, n)]
+    rank = 0
+    if (min(m, n) == 0) return
+    allocate (tau(min(m, n)), work(2 * n + 32 * (n + 1)))
+    a = matrix
+    pivots = 0
+    call dgeqp3(m, n, a, m, pivots, tau, work, size(work), info)
+    if (info /= 0) error stop 'nocdyn_lapack: dgeqp3 was called with a wrong argument'
+    do k = 1, min(m, n)
+      if (abs(a(k, k)) <= tolerance * abs(a(1, 1))) exit
+      rank = k
+    end do
+  end subroutine pivoted_rank
+
+  !> The inverse by LU (DGETRF, DGETRI), and the logarithm of |determinant|.
+  subroutine invert(matrix, inverse, log_determinant, is_singular)
+    real(wp), intent(in) :: matrix(:, :)             !! square
+    real(wp), allocatable, intent(out) :: inverse(:, :)
+    real(wp), intent(out) :: log_determinant         !! meaningless if singular
+    logical, intent(out) :: is_singular              !! a pivot is exactly zero
+    real(wp), allocatable :: work(:)
+    integer, allocatable :: ipiv(:)
+    integer :: info, k, n
+
+    n = size(matrix, 1)
+    allocate (ipiv(n), work(max(1, 32 * n)))
+    inverse = matrix
+    log_determinant = 0.0_wp
+    call lu_factor(inverse, ipiv, is_singular)
+    if (is_singular) return
+    do k = 1, n
+      log_determinant = log_determinant + log(abs(inverse(k, k)))
+    end do
+    call dgetri(n, inverse, max(1, n), ipiv, work, size(work), info)
+  end subroutine invert
+
+  !> Solves matrix * x = rhs by Cholesky (DPOSV).
+  subroutine solve_positive_definite(matrix, rhs, solution, is_indefinite)
+    real(wp), intent(in) :: matrix(:, :)
+    real(wp), intent(in) :: rhs(:, :)
+    real(wp), allocatable, intent(out) :: solution(:, :)
+    logical, intent(out) :: is_indefinite
+    real(wp), allocatable :: a(:, :)
+    integer :: info, n
+
+    n = size(matrix, 1)
+    a = matrix
+    solution = rhs
+    call dposv('L', n, size(rhs, 2), a, max(1, n), solution, max(1, n), info)
+    is_indefinite = info /= 0
+  end subroutine solve_positive_definite
+
+  !> Moore-Penrose inverse: the least-squares solutions of smallest norm for the unit vectors (DGELSY).
+  function pseudo_inverse(matrix, tolerance) result(inverse)
+    real(wp), intent(in) :: matrix(:, :)
+    real(wp), intent(in) :: tolerance          !! singular below this times the largest, as in `pivoted_rank`
+    real(wp), allocatable :: inverse(:, :)     !! shape transposed
+    real(wp), allocatable :: a(:, :), b(:, :), work(:)
+    integer, allocatable :: jpvt(:)
+    integer :: info, k, m, n, rank
+
+    m = size(matrix, 1)
+    n = size(matrix, 2)
+    allocate (b(max(m, n), m), source=0.0_wp)
+    allocate (jpvt(n), source=0)
+    allocate (work(32 * (m + n + 1) + min(m, n) * 2))
+    do k = 1, m
+      b(k, k) = 1.0_wp
+    end do
+    a = matrix
+    if (min(m, n) > 0) call dgelsy(m, n, m, a, m, b, size(b, 1), jpvt, tolerance, rank, work, size(work), info)
+    inverse = b(:n, :)
+  end function pseudo_inverse
+
+end module nocdyn_lapack

@@ -1,0 +1,19 @@
+!> Which nocdyn this is, and what built it.
+module nocdyn_version
+  use, intrinsic :: iso_fortran_env, only: compiler_version
+  implicit none
+  private
+
+  public :: compiler_text
+
+  character(len=*), parameter, public :: version = '0.1.0'   !! as in CMakeLists.txt, which a test compares
+
+contains
+
+  function compiler_text() result(text)
+    character(len=:), allocatable :: text
+
+    text = compiler_version()
+  end function compiler_text
+
+end module nocdyn_version

@@ -1,0 +1,38 @@
+!> Tests for infinities and NaNs that raise no floating-point exception and cost no change of the floating-point state.
+module nocdyn_finite
+  use, intrinsic :: iso_fortran_env, only: int64
+  use nocdyn_kinds, only: wp
+  implicit none
+  private
+
+  public :: all_finite, is_finite
+
+  ! An IEEE double is infinite or NaN if and only if its eleven exponent bits are all ones.
+  integer, parameter :: exponent_place = 52
+  integer, parameter :: exponent_bits = 11
+  integer(int64), parameter :: exponent_ones = 2_int64**exponent_bits - 1
+
+contains
+
+  pure function all_finite(n, x)
+    integer, intent(in) :: n
+    real(wp), intent(in) :: x(n)
+    logical :: all_finite
+    integer(int64) :: carries
+    integer :: i
+
+    carries = 0
+    do i = 1, n
+      carries = ior(carries, iand(shiftr(transfer(x(i), carries), exponent_place), exponent_ones) + 1)
+    end do
+    all_finite = .not. btest(carries, exponent_bits)
+  end function all_finite
+
+  elemental function is_finite(x)
+    real(wp), intent(in) :: x
+    logical :: is_finite
+
+    is_finite = iand(shiftr(transfer(x, exponent_ones), exponent_place), exponent_ones) /= exponent_ones
+  end function is_finite
+
+end module nocdyn_finite

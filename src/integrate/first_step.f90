@@ -1,0 +1,90 @@
+!> The size of the very first step.
+module nocdyn_first_step
+  use nocdyn_kinds, only: wp
+  use nocdyn_step_control, only: smallest_step, step_control_t
+  use nocdyn_system, only: system_t
+  use nocdyn_trial, only: evaluate, set_out, trial_t
+  implicit none
+  private
+
+  public :: guess_first_steps
+
+  ! The constants of HINIT in Hairer's DOPRI5.
+  real(wp), parameter :: negligible = 1.0e-5_wp      !! sizes that say nothing about the scale of time
+  real(wp), parameter :: no_curvature = 1.0e-15_wp
+  real(wp), parameter :: small_step = 1.0e-6_wp
+  real(wp), parameter :: small_change = 0.01_wp
+  real(wp), parameter :: most_growth = 100.0_wp
+  real(wp), parameter :: retreat = 0.01_wp           !! after a small step that cannot be evaluated
+
+  real(wp), parameter :: largest_ratio = 1.0e100_wp  !! keeps squares finite
+
+contains
+
+  !> Sets the first step sizes by comparing the slopes at both ends of a small Euler step:
+  !> Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I, 2nd ed. (1993), II.4.
+  subroutine guess_first_steps(control, order, system, trial)
+    type(step_control_t), intent(inout) :: control
+    integer, intent(in) :: order
+    class(system_t), intent(inout) :: system
+    type(trial_t), intent(inout) :: trial   !! t, y, slope and the lanes at work; h, y_new and deviation are scratch
+    real(wp) :: slope, steepest, longer
+    integer :: lane
+
+    do lane = 1, trial%lanes
+      if (trial%working(lane)) trial%h(lane) = euler_step(control, trial, lane)
+    end do
+    control%h = trial%h
+    call set_out(trial)
+    trial%y_new = trial%y + trial%h_spread * trial%slope
+    call evaluate(trial, system, trial%t + trial%h, trial%y_new, trial%deviation)
+    trial%deviation = trial%deviation - trial%slope
+    do lane = 1, trial%lanes
+      if (.not. trial%working(lane)) then
+        control%h(lane) = retreat * control%h(lane)
+        cycle
+      end if
+      slope = weighted_size(control, trial, lane, trial%slope)
+      steepest = max(slope, weighted_size(control, trial, lane, trial%deviation) / trial%h(lane))
+      if (steepest <= no_curvature) then
+        longer = max(small_step, trial%h(lane) * 1.0e-3_wp)
+      else
+        longer = (small_change / steepest)**(1.0_wp / order)
+      end if
+      control%h(lane) = min(most_growth * trial%h(lane), longer)
+    end do
+  end subroutine guess_first_steps
+
+  !> A step over which y changes by about 1 % if the slope stays as it is.
+  pure function euler_step(control, trial, lane) result(h)
+    type(step_control_t), intent(in) :: control
+    type(trial_t), intent(in) :: trial
+    integer, intent(in) :: lane
+    real(wp) :: h
+    real(wp) :: position, slope
+
+    position = weighted_size(control, trial, lane, trial%y)
+    slope = weighted_size(control, trial, lane, trial%slope)
+    h = small_step
+    if (min(position, slope) >= negligible) h = small_change * position / slope
+    h = min(h, control%longest, control%t_end - trial%t(lane))
+    h = max(h, smallest_step(trial%t(lane)))
+  end function euler_step
+
+  !> Root mean square of x / (atol + rtol |y|) over the states.
+  pure function weighted_size(control, trial, lane, x) result(rms)
+    type(step_control_t), intent(in) :: control
+    type(trial_t), intent(in) :: trial
+    integer, intent(in) :: lane
+    real(wp), intent(in) :: x(:, :)
+    real(wp) :: rms
+    integer :: i
+
+    rms = 0.0_wp
+    do i = 1, trial%states
+      rms = rms + min(abs(x(lane, i)) / (control%atol + control%rtol * abs(trial%y(lane, i))), largest_ratio)**2
+    end do
+    rms = sqrt(rms / max(trial%states, 1))
+  end function weighted_size
+
+end module nocdyn_first_step

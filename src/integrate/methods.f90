@@ -1,0 +1,49 @@
+!> The methods by the names that people give them.
+module nocdyn_methods
+  use nocdyn_errors, only: error_t, exit_input, raise
+  use nocdyn_explicit_stepper, only: explicit_stepper
+  use nocdyn_explicit_tables, only: dormand_prince_5
+  use nocdyn_rosenbrock_stepper, only: rosenbrock_stepper
+  use nocdyn_rosenbrock_tables, only: rodas4
+  use nocdyn_stepper, only: stepper_t
+  use nocdyn_text, only: joined, nearest_word, quoted, string_t
+  implicit none
+  private
+
+  public :: select_method
+
+  !> All names that `select_method` knows; 'rodas4' is another name of 'rosenbrock'.
+  character(len=10), parameter, public :: method_names(3) = [character(len=10) :: 'rk45', 'rosenbrock', 'rodas4']
+
+contains
+
+  subroutine select_method(name, stepper, error)
+    character(len=*), intent(in) :: name
+    class(stepper_t), allocatable, intent(out) :: stepper
+    type(error_t), allocatable, intent(out) :: error   !! allocated if there is no such method
+
+    select case (name)
+    case ('rk45')
+      stepper = explicit_stepper(dormand_prince_5())
+    case ('rosenbrock', 'rodas4')
+      stepper = rosenbrock_stepper(rodas4())
+    case default
+      call raise(error, exit_input, unknown_method(name))
+    end select
+  end subroutine select_method
+
+  function unknown_method(name) result(message)
+    character(len=*), intent(in) :: name
+    character(len=:), allocatable :: message
+    type(string_t) :: names(size(method_names))
+    integer :: i
+
+    do i = 1, size(names)
+      names(i)%text = trim(method_names(i))
+    end do
+    message = 'there is no integration method ' // quoted(name) // '; the methods are ' // joined(names, ', ')
+    i = nearest_word(name, names)
+    if (i > 0) message = message // '. Did you mean ' // quoted(names(i)%text) // '?'
+  end function unknown_method
+
+end module nocdyn_methods

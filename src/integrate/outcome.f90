@@ -1,0 +1,125 @@
+!> How an integration ended, lane by lane, and the sentence that says why.
+module nocdyn_outcome
+  use nocdyn_kinds, only: wp
+  use nocdyn_system, only: system_t
+  use nocdyn_text, only: to_text
+  implicit none
+  private
+
+  public :: allocate_outcome, failure_sentence
+
+  integer, parameter, public :: integration_running = -1
+  integer, parameter, public :: integration_done = 0
+  integer, parameter, public :: integration_step_too_small = 1
+  integer, parameter, public :: integration_too_many_steps = 2
+  integer, parameter, public :: integration_not_finite = 3
+  integer, parameter, public :: integration_gave_up = 4      !! the system said that no shorter step will help
+  integer, parameter, public :: integration_interrupted = 5  !! by the observer
+
+  !> Every array has one element per lane.
+  type, public :: outcome_t
+    integer, allocatable :: status(:)           !! integration_...
+    real(wp), allocatable :: t(:)               !! time reached
+    real(wp), allocatable :: h(:)               !! size of the last attempt
+    integer, allocatable :: component(:)        !! that is to blame for a failure, 0 if none is
+    integer, allocatable :: steps(:)            !! attempts, accepted or rejected
+    integer, allocatable :: accepted(:)
+    integer, allocatable :: rejected(:)
+    integer, allocatable :: evaluations(:)      !! of f
+    integer, allocatable :: jacobians(:)
+    integer, allocatable :: factorisations(:)
+  end type outcome_t
+
+contains
+
+  pure subroutine allocate_outcome(outcome, lanes)
+    type(outcome_t), intent(out) :: outcome
+    integer, intent(in) :: lanes
+
+    allocate (outcome%status(lanes), source=integration_running)
+    allocate (outcome%t(lanes), outcome%h(lanes), source=0.0_wp)
+    allocate (outcome%component(lanes), outcome%steps(lanes), outcome%accepted(lanes), outcome%rejected(lanes), &
+              outcome%evaluations(lanes), outcome%jacobians(lanes), outcome%factorisations(lanes), source=0)
+  end subroutine allocate_outcome
+
+  !> What happened to a lane, when, to which state, and what to try; for the person at the keyboard.
+  function failure_sentence(outcome, lane, system, rtol, atol) result(sentence)
+    type(outcome_t), intent(in) :: outcome
+    integer, intent(in) :: lane
+    class(system_t), intent(in) :: system
+    real(wp), intent(in) :: rtol, atol
+    character(len=:), allocatable :: sentence
+    character(len=:), allocatable :: when
+
+    when = 't = ' // rounded(outcome%t(lane)) // ' s'
+    select case (outcome%status(lane))
+    case (integration_done)
+      sentence = 'the integration reached ' // when
+    case (integration_step_too_small)
+      sentence = too_small_sentence(outcome, lane, system, rtol, atol, when)
+    case (integration_too_many_steps)
+      sentence = 'the integration stopped at ' // when // ' after ' // to_text(outcome%steps(lane)) // &
+        ' steps, the most that max_steps allows (last step ' // rounded(outcome%h(lane)) // ' s): raise max_steps, ' // &
+        'loosen rtol and atol, or, if the machine is stiff, use a Rosenbrock method'
+    case (integration_not_finite)
+      sentence = not_finite_sentence(outcome, lane, system, when)
+    case (integration_gave_up)
+      sentence = 'the equations cannot be evaluated beyond ' // when // ', and a shorter step does not help: ' // &
+        'check the start values and the parameters'
+    case (integration_interrupted)
+      sentence = 'the integration was interrupted at ' // when
+    case default
+      error stop 'nocdyn_outcome: an integration that is running has no outcome'
+    end select
+  end function failure_sentence
+
+  function too_small_sentence(outcome, lane, system, rtol, atol, when) result(sentence)
+    type(outcome_t), intent(in) :: outcome
+    integer, intent(in) :: lane
+    class(system_t), intent(in) :: system
+    real(wp), intent(in) :: rtol, atol
+    character(len=*), intent(in) :: when
+    character(len=:), allocatable :: sentence
+
+    sentence = 'the step size became too small at ' // when // ' (h = ' // rounded(outcome%h(lane)) // ' s): '
+    if (outcome%component(lane) > 0) then
+      sentence = sentence // 'the error of the ' // system%component_name(outcome%component(lane)) // &
+        ' cannot be kept within rtol = ' // rounded(rtol) // ', atol = ' // rounded(atol) // &
+        '; loosen the tolerances, or look for a jump or a singularity there'
+    else
+      sentence = sentence // 'the equations refuse to be evaluated beyond this time; look for a limit that is reached there'
+    end if
+  end function too_small_sentence
+
+  function not_finite_sentence(outcome, lane, system, when) result(sentence)
+    type(outcome_t), intent(in) :: outcome
+    integer, intent(in) :: lane
+    class(system_t), intent(in) :: system
+    character(len=*), intent(in) :: when
+    character(len=:), allocatable :: sentence
+    character(len=:), allocatable :: what
+
+    what = 'Jacobian'
+    if (outcome%component(lane) > 0) what = system%component_name(outcome%component(lane))
+    if (outcome%steps(lane) == 0) then
+      sentence = 'the derivative of the ' // what // ' at the start, ' // when // &
+        ', is not a finite number: check the start values and the parameters'
+    else
+      sentence = 'the ' // what // ' stops being a finite number right after ' // when // &
+        ', however short the step (h = ' // rounded(outcome%h(lane)) // ' s): look for a singularity there'
+    end if
+  end function not_finite_sentence
+
+  !> The value to six digits, as short as it can be written.
+  function rounded(value) result(text)
+    real(wp), intent(in) :: value
+    character(len=:), allocatable :: text
+    character(len=32) :: digits
+    real(wp) :: near
+
+    write (digits, '(es32.5e4)') value
+    read (digits, *) near
+    text = to_text(near)
+  end function rounded
+
+end module nocdyn_outcome

@@ -1,0 +1,153 @@
+!> Steps of any Rosenbrock method with the exact Jacobian.
+module nocdyn_rosenbrock_stepper
+  use nocdyn_combinations, only: combination, combination_t, combine
+  use nocdyn_kinds, only: wp
+  use nocdyn_rosenbrock_tables, only: rosenbrock_table_t
+  use nocdyn_stage_systems, only: allocate_stage_system, factor, renew_jacobian, solve, stage_system_t
+  use nocdyn_stepper, only: allocate_stages, estimate_error, set_weights, stepper_t, update_state
+  use nocdyn_system, only: system_t
+  use nocdyn_trial, only: evaluate, evaluate_start, trial_t
+  implicit none
+  private
+
+  public :: rosenbrock_stepper
+
+  type, extends(stepper_t), public :: rosenbrock_stepper_t
+    private
+    real(wp) :: gamma
+    real(wp), allocatable :: alpha(:)                 !! places of the stages in the step
+    real(wp), allocatable :: gamma_sum(:)             !! factors of h df/dt
+    type(combination_t), allocatable :: coupling(:)   !! rows of c_ij
+    type(stage_system_t) :: stage_system
+    real(wp), allocatable :: t_stage(:)
+    real(wp), allocatable :: y_stage(:, :)
+    real(wp), allocatable :: f(:, :)
+    real(wp), allocatable :: r(:, :)                  !! right-hand side of the stage
+    real(wp), allocatable :: one(:, :)                !! ones, shape [lanes, components]
+    real(wp), allocatable :: slope(:, :)              !! f(t, y) at the start of the step
+    logical, allocatable :: no_slope(:)               !! lanes that moved since it was evaluated
+    logical, allocatable :: no_jacobian(:)            !! lanes that moved since the Jacobian was evaluated
+  contains
+    procedure :: prepare
+    procedure :: begin
+    procedure :: attempt
+    procedure :: accept
+  end type rosenbrock_stepper_t
+
+contains
+
+  pure function rosenbrock_stepper(table) result(stepper)
+    type(rosenbrock_table_t), intent(in) :: table
+    type(rosenbrock_stepper_t) :: stepper
+    integer :: i
+
+    stepper%order = table%order
+    stepper%error_order = table%error_order
+    stepper%gamma = table%gamma
+    allocate (stepper%alpha, source=table%alpha)
+    allocate (stepper%gamma_sum, source=table%gamma_sum)
+    allocate (stepper%coupling(table%stages))
+    do i = 1, table%stages
+      stepper%coupling(i) = combination(table%c(i, :))
+    end do
+    call set_weights(stepper, table%a, table%m, table%error, table%dense)
+  end function rosenbrock_stepper
+
+  subroutine prepare(self, system)
+    class(rosenbrock_stepper_t), intent(inout) :: self
+    class(system_t), intent(in) :: system
+
+    call allocate_stages(self, system)
+    call allocate_stage_system(self%stage_system, system)
+    if (allocated(self%slope)) deallocate (self%t_stage, self%y_stage, self%f, self%r, self%one, self%slope, &
+                                           self%no_slope, self%no_jacobian)
+    associate (lanes => system%lanes, components => system%states + system%quadratures)
+      allocate (self%t_stage(lanes), source=0.0_wp)
+      allocate (self%y_stage(lanes, components), self%f(lanes, components), self%r(lanes, components), &
+                self%slope(lanes, components), source=0.0_wp)
+      allocate (self%one(lanes, components), source=1.0_wp)
+      allocate (self%no_slope(lanes), self%no_jacobian(lanes), source=.true.)
+    end associate
+  end subroutine prepare
+
+  subroutine begin(self, trial)
+    class(rosenbrock_stepper_t), intent(inout) :: self
+    type(trial_t), intent(in) :: trial
+
+    self%slope(:, :) = trial%slope
+    self%no_slope(:) = .false.
+    self%no_jacobian(:) = .true.
+  end subroutine begin
+
+  subroutine attempt(self, system, trial)
+    class(rosenbrock_stepper_t), intent(inout) :: self
+    class(system_t), intent(inout) :: system
+    type(trial_t), intent(inout) :: trial
+    integer :: stage
+
+    call renew_derivatives(self, system, trial)
+    call factor(self%stage_system, trial, self%gamma)
+    call solve_stage(self, trial, 1, self%slope)
+    do stage = 2, self%stages
+      if (.not. any(trial%working)) return
+      call combine(size(trial%y), self%stages, self%inner(stage), self%k, trial%y, trial%h_spread, self%y_stage)
+      self%t_stage(:) = trial%t + self%alpha(stage) * trial%h
+      call evaluate(trial, system, self%t_stage, self%y_stage, self%f)
+      call solve_stage(self, trial, stage, self%f)
+    end do
+    call update_state(self, trial)
+    call estimate_error(self, trial)
+  end subroutine attempt
+
+  !> f and its derivatives at the start of the step; a rejected step keeps them.
+  subroutine renew_derivatives(self, system, trial)
+    class(rosenbrock_stepper_t), intent(inout) :: self
+    class(system_t), intent(inout) :: system
+    type(trial_t), intent(inout) :: trial
+    integer :: lane
+
+    if (any(self%no_slope)) then
+      call evaluate_start(trial, system, self%no_slope, self%slope)
+      self%no_slope(:) = self%no_slope .and. .not. trial%working
+    end if
+    if (any(self%no_jacobian)) then
+      do lane = 1, trial%lanes
+        if (self%no_jacobian(lane) .and. trial%working(lane)) trial%jacobians(lane) = trial%jacobians(lane) + 1
+      end do
+      call renew_jacobian(self%stage_system, system, trial)
+      self%no_jacobian(:) = self%no_jacobian .and. .not. trial%working
+    end if
+  end subroutine renew_derivatives
+
+  !> (1/gamma - h J) k_i = f_i + sum c_ij k_j + gamma_i h df/dt.
+  subroutine solve_stage(self, trial, stage, f)
+    class(rosenbrock_stepper_t), intent(inout) :: self
+    type(trial_t), intent(in) :: trial
+    integer, intent(in) :: stage
+    real(wp), contiguous, intent(in) :: f(:, :)
+
+    call combine(size(f), self%stages, self%coupling(stage), self%k, f, self%one, self%r)
+    if (abs(self%gamma_sum(stage)) > 0) then
+      call add_time_derivative(size(f), self%gamma_sum(stage), trial%h_spread, self%stage_system%dfdt, self%r)
+    end if
+    call solve(self%stage_system, trial, self%gamma, self%r, self%k(:, :, stage))
+  end subroutine solve_stage
+
+  pure subroutine add_time_derivative(n, gamma_sum, h, dfdt, r)
+    integer, intent(in) :: n
+    real(wp), intent(in) :: gamma_sum
+    real(wp), intent(in) :: h(n), dfdt(n)
+    real(wp), intent(inout) :: r(n)
+
+    r = r + h * (gamma_sum * dfdt)
+  end subroutine add_time_derivative
+
+  subroutine accept(self, accepted)
+    class(rosenbrock_stepper_t), intent(inout) :: self
+    logical, intent(in) :: accepted(:)
+
+    self%no_slope(:) = self%no_slope .or. accepted
+    self%no_jacobian(:) = self%no_jacobian .or. accepted
+  end subroutine accept
+
+end module nocdyn_rosenbrock_stepper

@@ -1,0 +1,225 @@
+!> A checked input: groups in the order of the file, every key of the schema with its value or default.
+module nocdyn_input
+  use nocdyn_kinds, only: wp
+  use nocdyn_schema, only: first_key, group_rules, key_rules
+  use nocdyn_text, only: string_t, to_text
+  implicit none
+  private
+
+  !> The value of one key. Of the four arrays the one of the key's kind is allocated; none if the key is unset.
+  type, public :: value_t
+    logical :: is_given = .false.   !! by the file or by an override, not by default
+    integer :: line = 0             !! of the key in the file
+    integer :: override = 0         !! which override set it, 0: none
+    real(wp), allocatable :: numbers(:)
+    integer, allocatable :: whole_numbers(:)
+    logical, allocatable :: flags(:)
+    type(string_t), allocatable :: texts(:)
+  end type value_t
+
+  !> One group of the file. Asking for a key that the schema lacks, or with another type, is an error of the program.
+  type, public :: group_t
+    character(len=:), allocatable :: kind   !! 'body', 'gear' ...
+    character(len=:), allocatable :: name   !! of the element, '' where the kind has no names
+    integer :: rule = 0                     !! its row of `group_rules`
+    integer :: line = 0                     !! where it begins, 0: not in the file
+    type(value_t), allocatable :: values(:) !! one for each key, in the order of the schema
+  contains
+    procedure :: number          !! the single value of a key
+    procedure :: whole_number
+    procedure :: flag
+    procedure :: text
+    procedure :: numbers         !! all values, empty if unset
+    procedure :: whole_numbers
+    procedure :: texts
+    procedure :: is_given        !! set by the user
+    procedure :: has_value       !! set by the user or by default
+    procedure :: key_position    !! index in `values`
+  end type group_t
+
+  !> A whole input file with the overrides of the command line.
+  type, public :: input_t
+    character(len=:), allocatable :: file
+    type(string_t), allocatable :: overrides(:)   !! PATH=VALUE, as given
+    type(group_t), allocatable :: groups(:)       !! single groups that the file lacks stand at the end
+  contains
+    procedure :: groups_named   !! indices of the groups of one kind
+    procedure :: single         !! the one group of a kind that occurs once
+    procedure :: label          !! "&gear 'reducer'"
+    procedure :: place          !! where a group or a key comes from, to begin a message with
+  end type input_t
+
+contains
+
+  pure real(wp) function number(self, key)
+    class(group_t), intent(in) :: self
+    character(len=*), intent(in) :: key
+    integer :: k
+
+    k = self%key_position(key)
+    if (.not. allocated(self%values(k)%numbers)) error stop 'nocdyn_input: number() of a key without a number'
+    number = self%values(k)%numbers(1)
+  end function number
+
+  pure integer function whole_number(self, key)
+    class(group_t), intent(in) :: self
+    character(len=*), intent(in) :: key
+    integer :: k
+
+    k = self%key_position(key)
+    if (.not. allocated(self%values(k)%whole_numbers)) error stop 'nocdyn_input: whole_number() of a key without one'
+    whole_number = self%values(k)%whole_numbers(1)
+  end function whole_number
+
+  pure logical function flag(self, key)
+    class(group_t), intent(in) :: self
+    character(len=*), intent(in) :: key
+    integer :: k
+
+    k = self%key_position(key)
+    if (.not. allocated(self%values(k)%flags)) error stop 'nocdyn_input: flag() of a key without a logical value'
+    flag = self%values(k)%flags(1)
+  end function flag
+
+  pure function text(self, key)
+    class(group_t), intent(in) :: self
+    character(len=*), intent(in) :: key
+    character(len=:), allocatable :: text
+    integer :: k
+
+    k = self%key_position(key)
+    if (.not. allocated(self%values(k)%texts)) error stop 'nocdyn_input: text() of a key without a text'
+    text = self%values(k)%texts(1)%text
+  end function text
+
+  pure function numbers(self, key)
+    class(group_t), intent(in) :: self
+    character(len=*), intent(in) :: key
+    real(wp), allocatable :: numbers(:)
+
+    associate (value => self%values(self%key_position(key)))
+      if (allocated(value%numbers)) then
+        numbers = value%numbers
+      else
+        allocate (numbers(0))
+      end if
+    end associate
+  end function numbers
+
+  pure function whole_numbers(self, key)
+    class(group_t), intent(in) :: self
+    character(len=*), intent(in) :: key
+    integer, allocatable :: whole_numbers(:)
+
+    associate (value => self%values(self%key_position(key)))
+      if (allocated(value%whole_numbers)) then
+        whole_numbers = value%whole_numbers
+      else
+        allocate (whole_numbers(0))
+      end if
+    end associate
+  end function whole_numbers
+
+  pure function texts(self, key)
+    class(group_t), intent(in) :: self
+    character(len=*), intent(in) :: key
+    type(string_t), allocatable :: texts(:)
+
+    associate (value => self%values(self%key_position(key)))
+      if (allocated(value%texts)) then
+        texts = value%texts
+      else
+        allocate (texts(0))
+      end if
+    end associate
+  end function texts
+
+  pure logical function is_given(self, key)
+    class(group_t), intent(in) :: self
+    character(len=*), intent(in) :: key
+
+    is_given = self%values(self%key_position(key))%is_given
+  end function is_given
+
+  pure logical function has_value(self, key)
+    class(group_t), intent(in) :: self
+    character(len=*), intent(in) :: key
+
+    associate (value => self%values(self%key_position(key)))
+      has_value = allocated(value%numbers) .or. allocated(value%whole_numbers) .or. allocated(value%flags) &
+        .or. allocated(value%texts)
+    end associate
+  end function has_value
+
+  pure integer function key_position(self, key)
+    class(group_t), intent(in) :: self
+    character(len=*), intent(in) :: key
+    integer :: first
+
+    first = first_key(self%rule) - 1
+    do key_position = 1, size(self%values)
+      if (key_rules(first + key_position)%name == key) return
+    end do
+    error stop 'nocdyn_input: a key was asked for that the schema does not have'
+  end function key_position
+
+  pure function groups_named(self, kind) result(indices)
+    class(input_t), intent(in) :: self
+    character(len=*), intent(in) :: kind
+    integer, allocatable :: indices(:)
+    integer :: i
+
+    if (all(group_rules%name /= kind)) error stop 'nocdyn_input: a group was asked for that the schema does not have'
+    allocate (indices(count([(self%groups(i)%kind == kind, i=1, size(self%groups))])))
+    indices = pack([(i, i=1, size(self%groups))], [(self%groups(i)%kind == kind, i=1, size(self%groups))])
+  end function groups_named
+
+  pure function single(self, kind) result(group)
+    class(input_t), intent(in) :: self
+    character(len=*), intent(in) :: kind
+    type(group_t) :: group
+    integer :: i
+
+    do i = 1, size(self%groups)
+      if (self%groups(i)%kind == kind) then
+        group = self%groups(i)
+        return
+      end if
+    end do
+    error stop 'nocdyn_input: single() is for groups that occur once'
+  end function single
+
+  !> "machine.nml:12: &gear 'reducer'", with the line of `key` if the file sets it, or "--set PATH=VALUE: &gear
+  !> 'reducer'" if an override does.
+  pure function place(self, index, key) result(text)
+    class(input_t), intent(in) :: self
+    integer, intent(in) :: index   !! of the group
+    character(len=*), optional, intent(in) :: key
+    character(len=:), allocatable :: text
+    integer :: line, override
+
+    line = self%groups(index)%line
+    override = 0
+    if (present(key)) then
+      associate (value => self%groups(index)%values(self%groups(index)%key_position(key)))
+        if (value%line > 0) line = value%line
+        override = value%override
+      end associate
+    end if
+
+    text = self%file
+    if (line > 0) text = text // ':' // to_text(line)
+    if (override > 0) text = '--set ' // self%overrides(override)%text
+    text = text // ': ' // self%label(index)
+  end function place
+
+  pure function label(self, index) result(text)
+    class(input_t), intent(in) :: self
+    integer, intent(in) :: index   !! of the group
+    character(len=:), allocatable :: text
+
+    text = '&' // self%groups(index)%kind
+    if (len(self%groups(index)%name) > 0) text = text // " '" // self%groups(index)%name // "'"
+  end function label
+
+end module nocdyn_input

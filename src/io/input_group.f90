@@ -1,0 +1,255 @@
+!> One group of the input: what file and overrides say, completed by defaults and checked by itself.
+module nocdyn_input_group
+  use nocdyn_input, only: group_t
+  use nocdyn_input_draft, only: draft_t
+  use nocdyn_input_overrides, only: override_t
+  use nocdyn_input_values, only: convert
+  use nocdyn_mistakes, only: mistakes_t, no_line
+  use nocdyn_namelist, only: assignment_t, namelist_group_t, namelist_t
+  use nocdyn_schema, only: a_name, alternatives, first_key, group_rules, key_rule_index, key_rule_t, key_rules, &
+    last_key, orders, unset
+  use nocdyn_schema_text, only: allowed_text, key_names, suggestion
+  use nocdyn_text, only: nearest_word, to_text
+  implicit none
+  private
+
+  public :: read_group
+
+  !> The drafts of one group on their way to values.
+  type :: work_t
+    integer :: index = 0                      !! of the group in the input
+    integer :: rule = 0
+    integer :: first = 0                      !! row of its first key
+    type(draft_t), allocatable :: drafts(:)
+    logical, allocatable :: may_miss(:)       !! no value, and no mistake: unset, or part of what was not understood
+  end type work_t
+
+contains
+
+  !> Reads the group `index` of the input; `source` is empty for a single group that the file lacks.
+  subroutine read_group(namelist, source, index, overrides, group, mistakes)
+    type(namelist_t), intent(in) :: namelist
+    type(namelist_group_t), intent(in) :: source
+    integer, intent(in) :: index
+    type(override_t), intent(inout) :: overrides(:)
+    type(group_t), intent(inout) :: group   !! `rule`, `kind` and `line` are known
+    type(mistakes_t), intent(inout) :: mistakes
+    type(work_t) :: work
+    integer :: i, keys
+
+    work%index = index
+    work%rule = group%rule
+    work%first = first_key(group%rule)
+    keys = last_key(group%rule) - work%first + 1
+    allocate (work%drafts(keys), group%values(keys))
+    allocate (work%may_miss(keys), source=source%is_damaged)
+
+    call take_assignments(namelist, source, work, mistakes)
+    group%name = name_of(work)
+    call take_overrides(group%name, overrides, work, mistakes)
+    call choose_alternatives(group%line, work, mistakes)
+    do i = 1, keys
+      call complete(work, i, group, mistakes)
+    end do
+    call check_orders(group, index, mistakes)
+  end subroutine read_group
+
+  subroutine take_assignments(namelist, source, work, mistakes)
+    type(namelist_t), intent(in) :: namelist
+    type(namelist_group_t), intent(in) :: source
+    type(work_t), intent(inout) :: work
+    type(mistakes_t), intent(inout) :: mistakes
+    character(len=:), allocatable :: complaint
+    integer :: i, key
+
+    do i = source%first_assignment, source%last_assignment
+      associate (assignment => namelist%assignments(i))
+        key = key_rule_index(work%rule, assignment%key)
+        if (key == 0) then
+          call refuse_key(assignment, work, mistakes)
+          cycle
+        end if
+        call work%drafts(key - work%first + 1)%assign(namelist, assignment, key_rules(key), complaint)
+        if (complaint == '') cycle
+        call mistakes%add(assignment%line, work%index, complaint // missing_equals(namelist, assignment, work%rule))
+      end associate
+    end do
+  end subroutine take_assignments
+
+  !> The key that was probably meant is not missed in addition.
+  subroutine refuse_key(assignment, work, mistakes)
+    type(assignment_t), intent(in) :: assignment
+    type(work_t), intent(inout) :: work
+    type(mistakes_t), intent(inout) :: mistakes
+    integer :: nearest
+
+    nearest = nearest_word(assignment%key, key_names(work%rule))
+    if (nearest > 0) work%may_miss(nearest) = .true.
+    call mistakes%add(assignment%line, work%index, assignment%key // ' is not a key of &' &
+      // trim(group_rules(work%rule)%name) // suggestion(assignment%key, key_names(work%rule)))
+  end subroutine refuse_key
+
+  !> If one of the values is a key, an equals sign was probably forgotten.
+  pure function missing_equals(namelist, assignment, rule) result(hint)
+    type(namelist_t), intent(in) :: namelist
+    type(assignment_t), intent(in) :: assignment
+    integer, intent(in) :: rule
+    character(len=:), allocatable :: hint
+    character(len=:), allocatable :: word
+    integer :: i
+
+    hint = ''
+    do i = assignment%first_item, assignment%last_item
+      if (namelist%items(i)%is_quoted .or. namelist%items(i)%is_null) cycle
+      word = namelist%item_text(namelist%items(i))
+      if (key_rule_index(rule, word) == 0) cycle
+      hint = "; is '=' missing behind " // word // '?'
+      return
+    end do
+  end function missing_equals
+
+  !> The name that the file gives, '' if none.
+  pure function name_of(work) result(name)
+    type(work_t), intent(in) :: work
+    character(len=:), allocatable :: name
+    integer :: i
+
+    name = ''
+    do i = 1, size(work%drafts)
+      if (key_rules(work%first + i - 1)%kind /= a_name .or. work%drafts(i)%values_said() /= 1) cycle
+      name = work%drafts(i)%slots(1)%text
+    end do
+  end function name_of
+
+  subroutine take_overrides(name, overrides, work, mistakes)
+    character(len=*), intent(in) :: name
+    type(override_t), intent(inout) :: overrides(:)
+    type(work_t), intent(inout) :: work
+    type(mistakes_t), intent(inout) :: mistakes
+    character(len=:), allocatable :: complaint
+    integer :: i, key
+
+    do i = 1, size(overrides)
+      if (.not. overrides(i)%is_fine .or. overrides(i)%group_rule /= work%rule .or. overrides(i)%name /= name) cycle
+      overrides(i)%is_used = .true.
+      key = overrides(i)%key_rule
+      call work%drafts(key - work%first + 1)%replace(overrides(i)%namelist, overrides(i)%assignment, key_rules(key), i, &
+        complaint)
+      if (complaint /= '') call mistakes%add(no_line, 0, complaint, i)
+    end do
+  end subroutine take_overrides
+
+  !> Leaves one key of each pair of alternatives; an override wins over the file.
+  subroutine choose_alternatives(line, work, mistakes)
+    integer, intent(in) :: line
+    type(work_t), intent(inout) :: work
+    type(mistakes_t), intent(inout) :: mistakes
+    integer :: a, first, second
+
+    do a = 1, size(alternatives)
+      if (alternatives(a)%group /= group_rules(work%rule)%name) cycle
+      first = key_rule_index(work%rule, trim(alternatives(a)%first)) - work%first + 1
+      second = key_rule_index(work%rule, trim(alternatives(a)%second)) - work%first + 1
+      if (work%drafts(first)%is_said() .and. work%drafts(second)%is_said()) then
+        call resolve_both(work, first, second, mistakes)
+      else if (work%drafts(first)%is_said()) then
+        work%may_miss(second) = .true.
+      else if (work%drafts(second)%is_said()) then
+        work%may_miss(first) = .true.
+      else if (is_without_any(work, first, second)) then
+        call mistakes%add(line, work%index, trim(alternatives(a)%first) // ' or ' // trim(alternatives(a)%second) &
+          // ' is missing; one of them is needed')
+      end if
+    end do
+  end subroutine choose_alternatives
+
+  !> Whether neither of two keys has a default or may miss.
+  pure logical function is_without_any(work, first, second)
+    type(work_t), intent(in) :: work
+    integer, intent(in) :: first, second
+
+    is_without_any = .not. any(work%may_miss([first, second])) &
+      .and. key_rules(work%first - 1 + first)%default == unset .and. key_rules(work%first - 1 + second)%default == unset
+  end function is_without_any
+
+  subroutine resolve_both(work, first, second, mistakes)
+    type(work_t), intent(inout) :: work
+    integer, intent(in) :: first, second   !! positions of two keys that are both written
+    type(mistakes_t), intent(inout) :: mistakes
+    integer :: dropped, kept
+
+    kept = first
+    dropped = second
+    if (work%drafts(second)%override > 0) then
+      kept = second
+      dropped = first
+    end if
+    if ((work%drafts(first)%override > 0) .eqv. (work%drafts(second)%override > 0)) then
+      call mistakes%add(max(work%drafts(first)%line, work%drafts(second)%line), work%index, &
+        trim(key_rules(work%first - 1 + first)%name) // ' and ' // trim(key_rules(work%first - 1 + second)%name) &
+        // ' are both given; allowed: one of them', max(work%drafts(first)%override, work%drafts(second)%override))
+    end if
+    work%drafts(dropped) = draft_t()
+    work%may_miss(dropped) = .true.
+  end subroutine resolve_both
+
+  !> Fills defaults in and converts.
+  subroutine complete(work, i, group, mistakes)
+    type(work_t), intent(inout) :: work
+    integer, intent(in) :: i
+    type(group_t), intent(inout) :: group
+    type(mistakes_t), intent(inout) :: mistakes
+    type(key_rule_t) :: rule
+    integer :: line, said
+
+    rule = key_rules(work%first + i - 1)
+    associate (draft => work%drafts(i), value => group%values(i))
+      said = draft%values_said()
+      value%is_given = said > 0
+      value%line = draft%line
+      value%override = draft%override
+      if (draft%is_damaged .or. (said == 0 .and. (work%may_miss(i) .or. rule%default == unset))) return
+
+      call draft%fill_default(rule)
+      line = merge(draft%line, group%line, draft%line > 0)
+      if (draft%values_said() == size(draft%slots)) then
+        call convert(draft, rule, work%index, value, mistakes)
+      else if (said == 0 .and. .not. draft%is_written) then
+        call mistakes%add(line, work%index, trim(rule%name) // ' is missing; needed: ' // allowed_text(rule))
+      else if (said == 0) then
+        call mistakes%add(line, work%index, trim(rule%name) // ' has no value; needed: ' // allowed_text(rule))
+      else
+        call mistakes%add(line, work%index, trim(rule%name) // ' has ' // counted(said) // '; needed: ' &
+          // to_text(size(draft%slots)), draft%override)
+      end if
+    end associate
+  end subroutine complete
+
+  pure function counted(values) result(text)
+    integer, intent(in) :: values
+    character(len=:), allocatable :: text
+
+    text = to_text(values) // trim(merge(' value ', ' values', values == 1))
+  end function counted
+
+  subroutine check_orders(group, index, mistakes)
+    type(group_t), intent(in) :: group
+    integer, intent(in) :: index
+    type(mistakes_t), intent(inout) :: mistakes
+    integer :: o, lower, upper
+
+    do o = 1, size(orders)
+      if (orders(o)%group /= group_rules(group%rule)%name) cycle
+      lower = group%key_position(trim(orders(o)%lower))
+      upper = group%key_position(trim(orders(o)%upper))
+      associate (low => group%values(lower), high => group%values(upper))
+        if (.not. (allocated(low%numbers) .and. allocated(high%numbers))) cycle
+        if (high%numbers(1) > low%numbers(1)) cycle
+        call mistakes%add(max(low%line, high%line), index, trim(orders(o)%upper) // ' = ' // to_text(high%numbers(1)) &
+          // ' is out of range; allowed: > ' // trim(orders(o)%lower) // ' = ' // to_text(low%numbers(1)), &
+          max(low%override, high%override))
+      end associate
+    end do
+  end subroutine check_orders
+
+end module nocdyn_input_group

@@ -1,0 +1,216 @@
+!> Reads an input file: scanner, schema, overrides and all checks, with every mistake in one error.
+module nocdyn_input_reader
+  use nocdyn_errors, only: error_t, exit_input, raise
+  use nocdyn_input, only: group_t, input_t
+  use nocdyn_input_group, only: read_group
+  use nocdyn_input_names, only: check_doubled_names, check_references, collect_names
+  use nocdyn_input_overrides, only: override_t, read_overrides
+  use nocdyn_mistakes, only: mistake_t, mistakes_t, no_line
+  use nocdyn_namelist, only: namelist_group_t, namelist_t
+  use nocdyn_namelist_scanner, only: scan_namelist
+  use nocdyn_schema, only: at_least_once, exactly_once, group_rule_index, group_rules, is_single
+  use nocdyn_schema_text, only: group_names, occurrence_text, suggestion
+  use nocdyn_text, only: nearest_word, quoted, string_t, to_text
+  use nocdyn_text_buffer, only: text_buffer_t
+  use nocdyn_text_file, only: read_text_file
+  implicit none
+  private
+
+  public :: read_input, read_input_text
+
+contains
+
+  !> Reads and checks a file; every mistake is a line of the error's message, in the order of the file.
+  subroutine read_input(file, overrides, input, error)
+    character(len=*), intent(in) :: file
+    type(string_t), intent(in) :: overrides(:)   !! PATH=VALUE
+    type(input_t), intent(out) :: input
+    type(error_t), allocatable, intent(out) :: error
+    character(len=:), allocatable :: text
+
+    call read_text_file(file, text, error)
+    if (allocated(error)) return
+    call read_input_text(text, file, overrides, input, error)
+  end subroutine read_input
+
+  !> Reads and checks the text of a file.
+  subroutine read_input_text(text, file, overrides, input, error)
+    character(len=*), intent(in) :: text
+    character(len=*), intent(in) :: file         !! what messages call it
+    type(string_t), intent(in) :: overrides(:)   !! PATH=VALUE
+    type(input_t), intent(out) :: input
+    type(error_t), allocatable, intent(out) :: error
+    type(namelist_t) :: namelist
+    type(mistakes_t) :: mistakes
+    type(override_t), allocatable :: parsed(:)
+
+    input%file = file
+    input%overrides = overrides
+    if (index(text, achar(0)) > 0) then
+      call raise(error, exit_input, file // ': not a text file')
+      return
+    end if
+    call scan_namelist(text, namelist, mistakes)
+    if (namelist%group_count == 0 .and. mistakes%count == 0) then
+      call raise(error, exit_input, file // ": no group in it; 'nocdyn new FILE' writes an example")
+      return
+    end if
+
+    call read_overrides(overrides, parsed, mistakes)
+    call read_groups(namelist, parsed, input, mistakes)
+    call check_occurrences(input%groups, mistakes)
+    call refuse_unused(input%groups, parsed, mistakes)
+    call check_doubled_names(input%groups, mistakes)
+    if (.not. may_lack_bodies(namelist)) call check_references(input%groups, mistakes)
+    if (mistakes%count > 0) call raise(error, exit_input, report(input, mistakes))
+  end subroutine read_input_text
+
+  !> All groups of the file, then the single groups that it lacks.
+  subroutine read_groups(namelist, overrides, input, mistakes)
+    type(namelist_t), intent(in) :: namelist
+    type(override_t), intent(inout) :: overrides(:)
+    type(input_t), intent(inout) :: input
+    type(mistakes_t), intent(inout) :: mistakes
+    integer, allocatable :: added(:)
+    integer :: g, n
+
+    call find_absent_groups(namelist, overrides, added)
+    n = namelist%group_count
+    allocate (input%groups(n + size(added)))
+    do g = 1, n + size(added)
+      associate (group => input%groups(g))
+        group%name = ''
+        if (g > n) then
+          group%rule = added(g - n)
+          group%kind = trim(group_rules(group%rule)%name)
+          call read_group(namelist, namelist_group_t(), g, overrides, group, mistakes)
+          cycle
+        end if
+        group%kind = namelist%groups(g)%name
+        group%rule = group_rule_index(group%kind)
+        group%line = namelist%groups(g)%line
+        if (group%rule > 0) then
+          call read_group(namelist, namelist%groups(g), g, overrides, group, mistakes)
+        else
+          call mistakes%add(group%line, g, 'there is no such group' // suggestion(group%kind, group_names()))
+        end if
+      end associate
+    end do
+  end subroutine read_groups
+
+  !> Rows of the single groups that the file lacks and that have defaults or overrides.
+  subroutine find_absent_groups(namelist, overrides, rules)
+    type(namelist_t), intent(in) :: namelist
+    type(override_t), intent(in) :: overrides(:)
+    integer, allocatable, intent(out) :: rules(:)
+    integer :: g, rule
+    logical :: is_there
+
+    allocate (rules(0))
+    do rule = 1, size(group_rules)
+      is_there = .false.
+      do g = 1, namelist%group_count
+        is_there = is_there .or. namelist%groups(g)%name == group_rules(rule)%name
+      end do
+      if (is_there .or. .not. is_single(rule)) cycle
+      if (group_rules(rule)%occurrence == exactly_once .and. all(overrides%group_rule /= rule)) cycle
+      rules = [rules, rule]
+    end do
+  end subroutine find_absent_groups
+
+  !> Groups that must be there, and groups that may be there only once.
+  subroutine check_occurrences(groups, mistakes)
+    type(group_t), intent(in) :: groups(:)
+    type(mistakes_t), intent(inout) :: mistakes
+    integer :: first(size(group_rules))
+    integer :: g, rule
+    logical :: is_misspelt(size(group_rules))
+
+    first = 0
+    is_misspelt = .false.
+    do g = 1, size(groups)
+      rule = groups(g)%rule
+      if (rule == 0) then
+        rule = nearest_word(groups(g)%kind, group_names())
+        if (rule > 0) is_misspelt(rule) = .true.
+      else if (first(rule) == 0) then
+        first(rule) = g
+      else if (is_single(rule)) then
+        call mistakes%add(groups(g)%line, g, 'given twice, first on line ' // to_text(groups(first(rule))%line) &
+          // '; allowed: ' // occurrence_text(group_rules(rule)%occurrence))
+      end if
+    end do
+    do rule = 1, size(group_rules)
+      if (first(rule) > 0 .or. is_misspelt(rule)) cycle
+      if (all(group_rules(rule)%occurrence /= [exactly_once, at_least_once])) cycle
+      call mistakes%add(no_line, 0, 'there is no &' // trim(group_rules(rule)%name) // '; needed: ' &
+        // occurrence_text(group_rules(rule)%occurrence))
+    end do
+  end subroutine check_occurrences
+
+  !> Overrides whose element does not exist.
+  subroutine refuse_unused(groups, overrides, mistakes)
+    type(group_t), intent(in) :: groups(:)
+    type(override_t), intent(in) :: overrides(:)
+    type(mistakes_t), intent(inout) :: mistakes
+    type(string_t), allocatable :: names(:)
+    integer :: g, i
+
+    do i = 1, size(overrides)
+      if (overrides(i)%is_used .or. .not. overrides(i)%is_fine) cycle
+      call collect_names(groups, pack([(g, g=1, size(groups))], groups%rule == overrides(i)%group_rule), names)
+      call mistakes%add(no_line, 0, 'there is no &' // trim(group_rules(overrides(i)%group_rule)%name) // ' ' &
+        // quoted(overrides(i)%name) // suggestion(overrides(i)%name, names), i)
+    end do
+  end subroutine refuse_unused
+
+  !> Whether a &body is there whose name could not be read, so that references to it must not be refused.
+  pure logical function may_lack_bodies(namelist)
+    type(namelist_t), intent(in) :: namelist
+    integer :: g, nearest
+
+    may_lack_bodies = .false.
+    do g = 1, namelist%group_count
+      nearest = group_rule_index(namelist%groups(g)%name)
+      if (nearest == 0) then
+        nearest = nearest_word(namelist%groups(g)%name, group_names())
+        may_lack_bodies = may_lack_bodies .or. nearest == group_rule_index('body')
+      else if (nearest == group_rule_index('body')) then
+        may_lack_bodies = may_lack_bodies .or. namelist%groups(g)%is_damaged
+      end if
+    end do
+  end function may_lack_bodies
+
+  !> One line for each mistake.
+  function report(input, mistakes) result(text)
+    type(input_t), intent(in) :: input
+    type(mistakes_t), intent(in) :: mistakes
+    character(len=:), allocatable :: text
+    type(text_buffer_t) :: buffer
+    integer, allocatable :: order(:)
+    integer :: i
+
+    call mistakes%find_order_by_line(order)
+    do i = 1, size(order)
+      if (i > 1) call buffer%append(new_line('a'))
+      call buffer%append(sentence(input, mistakes%list(order(i))))
+    end do
+    text = buffer%text()
+  end function report
+
+  function sentence(input, mistake) result(text)
+    type(input_t), intent(in) :: input
+    type(mistake_t), intent(in) :: mistake
+    character(len=:), allocatable :: text
+
+    if (mistake%override > 0) then
+      text = '--set ' // input%overrides(mistake%override)%text
+    else
+      text = input%file
+      if (mistake%line > 0 .and. mistake%line < no_line) text = text // ':' // to_text(mistake%line)
+      if (mistake%group > 0) text = text // ': ' // input%label(mistake%group)
+    end if
+    text = text // ': ' // mistake%text
+  end function sentence
+
+end module nocdyn_input_reader

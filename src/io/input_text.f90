@@ -1,0 +1,109 @@
+!> The complete input as it was used, in the form in which it can be read again.
+module nocdyn_input_text
+  use nocdyn_input, only: group_t, input_t, value_t
+  use nocdyn_schema, only: first_key, key_rules
+  use nocdyn_text, only: string_t, to_text
+  use nocdyn_text_buffer, only: text_buffer_t
+  implicit none
+  private
+
+  public :: input_text
+
+  integer, parameter :: line_width = 100
+
+contains
+
+  !> A namelist with every key that has a value, defaults and overrides included; numbers read back as the same bits.
+  function input_text(input) result(text)
+    type(input_t), intent(in) :: input
+    character(len=:), allocatable :: text
+    type(text_buffer_t) :: buffer
+    integer :: g
+
+    call buffer%append_line('! The complete input of a run: every key with the value that was used.')
+    do g = 1, size(input%groups)
+      call append_group(buffer, input%groups(g))
+    end do
+    text = buffer%text()
+  end function input_text
+
+  subroutine append_group(buffer, group)
+    type(text_buffer_t), intent(inout) :: buffer
+    type(group_t), intent(in) :: group
+    type(string_t), allocatable :: items(:)
+    integer :: i
+
+    call buffer%append_line('&' // group%kind)
+    do i = 1, size(group%values)
+      call write_items(group%values(i), items)
+      if (size(items) > 0) call append_key(buffer, trim(key_rules(first_key(group%rule) + i - 1)%name), items)
+    end do
+    call buffer%append_line('/')
+  end subroutine append_group
+
+  !> `key = items`, broken where the line gets long.
+  subroutine append_key(buffer, key, items)
+    type(text_buffer_t), intent(inout) :: buffer
+    character(len=*), intent(in) :: key
+    type(string_t), intent(in) :: items(:)
+    character(len=:), allocatable :: line
+    integer :: i
+
+    line = '  ' // key // ' = ' // items(1)%text
+    do i = 2, size(items)
+      line = line // ','
+      if (len(line) + len(items(i)%text) >= line_width) then
+        call buffer%append_line(line)
+        line = '   '
+      end if
+      line = line // ' ' // items(i)%text
+    end do
+    call buffer%append_line(line)
+  end subroutine append_key
+
+  !> The values of one key as a namelist has them.
+  subroutine write_items(value, items)
+    type(value_t), intent(in) :: value
+    type(string_t), allocatable, intent(out) :: items(:)
+    integer :: i
+
+    if (allocated(value%numbers)) then
+      allocate (items(size(value%numbers)))
+      do i = 1, size(items)
+        items(i)%text = to_text(value%numbers(i))
+      end do
+    else if (allocated(value%whole_numbers)) then
+      allocate (items(size(value%whole_numbers)))
+      do i = 1, size(items)
+        items(i)%text = to_text(value%whole_numbers(i))
+      end do
+    else if (allocated(value%flags)) then
+      allocate (items(size(value%flags)))
+      do i = 1, size(items)
+        items(i)%text = trim(merge('.true. ', '.false.', value%flags(i)))
+      end do
+    else if (allocated(value%texts)) then
+      allocate (items(size(value%texts)))
+      do i = 1, size(items)
+        items(i)%text = with_quotes(value%texts(i)%text)
+      end do
+    else
+      allocate (items(0))
+    end if
+  end subroutine write_items
+
+  !> In single quotes, with those inside doubled.
+  pure function with_quotes(text) result(quoted)
+    character(len=*), intent(in) :: text
+    character(len=:), allocatable :: quoted
+    integer :: i
+
+    quoted = "'"
+    do i = 1, len(text)
+      quoted = quoted // text(i:i)
+      if (text(i:i) == "'") quoted = quoted // "'"
+    end do
+    quoted = quoted // "'"
+  end function with_quotes
+
+end module nocdyn_input_text

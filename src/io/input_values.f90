@@ -1,0 +1,203 @@
+!> From texts to typed values, with the checks that one value can fail by itself.
+module nocdyn_input_values
+  use nocdyn_input, only: value_t
+  use nocdyn_input_draft, only: draft_t, slot_t
+  use nocdyn_kinds, only: wp
+  use nocdyn_literals, only: literal_fine, literal_not_finite, literal_too_large, read_integer, read_logical, read_real
+  use nocdyn_schema, only: a_body, a_flag, a_name, a_number, a_word, allowed_t, an_integer, ground, holds_texts, &
+    key_rule_t, longest_name, words_of
+  use nocdyn_schema_text, only: allowed_text
+  use nocdyn_mistakes, only: mistakes_t
+  use nocdyn_text, only: joined, lower_case, nearest_word, string_t, to_text
+  implicit none
+  private
+
+  public :: convert
+
+contains
+
+  !> Fills `value` from a draft in which every value is said; a value with a mistake is left unset.
+  subroutine convert(draft, rule, group, value, mistakes)
+    type(draft_t), intent(in) :: draft
+    type(key_rule_t), intent(in) :: rule
+    integer, intent(in) :: group   !! index of the group, for the mistakes
+    type(value_t), intent(inout) :: value
+    type(mistakes_t), intent(inout) :: mistakes
+    character(len=:), allocatable :: complaint
+    integer :: i
+    logical :: is_fine
+
+    is_fine = .true.
+    call allocate_values(rule%kind, size(draft%slots), value)
+    do i = 1, size(draft%slots)
+      call convert_slot(draft%slots(i), rule, draft%override > 0, i, value, complaint)
+      if (complaint == '') cycle
+      is_fine = .false.
+      call mistakes%add(max(draft%line, draft%slots(i)%line), group, &
+        element(rule, i) // ' = ' // draft%slots(i)%written // complaint, draft%override)
+    end do
+    if (.not. is_fine) value = value_t(value%is_given, value%line, value%override)
+  end subroutine convert
+
+  subroutine allocate_values(kind, count, value)
+    integer, intent(in) :: kind, count
+    type(value_t), intent(inout) :: value
+
+    select case (kind)
+    case (a_number)
+      allocate (value%numbers(count), source=0.0_wp)
+    case (an_integer)
+      allocate (value%whole_numbers(count), source=0)
+    case (a_flag)
+      allocate (value%flags(count), source=.false.)
+    case default
+      allocate (value%texts(count))
+    end select
+  end subroutine allocate_values
+
+  !> "inertia" or "radii(2)".
+  pure function element(rule, i) result(text)
+    type(key_rule_t), intent(in) :: rule
+    integer, intent(in) :: i
+    character(len=:), allocatable :: text
+
+    text = trim(rule%name)
+    if (rule%count /= 1) text = text // '(' // to_text(i) // ')'
+  end function element
+
+  subroutine convert_slot(slot, rule, may_be_bare, i, value, complaint)
+    type(slot_t), intent(in) :: slot
+    type(key_rule_t), intent(in) :: rule
+    logical, intent(in) :: may_be_bare   !! texts need no quotes, which the shell has eaten
+    integer, intent(in) :: i
+    type(value_t), intent(inout) :: value
+    character(len=:), allocatable, intent(out) :: complaint   !! '' if all is well
+
+    complaint = ''
+    if (holds_texts(rule%kind)) then
+      value%texts(i)%text = slot%text
+      if (.not. (slot%is_quoted .or. may_be_bare)) then
+        complaint = " is not a text; texts are written in quotes: '" // slot%text // "'"
+      else
+        call check_text(rule, value%texts(i), complaint)
+      end if
+    else if (slot%is_quoted) then
+      complaint = ' is a text; write it without quotes; allowed: ' // allowed_text(rule)
+    else if (rule%kind == a_number) then
+      call convert_number(slot%text, rule, value%numbers(i), complaint)
+    else if (rule%kind == an_integer) then
+      call convert_integer(slot%text, rule, value%whole_numbers(i), complaint)
+    else
+      call convert_flag(slot%text, value%flags(i), complaint)
+    end if
+  end subroutine convert_slot
+
+  subroutine convert_number(text, rule, value, complaint)
+    character(len=*), intent(in) :: text
+    type(key_rule_t), intent(in) :: rule
+    real(wp), intent(out) :: value
+    character(len=:), allocatable, intent(inout) :: complaint
+    integer :: status
+
+    call read_real(text, value, status)
+    select case (status)
+    case (literal_fine)
+      if (is_outside(value, rule%allowed)) complaint = ' is out of range; allowed: ' // allowed_text(rule)
+    case (literal_not_finite)
+      complaint = ' is not a finite number; allowed: ' // allowed_text(rule)
+    case (literal_too_large)
+      complaint = ' is too large for a number; at most ' // to_text(huge(value)) // '; allowed: ' // allowed_text(rule)
+    case default
+      complaint = ' is not a number; allowed: ' // allowed_text(rule)
+    end select
+  end subroutine convert_number
+
+  subroutine convert_integer(text, rule, value, complaint)
+    character(len=*), intent(in) :: text
+    type(key_rule_t), intent(in) :: rule
+    integer, intent(out) :: value
+    character(len=:), allocatable, intent(inout) :: complaint
+    integer :: status
+
+    call read_integer(text, value, status)
+    select case (status)
+    case (literal_fine)
+      if (is_outside(real(value, wp), rule%allowed)) complaint = ' is out of range; allowed: ' // allowed_text(rule)
+    case (literal_too_large)
+      complaint = ' is too large for a whole number; at most ' // to_text(huge(value)) // '; allowed: ' // allowed_text(rule)
+    case default
+      complaint = ' is not a whole number; allowed: ' // allowed_text(rule)
+    end select
+  end subroutine convert_integer
+
+  subroutine convert_flag(text, value, complaint)
+    character(len=*), intent(in) :: text
+    logical, intent(out) :: value
+    character(len=:), allocatable, intent(inout) :: complaint
+    integer :: status
+
+    call read_logical(text, value, status)
+    if (status /= literal_fine) complaint = ' is neither true nor false; allowed: .true., .false.'
+  end subroutine convert_flag
+
+  pure logical function is_outside(value, allowed)
+    real(wp), intent(in) :: value
+    type(allowed_t), intent(in) :: allowed
+
+    is_outside = value < allowed%low .or. value > allowed%high
+    if (allowed%excludes_low) is_outside = is_outside .or. .not. value > allowed%low
+  end function is_outside
+
+  subroutine check_text(rule, value, complaint)
+    type(key_rule_t), intent(in) :: rule
+    type(string_t), intent(inout) :: value
+    character(len=:), allocatable, intent(inout) :: complaint
+
+    select case (rule%kind)
+    case (a_name)
+      complaint = name_complaint(value%text)
+    case (a_body)
+      if (value%text == ground) complaint = ': the ground is not allowed here; allowed: name of a &body'
+    case (a_word)
+      call check_word(words_of(rule%allowed), value, complaint)
+    end select
+  end subroutine check_text
+
+  subroutine check_word(words, value, complaint)
+    type(string_t), intent(in) :: words(:)
+    type(string_t), intent(inout) :: value   !! in any case; becomes the word of the schema
+    character(len=:), allocatable, intent(inout) :: complaint
+    integer :: i
+
+    do i = 1, size(words)
+      if (lower_case(value%text) /= words(i)%text) cycle
+      value%text = words(i)%text
+      return
+    end do
+    complaint = ' is not known; allowed: ' // joined(words, ', ')
+    i = nearest_word(value%text, words)
+    if (i > 0) complaint = complaint // "; did you mean '" // words(i)%text // "'?"
+  end subroutine check_word
+
+  !> Names become parts of column names and of paths on the command line.
+  pure function name_complaint(name) result(complaint)
+    character(len=*), intent(in) :: name
+    character(len=:), allocatable :: complaint
+    character(len=*), parameter :: forbidden = ',;=''"'
+    integer :: i
+
+    complaint = ''
+    if (len_trim(name) == 0) then
+      complaint = ' is an empty name'
+    else if (name == ground) then
+      complaint = ' is not allowed as a name: it stands for what does not turn'
+    else if (len(name) > longest_name) then
+      complaint = ' is too long for a name; allowed: ' // to_text(longest_name) // ' bytes'
+    else if (name(1:1) == ' ' .or. name(len(name):) == ' ') then
+      complaint = ' is a name with a blank at its begin or end'
+    else if (scan(name, forbidden) > 0 .or. any([(iachar(name(i:i)) < 32, i=1, len(name))])) then
+      complaint = ' is a name with a comma, semicolon, equals sign, quote or tab, which is not allowed'
+    end if
+  end function name_complaint
+
+end module nocdyn_input_values

@@ -1,0 +1,134 @@
+!> A JSON text, built key by key.
+module nocdyn_json
+  use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
+  use nocdyn_kinds, only: wp
+  use nocdyn_text, only: string_t, to_text
+  use nocdyn_text_buffer, only: text_buffer_t
+  implicit none
+  private
+
+  !> Nested objects, two blanks per level, in the order of the calls.
+  type, public :: json_t
+    type(text_buffer_t), private :: buffer
+    integer, private :: depth = 0
+    logical, private :: is_first = .true.
+  contains
+    procedure :: open => open_object
+    procedure :: close => close_object
+    procedure :: text
+    generic :: put => put_text, put_texts, put_number, put_integer
+    procedure, private :: put_text, put_texts, put_number, put_integer
+    procedure, private :: begin_member
+  end type json_t
+
+contains
+
+  !> Begins an object; the outermost one has no key.
+  subroutine open_object(self, key)
+    class(json_t), intent(inout) :: self
+    character(len=*), intent(in), optional :: key
+
+    if (present(key)) then
+      call self%begin_member(key)
+    end if
+    call self%buffer%append('{')
+    self%depth = self%depth + 1
+    self%is_first = .true.
+  end subroutine open_object
+
+  subroutine close_object(self)
+    class(json_t), intent(inout) :: self
+
+    self%depth = self%depth - 1
+    if (.not. self%is_first) call self%buffer%append(new_line('a') // repeat('  ', self%depth))
+    call self%buffer%append('}')
+    if (self%depth == 0) call self%buffer%append(new_line('a'))
+    self%is_first = .false.
+  end subroutine close_object
+
+  !> All that was put so far.
+  pure function text(self)
+    class(json_t), intent(in) :: self
+    character(len=:), allocatable :: text
+
+    text = self%buffer%text()
+  end function text
+
+  subroutine put_text(self, key, value)
+    class(json_t), intent(inout) :: self
+    character(len=*), intent(in) :: key, value
+
+    call self%begin_member(key)
+    call self%buffer%append(escaped(value))
+  end subroutine put_text
+
+  subroutine put_texts(self, key, values)
+    class(json_t), intent(inout) :: self
+    character(len=*), intent(in) :: key
+    type(string_t), intent(in) :: values(:)
+    integer :: i
+
+    call self%begin_member(key)
+    call self%buffer%append('[')
+    do i = 1, size(values)
+      if (i > 1) call self%buffer%append(', ')
+      call self%buffer%append(escaped(values(i)%text))
+    end do
+    call self%buffer%append(']')
+  end subroutine put_texts
+
+  !> A number; JSON has none that is not finite, these become null.
+  subroutine put_number(self, key, value)
+    class(json_t), intent(inout) :: self
+    character(len=*), intent(in) :: key
+    real(wp), intent(in) :: value
+
+    call self%begin_member(key)
+    if (ieee_is_finite(value)) then
+      call self%buffer%append(to_text(value))
+    else
+      call self%buffer%append('null')
+    end if
+  end subroutine put_number
+
+  subroutine put_integer(self, key, value)
+    class(json_t), intent(inout) :: self
+    character(len=*), intent(in) :: key
+    integer, intent(in) :: value
+
+    call self%begin_member(key)
+    call self%buffer%append(to_text(value))
+  end subroutine put_integer
+
+  subroutine begin_member(self, key)
+    class(json_t), intent(inout) :: self
+    character(len=*), intent(in) :: key
+
+    if (.not. self%is_first) call self%buffer%append(',')
+    call self%buffer%append(new_line('a') // repeat('  ', self%depth) // escaped(key) // ': ')
+    self%is_first = .false.
+  end subroutine begin_member
+
+  !> A JSON string with its quotes; control characters, which no input has, become blanks.
+  pure function escaped(text)
+    character(len=*), intent(in) :: text
+    character(len=:), allocatable :: escaped
+    integer :: i
+
+    escaped = '"'
+    do i = 1, len(text)
+      select case (text(i:i))
+      case ('"', '\')
+        escaped = escaped // '\' // text(i:i)
+      case (achar(10))
+        escaped = escaped // '\n'
+      case (achar(0):achar(9), achar(11):achar(31))
+        escaped = escaped // ' '
+      case default
+        escaped = escaped // text(i:i)
+      end select
+    end do
+    escaped = escaped // '"'
+  end function escaped
+
+end module nocdyn_json

@@ -1,0 +1,173 @@
+!> Values from their Fortran notation. Nothing is handed to the run-time library that it could misread: every text is
+!> checked digit by digit first, so that overflow is refused without raising a floating-point exception.
+module nocdyn_literals
+  use nocdyn_kinds, only: wp
+  use nocdyn_text, only: lower_case
+  implicit none
+  private
+
+  public :: read_real, read_integer, read_logical, digits_end
+
+  integer, parameter, public :: literal_fine = 0, literal_malformed = 1, literal_not_finite = 2, literal_too_large = 3
+
+  character(len=*), parameter :: digits = '0123456789'
+  !> Digits and decimal exponent of the largest double: 1.7976931348623157e308. Longer texts that begin with these digits
+  !> and round down to it are refused too.
+  character(len=*), parameter :: largest_digits = '17976931348623157'
+  integer, parameter :: largest_exponent = 308
+  integer, parameter :: exponent_limit = 99999999   !! longer exponents say no more
+
+contains
+
+  !> Decimal notation with an optional exponent by e, d or q; nan and infinity answer `literal_not_finite`.
+  subroutine read_real(text, value, status)
+    character(len=*), intent(in) :: text
+    real(wp), intent(out) :: value
+    integer, intent(out) :: status
+
+    value = 0.0_wp
+    status = literal_malformed
+    if (is_not_finite(text)) then
+      status = literal_not_finite
+    else if (is_decimal(text)) then
+      status = merge(literal_too_large, literal_fine, overflows(text))
+      if (status == literal_fine) read (text, *) value
+    end if
+  end subroutine read_real
+
+  !> Optional sign and digits.
+  subroutine read_integer(text, value, status)
+    character(len=*), intent(in) :: text
+    integer, intent(out) :: value
+    integer, intent(out) :: status
+    integer :: i, digit, sign_length
+
+    value = 0
+    status = literal_malformed
+    sign_length = sign_end(text)
+    if (sign_length == len(text) .or. digits_end(text, sign_length) < len(text)) return
+
+    status = literal_too_large
+    do i = sign_length + 1, len(text)
+      digit = index(digits, text(i:i)) - 1
+      if (value > (huge(value) - digit) / 10) return
+      value = 10 * value + digit
+    end do
+    if (text(1:1) == '-') value = -value
+    status = literal_fine
+  end subroutine read_integer
+
+  !> .true., .false., and what Fortran takes for short: true, false, .t., .f., t, f.
+  pure subroutine read_logical(text, value, status)
+    character(len=*), intent(in) :: text
+    logical, intent(out) :: value
+    integer, intent(out) :: status
+
+    select case (lower_case(text))
+    case ('.true.', '.true', 'true', '.t.', '.t', 't')
+      value = .true.
+      status = literal_fine
+    case ('.false.', '.false', 'false', '.f.', '.f', 'f')
+      value = .false.
+      status = literal_fine
+    case default
+      value = .false.
+      status = literal_malformed
+    end select
+  end subroutine read_logical
+
+  !> Last position of the digits that follow position `start`; `start` if there are none.
+  pure integer function digits_end(text, start)
+    character(len=*), intent(in) :: text
+    integer, intent(in) :: start
+    integer :: length
+
+    length = verify(text(start + 1:), digits) - 1
+    if (length < 0) length = len(text) - start
+    digits_end = start + length
+  end function digits_end
+
+  !> 1 if the text begins with a sign, else 0.
+  pure integer function sign_end(text)
+    character(len=*), intent(in) :: text
+
+    sign_end = 0
+    if (len(text) > 0) sign_end = merge(1, 0, scan(text(1:1), '+-') == 1)
+  end function sign_end
+
+  pure logical function is_not_finite(text)
+    character(len=*), intent(in) :: text
+    character(len=:), allocatable :: word
+
+    word = lower_case(text(sign_end(text) + 1:))
+    is_not_finite = word == 'nan' .or. word == 'inf' .or. word == 'infinity'
+    if (len(word) > 4) is_not_finite = is_not_finite .or. word(1:4) == 'nan('
+  end function is_not_finite
+
+  pure logical function is_decimal(text)
+    character(len=*), intent(in) :: text
+    integer :: start, whole, last
+
+    start = sign_end(text)
+    whole = digits_end(text, start)
+    last = mantissa_end(text)
+    is_decimal = whole > start .or. last > whole + 1
+    if (last == len(text) .or. .not. is_decimal) return
+
+    is_decimal = scan(text(last + 1:last + 1), 'eEdDqQ') == 1
+    last = last + 1
+    last = last + sign_end(text(last + 1:))
+    is_decimal = is_decimal .and. last < len(text) .and. digits_end(text, last) == len(text)
+  end function is_decimal
+
+  !> Last position of sign, digits, point and digits.
+  pure integer function mantissa_end(text) result(last)
+    character(len=*), intent(in) :: text
+
+    last = digits_end(text, sign_end(text))
+    if (last == len(text)) return
+    if (text(last + 1:last + 1) == '.') last = digits_end(text, last + 1)
+  end function mantissa_end
+
+  !> Whether a decimal text is beyond the largest double.
+  pure logical function overflows(text)
+    character(len=*), intent(in) :: text
+    character(len=:), allocatable :: mantissa
+    integer :: point, leading, exponent
+
+    mantissa = text(sign_end(text) + 1:mantissa_end(text))
+    point = index(mantissa // '.', '.')
+    leading = scan(mantissa, '123456789')
+    overflows = .false.
+    if (leading == 0) return
+
+    exponent = exponent_of(text(mantissa_end(text) + 1:)) + point - leading - merge(1, 0, leading < point)
+    if (exponent == largest_exponent) then
+      if (point <= len(mantissa)) mantissa = mantissa(:point - 1) // mantissa(point + 1:)
+      if (leading > point) leading = leading - 1
+      overflows = without_final_zeros(mantissa(leading:)) > largest_digits
+    else
+      overflows = exponent > largest_exponent
+    end if
+  end function overflows
+
+  pure function without_final_zeros(text) result(trimmed)
+    character(len=*), intent(in) :: text
+    character(len=:), allocatable :: trimmed
+
+    trimmed = text(:verify(text, '0', back=.true.))
+  end function without_final_zeros
+
+  !> The number after the exponent letter, limited to +-`exponent_limit`; 0 without an exponent.
+  pure integer function exponent_of(text)
+    character(len=*), intent(in) :: text   !! '' or letter, optional sign, digits
+    integer :: i
+
+    exponent_of = 0
+    do i = 2 + sign_end(text(min(2, len(text) + 1):)), len(text)
+      exponent_of = min(exponent_limit, 10 * exponent_of + index(digits, text(i:i)) - 1)
+    end do
+    if (len(text) > 1) exponent_of = merge(-exponent_of, exponent_of, text(2:2) == '-')
+  end function exponent_of
+
+end module nocdyn_literals

@@ -1,0 +1,66 @@
+!> The mistakes of an input, collected so that all are reported in one go.
+module nocdyn_mistakes
+  use nocdyn_text, only: string_t
+  use nocdyn_text_order, only: find_order
+  implicit none
+  private
+
+  integer, parameter, public :: no_line = huge(1)   !! for a mistake of the file as a whole; sorts last
+
+  !> A sentence without its place, which is put before it when the names of all groups are known.
+  type, public :: mistake_t
+    integer :: line = no_line
+    integer :: group = 0      !! index in the file, 0: outside groups
+    integer :: override = 0   !! index of the override that is wrong, 0: the file is
+    character(len=:), allocatable :: text
+  end type mistake_t
+
+  type, public :: mistakes_t
+    integer :: count = 0
+    type(mistake_t), allocatable :: list(:)   !! the first `count` are in use
+  contains
+    procedure :: add
+    procedure :: find_order_by_line
+  end type mistakes_t
+
+contains
+
+  subroutine add(self, line, group, text, override)
+    class(mistakes_t), intent(inout) :: self
+    integer, intent(in) :: line, group
+    character(len=*), intent(in) :: text
+    integer, optional, intent(in) :: override
+    type(mistake_t), allocatable :: longer(:)
+
+    if (.not. allocated(self%list)) allocate (self%list(16))
+    if (self%count == size(self%list)) then
+      allocate (longer(2 * self%count))
+      longer(:self%count) = self%list
+      call move_alloc(longer, self%list)
+    end if
+    self%count = self%count + 1
+    associate (mistake => self%list(self%count))
+      mistake%line = line
+      mistake%group = group
+      if (present(override)) mistake%override = override
+      mistake%text = text
+    end associate
+  end subroutine add
+
+  !> Positions in the list by line, mistakes of one line in the order of their discovery, those of overrides last.
+  subroutine find_order_by_line(self, order)
+    class(mistakes_t), intent(in) :: self
+    integer, allocatable, intent(out) :: order(:)
+    type(string_t), allocatable :: keys(:)
+    character(len=24) :: key
+    integer :: i
+
+    allocate (keys(self%count))
+    do i = 1, self%count
+      write (key, '(i12.12, i12.12)') self%list(i)%override, self%list(i)%line
+      keys(i)%text = key
+    end do
+    call find_order(keys, order)
+  end subroutine find_order_by_line
+
+end module nocdyn_mistakes

@@ -1,0 +1,135 @@
+!> A namelist file as its scanner leaves it: groups, assignments and values as written, with the line of each.
+module nocdyn_namelist
+  use nocdyn_text, only: lower_case
+  implicit none
+  private
+
+  !> One value: a bare word, a quoted text or nothing between two commas.
+  type, public :: item_t
+    integer :: first = 1, last = 0   !! in the source, quotes included
+    integer :: line = 0
+    logical :: is_quoted = .false.
+    logical :: is_null = .false.
+  end type item_t
+
+  !> `key(first:last:stride) = items`.
+  type, public :: assignment_t
+    character(len=:), allocatable :: key   !! in lower case
+    integer :: line = 0
+    integer :: first = 1
+    integer :: last = 0               !! 0: as far as the values go
+    integer :: stride = 1
+    logical :: is_whole = .true.      !! no subscript was written
+    logical :: is_damaged = .false.   !! subscript or values could not be understood
+    integer :: first_item = 1, last_item = 0
+  end type assignment_t
+
+  type, public :: namelist_group_t
+    character(len=:), allocatable :: name   !! in lower case
+    integer :: line = 0
+    integer :: first_assignment = 1, last_assignment = 0
+    logical :: is_damaged = .false.   !! what seems to be missing may be in the part that could not be understood
+  end type namelist_group_t
+
+  !> The assignments and items of all groups stand one after the other in flat lists.
+  type, public :: namelist_t
+    character(len=:), allocatable :: source
+    integer :: group_count = 0, assignment_count = 0, item_count = 0
+    type(namelist_group_t), allocatable :: groups(:)
+    type(assignment_t), allocatable :: assignments(:)
+    type(item_t), allocatable :: items(:)
+  contains
+    procedure :: append_group
+    procedure :: append_assignment
+    procedure :: append_item
+    procedure :: item_text
+    procedure :: as_written
+  end type namelist_t
+
+contains
+
+  subroutine append_group(self, name, line)
+    class(namelist_t), intent(inout) :: self
+    character(len=*), intent(in) :: name
+    integer, intent(in) :: line
+    type(namelist_group_t), allocatable :: longer(:)
+
+    if (.not. allocated(self%groups)) allocate (self%groups(64))
+    if (self%group_count == size(self%groups)) then
+      allocate (longer(2 * self%group_count))
+      longer(:self%group_count) = self%groups
+      call move_alloc(longer, self%groups)
+    end if
+    self%group_count = self%group_count + 1
+    associate (group => self%groups(self%group_count))
+      group%name = lower_case(name)
+      group%line = line
+      group%first_assignment = self%assignment_count + 1
+      group%last_assignment = self%assignment_count
+    end associate
+  end subroutine append_group
+
+  !> Appends to the last group.
+  subroutine append_assignment(self, assignment)
+    class(namelist_t), intent(inout) :: self
+    type(assignment_t), intent(in) :: assignment
+    type(assignment_t), allocatable :: longer(:)
+
+    if (.not. allocated(self%assignments)) allocate (self%assignments(64))
+    if (self%assignment_count == size(self%assignments)) then
+      allocate (longer(2 * self%assignment_count))
+      longer(:self%assignment_count) = self%assignments
+      call move_alloc(longer, self%assignments)
+    end if
+    self%assignment_count = self%assignment_count + 1
+    self%assignments(self%assignment_count) = assignment
+    self%groups(self%group_count)%last_assignment = self%assignment_count
+  end subroutine append_assignment
+
+  subroutine append_item(self, item)
+    class(namelist_t), intent(inout) :: self
+    type(item_t), intent(in) :: item
+    type(item_t), allocatable :: longer(:)
+
+    if (.not. allocated(self%items)) allocate (self%items(64))
+    if (self%item_count == size(self%items)) then
+      allocate (longer(2 * self%item_count))
+      longer(:self%item_count) = self%items
+      call move_alloc(longer, self%items)
+    end if
+    self%item_count = self%item_count + 1
+    self%items(self%item_count) = item
+  end subroutine append_item
+
+  !> A quoted item with its doubled quotes undone, or a bare word as it is.
+  pure function item_text(self, item) result(text)
+    class(namelist_t), intent(in) :: self
+    type(item_t), intent(in) :: item
+    character(len=:), allocatable :: text
+    character(len=1) :: quote
+    integer :: i, length
+
+    text = self%source(item%first:item%last)
+    if (.not. item%is_quoted) return
+
+    quote = text(1:1)
+    length = 0
+    i = 2
+    do while (i < item%last - item%first + 1)
+      length = length + 1
+      text(length:length) = text(i:i)
+      i = i + merge(2, 1, text(i:i) == quote)
+    end do
+    text = text(:length)
+  end function item_text
+
+  !> An item as the file has it, quotes included.
+  pure function as_written(self, item) result(text)
+    class(namelist_t), intent(in) :: self
+    type(item_t), intent(in) :: item
+    character(len=:), allocatable :: text
+
+    text = self%source(item%first:item%last)
+  end function as_written
+
+end module nocdyn_namelist

@@ -1,0 +1,221 @@
+!> A place in the text of a namelist file, and the smallest pieces of its syntax.
+module nocdyn_namelist_cursor
+  use nocdyn_text, only: lower_case
+  implicit none
+  private
+
+  character(len=1), parameter :: tab = achar(9), line_feed = achar(10), carriage_return = achar(13)
+  character(len=*), parameter :: blanks = ' ' // tab // carriage_return // line_feed
+  character(len=*), parameter :: letters = 'abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ'
+  character(len=*), parameter :: letters_and_digits = letters // '0123456789_'
+  character(len=*), parameter :: value_delimiters = ',/!=''"'
+  integer, parameter :: longest_excerpt = 40   !! characters of the file in a message
+
+  type, public :: cursor_t
+    character(len=:), allocatable :: text   !! ends with a line feed
+    integer :: at = 1                       !! next character, len(text) + 1 at the end
+    integer :: line = 1
+    logical :: is_value = .false.           !! of an override: '/', '!', '&' and '=' have no meaning
+  contains
+    procedure :: at_end
+    procedure :: next => next_character
+    procedure :: move_to
+    procedure :: skip_blanks
+    procedure :: line_end
+    procedure :: token_end
+    procedure :: value_end
+    procedure :: key_end
+    procedure :: quote_end
+    procedure :: key_follows
+    procedure :: subscript_end
+    procedure :: group_begins
+    procedure :: group_ends
+    procedure :: is_first_of_line
+    procedure :: excerpt
+  end type cursor_t
+
+contains
+
+  pure logical function at_end(self)
+    class(cursor_t), intent(in) :: self
+
+    at_end = self%at > len(self%text)
+  end function at_end
+
+  !> The character at the cursor, a line feed at the end.
+  pure character(len=1) function next_character(self) result(next)
+    class(cursor_t), intent(in) :: self
+
+    next = line_feed
+    if (self%at <= len(self%text)) next = self%text(self%at:self%at)
+  end function next_character
+
+  !> Goes forward to a position and counts the lines on the way.
+  pure subroutine move_to(self, position)
+    class(cursor_t), intent(inout) :: self
+    integer, intent(in) :: position
+    integer :: i
+
+    do i = self%at, min(position - 1, len(self%text))
+      if (self%text(i:i) == line_feed) self%line = self%line + 1
+    end do
+    self%at = position
+  end subroutine move_to
+
+  !> Goes past blanks, tabs, line ends and comments.
+  pure subroutine skip_blanks(self)
+    class(cursor_t), intent(inout) :: self
+
+    do while (.not. self%at_end())
+      if (scan(self%next(), blanks) == 1) then
+        call self%move_to(self%at + 1)
+      else if (self%next() == '!' .and. .not. self%is_value) then
+        call self%move_to(self%line_end())
+      else
+        exit
+      end if
+    end do
+  end subroutine skip_blanks
+
+  !> Position of the line feed that ends the line.
+  pure integer function line_end(self)
+    class(cursor_t), intent(in) :: self
+
+    line_end = self%at + index(self%text(self%at:), line_feed) - 1
+  end function line_end
+
+  !> Last position of the bare word at the cursor; before the cursor if there is none.
+  pure integer function token_end(self, delimiters)
+    class(cursor_t), intent(in) :: self
+    character(len=*), intent(in) :: delimiters   !! besides blanks
+    integer :: i
+
+    token_end = len(self%text)
+    do i = self%at, len(self%text)
+      if (scan(self%text(i:i), blanks // delimiters) == 1) then
+        token_end = i - 1
+        return
+      end if
+    end do
+  end function token_end
+
+  !> Last position of the bare value at the cursor.
+  pure integer function value_end(self)
+    class(cursor_t), intent(in) :: self
+
+    if (self%is_value) then
+      value_end = self%token_end(',')
+    else
+      value_end = self%token_end(value_delimiters)
+    end if
+  end function value_end
+
+  !> Last position of the key at the cursor.
+  pure integer function key_end(self)
+    class(cursor_t), intent(in) :: self
+
+    key_end = self%token_end(value_delimiters // '(')
+  end function key_end
+
+  !> Position of the quote that closes the text whose opening quote is at the cursor, 0 if the line has none.
+  pure integer function quote_end(self)
+    class(cursor_t), intent(in) :: self
+    character(len=1) :: quote
+    integer :: last
+
+    quote = self%next()
+    last = self%line_end()
+    quote_end = self%at + 1
+    do while (quote_end < last)
+      if (self%text(quote_end:quote_end) == quote) then
+        if (self%text(quote_end + 1:quote_end + 1) /= quote) return
+        quote_end = quote_end + 1
+      end if
+      quote_end = quote_end + 1
+    end do
+    quote_end = 0
+  end function quote_end
+
+  !> Whether a word, perhaps with a subscript, and an equals sign stand at the cursor.
+  pure logical function key_follows(self)
+    class(cursor_t), intent(in) :: self
+    integer :: i
+
+    key_follows = .false.
+    if (self%is_value) return
+    i = self%key_end() + 1
+    if (i == self%at) return
+    i = self%subscript_end(i)
+    if (i > 0) i = position_after_blanks(self%text, i)
+    if (i > 0) key_follows = self%text(i:i) == '='
+  end function key_follows
+
+  !> Position after a subscript that stands at `start` or behind blanks there; `start` if there is no subscript, 0 if it
+  !> does not close on its line.
+  pure integer function subscript_end(self, start)
+    class(cursor_t), intent(in) :: self
+    integer, intent(in) :: start
+    integer :: open, length
+
+    subscript_end = start
+    open = position_after_blanks(self%text, start)
+    if (open == 0) return
+    if (self%text(open:open) /= '(') return
+    length = scan(self%text(open:), ')' // line_feed)
+    subscript_end = merge(open + length, 0, self%text(open + length - 1:open + length - 1) == ')')
+  end function subscript_end
+
+  !> 0 if only blanks follow; otherwise the position of the first other character, at or after `start`.
+  pure integer function position_after_blanks(text, start) result(position)
+    character(len=*), intent(in) :: text
+    integer, intent(in) :: start
+
+    do position = start, len(text)
+      if (scan(text(position:position), blanks) == 0) return
+    end do
+    position = 0
+  end function position_after_blanks
+
+  !> Whether & or $ and the first letter of a name stand at the cursor.
+  pure logical function group_begins(self)
+    class(cursor_t), intent(in) :: self
+
+    group_begins = .false.
+    if (self%is_value .or. self%at >= len(self%text)) return
+    group_begins = scan(self%next(), '&$') == 1 .and. scan(self%text(self%at + 1:self%at + 1), letters) == 1 &
+      .and. self%group_ends() == 0
+  end function group_begins
+
+  !> Length of the end mark at the cursor: 1 for a slash, 4 for &end or $end, otherwise 0.
+  pure integer function group_ends(self)
+    class(cursor_t), intent(in) :: self
+
+    group_ends = 0
+    if (self%is_value) return
+    if (self%next() == '/') group_ends = 1
+    if (self%at + 4 > len(self%text) .or. scan(self%next(), '&$') == 0) return
+    if (lower_case(self%text(self%at + 1:self%at + 3)) /= 'end') return
+    if (scan(self%text(self%at + 4:self%at + 4), letters_and_digits) == 0) group_ends = 4
+  end function group_ends
+
+  !> Whether only blanks stand before the cursor on its line.
+  pure logical function is_first_of_line(self)
+    class(cursor_t), intent(in) :: self
+    integer :: line_start
+
+    line_start = index(self%text(:self%at - 1), line_feed, back=.true.) + 1
+    is_first_of_line = verify(self%text(line_start:self%at - 1), blanks) == 0
+  end function is_first_of_line
+
+  !> The rest of the line between quotes, cut to a length that suits a message.
+  pure function excerpt(self) result(text)
+    class(cursor_t), intent(in) :: self
+    character(len=:), allocatable :: text
+
+    text = self%text(self%at:self%line_end() - 1)
+    text = text(:verify(text, blanks, back=.true.))
+    if (len(text) > longest_excerpt) text = text(:longest_excerpt) // ' ...'
+    text = '<' // text // '>'
+  end function excerpt
+
+end module nocdyn_namelist_cursor

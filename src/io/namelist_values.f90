@@ -1,0 +1,203 @@
+!> The right-hand side of a namelist assignment, and the subscript of its left-hand side.
+module nocdyn_namelist_values
+  use nocdyn_literals, only: digits_end, literal_fine, read_integer
+  use nocdyn_mistakes, only: mistakes_t
+  use nocdyn_namelist, only: assignment_t, item_t, namelist_t
+  use nocdyn_namelist_cursor, only: cursor_t
+  use nocdyn_text, only: to_text
+  implicit none
+  private
+
+  public :: scan_items, read_subscript
+
+  integer, parameter, public :: longest_list = 100000   !! values that one key can take
+  character(len=*), parameter :: separators = ' ,/!' // achar(9) // achar(10)
+
+contains
+
+  !> Appends the values at the cursor up to the next key or the end of the group.
+  subroutine scan_items(cursor, namelist, mistakes, is_damaged)
+    type(cursor_t), intent(inout) :: cursor
+    type(namelist_t), intent(inout) :: namelist
+    type(mistakes_t), intent(inout) :: mistakes
+    logical, intent(out) :: is_damaged   !! some could not be understood
+    logical :: is_fine, is_after_value
+
+    is_damaged = .false.
+    is_after_value = .false.
+    do
+      call cursor%skip_blanks()
+      if (cursor%at_end() .or. cursor%group_ends() > 0 .or. cursor%group_begins()) exit
+      if (cursor%next() == ',') then
+        if (.not. is_after_value) call namelist%append_item(item_t(line=cursor%line, is_null=.true.))
+        is_after_value = .false.
+        call cursor%move_to(cursor%at + 1)
+      else if (cursor%key_follows()) then
+        exit
+      else
+        call scan_item(cursor, namelist, mistakes, is_fine)
+        is_damaged = is_damaged .or. .not. is_fine
+        is_after_value = .true.
+      end if
+    end do
+    if (is_damaged .and. namelist%group_count > 0) namelist%groups(namelist%group_count)%is_damaged = .true.
+  end subroutine scan_items
+
+  !> One value, or several by a repeat count such as 3*0.5.
+  subroutine scan_item(cursor, namelist, mistakes, is_fine)
+    type(cursor_t), intent(inout) :: cursor
+    type(namelist_t), intent(inout) :: namelist
+    type(mistakes_t), intent(inout) :: mistakes
+    logical, intent(out) :: is_fine
+    type(item_t) :: item
+    integer :: i, repeats
+
+    call scan_repeat_count(cursor, repeats)
+    item%line = cursor%line
+    is_fine = repeats >= 1 .and. repeats <= longest_list
+    if (.not. is_fine) call mistakes%add(cursor%line, namelist%group_count, &
+      'a repeat count such as 3*0.5 must be from 1 to ' // to_text(longest_list))
+
+    if (scan(cursor%next(), '''"') == 1) then
+      call scan_quoted(cursor, namelist%group_count, mistakes, item, is_fine)
+    else
+      call scan_bare(cursor, namelist%group_count, mistakes, item, is_fine)
+    end if
+    if (.not. is_fine) return
+    do i = 1, repeats
+      call namelist%append_item(item)
+    end do
+  end subroutine scan_item
+
+  !> Goes past "3*"; a count that no integer holds is answered with the largest integer.
+  subroutine scan_repeat_count(cursor, repeats)
+    type(cursor_t), intent(inout) :: cursor
+    integer, intent(out) :: repeats   !! 1 if none is written
+    integer :: last, status
+
+    repeats = 1
+    last = digits_end(cursor%text, cursor%at - 1)
+    if (last < cursor%at) return
+    if (cursor%text(last + 1:last + 1) /= '*') return
+    call read_integer(cursor%text(cursor%at:last), repeats, status)
+    if (status /= literal_fine) repeats = huge(repeats)
+    call cursor%move_to(last + 2)
+  end subroutine scan_repeat_count
+
+  subroutine scan_quoted(cursor, group, mistakes, item, is_fine)
+    type(cursor_t), intent(inout) :: cursor
+    integer, intent(in) :: group
+    type(mistakes_t), intent(inout) :: mistakes
+    type(item_t), intent(inout) :: item
+    logical, intent(inout) :: is_fine
+    integer :: last
+
+    last = cursor%quote_end()
+    if (last == 0) then
+      call mistakes%add(cursor%line, group, 'a quote is missing: the text ' // cursor%excerpt() // ' is not closed on its line')
+      call leave_broken_line(cursor)
+    else if (is_separated(cursor, last + 1)) then
+      item%first = cursor%at
+      item%last = last
+      item%is_quoted = .true.
+      call cursor%move_to(last + 1)
+      return
+    else
+      call mistakes%add(cursor%line, group, 'a quote or a comma is missing: ' // cursor%text(cursor%at:last) // &
+        ' is followed directly by ' // cursor%text(last + 1:last + 1))
+      call leave_broken_line(cursor)
+    end if
+    is_fine = .false.
+  end subroutine scan_quoted
+
+  subroutine scan_bare(cursor, group, mistakes, item, is_fine)
+    type(cursor_t), intent(inout) :: cursor
+    integer, intent(in) :: group
+    type(mistakes_t), intent(inout) :: mistakes
+    type(item_t), intent(inout) :: item
+    logical, intent(inout) :: is_fine
+    integer :: last
+
+    last = cursor%value_end()
+    item%first = cursor%at
+    item%last = last
+    item%is_null = last < cursor%at
+    call cursor%move_to(last + 1)
+    if (is_separated(cursor, cursor%at)) return
+
+    if (cursor%next() == '=') then
+      call mistakes%add(cursor%line, group, "'=' without a key before it: " // cursor%excerpt())
+      call cursor%move_to(cursor%at + 1)
+    else
+      call mistakes%add(cursor%line, group, 'a quote stands inside ' // cursor%text(item%first:last + 1) // &
+        '; a text begins and ends with a quote')
+      call leave_broken_line(cursor)
+    end if
+    is_fine = .false.
+  end subroutine scan_bare
+
+  !> Whether a value may end before a position.
+  pure logical function is_separated(cursor, position)
+    type(cursor_t), intent(in) :: cursor
+    integer, intent(in) :: position
+
+    is_separated = position > len(cursor%text)
+    if (.not. is_separated) is_separated = scan(cursor%text(position:position), separators) == 1
+  end function is_separated
+
+  !> With the quotes of a line out of step its rest means nothing, but a slash at its end still ends the group.
+  subroutine leave_broken_line(cursor)
+    type(cursor_t), intent(inout) :: cursor
+    character(len=:), allocatable :: rest
+    integer :: slash
+
+    rest = cursor%text(cursor%at:cursor%line_end() - 1)
+    slash = index(rest, '/', back=.true.)
+    if (slash > 0) then
+      if (index(adjustl(rest(slash + 1:)) // '!', '!') == 1 .or. len_trim(rest(slash + 1:)) == 0) then
+        call cursor%move_to(cursor%at + slash - 1)
+        return
+      end if
+    end if
+    call cursor%move_to(cursor%line_end())
+  end subroutine leave_broken_line
+
+  !> `(first)` or `(first:last:stride)` with any part of a section left out.
+  subroutine read_subscript(text, assignment)
+    character(len=*), intent(in) :: text   !! between the parentheses
+    type(assignment_t), intent(inout) :: assignment   !! damaged if the text is neither
+    character(len=:), allocatable :: rest
+    integer :: bounds(3), colon, part
+    logical :: is_fine
+
+    assignment%is_whole = .false.
+    bounds = [1, 0, 1]
+    is_fine = len_trim(text) > 0
+    rest = text
+    do part = 1, 3
+      colon = index(rest // ':', ':')
+      call read_bound(rest(:colon - 1), bounds(part), is_fine)
+      if (colon > len(rest)) exit
+      rest = rest(colon + 1:)
+    end do
+    if (part == 1) bounds(2) = bounds(1)
+
+    assignment%first = bounds(1)
+    assignment%last = bounds(2)
+    assignment%stride = bounds(3)
+    assignment%is_damaged = part > 3 .or. .not. is_fine .or. (bounds(2) > 0 .and. bounds(2) < bounds(1))
+  end subroutine read_subscript
+
+  !> A bound that is left out keeps its value.
+  subroutine read_bound(text, bound, is_fine)
+    character(len=*), intent(in) :: text
+    integer, intent(inout) :: bound
+    logical, intent(inout) :: is_fine
+    integer :: status
+
+    if (len_trim(text) == 0) return
+    call read_integer(trim(adjustl(text)), bound, status)
+    is_fine = is_fine .and. status == literal_fine .and. bound >= 1 .and. bound <= longest_list
+  end subroutine read_bound
+
+end module nocdyn_namelist_values

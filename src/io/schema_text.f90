@@ -1,0 +1,161 @@
+!> Rows of the schema in words, for messages and help.
+module nocdyn_schema_text
+  use nocdyn_kinds, only: wp
+  use nocdyn_schema, only: a_body, a_flag, a_name, a_number, a_text, a_word, allowed_t, alternatives, &
+    an_integer, any_number, any_times, at_least_once, at_most_once, body_or_ground, exactly_once, first_key, &
+    group_rules, key_rule_t, key_rules, last_key, words_of
+  use nocdyn_text, only: joined, nearest_word, string_t, to_text
+  implicit none
+  private
+
+  public :: allowed_text, alternative_of, kind_text, occurrence_text, group_names, key_names, suggestion
+
+contains
+
+  !> "> 0 [kg m2]", "'rk45', 'rosenbrock'", ".true., .false." ...; never empty.
+  function allowed_text(rule) result(text)
+    type(key_rule_t), intent(in) :: rule
+    character(len=:), allocatable :: text
+
+    select case (rule%kind)
+    case (a_number, an_integer)
+      text = range_text(rule%allowed)
+      if (text == '') text = 'any value'
+      if (rule%unit /= '') text = text // ' [' // trim(rule%unit) // ']'
+    case (a_word)
+      text = joined(words_of(rule%allowed), ', ')
+    case (a_flag)
+      text = '.true., .false.'
+    case (a_body)
+      text = 'name of a &body'
+    case (body_or_ground)
+      text = "name of a &body, or 'ground'"
+    case (a_name)
+      text = 'a name of its own'
+    case default
+      text = 'any text'
+    end select
+  end function allowed_text
+
+  !> "> 0", ">= 2", "1e-14 to 0.1", '' if all is allowed.
+  function range_text(allowed) result(text)
+    type(allowed_t), intent(in) :: allowed
+    character(len=:), allocatable :: text
+
+    text = ''
+    if (allowed%high < huge(1.0_wp)) then
+      text = to_text(allowed%low) // ' to ' // to_text(allowed%high)
+    else if (allowed%low > -huge(1.0_wp)) then
+      text = '>= ' // to_text(allowed%low)
+      if (allowed%excludes_low) text = '> ' // to_text(allowed%low)
+    end if
+  end function range_text
+
+  !> "number", "2 bodies", "list of bodies" ...
+  pure function kind_text(rule) result(text)
+    type(key_rule_t), intent(in) :: rule
+    character(len=:), allocatable :: text
+
+    select case (rule%kind)
+    case (a_text)
+      text = noun('text', 'texts', rule%count)
+    case (a_name)
+      text = noun('name', 'names', rule%count)
+    case (a_body, body_or_ground)
+      text = noun('body', 'bodies', rule%count)
+    case (a_word)
+      text = noun('word', 'words', rule%count)
+    case (a_number)
+      text = noun('number', 'numbers', rule%count)
+    case (an_integer)
+      text = noun('whole number', 'whole numbers', rule%count)
+    case default
+      text = noun('logical', 'logicals', rule%count)
+    end select
+  end function kind_text
+
+  pure function noun(singular, plural, count) result(text)
+    character(len=*), intent(in) :: singular, plural
+    integer, intent(in) :: count
+    character(len=:), allocatable :: text
+
+    select case (count)
+    case (1)
+      text = singular
+    case (any_number)
+      text = 'list of ' // plural
+    case default
+      text = to_text(count) // ' ' // plural
+    end select
+  end function noun
+
+  !> The key that may stand instead of this one, '' if there is none.
+  pure function alternative_of(rule) result(key)
+    type(key_rule_t), intent(in) :: rule
+    character(len=:), allocatable :: key
+    integer :: i
+
+    key = ''
+    do i = 1, size(alternatives)
+      if (alternatives(i)%group /= rule%group) cycle
+      if (alternatives(i)%first == rule%name) key = trim(alternatives(i)%second)
+      if (alternatives(i)%second == rule%name) key = trim(alternatives(i)%first)
+    end do
+  end function alternative_of
+
+  pure function occurrence_text(occurrence) result(text)
+    integer, intent(in) :: occurrence
+    character(len=:), allocatable :: text
+
+    select case (occurrence)
+    case (exactly_once)
+      text = 'once'
+    case (at_most_once)
+      text = 'at most once'
+    case (at_least_once)
+      text = 'at least once'
+    case (any_times)
+      text = 'any number of times'
+    end select
+  end function occurrence_text
+
+  pure function group_names() result(names)
+    type(string_t), allocatable :: names(:)
+    integer :: i
+
+    allocate (names(size(group_rules)))
+    do i = 1, size(names)
+      names(i)%text = trim(group_rules(i)%name)
+    end do
+  end function group_names
+
+  pure function key_names(group_rule) result(names)
+    integer, intent(in) :: group_rule
+    type(string_t), allocatable :: names(:)
+    integer :: first, i
+
+    first = first_key(group_rule)
+    allocate (names(last_key(group_rule) - first + 1))
+    do i = 1, size(names)
+      names(i)%text = trim(key_rules(first + i - 1)%name)
+    end do
+  end function key_names
+
+  !> "; did you mean 'stiffness'?", or all candidates if none is near and they are few.
+  pure function suggestion(word, candidates) result(text)
+    character(len=*), intent(in) :: word
+    type(string_t), intent(in) :: candidates(:)
+    character(len=:), allocatable :: text
+    integer, parameter :: few = 12
+    integer :: nearest
+
+    nearest = nearest_word(word, candidates)
+    text = ''
+    if (nearest > 0) then
+      text = "; did you mean '" // candidates(nearest)%text // "'?"
+    else if (size(candidates) > 0 .and. size(candidates) <= few) then
+      text = '; allowed: ' // joined(candidates, ', ')
+    end if
+  end function suggestion
+
+end module nocdyn_schema_text

@@ -1,0 +1,51 @@
+!> A text that grows at its end in constant time per character.
+module nocdyn_text_buffer
+  implicit none
+  private
+
+  character(len=*), parameter :: line_end = new_line('a')
+
+  type, public :: text_buffer_t
+    private
+    character(len=:), allocatable :: storage
+    integer :: length = 0
+  contains
+    procedure :: append
+    procedure :: append_line
+    procedure :: text => buffer_text
+  end type text_buffer_t
+
+contains
+
+  subroutine append(self, text)
+    class(text_buffer_t), intent(inout) :: self
+    character(len=*), intent(in) :: text
+    character(len=:), allocatable :: wider
+
+    if (.not. allocated(self%storage)) allocate (character(len=256) :: self%storage)
+    if (self%length + len(text) > len(self%storage)) then
+      allocate (character(len=2 * (self%length + len(text))) :: wider)
+      wider(:self%length) = self%storage(:self%length)
+      call move_alloc(wider, self%storage)
+    end if
+    self%storage(self%length + 1:self%length + len(text)) = text
+    self%length = self%length + len(text)
+  end subroutine append
+
+  subroutine append_line(self, text)
+    class(text_buffer_t), intent(inout) :: self
+    character(len=*), intent(in) :: text
+
+    call self%append(text)
+    call self%append(line_end)
+  end subroutine append_line
+
+  pure function buffer_text(self) result(text)
+    class(text_buffer_t), intent(in) :: self
+    character(len=:), allocatable :: text
+
+    text = ''
+    if (self%length > 0) text = self%storage(:self%length)
+  end function buffer_text
+
+end module nocdyn_text_buffer

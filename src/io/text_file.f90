@@ -1,0 +1,63 @@
+!> Whole text files.
+module nocdyn_text_file
+  use, intrinsic :: iso_fortran_env, only: int64
+  use nocdyn_errors, only: error_t, exit_file, raise
+  use nocdyn_text_buffer, only: text_buffer_t
+  implicit none
+  private
+
+  public :: read_text_file
+
+contains
+
+  !> All bytes of a file; pipes work too.
+  subroutine read_text_file(file, text, error)
+    character(len=*), intent(in) :: file
+    character(len=:), allocatable, intent(out) :: text
+    type(error_t), allocatable, intent(out) :: error
+    character(len=256) :: reason
+    integer(int64) :: bytes
+    integer :: status, unit
+    logical :: exists
+
+    inquire (file=file, exist=exists)
+    if (.not. exists) then
+      call raise(error, exit_file, file // ': cannot be read: there is no such file')
+      return
+    end if
+    open (newunit=unit, file=file, access='stream', form='unformatted', action='read', status='old', iostat=status, &
+      iomsg=reason)
+    if (status /= 0) then
+      call raise(error, exit_file, file // ': cannot be read: ' // trim(reason))
+      return
+    end if
+    inquire (unit=unit, size=bytes)
+    if (bytes > 0) then
+      allocate (character(len=bytes) :: text)
+      read (unit, iostat=status, iomsg=reason) text
+    else
+      call read_to_end(unit, text, status, reason)
+    end if
+    close (unit)
+    if (status /= 0) call raise(error, exit_file, file // ': cannot be read: ' // trim(reason))
+  end subroutine read_text_file
+
+  !> Byte by byte, for what has no size.
+  subroutine read_to_end(unit, text, status, reason)
+    integer, intent(in) :: unit
+    character(len=:), allocatable, intent(out) :: text
+    integer, intent(out) :: status
+    character(len=*), intent(inout) :: reason
+    type(text_buffer_t) :: buffer
+    character(len=1) :: byte
+
+    do
+      read (unit, iostat=status, iomsg=reason) byte
+      if (status /= 0) exit
+      call buffer%append(byte)
+    end do
+    text = buffer%text()
+    if (is_iostat_end(status)) status = 0
+  end subroutine read_to_end
+
+end module nocdyn_text_file

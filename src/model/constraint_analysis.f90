@@ -1,0 +1,251 @@
+!> What the constraint rows allow: rank, redundant rows, locked bodies, independent coordinates, group by group.
+module nocdyn_constraint_analysis
+  use nocdyn_complement, only: natural_complement
+  use nocdyn_constraints, only: constraints_t
+  use nocdyn_geared_groups, only: find_groups, geared_group_t, redundancy_t
+  use nocdyn_errors, only: error_t, exit_input, raise
+  use nocdyn_kinds, only: wp
+  use nocdyn_lapack, only: pivoted_rank, pseudo_inverse
+  use nocdyn_text, only: joined, quoted, string_t, to_text
+  implicit none
+  private
+
+  public :: analyse_constraints
+
+  !> Rows of unit length count as dependent below this: decimals such as 0.1 * 3 against 0.3 agree, ratios that
+  !> differ in the tenth digit do not.
+  real(wp), parameter, public :: rank_tolerance = 1.0e-10_wp
+
+contains
+
+  !> Finds the groups and analyses each; locked bodies and unusable coordinates are errors.
+  subroutine analyse_constraints(constraints, body_names, wanted, groups, culprit, error)
+    type(constraints_t), intent(in) :: constraints
+    type(string_t), intent(in) :: body_names(:)
+    integer, intent(in) :: wanted(:)       !! bodies that are to be the coordinates; empty: found by pivoting
+    type(geared_group_t), allocatable, intent(out) :: groups(:)
+    integer, intent(out) :: culprit        !! row that the error is about, 0 if it is about `wanted`
+    type(error_t), allocatable, intent(out) :: error
+    integer :: g
+
+    call find_groups(constraints, groups)
+    culprit = 0
+    do g = 1, size(groups)
+      call sift_rows(constraints, groups(g))
+      call refuse_locks(constraints, body_names, groups(g), culprit, error)
+      if (allocated(error)) return
+      call choose_coordinates(constraints, body_names, wanted, groups(g), error)
+      if (allocated(error)) return
+    end do
+  end subroutine analyse_constraints
+
+  !> Keeps, in the order of the input, the rows that are independent of those before them.
+  subroutine sift_rows(constraints, group)
+    type(constraints_t), intent(in) :: constraints
+    type(geared_group_t), intent(inout) :: group
+    integer :: pivots(size(group%bodies))
+    integer :: i, rank
+
+    allocate (group%redundancies(0))
+    call pivoted_rank(unit_rows(constraints, group%rows, group%bodies), rank_tolerance, rank, pivots)
+    if (rank == size(group%rows)) then
+      group%kept = group%rows
+      return
+    end if
+    allocate (group%kept(0))
+    do i = 1, size(group%rows)
+      associate (row => group%rows(i))
+        call pivoted_rank(unit_rows(constraints, [group%kept, row], group%bodies), rank_tolerance, rank, pivots)
+        if (rank > size(group%kept)) then
+          group%kept = [group%kept, row]
+        else
+          group%redundancies = [group%redundancies, redundancy_t(row, combination(constraints, group, row))]
+        end if
+      end associate
+    end do
+  end subroutine sift_rows
+
+  !> L_lambda of the group with every row scaled to unit length, so that metres and teeth compare.
+  pure function unit_rows(constraints, rows, bodies) result(matrix)
+    type(constraints_t), intent(in) :: constraints
+    integer, intent(in) :: rows(:), bodies(:)
+    real(wp) :: matrix(size(rows), size(bodies))
+    integer :: i
+
+    matrix = constraints%block(1, rows, bodies)
+    do i = 1, size(rows)
+      matrix(i, :) = matrix(i, :) / norm2(matrix(i, :))
+    end do
+  end function unit_rows
+
+  !> The kept rows that together say what `row` says.
+  function combination(constraints, group, row) result(rows)
+    type(constraints_t), intent(in) :: constraints
+    type(geared_group_t), intent(in) :: group
+    integer, intent(in) :: row
+    integer, allocatable :: rows(:)
+    real(wp) :: wanted(1, size(group%bodies))
+
+    wanted = unit_rows(constraints, [row], group%bodies)
+    rows = contributing_rows(constraints, group%kept, group%bodies, wanted(1, :))
+  end function combination
+
+  !> The rows with a share in the least-squares representation of the relation `wanted` by `rows`.
+  function contributing_rows(constraints, rows, bodies, wanted) result(contributing)
+    type(constraints_t), intent(in) :: constraints
+    integer, intent(in) :: rows(:), bodies(:)
+    real(wp), intent(in) :: wanted(:)
+    integer, allocatable :: contributing(:)
+    real(wp) :: share(size(rows))
+
+    share = matmul(pseudo_inverse(transpose(unit_rows(constraints, rows, bodies)), rank_tolerance), wanted)
+    contributing = pack(rows, abs(share) > sqrt(rank_tolerance) * maxval(abs(share)))
+  end function contributing_rows
+
+  !> Error if the kept rows leave a body no motion: the row with which the lock begins is the culprit.
+  subroutine refuse_locks(constraints, body_names, group, culprit, error)
+    type(constraints_t), intent(in) :: constraints
+    type(string_t), intent(in) :: body_names(:)
+    type(geared_group_t), intent(in) :: group
+    integer, intent(inout) :: culprit
+    type(error_t), allocatable, intent(out) :: error
+    integer :: k
+
+    if (size(locked_bodies(constraints, group%kept, group%bodies)) == 0) return
+    do k = 1, size(group%kept)
+      associate (locked => locked_bodies(constraints, group%kept(:k), group%bodies))
+        if (size(locked) == 0) cycle
+        culprit = group%kept(k)
+        call raise(error, exit_input, 'locks ' // joined(body_names(locked), ', ') // &
+                   contradiction(constraints, body_names, group%kept(:k - 1), group%bodies, culprit))
+        return
+      end associate
+    end do
+  end subroutine refuse_locks
+
+  !> Bodies whose row of the complement of `rows` is zero.
+  function locked_bodies(constraints, rows, bodies) result(locked)
+    type(constraints_t), intent(in) :: constraints
+    integer, intent(in) :: rows(:), bodies(:)
+    integer, allocatable :: locked(:)
+    real(wp), allocatable :: motion(:, :)
+
+    motion = allowed_motion(constraints, rows, bodies)
+    locked = pack(bodies, maxval(abs(motion), dim=2) <= rank_tolerance)
+  end function locked_bodies
+
+  !> The natural complement of `rows` with coordinates found by pivoting, shape [bodies, freedoms].
+  function allowed_motion(constraints, rows, bodies) result(motion)
+    type(constraints_t), intent(in) :: constraints
+    integer, intent(in) :: rows(:), bodies(:)
+    real(wp), allocatable :: motion(:, :)
+    real(wp), allocatable :: dual(:, :)
+    real(wp) :: matrix(size(rows), size(bodies)), log_determinant
+    integer :: pivots(size(bodies)), rank
+    logical :: is_singular
+
+    matrix = unit_rows(constraints, rows, bodies)
+    call pivoted_rank(matrix, rank_tolerance, rank, pivots)
+    call natural_complement(matrix, pivots(rank + 1:), motion, dual, log_determinant, is_singular)
+    if (is_singular) error stop 'nocdyn_constraint_analysis: rows must be independent here'
+  end function allowed_motion
+
+  !> For a row between two bodies whose ratio `earlier` rows fix already: who drives what at which ratio.
+  function contradiction(constraints, body_names, earlier, bodies, row) result(text)
+    type(constraints_t), intent(in) :: constraints
+    type(string_t), intent(in) :: body_names(:)
+    integer, intent(in) :: earlier(:), bodies(:), row
+    character(len=:), allocatable :: text
+    real(wp), allocatable :: motion(:, :)
+    real(wp) :: relation(size(bodies)), fixed, asked
+    integer :: a, b, first
+
+    text = ''
+    first = constraints%first(row)
+    if (constraints%first(row + 1) - first /= 2) return
+    a = findloc(bodies, constraints%body(first), dim=1)
+    b = findloc(bodies, constraints%body(first + 1), dim=1)
+    motion = allowed_motion(constraints, earlier, bodies)
+    fixed = dot_product(motion(a, :), motion(b, :)) / dot_product(motion(a, :), motion(a, :))
+    if (maxval(abs(motion(b, :) - fixed * motion(a, :))) > rank_tolerance) return
+    asked = -constraints%coefficient(1, first) / constraints%coefficient(1, first + 1)
+    relation = 0.0_wp
+    relation(b) = 1.0_wp
+    relation(a) = -fixed
+    text = ': it drives ' // quoted(body_names(bodies(b))%text) // ' at ' // ratio_text(asked) // ' times ' // &
+           quoted(body_names(bodies(a))%text) // ', but ' // &
+           joined(constraints%names(contributing_rows(constraints, earlier, bodies, relation)), ', ') // &
+           ' already drive it at ' // ratio_text(fixed) // ' times'
+  end function contradiction
+
+  !> A ratio with as many digits as tell two ratios apart, without the noise of rounding.
+  function ratio_text(ratio) result(text)
+    real(wp), intent(in) :: ratio
+    character(len=:), allocatable :: text
+    character(len=32) :: buffer
+    real(wp) :: rounded
+
+    write (buffer, '(es24.11)') ratio
+    read (buffer, *) rounded
+    text = to_text(rounded)
+  end function ratio_text
+
+  !> The independent bodies of the group: the wanted ones, or those that pivoting leaves over.
+  subroutine choose_coordinates(constraints, body_names, wanted, group, error)
+    type(constraints_t), intent(in) :: constraints
+    type(string_t), intent(in) :: body_names(:)
+    integer, intent(in) :: wanted(:)
+    type(geared_group_t), intent(inout) :: group
+    type(error_t), allocatable, intent(out) :: error
+    integer, allocatable :: others(:)
+    integer :: pivots(size(group%bodies)), freedoms, i, rank
+
+    freedoms = size(group%bodies) - size(group%kept)
+    if (size(wanted) == 0) then
+      call pivoted_rank(unit_rows(constraints, group%kept, group%bodies), rank_tolerance, rank, pivots)
+      group%independent = pack(group%bodies, [(all(pivots(:rank) /= i), i=1, size(group%bodies))])
+      return
+    end if
+    group%independent = pack(wanted, [(any(group%bodies == wanted(i)), i=1, size(wanted))])
+    if (size(group%independent) /= freedoms) then
+      call raise(error, exit_input, count_message(body_names(group%bodies), body_names(group%independent), freedoms))
+      return
+    end if
+    others = pack(group%bodies, [(all(group%independent /= group%bodies(i)), i=1, size(group%bodies))])
+    rank = 0
+    if (size(others) == size(group%kept)) call pivoted_rank(dependent_columns(), rank_tolerance, rank, pivots(:size(others)))
+    if (rank < size(group%kept)) call raise(error, exit_input, joined(body_names(group%independent), ', ') // &
+                                            ' cannot be independent: the constraints relate their speeds')
+
+  contains
+
+    function dependent_columns() result(matrix)
+      real(wp) :: matrix(size(group%kept), size(others))
+      real(wp) :: all_columns(size(group%kept), size(group%bodies))
+      integer :: k
+
+      all_columns = unit_rows(constraints, group%kept, group%bodies)
+      matrix = all_columns(:, [(findloc(group%bodies, others(k), dim=1), k=1, size(others))])
+    end function dependent_columns
+
+  end subroutine choose_coordinates
+
+  function count_message(bodies, named, freedoms) result(text)
+    type(string_t), intent(in) :: bodies(:), named(:)
+    integer, intent(in) :: freedoms
+    character(len=:), allocatable :: text
+
+    if (size(bodies) == 1) then
+      text = 'must name ' // joined(bodies, ', ') // ' once: no gear joins it to another body'
+    else
+      text = 'must name exactly ' // to_text(freedoms) // ' of the bodies ' // joined(bodies, ', ') // &
+             ', which are geared together'
+    end if
+    if (size(named) == 0) then
+      text = text // '; it names none of them'
+    else
+      text = text // '; it names ' // joined(named, ', ')
+    end if
+  end function count_message
+
+end module nocdyn_constraint_analysis

@@ -1,0 +1,87 @@
+!> The multiplier formulation: [J, -L_lambda^T; L_lambda, 0] [omega'; lambda] = [Q + C omega + K phi; 0], states omega, phi.
+module nocdyn_multiplier
+  use nocdyn_body_formulation, only: body_formulation_t
+  use nocdyn_kinds, only: wp
+  use nocdyn_lapack_lu, only: lu_factor, lu_solve
+  use nocdyn_machine, only: machine_t
+  use nocdyn_system, only: evaluation_fine
+  implicit none
+  private
+
+  public :: new_multiplier
+
+  type, extends(body_formulation_t), public :: multiplier_t
+    integer, allocatable :: kept(:)               !! constraint rows in the system: those that are independent
+    real(wp), allocatable :: factors(:, :, :)     !! LU of the matrix, which is constant, [n + kept, n + kept, lanes]
+    integer, allocatable :: pivots(:, :)          !! [n + kept, lanes]
+    real(wp), allocatable :: solution(:, :)       !! omega' and lambda, [n + kept, lanes]
+  contains
+    procedure :: derivative
+    procedure :: reactions
+  end type multiplier_t
+
+contains
+
+  function new_multiplier(machine) result(self)
+    type(machine_t), intent(in) :: machine
+    type(multiplier_t) :: self
+    integer :: b, g, l, order
+    logical :: is_singular
+
+    call self%attach_bodies(machine, 2 * machine%bodies)
+    self%kept = [(machine%groups(g)%kept, g=1, size(machine%groups))]
+    order = machine%bodies + size(self%kept)
+    allocate (self%factors(order, order, machine%lanes), source=0.0_wp)
+    allocate (self%pivots(order, machine%lanes), self%solution(order, machine%lanes))
+    do l = 1, machine%lanes
+      do b = 1, machine%bodies
+        self%factors(b, b, l) = machine%inertia(l, b)
+      end do
+      associate (constraint => machine%constraints%block(l, self%kept, [(b, b=1, machine%bodies)]))
+        self%factors(machine%bodies + 1:, :machine%bodies, l) = constraint
+        self%factors(:machine%bodies, machine%bodies + 1:, l) = -transpose(constraint)
+      end associate
+      call lu_factor(self%factors(:, :, l), self%pivots(:, l), is_singular)
+      if (is_singular) error stop 'nocdyn_multiplier: inertias must be positive and the kept rows independent'
+    end do
+  end function new_multiplier
+
+  subroutine derivative(self, t, y, dydt, status)
+    class(multiplier_t), intent(inout) :: self
+    real(wp), contiguous, intent(in) :: t(:)
+    real(wp), contiguous, intent(in) :: y(:, :)
+    real(wp), contiguous, intent(inout) :: dydt(:, :)
+    integer, contiguous, intent(inout) :: status(:)
+    integer :: l, n
+
+    n = self%machine%bodies
+    call self%place(y)
+    call self%machine%evaluate(t, self%phi, self%omega, self%torque)
+    do l = 1, self%lanes
+      self%solution(:n, l) = self%torque(l, 1:)
+      self%solution(n + 1:, l) = 0.0_wp
+      call lu_solve(self%factors(:, :, l), self%pivots(:, l), self%solution(:, l))
+      dydt(l, :n) = self%solution(:n, l)
+    end do
+    dydt(:, n + 1:2 * n) = y(:, :n)
+    call self%machine%power(dydt(:, 2 * n + 1:))
+    status = evaluation_fine
+  end subroutine derivative
+
+  !> lambda of the system itself, shared out where rows are redundant.
+  subroutine reactions(self, lane, lambda)
+    class(multiplier_t), intent(inout) :: self
+    integer, intent(in) :: lane
+    real(wp), intent(out) :: lambda(:)
+    integer :: g, next
+
+    next = self%machine%bodies + 1
+    do g = 1, size(self%machine%coordinates%blocks)
+      associate (block => self%machine%coordinates%blocks(g))
+        lambda(block%rows) = matmul(block%of_kept(lane, :, :), self%solution(next:next + size(block%kept) - 1, lane))
+        next = next + size(block%kept)
+      end associate
+    end do
+  end subroutine reactions
+
+end module nocdyn_multiplier

@@ -1,0 +1,265 @@
+!> The paper's formulation, eq. (43): J_3 beta' = Q_3 + C_3 beta + K_3 beta with beta = [omega; phi; F], as written.
+module nocdyn_paper
+  use nocdyn_bank, only: role_coupling, role_excitation, role_load, role_motor
+  use nocdyn_body_formulation, only: body_formulation_t, jacobian_of_bodies, observe_bodies, start_of_bodies
+  use nocdyn_incidence, only: add_coefficient, add_moment
+  use nocdyn_kinds, only: wp
+  use nocdyn_lapack, only: pseudo_inverse
+  use nocdyn_lapack_lu, only: lu_factor, lu_solve
+  use nocdyn_machine, only: machine_t
+  use nocdyn_paper_matrices, only: constrained_inertia, constrained_matrix, constrained_vector, damping_2, damping_3, &
+                                   damping_matrix, elastic_moments, inertia_2, inertia_3, inertia_matrix, stiffness_2, &
+                                   stiffness_3, stiffness_matrix, tangent_matrix, torque_2, torque_3, torque_vector
+  use nocdyn_system, only: evaluation_fine
+  implicit none
+  private
+
+  public :: new_paper
+
+  !> All matrices of one lane; n bodies.
+  type :: matrices_t
+    real(wp), allocatable :: stiffness(:, :), stiffness_1(:, :), stiffness_2(:, :), stiffness_3(:, :)   !! K, K_1, K_2, K_3
+    real(wp), allocatable :: damping(:, :), damping_1(:, :), damping_2(:, :), damping_3(:, :)           !! C, C_1, C_2, C_3
+    real(wp), allocatable :: torque(:), torque_1(:), torque_2(:), torque_3(:)                           !! Q, Q_1, Q_2, Q_3
+    real(wp), allocatable :: term(:)         !! one term of Q
+    real(wp), allocatable :: tangent(:, :)   !! K_4
+    real(wp), allocatable :: beta(:)         !! [omega; phi; F], then its derivative
+  end type matrices_t
+
+  type, extends(body_formulation_t), public :: paper_t
+    real(wp), allocatable, private :: complement(:, :, :)         !! L_tau, [n, freedoms, lanes]
+    real(wp), allocatable, private :: factors(:, :, :)            !! LU of J_3, [3n, 3n, lanes]
+    integer, allocatable, private :: pivots(:, :)                 !! [3n, lanes]
+    real(wp), allocatable, private :: moment_of_bodies(:, :)      !! coupling moments from moments on the bodies, [couplings, n]
+    type(matrices_t), private :: work
+  contains
+    procedure :: derivative
+    procedure :: jacobian
+    procedure :: start
+    procedure :: observe
+    procedure :: reactions
+  end type paper_t
+
+contains
+
+  function new_paper(machine) result(self)
+    type(machine_t), intent(in) :: machine
+    type(paper_t) :: self
+    integer :: b, g, l, n
+    logical :: is_singular
+    real(wp) :: inertia(machine%bodies, machine%bodies), inertia_of_1(machine%bodies, machine%bodies)
+    real(wp) :: inertia_of_2(2 * machine%bodies, 2 * machine%bodies)
+
+    n = machine%bodies
+    call self%attach_bodies(machine, 3 * n)
+    call allocate_matrices(n, self%work)
+    allocate (self%complement(n, machine%coordinates%freedoms, machine%lanes))
+    allocate (self%factors(3 * n, 3 * n, machine%lanes), self%pivots(3 * n, machine%lanes))
+    do l = 1, machine%lanes
+      self%complement(:, :, l) = machine%coordinates%complement(l)
+      call inertia_matrix(machine, l, inertia)
+      call constrained_inertia(self%complement(:, :, l), inertia, &
+                               machine%constraints%block(l, [(machine%groups(g)%kept, g=1, size(machine%groups))], &
+                                                         [(b, b=1, n)]), inertia_of_1)
+      call inertia_2(inertia_of_1, inertia_of_2)
+      call inertia_3(inertia_of_2, self%factors(:, :, l))
+      call lu_factor(self%factors(:, :, l), self%pivots(:, l), is_singular)
+      if (is_singular) error stop 'nocdyn_paper: inertias must be positive and the kept rows independent'
+    end do
+    self%moment_of_bodies = pseudo_inverse(coupling_incidence(machine), 1.0e-10_wp)
+  end function new_paper
+
+  subroutine allocate_matrices(n, work)
+    integer, intent(in) :: n
+    type(matrices_t), intent(inout) :: work
+
+    allocate (work%stiffness(n, n), work%damping(n, n), work%torque(n), work%term(n), work%tangent(n, n))
+    allocate (work%stiffness_1(n, n), work%damping_1(n, n), work%torque_1(n))
+    allocate (work%stiffness_2(2 * n, 2 * n), work%damping_2(2 * n, 2 * n), work%torque_2(2 * n))
+    allocate (work%stiffness_3(3 * n, 3 * n), work%damping_3(3 * n, 3 * n), work%torque_3(3 * n), work%beta(3 * n))
+  end subroutine allocate_matrices
+
+  !> Moments on the bodies from the restoring moments of the couplings, [n, couplings].
+  function coupling_incidence(machine) result(incidence)
+    type(machine_t), intent(in) :: machine
+    real(wp), allocatable :: incidence(:, :)
+    integer :: column, e, i
+
+    allocate (incidence(machine%bodies, coupling_count(machine)), source=0.0_wp)
+    column = 0
+    do i = 1, size(machine%banks)
+      associate (bank => machine%banks(i)%bank)
+        if (bank%role /= role_coupling) cycle
+        do e = 1, size(bank%to)
+          column = column + 1
+          call add_moment(bank%from(e), bank%to(e), 1.0_wp, incidence(:, column))
+        end do
+      end associate
+    end do
+  end function coupling_incidence
+
+  pure integer function coupling_count(machine)
+    type(machine_t), intent(in) :: machine
+    integer :: i
+
+    coupling_count = 0
+    do i = 1, size(machine%banks)
+      if (machine%banks(i)%bank%role == role_coupling) coupling_count = coupling_count + size(machine%banks(i)%bank%to)
+    end do
+  end function coupling_count
+
+  !> beta at the start: F are the elastic moments at the start angles, eqs. (48)-(51).
+  function start(self) result(y)
+    class(paper_t), intent(in) :: self
+    real(wp), allocatable :: y(:, :)
+    type(machine_t) :: machine
+    real(wp) :: t(self%lanes), moments(self%machine%bodies)
+    real(wp), dimension(self%lanes, 0:self%machine%bodies) :: phi, omega, torque
+    integer :: l, n
+
+    y = start_of_bodies(self)
+    n = self%machine%bodies
+    phi = 0.0_wp
+    omega = 0.0_wp
+    t = 0.0_wp
+    phi(:, 1:) = self%machine%start_angle
+    machine = self%machine
+    call machine%evaluate(t, phi, omega, torque)
+    do l = 1, self%lanes
+      call elastic_moments(machine, l, moments)
+      y(l, 2 * n + 1:3 * n) = moments
+    end do
+  end function start
+
+  subroutine derivative(self, t, y, dydt, status)
+    class(paper_t), intent(inout) :: self
+    real(wp), contiguous, intent(in) :: t(:)
+    real(wp), contiguous, intent(in) :: y(:, :)
+    real(wp), contiguous, intent(inout) :: dydt(:, :)
+    integer, contiguous, intent(inout) :: status(:)
+    integer :: i, l, n
+
+    n = self%machine%bodies
+    call self%place(y)
+    call self%machine%evaluate(t, self%phi, self%omega, self%torque)
+    do i = 1, size(self%machine%banks)
+      call self%machine%banks(i)%bank%assess()
+      call self%machine%banks(i)%bank%differentiate(t)
+    end do
+    do l = 1, self%lanes
+      call assemble(self%machine, l, self%complement(:, :, l), self%work)
+      self%work%beta(:) = y(l, :3 * n)
+      call solve_generalised_system(self%factors(:, :, l), self%pivots(:, l), self%work)
+      dydt(l, :3 * n) = self%work%beta
+    end do
+    call self%machine%power(dydt(:, 3 * n + 1:))
+    status = evaluation_fine
+  end subroutine derivative
+
+  !> The matrices of eqs. (16)-(72) of one lane, up to those of eq. (43).
+  subroutine assemble(machine, lane, complement, work)
+    type(machine_t), intent(in) :: machine
+    integer, intent(in) :: lane
+    real(wp), intent(in) :: complement(:, :)
+    type(matrices_t), intent(inout) :: work
+    integer, parameter :: roles(4) = [role_coupling, role_load, role_motor, role_excitation]
+    integer :: i
+
+    work%torque(:) = 0.0_wp
+    do i = 1, size(roles)
+      call torque_vector(machine, lane, roles(i), work%term)
+      work%torque(:) = work%torque + work%term
+    end do
+    call stiffness_matrix(machine, lane, work%stiffness)
+    call damping_matrix(machine, lane, work%damping)
+    call tangent_matrix(machine, lane, work%tangent)
+    call constrained_vector(complement, work%torque, work%torque_1)
+    call constrained_matrix(complement, work%damping, work%damping_1)
+    call constrained_matrix(complement, work%stiffness, work%stiffness_1)
+    call torque_2(work%torque_1, work%torque_2)
+    call damping_2(work%damping_1, work%damping_2)
+    call stiffness_2(work%stiffness_1, work%stiffness_2)
+    call torque_3(work%torque_2, work%torque_3)
+    call damping_3(work%damping_2, work%damping_3)
+    call stiffness_3(work%stiffness_2, work%tangent, work%stiffness_3)
+  end subroutine assemble
+
+  !> Eq. (43): replaces beta by its derivative.
+  subroutine solve_generalised_system(factors, pivots, work)
+    real(wp), contiguous, intent(in) :: factors(:, :)
+    integer, contiguous, intent(in) :: pivots(:)
+    type(matrices_t), intent(inout) :: work
+    integer :: j
+
+    do j = 1, size(work%beta)
+      work%torque_3(:) = work%torque_3 + (work%damping_3(:, j) + work%stiffness_3(:, j)) * work%beta(j)
+    end do
+    work%beta(:) = work%torque_3
+    call lu_solve(factors, pivots, work%beta)
+  end subroutine solve_generalised_system
+
+  !> Adds the rows F' = K_4 omega.
+  subroutine jacobian(self, t, y, dfdy, dfdt, status)
+    class(paper_t), intent(inout) :: self
+    real(wp), contiguous, intent(in) :: t(:)
+    real(wp), contiguous, intent(in) :: y(:, :)
+    real(wp), contiguous, intent(inout) :: dfdy(:, :, :)
+    real(wp), contiguous, intent(inout) :: dfdt(:, :)
+    integer, contiguous, intent(inout) :: status(:)
+    integer :: e, i, l, n
+
+    n = self%machine%bodies
+    call jacobian_of_bodies(self, t, y, dfdy, dfdt, status)
+    do l = 1, self%lanes
+      call tangent_matrix(self%machine, l, self%work%tangent)
+      dfdy(l, 2 * n + 1:3 * n, :n) = self%work%tangent
+      self%work%tangent(:, :) = 0.0_wp
+      do i = 1, size(self%machine%banks)
+        associate (bank => self%machine%banks(i)%bank)
+          do e = 1, size(bank%to)
+            call add_coefficient(bank%from(e), bank%to(e), -bank%restoring_curvature(l, e) * bank%speed(l, e), &
+                                 self%work%tangent)
+          end do
+        end associate
+      end do
+      dfdy(l, 2 * n + 1:3 * n, n + 1:2 * n) = self%work%tangent
+    end do
+  end subroutine jacobian
+
+  !> The moments of the couplings are then read from the states F: of all moments that add up to F on the bodies, those
+  !> nearest to the law's (where the couplings form no loop, F determines them).
+  subroutine observe(self, t, y)
+    class(paper_t), intent(inout) :: self
+    real(wp), contiguous, intent(in) :: t(:)
+    real(wp), contiguous, intent(in) :: y(:, :)
+    real(wp) :: difference(self%machine%bodies)
+    integer :: i, l, n, next
+
+    n = self%machine%bodies
+    call observe_bodies(self, t, y)
+    do l = 1, self%lanes
+      call elastic_moments(self%machine, l, difference)
+      difference = y(l, 2 * n + 1:3 * n) - difference
+      next = 1
+      do i = 1, size(self%machine%banks)
+        associate (bank => self%machine%banks(i)%bank)
+          if (bank%role /= role_coupling) cycle
+          bank%restoring(l, :) = bank%restoring(l, :) &
+                                 + matmul(self%moment_of_bodies(next:next + size(bank%to) - 1, :), difference)
+          next = next + size(bank%to)
+        end associate
+      end do
+    end do
+  end subroutine observe
+
+  !> lambda from eq. (12) with the accelerations of eq. (43).
+  subroutine reactions(self, lane, lambda)
+    class(paper_t), intent(inout) :: self
+    integer, intent(in) :: lane
+    real(wp), intent(out) :: lambda(:)
+
+    call self%machine%coordinates%reactions_of_imbalances(lane, &
+      self%machine%inertia(lane, :) * self%slope(lane, :self%machine%bodies) - self%torque(lane, 1:), lambda)
+  end subroutine reactions
+
+end module nocdyn_paper

@@ -1,0 +1,252 @@
+!> The matrices and vectors of the paper, eqs. (13)-(72), for any machine of n bodies.
+!>
+!> They are those of one lane at the angles and speeds at which the machine was last brought by `evaluate`,
+!> `differentiate` and by `assess` of its banks. What a law has beyond -K12 u - c u' (the rest twist of a coupling,
+!> the torque of a motor) stands in Q. Every procedure overwrites its last argument and allocates nothing.
+module nocdyn_paper_matrices
+  use nocdyn_incidence, only: add_coefficient, add_moment
+  use nocdyn_kinds, only: wp
+  use nocdyn_machine, only: machine_t
+  implicit none
+  private
+
+  public :: inertia_matrix, torque_vector, stiffness_matrix, damping_matrix, tangent_matrix, elastic_moments
+  public :: constrained_inertia, constrained_matrix, constrained_vector
+  public :: inertia_2, damping_2, stiffness_2, torque_2
+  public :: inertia_3, damping_3, stiffness_3, torque_3
+
+contains
+
+  !> J of eq. (13), [n, n].
+  subroutine inertia_matrix(machine, lane, inertia)
+    type(machine_t), intent(in) :: machine
+    integer, intent(in) :: lane
+    real(wp), intent(inout) :: inertia(:, :)
+    integer :: b
+
+    inertia = 0.0_wp
+    do b = 1, machine%bodies
+      inertia(b, b) = machine%inertia(lane, b)
+    end do
+  end subroutine inertia_matrix
+
+  !> The terms of Q, eq. (16), from the banks of one role: Q_0 of eq. (17) from the excitations, Q_m of eqs. (18), (20)
+  !> from the motors, and what couplings and loads have beyond K phi and C omega, [n].
+  subroutine torque_vector(machine, lane, role, torque)
+    type(machine_t), intent(in) :: machine
+    integer, intent(in) :: lane
+    integer, intent(in) :: role   !! role_... of nocdyn_bank
+    real(wp), intent(inout) :: torque(:)
+    integer :: e, i
+
+    torque = 0.0_wp
+    do i = 1, size(machine%banks)
+      associate (bank => machine%banks(i)%bank)
+        if (bank%role /= role) cycle
+        do e = 1, size(bank%to)
+          call add_moment(bank%from(e), bank%to(e), (bank%restoring(lane, e) + bank%secant(lane, e) * bank%angle(lane, e)) &
+                          + (bank%working(lane, e) + bank%damping(lane, e) * bank%speed(lane, e)), torque)
+        end do
+      end associate
+    end do
+  end subroutine torque_vector
+
+  !> K of eq. (21) from the secant stiffnesses K12 of eq. (3), [n, n].
+  subroutine stiffness_matrix(machine, lane, stiffness)
+    type(machine_t), intent(in) :: machine
+    integer, intent(in) :: lane
+    real(wp), intent(inout) :: stiffness(:, :)
+    integer :: e, i
+
+    stiffness = 0.0_wp
+    do i = 1, size(machine%banks)
+      associate (bank => machine%banks(i)%bank)
+        do e = 1, size(bank%to)
+          call add_coefficient(bank%from(e), bank%to(e), bank%secant(lane, e), stiffness)
+        end do
+      end associate
+    end do
+  end subroutine stiffness_matrix
+
+  !> C of eq. (22) from viscous loads and the damping of couplings, [n, n].
+  subroutine damping_matrix(machine, lane, damping)
+    type(machine_t), intent(in) :: machine
+    integer, intent(in) :: lane
+    real(wp), intent(inout) :: damping(:, :)
+    integer :: e, i
+
+    damping = 0.0_wp
+    do i = 1, size(machine%banks)
+      associate (bank => machine%banks(i)%bank)
+        do e = 1, size(bank%to)
+          call add_coefficient(bank%from(e), bank%to(e), bank%damping(lane, e), damping)
+        end do
+      end associate
+    end do
+  end subroutine damping_matrix
+
+  !> K_4 of eqs. (62)-(72) from the tangent stiffnesses K1 + 3 k1 w^2, [n, n]; the derivative of the elastic moments is
+  !> F' = K_4 omega, eqs. (47), (52)-(56).
+  subroutine tangent_matrix(machine, lane, tangent)
+    type(machine_t), intent(in) :: machine
+    integer, intent(in) :: lane
+    real(wp), intent(inout) :: tangent(:, :)
+    integer :: e, i
+
+    tangent = 0.0_wp
+    do i = 1, size(machine%banks)
+      associate (bank => machine%banks(i)%bank)
+        do e = 1, size(bank%to)
+          call add_coefficient(bank%from(e), bank%to(e), -bank%restoring_angle(lane, e), tangent)
+        end do
+      end associate
+    end do
+  end subroutine tangent_matrix
+
+  !> F of eqs. (48)-(51): the elastic moment that acts on each body, [n].
+  subroutine elastic_moments(machine, lane, moments)
+    type(machine_t), intent(in) :: machine
+    integer, intent(in) :: lane
+    real(wp), intent(inout) :: moments(:)
+    integer :: e, i
+
+    moments = 0.0_wp
+    do i = 1, size(machine%banks)
+      associate (bank => machine%banks(i)%bank)
+        do e = 1, size(bank%to)
+          call add_moment(bank%from(e), bank%to(e), bank%restoring(lane, e), moments)
+        end do
+      end associate
+    end do
+  end subroutine elastic_moments
+
+  !> J_1 of eq. (25): [L_tau^T J; L_lambda], [n, n].
+  subroutine constrained_inertia(complement, inertia, constraint, inertia_1)
+    real(wp), intent(in) :: complement(:, :)   !! L_tau, [n, freedoms]
+    real(wp), intent(in) :: inertia(:, :)      !! J, [n, n]
+    real(wp), intent(in) :: constraint(:, :)   !! L_lambda, [n - freedoms, n]
+    real(wp), intent(inout) :: inertia_1(:, :)
+
+    call constrained_matrix(complement, inertia, inertia_1)
+    inertia_1(size(complement, 2) + 1:, :) = constraint
+  end subroutine constrained_inertia
+
+  !> C_1 of eq. (29) and K_1 of eq. (30): [L_tau^T M; 0], [n, n].
+  subroutine constrained_matrix(complement, matrix, matrix_1)
+    real(wp), intent(in) :: complement(:, :), matrix(:, :)
+    real(wp), intent(inout) :: matrix_1(:, :)
+    integer :: j
+
+    do j = 1, size(matrix, 2)
+      call constrained_vector(complement, matrix(:, j), matrix_1(:, j))
+    end do
+  end subroutine constrained_matrix
+
+  !> Q_1, Q_0^1, Q_m^1 of eqs. (26)-(28): [L_tau^T Q; 0], [n].
+  subroutine constrained_vector(complement, vector, vector_1)
+    real(wp), intent(in) :: complement(:, :), vector(:)
+    real(wp), intent(inout) :: vector_1(:)
+    integer :: i
+
+    vector_1 = 0.0_wp
+    do i = 1, size(complement, 2)
+      vector_1(i) = dot_product(complement(:, i), vector)
+    end do
+  end subroutine constrained_vector
+
+  !> J_2 of eq. (35): diag(J_1, I) with the unit matrix of eq. (36), [2n, 2n].
+  subroutine inertia_2(inertia_1, matrix)
+    real(wp), intent(in) :: inertia_1(:, :)
+    real(wp), intent(inout) :: matrix(:, :)
+
+    call extend_by_unit(inertia_1, matrix)
+  end subroutine inertia_2
+
+  !> C_2 of eq. (38): [C_1, 0; 0, 0] with the zero matrix of eq. (37), [2n, 2n].
+  subroutine damping_2(damping_1, matrix)
+    real(wp), intent(in) :: damping_1(:, :)
+    real(wp), intent(inout) :: matrix(:, :)
+
+    call extend_by_zero(damping_1, matrix)
+  end subroutine damping_2
+
+  !> K_2 of eq. (39): [0, K_1; I, 0], [2n, 2n].
+  subroutine stiffness_2(stiffness_1, matrix)
+    real(wp), intent(in) :: stiffness_1(:, :)
+    real(wp), intent(inout) :: matrix(:, :)
+    integer :: i, n
+
+    n = size(stiffness_1, 1)
+    matrix = 0.0_wp
+    matrix(:n, n + 1:) = stiffness_1
+    do i = 1, n
+      matrix(n + i, i) = 1.0_wp
+    end do
+  end subroutine stiffness_2
+
+  !> Q_2 of eq. (40): [Q_1; 0], [2n].
+  subroutine torque_2(torque_1, vector)
+    real(wp), intent(in) :: torque_1(:)
+    real(wp), intent(inout) :: vector(:)
+
+    vector = 0.0_wp
+    vector(:size(torque_1)) = torque_1
+  end subroutine torque_2
+
+  !> J_3 of eq. (44): diag(J_1, I, I) = diag(J_2, I), [3n, 3n].
+  subroutine inertia_3(matrix_2, matrix)
+    real(wp), intent(in) :: matrix_2(:, :)
+    real(wp), intent(inout) :: matrix(:, :)
+
+    call extend_by_unit(matrix_2, matrix)
+  end subroutine inertia_3
+
+  !> C_3 of eq. (60): [C_2, 0; 0, 0], [3n, 3n].
+  subroutine damping_3(matrix_2, matrix)
+    real(wp), intent(in) :: matrix_2(:, :)
+    real(wp), intent(inout) :: matrix(:, :)
+
+    call extend_by_zero(matrix_2, matrix)
+  end subroutine damping_3
+
+  !> K_3 of eq. (61): [K_2, 0; (K_4, 0), 0], K_4 acting on omega, [3n, 3n].
+  subroutine stiffness_3(matrix_2, tangent, matrix)
+    real(wp), intent(in) :: matrix_2(:, :)   !! K_2, [2n, 2n]
+    real(wp), intent(in) :: tangent(:, :)    !! K_4, [n, n]
+    real(wp), intent(inout) :: matrix(:, :)
+
+    call extend_by_zero(matrix_2, matrix)
+    matrix(size(matrix_2, 1) + 1:, :size(tangent, 2)) = tangent
+  end subroutine stiffness_3
+
+  !> Q_3 of eq. (58): [Q_2; 0] with the zero vector of eq. (59), [3n].
+  subroutine torque_3(vector_2, vector)
+    real(wp), intent(in) :: vector_2(:)
+    real(wp), intent(inout) :: vector(:)
+
+    vector = 0.0_wp
+    vector(:size(vector_2)) = vector_2
+  end subroutine torque_3
+
+  !> diag(block, I).
+  pure subroutine extend_by_unit(block, matrix)
+    real(wp), intent(in) :: block(:, :)
+    real(wp), intent(inout) :: matrix(:, :)
+    integer :: i
+
+    call extend_by_zero(block, matrix)
+    do i = size(block, 1) + 1, size(matrix, 1)
+      matrix(i, i) = 1.0_wp
+    end do
+  end subroutine extend_by_unit
+
+  !> diag(block, 0).
+  pure subroutine extend_by_zero(block, matrix)
+    real(wp), intent(in) :: block(:, :)
+    real(wp), intent(inout) :: matrix(:, :)
+
+    matrix = 0.0_wp
+    matrix(:size(block, 1), :size(block, 2)) = block
+  end subroutine extend_by_zero
+
+end module nocdyn_paper_matrices

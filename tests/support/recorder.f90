@@ -1,0 +1,53 @@
+!> An observer that keeps all that it is told.
+module nocdyn_recorder
+  use nocdyn_kinds, only: wp
+  use nocdyn_system, only: observer_t, system_t
+  implicit none
+  private
+
+  public :: recorder
+
+  type, extends(observer_t), public :: recorder_t
+    integer, allocatable :: count(:)         !! records of each lane
+    real(wp), allocatable :: t(:, :)         !! [lanes, times]
+    real(wp), allocatable :: y(:, :, :)      !! [lanes, times, components]
+    real(wp) :: stop_time = huge(1.0_wp)     !! asks to stop once the slowest lane is there
+    integer :: questions = 0                 !! calls of `stops`
+  contains
+    procedure :: record
+    procedure :: stops
+  end type recorder_t
+
+contains
+
+  pure function recorder(system, times)
+    class(system_t), intent(in) :: system
+    integer, intent(in) :: times
+    type(recorder_t) :: recorder
+
+    allocate (recorder%count(system%lanes), source=0)
+    allocate (recorder%t(system%lanes, times), source=0.0_wp)
+    allocate (recorder%y(system%lanes, times, system%states + system%quadratures), source=0.0_wp)
+  end function recorder
+
+  subroutine record(self, lane, t, y)
+    class(recorder_t), intent(inout) :: self
+    integer, intent(in) :: lane
+    real(wp), intent(in) :: t
+    real(wp), contiguous, intent(in) :: y(:)
+
+    self%count(lane) = self%count(lane) + 1
+    self%t(lane, self%count(lane)) = t
+    self%y(lane, self%count(lane), :) = y
+  end subroutine record
+
+  function stops(self, t)
+    class(recorder_t), intent(inout) :: self
+    real(wp), intent(in) :: t
+    logical :: stops
+
+    self%questions = self%questions + 1
+    stops = t >= self%stop_time
+  end function stops
+
+end module nocdyn_recorder

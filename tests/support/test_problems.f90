@@ -1,0 +1,378 @@
+!> Systems of equations that the integrators are tested on.
+module nocdyn_test_problems
+  use nocdyn_kinds, only: wp
+  use nocdyn_system, only: evaluation_fine, evaluation_give_up, evaluation_shorten, system_t
+  implicit none
+  private
+
+  public :: smooth_problem, smooth_solution, smooth_quadrature, stiff_problem, duffing_problem, wall_problem, rest_problem
+
+  !> What a `wall_t` does on its far side.
+  integer, parameter, public :: wall_absent = 0
+  integer, parameter, public :: wall_not_finite = 1
+  integer, parameter, public :: wall_shorten = 2
+  integer, parameter, public :: wall_give_up = 3
+  integer, parameter, public :: wall_jump = 4       !! the slope jumps by a factor of 1e30
+  integer, parameter, public :: wall_jacobian = 5   !! only the Jacobian is not finite there
+
+  !> y' = rate (g(y) - g(u)) + u' with y = u(t), and one quadrature w' = y1 y2^2 - u1 u2^2 + cos(2 t) with w = sin(2 t) / 2;
+  !> g = (-y1 y2 + y2^2 / 2, y1^2 / 2 - y2).
+  type, extends(system_t), public :: smooth_t
+    real(wp), allocatable :: rate(:)
+  contains
+    procedure :: derivative => smooth_derivative
+    procedure :: jacobian => smooth_jacobian
+    procedure :: component_name => smooth_name
+  end type smooth_t
+
+  !> Prothero and Robinson: y' = -stiffness (y - cos t) - sin t, with y = cos t, and a quadrature w' = y.
+  type, extends(system_t), public :: stiff_t
+    real(wp), allocatable :: stiffness(:)
+  contains
+    procedure :: derivative => stiff_derivative
+    procedure :: jacobian => stiff_jacobian
+    procedure :: component_name => stiff_name
+  end type stiff_t
+
+  !> x'' + 0.1 x' + stiffness x + x^3 = 3 cos(1.3 t), and the work of the damper as a quadrature.
+  type, extends(system_t), public :: duffing_t
+    real(wp), allocatable :: stiffness(:)
+  contains
+    procedure :: derivative => duffing_derivative
+    procedure :: jacobian => duffing_jacobian
+    procedure :: component_name => duffing_name
+  end type duffing_t
+
+  !> (y1', y2') = (1, cos t) as long as y1 < place; then whatever `answer` says.
+  type, extends(system_t), public :: wall_t
+    real(wp), allocatable :: place(:)
+    integer, allocatable :: answer(:)   !! wall_...
+  contains
+    procedure :: derivative => wall_derivative
+    procedure :: jacobian => wall_jacobian_values
+    procedure :: component_name => wall_name
+  end type wall_t
+
+  !> Nothing moves; the quadratures, if there are any, grow with the slope 1.
+  type, extends(system_t), public :: rest_t
+  contains
+    procedure :: derivative => rest_derivative
+    procedure :: jacobian => rest_jacobian
+    procedure :: component_name => rest_name
+  end type rest_t
+
+contains
+
+  pure function smooth_problem(rate) result(problem)
+    real(wp), intent(in) :: rate(:)
+    type(smooth_t) :: problem
+
+    problem%lanes = size(rate)
+    problem%states = 2
+    problem%quadratures = 1
+    allocate (problem%rate, source=rate)
+  end function smooth_problem
+
+  pure function smooth_solution(t) result(u)
+    real(wp), intent(in) :: t
+    real(wp) :: u(2)
+
+    u = [1 + 0.5_wp * sin(t), exp(-0.5_wp * t) * cos(2 * t)]
+  end function smooth_solution
+
+  pure function smooth_slope(t) result(slope)
+    real(wp), intent(in) :: t
+    real(wp) :: slope(2)
+
+    slope = [0.5_wp * cos(t), exp(-0.5_wp * t) * (-0.5_wp * cos(2 * t) - 2 * sin(2 * t))]
+  end function smooth_slope
+
+  pure function smooth_curvature(t) result(curvature)
+    real(wp), intent(in) :: t
+    real(wp) :: curvature(2)
+
+    curvature = [-0.5_wp * sin(t), exp(-0.5_wp * t) * (-3.75_wp * cos(2 * t) + 2 * sin(2 * t))]
+  end function smooth_curvature
+
+  pure function smooth_quadrature(t) result(w)
+    real(wp), intent(in) :: t
+    real(wp) :: w
+
+    w = 0.5_wp * sin(2 * t)
+  end function smooth_quadrature
+
+  pure function smooth_coupling(y) result(g)
+    real(wp), intent(in) :: y(2)
+    real(wp) :: g(2)
+
+    g = [-y(1) * y(2) + 0.5_wp * y(2)**2, 0.5_wp * y(1)**2 - y(2)]
+  end function smooth_coupling
+
+  subroutine smooth_derivative(self, t, y, dydt, status)
+    class(smooth_t), intent(inout) :: self
+    real(wp), contiguous, intent(in) :: t(:)
+    real(wp), contiguous, intent(in) :: y(:, :)
+    real(wp), contiguous, intent(inout) :: dydt(:, :)
+    integer, contiguous, intent(inout) :: status(:)
+    real(wp) :: u(2)
+    integer :: lane
+
+    status = evaluation_fine
+    do lane = 1, self%lanes
+      u = smooth_solution(t(lane))
+      dydt(lane, 1:2) = self%rate(lane) * (smooth_coupling(y(lane, 1:2)) - smooth_coupling(u)) + smooth_slope(t(lane))
+      dydt(lane, 3) = y(lane, 1) * y(lane, 2)**2 - u(1) * u(2)**2 + cos(2 * t(lane))
+    end do
+  end subroutine smooth_derivative
+
+  subroutine smooth_jacobian(self, t, y, dfdy, dfdt, status)
+    class(smooth_t), intent(inout) :: self
+    real(wp), contiguous, intent(in) :: t(:)
+    real(wp), contiguous, intent(in) :: y(:, :)
+    real(wp), contiguous, intent(inout) :: dfdy(:, :, :)
+    real(wp), contiguous, intent(inout) :: dfdt(:, :)
+    integer, contiguous, intent(inout) :: status(:)
+    real(wp) :: u(2), v(2)
+    integer :: lane
+
+    status = evaluation_fine
+    do lane = 1, self%lanes
+      u = smooth_solution(t(lane))
+      v = smooth_slope(t(lane))
+      dfdy(lane, 1, :) = self%rate(lane) * [-y(lane, 2), -y(lane, 1) + y(lane, 2)]
+      dfdy(lane, 2, :) = self%rate(lane) * [y(lane, 1), -1.0_wp]
+      dfdy(lane, 3, :) = [y(lane, 2)**2, 2 * y(lane, 1) * y(lane, 2)]
+      dfdt(lane, 1:2) = smooth_curvature(t(lane)) &
+        - self%rate(lane) * [-v(1) * u(2) - u(1) * v(2) + u(2) * v(2), u(1) * v(1) - v(2)]
+      dfdt(lane, 3) = -v(1) * u(2)**2 - 2 * u(1) * u(2) * v(2) - 2 * sin(2 * t(lane))
+    end do
+  end subroutine smooth_jacobian
+
+  function smooth_name(self, index) result(name)
+    class(smooth_t), intent(in) :: self
+    integer, intent(in) :: index
+    character(len=:), allocatable :: name
+
+    name = numbered('smooth', index, self%states)
+  end function smooth_name
+
+  pure function stiff_problem(stiffness) result(problem)
+    real(wp), intent(in) :: stiffness(:)
+    type(stiff_t) :: problem
+
+    problem%lanes = size(stiffness)
+    problem%states = 1
+    problem%quadratures = 1
+    allocate (problem%stiffness, source=stiffness)
+  end function stiff_problem
+
+  subroutine stiff_derivative(self, t, y, dydt, status)
+    class(stiff_t), intent(inout) :: self
+    real(wp), contiguous, intent(in) :: t(:)
+    real(wp), contiguous, intent(in) :: y(:, :)
+    real(wp), contiguous, intent(inout) :: dydt(:, :)
+    integer, contiguous, intent(inout) :: status(:)
+
+    status = evaluation_fine
+    dydt(:, 1) = -self%stiffness * (y(:, 1) - cos(t)) - sin(t)
+    dydt(:, 2) = y(:, 1)
+  end subroutine stiff_derivative
+
+  subroutine stiff_jacobian(self, t, y, dfdy, dfdt, status)
+    class(stiff_t), intent(inout) :: self
+    real(wp), contiguous, intent(in) :: t(:)
+    real(wp), contiguous, intent(in) :: y(:, :)
+    real(wp), contiguous, intent(inout) :: dfdy(:, :, :)
+    real(wp), contiguous, intent(inout) :: dfdt(:, :)
+    integer, contiguous, intent(inout) :: status(:)
+
+    status = evaluation_fine
+    dfdy(:, 1, 1) = -self%stiffness
+    dfdy(:, 2, 1) = 1.0_wp
+    dfdt(:, 1) = -self%stiffness * sin(t) - cos(t)
+    dfdt(:, 2) = 0.0_wp * y(:, 2)
+  end subroutine stiff_jacobian
+
+  function stiff_name(self, index) result(name)
+    class(stiff_t), intent(in) :: self
+    integer, intent(in) :: index
+    character(len=:), allocatable :: name
+
+    name = numbered('stiff', index, self%states)
+  end function stiff_name
+
+  pure function duffing_problem(stiffness) result(problem)
+    real(wp), intent(in) :: stiffness(:)
+    type(duffing_t) :: problem
+
+    problem%lanes = size(stiffness)
+    problem%states = 2
+    problem%quadratures = 1
+    allocate (problem%stiffness, source=stiffness)
+  end function duffing_problem
+
+  subroutine duffing_derivative(self, t, y, dydt, status)
+    class(duffing_t), intent(inout) :: self
+    real(wp), contiguous, intent(in) :: t(:)
+    real(wp), contiguous, intent(in) :: y(:, :)
+    real(wp), contiguous, intent(inout) :: dydt(:, :)
+    integer, contiguous, intent(inout) :: status(:)
+    integer :: lane
+
+    status = evaluation_fine
+    do lane = 1, self%lanes
+      dydt(lane, 1) = y(lane, 2)
+      dydt(lane, 2) = 3 * cos(1.3_wp * t(lane)) - 0.1_wp * y(lane, 2) - self%stiffness(lane) * y(lane, 1) - y(lane, 1)**3
+      dydt(lane, 3) = 0.1_wp * y(lane, 2)**2
+    end do
+  end subroutine duffing_derivative
+
+  subroutine duffing_jacobian(self, t, y, dfdy, dfdt, status)
+    class(duffing_t), intent(inout) :: self
+    real(wp), contiguous, intent(in) :: t(:)
+    real(wp), contiguous, intent(in) :: y(:, :)
+    real(wp), contiguous, intent(inout) :: dfdy(:, :, :)
+    real(wp), contiguous, intent(inout) :: dfdt(:, :)
+    integer, contiguous, intent(inout) :: status(:)
+
+    status = evaluation_fine
+    dfdy(:, :, :) = 0.0_wp
+    dfdy(:, 1, 2) = 1.0_wp
+    dfdy(:, 2, 1) = -self%stiffness - 3 * y(:, 1)**2
+    dfdy(:, 2, 2) = -0.1_wp
+    dfdy(:, 3, 2) = 0.2_wp * y(:, 2)
+    dfdt(:, :) = 0.0_wp
+    dfdt(:, 2) = -3.9_wp * sin(1.3_wp * t)
+  end subroutine duffing_jacobian
+
+  function duffing_name(self, index) result(name)
+    class(duffing_t), intent(in) :: self
+    integer, intent(in) :: index
+    character(len=:), allocatable :: name
+
+    name = numbered('duffing', index, self%states)
+  end function duffing_name
+
+  pure function wall_problem(place, answer) result(problem)
+    real(wp), intent(in) :: place(:)
+    integer, intent(in) :: answer(:)
+    type(wall_t) :: problem
+
+    problem%lanes = size(place)
+    problem%states = 2
+    allocate (problem%place, source=place)
+    allocate (problem%answer, source=answer)
+  end function wall_problem
+
+  subroutine wall_derivative(self, t, y, dydt, status)
+    class(wall_t), intent(inout) :: self
+    real(wp), contiguous, intent(in) :: t(:)
+    real(wp), contiguous, intent(in) :: y(:, :)
+    real(wp), contiguous, intent(inout) :: dydt(:, :)
+    integer, contiguous, intent(inout) :: status(:)
+    integer :: lane
+
+    status = evaluation_fine
+    do lane = 1, self%lanes
+      dydt(lane, 1) = 1.0_wp
+      dydt(lane, 2) = cos(t(lane))
+      if (y(lane, 1) < self%place(lane)) cycle
+      select case (self%answer(lane))
+      case (wall_not_finite)
+        dydt(lane, 2) = quiet_nan()
+      case (wall_shorten)
+        status(lane) = evaluation_shorten
+      case (wall_give_up)
+        status(lane) = evaluation_give_up
+      case (wall_jump)
+        dydt(lane, 2) = 1.0e30_wp
+      end select
+    end do
+  end subroutine wall_derivative
+
+  subroutine wall_jacobian_values(self, t, y, dfdy, dfdt, status)
+    class(wall_t), intent(inout) :: self
+    real(wp), contiguous, intent(in) :: t(:)
+    real(wp), contiguous, intent(in) :: y(:, :)
+    real(wp), contiguous, intent(inout) :: dfdy(:, :, :)
+    real(wp), contiguous, intent(inout) :: dfdt(:, :)
+    integer, contiguous, intent(inout) :: status(:)
+    integer :: lane
+
+    status = evaluation_fine
+    dfdy(:, :, :) = 0.0_wp
+    dfdt(:, :) = 0.0_wp
+    do lane = 1, self%lanes
+      dfdt(lane, 2) = -sin(t(lane))
+      if (self%answer(lane) == wall_jacobian .and. y(lane, 1) >= self%place(lane)) dfdy(lane, 1, 2) = quiet_nan()
+    end do
+  end subroutine wall_jacobian_values
+
+  function wall_name(self, index) result(name)
+    class(wall_t), intent(in) :: self
+    integer, intent(in) :: index
+    character(len=:), allocatable :: name
+
+    name = numbered('wall', index, self%states)
+  end function wall_name
+
+  !> NaN that raises no exception when it is made or copied.
+  pure function quiet_nan() result(nan)
+    use, intrinsic :: iso_fortran_env, only: int64
+    real(wp) :: nan
+
+    nan = transfer(int(z'7FF8000000000000', int64), nan)
+  end function quiet_nan
+
+  pure function rest_problem(lanes, states, quadratures) result(problem)
+    integer, intent(in) :: lanes, states, quadratures
+    type(rest_t) :: problem
+
+    problem%lanes = lanes
+    problem%states = states
+    problem%quadratures = quadratures
+  end function rest_problem
+
+  subroutine rest_derivative(self, t, y, dydt, status)
+    class(rest_t), intent(inout) :: self
+    real(wp), contiguous, intent(in) :: t(:)
+    real(wp), contiguous, intent(in) :: y(:, :)
+    real(wp), contiguous, intent(inout) :: dydt(:, :)
+    integer, contiguous, intent(inout) :: status(:)
+
+    status = merge(evaluation_fine, evaluation_give_up, size(t) == self%lanes .and. size(y, 1) == self%lanes)
+    dydt(:, :self%states) = 0.0_wp
+    dydt(:, self%states + 1:) = 1.0_wp
+  end subroutine rest_derivative
+
+  subroutine rest_jacobian(self, t, y, dfdy, dfdt, status)
+    class(rest_t), intent(inout) :: self
+    real(wp), contiguous, intent(in) :: t(:)
+    real(wp), contiguous, intent(in) :: y(:, :)
+    real(wp), contiguous, intent(inout) :: dfdy(:, :, :)
+    real(wp), contiguous, intent(inout) :: dfdt(:, :)
+    integer, contiguous, intent(inout) :: status(:)
+
+    status = merge(evaluation_fine, evaluation_give_up, size(t) == self%lanes .and. size(y, 1) == self%lanes)
+    dfdy(:, :, :) = 0.0_wp
+    dfdt(:, :) = 0.0_wp
+  end subroutine rest_jacobian
+
+  function rest_name(self, index) result(name)
+    class(rest_t), intent(in) :: self
+    integer, intent(in) :: index
+    character(len=:), allocatable :: name
+
+    name = numbered('rest', index, self%states)
+  end function rest_name
+
+  pure function numbered(word, index, states) result(name)
+    character(len=*), intent(in) :: word
+    integer, intent(in) :: index, states
+    character(len=:), allocatable :: name
+
+    name = word // merge(' state     ', ' quadrature', index <= states)
+    name = trim(name) // ' ' // achar(iachar('0') + index)
+  end function numbered
+
+end module nocdyn_test_problems
