@@ -112,10 +112,10 @@ contains
     integer, allocatable :: indices(:)
 
     if (culprit > 0) then
-      indices = input%groups_named('gear')
+      allocate (indices, source=input%groups_named('gear'))
       error%message = input%place(indices(culprit)) // ': ' // error%message
     else
-      indices = input%groups_named('run')
+      allocate (indices, source=input%groups_named('run'))
       error%message = input%place(indices(1), 'independent') // ': independent ' // error%message
     end if
   end subroutine tell_place
@@ -127,7 +127,7 @@ contains
     integer, allocatable :: indices(:)
     integer :: i
 
-    indices = input%groups_named(kind)
+    allocate (indices, source=input%groups_named(kind))
     allocate (names(size(indices)))
     do i = 1, size(indices)
       names(i)%text = input%groups(indices(i))%name
@@ -142,7 +142,7 @@ contains
     integer, allocatable :: indices(:)
     integer :: i
 
-    indices = input%groups_named(kind)
+    allocate (indices, source=input%groups_named(kind))
     allocate (values(1, size(indices)))
     do i = 1, size(indices)
       values(1, i) = input%groups(indices(i))%number(key)
@@ -167,7 +167,7 @@ contains
     type(string_t), allocatable :: names(:)
     integer :: i
 
-    names = group%texts(key)
+    allocate (names, source=group%texts(key))
     allocate (bodies(size(names)))
     do i = 1, size(names)
       bodies(i) = directory%body(names(i)%text)
@@ -184,7 +184,7 @@ contains
     integer, allocatable :: bodies(:), indices(:)
     integer :: i
 
-    indices = input%groups_named(kind)
+    allocate (indices, source=input%groups_named(kind))
     allocate (chosen(size(indices)))
     do i = 1, size(indices)
       bodies = bodies_of(input%groups(indices(i)), key, directory)
@@ -225,7 +225,7 @@ contains
     real(wp), allocatable :: coefficients(:, :)
     integer :: i
 
-    indices = input%groups_named('gear')
+    allocate (indices, source=input%groups_named('gear'))
     allocate (units(size(indices)), coefficients(2, size(indices)), wheels(2, size(indices)))
     wheels(1, :) = ends_of(input, 'gear', 'bodies', 1, directory)
     wheels(2, :) = ends_of(input, 'gear', 'bodies', 2, directory)

@@ -53,7 +53,7 @@ contains
     do b = 1, machine%bodies
       if (all(machine%coordinates%body /= b)) call report%append(new_line('a') // '  ' // speed_relation(machine, b))
     end do
-    notes = redundancy_notes(machine)
+    allocate (notes, source=redundancy_notes(machine))
     do i = 1, size(notes)
       call report%append(new_line('a') // '  note: ' // notes(i)%text)
     end do

@@ -127,7 +127,7 @@ contains
   subroutine solve(formulation, run, times, recorder, outcome, error)
     class(formulation_t), intent(inout) :: formulation
     type(group_t), intent(in) :: run
-    real(wp), intent(in) :: times(:)
+    real(wp), contiguous, intent(in) :: times(:)
     type(recorder_t), intent(inout) :: recorder
     type(outcome_t), intent(out) :: outcome
     type(error_t), allocatable, intent(out) :: error

@@ -1,4 +1,6 @@
 !> The dense linear algebra of the constraint analysis, by LAPACK.
+!>
+!> Arrays are allocated with `source=`: gfortran 12 takes the descriptor that an assignment allocates for uninitialised.
 module nocdyn_lapack
   use nocdyn_kinds, only: wp
   use nocdyn_lapack_lu, only: lu_factor
@@ -62,7 +64,7 @@ contains
     rank = 0
     if (min(m, n) == 0) return
     allocate (tau(min(m, n)), work(2 * n + 32 * (n + 1)))
-    a = matrix
+    allocate (a, source=matrix)
     pivots = 0
     call dgeqp3(m, n, a, m, pivots, tau, work, size(work), info)
     if (info /= 0) error stop 'nocdyn_lapack: dgeqp3 was called with a wrong argument'
@@ -84,7 +86,7 @@ contains
 
     n = size(matrix, 1)
     allocate (ipiv(n), work(max(1, 32 * n)))
-    inverse = matrix
+    allocate (inverse, source=matrix)
     log_determinant = 0.0_wp
     call lu_factor(inverse, ipiv, is_singular)
     if (is_singular) return
@@ -104,8 +106,8 @@ contains
     integer :: info, n
 
     n = size(matrix, 1)
-    a = matrix
-    solution = rhs
+    allocate (a, source=matrix)
+    allocate (solution, source=rhs)
     call dposv('L', n, size(rhs, 2), a, max(1, n), solution, max(1, n), info)
     is_indefinite = info /= 0
   end subroutine solve_positive_definite
@@ -114,7 +116,7 @@ contains
   function pseudo_inverse(matrix, tolerance) result(inverse)
     real(wp), intent(in) :: matrix(:, :)
     real(wp), intent(in) :: tolerance          !! singular below this times the largest, as in `pivoted_rank`
-    real(wp), allocatable :: inverse(:, :)     !! shape transposed
+    real(wp) :: inverse(size(matrix, 2), size(matrix, 1))
     real(wp), allocatable :: a(:, :), b(:, :), work(:)
     integer, allocatable :: jpvt(:)
     integer :: info, k, m, n, rank
@@ -127,7 +129,7 @@ contains
     do k = 1, m
       b(k, k) = 1.0_wp
     end do
-    a = matrix
+    allocate (a, source=matrix)
     if (min(m, n) > 0) call dgelsy(m, n, m, a, m, b, size(b, 1), jpvt, tolerance, rank, work, size(work), info)
     inverse = b(:n, :)
   end function pseudo_inverse

@@ -60,12 +60,11 @@ contains
     case (integration_too_many_steps)
       sentence = 'the integration stopped at ' // when // ' after ' // to_text(outcome%steps(lane)) // &
         ' steps, the most that max_steps allows (last step ' // rounded(outcome%h(lane)) // ' s): raise max_steps, ' // &
-        'loosen rtol and atol, or, if the machine is stiff, use a Rosenbrock method'
+        'loosen rtol and atol, or, if the system is stiff, use a Rosenbrock method'
     case (integration_not_finite)
       sentence = not_finite_sentence(outcome, lane, system, when)
     case (integration_gave_up)
-      sentence = 'the equations cannot be evaluated beyond ' // when // ', and a shorter step does not help: ' // &
-        'check the start values and the parameters'
+      sentence = gave_up_sentence(outcome%steps(lane) == 0, when)
     case (integration_interrupted)
       sentence = 'the integration was interrupted at ' // when
     case default
@@ -109,6 +108,19 @@ contains
         ', however short the step (h = ' // rounded(outcome%h(lane)) // ' s): look for a singularity there'
     end if
   end function not_finite_sentence
+
+  pure function gave_up_sentence(at_start, when) result(sentence)
+    logical, intent(in) :: at_start
+    character(len=*), intent(in) :: when
+    character(len=:), allocatable :: sentence
+
+    if (at_start) then
+      sentence = 'the equations cannot be evaluated at the start, ' // when
+    else
+      sentence = 'the equations cannot be evaluated beyond ' // when // ', and a shorter step does not help'
+    end if
+    sentence = sentence // ': check the start values and the parameters'
+  end function gave_up_sentence
 
   !> The value to six digits, as short as it can be written.
   function rounded(value) result(text)

@@ -44,7 +44,7 @@ contains
     if (self%is_written .and. (self%is_whole .or. assignment%is_whole)) then
       complaint = doubled(self, trim(rule%name))
     else
-      call find_last(assignment, rule, last, complaint)
+      call find_last(namelist, assignment, rule, last, complaint)
     end if
     if (.not. self%is_written) self%line = assignment%line
     self%is_written = .true.
@@ -77,7 +77,7 @@ contains
       self%slots = [slot_t ::]
       self%is_damaged = .false.
     end if
-    call find_last(assignment, rule, last, complaint)
+    call find_last(namelist, assignment, rule, last, complaint)
     self%is_damaged = self%is_damaged .or. assignment%is_damaged .or. complaint /= ''
     if (self%is_damaged) return
     call widen(self, last)
@@ -93,7 +93,8 @@ contains
   end function doubled
 
   !> Index of the last value that an assignment can reach.
-  subroutine find_last(assignment, rule, last, complaint)
+  subroutine find_last(namelist, assignment, rule, last, complaint)
+    type(namelist_t), intent(in) :: namelist
     type(assignment_t), intent(in) :: assignment
     type(key_rule_t), intent(in) :: rule
     integer, intent(out) :: last
@@ -111,10 +112,26 @@ contains
     else if (rule%count /= any_number .and. max(last, assignment%first) > rule%count) then
       complaint = 'the subscript of ' // trim(rule%name) // ' is out of range; allowed: 1 to ' // to_text(rule%count)
     else if (items > (last - assignment%first) / assignment%stride + 1) then
-      complaint = trim(rule%name) // ' has ' // to_text(items) // ' values; allowed: ' &
-        // to_text((last - assignment%first) / assignment%stride + 1)
+      complaint = trim(rule%name) // ' has ' // to_text(items) // ' values (' // found_values(namelist, assignment) &
+        // '); allowed: ' // to_text((last - assignment%first) / assignment%stride + 1)
     end if
   end subroutine find_last
+
+  !> The first few values as they are written.
+  pure function found_values(namelist, assignment) result(text)
+    type(namelist_t), intent(in) :: namelist
+    type(assignment_t), intent(in) :: assignment
+    character(len=:), allocatable :: text
+    integer, parameter :: few = 5
+    integer :: i
+
+    text = ''
+    do i = assignment%first_item, min(assignment%last_item, assignment%first_item + few - 1)
+      if (i > assignment%first_item) text = text // ', '
+      if (.not. namelist%items(i)%is_null) text = text // namelist%as_written(namelist%items(i))
+    end do
+    if (assignment%last_item - assignment%first_item >= few) text = text // ' ...'
+  end function found_values
 
   subroutine widen(draft, last)
     type(draft_t), intent(inout) :: draft

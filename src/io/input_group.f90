@@ -9,7 +9,7 @@ module nocdyn_input_group
   use nocdyn_schema, only: a_name, alternatives, first_key, group_rules, key_rule_index, key_rule_t, key_rules, &
     last_key, orders, unset
   use nocdyn_schema_text, only: allowed_text, key_names, suggestion
-  use nocdyn_text, only: nearest_word, to_text
+  use nocdyn_text, only: lower_case, nearest_word, to_text
   implicit none
   private
 
@@ -71,7 +71,12 @@ contains
         end if
         call work%drafts(key - work%first + 1)%assign(namelist, assignment, key_rules(key), complaint)
         if (complaint == '') cycle
-        call mistakes%add(assignment%line, work%index, complaint // missing_equals(namelist, assignment, work%rule))
+        key = key_without_equals(namelist, assignment, work%rule)
+        if (key > 0) then
+          complaint = complaint // "; is '=' missing behind " // trim(key_rules(key)%name) // '?'
+          work%may_miss(key - work%first + 1) = .true.
+        end if
+        call mistakes%add(assignment%line, work%index, complaint)
       end associate
     end do
   end subroutine take_assignments
@@ -89,24 +94,20 @@ contains
       // trim(group_rules(work%rule)%name) // suggestion(assignment%key, key_names(work%rule)))
   end subroutine refuse_key
 
-  !> If one of the values is a key, an equals sign was probably forgotten.
-  pure function missing_equals(namelist, assignment, rule) result(hint)
+  !> Row of a key that stands among the values, 0 if none does: its equals sign was probably forgotten.
+  pure integer function key_without_equals(namelist, assignment, rule) result(key)
     type(namelist_t), intent(in) :: namelist
     type(assignment_t), intent(in) :: assignment
     integer, intent(in) :: rule
-    character(len=:), allocatable :: hint
-    character(len=:), allocatable :: word
     integer :: i
 
-    hint = ''
+    key = 0
     do i = assignment%first_item, assignment%last_item
       if (namelist%items(i)%is_quoted .or. namelist%items(i)%is_null) cycle
-      word = namelist%item_text(namelist%items(i))
-      if (key_rule_index(rule, word) == 0) cycle
-      hint = "; is '=' missing behind " // word // '?'
-      return
+      key = key_rule_index(rule, lower_case(namelist%item_text(namelist%items(i))))
+      if (key > 0) return
     end do
-  end function missing_equals
+  end function key_without_equals
 
   !> The name that the file gives, '' if none.
   pure function name_of(work) result(name)

@@ -75,8 +75,9 @@ contains
   end subroutine report_doubles
 
   !> Every body that is referred to must be there, and no key may name one twice.
-  subroutine check_references(groups, mistakes)
+  subroutine check_references(groups, bodies_are_known, mistakes)
     type(group_t), intent(in) :: groups(:)
+    logical, intent(in) :: bodies_are_known   !! false: a &body has a name that could not be read
     type(mistakes_t), intent(inout) :: mistakes
     type(string_t), allocatable :: bodies(:)
     integer, allocatable :: members(:), order(:)
@@ -93,7 +94,7 @@ contains
         rule = key_rules(first_key(groups(g)%rule) + key - 1)
         if (rule%kind /= a_body .and. rule%kind /= body_or_ground) cycle
         if (.not. allocated(groups(g)%values(key)%texts)) cycle
-        call check_missing(groups(g)%values(key), g, trim(rule%name), bodies, order, missing, mistakes)
+        if (bodies_are_known) call check_missing(groups(g)%values(key), g, trim(rule%name), bodies, order, missing, mistakes)
         call check_repeated(groups(g)%values(key), g, trim(rule%name), mistakes)
       end do
     end do

@@ -61,7 +61,7 @@ contains
     call check_occurrences(input%groups, mistakes)
     call refuse_unused(input%groups, parsed, mistakes)
     call check_doubled_names(input%groups, mistakes)
-    if (.not. may_lack_bodies(namelist)) call check_references(input%groups, mistakes)
+    call check_references(input%groups, bodies_are_known(input%groups), mistakes)
     if (mistakes%count > 0) call raise(error, exit_input, report(input, mistakes))
   end subroutine read_input_text
 
@@ -164,22 +164,21 @@ contains
     end do
   end subroutine refuse_unused
 
-  !> Whether a &body is there whose name could not be read, so that references to it must not be refused.
-  pure logical function may_lack_bodies(namelist)
-    type(namelist_t), intent(in) :: namelist
-    integer :: g, nearest
+  !> False if a &body, perhaps misspelt, is there whose name could not be read.
+  pure logical function bodies_are_known(groups)
+    type(group_t), intent(in) :: groups(:)
+    integer :: body, g
 
-    may_lack_bodies = .false.
-    do g = 1, namelist%group_count
-      nearest = group_rule_index(namelist%groups(g)%name)
-      if (nearest == 0) then
-        nearest = nearest_word(namelist%groups(g)%name, group_names())
-        may_lack_bodies = may_lack_bodies .or. nearest == group_rule_index('body')
-      else if (nearest == group_rule_index('body')) then
-        may_lack_bodies = may_lack_bodies .or. namelist%groups(g)%is_damaged
+    body = group_rule_index('body')
+    bodies_are_known = .true.
+    do g = 1, size(groups)
+      if (groups(g)%rule == 0) then
+        bodies_are_known = bodies_are_known .and. nearest_word(groups(g)%kind, group_names()) /= body
+      else if (groups(g)%rule == body) then
+        bodies_are_known = bodies_are_known .and. groups(g)%name /= ''
       end if
     end do
-  end function may_lack_bodies
+  end function bodies_are_known
 
   !> One line for each mistake.
   function report(input, mistakes) result(text)

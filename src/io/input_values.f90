@@ -106,7 +106,7 @@ contains
     case (literal_not_finite)
       complaint = ' is not a finite number; allowed: ' // allowed_text(rule)
     case (literal_too_large)
-      complaint = ' is too large for a number; at most ' // to_text(huge(value)) // '; allowed: ' // allowed_text(rule)
+      complaint = ' is too large for a number; allowed: ' // allowed_text(rule)
     case default
       complaint = ' is not a number; allowed: ' // allowed_text(rule)
     end select
@@ -124,7 +124,7 @@ contains
     case (literal_fine)
       if (is_outside(real(value, wp), rule%allowed)) complaint = ' is out of range; allowed: ' // allowed_text(rule)
     case (literal_too_large)
-      complaint = ' is too large for a whole number; at most ' // to_text(huge(value)) // '; allowed: ' // allowed_text(rule)
+      complaint = ' is too large; at most ' // to_text(huge(value)) // '; allowed: ' // allowed_text(rule)
     case default
       complaint = ' is not a whole number; allowed: ' // allowed_text(rule)
     end select

@@ -185,7 +185,7 @@ module nocdyn_schema
     example_t('body',       "name = 'motor'    inertia = 10.0"), &
     example_t('body',       "name = 'pinion'   inertia = 5.0"), &
     example_t('body',       "name = 'machine'  inertia = 5.0"), &
-    example_t('coupling',   "name = 'coupling' bodies = 'motor', 'pinion'  stiffness = 100.0  cubic_stiffness = 10.0"), &
+    example_t('coupling',   "name = 'coupling' bodies = 'motor', 'pinion' stiffness = 100.0 cubic_stiffness = 10.0"), &
     example_t('gear',       "name = 'reducer'  bodies = 'pinion', 'machine' radii = 2.0, 3.0"), &
     example_t('motor',      "name = 'drive'    body = 'motor'    a = 200.0  b = 10.0  c = 1.0"), &
     example_t('load',       "name = 'work'     body = 'machine'  viscous = 100.0"), &

@@ -96,9 +96,10 @@ contains
     integer, intent(in) :: rows(:), bodies(:)
     real(wp), intent(in) :: wanted(:)
     integer, allocatable :: contributing(:)
-    real(wp) :: share(size(rows))
+    real(wp) :: inverse(size(rows), size(bodies)), share(size(rows))
 
-    share = matmul(pseudo_inverse(transpose(unit_rows(constraints, rows, bodies)), rank_tolerance), wanted)
+    inverse = pseudo_inverse(transpose(unit_rows(constraints, rows, bodies)), rank_tolerance)
+    share = matmul(inverse, wanted)
     contributing = pack(rows, abs(share) > sqrt(rank_tolerance) * maxval(abs(share)))
   end function contributing_rows
 
@@ -130,7 +131,7 @@ contains
     integer, allocatable :: locked(:)
     real(wp), allocatable :: motion(:, :)
 
-    motion = allowed_motion(constraints, rows, bodies)
+    allocate (motion, source=allowed_motion(constraints, rows, bodies))
     locked = pack(bodies, maxval(abs(motion), dim=2) <= rank_tolerance)
   end function locked_bodies
 
@@ -165,7 +166,7 @@ contains
     if (constraints%first(row + 1) - first /= 2) return
     a = findloc(bodies, constraints%body(first), dim=1)
     b = findloc(bodies, constraints%body(first + 1), dim=1)
-    motion = allowed_motion(constraints, earlier, bodies)
+    allocate (motion, source=allowed_motion(constraints, earlier, bodies))
     fixed = dot_product(motion(a, :), motion(b, :)) / dot_product(motion(a, :), motion(a, :))
     if (maxval(abs(motion(b, :) - fixed * motion(a, :))) > rank_tolerance) return
     asked = -constraints%coefficient(1, first) / constraints%coefficient(1, first + 1)

@@ -1,0 +1,66 @@
+"""Draws figures 2 to 5 of the paper from the results of its two cases."""
+
+import argparse
+import shutil
+import sys
+from pathlib import Path
+
+from matplotlib import pyplot
+from matplotlib.figure import Figure
+
+from .paper_machine import steady_state
+from .phase_planes import draw_phase_planes
+from .results import Results, ResultsError, read_results
+from .style import REFERENCE, WIDTH, draw_lines, plain, save
+
+ROOT = Path(__file__).resolve().parents[2]
+MEDIA = ROOT / "docs" / "media"
+
+
+def draw_elastic_moments(results: Results) -> Figure:
+    """F1 and F2 = -F1 over time, with their steady values."""
+    figure, axes = pyplot.subplots(figsize=(WIDTH, 4.2))
+    moment = results.columns("moment")[0].values
+    steady = steady_state(results).moment
+    axes.axhline(steady, label="uniform\nmotion", **REFERENCE)
+    axes.axhline(-steady, **REFERENCE)
+    draw_lines(axes, ["F₁", "F₂"], [(results.time, moment), (results.time, -moment)])
+    axes.set_xlim(results.time[0], results.time[-1])
+    axes.set_xlabel("time $t$ [s]")
+    axes.set_ylabel("elastic moment [N m]")
+    return figure
+
+
+def draw_paper_figures(case1: Results, case2: Results, folder: Path) -> list[str]:
+    """Saves the figures and gives their names."""
+    drawn = []
+    for number, results in ((2, case1), (4, case2)):
+        planes, moments = draw_phase_planes(results), draw_elastic_moments(results)
+        planes.suptitle(plain(f"Figure {number}. Phase planes. {results.title}"))
+        moments.suptitle(plain(f"Figure {number + 1}. Elastic moments. {results.title}"))
+        for offset, figure in enumerate((planes, moments)):
+            drawn.append(f"fig{number + offset}")
+            save(figure, folder, drawn[-1])
+    return drawn
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(prog="scripts/figures", description=__doc__)
+    parser.add_argument("results", nargs=2, type=Path, metavar="RESULTS", help="results folders of case 1 and of case 2")
+    parser.add_argument("--out", type=Path, default=ROOT / "results" / "figures", metavar="DIR",
+                        help="where fig2 ... fig5 go, as PNG, SVG and PDF (%(default)s)")
+    parser.add_argument("--media", action="store_true", help="also copy the PNG files to docs/media, for the README")
+    arguments = parser.parse_args()
+    try:
+        names = draw_paper_figures(*map(read_results, arguments.results), arguments.out)
+    except ResultsError as error:
+        sys.exit(f"{parser.prog}: {error}")
+    if arguments.media:
+        MEDIA.mkdir(parents=True, exist_ok=True)
+        for name in names:
+            shutil.copy(arguments.out / f"{name}.png", MEDIA)
+    print(f"{', '.join(names)} (PNG, SVG, PDF) are in {arguments.out}")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,77 @@
+"""How all figures look, and how they are saved."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import matplotlib
+import numpy as np
+from matplotlib import colormaps, pyplot
+from matplotlib.axes import Axes
+from matplotlib.colors import BoundaryNorm, ListedColormap
+from matplotlib.cm import ScalarMappable
+from matplotlib.figure import Figure
+
+# Okabe and Ito's colours, told apart with any colour vision, without the yellow that white paper swallows.
+COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
+REFERENCE = {"color": "0.35", "linestyle": (0, (5, 3)), "linewidth": 0.9}
+FORMATS = ("png", "svg", "pdf")
+WIDTH = 8.0  # of a figure [in]
+MOST_TICKS = 8  # on the colour bar that stands for a legend of many lines
+
+matplotlib.use("Agg")
+matplotlib.rcParams.update({
+    "axes.axisbelow": True,
+    "axes.formatter.limits": (-4, 5),
+    "axes.formatter.use_mathtext": True,
+    "axes.grid": True,
+    "axes.spines.right": False,
+    "axes.spines.top": False,
+    "axes.titlesize": 10,
+    "axes.titleweight": "bold",
+    "figure.constrained_layout.use": True,
+    "figure.titlesize": 12,
+    "font.size": 10,
+    "grid.color": "0.88",
+    "grid.linewidth": 0.6,
+    "legend.frameon": False,
+    "lines.linewidth": 1.3,
+    "pdf.fonttype": 42,  # fonts as TrueType, so that the text stays text
+    "savefig.dpi": 160,
+    "svg.fonttype": "none",
+    "svg.hashsalt": "nocdyn",  # the same picture gives the same file
+})
+
+
+def plain(text: str) -> str:
+    """Text of a user, without meaning for mathematics."""
+    return text.replace("$", r"\$")
+
+
+def draw_lines(axes: Axes, names: Sequence[str], lines: Sequence[tuple[np.ndarray, np.ndarray]]) -> None:
+    """Lines (x, y) with their names: in a legend if they are few, else on a colour bar."""
+    few = len(lines) <= len(COLOURS)
+    palette = COLOURS if few else colormaps["viridis"](np.linspace(0.0, 0.95, len(lines)))
+    for name, (x, y), colour in zip(names, lines, palette):
+        axes.plot(x, y, color=colour, label=plain(name), linewidth=1.3 if few else 0.8)
+    if few:
+        axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
+    else:
+        _add_colour_bar(axes, names, palette)
+
+
+def _add_colour_bar(axes: Axes, names: Sequence[str], palette: np.ndarray) -> None:
+    norm = BoundaryNorm(np.arange(len(names) + 1) - 0.5, len(names))
+    ticks = np.unique(np.linspace(0, len(names) - 1, MOST_TICKS).round().astype(int))
+    bar = axes.figure.colorbar(ScalarMappable(norm, ListedColormap(palette)), ax=axes, ticks=ticks)
+    bar.ax.set_yticklabels([plain(names[tick]) for tick in ticks])
+    bar.ax.tick_params(which="both", length=0)
+    bar.ax.invert_yaxis()  # reads as the list of bodies does
+
+
+def save(figure: Figure, folder: Path, name: str) -> None:
+    """Writes FOLDER/NAME.png, .svg and .pdf and frees the figure."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for kind in FORMATS:
+        undated = {"png": None, "svg": {"Date": None}, "pdf": {"CreationDate": None}}[kind]
+        figure.savefig(folder / f"{name}.{kind}", metadata=undated)
+    pyplot.close(figure)

@@ -1,0 +1,183 @@
+!> Machines to test with.
+module nocdyn_test_machines
+  use nocdyn_bank, only: bank_slot_t, bank_t
+  use nocdyn_constraint_analysis, only: analyse_constraints
+  use nocdyn_constraints, only: constraints_t, new_constraints
+  use nocdyn_coordinates, only: new_coordinates
+  use nocdyn_couplings, only: new_couplings
+  use nocdyn_errors, only: error_t
+  use nocdyn_excitations, only: new_excitations
+  use nocdyn_kinds, only: wp
+  use nocdyn_loads, only: new_loads
+  use nocdyn_machine, only: machine_t
+  use nocdyn_motors, only: new_motors
+  use nocdyn_text, only: string_t, to_text
+  implicit none
+  private
+
+  public :: paper_machine, damped_chain, branched_train, gear_loop, bare_machine
+  public :: install, gear_rows, numbered_names, finish
+
+contains
+
+  !> The machine of the paper's section 7.
+  function paper_machine(amplitude, choice) result(machine)
+    real(wp), intent(in) :: amplitude   !! M_0 [N m]: 0 in case 1, which has no excitation, 20 in case 2
+    integer, intent(in) :: choice       !! complement_...
+    type(machine_t) :: machine
+
+    machine = bare_machine(row([10.0_wp, 5.0_wp, 5.0_wp]))
+    machine%names = [string_t('motor'), string_t('pinion'), string_t('machine')]
+    call install(machine%banks, new_couplings([string_t('coupling')], [1], [2], row([100.0_wp]), row([10.0_wp]), &
+                                              row([0.0_wp]), row([0.0_wp])))
+    call install(machine%banks, new_motors([string_t('drive')], [1], row([200.0_wp]), row([10.0_wp]), row([1.0_wp])))
+    call install(machine%banks, new_loads([string_t('work')], [3], row([100.0_wp])))
+    if (abs(amplitude) > 0.0_wp) then
+      call install(machine%banks, new_excitations([string_t('shaker')], [1], row([amplitude]), row([5.0_wp]), &
+                                                  row([0.0_wp])))
+    end if
+    machine%constraints = gear_rows(3, reshape([2, 3], [2, 1]), row([2.0_wp, 3.0_wp]))
+    machine%constraints%names(1)%text = 'reducer'
+    call finish(machine, [1, 2], choice)
+  end function paper_machine
+
+  !> Four bodies without gears between two walls: damping, rest twists, softening and hardening springs, phases.
+  function damped_chain() result(machine)
+    type(machine_t) :: machine
+
+    machine = bare_machine(row([4.0_wp, 2.0_wp, 1.0_wp, 3.0_wp]))
+    call install(machine%banks, new_couplings(numbered_names('spring', 5), [0, 1, 2, 3, 4], [1, 2, 3, 4, 0], &
+                                              row([30.0_wp, 100.0_wp, 80.0_wp, 50.0_wp, 20.0_wp]), &
+                                              row([5.0_wp, 10.0_wp, -4.0_wp, 0.0_wp, 0.0_wp]), &
+                                              row([0.7_wp, 3.0_wp, 0.0_wp, 1.5_wp, 0.0_wp]), &
+                                              row([0.3_wp, 0.2_wp, 0.0_wp, -0.1_wp, 0.4_wp])))
+    call install(machine%banks, new_motors(numbered_names('motor', 1), [1], row([90.0_wp]), row([6.0_wp]), &
+                                           row([0.5_wp])))
+    call install(machine%banks, new_loads(numbered_names('load', 1), [3], row([12.0_wp])))
+    call install(machine%banks, new_excitations(numbered_names('shaker', 2), [2, 4], row([8.0_wp, 5.0_wp]), &
+                                                row([3.0_wp, 7.0_wp]), row([0.5_wp, -1.0_wp])))
+    machine%start_angle = row([0.1_wp, -0.2_wp, 0.3_wp, 0.05_wp])
+    machine%start_speed = row([1.0_wp, 0.5_wp, -0.4_wp, 2.0_wp])
+    call finish(machine, [integer ::], 1)
+  end function damped_chain
+
+  !> Seven bodies: body 2 drives 1, 3 (an internal gear) and 4; 5 drives 6; 7 is free. The couplings form a loop.
+  function branched_train(choice) result(machine)
+    integer, intent(in) :: choice   !! complement_...
+    type(machine_t) :: machine
+
+    machine = bare_machine(row([4.0_wp, 2.0_wp, 6.0_wp, 1.0_wp, 3.0_wp, 2.5_wp, 8.0_wp]))
+    call install(machine%banks, new_couplings(numbered_names('shaft', 4), [4, 3, 6, 0], [5, 5, 7, 7], &
+                                              row([60.0_wp, 40.0_wp, 90.0_wp, 10.0_wp]), &
+                                              row([4.0_wp, 0.0_wp, 7.0_wp, 0.0_wp]), &
+                                              row([0.5_wp, 0.0_wp, 1.0_wp, 0.2_wp]), &
+                                              row([0.0_wp, 0.1_wp, -0.2_wp, 0.0_wp])))
+    call install(machine%banks, new_motors(numbered_names('motor', 1), [1], row([150.0_wp]), row([8.0_wp]), &
+                                           row([0.3_wp])))
+    call install(machine%banks, new_loads(numbered_names('load', 2), [3, 7], row([5.0_wp, 20.0_wp])))
+    machine%constraints = gear_rows(7, reshape([1, 2, 2, 3, 2, 4, 5, 6], [2, 4]), &
+                                    row([2.0_wp, 3.0_wp, 1.5_wp, -4.0_wp, 1.0_wp, 2.5_wp, 1.0_wp, 1.25_wp]))
+    call finish(machine, [integer ::], choice)
+  end function branched_train
+
+  !> Four wheels in a ring, the last gear of which repeats the others, and a fifth body on a coupling.
+  function gear_loop() result(machine)
+    type(machine_t) :: machine
+
+    machine = bare_machine(row([4.0_wp, 2.0_wp, 6.0_wp, 1.0_wp, 3.0_wp]))
+    call install(machine%banks, new_couplings(numbered_names('shaft', 1), [3], [5], row([60.0_wp]), row([4.0_wp]), &
+                                              row([0.5_wp]), row([0.0_wp])))
+    call install(machine%banks, new_motors(numbered_names('motor', 1), [1], row([150.0_wp]), row([8.0_wp]), &
+                                           row([0.3_wp])))
+    call install(machine%banks, new_loads(numbered_names('load', 2), [4, 5], row([5.0_wp, 20.0_wp])))
+    machine%constraints = gear_rows(5, reshape([1, 2, 2, 3, 3, 4, 4, 1], [2, 4]), &
+                                    row([0.2_wp, 0.3_wp, 0.3_wp, 0.5_wp, 0.5_wp, 0.4_wp, 0.4_wp, 0.2_wp]))
+    call finish(machine, [integer ::], 1)
+  end function gear_loop
+
+  !> Bodies at rest that nothing joins or drives.
+  function bare_machine(inertia) result(machine)
+    real(wp), intent(in) :: inertia(:, :)   !! [lanes, bodies] [kg m2]
+    type(machine_t) :: machine
+
+    machine%lanes = size(inertia, 1)
+    machine%bodies = size(inertia, 2)
+    machine%names = numbered_names('body', machine%bodies)
+    machine%inertia = inertia
+    allocate (machine%start_angle, machine%start_speed, source=0.0_wp * inertia)
+    machine%banks = element_banks(machine%lanes)
+    machine%constraints = gear_rows(machine%bodies, reshape([integer ::], [2, 0]), inertia(:, :0))
+  end function bare_machine
+
+  !> One bank of every kind in the order of the roles, without elements.
+  function element_banks(lanes) result(banks)
+    integer, intent(in) :: lanes
+    type(bank_slot_t), allocatable :: banks(:)
+    type(string_t) :: names(0)
+    real(wp) :: none(lanes, 0)
+
+    allocate (banks(4))
+    call install(banks, new_couplings(names, [integer ::], [integer ::], none, none, none, none))
+    call install(banks, new_motors(names, [integer ::], none, none, none))
+    call install(banks, new_loads(names, [integer ::], none))
+    call install(banks, new_excitations(names, [integer ::], none, none, none))
+  end function element_banks
+
+  !> Puts a bank into the place of its role; what was there is dropped.
+  subroutine install(banks, bank)
+    type(bank_slot_t), intent(inout) :: banks(:)
+    class(bank_t), intent(in) :: bank
+
+    associate (slot => banks(bank%role))
+      if (allocated(slot%bank)) deallocate (slot%bank)
+      allocate (slot%bank, source=bank)
+    end associate
+  end subroutine install
+
+  !> Gears 'gear1', 'gear2' ... between two bodies each.
+  function gear_rows(bodies, wheels, coefficients) result(constraints)
+    integer, intent(in) :: bodies
+    integer, intent(in) :: wheels(:, :)          !! [2, gears]
+    real(wp), intent(in) :: coefficients(:, :)   !! radii, negative for the second of an internal gear, [lanes, 2 gears]
+    type(constraints_t) :: constraints
+    integer :: i
+
+    associate (gears => size(wheels, 2))
+      constraints = new_constraints(bodies, numbered_names('gear', gears), [(string_t('N'), i=1, gears)], &
+                                    [(2 * i - 1, i=1, gears + 1)], reshape(wheels, [2 * gears]), coefficients)
+    end associate
+  end function gear_rows
+
+  !> Analyses the gears of a machine that has everything else.
+  subroutine finish(machine, wanted, choice)
+    type(machine_t), intent(inout) :: machine
+    integer, intent(in) :: wanted(:)   !! bodies that are to be the coordinates, none to have them found
+    integer, intent(in) :: choice      !! complement_...
+    type(error_t), allocatable :: error
+    integer :: culprit
+
+    call analyse_constraints(machine%constraints, machine%names, wanted, machine%groups, culprit, error)
+    if (allocated(error)) error stop 'nocdyn_test_machines: a machine to test with has gears that lock'
+    machine%coordinates = new_coordinates(machine%constraints, machine%groups, machine%inertia, wanted, choice)
+  end subroutine finish
+
+  function numbered_names(stem, count) result(names)
+    character(len=*), intent(in) :: stem
+    integer, intent(in) :: count
+    type(string_t) :: names(count)
+    integer :: i
+
+    do i = 1, count
+      names(i)%text = stem // to_text(i)
+    end do
+  end function numbered_names
+
+  !> The numbers of a single lane.
+  pure function row(values)
+    real(wp), intent(in) :: values(:)
+    real(wp) :: row(1, size(values))
+
+    row(1, :) = values
+  end function row
+
+end module nocdyn_test_machines

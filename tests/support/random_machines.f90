@@ -1,0 +1,142 @@
+!> Machines of any size that are different with every seed, alone or in blocks of lanes.
+module nocdyn_test_random_machines
+  use nocdyn_constraints, only: constraints_t
+  use nocdyn_couplings, only: new_couplings
+  use nocdyn_excitations, only: new_excitations
+  use nocdyn_kinds, only: wp
+  use nocdyn_loads, only: new_loads
+  use nocdyn_machine, only: machine_t
+  use nocdyn_motors, only: new_motors
+  use nocdyn_test_machines, only: bare_machine, finish, gear_rows, install, numbered_names
+  use nocdyn_test_random, only: random_stream, random_stream_t
+  implicit none
+  private
+
+  public :: random_machine
+
+contains
+
+  !> A forest of gears, external and internal, with gears that repeat others, and elements of all kinds.
+  !>
+  !> What is joined to what depends on `seed`; the numbers of a lane on `seed` and on the variant of that lane.
+  function random_machine(seed, bodies, variants, wanted, choice) result(machine)
+    integer, intent(in) :: seed, bodies
+    integer, intent(in) :: variants(:)   !! of each lane
+    integer, intent(in) :: wanted(:)     !! bodies that are to be the coordinates, none to have them found
+    integer, intent(in) :: choice        !! complement_...
+    type(machine_t) :: machine
+    type(random_stream_t) :: layout, lanes(size(variants))
+    real(wp) :: speed(size(variants), bodies)   ! with which all gears of the machine can run together
+    integer :: b, l
+
+    layout = random_stream(seed)
+    do l = 1, size(lanes)
+      lanes(l) = random_stream(1000 * seed + variants(l))
+    end do
+    machine = bare_machine(drawn(lanes, 0.5_wp, 10.0_wp, bodies))
+    speed = drawn(lanes, 0.4_wp, 2.5_wp, bodies)
+    do b = 1, bodies
+      if (layout%number(0.0_wp, 1.0_wp) < 0.6_wp) speed(:, b) = -speed(:, b)
+    end do
+    machine%constraints = random_gears(layout, lanes, speed)
+    call add_couplings(layout, lanes, machine)
+    call add_torques(layout, lanes, machine)
+    machine%start_speed = speed
+    machine%start_angle = drawn(lanes, -1.0_wp, 1.0_wp, bodies)
+    call finish(machine, wanted, choice)
+  end function random_machine
+
+  !> Gears that fit the speeds: m speed(b) * omega(a) - m speed(a) * omega(b) = 0.
+  function random_gears(layout, lanes, speed) result(constraints)
+    type(random_stream_t), intent(inout) :: layout, lanes(:)
+    real(wp), intent(in) :: speed(:, :)   !! [lanes, bodies]
+    type(constraints_t) :: constraints
+    real(wp), allocatable :: coefficients(:, :), measure(:, :)
+    integer, allocatable :: wheels(:, :)
+    integer :: i
+
+    wheels = random_wheels(layout, size(speed, 2))
+    measure = drawn(lanes, 0.5_wp, 2.0_wp, size(wheels, 2))
+    allocate (coefficients(size(lanes), size(wheels)))
+    do i = 1, size(wheels, 2)
+      coefficients(:, 2 * i - 1) = measure(:, i) * speed(:, wheels(2, i))
+      coefficients(:, 2 * i) = -measure(:, i) * speed(:, wheels(1, i))
+    end do
+    constraints = gear_rows(size(speed, 2), wheels, coefficients)
+  end function random_gears
+
+  !> Most bodies mesh with an earlier one; then some more gears within the groups.
+  function random_wheels(layout, bodies) result(wheels)
+    type(random_stream_t), intent(inout) :: layout
+    integer, intent(in) :: bodies
+    integer, allocatable :: wheels(:, :)   !! [2, gears]
+    integer :: a, b, i, root(bodies)
+
+    wheels = reshape([integer ::], [2, 0])
+    do b = 1, bodies
+      root(b) = b
+      if (b == 1 .or. layout%number(0.0_wp, 1.0_wp) > 0.7_wp) cycle
+      a = layout%whole(1, b - 1)
+      root(b) = root(a)
+      wheels = reshape([wheels, a, b], [2, size(wheels, 2) + 1])
+    end do
+    do i = 1, bodies / 3
+      a = layout%whole(1, bodies)
+      b = layout%whole(1, bodies)
+      if (a /= b .and. root(a) == root(b)) wheels = reshape([wheels, a, b], [2, size(wheels, 2) + 1])
+    end do
+  end function random_wheels
+
+  !> As many couplings as bodies, one in three without damping.
+  subroutine add_couplings(layout, lanes, machine)
+    type(random_stream_t), intent(inout) :: layout, lanes(:)
+    type(machine_t), intent(inout) :: machine
+    integer :: from(machine%bodies), to(machine%bodies)
+    real(wp) :: damping(size(lanes), machine%bodies)
+    integer :: i
+
+    do i = 1, machine%bodies
+      from(i) = layout%whole(0, machine%bodies)
+      to(i) = modulo(from(i) + layout%whole(1, machine%bodies), machine%bodies + 1)
+    end do
+    damping = drawn(lanes, 0.5_wp, 3.0_wp, machine%bodies)
+    damping(:, 3::3) = 0.0_wp
+    call install(machine%banks, new_couplings(numbered_names('shaft', machine%bodies), from, to, &
+                                              drawn(lanes, 50.0_wp, 150.0_wp, machine%bodies), &
+                                              drawn(lanes, -10.0_wp, 10.0_wp, machine%bodies), damping, &
+                                              drawn(lanes, -0.3_wp, 0.3_wp, machine%bodies)))
+  end subroutine add_couplings
+
+  !> Two motors, three loads, two excitations, which may share bodies.
+  subroutine add_torques(layout, lanes, machine)
+    type(random_stream_t), intent(inout) :: layout, lanes(:)
+    type(machine_t), intent(inout) :: machine
+    integer :: body(7), i
+
+    do i = 1, size(body)
+      body(i) = layout%whole(1, machine%bodies)
+    end do
+    call install(machine%banks, new_motors(numbered_names('motor', 2), body(1:2), drawn(lanes, 50.0_wp, 200.0_wp, 2), &
+                                           drawn(lanes, 1.0_wp, 10.0_wp, 2), drawn(lanes, -1.0_wp, 1.0_wp, 2)))
+    call install(machine%banks, new_loads(numbered_names('load', 3), body(3:5), drawn(lanes, 1.0_wp, 100.0_wp, 3)))
+    call install(machine%banks, new_excitations(numbered_names('shaker', 2), body(6:7), &
+                                                drawn(lanes, 1.0_wp, 30.0_wp, 2), drawn(lanes, 1.0_wp, 8.0_wp, 2), &
+                                                drawn(lanes, -3.0_wp, 3.0_wp, 2)))
+  end subroutine add_torques
+
+  !> Numbers of every lane from its own stream, [lanes, count].
+  function drawn(lanes, low, high, count) result(values)
+    type(random_stream_t), intent(inout) :: lanes(:)
+    real(wp), intent(in) :: low, high
+    integer, intent(in) :: count
+    real(wp) :: values(size(lanes), count)
+    integer :: i, l
+
+    do i = 1, count
+      do l = 1, size(lanes)
+        values(l, i) = lanes(l)%number(low, high)
+      end do
+    end do
+  end function drawn
+
+end module nocdyn_test_random_machines

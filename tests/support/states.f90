@@ -1,0 +1,116 @@
+!> States of a machine that its gears allow, and the same state as each formulation writes it.
+module nocdyn_test_states
+  use nocdyn_body_formulation, only: body_formulation_t
+  use nocdyn_formulation, only: formulation_t
+  use nocdyn_kinds, only: wp
+  use nocdyn_machine, only: machine_t
+  use nocdyn_multiplier, only: new_multiplier
+  use nocdyn_paper, only: new_paper
+  use nocdyn_paper_matrices, only: elastic_moments
+  use nocdyn_reduced, only: new_reduced, reduced_t
+  use nocdyn_test_random, only: random_stream, random_stream_t
+  implicit none
+  private
+
+  public :: draw_state, state_of, bring_to, all_formulations
+
+  type, public :: formulation_slot_t
+    class(formulation_t), allocatable :: formulation
+  end type formulation_slot_t
+
+contains
+
+  !> `reduced`, `paper`, `multiplier`.
+  function all_formulations(machine) result(slots)
+    type(machine_t), intent(in) :: machine
+    type(formulation_slot_t) :: slots(3)
+
+    slots(1)%formulation = new_reduced(machine)
+    slots(2)%formulation = new_paper(machine)
+    slots(3)%formulation = new_multiplier(machine)
+  end function all_formulations
+
+  !> Random angles and speeds that obey the gears, [lanes, ground and bodies].
+  subroutine draw_state(machine, seed, phi, omega)
+    type(machine_t), intent(in) :: machine
+    integer, intent(in) :: seed
+    real(wp), allocatable, intent(out) :: phi(:, :), omega(:, :)
+    type(random_stream_t) :: stream
+    real(wp) :: speed(machine%coordinates%freedoms), twist(machine%coordinates%freedoms)
+    integer :: i, l
+
+    stream = random_stream(seed)
+    allocate (phi(machine%lanes, 0:machine%bodies), omega(machine%lanes, 0:machine%bodies), source=0.0_wp)
+    do l = 1, machine%lanes
+      do i = 1, size(speed)
+        speed(i) = stream%number(-3.0_wp, 3.0_wp)
+        twist(i) = stream%number(-1.0_wp, 1.0_wp)
+      end do
+      phi(l, 1:) = machine%start_angle(l, :) + matmul(machine%coordinates%complement(l), twist)
+      omega(l, 1:) = matmul(machine%coordinates%complement(l), speed)
+    end do
+  end subroutine draw_state
+
+  !> The state vector of a formulation for given angles and speeds, without works, [lanes, states + quadratures].
+  function state_of(formulation, phi, omega) result(y)
+    class(formulation_t), intent(in) :: formulation
+    real(wp), intent(in) :: phi(:, 0:), omega(:, 0:)   !! [lanes, ground and bodies]
+    real(wp), allocatable :: y(:, :)
+
+    allocate (y(formulation%lanes, formulation%states + formulation%quadratures), source=0.0_wp)
+    select type (formulation)
+    type is (reduced_t)
+      call place_coordinates(formulation%machine, phi, omega, y)
+    class is (body_formulation_t)
+      y(:, :formulation%machine%bodies) = omega(:, 1:)
+      y(:, formulation%machine%bodies + 1:2 * formulation%machine%bodies) = phi(:, 1:)
+      if (formulation%states > 2 * formulation%machine%bodies) call place_moments(formulation%machine, phi, omega, y)
+    end select
+  end function state_of
+
+  subroutine place_coordinates(machine, phi, omega, y)
+    type(machine_t), intent(in) :: machine
+    real(wp), intent(in) :: phi(:, 0:), omega(:, 0:)
+    real(wp), intent(inout) :: y(:, :)
+    integer :: l
+
+    associate (f => machine%coordinates%freedoms)
+      do l = 1, machine%lanes
+        call machine%coordinates%project(l, machine%inertia(l, :), omega(l, 1:), y(l, :f))
+        call machine%coordinates%project(l, machine%inertia(l, :), phi(l, 1:) - machine%start_angle(l, :), y(l, f + 1:2 * f))
+      end do
+    end associate
+  end subroutine place_coordinates
+
+  !> The states F of the paper's formulation.
+  subroutine place_moments(machine, phi, omega, y)
+    type(machine_t), intent(in) :: machine
+    real(wp), intent(in) :: phi(:, 0:), omega(:, 0:)
+    real(wp), intent(inout) :: y(:, :)
+    type(machine_t) :: copy
+    real(wp) :: moments(machine%bodies)
+    integer :: l, n
+
+    n = machine%bodies
+    copy = machine
+    call bring_to(copy, [(0.0_wp, l=1, machine%lanes)], phi, omega)
+    do l = 1, machine%lanes
+      call elastic_moments(copy, l, moments)
+      y(l, 2 * n + 1:3 * n) = moments
+    end do
+  end subroutine place_moments
+
+  !> Brings the banks to a state, with all that the paper's matrices are read from.
+  subroutine bring_to(machine, t, phi, omega)
+    type(machine_t), intent(inout) :: machine
+    real(wp), intent(in) :: t(:)
+    real(wp), contiguous, intent(in) :: phi(:, 0:), omega(:, 0:)
+    integer :: i
+
+    call machine%differentiate(t, phi, omega)
+    do i = 1, size(machine%banks)
+      call machine%banks(i)%bank%assess()
+    end do
+  end subroutine bring_to
+
+end module nocdyn_test_states
