@@ -1,6 +1,6 @@
 # Sourced by the other scripts.
 
-# quietly LABEL COMMAND...: one line with the time it took; what the command printed only if it failed.
+# quietly LABEL COMMAND...: one line with the time it took; the end of what the command printed only if it failed.
 quietly() {
   local label=$1 began=$SECONDS log status=0
   shift
@@ -11,8 +11,14 @@ quietly() {
     printf 'done (%d s)\n' $((SECONDS - began))
   else
     printf 'failed\n'
-    cat "$log" >&2
+    tail -n 100 "$log" >&2
   fi
   rm -f "$log"
   return "$status"
+}
+
+# build_release: the program build/release/bin/nocdyn, up to date; to be called in the project's folder.
+build_release() {
+  [[ -f build/release/build.ninja ]] || quietly 'Configuring' cmake --preset release
+  quietly 'Building nocdyn' cmake --build --preset release --target nocdyn_program
 }

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from .paper_machine import steady_state
 from .phase_planes import draw_phase_planes
 from .results import Results, ResultsError, read_results
-from .style import REFERENCE, WIDTH, draw_lines, plain, save
+from .style import REFERENCE, WIDTH, add_title, draw_lines, save
 
 ROOT = Path(__file__).resolve().parents[2]
 MEDIA = ROOT / "docs" / "media"
@@ -36,10 +36,10 @@ def draw_paper_figures(case1: Results, case2: Results, folder: Path) -> list[str
     drawn = []
     for number, results in ((2, case1), (4, case2)):
         planes, moments = draw_phase_planes(results), draw_elastic_moments(results)
-        planes.suptitle(plain(f"Figure {number}. Phase planes. {results.title}"))
-        moments.suptitle(plain(f"Figure {number + 1}. Elastic moments. {results.title}"))
+        add_title(planes, f"Figure {number}. Phase planes. {results.title}")
+        add_title(moments, f"Figure {number + 1}. Elastic moments. {results.title}")
         for offset, figure in enumerate((planes, moments)):
-            drawn.append(f"fig{number + offset}")
+            drawn.append(f"figure{number + offset}")
             save(figure, folder, drawn[-1])
     return drawn
 
@@ -48,7 +48,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(prog="scripts/figures", description=__doc__)
     parser.add_argument("results", nargs=2, type=Path, metavar="RESULTS", help="results folders of case 1 and of case 2")
     parser.add_argument("--out", type=Path, default=ROOT / "results" / "figures", metavar="DIR",
-                        help="where fig2 ... fig5 go, as PNG, SVG and PDF (%(default)s)")
+                        help="where figure2 ... figure5 go, as PNG, SVG and PDF (%(default)s)")
     parser.add_argument("--media", action="store_true", help="also copy the PNG files to docs/media, for the README")
     arguments = parser.parse_args()
     try:

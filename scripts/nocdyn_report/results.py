@@ -39,7 +39,7 @@ class Results:
 
     @property
     def title(self) -> str:
-        return self.machine["case"]["title"] or self.folder.resolve().name
+        return self.machine.get("case", {}).get("title") or self.folder.resolve().name
 
     def values(self, label: str) -> np.ndarray:
         """A column by its label in trajectory.csv."""

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 from .phase_planes import draw_phase_planes
 from .results import Column, Results, ResultsError, read_results
-from .style import COLOURS, WIDTH, draw_lines, plain, save
+from .style import COLOURS, WIDTH, add_title, draw_lines, save
 
 MOTION = {"omega": "speed", "twist": "twist"}
 TORQUES = {
@@ -74,7 +74,7 @@ def draw_run(results: Results, folder: Path) -> list[str]:
     title = results.title + (f" ({results.shortfall})" if results.shortfall else "")
     drawn = [name for name, figure in figures.items() if figure]
     for name in drawn:
-        figures[name].suptitle(plain(title))
+        add_title(figures[name], title)
         save(figures[name], folder, name)
     return drawn
 

@@ -1,5 +1,6 @@
 """How all figures look, and how they are saved."""
 
+import textwrap
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -16,6 +17,7 @@ COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#0
 REFERENCE = {"color": "0.35", "linestyle": (0, (5, 3)), "linewidth": 0.9}
 FORMATS = ("png", "svg", "pdf")
 WIDTH = 8.0  # of a figure [in]
+TITLE_LENGTH = 75  # characters that fit on a line of that width
 MOST_TICKS = 8  # on the colour bar that stands for a legend of many lines
 
 matplotlib.use("Agg")
@@ -45,6 +47,10 @@ matplotlib.rcParams.update({
 def plain(text: str) -> str:
     """Text of a user, without meaning for mathematics."""
     return text.replace("$", r"\$")
+
+
+def add_title(figure: Figure, title: str) -> None:
+    figure.suptitle(plain(textwrap.fill(title, TITLE_LENGTH)))
 
 
 def draw_lines(axes: Axes, names: Sequence[str], lines: Sequence[tuple[np.ndarray, np.ndarray]]) -> None:

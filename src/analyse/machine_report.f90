@@ -1,5 +1,6 @@
 !> What can be said of a machine before it moves: bodies, gears, coordinates, redundancies.
 module nocdyn_machine_report
+  use nocdyn_bank, only: role_names
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
   use nocdyn_text, only: joined, quoted, rounded_text, string_t, to_text
@@ -29,9 +30,9 @@ contains
     do g = 1, size(machine%groups)
       do r = 1, size(machine%groups(g)%redundancies)
         associate (redundancy => machine%groups(g)%redundancies(r), names => machine%constraints%names)
-          notes = [notes, string_t('gear ' // quoted(names(redundancy%row)%text) // ' repeats what ' // &
-                                   joined(names(redundancy%repeats), ', ') // ' already fix; their reactions are not ' // &
-                                   'unique, the share of smallest norm is reported')]
+          notes = [notes, string_t('gear ' // quoted(names(redundancy%row)%text) // ' only repeats ' // &
+                                   joined(names(redundancy%repeats), ', ') // '; their reactions are not unique, ' // &
+                                   'and those of smallest norm are reported')]
         end associate
       end do
     end do
@@ -46,10 +47,14 @@ contains
     type(string_t), allocatable :: notes(:)
     integer :: b, i
 
-    call report%append(file // ': ' // to_text(machine%bodies) // ' bodies, ' // &
-                       to_text(machine%constraints%rows()) // ' gears, ' // to_text(element_count(machine)) // &
-                       ' couplings and torques; degrees of freedom: ' // to_text(machine%coordinates%freedoms))
-    call report%append(new_line('a') // '  coordinates: the speeds of ' // joined(coordinate_names(machine), ', '))
+    call report%append(file // ': ' // counted(machine%bodies, 'body', 'bodies') // ', ' // &
+                       counted(machine%constraints%rows(), 'gear', 'gears'))
+    do i = 1, size(machine%banks)
+      call report%append(', ' // counted(size(machine%banks(i)%bank%to), trim(role_names(machine%banks(i)%bank%role)), &
+                                         trim(role_names(machine%banks(i)%bank%role)) // 's'))
+    end do
+    call report%append(new_line('a') // '  ' // counted(machine%coordinates%freedoms, 'degree', 'degrees') // ' of freedom')
+    call report%append(new_line('a') // '  coordinates: ' // joined(coordinate_names(machine), ', '))
     do b = 1, machine%bodies
       if (all(machine%coordinates%body /= b)) call report%append(new_line('a') // '  ' // speed_relation(machine, b))
     end do
@@ -60,15 +65,15 @@ contains
     text = report%text()
   end function machine_report
 
-  pure integer function element_count(machine)
-    type(machine_t), intent(in) :: machine
-    integer :: i
+  !> "1 gear", "2 gears".
+  function counted(number, singular, plural) result(text)
+    integer, intent(in) :: number
+    character(len=*), intent(in) :: singular, plural
+    character(len=:), allocatable :: text
 
-    element_count = 0
-    do i = 1, size(machine%banks)
-      element_count = element_count + size(machine%banks(i)%bank%to)
-    end do
-  end function element_count
+    text = to_text(number) // ' ' // plural
+    if (number == 1) text = to_text(number) // ' ' // singular
+  end function counted
 
   !> "speed of 'machine' = -0.6666667 * speed of 'pinion'", for a body that is no coordinate.
   function speed_relation(machine, body) result(text)

@@ -14,6 +14,7 @@ module nocdyn_transient
   use nocdyn_machine_report, only: redundancy_notes
   use nocdyn_outcome, only: failure_sentence, integration_done, integration_interrupted, outcome_t
   use nocdyn_output_file, only: output_file_t, write_whole
+  use nocdyn_output_times, only: check_output_times, output_times
   use nocdyn_posix, only: is_interrupted, remove_file
   use nocdyn_run_summary, only: run_summary_t, start_extremes, summary_json, update_extremes
   use nocdyn_system, only: observer_t
@@ -21,7 +22,7 @@ module nocdyn_transient
   implicit none
   private
 
-  public :: run_transient, output_times
+  public :: run_transient
 
   character(len=*), parameter, public :: trajectory_file = 'trajectory.csv', partial_file = 'trajectory.partial.csv'
   character(len=*), parameter, public :: summary_file = 'summary.json', input_file = 'input.nml'
@@ -71,11 +72,12 @@ contains
     type(error_t), allocatable :: write_error
     real(wp), allocatable :: times(:)
 
-    call assemble_machine(input, machine, error)
+    call check_output_times(input, error)
+    if (.not. allocated(error)) call assemble_machine(input, machine, error)
     if (allocated(error)) return
     run = input%single('run')
     call new_formulation(run%text('formulation'), machine, formulation)
-    times = output_times(run%number('t_start'), run%number('t_end'), input%single('output'))
+    times = output_times(input)
     call start_recorder(recorder, formulation, times, folder, progress)
     call solve(formulation, run, times, recorder, outcome, error)
     call conclude(outcome, error, recorder%summary)
@@ -83,26 +85,6 @@ contains
     if (allocated(write_error)) call move_alloc(write_error, error)
     summary = recorder%summary
   end subroutine run_transient
-
-  !> The requested times: a row at t_start, one every `interval`, and one at t_end; or `points` rows evenly spaced.
-  pure function output_times(t_start, t_end, output) result(times)
-    real(wp), intent(in) :: t_start, t_end   !! [s]
-    type(group_t), intent(in) :: output      !! the &output group
-    real(wp), allocatable :: times(:)
-    real(wp), parameter :: sliver = 1.0e-9_wp   ! of an interval: a last row nearer to t_end than that is t_end
-    integer :: i, intervals
-
-    if (output%has_value('interval')) then
-      associate (interval => output%number('interval'))
-        intervals = max(1, ceiling((t_end - t_start) / interval - sliver))
-        times = [(t_start + i * interval, i=0, intervals)]
-      end associate
-    else
-      intervals = output%whole_number('points') - 1
-      times = [(t_start + (t_end - t_start) * i / intervals, i=0, intervals)]
-    end if
-    times(size(times)) = t_end
-  end function output_times
 
   subroutine start_recorder(recorder, formulation, times, folder, progress)
     type(recorder_t), intent(inout) :: recorder

@@ -128,7 +128,7 @@ contains
 
     if (value == '') then
       call raise(error, exit_input, name // ' needs a value: ' // &
-                 merge('--out DIR       ', '--set PATH=VALUE', name == '--out'))
+                 trim(merge('--out DIR       ', '--set PATH=VALUE', name == '--out')))
     else if (name == '--set') then
       arguments%overrides = [arguments%overrides, string_t(value)]
     else if (allocated(arguments%out)) then
@@ -159,6 +159,8 @@ contains
     operands = size(arguments%operands)
     if (allocated(arguments%out) .and. arguments%command /= 'run') then
       call raise(error, exit_input, '--out is an option of nocdyn run')
+    else if (arguments%is_quiet .and. arguments%command /= 'run') then
+      call raise(error, exit_input, '--quiet is an option of nocdyn run')
     else if (size(arguments%overrides) > 0 .and. all(arguments%command /= ['run     ', 'check   ', 'matrices'])) then
       call raise(error, exit_input, '--set is an option of nocdyn run, check and matrices')
     else if (any(arguments%command == ['run     ', 'check   ']) .and. operands == 0) then

@@ -11,6 +11,7 @@ module nocdyn_commands
   use nocdyn_machine_report, only: machine_report
   use nocdyn_matrix_report, only: matrix_report
   use nocdyn_output_file, only: write_whole
+  use nocdyn_output_times, only: check_output_times
   use nocdyn_schema_help, only: group_help, input_help, input_template
   use nocdyn_text, only: joined, quoted
   use nocdyn_version, only: compiler_text, version
@@ -50,6 +51,7 @@ contains
     type(error_t), allocatable, intent(out) :: error
 
     call read_input(arguments%operands(number)%text, arguments%overrides, input, error)
+    if (.not. allocated(error)) call check_output_times(input, error)
     if (.not. allocated(error)) call assemble_machine(input, machine, error)
   end subroutine read_machine
 

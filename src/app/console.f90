@@ -1,9 +1,9 @@
 !> What the person at the keyboard sees: messages, and progress on a terminal.
 module nocdyn_console
-  use, intrinsic :: iso_fortran_env, only: error_unit, int64, output_unit
+  use, intrinsic :: iso_fortran_env, only: error_unit, int64
   use nocdyn_errors, only: error_t
   use nocdyn_kinds, only: wp
-  use nocdyn_posix, only: is_terminal
+  use nocdyn_posix, only: is_terminal, standard_error, standard_output, write_bytes
   use nocdyn_text, only: to_text
   use nocdyn_transient, only: progress_t
   implicit none
@@ -11,9 +11,10 @@ module nocdyn_console
 
   public :: say, complain, new_console_progress
 
+  logical, protected, public :: output_is_lost = .false.   !! some of standard output could not be written
+
   real(wp), parameter :: patience = 1.0_wp    ! a run shorter than this shows no progress [s]
   real(wp), parameter :: refresh = 0.2_wp     ! time between two updates of the line [s]
-  integer, parameter :: standard_error = 2    ! file descriptor
 
   !> One line on the terminal, rewritten in place.
   type, extends(progress_t), public :: console_progress_t
@@ -32,14 +33,16 @@ contains
   subroutine say(text)
     character(len=*), intent(in) :: text
 
-    write (output_unit, '(a)') text
+    logical :: is_done
+
+    call write_bytes(standard_output, text // new_line('a'), is_done)
+    if (.not. is_done) output_is_lost = .true.
   end subroutine say
 
   !> The message of an error on standard error.
   subroutine complain(error)
     type(error_t), intent(in) :: error
 
-    flush (output_unit)
     write (error_unit, '(a)') 'nocdyn: ' // error%message
   end subroutine complain
 

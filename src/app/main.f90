@@ -2,8 +2,8 @@
 program nocdyn
   use nocdyn_arguments, only: arguments_t, command_line, parse_arguments
   use nocdyn_commands, only: check_command, help_command, matrices_command, new_command, version_command
-  use nocdyn_console, only: complain
-  use nocdyn_errors, only: error_t
+  use nocdyn_console, only: complain, output_is_lost
+  use nocdyn_errors, only: error_t, exit_file, raise
   use nocdyn_run_command, only: run_command
   implicit none
 
@@ -30,5 +30,10 @@ program nocdyn
   case default
     call help_command(arguments, code)
   end select
+  if (output_is_lost) then
+    call raise(error, exit_file, 'standard output cannot be written')
+    call complain(error)
+    code = max(code, error%code)
+  end if
   stop code, quiet=.true.
 end program nocdyn

@@ -9,7 +9,7 @@ module nocdyn_run_command
   use nocdyn_run_summary, only: run_summary_t
   use nocdyn_summary_table, only: summary_line, summary_table
   use nocdyn_text, only: quoted, string_t, to_text
-  use nocdyn_transient, only: run_transient
+  use nocdyn_transient, only: partial_file, run_transient
   implicit none
   private
 
@@ -45,8 +45,8 @@ contains
       if (is_good(i)) call run_file(arguments, inputs(i), folders(i)%text, code)
       if (is_interrupted()) exit
     end do
-    if (i < size(inputs)) then
-      call raise(error, exit_failed, to_text(count(is_good(i + 1:))) // ' more files were not run')
+    if (any(is_good(i + 1:))) then
+      call raise(error, exit_failed, 'files not run after the interruption: ' // to_text(count(is_good(i + 1:))))
       call count_failure(error, code)
     end if
   end subroutine run_command
@@ -73,6 +73,8 @@ contains
     call run_transient(input, folder, progress, summary, error)
     call progress%clear()
     if (allocated(error)) then
+      if (error%code == exit_failed) error%message = input%file // ': ' // error%message // '; the rows up to there are in ' // &
+                                                     folder // '/' // partial_file
       call count_failure(error, code)
     else if (.not. arguments%is_quiet) then
       do i = 1, size(summary%notes)

@@ -1,5 +1,5 @@
 // Shortest decimal text that reads back as the same double: std::to_chars, which Fortran's formatted write cannot do
-// and which is an order of magnitude faster. The only C++ of the project; it needs no C++ runtime beyond this call.
+// and which is an order of magnitude faster.
 #include <charconv>
 #include <cstddef>
 

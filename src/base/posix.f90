@@ -1,13 +1,19 @@
-!> The few services of the operating system that Fortran lacks: folders, renaming, terminals, interrupts.
+!> The few services of the operating system that Fortran lacks: folders, renaming, terminals, interrupts; and writing,
+!> because gfortran's `write`, `flush` and `close` report no error when a disk is full.
 module nocdyn_posix
-  use, intrinsic :: iso_c_binding, only: c_char, c_funloc, c_funptr, c_int, c_null_char
+  use, intrinsic :: iso_c_binding, only: c_char, c_f_pointer, c_funloc, c_funptr, c_int, c_intptr_t, c_null_char, &
+    c_null_funptr, c_ptr, c_size_t
   implicit none
   private
 
   public :: make_folders, rename_file, remove_file, process_id, is_terminal, watch_interrupts, is_interrupted
+  public :: create_file, write_bytes, close_file, last_failure
 
-  integer(c_int), parameter :: everything_allowed = int(o'777', c_int)   ! less the umask
-  integer(c_int), parameter :: interrupt_signal = 2, termination_signal = 15
+  integer, parameter, public :: standard_output = 1, standard_error = 2   !! file descriptors
+
+  integer(c_int), parameter :: everything_allowed = int(o'777', c_int), reading_writing = int(o'666', c_int)   ! less the umask
+  integer(c_int), parameter :: interrupt_signal = 2, termination_signal = 15, file_size_signal = 25
+  integer(c_intptr_t), parameter :: ignored = 1   ! SIG_IGN
 
   integer(c_int), volatile :: received_signal = 0
 
@@ -27,6 +33,38 @@ module nocdyn_posix
       import :: c_char, c_int
       character(kind=c_char), intent(in) :: path(*)
     end function c_unlink
+
+    integer(c_int) function c_creat(path, mode) bind(c, name='creat')
+      import :: c_char, c_int
+      character(kind=c_char), intent(in) :: path(*)
+      integer(c_int), value, intent(in) :: mode
+    end function c_creat
+
+    integer(c_intptr_t) function c_write(descriptor, bytes, length) bind(c, name='write')
+      import :: c_char, c_int, c_intptr_t, c_size_t
+      integer(c_int), value, intent(in) :: descriptor
+      character(kind=c_char), intent(in) :: bytes(*)
+      integer(c_size_t), value, intent(in) :: length
+    end function c_write
+
+    integer(c_int) function c_close(descriptor) bind(c, name='close')
+      import :: c_int
+      integer(c_int), value, intent(in) :: descriptor
+    end function c_close
+
+    integer(c_int) function c_errno() bind(c, name='nocdyn_errno')
+      import :: c_int
+    end function c_errno
+
+    type(c_ptr) function c_strerror(number) bind(c, name='strerror')
+      import :: c_int, c_ptr
+      integer(c_int), value, intent(in) :: number
+    end function c_strerror
+
+    integer(c_size_t) function c_strlen(text) bind(c, name='strlen')
+      import :: c_ptr, c_size_t
+      type(c_ptr), value, intent(in) :: text
+    end function c_strlen
 
     integer(c_int) function c_getpid() bind(c, name='getpid')
       import :: c_int
@@ -79,6 +117,52 @@ contains
     status = c_unlink(path // c_null_char)
   end subroutine remove_file
 
+  !> Makes a file, or empties the one that is there; the descriptor to write to, negative on failure.
+  integer function create_file(path)
+    character(len=*), intent(in) :: path
+
+    create_file = int(c_creat(path // c_null_char, reading_writing))
+  end function create_file
+
+  !> Writes all bytes, in as many goes as it takes.
+  subroutine write_bytes(descriptor, bytes, is_done)
+    integer, intent(in) :: descriptor
+    character(len=*), intent(in) :: bytes
+    logical, intent(out) :: is_done
+    integer(c_intptr_t) :: written
+    integer :: next
+
+    next = 1
+    do while (next <= len(bytes))
+      written = c_write(int(descriptor, c_int), bytes(next:), int(len(bytes) - next + 1, c_size_t))
+      if (written < 1) exit
+      next = next + int(written)
+    end do
+    is_done = next > len(bytes)
+  end subroutine write_bytes
+
+  subroutine close_file(descriptor, is_done)
+    integer, intent(in) :: descriptor
+    logical, intent(out) :: is_done
+
+    is_done = c_close(int(descriptor, c_int)) == 0
+  end subroutine close_file
+
+  !> Why the call before this one failed, e.g. "No space left on device".
+  function last_failure() result(reason)
+    character(len=:), allocatable :: reason
+    character(kind=c_char), pointer :: characters(:)
+    type(c_ptr) :: text
+    integer :: i
+
+    text = c_strerror(c_errno())
+    call c_f_pointer(text, characters, [c_strlen(text)])
+    allocate (character(len=size(characters)) :: reason)
+    do i = 1, size(characters)
+      reason(i:i) = characters(i)
+    end do
+  end function last_failure
+
   integer function process_id()
     process_id = int(c_getpid())
   end function process_id
@@ -91,11 +175,13 @@ contains
   end function is_terminal
 
   !> From here on Ctrl-C and termination do not end the program but show in `is_interrupted`; the second one ends it.
+  !> A file that grows beyond the limit of the shell is a write that fails.
   subroutine watch_interrupts()
     type(c_funptr) :: previous
 
     previous = c_signal(interrupt_signal, c_funloc(note_signal))
     previous = c_signal(termination_signal, c_funloc(note_signal))
+    previous = c_signal(file_size_signal, transfer(ignored, c_null_funptr))
   end subroutine watch_interrupts
 
   subroutine note_signal(signal) bind(c)

@@ -33,61 +33,58 @@ contains
     end do
   end function combination
 
-  !> total = base + scale * (sum of weights times stages), in one pass. Every number goes through the same operations in the
-  !> same order wherever it stands in the arrays, so that a lane's result does not depend on its place in a block.
-  pure subroutine combine(n, stages, combination, k, base, scale, total)
-    integer, intent(in) :: n                          !! lanes * components
+  !> y = x + h * (sum of weights times stages), in one pass. Every number goes through the same operations in the same
+  !> order wherever it stands in the arrays, so that a lane's result does not depend on its place in a block.
+  pure subroutine combine(n, stages, combination, k, x, h, y)
+    integer, intent(in) :: n        !! lanes * components
     integer, intent(in) :: stages
     type(combination_t), intent(in) :: combination
-    real(wp), intent(in) :: k(n, stages)
-    real(wp), intent(in) :: base(n), scale(n)
-    real(wp), intent(inout) :: total(n)
+    real(wp), intent(in) :: k(n, stages), x(n), h(n)
+    real(wp), intent(inout) :: y(n)
     integer :: i
 
     associate (w => combination%weights, s => combination%stages)
       select case (combination%terms)
       case (0)
-        total = base
+        y = x
       case (1)
         do i = 1, n
-          total(i) = base(i) + scale(i) * (w(1) * k(i, s(1)))
+          y(i) = x(i) + h(i) * (w(1) * k(i, s(1)))
         end do
       case (2)
         do i = 1, n
-          total(i) = base(i) + scale(i) * (w(1) * k(i, s(1)) + w(2) * k(i, s(2)))
+          y(i) = x(i) + h(i) * (w(1) * k(i, s(1)) + w(2) * k(i, s(2)))
         end do
       case (3)
         do i = 1, n
-          total(i) = base(i) + scale(i) * (w(1) * k(i, s(1)) + w(2) * k(i, s(2)) + w(3) * k(i, s(3)))
+          y(i) = x(i) + h(i) * (w(1) * k(i, s(1)) + w(2) * k(i, s(2)) + w(3) * k(i, s(3)))
         end do
       case (4)
         do i = 1, n
-          total(i) = base(i) + scale(i) * (w(1) * k(i, s(1)) + w(2) * k(i, s(2)) + w(3) * k(i, s(3)) + w(4) * k(i, s(4)))
+          y(i) = x(i) + h(i) * (w(1) * k(i, s(1)) + w(2) * k(i, s(2)) + w(3) * k(i, s(3)) + w(4) * k(i, s(4)))
         end do
       case (5)
         do i = 1, n
-          total(i) = base(i) + scale(i) * (w(1) * k(i, s(1)) + w(2) * k(i, s(2)) + w(3) * k(i, s(3)) + w(4) * k(i, s(4)) &
-                                           + w(5) * k(i, s(5)))
+          y(i) = x(i) + h(i) * (w(1) * k(i, s(1)) + w(2) * k(i, s(2)) + w(3) * k(i, s(3)) + w(4) * k(i, s(4)) &
+                                + w(5) * k(i, s(5)))
         end do
       case (6)
         do i = 1, n
-          total(i) = base(i) + scale(i) * (w(1) * k(i, s(1)) + w(2) * k(i, s(2)) + w(3) * k(i, s(3)) + w(4) * k(i, s(4)) &
-                                           + w(5) * k(i, s(5)) + w(6) * k(i, s(6)))
+          y(i) = x(i) + h(i) * (w(1) * k(i, s(1)) + w(2) * k(i, s(2)) + w(3) * k(i, s(3)) + w(4) * k(i, s(4)) &
+                                + w(5) * k(i, s(5)) + w(6) * k(i, s(6)))
         end do
       case default
-        call combine_by_strips(n, stages, combination, k, base, scale, total)
+        call combine_by_strips(n, stages, combination, k, x, h, y)
       end select
     end associate
   end subroutine combine
 
   !> The same for any number of weights.
-  pure subroutine combine_by_strips(n, stages, combination, k, base, scale, total)
-    integer, intent(in) :: n
-    integer, intent(in) :: stages
+  pure subroutine combine_by_strips(n, stages, combination, k, x, h, y)
+    integer, intent(in) :: n, stages
     type(combination_t), intent(in) :: combination
-    real(wp), intent(in) :: k(n, stages)
-    real(wp), intent(in) :: base(n), scale(n)
-    real(wp), intent(inout) :: total(n)
+    real(wp), intent(in) :: k(n, stages), x(n), h(n)
+    real(wp), intent(inout) :: y(n)
     real(wp) :: strip(strip_length)
     integer :: i, j, before
 
@@ -102,7 +99,7 @@ contains
           end do
         end do
         do i = 1, min(strip_length, n - before)
-          total(before + i) = base(before + i) + scale(before + i) * strip(i)
+          y(before + i) = x(before + i) + h(before + i) * strip(i)
         end do
       end do
     end associate

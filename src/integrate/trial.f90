@@ -79,7 +79,9 @@ contains
     end do
     trial%status(:) = evaluation_fine
     call system%derivative(t, y, dydt, trial%status)
-    if (is_good(trial%status, dydt)) return
+    if (all(trial%status == evaluation_fine)) then
+      if (all_finite(size(dydt), dydt)) return
+    end if
     call clear_failures(trial%status, trial%suspect, dydt)
     call park_failures(trial)
   end subroutine evaluate
@@ -97,19 +99,12 @@ contains
     end do
     trial%status(:) = evaluation_fine
     call system%derivative(trial%t, trial%y, slope, trial%status)
-    if (is_good(trial%status, slope)) return
+    if (all(trial%status == evaluation_fine)) then
+      if (all_finite(size(slope), slope)) return
+    end if
     call clear_failures(trial%status, trial%suspect, slope)
     call park_failures(trial)
   end subroutine evaluate_start
-
-  pure function is_good(status, values)
-    integer, intent(in) :: status(:)
-    real(wp), contiguous, intent(in) :: values(:, :)
-    logical :: is_good
-
-    is_good = all(status == evaluation_fine)
-    if (is_good) is_good = all_finite(size(values), values)
-  end function is_good
 
   !> Turns values that are not finite into a status, and clears the values of the lanes that failed.
   pure subroutine clear_failures(status, suspect, values)

@@ -160,6 +160,8 @@ contains
       if (value%text == ground) complaint = ': the ground is not allowed here; allowed: name of a &body'
     case (a_word)
       call check_word(words_of(rule%allowed), value, complaint)
+    case default
+      complaint = ''
     end select
   end subroutine check_text
 

@@ -62,7 +62,7 @@ contains
 
   !> Control characters become blanks; the first of each line is a mistake.
   subroutine blank_control_characters(text, mistakes)
-    character(len=*), intent(inout) :: text
+    character(len=:), allocatable, intent(inout) :: text
     type(mistakes_t), intent(inout) :: mistakes
     integer :: code, i, line, refused_line
 

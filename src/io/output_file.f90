@@ -1,7 +1,7 @@
 !> Text files that appear whole or not at all: written aside, renamed at the end.
 module nocdyn_output_file
   use nocdyn_errors, only: error_t, exit_file, raise
-  use nocdyn_posix, only: make_folders, process_id, remove_file, rename_file
+  use nocdyn_posix, only: close_file, create_file, last_failure, make_folders, process_id, remove_file, rename_file, write_bytes
   use nocdyn_text, only: quoted, to_text
   implicit none
   private
@@ -17,7 +17,7 @@ module nocdyn_output_file
     character(len=:), allocatable, private :: reason
     character(len=:), allocatable, private :: buffer
     integer, private :: used = 0
-    integer, private :: unit = 0
+    integer, private :: descriptor = -1
   contains
     procedure :: open => open_aside
     procedure :: put
@@ -45,8 +45,6 @@ contains
     class(output_file_t), intent(inout) :: self
     character(len=*), intent(in) :: folder
     character(len=*), intent(in) :: name     !! of the hidden file, without its dot and process number
-    character(len=200) :: message
-    integer :: status
 
     self%folder = folder
     self%aside = folder // '/.' // name // '.' // to_text(process_id())
@@ -54,9 +52,8 @@ contains
     self%used = 0
     self%has_failed = .false.
     call make_folders(folder)
-    open (newunit=self%unit, file=self%aside, access='stream', form='unformatted', action='write', status='replace', &
-          iostat=status, iomsg=message)
-    call self%note(status, message)
+    self%descriptor = create_file(self%aside)
+    if (self%descriptor < 0) call self%note(last_failure())
   end subroutine open_aside
 
   subroutine put(self, text)
@@ -76,58 +73,76 @@ contains
 
   subroutine flush_buffer(self)
     class(output_file_t), intent(inout) :: self
-    character(len=200) :: message
-    integer :: status
+    logical :: is_done
 
     if (.not. self%has_failed) then
-      write (self%unit, iostat=status, iomsg=message) self%buffer(:self%used)
-      call self%note(status, message)
+      call write_bytes(self%descriptor, self%buffer(:self%used), is_done)
+      if (.not. is_done) call self%note(last_failure())
     end if
     self%used = 0
   end subroutine flush_buffer
 
-  !> Closes the file and gives it its name; if anything failed since `open` there is no file and an error.
+  !> Closes the file, which keeps its hidden name; if anything failed since `open` there is no file and an error.
+  subroutine complete(self, name, error)
+    class(output_file_t), intent(inout) :: self
+    character(len=*), intent(in) :: name     !! that the file is to have, for the message
+    type(error_t), allocatable, intent(out) :: error
+
+    call self%flush_buffer()
+    call self%close()
+    if (self%has_failed) call self%fail(name, error)
+  end subroutine complete
+
+  !> Closes the file if that is still to be done and gives it its name, as safely as `complete`.
   subroutine finish(self, name, error)
     class(output_file_t), intent(inout) :: self
     character(len=*), intent(in) :: name
     type(error_t), allocatable, intent(out) :: error
-    character(len=200) :: message
-    integer :: status
     logical :: is_done
 
-    call self%flush_buffer()
-    if (.not. self%has_failed) then
-      flush (self%unit, iostat=status, iomsg=message)
-      call self%note(status, message)
-    end if
-    close (self%unit, iostat=status, iomsg=message)
-    call self%note(status, message)
-    if (.not. self%has_failed) then
-      call rename_file(self%aside, self%folder // '/' // name, is_done)
-      call self%note(merge(0, 1, is_done), 'it cannot take its name')
-    end if
-    if (.not. self%has_failed) return
-    call remove_file(self%aside)
-    call raise(error, exit_file, 'cannot write ' // quoted(self%folder // '/' // name) // ': ' // self%reason)
+    call self%complete(name, error)
+    if (allocated(error)) return
+    call rename_file(self%aside, self%folder // '/' // name, is_done)
+    if (is_done) return
+    call self%note(last_failure())
+    call self%fail(name, error)
   end subroutine finish
 
   !> Leaves no file.
   subroutine discard(self)
     class(output_file_t), intent(inout) :: self
-    integer :: status
 
-    close (self%unit, iostat=status)
+    call self%close()
     call remove_file(self%aside)
   end subroutine discard
 
-  subroutine note(self, status, message)
+  subroutine close_aside(self)
     class(output_file_t), intent(inout) :: self
-    integer, intent(in) :: status
-    character(len=*), intent(in) :: message
+    logical :: is_done
 
-    if (status == 0 .or. self%has_failed) return
+    if (self%descriptor < 0) return
+    call close_file(self%descriptor, is_done)
+    if (.not. is_done) call self%note(last_failure())
+    self%descriptor = -1
+  end subroutine close_aside
+
+  subroutine fail(self, name, error)
+    class(output_file_t), intent(in) :: self
+    character(len=*), intent(in) :: name
+    type(error_t), allocatable, intent(out) :: error
+
+    call remove_file(self%aside)
+    call raise(error, exit_file, 'cannot write ' // quoted(self%folder // '/' // name) // ': ' // self%reason)
+  end subroutine fail
+
+  !> Keeps the reason of the first failure.
+  subroutine note(self, reason)
+    class(output_file_t), intent(inout) :: self
+    character(len=*), intent(in) :: reason
+
+    if (self%has_failed) return
     self%has_failed = .true.
-    self%reason = trim(message)
+    self%reason = reason
   end subroutine note
 
 end module nocdyn_output_file

@@ -31,7 +31,7 @@ contains
     end do
     call buffer%append_line('Example')
     do rule = 1, size(group_rules)
-      call append_examples(buffer, rule, '  ')
+      call append_examples(buffer, rule)
     end do
     text = buffer%text()
   end function input_help
@@ -53,7 +53,7 @@ contains
     end if
     call append_group_help(buffer, rule)
     call buffer%append_line('Example')
-    call append_examples(buffer, rule, '  ')
+    call append_examples(buffer, rule)
     text = buffer%text()
   end subroutine group_help
 
@@ -73,7 +73,7 @@ contains
         call buffer%append_line('!   ' // key_rules(key)%name // short_rule(key_rules(key)))
         call buffer%append_line('!     ' // trim(key_rules(key)%help))
       end do
-      call append_examples(buffer, rule, '')
+      call append_examples(buffer, rule)
     end do
     text = buffer%text()
   end function input_template
@@ -111,7 +111,7 @@ contains
     end do
     call buffer%append_line('')
     call buffer%append_line('```')
-    call append_examples(buffer, rule, '')
+    call append_examples(buffer, rule)
     call buffer%append_line('```')
   end subroutine append_reference
 
@@ -163,15 +163,14 @@ contains
     if (alternative_of(rule) /= '') text = text // ', or ' // alternative_of(rule) // ' instead'
   end function default_text
 
-  subroutine append_examples(buffer, rule, indent)
+  subroutine append_examples(buffer, rule)
     type(text_buffer_t), intent(inout) :: buffer
     integer, intent(in) :: rule
-    character(len=*), intent(in) :: indent
     integer :: i
 
     do i = 1, size(examples)
       if (examples(i)%group /= group_rules(rule)%name) cycle
-      call buffer%append_line(indent // '&' // examples(i)%group(:longest_group) // ' ' // trim(examples(i)%text) // ' /')
+      call buffer%append_line('&' // examples(i)%group(:longest_group) // ' ' // trim(examples(i)%text) // ' /')
     end do
   end subroutine append_examples
 

@@ -2,7 +2,7 @@
 module nocdyn_schema_text
   use nocdyn_kinds, only: wp
   use nocdyn_schema, only: a_body, a_flag, a_name, a_number, a_text, a_word, allowed_t, alternatives, &
-    an_integer, any_number, any_times, at_least_once, at_most_once, body_or_ground, exactly_once, first_key, &
+    an_integer, any_number, at_least_once, at_most_once, body_or_ground, exactly_once, first_key, &
     group_rules, key_rule_t, key_rules, last_key, words_of
   use nocdyn_text, only: joined, nearest_word, string_t, to_text
   implicit none
@@ -114,7 +114,7 @@ contains
       text = 'at most once'
     case (at_least_once)
       text = 'at least once'
-    case (any_times)
+    case default
       text = 'any number of times'
     end select
   end function occurrence_text

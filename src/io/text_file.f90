@@ -8,6 +8,8 @@ module nocdyn_text_file
 
   public :: read_text_file
 
+  integer, parameter :: reason_length = 256
+
 contains
 
   !> All bytes of a file; pipes work too.
@@ -15,7 +17,7 @@ contains
     character(len=*), intent(in) :: file
     character(len=:), allocatable, intent(out) :: text
     type(error_t), allocatable, intent(out) :: error
-    character(len=256) :: reason
+    character(len=reason_length) :: reason
     integer(int64) :: bytes
     integer :: status, unit
     logical :: exists
@@ -47,7 +49,7 @@ contains
     integer, intent(in) :: unit
     character(len=:), allocatable, intent(out) :: text
     integer, intent(out) :: status
-    character(len=*), intent(inout) :: reason
+    character(len=reason_length), intent(inout) :: reason
     type(text_buffer_t) :: buffer
     character(len=1) :: byte
 

@@ -15,6 +15,8 @@ module nocdyn_bank
   integer, parameter, public :: role_motor = 3        !! in Q_m of eq. (18); puts energy in
   integer, parameter, public :: role_excitation = 4   !! in Q_0 of eq. (17); puts energy in
 
+  character(len=*), parameter, public :: role_names(4) = ['coupling  ', 'load      ', 'motor     ', 'excitation']
+
   !> What a bank puts into the table of results for each of its elements.
   type, public :: quantity_t
     character(len=16) :: name          !! first part of the column's name, e.g. 'torque'

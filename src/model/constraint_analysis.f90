@@ -13,8 +13,8 @@ module nocdyn_constraint_analysis
   public :: analyse_constraints
 
   !> Rows of unit length count as dependent below this: decimals such as 0.1 * 3 against 0.3 agree, ratios that
-  !> differ in the tenth digit do not.
-  real(wp), parameter, public :: rank_tolerance = 1.0e-10_wp
+  !> differ in the ninth digit do not.
+  real(wp), parameter :: rank_tolerance = 1.0e-10_wp
 
 contains
 
@@ -47,7 +47,7 @@ contains
     integer :: i, rank
 
     allocate (group%redundancies(0))
-    call pivoted_rank(unit_rows(constraints, group%rows, group%bodies), rank_tolerance, rank, pivots)
+    call pivoted_rank(paced_rows(constraints, group, group%rows), rank_tolerance, rank, pivots)
     if (rank == size(group%rows)) then
       group%kept = group%rows
       return
@@ -55,7 +55,7 @@ contains
     allocate (group%kept(0))
     do i = 1, size(group%rows)
       associate (row => group%rows(i))
-        call pivoted_rank(unit_rows(constraints, [group%kept, row], group%bodies), rank_tolerance, rank, pivots)
+        call pivoted_rank(paced_rows(constraints, group, [group%kept, row]), rank_tolerance, rank, pivots)
         if (rank > size(group%kept)) then
           group%kept = [group%kept, row]
         else
@@ -66,17 +66,25 @@ contains
   end subroutine sift_rows
 
   !> L_lambda of the group with every row scaled to unit length, so that metres and teeth compare.
-  pure function unit_rows(constraints, rows, bodies) result(matrix)
-    type(constraints_t), intent(in) :: constraints
-    integer, intent(in) :: rows(:), bodies(:)
-    real(wp) :: matrix(size(rows), size(bodies))
+  pure function unit_rows(matrix) result(scaled)
+    real(wp), intent(in) :: matrix(:, :)
+    real(wp) :: scaled(size(matrix, 1), size(matrix, 2))
     integer :: i
 
-    matrix = constraints%block(1, rows, bodies)
-    do i = 1, size(rows)
-      matrix(i, :) = matrix(i, :) / norm2(matrix(i, :))
+    do i = 1, size(matrix, 1)
+      scaled(i, :) = matrix(i, :) / norm2(matrix(i, :))
     end do
   end function unit_rows
+
+  !> The same for speeds measured by the pace of each body, so that a long reduction is not taken for a lock.
+  pure function paced_rows(constraints, group, rows) result(matrix)
+    type(constraints_t), intent(in) :: constraints
+    type(geared_group_t), intent(in) :: group
+    integer, intent(in) :: rows(:)
+    real(wp) :: matrix(size(rows), size(group%bodies))
+
+    matrix = unit_rows(constraints%block(1, rows, group%bodies) * spread(group%pace, 1, size(rows)))
+  end function paced_rows
 
   !> The kept rows that together say what `row` says.
   function combination(constraints, group, row) result(rows)
@@ -86,20 +94,20 @@ contains
     integer, allocatable :: rows(:)
     real(wp) :: wanted(1, size(group%bodies))
 
-    wanted = unit_rows(constraints, [row], group%bodies)
-    rows = contributing_rows(constraints, group%kept, group%bodies, wanted(1, :))
+    wanted = paced_rows(constraints, group, [row])
+    rows = contributing_rows(constraints, group, group%kept, wanted(1, :))
   end function combination
 
   !> The rows with a share in the least-squares representation of the relation `wanted` by `rows`.
-  function contributing_rows(constraints, rows, bodies, wanted) result(contributing)
+  function contributing_rows(constraints, group, rows, wanted) result(contributing)
     type(constraints_t), intent(in) :: constraints
-    integer, intent(in) :: rows(:), bodies(:)
-    real(wp), intent(in) :: wanted(:)
+    type(geared_group_t), intent(in) :: group
+    integer, intent(in) :: rows(:)
+    real(wp), intent(in) :: wanted(:)   !! between paced speeds
     integer, allocatable :: contributing(:)
-    real(wp) :: inverse(size(rows), size(bodies)), share(size(rows))
+    real(wp) :: share(size(rows))
 
-    inverse = pseudo_inverse(transpose(unit_rows(constraints, rows, bodies)), rank_tolerance)
-    share = matmul(inverse, wanted)
+    share = matmul(pseudo_inverse(transpose(paced_rows(constraints, group, rows)), rank_tolerance), wanted)
     contributing = pack(rows, abs(share) > sqrt(rank_tolerance) * maxval(abs(share)))
   end function contributing_rows
 
@@ -112,71 +120,76 @@ contains
     type(error_t), allocatable, intent(out) :: error
     integer :: k
 
-    if (size(locked_bodies(constraints, group%kept, group%bodies)) == 0) return
+    if (size(locked_bodies(constraints, group, group%kept)) == 0) return
     do k = 1, size(group%kept)
-      associate (locked => locked_bodies(constraints, group%kept(:k), group%bodies))
+      associate (locked => locked_bodies(constraints, group, group%kept(:k)))
         if (size(locked) == 0) cycle
         culprit = group%kept(k)
         call raise(error, exit_input, 'locks ' // joined(body_names(locked), ', ') // &
-                   contradiction(constraints, body_names, group%kept(:k - 1), group%bodies, culprit))
+                   contradiction(constraints, body_names, group, group%kept(:k - 1), culprit))
         return
       end associate
     end do
   end subroutine refuse_locks
 
   !> Bodies whose row of the complement of `rows` is zero.
-  function locked_bodies(constraints, rows, bodies) result(locked)
+  function locked_bodies(constraints, group, rows) result(locked)
     type(constraints_t), intent(in) :: constraints
-    integer, intent(in) :: rows(:), bodies(:)
+    type(geared_group_t), intent(in) :: group
+    integer, intent(in) :: rows(:)
     integer, allocatable :: locked(:)
     real(wp), allocatable :: motion(:, :)
 
-    allocate (motion, source=allowed_motion(constraints, rows, bodies))
-    locked = pack(bodies, maxval(abs(motion), dim=2) <= rank_tolerance)
+    motion = allowed_motion(constraints, group, rows)
+    locked = pack(group%bodies, maxval(abs(motion), dim=2) <= rank_tolerance)
   end function locked_bodies
 
-  !> The natural complement of `rows` with coordinates found by pivoting, shape [bodies, freedoms].
-  function allowed_motion(constraints, rows, bodies) result(motion)
+  !> The natural complement of `rows` for paced speeds with coordinates found by pivoting, shape [bodies, freedoms].
+  function allowed_motion(constraints, group, rows) result(motion)
     type(constraints_t), intent(in) :: constraints
-    integer, intent(in) :: rows(:), bodies(:)
+    type(geared_group_t), intent(in) :: group
+    integer, intent(in) :: rows(:)
     real(wp), allocatable :: motion(:, :)
     real(wp), allocatable :: dual(:, :)
-    real(wp) :: matrix(size(rows), size(bodies)), log_determinant
-    integer :: pivots(size(bodies)), rank
+    real(wp) :: matrix(size(rows), size(group%bodies)), log_determinant
+    integer :: pivots(size(group%bodies)), rank
     logical :: is_singular
 
-    matrix = unit_rows(constraints, rows, bodies)
+    matrix = paced_rows(constraints, group, rows)
     call pivoted_rank(matrix, rank_tolerance, rank, pivots)
     call natural_complement(matrix, pivots(rank + 1:), motion, dual, log_determinant, is_singular)
     if (is_singular) error stop 'nocdyn_constraint_analysis: rows must be independent here'
   end function allowed_motion
 
   !> For a row between two bodies whose ratio `earlier` rows fix already: who drives what at which ratio.
-  function contradiction(constraints, body_names, earlier, bodies, row) result(text)
+  function contradiction(constraints, body_names, group, earlier, row) result(text)
     type(constraints_t), intent(in) :: constraints
     type(string_t), intent(in) :: body_names(:)
-    integer, intent(in) :: earlier(:), bodies(:), row
+    type(geared_group_t), intent(in) :: group
+    integer, intent(in) :: earlier(:), row
     character(len=:), allocatable :: text
     real(wp), allocatable :: motion(:, :)
-    real(wp) :: relation(size(bodies)), fixed, asked
+    real(wp) :: relation(size(group%bodies)), fixed, asked
     integer :: a, b, first
 
     text = ''
     first = constraints%first(row)
     if (constraints%first(row + 1) - first /= 2) return
-    a = findloc(bodies, constraints%body(first), dim=1)
-    b = findloc(bodies, constraints%body(first + 1), dim=1)
-    allocate (motion, source=allowed_motion(constraints, earlier, bodies))
+    a = findloc(group%bodies, constraints%body(first), dim=1)
+    b = findloc(group%bodies, constraints%body(first + 1), dim=1)
+    motion = allowed_motion(constraints, group, earlier)
     fixed = dot_product(motion(a, :), motion(b, :)) / dot_product(motion(a, :), motion(a, :))
     if (maxval(abs(motion(b, :) - fixed * motion(a, :))) > rank_tolerance) return
     asked = -constraints%coefficient(1, first) / constraints%coefficient(1, first + 1)
     relation = 0.0_wp
     relation(b) = 1.0_wp
     relation(a) = -fixed
-    text = ': it drives ' // quoted(body_names(bodies(b))%text) // ' at ' // ratio_text(asked) // ' times ' // &
-           quoted(body_names(bodies(a))%text) // ', but ' // &
-           joined(constraints%names(contributing_rows(constraints, earlier, bodies, relation)), ', ') // &
-           ' already drive it at ' // ratio_text(fixed) // ' times'
+    associate (rows => contributing_rows(constraints, group, earlier, relation))
+      text = ': it drives ' // quoted(body_names(group%bodies(b))%text) // ' at ' // ratio_text(asked) // ' times ' // &
+             quoted(body_names(group%bodies(a))%text) // ', but ' // joined(constraints%names(rows), ', ') // ' already ' // &
+             trim(merge('drives', 'drive ', size(rows) == 1)) // ' it at ' // &
+             ratio_text(fixed * group%pace(b) / group%pace(a)) // ' times'
+    end associate
   end function contradiction
 
   !> A ratio with as many digits as tell two ratios apart, without the noise of rounding.
@@ -203,8 +216,8 @@ contains
 
     freedoms = size(group%bodies) - size(group%kept)
     if (size(wanted) == 0) then
-      call pivoted_rank(unit_rows(constraints, group%kept, group%bodies), rank_tolerance, rank, pivots)
-      group%independent = pack(group%bodies, [(all(pivots(:rank) /= i), i=1, size(group%bodies))])
+      call pivoted_rank(unit_rows(constraints%block(1, group%kept, group%bodies)), rank_tolerance, rank, pivots)
+      group%independent = pack(group%bodies, [(all(pivots(:size(group%kept)) /= i), i=1, size(group%bodies))])
       return
     end if
     group%independent = pack(wanted, [(any(group%bodies == wanted(i)), i=1, size(wanted))])
@@ -225,7 +238,7 @@ contains
       real(wp) :: all_columns(size(group%kept), size(group%bodies))
       integer :: k
 
-      all_columns = unit_rows(constraints, group%kept, group%bodies)
+      all_columns = paced_rows(constraints, group, group%kept)
       matrix = all_columns(:, [(findloc(group%bodies, others(k), dim=1), k=1, size(others))])
     end function dependent_columns
 

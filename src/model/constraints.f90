@@ -14,7 +14,7 @@ module nocdyn_constraints
     type(string_t), allocatable :: units(:)      !! of their multipliers
     integer, allocatable :: first(:)             !! [rows + 1]
     integer, allocatable :: body(:)              !! [entries]
-    real(wp), allocatable :: coefficient(:, :)   !! [lanes, entries]
+    real(wp), allocatable :: coefficient(:, :)   !! never 0, [lanes, entries]
   contains
     procedure :: rows
     procedure :: block

@@ -14,12 +14,13 @@ module nocdyn_coordinates
 
   public :: new_coordinates
 
-  !> The reactions of a group's rows, as linear maps.
+  !> The reactions of a group's rows, as linear maps. The lane comes last: a matrix product of strided slices may round
+  !> otherwise than one of contiguous ones, and a lane must not depend on its neighbours.
   type, public :: reaction_block_t
     integer, allocatable :: bodies(:), rows(:), kept(:)
-    real(wp), allocatable :: of_torques(:, :, :)      !! from the torques T of the elements, [lanes, rows, bodies]
-    real(wp), allocatable :: of_imbalances(:, :, :)   !! from J omega' - T, [lanes, rows, bodies]
-    real(wp), allocatable :: of_kept(:, :, :)         !! from the reactions of `kept`, [lanes, rows, kept]
+    real(wp), allocatable :: of_torques(:, :, :)      !! from the torques T of the elements, [rows, bodies, lanes]
+    real(wp), allocatable :: of_imbalances(:, :, :)   !! from J omega' - T, [rows, bodies, lanes]
+    real(wp), allocatable :: of_kept(:, :, :)         !! from the reactions of `kept`, [rows, kept, lanes]
   end type reaction_block_t
 
   type, public :: coordinates_t
@@ -118,9 +119,9 @@ contains
       reactions(k)%bodies = groups(g)%bodies
       reactions(k)%rows = groups(g)%rows
       reactions(k)%kept = groups(g)%kept
-      allocate (reactions(k)%of_torques(lanes, size(groups(g)%rows), size(groups(g)%bodies)), source=0.0_wp)
+      allocate (reactions(k)%of_torques(size(groups(g)%rows), size(groups(g)%bodies), lanes), source=0.0_wp)
       allocate (reactions(k)%of_imbalances, source=reactions(k)%of_torques)
-      allocate (reactions(k)%of_kept(lanes, size(groups(g)%rows), size(groups(g)%kept)), source=0.0_wp)
+      allocate (reactions(k)%of_kept(size(groups(g)%rows), size(groups(g)%kept), lanes), source=0.0_wp)
     end do
   end subroutine lay_out_reactions
 
@@ -151,16 +152,18 @@ contains
     type(coordinates_t), intent(in) :: self
     type(reaction_block_t), intent(inout) :: block
     real(wp) :: imbalance(size(inertia), size(inertia))   ! J L_tau (L_tau^T J L_tau)^-1 L_tau^T - 1
+    real(wp) :: response(size(complement, 2))
     integer :: b, k
 
     do b = 1, size(inertia)
       k = self%first(block%bodies(b))
-      imbalance(:, b) = inertia * matmul(complement, self%response(lane, k:k + size(complement, 2) - 1))
+      response = self%response(lane, k:k + size(response) - 1)
+      imbalance(:, b) = inertia * matmul(complement, response)
       imbalance(b, b) = imbalance(b, b) - 1.0_wp
     end do
-    block%of_kept(lane, :, :) = share
-    block%of_imbalances(lane, :, :) = matmul(share, dual)
-    block%of_torques(lane, :, :) = matmul(block%of_imbalances(lane, :, :), imbalance)
+    block%of_kept(:, :, lane) = share
+    block%of_imbalances(:, :, lane) = matmul(share, dual)
+    block%of_torques(:, :, lane) = matmul(block%of_imbalances(:, :, lane), imbalance)
   end subroutine fill_reactions
 
   !> Eq. (81) or section 6 for one group.
@@ -281,7 +284,7 @@ contains
 
     do g = 1, size(self%blocks)
       associate (block => self%blocks(g))
-        lambda(block%rows) = matmul(block%of_torques(lane, :, :), torque(block%bodies))
+        lambda(block%rows) = matmul(block%of_torques(:, :, lane), torque(block%bodies))
       end associate
     end do
   end subroutine reactions_of_torques
@@ -296,7 +299,7 @@ contains
 
     do g = 1, size(self%blocks)
       associate (block => self%blocks(g))
-        lambda(block%rows) = matmul(block%of_imbalances(lane, :, :), imbalance(block%bodies))
+        lambda(block%rows) = matmul(block%of_imbalances(:, :, lane), imbalance(block%bodies))
       end associate
     end do
   end subroutine reactions_of_imbalances

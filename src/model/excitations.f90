@@ -1,4 +1,7 @@
 !> Harmonic excitations, eq. (17): M_0 sin(omega_p t + phase).
+!>
+!> The loops over lanes are not vectorised: a vector sine differs from the scalar one in its last bit, and a lane's result
+!> would depend on its place in the block.
 module nocdyn_excitations
   use nocdyn_bank, only: bank_t, role_excitation
   use nocdyn_kinds, only: wp
@@ -38,6 +41,7 @@ contains
     integer :: e, l
 
     do e = 1, size(self%to)
+      !GCC$ novector
       do l = 1, size(t)
         self%working(l, e) = self%amplitude(l, e) * sin(self%frequency(l, e) * t(l) + self%phase(l, e))
       end do
@@ -50,6 +54,7 @@ contains
     integer :: e, l
 
     do e = 1, size(self%to)
+      !GCC$ novector
       do l = 1, size(t)
         self%working_time(l, e) = self%amplitude(l, e) * self%frequency(l, e) &
                                   * cos(self%frequency(l, e) * t(l) + self%phase(l, e))

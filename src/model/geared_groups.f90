@@ -1,6 +1,7 @@
 !> The bodies of a machine in groups that are geared together; each is analysed for itself.
 module nocdyn_geared_groups
   use nocdyn_constraints, only: constraints_t
+  use nocdyn_kinds, only: wp
   implicit none
   private
 
@@ -15,6 +16,7 @@ module nocdyn_geared_groups
   !> Bodies joined by constraints, directly or through others; a free body is a group of its own.
   type, public :: geared_group_t
     integer, allocatable :: bodies(:)        !! ascending
+    real(wp), allocatable :: pace(:)         !! size of the speeds of `bodies` when they turn together, the first of them at 1
     integer, allocatable :: rows(:)          !! all constraint rows of the group, ascending
     integer, allocatable :: kept(:)          !! the independent ones among them
     integer, allocatable :: independent(:)   !! bodies whose speeds are the group's coordinates
@@ -43,7 +45,36 @@ contains
     rows = sorted_by_group([(group_of(constraints%body(constraints%first(r))), r=1, constraints%rows())], g)
     allocate (groups(g))
     call distribute(bodies, rows, group_of, constraints, groups)
+    do g = 1, size(groups)
+      groups(g)%pace = paces(constraints, groups(g)%bodies, groups(g)%rows)
+    end do
   end subroutine find_groups
+
+  !> Speeds that make the terms of a row alike, carried from body to body: the measure of what is small.
+  pure function paces(constraints, bodies, rows) result(pace)
+    type(constraints_t), intent(in) :: constraints
+    integer, intent(in) :: bodies(:), rows(:)
+    real(wp) :: pace(size(bodies))
+    real(wp) :: known(constraints%bodies), term   ! 0: not known yet
+    integer :: entry, i
+
+    known = 0.0_wp
+    known(bodies(1)) = 1.0_wp
+    do while (any(known(bodies) <= 0.0_wp))
+      do i = 1, size(rows)
+        associate (first => constraints%first(rows(i)), last => constraints%first(rows(i) + 1) - 1)
+          term = maxval(abs(constraints%coefficient(1, first:last)) * known(constraints%body(first:last)))
+          if (term <= 0.0_wp) cycle
+          do entry = first, last
+            associate (body => constraints%body(entry))
+              if (known(body) <= 0.0_wp) known(body) = term / abs(constraints%coefficient(1, entry))
+            end associate
+          end do
+        end associate
+      end do
+    end do
+    pace = known(bodies)
+  end function paces
 
   !> Hands the bodies and rows, sorted by group, out to the groups.
   subroutine distribute(bodies, rows, group_of, constraints, groups)

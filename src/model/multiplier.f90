@@ -78,7 +78,7 @@ contains
     next = self%machine%bodies + 1
     do g = 1, size(self%machine%coordinates%blocks)
       associate (block => self%machine%coordinates%blocks(g))
-        lambda(block%rows) = matmul(block%of_kept(lane, :, :), self%solution(next:next + size(block%kept) - 1, lane))
+        lambda(block%rows) = matmul(block%of_kept(:, :, lane), self%solution(next:next + size(block%kept) - 1, lane))
         next = next + size(block%kept)
       end associate
     end do

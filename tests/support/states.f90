@@ -12,23 +12,27 @@ module nocdyn_test_states
   implicit none
   private
 
-  public :: draw_state, state_of, bring_to, all_formulations
+  public :: draw_state, state_of, bring_to, formulate
 
-  type, public :: formulation_slot_t
-    class(formulation_t), allocatable :: formulation
-  end type formulation_slot_t
+  !> What `formulate` knows, to loop over.
+  integer, parameter, public :: reduced = 1, paper = 2, multiplier = 3
 
 contains
 
-  !> `reduced`, `paper`, `multiplier`.
-  function all_formulations(machine) result(slots)
+  subroutine formulate(machine, which, formulation)
     type(machine_t), intent(in) :: machine
-    type(formulation_slot_t) :: slots(3)
+    integer, intent(in) :: which   !! `reduced`, `paper` or `multiplier`
+    class(formulation_t), allocatable, intent(out) :: formulation
 
-    slots(1)%formulation = new_reduced(machine)
-    slots(2)%formulation = new_paper(machine)
-    slots(3)%formulation = new_multiplier(machine)
-  end function all_formulations
+    select case (which)
+    case (reduced)
+      formulation = new_reduced(machine)
+    case (paper)
+      formulation = new_paper(machine)
+    case default
+      formulation = new_multiplier(machine)
+    end select
+  end subroutine formulate
 
   !> Random angles and speeds that obey the gears, [lanes, ground and bodies].
   subroutine draw_state(machine, seed, phi, omega)
@@ -54,7 +58,7 @@ contains
   !> The state vector of a formulation for given angles and speeds, without works, [lanes, states + quadratures].
   function state_of(formulation, phi, omega) result(y)
     class(formulation_t), intent(in) :: formulation
-    real(wp), intent(in) :: phi(:, 0:), omega(:, 0:)   !! [lanes, ground and bodies]
+    real(wp), contiguous, intent(in) :: phi(:, 0:), omega(:, 0:)   !! [lanes, ground and bodies]
     real(wp), allocatable :: y(:, :)
 
     allocate (y(formulation%lanes, formulation%states + formulation%quadratures), source=0.0_wp)
@@ -85,7 +89,7 @@ contains
   !> The states F of the paper's formulation.
   subroutine place_moments(machine, phi, omega, y)
     type(machine_t), intent(in) :: machine
-    real(wp), intent(in) :: phi(:, 0:), omega(:, 0:)
+    real(wp), contiguous, intent(in) :: phi(:, 0:), omega(:, 0:)
     real(wp), intent(inout) :: y(:, :)
     type(machine_t) :: copy
     real(wp) :: moments(machine%bodies)
@@ -103,7 +107,7 @@ contains
   !> Brings the banks to a state, with all that the paper's matrices are read from.
   subroutine bring_to(machine, t, phi, omega)
     type(machine_t), intent(inout) :: machine
-    real(wp), intent(in) :: t(:)
+    real(wp), contiguous, intent(in) :: t(:)
     real(wp), contiguous, intent(in) :: phi(:, 0:), omega(:, 0:)
     integer :: i
 

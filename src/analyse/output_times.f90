@@ -1,0 +1,83 @@
+!> The times at which a run is written.
+module nocdyn_output_times
+  use nocdyn_errors, only: error_t, exit_input, raise
+  use nocdyn_input, only: group_t, input_t
+  use nocdyn_kinds, only: wp
+  use nocdyn_text, only: rounded_text, to_text
+  implicit none
+  private
+
+  public :: check_output_times, output_times
+
+  integer, parameter :: most_rows = 10000000   ! some gigabytes of text
+
+contains
+
+  !> Refuses more than `most_rows` rows, and rows whose times would differ by no more than rounding.
+  subroutine check_output_times(input, error)
+    type(input_t), intent(in) :: input   !! read without mistakes
+    type(error_t), allocatable, intent(out) :: error
+    type(group_t) :: output, run
+    real(wp) :: rounding, span, step
+    character(len=:), allocatable :: complaint, key
+
+    output = input%single('output')
+    run = input%single('run')
+    span = run%number('t_end') - run%number('t_start')
+    rounding = spacing(max(abs(run%number('t_start')), abs(run%number('t_end'))))
+    if (output%has_value('interval')) then
+      key = 'interval'
+      step = output%number(key)
+      complaint = key // ' = ' // to_text(step)
+    else
+      key = 'points'
+      step = span / (output%whole_number(key) - 1)
+      complaint = key // ' = ' // to_text(output%whole_number(key))
+    end if
+    if (step < span / most_rows) then
+      complaint = complaint // ' asks for too many rows; allowed: at most ' // to_text(most_rows) // &
+                  ', an interval of ' // rounded_text(span / most_rows, 3) // ' s'
+    else if (step <= rounding) then
+      complaint = complaint // ' asks for times that rounding makes equal; allowed: an interval above ' // &
+                  rounded_text(rounding, 3) // ' s, the spacing of numbers at t_start and t_end'
+    else
+      return
+    end if
+    call raise(error, exit_input, place_of_output(input, key) // ': ' // complaint)
+  end subroutine check_output_times
+
+  function place_of_output(input, key) result(place)
+    type(input_t), intent(in) :: input
+    character(len=*), intent(in) :: key
+    character(len=:), allocatable :: place
+    integer, allocatable :: indices(:)
+
+    allocate (indices, source=input%groups_named('output'))
+    place = input%place(indices(1), key)
+  end function place_of_output
+
+  !> The requested times: a row at t_start, one every `interval`, and one at t_end; or `points` rows evenly spaced.
+  pure function output_times(input) result(times)
+    type(input_t), intent(in) :: input   !! with output times that have been checked
+    real(wp), allocatable :: times(:)
+    type(group_t) :: output, run
+    real(wp), parameter :: sliver = 1.0e-9_wp   ! of an interval: a last row nearer to t_end than that is t_end
+    integer :: i, intervals
+
+    output = input%single('output')
+    run = input%single('run')
+    associate (t_start => run%number('t_start'), t_end => run%number('t_end'))
+      if (output%has_value('interval')) then
+        associate (interval => output%number('interval'))
+          intervals = max(1, ceiling((t_end - t_start) / interval - sliver))
+          times = [(t_start + i * interval, i=0, intervals)]
+        end associate
+      else
+        intervals = output%whole_number('points') - 1
+        times = [(t_start + (t_end - t_start) * i / intervals, i=0, intervals)]
+      end if
+      times(size(times)) = t_end
+    end associate
+  end function output_times
+
+end module nocdyn_output_times

@@ -1,0 +1,235 @@
+"""The scripts around the program: figures, numbers, and what scripts/setup installs."""
+
+import importlib.util
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+NOCDYN = os.environ["NOCDYN"]
+SOURCE = Path(os.environ["NOCDYN_SOURCE"])
+SCRIPTS = SOURCE / "scripts"
+SETUP = SCRIPTS / "setup"
+CASES = [SOURCE / "input" / "paper" / f"case{number}.nml" for number in (1, 2)]
+SIGNATURES = {"png": b"\x89PNG", "svg": b"<?xml", "pdf": b"%PDF"}
+
+# The uniform motion of the paper's machine: the root of w^2 + (10 + 100 (2/3)^2) w - 200 = 0.
+UNIFORM_SPEED = 3.454305983687
+# The paper's case 1 has settled to this after 10 s.
+SETTLED = 1e-6
+
+
+@pytest.fixture(scope="session", autouse=True)
+def python_packages() -> None:
+    for package in ("f90nml", "matplotlib", "numpy", "pandas"):
+        if importlib.util.find_spec(package) is None:
+            pytest.fail(f"{package} is not installed for {sys.executable}: run scripts/setup figures test", pytrace=False)
+    sys.path.insert(0, str(SCRIPTS))
+
+
+@pytest.fixture(scope="session")
+def paper_results(tmp_path_factory) -> list[Path]:
+    folder = tmp_path_factory.mktemp("paper results")
+    subprocess.run([NOCDYN, "run", "--quiet", "--out", folder, *CASES], check=True)
+    return [folder / case.stem for case in CASES]
+
+
+def run_input(folder: Path, text: str, *options: str) -> Path:
+    """Results of a machine, in `folder`; the run itself may fail."""
+    file = folder / "machine.nml"
+    file.write_text(text, encoding="utf-8")
+    subprocess.run([NOCDYN, "run", "--quiet", "--out", folder / "results", *options, file], capture_output=True)
+    return folder / "results"
+
+
+def call(monkeypatch, module: str, *arguments: object) -> None:
+    """A script's Python part within this process, for the start of Matplotlib takes a second."""
+    main = importlib.import_module(f"nocdyn_report.{module}").main
+    monkeypatch.setattr(sys, "argv", [module, *map(str, arguments)])
+    main()
+
+
+def refusal(monkeypatch, module: str, *arguments: object) -> str:
+    with pytest.raises(SystemExit) as leaving:
+        call(monkeypatch, module, *arguments)
+    return leaving.value.code
+
+
+def assert_figures(folder: Path, *names: str) -> None:
+    for name in names:
+        for kind, signature in SIGNATURES.items():
+            content = (folder / f"{name}.{kind}").read_bytes()
+            assert content.startswith(signature) and len(content) > 1000, f"{name}.{kind}"
+    assert len(list(folder.iterdir())) == len(names) * len(SIGNATURES)
+
+
+def chain(bodies: int, run: str) -> str:
+    groups = [f"&body name = 'rotor{i}' inertia = 1.0 /" for i in range(bodies)]
+    groups += [f"&coupling name = 'shaft{i}' bodies = 'rotor{i - 1}', 'rotor{i}' stiffness = 1e3 damping = 1.0 /"
+               for i in range(1, bodies)]
+    return "\n".join([*groups, "&motor name = 'drive' body = 'rotor0' a = 100.0 b = 1.0 c = 0.0 /", f"&run {run} /", ""])
+
+
+def test_paper_figures_appear_in_three_formats(paper_results, tmp_path, monkeypatch):
+    call(monkeypatch, "paper_figures", *paper_results, "--out", tmp_path)
+    assert_figures(tmp_path, "figure2", "figure3", "figure4", "figure5")
+    assert "Paper, case 2" in (tmp_path / "figure5.svg").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("bodies", [1, 2, 30])
+def test_any_run_is_drawn(bodies, tmp_path, monkeypatch):
+    results = run_input(tmp_path, chain(bodies, "t_end = 1.0"))
+    call(monkeypatch, "run_figures", results)
+    assert_figures(results / "figures", "motion", "phase_planes", "torques", "energy")
+
+
+def test_machine_with_ground_and_awkward_names_is_drawn(tmp_path, monkeypatch):
+    results = run_input(tmp_path, """
+&case title = 'Costs $5, and a title that is far too long for one line: 50 % of a lot of words that nobody wants to read' /
+&body name = 'a $ b' inertia = 1.0 speed = 1.0 /
+&body name = 'wheel_2' inertia = 1.0 speed = -1.0 /
+&coupling name = 'mount [x]' bodies = 'ground', 'a $ b' stiffness = 100.0 damping = 0.1 /
+&gear name = 'g' bodies = 'a $ b', 'wheel_2' teeth = 20, 20 /
+&run t_end = 1.0 /
+""")
+    call(monkeypatch, "run_figures", results)
+    assert_figures(results / "figures", "motion", "phase_planes", "torques", "energy")
+
+
+def test_partial_trajectory_is_drawn_and_called_partial(tmp_path, monkeypatch, capsys):
+    results = run_input(tmp_path, chain(3, "t_end = 1000.0"), "--set", "run.max_steps=200", "--set", "output.points=10001")
+    assert (results / "trajectory.partial.csv").is_file()
+    call(monkeypatch, "run_figures", results)
+    assert_figures(results / "figures", "motion", "phase_planes", "torques", "energy")
+    assert "the trajectory is partial: failed, ends at t = " in capsys.readouterr().err
+    assert "failed, ends at t = " in (results / "figures" / "motion.svg").read_text(encoding="utf-8")
+
+
+def test_numbers_stand_beside_their_closed_forms(paper_results, monkeypatch, capsys):
+    call(monkeypatch, "paper_numbers", *paper_results)
+    case1, case2 = capsys.readouterr().out.split("\n\n")
+    moment = -100.0 * 4.0 / 9.0 * UNIFORM_SPEED
+    uniform = [UNIFORM_SPEED, UNIFORM_SPEED, -2.0 / 3.0 * UNIFORM_SPEED, moment, moment / 2.0]
+    last_columns = [[float(word) for word in line.split("]")[1].replace("..", " ").split()]
+                    for case in (case1, case2) for line in case.splitlines()[2:]]
+    for expected, (end, steady, difference) in zip(uniform, last_columns[:5], strict=True):
+        assert steady == pytest.approx(expected, rel=1e-8)
+        assert end == pytest.approx(expected, rel=SETTLED)
+        assert abs(difference) < SETTLED * abs(expected)
+    for expected, (end, steady, low, high) in zip(uniform, last_columns[5:], strict=True):
+        assert steady == pytest.approx(expected, rel=1e-8)
+        assert low <= end <= high
+        assert low < expected < high
+
+
+def test_numbers_of_another_machine_are_refused(tmp_path, monkeypatch):
+    results = run_input(tmp_path, chain(2, "t_end = 1.0"))
+    assert "not the paper's machine" in refusal(monkeypatch, "paper_numbers", results)
+
+
+@pytest.mark.parametrize(("files", "message"), [
+    (None, "there is no such results folder"),
+    ({}, "no trajectory.csv here"),
+    ({"trajectory.csv": ""}, "not a table of numbers"),
+    ({"trajectory.csv": "t [s],phi_a [rad]\n0,one\n"}, "not a table of numbers"),
+    ({"trajectory.csv": "a,b\n0,1\n2,3\n"}, "there is no column 't [s]'"),
+    ({"trajectory.csv": "t [s],phi_a [rad]\n0,1\n"}, "nothing to draw: the trajectory has 1 row(s)"),
+    ({"trajectory.partial.csv": "t [s],phi_a [rad]\n"}, "nothing to draw: the trajectory has 0 row(s)"),
+    ({"trajectory.csv": "t [s],phi_a [rad]\n0,1\n1,1\n"}, "input.nml: missing"),
+])
+def test_unusable_results_are_one_clear_line(files, message, tmp_path, monkeypatch):
+    folder = tmp_path / "results"
+    for name, text in (files or {}).items():
+        folder.mkdir(exist_ok=True)
+        (folder / name).write_text(text, encoding="utf-8")
+    if files == {}:
+        folder.mkdir()
+    said = refusal(monkeypatch, "run_figures", folder)
+    assert message in said and str(folder) in said and "\n" not in said
+
+
+def test_refusals_leave_with_exit_code_1_and_one_line(tmp_path):
+    result = subprocess.run([sys.executable, "-m", "nocdyn_report.run_figures", tmp_path / "none"], text=True,
+                            capture_output=True, env={**os.environ, "PYTHONPATH": str(SCRIPTS)})
+    assert result.returncode == 1
+    assert result.stderr.count("\n") == 1 and result.stderr.startswith("scripts/plot: ")
+
+
+class BareMachine:
+    """A PATH with the plain tools and stand-ins: apt-get notes its arguments and 'installs' a compiler."""
+
+    TOOLS = ("bash", "cat", "chmod", "dirname", "env", "mktemp", "rm", "tail", "cmake", "ninja", "g++", "python3")
+    COMPILER = '#!/usr/bin/env bash\necho "/lib/${1#*=}"\n'
+
+    def __init__(self, folder: Path):
+        self.folder = folder
+        self.calls = folder / "calls"
+        for tool in self.TOOLS:
+            (folder / tool).symlink_to(shutil.which(tool))
+
+    def stand_in(self, name: str, text: str) -> None:
+        file = self.folder / name
+        file.write_text(text, encoding="utf-8")
+        file.chmod(0o755)
+
+    def setup(self, *parts: str) -> subprocess.CompletedProcess:
+        environment = {"PATH": str(self.folder), "HOME": str(self.folder)}
+        return subprocess.run([SETUP, *parts], text=True, capture_output=True, stdin=subprocess.DEVNULL,
+                              env=environment, cwd=self.folder)
+
+
+@pytest.fixture
+def bare_machine(tmp_path) -> BareMachine:
+    machine = BareMachine(tmp_path)
+    machine.stand_in("id", "#!/usr/bin/env bash\necho 1000\n")
+    machine.stand_in("apt-get", f'''#!/usr/bin/env bash
+echo "$@" >> '{machine.calls}'
+[[ $1 != install ]] || {{ printf '%s\\n' '{machine.COMPILER}' > '{tmp_path}/gfortran'; chmod +x '{tmp_path}/gfortran'; }}
+''')
+    return machine
+
+
+def test_setup_is_silent_when_nothing_is_missing(bare_machine):
+    bare_machine.stand_in("gfortran", bare_machine.COMPILER)
+    result = bare_machine.setup("build")
+    assert (result.returncode, result.stdout, result.stderr) == (0, "", "")
+    assert not bare_machine.calls.exists()
+
+
+def test_setup_without_root_and_sudo_says_what_to_run(bare_machine):
+    result = bare_machine.setup("build")
+    assert result.returncode == 3
+    assert "apt-get install --no-install-recommends gfortran liblapack-dev libblas-dev\n" in result.stderr
+    assert not bare_machine.calls.exists()
+
+
+def test_setup_installs_what_is_missing_by_sudo(bare_machine):
+    bare_machine.stand_in("sudo", '#!/usr/bin/env bash\n[[ $1 == --validate ]] || exec "$@"\n')
+    result = bare_machine.setup("build")
+    assert (result.returncode, result.stderr) == (0, "")
+    assert bare_machine.calls.read_text(encoding="utf-8").splitlines() == [
+        "update", "install --yes --no-install-recommends gfortran liblapack-dev libblas-dev"]
+
+
+def test_setup_says_when_an_installation_did_not_help(bare_machine):
+    bare_machine.stand_in("id", "#!/usr/bin/env bash\necho 0\n")
+    bare_machine.stand_in("apt-get", "#!/usr/bin/env bash\n")
+    result = bare_machine.setup("build")
+    assert result.returncode == 3
+    assert "still not found or too old: gfortran liblapack-dev libblas-dev" in result.stderr
+
+
+def test_setup_on_another_system_says_what_is_needed(bare_machine):
+    (bare_machine.folder / "apt-get").unlink()
+    result = bare_machine.setup("build")
+    assert result.returncode == 3
+    assert "must be installed first: gfortran liblapack-dev libblas-dev" in result.stderr
+
+
+def test_setup_refuses_an_unknown_part(bare_machine):
+    result = bare_machine.setup("building")
+    assert result.returncode == 2
+    assert "there is no part 'building'" in result.stderr
