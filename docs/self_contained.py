@@ -1,9 +1,9 @@
-"""Makes a FORD site readable without a network: local copies of Bootstrap and MathJax in place of FORD's links to them.
+"""Makes a FORD site readable without a network: local copies of the scripts and styles that its pages load.
 
 usage: self_contained.py SITE
 
-The copies come from the Debian packages libjs-bootstrap5 and libjs-mathjax. Exit codes: 0 done, 1 the pages are not
-those that this script knows, 3 a package is missing.
+The copies come from the Debian packages libjs-bootstrap5, libjs-lunr and libjs-mathjax. Exit codes: 0 done, 1 the pages
+load something that this script does not know, 3 a package is missing; then the site is left as it is.
 """
 import os
 import pathlib
@@ -11,50 +11,49 @@ import re
 import shutil
 import sys
 
-LIBRARIES = pathlib.Path("/usr/share/javascript")
-BOOTSTRAP = ["css/bootstrap.min.css", "js/bootstrap.bundle.min.js"]
-MATHJAX = ["MathJax.js", "config/TeX-AMS-MML_SVG.js", "extensions", "jax/element", "jax/input/TeX", "jax/output/SVG/autoload",
-           "jax/output/SVG/fonts/TeX", "jax/output/SVG/jax.js"]
-COPIES = {"bootstrap5": BOOTSTRAP, "mathjax": MATHJAX}
-
-# what FORD links to, and the file in the site that replaces it; formulas as SVG need no font files
-REMOTE = re.compile(r'(href|src)="https://cdn\.[^"]*/(bootstrap\.min\.css|bootstrap\.bundle\.min\.js|MathJax\.js)[^"]*"')
+INSTALLED = pathlib.Path("/usr/share/javascript")
+COPIES = [
+    "bootstrap5/css/bootstrap.min.css", "bootstrap5/js/bootstrap.bundle.min.js", "lunr/lunr.js", "mathjax/MathJax.js",
+    "mathjax/config/TeX-AMS-MML_SVG.js", "mathjax/extensions", "mathjax/jax/element", "mathjax/jax/input/TeX",
+    "mathjax/jax/output/SVG/autoload", "mathjax/jax/output/SVG/fonts/TeX", "mathjax/jax/output/SVG/jax.js",
+]
 LOCAL = {
-    "bootstrap.min.css": "lib/bootstrap5/css/bootstrap.min.css",
-    "bootstrap.bundle.min.js": "lib/bootstrap5/js/bootstrap.bundle.min.js",
-    "MathJax.js": "lib/mathjax/MathJax.js?config=TeX-AMS-MML_SVG",
+    "bootstrap.min.css": "bootstrap5/css/bootstrap.min.css",
+    "bootstrap.bundle.min.js": "bootstrap5/js/bootstrap.bundle.min.js",
+    "lunr.js": "lunr/lunr.js",
+    "MathJax.js": "mathjax/MathJax.js?config=TeX-AMS-MML_SVG",   # formulas as SVG need no font files
 }
-INTEGRITY = re.compile(r'\s+(integrity|crossorigin)="[^"]*"')
+LOADED = re.compile(r"<(?:script|link)\b[^>]*\"https?://[^>]*>")
+ADDRESS = re.compile(r'"https?://[^"?]*/([^"/?]+)[^"]*"')
+INTEGRITY = re.compile(r'\s+(?:integrity|crossorigin)="[^"]*"')
 
 
-def copy_libraries(site):
-    for library, parts in COPIES.items():
-        for part in parts:
-            source, target = LIBRARIES / library / part, site / "lib" / library / part
-            target.parent.mkdir(parents=True, exist_ok=True)
-            if source.is_dir():
-                shutil.copytree(source, target, dirs_exist_ok=True)
-            else:
-                shutil.copy(source, target)
+def copy_libraries(target):
+    for part in COPIES:
+        (target / part).parent.mkdir(parents=True, exist_ok=True)
+        if (INSTALLED / part).is_dir():
+            shutil.copytree(INSTALLED / part, target / part, dirs_exist_ok=True)
+        else:
+            shutil.copy(INSTALLED / part, target / part)
 
 
-def localised(html, to_root):
-    """The page with local links, and how many there are."""
-    html, count = REMOTE.subn(lambda link: f'{link[1]}="{to_root}/{LOCAL[link[2]]}"', html)
-    return INTEGRITY.sub("", html), count
+def localised(html, libraries):
+    """The page with links to the copies; KeyError names what has none."""
+    def local(tag):
+        return INTEGRITY.sub("", ADDRESS.sub(lambda address: f'"{libraries}/{LOCAL[address[1]]}"', tag[0]))
+    return LOADED.sub(local, html)
 
 
 def main(site):
-    missing = [library for library in COPIES if not (LIBRARIES / library).is_dir()]
-    if missing:
+    if not all((INSTALLED / part).exists() for part in COPIES):
         return 3
-    copy_libraries(site)
-    for page in site.rglob("*.html"):
-        if "lib" in page.relative_to(site).parts:
-            continue
-        html, count = localised(page.read_text(encoding="utf-8"), os.path.relpath(site, page.parent))
-        if count != len(LOCAL):
-            print(f"{page}: expected {len(LOCAL)} links to replace, found {count}", file=sys.stderr)
+    pages = list(site.rglob("*.html"))
+    copy_libraries(site / "lib")
+    for page in pages:
+        try:
+            html = localised(page.read_text(encoding="utf-8"), os.path.relpath(site / "lib", page.parent))
+        except KeyError as unknown:
+            print(f"{page}: there is no copy of {unknown}", file=sys.stderr)
             return 1
         page.write_text(html, encoding="utf-8")
     return 0

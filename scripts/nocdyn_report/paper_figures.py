@@ -26,7 +26,7 @@ def draw_elastic_moments(results: Results) -> Figure:
     axes.axhline(-steady, **REFERENCE)
     draw_lines(axes, ["F₁", "F₂"], [(results.time, moment), (results.time, -moment)])
     axes.set_xlim(results.time[0], results.time[-1])
-    axes.set_xlabel("time $t$ [s]")
+    axes.set_xlabel("time [s]")
     axes.set_ylabel("elastic moment [N m]")
     return figure
 

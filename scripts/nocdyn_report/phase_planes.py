@@ -42,12 +42,12 @@ def draw_phase_planes(results: Results) -> Figure:
 def _bodies(results: Results) -> Kind:
     pairs = zip(results.columns("phi"), results.columns("omega"))
     planes = [Plane(phi.element, phi.values, omega.values) for phi, omega in pairs]
-    return Kind("body", r"angle $\varphi$ [rad]", r"speed $\omega$ [rad/s]", planes)
+    return Kind("body", "angle φ [rad]", "speed ω [rad/s]", planes)
 
 
 def _couplings(results: Results) -> Kind:
     planes = [Plane(twist.element, twist.values, results.twist_rate(twist.element)) for twist in results.columns("twist")]
-    return Kind("twist of", r"twist $\Delta\varphi$ [rad]", r"rate of twist $\Delta\omega$ [rad/s]", planes)
+    return Kind("twist of", "twist Δφ [rad]", "rate of twist Δω [rad/s]", planes)
 
 
 def _draw_apart(kinds: list[Kind]) -> Figure:

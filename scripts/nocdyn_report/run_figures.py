@@ -60,7 +60,7 @@ def _by_unit(columns: list[Column]) -> Iterator[list[Column]]:
 
 def _finish_time_axis(axes: Axes, results: Results) -> None:
     axes.set_xlim(results.time[0], results.time[-1])
-    axes.set_xlabel("time $t$ [s]")
+    axes.set_xlabel("time [s]")
 
 
 def draw_run(results: Results, folder: Path) -> list[str]:
@@ -71,10 +71,9 @@ def draw_run(results: Results, folder: Path) -> list[str]:
         "torques": draw_over_time(results, TORQUES),
         "energy": draw_energy(results),
     }
-    title = results.title + (f" ({results.shortfall})" if results.shortfall else "")
     drawn = [name for name, figure in figures.items() if figure]
     for name in drawn:
-        add_title(figures[name], title)
+        add_title(figures[name], results.title, results.shortfall)
         save(figures[name], folder, name)
     return drawn
 

@@ -8,8 +8,8 @@ import matplotlib
 import numpy as np
 from matplotlib import colormaps, pyplot
 from matplotlib.axes import Axes
-from matplotlib.colors import BoundaryNorm, ListedColormap
 from matplotlib.cm import ScalarMappable
+from matplotlib.colors import BoundaryNorm, ListedColormap
 from matplotlib.figure import Figure
 
 # Okabe and Ito's colours, told apart with any colour vision, without the yellow that white paper swallows.
@@ -29,7 +29,6 @@ matplotlib.rcParams.update({
     "axes.spines.right": False,
     "axes.spines.top": False,
     "axes.titlesize": 10,
-    "axes.titleweight": "bold",
     "figure.constrained_layout.use": True,
     "figure.titlesize": 12,
     "font.size": 10,
@@ -49,8 +48,8 @@ def plain(text: str) -> str:
     return text.replace("$", r"\$")
 
 
-def add_title(figure: Figure, title: str) -> None:
-    figure.suptitle(plain(textwrap.fill(title, TITLE_LENGTH)))
+def add_title(figure: Figure, *lines: str) -> None:
+    figure.suptitle(plain("\n".join(textwrap.fill(line, TITLE_LENGTH) for line in lines if line)))
 
 
 def draw_lines(axes: Axes, names: Sequence[str], lines: Sequence[tuple[np.ndarray, np.ndarray]]) -> None:
@@ -77,6 +76,8 @@ def _add_colour_bar(axes: Axes, names: Sequence[str], palette: np.ndarray) -> No
 def save(figure: Figure, folder: Path, name: str) -> None:
     """Writes FOLDER/NAME.png, .svg and .pdf and frees the figure."""
     folder.mkdir(parents=True, exist_ok=True)
+    figure.draw_without_rendering()
+    figure.set_layout_engine("none")  # laid out once, not for each format again
     for kind in FORMATS:
         undated = {"png": None, "svg": {"Date": None}, "pdf": {"CreationDate": None}}[kind]
         figure.savefig(folder / f"{name}.{kind}", metadata=undated)

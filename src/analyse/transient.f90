@@ -13,7 +13,7 @@ module nocdyn_transient
   use nocdyn_machine, only: machine_t
   use nocdyn_machine_report, only: redundancy_notes
   use nocdyn_outcome, only: failure_sentence, integration_done, integration_interrupted, outcome_t
-  use nocdyn_output_file, only: output_file_t, write_whole
+  use nocdyn_output_file, only: output_file_t
   use nocdyn_output_times, only: check_output_times, output_times
   use nocdyn_posix, only: is_interrupted, remove_file
   use nocdyn_run_summary, only: run_summary_t, start_extremes, summary_json, update_extremes
@@ -127,8 +127,9 @@ contains
     call system_clock(ended)
     if (allocated(error)) return
     recorder%summary%wall_time = real(ended - began, wp) / real(rate, wp)
-    if (outcome%status(1) /= integration_done) &
+    if (outcome%status(1) /= integration_done) then
       call raise(error, exit_failed, failure_sentence(outcome, 1, formulation, settings%rtol, settings%atol))
+    end if
   end subroutine solve
 
   subroutine conclude(outcome, error, summary)
@@ -143,24 +144,40 @@ contains
     if (outcome%status(1) == integration_interrupted) summary%status = 'interrupted'
   end subroutine conclude
 
-  !> Gives the files their names; what an earlier run left there and this one does not replace is removed.
+  !> Gives the three files their names once all are written: a full disk leaves the results of an earlier run alone.
+  !> The other trajectory file of an earlier run is removed.
   subroutine write_results(input, machine, recorder, folder, error)
     type(input_t), intent(in) :: input
     type(machine_t), intent(in) :: machine
     type(recorder_t), intent(inout) :: recorder
     character(len=*), intent(in) :: folder
     type(error_t), allocatable, intent(out) :: error
+    type(output_file_t) :: input_copy, summary
+
+    call input_copy%open(folder, input_file)
+    call input_copy%put(input_text(input))
+    call summary%open(folder, summary_file)
+    call summary%put(summary_json(input, machine, recorder%summary))
+    call recorder%file%complete(trajectory_file, error)
+    if (.not. allocated(error)) call input_copy%complete(input_file, error)
+    if (.not. allocated(error)) call summary%complete(summary_file, error)
+    if (allocated(error)) then
+      call recorder%file%discard()
+      call input_copy%discard()
+      call summary%discard()
+      return
+    end if
 
     call remove_file(folder // '/' // summary_file)
     if (recorder%summary%status == 'done') then
-      call recorder%file%finish(trajectory_file, error)
       call remove_file(folder // '/' // partial_file)
+      call recorder%file%finish(trajectory_file, error)
     else
-      call recorder%file%finish(partial_file, error)
       call remove_file(folder // '/' // trajectory_file)
+      call recorder%file%finish(partial_file, error)
     end if
-    if (.not. allocated(error)) call write_whole(folder, input_file, input_text(input), error)
-    if (.not. allocated(error)) call write_whole(folder, summary_file, summary_json(input, machine, recorder%summary), error)
+    if (.not. allocated(error)) call input_copy%finish(input_file, error)
+    if (.not. allocated(error)) call summary%finish(summary_file, error)
   end subroutine write_results
 
   !> One requested time: a row of the table.

@@ -113,7 +113,9 @@ contains
       end if
       call take_value(name, value, arguments, error)
     case ('--help', '-h')
-      arguments%operands = [string_t(arguments%command)]
+      deallocate (arguments%operands)
+      allocate (arguments%operands(1))   ! gfortran 12 loses the text in an array constructor here
+      call move_alloc(arguments%command, arguments%operands(1)%text)
       arguments%command = 'help'
     case default
       options = [string_t('--out'), string_t('--set'), string_t('--quiet'), string_t('--help')]

@@ -29,13 +29,16 @@ module nocdyn_console
 
 contains
 
-  !> A line, or several, on standard output.
+  !> A line, or several, on standard output; the last one may have its end already.
   subroutine say(text)
     character(len=*), intent(in) :: text
-
     logical :: is_done
 
-    call write_bytes(standard_output, text // new_line('a'), is_done)
+    if (index(text, new_line('a'), back=.true.) == len(text)) then
+      call write_bytes(standard_output, text, is_done)
+    else
+      call write_bytes(standard_output, text // new_line('a'), is_done)
+    end if
     if (.not. is_done) output_is_lost = .true.
   end subroutine say
 

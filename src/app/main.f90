@@ -4,6 +4,7 @@ program nocdyn
   use nocdyn_commands, only: check_command, help_command, matrices_command, new_command, version_command
   use nocdyn_console, only: complain, output_is_lost
   use nocdyn_errors, only: error_t, exit_file, raise
+  use nocdyn_posix, only: survive_size_limit
   use nocdyn_run_command, only: run_command
   implicit none
 
@@ -11,6 +12,7 @@ program nocdyn
   type(error_t), allocatable :: error
   integer :: code
 
+  call survive_size_limit()
   call parse_arguments(command_line(), arguments, error)
   if (allocated(error)) then
     call complain(error)

@@ -6,7 +6,8 @@ module nocdyn_posix
   implicit none
   private
 
-  public :: make_folders, rename_file, remove_file, process_id, is_terminal, watch_interrupts, is_interrupted
+  public :: make_folders, rename_file, remove_file, process_id, is_terminal, watch_interrupts, is_interrupted, &
+    survive_size_limit
   public :: create_file, write_bytes, close_file, last_failure
 
   integer, parameter, public :: standard_output = 1, standard_error = 2   !! file descriptors
@@ -175,14 +176,19 @@ contains
   end function is_terminal
 
   !> From here on Ctrl-C and termination do not end the program but show in `is_interrupted`; the second one ends it.
-  !> A file that grows beyond the limit of the shell is a write that fails.
   subroutine watch_interrupts()
     type(c_funptr) :: previous
 
     previous = c_signal(interrupt_signal, c_funloc(note_signal))
     previous = c_signal(termination_signal, c_funloc(note_signal))
-    previous = c_signal(file_size_signal, transfer(ignored, c_null_funptr))
   end subroutine watch_interrupts
+
+  !> From here on a file that would grow beyond the limit of the shell is a write that fails, not the end of the program.
+  subroutine survive_size_limit()
+    type(c_funptr) :: previous
+
+    previous = c_signal(file_size_signal, transfer(ignored, c_null_funptr))
+  end subroutine survive_size_limit
 
   subroutine note_signal(signal) bind(c)
     integer(c_int), value, intent(in) :: signal

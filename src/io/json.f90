@@ -113,10 +113,12 @@ contains
   pure function escaped(text)
     character(len=*), intent(in) :: text
     character(len=:), allocatable :: escaped
-    integer :: i
+    integer :: i, length
 
     escaped = '"'
-    do i = 1, len(text)
+    i = 1
+    do while (i <= len(text))
+      length = utf_8_length(text, i)
       select case (text(i:i))
       case ('"', '\')
         escaped = escaped // '\' // text(i:i)
@@ -125,10 +127,40 @@ contains
       case (achar(0):achar(9), achar(11):achar(31))
         escaped = escaped // ' '
       case default
-        escaped = escaped // text(i:i)
+        if (length > 0) escaped = escaped // text(i:i + length - 1)
+        if (length == 0) escaped = escaped // latin_1(text(i:i))
       end select
+      i = i + max(1, length)
     end do
     escaped = escaped // '"'
   end function escaped
+
+  !> Bytes of the UTF-8 character that begins at `first`, 0 if none does.
+  pure integer function utf_8_length(text, first) result(length)
+    character(len=*), intent(in) :: text
+    integer, intent(in) :: first
+    integer :: head, i, second
+
+    head = iachar(text(first:first))
+    length = 1
+    if (head < 128) return
+    length = count(head >= [194, 194, 224, 240])
+    if (head > 244 .or. first + max(2, length) - 1 > len(text)) length = 0
+    do i = first + 1, first + length - 1
+      if (iachar(text(i:i)) < 128 .or. iachar(text(i:i)) > 191) length = 0
+    end do
+    if (length < 3) return
+    second = iachar(text(first + 1:first + 1))   ! overlong forms, surrogates, beyond the last character
+    if ((head == 224 .and. second < 160) .or. (head == 237 .and. second > 159) .or. (head == 240 .and. second < 144) &
+        .or. (head == 244 .and. second > 143)) length = 0
+  end function utf_8_length
+
+  !> A byte that is no UTF-8, taken for Latin-1.
+  pure function latin_1(byte) result(escape)
+    character(len=1), intent(in) :: byte
+    character(len=6) :: escape
+
+    write (escape, '(a, z4.4)') '\u', iachar(byte)
+  end function latin_1
 
 end module nocdyn_json

@@ -21,10 +21,13 @@ module nocdyn_output_file
   contains
     procedure :: open => open_aside
     procedure :: put
+    procedure :: complete
     procedure :: finish
     procedure :: discard
     procedure, private :: flush_buffer
+    procedure, private :: close => close_aside
     procedure, private :: note
+    procedure, private :: fail
   end type output_file_t
 
 contains
@@ -75,7 +78,7 @@ contains
     class(output_file_t), intent(inout) :: self
     logical :: is_done
 
-    if (.not. self%has_failed) then
+    if (.not. self%has_failed .and. self%used > 0) then
       call write_bytes(self%descriptor, self%buffer(:self%used), is_done)
       if (.not. is_done) call self%note(last_failure())
     end if

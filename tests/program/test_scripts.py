@@ -79,9 +79,8 @@ def test_paper_figures_appear_in_three_formats(paper_results, tmp_path, monkeypa
     assert "Paper, case 2" in (tmp_path / "figure5.svg").read_text(encoding="utf-8")
 
 
-@pytest.mark.parametrize("bodies", [1, 2, 30])
-def test_any_run_is_drawn(bodies, tmp_path, monkeypatch):
-    results = run_input(tmp_path, chain(bodies, "t_end = 1.0"))
+def test_single_body_is_drawn(tmp_path, monkeypatch):
+    results = run_input(tmp_path, chain(1, "t_end = 1.0"))
     call(monkeypatch, "run_figures", results)
     assert_figures(results / "figures", "motion", "phase_planes", "torques", "energy")
 
@@ -99,8 +98,8 @@ def test_machine_with_ground_and_awkward_names_is_drawn(tmp_path, monkeypatch):
     assert_figures(results / "figures", "motion", "phase_planes", "torques", "energy")
 
 
-def test_partial_trajectory_is_drawn_and_called_partial(tmp_path, monkeypatch, capsys):
-    results = run_input(tmp_path, chain(3, "t_end = 1000.0"), "--set", "run.max_steps=200", "--set", "output.points=10001")
+def test_partial_trajectory_of_many_bodies_is_drawn_and_called_partial(tmp_path, monkeypatch, capsys):
+    results = run_input(tmp_path, chain(30, "t_end = 1000.0"), "--set", "run.max_steps=200", "--set", "output.points=10001")
     assert (results / "trajectory.partial.csv").is_file()
     call(monkeypatch, "run_figures", results)
     assert_figures(results / "figures", "motion", "phase_planes", "torques", "energy")
@@ -202,12 +201,12 @@ def test_setup_is_silent_when_nothing_is_missing(bare_machine):
 def test_setup_without_root_and_sudo_says_what_to_run(bare_machine):
     result = bare_machine.setup("build")
     assert result.returncode == 3
-    assert "apt-get install --no-install-recommends gfortran liblapack-dev libblas-dev\n" in result.stderr
+    assert "apt-get update && apt-get install --no-install-recommends gfortran liblapack-dev libblas-dev\n" in result.stderr
     assert not bare_machine.calls.exists()
 
 
 def test_setup_installs_what_is_missing_by_sudo(bare_machine):
-    bare_machine.stand_in("sudo", '#!/usr/bin/env bash\n[[ $1 == --validate ]] || exec "$@"\n')
+    bare_machine.stand_in("sudo", '#!/usr/bin/env bash\n[[ $1 == true ]] || exec "$@"\n')
     result = bare_machine.setup("build")
     assert (result.returncode, result.stderr) == (0, "")
     assert bare_machine.calls.read_text(encoding="utf-8").splitlines() == [

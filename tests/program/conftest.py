@@ -1,0 +1,90 @@
+"""What the whole-program tests share: the executable, and a folder to run it in."""
+
+import csv
+import json
+import os
+import subprocess
+import time
+from pathlib import Path
+
+import pytest
+
+SOURCE = Path(os.environ["NOCDYN_SOURCE"])
+DATA = Path(__file__).parent / "data"
+CASE_1 = SOURCE / "input/paper/case1.nml"
+CASE_2 = SOURCE / "input/paper/case2.nml"
+
+# A run that no test waits for, with few rows.
+ENDLESS = ("--set", "run.t_end=1e6", "--set", "run.max_steps=100000000", "--set", "output.interval=1")
+
+
+class Program:
+    """The executable, run in a folder of its own."""
+
+    def __init__(self, folder):
+        self.folder = folder
+        self.executable = os.environ["NOCDYN"]
+
+    def __call__(self, *words, **options):
+        words = [self.executable, *map(str, words)]
+        return subprocess.run(words, cwd=self.folder, check=False, capture_output=True, text=True, timeout=120, **options)
+
+    def start(self, *words, **options):
+        words = [self.executable, *map(str, words)]
+        pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+        return subprocess.Popen(words, cwd=self.folder, **(pipes | options))
+
+    def start_endless(self, folder, *words, **options):
+        """A run of case 2 that has begun to integrate."""
+        process = self.start("run", CASE_2, "--out", folder, *words, *ENDLESS, **options)
+        wait_for(lambda: list((self.folder / folder).glob(".trajectory.csv.*")))
+        return process
+
+    def write(self, name, text):
+        path = self.folder / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text)
+        return path
+
+    def files(self, folder):
+        return sorted(path.name for path in (self.folder / folder).iterdir())
+
+    def table(self, folder, name="trajectory.csv"):
+        """Header and rows of numbers."""
+        with open(self.folder / folder / name, newline="") as file:
+            header, *rows = csv.reader(file)
+        return header, [[float(cell) for cell in row] for row in rows]
+
+    def summary(self, folder):
+        return json.loads((self.folder / folder / "summary.json").read_text())
+
+
+def wait_for(condition, seconds=30):
+    end = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < end, "waited in vain"
+        time.sleep(0.005)
+
+
+@pytest.fixture
+def nocdyn(tmp_path):
+    return Program(tmp_path)
+
+
+@pytest.fixture(scope="module")
+def shared_nocdyn(tmp_path_factory):
+    return Program(tmp_path_factory.mktemp("run"))
+
+
+# A machine without gears, for tests to which the physics does not matter.
+SPINNER = """\
+&body name = 'disc' inertia = 2.0 speed = 1.0 /
+&load name = 'drag' body = 'disc' viscous = 0.5 /
+&run t_end = 1.0 /
+&output points = 11 /
+"""
+
+
+@pytest.fixture
+def spinner(nocdyn):
+    return nocdyn.write("spinner.nml", SPINNER)

@@ -1,0 +1,167 @@
+"""Commands, options and what they print."""
+
+import re
+
+import f90nml
+import pytest
+from conftest import CASE_1, CASE_2, SOURCE
+
+
+def one_line(text):
+    return text.endswith("\n") and text.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    ("words", "complaint"),
+    [
+        ([], "a command is missing"),
+        (["rnu", "x.nml"], "'rnu' is not a command; allowed: 'run', 'check', 'matrices', 'new', 'help'; did you mean 'run'?"),
+        (["simulate"], "'simulate' is not a command"),
+        (["run"], "an input file is missing: nocdyn run FILE..."),
+        (["check"], "an input file is missing: nocdyn check FILE..."),
+        (["matrices"], "exactly one file is needed: nocdyn matrices FILE"),
+        (["matrices", CASE_1, CASE_2], "exactly one file is needed: nocdyn matrices FILE"),
+        (["new"], "exactly one file is needed: nocdyn new FILE"),
+        (["run", CASE_1, "--ouy", "x"], "'--ouy' is not an option"),
+        (["run", CASE_1, "--ouy", "x"], "did you mean '--out'?"),
+        (["run", CASE_1, "--out"], "--out needs a value: --out DIR\n"),
+        (["run", CASE_1, "--out="], "--out needs a value: --out DIR\n"),
+        (["run", CASE_1, "--set"], "--set needs a value: --set PATH=VALUE\n"),
+        (["run", CASE_1, "--out", "a", "--out", "b"], "--out is given twice"),
+        (["run", CASE_1, "--quiet=yes"], "--quiet takes no value"),
+        (["check", CASE_1, "--out", "a"], "--out is an option of nocdyn run"),
+        (["check", CASE_1, "--quiet"], "--quiet is an option of nocdyn run"),
+        (["new", "a.nml", "--set", "run.t_end=1"], "--set is an option of nocdyn run, check and matrices"),
+        (["--version", "now"], "--version takes no arguments"),
+        (["help", "simulate"], "there is no help on that; try 'run', 'check', 'matrices', 'new', 'help' or 'input'"),
+        (["help", "input", "boddy"], "there is no group 'boddy'; did you mean 'body'?"),
+    ],
+)
+def test_wrong_usage_is_refused_with_code_2(nocdyn, words, complaint):
+    outcome = nocdyn(*words)
+    assert (outcome.returncode, outcome.stdout) == (2, "")
+    assert complaint in outcome.stderr
+    assert one_line(outcome.stderr) and outcome.stderr.startswith("nocdyn: ")
+    assert list(nocdyn.folder.iterdir()) == []
+
+
+@pytest.mark.parametrize("words", [["help"], ["--help"], ["-h"]])
+def test_help_names_every_command_and_the_exit_codes(nocdyn, words):
+    outcome = nocdyn(*words)
+    assert (outcome.returncode, outcome.stderr) == (0, "")
+    for command in ("run FILE", "check FILE", "matrices FILE", "new FILE", "help [COMMAND]", "help input", "--version"):
+        assert f"nocdyn {command}" in outcome.stdout
+    assert "0 done, 1 a computation failed, 2 wrong usage or input, 3 a file cannot be read or written" in outcome.stdout
+
+
+@pytest.mark.parametrize("command", ["run", "check", "matrices", "new", "help"])
+def test_every_command_has_help_by_two_ways(nocdyn, command):
+    by_command = nocdyn("help", command)
+    assert by_command.returncode == 0
+    assert by_command.stdout.startswith(f"nocdyn {command}")
+    assert nocdyn(command, "--help").stdout == by_command.stdout
+
+
+def test_help_on_run_names_its_options(nocdyn):
+    text = nocdyn("help", "run").stdout
+    assert all(option in text for option in ("--out DIR", "--set PATH=VALUE", "--quiet"))
+
+
+def test_help_input_names_every_group_and_key_that_a_run_writes(nocdyn):
+    nocdyn("run", CASE_2, "--out", "out", "-q")
+    text = nocdyn("help", "input").stdout
+    for kind, values in f90nml.read(nocdyn.folder / "out/input.nml").items():
+        assert f"&{kind}" in text
+        for group in values if isinstance(values, list) else [values]:
+            assert all(re.search(rf"^ +{key} ", text, re.MULTILINE) for key in group)
+
+
+@pytest.mark.parametrize("group", ["gear", "&gear", "GEAR"])
+def test_help_on_a_group_shows_its_keys_and_no_others(nocdyn, group):
+    text = nocdyn("help", "input", group).stdout
+    assert "radii" in text and "teeth" in text and "cubic_stiffness" not in text
+
+
+def test_the_version_is_that_of_the_build(nocdyn):
+    declared = re.search(r"project\(nocdyn VERSION (\S+)", (SOURCE / "CMakeLists.txt").read_text()).group(1)
+    outcome = nocdyn("--version")
+    assert outcome.returncode == 0
+    assert outcome.stdout.split()[:2] == ["nocdyn", declared]
+    assert nocdyn("-V").stdout == outcome.stdout
+
+
+def test_new_writes_an_input_that_runs(nocdyn):
+    outcome = nocdyn("new", "mine.nml")
+    assert (outcome.returncode, outcome.stderr) == (0, "")
+    assert "nocdyn run mine.nml" in outcome.stdout
+    assert nocdyn("run", "mine.nml", "-q").returncode == 0
+    assert nocdyn.files("results/mine") == ["input.nml", "summary.json", "trajectory.csv"]
+
+
+def test_new_explains_every_key(nocdyn):
+    nocdyn("new", "mine.nml")
+    comments = [line for line in (nocdyn.folder / "mine.nml").read_text().splitlines() if line.startswith("!")]
+    for key in ("inertia", "cubic_stiffness", "teeth", "viscous", "max_steps", "directory"):
+        assert any(line.startswith(f"!   {key}") for line in comments)
+
+
+def test_new_makes_the_folder(nocdyn):
+    assert nocdyn("new", "machines/small/mine.nml").returncode == 0
+    assert nocdyn("check", "machines/small/mine.nml").returncode == 0
+    assert nocdyn.files("machines/small") == ["mine.nml"]
+
+
+def test_new_leaves_a_file_that_exists_alone(nocdyn):
+    nocdyn.write("mine.nml", "precious")
+    outcome = nocdyn("new", "mine.nml")
+    assert (outcome.returncode, outcome.stdout) == (3, "")
+    assert outcome.stderr == "nocdyn: 'mine.nml' exists; it was left as it is\n"
+    assert (nocdyn.folder / "mine.nml").read_text() == "precious"
+
+
+def test_check_reports_the_machine_and_integrates_nothing(nocdyn):
+    outcome = nocdyn("check", CASE_1, CASE_2)
+    assert (outcome.returncode, outcome.stderr) == (0, "")
+    for path in (CASE_1, CASE_2):
+        assert f"{path}: 3 bodies, 1 gear, 1 coupling, 1 motor, 1 load, 1 excitation\n" in outcome.stdout
+    assert outcome.stdout.count("2 degrees of freedom") == 2
+    assert outcome.stdout.count("speed of 'machine' = -0.6666667 * speed of 'pinion'") == 2
+    assert list(nocdyn.folder.iterdir()) == []
+
+
+def test_check_goes_on_past_a_bad_file(nocdyn):
+    outcome = nocdyn("check", "absent.nml", CASE_1)
+    assert outcome.returncode == 3
+    assert "absent.nml: cannot be read: there is no such file" in outcome.stderr
+    assert str(CASE_1) in outcome.stdout
+
+
+def test_a_file_whose_name_looks_like_an_option_comes_after_two_dashes(nocdyn, spinner):
+    spinner.rename(nocdyn.folder / "--odd.nml")
+    assert nocdyn("check", "--odd.nml").returncode == 2
+    assert nocdyn("check", "--", "--odd.nml").returncode == 0
+
+
+def test_an_input_may_come_through_a_pipe(nocdyn):
+    outcome = nocdyn("run", "/dev/stdin", input=CASE_2.read_text())
+    assert (outcome.returncode, outcome.stderr) == (0, "")
+    assert nocdyn.files("results/stdin") == ["input.nml", "summary.json", "trajectory.csv"]
+
+
+def test_a_chain_of_ten_thousand_bodies_is_checked(nocdyn):
+    bodies = 10000
+    lines = [f"&body name = 'b{i}' inertia = 1.0 /" for i in range(bodies)]
+    lines += [f"&coupling name = 'c{i}' bodies = 'b{i}', 'b{i + 1}' stiffness = 1.0 /" for i in range(0, bodies - 1, 2)]
+    lines += [f"&gear name = 'g{i}' bodies = 'b{i}', 'b{i + 1}' radii = 1, 2 /" for i in range(1, bodies - 1, 2)]
+    nocdyn.write("chain.nml", "\n".join([*lines, "&run t_end = 1.0 /\n"]))
+    outcome = nocdyn("check", "chain.nml")
+    assert (outcome.returncode, outcome.stderr) == (0, "")
+    assert "10000 bodies, 4999 gears, 5000 couplings" in outcome.stdout
+    assert "5001 degrees of freedom" in outcome.stdout
+
+
+def test_output_that_cannot_be_written_is_not_a_success(nocdyn):
+    with open("/dev/full", "w") as full:
+        outcome = nocdyn.start("help", stdout=full)
+        assert outcome.communicate()[1] == "nocdyn: standard output cannot be written\n"
+    assert outcome.returncode == 3

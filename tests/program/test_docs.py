@@ -1,0 +1,141 @@
+"""What the documentation claims about the program, its sources and its tests."""
+import os
+import re
+import subprocess
+
+import pytest
+from conftest import SOURCE
+
+PAGES = SOURCE / "docs" / "pages"
+TOP_PAGES = [SOURCE / name for name in ("README.md", "CONTRIBUTING.md", "CHANGELOG.md")]
+DOCUMENTS = [page for page in [*sorted(PAGES.glob("*.md")), *TOP_PAGES] if page.exists()]
+
+UNIT = re.compile(
+    r"^\s*(?:(?:pure|elemental|recursive|integer|logical|real\(wp\))\s+)*"
+    r"(?:module(?!\s+procedure)|program|subroutine|function|type\b[^:!]*::)\s+(\w+)", re.MULTILINE)
+COMMENTED_UNIT = re.compile(r"((?:^[ \t]*!>.*\n)+)" + UNIT.pattern, re.MULTILINE)
+
+
+def name_of(path):
+    return path.relative_to(SOURCE).as_posix()
+
+
+def module_text(module):
+    paths = list((SOURCE / "src").glob(f"*/{module.removeprefix('nocdyn_')}.f90"))
+    assert paths, f"there is no module {module}"
+    return paths[0].read_text()
+
+
+def slug(heading):
+    """As FORD's Markdown makes them."""
+    return re.sub(r"[-\s]+", "-", re.sub(r"[^\w\s-]", "", heading).strip().lower())
+
+
+def headings(page):
+    text = re.sub(r"^```.*?^```", "", page.read_text(), flags=re.MULTILINE | re.DOTALL)
+    return {slug(heading) for heading in re.findall(r"^#+ +(.*)$", text, re.MULTILINE)}
+
+
+@pytest.mark.parametrize("page", DOCUMENTS, ids=name_of)
+def test_relative_links_lead_to_files_and_headings(page):
+    for target in re.findall(r"\]\(([^)\s]+)\)", re.sub(r"\\\(.*?\\\)", "", page.read_text())):
+        if re.match(r"[a-z]+:", target):
+            continue
+        file, _, anchor = target.partition("#")
+        linked = page.parent / file if file else page
+        assert linked.exists(), f"{target}: no such file"
+        if anchor:
+            assert anchor in headings(linked), f"{target}: no such heading"
+
+
+@pytest.mark.parametrize("page", DOCUMENTS, ids=name_of)
+def test_modules_and_procedures_that_pages_link_to_exist(page):
+    for module, kind, unit in re.findall(r"\[\[(\w+)(\(module\))?(?::(\w+))?\]\]", page.read_text()):
+        assert kind or unit, f"[[{module}]] says neither module nor unit"
+        text = module_text(module)
+        if unit:
+            assert unit in UNIT.findall(text), f"{unit} is not in {module}"
+
+
+@pytest.mark.parametrize("page", DOCUMENTS, ids=name_of)
+def test_tests_that_pages_name_exist(page):
+    for file, test in re.findall(r"`(test_\w+): (\w+)`", page.read_text()):
+        paths = [path for path in (SOURCE / "tests").rglob(f"{file}.*") if path.suffix in (".pf", ".py")]
+        assert paths, f"there is no {file}"
+        assert re.search(rf"(subroutine|def) {test}\b", paths[0].read_text()), f"{test} is not in {file}"
+
+
+@pytest.mark.parametrize("page", DOCUMENTS, ids=name_of)
+def test_files_that_pages_name_exist(page):
+    for path in re.findall(r"`((?:src|docs|tests|scripts|input)/[\w./]+)`", page.read_text()):
+        assert (SOURCE / path).exists(), f"there is no {path}"
+
+
+def equations(text):
+    """The numbers in '(16), (47), (52)-(56)'."""
+    numbers = set()
+    for first, last in re.findall(r"\((\d+)\)(?:-\((\d+)\))?", text):
+        numbers |= set(range(int(first), int(last or first) + 1))
+    return numbers
+
+
+def equation_rows():
+    table = (PAGES / "theory.md").read_text().split("## Equations and procedures")[1]
+    rows = re.findall(r"^\| (\(\d+\)[^|]*)\|[^|]*\| \[\[(\w+)(?:\(module\))?(?::(\w+))?\]\] \|$", table, re.MULTILINE)
+    return [(equation.strip(), module, unit or module) for equation, module, unit in rows]
+
+
+def test_the_theory_page_has_its_table_of_equations():
+    assert len(equation_rows()) >= 25
+
+
+@pytest.mark.parametrize(("equation", "module", "unit"), equation_rows())
+def test_doc_comment_of_the_unit_carries_the_equation_number(equation, module, unit):
+    comments = {name: comment for comment, name in COMMENTED_UNIT.findall(module_text(module))}
+    missing = equations(equation) - equations(comments[unit])
+    assert not missing, f"({missing}) is not in the comment of {unit}: {comments[unit]}"
+
+
+def test_every_equation_from_1_to_109_is_accounted_for():
+    section = (PAGES / "theory.md").read_text().split("## Equations and procedures")[1]
+    text = section.split("## References")[0].replace(") to (", ")-(")
+    assert equations(text) == set(range(1, 110))
+
+
+def test_use_points_down_only():
+    below = {"base": set(), "integrate": {"base"}, "model": {"base"}, "io": {"base"}}
+    below["analyse"] = {"base", "integrate", "model", "io"}
+    below["app"] = below["analyse"] | {"analyse"}
+    layer = {"nocdyn_" + path.stem: path.parent.name for path in (SOURCE / "src").glob("*/*.f90")}
+    for path in (SOURCE / "src").glob("*/*.f90"):
+        for used in re.findall(r"^\s*use (nocdyn_\w+)", path.read_text(), re.MULTILINE):
+            allowed = below[path.parent.name] | {path.parent.name}
+            assert layer[used] in allowed, f"{name_of(path)} uses {used}"
+
+
+@pytest.fixture(scope="module")
+def reference():
+    """The page that scripts/docs makes from the schema."""
+    build = os.environ["NOCDYN_BUILD"]
+    subprocess.run(["cmake", "--build", build, "--target", "nocdyn_input_reference"], check=True, capture_output=True)
+    return subprocess.run([f"{build}/bin/nocdyn_input_reference"], check=True, capture_output=True, text=True).stdout
+
+
+def keys_of_help(text):
+    """Group -> [(key, default)] as `nocdyn help input` prints them."""
+    groups = {}
+    for line in text.split("\nExample")[0].splitlines():
+        if group := re.match(r"&(\w+), ", line):
+            keys = groups.setdefault(group[1], [])
+        elif key := re.match(r" {4}(\w+) .*?\s((?:required|default|optional).*)$", line):
+            keys.append((key[1], key[2]))
+    return groups
+
+
+def test_input_reference_has_the_groups_keys_and_defaults_of_the_help(nocdyn, reference):
+    groups = {}
+    for section in re.split(r"^## `&", reference, flags=re.MULTILINE)[1:]:
+        rows = re.findall(r"^\| `(\w+)` \|([^|]*)\|([^|]*)\|([^|]*)\|([^|]*)\|$", section, re.MULTILINE)
+        groups[section.split("`")[0]] = [(row[0], row[2].strip()) for row in rows]
+    assert groups == keys_of_help(nocdyn("help", "input").stdout)
+    assert len(groups) >= 9 and all(groups.values())

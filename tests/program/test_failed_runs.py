@@ -1,0 +1,155 @@
+"""Runs that fail, are interrupted, or cannot write: exit code, message, and what is left behind."""
+
+import resource
+import signal
+
+import pytest
+from conftest import CASE_1, CASE_2, ENDLESS, wait_for
+
+RESULTS = ["input.nml", "summary.json", "trajectory.csv"]
+PARTIAL = ["input.nml", "summary.json", "trajectory.partial.csv"]
+
+# The cubic part wins beyond 0.32 rad, and the disc has the speed to get there.
+EXPLODING = """\
+&body name = 'disc' inertia = 1.0 speed = 1.0 /
+&coupling name = 'shaft' bodies = 'ground', 'disc' stiffness = 1.0 cubic_stiffness = -10.0 /
+&run t_end = 100.0 /
+&output interval = 0.1 /
+"""
+
+
+@pytest.mark.parametrize("method", ["rk45", "rosenbrock"])
+def test_a_machine_that_blows_up_fails_with_time_and_state(nocdyn, method):
+    nocdyn.write("exploding.nml", EXPLODING)
+    outcome = nocdyn("run", "exploding.nml", "--out", "out", "--set", f"run.method={method}")
+    assert (outcome.returncode, outcome.stdout) == (1, "")
+    assert outcome.stderr.startswith("nocdyn: exploding.nml: the step size became too small at t = 1.31")
+    assert " of 'disc' " in outcome.stderr
+    assert outcome.stderr.endswith("; the rows up to there are in out/trajectory.partial.csv\n")
+    assert nocdyn.files("out") == PARTIAL
+
+
+def test_a_failed_run_keeps_the_rows_until_then(nocdyn):
+    nocdyn.write("exploding.nml", EXPLODING)
+    nocdyn("run", "exploding.nml", "--out", "out")
+    _, rows = nocdyn.table("out", "trajectory.partial.csv")
+    assert [row[0] for row in rows] == [i * 0.1 for i in range(14)]
+    summary = nocdyn.summary("out")
+    assert summary["status"] == "failed"
+    assert "step size became too small" in summary["message"]
+    assert summary["counts"]["rows"] == 14
+    assert 1.3 < summary["time_reached"] < 1.4
+
+
+def test_too_few_steps_are_a_failure_that_names_the_key(nocdyn):
+    outcome = nocdyn("run", CASE_2, "--out", "out", "--set", "run.max_steps=5")
+    assert outcome.returncode == 1
+    assert "after 5 steps, the most that max_steps allows" in outcome.stderr
+    assert nocdyn.files("out") == PARTIAL
+
+
+def test_a_run_that_fails_before_its_first_step_leaves_a_partial_file(nocdyn):
+    outcome = nocdyn("run", CASE_2, "--out", "out", "--set", "run.max_steps=1", "--set", "output.points=2")
+    assert outcome.returncode == 1
+    assert nocdyn.files("out") == PARTIAL
+    assert len(nocdyn.table("out", "trajectory.partial.csv")[1]) == 1
+
+
+def test_a_failed_run_replaces_the_results_of_an_earlier_one(nocdyn):
+    nocdyn("run", CASE_2, "--out", "out")
+    assert nocdyn.files("out") == RESULTS
+    nocdyn("run", CASE_2, "--out", "out", "--set", "run.max_steps=5")
+    assert nocdyn.files("out") == PARTIAL
+    nocdyn("run", CASE_2, "--out", "out")
+    assert nocdyn.files("out") == RESULTS
+    assert nocdyn.summary("out")["status"] == "done"
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_an_interrupted_run_leaves_a_partial_result(nocdyn, number):
+    nocdyn("run", CASE_2, "--out", "out", "-q")
+    process = nocdyn.start_endless("out")
+    process.send_signal(number)
+    output, complaint = process.communicate(timeout=30)
+    assert (process.returncode, output) == (1, "")
+    assert complaint.startswith(f"nocdyn: {CASE_2}: the integration was interrupted at t = ")
+    assert complaint.count("\n") == 1 and "out/trajectory.partial.csv" in complaint
+    assert nocdyn.files("out") == PARTIAL
+    summary = nocdyn.summary("out")
+    assert summary["status"] == "interrupted"
+    _, rows = nocdyn.table("out", "trajectory.partial.csv")
+    assert [row[0] for row in rows] == list(range(int(summary["time_reached"]) + 1))
+
+
+def test_an_interruption_ends_the_whole_list_of_files(nocdyn):
+    process = nocdyn.start("run", CASE_1, CASE_2, "--out", "out", *ENDLESS)
+    wait_for(lambda: list((nocdyn.folder).glob("out/case1/.trajectory.csv.*")))
+    process.send_signal(signal.SIGINT)
+    _, complaint = process.communicate(timeout=30)
+    assert process.returncode == 1
+    assert "files not run after the interruption: 1" in complaint
+    assert nocdyn.files("out") == ["case1"]
+
+
+def test_a_second_interruption_ends_the_program_at_once(nocdyn):
+    nocdyn("run", CASE_2, "--out", "out", "-q")
+    process = nocdyn.start_endless("out")
+    # both signals wait until the process goes on, and meet it together
+    for number in (signal.SIGSTOP, signal.SIGINT, signal.SIGTERM, signal.SIGCONT):
+        process.send_signal(number)
+    process.communicate(timeout=30)
+    assert process.returncode in (128 + signal.SIGINT, 128 + signal.SIGTERM)
+    assert set(RESULTS) < set(nocdyn.files("out"))
+
+
+def test_a_killed_run_leaves_earlier_results_whole(nocdyn):
+    nocdyn("run", CASE_2, "--out", "out", "-q")
+    before = {name: (nocdyn.folder / "out" / name).read_bytes() for name in RESULTS}
+    process = nocdyn.start_endless("out")
+    process.kill()
+    process.communicate()
+    assert {name: (nocdyn.folder / "out" / name).read_bytes() for name in RESULTS} == before
+
+
+def test_a_folder_that_cannot_be_made_is_exit_code_3(nocdyn, spinner):
+    nocdyn.write("file", "in the way")
+    outcome = nocdyn("run", spinner, "--out", "file/out")
+    assert (outcome.returncode, outcome.stdout) == (3, "")
+    assert outcome.stderr == "nocdyn: cannot write 'file/out/trajectory.csv': Not a directory\n"
+    assert (nocdyn.folder / "file").read_text() == "in the way"
+
+
+def limited_to(size):
+    """Files of the process cannot grow beyond so many bytes."""
+    return lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (size, size))
+
+
+# nothing fits, one piece of the trajectory fits, all but its last piece does
+@pytest.mark.parametrize("size", [0, 100_000, 320_000])
+def test_a_full_disk_is_exit_code_3_and_leaves_nothing(nocdyn, size):
+    outcome = nocdyn("run", CASE_2, "--out", "out", preexec_fn=limited_to(size))
+    assert (outcome.returncode, outcome.stdout) == (3, "")
+    assert outcome.stderr == "nocdyn: cannot write 'out/trajectory.csv': File too large\n"
+    assert nocdyn.files("out") == []
+
+
+def test_a_disk_with_no_room_for_the_summary_leaves_nothing(nocdyn, spinner):
+    # more than trajectory and input need, less than the summary does
+    outcome = nocdyn("run", spinner, "--out", "out", "--set", "output.points=2", preexec_fn=limited_to(1200))
+    assert (outcome.returncode, outcome.stdout) == (3, "")
+    assert outcome.stderr == "nocdyn: cannot write 'out/summary.json': File too large\n"
+    assert nocdyn.files("out") == []
+
+
+def test_a_full_disk_leaves_earlier_results_whole(nocdyn):
+    nocdyn("run", CASE_2, "--out", "out", "-q")
+    before = {name: (nocdyn.folder / "out" / name).read_bytes() for name in RESULTS}
+    outcome = nocdyn("run", CASE_2, "--out", "out", "--set", "load.work.viscous=50", preexec_fn=limited_to(100_000))
+    assert outcome.returncode == 3
+    assert {name: (nocdyn.folder / "out" / name).read_bytes() for name in nocdyn.files("out")} == before
+
+
+def test_new_on_a_full_disk_leaves_nothing(nocdyn):
+    outcome = nocdyn("new", "mine.nml", preexec_fn=limited_to(100))
+    assert outcome.returncode == 3 and outcome.stderr == "nocdyn: cannot write './mine.nml': File too large\n"
+    assert list(nocdyn.folder.iterdir()) == []

@@ -1,0 +1,69 @@
+"""cmake --install, and a project that finds and calls what was installed."""
+
+import os
+import subprocess
+
+import pytest
+from conftest import CASE_1, SOURCE
+
+# State of case 1 at t = 10 s, and the accuracy of the tolerances in spin_up.f90.
+SPEEDS = [3.45430601101172, 3.45430595814429, -2.30287063876286]
+ACCURACY = 1e-8
+
+
+def run(*words):
+    outcome = subprocess.run(list(map(str, words)), check=False, capture_output=True, text=True, timeout=120)
+    assert outcome.returncode == 0, outcome.stdout + outcome.stderr
+    return outcome.stdout
+
+
+@pytest.fixture(scope="module")
+def prefix(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("installed")
+    run("cmake", "--install", os.environ["NOCDYN_BUILD"], "--prefix", folder)
+    return folder
+
+
+def test_the_installed_program_runs(prefix):
+    assert run(prefix / "bin/nocdyn", "--version").startswith("nocdyn ")
+
+
+def test_another_project_finds_the_package_and_integrates_with_it(prefix, tmp_path):
+    compiler = os.environ.get("FC", "gfortran")
+    run(
+        "cmake",
+        "-S",
+        SOURCE / "tests/package",
+        "-B",
+        tmp_path,
+        f"-DCMAKE_PREFIX_PATH={prefix}",
+        f"-DCMAKE_Fortran_COMPILER={compiler}",
+    )
+    run("cmake", "--build", tmp_path)
+    rows, *speeds = run(tmp_path / "spin_up", CASE_1).split()
+    assert rows == "3"
+    assert list(map(float, speeds)) == pytest.approx(SPEEDS, rel=ACCURACY)
+
+
+def test_the_installed_package_can_be_moved(prefix, tmp_path):
+    moved = prefix.rename(prefix.parent / "moved")
+    try:
+        run("cmake", "-S", SOURCE / "tests/package", "-B", tmp_path, f"-DCMAKE_PREFIX_PATH={moved}")
+    finally:
+        moved.rename(prefix)
+
+
+def test_no_installed_text_names_the_folder_of_the_build(prefix):
+    for path in prefix.rglob("*.cmake"):
+        text = path.read_text()
+        assert os.environ["NOCDYN_BUILD"] not in text and str(SOURCE) not in text, path
+
+
+def test_a_version_that_does_not_fit_is_refused(prefix, tmp_path):
+    project = (SOURCE / "tests/package/CMakeLists.txt").read_text().replace("nocdyn 0.1", "nocdyn 99")
+    (tmp_path / "CMakeLists.txt").write_text(project)
+    (tmp_path / "spin_up.f90").write_text("end\n")
+    words = ["cmake", "-S", tmp_path, "-B", tmp_path / "build", f"-DCMAKE_PREFIX_PATH={prefix}"]
+    outcome = subprocess.run(words, check=False, capture_output=True, text=True)
+    assert outcome.returncode != 0
+    assert 'requested version "99"' in outcome.stderr

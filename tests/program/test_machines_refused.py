@@ -1,0 +1,91 @@
+"""Machines that cannot be, and notes on those that can: file, line, group and name."""
+
+import pytest
+from conftest import CASE_2
+
+PAIR = """\
+&body name = 'a' inertia = 1.0 speed = {a} /
+&body name = 'b' inertia = 1.0 speed = {b} /
+&gear name = 'first' bodies = 'a', 'b' radii = 1.0, 1.0 /
+&gear name = 'second' bodies = 'a', 'b' radii = 1.0, {radius} /
+&run t_end = 1.0 /
+"""
+
+
+def refusal(nocdyn, command, text):
+    nocdyn.write("pair.nml", text)
+    outcome = nocdyn(command, "pair.nml")
+    assert (outcome.returncode, outcome.stdout) == (2, "")
+    return outcome.stderr
+
+
+@pytest.mark.parametrize("command", ["run", "check", "matrices"])
+def test_gears_that_lock_are_refused_by_place_and_name(nocdyn, command):
+    complaint = refusal(nocdyn, command, PAIR.format(a=0, b=0, radius=2.0))
+    assert complaint.startswith("nocdyn: pair.nml:4: &gear 'second': locks 'a', 'b': ")
+    assert "'first'" in complaint
+
+
+@pytest.mark.parametrize("command", ["run", "check"])
+def test_start_speeds_that_break_a_gear_are_refused_with_the_residual(nocdyn, command):
+    complaint = refusal(nocdyn, command, PAIR.format(a=1.0, b=-1.5, radius=1.0))
+    assert complaint.startswith("nocdyn: pair.nml:3: &gear 'first': the start speeds break this gear: ")
+    assert "('a')" in complaint and "('b')" in complaint and "= -0.5, which must be 0" in complaint
+
+
+def test_coordinates_that_cannot_be_independent_are_refused(nocdyn):
+    outcome = nocdyn("check", CASE_2, "--set", "run.independent='pinion','machine'")
+    assert outcome.returncode == 2
+    assert outcome.stderr.startswith("nocdyn: --set run.independent='pinion','machine': &run: independent ")
+
+
+@pytest.mark.parametrize("command", ["run", "check"])
+def test_a_redundant_gear_is_a_note_and_no_failure(nocdyn, command):
+    nocdyn.write("pair.nml", PAIR.format(a=1.0, b=-1.0, radius=1.0))
+    outcome = nocdyn(command, "pair.nml")
+    assert (outcome.returncode, outcome.stderr) == (0, "")
+    assert "note: gear 'second' only repeats 'first'" in outcome.stdout
+
+
+def test_the_note_on_a_redundant_gear_stands_in_the_summary(nocdyn):
+    nocdyn.write("pair.nml", PAIR.format(a=1.0, b=-1.0, radius=1.0))
+    nocdyn("run", "pair.nml", "--out", "out")
+    machine = nocdyn.summary("out")["machine"]
+    assert (machine["gears"], machine["degrees_of_freedom"]) == (2, 1)
+    assert len(machine["notes"]) == 1 and "'second' only repeats 'first'" in machine["notes"][0]
+
+
+def test_all_mistakes_of_a_file_come_in_one_go_each_with_its_line(nocdyn):
+    complaint = refusal(
+        nocdyn,
+        "run",
+        "&body name = 'a' inertia = -1 /\n&gera name = 'g' /\n&load name = 'l' body = 'b' viscous = 1e999 /\n&run t_end = 1 /\n",
+    )
+    assert [line.removeprefix("nocdyn: ").split(": ")[0] for line in complaint.splitlines()] == [
+        "pair.nml:1",
+        "pair.nml:2",
+        "pair.nml:3",
+        "pair.nml:3",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("override", "complaint"),
+    [
+        ("output.interval=1e-9", "interval = 1e-09 asks for too many rows; allowed: at most 10000000"),
+        ("output.interval=1e-300", "interval = 1e-300 asks for too many rows"),
+        ("run.t_end=1e300", "interval = 0.01 asks for too many rows"),
+    ],
+)
+@pytest.mark.parametrize("command", ["run", "check"])
+def test_more_rows_than_anyone_can_read_are_refused(nocdyn, command, override, complaint):
+    outcome = nocdyn(command, CASE_2, "--set", override)
+    assert outcome.returncode == 2 and complaint in outcome.stderr
+    assert list(nocdyn.folder.iterdir()) == []
+
+
+@pytest.mark.parametrize("command", ["run", "check"])
+def test_rows_that_rounding_makes_equal_are_refused(nocdyn, command):
+    outcome = nocdyn(command, CASE_2, "--set", "run.t_start=1e15", "--set", "run.t_end=1000000000000010")
+    assert outcome.returncode == 2
+    assert f"{CASE_2}:24: &output: interval = 0.01 asks for times that rounding makes equal" in outcome.stderr

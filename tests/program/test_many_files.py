@@ -1,0 +1,100 @@
+"""nocdyn run with several files, and where results go."""
+
+import pytest
+from conftest import CASE_1, CASE_2, SPINNER
+
+RESULTS = ["input.nml", "summary.json", "trajectory.csv"]
+BAD = SPINNER.replace("inertia", "inertai")
+EXPLODING = """\
+&body name = 'disc' inertia = 1.0 speed = 1.0 /
+&coupling name = 'shaft' bodies = 'ground', 'disc' stiffness = 1.0 cubic_stiffness = -10.0 /
+&run t_end = 100.0 /
+"""
+
+
+def test_results_go_to_a_folder_named_like_the_input(nocdyn):
+    nocdyn("run", CASE_2)
+    assert nocdyn.files("results/case2") == RESULTS
+
+
+def test_the_input_says_where_results_go(nocdyn):
+    nocdyn.write("a.nml", SPINNER.replace("points", "directory = 'far/away/' points"))
+    nocdyn("run", "a.nml")
+    assert nocdyn.files("far/away") == RESULTS
+
+
+def test_out_counts_more_than_the_input(nocdyn):
+    nocdyn.write("a.nml", SPINNER.replace("points", "directory = 'far' points"))
+    nocdyn("run", "a.nml", "--out", "near/")
+    assert nocdyn.files("near") == RESULTS
+    assert not (nocdyn.folder / "far").exists()
+
+
+def test_several_files_have_folders_of_their_own_in_out(nocdyn):
+    outcome = nocdyn("run", CASE_1, CASE_2, "--out=out")
+    assert outcome.returncode == 0
+    assert nocdyn.files("out") == ["case1", "case2"]
+    assert nocdyn.files("out/case1") == nocdyn.files("out/case2") == RESULTS
+
+
+def test_several_files_print_one_line_each(nocdyn):
+    outcome = nocdyn("run", CASE_1, CASE_2)
+    assert (outcome.returncode, outcome.stderr) == (0, "")
+    first, second = outcome.stdout.splitlines()
+    assert first.startswith(f"{CASE_1}: done at t = 10 s, ") and first.endswith("results in results/case1")
+    assert second.startswith(f"{CASE_2}: done at t = 10 s, ") and "1001 rows" in second
+
+
+def test_one_file_prints_title_and_every_column(nocdyn):
+    outcome = nocdyn("run", CASE_2)
+    assert outcome.stdout.startswith("Paper, case 2: harmonic torque on the motor\n")
+    header, _ = nocdyn.table("results/case2")
+    assert [line.split("]")[0] + "]" for line in outcome.stdout.splitlines()[2:-1]] == header[1:]
+
+
+def test_quiet_prints_nothing_but_errors(nocdyn, spinner):
+    assert nocdyn("run", CASE_1, spinner, "--quiet").stdout == ""
+    outcome = nocdyn("run", "absent.nml", spinner, "-q")
+    assert outcome.stdout == ""
+    assert outcome.stderr == "nocdyn: absent.nml: cannot be read: there is no such file\n"
+
+
+@pytest.mark.parametrize(
+    ("files", "code"),
+    [
+        (["good.nml"], 0),
+        (["exploding.nml", "good.nml"], 1),
+        (["bad.nml", "good.nml"], 2),
+        (["exploding.nml", "bad.nml", "good.nml"], 2),
+        (["absent.nml", "exploding.nml", "bad.nml", "good.nml"], 3),
+    ],
+)
+def test_the_run_goes_on_past_bad_files_and_the_code_is_the_worst(nocdyn, files, code):
+    nocdyn.write("good.nml", SPINNER)
+    nocdyn.write("bad.nml", BAD)
+    nocdyn.write("exploding.nml", EXPLODING)
+    outcome = nocdyn("run", *files)
+    assert outcome.returncode == code
+    assert nocdyn.files("results/good") == RESULTS
+    assert outcome.stdout.splitlines()[-1].startswith("good.nml: done at t = 1 s")
+    for name in files[:-1]:
+        assert sum(name in line for line in outcome.stderr.splitlines()) == 1
+    assert not (nocdyn.folder / "results/bad").exists()
+
+
+@pytest.mark.parametrize("options", [[], ["--out", "out"]])
+def test_two_files_with_one_folder_are_refused(nocdyn, options):
+    nocdyn.write("a/same.nml", SPINNER)
+    nocdyn.write("b/same.nml", SPINNER)
+    outcome = nocdyn("run", "a/same.nml", "b/same.nml", *options)
+    assert (outcome.returncode, outcome.stdout) == (2, "")
+    folder = "out/same" if options else "results/same"
+    assert outcome.stderr == f"nocdyn: 'a/same.nml' and 'b/same.nml' would both write to '{folder}'; nothing was run\n"
+    assert not (nocdyn.folder / folder).exists()
+
+
+def test_a_bad_file_does_not_claim_a_folder(nocdyn):
+    nocdyn.write("a/same.nml", BAD)
+    nocdyn.write("b/same.nml", SPINNER)
+    assert nocdyn("run", "a/same.nml", "b/same.nml").returncode == 2
+    assert nocdyn.files("results/same") == RESULTS

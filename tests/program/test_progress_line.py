@@ -1,0 +1,74 @@
+"""Progress shows on a terminal only, and only on work that takes longer than a second."""
+
+import os
+import pty
+import re
+import select
+import signal
+import time
+
+from conftest import CASE_2
+
+PROGRESS = re.compile(r"\r[^\r]*case2\.nml: \d+ %, \d+ s left\x1b\[K")
+ERASED = "\r\x1b[K"
+
+
+def read_available(terminal, seconds):
+    """What is written to the terminal until it closes or the time is over."""
+    text, end = b"", time.monotonic() + seconds
+    while time.monotonic() < end:
+        ready, _, _ = select.select([terminal], [], [], 0.05)
+        if not ready:
+            continue
+        try:
+            piece = os.read(terminal, 4096)
+        except OSError:  # the program has closed its end
+            break
+        if not piece:
+            break
+        text += piece
+        if b"%" in text:
+            break
+    return text.decode()
+
+
+def test_a_long_run_shows_progress_on_a_terminal_after_a_second(nocdyn):
+    terminal, end = pty.openpty()
+    began = time.monotonic()
+    process = nocdyn.start_endless("out", stderr=end)
+    os.close(end)
+    shown = read_available(terminal, 20)
+    assert time.monotonic() - began >= 1.0
+    assert PROGRESS.fullmatch(shown)
+    process.send_signal(signal.SIGINT)
+    process.communicate(timeout=30)
+    rest = os.read(terminal, 4096).decode()
+    os.close(terminal)
+    assert ERASED + "nocdyn: " in rest
+
+
+def test_a_short_run_shows_no_progress(nocdyn):
+    terminal, end = pty.openpty()
+    process = nocdyn.start("run", CASE_2, stderr=end)
+    os.close(end)
+    assert process.wait(timeout=30) == 0
+    assert read_available(terminal, 5) == ""
+    os.close(terminal)
+
+
+def test_quiet_and_pipes_show_no_progress(nocdyn):
+    terminal, end = pty.openpty()
+    quiet = nocdyn.start_endless("quiet", "--quiet", stderr=end)
+    piped = nocdyn.start_endless("piped")
+    os.close(end)
+    # longer than the second after which progress would show
+    time.sleep(1.5)
+    for process in (quiet, piped):
+        process.send_signal(signal.SIGINT)
+    output, complaint = piped.communicate(timeout=30)
+    quiet.communicate(timeout=30)
+    shown = read_available(terminal, 5)
+    os.close(terminal)
+    assert (output, complaint.count("\n")) == ("", 1)
+    assert "%" not in complaint and "\r" not in complaint
+    assert "interrupted" in shown and "%" not in shown

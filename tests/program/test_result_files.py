@@ -1,0 +1,230 @@
+"""trajectory.csv, summary.json and input.nml."""
+
+import json
+import re
+from decimal import Decimal
+
+import pytest
+from conftest import CASE_2, DATA, SOURCE
+
+FULL = DATA / "full_machine.nml"
+ENERGIES = ["kinetic_energy [J]", "elastic_energy [J]", "work_in [J]", "work_out [J]", "energy_residual [J]"]
+
+CASE_2_HEADER = [
+    "t [s]",
+    *(f"phi_{body} [rad]" for body in ("motor", "pinion", "machine")),
+    *(f"omega_{body} [rad/s]" for body in ("motor", "pinion", "machine")),
+    "twist_coupling [rad]",
+    "moment_coupling [N m]",
+    "torque_drive [N m]",
+    "torque_work [N m]",
+    "torque_shaker [N m]",
+    "reaction_reducer [N]",
+    *ENERGIES,
+]
+
+FULL_BODIES = ("motor", "sun", "wheel", "ring", "flywheel")
+FULL_HEADER = [
+    "t [s]",
+    *(f"phi_{body} [rad]" for body in FULL_BODIES),
+    *(f"omega_{body} [rad/s]" for body in FULL_BODIES),
+    *(f"twist_{coupling} [rad]" for coupling in ("shaft", "belt", "anchor")),
+    *(f"moment_{coupling} [N m]" for coupling in ("shaft", "belt", "anchor")),
+    *(f"damping_{coupling} [N m]" for coupling in ("shaft", "anchor")),
+    *(f"torque_{motor} [N m]" for motor in ("drive", "booster")),
+    "torque_fan [N m]",
+    *(f"torque_{excitation} [N m]" for excitation in ("engine", "gust")),
+    "reaction_pair [N m]",
+    "reaction_inner [N]",
+    *ENERGIES,
+]
+
+
+@pytest.fixture(scope="module")
+def case_2(shared_nocdyn):
+    assert shared_nocdyn("run", CASE_2, "--out", "case2").returncode == 0
+    return shared_nocdyn
+
+
+@pytest.fixture(scope="module")
+def full(shared_nocdyn):
+    assert shared_nocdyn("run", FULL, "--out", "full").returncode == 0
+    return shared_nocdyn
+
+
+def columns(nocdyn, folder):
+    header, rows = nocdyn.table(folder)
+    return dict(zip(header, zip(*rows)))
+
+
+def test_the_header_of_the_papers_machine_is_exact(case_2):
+    assert case_2.table("case2")[0] == CASE_2_HEADER
+
+
+def test_the_header_of_a_machine_with_every_element_is_exact(full):
+    assert full.table("full")[0] == FULL_HEADER
+
+
+def test_there_is_a_row_for_every_interval_and_the_start(case_2):
+    times = columns(case_2, "case2")["t [s]"]
+    assert list(times) == [i * 0.01 for i in range(1000)] + [10.0]
+
+
+def test_points_are_spread_evenly_from_start_to_end(full):
+    times = columns(full, "full")["t [s]"]
+    assert list(times) == [0.5 + 2.5 * i / 500 for i in range(501)]
+
+
+@pytest.mark.parametrize(
+    ("interval", "times"),
+    [
+        (0.3, [0, 0.3, 0.6, 0.3 * 3, 1.0]),
+        (0.25, [0, 0.25, 0.5, 0.75, 1.0]),
+        (5, [0, 1.0]),
+        (0.1, [i * 0.1 for i in range(10)] + [1.0]),
+    ],
+)
+def test_the_last_row_is_at_the_end_whether_or_not_the_interval_divides(nocdyn, interval, times):
+    assert nocdyn("run", CASE_2, "--out", "out", "--set", "run.t_end=1", "--set", f"output.interval={interval}").returncode == 0
+    assert list(columns(nocdyn, "out")["t [s]"]) == times
+
+
+@pytest.mark.parametrize("folder", ["case2", "full"])
+def test_numbers_are_the_shortest_that_round_trip(case_2, full, folder):
+    lines = (case_2.folder / folder / "trajectory.csv").read_text().splitlines()[1:]
+    for cell in ",".join(lines).split(","):
+        assert Decimal(cell) == Decimal(repr(float(cell)))
+
+
+def test_every_row_is_complete_and_every_line_ends(full):
+    text = (full.folder / "full/trajectory.csv").read_text()
+    assert text.endswith("\n") and "\r" not in text and '"' not in text
+    assert {line.count(",") for line in text.splitlines()} == {len(FULL_HEADER) - 1}
+
+
+def test_columns_obey_their_definitions(full):
+    # the numbers of full_machine.nml; rounding only
+    table = columns(full, "full")
+
+    def close(a, b):
+        return a == pytest.approx(b, rel=1e-12, abs=1e-10)
+
+    for i in range(0, 501, 25):
+        value = {name.split(" ")[0]: column[i] for name, column in table.items()}
+        assert close(value["twist_shaft"], value["phi_sun"] - value["phi_motor"])
+        assert close(value["twist_anchor"], value["phi_flywheel"])
+        bend = value["twist_shaft"] - 0.05
+        assert close(value["moment_shaft"], (200 + 15 * bend**2) * bend)
+        assert close(value["moment_belt"], 80 * value["twist_belt"])
+        assert close(value["damping_shaft"], 2 * (value["omega_sun"] - value["omega_motor"]))
+        assert close(value["torque_drive"], 150 - 8 * value["omega_motor"] - 0.5 * value["omega_motor"] ** 2)
+        assert close(value["torque_fan"], -4 * value["omega_wheel"])
+        assert close(20 * value["omega_sun"] + 40 * value["omega_wheel"], 0)
+        assert close(0.1 * value["omega_sun"] - 0.3 * value["omega_ring"], 0)
+        inertia = dict(zip(FULL_BODIES, (10.0, 2.0, 1.5, 4.0, 20.0)))
+        assert close(value["kinetic_energy"], sum(j * value[f"omega_{body}"] ** 2 / 2 for body, j in inertia.items()))
+
+
+def test_the_energy_audit_closes(full):
+    # the tolerances of the file
+    table = columns(full, "full")
+    assert max(map(abs, table["energy_residual [J]"])) < 1e-6 * table["work_in [J]"][-1]
+
+
+def test_start_angles_and_speeds_stand_in_the_first_row(full):
+    header, rows = full.table("full")
+    first = dict(zip(header, rows[0]))
+    assert [first[f"phi_{body} [rad]"] for body in FULL_BODIES] == [0.2, -0.1, 0, 0, 0]
+    assert [first[f"omega_{body} [rad/s]"] for body in FULL_BODIES] == pytest.approx([1, 3, -1.5, 1, 0], rel=1e-15)
+    assert first["work_in [J]"] == first["work_out [J]"] == first["energy_residual [J]"] == 0
+
+
+def test_the_summary_tells_what_was_done(case_2):
+    summary = case_2.summary("case2")
+    version = re.search(r"project\(nocdyn VERSION (\S+)", (SOURCE / "CMakeLists.txt").read_text()).group(1)
+    assert (summary["program"], summary["version"], summary["status"]) == ("nocdyn", version, "done")
+    assert summary["input"] == str(CASE_2)
+    assert summary["title"] == "Paper, case 2: harmonic torque on the motor"
+    assert summary["time_reached"] == 10
+    assert summary["wall_time_s"] > 0
+    assert "message" not in summary
+    assert summary["machine"] == {
+        "bodies": 3,
+        "gears": 1,
+        "degrees_of_freedom": 2,
+        "independent": ["motor", "pinion"],
+        "notes": [],
+    }
+    assert summary["settings"] == {
+        "t_start": 0,
+        "t_end": 10,
+        "method": "rk45",
+        "rtol": 1e-9,
+        "atol": 1e-9,
+        "formulation": "reduced",
+        "complement": "natural",
+        "max_steps": 1000000,
+    }
+
+
+def test_the_summary_counts_steps_and_rows(case_2):
+    counts = case_2.summary("case2")["counts"]
+    assert counts["rows"] == 1001
+    assert counts["accepted_steps"] > 100
+    assert counts["evaluations"] >= 6 * counts["accepted_steps"]
+    assert counts["jacobians"] == counts["factorisations"] == 0
+
+
+def test_the_rosenbrock_method_counts_its_jacobians(nocdyn):
+    nocdyn("run", CASE_2, "--out", "out", "--set", "run.method=rosenbrock", "--set", "run.rtol=1e-5")
+    counts = nocdyn.summary("out")["counts"]
+    assert counts["jacobians"] >= counts["accepted_steps"]
+    assert counts["factorisations"] == counts["accepted_steps"] + counts["rejected_steps"]
+
+
+@pytest.mark.parametrize("folder", ["case2", "full"])
+def test_the_summary_has_the_extremes_of_every_column(case_2, full, folder):
+    table = columns(case_2, folder)
+    times = table.pop("t [s]")
+    extremes = case_2.summary(folder)["columns"]
+    assert list(extremes) == list(table)
+    for name, column in table.items():
+        assert extremes[name] == {
+            "min": min(column),
+            "time_of_min": times[column.index(min(column))],
+            "max": max(column),
+            "time_of_max": times[column.index(max(column))],
+            "last": column[-1],
+        }
+
+
+def test_a_title_with_odd_characters_survives(nocdyn):
+    title = 'Welle "öl" \\ 5 µm, it\'s'
+    assert nocdyn("run", CASE_2, "--out", "out", "--set", "case.title=" + title).returncode == 0
+    assert nocdyn.summary("out")["title"] == title
+
+
+def test_a_title_that_is_not_utf_8_leaves_valid_json(nocdyn):
+    path = nocdyn.folder / "latin.nml"
+    path.write_bytes(CASE_2.read_bytes().replace(b"Paper", b"\xd6lwelle"))
+    assert nocdyn("run", path, "--out", "out", "-q").returncode == 0
+    json.loads((nocdyn.folder / "out/summary.json").read_bytes().decode("utf-8"))
+
+
+@pytest.mark.parametrize("path", [CASE_2, FULL], ids=["case2", "full"])
+@pytest.mark.parametrize(
+    "overrides",
+    [
+        [],
+        ["run.rtol=3e-7", "motor.drive.a=123.4567890123456789"],
+        ["run.method=rosenbrock", "run.rtol=1e-5", "run.formulation=paper", "run.complement=negated"],
+    ],
+    ids=["plain", "numbers", "words"],
+)
+def test_input_nml_reproduces_the_run_bit_for_bit(nocdyn, path, overrides):
+    words = [word for override in overrides for word in ("--set", override)]
+    assert nocdyn("run", path, "--out", "first", *words).returncode == 0
+    assert nocdyn("run", "first/input.nml", "--out", "second").returncode == 0
+    first, second = ((nocdyn.folder / folder) for folder in ("first", "second"))
+    assert (first / "trajectory.csv").read_bytes() == (second / "trajectory.csv").read_bytes()
+    assert (first / "input.nml").read_bytes() == (second / "input.nml").read_bytes()

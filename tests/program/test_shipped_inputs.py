@@ -1,0 +1,68 @@
+"""The inputs stay real namelists: Fortran's own read, f90nml and nocdyn find the same values in them."""
+
+import os
+import shutil
+import subprocess
+
+import f90nml
+import pytest
+from conftest import DATA, SOURCE
+
+INPUTS = sorted((SOURCE / "input").rglob("*.nml")) + sorted(DATA.glob("*.nml"))
+
+
+def names(path):
+    return path.stem
+
+
+@pytest.fixture(scope="module")
+def fortran_reader(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("reader")
+    reader = folder / "read_namelists"
+    compiler = os.environ.get("FC", "gfortran")
+    subprocess.run([compiler, "-o", reader, DATA / "read_namelists.f90"], cwd=folder, check=True)
+
+    def read(path):
+        return subprocess.run([reader, path], capture_output=True, text=True, check=True).stdout.splitlines()
+
+    return read
+
+
+def used_input(nocdyn, path):
+    """input.nml of a run of this file."""
+    assert nocdyn("run", path, "--out", "out").returncode == 0
+    return nocdyn.folder / "out/input.nml"
+
+
+def groups(namelist):
+    """Pairs of group name and values, one for each group of the file."""
+    for kind, value in namelist.items():
+        for group in value if isinstance(value, list) else [value]:
+            yield kind, dict(group)
+
+
+def test_there_are_inputs():
+    assert len(INPUTS) >= 4
+
+
+@pytest.mark.parametrize("path", INPUTS, ids=names)
+def test_fortran_reads_the_same_values(nocdyn, fortran_reader, path):
+    # Fortran's read takes file names of limited length only
+    shutil.copy(path, nocdyn.folder / "given.nml")
+    assert fortran_reader(nocdyn.folder / "given.nml") == fortran_reader(used_input(nocdyn, path))
+
+
+@pytest.mark.parametrize("path", INPUTS, ids=names)
+def test_f90nml_reads_the_same_values(nocdyn, path):
+    given = list(groups(f90nml.read(path)))
+    used = list(groups(f90nml.read(used_input(nocdyn, path))))
+    # groups that the file lacks stand at the end
+    assert [kind for kind, _ in given] == [kind for kind, _ in used][: len(given)]
+    for (_, values), (_, all_values) in zip(given, used):
+        assert values == {key: all_values[key] for key in values}
+
+
+@pytest.mark.parametrize("path", INPUTS, ids=names)
+def test_check_finds_no_fault(nocdyn, path):
+    outcome = nocdyn("check", path)
+    assert (outcome.returncode, outcome.stderr) == (0, "")

@@ -1,0 +1,79 @@
+"""Inputs that are missing, no files, empty, not text, damaged: one clear message, never a backtrace."""
+
+import random
+
+import pytest
+from conftest import CASE_2, SOURCE
+
+COMMANDS = ["run", "check", "matrices"]
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_a_missing_file_is_exit_code_3(nocdyn, command):
+    outcome = nocdyn(command, "absent.nml")
+    assert (outcome.returncode, outcome.stdout) == (3, "")
+    assert outcome.stderr == "nocdyn: absent.nml: cannot be read: there is no such file\n"
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_a_folder_is_no_input(nocdyn, command):
+    outcome = nocdyn(command, SOURCE)
+    assert (outcome.returncode, outcome.stdout) == (3, "")
+    assert outcome.stderr == f"nocdyn: {SOURCE}: cannot be read: Is a directory\n"
+
+
+@pytest.mark.parametrize("content", ["", "\n\n", "! nothing but words\n"])
+def test_an_empty_file_is_refused(nocdyn, content):
+    nocdyn.write("empty.nml", content)
+    outcome = nocdyn("run", "empty.nml")
+    assert outcome.returncode == 2
+    assert outcome.stderr == "nocdyn: empty.nml: no group in it; 'nocdyn new FILE' writes an example\n"
+
+
+def test_a_binary_file_is_refused_in_one_line(nocdyn):
+    path = nocdyn.folder / "binary.nml"
+    path.write_bytes(random.Random(1).randbytes(20_000))
+    outcome = nocdyn("check", path, errors="replace")
+    assert (outcome.returncode, outcome.stdout) == (2, "")
+    assert outcome.stderr == f"nocdyn: {path}: not a text file\n"
+
+
+def mutated(text, rng):
+    """The bytes of a text with one to four random accidents."""
+    for _ in range(rng.randint(1, 4)):
+        lines = text.split(b"\n")
+        line = rng.randrange(len(lines))
+        place = rng.randrange(len(text) + 1)
+        accident = rng.randrange(6)
+        if accident == 0:
+            text = text[:place] + bytes([rng.randrange(256)]) + text[place + 1 :]
+        elif accident == 1:
+            text = text[:place] + rng.choice([b"'", b"/", b"&", b"=", b",", b"(", b")", b"*", b"9", b"e", b"!"]) + text[place:]
+        elif accident == 2:
+            text = text[:place] + text[place + rng.randint(1, 20) :]
+        elif accident == 3:
+            del lines[line]
+            text = b"\n".join(lines)
+        elif accident == 4:
+            lines.insert(rng.randrange(len(lines)), lines[line])
+            text = b"\n".join(lines)
+        else:
+            text = text[:place]
+        text = text or b" "
+    return text
+
+
+@pytest.mark.parametrize("part", range(5))
+def test_damaged_inputs_are_read_or_refused_but_never_crash(nocdyn, part):
+    original = CASE_2.read_bytes()
+    codes = set()
+    for seed in range(100 * part, 100 * part + 100):
+        path = nocdyn.folder / f"damaged_{seed}.nml"
+        path.write_bytes(mutated(original, random.Random(seed)))
+        outcome = nocdyn("check", path, errors="replace")
+        assert outcome.returncode in (0, 2), path
+        assert "Backtrace" not in outcome.stderr and "Fortran runtime error" not in outcome.stderr, path
+        assert (outcome.stderr == "") == (outcome.returncode == 0), path
+        assert all(path.name in line for line in outcome.stderr.splitlines()), outcome.stderr
+        codes.add(outcome.returncode)
+    assert codes == {0, 2}
