@@ -30,18 +30,18 @@ class Workload:
     title: str
     contestants: list[Contestant]
     reference: Path | None = None  # trajectory.csv of an accurate run
-    slowest: str = ""  # label of the contestant that the first one is to beat ...
+    rival: str = ""  # label of the contestant that the first one is to beat ...
     factor: float = 1.0  # ... by this much
 
     @property
     def target(self) -> str:
         """What is asked for and what was found, '' if nothing is asked for."""
-        if not self.slowest:
+        if not self.rival:
             return ""
-        other = next(contestant for contestant in self.contestants if contestant.label == self.slowest)
+        other = next(contestant for contestant in self.contestants if contestant.label == self.rival)
         found = other.median / self.contestants[0].median
         verdict = "reached" if found >= self.factor else "missed"
-        return f"{self.slowest} takes {found:.1f} times as long; at least {self.factor:g} times are wanted: {verdict}."
+        return f"{self.rival} takes {found:.1f} times as long; at least {self.factor:g} times are wanted: {verdict}."
 
 
 def measure(workload: Workload, rounds: int) -> None:

@@ -29,12 +29,12 @@ LABELS = (
 )
 
 
-def torques(omega_1, omega_2, twist):
-    """Elastic moment F1, motor, load (on body 3)."""
+def torques(omega_1, omega_2, twist) -> tuple:
+    """Elastic moment F1, motor, load (on body 3), of numbers or of arrays."""
     return (K1 + CUBIC * twist * twist) * twist, A - (B + C * omega_1) * omega_1, VISCOUS * RATIO * omega_2
 
 
-def derivative(t, y):
+def derivative(t: float, y: np.ndarray) -> tuple[float, ...]:
     omega_1, omega_2, phi_1, phi_2 = y[:4].tolist()  # Python's own numbers are faster than NumPy's, one by one
     elastic, motor, load = torques(omega_1, omega_2, phi_2 - phi_1)
     excitation = M0 * math.sin(OMEGA_P * t)
@@ -49,7 +49,7 @@ def derivative(t, y):
     )
 
 
-def table(t, y):
+def table(t: np.ndarray, y: np.ndarray) -> np.ndarray:
     """The columns of trajectory.csv, shape [len(t), len(LABELS)]."""
     omega_1, omega_2, phi_1, phi_2, motor_work, load_work, excitation_work = y
     twist = phi_2 - phi_1

@@ -41,7 +41,7 @@ def case2(nocdyn: Path, scratch: Path) -> Workload:
         scipy("LSODA"),
         scipy("DOP853"),
         scipy("RK45"),
-    ], reference / "trajectory.csv", slowest="SciPy LSODA", factor=20.0)
+    ], reference / "trajectory.csv", rival="SciPy LSODA", factor=20.0)
 
 
 WORKLOADS = {"start_up": start_up, "case2": case2}

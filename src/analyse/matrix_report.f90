@@ -3,10 +3,12 @@ module nocdyn_matrix_report
   use nocdyn_bank, only: role_coupling, role_excitation, role_load, role_motor
   use nocdyn_complement, only: coordinate_selector, extended_constraint
   use nocdyn_kinds, only: wp
+  use nocdyn_lapack_lu, only: lu_factor, lu_solve
   use nocdyn_machine, only: machine_t
   use nocdyn_paper_matrices, only: constrained_inertia, constrained_matrix, constrained_vector, damping_2, damping_3, &
-                                   damping_matrix, elastic_moments, inertia_2, inertia_3, inertia_matrix, stiffness_2, &
-                                   stiffness_3, stiffness_matrix, tangent_matrix, torque_2, torque_3, torque_vector
+                                   damping_matrix, elastic_moments, elastic_rates, inertia_2, inertia_3, inertia_matrix, &
+                                   stacked_2, stacked_3, stiffness_2, stiffness_3, stiffness_matrix, tangent_matrix, &
+                                   torque_2, torque_3, torque_vector, unit_matrix, zero_matrix
   use nocdyn_text, only: joined, rounded_text, to_text
   use nocdyn_text_buffer, only: text_buffer_t
   implicit none
@@ -16,6 +18,20 @@ module nocdyn_matrix_report
 
   integer, parameter :: digits = 7   ! significant digits printed
 
+  !> What later equations need of earlier ones: matrices of n bodies, then those of the first-order systems.
+  type :: equations_t
+    type(machine_t) :: machine
+    type(text_buffer_t) :: report
+    integer :: n = 0
+    real(wp), allocatable :: constraint(:, :), complement(:, :)                        !! L_lambda, L_tau
+    real(wp), allocatable :: inertia(:, :), damping(:, :), stiffness(:, :)             !! J, C, K; then J_1, C_1, K_1; ...
+    real(wp), allocatable :: excitation(:), motor(:), torque(:)                        !! Q_0, Q_m, Q; then with index 1, ...
+    real(wp), allocatable :: tangent(:, :), moments(:)                                 !! K_4, F
+  contains
+    procedure :: put_matrix
+    procedure :: put_vector
+  end type equations_t
+
 contains
 
   !> The report as lines of text; the machine is at its start angles and speeds, the time is `t_start`.
@@ -23,24 +39,20 @@ contains
     type(machine_t), intent(in) :: machine
     real(wp), intent(in) :: t_start   !! [s]
     character(len=:), allocatable :: text
-    type(machine_t) :: placed
-    type(text_buffer_t) :: report
-    real(wp), dimension(machine%bodies, machine%bodies) :: inertia, damping, stiffness, tangent
-    real(wp), dimension(machine%bodies) :: torque
+    type(equations_t) :: equations
 
-    placed = machine
-    call place(placed, t_start)
-    call report%append_line('Bodies 1 to ' // to_text(machine%bodies) // ': ' // joined(machine%names, ', '))
-    call report%append_line('Coordinates: ' // joined(machine%names(machine%coordinates%body), ', '))
-    call report%append_line('At the start: t = ' // rounded_text(t_start, digits) // ' s')
-    call inertia_matrix(placed, 1, inertia)
-    call damping_matrix(placed, 1, damping)
-    call stiffness_matrix(placed, 1, stiffness)
-    call tangent_matrix(placed, 1, tangent)
-    call report_free_bodies(report, placed, inertia, damping, stiffness, torque)
-    call report_constraints(report, placed)
-    call report_constrained(report, placed, inertia, damping, stiffness, tangent, torque)
-    text = report%text()
+    equations%machine = machine
+    equations%n = machine%bodies
+    call place(equations%machine, t_start)
+    call equations%report%append_line('Bodies 1 to ' // to_text(machine%bodies) // ': ' // joined(machine%names, ', '))
+    call equations%report%append_line('Coordinates: ' // joined(machine%names(machine%coordinates%body), ', '))
+    call equations%report%append_line('At the start: t = ' // rounded_text(t_start, digits) // ' s')
+    call report_free_bodies(equations)
+    call report_constraints(equations)
+    call report_projection(equations)
+    call report_first_order(equations)
+    call report_moments_as_states(equations)
+    text = equations%report%text()
   end function matrix_report
 
   !> Brings all elements of the machine to the start.
@@ -60,125 +72,178 @@ contains
     end do
   end subroutine place
 
-  !> Section 4, the bodies before the constraints: eqs. (13)-(23).
-  subroutine report_free_bodies(report, machine, inertia, damping, stiffness, torque)
-    type(text_buffer_t), intent(inout) :: report
-    type(machine_t), intent(in) :: machine
-    real(wp), intent(in) :: inertia(:, :), damping(:, :), stiffness(:, :)
-    real(wp), intent(inout) :: torque(:)   !! the whole Q
-    real(wp) :: term(machine%bodies)
+  !> The bodies before the constraints: eqs. (13)-(22).
+  subroutine report_free_bodies(equations)
+    type(equations_t), intent(inout) :: equations
+    real(wp), allocatable :: rest(:)
 
-    call put_matrix(report, '(13) J [kg m2]', inertia)
-    call put_vector(report, '(15) omega [rad/s]', machine%start_speed(1, :))
-    torque = 0.0_wp
-    call torque_vector(machine, 1, role_excitation, term)
-    call put_vector(report, '(17) Q_0, excitations [N m]', term)
-    torque = torque + term
-    call torque_vector(machine, 1, role_motor, term)
-    call put_vector(report, '(18), (20) Q_m, motors [N m]', term)
-    torque = torque + term
-    call torque_vector(machine, 1, role_coupling, term)
-    call put_vector(report, 'K12 * rest twist of the couplings, a further term of Q [N m]', term)
-    torque = torque + term
-    call torque_vector(machine, 1, role_load, term)
-    torque = torque + term
-    call put_vector(report, '(16) Q [N m]', torque)
-    call put_vector(report, '(19) phi [rad]', machine%start_angle(1, :))
-    call put_matrix(report, '(21) K, secant stiffness [N m/rad]', stiffness)
-    call put_matrix(report, '(22) C [N m s/rad]', damping)
+    associate (n => equations%n, machine => equations%machine)
+      allocate (equations%inertia(n, n), equations%damping(n, n), equations%stiffness(n, n), equations%tangent(n, n))
+      allocate (equations%excitation(n), equations%motor(n), equations%torque(n), equations%moments(n), rest(n))
+      call inertia_matrix(machine, 1, equations%inertia)
+      call equations%put_matrix('(13) J [kg m2]', equations%inertia)
+      call equations%put_vector('(15) omega [rad/s]', machine%start_speed(1, :))
+      call torque_vector(machine, 1, role_excitation, equations%excitation)
+      call equations%put_vector('(17) Q_0, excitations [N m]', equations%excitation)
+      call torque_vector(machine, 1, role_motor, equations%motor)
+      call equations%put_vector('(18), (20) Q_m, motors [N m]', equations%motor)
+      call torque_vector(machine, 1, role_coupling, rest)
+      call equations%put_vector('K12 * rest twist of the couplings, a further term of Q [N m]', rest)
+      call torque_vector(machine, 1, role_load, equations%torque)
+      equations%torque = equations%torque + equations%excitation + equations%motor + rest
+      call equations%put_vector('(16) Q [N m]', equations%torque)
+      call equations%put_vector('(19) phi [rad]', machine%start_angle(1, :))
+      call stiffness_matrix(machine, 1, equations%stiffness)
+      call equations%put_matrix('(21) K, secant stiffness [N m/rad]', equations%stiffness)
+      call damping_matrix(machine, 1, equations%damping)
+      call equations%put_matrix('(22) C [N m s/rad]', equations%damping)
+    end associate
   end subroutine report_free_bodies
 
-  !> Section 5: L_lambda and how the complement comes from it, eqs. (23), (31), (73)-(82).
-  subroutine report_constraints(report, machine)
-    type(text_buffer_t), intent(inout) :: report
-    type(machine_t), intent(in) :: machine
-    real(wp) :: constraint(machine%bodies - machine%coordinates%freedoms, machine%bodies)
-
-    constraint = kept_constraint(machine)
-    call put_matrix(report, '(23), (74) L_lambda, independent rows', constraint)
-    call put_matrix(report, '(78) L_lambda^ext', extended_constraint(constraint, machine%coordinates%body))
-    call put_matrix(report, '(79) l_lambda', coordinate_selector(machine%bodies, machine%coordinates%freedoms))
-    call put_matrix(report, '(31), (81)-(83) L_tau', machine%coordinates%complement(1))
-  end subroutine report_constraints
-
-  function kept_constraint(machine) result(constraint)
-    type(machine_t), intent(in) :: machine
-    real(wp) :: constraint(machine%bodies - machine%coordinates%freedoms, machine%bodies)
+  !> L_lambda and how the complement comes from it: eqs. (23), (31), (73)-(83).
+  subroutine report_constraints(equations)
+    type(equations_t), intent(inout) :: equations
+    real(wp) :: coordinate_speed(equations%machine%coordinates%freedoms)
     integer :: b, g
 
-    constraint = machine%constraints%block(1, [(machine%groups(g)%kept, g=1, size(machine%groups))], &
-                                           [(b, b=1, machine%bodies)])
-  end function kept_constraint
+    associate (machine => equations%machine, coordinates => equations%machine%coordinates)
+      allocate (equations%constraint, source=machine%constraints%block(1, &
+                [(machine%groups(g)%kept, g=1, size(machine%groups))], [(b, b=1, machine%bodies)]))
+      allocate (equations%complement, source=coordinates%complement(1))
+      call equations%put_matrix('(23), (74) L_lambda, independent rows', equations%constraint)
+      call coordinates%project(1, machine%inertia(1, :), machine%start_speed(1, :), coordinate_speed)
+      call equations%put_vector("(77) q' [rad/s]", coordinate_speed)
+      call equations%put_matrix('(78) L_lambda^ext', extended_constraint(equations%constraint, coordinates%body))
+      call equations%put_matrix('(79) l_lambda', coordinate_selector(machine%bodies, coordinates%freedoms))
+      call equations%put_matrix('(31), (81)-(83) L_tau', equations%complement)
+    end associate
+  end subroutine report_constraints
 
-  !> The projected system and the first-order systems that follow from it, eqs. (24)-(72).
-  subroutine report_constrained(report, machine, inertia, damping, stiffness, tangent, torque)
-    type(text_buffer_t), intent(inout) :: report
-    type(machine_t), intent(in) :: machine
-    real(wp), intent(in) :: inertia(:, :), damping(:, :), stiffness(:, :), tangent(:, :), torque(:)
-    real(wp) :: complement(machine%bodies, machine%coordinates%freedoms)
-    real(wp), dimension(machine%bodies, machine%bodies) :: inertia_of_1, damping_of_1, stiffness_of_1
-    real(wp), dimension(machine%bodies) :: torque_of_1, moments
+  !> The projected system: eqs. (24)-(30).
+  subroutine report_projection(equations)
+    type(equations_t), intent(inout) :: equations
+    real(wp) :: matrix(equations%n, equations%n)
 
-    complement = machine%coordinates%complement(1)
-    call constrained_inertia(complement, inertia, kept_constraint(machine), inertia_of_1)
-    call constrained_matrix(complement, damping, damping_of_1)
-    call constrained_matrix(complement, stiffness, stiffness_of_1)
-    call constrained_vector(complement, torque, torque_of_1)
-    call put_matrix(report, '(25) J_1', inertia_of_1)
-    call put_vector(report, '(26)-(28) Q_1', torque_of_1)
-    call put_matrix(report, '(29) C_1', damping_of_1)
-    call put_matrix(report, '(30) K_1', stiffness_of_1)
-    call report_first_order(report, inertia_of_1, damping_of_1, stiffness_of_1, torque_of_1, tangent)
-    call elastic_moments(machine, 1, moments)
-    call put_vector(report, '(48)-(51) F, elastic moments on the bodies [N m]', moments)
-    call put_vector(report, "(47), (52)-(56) F' = K_4 omega [N m/s]", matmul(tangent, machine%start_speed(1, :)))
-    call put_matrix(report, '(62)-(72) K_4, tangent stiffness [N m/rad]', tangent)
-  end subroutine report_constrained
+    call constrained_inertia(equations%complement, equations%inertia, equations%constraint, matrix)
+    equations%inertia = matrix
+    call equations%put_matrix('(25) J_1', matrix)
+    call project(equations%complement, equations%excitation)
+    call project(equations%complement, equations%motor)
+    call project(equations%complement, equations%torque)
+    call equations%put_vector('(26) Q_1', equations%torque)
+    call equations%put_vector('(27) Q_0^1', equations%excitation)
+    call equations%put_vector('(28) Q_m^1', equations%motor)
+    call constrained_matrix(equations%complement, equations%damping, matrix)
+    equations%damping = matrix
+    call equations%put_matrix('(29) C_1', matrix)
+    call constrained_matrix(equations%complement, equations%stiffness, matrix)
+    equations%stiffness = matrix
+    call equations%put_matrix('(30) K_1', matrix)
+  end subroutine report_projection
 
-  !> Eqs. (34)-(40) for alpha = [omega; phi] and (43)-(61) for beta = [omega; phi; F].
-  subroutine report_first_order(report, inertia, damping, stiffness, torque, tangent)
-    type(text_buffer_t), intent(inout) :: report
-    real(wp), intent(in) :: inertia(:, :), damping(:, :), stiffness(:, :), torque(:), tangent(:, :)
-    real(wp), dimension(2 * size(torque), 2 * size(torque)) :: inertia_of_2, damping_of_2, stiffness_of_2
-    real(wp), dimension(3 * size(torque), 3 * size(torque)) :: matrix
-    real(wp) :: torque_of_2(2 * size(torque)), vector(3 * size(torque))
+  subroutine project(complement, vector)
+    real(wp), intent(in) :: complement(:, :)
+    real(wp), intent(inout) :: vector(:)
+    real(wp) :: projected(size(vector))
 
-    call inertia_2(inertia, inertia_of_2)
-    call damping_2(damping, damping_of_2)
-    call stiffness_2(stiffness, stiffness_of_2)
-    call torque_2(torque, torque_of_2)
-    call put_matrix(report, '(35) J_2', inertia_of_2)
-    call put_matrix(report, '(38) C_2', damping_of_2)
-    call put_matrix(report, '(39) K_2', stiffness_of_2)
-    call put_vector(report, '(40) Q_2', torque_of_2)
-    call inertia_3(inertia_of_2, matrix)
-    call put_matrix(report, '(44) J_3', matrix)
-    call torque_3(torque_of_2, vector)
-    call put_vector(report, '(58) Q_3', vector)
-    call damping_3(damping_of_2, matrix)
-    call put_matrix(report, '(60) C_3', matrix)
-    call stiffness_3(stiffness_of_2, tangent, matrix)
-    call put_matrix(report, '(61) K_3', matrix)
+    call constrained_vector(complement, vector, projected)
+    vector = projected
+  end subroutine project
+
+  !> The system of first order for alpha = [omega; phi]: eqs. (34)-(42).
+  subroutine report_first_order(equations)
+    type(equations_t), intent(inout) :: equations
+    real(wp), dimension(2 * equations%n, 2 * equations%n) :: inertia, damping, stiffness
+    real(wp) :: block(equations%n, equations%n), torque(2 * equations%n), alpha(2 * equations%n)
+
+    call inertia_2(equations%inertia, inertia)
+    call equations%put_matrix('(35) J_2', inertia)
+    call unit_matrix(block)
+    call equations%put_matrix('(36) I', block)
+    call zero_matrix(block)
+    call equations%put_matrix('(37) 0', block)
+    call damping_2(equations%damping, damping)
+    call equations%put_matrix('(38) C_2', damping)
+    call stiffness_2(equations%stiffness, stiffness)
+    call equations%put_matrix('(39) K_2', stiffness)
+    call torque_2(equations%torque, torque)
+    call equations%put_vector('(40) Q_2', torque)
+    call stacked_2(equations%machine%start_speed(1, :), equations%machine%start_angle(1, :), alpha)
+    call equations%put_vector('(42) alpha', alpha)
+    equations%inertia = inertia
+    equations%damping = damping
+    equations%stiffness = stiffness
+    equations%torque = torque
   end subroutine report_first_order
 
-  subroutine put_vector(report, label, vector)
-    type(text_buffer_t), intent(inout) :: report
+  !> The generalised system for beta = [omega; phi; F] and its solution: eqs. (43)-(72).
+  subroutine report_moments_as_states(equations)
+    type(equations_t), intent(inout) :: equations
+    real(wp), dimension(3 * equations%n, 3 * equations%n) :: inertia, damping, stiffness
+    real(wp), dimension(3 * equations%n) :: torque, beta
+    real(wp) :: alpha(2 * equations%n)
+
+    call inertia_3(equations%inertia, inertia)
+    call equations%put_matrix('(44) J_3', inertia)
+    call elastic_moments(equations%machine, 1, equations%moments)
+    call equations%put_vector('(48)-(51) F, elastic moments on the bodies [N m]', equations%moments)
+    call stacked_2(equations%machine%start_speed(1, :), equations%machine%start_angle(1, :), alpha)
+    call stacked_3(alpha, equations%moments, beta)
+    call equations%put_vector('(46) beta', beta)
+    call torque_3(equations%torque, torque)
+    call equations%put_vector('(58), (59) Q_3', torque)
+    call damping_3(equations%damping, damping)
+    call equations%put_matrix('(60) C_3', damping)
+    call tangent_matrix(equations%machine, 1, equations%tangent)
+    call stiffness_3(equations%stiffness, equations%tangent, stiffness)
+    call equations%put_matrix('(61) K_3', stiffness)
+    call equations%put_matrix('(62)-(72) K_4, tangent stiffness [N m/rad]', equations%tangent)
+    stiffness = stiffness + damping
+    call report_derivatives(equations, inertia, torque + matmul(stiffness, beta))
+  end subroutine report_moments_as_states
+
+  !> beta' from eq. (43), and its parts: eqs. (14), (33), (41), (45), (47).
+  subroutine report_derivatives(equations, inertia, right_hand_side)
+    type(equations_t), intent(inout) :: equations
+    real(wp), intent(in) :: inertia(:, :)         !! J_3
+    real(wp), intent(in) :: right_hand_side(:)    !! Q_3 + C_3 beta + K_3 beta
+    real(wp) :: factors(size(inertia, 1), size(inertia, 2)), slope(size(right_hand_side)), rates(equations%n)
+    integer :: pivots(size(right_hand_side))
+    logical :: is_singular
+
+    factors = inertia
+    slope = right_hand_side
+    call lu_factor(factors, pivots, is_singular)
+    if (is_singular) error stop 'nocdyn_matrix_report: inertias must be positive and the rows independent'
+    call lu_solve(factors, pivots, slope)
+    associate (n => equations%n)
+      call equations%put_vector("(14) omega' [rad/s2]", slope(:n))
+      call equations%put_vector("(33) phi' = omega [rad/s]", slope(n + 1:2 * n))
+      call equations%put_vector("(41) alpha'", slope(:2 * n))
+      call elastic_rates(equations%tangent, equations%machine%start_speed(1, :), rates)
+      call equations%put_vector("(47), (52)-(57) F' = K_4 omega [N m/s]", rates)
+      call equations%put_vector("(45) beta'", slope)
+    end associate
+  end subroutine report_derivatives
+
+  subroutine put_vector(self, label, vector)
+    class(equations_t), intent(inout) :: self
     character(len=*), intent(in) :: label
     real(wp), intent(in) :: vector(:)
 
-    call put_matrix(report, label // ', transposed', reshape(vector, [1, size(vector)]))
+    call self%put_matrix(label // ', transposed', reshape(vector, [1, size(vector)]))
   end subroutine put_vector
 
   !> A blank line, the label with the shape, and the rows with their columns aligned.
-  subroutine put_matrix(report, label, matrix)
-    type(text_buffer_t), intent(inout) :: report
+  subroutine put_matrix(self, label, matrix)
+    class(equations_t), intent(inout) :: self
     character(len=*), intent(in) :: label
     real(wp), intent(in) :: matrix(:, :)
-    integer :: i, j, width
     character(len=:), allocatable :: number
+    integer :: i, j, width
 
-    call report%append_line('')
-    call report%append_line(label // ' (' // to_text(size(matrix, 1)) // ' x ' // to_text(size(matrix, 2)) // ')')
+    call self%report%append_line('')
+    call self%report%append_line(label // ' (' // to_text(size(matrix, 1)) // ' x ' // to_text(size(matrix, 2)) // ')')
     width = 0
     do j = 1, size(matrix, 2)
       do i = 1, size(matrix, 1)
@@ -188,9 +253,9 @@ contains
     do i = 1, size(matrix, 1)
       do j = 1, size(matrix, 2)
         number = rounded_text(matrix(i, j), digits)
-        call report%append(repeat(' ', width + 2 - len(number)) // number)
+        call self%report%append(repeat(' ', width + 2 - len(number)) // number)
       end do
-      call report%append_line('')
+      call self%report%append_line('')
     end do
   end subroutine put_matrix
 

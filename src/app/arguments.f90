@@ -140,16 +140,17 @@ contains
     end if
   end subroutine take_value
 
-  !> "'rnu' is not a command; allowed: 'run', ...; did you mean 'run'?"
+  !> "'rnu' is not a command; did you mean 'run'? allowed: 'run', ..."
   function unknown_word(word, what, known) result(message)
     character(len=*), intent(in) :: word, what
     type(string_t), intent(in) :: known(:)
     character(len=:), allocatable :: message
     integer :: nearest
 
-    message = quoted(word) // ' is not ' // what // '; allowed: ' // joined(known, ', ')
+    message = quoted(word) // ' is not ' // what // ';'
     nearest = nearest_word(word, known)
-    if (nearest > 0) message = message // '; did you mean ' // quoted(known(nearest)%text) // '?'
+    if (nearest > 0) message = message // ' did you mean ' // quoted(known(nearest)%text) // '?'
+    message = message // ' allowed: ' // joined(known, ', ')
   end function unknown_word
 
   !> Options and numbers of operands that a command does not take.

@@ -120,7 +120,8 @@ contains
       else if (size(topics) == 1 .and. len(command_help(topics(1)%text)) > 0) then
         call say(command_help(topics(1)%text))
       else
-        call raise(error, exit_input, 'there is no help on that; try ' // joined(command_names(), ', ') // " or 'input'")
+        call raise(error, exit_input, 'there is no help on ' // joined(topics, ' ') // '; try ' // &
+                   joined(command_names(), ', ') // " or 'input'")
       end if
     end associate
     if (.not. allocated(error)) return

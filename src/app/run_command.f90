@@ -95,23 +95,31 @@ contains
     output = input%single('output')
     folder = output%text('directory')
     if (allocated(arguments%out)) then
-      folder = without_last_slash(arguments%out)
+      folder = plain_path(arguments%out)
       if (size(arguments%operands) > 1) folder = folder // '/' // stem(input%file)
     else if (folder == '') then
       folder = 'results/' // stem(input%file)
     else
-      folder = without_last_slash(folder)
+      folder = plain_path(folder)
     end if
   end function result_folder
 
-  pure function without_last_slash(path) result(shorter)
+  !> The path without "." parts, doubled slashes and a last slash, so that equal folders have equal names.
+  pure function plain_path(path) result(plain)
     character(len=*), intent(in) :: path
-    character(len=:), allocatable :: shorter
-    integer :: last
+    character(len=:), allocatable :: plain
+    integer :: first, last
 
-    last = verify(path, '/', back=.true.)
-    shorter = path(:max(1, last))
-  end function without_last_slash
+    plain = ''
+    first = 1
+    do while (first <= len(path))
+      last = first + index(path(first:) // '/', '/') - 2
+      if (path(first:last) /= '' .and. path(first:last) /= '.') plain = plain // '/' // path(first:last)
+      first = last + 2
+    end do
+    if (index(path, '/') /= 1) plain = plain(2:)
+    if (plain == '') plain = merge('/', '.', index(path, '/') == 1)
+  end function plain_path
 
   !> The file's name without its folders and its last ending.
   pure function stem(path)

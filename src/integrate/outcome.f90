@@ -60,7 +60,7 @@ contains
     case (integration_too_many_steps)
       sentence = 'the integration stopped at ' // when // ' after ' // to_text(outcome%steps(lane)) // &
         ' steps, the most that max_steps allows (last step ' // rounded(outcome%h(lane)) // ' s): raise max_steps, ' // &
-        'loosen rtol and atol, or, if the system is stiff, use a Rosenbrock method'
+        'loosen rtol and atol, or, if the system is stiff, take the method rosenbrock'
     case (integration_not_finite)
       sentence = not_finite_sentence(outcome, lane, system, when)
     case (integration_gave_up)

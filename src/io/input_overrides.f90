@@ -58,7 +58,10 @@ contains
 
     first_dot = index(path, '.')
     last_dot = index(path, '.', back=.true.)
-    if (first_dot == 0) then
+    if (path == '') then
+      complaint = 'there is nothing before the =; write GROUP.KEY=VALUE or GROUP.NAME.KEY=VALUE'
+      return
+    else if (first_dot == 0) then
       complaint = 'there is no dot in ' // path // '; write GROUP.KEY=VALUE or GROUP.NAME.KEY=VALUE'
       return
     end if

@@ -13,7 +13,8 @@ module nocdyn_output_file
   !> The first failure is kept and told by `finish`; until then `has_failed` answers.
   type, public :: output_file_t
     logical :: has_failed = .false.
-    character(len=:), allocatable, private :: folder, aside
+    character(len=:), allocatable, private :: folder   !! with its last slash
+    character(len=:), allocatable, private :: aside
     character(len=:), allocatable, private :: reason
     character(len=:), allocatable, private :: buffer
     integer, private :: used = 0
@@ -49,8 +50,9 @@ contains
     character(len=*), intent(in) :: folder
     character(len=*), intent(in) :: name     !! of the hidden file, without its dot and process number
 
-    self%folder = folder
-    self%aside = folder // '/.' // name // '.' // to_text(process_id())
+    self%folder = folder // '/'
+    if (folder == '.') self%folder = ''
+    self%aside = self%folder // '.' // name // '.' // to_text(process_id())
     if (.not. allocated(self%buffer)) allocate (character(len=buffer_size) :: self%buffer)
     self%used = 0
     self%has_failed = .false.
@@ -105,7 +107,7 @@ contains
 
     call self%complete(name, error)
     if (allocated(error)) return
-    call rename_file(self%aside, self%folder // '/' // name, is_done)
+    call rename_file(self%aside, self%folder // name, is_done)
     if (is_done) return
     call self%note(last_failure())
     call self%fail(name, error)
@@ -135,7 +137,7 @@ contains
     type(error_t), allocatable, intent(out) :: error
 
     call remove_file(self%aside)
-    call raise(error, exit_file, 'cannot write ' // quoted(self%folder // '/' // name) // ': ' // self%reason)
+    call raise(error, exit_file, 'cannot write ' // quoted(self%folder // name) // ': ' // self%reason)
   end subroutine fail
 
   !> Keeps the reason of the first failure.

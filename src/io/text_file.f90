@@ -22,6 +22,10 @@ contains
     integer :: status, unit
     logical :: exists
 
+    if (file == '') then
+      call raise(error, exit_file, 'an empty text is not the name of a file')
+      return
+    end if
     inquire (file=file, exist=exists)
     if (.not. exists) then
       call raise(error, exit_file, file // ': cannot be read: there is no such file')

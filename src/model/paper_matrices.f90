@@ -14,6 +14,7 @@ module nocdyn_paper_matrices
   public :: constrained_inertia, constrained_matrix, constrained_vector
   public :: inertia_2, damping_2, stiffness_2, torque_2
   public :: inertia_3, damping_3, stiffness_3, torque_3
+  public :: unit_matrix, zero_matrix, stacked_2, stacked_3, elastic_rates
 
 contains
 
@@ -120,6 +121,19 @@ contains
     end do
   end subroutine elastic_moments
 
+  !> F' of eqs. (47), (52)-(57): K_4 omega, [n].
+  subroutine elastic_rates(tangent, omega, rates)
+    real(wp), intent(in) :: tangent(:, :)   !! K_4, [n, n]
+    real(wp), intent(in) :: omega(:)
+    real(wp), intent(inout) :: rates(:)
+    integer :: j
+
+    rates = 0.0_wp
+    do j = 1, size(omega)
+      rates = rates + tangent(:, j) * omega(j)
+    end do
+  end subroutine elastic_rates
+
   !> J_1 of eq. (25): [L_tau^T J; L_lambda], [n, n].
   subroutine constrained_inertia(complement, inertia, constraint, inertia_1)
     real(wp), intent(in) :: complement(:, :)   !! L_tau, [n, freedoms]
@@ -153,6 +167,33 @@ contains
       vector_1(i) = dot_product(complement(:, i), vector)
     end do
   end subroutine constrained_vector
+
+  !> I of eq. (36).
+  subroutine unit_matrix(matrix)
+    real(wp), intent(inout) :: matrix(:, :)
+    integer :: i
+
+    call zero_matrix(matrix)
+    do i = 1, size(matrix, 1)
+      matrix(i, i) = 1.0_wp
+    end do
+  end subroutine unit_matrix
+
+  !> 0 of eq. (37).
+  subroutine zero_matrix(matrix)
+    real(wp), intent(inout) :: matrix(:, :)
+
+    matrix = 0.0_wp
+  end subroutine zero_matrix
+
+  !> alpha = [omega; phi] of eq. (42) and alpha' = [omega'; phi'] of eq. (41), [2n]; phi' = omega, eqs. (32), (33).
+  subroutine stacked_2(upper, lower, vector)
+    real(wp), intent(in) :: upper(:), lower(:)   !! [n]
+    real(wp), intent(inout) :: vector(:)
+
+    vector(:size(upper)) = upper
+    vector(size(upper) + 1:) = lower
+  end subroutine stacked_2
 
   !> J_2 of eq. (35): diag(J_1, I) with the unit matrix of eq. (36), [2n, 2n].
   subroutine inertia_2(inertia_1, matrix)
@@ -192,6 +233,15 @@ contains
     vector = 0.0_wp
     vector(:size(torque_1)) = torque_1
   end subroutine torque_2
+
+  !> beta = [alpha; F] of eq. (46) and beta' = [alpha'; F'] of eq. (45), [3n].
+  subroutine stacked_3(upper, lower, vector)
+    real(wp), intent(in) :: upper(:)   !! [2n]
+    real(wp), intent(in) :: lower(:)   !! [n]
+    real(wp), intent(inout) :: vector(:)
+
+    call stacked_2(upper, lower, vector)
+  end subroutine stacked_3
 
   !> J_3 of eq. (44): diag(J_1, I, I) = diag(J_2, I), [3n, 3n].
   subroutine inertia_3(matrix_2, matrix)

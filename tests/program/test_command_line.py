@@ -15,7 +15,7 @@ def one_line(text):
     ("words", "complaint"),
     [
         ([], "a command is missing"),
-        (["rnu", "x.nml"], "'rnu' is not a command; allowed: 'run', 'check', 'matrices', 'new', 'help'; did you mean 'run'?"),
+        (["rnu", "x.nml"], "'rnu' is not a command; did you mean 'run'? allowed: 'run', 'check', 'matrices', 'new', 'help'"),
         (["simulate"], "'simulate' is not a command"),
         (["run"], "an input file is missing: nocdyn run FILE..."),
         (["check"], "an input file is missing: nocdyn check FILE..."),
@@ -33,7 +33,7 @@ def one_line(text):
         (["check", CASE_1, "--quiet"], "--quiet is an option of nocdyn run"),
         (["new", "a.nml", "--set", "run.t_end=1"], "--set is an option of nocdyn run, check and matrices"),
         (["--version", "now"], "--version takes no arguments"),
-        (["help", "simulate"], "there is no help on that; try 'run', 'check', 'matrices', 'new', 'help' or 'input'"),
+        (["help", "simulate"], "there is no help on 'simulate'; try 'run', 'check', 'matrices', 'new', 'help' or 'input'"),
         (["help", "input", "boddy"], "there is no group 'boddy'; did you mean 'body'?"),
     ],
 )

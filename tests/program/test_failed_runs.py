@@ -151,5 +151,5 @@ def test_a_full_disk_leaves_earlier_results_whole(nocdyn):
 
 def test_new_on_a_full_disk_leaves_nothing(nocdyn):
     outcome = nocdyn("new", "mine.nml", preexec_fn=limited_to(100))
-    assert outcome.returncode == 3 and outcome.stderr == "nocdyn: cannot write './mine.nml': File too large\n"
+    assert outcome.returncode == 3 and outcome.stderr == "nocdyn: cannot write 'mine.nml': File too large\n"
     assert list(nocdyn.folder.iterdir()) == []
