@@ -2,7 +2,7 @@
 program nocdyn_input_reference
   use, intrinsic :: iso_fortran_env, only: output_unit
   use nocdyn_schema_help, only: input_reference
-  implicit none
+  implicit none (type, external)
 
   write (output_unit, '(a)') input_reference()
 end program nocdyn_input_reference

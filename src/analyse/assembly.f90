@@ -20,7 +20,7 @@ module nocdyn_assembly
   use nocdyn_schema, only: ground
   use nocdyn_text, only: quoted, string_t, to_text
   use nocdyn_text_order, only: find_order, first_position
-  implicit none
+  implicit none (type, external)
   private
 
   public :: assemble_machine, new_formulation

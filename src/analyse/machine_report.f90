@@ -5,7 +5,7 @@ module nocdyn_machine_report
   use nocdyn_machine, only: machine_t
   use nocdyn_text, only: joined, quoted, rounded_text, string_t, to_text
   use nocdyn_text_buffer, only: text_buffer_t
-  implicit none
+  implicit none (type, external)
   private
 
   public :: coordinate_names, machine_report, redundancy_notes

@@ -11,7 +11,7 @@ module nocdyn_matrix_report
                                    torque_2, torque_3, torque_vector, unit_matrix, zero_matrix
   use nocdyn_text, only: joined, rounded_text, to_text
   use nocdyn_text_buffer, only: text_buffer_t
-  implicit none
+  implicit none (type, external)
   private
 
   public :: matrix_report

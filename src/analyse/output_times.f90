@@ -4,7 +4,7 @@ module nocdyn_output_times
   use nocdyn_input, only: group_t, input_t
   use nocdyn_kinds, only: wp
   use nocdyn_text, only: rounded_text, to_text
-  implicit none
+  implicit none (type, external)
   private
 
   public :: check_output_times, output_times

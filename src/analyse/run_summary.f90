@@ -8,7 +8,7 @@ module nocdyn_run_summary
   use nocdyn_outcome, only: outcome_t
   use nocdyn_text, only: string_t
   use nocdyn_version, only: compiler_text, version
-  implicit none
+  implicit none (type, external)
   private
 
   public :: start_extremes, update_extremes, summary_json

@@ -4,7 +4,7 @@ module nocdyn_summary_table
   use nocdyn_kinds, only: wp
   use nocdyn_run_summary, only: run_summary_t
   use nocdyn_text, only: rounded_text, to_text
-  implicit none
+  implicit none (type, external)
   private
 
   public :: summary_line, summary_table

@@ -5,7 +5,7 @@ module nocdyn_trajectory_table
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
   use nocdyn_text, only: string_t
-  implicit none
+  implicit none (type, external)
   private
 
   public :: new_trajectory_table

@@ -19,7 +19,7 @@ module nocdyn_transient
   use nocdyn_run_summary, only: run_summary_t, start_extremes, summary_json, update_extremes
   use nocdyn_system, only: observer_t
   use nocdyn_trajectory_table, only: new_trajectory_table, trajectory_table_t
-  implicit none
+  implicit none (type, external)
   private
 
   public :: run_transient

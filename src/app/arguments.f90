@@ -2,7 +2,7 @@
 module nocdyn_arguments
   use nocdyn_errors, only: error_t, exit_input, raise
   use nocdyn_text, only: joined, nearest_word, quoted, string_t
-  implicit none
+  implicit none (type, external)
   private
 
   public :: command_line, parse_arguments, command_names

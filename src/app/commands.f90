@@ -15,7 +15,7 @@ module nocdyn_commands
   use nocdyn_schema_help, only: group_help, input_help, input_template
   use nocdyn_text, only: joined, quoted
   use nocdyn_version, only: compiler_text, version
-  implicit none
+  implicit none (type, external)
   private
 
   public :: check_command, matrices_command, new_command, help_command, version_command

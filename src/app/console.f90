@@ -6,7 +6,7 @@ module nocdyn_console
   use nocdyn_posix, only: is_terminal, standard_error, standard_output, write_bytes
   use nocdyn_text, only: to_text
   use nocdyn_transient, only: progress_t
-  implicit none
+  implicit none (type, external)
   private
 
   public :: say, complain, new_console_progress

@@ -1,6 +1,6 @@
 !> The help texts of the command line.
 module nocdyn_help
-  implicit none
+  implicit none (type, external)
   private
 
   public :: command_help

@@ -6,7 +6,7 @@ program nocdyn
   use nocdyn_errors, only: error_t, exit_file, raise
   use nocdyn_posix, only: survive_size_limit
   use nocdyn_run_command, only: run_command
-  implicit none
+  implicit none (type, external)
 
   type(arguments_t) :: arguments
   type(error_t), allocatable :: error

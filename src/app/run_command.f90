@@ -10,7 +10,7 @@ module nocdyn_run_command
   use nocdyn_summary_table, only: summary_line, summary_table
   use nocdyn_text, only: quoted, string_t, to_text
   use nocdyn_transient, only: partial_file, run_transient
-  implicit none
+  implicit none (type, external)
   private
 
   public :: run_command

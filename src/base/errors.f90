@@ -1,6 +1,6 @@
 !> Failures that are the input's or the numbers' fault: an exit code and a sentence for the person at the keyboard.
 module nocdyn_errors
-  implicit none
+  implicit none (type, external)
   private
 
   public :: raise

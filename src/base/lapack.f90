@@ -4,7 +4,7 @@
 module nocdyn_lapack
   use nocdyn_kinds, only: wp
   use nocdyn_lapack_lu, only: lu_factor
-  implicit none
+  implicit none (type, external)
   private
 
   public :: pivoted_rank, invert, solve_positive_definite, pseudo_inverse

@@ -1,7 +1,7 @@
 !> LU factors of a square matrix and solutions with them, by LAPACK.
 module nocdyn_lapack_lu
   use nocdyn_kinds, only: wp
-  implicit none
+  implicit none (type, external)
   private
 
   public :: lu_factor, lu_solve

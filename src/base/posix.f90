@@ -3,7 +3,7 @@
 module nocdyn_posix
   use, intrinsic :: iso_c_binding, only: c_char, c_f_pointer, c_funloc, c_funptr, c_int, c_intptr_t, c_null_char, &
     c_null_funptr, c_ptr, c_size_t
-  implicit none
+  implicit none (type, external)
   private
 
   public :: make_folders, rename_file, remove_file, process_id, is_terminal, watch_interrupts, is_interrupted, &

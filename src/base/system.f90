@@ -8,7 +8,7 @@
 !> part in error control. An integrator solves linear systems only for the first `states` components.
 module nocdyn_system
   use nocdyn_kinds, only: wp
-  implicit none
+  implicit none (type, external)
   private
 
   integer, parameter, public :: evaluation_fine = 0       !! the values are good

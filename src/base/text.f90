@@ -2,7 +2,7 @@
 module nocdyn_text
   use, intrinsic :: iso_c_binding, only: c_char, c_double, c_int, c_size_t
   use nocdyn_kinds, only: wp
-  implicit none
+  implicit none (type, external)
   private
 
   public :: to_text, rounded_text, write_number, lower_case, quoted, joined, nearest_word

@@ -1,7 +1,7 @@
 !> Which nocdyn this is, and what built it.
 module nocdyn_version
   use, intrinsic :: iso_fortran_env, only: compiler_version
-  implicit none
+  implicit none (type, external)
   private
 
   public :: compiler_text

@@ -1,7 +1,7 @@
 !> Linear combinations of stages: the inner loops of every one-step method.
 module nocdyn_combinations
   use nocdyn_kinds, only: wp
-  implicit none
+  implicit none (type, external)
   private
 
   public :: combination, combine

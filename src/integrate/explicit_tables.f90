@@ -1,7 +1,7 @@
 !> Explicit Runge-Kutta methods as tables of numbers.
 module nocdyn_explicit_tables
   use nocdyn_kinds, only: wp
-  implicit none
+  implicit none (type, external)
   private
 
   public :: dormand_prince_5

@@ -2,7 +2,7 @@
 module nocdyn_finite
   use, intrinsic :: iso_fortran_env, only: int64
   use nocdyn_kinds, only: wp
-  implicit none
+  implicit none (type, external)
   private
 
   public :: all_finite, is_finite

@@ -4,7 +4,7 @@ module nocdyn_first_step
   use nocdyn_step_control, only: smallest_step, step_control_t
   use nocdyn_system, only: system_t
   use nocdyn_trial, only: evaluate, set_out, trial_t
-  implicit none
+  implicit none (type, external)
   private
 
   public :: guess_first_steps

@@ -8,7 +8,7 @@ module nocdyn_integration
   use nocdyn_outcome, only: allocate_outcome, integration_interrupted, integration_running, outcome_t
   use nocdyn_stepper, only: stepper_t
   use nocdyn_system, only: observer_t, system_t
-  implicit none
+  implicit none (type, external)
   private
 
   public :: integrate, integrate_with

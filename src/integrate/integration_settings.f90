@@ -3,7 +3,7 @@ module nocdyn_integration_settings
   use nocdyn_errors, only: error_t, exit_input, raise
   use nocdyn_kinds, only: wp
   use nocdyn_text, only: to_text
-  implicit none
+  implicit none (type, external)
   private
 
   public :: check_settings

@@ -9,7 +9,7 @@ module nocdyn_march
   use nocdyn_stepper, only: stepper_t
   use nocdyn_system, only: observer_t, system_t
   use nocdyn_trial, only: allocate_trial, evaluate_start, set_out, trial_fine, trial_give_up, trial_not_finite, trial_t
-  implicit none
+  implicit none (type, external)
   private
 
   public :: prepare, start, set_out_lanes, judge_lanes, record_lanes, advance_lanes

@@ -7,7 +7,7 @@ module nocdyn_methods
   use nocdyn_rosenbrock_tables, only: rodas4
   use nocdyn_stepper, only: stepper_t
   use nocdyn_text, only: joined, nearest_word, quoted, string_t
-  implicit none
+  implicit none (type, external)
   private
 
   public :: select_method

@@ -2,8 +2,8 @@
 module nocdyn_outcome
   use nocdyn_kinds, only: wp
   use nocdyn_system, only: system_t
-  use nocdyn_text, only: to_text
-  implicit none
+  use nocdyn_text, only: rounded_text, to_text
+  implicit none (type, external)
   private
 
   public :: allocate_outcome, failure_sentence
@@ -30,6 +30,8 @@ module nocdyn_outcome
     integer, allocatable :: factorisations(:)
   end type outcome_t
 
+  integer, parameter :: digits = 6   ! of the numbers in messages
+
 contains
 
   pure subroutine allocate_outcome(outcome, lanes)
@@ -51,7 +53,7 @@ contains
     character(len=:), allocatable :: sentence
     character(len=:), allocatable :: when
 
-    when = 't = ' // rounded(outcome%t(lane)) // ' s'
+    when = 't = ' // rounded_text(outcome%t(lane), digits) // ' s'
     select case (outcome%status(lane))
     case (integration_done)
       sentence = 'the integration reached ' // when
@@ -59,8 +61,8 @@ contains
       sentence = too_small_sentence(outcome, lane, system, rtol, atol, when)
     case (integration_too_many_steps)
       sentence = 'the integration stopped at ' // when // ' after ' // to_text(outcome%steps(lane)) // &
-        ' steps, the most that max_steps allows (last step ' // rounded(outcome%h(lane)) // ' s): raise max_steps, ' // &
-        'loosen rtol and atol, or, if the system is stiff, take the method rosenbrock'
+        ' steps, the most that max_steps allows (last step ' // rounded_text(outcome%h(lane), digits) // &
+        ' s): raise max_steps, loosen rtol and atol, or, if the system is stiff, take the method rosenbrock'
     case (integration_not_finite)
       sentence = not_finite_sentence(outcome, lane, system, when)
     case (integration_gave_up)
@@ -80,10 +82,10 @@ contains
     character(len=*), intent(in) :: when
     character(len=:), allocatable :: sentence
 
-    sentence = 'the step size became too small at ' // when // ' (h = ' // rounded(outcome%h(lane)) // ' s): '
+    sentence = 'the step size became too small at ' // when // ' (h = ' // rounded_text(outcome%h(lane), digits) // ' s): '
     if (outcome%component(lane) > 0) then
       sentence = sentence // 'the error of the ' // system%component_name(outcome%component(lane)) // &
-        ' cannot be kept within rtol = ' // rounded(rtol) // ', atol = ' // rounded(atol) // &
+        ' cannot be kept within rtol = ' // rounded_text(rtol, digits) // ', atol = ' // rounded_text(atol, digits) // &
         '; loosen the tolerances, or look for a jump or a singularity there'
     else
       sentence = sentence // 'the equations refuse to be evaluated beyond this time; look for a limit that is reached there'
@@ -105,7 +107,7 @@ contains
         ', is not a finite number: check the start values and the parameters'
     else
       sentence = 'the ' // what // ' stops being a finite number right after ' // when // &
-        ', however short the step (h = ' // rounded(outcome%h(lane)) // ' s): look for a singularity there'
+        ', however short the step (h = ' // rounded_text(outcome%h(lane), digits) // ' s): look for a singularity there'
     end if
   end function not_finite_sentence
 
@@ -121,17 +123,5 @@ contains
     end if
     sentence = sentence // ': check the start values and the parameters'
   end function gave_up_sentence
-
-  !> The value to six digits, as short as it can be written.
-  function rounded(value) result(text)
-    real(wp), intent(in) :: value
-    character(len=:), allocatable :: text
-    character(len=32) :: digits
-    real(wp) :: near
-
-    write (digits, '(es32.5e4)') value
-    read (digits, *) near
-    text = to_text(near)
-  end function rounded
 
 end module nocdyn_outcome

@@ -7,7 +7,7 @@ module nocdyn_rosenbrock_stepper
   use nocdyn_stepper, only: allocate_stages, estimate_error, set_weights, stepper_t, update_state
   use nocdyn_system, only: system_t
   use nocdyn_trial, only: evaluate, evaluate_start, trial_t
-  implicit none
+  implicit none (type, external)
   private
 
   public :: rosenbrock_stepper

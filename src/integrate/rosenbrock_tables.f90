@@ -1,7 +1,7 @@
 !> Rosenbrock methods as tables of numbers.
 module nocdyn_rosenbrock_tables
   use nocdyn_kinds, only: wp
-  implicit none
+  implicit none (type, external)
   private
 
   public :: rodas4

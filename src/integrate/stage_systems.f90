@@ -5,7 +5,7 @@ module nocdyn_stage_systems
   use nocdyn_lapack_lu, only: lu_factor, lu_solve
   use nocdyn_system, only: evaluation_fine, system_t
   use nocdyn_trial, only: park, trial_not_finite, trial_shorten, trial_t
-  implicit none
+  implicit none (type, external)
   private
 
   public :: allocate_stage_system, renew_jacobian, factor, solve

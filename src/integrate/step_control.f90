@@ -2,7 +2,7 @@
 module nocdyn_step_control
   use nocdyn_kinds, only: wp
   use nocdyn_trial, only: trial_t
-  implicit none
+  implicit none (type, external)
   private
 
   public :: step_control, weigh_error, accept_or_reject, shorten, propose, smallest_step

@@ -4,7 +4,7 @@ module nocdyn_stepper
   use nocdyn_kinds, only: wp
   use nocdyn_system, only: system_t
   use nocdyn_trial, only: check_deviation, check_state, trial_t
-  implicit none
+  implicit none (type, external)
   private
 
   public :: set_weights, allocate_stages, update_state, estimate_error

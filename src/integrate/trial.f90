@@ -3,7 +3,7 @@ module nocdyn_trial
   use nocdyn_finite, only: all_finite, is_finite
   use nocdyn_kinds, only: wp
   use nocdyn_system, only: evaluation_fine, evaluation_give_up, evaluation_shorten, system_t
-  implicit none
+  implicit none (type, external)
   private
 
   public :: allocate_trial, set_out, evaluate, evaluate_start, check_state, check_deviation, park

@@ -3,7 +3,7 @@ module nocdyn_csv
   use nocdyn_kinds, only: wp
   use nocdyn_output_file, only: output_file_t
   use nocdyn_text, only: number_width, string_t, write_number
-  implicit none
+  implicit none (type, external)
   private
 
   public :: write_header, write_row

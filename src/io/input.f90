@@ -3,7 +3,7 @@ module nocdyn_input
   use nocdyn_kinds, only: wp
   use nocdyn_schema, only: first_key, group_rules, key_rules
   use nocdyn_text, only: string_t, to_text
-  implicit none
+  implicit none (type, external)
   private
 
   !> The value of one key. Of the four arrays the one of the key's kind is allocated; none if the key is unset.

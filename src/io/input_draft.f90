@@ -3,7 +3,7 @@ module nocdyn_input_draft
   use nocdyn_namelist, only: assignment_t, namelist_t
   use nocdyn_schema, only: any_number, key_rule_t, required, unset
   use nocdyn_text, only: to_text
-  implicit none
+  implicit none (type, external)
   private
 
   !> One value of a key; `text` is not allocated where nothing is said.

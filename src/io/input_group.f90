@@ -10,7 +10,7 @@ module nocdyn_input_group
     last_key, orders, unset
   use nocdyn_schema_text, only: allowed_text, key_names, suggestion
   use nocdyn_text, only: lower_case, nearest_word, to_text
-  implicit none
+  implicit none (type, external)
   private
 
   public :: read_group

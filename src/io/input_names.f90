@@ -6,7 +6,7 @@ module nocdyn_input_names
   use nocdyn_schema_text, only: suggestion
   use nocdyn_text, only: quoted, string_t, to_text
   use nocdyn_text_order, only: first_position, find_order
-  implicit none
+  implicit none (type, external)
   private
 
   public :: check_doubled_names, check_references, collect_names

@@ -8,7 +8,7 @@ module nocdyn_input_overrides
     key_rules
   use nocdyn_schema_text, only: group_names, key_names, suggestion
   use nocdyn_text, only: lower_case, string_t
-  implicit none
+  implicit none (type, external)
   private
 
   public :: read_overrides

@@ -13,7 +13,7 @@ module nocdyn_input_reader
   use nocdyn_text, only: nearest_word, quoted, string_t, to_text
   use nocdyn_text_buffer, only: text_buffer_t
   use nocdyn_text_file, only: read_text_file
-  implicit none
+  implicit none (type, external)
   private
 
   public :: read_input, read_input_text

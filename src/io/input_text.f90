@@ -4,7 +4,7 @@ module nocdyn_input_text
   use nocdyn_schema, only: first_key, key_rules
   use nocdyn_text, only: string_t, to_text
   use nocdyn_text_buffer, only: text_buffer_t
-  implicit none
+  implicit none (type, external)
   private
 
   public :: input_text

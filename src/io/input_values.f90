@@ -9,7 +9,7 @@ module nocdyn_input_values
   use nocdyn_schema_text, only: allowed_text
   use nocdyn_mistakes, only: mistakes_t
   use nocdyn_text, only: joined, lower_case, nearest_word, string_t, to_text
-  implicit none
+  implicit none (type, external)
   private
 
   public :: convert

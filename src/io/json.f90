@@ -4,7 +4,7 @@ module nocdyn_json
   use nocdyn_kinds, only: wp
   use nocdyn_text, only: string_t, to_text
   use nocdyn_text_buffer, only: text_buffer_t
-  implicit none
+  implicit none (type, external)
   private
 
   !> Nested objects, two blanks per level, in the order of the calls.

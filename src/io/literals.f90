@@ -3,7 +3,7 @@
 module nocdyn_literals
   use nocdyn_kinds, only: wp
   use nocdyn_text, only: lower_case
-  implicit none
+  implicit none (type, external)
   private
 
   public :: read_real, read_integer, read_logical, digits_end

@@ -2,7 +2,7 @@
 module nocdyn_mistakes
   use nocdyn_text, only: string_t
   use nocdyn_text_order, only: find_order
-  implicit none
+  implicit none (type, external)
   private
 
   integer, parameter, public :: no_line = huge(1)   !! for a mistake of the file as a whole; sorts last

@@ -1,7 +1,7 @@
 !> A namelist file as its scanner leaves it: groups, assignments and values as written, with the line of each.
 module nocdyn_namelist
   use nocdyn_text, only: lower_case
-  implicit none
+  implicit none (type, external)
   private
 
   !> One value: a bare word, a quoted text or nothing between two commas.

@@ -1,7 +1,7 @@
 !> A place in the text of a namelist file, and the smallest pieces of its syntax.
 module nocdyn_namelist_cursor
   use nocdyn_text, only: lower_case
-  implicit none
+  implicit none (type, external)
   private
 
   character(len=1), parameter :: tab = achar(9), line_feed = achar(10), carriage_return = achar(13)

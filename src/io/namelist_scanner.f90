@@ -8,7 +8,7 @@ module nocdyn_namelist_scanner
   use nocdyn_namelist_cursor, only: cursor_t
   use nocdyn_namelist_values, only: longest_list, read_subscript, scan_items
   use nocdyn_text, only: lower_case, to_text
-  implicit none
+  implicit none (type, external)
   private
 
   public :: scan_namelist, scan_value

@@ -5,7 +5,7 @@ module nocdyn_namelist_values
   use nocdyn_namelist, only: assignment_t, item_t, namelist_t
   use nocdyn_namelist_cursor, only: cursor_t
   use nocdyn_text, only: to_text
-  implicit none
+  implicit none (type, external)
   private
 
   public :: scan_items, read_subscript

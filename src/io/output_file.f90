@@ -3,7 +3,7 @@ module nocdyn_output_file
   use nocdyn_errors, only: error_t, exit_file, raise
   use nocdyn_posix, only: close_file, create_file, last_failure, make_folders, process_id, remove_file, rename_file, write_bytes
   use nocdyn_text, only: quoted, to_text
-  implicit none
+  implicit none (type, external)
   private
 
   public :: write_whole

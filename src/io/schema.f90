@@ -5,7 +5,7 @@
 module nocdyn_schema
   use nocdyn_kinds, only: wp
   use nocdyn_text, only: string_t
-  implicit none
+  implicit none (type, external)
   private
 
   public :: group_rule_index, key_rule_index, first_key, last_key, is_single, holds_texts, words_of
@@ -191,7 +191,7 @@ module nocdyn_schema
     example_t('load',       "name = 'work'     body = 'machine'  viscous = 100.0"), &
     example_t('excitation', "name = 'shaker'   body = 'motor'    amplitude = 20.0  frequency = 5.0"), &
     example_t('run',        "t_end = 10.0  method = 'rk45'  rtol = 1.0e-9  atol = 1.0e-9"), &
-    example_t('output',     "interval = 0.01")]
+    example_t('output',     'interval = 0.01')]
 
 contains
 

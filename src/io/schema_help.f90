@@ -6,7 +6,7 @@ module nocdyn_schema_help
   use nocdyn_errors, only: error_t, exit_input, raise
   use nocdyn_text, only: lower_case
   use nocdyn_text_buffer, only: text_buffer_t
-  implicit none
+  implicit none (type, external)
   private
 
   public :: input_help, group_help, input_template, input_reference

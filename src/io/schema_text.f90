@@ -5,7 +5,7 @@ module nocdyn_schema_text
     an_integer, any_number, at_least_once, at_most_once, body_or_ground, exactly_once, first_key, &
     group_rules, key_rule_t, key_rules, last_key, words_of
   use nocdyn_text, only: joined, nearest_word, string_t, to_text
-  implicit none
+  implicit none (type, external)
   private
 
   public :: allowed_text, alternative_of, kind_text, occurrence_text, group_names, key_names, suggestion

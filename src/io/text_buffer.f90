@@ -1,6 +1,6 @@
 !> A text that grows at its end in constant time per character.
 module nocdyn_text_buffer
-  implicit none
+  implicit none (type, external)
   private
 
   character(len=*), parameter :: line_end = new_line('a')

@@ -3,7 +3,7 @@ module nocdyn_text_file
   use, intrinsic :: iso_fortran_env, only: int64
   use nocdyn_errors, only: error_t, exit_file, raise
   use nocdyn_text_buffer, only: text_buffer_t
-  implicit none
+  implicit none (type, external)
   private
 
   public :: read_text_file

@@ -1,7 +1,7 @@
 !> Sorting and searching of texts, so that names are found among thousands without comparing each with each.
 module nocdyn_text_order
   use nocdyn_text, only: string_t
-  implicit none
+  implicit none (type, external)
   private
 
   public :: find_order, first_position

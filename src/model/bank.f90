@@ -7,7 +7,7 @@
 module nocdyn_bank
   use nocdyn_kinds, only: wp
   use nocdyn_text, only: string_t
-  implicit none
+  implicit none (type, external)
   private
 
   integer, parameter, public :: role_coupling = 1     !! in K and C of eqs. (21), (22); stores energy

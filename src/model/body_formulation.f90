@@ -6,7 +6,7 @@ module nocdyn_body_formulation
   use nocdyn_machine, only: machine_t
   use nocdyn_system, only: evaluation_fine
   use nocdyn_text, only: quoted
-  implicit none
+  implicit none (type, external)
   private
 
   public :: start_of_bodies, observe_bodies, jacobian_of_bodies   ! for extensions that add to them

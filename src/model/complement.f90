@@ -2,7 +2,7 @@
 module nocdyn_complement
   use nocdyn_kinds, only: wp
   use nocdyn_lapack, only: invert
-  implicit none
+  implicit none (type, external)
   private
 
   public :: extended_constraint, coordinate_selector, natural_complement, complement_factor

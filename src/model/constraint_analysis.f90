@@ -6,8 +6,8 @@ module nocdyn_constraint_analysis
   use nocdyn_errors, only: error_t, exit_input, raise
   use nocdyn_kinds, only: wp
   use nocdyn_lapack, only: pivoted_rank, pseudo_inverse
-  use nocdyn_text, only: joined, quoted, string_t, to_text
-  implicit none
+  use nocdyn_text, only: joined, quoted, rounded_text, string_t, to_text
+  implicit none (type, external)
   private
 
   public :: analyse_constraints
@@ -15,6 +15,8 @@ module nocdyn_constraint_analysis
   !> Rows of unit length count as dependent below this: decimals such as 0.1 * 3 against 0.3 agree, ratios that
   !> differ in the ninth digit do not.
   real(wp), parameter :: rank_tolerance = 1.0e-10_wp
+
+  integer, parameter :: ratio_digits = 12   ! enough to tell two ratios apart, without the noise of rounding
 
 contains
 
@@ -105,9 +107,10 @@ contains
     integer, intent(in) :: rows(:)
     real(wp), intent(in) :: wanted(:)   !! between paced speeds
     integer, allocatable :: contributing(:)
-    real(wp) :: share(size(rows))
+    real(wp) :: inverse(size(rows), size(group%bodies)), share(size(rows))
 
-    share = matmul(pseudo_inverse(transpose(paced_rows(constraints, group, rows)), rank_tolerance), wanted)
+    inverse = pseudo_inverse(transpose(paced_rows(constraints, group, rows)), rank_tolerance)
+    share = matmul(inverse, wanted)
     contributing = pack(rows, abs(share) > sqrt(rank_tolerance) * maxval(abs(share)))
   end function contributing_rows
 
@@ -140,7 +143,7 @@ contains
     integer, allocatable :: locked(:)
     real(wp), allocatable :: motion(:, :)
 
-    motion = allowed_motion(constraints, group, rows)
+    allocate (motion, source=allowed_motion(constraints, group, rows))
     locked = pack(group%bodies, maxval(abs(motion), dim=2) <= rank_tolerance)
   end function locked_bodies
 
@@ -177,7 +180,7 @@ contains
     if (constraints%first(row + 1) - first /= 2) return
     a = findloc(group%bodies, constraints%body(first), dim=1)
     b = findloc(group%bodies, constraints%body(first + 1), dim=1)
-    motion = allowed_motion(constraints, group, earlier)
+    allocate (motion, source=allowed_motion(constraints, group, earlier))
     fixed = dot_product(motion(a, :), motion(b, :)) / dot_product(motion(a, :), motion(a, :))
     if (maxval(abs(motion(b, :) - fixed * motion(a, :))) > rank_tolerance) return
     asked = -constraints%coefficient(1, first) / constraints%coefficient(1, first + 1)
@@ -185,24 +188,12 @@ contains
     relation(b) = 1.0_wp
     relation(a) = -fixed
     associate (rows => contributing_rows(constraints, group, earlier, relation))
-      text = ': it drives ' // quoted(body_names(group%bodies(b))%text) // ' at ' // ratio_text(asked) // ' times ' // &
-             quoted(body_names(group%bodies(a))%text) // ', but ' // joined(constraints%names(rows), ', ') // ' already ' // &
-             trim(merge('drives', 'drive ', size(rows) == 1)) // ' it at ' // &
-             ratio_text(fixed * group%pace(b) / group%pace(a)) // ' times'
+      text = ': it drives ' // quoted(body_names(group%bodies(b))%text) // ' at ' // rounded_text(asked, ratio_digits) // &
+             ' times ' // quoted(body_names(group%bodies(a))%text) // ', but ' // joined(constraints%names(rows), ', ') // &
+             ' already ' // trim(merge('drives', 'drive ', size(rows) == 1)) // ' it at ' // &
+             rounded_text(fixed * group%pace(b) / group%pace(a), ratio_digits) // ' times'
     end associate
   end function contradiction
-
-  !> A ratio with as many digits as tell two ratios apart, without the noise of rounding.
-  function ratio_text(ratio) result(text)
-    real(wp), intent(in) :: ratio
-    character(len=:), allocatable :: text
-    character(len=32) :: buffer
-    real(wp) :: rounded
-
-    write (buffer, '(es24.11)') ratio
-    read (buffer, *) rounded
-    text = to_text(rounded)
-  end function ratio_text
 
   !> The independent bodies of the group: the wanted ones, or those that pivoting leaves over.
   subroutine choose_coordinates(constraints, body_names, wanted, group, error)

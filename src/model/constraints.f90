@@ -2,7 +2,7 @@
 module nocdyn_constraints
   use nocdyn_kinds, only: wp
   use nocdyn_text, only: string_t
-  implicit none
+  implicit none (type, external)
   private
 
   public :: new_constraints

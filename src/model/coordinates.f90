@@ -9,7 +9,7 @@ module nocdyn_coordinates
   use nocdyn_geared_groups, only: geared_group_t
   use nocdyn_kinds, only: wp
   use nocdyn_lapack, only: pseudo_inverse, solve_positive_definite
-  implicit none
+  implicit none (type, external)
   private
 
   public :: new_coordinates

@@ -6,7 +6,7 @@ module nocdyn_excitations
   use nocdyn_bank, only: bank_t, role_excitation
   use nocdyn_kinds, only: wp
   use nocdyn_text, only: string_t
-  implicit none
+  implicit none (type, external)
   private
 
   public :: new_excitations

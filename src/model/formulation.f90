@@ -3,7 +3,7 @@ module nocdyn_formulation
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
   use nocdyn_system, only: system_t
-  implicit none
+  implicit none (type, external)
   private
 
   !> Extensions choose the states; the integrated work of the accounted elements follows them as quadratures.

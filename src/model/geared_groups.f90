@@ -2,7 +2,7 @@
 module nocdyn_geared_groups
   use nocdyn_constraints, only: constraints_t
   use nocdyn_kinds, only: wp
-  implicit none
+  implicit none (type, external)
   private
 
   public :: find_groups

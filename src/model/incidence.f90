@@ -1,7 +1,7 @@
 !> How an element between two bodies enters the vectors and matrices of the machine; body 0 is the ground.
 module nocdyn_incidence
   use nocdyn_kinds, only: wp
-  implicit none
+  implicit none (type, external)
   private
 
   public :: add_moment, add_coefficient

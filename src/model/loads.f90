@@ -3,7 +3,7 @@ module nocdyn_loads
   use nocdyn_bank, only: bank_t, role_load
   use nocdyn_kinds, only: wp
   use nocdyn_text, only: string_t
-  implicit none
+  implicit none (type, external)
   private
 
   public :: new_loads

@@ -6,7 +6,7 @@ module nocdyn_machine
   use nocdyn_geared_groups, only: geared_group_t
   use nocdyn_kinds, only: wp
   use nocdyn_text, only: string_t
-  implicit none
+  implicit none (type, external)
   private
 
   type, public :: machine_t

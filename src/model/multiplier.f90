@@ -5,7 +5,7 @@ module nocdyn_multiplier
   use nocdyn_lapack_lu, only: lu_factor, lu_solve
   use nocdyn_machine, only: machine_t
   use nocdyn_system, only: evaluation_fine
-  implicit none
+  implicit none (type, external)
   private
 
   public :: new_multiplier

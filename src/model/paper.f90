@@ -11,7 +11,7 @@ module nocdyn_paper
                                    damping_matrix, elastic_moments, inertia_2, inertia_3, inertia_matrix, stiffness_2, &
                                    stiffness_3, stiffness_matrix, tangent_matrix, torque_2, torque_3, torque_vector
   use nocdyn_system, only: evaluation_fine
-  implicit none
+  implicit none (type, external)
   private
 
   public :: new_paper

@@ -7,7 +7,7 @@ module nocdyn_paper_matrices
   use nocdyn_incidence, only: add_coefficient, add_moment
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
-  implicit none
+  implicit none (type, external)
   private
 
   public :: inertia_matrix, torque_vector, stiffness_matrix, damping_matrix, tangent_matrix, elastic_moments

@@ -7,7 +7,7 @@ module nocdyn_reduced
   use nocdyn_machine, only: machine_t
   use nocdyn_system, only: evaluation_fine
   use nocdyn_text, only: quoted
-  implicit none
+  implicit none (type, external)
   private
 
   public :: new_reduced

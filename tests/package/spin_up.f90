@@ -2,7 +2,7 @@
 module row_counter
   use nocdyn_kinds, only: wp
   use nocdyn_system, only: observer_t
-  implicit none
+  implicit none (type, external)
   private
 
   type, extends(observer_t), public :: row_counter_t
@@ -47,7 +47,7 @@ program spin_up
   use nocdyn_outcome, only: integration_done, outcome_t
   use nocdyn_text, only: string_t
   use row_counter, only: row_counter_t
-  implicit none
+  implicit none (type, external)
 
   type(input_t) :: input
   type(machine_t) :: machine

@@ -11,6 +11,7 @@ import pytest
 
 SOURCE = Path(os.environ["NOCDYN_SOURCE"])
 DATA = Path(__file__).parent / "data"
+TRAPS_EXCEPTIONS = "CMAKE_BUILD_TYPE:STRING=Debug" in (Path(os.environ["NOCDYN_BUILD"]) / "CMakeCache.txt").read_text()
 CASE_1 = SOURCE / "input/paper/case1.nml"
 CASE_2 = SOURCE / "input/paper/case2.nml"
 

@@ -4,7 +4,7 @@ import resource
 import signal
 
 import pytest
-from conftest import CASE_1, CASE_2, ENDLESS, wait_for
+from conftest import CASE_1, CASE_2, ENDLESS, TRAPS_EXCEPTIONS, wait_for
 
 RESULTS = ["input.nml", "summary.json", "trajectory.csv"]
 PARTIAL = ["input.nml", "summary.json", "trajectory.partial.csv"]
@@ -27,6 +27,14 @@ def test_a_machine_that_blows_up_fails_with_time_and_state(nocdyn, method):
     assert " of 'disc' " in outcome.stderr
     assert outcome.stderr.endswith("; the rows up to there are in out/trajectory.partial.csv\n")
     assert nocdyn.files("out") == PARTIAL
+
+
+@pytest.mark.skipif(TRAPS_EXCEPTIONS, reason="the debug build traps the overflow")
+def test_a_state_that_is_not_finite_is_named(nocdyn):
+    nocdyn.write("exploding.nml", EXPLODING)
+    outcome = nocdyn("run", "exploding.nml", "--out", "out", "--set", "body.disc.angle=1e200")
+    assert (outcome.returncode, outcome.stdout) == (1, "")
+    assert "the derivative of the speed of 'disc' at the start, t = 0 s, is not a finite number" in outcome.stderr
 
 
 def test_a_failed_run_keeps_the_rows_until_then(nocdyn):

@@ -32,6 +32,14 @@ C_1 = [[0, 0, 0], [0, 0, 100 * RATIO], [0, 0, 0]]
 K_1 = [K[0], K[1], [0, 0, 0]]
 Q_1 = [MOTOR + SHAKER, 0, 0]
 
+OMEGA = [1, 3, -2]
+PHI = [1, 0.5, -0.25]
+F = [-SECANT * 0.5, SECANT * 0.5, 0]
+F_RATE = [TANGENT * 2, -TANGENT * 2, 0]
+# the pinion and the wheel together: J2 + J3 (R1/R2)^2 turned by F2 and by the load, geared up
+PINION_RATE = (F[1] + RATIO * -100 * 2) / (5 + 5 * RATIO**2)
+OMEGA_RATE = [(MOTOR + SHAKER + F[0]) / 10, PINION_RATE, -RATIO * PINION_RATE]
+
 
 def blocks(*rows):
     """A matrix of 3 x 3 blocks."""
@@ -40,30 +48,41 @@ def blocks(*rows):
 
 EXPECTED = {
     "13": [[10, 0, 0], [0, 5, 0], [0, 0, 5]],
-    "15": [[1, 3, -2]],
+    "14": [OMEGA_RATE],
+    "15": [OMEGA],
     "16": [[MOTOR + SHAKER, 0, 0]],
     "17": [[SHAKER, 0, 0]],
     "18": [[MOTOR, 0, 0]],
-    "19": [[1, 0.5, -0.25]],
+    "19": [PHI],
     "21": K,
     "22": [[0, 0, 0], [0, 0, 0], [0, 0, -100]],
     "23": [[0, 2, 3]],
     "25": J_1,
     "26": [Q_1],
+    "27": [[SHAKER, 0, 0]],
+    "28": [[MOTOR, 0, 0]],
     "29": C_1,
     "30": K_1,
     "31": [[1, 0], [0, 1], [0, -RATIO]],
+    "33": [OMEGA],
     "35": blocks([J_1, ZERO], [ZERO, ONE]),
+    "36": ONE,
+    "37": ZERO,
     "38": blocks([C_1, ZERO], [ZERO, ZERO]),
     "39": blocks([ZERO, K_1], [ONE, ZERO]),
     "40": [Q_1 + [0, 0, 0]],
+    "41": [OMEGA_RATE + OMEGA],
+    "42": [OMEGA + PHI],
     "44": blocks([J_1, ZERO, ZERO], [ZERO, ONE, ZERO], [ZERO, ZERO, ONE]),
-    "47": [[TANGENT * 2, -TANGENT * 2, 0]],
-    "48": [[-SECANT * 0.5, SECANT * 0.5, 0]],
+    "45": [OMEGA_RATE + OMEGA + F_RATE],
+    "46": [OMEGA + PHI + F],
+    "47": [F_RATE],
+    "48": [F],
     "58": [Q_1 + [0] * 6],
     "60": blocks([C_1, ZERO, ZERO], [ZERO, ZERO, ZERO], [ZERO, ZERO, ZERO]),
     "61": blocks([ZERO, K_1, ZERO], [ONE, ZERO, ZERO], [K_4, ZERO, ZERO]),
     "62": K_4,
+    "77": [[1, 3]],
     "78": [[1, 0, 0], [0, 1, 0], [0, 2, 3]],
     "79": [[1, 0], [0, 1], [0, 0]],
 }

@@ -4,7 +4,7 @@ module funit
   use, intrinsic :: iso_fortran_env, only: wp => real64
   use funit_failures, only: anyExceptions, SourceLocation, throw
   use funit_numbers, only: numbers, require, require_relatively_equal
-  implicit none
+  implicit none (type, external)
   private
 
   public :: SourceLocation, anyExceptions

@@ -1,7 +1,7 @@
 !> The test that is running and its failed assertions, each printed as it happens so that a crash loses none.
 module funit_failures
   use, intrinsic :: iso_fortran_env, only: output_unit
-  implicit none
+  implicit none (type, external)
   private
 
   public :: SourceLocation, anyExceptions, begin_test, throw

@@ -1,9 +1,9 @@
 !> Comparison of numbers and of arrays of numbers of any rank; the first element that breaks a relation is reported.
 module funit_numbers
-  use, intrinsic :: ieee_exceptions, only: ieee_set_halting_mode, ieee_usual
+  use, intrinsic :: ieee_exceptions, only: ieee_get_halting_mode, ieee_set_flag, ieee_set_halting_mode, ieee_usual
   use, intrinsic :: iso_fortran_env, only: wp => real64
   use funit_failures, only: SourceLocation, throw
-  implicit none
+  implicit none (type, external)
   private
 
   public :: numbers, numbers_t, require, require_relatively_equal
@@ -76,13 +76,13 @@ contains
     real(wp), allocatable :: l(:)
     real(wp) :: allowed
     logical, allocatable :: holds(:)
+    logical :: halting(size(ieee_usual))
 
-    ! Comparing with NaN and subtracting infinities are what is asked here; the mode returns with the procedure.
-    call ieee_set_halting_mode(ieee_usual, .false.)
     if (.not. conformable(left, right, message, location)) return
     l = expanded(left, size(right%values))
     allowed = 0
     if (present(tolerance)) allowed = tolerance
+    call suspend_halting(halting)
     associate (r => right%values)
       select case (relation)
         case ('==')
@@ -101,6 +101,7 @@ contains
           error stop 'funit_numbers: unknown relation'
       end select
     end associate
+    call resume_halting(halting)
     call report_first(holds, l, relation, right, tolerance, message, location)
   end subroutine require
 
@@ -112,13 +113,31 @@ contains
     character(len=*), intent(in), optional :: message
     type(SourceLocation), intent(in), optional :: location
     real(wp), allocatable :: e(:)
+    logical, allocatable :: holds(:)
+    logical :: halting(size(ieee_usual))
 
-    call ieee_set_halting_mode(ieee_usual, .false.)
     if (.not. conformable(expected, actual, message, location)) return
     e = expanded(expected, size(actual%values))
-    call report_first(abs(actual%values - e) <= tolerance * abs(e) .and. abs(e) > 0, e, '== relatively', &
-      actual, tolerance, message, location)
+    call suspend_halting(halting)
+    holds = abs(actual%values - e) <= tolerance * abs(e) .and. abs(e) > 0
+    call resume_halting(halting)
+    call report_first(holds, e, '== relatively', actual, tolerance, message, location)
   end subroutine require_relatively_equal
+
+  !> Comparing with NaN and subtracting infinities are what is asked here, in programs that trap them elsewhere.
+  subroutine suspend_halting(halting)
+    logical, intent(out) :: halting(:)   !! the modes before
+
+    call ieee_get_halting_mode(ieee_usual, halting)
+    call ieee_set_halting_mode(ieee_usual, .false.)
+  end subroutine suspend_halting
+
+  subroutine resume_halting(halting)
+    logical, intent(in) :: halting(:)
+
+    call ieee_set_flag(ieee_usual, .false.)
+    call ieee_set_halting_mode(ieee_usual, halting)
+  end subroutine resume_halting
 
   subroutine report_first(holds, left, relation, right, tolerance, message, location)
     logical, intent(in) :: holds(:)

@@ -2,7 +2,7 @@
 module funit_runner
   use, intrinsic :: iso_fortran_env, only: error_unit, output_unit
   use funit_failures, only: anyExceptions, begin_test
-  implicit none
+  implicit none (type, external)
   private
 
   public :: finish_tests, run_test, start_tests

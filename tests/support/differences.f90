@@ -6,7 +6,7 @@ module nocdyn_test_differences
   use nocdyn_bank, only: bank_t
   use nocdyn_kinds, only: wp
   use nocdyn_system, only: system_t
-  implicit none
+  implicit none (type, external)
   private
 
   public :: difference_laws, difference_system

@@ -4,7 +4,7 @@ module nocdyn_fixed_steps
   use nocdyn_stepper, only: stepper_t
   use nocdyn_system, only: system_t
   use nocdyn_trial, only: allocate_trial, evaluate_start, set_out, trial_t
-  implicit none
+  implicit none (type, external)
   private
 
   public :: take_steps, one_step, measured_order

@@ -12,7 +12,7 @@ module nocdyn_test_machines
   use nocdyn_machine, only: machine_t
   use nocdyn_motors, only: new_motors
   use nocdyn_text, only: string_t, to_text
-  implicit none
+  implicit none (type, external)
   private
 
   public :: paper_machine, damped_chain, branched_train, gear_loop, bare_machine
@@ -102,7 +102,7 @@ contains
 
     machine%lanes = size(inertia, 1)
     machine%bodies = size(inertia, 2)
-    machine%names = numbered_names('body', machine%bodies)
+    allocate (machine%names, source=numbered_names('body', machine%bodies))
     machine%inertia = inertia
     allocate (machine%start_angle, machine%start_speed, source=0.0_wp * inertia)
     machine%banks = element_banks(machine%lanes)

@@ -9,7 +9,7 @@ module nocdyn_test_random_machines
   use nocdyn_motors, only: new_motors
   use nocdyn_test_machines, only: bare_machine, finish, gear_rows, install, numbered_names
   use nocdyn_test_random, only: random_stream, random_stream_t
-  implicit none
+  implicit none (type, external)
   private
 
   public :: random_machine

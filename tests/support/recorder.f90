@@ -2,7 +2,7 @@
 module nocdyn_recorder
   use nocdyn_kinds, only: wp
   use nocdyn_system, only: observer_t, system_t
-  implicit none
+  implicit none (type, external)
   private
 
   public :: recorder

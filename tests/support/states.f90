@@ -9,7 +9,7 @@ module nocdyn_test_states
   use nocdyn_paper_matrices, only: elastic_moments
   use nocdyn_reduced, only: new_reduced, reduced_t
   use nocdyn_test_random, only: random_stream, random_stream_t
-  implicit none
+  implicit none (type, external)
   private
 
   public :: draw_state, state_of, bring_to, formulate

@@ -5,7 +5,7 @@
 module nocdyn_test_problems
   use nocdyn_kinds, only: wp
   use nocdyn_system, only: evaluation_fine, evaluation_give_up, evaluation_shorten, system_t
-  implicit none
+  implicit none (type, external)
   private
 
   public :: smooth_problem, smooth_solution, smooth_quadrature, stiff_problem, duffing_problem, wall_problem, rest_problem

@@ -1,7 +1,7 @@
 !> Reads a machine with Fortran's own namelist read and prints every value of every group, defaults included.
 program read_namelists
   use, intrinsic :: iso_fortran_env, only: real64
-  implicit none
+  implicit none (type, external)
 
   integer, parameter :: wp = real64
   integer, parameter :: most_bodies = 8       ! in a list
