@@ -75,7 +75,8 @@ contains
     wheels = reshape([integer ::], [2, 0])
     do b = 1, bodies
       root(b) = b
-      if (b == 1 .or. layout%number(0.0_wp, 1.0_wp) > 0.7_wp) cycle
+      if (b == 1) cycle
+      if (layout%number(0.0_wp, 1.0_wp) > 0.7_wp) cycle
       a = layout%whole(1, b - 1)
       root(b) = root(a)
       wheels = reshape([wheels, a, b], [2, size(wheels, 2) + 1])
