@@ -42,11 +42,17 @@ contains
     if (.not. is_done) output_is_lost = .true.
   end subroutine say
 
-  !> The message of an error on standard error.
+  !> The message of an error on standard error, every line with the program's name before it.
   subroutine complain(error)
     type(error_t), intent(in) :: error
+    integer :: first, last
 
-    write (error_unit, '(a)') 'nocdyn: ' // error%message
+    first = 1
+    do while (first <= len(error%message))
+      last = first + index(error%message(first:) // new_line('a'), new_line('a')) - 2
+      write (error_unit, '(a)') 'nocdyn: ' // error%message(first:last)
+      first = last + 2
+    end do
   end subroutine complain
 
   function new_console_progress(title, is_quiet) result(progress)

@@ -165,3 +165,11 @@ def test_output_that_cannot_be_written_is_not_a_success(nocdyn):
         outcome = nocdyn.start("help", stdout=full)
         assert outcome.communicate()[1] == "nocdyn: standard output cannot be written\n"
     assert outcome.returncode == 3
+
+
+def test_every_mistake_is_a_line_with_the_program_and_the_place(nocdyn):
+    nocdyn.write("bad.nml", "&body name = 'a' inertia = -1 /\n&run t_end = 1.0 methd = 'rk45' /\n")
+    outcome = nocdyn("check", "bad.nml")
+    first, second = outcome.stderr.splitlines()
+    assert first.startswith("nocdyn: bad.nml:1: &body 'a': inertia = -1 is out of range")
+    assert second.startswith("nocdyn: bad.nml:2: &run: methd is not a key of &run; did you mean 'method'?")
