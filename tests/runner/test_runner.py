@@ -171,6 +171,7 @@ def test_compiler_names_the_line_of_the_pf_file(tmp_path, library):
     ("@test\nsubroutine t(this)\nend subroutine\n", 6, "expected 'subroutine NAME()' after @test"),
     ("@test\ninteger function t()\nend function\n", 6, "expected 'subroutine NAME()' after @test"),
     ("subroutine t()\nend subroutine\n", 1, "no @test in this file"),
+    ("pure integer function run()\nend function\n", 5, "run is a name of pFUnit's"),
     ("@before\nsubroutine a()\nend subroutine\n@before\nsubroutine b()\nend subroutine\n@test\nsubroutine c()\n"
      "end subroutine\n", 1, "more than one @before"),
 ])

@@ -15,11 +15,14 @@ ASSERTIONS = (
     "assertLessThan", "assertLessThanOrEqual", "assertGreaterThan", "assertGreaterThanOrEqual",
 )
 MARKERS = ("test", "before", "after")
+# Procedures and short words that pFUnit's `funit` exports: a test module that defines one does not build with it.
+TAKEN = {"run", "initialize", "finalize", "throw", "is", "test", "every", "stub", "subject", "predicate", "disable"}
 CANONICAL = {name.lower(): name for name in ASSERTIONS + MARKERS}
 
 ANNOTATION = re.compile(r"\s*@(\w*)\s*(.*?)\s*$")
 SUBROUTINE = re.compile(r"\s*subroutine\s+(\w+)\s*(\(\s*\))?\s*(!.*)?$", re.IGNORECASE)
 MODULE = re.compile(r"\s*module\s+(\w+)\s*$", re.IGNORECASE)
+PROCEDURE = re.compile(r"(?!\s*end\b)[^!'\"]*\b(?:subroutine|function)\s+(\w+)", re.IGNORECASE)
 BLANK_OR_COMMENT = re.compile(r"\s*(!.*)?$")
 
 TESTS_FOLDER = Path(__file__).resolve().parent.parent
@@ -59,6 +62,9 @@ class Translation:
         self.lines.append(line)
         if self.marker and not BLANK_OR_COMMENT.match(line):
             self.name_procedure(number, line)
+        procedure = PROCEDURE.match(line)
+        if procedure and procedure.group(1).lower() in TAKEN:
+            self.refuse(number, f"{procedure.group(1)} is a name of pFUnit's; call the procedure something else")
         module = MODULE.match(line)
         if module and not self.module:
             self.module = module.group(1)
