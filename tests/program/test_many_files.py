@@ -98,3 +98,24 @@ def test_a_bad_file_does_not_claim_a_folder(nocdyn):
     nocdyn.write("b/same.nml", SPINNER)
     assert nocdyn("run", "a/same.nml", "b/same.nml").returncode == 2
     assert nocdyn.files("results/same") == RESULTS
+
+
+@pytest.mark.parametrize(("out", "folder"), [("./a//b/./", "a/b"), ("./", "."), ("a/../b", "a/../b")])
+def test_a_result_folder_is_named_plainly(nocdyn, spinner, out, folder):
+    assert nocdyn("run", spinner, "--out", out).stdout.splitlines()[-1].endswith(f"results in {folder}")
+    assert (nocdyn.folder / folder / "trajectory.csv").exists()
+
+
+def test_two_spellings_of_a_folder_are_one_folder(nocdyn, spinner):
+    other = nocdyn.write("other.nml", spinner.read_text() + "&output directory = './x/' /\n")
+    third = nocdyn.write("third.nml", spinner.read_text() + "&output directory = 'x' /\n")
+    outcome = nocdyn("run", other, third)
+    assert outcome.returncode == 2 and "would both write to 'x'; nothing was run" in outcome.stderr
+
+
+def test_the_table_of_a_large_machine_stops_and_says_so(nocdyn):
+    bodies = "".join(f"&body name = 'b{i}' inertia = 1.0 /\n" for i in range(40))
+    nocdyn.write("many.nml", bodies + "&run t_end = 1.0 /\n&output points = 2 /\n")
+    lines = nocdyn("run", "many.nml").stdout.splitlines()
+    assert lines[-2] == "(26 more columns in summary.json)"
+    assert len(lines) == 62

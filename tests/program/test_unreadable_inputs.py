@@ -16,6 +16,12 @@ def test_a_missing_file_is_exit_code_3(nocdyn, command):
 
 
 @pytest.mark.parametrize("command", COMMANDS)
+def test_an_empty_name_is_no_file(nocdyn, command):
+    outcome = nocdyn(command, "")
+    assert (outcome.returncode, outcome.stderr) == (3, "nocdyn: an empty text is not the name of a file\n")
+
+
+@pytest.mark.parametrize("command", COMMANDS)
 def test_a_folder_is_no_input(nocdyn, command):
     outcome = nocdyn(command, SOURCE)
     assert (outcome.returncode, outcome.stdout) == (3, "")
