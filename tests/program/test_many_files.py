@@ -107,9 +107,9 @@ def test_a_result_folder_is_named_plainly(nocdyn, spinner, out, folder):
 
 
 def test_two_spellings_of_a_folder_are_one_folder(nocdyn, spinner):
-    other = nocdyn.write("other.nml", spinner.read_text() + "&output directory = './x/' /\n")
-    third = nocdyn.write("third.nml", spinner.read_text() + "&output directory = 'x' /\n")
-    outcome = nocdyn("run", other, third)
+    for name, folder in (("plain", "x"), ("dotted", "./x/")):
+        nocdyn.write(f"{name}.nml", spinner.read_text().replace("&output", f"&output directory = '{folder}'"))
+    outcome = nocdyn("run", "plain.nml", "dotted.nml")
     assert outcome.returncode == 2 and "would both write to 'x'; nothing was run" in outcome.stderr
 
 
