@@ -19,6 +19,7 @@ module nocdyn_trajectory_table
     type(string_t), allocatable :: labels(:)
     class(formulation_t), allocatable :: formulation
     type(bank_columns_t), allocatable, private :: columns(:)   !! of each bank
+    real(wp), private :: t(1) = 0.0_wp
     real(wp), allocatable, private :: y(:, :)      !! [1, states + quadratures]
     real(wp), allocatable, private :: values(:)    !! of one quantity of a bank, work space
     real(wp), private :: start_energy = 0.0_wp
@@ -109,10 +110,11 @@ contains
     real(wp), intent(in) :: t
     real(wp), contiguous, intent(in) :: y(:)   !! [states + quadratures]
     real(wp), intent(out) :: row(:)            !! [labels]
-    integer :: next, q, i
+    integer :: e, i, next, q
 
+    self%t(1) = t
     self%y(1, :) = y
-    call self%formulation%observe([t], self%y)
+    call self%formulation%observe(self%t, self%y)
     associate (machine => self%formulation%machine)
       row(1) = t
       row(2:1 + machine%bodies) = self%formulation%phi(1, 1:)
@@ -122,8 +124,10 @@ contains
         do q = 1, size(self%columns(i)%quantities)
           associate (elements => self%columns(i)%quantities(q)%elements, values => self%values(:size(machine%banks(i)%bank%to)))
             call machine%banks(i)%bank%observe(q, 1, values)
-            row(next:next + size(elements) - 1) = values(elements)
-            next = next + size(elements)
+            do e = 1, size(elements)
+              row(next) = values(elements(e))
+              next = next + 1
+            end do
           end associate
         end do
       end do

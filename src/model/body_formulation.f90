@@ -14,6 +14,7 @@ module nocdyn_body_formulation
   !> Extensions find the accelerations; the first 2n states are omega, phi, further states may follow.
   type, abstract, extends(formulation_t), public :: body_formulation_t
     real(wp), allocatable :: slope(:, :)         !! y' at the state last observed, [lanes, states + quadratures]
+    integer, allocatable :: status(:)            !! of that evaluation, [lanes]
     real(wp), allocatable :: mobility(:, :, :)   !! omega' = mobility T, shape [bodies, bodies, lanes]
     real(wp), allocatable :: by_angle(:, :)      !! derivative of T by phi, [bodies, bodies], work space
     real(wp), allocatable :: by_speed(:, :)      !! derivative of T by omega
@@ -38,6 +39,7 @@ contains
     call self%attach(machine)
     self%states = states
     allocate (self%slope(self%lanes, states + self%quadratures), source=0.0_wp)
+    allocate (self%status(self%lanes), source=evaluation_fine)
     allocate (self%mobility(machine%bodies, machine%bodies, self%lanes))
     allocate (self%by_angle(machine%bodies, machine%bodies), self%by_speed(machine%bodies, machine%bodies))
     allocate (self%by_time(machine%bodies))
@@ -70,9 +72,8 @@ contains
     class(body_formulation_t), intent(inout) :: self
     real(wp), contiguous, intent(in) :: t(:)
     real(wp), contiguous, intent(in) :: y(:, :)
-    integer :: status(size(t))
 
-    call self%derivative(t, y, self%slope, status)
+    call self%derivative(t, y, self%slope, self%status)
   end subroutine observe_bodies
 
   !> omega' = mobility T(phi, omega, t), phi' = omega, and the works; further states are the extension's.

@@ -279,12 +279,12 @@ contains
     class(coordinates_t), intent(in) :: self
     integer, intent(in) :: lane
     real(wp), intent(in) :: torque(:)     !! T [N m], shape [bodies]
-    real(wp), intent(out) :: lambda(:)    !! [rows]
+    real(wp), intent(inout) :: lambda(:)  !! [rows]
     integer :: g
 
     do g = 1, size(self%blocks)
       associate (block => self%blocks(g))
-        lambda(block%rows) = matmul(block%of_torques(:, :, lane), torque(block%bodies))
+        call apply(block%of_torques(:, :, lane), block%bodies, torque, block%rows, lambda)
       end associate
     end do
   end subroutine reactions_of_torques
@@ -294,14 +294,31 @@ contains
     class(coordinates_t), intent(in) :: self
     integer, intent(in) :: lane
     real(wp), intent(in) :: imbalance(:)   !! J omega' - T [N m], shape [bodies]
-    real(wp), intent(out) :: lambda(:)     !! [rows]
+    real(wp), intent(inout) :: lambda(:)   !! [rows]
     integer :: g
 
     do g = 1, size(self%blocks)
       associate (block => self%blocks(g))
-        lambda(block%rows) = matmul(block%of_imbalances(:, :, lane), imbalance(block%bodies))
+        call apply(block%of_imbalances(:, :, lane), block%bodies, imbalance, block%rows, lambda)
       end associate
     end do
   end subroutine reactions_of_imbalances
+
+  !> y(rows) = map x(columns), without temporary arrays.
+  pure subroutine apply(map, columns, x, rows, y)
+    real(wp), contiguous, intent(in) :: map(:, :)
+    integer, intent(in) :: columns(:)
+    real(wp), intent(in) :: x(:)
+    integer, intent(in) :: rows(:)
+    real(wp), intent(inout) :: y(:)
+    integer :: i, j
+
+    y(rows) = 0.0_wp
+    do j = 1, size(columns)
+      do i = 1, size(rows)
+        y(rows(i)) = y(rows(i)) + map(i, j) * x(columns(j))
+      end do
+    end do
+  end subroutine apply
 
 end module nocdyn_coordinates

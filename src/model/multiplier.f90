@@ -73,12 +73,15 @@ contains
     class(multiplier_t), intent(inout) :: self
     integer, intent(in) :: lane
     real(wp), intent(out) :: lambda(:)
-    integer :: g, next
+    integer :: g, i, next
 
     next = self%machine%bodies + 1
     do g = 1, size(self%machine%coordinates%blocks)
       associate (block => self%machine%coordinates%blocks(g))
-        lambda(block%rows) = matmul(block%of_kept(:, :, lane), self%solution(next:next + size(block%kept) - 1, lane))
+        do i = 1, size(block%rows)
+          lambda(block%rows(i)) = dot_product(block%of_kept(i, :, lane), &
+                                              self%solution(next:next + size(block%kept) - 1, lane))
+        end do
         next = next + size(block%kept)
       end associate
     end do

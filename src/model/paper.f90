@@ -232,21 +232,23 @@ contains
     class(paper_t), intent(inout) :: self
     real(wp), contiguous, intent(in) :: t(:)
     real(wp), contiguous, intent(in) :: y(:, :)
-    real(wp) :: difference(self%machine%bodies)
-    integer :: i, l, n, next
+    integer :: b, column, e, i, l, n
 
     n = self%machine%bodies
     call observe_bodies(self, t, y)
     do l = 1, self%lanes
-      call elastic_moments(self%machine, l, difference)
-      difference = y(l, 2 * n + 1:3 * n) - difference
-      next = 1
+      call elastic_moments(self%machine, l, self%work%term)
+      column = 0
       do i = 1, size(self%machine%banks)
         associate (bank => self%machine%banks(i)%bank)
           if (bank%role /= role_coupling) cycle
-          bank%restoring(l, :) = bank%restoring(l, :) &
-                                 + matmul(self%moment_of_bodies(next:next + size(bank%to) - 1, :), difference)
-          next = next + size(bank%to)
+          do e = 1, size(bank%to)
+            column = column + 1
+            do b = 1, n
+              bank%restoring(l, e) = bank%restoring(l, e) &
+                                     + self%moment_of_bodies(column, b) * (y(l, 2 * n + b) - self%work%term(b))
+            end do
+          end do
         end associate
       end do
     end do
@@ -258,8 +260,8 @@ contains
     integer, intent(in) :: lane
     real(wp), intent(out) :: lambda(:)
 
-    call self%machine%coordinates%reactions_of_imbalances(lane, &
-      self%machine%inertia(lane, :) * self%slope(lane, :self%machine%bodies) - self%torque(lane, 1:), lambda)
+    self%work%term(:) = self%machine%inertia(lane, :) * self%slope(lane, :self%machine%bodies) - self%torque(lane, 1:)
+    call self%machine%coordinates%reactions_of_imbalances(lane, self%work%term, lambda)
   end subroutine reactions
 
 end module nocdyn_paper
