@@ -1,7 +1,7 @@
 !> Formulations whose states are the speeds and angles of all bodies, omega and phi: `paper` and `multiplier`.
 module nocdyn_body_formulation
   use nocdyn_formulation, only: formulation_t
-  use nocdyn_incidence, only: add_coefficient, add_moment
+  use nocdyn_incidence, only: add_coefficients, add_moment
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
   use nocdyn_system, only: evaluation_fine
@@ -115,10 +115,10 @@ contains
     self%by_time(:) = 0.0_wp
     do i = 1, size(self%machine%banks)
       associate (bank => self%machine%banks(i)%bank)
+        call add_coefficients(bank%from, bank%to, -1.0_wp, bank%restoring_angle(lane, :), self%by_angle)
+        call add_coefficients(bank%from, bank%to, -1.0_wp, bank%working_angle(lane, :), self%by_angle)
+        call add_coefficients(bank%from, bank%to, -1.0_wp, bank%working_speed(lane, :), self%by_speed)
         do e = 1, size(bank%to)
-          call add_coefficient(bank%from(e), bank%to(e), -bank%restoring_angle(lane, e) - bank%working_angle(lane, e), &
-                               self%by_angle)
-          call add_coefficient(bank%from(e), bank%to(e), -bank%working_speed(lane, e), self%by_speed)
           call add_moment(bank%from(e), bank%to(e), bank%working_time(lane, e), self%by_time)
         end do
       end associate

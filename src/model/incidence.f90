@@ -4,7 +4,7 @@ module nocdyn_incidence
   implicit none (type, external)
   private
 
-  public :: add_moment, add_coefficient
+  public :: add_moment, add_coefficient, add_coefficients
 
 contains
 
@@ -31,5 +31,18 @@ contains
       matrix(from, to) = matrix(from, to) + coefficient
     end if
   end subroutine add_coefficient
+
+  !> The pattern of eq. (21) for all elements of a bank, with k = factor * coefficient.
+  pure subroutine add_coefficients(from, to, factor, coefficient, matrix)
+    integer, intent(in) :: from(:), to(:)          !! [elements]
+    real(wp), intent(in) :: factor
+    real(wp), intent(in) :: coefficient(:)         !! [elements]
+    real(wp), intent(inout) :: matrix(:, :)
+    integer :: e
+
+    do e = 1, size(to)
+      call add_coefficient(from(e), to(e), factor * coefficient(e), matrix)
+    end do
+  end subroutine add_coefficients
 
 end module nocdyn_incidence

@@ -4,7 +4,7 @@
 !> `differentiate` and by `assess` of its banks. What a law has beyond -K12 u - c u' (the rest twist of a coupling,
 !> the torque of a motor) stands in Q. Every procedure overwrites its last argument and allocates nothing.
 module nocdyn_paper_matrices
-  use nocdyn_incidence, only: add_coefficient, add_moment
+  use nocdyn_incidence, only: add_coefficients, add_moment
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
   implicit none (type, external)
@@ -57,14 +57,12 @@ contains
     type(machine_t), intent(in) :: machine
     integer, intent(in) :: lane
     real(wp), intent(inout) :: stiffness(:, :)
-    integer :: e, i
+    integer :: i
 
     stiffness = 0.0_wp
     do i = 1, size(machine%banks)
       associate (bank => machine%banks(i)%bank)
-        do e = 1, size(bank%to)
-          call add_coefficient(bank%from(e), bank%to(e), bank%secant(lane, e), stiffness)
-        end do
+        call add_coefficients(bank%from, bank%to, 1.0_wp, bank%secant(lane, :), stiffness)
       end associate
     end do
   end subroutine stiffness_matrix
@@ -74,14 +72,12 @@ contains
     type(machine_t), intent(in) :: machine
     integer, intent(in) :: lane
     real(wp), intent(inout) :: damping(:, :)
-    integer :: e, i
+    integer :: i
 
     damping = 0.0_wp
     do i = 1, size(machine%banks)
       associate (bank => machine%banks(i)%bank)
-        do e = 1, size(bank%to)
-          call add_coefficient(bank%from(e), bank%to(e), bank%damping(lane, e), damping)
-        end do
+        call add_coefficients(bank%from, bank%to, 1.0_wp, bank%damping(lane, :), damping)
       end associate
     end do
   end subroutine damping_matrix
@@ -92,14 +88,12 @@ contains
     type(machine_t), intent(in) :: machine
     integer, intent(in) :: lane
     real(wp), intent(inout) :: tangent(:, :)
-    integer :: e, i
+    integer :: i
 
     tangent = 0.0_wp
     do i = 1, size(machine%banks)
       associate (bank => machine%banks(i)%bank)
-        do e = 1, size(bank%to)
-          call add_coefficient(bank%from(e), bank%to(e), -bank%restoring_angle(lane, e), tangent)
-        end do
+        call add_coefficients(bank%from, bank%to, -1.0_wp, bank%restoring_angle(lane, :), tangent)
       end associate
     end do
   end subroutine tangent_matrix
