@@ -80,6 +80,10 @@ contains
     times = output_times(input)
     call start_recorder(recorder, formulation, times, folder, progress)
     call solve(formulation, run, times, recorder, outcome, error)
+    if (.not. allocated(outcome%status)) then   ! a setting was refused
+      call recorder%file%discard()
+      return
+    end if
     call conclude(outcome, error, recorder%summary)
     call write_results(input, machine, recorder, folder, write_error)
     if (allocated(write_error)) call move_alloc(write_error, error)
@@ -161,12 +165,19 @@ contains
     call recorder%file%complete(trajectory_file, error)
     if (.not. allocated(error)) call input_copy%complete(input_file, error)
     if (.not. allocated(error)) call summary%complete(summary_file, error)
-    if (allocated(error)) then
-      call recorder%file%discard()
-      call input_copy%discard()
-      call summary%discard()
-      return
-    end if
+    if (.not. allocated(error)) call name_results(recorder, folder, input_copy, summary, error)
+    if (.not. allocated(error)) return
+    call recorder%file%discard()
+    call input_copy%discard()
+    call summary%discard()
+  end subroutine write_results
+
+  !> Files that have their names stay if a later one cannot take its own; without a summary.json they are no results.
+  subroutine name_results(recorder, folder, input_copy, summary, error)
+    type(recorder_t), intent(inout) :: recorder
+    character(len=*), intent(in) :: folder
+    type(output_file_t), intent(inout) :: input_copy, summary
+    type(error_t), allocatable, intent(out) :: error
 
     call remove_file(folder // '/' // summary_file)
     if (recorder%summary%status == 'done') then
@@ -178,7 +189,7 @@ contains
     end if
     if (.not. allocated(error)) call input_copy%finish(input_file, error)
     if (.not. allocated(error)) call summary%finish(summary_file, error)
-  end subroutine write_results
+  end subroutine name_results
 
   !> One requested time: a row of the table.
   subroutine record(self, lane, t, y)

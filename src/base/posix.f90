@@ -1,8 +1,8 @@
 !> The few services of the operating system that Fortran lacks: folders, renaming, terminals, interrupts; and writing,
 !> because gfortran's `write`, `flush` and `close` report no error when a disk is full.
 module nocdyn_posix
-  use, intrinsic :: iso_c_binding, only: c_char, c_f_pointer, c_funloc, c_funptr, c_int, c_intptr_t, c_null_char, &
-    c_null_funptr, c_ptr, c_size_t
+  use, intrinsic :: iso_c_binding, only: c_char, c_f_pointer, c_funloc, c_funptr, c_int, c_intptr_t, c_long, &
+    c_null_char, c_null_funptr, c_null_ptr, c_ptr, c_size_t
   implicit none (type, external)
   private
 
@@ -13,10 +13,13 @@ module nocdyn_posix
   integer, parameter, public :: standard_output = 1, standard_error = 2   !! file descriptors
 
   integer(c_int), parameter :: everything_allowed = int(o'777', c_int), reading_writing = int(o'666', c_int)   ! less the umask
-  integer(c_int), parameter :: interrupt_signal = 2, termination_signal = 15, file_size_signal = 25
+  integer(c_int), parameter :: hang_up_signal = 1, interrupt_signal = 2, termination_signal = 15, file_size_signal = 25
+  integer(c_long), parameter :: echo = 1   ! seconds in which a second signal is the first one again, sent to the whole group
   integer(c_intptr_t), parameter :: ignored = 1   ! SIG_IGN
+  integer(c_int), parameter :: exists_already = 17   ! EEXIST
 
   integer(c_int), volatile :: received_signal = 0
+  integer(c_long), volatile :: received_time = 0
 
   interface
     integer(c_int) function c_mkdir(path, mode) bind(c, name='mkdir')
@@ -76,6 +79,11 @@ module nocdyn_posix
       integer(c_int), value, intent(in) :: descriptor
     end function c_isatty
 
+    integer(c_long) function c_time(result) bind(c, name='time')
+      import :: c_long, c_ptr
+      type(c_ptr), value, intent(in) :: result
+    end function c_time
+
     subroutine c_exit_now(status) bind(c, name='_exit')
       import :: c_int
       integer(c_int), value, intent(in) :: status
@@ -90,16 +98,21 @@ module nocdyn_posix
 
 contains
 
-  !> Makes a folder and those above it; folders that exist are fine, and failure shows when a file is opened in it.
-  subroutine make_folders(path)
+  !> Makes a folder and those above it; folders that exist are fine.
+  subroutine make_folders(path, failure)
     character(len=*), intent(in) :: path
-    integer(c_int) :: status
+    character(len=:), allocatable, intent(out) :: failure   !! why it could not be done
     integer :: i
 
-    do i = 2, len(path)
-      if (path(i:i) == '/') status = c_mkdir(path(:i - 1) // c_null_char, everything_allowed)
+    do i = 2, len(path) + 1
+      if (i <= len(path)) then
+        if (path(i:i) /= '/') cycle
+      end if
+      if (c_mkdir(path(:i - 1) // c_null_char, everything_allowed) == 0) cycle
+      if (c_errno() == exists_already) cycle
+      failure = last_failure()
+      return
     end do
-    status = c_mkdir(path // c_null_char, everything_allowed)
   end subroutine make_folders
 
   !> Renames a file in one go, replacing the target.
@@ -175,13 +188,22 @@ contains
     is_terminal = c_isatty(int(descriptor, c_int)) == 1
   end function is_terminal
 
-  !> From here on Ctrl-C and termination do not end the program but show in `is_interrupted`; the second one ends it.
+  !> From here on Ctrl-C, termination and the end of the terminal do not end the program but show in `is_interrupted`;
+  !> a second one, more than a second later, ends it.
   subroutine watch_interrupts()
+    call watch(interrupt_signal)
+    call watch(termination_signal)
+    call watch(hang_up_signal)
+  end subroutine watch_interrupts
+
+  !> A signal that is ignored (nohup, a background job of a script) stays ignored.
+  subroutine watch(signal)
+    integer(c_int), intent(in) :: signal
     type(c_funptr) :: previous
 
-    previous = c_signal(interrupt_signal, c_funloc(note_signal))
-    previous = c_signal(termination_signal, c_funloc(note_signal))
-  end subroutine watch_interrupts
+    previous = c_signal(signal, c_funloc(note_signal))
+    if (transfer(previous, ignored) == ignored) previous = c_signal(signal, previous)
+  end subroutine watch
 
   !> From here on a file that would grow beyond the limit of the shell is a write that fails, not the end of the program.
   subroutine survive_size_limit()
@@ -193,7 +215,11 @@ contains
   subroutine note_signal(signal) bind(c)
     integer(c_int), value, intent(in) :: signal
 
-    if (received_signal /= 0) call c_exit_now(128 + signal)
+    integer(c_long) :: now
+
+    now = c_time(c_null_ptr)
+    if (received_signal == 0) received_time = now
+    if (now - received_time > echo) call c_exit_now(128 + signal)
     received_signal = signal
   end subroutine note_signal
 

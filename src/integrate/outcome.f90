@@ -62,7 +62,8 @@ contains
     case (integration_too_many_steps)
       sentence = 'the integration stopped at ' // when // ' after ' // to_text(outcome%steps(lane)) // &
         ' steps, the most that max_steps allows (last step ' // rounded_text(outcome%h(lane), digits) // &
-        ' s): raise max_steps, loosen rtol and atol, or, if the system is stiff, take the method rosenbrock'
+        ' s): raise max_steps, or loosen rtol and atol'
+      if (outcome%jacobians(lane) == 0) sentence = sentence // ', or, if the system is stiff, take an implicit method'
     case (integration_not_finite)
       sentence = not_finite_sentence(outcome, lane, system, when)
     case (integration_gave_up)

@@ -4,7 +4,7 @@ module nocdyn_input_overrides
   use nocdyn_namelist, only: assignment_t, item_t, namelist_t
   use nocdyn_namelist_scanner, only: scan_value
   use nocdyn_namelist_values, only: read_subscript
-  use nocdyn_schema, only: group_rule_index, group_rules, holds_texts, is_single, key_rule_index, key_rule_t, &
+  use nocdyn_schema, only: a_name, group_rule_index, group_rules, holds_texts, is_single, key_rule_index, key_rule_t, &
     key_rules
   use nocdyn_schema_text, only: group_names, key_names, suggestion
   use nocdyn_text, only: lower_case, string_t
@@ -91,6 +91,8 @@ contains
     if (override%key_rule == 0) then
       complaint = key // ' is not a key of &' // trim(group_rules(override%group_rule)%name) &
         // suggestion(key, key_names(override%group_rule))
+    else if (key_rules(override%key_rule)%kind == a_name) then
+      complaint = 'a name cannot be overridden: other groups refer to it'
     else if (open <= len(text)) then
       call read_subscript(text(open + 1:max(open, len(text) - 1)), override%assignment)
       if (override%assignment%is_damaged .or. text(len(text):) /= ')') complaint = text(open:) &

@@ -82,7 +82,7 @@ contains
         call check_text(rule, value%texts(i), complaint)
       end if
     else if (slot%is_quoted) then
-      complaint = ' is a text; write it without quotes; allowed: ' // allowed_text(rule)
+      complaint = ' is a text; needed without quotes: ' // allowed_text(rule)
     else if (rule%kind == a_number) then
       call convert_number(slot%text, rule, value%numbers(i), complaint)
     else if (rule%kind == an_integer) then

@@ -49,6 +49,7 @@ contains
     class(output_file_t), intent(inout) :: self
     character(len=*), intent(in) :: folder
     character(len=*), intent(in) :: name     !! of the hidden file, without its dot and process number
+    character(len=:), allocatable :: failure
 
     self%folder = folder // '/'
     if (folder == '.') self%folder = ''
@@ -56,7 +57,12 @@ contains
     if (.not. allocated(self%buffer)) allocate (character(len=buffer_size) :: self%buffer)
     self%used = 0
     self%has_failed = .false.
-    call make_folders(folder)
+    self%descriptor = -1
+    call make_folders(folder, failure)
+    if (allocated(failure)) then
+      call self%note('the folder cannot be made: ' // failure)
+      return
+    end if
     self%descriptor = create_file(self%aside)
     if (self%descriptor < 0) call self%note(last_failure())
   end subroutine open_aside

@@ -72,6 +72,7 @@ module nocdyn_schema
   type(allowed_t), parameter :: positive = allowed_t(low=0.0_wp, excludes_low=.true.)
   type(allowed_t), parameter :: not_negative = allowed_t(low=0.0_wp)
   type(allowed_t), parameter :: from_1 = allowed_t(low=1.0_wp)
+  type(allowed_t), parameter :: steps = allowed_t(low=1.0_wp, high=1.0e8_wp)
   type(allowed_t), parameter :: from_2 = allowed_t(low=2.0_wp)
   type(allowed_t), parameter :: tolerance = allowed_t(low=1.0e-14_wp, high=0.1_wp)
   type(allowed_t), parameter :: methods = allowed_t(words='rk45 rosenbrock')
@@ -164,7 +165,7 @@ module nocdyn_schema
       'bodies whose speeds are the coordinates; found if not given'), &
     key_rule_t('run',        'complement',      a_word,         1, '',            "'natural'", complements, &
       'which orthogonal complement of the gear constraints'), &
-    key_rule_t('run',        'max_steps',       an_integer,     1, '',            '1000000',   from_1, &
+    key_rule_t('run',        'max_steps',       an_integer,     1, '',            '1000000',   steps, &
       'the run fails after this many steps'), &
     key_rule_t('output',     'interval',        a_number,       1, 's',           unset,       positive, &
       'time from row to row'), &

@@ -31,10 +31,12 @@ contains
       call raise(error, exit_file, file // ': cannot be read: there is no such file')
       return
     end if
+    reason = ''
     open (newunit=unit, file=file, access='stream', form='unformatted', action='read', status='old', iostat=status, &
       iomsg=reason)
     if (status /= 0) then
-      call raise(error, exit_file, file // ': cannot be read: ' // trim(reason))
+      ! "Cannot open file 'x': Permission denied"
+      call raise(error, exit_file, file // ': cannot be read: ' // trim(reason(index(reason, ': ', back=.true.) + 2:)))
       return
     end if
     inquire (unit=unit, size=bytes)

@@ -1,7 +1,9 @@
 """Runs that fail, are interrupted, or cannot write: exit code, message, and what is left behind."""
 
+import os
 import resource
 import signal
+import time
 
 import pytest
 from conftest import CASE_1, CASE_2, ENDLESS, TRAPS_EXCEPTIONS, wait_for
@@ -99,15 +101,42 @@ def test_an_interruption_ends_the_whole_list_of_files(nocdyn):
     assert nocdyn.files("out") == ["case1"]
 
 
-def test_a_second_interruption_ends_the_program_at_once(nocdyn):
-    nocdyn("run", CASE_2, "--out", "out", "-q")
+def test_signals_that_come_together_are_one_interruption(nocdyn):
+    # `timeout` sends its signal to the program and then to the program's group
     process = nocdyn.start_endless("out")
-    # both signals wait until the process goes on, and meet it together
-    for number in (signal.SIGSTOP, signal.SIGINT, signal.SIGTERM, signal.SIGCONT):
+    for number in (signal.SIGSTOP, signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGCONT):
         process.send_signal(number)
     process.communicate(timeout=30)
-    assert process.returncode in (128 + signal.SIGINT, 128 + signal.SIGTERM)
-    assert set(RESULTS) < set(nocdyn.files("out"))
+    assert process.returncode == 1
+    assert nocdyn.files("out") == PARTIAL
+
+
+def test_a_second_interruption_ends_a_program_that_does_not_end(nocdyn):
+    reading, writing = os.pipe()  # full, so that the message of the first interruption cannot be written
+    os.set_blocking(writing, False)
+    with pytest.raises(BlockingIOError):
+        while True:
+            os.write(writing, bytes(4096))
+    os.set_blocking(writing, True)
+    process = nocdyn.start_endless("out", stderr=writing)
+    process.send_signal(signal.SIGINT)
+    wait_for(lambda: nocdyn.files("out") == PARTIAL)
+    time.sleep(2.1)
+    assert process.poll() is None
+    process.send_signal(signal.SIGINT)
+    assert process.wait(timeout=30) == 128 + signal.SIGINT
+    os.close(reading)
+    os.close(writing)
+
+
+def test_a_signal_that_the_shell_ignores_stays_ignored(nocdyn):
+    options = {"preexec_fn": lambda: signal.signal(signal.SIGHUP, signal.SIG_IGN)}
+    process = nocdyn.start("run", CASE_2, "--out", "out", "-q", "--set", "run.t_end=2e4", **options)
+    wait_for(lambda: list((nocdyn.folder / "out").glob(".trajectory.csv.*")))
+    process.send_signal(signal.SIGHUP)
+    process.communicate(timeout=60)
+    assert process.returncode == 0
+    assert nocdyn.files("out") == RESULTS
 
 
 def test_a_killed_run_leaves_earlier_results_whole(nocdyn):
@@ -123,7 +152,9 @@ def test_a_folder_that_cannot_be_made_is_exit_code_3(nocdyn, spinner):
     nocdyn.write("file", "in the way")
     outcome = nocdyn("run", spinner, "--out", "file/out")
     assert (outcome.returncode, outcome.stdout) == (3, "")
-    assert outcome.stderr == "nocdyn: cannot write 'file/out/trajectory.csv': Not a directory\n"
+    assert outcome.stderr == (
+        "nocdyn: cannot write 'file/out/trajectory.csv': the folder cannot be made: Not a directory\n"
+    )
     assert (nocdyn.folder / "file").read_text() == "in the way"
 
 
