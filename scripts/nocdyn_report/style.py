@@ -22,6 +22,7 @@ MOST_TICKS = 8  # on the colour bar that stands for a legend of many lines
 
 matplotlib.use("Agg")
 matplotlib.rcParams.update({
+    "agg.path.chunksize": 20000,  # lines of any length
     "axes.axisbelow": True,
     "axes.formatter.limits": (-4, 5),
     "axes.formatter.use_mathtext": True,

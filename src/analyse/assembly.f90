@@ -18,7 +18,7 @@ module nocdyn_assembly
   use nocdyn_paper, only: new_paper
   use nocdyn_reduced, only: new_reduced
   use nocdyn_schema, only: ground
-  use nocdyn_text, only: quoted, string_t, to_text
+  use nocdyn_text, only: quoted, rounded_text, string_t, to_text
   use nocdyn_text_order, only: find_order, first_position
   implicit none (type, external)
   private
@@ -260,10 +260,27 @@ contains
       if (abs(residual) <= speed_tolerance * scale) cycle
       culprit = row
       call raise(error, exit_input, 'the start speeds break this gear: ' // row_text(machine, row) // ' = ' // &
-                 to_text(residual) // ', which must be 0')
+                 rounded_text(residual, 6) // ', which must be 0' // fitting_speed(machine, row))
       return
     end do
   end subroutine refuse_start_speeds
+
+  !> For a row of two bodies: the speed of the second that fits that of the first.
+  function fitting_speed(machine, row) result(text)
+    type(machine_t), intent(in) :: machine
+    integer, intent(in) :: row
+    character(len=:), allocatable :: text
+    real(wp) :: speed
+    integer :: first
+
+    text = ''
+    associate (rows => machine%constraints)
+      first = rows%first(row)
+      if (rows%first(row + 1) - first /= 2) return
+      speed = -rows%coefficient(1, first) * machine%start_speed(1, rows%body(first)) / rows%coefficient(1, first + 1)
+      text = '; ' // quoted(machine%names(rows%body(first + 1))%text) // ' fits with speed = ' // to_text(speed)
+    end associate
+  end function fitting_speed
 
   !> The left-hand side of a row with the start speeds in it, e.g. "2 * 1 ('pinion') + 3 * 0 ('machine')".
   function row_text(machine, row) result(text)

@@ -6,12 +6,15 @@ module nocdyn_run_summary
   use nocdyn_machine, only: machine_t
   use nocdyn_machine_report, only: coordinate_names
   use nocdyn_outcome, only: outcome_t
-  use nocdyn_text, only: string_t
+  use nocdyn_text, only: rounded_text, string_t
   use nocdyn_version, only: compiler_text, version
   implicit none (type, external)
   private
 
-  public :: start_extremes, update_extremes, summary_json
+  public :: start_extremes, update_extremes, audit_note, summary_json
+
+  !> A note is made of an energy residual above this share of the energy turned over: the motion is then not to be trusted.
+  real(wp), parameter :: audit_limit = 0.01_wp
 
   !> Smallest and largest values of the columns of the table among its rows, with their times.
   type, public :: extremes_t
@@ -59,6 +62,22 @@ contains
     extremes%last(:) = row
     extremes%rows = extremes%rows + 1
   end subroutine update_extremes
+
+  !> A sentence if the energy audit does not close, else nothing. The last five columns are the energies, the residual last.
+  function audit_note(extremes) result(note)
+    type(extremes_t), intent(in) :: extremes
+    type(string_t), allocatable :: note(:)
+    real(wp) :: residual, turned_over
+    integer :: columns
+
+    allocate (note(0))
+    columns = size(extremes%last)
+    residual = max(abs(extremes%lowest(columns)), abs(extremes%highest(columns)))
+    turned_over = maxval(max(abs(extremes%lowest(columns - 4:columns - 1)), abs(extremes%highest(columns - 4:columns - 1))))
+    if (extremes%rows == 0 .or. residual <= audit_limit * turned_over) return
+    note = [string_t('the energy does not add up: energy_residual reaches ' // rounded_text(residual, 3) // &
+                     ' J where at most ' // rounded_text(turned_over, 3) // ' J were turned over; tighten rtol and atol')]
+  end function audit_note
 
   function summary_json(input, machine, summary) result(text)
     type(input_t), intent(in) :: input

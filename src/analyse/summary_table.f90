@@ -41,8 +41,8 @@ contains
     if (len(text) > 0) text = text // new_line('a')
     rows = min(size(summary%labels), most_rows)
     label_width = maxval([(len(summary%labels(i)%text), i=2, rows)])
-    text = text // padded('', label_width) // right('at the end') // right('smallest') // right('at t [s]') // &
-           right('largest') // right('at t [s]')
+    text = text // padded('of ' // to_text(summary%extremes%rows) // ' rows:', label_width) // right('the last') // &
+           right('smallest') // right('at t [s]') // right('largest') // right('at t [s]')
     associate (extremes => summary%extremes)
       do i = 2, rows
         text = text // new_line('a') // padded(summary%labels(i)%text, label_width) // cell(extremes%last(i)) // &

@@ -16,7 +16,7 @@ module nocdyn_transient
   use nocdyn_output_file, only: output_file_t
   use nocdyn_output_times, only: check_output_times, output_times
   use nocdyn_posix, only: is_interrupted, remove_file
-  use nocdyn_run_summary, only: run_summary_t, start_extremes, summary_json, update_extremes
+  use nocdyn_run_summary, only: audit_note, run_summary_t, start_extremes, summary_json, update_extremes
   use nocdyn_system, only: observer_t
   use nocdyn_trajectory_table, only: new_trajectory_table, trajectory_table_t
   implicit none (type, external)
@@ -142,6 +142,7 @@ contains
     type(run_summary_t), intent(inout) :: summary
 
     summary%outcome = outcome
+    summary%notes = [summary%notes, audit_note(summary%extremes)]
     if (.not. allocated(error)) return
     summary%message = error%message
     summary%status = 'failed'

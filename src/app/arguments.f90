@@ -81,6 +81,7 @@ contains
       arguments%command = 'version'
     case default
       names = command_names()
+      if (index(arguments%command, '-') == 1) names = [names, string_t('--help'), string_t('--version')]
       if (any([(names(i)%text == arguments%command, i=1, size(names))])) return
       call raise(error, exit_input, unknown_word(arguments%command, 'a command', names))
     end select

@@ -12,8 +12,9 @@ module nocdyn_commands
   use nocdyn_matrix_report, only: matrix_report
   use nocdyn_output_file, only: write_whole
   use nocdyn_output_times, only: check_output_times
+  use nocdyn_schema, only: group_rule_index
   use nocdyn_schema_help, only: group_help, input_help, input_template
-  use nocdyn_text, only: joined, quoted
+  use nocdyn_text, only: joined, lower_case, quoted
   use nocdyn_version, only: compiler_text, version
   implicit none (type, external)
   private
@@ -119,6 +120,8 @@ contains
         if (.not. allocated(error)) call say(text)
       else if (size(topics) == 1 .and. len(command_help(topics(1)%text)) > 0) then
         call say(command_help(topics(1)%text))
+      else if (group_rule_index(lower_case(topics(1)%text)) > 0) then
+        call raise(error, exit_input, quoted(topics(1)%text) // ' is a group of the input: nocdyn help input ' // topics(1)%text)
       else
         call raise(error, exit_input, 'there is no help on ' // joined(topics, ' ') // '; try ' // &
                    joined(command_names(), ', ') // " or 'input'")

@@ -17,12 +17,12 @@ contains
     select case (command)
     case ('')
       text = 'nocdyn: dynamics of drivetrains: rotating bodies, nonlinear elastic couplings, gears.' // nl // nl // &
-             '  nocdyn run FILE...       integrate machines and write their results' // nl // &
-             '  nocdyn check FILE...     read and analyse, integrate nothing' // nl // &
-             '  nocdyn matrices FILE     print the matrices of the method for a machine' // nl // &
-             '  nocdyn new FILE          write a commented input to start from' // nl // &
-             '  nocdyn help [COMMAND]    help on a command' // nl // &
-             '  nocdyn help input        the groups and keys of an input file' // nl // &
+             '  nocdyn run FILE...         integrate machines and write their results' // nl // &
+             '  nocdyn check FILE...       read and analyse, integrate nothing' // nl // &
+             '  nocdyn matrices FILE       print the matrices of the method for a machine' // nl // &
+             '  nocdyn new FILE            write a commented input to start from' // nl // &
+             '  nocdyn help [COMMAND]      help on a command' // nl // &
+             '  nocdyn help input [GROUP]  the groups and keys of an input file' // nl // &
              '  nocdyn --version' // nl // nl // &
              'Exit codes: 0 done, 1 a computation failed, 2 wrong usage or input, 3 a file cannot be read or written.'
     case ('run')

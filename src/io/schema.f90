@@ -160,7 +160,7 @@ module nocdyn_schema
     key_rule_t('run',        'atol',            a_number,       1, '',            '1e-9',      positive, &
       'absolute error tolerated in a step, in the unit of the state'), &
     key_rule_t('run',        'formulation',     a_word,         1, '',            "'reduced'", formulations, &
-      'equations that are integrated; all give the same motion'), &
+      'equations that are integrated: the same motion, reduced is the fastest'), &
     key_rule_t('run',        'independent',     a_body,         any_number, '',   unset,       anything, &
       'bodies whose speeds are the coordinates; found if not given'), &
     key_rule_t('run',        'complement',      a_word,         1, '',            "'natural'", complements, &

@@ -33,6 +33,8 @@ def one_line(text):
         (["check", CASE_1, "--quiet"], "--quiet is an option of nocdyn run"),
         (["new", "a.nml", "--set", "run.t_end=1"], "--set is an option of nocdyn run, check and matrices"),
         (["--version", "now"], "--version takes no arguments"),
+        (["help", "gear"], "'gear' is a group of the input: nocdyn help input gear"),
+        (["--versoin"], "'--versoin' is not a command; did you mean '--version'?"),
         (["help", "simulate"], "there is no help on 'simulate'; try 'run', 'check', 'matrices', 'new', 'help' or 'input'"),
         (["help", "input", "boddy"], "there is no group 'boddy'; did you mean 'body'?"),
     ],

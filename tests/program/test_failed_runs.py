@@ -131,7 +131,7 @@ def test_a_second_interruption_ends_a_program_that_does_not_end(nocdyn):
 
 def test_a_signal_that_the_shell_ignores_stays_ignored(nocdyn):
     options = {"preexec_fn": lambda: signal.signal(signal.SIGHUP, signal.SIG_IGN)}
-    process = nocdyn.start("run", CASE_2, "--out", "out", "-q", "--set", "run.t_end=2e4", **options)
+    process = nocdyn.start("run", CASE_2, "--out", "out", "-q", "--set", "run.t_end=2e3", "--set", "output.interval=1", **options)
     wait_for(lambda: list((nocdyn.folder / "out").glob(".trajectory.csv.*")))
     process.send_signal(signal.SIGHUP)
     process.communicate(timeout=60)

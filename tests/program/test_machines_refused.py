@@ -30,6 +30,7 @@ def test_gears_that_lock_are_refused_by_place_and_name(nocdyn, command):
 def test_start_speeds_that_break_a_gear_are_refused_with_the_residual(nocdyn, command):
     complaint = refusal(nocdyn, command, PAIR.format(a=1.0, b=-1.5, radius=1.0))
     assert complaint.startswith("nocdyn: pair.nml:3: &gear 'first': the start speeds break this gear: ")
+    assert "; 'b' fits with speed = " in complaint
     assert "('a')" in complaint and "('b')" in complaint and "= -0.5, which must be 0" in complaint
 
 

@@ -228,3 +228,21 @@ def test_input_nml_reproduces_the_run_bit_for_bit(nocdyn, path, overrides):
     first, second = ((nocdyn.folder / folder) for folder in ("first", "second"))
     assert (first / "trajectory.csv").read_bytes() == (second / "trajectory.csv").read_bytes()
     assert (first / "input.nml").read_bytes() == (second / "input.nml").read_bytes()
+
+
+def test_a_motion_that_the_energy_audit_refutes_is_noted(nocdyn):
+    nocdyn.write("coarse.nml", """\
+&body name = 'a' inertia = 1.0 /
+&excitation name = 'x' body = 'a' amplitude = 1.0 frequency = 1000.0 /
+&run t_end = 1000.0 rtol = 1e-3 atol = 1e-2 /
+""")
+    outcome = nocdyn("run", "coarse.nml", "--out", "out")
+    assert outcome.returncode == 0
+    assert "coarse.nml: note: the energy does not add up: energy_residual reaches " in outcome.stdout
+    assert "tighten rtol and atol" in nocdyn.summary("out")["machine"]["notes"][0]
+
+
+def test_a_motion_that_the_energy_audit_confirms_has_no_note(nocdyn):
+    outcome = nocdyn("run", CASE_2, "--out", "out")
+    assert "note" not in outcome.stdout
+    assert nocdyn.summary("out")["machine"]["notes"] == []
