@@ -34,6 +34,7 @@ module nocdyn_run_summary
 
 contains
 
+  !> No rows yet; the first row sets everything.
   subroutine start_extremes(extremes, columns)
     type(extremes_t), intent(out) :: extremes
     integer, intent(in) :: columns
@@ -79,6 +80,7 @@ contains
                      ' J where at most ' // rounded_text(turned_over, 3) // ' J were turned over; tighten rtol and atol')]
   end function audit_note
 
+  !> The text of summary.json; `input` and `machine` are those of the run.
   function summary_json(input, machine, summary) result(text)
     type(input_t), intent(in) :: input
     type(machine_t), intent(in) :: machine

@@ -30,6 +30,7 @@ module nocdyn_trajectory_table
 
 contains
 
+  !> A table for the columns of a machine; the energies of the start are taken at `t_start` [s].
   function new_trajectory_table(formulation, t_start) result(table)
     class(formulation_t), intent(in) :: formulation   !! of one lane
     real(wp), intent(in) :: t_start

@@ -30,6 +30,7 @@ contains
     end do
   end function command_line
 
+  !> The commands that a command line can begin with.
   function command_names() result(names)
     type(string_t), allocatable :: names(:)
 

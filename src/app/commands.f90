@@ -56,6 +56,7 @@ contains
     if (.not. allocated(error)) call assemble_machine(input, machine, error)
   end subroutine read_machine
 
+  !> Prints every matrix of one file.
   subroutine matrices_command(arguments, code)
     type(arguments_t), intent(in) :: arguments
     integer, intent(out) :: code
@@ -132,6 +133,7 @@ contains
     code = error%code
   end subroutine help_command
 
+  !> Prints version and compiler.
   subroutine version_command(code)
     integer, intent(out) :: code
 

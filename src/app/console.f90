@@ -55,6 +55,7 @@ contains
     end do
   end subroutine complain
 
+  !> A line that shows after a second of work, if standard error is a terminal.
   function new_console_progress(title, is_quiet) result(progress)
     character(len=*), intent(in) :: title
     logical, intent(in) :: is_quiet

@@ -17,6 +17,7 @@ module nocdyn_run_command
 
 contains
 
+  !> Reads all files, then runs those without mistakes one after the other.
   subroutine run_command(arguments, code)
     type(arguments_t), intent(in) :: arguments
     integer, intent(out) :: code   !! the worst of all files

@@ -155,6 +155,7 @@ contains
     is_done = next > len(bytes)
   end subroutine write_bytes
 
+  !> Closes a descriptor of `create_file`; not done means that what was written may be lost.
   subroutine close_file(descriptor, is_done)
     integer, intent(in) :: descriptor
     logical, intent(out) :: is_done
@@ -177,6 +178,7 @@ contains
     end do
   end function last_failure
 
+  !> Number of this process, for names that no other process uses.
   integer function process_id()
     process_id = int(c_getpid())
   end function process_id

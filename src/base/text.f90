@@ -90,6 +90,7 @@ contains
     end do
   end function lower_case
 
+  !> The text between single quotes, for messages.
   pure function quoted(text)
     character(len=*), intent(in) :: text
     character(len=:), allocatable :: quoted

@@ -10,6 +10,7 @@ module nocdyn_version
 
 contains
 
+  !> Name and version of the compiler, as it calls itself.
   function compiler_text() result(text)
     character(len=:), allocatable :: text
 

@@ -19,6 +19,7 @@ module nocdyn_combinations
 
 contains
 
+  !> The non-zero weights of a row, in the order of the stages.
   pure function combination(row)
     real(wp), intent(in) :: row(:)   !! one weight per stage
     type(combination_t) :: combination

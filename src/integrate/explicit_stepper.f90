@@ -27,6 +27,7 @@ module nocdyn_explicit_stepper
 
 contains
 
+  !> The stepper of a table.
   pure function explicit_stepper(table) result(stepper)
     type(explicit_table_t), intent(in) :: table
     type(explicit_stepper_t) :: stepper

@@ -14,6 +14,7 @@ module nocdyn_finite
 
 contains
 
+  !> Whether no element is infinite or NaN.
   pure function all_finite(n, x)
     integer, intent(in) :: n
     real(wp), intent(in) :: x(n)
@@ -28,6 +29,7 @@ contains
     all_finite = .not. btest(carries, exponent_bits)
   end function all_finite
 
+  !> Whether a number is neither infinite nor NaN.
   elemental function is_finite(x)
     real(wp), intent(in) :: x
     logical :: is_finite

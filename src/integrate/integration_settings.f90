@@ -21,6 +21,7 @@ module nocdyn_integration_settings
 
 contains
 
+  !> Refuses values outside their ranges, the first of them by name.
   subroutine check_settings(settings, error)
     type(integration_settings_t), intent(in) :: settings
     type(error_t), allocatable, intent(out) :: error   !! allocated if a value is out of its range

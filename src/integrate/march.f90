@@ -27,6 +27,7 @@ module nocdyn_march
 
 contains
 
+  !> Allocates all that the march needs; nothing is allocated later.
   subroutine prepare(march, stepper, system, settings, times)
     type(march_t), intent(out) :: march
     class(stepper_t), intent(inout) :: stepper

@@ -17,6 +17,7 @@ module nocdyn_methods
 
 contains
 
+  !> The stepper of a name in `method_names`.
   subroutine select_method(name, stepper, error)
     character(len=*), intent(in) :: name
     class(stepper_t), allocatable, intent(out) :: stepper

@@ -34,6 +34,7 @@ module nocdyn_outcome
 
 contains
 
+  !> Every lane is running and nothing has been counted.
   pure subroutine allocate_outcome(outcome, lanes)
     type(outcome_t), intent(out) :: outcome
     integer, intent(in) :: lanes

@@ -36,6 +36,7 @@ module nocdyn_rosenbrock_stepper
 
 contains
 
+  !> The stepper of a table.
   pure function rosenbrock_stepper(table) result(stepper)
     type(rosenbrock_table_t), intent(in) :: table
     type(rosenbrock_stepper_t) :: stepper

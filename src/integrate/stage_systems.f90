@@ -22,6 +22,7 @@ module nocdyn_stage_systems
 
 contains
 
+  !> Room for the Jacobian and the factors of every lane.
   subroutine allocate_stage_system(stage_system, system)
     type(stage_system_t), intent(out) :: stage_system
     class(system_t), intent(in) :: system

@@ -33,6 +33,7 @@ module nocdyn_step_control
 
 contains
 
+  !> A controller for an error estimate of order `error_order`; the first step sizes are still to be set.
   pure function step_control(lanes, error_order, rtol, atol, t_end, longest) result(control)
     integer, intent(in) :: lanes
     integer, intent(in) :: error_order

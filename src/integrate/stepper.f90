@@ -62,6 +62,7 @@ module nocdyn_stepper
 
 contains
 
+  !> Takes over the rows of a table, without their zeros.
   pure subroutine set_weights(stepper, inner, update, error, dense)
     class(stepper_t), intent(inout) :: stepper
     real(wp), intent(in) :: inner(:, :)   !! shape [stages, stages]
@@ -82,6 +83,7 @@ contains
     end do
   end subroutine set_weights
 
+  !> Room for the stages of every lane.
   subroutine allocate_stages(stepper, system)
     class(stepper_t), intent(inout) :: stepper
     class(system_t), intent(in) :: system

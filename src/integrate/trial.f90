@@ -37,6 +37,7 @@ module nocdyn_trial
 
 contains
 
+  !> Room for one attempted step of every lane of the system.
   subroutine allocate_trial(trial, system)
     type(trial_t), intent(out) :: trial
     class(system_t), intent(in) :: system

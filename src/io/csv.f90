@@ -10,6 +10,7 @@ module nocdyn_csv
 
 contains
 
+  !> The header line.
   subroutine write_header(file, labels)
     type(output_file_t), intent(inout) :: file
     type(string_t), intent(in) :: labels(:)   !! without commas and quotes
@@ -22,6 +23,7 @@ contains
     call file%put(new_line('a'))
   end subroutine write_header
 
+  !> One row of the table.
   subroutine write_row(file, values)
     type(output_file_t), intent(inout) :: file
     real(wp), intent(in) :: values(:)

@@ -26,6 +26,7 @@ module nocdyn_input_overrides
 
 contains
 
+  !> Takes PATH=VALUE texts apart; what cannot be understood is a mistake and not `is_fine`.
   subroutine read_overrides(texts, overrides, mistakes)
     type(string_t), intent(in) :: texts(:)
     type(override_t), allocatable, intent(out) :: overrides(:)

@@ -103,6 +103,7 @@ contains
     end do
   end function alternative_of
 
+  !> How often a group may occur, in words.
   pure function occurrence_text(occurrence) result(text)
     integer, intent(in) :: occurrence
     character(len=:), allocatable :: text
@@ -119,6 +120,7 @@ contains
     end select
   end function occurrence_text
 
+  !> The names of all groups.
   pure function group_names() result(names)
     type(string_t), allocatable :: names(:)
     integer :: i
@@ -129,6 +131,7 @@ contains
     end do
   end function group_names
 
+  !> The names of the keys of a group.
   pure function key_names(group_rule) result(names)
     integer, intent(in) :: group_rule
     type(string_t), allocatable :: names(:)

@@ -48,6 +48,7 @@ contains
     end do
   end subroutine attach_bodies
 
+  !> Start speeds and angles; further states and the works are zero.
   function start_of_bodies(self) result(y)
     class(body_formulation_t), intent(in) :: self
     real(wp), allocatable :: y(:, :)
@@ -68,6 +69,7 @@ contains
     end do
   end subroutine place
 
+  !> Evaluates the right-hand side, whose value stays in `slope`.
   subroutine observe_bodies(self, t, y)
     class(body_formulation_t), intent(inout) :: self
     real(wp), contiguous, intent(in) :: t(:)

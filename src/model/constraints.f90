@@ -23,6 +23,7 @@ module nocdyn_constraints
 
 contains
 
+  !> Rows from their entries; the arrays are described at `constraints_t`.
   function new_constraints(bodies, names, units, first, body, coefficient) result(constraints)
     integer, intent(in) :: bodies
     type(string_t), intent(in) :: names(:), units(:)

@@ -25,6 +25,7 @@ module nocdyn_couplings
 
 contains
 
+  !> A bank of couplings; those without damping in any lane are not accounted.
   function new_couplings(names, from, to, stiffness, cubic_stiffness, damping, rest_twist) result(bank)
     type(string_t), intent(in) :: names(:)
     integer, intent(in) :: from(:), to(:)              !! bodies, 0 = ground

@@ -22,6 +22,7 @@ module nocdyn_excitations
 
 contains
 
+  !> A bank of excitations, each on one body.
   function new_excitations(names, body, amplitude, frequency, phase) result(bank)
     type(string_t), intent(in) :: names(:)
     integer, intent(in) :: body(:)

@@ -17,6 +17,7 @@ module nocdyn_loads
 
 contains
 
+  !> A bank of viscous loads, each on one body.
   function new_loads(names, body, viscous) result(bank)
     type(string_t), intent(in) :: names(:)
     integer, intent(in) :: body(:)

@@ -19,6 +19,7 @@ module nocdyn_motors
 
 contains
 
+  !> A bank of motors, each on one body.
   function new_motors(names, body, a, b, c) result(bank)
     type(string_t), intent(in) :: names(:)
     integer, intent(in) :: body(:)

@@ -22,6 +22,7 @@ module nocdyn_multiplier
 
 contains
 
+  !> The formulation of a machine; its matrix is factored here.
   function new_multiplier(machine) result(self)
     type(machine_t), intent(in) :: machine
     type(multiplier_t) :: self

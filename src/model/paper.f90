@@ -42,6 +42,7 @@ module nocdyn_paper
 
 contains
 
+  !> The formulation of a machine; J_3 is assembled and factored here.
   function new_paper(machine) result(self)
     type(machine_t), intent(in) :: machine
     type(paper_t) :: self

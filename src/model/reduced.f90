@@ -33,6 +33,7 @@ module nocdyn_reduced
 
 contains
 
+  !> The formulation of a machine whose coordinates are known.
   function new_reduced(machine) result(self)
     type(machine_t), intent(in) :: machine
     type(reduced_t) :: self
