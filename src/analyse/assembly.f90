@@ -23,7 +23,9 @@ module nocdyn_assembly
   implicit none (type, external)
   private
 
-  public :: assemble_machine, new_formulation
+  public :: assemble_machine, check_size, new_formulation
+
+  integer, parameter :: largest_matrix = 6000   ! rows: 0.3 GB each, and there are several
 
   !> Start speeds break a gear when the sum of the row exceeds this times the sum of its absolute terms.
   real(wp), parameter :: speed_tolerance = 1.0e-9_wp
@@ -70,6 +72,29 @@ contains
     machine%coordinates = new_coordinates(machine%constraints, machine%groups, machine%inertia, wanted, &
                                           complement_choice(run%text('complement')))
   end subroutine assemble_machine
+
+  !> Refuses machines whose dense matrices would not fit into memory: those of two formulations and of the Rosenbrock method.
+  subroutine check_size(input, machine, error)
+    type(input_t), intent(in) :: input
+    type(machine_t), intent(in) :: machine
+    type(error_t), allocatable, intent(out) :: error
+    type(group_t) :: run
+    integer :: order
+
+    run = input%single('run')
+    select case (run%text('formulation'))
+    case ('paper')
+      order = 3 * machine%bodies
+    case ('multiplier')
+      order = 2 * machine%bodies
+    case default
+      order = 0
+      if (run%text('method') == 'rosenbrock') order = 2 * machine%coordinates%freedoms
+    end select
+    if (order <= largest_matrix) return
+    call raise(error, exit_input, input%file // ': this machine needs dense matrices of ' // to_text(order) // &
+               ' rows, at most ' // to_text(largest_matrix) // " are allowed; formulation = 'reduced' with method = 'rk45' needs none")
+  end subroutine check_size
 
   !> The system that an integrator solves, by the word of the input.
   subroutine new_formulation(word, machine, formulation)

@@ -1,7 +1,7 @@
 !> What does the machine do over time: integrates an input and writes its results.
 module nocdyn_transient
   use, intrinsic :: iso_fortran_env, only: int64
-  use nocdyn_assembly, only: assemble_machine, new_formulation
+  use nocdyn_assembly, only: assemble_machine, check_size, new_formulation
   use nocdyn_csv, only: write_header, write_row
   use nocdyn_errors, only: error_t, exit_failed, raise
   use nocdyn_formulation, only: formulation_t
@@ -74,6 +74,7 @@ contains
 
     call check_output_times(input, error)
     if (.not. allocated(error)) call assemble_machine(input, machine, error)
+    if (.not. allocated(error)) call check_size(input, machine, error)
     if (allocated(error)) return
     run = input%single('run')
     call new_formulation(run%text('formulation'), machine, formulation)

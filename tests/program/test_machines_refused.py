@@ -90,3 +90,16 @@ def test_rows_that_rounding_makes_equal_are_refused(nocdyn, command):
     outcome = nocdyn(command, CASE_2, "--set", "run.t_start=1e15", "--set", "run.t_end=1000000000000010")
     assert outcome.returncode == 2
     assert f"{CASE_2}:24: &output: interval = 0.01 asks for times that rounding makes equal" in outcome.stderr
+
+
+@pytest.mark.parametrize(
+    ("bodies", "override", "rows"),
+    [(3001, "method=rosenbrock", 6002), (2001, "formulation=paper", 6003), (3001, "formulation=multiplier", 6002)],
+)
+def test_dense_matrices_too_large_for_memory_are_refused(nocdyn, bodies, override, rows):
+    lines = [f"&body name = 'b{i}' inertia = 1.0 /" for i in range(bodies)]
+    nocdyn.write("large.nml", "\n".join([*lines, "&run t_end = 1.0 /", "&output points = 2 /\n"]))
+    outcome = nocdyn("run", "large.nml", "--set", f"run.{override}")
+    assert outcome.returncode == 2
+    assert outcome.stderr.startswith(f"nocdyn: large.nml: this machine needs dense matrices of {rows} rows, at most 6000")
+    assert nocdyn("run", "large.nml").returncode == 0
