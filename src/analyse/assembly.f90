@@ -93,7 +93,8 @@ contains
     end select
     if (order <= largest_matrix) return
     call raise(error, exit_input, input%file // ': this machine needs dense matrices of ' // to_text(order) // &
-               ' rows, at most ' // to_text(largest_matrix) // " are allowed; formulation = 'reduced' with method = 'rk45' needs none")
+               ' rows, at most ' // to_text(largest_matrix) // ' are allowed; formulation = ' // &
+               quoted('reduced') // ' with method = ' // quoted('rk45') // ' needs none')
   end subroutine check_size
 
   !> The system that an integrator solves, by the word of the input.
