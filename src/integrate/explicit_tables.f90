@@ -10,16 +10,18 @@ module nocdyn_explicit_tables
   type, public :: explicit_table_t
     character(len=:), allocatable :: name
     character(len=:), allocatable :: reference
-    integer :: stages
+    integer :: stages                        !! of the step
+    integer :: dense_stages = 0              !! further ones that only the solution inside the step needs
     integer :: order                         !! of y_new
     integer :: error_order                   !! of the embedded solution that y_new is compared with
     integer :: dense_order                   !! of the solution inside a step
     logical :: first_same_as_last            !! the last stage is f(t + h, y_new), the first stage of the next step
-    real(wp), allocatable :: a(:, :)         !! strictly lower triangular, shape [stages, stages]
-    real(wp), allocatable :: b(:)
-    real(wp), allocatable :: c(:)
-    real(wp), allocatable :: error(:)        !! b minus the embedded weights
-    real(wp), allocatable :: dense(:, :)     !! b_i(theta) = sum_p dense(i, p) theta^p, shape [stages, degree]
+    real(wp), allocatable :: a(:, :)         !! strictly lower triangular, shape [all stages, all stages]
+    real(wp), allocatable :: b(:)            !! shape [stages]
+    real(wp), allocatable :: c(:)            !! shape [all stages]
+    real(wp), allocatable :: error(:)        !! b minus the embedded weights, shape [stages]
+    real(wp), allocatable :: coarse_error(:) !! the same of a second embedded method of lower order, if there is one
+    real(wp), allocatable :: dense(:, :)     !! b_i(theta) = sum_p dense(i, p) theta^p, shape [all stages, degree]
   end type explicit_table_t
 
 contains
