@@ -37,34 +37,52 @@ module nocdyn_system
     procedure :: component_name
   end type system_t
 
-  !> Receives the solution at the requested times, and may stop the integration.
+  integer, parameter, public :: event_any = 0       !! every change of sign
+  integer, parameter, public :: event_rising = 1    !! from below zero to zero or above
+  integer, parameter, public :: event_falling = -1
+
+  !> Receives the solution at the requested times, is told of events and extremes, and may stop the integration.
+  !>
+  !> An event is a root of a function of time and state, found on the solution inside the steps. The tracked functions
+  !> are followed between the steps too: `ranges` receives their extremes in continuous time.
   type, abstract, public :: observer_t
+    integer, allocatable :: directions(:)   !! event_... of each event function; not allocated: there are none
+    integer :: tracked = 0                  !! number of tracked functions
   contains
     procedure(record_interface), deferred :: record
-    procedure(stops_interface), deferred :: stops
+    procedure :: stops
+    procedure :: event_values
+    procedure :: happen
+    procedure :: tracked_values
+    procedure :: take_ranges
   end type observer_t
+
+  !> Smallest and largest values of the tracked functions so far, with their times; [functions].
+  type, public :: ranges_t
+    real(wp), allocatable :: lowest(:), lowest_time(:), highest(:), highest_time(:)
+  end type ranges_t
 
   abstract interface
 
-    !> dydt = f(t, y); y and dydt have the shape [lanes, states + quadratures].
+    !> dydt = f(t, y). The shapes are explicit, so that a call hands over nothing but addresses.
     subroutine derivative_interface(self, t, y, dydt, status)
       import :: system_t, wp
       class(system_t), intent(inout) :: self
-      real(wp), contiguous, intent(in) :: t(:)           !! time of each lane
-      real(wp), contiguous, intent(in) :: y(:, :)
-      real(wp), contiguous, intent(inout) :: dydt(:, :)
-      integer, contiguous, intent(inout) :: status(:)    !! evaluation_... of each lane
+      real(wp), intent(in) :: t(self%lanes)                                         !! time of each lane
+      real(wp), intent(in) :: y(self%lanes, self%states + self%quadratures)
+      real(wp), intent(inout) :: dydt(self%lanes, self%states + self%quadratures)
+      integer, intent(inout) :: status(self%lanes)                                  !! evaluation_fine on entry
     end subroutine derivative_interface
 
     !> Partial derivatives of f with respect to the states, at the positions of `jacobian_pattern`, and to the time.
     subroutine jacobian_interface(self, t, y, dfdy, dfdt, status)
       import :: system_t, wp
       class(system_t), intent(inout) :: self
-      real(wp), contiguous, intent(in) :: t(:)
-      real(wp), contiguous, intent(in) :: y(:, :)
-      real(wp), contiguous, intent(inout) :: dfdy(:, :)   !! [lanes, positions]
-      real(wp), contiguous, intent(inout) :: dfdt(:, :)   !! [lanes, states + quadratures]
-      integer, contiguous, intent(inout) :: status(:)
+      real(wp), intent(in) :: t(self%lanes)
+      real(wp), intent(in) :: y(self%lanes, self%states + self%quadratures)
+      real(wp), contiguous, intent(inout) :: dfdy(:, :)                             !! [lanes, positions]
+      real(wp), intent(inout) :: dfdt(self%lanes, self%states + self%quadratures)
+      integer, intent(inout) :: status(self%lanes)                                  !! evaluation_fine on entry
     end subroutine jacobian_interface
 
     !> One requested time of one lane; the calls of a lane come in the order of its times.
@@ -75,14 +93,6 @@ module nocdyn_system
       real(wp), intent(in) :: t
       real(wp), contiguous, intent(in) :: y(:)   !! [states + quadratures]
     end subroutine record_interface
-
-    !> Asked after every step: true ends the integration.
-    function stops_interface(self, t) result(stops)
-      import :: observer_t, wp
-      class(observer_t), intent(inout) :: self
-      real(wp), intent(in) :: t   !! time reached by the slowest lane
-      logical :: stops
-    end function stops_interface
 
   end interface
 
@@ -114,5 +124,57 @@ contains
     name = 'component ' // to_text(index)
     if (index > self%states) name = 'quadrature ' // to_text(index - self%states)
   end function component_name
+
+  !> Asked after every step: true ends the integration of all lanes.
+  function stops(self, t)
+    class(observer_t), intent(inout) :: self
+    real(wp), intent(in) :: t   !! time reached by the slowest lane
+    logical :: stops
+
+    stops = .false.
+  end function stops
+
+  !> The event functions g(t, y) of one lane, [size(directions)].
+  subroutine event_values(self, lane, t, y, g)
+    class(observer_t), intent(inout) :: self
+    integer, intent(in) :: lane
+    real(wp), intent(in) :: t
+    real(wp), contiguous, intent(in) :: y(:)      !! [states + quadratures]
+    real(wp), contiguous, intent(inout) :: g(:)
+
+    error stop 'nocdyn_system: an observer with events overrides event_values'
+  end subroutine event_values
+
+  !> An event of one lane; events and records of a lane come in the order of their times.
+  subroutine happen(self, lane, event, t, y, is_terminal)
+    class(observer_t), intent(inout) :: self
+    integer, intent(in) :: lane
+    integer, intent(in) :: event                !! number of the event function
+    real(wp), intent(in) :: t
+    real(wp), contiguous, intent(in) :: y(:)    !! state at the event
+    logical, intent(out) :: is_terminal         !! true ends the integration of this lane here
+
+    is_terminal = .false.
+  end subroutine happen
+
+  !> The tracked functions of one lane, [tracked].
+  subroutine tracked_values(self, lane, t, y, values)
+    class(observer_t), intent(inout) :: self
+    integer, intent(in) :: lane
+    real(wp), intent(in) :: t
+    real(wp), contiguous, intent(in) :: y(:)    !! [states + quadratures]
+    real(wp), contiguous, intent(inout) :: values(:)
+
+    error stop 'nocdyn_system: an observer with tracked functions overrides tracked_values'
+  end subroutine tracked_values
+
+  !> The ranges of the tracked functions when a lane has ended.
+  subroutine take_ranges(self, lane, ranges)
+    class(observer_t), intent(inout) :: self
+    integer, intent(in) :: lane
+    type(ranges_t), intent(in) :: ranges
+
+    error stop 'nocdyn_system: an observer with tracked functions overrides take_ranges'
+  end subroutine take_ranges
 
 end module nocdyn_system

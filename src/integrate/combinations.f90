@@ -4,11 +4,10 @@ module nocdyn_combinations
   implicit none (type, external)
   private
 
-  public :: combination, combine
+  public :: combination, combine, padded_columns
 
-  integer, parameter :: strip_length = 64   !! numbers that a long sum holds at a time, small enough for the first cache
-
-  integer, parameter :: most_terms = 16     !! of a row of any table
+  integer, parameter :: most_terms = 12     !! of a row of any table
+  integer, parameter, public :: width = 4   !! all arrays here consist of whole vectors of this length
 
   !> The non-zero weights of a row of a method's table and the stages that they belong to.
   type, public :: combination_t
@@ -34,76 +33,143 @@ contains
     end do
   end function combination
 
+  !> Columns, at least one, of an array [lanes, columns] that holds all components and consists of whole vectors.
+  pure integer function padded_columns(lanes, components)
+    integer, intent(in) :: lanes, components
+
+    padded_columns = max(components, 1)
+    do while (modulo(lanes * padded_columns, width) /= 0)
+      padded_columns = padded_columns + 1
+    end do
+  end function padded_columns
+
   !> y = x + h * (sum of weights times stages), in one pass. Every number goes through the same operations in the same
   !> order wherever it stands in the arrays, so that a lane's result does not depend on its place in a block.
   pure subroutine combine(n, stages, combination, k, x, h, y)
-    integer, intent(in) :: n        !! lanes * components
+    integer, intent(in) :: n        !! length of the arrays, whole vectors
     integer, intent(in) :: stages
     type(combination_t), intent(in) :: combination
     real(wp), intent(in) :: k(n, stages), x(n), h(n)
     real(wp), intent(inout) :: y(n)
-    integer :: i
 
-    associate (w => combination%weights, s => combination%stages)
-      select case (combination%terms)
-      case (0)
-        y = x
-      case (1)
-        do i = 1, n
-          y(i) = x(i) + h(i) * (w(1) * k(i, s(1)))
-        end do
-      case (2)
-        do i = 1, n
-          y(i) = x(i) + h(i) * (w(1) * k(i, s(1)) + w(2) * k(i, s(2)))
-        end do
-      case (3)
-        do i = 1, n
-          y(i) = x(i) + h(i) * (w(1) * k(i, s(1)) + w(2) * k(i, s(2)) + w(3) * k(i, s(3)))
-        end do
-      case (4)
-        do i = 1, n
-          y(i) = x(i) + h(i) * (w(1) * k(i, s(1)) + w(2) * k(i, s(2)) + w(3) * k(i, s(3)) + w(4) * k(i, s(4)))
-        end do
-      case (5)
-        do i = 1, n
-          y(i) = x(i) + h(i) * (w(1) * k(i, s(1)) + w(2) * k(i, s(2)) + w(3) * k(i, s(3)) + w(4) * k(i, s(4)) &
-                                + w(5) * k(i, s(5)))
-        end do
-      case (6)
-        do i = 1, n
-          y(i) = x(i) + h(i) * (w(1) * k(i, s(1)) + w(2) * k(i, s(2)) + w(3) * k(i, s(3)) + w(4) * k(i, s(4)) &
-                                + w(5) * k(i, s(5)) + w(6) * k(i, s(6)))
-        end do
-      case default
-        call combine_by_strips(n, stages, combination, k, x, h, y)
-      end select
-    end associate
+    if (combination%terms <= 4) then
+      call combine_few(n, stages, combination%terms, combination%weights, combination%stages, k, x, h, y)
+    else if (combination%terms <= 8) then
+      call combine_several(n, stages, combination%terms, combination%weights, combination%stages, k, x, h, y)
+    else
+      call combine_many(n, stages, combination%terms, combination%weights, combination%stages, k, x, h, y)
+    end if
   end subroutine combine
 
-  !> The same for any number of weights.
-  pure subroutine combine_by_strips(n, stages, combination, k, x, h, y)
-    integer, intent(in) :: n, stages
-    type(combination_t), intent(in) :: combination
+  !> Sums of up to four terms.
+  pure subroutine combine_few(n, stages, terms, w, s, k, x, h, y)
+    integer, intent(in) :: n, stages, terms
+    real(wp), intent(in) :: w(terms)
+    integer, intent(in) :: s(terms)
     real(wp), intent(in) :: k(n, stages), x(n), h(n)
     real(wp), intent(inout) :: y(n)
-    real(wp) :: strip(strip_length)
-    integer :: i, j, before
+    integer :: i
 
-    associate (w => combination%weights, s => combination%stages)
-      do before = 0, n - 1, strip_length
-        do i = 1, min(strip_length, n - before)
-          strip(i) = w(1) * k(before + i, s(1))
-        end do
-        do j = 2, combination%terms
-          do i = 1, min(strip_length, n - before)
-            strip(i) = strip(i) + w(j) * k(before + i, s(j))
-          end do
-        end do
-        do i = 1, min(strip_length, n - before)
-          y(before + i) = x(before + i) + h(before + i) * strip(i)
-        end do
+    select case (terms)
+    case (0)
+      y = x
+    case (1)
+      do i = 1, n, width
+        y(i:i + 3) = x(i:i + 3) + h(i:i + 3) * (w(1) * k(i:i + 3, s(1)))
       end do
-    end associate
-  end subroutine combine_by_strips
+    case (2)
+      do i = 1, n, width
+        y(i:i + 3) = x(i:i + 3) + h(i:i + 3) * (w(1) * k(i:i + 3, s(1)) + w(2) * k(i:i + 3, s(2)))
+      end do
+    case (3)
+      do i = 1, n, width
+        y(i:i + 3) = x(i:i + 3) + h(i:i + 3) * (w(1) * k(i:i + 3, s(1)) + w(2) * k(i:i + 3, s(2)) &
+                                   + w(3) * k(i:i + 3, s(3)))
+      end do
+    case (4)
+      do i = 1, n, width
+        y(i:i + 3) = x(i:i + 3) + h(i:i + 3) * (w(1) * k(i:i + 3, s(1)) + w(2) * k(i:i + 3, s(2)) &
+                                   + w(3) * k(i:i + 3, s(3)) + w(4) * k(i:i + 3, s(4)))
+      end do
+    end select
+  end subroutine combine_few
+
+  !> Sums of five to eight terms.
+  pure subroutine combine_several(n, stages, terms, w, s, k, x, h, y)
+    integer, intent(in) :: n, stages, terms
+    real(wp), intent(in) :: w(terms)
+    integer, intent(in) :: s(terms)
+    real(wp), intent(in) :: k(n, stages), x(n), h(n)
+    real(wp), intent(inout) :: y(n)
+    integer :: i
+
+    select case (terms)
+    case (5)
+      do i = 1, n, width
+        y(i:i + 3) = x(i:i + 3) + h(i:i + 3) * (w(1) * k(i:i + 3, s(1)) + w(2) * k(i:i + 3, s(2)) &
+                                   + w(3) * k(i:i + 3, s(3)) + w(4) * k(i:i + 3, s(4)) + w(5) * k(i:i + 3, s(5)))
+      end do
+    case (6)
+      do i = 1, n, width
+        y(i:i + 3) = x(i:i + 3) + h(i:i + 3) * (w(1) * k(i:i + 3, s(1)) + w(2) * k(i:i + 3, s(2)) &
+                                   + w(3) * k(i:i + 3, s(3)) + w(4) * k(i:i + 3, s(4)) + w(5) * k(i:i + 3, s(5)) &
+                                   + w(6) * k(i:i + 3, s(6)))
+      end do
+    case (7)
+      do i = 1, n, width
+        y(i:i + 3) = x(i:i + 3) + h(i:i + 3) * (w(1) * k(i:i + 3, s(1)) + w(2) * k(i:i + 3, s(2)) &
+                                   + w(3) * k(i:i + 3, s(3)) + w(4) * k(i:i + 3, s(4)) + w(5) * k(i:i + 3, s(5)) &
+                                   + w(6) * k(i:i + 3, s(6)) + w(7) * k(i:i + 3, s(7)))
+      end do
+    case (8)
+      do i = 1, n, width
+        y(i:i + 3) = x(i:i + 3) + h(i:i + 3) * (w(1) * k(i:i + 3, s(1)) + w(2) * k(i:i + 3, s(2)) &
+                                   + w(3) * k(i:i + 3, s(3)) + w(4) * k(i:i + 3, s(4)) + w(5) * k(i:i + 3, s(5)) &
+                                   + w(6) * k(i:i + 3, s(6)) + w(7) * k(i:i + 3, s(7)) + w(8) * k(i:i + 3, s(8)))
+      end do
+    end select
+  end subroutine combine_several
+
+  !> Sums of nine to twelve terms.
+  pure subroutine combine_many(n, stages, terms, w, s, k, x, h, y)
+    integer, intent(in) :: n, stages, terms
+    real(wp), intent(in) :: w(terms)
+    integer, intent(in) :: s(terms)
+    real(wp), intent(in) :: k(n, stages), x(n), h(n)
+    real(wp), intent(inout) :: y(n)
+    integer :: i
+
+    select case (terms)
+    case (9)
+      do i = 1, n, width
+        y(i:i + 3) = x(i:i + 3) + h(i:i + 3) * (w(1) * k(i:i + 3, s(1)) + w(2) * k(i:i + 3, s(2)) &
+                                   + w(3) * k(i:i + 3, s(3)) + w(4) * k(i:i + 3, s(4)) + w(5) * k(i:i + 3, s(5)) &
+                                   + w(6) * k(i:i + 3, s(6)) + w(7) * k(i:i + 3, s(7)) + w(8) * k(i:i + 3, s(8)) &
+                                   + w(9) * k(i:i + 3, s(9)))
+      end do
+    case (10)
+      do i = 1, n, width
+        y(i:i + 3) = x(i:i + 3) + h(i:i + 3) * (w(1) * k(i:i + 3, s(1)) + w(2) * k(i:i + 3, s(2)) &
+                                   + w(3) * k(i:i + 3, s(3)) + w(4) * k(i:i + 3, s(4)) + w(5) * k(i:i + 3, s(5)) &
+                                   + w(6) * k(i:i + 3, s(6)) + w(7) * k(i:i + 3, s(7)) + w(8) * k(i:i + 3, s(8)) &
+                                   + w(9) * k(i:i + 3, s(9)) + w(10) * k(i:i + 3, s(10)))
+      end do
+    case (11)
+      do i = 1, n, width
+        y(i:i + 3) = x(i:i + 3) + h(i:i + 3) * (w(1) * k(i:i + 3, s(1)) + w(2) * k(i:i + 3, s(2)) &
+                                   + w(3) * k(i:i + 3, s(3)) + w(4) * k(i:i + 3, s(4)) + w(5) * k(i:i + 3, s(5)) &
+                                   + w(6) * k(i:i + 3, s(6)) + w(7) * k(i:i + 3, s(7)) + w(8) * k(i:i + 3, s(8)) &
+                                   + w(9) * k(i:i + 3, s(9)) + w(10) * k(i:i + 3, s(10)) + w(11) * k(i:i + 3, s(11)))
+      end do
+    case (12)
+      do i = 1, n, width
+        y(i:i + 3) = x(i:i + 3) + h(i:i + 3) * (w(1) * k(i:i + 3, s(1)) + w(2) * k(i:i + 3, s(2)) &
+                                   + w(3) * k(i:i + 3, s(3)) + w(4) * k(i:i + 3, s(4)) + w(5) * k(i:i + 3, s(5)) &
+                                   + w(6) * k(i:i + 3, s(6)) + w(7) * k(i:i + 3, s(7)) + w(8) * k(i:i + 3, s(8)) &
+                                   + w(9) * k(i:i + 3, s(9)) + w(10) * k(i:i + 3, s(10)) + w(11) * k(i:i + 3, s(11)) &
+                                   + w(12) * k(i:i + 3, s(12)))
+      end do
+    end select
+  end subroutine combine_many
 
 end module nocdyn_combinations

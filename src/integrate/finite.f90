@@ -14,19 +14,22 @@ module nocdyn_finite
 
 contains
 
-  !> Whether no element is infinite or NaN.
+  !> Whether no element is infinite or NaN: the sum of their sizes is then neither, unless it overflows.
   pure function all_finite(n, x)
     integer, intent(in) :: n
     real(wp), intent(in) :: x(n)
     logical :: all_finite
-    integer(int64) :: carries
+    real(wp) :: total(4)   ! four sums, as a vector
     integer :: i
 
-    carries = 0
-    do i = 1, n
-      carries = ior(carries, iand(shiftr(transfer(x(i), carries), exponent_place), exponent_ones) + 1)
+    total = 0.0_wp
+    do i = 1, n - 3, 4
+      total = total + abs(x(i:i + 3))
     end do
-    all_finite = .not. btest(carries, exponent_bits)
+    do i = n - modulo(n, 4) + 1, n
+      total(1) = total(1) + abs(x(i))
+    end do
+    all_finite = is_finite((total(1) + total(2)) + (total(3) + total(4)))
   end function all_finite
 
   !> Whether a number is neither infinite nor NaN.

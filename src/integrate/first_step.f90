@@ -3,7 +3,7 @@ module nocdyn_first_step
   use nocdyn_kinds, only: wp
   use nocdyn_step_control, only: smallest_step, step_control_t
   use nocdyn_system, only: system_t
-  use nocdyn_trial, only: evaluate, set_out, trial_t
+  use nocdyn_trial, only: count_evaluations, evaluate_finite, set_out, trial_t
   implicit none (type, external)
   private
 
@@ -21,7 +21,7 @@ module nocdyn_first_step
 
 contains
 
-  !> Sets the first step sizes by comparing the slopes at both ends of a small Euler step:
+  !> Sets the first step sizes of the lanes that are `working` by comparing the slopes at both ends of a small Euler step:
   !> Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I, 2nd ed. (1993), II.4.
   subroutine guess_first_steps(control, order, system, trial)
     type(step_control_t), intent(inout) :: control
@@ -32,18 +32,19 @@ contains
     integer :: lane
 
     do lane = 1, trial%lanes
-      if (trial%working(lane)) trial%h(lane) = euler_step(control, trial, lane)
+      trial%h(lane) = 0.0_wp
+      if (.not. trial%working(lane)) cycle
+      trial%h(lane) = euler_step(control, trial, lane)
+      control%h(lane) = retreat * trial%h(lane)
     end do
-    control%h = trial%h
     call set_out(trial)
-    trial%y_new = trial%y + trial%h_spread * trial%slope
-    call evaluate(trial, system, trial%t + trial%h, trial%y_new, trial%deviation)
-    trial%deviation = trial%deviation - trial%slope
+    trial%scratch(:) = trial%t + trial%h
+    trial%y_new(:, :) = trial%y + trial%h_spread * trial%slope
+    call evaluate_finite(trial, system, trial%scratch, trial%y_new, trial%deviation)
+    call count_evaluations(trial)
+    trial%deviation(:, :) = trial%deviation - trial%slope
     do lane = 1, trial%lanes
-      if (.not. trial%working(lane)) then
-        control%h(lane) = retreat * control%h(lane)
-        cycle
-      end if
+      if (.not. trial%working(lane)) cycle
       slope = weighted_size(control, trial, lane, trial%slope)
       steepest = max(slope, weighted_size(control, trial, lane, trial%deviation) / trial%h(lane))
       if (steepest <= no_curvature) then

@@ -3,19 +3,20 @@ module nocdyn_integration
   use nocdyn_errors, only: error_t
   use nocdyn_integration_settings, only: check_settings, integration_settings_t
   use nocdyn_kinds, only: wp
-  use nocdyn_march, only: advance_lanes, judge_lanes, march_t, prepare, record_lanes, set_out_lanes, start
+  use nocdyn_march, only: advance_lanes, empty_lanes, fill_lanes, follow_lanes, judge_lanes, march_t, prepare, set_out_lanes
   use nocdyn_methods, only: select_method
   use nocdyn_outcome, only: allocate_outcome, integration_interrupted, integration_running, outcome_t
+  use nocdyn_queue, only: one_each, one_each_t, queue_t
   use nocdyn_stepper, only: stepper_t
   use nocdyn_system, only: observer_t, system_t
   implicit none (type, external)
   private
 
-  public :: integrate, integrate_with
+  public :: integrate, integrate_queue, integrate_with
 
 contains
 
-  !> Solves y' = f(t, y) with the method that `settings` names.
+  !> Solves y' = f(t, y) once in each lane, with the method that `settings` names.
   subroutine integrate(system, settings, times, y, observer, outcome, error)
     class(system_t), intent(inout) :: system
     type(integration_settings_t), intent(in) :: settings
@@ -24,59 +25,65 @@ contains
     class(observer_t), intent(inout) :: observer
     type(outcome_t), intent(out) :: outcome            !! says which lanes failed
     type(error_t), allocatable, intent(out) :: error   !! allocated if a setting is refused
+    type(one_each_t) :: queue
+
+    if (size(y, 1) /= system%lanes .or. size(y, 2) /= system%states + system%quadratures) then
+      error stop 'nocdyn_integration: y must have the shape [lanes, states + quadratures]'
+    end if
+    queue = one_each(y)
+    call integrate_queue(system, settings, times, queue, observer, outcome, error)
+    y = queue%y
+  end subroutine integrate
+
+  !> Solves y' = f(t, y) for all variants of a queue; a lane that has ended takes the next variant.
+  subroutine integrate_queue(system, settings, times, queue, observer, outcome, error)
+    class(system_t), intent(inout) :: system
+    type(integration_settings_t), intent(in) :: settings
+    real(wp), contiguous, intent(in) :: times(:)       !! of every variant
+    class(queue_t), intent(inout) :: queue             !! hands out the variants and takes their ends
+    class(observer_t), intent(inout) :: observer
+    type(outcome_t), intent(out) :: outcome            !! of the last variant in each lane
+    type(error_t), allocatable, intent(out) :: error   !! allocated if a setting is refused
     class(stepper_t), allocatable :: stepper
 
     call check_settings(settings, error)
     if (allocated(error)) return
     call select_method(trim(settings%method), stepper, error)
     if (allocated(error)) return
-    call integrate_with(stepper, system, settings, times, y, observer, outcome)
-  end subroutine integrate
+    call integrate_with(stepper, system, settings, times, queue, observer, outcome)
+  end subroutine integrate_queue
 
   !> The same with any stepper and with settings that have been checked.
-  subroutine integrate_with(stepper, system, settings, times, y, observer, outcome)
+  subroutine integrate_with(stepper, system, settings, times, queue, observer, outcome)
     class(stepper_t), intent(inout) :: stepper
     class(system_t), intent(inout) :: system
     type(integration_settings_t), intent(in) :: settings
     real(wp), contiguous, intent(in) :: times(:)
-    real(wp), contiguous, intent(inout) :: y(:, :)
+    class(queue_t), intent(inout) :: queue
     class(observer_t), intent(inout) :: observer
     type(outcome_t), intent(out) :: outcome
     type(march_t) :: march
 
-    call check_arguments(system, times, y)
+    if (size(times) < 2) error stop 'nocdyn_integration: times needs a start and an end'
+    if (.not. all(times(2:) > times(:size(times) - 1))) error stop 'nocdyn_integration: times must ascend'
     call allocate_outcome(outcome, system%lanes)
-    call prepare(march, stepper, system, settings, times)
-    call start(march, stepper, system, y, settings%first_step, observer, outcome)
-    do while (any(outcome%status == integration_running))
+    call prepare(march, stepper, system, settings, times, observer)
+    do
+      call fill_lanes(march, stepper, system, queue, times(1), observer, outcome)
+      if (.not. any(march%occupied)) exit
       call set_out_lanes(march, outcome)
       call stepper%attempt(system, march%trial)
-      call judge_lanes(march, outcome)
+      call judge_lanes(march, stepper, system, times, outcome)
       if (any(march%accepted)) then
-        call record_lanes(march, stepper, times, observer)
+        call follow_lanes(march, times, observer, outcome)
         call advance_lanes(march)
         call stepper%accept(march%accepted)
       end if
       call interrupt_if_asked(march, observer, outcome)
+      call empty_lanes(march, queue, observer, outcome)
+      if (any(outcome%status == integration_interrupted)) exit
     end do
-    y = march%trial%y
-    outcome%t = march%trial%t
-    outcome%evaluations = march%trial%evaluations
-    outcome%jacobians = march%trial%jacobians
-    outcome%factorisations = march%trial%factorisations
   end subroutine integrate_with
-
-  subroutine check_arguments(system, times, y)
-    class(system_t), intent(in) :: system
-    real(wp), intent(in) :: times(:)
-    real(wp), intent(in) :: y(:, :)
-
-    if (size(times) < 2) error stop 'nocdyn_integration: times needs a start and an end'
-    if (.not. all(times(2:) > times(:size(times) - 1))) error stop 'nocdyn_integration: times must ascend'
-    if (size(y, 1) /= system%lanes .or. size(y, 2) /= system%states + system%quadratures) then
-      error stop 'nocdyn_integration: y must have the shape [lanes, states + quadratures]'
-    end if
-  end subroutine check_arguments
 
   subroutine interrupt_if_asked(march, observer, outcome)
     type(march_t), intent(in) :: march

@@ -1,24 +1,38 @@
 !> The march of a block of lanes through time: each lane at its own pace, all of them in one loop.
 module nocdyn_march
+  use nocdyn_dense_output, only: allocate_dense_output, dense_output_t, sample, take_lane
+  use nocdyn_events, only: allocate_events, events_t, find_events, start_events
+  use nocdyn_extremes, only: allocate_extremes, extremes_t, follow_extremes, start_extremes
   use nocdyn_first_step, only: guess_first_steps
   use nocdyn_integration_settings, only: integration_settings_t
   use nocdyn_kinds, only: wp
   use nocdyn_outcome, only: integration_done, integration_gave_up, integration_not_finite, integration_running, &
-    integration_step_too_small, integration_too_many_steps, outcome_t
-  use nocdyn_step_control, only: accept_or_reject, propose, shorten, smallest_step, step_control, step_control_t, weigh_error
+    integration_step_too_small, integration_stopped, integration_too_many_steps, note_method, outcome_t, reset_outcome
+  use nocdyn_queue, only: queue_t
+  use nocdyn_step_control, only: is_within, lengthen, propose, reduce, restart, shorten, smallest_step, step_control, &
+    step_control_t, weigh_error
   use nocdyn_stepper, only: stepper_t
   use nocdyn_system, only: observer_t, system_t
   use nocdyn_trial, only: allocate_trial, evaluate_start, set_out, trial_fine, trial_give_up, trial_not_finite, trial_t
   implicit none (type, external)
   private
 
-  public :: prepare, start, set_out_lanes, judge_lanes, record_lanes, advance_lanes
+  public :: prepare, fill_lanes, set_out_lanes, judge_lanes, follow_lanes, advance_lanes, empty_lanes
 
   type, public :: march_t
     type(trial_t) :: trial
     type(step_control_t) :: control
+    type(dense_output_t) :: dense                    !! the lane that is looked at
+    type(events_t) :: events
+    type(extremes_t) :: extremes
+    real(wp) :: first_step                           !! 0: find it
     integer :: max_steps
+    logical :: has_events = .false.
+    logical :: has_extremes = .false.
+    logical, allocatable :: occupied(:)              !! lanes that hold a variant
+    logical, allocatable :: starting(:)              !! lanes that have just been given one
     logical, allocatable :: accepted(:)              !! lanes whose last attempt was accepted
+    logical, allocatable :: wanted(:)                !! lanes whose solution inside the last step is wanted
     real(wp), allocatable :: t_new(:)                !! end of the last attempt of each lane
     integer, allocatable :: next(:)                  !! first requested time of each lane that is not recorded yet
     real(wp), allocatable :: sample(:)               !! one lane's state at a requested time
@@ -28,56 +42,106 @@ module nocdyn_march
 contains
 
   !> Allocates all that the march needs; nothing is allocated later.
-  subroutine prepare(march, stepper, system, settings, times)
+  subroutine prepare(march, stepper, system, settings, times, observer)
     type(march_t), intent(out) :: march
     class(stepper_t), intent(inout) :: stepper
     class(system_t), intent(in) :: system
     type(integration_settings_t), intent(in) :: settings
     real(wp), intent(in) :: times(:)
+    class(observer_t), intent(in) :: observer
 
     call stepper%prepare(system)
     call allocate_trial(march%trial, system)
-    march%control = step_control(system%lanes, stepper%error_order, settings%rtol, settings%atol, times(size(times)), &
-                                 settings%longest_step)
+    march%trial%error_order(:) = stepper%error_order
+    march%trial%has_coarse_deviation = stepper%has_coarse_error
+    march%control = step_control(system%lanes, settings%rtol, settings%atol, times(size(times)), settings%longest_step)
+    march%first_step = settings%first_step
     march%max_steps = settings%max_steps
     associate (lanes => system%lanes, components => system%states + system%quadratures)
-      allocate (march%accepted(lanes), source=.false.)
+      allocate (march%occupied(lanes), march%starting(lanes), march%accepted(lanes), march%wanted(lanes), source=.false.)
       allocate (march%t_new(lanes), source=times(1))
       allocate (march%next(lanes), source=2)
       allocate (march%sample(components), source=0.0_wp)
-      allocate (march%coefficients(lanes, components, size(stepper%dense)), source=0.0_wp)
+      allocate (march%coefficients(lanes, size(march%trial%y, 2), stepper%degree), source=0.0_wp)
     end associate
+    call allocate_dense_output(march%dense, march%trial%components, stepper%degree)
+    march%has_extremes = observer%tracked > 0
+    if (march%has_extremes) call allocate_extremes(march%extremes, observer%tracked, stepper%degree, march%trial)
+    if (.not. allocated(observer%directions)) return
+    march%has_events = size(observer%directions) > 0
+    if (march%has_events) call allocate_events(march%events, observer, march%trial)
   end subroutine prepare
 
-  !> Records the start, evaluates the slope there and chooses the first step of each lane.
-  subroutine start(march, stepper, system, y, first_step, observer, outcome)
+  !> Gives the free lanes their next variants and starts them.
+  subroutine fill_lanes(march, stepper, system, queue, t_start, observer, outcome)
     type(march_t), intent(inout) :: march
     class(stepper_t), intent(inout) :: stepper
     class(system_t), intent(inout) :: system
-    real(wp), intent(in) :: y(:, :)
-    real(wp), intent(in) :: first_step   !! 0: find it
+    class(queue_t), intent(inout) :: queue
+    real(wp), intent(in) :: t_start
+    class(observer_t), intent(inout) :: observer
+    type(outcome_t), intent(inout) :: outcome
+    integer :: lane
+
+    do lane = 1, size(march%occupied)
+      march%starting(lane) = .false.
+      if (march%occupied(lane)) cycle
+      call queue%next(system, lane, march%sample, march%starting(lane))
+      march%occupied(lane) = march%starting(lane)
+      if (march%starting(lane)) call place_start(march, lane, t_start, outcome)
+    end do
+    if (any(march%starting)) call start_lanes(march, stepper, system, observer, outcome)
+  end subroutine fill_lanes
+
+  !> Puts the state in `sample` at the start of a lane that has done nothing yet.
+  subroutine place_start(march, lane, t_start, outcome)
+    type(march_t), intent(inout) :: march
+    integer, intent(in) :: lane
+    real(wp), intent(in) :: t_start
+    type(outcome_t), intent(inout) :: outcome
+
+    associate (trial => march%trial)
+      trial%t(lane) = t_start
+      trial%y(lane, :trial%components) = march%sample
+      trial%evaluations(lane) = 0
+      trial%jacobians(lane) = 0
+      trial%factorisations(lane) = 0
+      trial%implicit(lane) = .false.
+    end associate
+    march%next(lane) = 2
+    call restart(march%control, lane)
+    call reset_outcome(outcome, lane)
+  end subroutine place_start
+
+  !> Records the start, evaluates the slope there and chooses the first step of the lanes in `starting`.
+  subroutine start_lanes(march, stepper, system, observer, outcome)
+    type(march_t), intent(inout) :: march
+    class(stepper_t), intent(inout) :: stepper
+    class(system_t), intent(inout) :: system
     class(observer_t), intent(inout) :: observer
     type(outcome_t), intent(inout) :: outcome
     integer :: lane
 
     associate (trial => march%trial)
-      trial%t(:) = march%t_new
-      trial%y(:, :) = y
+      trial%working(:) = march%starting
+      call evaluate_start(trial, system, march%starting, trial%slope)
+      call stepper%begin(trial, march%starting)
       do lane = 1, trial%lanes
-        march%sample(:) = y(lane, :)
+        if (.not. march%starting(lane)) cycle
+        march%sample(:) = trial%y(lane, :trial%components)
         call observer%record(lane, trial%t(lane), march%sample)
+        march%control%h(lane) = march%first_step
+        if (.not. trial%working(lane)) then
+          outcome%status(lane) = merge(integration_not_finite, integration_gave_up, trial%verdict(lane) == trial_not_finite)
+          outcome%component(lane) = trial%culprit(lane)
+        else
+          if (march%has_events) call start_events(march%events, observer, trial, lane)
+          if (march%has_extremes) call start_extremes(march%extremes, observer, trial, lane)
+        end if
       end do
-      call evaluate_start(trial, system, trial%working, trial%slope)
-      call stepper%begin(trial)
-      do lane = 1, trial%lanes
-        if (trial%working(lane)) cycle
-        outcome%status(lane) = merge(integration_not_finite, integration_gave_up, trial%verdict(lane) == trial_not_finite)
-        outcome%component(lane) = trial%culprit(lane)
-      end do
+      if (march%first_step <= 0) call guess_first_steps(march%control, stepper%order, system, trial)
     end associate
-    march%control%h(:) = first_step
-    if (first_step <= 0.0_wp) call guess_first_steps(march%control, stepper%order, system, march%trial)
-  end subroutine start
+  end subroutine start_lanes
 
   !> The next attempt of the lanes that are still running.
   subroutine set_out_lanes(march, outcome)
@@ -87,7 +151,7 @@ contains
 
     associate (trial => march%trial)
       do lane = 1, trial%lanes
-        trial%working(lane) = outcome%status(lane) == integration_running
+        trial%working(lane) = march%occupied(lane) .and. outcome%status(lane) == integration_running
         trial%h(lane) = 0.0_wp
         if (.not. trial%working(lane)) cycle
         call propose(march%control, lane, trial%t(lane), trial%h(lane))
@@ -101,25 +165,29 @@ contains
   end subroutine set_out_lanes
 
   !> Accepts or rejects the last attempt of each lane, and ends the lanes that cannot go on.
-  subroutine judge_lanes(march, outcome)
+  subroutine judge_lanes(march, stepper, system, times, outcome)
     type(march_t), intent(inout) :: march
+    class(stepper_t), intent(inout) :: stepper
+    class(system_t), intent(inout) :: system
+    real(wp), contiguous, intent(in) :: times(:)
     type(outcome_t), intent(inout) :: outcome
     integer :: lane
 
     call weigh_error(march%control, march%trial)
     do lane = 1, march%trial%lanes
-      march%accepted(lane) = .false.
-      if (outcome%status(lane) /= integration_running) cycle
-      if (march%trial%verdict(lane) == trial_fine) then
-        call accept_or_reject(march%control, lane, outcome%h(lane), march%accepted(lane))
-      else
-        call shorten(march%control, lane, outcome%h(lane))
-      end if
+      march%accepted(lane) = march%trial%working(lane) .and. is_within(march%control%mean_square(lane))
+      march%wanted(lane) = march%accepted(lane) &
+                           .and. (march%has_events .or. march%has_extremes .or. times(march%next(lane)) < march%t_new(lane))
+    end do
+    if (any(march%wanted)) call stepper%interpolate(system, march%trial, march%wanted, march%coefficients)
+    do lane = 1, march%trial%lanes
+      if (.not. march%occupied(lane) .or. outcome%status(lane) /= integration_running) cycle
+      march%accepted(lane) = march%accepted(lane) .and. march%trial%verdict(lane) == trial_fine
       if (march%accepted(lane)) then
-        outcome%accepted(lane) = outcome%accepted(lane) + 1
+        call lengthen(march%control, lane, march%trial%error_order(lane), outcome%h(lane))
+        call note_method(outcome, lane, march%trial%t(lane), march%trial%implicit(lane))
         if (march%control%reaches_end(lane)) outcome%status(lane) = integration_done
       else
-        outcome%rejected(lane) = outcome%rejected(lane) + 1
         call judge_rejection(march, lane, outcome)
       end if
       if (outcome%status(lane) == integration_running .and. outcome%steps(lane) >= march%max_steps) then
@@ -128,13 +196,19 @@ contains
     end do
   end subroutine judge_lanes
 
-  !> A lane fails if no shorter step will help or none is possible.
+  !> A lane takes a shorter step, or fails if no shorter step will help or none is possible.
   subroutine judge_rejection(march, lane, outcome)
-    type(march_t), intent(in) :: march
+    type(march_t), intent(inout) :: march
     integer, intent(in) :: lane
     type(outcome_t), intent(inout) :: outcome
 
+    outcome%rejected(lane) = outcome%rejected(lane) + 1
     associate (trial => march%trial)
+      if (trial%verdict(lane) == trial_fine) then
+        call reduce(march%control, lane, trial%error_order(lane), outcome%h(lane))
+      else
+        call shorten(march%control, lane, outcome%h(lane))
+      end if
       if (trial%verdict(lane) == trial_give_up) then
         outcome%status(lane) = integration_gave_up
       else if (outcome%h(lane) <= smallest_step(trial%t(lane))) then
@@ -152,64 +226,72 @@ contains
     end associate
   end subroutine judge_rejection
 
-  !> Hands the observer the requested times that the accepted steps have passed.
-  subroutine record_lanes(march, stepper, times, observer)
+  !> Tells the observer what lies in the accepted steps: requested times, events, extremes.
+  subroutine follow_lanes(march, times, observer, outcome)
     type(march_t), intent(inout) :: march
-    class(stepper_t), intent(in) :: stepper
     real(wp), contiguous, intent(in) :: times(:)
     class(observer_t), intent(inout) :: observer
-    logical :: interpolated   ! the whole block at once, when the first lane needs it
+    type(outcome_t), intent(inout) :: outcome
     integer :: lane
 
-    interpolated = .false.
     do lane = 1, march%trial%lanes
-      if (.not. march%accepted(lane) .or. times(march%next(lane)) > march%t_new(lane)) cycle
-      if (.not. interpolated) call stepper%interpolate(march%trial, march%coefficients)
-      interpolated = .true.
-      call record_lane(march, lane, times, observer)
+      if (.not. march%accepted(lane)) cycle
+      if (march%wanted(lane)) call take_lane(march%dense, march%trial, march%coefficients, lane)
+      if (march%has_events) call pass_events(march, lane, times, observer, outcome)
+      if (times(march%next(lane)) <= march%t_new(lane)) call record_until(march, lane, march%t_new(lane), times, observer)
+      if (march%has_extremes) call follow_extremes(march%extremes, observer, march%dense, march%t_new(lane))
     end do
-  end subroutine record_lanes
+  end subroutine follow_lanes
 
-  subroutine record_lane(march, lane, times, observer)
+  !> The events of a lane in their order, with the requested times between them; a terminal event ends the step and the lane.
+  subroutine pass_events(march, lane, times, observer, outcome)
     type(march_t), intent(inout) :: march
     integer, intent(in) :: lane
+    real(wp), contiguous, intent(in) :: times(:)
+    class(observer_t), intent(inout) :: observer
+    type(outcome_t), intent(inout) :: outcome
+    real(wp) :: t
+    logical :: is_terminal
+    integer :: i
+
+    call find_events(march%events, observer, march%dense)
+    do i = 1, march%events%found
+      t = min(march%trial%t(lane) + march%events%theta(i) * march%trial%h(lane), march%t_new(lane))
+      call record_until(march, lane, t, times, observer)
+      call sample(march%dense, march%events%theta(i), march%sample)
+      call observer%happen(lane, march%events%which(i), t, march%sample, is_terminal)
+      if (.not. is_terminal) cycle
+      outcome%status(lane) = integration_stopped
+      march%t_new(lane) = t
+      march%trial%y_new(lane, :march%trial%components) = march%sample
+      exit
+    end do
+  end subroutine pass_events
+
+  !> Records the requested times up to t that have not been recorded yet.
+  subroutine record_until(march, lane, t, times, observer)
+    type(march_t), intent(inout) :: march
+    integer, intent(in) :: lane
+    real(wp), intent(in) :: t
     real(wp), contiguous, intent(in) :: times(:)
     class(observer_t), intent(inout) :: observer
     real(wp) :: theta
+    integer :: next
 
-    associate (trial => march%trial, next => march%next(lane))
-      do while (times(next) <= march%t_new(lane))
-        if (times(next) < march%t_new(lane)) then
-          theta = (times(next) - trial%t(lane)) / trial%h(lane)
-          call sample_lane(lane, theta, trial%y, march%coefficients, march%sample)
-        else
-          march%sample(:) = trial%y_new(lane, :)
-        end if
-        call observer%record(lane, times(next), march%sample)
-        if (next == size(times)) exit
-        next = next + 1
-      end do
-    end associate
-  end subroutine record_lane
-
-  !> sample = y + sum over p of coefficients(:, :, p) theta^p, of one lane.
-  pure subroutine sample_lane(lane, theta, y, coefficients, sample)
-    integer, intent(in) :: lane
-    real(wp), intent(in) :: theta
-    real(wp), contiguous, intent(in) :: y(:, :)
-    real(wp), contiguous, intent(in) :: coefficients(:, :, :)
-    real(wp), contiguous, intent(inout) :: sample(:)
-    real(wp) :: polynomial
-    integer :: component, power
-
-    do component = 1, size(sample)
-      polynomial = 0.0_wp
-      do power = size(coefficients, 3), 1, -1
-        polynomial = theta * (polynomial + coefficients(lane, component, power))
-      end do
-      sample(component) = y(lane, component) + polynomial
+    next = march%next(lane)
+    do while (times(next) <= t)
+      if (times(next) < march%t_new(lane)) then
+        theta = (times(next) - march%dense%t) / march%dense%h
+        call sample(march%dense, theta, march%sample)
+      else
+        march%sample(:) = march%trial%y_new(lane, :march%trial%components)
+      end if
+      call observer%record(lane, times(next), march%sample)
+      if (next == size(times)) exit
+      next = next + 1
     end do
-  end subroutine sample_lane
+    march%next(lane) = next
+  end subroutine record_until
 
   !> The accepted lanes move to the end of their step.
   subroutine advance_lanes(march)
@@ -231,5 +313,26 @@ contains
       end if
     end associate
   end subroutine advance_lanes
+
+  !> Hands the lanes that have ended to the queue and frees them.
+  subroutine empty_lanes(march, queue, observer, outcome)
+    type(march_t), intent(inout) :: march
+    class(queue_t), intent(inout) :: queue
+    class(observer_t), intent(inout) :: observer
+    type(outcome_t), intent(inout) :: outcome
+    integer :: lane
+
+    do lane = 1, size(march%occupied)
+      if (.not. march%occupied(lane) .or. outcome%status(lane) == integration_running) cycle
+      march%occupied(lane) = .false.
+      outcome%t(lane) = march%trial%t(lane)
+      outcome%evaluations(lane) = march%trial%evaluations(lane)
+      outcome%jacobians(lane) = march%trial%jacobians(lane)
+      outcome%factorisations(lane) = march%trial%factorisations(lane)
+      if (march%has_extremes) call observer%take_ranges(lane, march%extremes%ranges(lane))
+      march%sample(:) = march%trial%y(lane, :march%trial%components)
+      call queue%finish(lane, march%sample, outcome)
+    end do
+  end subroutine empty_lanes
 
 end module nocdyn_march

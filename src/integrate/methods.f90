@@ -1,10 +1,11 @@
 !> The methods by the names that people give them.
 module nocdyn_methods
+  use nocdyn_auto_stepper, only: auto_stepper
   use nocdyn_errors, only: error_t, exit_input, raise
   use nocdyn_explicit_stepper, only: explicit_stepper
-  use nocdyn_explicit_tables, only: dormand_prince_5
+  use nocdyn_explicit_tables, only: dormand_prince_5, dormand_prince_8
   use nocdyn_rosenbrock_stepper, only: rosenbrock_stepper
-  use nocdyn_rosenbrock_tables, only: rodas4
+  use nocdyn_rosenbrock_tables, only: rodas4, rodas5p
   use nocdyn_stepper, only: stepper_t
   use nocdyn_text, only: joined, nearest_word, quoted, string_t
   implicit none (type, external)
@@ -12,8 +13,9 @@ module nocdyn_methods
 
   public :: select_method
 
-  !> All names that `select_method` knows; 'rodas4' is another name of 'rosenbrock'.
-  character(len=10), parameter, public :: method_names(3) = [character(len=10) :: 'rk45', 'rosenbrock', 'rodas4']
+  !> All names that `select_method` knows; 'rosenbrock' is another name of 'rodas4'.
+  character(len=10), parameter, public :: method_names(6) = &
+    [character(len=10) :: 'auto', 'rk45', 'rk853', 'rosenbrock', 'rodas4', 'rodas5p']
 
 contains
 
@@ -24,10 +26,16 @@ contains
     type(error_t), allocatable, intent(out) :: error   !! allocated if there is no such method
 
     select case (name)
+    case ('auto')
+      allocate (stepper, source=auto_stepper(dormand_prince_8(), rodas5p()))
     case ('rk45')
-      stepper = explicit_stepper(dormand_prince_5())
+      allocate (stepper, source=explicit_stepper(dormand_prince_5()))
+    case ('rk853')
+      allocate (stepper, source=explicit_stepper(dormand_prince_8()))
     case ('rosenbrock', 'rodas4')
-      stepper = rosenbrock_stepper(rodas4())
+      allocate (stepper, source=rosenbrock_stepper(rodas4()))
+    case ('rodas5p')
+      allocate (stepper, source=rosenbrock_stepper(rodas5p()))
     case default
       call raise(error, exit_input, unknown_method(name))
     end select

@@ -6,7 +6,7 @@ module nocdyn_outcome
   implicit none (type, external)
   private
 
-  public :: allocate_outcome, failure_sentence
+  public :: allocate_outcome, reset_outcome, note_method, failure_sentence
 
   integer, parameter, public :: integration_running = -1
   integer, parameter, public :: integration_done = 0
@@ -15,6 +15,9 @@ module nocdyn_outcome
   integer, parameter, public :: integration_not_finite = 3
   integer, parameter, public :: integration_gave_up = 4      !! the system said that no shorter step will help
   integer, parameter, public :: integration_interrupted = 5  !! by the observer
+  integer, parameter, public :: integration_stopped = 6      !! by a terminal event
+
+  integer, parameter, public :: most_switches = 32           !! whose times are kept
 
   !> Every array has one element per lane.
   type, public :: outcome_t
@@ -28,6 +31,10 @@ module nocdyn_outcome
     integer, allocatable :: evaluations(:)      !! of f
     integer, allocatable :: jacobians(:)
     integer, allocatable :: factorisations(:)
+    integer, allocatable :: implicit_steps(:)   !! accepted steps of an implicit method
+    integer, allocatable :: switches(:)         !! between explicit and implicit method
+    real(wp), allocatable :: switch_times(:, :) !! of the first switches, [most_switches, lanes]
+    logical, allocatable :: implicit(:)         !! whether the last accepted step was an implicit method's
   end type outcome_t
 
   integer, parameter :: digits = 6   ! of the numbers in messages
@@ -42,8 +49,41 @@ contains
     allocate (outcome%status(lanes), source=integration_running)
     allocate (outcome%t(lanes), outcome%h(lanes), source=0.0_wp)
     allocate (outcome%component(lanes), outcome%steps(lanes), outcome%accepted(lanes), outcome%rejected(lanes), &
-              outcome%evaluations(lanes), outcome%jacobians(lanes), outcome%factorisations(lanes), source=0)
+              outcome%evaluations(lanes), outcome%jacobians(lanes), outcome%factorisations(lanes), &
+              outcome%implicit_steps(lanes), outcome%switches(lanes), source=0)
+    allocate (outcome%switch_times(most_switches, lanes), source=0.0_wp)
+    allocate (outcome%implicit(lanes), source=.false.)
   end subroutine allocate_outcome
+
+  !> A lane is running and nothing has been counted in it.
+  pure subroutine reset_outcome(outcome, lane)
+    type(outcome_t), intent(inout) :: outcome
+    integer, intent(in) :: lane
+
+    outcome%status(lane) = integration_running
+    outcome%component(lane) = 0
+    outcome%steps(lane) = 0
+    outcome%accepted(lane) = 0
+    outcome%rejected(lane) = 0
+    outcome%implicit_steps(lane) = 0
+    outcome%switches(lane) = 0
+  end subroutine reset_outcome
+
+  !> Counts an accepted step, and a switch if its method is of the other kind than that of the step before.
+  pure subroutine note_method(outcome, lane, t, implicit)
+    type(outcome_t), intent(inout) :: outcome
+    integer, intent(in) :: lane
+    real(wp), intent(in) :: t        !! start of the step
+    logical, intent(in) :: implicit
+
+    outcome%accepted(lane) = outcome%accepted(lane) + 1
+    if (implicit) outcome%implicit_steps(lane) = outcome%implicit_steps(lane) + 1
+    if (outcome%accepted(lane) > 1 .and. (implicit .neqv. outcome%implicit(lane))) then
+      outcome%switches(lane) = outcome%switches(lane) + 1
+      if (outcome%switches(lane) <= most_switches) outcome%switch_times(outcome%switches(lane), lane) = t
+    end if
+    outcome%implicit(lane) = implicit
+  end subroutine note_method
 
   !> What happened to a lane, when, to which state, and what to try; for the person at the keyboard.
   function failure_sentence(outcome, lane, system, rtol, atol) result(sentence)
@@ -69,6 +109,8 @@ contains
       sentence = not_finite_sentence(outcome, lane, system, when)
     case (integration_gave_up)
       sentence = gave_up_sentence(outcome%steps(lane) == 0, when)
+    case (integration_stopped)
+      sentence = 'the integration was ended by an event at ' // when
     case (integration_interrupted)
       sentence = 'the integration was interrupted at ' // when
     case default

@@ -3,10 +3,12 @@ module nocdyn_rosenbrock_stepper
   use nocdyn_combinations, only: combination, combination_t, combine
   use nocdyn_kinds, only: wp
   use nocdyn_rosenbrock_tables, only: rosenbrock_table_t
+  use nocdyn_spectra, only: allocate_spectra, dominate, spectra_t
   use nocdyn_stage_systems, only: allocate_stage_system, factor, renew_jacobian, solve, stage_system_t
-  use nocdyn_stepper, only: allocate_stages, estimate_error, set_weights, stepper_t, update_state
+  use nocdyn_stages, only: allocate_stages, estimate_error, expand, inner_state, set_weights, stages_t, update_state
+  use nocdyn_stepper, only: stepper_t
   use nocdyn_system, only: system_t
-  use nocdyn_trial, only: evaluate, evaluate_start, trial_t
+  use nocdyn_trial, only: count_evaluations, evaluate_finite, evaluate_start, trial_t
   implicit none (type, external)
   private
 
@@ -14,11 +16,13 @@ module nocdyn_rosenbrock_stepper
 
   type, extends(stepper_t), public :: rosenbrock_stepper_t
     private
+    type(stages_t) :: stages
     real(wp) :: gamma
     real(wp), allocatable :: alpha(:)                 !! places of the stages in the step
     real(wp), allocatable :: gamma_sum(:)             !! factors of h df/dt
     type(combination_t), allocatable :: coupling(:)   !! rows of c_ij
     type(stage_system_t) :: stage_system
+    type(spectra_t) :: spectra
     real(wp), allocatable :: t_stage(:)
     real(wp), allocatable :: y_stage(:, :)
     real(wp), allocatable :: f(:, :)
@@ -31,7 +35,9 @@ module nocdyn_rosenbrock_stepper
     procedure :: prepare
     procedure :: begin
     procedure :: attempt
+    procedure :: interpolate
     procedure :: accept
+    procedure :: stiffness
   end type rosenbrock_stepper_t
 
 contains
@@ -44,6 +50,7 @@ contains
 
     stepper%order = table%order
     stepper%error_order = table%error_order
+    stepper%degree = size(table%dense, 2)
     stepper%gamma = table%gamma
     allocate (stepper%alpha, source=table%alpha)
     allocate (stepper%gamma_sum, source=table%gamma_sum)
@@ -51,33 +58,39 @@ contains
     do i = 1, table%stages
       stepper%coupling(i) = combination(table%c(i, :))
     end do
-    call set_weights(stepper, table%a, table%m, table%error, table%dense)
+    call set_weights(stepper%stages, table%a, table%m, table%error, table%dense)
   end function rosenbrock_stepper
 
   subroutine prepare(self, system)
     class(rosenbrock_stepper_t), intent(inout) :: self
     class(system_t), intent(in) :: system
 
-    call allocate_stages(self, system)
+    call allocate_stages(self%stages, system)
     call allocate_stage_system(self%stage_system, system)
+    call allocate_spectra(self%spectra, system)
     if (allocated(self%slope)) deallocate (self%t_stage, self%y_stage, self%f, self%r, self%one, self%slope, &
                                            self%no_slope, self%no_jacobian)
-    associate (lanes => system%lanes, components => system%states + system%quadratures)
+    associate (lanes => system%lanes)
       allocate (self%t_stage(lanes), source=0.0_wp)
-      allocate (self%y_stage(lanes, components), self%f(lanes, components), self%r(lanes, components), &
-                self%slope(lanes, components), source=0.0_wp)
-      allocate (self%one(lanes, components), source=1.0_wp)
+      allocate (self%y_stage, self%f, self%r, self%slope, source=self%stages%zero)
+      allocate (self%one, source=self%stages%zero + 1)
       allocate (self%no_slope(lanes), self%no_jacobian(lanes), source=.true.)
     end associate
   end subroutine prepare
 
-  subroutine begin(self, trial)
+  subroutine begin(self, trial, starting)
     class(rosenbrock_stepper_t), intent(inout) :: self
-    type(trial_t), intent(in) :: trial
+    type(trial_t), intent(inout) :: trial
+    logical, intent(in) :: starting(:)
+    integer :: lane
 
-    self%slope(:, :) = trial%slope
-    self%no_slope(:) = .false.
-    self%no_jacobian(:) = .true.
+    do lane = 1, size(starting)
+      trial%implicit(lane) = trial%implicit(lane) .or. starting(lane)
+      if (.not. starting(lane)) cycle
+      self%slope(lane, :) = trial%slope(lane, :)
+      self%no_slope(lane) = .false.
+      self%no_jacobian(lane) = .true.
+    end do
   end subroutine begin
 
   subroutine attempt(self, system, trial)
@@ -89,15 +102,16 @@ contains
     call renew_derivatives(self, system, trial)
     call factor(self%stage_system, trial, self%gamma)
     call solve_stage(self, trial, 1, self%slope)
-    do stage = 2, self%stages
-      if (.not. any(trial%working)) return
-      call combine(size(trial%y), self%stages, self%inner(stage), self%k, trial%y, trial%h_spread, self%y_stage)
+    do stage = 2, self%stages%step
+      if (.not. any(trial%working)) exit
+      call inner_state(self%stages, trial, stage, self%y_stage)
       self%t_stage(:) = trial%t + self%alpha(stage) * trial%h
-      call evaluate(trial, system, self%t_stage, self%y_stage, self%f)
+      call evaluate_finite(trial, system, self%t_stage, self%y_stage, self%f)
       call solve_stage(self, trial, stage, self%f)
     end do
-    call update_state(self, trial)
-    call estimate_error(self, trial)
+    call update_state(self%stages, trial)
+    call estimate_error(self%stages, trial)
+    call count_evaluations(trial)
   end subroutine attempt
 
   !> f and its derivatives at the start of the step; a rejected step keeps them.
@@ -125,13 +139,14 @@ contains
     class(rosenbrock_stepper_t), intent(inout) :: self
     type(trial_t), intent(in) :: trial
     integer, intent(in) :: stage
-    real(wp), contiguous, intent(in) :: f(:, :)
+    real(wp), intent(in) :: f(trial%length)
 
-    call combine(size(f), self%stages, self%coupling(stage), self%k, f, self%one, self%r)
+    call combine(trial%length, self%stages%all, self%coupling(stage), self%stages%k, f, self%one, self%r)
     if (abs(self%gamma_sum(stage)) > 0) then
-      call add_time_derivative(size(f), self%gamma_sum(stage), trial%h_spread, self%stage_system%dfdt, self%r)
+      call add_time_derivative(trial%lanes * trial%components, self%gamma_sum(stage), trial%h_spread, &
+                               self%stage_system%dfdt, self%r)
     end if
-    call solve(self%stage_system, trial, self%gamma, self%r, self%k(:, :, stage))
+    call solve(self%stage_system, trial, self%gamma, self%r, self%stages%k(:, :, stage))
   end subroutine solve_stage
 
   pure subroutine add_time_derivative(n, gamma_sum, h, dfdt, r)
@@ -143,6 +158,17 @@ contains
     r = r + h * (gamma_sum * dfdt)
   end subroutine add_time_derivative
 
+  subroutine interpolate(self, system, trial, wanted, coefficients)
+    class(rosenbrock_stepper_t), intent(inout) :: self
+    class(system_t), intent(inout) :: system
+    type(trial_t), intent(inout) :: trial
+    logical, intent(in) :: wanted(:)
+    real(wp), contiguous, intent(inout) :: coefficients(:, :, :)
+
+    call expand(self%stages, trial, coefficients)
+  end subroutine interpolate
+
+  !> Each lane that moved needs new derivatives.
   subroutine accept(self, accepted)
     class(rosenbrock_stepper_t), intent(inout) :: self
     logical, intent(in) :: accepted(:)
@@ -150,5 +176,16 @@ contains
     self%no_slope(:) = self%no_slope .or. accepted
     self%no_jacobian(:) = self%no_jacobian .or. accepted
   end subroutine accept
+
+  !> |h lambda| of the dominant eigenvalue of the Jacobian at the start of the step.
+  function stiffness(self, trial, lane) result(ratio)
+    class(rosenbrock_stepper_t), intent(inout) :: self
+    type(trial_t), intent(in) :: trial
+    integer, intent(in) :: lane
+    real(wp) :: ratio
+
+    call dominate(self%spectra, lane, self%stage_system%dfdy, ratio)
+    ratio = trial%h(lane) * ratio
+  end function stiffness
 
 end module nocdyn_rosenbrock_stepper

@@ -4,7 +4,7 @@ module nocdyn_rosenbrock_tables
   implicit none (type, external)
   private
 
-  public :: rodas4
+  public :: rodas4, rodas5p
 
   !> The transformed form of Hairer and Wanner, Solving Ordinary Differential Equations II, (IV.7.25), with u_i = h k_i:
   !> y_new = y + h sum m_i k_i, where
@@ -74,5 +74,69 @@ contains
     dense(:, 2) = s - r
     dense(:, 3) = -s
   end function rodas_dense
+
+  !> RODAS5P: order 5(4), stiffly accurate, L-stable, with a dense output of order 4; no loss of order on stiff problems of
+  !> Prothero and Robinson's kind.
+  function rodas5p() result(table)
+    type(rosenbrock_table_t) :: table
+
+    table%name = 'rodas5p'
+    table%reference = 'G. Steinebach, Construction of Rosenbrock-Wanner method Rodas5P and numerical benchmarks within ' // &
+      'the Julia Differential Equations package, BIT Numer. Math. 63 (2023) 27'
+    table%stages = 8
+    table%order = 5
+    table%error_order = 4
+    table%dense_order = 4
+    table%gamma = 0.21193756319429014_wp
+    allocate (table%a(8, 8), table%c(8, 8), table%dense(8, 4), source=0.0_wp)
+    allocate (table%alpha(8), table%gamma_sum(8), table%m(8), table%error(8), source=0.0_wp)
+    table%alpha(:) = [0.0_wp, 0.6358126895828704_wp, 0.4095798393397535_wp, 0.9769306725060716_wp, &
+                      0.4288403609558664_wp, 1.0_wp, 1.0_wp, 1.0_wp]
+    table%gamma_sum(:) = [0.21193756319429014_wp, -0.42387512638858027_wp, -0.3384627126235924_wp, &
+                          1.8046452872882734_wp, 2.325825639765069_wp, 0.0_wp, 0.0_wp, 0.0_wp]
+    table%a(2, 1) = 3.0_wp
+    table%a(3, 1:2) = [2.849394379747939_wp, 0.45842242204463923_wp]
+    table%a(4, 1:3) = [-6.954028509809101_wp, 2.489845061869568_wp, -10.358996098473584_wp]
+    table%a(5, 1:4) = [2.8029986275628964_wp, 0.5072464736228206_wp, -0.3988312541770524_wp, -0.04721187230404641_wp]
+    table%a(6, 1:5) = [-7.502846399306121_wp, 2.561846144803919_wp, -11.627539656261098_wp, -0.18268767659942256_wp, &
+                       0.030198172008377946_wp]
+    table%a(7, 1:6) = [table%a(6, 1:5), 1.0_wp]
+    table%a(8, 1:7) = [table%a(7, 1:6), 1.0_wp]
+    table%c(2, 1) = -14.155112264123755_wp
+    table%c(3, 1:2) = [-17.97296035885952_wp, -2.859693295451294_wp]
+    table%c(4, 1:3) = [147.12150275711716_wp, -1.41221402718213_wp, 71.68940251302358_wp]
+    table%c(5, 1:4) = [165.43517024871676_wp, -0.4592823456491126_wp, 42.90938336958603_wp, -5.961986721573306_wp]
+    table%c(6, 1:5) = [24.854864614690072_wp, -3.0009227002832186_wp, 47.4931110020768_wp, 5.5814197821558125_wp, &
+                       -0.6610691825249471_wp]
+    table%c(7, 1:6) = [30.91273214028599_wp, -3.1208243349937974_wp, 77.79954646070892_wp, 34.28646028294783_wp, &
+                       -19.097331116725623_wp, -28.087943162872662_wp]
+    table%c(8, 1:7) = [37.80277123390563_wp, -3.2571969029072276_wp, 112.26918849496327_wp, 66.9347231244047_wp, &
+                       -40.06618937091002_wp, -54.66780262877968_wp, -9.48861652309627_wp]
+    table%m(:) = [table%a(8, 1:7), 1.0_wp]
+    table%error(8) = 1.0_wp
+    table%dense(:, :) = rodas5p_dense(table%m)
+  end function rodas5p
+
+  !> Steinebach's y (1 - theta) + theta (y_new + (1 - theta) (r + theta (s + theta q))), expanded in powers of theta, where
+  !> r, s and q are sums of the stages. No condition of order 4 sees the factors of the last stage, which is y_new minus the
+  !> embedded solution.
+  pure function rodas5p_dense(m) result(dense)
+    real(wp), intent(in) :: m(8)
+    real(wp) :: dense(8, 4)
+    real(wp), parameter :: r(8) = [25.948786856663858_wp, -2.5579724845846235_wp, 10.433815404888879_wp, &
+                                   -2.3679251022685204_wp, 0.524948541321073_wp, 1.1241088310450404_wp, &
+                                   0.4272876194431874_wp, -0.17202221070155493_wp]
+    real(wp), parameter :: s(8) = [-9.91568850695171_wp, -0.9689944594115154_wp, 3.0438037242978453_wp, &
+                                   -24.495224566215796_wp, 20.176138334709044_wp, 15.98066361424651_wp, &
+                                   -6.789040303419874_wp, -6.710236069923372_wp]
+    real(wp), parameter :: q(8) = [11.419903575922262_wp, 2.8879645146136994_wp, 72.92137995996029_wp, &
+                                   80.12511834622643_wp, -52.072871366152654_wp, -59.78993625266729_wp, &
+                                   -0.15582684282751913_wp, 4.883087185713722_wp]
+
+    dense(:, 1) = m + r
+    dense(:, 2) = s - r
+    dense(:, 3) = q - s
+    dense(:, 4) = -q
+  end function rodas5p_dense
 
 end module nocdyn_rosenbrock_tables

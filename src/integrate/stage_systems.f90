@@ -2,8 +2,10 @@
 module nocdyn_stage_systems
   use nocdyn_finite, only: all_finite, is_finite
   use nocdyn_kinds, only: wp
-  use nocdyn_lapack_lu, only: lu_factor, lu_solve
-  use nocdyn_system, only: evaluation_fine, system_t
+  use nocdyn_pattern_entries, only: entries_t, pattern_fault, quadrature_entries, state_entries
+  use nocdyn_stage_matrix, only: stage_matrix_t
+  use nocdyn_stage_solver, only: choose_stage_matrix
+  use nocdyn_system, only: evaluation_fine, pattern_t, system_t
   use nocdyn_trial, only: park, trial_not_finite, trial_shorten, trial_t
   implicit none (type, external)
   private
@@ -13,11 +15,10 @@ module nocdyn_stage_systems
   !> Quadratures drive nothing, so J is block triangular: the factors are those of the states alone, and the rows of the
   !> quadratures follow from the solution for the states.
   type, public :: stage_system_t
-    real(wp), allocatable :: dfdy(:, :, :)             !! shape [lanes, components, states]
-    real(wp), allocatable :: dfdt(:, :)                !! shape [lanes, components]
-    real(wp), allocatable, private :: factors(:, :, :) !! shape [states, states, lanes]
-    integer, allocatable, private :: pivots(:, :)      !! shape [states, lanes]
-    real(wp), allocatable, private :: x(:)             !! right-hand side and solution of one lane
+    real(wp), allocatable :: dfdt(:, :)                     !! shape [lanes, components]
+    real(wp), allocatable :: dfdy(:, :)                     !! shape [lanes, positions]
+    class(stage_matrix_t), allocatable, private :: matrix   !! absent if there are no states
+    type(entries_t), private :: quadratures                 !! entries of the Jacobian in the rows of quadratures
   end type stage_system_t
 
 contains
@@ -26,13 +27,17 @@ contains
   subroutine allocate_stage_system(stage_system, system)
     type(stage_system_t), intent(out) :: stage_system
     class(system_t), intent(in) :: system
+    type(pattern_t) :: pattern
+    character(len=:), allocatable :: fault
 
+    pattern = system%jacobian_pattern()
+    fault = pattern_fault(pattern, system%states, system%quadratures)
+    if (len(fault) > 0) error stop 'nocdyn_stage_systems: ' // fault
     associate (lanes => system%lanes, states => system%states, components => system%states + system%quadratures)
-      allocate (stage_system%dfdy(lanes, components, states), source=0.0_wp)
+      allocate (stage_system%dfdy(lanes, size(pattern%row)), source=0.0_wp)
       allocate (stage_system%dfdt(lanes, components), source=0.0_wp)
-      allocate (stage_system%factors(states, states, lanes), source=0.0_wp)
-      allocate (stage_system%pivots(states, lanes), source=0)
-      allocate (stage_system%x(states), source=0.0_wp)
+      stage_system%quadratures = quadrature_entries(pattern, states)
+      if (states > 0) call choose_stage_matrix(state_entries(pattern, states), lanes, states, stage_system%matrix)
     end associate
   end subroutine allocate_stage_system
 
@@ -43,19 +48,19 @@ contains
     type(trial_t), intent(inout) :: trial
     integer :: lane
 
-    trial%status = evaluation_fine
     call system%jacobian(trial%t, trial%y, stage_system%dfdy, stage_system%dfdt, trial%status)
     associate (dfdy => stage_system%dfdy, dfdt => stage_system%dfdt)
       if (all_finite(size(dfdy), dfdy) .and. all_finite(size(dfdt), dfdt) &
           .and. all(trial%status == evaluation_fine)) return
       do lane = 1, trial%lanes
         if (trial%status(lane) == evaluation_fine) then
-          if (all(is_finite(dfdy(lane, :, :))) .and. all(is_finite(dfdt(lane, :)))) cycle
+          if (all(is_finite(dfdy(lane, :))) .and. all(is_finite(dfdt(lane, :)))) cycle
           trial%status(lane) = trial_not_finite
         end if
-        dfdy(lane, :, :) = 0.0_wp
+        dfdy(lane, :) = 0.0_wp
         dfdt(lane, :) = 0.0_wp
         call park(trial, lane, trial%status(lane), 0)
+        trial%status(lane) = evaluation_fine
       end do
     end associate
   end subroutine renew_jacobian
@@ -66,18 +71,12 @@ contains
     type(trial_t), intent(inout) :: trial
     real(wp), intent(in) :: gamma
     logical :: singular
-    integer :: lane, i, j
+    integer :: lane
 
     if (trial%states == 0) return
     do lane = 1, trial%lanes
       if (.not. trial%working(lane)) cycle
-      do j = 1, trial%states
-        do i = 1, trial%states
-          stage_system%factors(i, j, lane) = -trial%h(lane) * stage_system%dfdy(lane, i, j)
-        end do
-        stage_system%factors(j, j, lane) = stage_system%factors(j, j, lane) + 1 / gamma
-      end do
-      call lu_factor(stage_system%factors(:, :, lane), stage_system%pivots(:, lane), singular)
+      call stage_system%matrix%factor(lane, 1 / gamma, trial%h(lane), stage_system%dfdy, singular)
       trial%factorisations(lane) = trial%factorisations(lane) + 1
       if (singular) call park(trial, lane, trial_shorten, 0)
     end do
@@ -90,43 +89,45 @@ contains
     real(wp), intent(in) :: gamma
     real(wp), contiguous, intent(in) :: r(:, :)      !! shape [lanes, components]
     real(wp), contiguous, intent(inout) :: k(:, :)   !! shape [lanes, components]
-    integer :: lane, i
+    integer :: lane
 
+    if (trial%states > 0) then
+      do lane = 1, trial%lanes
+        if (trial%working(lane)) call stage_system%matrix%solve(lane, r, k)
+      end do
+    end if
+    if (trial%components > trial%states) then
+      call solve_quadratures(trial%lanes, trial%states, trial%components, stage_system%quadratures, stage_system%dfdy, &
+                             gamma, trial%h, r, k)
+    end if
     do lane = 1, trial%lanes
-      if (.not. trial%working(lane)) then
-        k(lane, :) = 0.0_wp
-      else if (trial%states > 0) then
-        do i = 1, trial%states
-          stage_system%x(i) = r(lane, i)
-        end do
-        call lu_solve(stage_system%factors(:, :, lane), stage_system%pivots(:, lane), stage_system%x)
-        do i = 1, trial%states
-          k(lane, i) = stage_system%x(i)
-        end do
-      end if
+      if (.not. trial%working(lane)) k(lane, :) = 0.0_wp
     end do
-    call solve_quadratures(trial%lanes, trial%components, trial%states, gamma, trial%h, stage_system%dfdy, r, k)
   end subroutine solve
 
   !> The rows k_w / gamma - h dfw/dy k_y = r_w.
-  pure subroutine solve_quadratures(lanes, components, states, gamma, h, dfdy, r, k)
-    integer, intent(in) :: lanes, components, states
+  pure subroutine solve_quadratures(lanes, states, components, entries, dfdy, gamma, h, r, k)
+    integer, intent(in) :: lanes, states, components
+    type(entries_t), intent(in) :: entries
+    real(wp), contiguous, intent(in) :: dfdy(:, :)
     real(wp), intent(in) :: gamma
-    real(wp), intent(in) :: h(lanes), dfdy(lanes, components, states), r(lanes, components)
+    real(wp), intent(in) :: h(lanes), r(lanes, components)
     real(wp), intent(inout) :: k(lanes, components)
-    integer :: lane, row, state
+    integer :: lane, p, w
 
-    do row = states + 1, components
+    do w = states + 1, components
       do lane = 1, lanes
-        k(lane, row) = 0.0_wp
+        k(lane, w) = 0.0_wp
       end do
-      do state = 1, states
-        do lane = 1, lanes
-          k(lane, row) = k(lane, row) + dfdy(lane, row, state) * k(lane, state)
-        end do
-      end do
+    end do
+    do p = 1, size(entries%position)
       do lane = 1, lanes
-        k(lane, row) = gamma * (r(lane, row) + h(lane) * k(lane, row))
+        k(lane, entries%row(p)) = k(lane, entries%row(p)) + dfdy(lane, entries%position(p)) * k(lane, entries%column(p))
+      end do
+    end do
+    do w = states + 1, components
+      do lane = 1, lanes
+        k(lane, w) = gamma * (r(lane, w) + h(lane) * k(lane, w))
       end do
     end do
   end subroutine solve_quadratures

@@ -5,7 +5,7 @@ module nocdyn_step_control
   implicit none (type, external)
   private
 
-  public :: step_control, weigh_error, accept_or_reject, shorten, propose, smallest_step
+  public :: step_control, restart, weigh_error, is_within, lengthen, reduce, shorten, propose, smallest_step
 
   ! The constants of Hairer's DOPRI5, for any order of the error estimate.
   real(wp), parameter :: beta = 0.04_wp            !! weight of the last error in the PI controller
@@ -15,6 +15,7 @@ module nocdyn_step_control
   real(wp), parameter :: most_change = 10.0_wp
   real(wp), parameter :: end_stretch = 1.01_wp     !! a step is stretched by up to 1 % to end on the final time
   real(wp), parameter :: least_old_error = 1.0e-4_wp
+  real(wp), parameter :: coarse_share = 0.01_wp    !! of a coarse error estimate in the combination of Hairer's DOP853
 
   real(wp), parameter :: no_error = 1.0e-30_wp         !! stands for an error of zero under the logarithm
   real(wp), parameter :: largest_ratio = 1.0e100_wp    !! keeps the square of an error ratio finite
@@ -23,7 +24,6 @@ module nocdyn_step_control
     real(wp) :: rtol, atol
     real(wp) :: t_end
     real(wp) :: longest
-    real(wp) :: exponent                               !! of the present error
     real(wp), allocatable :: h(:)                      !! next step size of each lane
     real(wp), allocatable :: log_error(:)              !! logarithm of the error of the last accepted step
     logical, allocatable :: was_rejected(:)
@@ -33,10 +33,9 @@ module nocdyn_step_control
 
 contains
 
-  !> A controller for an error estimate of order `error_order`; the first step sizes are still to be set.
-  pure function step_control(lanes, error_order, rtol, atol, t_end, longest) result(control)
+  !> A controller for a block of lanes; the first step sizes are still to be set.
+  pure function step_control(lanes, rtol, atol, t_end, longest) result(control)
     integer, intent(in) :: lanes
-    integer, intent(in) :: error_order
     real(wp), intent(in) :: rtol, atol
     real(wp), intent(in) :: t_end
     real(wp), intent(in) :: longest
@@ -46,11 +45,19 @@ contains
     control%atol = atol
     control%t_end = t_end
     control%longest = longest
-    control%exponent = 1.0_wp / (error_order + 1) - integral_loss * beta
     allocate (control%h(lanes), control%mean_square(lanes), source=0.0_wp)
     allocate (control%log_error(lanes), source=log(least_old_error))
     allocate (control%was_rejected(lanes), control%reaches_end(lanes), source=.false.)
   end function step_control
+
+  !> Forgets the past of a lane.
+  pure subroutine restart(control, lane)
+    type(step_control_t), intent(inout) :: control
+    integer, intent(in) :: lane
+
+    control%log_error(lane) = log(least_old_error)
+    control%was_rejected(lane) = .false.
+  end subroutine restart
 
   !> No step can be shorter: ten spacings of the numbers at t.
   elemental function smallest_step(t)
@@ -73,56 +80,104 @@ contains
   end subroutine propose
 
   !> The mean over the states of (deviation / (atol + rtol max(|y|, |y_new|)))^2; leaves each term in `deviation`.
+  !> A coarse estimate joins in as in DOP853: E5^2 / (E5 + 0.01 E3), sums of squares of the two estimates.
   pure subroutine weigh_error(control, trial)
     type(step_control_t), intent(inout) :: control
     type(trial_t), intent(inout) :: trial
+    integer :: lane
 
-    call weigh(trial%lanes, trial%states, control%rtol, control%atol, trial%y, trial%y_new, trial%deviation, &
-               control%mean_square)
+    call square_ratios(trial%lanes * trial%states, control, trial%y, trial%y_new, trial%deviation)
+    call add_up(trial%lanes, trial%states, trial%deviation, control%mean_square)
+    if (trial%has_coarse_deviation) then
+      call square_ratios(trial%lanes * trial%states, control, trial%y, trial%y_new, trial%coarse_deviation)
+      call add_up(trial%lanes, trial%states, trial%coarse_deviation, trial%scratch)
+      do lane = 1, trial%lanes
+        associate (fine => control%mean_square(lane), coarse => trial%scratch(lane))
+          if (fine > 0) fine = fine * (fine / (fine + coarse_share * coarse))
+        end associate
+      end do
+    end if
+    control%mean_square(:) = control%mean_square / max(trial%states, 1)
   end subroutine weigh_error
 
-  pure subroutine weigh(lanes, states, rtol, atol, y, y_new, deviation, mean_square)
-    integer, intent(in) :: lanes, states
-    real(wp), intent(in) :: rtol, atol
-    real(wp), intent(in) :: y(lanes * states), y_new(lanes * states)
-    real(wp), intent(inout) :: deviation(lanes * states)
-    real(wp), intent(inout) :: mean_square(lanes)
-    real(wp) :: total
-    integer :: i, lane
+  pure subroutine square_ratios(n, control, y, y_new, deviation)
+    integer, intent(in) :: n   !! lanes * states
+    type(step_control_t), intent(in) :: control
+    real(wp), intent(in) :: y(n), y_new(n)
+    real(wp), intent(inout) :: deviation(n)
+    real(wp) :: rtol, atol
+    integer :: i
 
-    do i = 1, lanes * states
+    rtol = control%rtol
+    atol = control%atol
+    do i = 1, n
       deviation(i) = min(abs(deviation(i)) / (atol + rtol * max(abs(y(i)), abs(y_new(i)))), largest_ratio)**2
     end do
-    do lane = 1, lanes
-      total = 0.0_wp
-      do i = lane, lanes * states, lanes
-        total = total + deviation(i)
-      end do
-      mean_square(lane) = total / max(states, 1)
-    end do
-  end subroutine weigh
+  end subroutine square_ratios
 
-  !> PI control after a completed attempt of size h.
-  pure subroutine accept_or_reject(control, lane, h, accepted)
+  !> Sums over the states, of every fourth state first: the additions need not wait for one another.
+  pure subroutine add_up(lanes, states, squares, total)
+    integer, intent(in) :: lanes, states
+    real(wp), intent(in) :: squares(lanes, states)
+    real(wp), intent(inout) :: total(lanes)
+    real(wp) :: part(4)
+    integer :: lane, state, whole
+
+    whole = states - modulo(states, 4)
+    do lane = 1, lanes
+      part = 0.0_wp
+      do state = 1, whole, 4
+        part = part + squares(lane, state:state + 3)
+      end do
+      total(lane) = (part(1) + part(2)) + (part(3) + part(4))
+      do state = whole + 1, states
+        total(lane) = total(lane) + squares(lane, state)
+      end do
+    end do
+  end subroutine add_up
+
+  !> Whether the error of the last attempt is within the tolerances.
+  elemental logical function is_within(mean_square)
+    real(wp), intent(in) :: mean_square   !! of `step_control_t`
+
+    is_within = mean_square <= 1
+  end function is_within
+
+  !> PI control after an accepted step of size h.
+  pure subroutine lengthen(control, lane, error_order, h)
     type(step_control_t), intent(inout) :: control
     integer, intent(in) :: lane
+    integer, intent(in) :: error_order   !! the error falls as h^(error_order + 1)
     real(wp), intent(in) :: h
-    logical, intent(out) :: accepted
     real(wp) :: log_error, change
 
     log_error = 0.5_wp * log(max(control%mean_square(lane), no_error))
-    accepted = control%mean_square(lane) <= 1
-    if (accepted) then
-      change = safety * exp(beta * control%log_error(lane) - control%exponent * log_error)
-      change = max(least_change, min(change, most_change))
-      if (control%was_rejected(lane)) change = min(change, 1.0_wp)
-      control%log_error(lane) = max(log_error, log(least_old_error))
-    else
-      change = max(least_change, safety * exp(-control%exponent * log_error))
-    end if
-    control%was_rejected(lane) = .not. accepted
+    change = safety * exp(beta * control%log_error(lane) - present_exponent(error_order) * log_error)
+    change = max(least_change, min(change, most_change))
+    if (control%was_rejected(lane)) change = min(change, 1.0_wp)
+    control%log_error(lane) = max(log_error, log(least_old_error))
+    control%was_rejected(lane) = .false.
     control%h(lane) = change * h
-  end subroutine accept_or_reject
+  end subroutine lengthen
+
+  !> After an attempt of size h whose error is too large.
+  pure subroutine reduce(control, lane, error_order, h)
+    type(step_control_t), intent(inout) :: control
+    integer, intent(in) :: lane
+    integer, intent(in) :: error_order
+    real(wp), intent(in) :: h
+
+    control%was_rejected(lane) = .true.
+    control%h(lane) = h * max(least_change, &
+                              safety * exp(-0.5_wp * present_exponent(error_order) * log(control%mean_square(lane))))
+  end subroutine reduce
+
+  !> Exponent of the present error in the PI controller.
+  elemental real(wp) function present_exponent(error_order)
+    integer, intent(in) :: error_order
+
+    present_exponent = 1.0_wp / (error_order + 1) - integral_loss * beta
+  end function present_exponent
 
   !> After an attempt of size h that could not be completed.
   pure subroutine shorten(control, lane, h)

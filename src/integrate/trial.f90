@@ -1,12 +1,14 @@
 !> One attempted step of every lane of a block: what the steppers read and what they leave.
 module nocdyn_trial
+  use nocdyn_combinations, only: padded_columns
   use nocdyn_finite, only: all_finite, is_finite
   use nocdyn_kinds, only: wp
   use nocdyn_system, only: evaluation_fine, evaluation_give_up, evaluation_shorten, system_t
   implicit none (type, external)
   private
 
-  public :: allocate_trial, set_out, evaluate, evaluate_start, check_state, check_deviation, park
+  public :: allocate_trial, set_out, spread_steps, evaluate, evaluate_finite, evaluate_start, count_evaluations
+  public :: park, park_infinities
 
   integer, parameter, public :: trial_fine = evaluation_fine
   integer, parameter, public :: trial_shorten = evaluation_shorten
@@ -18,18 +20,24 @@ module nocdyn_trial
     integer :: lanes
     integer :: states
     integer :: components                          !! states and quadratures
+    integer :: length                              !! of the state arrays: whole vectors, the rest after the components is 0
     real(wp), allocatable :: t(:)                  !! start of the step
     real(wp), allocatable :: h(:)                  !! size of the step, 0 for a lane that is not working
-    real(wp), allocatable :: h_spread(:, :)        !! h of each lane, repeated for every component
+    real(wp), allocatable :: h_spread(:, :)        !! h of each lane, repeated; shape [lanes, padded columns] as all these
     real(wp), allocatable :: y(:, :)               !! state at t
     real(wp), allocatable :: y_new(:, :)           !! state at t + h
     real(wp), allocatable :: deviation(:, :)       !! y_new minus the embedded solution
+    real(wp), allocatable :: coarse_deviation(:, :)   !! the same of a coarser one, for methods with two estimates
     real(wp), allocatable :: slope(:, :)           !! f(t, y) where the integration started
     logical, allocatable :: working(:)             !! lanes that take part and have not failed
+    logical :: has_coarse_deviation = .false.
+    real(wp), allocatable :: scratch(:)            !! work space, shape [lanes]
+    logical, allocatable :: implicit(:)            !! lanes that an implicit method moves
+    integer, allocatable :: error_order(:)         !! of the method that moves the lane
     integer, allocatable :: verdict(:)             !! trial_... of each lane
     integer, allocatable :: culprit(:)             !! component that is not finite, 0 if there is none
-    integer, allocatable :: status(:)              !! answers to the last evaluation
-    integer, allocatable :: suspect(:)             !! component that is not finite in the last evaluation
+    integer, allocatable :: status(:)              !! answers to the last evaluation; evaluation_fine between evaluations
+    integer :: made = 0                            !! evaluations that have not been counted yet
     integer, allocatable :: evaluations(:)         !! counts of the whole integration
     integer, allocatable :: jacobians(:)
     integer, allocatable :: factorisations(:)
@@ -42,15 +50,21 @@ contains
     type(trial_t), intent(out) :: trial
     class(system_t), intent(in) :: system
 
+    integer :: columns
+
     associate (lanes => system%lanes, components => system%states + system%quadratures)
+      columns = padded_columns(lanes, components)
       trial%lanes = lanes
       trial%states = system%states
       trial%components = components
-      allocate (trial%t(lanes), trial%h(lanes), source=0.0_wp)
-      allocate (trial%h_spread(lanes, components), trial%y(lanes, components), trial%y_new(lanes, components), &
-                trial%deviation(lanes, components), trial%slope(lanes, components), source=0.0_wp)
+      trial%length = lanes * columns
+      allocate (trial%t(lanes), trial%h(lanes), trial%scratch(lanes), source=0.0_wp)
+      allocate (trial%h_spread(lanes, columns), trial%y(lanes, columns), trial%y_new(lanes, columns), &
+                trial%deviation(lanes, columns), trial%coarse_deviation(lanes, columns), trial%slope(lanes, columns), &
+                source=0.0_wp)
       allocate (trial%working(lanes), source=.true.)
-      allocate (trial%verdict(lanes), trial%culprit(lanes), trial%status(lanes), trial%suspect(lanes), &
+      allocate (trial%implicit(lanes), source=.false.)
+      allocate (trial%error_order(lanes), trial%verdict(lanes), trial%culprit(lanes), trial%status(lanes), &
                 trial%evaluations(lanes), trial%jacobians(lanes), trial%factorisations(lanes), source=0)
     end associate
   end subroutine allocate_trial
@@ -58,105 +72,110 @@ contains
   !> A new attempt of the lanes that are `working`, with the step sizes `h`.
   pure subroutine set_out(trial)
     type(trial_t), intent(inout) :: trial
-    integer :: component
 
     trial%verdict(:) = trial_fine
-    do component = 1, trial%components
-      trial%h_spread(:, component) = trial%h
-    end do
+    call spread_steps(trial)
   end subroutine set_out
 
-  !> dydt = f(t, y) within the step; lanes that cannot go on are parked.
+  !> Repeats the step size of each lane for all components.
+  pure subroutine spread_steps(trial)
+    type(trial_t), intent(inout) :: trial
+    integer :: column
+
+    if (trial%lanes == 1) then
+      trial%h_spread(:, :) = trial%h(1)
+    else
+      do column = 1, size(trial%h_spread, 2)
+        trial%h_spread(:, column) = trial%h
+      end do
+    end if
+  end subroutine spread_steps
+
+  !> dydt = f(t, y) within the step; lanes that cannot go on are parked. Values that are not finite are left to the caller.
   subroutine evaluate(trial, system, t, y, dydt)
     type(trial_t), intent(inout) :: trial
     class(system_t), intent(inout) :: system
-    real(wp), contiguous, intent(in) :: t(:)
-    real(wp), contiguous, intent(in) :: y(:, :)
-    real(wp), contiguous, intent(inout) :: dydt(:, :)
+    real(wp), intent(in) :: t(trial%lanes)
+    real(wp), intent(in) :: y(trial%length)
+    real(wp), intent(inout) :: dydt(trial%length)
     integer :: lane
 
-    do lane = 1, trial%lanes
-      if (trial%working(lane)) trial%evaluations(lane) = trial%evaluations(lane) + 1
-    end do
-    trial%status(:) = evaluation_fine
+    trial%made = trial%made + 1
     call system%derivative(t, y, dydt, trial%status)
-    if (all(trial%status == evaluation_fine)) then
-      if (all_finite(size(dydt), dydt)) return
-    end if
-    call clear_failures(trial%status, trial%suspect, dydt)
-    call park_failures(trial)
+    do lane = 1, trial%lanes
+      if (trial%status(lane) /= evaluation_fine) exit
+    end do
+    if (lane <= trial%lanes) call park_failures(trial, dydt)
   end subroutine evaluate
+
+  !> The same, and lanes whose values are not finite are parked too.
+  subroutine evaluate_finite(trial, system, t, y, dydt)
+    type(trial_t), intent(inout) :: trial
+    class(system_t), intent(inout) :: system
+    real(wp), intent(in) :: t(trial%lanes)
+    real(wp), intent(in) :: y(trial%length)
+    real(wp), intent(inout) :: dydt(trial%length)
+
+    call evaluate(trial, system, t, y, dydt)
+    if (.not. all_finite(trial%length, dydt)) call park_infinities(trial, dydt)
+  end subroutine evaluate_finite
 
   !> slope = f(t, y) at the start of the step, new only for the lanes that moved since the last call.
   subroutine evaluate_start(trial, system, moved, slope)
     type(trial_t), intent(inout) :: trial
     class(system_t), intent(inout) :: system
     logical, intent(in) :: moved(:)
-    real(wp), contiguous, intent(inout) :: slope(:, :)
+    real(wp), intent(inout) :: slope(trial%length)
     integer :: lane
 
     do lane = 1, trial%lanes
       if (trial%working(lane) .and. moved(lane)) trial%evaluations(lane) = trial%evaluations(lane) + 1
     end do
-    trial%status(:) = evaluation_fine
     call system%derivative(trial%t, trial%y, slope, trial%status)
-    if (all(trial%status == evaluation_fine)) then
-      if (all_finite(size(slope), slope)) return
-    end if
-    call clear_failures(trial%status, trial%suspect, slope)
-    call park_failures(trial)
+    if (any(trial%status /= evaluation_fine)) call park_failures(trial, slope)
+    if (.not. all_finite(trial%length, slope)) call park_infinities(trial, slope)
   end subroutine evaluate_start
 
-  !> Turns values that are not finite into a status, and clears the values of the lanes that failed.
-  pure subroutine clear_failures(status, suspect, values)
-    integer, intent(inout) :: status(:)
-    integer, intent(inout) :: suspect(:)   !! component that is not finite, of the lanes where one is
-    real(wp), contiguous, intent(inout) :: values(:, :)
-    integer :: lane, component
-
-    do lane = 1, size(status)
-      if (status(lane) == evaluation_fine) then
-        do component = 1, size(values, 2)
-          if (is_finite(values(lane, component))) cycle
-          status(lane) = trial_not_finite
-          suspect(lane) = component
-          exit
-        end do
-      end if
-      if (status(lane) /= evaluation_fine) values(lane, :) = 0.0_wp
-    end do
-  end subroutine clear_failures
-
-  !> Parks the lanes whose status is not fine.
-  pure subroutine park_failures(trial)
+  !> Counts the evaluations made for the lanes that are still working.
+  pure subroutine count_evaluations(trial)
     type(trial_t), intent(inout) :: trial
     integer :: lane
 
     do lane = 1, trial%lanes
+      if (trial%working(lane)) trial%evaluations(lane) = trial%evaluations(lane) + trial%made
+    end do
+    trial%made = 0
+  end subroutine count_evaluations
+
+  !> Parks the lanes whose status is not fine, and clears their values and the status.
+  pure subroutine park_failures(trial, values)
+    type(trial_t), intent(inout) :: trial
+    real(wp), intent(inout) :: values(trial%lanes, trial%components)
+    integer :: lane
+
+    do lane = 1, trial%lanes
       if (trial%status(lane) == evaluation_fine) cycle
-      call park(trial, lane, trial%status(lane), merge(trial%suspect(lane), 0, trial%status(lane) == trial_not_finite))
+      values(lane, :) = 0.0_wp
+      call park(trial, lane, trial%status(lane), 0)
+      trial%status(lane) = evaluation_fine
     end do
   end subroutine park_failures
 
-  !> Parks the lanes where y_new overflowed.
-  pure subroutine check_state(trial)
+  !> Parks the lanes with values that are not finite, and clears these values.
+  pure subroutine park_infinities(trial, values)
     type(trial_t), intent(inout) :: trial
+    real(wp), intent(inout) :: values(trial%lanes, trial%components)
+    integer :: component, lane
 
-    if (all_finite(size(trial%y_new), trial%y_new)) return
-    trial%status(:) = evaluation_fine
-    call clear_failures(trial%status, trial%suspect, trial%y_new)
-    call park_failures(trial)
-  end subroutine check_state
-
-  !> Parks the lanes where the deviation overflowed.
-  pure subroutine check_deviation(trial)
-    type(trial_t), intent(inout) :: trial
-
-    if (all_finite(size(trial%deviation), trial%deviation)) return
-    trial%status(:) = evaluation_fine
-    call clear_failures(trial%status, trial%suspect, trial%deviation)
-    call park_failures(trial)
-  end subroutine check_deviation
+    do lane = 1, trial%lanes
+      do component = 1, trial%components
+        if (is_finite(values(lane, component))) cycle
+        values(lane, :) = 0.0_wp
+        call park(trial, lane, trial_not_finite, component)
+        exit
+      end do
+    end do
+  end subroutine park_infinities
 
   !> Takes a lane out of this step; the first verdict on it stands.
   pure subroutine park(trial, lane, verdict, culprit)
@@ -169,6 +188,7 @@ contains
     trial%working(lane) = .false.
     trial%verdict(lane) = verdict
     trial%culprit(lane) = culprit
+    trial%evaluations(lane) = trial%evaluations(lane) + trial%made
     trial%h(lane) = 0.0_wp
     trial%h_spread(lane, :) = 0.0_wp
   end subroutine park

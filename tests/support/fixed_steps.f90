@@ -7,7 +7,7 @@ module nocdyn_fixed_steps
   implicit none (type, external)
   private
 
-  public :: take_steps, one_step, measured_order
+  public :: prepare_trial, take_steps, one_step, measured_order
 
 contains
 
@@ -30,7 +30,7 @@ contains
       trial%y = trial%y_new
       call stepper%accept(trial%working)
     end do
-    y = trial%y(1, :)
+    y = trial%y(1, :trial%components)
   end subroutine take_steps
 
   !> One step of size h: its result, its deviation from the embedded solution, and the solution inside it at `theta`.
@@ -42,20 +42,21 @@ contains
     real(wp), intent(inout) :: y(:, :)   !! first column: start; on return the columns y_new, deviation, y(t + theta h)
     type(trial_t) :: trial
     real(wp), allocatable :: coefficients(:, :, :)
+    logical, parameter :: wanted(1) = .true.
     integer :: power
 
     call prepare_trial(stepper, system, t, y(:, 1), trial)
     trial%h = h
     call set_out(trial)
     call stepper%attempt(system, trial)
-    allocate (coefficients(1, size(y, 1), size(stepper%dense)), source=0.0_wp)
-    call stepper%interpolate(trial, coefficients)
-    y(:, 3) = trial%y(1, :)
+    allocate (coefficients(1, size(trial%y, 2), stepper%degree), source=0.0_wp)
+    call stepper%interpolate(system, trial, wanted, coefficients)
+    y(:, 3) = trial%y(1, :size(y, 1))
     do power = 1, size(coefficients, 3)
-      y(:, 3) = y(:, 3) + theta**power * coefficients(1, :, power)
+      y(:, 3) = y(:, 3) + theta**power * coefficients(1, :size(y, 1), power)
     end do
-    y(:, 1) = trial%y_new(1, :)
-    y(:, 2) = trial%deviation(1, :)
+    y(:, 1) = trial%y_new(1, :size(y, 1))
+    y(:, 2) = trial%deviation(1, :size(y, 1))
   end subroutine one_step
 
   subroutine prepare_trial(stepper, system, t, y, trial)
@@ -67,10 +68,11 @@ contains
 
     call stepper%prepare(system)
     call allocate_trial(trial, system)
+    trial%has_coarse_deviation = stepper%has_coarse_error
     trial%t = t
-    trial%y(1, :) = y
+    trial%y(1, :size(y)) = y
     call evaluate_start(trial, system, trial%working, trial%slope)
-    call stepper%begin(trial)
+    call stepper%begin(trial, trial%working)
   end subroutine prepare_trial
 
   !> The exponent p of errors that fall as h^p when h is halved.

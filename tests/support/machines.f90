@@ -15,7 +15,7 @@ module nocdyn_test_machines
   implicit none (type, external)
   private
 
-  public :: paper_machine, damped_chain, branched_train, gear_loop, bare_machine
+  public :: paper_machine, damped_chain, long_chain, branched_train, gear_loop, bare_machine
   public :: install, gear_rows, numbered_names, finish
 
 contains
@@ -60,6 +60,24 @@ contains
     machine%start_speed = row([1.0_wp, 0.5_wp, -0.4_wp, 2.0_wp])
     call finish(machine, [integer ::], 1)
   end function damped_chain
+
+  !> Rotors of 1 kg m2 in a row, driven at the first and braked at the last.
+  function long_chain(bodies) result(machine)
+    integer, intent(in) :: bodies
+    type(machine_t) :: machine
+    integer :: i
+
+    machine = bare_machine(row([(1.0_wp, i=1, bodies)]))
+    associate (stiffness => row([(1.0e4_wp, i=1, bodies - 1)]))
+      call install(machine%banks, new_couplings(numbered_names('shaft', bodies - 1), [(i, i=1, bodies - 1)], &
+                                                [(i + 1, i=1, bodies - 1)], stiffness, 10.0_wp * stiffness, &
+                                                1.0e-4_wp * stiffness, 0.0_wp * stiffness))
+    end associate
+    call install(machine%banks, new_motors(numbered_names('motor', 1), [1], row([100.0_wp]), row([0.0_wp]), &
+                                           row([0.0_wp])))
+    call install(machine%banks, new_loads(numbered_names('load', 1), [bodies], row([10.0_wp])))
+    call finish(machine, [integer ::], 1)
+  end function long_chain
 
   !> Seven bodies: body 2 drives 1, 3 (an internal gear) and 4; 5 drives 6; 7 is free. The couplings form a loop.
   function branched_train(choice) result(machine)
@@ -148,7 +166,7 @@ contains
     end associate
   end function gear_rows
 
-  !> Analyses the gears of a machine that has everything else.
+  !> Numbers the elements and analyses the gears of a machine that has everything else.
   subroutine finish(machine, wanted, choice)
     type(machine_t), intent(inout) :: machine
     integer, intent(in) :: wanted(:)   !! bodies that are to be the coordinates, none to have them found
@@ -156,6 +174,7 @@ contains
     type(error_t), allocatable :: error
     integer :: culprit
 
+    call machine%number_elements()
     call analyse_constraints(machine%constraints, machine%names, wanted, machine%groups, culprit, error)
     if (allocated(error)) error stop 'nocdyn_test_machines: a machine to test with has gears that lock'
     machine%coordinates = new_coordinates(machine%constraints, machine%groups, machine%inertia, wanted, choice)

@@ -19,18 +19,22 @@ module nocdyn_test_states
 
 contains
 
-  subroutine formulate(machine, which, formulation)
+  subroutine formulate(machine, which, formulation, audited)
     type(machine_t), intent(in) :: machine
     integer, intent(in) :: which   !! `reduced`, `paper` or `multiplier`
     class(formulation_t), allocatable, intent(out) :: formulation
+    logical, intent(in), optional :: audited   !! whether the works are integrated; absent: they are
+    logical :: has_works
 
+    has_works = .true.
+    if (present(audited)) has_works = audited
     select case (which)
     case (reduced)
-      formulation = new_reduced(machine)
+      formulation = new_reduced(machine, has_works)
     case (paper)
-      formulation = new_paper(machine)
+      formulation = new_paper(machine, has_works)
     case default
-      formulation = new_multiplier(machine)
+      formulation = new_multiplier(machine, has_works)
     end select
   end subroutine formulate
 
@@ -104,17 +108,14 @@ contains
     end do
   end subroutine place_moments
 
-  !> Brings the banks to a state, with all that the paper's matrices are read from.
+  !> Brings the elements to a state, with all that the paper's matrices are read from.
   subroutine bring_to(machine, t, phi, omega)
     type(machine_t), intent(inout) :: machine
     real(wp), contiguous, intent(in) :: t(:)
     real(wp), contiguous, intent(in) :: phi(:, 0:), omega(:, 0:)
-    integer :: i
 
     call machine%differentiate(t, phi, omega)
-    do i = 1, size(machine%banks)
-      call machine%banks(i)%bank%assess()
-    end do
+    call machine%assess()
   end subroutine bring_to
 
 end module nocdyn_test_states

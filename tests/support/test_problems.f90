@@ -4,7 +4,8 @@
 !> functions, so that a lane would depend on its place in the block: loops with such calls are marked `novector`.
 module nocdyn_test_problems
   use nocdyn_kinds, only: wp
-  use nocdyn_system, only: evaluation_fine, evaluation_give_up, evaluation_shorten, system_t
+  use nocdyn_system, only: evaluation_fine, evaluation_give_up, evaluation_shorten, pattern_t, system_t
+  use nocdyn_text, only: to_text
   implicit none (type, external)
   private
 
@@ -25,7 +26,6 @@ module nocdyn_test_problems
   contains
     procedure :: derivative => smooth_derivative
     procedure :: jacobian => smooth_jacobian
-    procedure :: component_name => smooth_name
   end type smooth_t
 
   !> Prothero and Robinson: y' = -stiffness (y - cos t) - sin t, with y = cos t, and a quadrature w' = y.
@@ -34,7 +34,6 @@ module nocdyn_test_problems
   contains
     procedure :: derivative => stiff_derivative
     procedure :: jacobian => stiff_jacobian
-    procedure :: component_name => stiff_name
   end type stiff_t
 
   !> x'' + 0.1 x' + stiffness x + x^3 = 3 cos(1.3 t), and the work of the damper as a quadrature.
@@ -43,7 +42,7 @@ module nocdyn_test_problems
   contains
     procedure :: derivative => duffing_derivative
     procedure :: jacobian => duffing_jacobian
-    procedure :: component_name => duffing_name
+    procedure :: jacobian_pattern => duffing_pattern
   end type duffing_t
 
   !> (y1', y2') = (1, cos t) as long as y1 < place; then whatever `answer` says.
@@ -61,7 +60,6 @@ module nocdyn_test_problems
   contains
     procedure :: derivative => rest_derivative
     procedure :: jacobian => rest_jacobian
-    procedure :: component_name => rest_name
   end type rest_t
 
 contains
@@ -113,10 +111,10 @@ contains
 
   subroutine smooth_derivative(self, t, y, dydt, status)
     class(smooth_t), intent(inout) :: self
-    real(wp), contiguous, intent(in) :: t(:)
-    real(wp), contiguous, intent(in) :: y(:, :)
-    real(wp), contiguous, intent(inout) :: dydt(:, :)
-    integer, contiguous, intent(inout) :: status(:)
+    real(wp), intent(in) :: t(self%lanes)
+    real(wp), intent(in) :: y(self%lanes, self%states + self%quadratures)
+    real(wp), intent(inout) :: dydt(self%lanes, self%states + self%quadratures)
+    integer, intent(inout) :: status(self%lanes)
     real(wp) :: u(2)
     integer :: lane
 
@@ -131,11 +129,11 @@ contains
 
   subroutine smooth_jacobian(self, t, y, dfdy, dfdt, status)
     class(smooth_t), intent(inout) :: self
-    real(wp), contiguous, intent(in) :: t(:)
-    real(wp), contiguous, intent(in) :: y(:, :)
-    real(wp), contiguous, intent(inout) :: dfdy(:, :, :)
-    real(wp), contiguous, intent(inout) :: dfdt(:, :)
-    integer, contiguous, intent(inout) :: status(:)
+    real(wp), intent(in) :: t(self%lanes)
+    real(wp), intent(in) :: y(self%lanes, self%states + self%quadratures)
+    real(wp), contiguous, intent(inout) :: dfdy(:, :)
+    real(wp), intent(inout) :: dfdt(self%lanes, self%states + self%quadratures)
+    integer, intent(inout) :: status(self%lanes)
     real(wp) :: u(2), v(2)
     integer :: lane
 
@@ -144,22 +142,13 @@ contains
     do lane = 1, self%lanes
       u = smooth_solution(t(lane))
       v = smooth_slope(t(lane))
-      dfdy(lane, 1, :) = self%rate(lane) * [-y(lane, 2), -y(lane, 1) + y(lane, 2)]
-      dfdy(lane, 2, :) = self%rate(lane) * [y(lane, 1), -1.0_wp]
-      dfdy(lane, 3, :) = [y(lane, 2)**2, 2 * y(lane, 1) * y(lane, 2)]
+      dfdy(lane, 1:3) = [-self%rate(lane) * y(lane, 2), self%rate(lane) * y(lane, 1), y(lane, 2)**2]
+      dfdy(lane, 4:6) = [self%rate(lane) * (y(lane, 2) - y(lane, 1)), -self%rate(lane), 2 * y(lane, 1) * y(lane, 2)]
       dfdt(lane, 1:2) = smooth_curvature(t(lane)) &
         - self%rate(lane) * [-v(1) * u(2) - u(1) * v(2) + u(2) * v(2), u(1) * v(1) - v(2)]
       dfdt(lane, 3) = -v(1) * u(2)**2 - 2 * u(1) * u(2) * v(2) - 2 * sin(2 * t(lane))
     end do
   end subroutine smooth_jacobian
-
-  function smooth_name(self, index) result(name)
-    class(smooth_t), intent(in) :: self
-    integer, intent(in) :: index
-    character(len=:), allocatable :: name
-
-    name = numbered('smooth', index, self%states)
-  end function smooth_name
 
   pure function stiff_problem(stiffness) result(problem)
     real(wp), intent(in) :: stiffness(:)
@@ -173,10 +162,10 @@ contains
 
   subroutine stiff_derivative(self, t, y, dydt, status)
     class(stiff_t), intent(inout) :: self
-    real(wp), contiguous, intent(in) :: t(:)
-    real(wp), contiguous, intent(in) :: y(:, :)
-    real(wp), contiguous, intent(inout) :: dydt(:, :)
-    integer, contiguous, intent(inout) :: status(:)
+    real(wp), intent(in) :: t(self%lanes)
+    real(wp), intent(in) :: y(self%lanes, self%states + self%quadratures)
+    real(wp), intent(inout) :: dydt(self%lanes, self%states + self%quadratures)
+    integer, intent(inout) :: status(self%lanes)
     integer :: lane
 
     status = evaluation_fine
@@ -189,30 +178,22 @@ contains
 
   subroutine stiff_jacobian(self, t, y, dfdy, dfdt, status)
     class(stiff_t), intent(inout) :: self
-    real(wp), contiguous, intent(in) :: t(:)
-    real(wp), contiguous, intent(in) :: y(:, :)
-    real(wp), contiguous, intent(inout) :: dfdy(:, :, :)
-    real(wp), contiguous, intent(inout) :: dfdt(:, :)
-    integer, contiguous, intent(inout) :: status(:)
+    real(wp), intent(in) :: t(self%lanes)
+    real(wp), intent(in) :: y(self%lanes, self%states + self%quadratures)
+    real(wp), contiguous, intent(inout) :: dfdy(:, :)
+    real(wp), intent(inout) :: dfdt(self%lanes, self%states + self%quadratures)
+    integer, intent(inout) :: status(self%lanes)
     integer :: lane
 
     status = evaluation_fine
     dfdt(:, 2) = 0.0_wp * y(:, 2)
     !GCC$ novector
     do lane = 1, self%lanes
-      dfdy(lane, 1, 1) = -self%stiffness(lane)
-      dfdy(lane, 2, 1) = 1.0_wp
+      dfdy(lane, 1) = -self%stiffness(lane)
+      dfdy(lane, 2) = 1.0_wp
       dfdt(lane, 1) = -self%stiffness(lane) * sin(t(lane)) - cos(t(lane))
     end do
   end subroutine stiff_jacobian
-
-  function stiff_name(self, index) result(name)
-    class(stiff_t), intent(in) :: self
-    integer, intent(in) :: index
-    character(len=:), allocatable :: name
-
-    name = numbered('stiff', index, self%states)
-  end function stiff_name
 
   pure function duffing_problem(stiffness) result(problem)
     real(wp), intent(in) :: stiffness(:)
@@ -226,10 +207,10 @@ contains
 
   subroutine duffing_derivative(self, t, y, dydt, status)
     class(duffing_t), intent(inout) :: self
-    real(wp), contiguous, intent(in) :: t(:)
-    real(wp), contiguous, intent(in) :: y(:, :)
-    real(wp), contiguous, intent(inout) :: dydt(:, :)
-    integer, contiguous, intent(inout) :: status(:)
+    real(wp), intent(in) :: t(self%lanes)
+    real(wp), intent(in) :: y(self%lanes, self%states + self%quadratures)
+    real(wp), intent(inout) :: dydt(self%lanes, self%states + self%quadratures)
+    integer, intent(inout) :: status(self%lanes)
     integer :: lane
 
     status = evaluation_fine
@@ -241,35 +222,34 @@ contains
     end do
   end subroutine duffing_derivative
 
+  function duffing_pattern(self) result(pattern)
+    class(duffing_t), intent(in) :: self
+    type(pattern_t) :: pattern
+
+    allocate (pattern%row, source=[2, 1, 2, self%states + 1])
+    allocate (pattern%column, source=[1, 2, 2, 2])
+  end function duffing_pattern
+
   subroutine duffing_jacobian(self, t, y, dfdy, dfdt, status)
     class(duffing_t), intent(inout) :: self
-    real(wp), contiguous, intent(in) :: t(:)
-    real(wp), contiguous, intent(in) :: y(:, :)
-    real(wp), contiguous, intent(inout) :: dfdy(:, :, :)
-    real(wp), contiguous, intent(inout) :: dfdt(:, :)
-    integer, contiguous, intent(inout) :: status(:)
+    real(wp), intent(in) :: t(self%lanes)
+    real(wp), intent(in) :: y(self%lanes, self%states + self%quadratures)
+    real(wp), contiguous, intent(inout) :: dfdy(:, :)
+    real(wp), intent(inout) :: dfdt(self%lanes, self%states + self%quadratures)
+    integer, intent(inout) :: status(self%lanes)
     integer :: lane
 
     status = evaluation_fine
-    dfdy(:, :, :) = 0.0_wp
-    dfdy(:, 1, 2) = 1.0_wp
-    dfdy(:, 2, 1) = -self%stiffness - 3 * y(:, 1)**2
-    dfdy(:, 2, 2) = -0.1_wp
-    dfdy(:, 3, 2) = 0.2_wp * y(:, 2)
+    dfdy(:, 1) = -self%stiffness - 3 * y(:, 1)**2
+    dfdy(:, 2) = 1.0_wp
+    dfdy(:, 3) = -0.1_wp
+    dfdy(:, 4) = 0.2_wp * y(:, 2)
     dfdt(:, :) = 0.0_wp
     !GCC$ novector
     do lane = 1, self%lanes
       dfdt(lane, 2) = -3.9_wp * sin(1.3_wp * t(lane))
     end do
   end subroutine duffing_jacobian
-
-  function duffing_name(self, index) result(name)
-    class(duffing_t), intent(in) :: self
-    integer, intent(in) :: index
-    character(len=:), allocatable :: name
-
-    name = numbered('duffing', index, self%states)
-  end function duffing_name
 
   pure function wall_problem(place, answer) result(problem)
     real(wp), intent(in) :: place(:)
@@ -284,10 +264,10 @@ contains
 
   subroutine wall_derivative(self, t, y, dydt, status)
     class(wall_t), intent(inout) :: self
-    real(wp), contiguous, intent(in) :: t(:)
-    real(wp), contiguous, intent(in) :: y(:, :)
-    real(wp), contiguous, intent(inout) :: dydt(:, :)
-    integer, contiguous, intent(inout) :: status(:)
+    real(wp), intent(in) :: t(self%lanes)
+    real(wp), intent(in) :: y(self%lanes, self%states + self%quadratures)
+    real(wp), intent(inout) :: dydt(self%lanes, self%states + self%quadratures)
+    integer, intent(inout) :: status(self%lanes)
     integer :: lane
 
     status = evaluation_fine
@@ -313,20 +293,20 @@ contains
 
   subroutine wall_jacobian_values(self, t, y, dfdy, dfdt, status)
     class(wall_t), intent(inout) :: self
-    real(wp), contiguous, intent(in) :: t(:)
-    real(wp), contiguous, intent(in) :: y(:, :)
-    real(wp), contiguous, intent(inout) :: dfdy(:, :, :)
-    real(wp), contiguous, intent(inout) :: dfdt(:, :)
-    integer, contiguous, intent(inout) :: status(:)
+    real(wp), intent(in) :: t(self%lanes)
+    real(wp), intent(in) :: y(self%lanes, self%states + self%quadratures)
+    real(wp), contiguous, intent(inout) :: dfdy(:, :)
+    real(wp), intent(inout) :: dfdt(self%lanes, self%states + self%quadratures)
+    integer, intent(inout) :: status(self%lanes)
     integer :: lane
 
     status = evaluation_fine
-    dfdy(:, :, :) = 0.0_wp
+    dfdy(:, :) = 0.0_wp
     dfdt(:, :) = 0.0_wp
     !GCC$ novector
     do lane = 1, self%lanes
       dfdt(lane, 2) = -sin(t(lane))
-      if (self%answer(lane) == wall_jacobian .and. y(lane, 1) >= self%place(lane)) dfdy(lane, 1, 2) = quiet_nan()
+      if (self%answer(lane) == wall_jacobian .and. y(lane, 1) >= self%place(lane)) dfdy(lane, 3) = quiet_nan()
     end do
   end subroutine wall_jacobian_values
 
@@ -335,7 +315,8 @@ contains
     integer, intent(in) :: index
     character(len=:), allocatable :: name
 
-    name = numbered('wall', index, self%states)
+    name = 'wall state ' // to_text(index)
+    if (index > self%states) error stop 'nocdyn_test_problems: the wall has no quadratures'
   end function wall_name
 
   !> NaN that raises no exception when it is made or copied.
@@ -357,10 +338,10 @@ contains
 
   subroutine rest_derivative(self, t, y, dydt, status)
     class(rest_t), intent(inout) :: self
-    real(wp), contiguous, intent(in) :: t(:)
-    real(wp), contiguous, intent(in) :: y(:, :)
-    real(wp), contiguous, intent(inout) :: dydt(:, :)
-    integer, contiguous, intent(inout) :: status(:)
+    real(wp), intent(in) :: t(self%lanes)
+    real(wp), intent(in) :: y(self%lanes, self%states + self%quadratures)
+    real(wp), intent(inout) :: dydt(self%lanes, self%states + self%quadratures)
+    integer, intent(inout) :: status(self%lanes)
 
     status = merge(evaluation_fine, evaluation_give_up, size(t) == self%lanes .and. size(y, 1) == self%lanes)
     dydt(:, :self%states) = 0.0_wp
@@ -369,32 +350,15 @@ contains
 
   subroutine rest_jacobian(self, t, y, dfdy, dfdt, status)
     class(rest_t), intent(inout) :: self
-    real(wp), contiguous, intent(in) :: t(:)
-    real(wp), contiguous, intent(in) :: y(:, :)
-    real(wp), contiguous, intent(inout) :: dfdy(:, :, :)
-    real(wp), contiguous, intent(inout) :: dfdt(:, :)
-    integer, contiguous, intent(inout) :: status(:)
+    real(wp), intent(in) :: t(self%lanes)
+    real(wp), intent(in) :: y(self%lanes, self%states + self%quadratures)
+    real(wp), contiguous, intent(inout) :: dfdy(:, :)
+    real(wp), intent(inout) :: dfdt(self%lanes, self%states + self%quadratures)
+    integer, intent(inout) :: status(self%lanes)
 
     status = merge(evaluation_fine, evaluation_give_up, size(t) == self%lanes .and. size(y, 1) == self%lanes)
-    dfdy(:, :, :) = 0.0_wp
+    dfdy(:, :) = 0.0_wp
     dfdt(:, :) = 0.0_wp
   end subroutine rest_jacobian
-
-  function rest_name(self, index) result(name)
-    class(rest_t), intent(in) :: self
-    integer, intent(in) :: index
-    character(len=:), allocatable :: name
-
-    name = numbered('rest', index, self%states)
-  end function rest_name
-
-  pure function numbered(word, index, states) result(name)
-    character(len=*), intent(in) :: word
-    integer, intent(in) :: index, states
-    character(len=:), allocatable :: name
-
-    name = word // merge(' state     ', ' quadrature', index <= states)
-    name = trim(name) // ' ' // achar(iachar('0') + index)
-  end function numbered
 
 end module nocdyn_test_problems

@@ -1,0 +1,97 @@
+!> The solution of one lane inside its last step: polynomials in theta = (time - t) / h.
+module nocdyn_dense_output
+  use nocdyn_combinations, only: width
+  use nocdyn_kinds, only: wp
+  use nocdyn_trial, only: trial_t
+  implicit none (type, external)
+  private
+
+  public :: allocate_dense_output, take_lane, sample
+
+  !> y(t + theta h) = sum over p = 0 to degree of c(:, p) theta^p.
+  type, public :: dense_output_t
+    integer :: lane = 0                         !! that the polynomials belong to
+    real(wp) :: t = 0.0_wp, h = 0.0_wp          !! its last step
+    real(wp), allocatable, private :: c(:, :)   !! [whole vectors of components, 0:degree]
+    real(wp), allocatable, private :: y(:)      !! [whole vectors of components]
+  end type dense_output_t
+
+contains
+
+  !> Room for the polynomials of one lane.
+  subroutine allocate_dense_output(dense, components, degree)
+    type(dense_output_t), intent(out) :: dense
+    integer, intent(in) :: components
+    integer, intent(in) :: degree
+    integer :: length
+
+    length = width * ((components + width - 1) / width)
+    allocate (dense%c(length, 0:degree), dense%y(length), source=0.0_wp)
+  end subroutine allocate_dense_output
+
+  !> Takes over the polynomials of one lane of a block.
+  pure subroutine take_lane(dense, trial, coefficients, lane)
+    type(dense_output_t), intent(inout) :: dense
+    type(trial_t), intent(in) :: trial
+    real(wp), contiguous, intent(in) :: coefficients(:, :, :)   !! of the powers 1 to degree, [lanes, padded columns, degree]
+    integer, intent(in) :: lane
+    integer :: power
+
+    dense%lane = lane
+    dense%t = trial%t(lane)
+    dense%h = trial%h(lane)
+    associate (n => trial%components)
+      dense%c(:n, 0) = trial%y(lane, :n)
+      do power = 1, size(coefficients, 3)
+        dense%c(:n, power) = coefficients(lane, :n, power)
+      end do
+    end associate
+  end subroutine take_lane
+
+  !> The state at t + theta h, 0 <= theta <= 1.
+  pure subroutine sample(dense, theta, y)
+    type(dense_output_t), intent(inout) :: dense
+    real(wp), intent(in) :: theta
+    real(wp), contiguous, intent(inout) :: y(:)   !! [components]
+
+    call evaluate(size(dense%y), ubound(dense%c, 2), theta, dense%c, dense%y)
+    y(:) = dense%y(:size(y))
+  end subroutine sample
+
+  !> Written out for the degrees of the methods, so that the loop over the components is the innermost.
+  pure subroutine evaluate(n, degree, x, c, y)
+    integer, intent(in) :: n, degree
+    real(wp), intent(in) :: x
+    real(wp), intent(in) :: c(n, 0:degree)
+    real(wp), intent(inout) :: y(n)
+    integer :: i, p
+
+    select case (degree)
+    case (3)
+      do i = 1, n, width
+        associate (j => i + width - 1)
+          y(i:j) = c(i:j, 0) + x * (c(i:j, 1) + x * (c(i:j, 2) + x * c(i:j, 3)))
+        end associate
+      end do
+    case (4)
+      do i = 1, n, width
+        associate (j => i + width - 1)
+          y(i:j) = c(i:j, 0) + x * (c(i:j, 1) + x * (c(i:j, 2) + x * (c(i:j, 3) + x * c(i:j, 4))))
+        end associate
+      end do
+    case (7)
+      do i = 1, n, width
+        associate (j => i + width - 1)
+          y(i:j) = c(i:j, 0) + x * (c(i:j, 1) + x * (c(i:j, 2) + x * (c(i:j, 3) + x * (c(i:j, 4) + x * (c(i:j, 5) &
+                                    + x * (c(i:j, 6) + x * c(i:j, 7)))))))
+        end associate
+      end do
+    case default
+      y(:) = c(:, degree)
+      do p = degree - 1, 0, -1
+        y(:) = c(:, p) + x * y
+      end do
+    end select
+  end subroutine evaluate
+
+end module nocdyn_dense_output

@@ -1,0 +1,213 @@
+!> Extremes in continuous time of functions of the solution, such as moments and reactions.
+!>
+!> In every step each function is replaced by the polynomial through its values at a few places of the solution inside the
+!> step (Chebyshev-Lobatto places, as many as that solution has coefficients: a linear function of the state is met
+!> exactly). Its critical points are found to machine precision wherever they can exceed the extremes so far.
+module nocdyn_extremes
+  use nocdyn_dense_output, only: dense_output_t, sample
+  use nocdyn_kinds, only: wp
+  use nocdyn_lapack, only: invert
+  use nocdyn_system, only: observer_t, ranges_t
+  use nocdyn_trial, only: trial_t
+  implicit none (type, external)
+  private
+
+  public :: allocate_extremes, start_extremes, follow_extremes
+
+  real(wp), parameter :: overshoot = 0.25_wp   !! of the spread of the values: no polynomial is expected to pass them by more
+  integer, parameter :: most_places = 16       !! in a step
+  integer, parameter :: most_newton_steps = 60   !! bisection alone would need as many
+
+  type, public :: extremes_t
+    type(ranges_t), allocatable :: ranges(:)               !! [lanes]
+    real(wp), allocatable, private :: last(:, :)           !! values at the end of the last step, [functions, lanes]
+    real(wp), allocatable, private :: places(:)            !! in the step, -1 to 1, [places]
+    real(wp), allocatable, private :: to_powers(:, :)      !! from values to coefficients of the powers 0, 1, ... of the place
+    real(wp), allocatable, private :: values(:, :)         !! [functions, places]
+    real(wp), allocatable, private :: y(:)                 !! [components]
+  end type extremes_t
+
+contains
+
+  !> Room for the tracked functions of an observer, on solutions of a degree inside the step.
+  subroutine allocate_extremes(extremes, functions, degree, trial)
+    type(extremes_t), intent(out) :: extremes
+    integer, intent(in) :: functions
+    integer, intent(in) :: degree
+    type(trial_t), intent(in) :: trial
+    real(wp), parameter :: pi = acos(-1.0_wp)
+    real(wp) :: powers(degree + 1, degree + 1), log_determinant
+    logical :: is_singular
+    integer :: i, lane
+
+    if (degree >= most_places) error stop 'nocdyn_extremes: the solution inside the step has too many coefficients'
+    allocate (extremes%places(degree + 1))
+    extremes%places(:) = [(-cos(pi * i / degree), i=0, degree)]
+    do i = 0, degree
+      powers(:, i + 1) = extremes%places**i
+    end do
+    call invert(powers, extremes%to_powers, log_determinant, is_singular)
+    if (is_singular) error stop 'nocdyn_extremes: two places are the same'
+    allocate (extremes%ranges(trial%lanes))
+    do lane = 1, trial%lanes
+      associate (ranges => extremes%ranges(lane))
+        allocate (ranges%lowest(functions), ranges%lowest_time(functions), ranges%highest(functions), &
+                  ranges%highest_time(functions), source=0.0_wp)
+      end associate
+    end do
+    allocate (extremes%last(functions, trial%lanes), extremes%values(functions, degree + 1), extremes%y(trial%components), &
+              source=0.0_wp)
+  end subroutine allocate_extremes
+
+  !> The ranges of a lane at its start.
+  subroutine start_extremes(extremes, observer, trial, lane)
+    type(extremes_t), intent(inout) :: extremes
+    class(observer_t), intent(inout) :: observer
+    type(trial_t), intent(in) :: trial
+    integer, intent(in) :: lane
+
+    extremes%y(:) = trial%y(lane, :trial%components)
+    call observer%tracked_values(lane, trial%t(lane), extremes%y, extremes%last(:, lane))
+    associate (ranges => extremes%ranges(lane))
+      ranges%lowest(:) = extremes%last(:, lane)
+      ranges%highest(:) = extremes%last(:, lane)
+      ranges%lowest_time(:) = trial%t(lane)
+      ranges%highest_time(:) = trial%t(lane)
+    end associate
+  end subroutine start_extremes
+
+  !> Widens the ranges of a lane by its last step, up to t_end.
+  subroutine follow_extremes(extremes, observer, dense, t_end)
+    type(extremes_t), intent(inout) :: extremes
+    class(observer_t), intent(inout) :: observer
+    type(dense_output_t), intent(inout) :: dense   !! of the lane
+    real(wp), intent(in) :: t_end
+    real(wp) :: t, half, middle
+    integer :: i, last
+
+    last = size(extremes%places)
+    half = 0.5_wp * (t_end - dense%t)
+    middle = dense%t + half
+    extremes%values(:, 1) = extremes%last(:, dense%lane)
+    do i = 2, last
+      t = middle + extremes%places(i) * half
+      call sample(dense, min(1.0_wp, (t - dense%t) / dense%h), extremes%y)
+      call observer%tracked_values(dense%lane, t, extremes%y, extremes%values(:, i))
+    end do
+    extremes%last(:, dense%lane) = extremes%values(:, last)
+    call widen(extremes, extremes%ranges(dense%lane), dense%t, t_end)
+  end subroutine follow_extremes
+
+  !> Widens the ranges by the polynomials through `values`, over the times from t_start to t_end.
+  pure subroutine widen(extremes, ranges, t_start, t_end)
+    type(extremes_t), intent(in) :: extremes
+    type(ranges_t), intent(inout) :: ranges
+    real(wp), intent(in) :: t_start, t_end
+    real(wp) :: values(most_places), lowest, highest, margin
+    integer :: function, places
+
+    places = size(extremes%places)
+    do function = 1, size(extremes%values, 1)
+      values(:places) = extremes%values(function, :)
+      lowest = minval(values(:places))
+      highest = maxval(values(:places))
+      margin = overshoot * (highest - lowest)
+      if (highest + margin > ranges%highest(function)) then
+        call raise(extremes, values, t_start, t_end, ranges%highest(function), ranges%highest_time(function))
+      end if
+      if (lowest - margin < ranges%lowest(function)) then
+        values(:places) = -values(:places)
+        ranges%lowest(function) = -ranges%lowest(function)
+        call raise(extremes, values, t_start, t_end, ranges%lowest(function), ranges%lowest_time(function))
+        ranges%lowest(function) = -ranges%lowest(function)
+      end if
+    end do
+  end subroutine widen
+
+  !> Raises `highest` to the largest value of the polynomial through `values`, if that is larger.
+  pure subroutine raise(extremes, values, t_start, t_end, highest, time)
+    type(extremes_t), intent(in) :: extremes
+    real(wp), intent(in) :: values(most_places)
+    real(wp), intent(in) :: t_start, t_end
+    real(wp), intent(inout) :: highest, time
+    real(wp) :: place, peak
+
+    call find_peak(size(extremes%places), extremes%places, extremes%to_powers, values, place, peak)
+    if (peak <= highest) return
+    highest = peak
+    time = t_start + 0.5_wp * (1 + place) * (t_end - t_start)
+    if (place >= 1) time = t_end
+  end subroutine raise
+
+  !> The largest value of the polynomial through `values` and its place, by Newton's method on the derivative with
+  !> bisection as safeguard, between the neighbours of the largest of the values.
+  pure subroutine find_peak(n, places, to_powers, values, place, peak)
+    integer, intent(in) :: n
+    real(wp), intent(in) :: places(n), to_powers(n, n), values(n)
+    real(wp), intent(out) :: place, peak
+    real(wp) :: c(most_places), below, above, candidate, slope, curvature
+    integer :: i, step
+
+    i = maxloc(values, dim=1)
+    place = places(i)
+    peak = values(i)
+    c(:n) = 0.0_wp
+    do step = 1, n
+      c(:n) = c(:n) + to_powers(:, step) * values(step)
+    end do
+    below = places(max(i - 1, 1))
+    above = places(min(i + 1, n))
+    if (derivative(n, c, below) <= 0 .or. derivative(n, c, above) >= 0) return
+    candidate = place
+    do step = 1, most_newton_steps
+      slope = derivative(n, c, candidate)
+      curvature = second_derivative(n, c, candidate)
+      if (slope > 0) then
+        below = candidate
+      else
+        above = candidate
+      end if
+      candidate = 0.5_wp * (below + above)
+      if (curvature < 0) then
+        if (abs(slope) < -curvature * (above - below)) candidate = min(above, max(below, place - slope / curvature))
+      end if
+      if (abs(candidate - place) <= epsilon(place)) exit
+      place = candidate
+    end do
+    peak = max(peak, polynomial(n, c, place))
+  end subroutine find_peak
+
+  pure real(wp) function polynomial(n, c, x)
+    integer, intent(in) :: n
+    real(wp), intent(in) :: c(n), x
+    integer :: i
+
+    polynomial = c(n)
+    do i = n - 1, 1, -1
+      polynomial = c(i) + x * polynomial
+    end do
+  end function polynomial
+
+  pure real(wp) function derivative(n, c, x)
+    integer, intent(in) :: n
+    real(wp), intent(in) :: c(n), x
+    integer :: i
+
+    derivative = (n - 1) * c(n)
+    do i = n - 1, 2, -1
+      derivative = (i - 1) * c(i) + x * derivative
+    end do
+  end function derivative
+
+  pure real(wp) function second_derivative(n, c, x)
+    integer, intent(in) :: n
+    real(wp), intent(in) :: c(n), x
+    integer :: i
+
+    second_derivative = (n - 1) * (n - 2) * c(n)
+    do i = n - 1, 3, -1
+      second_derivative = (i - 1) * (i - 2) * c(i) + x * second_derivative
+    end do
+  end function second_derivative
+
+end module nocdyn_extremes

@@ -1,0 +1,84 @@
+!> What the lanes of a block work through: one variant after the other.
+module nocdyn_queue
+  use nocdyn_kinds, only: wp
+  use nocdyn_outcome, only: outcome_t
+  use nocdyn_system, only: system_t
+  implicit none (type, external)
+  private
+
+  public :: one_each
+
+  !> A lane that has ended is given the next variant at once. The order in which variants end depends on the block; the
+  !> result of each does not.
+  type, abstract, public :: queue_t
+  contains
+    procedure(next_interface), deferred :: next
+    procedure(finish_interface), deferred :: finish
+  end type queue_t
+
+  abstract interface
+
+    !> Puts the numbers of the next variant into a lane of the system, and its start into y.
+    subroutine next_interface(self, system, lane, y, found)
+      import :: queue_t, system_t, wp
+      class(queue_t), intent(inout) :: self
+      class(system_t), intent(inout) :: system
+      integer, intent(in) :: lane
+      real(wp), contiguous, intent(inout) :: y(:)   !! [states + quadratures]
+      logical, intent(out) :: found                 !! false: there is no variant left
+    end subroutine next_interface
+
+    !> Takes the end of the variant in a lane: done, stopped by an event, failed or interrupted.
+    subroutine finish_interface(self, lane, y, outcome)
+      import :: outcome_t, queue_t, wp
+      class(queue_t), intent(inout) :: self
+      integer, intent(in) :: lane
+      real(wp), contiguous, intent(in) :: y(:)      !! last state, at the time outcome%t(lane)
+      type(outcome_t), intent(in) :: outcome        !! only the elements of this lane are settled
+    end subroutine finish_interface
+
+  end interface
+
+  !> One variant for each lane, whose numbers are in the system already.
+  type, extends(queue_t), public :: one_each_t
+    real(wp), allocatable :: y(:, :)        !! [lanes, components]: starts, and ends once they are reached
+    type(outcome_t) :: outcome
+    logical, allocatable :: begun(:)
+  contains
+    procedure :: next
+    procedure :: finish
+  end type one_each_t
+
+contains
+
+  !> The queue of the lanes that start at the rows of y.
+  pure function one_each(y) result(queue)
+    real(wp), intent(in) :: y(:, :)   !! [lanes, components]
+    type(one_each_t) :: queue
+
+    allocate (queue%y, source=y)
+    allocate (queue%begun(size(y, 1)), source=.false.)
+  end function one_each
+
+  subroutine next(self, system, lane, y, found)
+    class(one_each_t), intent(inout) :: self
+    class(system_t), intent(inout) :: system
+    integer, intent(in) :: lane
+    real(wp), contiguous, intent(inout) :: y(:)
+    logical, intent(out) :: found
+
+    found = .not. self%begun(lane)
+    if (found) y(:) = self%y(lane, :)
+    self%begun(lane) = .true.
+  end subroutine next
+
+  subroutine finish(self, lane, y, outcome)
+    class(one_each_t), intent(inout) :: self
+    integer, intent(in) :: lane
+    real(wp), contiguous, intent(in) :: y(:)
+    type(outcome_t), intent(in) :: outcome
+
+    self%y(lane, :) = y
+  end subroutine finish
+
+end module nocdyn_queue

@@ -1,0 +1,67 @@
+!> Which solver suits the Jacobian of a system.
+module nocdyn_stage_solver
+  use nocdyn_banded_matrix, only: allocate_banded, banded_matrix_t, half_bandwidths
+  use nocdyn_dense_matrix, only: allocate_dense, dense_matrix_t
+  use nocdyn_kinds, only: wp
+  use nocdyn_ordering, only: reverse_cuthill_mckee
+  use nocdyn_pattern_entries, only: entries_t
+  use nocdyn_stage_matrix, only: stage_matrix_t
+  implicit none (type, external)
+  private
+
+  public :: choose_stage_matrix, dense_cost, banded_cost
+
+  real(wp), parameter :: solutions = 6   ! with one set of factors: the stages of RODAS
+  ! Calls of the BLAS for each column, inside of DGBTRF and DGBTRS, take the time of so many operations: 15 to 20 ns beside
+  ! 2 to 4 operations per ns, measured with the reference LAPACK at orders 4 to 200 and bandwidths 1 to 16.
+  real(wp), parameter :: column_cost = 40
+
+contains
+
+  !> The matrices of every lane, dense or banded, whichever makes a step cheaper by the counts below. Up to about a dozen
+  !> states that is always the dense one.
+  subroutine choose_stage_matrix(entries, lanes, states, matrix)
+    type(entries_t), intent(in) :: entries   !! in the rows of states
+    integer, intent(in) :: lanes, states
+    class(stage_matrix_t), allocatable, intent(out) :: matrix
+    type(dense_matrix_t), allocatable :: dense
+    type(banded_matrix_t), allocatable :: banded
+    integer, allocatable :: order(:)
+    integer :: lower, upper
+
+    allocate (order(states), source=0)
+    order(:) = reverse_cuthill_mckee(states, entries%row, entries%column)
+    call half_bandwidths(order, entries, lower, upper)
+    if (banded_cost(states, lower, upper) < dense_cost(states)) then
+      allocate (banded)
+      call allocate_banded(banded, order, entries, lanes)
+      call move_alloc(banded, matrix)
+    else
+      allocate (dense)
+      call allocate_dense(dense, entries, lanes, states)
+      call move_alloc(dense, matrix)
+    end if
+  end subroutine choose_stage_matrix
+
+  !> Operations of a step: 2/3 n^3 for the factors, 2 n^2 for each solution.
+  elemental function dense_cost(states) result(cost)
+    integer, intent(in) :: states
+    real(wp) :: cost
+
+    associate (n => real(states, wp))
+      cost = (2 * n / 3 + 2 * solutions) * n**2
+    end associate
+  end function dense_cost
+
+  !> Operations of a step with `lower` and `upper` diagonals beside the main one. Interchanges lengthen the rows of U to
+  !> lower + upper: a column costs 2 lower (lower + upper) for its factors and 2 (2 lower + upper) in each solution.
+  elemental function banded_cost(states, lower, upper) result(cost)
+    integer, intent(in) :: states, lower, upper
+    real(wp) :: cost
+
+    associate (n => real(states, wp), l => real(lower, wp), u => real(upper, wp))
+      cost = n * (2 * l * (l + u) + column_cost + solutions * (2 * (2 * l + u) + column_cost))
+    end associate
+  end function banded_cost
+
+end module nocdyn_stage_solver

@@ -1,0 +1,120 @@
+!> The stages of a one-step method on a block of lanes, and the sums that are formed of them.
+module nocdyn_stages
+  use nocdyn_combinations, only: combination, combination_t, combine, padded_columns
+  use nocdyn_finite, only: all_finite, is_finite
+  use nocdyn_kinds, only: wp
+  use nocdyn_system, only: system_t
+  use nocdyn_trial, only: park, park_infinities, trial_not_finite, trial_t
+  implicit none (type, external)
+  private
+
+  public :: set_weights, allocate_stages, inner_state, update_state, estimate_error, expand
+
+  type, public :: stages_t
+    integer :: step = 0                                !! stages that a step needs
+    integer :: all = 0                                 !! those and the ones that only the solution inside the step needs
+    type(combination_t), allocatable :: inner(:)       !! states that the stages are taken at, row by row
+    type(combination_t) :: update                      !! weights of y_new
+    type(combination_t) :: error                       !! weights of the deviation
+    type(combination_t) :: coarse_error                !! weights of the coarse deviation; no terms: there is none
+    type(combination_t), allocatable :: dense(:)       !! weights of each power of theta = (time - t) / h
+    real(wp), allocatable :: k(:, :, :)                !! the stages, shape [lanes, padded columns, all]
+    real(wp), allocatable :: zero(:, :)                !! zeros, shape [lanes, padded columns]
+  end type stages_t
+
+contains
+
+  !> Takes over the rows of a table, without their zeros.
+  pure subroutine set_weights(self, inner, update, error, dense)
+    type(stages_t), intent(inout) :: self
+    real(wp), intent(in) :: inner(:, :)   !! shape [all, all]
+    real(wp), intent(in) :: update(:)     !! shape [step]
+    real(wp), intent(in) :: error(:)      !! shape [step]
+    real(wp), intent(in) :: dense(:, :)   !! shape [all, degree]
+    integer :: i
+
+    self%step = size(update)
+    self%all = size(inner, 1)
+    allocate (self%inner(self%all), self%dense(size(dense, 2)))
+    do i = 1, self%all
+      self%inner(i) = combination(inner(i, :))
+    end do
+    self%update = combination(update)
+    self%error = combination(error)
+    do i = 1, size(dense, 2)
+      self%dense(i) = combination(dense(:, i))
+    end do
+  end subroutine set_weights
+
+  !> Room for the stages of every lane.
+  subroutine allocate_stages(self, system)
+    type(stages_t), intent(inout) :: self
+    class(system_t), intent(in) :: system
+
+    if (allocated(self%k)) deallocate (self%k, self%zero)
+    associate (lanes => system%lanes, columns => padded_columns(system%lanes, system%states + system%quadratures))
+      allocate (self%k(lanes, columns, self%all), self%zero(lanes, columns), source=0.0_wp)
+    end associate
+  end subroutine allocate_stages
+
+  !> The state that a stage is taken at, from the stages before it; a lane where it overflows is parked.
+  pure subroutine inner_state(self, trial, stage, y)
+    type(stages_t), intent(inout) :: self
+    type(trial_t), intent(inout) :: trial
+    integer, intent(in) :: stage
+    real(wp), intent(inout) :: y(trial%length)
+
+    call combine(trial%length, self%all, self%inner(stage), self%k, trial%y, trial%h_spread, y)
+    if (.not. all_finite(trial%length, y)) call leave_infinities(self, trial, y)
+  end subroutine inner_state
+
+  !> Parks the lanes where y is not finite, at their start and with nothing in the stages that led there.
+  pure subroutine leave_infinities(self, trial, y)
+    type(stages_t), intent(inout) :: self
+    type(trial_t), intent(inout) :: trial
+    real(wp), intent(inout) :: y(trial%lanes, trial%components)
+    integer :: lane
+
+    do lane = 1, trial%lanes
+      if (all(is_finite(y(lane, :)))) cycle
+      if (trial%working(lane)) self%k(lane, :, 2:) = 0.0_wp
+      call park(trial, lane, trial_not_finite, findloc(is_finite(y(lane, :)), .false., dim=1))
+      y(lane, :) = trial%y(lane, :trial%components)
+    end do
+  end subroutine leave_infinities
+
+  !> y_new, once its stages are known; a lane where it overflows is parked.
+  pure subroutine update_state(self, trial)
+    type(stages_t), intent(in) :: self
+    type(trial_t), intent(inout) :: trial
+
+    call combine(trial%length, self%all, self%update, self%k, trial%y, trial%h_spread, trial%y_new)
+    if (.not. all_finite(trial%length, trial%y_new)) call park_infinities(trial, trial%y_new)
+  end subroutine update_state
+
+  !> The deviations of y_new from the embedded solutions, once all stages of the step are known; a lane where one overflows
+  !> is parked.
+  pure subroutine estimate_error(self, trial)
+    type(stages_t), intent(in) :: self
+    type(trial_t), intent(inout) :: trial
+
+    call combine(trial%length, self%all, self%error, self%k, self%zero, trial%h_spread, trial%deviation)
+    if (.not. all_finite(trial%length, trial%deviation)) call park_infinities(trial, trial%deviation)
+    if (.not. trial%has_coarse_deviation) return
+    call combine(trial%length, self%all, self%coarse_error, self%k, self%zero, trial%h_spread, trial%coarse_deviation)
+    if (.not. all_finite(trial%length, trial%coarse_deviation)) call park_infinities(trial, trial%coarse_deviation)
+  end subroutine estimate_error
+
+  !> The solution inside the last step: y + sum over p of coefficients(:, :, p) theta^p.
+  pure subroutine expand(self, trial, coefficients)
+    type(stages_t), intent(in) :: self
+    type(trial_t), intent(in) :: trial
+    real(wp), intent(inout) :: coefficients(trial%length, size(self%dense))   !! [lanes * padded columns, degree]
+    integer :: power
+
+    do power = 1, size(self%dense)
+      call combine(trial%length, self%all, self%dense(power), self%k, self%zero, trial%h_spread, coefficients(:, power))
+    end do
+  end subroutine expand
+
+end module nocdyn_stages

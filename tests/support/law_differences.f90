@@ -1,0 +1,73 @@
+!> Derivatives of the laws of banks by central differences of fourth order, against which the analytic ones are checked.
+!>
+!> They are exact for polynomials of degree four, which all laws but the harmonic one are, so that a large step is
+!> best: only rounding remains.
+module nocdyn_test_law_differences
+  use nocdyn_bank, only: bank_t
+  use nocdyn_elements, only: elements_t, new_elements
+  use nocdyn_kinds, only: wp
+  implicit none (type, external)
+  private
+
+  public :: difference_laws, elements_of, evaluate_all
+
+  integer, parameter, public :: by_angle = 1, by_speed = 2, by_time = 3
+
+  real(wp), parameter :: offset(4) = [-2.0_wp, -1.0_wp, 1.0_wp, 2.0_wp]
+  real(wp), parameter :: weight(4) = [1.0_wp, -8.0_wp, 8.0_wp, -1.0_wp] / 12.0_wp
+  real(wp), parameter :: state_step = 0.1_wp
+  real(wp), parameter :: time_step = 1.0e-3_wp
+
+  !> Derivatives of what a bank computes, [lanes, elements].
+  type, public :: law_slopes_t
+    real(wp), allocatable :: restoring(:, :), working(:, :), stored(:, :)
+    real(wp), allocatable :: tangent(:, :)   !! of `restoring_angle`
+  end type law_slopes_t
+
+contains
+
+  !> The elements of a bank that is alone, at rest.
+  function elements_of(bank) result(elements)
+    class(bank_t), intent(in) :: bank
+    type(elements_t) :: elements
+
+    elements = new_elements(bank%lanes, bank%from, bank%to)
+  end function elements_of
+
+  !> All that a bank finds for its elements at their angles, speeds and time.
+  subroutine evaluate_all(bank, elements)
+    class(bank_t), intent(in) :: bank
+    type(elements_t), intent(inout) :: elements
+
+    call bank%evaluate(elements%time, elements%angle, elements%speed, elements%restoring, elements%working)
+    call bank%differentiate(elements)
+    call bank%assess(elements)
+  end subroutine evaluate_all
+
+  !> Derivatives of the laws of a bank by its angles, its speeds or the time.
+  function difference_laws(bank, elements, variable) result(slopes)
+    class(bank_t), intent(in) :: bank
+    type(elements_t), intent(in) :: elements
+    integer, intent(in) :: variable   !! by_...
+    type(law_slopes_t) :: slopes
+    type(elements_t) :: moved
+    real(wp) :: gain, step
+    integer :: k
+
+    allocate (slopes%restoring, slopes%working, slopes%stored, slopes%tangent, source=0.0_wp * elements%angle)
+    step = merge(time_step, state_step, variable == by_time)
+    do k = 1, size(offset)
+      moved = elements
+      if (variable == by_angle) moved%angle = elements%angle + offset(k) * step
+      if (variable == by_speed) moved%speed = elements%speed + offset(k) * step
+      if (variable == by_time) moved%time = elements%time + offset(k) * step
+      call evaluate_all(bank, moved)
+      gain = weight(k) / step
+      slopes%restoring = slopes%restoring + gain * moved%restoring
+      slopes%working = slopes%working + gain * moved%working
+      slopes%stored = slopes%stored + gain * moved%stored
+      slopes%tangent = slopes%tangent + gain * moved%restoring_angle
+    end do
+  end function difference_laws
+
+end module nocdyn_test_law_differences
