@@ -1,6 +1,7 @@
 !> From the input to the model: bodies, banks, constraints and coordinates.
 module nocdyn_assembly
   use nocdyn_bank, only: bank_slot_t
+  use nocdyn_banded_matrix, only: half_bandwidths
   use nocdyn_complement, only: complement_natural, complement_negated, complement_scaled
   use nocdyn_constraint_analysis, only: analyse_constraints
   use nocdyn_constraints, only: constraints_t, new_constraints
@@ -15,7 +16,9 @@ module nocdyn_assembly
   use nocdyn_machine, only: machine_t
   use nocdyn_motors, only: new_motors
   use nocdyn_multiplier, only: new_multiplier
+  use nocdyn_ordering, only: reverse_cuthill_mckee
   use nocdyn_paper, only: new_paper
+  use nocdyn_pattern_entries, only: entries_t, state_entries
   use nocdyn_reduced, only: new_reduced
   use nocdyn_schema, only: ground
   use nocdyn_text, only: quoted, rounded_text, string_t, to_text
@@ -23,7 +26,7 @@ module nocdyn_assembly
   implicit none (type, external)
   private
 
-  public :: assemble_machine, check_size, new_formulation
+  public :: assemble_machine, check_size, check_jacobian, new_formulation
 
   integer, parameter :: largest_matrix = 6000   ! rows: 0.3 GB each, and there are several
 
@@ -60,6 +63,7 @@ contains
     call find_order(directory%names, directory%order)
     machine%constraints = gear_constraints(input, directory)
     machine%banks = element_banks(input, directory)
+    call machine%number_elements()
 
     run = input%single('run')
     wanted = bodies_of(run, 'independent', directory)
@@ -73,7 +77,7 @@ contains
                                           complement_choice(run%text('complement')))
   end subroutine assemble_machine
 
-  !> Refuses machines whose dense matrices would not fit into memory: those of two formulations and of the Rosenbrock method.
+  !> Refuses machines for whose dense matrices two formulations have no memory.
   subroutine check_size(input, machine, error)
     type(input_t), intent(in) :: input
     type(machine_t), intent(in) :: machine
@@ -89,27 +93,52 @@ contains
       order = 2 * machine%bodies
     case default
       order = 0
-      if (run%text('method') == 'rosenbrock') order = 2 * machine%coordinates%freedoms
     end select
     if (order <= largest_matrix) return
     call raise(error, exit_input, input%file // ': this machine needs dense matrices of ' // to_text(order) // &
                ' rows, at most ' // to_text(largest_matrix) // ' are allowed; formulation = ' // &
-               quoted('reduced') // ' with method = ' // quoted('rk45') // ' needs none')
+               quoted('reduced') // ' needs none')
   end subroutine check_size
 
+  !> Refuses machines whose Jacobian is neither small nor of a narrow band where the method stores its factors.
+  subroutine check_jacobian(input, formulation, error)
+    type(input_t), intent(in) :: input
+    class(formulation_t), intent(in) :: formulation
+    type(error_t), allocatable, intent(out) :: error
+    type(group_t) :: run
+    type(entries_t) :: entries
+    integer :: lower, upper
+    real(wp) :: rows
+
+    run = input%single('run')
+    if (any(run%text('method') == ['rk45 ', 'rk853']) .or. formulation%states <= largest_matrix) return
+    entries = state_entries(formulation%jacobian_pattern(), formulation%states)
+    call half_bandwidths(reverse_cuthill_mckee(formulation%states, entries%row, entries%column), entries, lower, upper)
+    rows = min(2.0_wp * lower + upper + 1.0_wp, real(formulation%states, wp))
+    if (rows * formulation%states <= real(largest_matrix, wp)**2) return
+    call raise(error, exit_input, input%file // ': this machine needs a Jacobian of ' // to_text(formulation%states) // &
+               ' columns and a band of ' // to_text(nint(rows)) // ' rows, at most as many entries as ' // &
+               to_text(largest_matrix) // ' x ' // to_text(largest_matrix) // ' are allowed; method = ' // &
+               quoted('rk45') // ' needs none')
+  end subroutine check_jacobian
+
   !> The system that an integrator solves, by the word of the input.
-  subroutine new_formulation(word, machine, formulation)
+  subroutine new_formulation(word, machine, formulation, audited)
     character(len=*), intent(in) :: word
     type(machine_t), intent(in) :: machine
     class(formulation_t), allocatable, intent(out) :: formulation
+    logical, intent(in), optional :: audited   !! whether the works of the elements are integrated; absent: they are
+    logical :: has_works
 
+    has_works = .true.
+    if (present(audited)) has_works = audited
     select case (word)
     case ('reduced')
-      allocate (formulation, source=new_reduced(machine))
+      allocate (formulation, source=new_reduced(machine, has_works))
     case ('paper')
-      allocate (formulation, source=new_paper(machine))
+      allocate (formulation, source=new_paper(machine, has_works))
     case ('multiplier')
-      allocate (formulation, source=new_multiplier(machine))
+      allocate (formulation, source=new_multiplier(machine, has_works))
     case default
       error stop 'nocdyn_assembly: the schema allows a formulation that is not there'
     end select

@@ -60,16 +60,13 @@ contains
     type(machine_t), intent(inout) :: machine
     real(wp), intent(in) :: t_start
     real(wp), dimension(1, 0:machine%bodies) :: phi, omega
-    integer :: i
 
     phi = 0.0_wp
     omega = 0.0_wp
     phi(:, 1:) = machine%start_angle
     omega(:, 1:) = machine%start_speed
     call machine%differentiate([t_start], phi, omega)
-    do i = 1, size(machine%banks)
-      call machine%banks(i)%bank%assess()
-    end do
+    call machine%assess()
   end subroutine place
 
   !> The bodies before the constraints: eqs. (13)-(22).

@@ -32,11 +32,12 @@ contains
 
   !> A table for the columns of a machine; the energies of the start are taken at `t_start` [s].
   function new_trajectory_table(formulation, t_start) result(table)
-    class(formulation_t), intent(in) :: formulation   !! of one lane
+    class(formulation_t), intent(in) :: formulation   !! of one lane, audited
     real(wp), intent(in) :: t_start
     type(trajectory_table_t) :: table
     integer :: i
 
+    if (.not. formulation%is_audited) error stop 'nocdyn_trajectory_table: the works are among the columns'
     allocate (table%formulation, source=formulation)
     associate (banks => formulation%machine%banks)
       allocate (table%columns(size(banks)))
@@ -124,7 +125,7 @@ contains
       do i = 1, size(self%columns)
         do q = 1, size(self%columns(i)%quantities)
           associate (elements => self%columns(i)%quantities(q)%elements, values => self%values(:size(machine%banks(i)%bank%to)))
-            call machine%banks(i)%bank%observe(q, 1, values)
+            call machine%banks(i)%bank%observe(machine%elements, q, 1, values)
             do e = 1, size(elements)
               row(next) = values(elements(e))
               next = next + 1

@@ -1,7 +1,7 @@
 !> What does the machine do over time: integrates an input and writes its results.
 module nocdyn_transient
   use, intrinsic :: iso_fortran_env, only: int64
-  use nocdyn_assembly, only: assemble_machine, check_size, new_formulation
+  use nocdyn_assembly, only: assemble_machine, check_jacobian, check_size, new_formulation
   use nocdyn_csv, only: write_header, write_row
   use nocdyn_errors, only: error_t, exit_failed, raise
   use nocdyn_formulation, only: formulation_t
@@ -78,6 +78,8 @@ contains
     if (allocated(error)) return
     run = input%single('run')
     call new_formulation(run%text('formulation'), machine, formulation)
+    call check_jacobian(input, formulation, error)
+    if (allocated(error)) return
     times = output_times(input)
     call start_recorder(recorder, formulation, times, folder, progress)
     call solve(formulation, run, times, recorder, outcome, error)

@@ -1,12 +1,12 @@
-!> Elements of one kind, evaluated together on a block of lanes: gather, one vector loop, scatter.
+!> Elements of one kind, evaluated together on a block of lanes.
 !>
-!> Every element acts between two bodies along its relative angle u = phi_to - phi_from (body 0 is the ground, which
-!> stands still): its law gives a moment M(t, u, u') that acts on `to`, and -M on `from`. The moment is the sum of
-!> a restoring part, which has a potential, and a working part, whose power enters or leaves the machine.
+!> The values of all elements of a machine are numbered through (`elements_t`); a bank works on its own contiguous
+!> part of them, from its element `first` on, by loops over all lanes and elements at once.
 !> A new kind of element extends `bank_t` by its law and the derivatives of that law.
 module nocdyn_bank
-  use nocdyn_kinds, only: wp
+  use nocdyn_elements, only: elements_t
   use nocdyn_text, only: string_t
+  use nocdyn_kinds, only: wp
   implicit none (type, external)
   private
 
@@ -21,36 +21,26 @@ module nocdyn_bank
   type, public :: quantity_t
     character(len=16) :: name          !! first part of the column's name, e.g. 'torque'
     character(len=8) :: unit
-    integer, allocatable :: elements(:) !! those that have it
+    integer, allocatable :: elements(:) !! those that have it, numbered within the bank
   end type quantity_t
 
   type, abstract, public :: bank_t
     type(string_t), allocatable :: names(:)
     integer, allocatable :: from(:)          !! body, 0 = ground
     integer, allocatable :: to(:)            !! body, 0 = ground
-    integer, allocatable :: accounted(:)     !! elements whose power is integrated
+    integer, allocatable :: accounted(:)     !! elements whose power is integrated, numbered within the bank
     integer :: role = role_coupling          !! role_...: which term of eq. (12) the bank belongs to
-    real(wp), allocatable :: damping(:, :)           !! linear damping c: `working` contains -c u' [N m s/rad]
-    real(wp), allocatable :: angle(:, :)             !! u [rad], shape [lanes, elements] as all of these
-    real(wp), allocatable :: speed(:, :)             !! u' [rad/s]
-    real(wp), allocatable :: restoring(:, :)         !! part of M with a potential [N m]
-    real(wp), allocatable :: working(:, :)           !! the rest of M [N m]
-    real(wp), allocatable :: restoring_angle(:, :)   !! derivative of `restoring` by u
-    real(wp), allocatable :: restoring_curvature(:, :)   !! second derivative of `restoring` by u
-    real(wp), allocatable :: working_angle(:, :)     !! derivative of `working` by u
-    real(wp), allocatable :: working_speed(:, :)     !! derivative of `working` by u'
-    real(wp), allocatable :: working_time(:, :)      !! derivative of `working` by t
-    real(wp), allocatable :: stored(:, :)            !! potential energy of `restoring` [J]
-    real(wp), allocatable :: secant(:, :)            !! secant stiffness K12 of eq. (3), the -K12 u in `restoring` [N m/rad]
+    integer :: lanes = 1
+    integer :: first = 1                     !! number of its first element in the machine
+    integer :: values = 0                    !! lanes * elements
+    integer :: first_value = 1               !! the place of lane 1 of `first` in the values of the machine
   contains
-    procedure(law_interface), deferred :: evaluate
-    procedure(law_interface), deferred :: differentiate
-    procedure :: connect
-    procedure :: is_source
-    procedure :: gather
-    procedure :: scatter
-    procedure :: power
+    procedure(evaluate_interface), deferred :: evaluate
+    procedure(differentiate_interface), deferred :: differentiate
     procedure :: assess
+    procedure :: connect
+    procedure :: last
+    procedure :: is_source
     procedure :: quantities
     procedure :: observe
   end type bank_t
@@ -61,17 +51,29 @@ module nocdyn_bank
   end type bank_slot_t
 
   abstract interface
-    !> `evaluate` fills `restoring` and `working`, `differentiate` their derivatives, from `angle` and `speed`.
-    subroutine law_interface(self, t)
+
+    !> The moments of the bank's elements. All arrays but `time` are flat: the lanes of its first element, then those of
+    !> its second, and so on. What is always zero need not be written.
+    subroutine evaluate_interface(self, time, angle, speed, restoring, working)
       import :: bank_t, wp
-      class(bank_t), intent(inout) :: self
-      real(wp), contiguous, intent(in) :: t(:)   !! time of each lane [s]
-    end subroutine law_interface
+      class(bank_t), intent(in) :: self
+      real(wp), intent(in) :: time(self%lanes)                                  !! t [s]
+      real(wp), intent(in) :: angle(self%values), speed(self%values)            !! u [rad], u' [rad/s]
+      real(wp), intent(inout) :: restoring(self%values), working(self%values)   !! [N m]
+    end subroutine evaluate_interface
+
+    !> Fills the derivatives of `restoring` and `working` of the bank's elements. What is always zero need not be written.
+    subroutine differentiate_interface(self, elements)
+      import :: bank_t, elements_t
+      class(bank_t), intent(in) :: self
+      type(elements_t), intent(inout) :: elements   !! of the machine
+    end subroutine differentiate_interface
+
   end interface
 
 contains
 
-  !> Sets the connectivity and allocates the work arrays; every extension's constructor calls it.
+  !> Sets the connectivity; every extension's constructor calls it.
   subroutine connect(self, role, lanes, names, from, to)
     class(bank_t), intent(inout) :: self
     integer, intent(in) :: role
@@ -81,15 +83,20 @@ contains
     integer :: e
 
     self%role = role
+    self%lanes = lanes
+    self%values = lanes * size(to)
     self%names = names
     self%from = from
     self%to = to
     self%accounted = [(e, e=1, size(to))]
-    allocate (self%angle(lanes, size(to)), source=0.0_wp)
-    allocate (self%speed, self%restoring, self%working, source=self%angle)
-    allocate (self%restoring_angle, self%working_angle, self%working_speed, self%working_time, source=self%angle)
-    allocate (self%damping, self%stored, self%secant, self%restoring_curvature, source=self%angle)
   end subroutine connect
+
+  !> Number of its last element in the machine.
+  pure integer function last(self)
+    class(bank_t), intent(in) :: self
+
+    last = self%first + size(self%to) - 1
+  end function last
 
   !> Whether the work of the elements counts as work put in, not as work taken out.
   pure logical function is_source(self)
@@ -98,56 +105,14 @@ contains
     is_source = self%role == role_motor .or. self%role == role_excitation
   end function is_source
 
-  !> Relative angles and speeds of the elements from those of the bodies.
-  subroutine gather(self, phi, omega)
-    class(bank_t), intent(inout) :: self
-    real(wp), contiguous, intent(in) :: phi(:, 0:)     !! [lanes, ground and bodies] [rad]
-    real(wp), contiguous, intent(in) :: omega(:, 0:)   !! [rad/s]
-    integer :: e, l
-
-    do e = 1, size(self%to)
-      do l = 1, size(self%angle, 1)
-        self%angle(l, e) = phi(l, self%to(e)) - phi(l, self%from(e))
-        self%speed(l, e) = omega(l, self%to(e)) - omega(l, self%from(e))
-      end do
-    end do
-  end subroutine gather
-
-  !> Adds the moments to the torques on the bodies.
-  subroutine scatter(self, torque)
+  !> Fills `stored`, `secant` and `damping` of its elements from their angles: by default all are zero.
+  subroutine assess(self, elements)
     class(bank_t), intent(in) :: self
-    real(wp), contiguous, intent(inout) :: torque(:, 0:)   !! [lanes, ground and bodies] [N m]
-    real(wp) :: moment
-    integer :: e, l
+    type(elements_t), intent(inout) :: elements   !! of the machine
 
-    do e = 1, size(self%to)
-      do l = 1, size(self%angle, 1)
-        moment = self%restoring(l, e) + self%working(l, e)
-        torque(l, self%to(e)) = torque(l, self%to(e)) + moment
-        torque(l, self%from(e)) = torque(l, self%from(e)) - moment
-      end do
-    end do
-  end subroutine scatter
-
-  !> Power of the working moments of the accounted elements, positive into the machine [W].
-  subroutine power(self, watts)
-    class(bank_t), intent(in) :: self
-    real(wp), contiguous, intent(inout) :: watts(:, :)   !! [lanes, accounted elements]
-    integer :: k, l
-
-    do k = 1, size(self%accounted)
-      do l = 1, size(watts, 1)
-        watts(l, k) = self%working(l, self%accounted(k)) * self%speed(l, self%accounted(k))
-      end do
-    end do
-  end subroutine power
-
-  !> Fills `stored` and `secant` from `angle`: by default both are zero.
-  subroutine assess(self)
-    class(bank_t), intent(inout) :: self
-
-    self%stored(:, :) = 0.0_wp
-    self%secant(:, :) = 0.0_wp
+    elements%stored(:, self%first:self%last()) = 0.0_wp
+    elements%secant(:, self%first:self%last()) = 0.0_wp
+    elements%damping(:, self%first:self%last()) = 0.0_wp
   end subroutine assess
 
   !> The columns of the bank in the table of results: by default the torque of each element.
@@ -162,14 +127,15 @@ contains
     columns(1)%elements = [(e, e=1, size(self%to))]
   end function quantities
 
-  !> Values of the quantity number `quantity` of all elements after `evaluate`.
-  pure subroutine observe(self, quantity, lane, values)
+  !> Values of the quantity number `quantity` of all elements of the bank after `evaluate`.
+  pure subroutine observe(self, elements, quantity, lane, values)
     class(bank_t), intent(in) :: self
+    type(elements_t), intent(in) :: elements   !! of the machine
     integer, intent(in) :: quantity
     integer, intent(in) :: lane
-    real(wp), intent(out) :: values(:)   !! [elements]
+    real(wp), intent(out) :: values(:)   !! [elements of the bank]
 
-    values = self%restoring(lane, :) + self%working(lane, :)
+    values = elements%restoring(lane, self%first:self%last()) + elements%working(lane, self%first:self%last())
     if (quantity /= 1) error stop 'nocdyn_bank: a bank with several quantities overrides observe'
   end subroutine observe
 

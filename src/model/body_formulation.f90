@@ -30,13 +30,14 @@ module nocdyn_body_formulation
 
 contains
 
-  subroutine attach_bodies(self, machine, states)
+  subroutine attach_bodies(self, machine, states, audited)
     class(body_formulation_t), intent(inout) :: self
     type(machine_t), intent(in) :: machine
     integer, intent(in) :: states   !! at least 2 * bodies
+    logical, intent(in) :: audited
     integer :: l
 
-    call self%attach(machine)
+    call self%attach(machine, audited)
     self%states = states
     allocate (self%slope(self%lanes, states + self%quadratures), source=0.0_wp)
     allocate (self%status(self%lanes), source=evaluation_fine)
@@ -81,18 +82,30 @@ contains
   !> omega' = mobility T(phi, omega, t), phi' = omega, and the works; further states are the extension's.
   subroutine jacobian_of_bodies(self, t, y, dfdy, dfdt, status)
     class(body_formulation_t), intent(inout) :: self
+    real(wp), intent(in) :: t(self%lanes)
+    real(wp), intent(in) :: y(self%lanes, self%states + self%quadratures)
+    real(wp), contiguous, intent(inout) :: dfdy(:, :)
+    real(wp), intent(inout) :: dfdt(self%lanes, self%states + self%quadratures)
+    integer, intent(inout) :: status(self%lanes)
+
+    call fill_of_bodies(self, t, y, size(dfdt, 2), dfdy, dfdt)
+  end subroutine jacobian_of_bodies
+
+  !> The Jacobian, all of whose positions are kept, as the array that it then is.
+  subroutine fill_of_bodies(self, t, y, components, dfdy, dfdt)
+    class(body_formulation_t), intent(inout) :: self
     real(wp), contiguous, intent(in) :: t(:)
     real(wp), contiguous, intent(in) :: y(:, :)
-    real(wp), contiguous, intent(inout) :: dfdy(:, :, :)
-    real(wp), contiguous, intent(inout) :: dfdt(:, :)
-    integer, contiguous, intent(inout) :: status(:)
+    integer, intent(in) :: components
+    real(wp), intent(inout) :: dfdy(self%lanes, components, self%states)
+    real(wp), intent(inout) :: dfdt(self%lanes, components)
     integer :: b, l, n
 
     n = self%machine%bodies
     call self%place(y)
     call self%machine%differentiate(t, self%phi, self%omega)
-    dfdy(:, :, :) = 0.0_wp
-    dfdt(:, :) = 0.0_wp
+    dfdy = 0.0_wp
+    dfdt = 0.0_wp
     do l = 1, self%lanes
       call differentiate_torques(self, l)
       do b = 1, n
@@ -103,28 +116,25 @@ contains
       call multiply(self%mobility(:, :, l), self%by_time, dfdt(l, :n))
       call differentiate_powers(self, l, dfdy(l, :, :), dfdt(l, :))
     end do
-    status = evaluation_fine
-  end subroutine jacobian_of_bodies
+  end subroutine fill_of_bodies
 
   !> The derivatives of the torques T of one lane from those of the elements.
   subroutine differentiate_torques(self, lane)
     class(body_formulation_t), intent(inout) :: self
     integer, intent(in) :: lane
-    integer :: e, i
+    integer :: e
 
     self%by_angle(:, :) = 0.0_wp
     self%by_speed(:, :) = 0.0_wp
     self%by_time(:) = 0.0_wp
-    do i = 1, size(self%machine%banks)
-      associate (bank => self%machine%banks(i)%bank)
-        call add_coefficients(bank%from, bank%to, -1.0_wp, bank%restoring_angle(lane, :), self%by_angle)
-        call add_coefficients(bank%from, bank%to, -1.0_wp, bank%working_angle(lane, :), self%by_angle)
-        call add_coefficients(bank%from, bank%to, -1.0_wp, bank%working_speed(lane, :), self%by_speed)
-        do e = 1, size(bank%to)
-          call add_moment(bank%from(e), bank%to(e), bank%working_time(lane, e), self%by_time)
-        end do
-      end associate
-    end do
+    associate (elements => self%machine%elements)
+      call add_coefficients(elements%from, elements%to, -1.0_wp, elements%restoring_angle(lane, :), self%by_angle)
+      call add_coefficients(elements%from, elements%to, -1.0_wp, elements%working_angle(lane, :), self%by_angle)
+      call add_coefficients(elements%from, elements%to, -1.0_wp, elements%working_speed(lane, :), self%by_speed)
+      do e = 1, size(elements%to)
+        call add_moment(elements%from(e), elements%to(e), elements%working_time(lane, e), self%by_time)
+      end do
+    end associate
   end subroutine differentiate_torques
 
   !> The rows of the integrated works of one lane: the power is M u', M the working moment.
@@ -133,23 +143,19 @@ contains
     integer, intent(in) :: lane
     real(wp), intent(inout) :: dfdy(:, :)
     real(wp), intent(inout) :: dfdt(:)
-    integer :: a, e, i, n, row
+    integer :: e, k, n
 
     n = self%machine%bodies
-    row = self%states
-    do i = 1, size(self%machine%banks)
-      associate (bank => self%machine%banks(i)%bank)
-        do a = 1, size(bank%accounted)
-          e = bank%accounted(a)
-          row = row + 1
-          call add_moment(bank%from(e), bank%to(e), &
-                          bank%working(lane, e) + bank%speed(lane, e) * bank%working_speed(lane, e), dfdy(row, :n))
-          call add_moment(bank%from(e), bank%to(e), bank%speed(lane, e) * bank%working_angle(lane, e), &
-                          dfdy(row, n + 1:2 * n))
-          dfdt(row) = bank%working_time(lane, e) * bank%speed(lane, e)
-        end do
-      end associate
-    end do
+    associate (elements => self%machine%elements)
+      do k = 1, self%quadratures
+        e = self%machine%accounted(k)
+        call add_moment(elements%from(e), elements%to(e), elements%working(lane, e) &
+                        + elements%speed(lane, e) * elements%working_speed(lane, e), dfdy(self%states + k, :n))
+        call add_moment(elements%from(e), elements%to(e), elements%speed(lane, e) * elements%working_angle(lane, e), &
+                        dfdy(self%states + k, n + 1:2 * n))
+        dfdt(self%states + k) = elements%working_time(lane, e) * elements%speed(lane, e)
+      end do
+    end associate
   end subroutine differentiate_powers
 
   pure subroutine multiply(matrix, vector, product)

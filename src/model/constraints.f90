@@ -48,15 +48,13 @@ contains
     integer, intent(in) :: chosen(:)   !! rows
     integer, intent(in) :: bodies(:)   !! columns; no row may have an entry outside them
     real(wp) :: dense(size(chosen), size(bodies))
-    integer :: column(self%bodies)
-    integer :: entry, i
+    integer :: column, entry, i
 
-    column = 0
-    column(bodies) = [(i, i=1, size(bodies))]
     dense = 0.0_wp
     do i = 1, size(chosen)
       do entry = self%first(chosen(i)), self%first(chosen(i) + 1) - 1
-        dense(i, column(self%body(entry))) = dense(i, column(self%body(entry))) + self%coefficient(lane, entry)
+        column = findloc(bodies, self%body(entry), dim=1)
+        dense(i, column) = dense(i, column) + self%coefficient(lane, entry)
       end do
     end do
   end function block

@@ -1,6 +1,7 @@
 !> Elastic couplings: the nonlinear spring of eqs. (2), (3) with viscous damping and a twist at which it rests.
 module nocdyn_couplings
   use nocdyn_bank, only: bank_t, quantity_t, role_coupling
+  use nocdyn_elements, only: elements_t
   use nocdyn_kinds, only: wp
   use nocdyn_text, only: string_t
   implicit none (type, external)
@@ -10,8 +11,9 @@ module nocdyn_couplings
 
   !> M_el = -(K1 + k1 w^2) w on the second body, w = u - rest_twist; damping moment -d u'.
   type, extends(bank_t), public :: couplings_t
-    real(wp), allocatable :: stiffness(:, :)         !! K1 [N m/rad], shape [lanes, couplings]
+    real(wp), allocatable :: stiffness(:, :)         !! K1 [N m/rad], shape [lanes, couplings] as all parameters
     real(wp), allocatable :: cubic_stiffness(:, :)   !! k1 [N m/rad3], of either sign
+    real(wp), allocatable :: damping(:, :)           !! d [N m s/rad]
     real(wp), allocatable :: rest_twist(:, :)        !! [rad]
   contains
     procedure :: evaluate
@@ -44,50 +46,62 @@ contains
     bank%accounted = pack([(e, e=1, size(to))], any(abs(damping) > 0.0_wp, dim=1))
   end function new_couplings
 
-  !> Eqs. (3), (49), (50), in the restoring sense.
-  subroutine evaluate(self, t)
-    class(couplings_t), intent(inout) :: self
-    real(wp), contiguous, intent(in) :: t(:)
-    real(wp) :: w
-    integer :: e, l
+  subroutine evaluate(self, time, angle, speed, restoring, working)
+    class(couplings_t), intent(in) :: self
+    real(wp), intent(in) :: time(self%lanes), angle(self%values), speed(self%values)
+    real(wp), intent(inout) :: restoring(self%values), working(self%values)
 
-    do e = 1, size(self%to)
-      do l = 1, size(t)
-        w = self%angle(l, e) - self%rest_twist(l, e)
-        self%restoring(l, e) = -(self%stiffness(l, e) + self%cubic_stiffness(l, e) * w * w) * w
-        self%working(l, e) = -self%damping(l, e) * self%speed(l, e)
-      end do
-    end do
+    call spring_moments(self%values, self%stiffness, self%cubic_stiffness, self%damping, self%rest_twist, angle, speed, &
+                        restoring, working)
   end subroutine evaluate
 
-  !> The tangent stiffness K1 + 3 k1 w^2 of eqs. (64)-(68), negative.
-  subroutine differentiate(self, t)
-    class(couplings_t), intent(inout) :: self
-    real(wp), contiguous, intent(in) :: t(:)
+  !> Eqs. (3), (49), (50), in the restoring sense.
+  pure subroutine spring_moments(n, stiffness, cubic_stiffness, damping, rest_twist, angle, speed, restoring, working)
+    integer, intent(in) :: n
+    real(wp), intent(in) :: stiffness(n), cubic_stiffness(n), damping(n), rest_twist(n), angle(n), speed(n)
+    real(wp), intent(inout) :: restoring(n), working(n)
     real(wp) :: w
-    integer :: e, l
+    integer :: i
+
+    do i = 1, n
+      w = angle(i) - rest_twist(i)
+      restoring(i) = -(stiffness(i) + cubic_stiffness(i) * w * w) * w
+      working(i) = -damping(i) * speed(i)
+    end do
+  end subroutine spring_moments
+
+  !> The tangent stiffness K1 + 3 k1 w^2 of eqs. (64)-(68), negative.
+  subroutine differentiate(self, elements)
+    class(couplings_t), intent(in) :: self
+    type(elements_t), intent(inout) :: elements
+    real(wp) :: w
+    integer :: e, i, l
 
     do e = 1, size(self%to)
-      do l = 1, size(t)
-        w = self%angle(l, e) - self%rest_twist(l, e)
-        self%restoring_angle(l, e) = -(self%stiffness(l, e) + 3.0_wp * self%cubic_stiffness(l, e) * w * w)
-        self%restoring_curvature(l, e) = -6.0_wp * self%cubic_stiffness(l, e) * w
-        self%working_speed(l, e) = -self%damping(l, e)
+      i = self%first + e - 1
+      do l = 1, self%lanes
+        w = elements%angle(l, i) - self%rest_twist(l, e)
+        elements%restoring_angle(l, i) = -(self%stiffness(l, e) + 3.0_wp * self%cubic_stiffness(l, e) * w * w)
+        elements%restoring_curvature(l, i) = -6.0_wp * self%cubic_stiffness(l, e) * w
+        elements%working_speed(l, i) = -self%damping(l, e)
       end do
     end do
   end subroutine differentiate
 
   !> Stored energy K1 w^2 / 2 + k1 w^4 / 4 and the secant stiffness K12 of eq. (3).
-  subroutine assess(self)
-    class(couplings_t), intent(inout) :: self
+  subroutine assess(self, elements)
+    class(couplings_t), intent(in) :: self
+    type(elements_t), intent(inout) :: elements
     real(wp) :: w2
-    integer :: e, l
+    integer :: e, i, l
 
     do e = 1, size(self%to)
-      do l = 1, size(self%angle, 1)
-        w2 = (self%angle(l, e) - self%rest_twist(l, e))**2
-        self%secant(l, e) = self%stiffness(l, e) + self%cubic_stiffness(l, e) * w2
-        self%stored(l, e) = (0.5_wp * self%stiffness(l, e) + 0.25_wp * self%cubic_stiffness(l, e) * w2) * w2
+      i = self%first + e - 1
+      do l = 1, self%lanes
+        w2 = (elements%angle(l, i) - self%rest_twist(l, e))**2
+        elements%secant(l, i) = self%stiffness(l, e) + self%cubic_stiffness(l, e) * w2
+        elements%stored(l, i) = (0.5_wp * self%stiffness(l, e) + 0.25_wp * self%cubic_stiffness(l, e) * w2) * w2
+        elements%damping(l, i) = self%damping(l, e)
       end do
     end do
   end subroutine assess
@@ -104,19 +118,20 @@ contains
   end function quantities
 
   !> Twist, and the moments that act on the first body: F1 of the paper and the damping moment.
-  pure subroutine observe(self, quantity, lane, values)
+  pure subroutine observe(self, elements, quantity, lane, values)
     class(couplings_t), intent(in) :: self
+    type(elements_t), intent(in) :: elements
     integer, intent(in) :: quantity
     integer, intent(in) :: lane
     real(wp), intent(out) :: values(:)
 
     select case (quantity)
     case (twist)
-      values = self%angle(lane, :)
+      values = elements%angle(lane, self%first:self%last())
     case (moment)
-      values = -self%restoring(lane, :)
+      values = -elements%restoring(lane, self%first:self%last())
     case default
-      values = -self%working(lane, :)
+      values = -elements%working(lane, self%first:self%last())
     end select
   end subroutine observe
 

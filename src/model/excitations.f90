@@ -1,11 +1,10 @@
 !> Harmonic excitations, eq. (17): M_0 sin(omega_p t + phase).
-!>
-!> The loops over lanes are not vectorised: a vector sine differs from the scalar one in its last bit, and a lane's result
-!> would depend on its place in the block.
 module nocdyn_excitations
   use nocdyn_bank, only: bank_t, role_excitation
+  use nocdyn_elements, only: elements_t
   use nocdyn_kinds, only: wp
   use nocdyn_text, only: string_t
+  use nocdyn_vector_functions, only: cosines, sines
   implicit none (type, external)
   private
 
@@ -36,31 +35,46 @@ contains
     bank%phase = phase
   end function new_excitations
 
-  subroutine evaluate(self, t)
-    class(excitations_t), intent(inout) :: self
-    real(wp), contiguous, intent(in) :: t(:)
-    integer :: e, l
+  subroutine evaluate(self, time, angle, speed, restoring, working)
+    class(excitations_t), intent(in) :: self
+    real(wp), intent(in) :: time(self%lanes), angle(self%values), speed(self%values)
+    real(wp), intent(inout) :: restoring(self%values), working(self%values)
 
-    do e = 1, size(self%to)
-      !GCC$ novector
-      do l = 1, size(t)
-        self%working(l, e) = self%amplitude(l, e) * sin(self%frequency(l, e) * t(l) + self%phase(l, e))
-      end do
-    end do
+    call harmonic_torques(self%lanes, self%values, self%amplitude, self%frequency, self%phase, time, working)
   end subroutine evaluate
 
-  subroutine differentiate(self, t)
-    class(excitations_t), intent(inout) :: self
-    real(wp), contiguous, intent(in) :: t(:)
-    integer :: e, l
+  !> Eq. (17).
+  pure subroutine harmonic_torques(lanes, n, amplitude, frequency, phase, time, working)
+    integer, intent(in) :: lanes, n
+    real(wp), intent(in) :: amplitude(n), frequency(n), phase(n), time(lanes)
+    real(wp), intent(inout) :: working(n)
+    integer :: i, l
 
-    do e = 1, size(self%to)
-      !GCC$ novector
-      do l = 1, size(t)
-        self%working_time(l, e) = self%amplitude(l, e) * self%frequency(l, e) &
-                                  * cos(self%frequency(l, e) * t(l) + self%phase(l, e))
+    do i = 0, n - lanes, lanes
+      do l = 1, lanes
+        working(i + l) = frequency(i + l) * time(l) + phase(i + l)
       end do
     end do
+    call sines(n, working)
+    do i = 1, n
+      working(i) = amplitude(i) * working(i)
+    end do
+  end subroutine harmonic_torques
+
+  subroutine differentiate(self, elements)
+    class(excitations_t), intent(in) :: self
+    type(elements_t), intent(inout) :: elements
+    integer :: e, l
+
+    associate (slope => elements%working_time(:, self%first:self%last()))
+      do e = 1, size(self%to)
+        do l = 1, self%lanes
+          slope(l, e) = self%frequency(l, e) * elements%time(l) + self%phase(l, e)
+        end do
+      end do
+      call cosines(size(slope), slope)
+      slope = self%amplitude * self%frequency * slope
+    end associate
   end subroutine differentiate
 
 end module nocdyn_excitations

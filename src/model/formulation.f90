@@ -6,12 +6,13 @@ module nocdyn_formulation
   implicit none (type, external)
   private
 
-  !> Extensions choose the states; the integrated work of the accounted elements follows them as quadratures.
+  !> Extensions choose the states; where the works are audited, those of the accounted elements follow as quadratures.
   type, abstract, extends(system_t), public :: formulation_t
     type(machine_t) :: machine
-    real(wp), allocatable :: phi(:, :)      !! angles [rad], shape [lanes, 0:bodies], 0 is the ground
-    real(wp), allocatable :: omega(:, :)    !! speeds [rad/s]
-    real(wp), allocatable :: torque(:, :)   !! torques of the elements [N m]
+    logical :: is_audited = .true.          !! whether the power of the accounted elements is integrated
+    real(wp), allocatable :: phi(:, :)      !! angles [rad] after `place`, shape [lanes, 0:bodies], 0 is the ground
+    real(wp), allocatable :: omega(:, :)    !! speeds [rad/s] after `place`
+    real(wp), allocatable :: torque(:, :)   !! torques of the elements [N m] after `observe`
   contains
     procedure(start_interface), deferred :: start
     procedure(place_interface), deferred :: place
@@ -49,13 +50,15 @@ module nocdyn_formulation
 contains
 
   !> Takes the machine and allocates what every formulation needs.
-  subroutine attach(self, machine)
+  subroutine attach(self, machine, audited)
     class(formulation_t), intent(inout) :: self
     type(machine_t), intent(in) :: machine
+    logical, intent(in) :: audited
 
     self%machine = machine
     self%lanes = machine%lanes
-    self%quadratures = machine%accounts()
+    self%is_audited = audited
+    self%quadratures = merge(machine%accounts(), 0, audited)
     allocate (self%phi(machine%lanes, 0:machine%bodies), source=0.0_wp)
     allocate (self%omega, self%torque, source=self%phi)
   end subroutine attach

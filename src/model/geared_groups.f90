@@ -55,10 +55,10 @@ contains
     type(constraints_t), intent(in) :: constraints
     integer, intent(in) :: bodies(:), rows(:)
     real(wp) :: pace(size(bodies))
-    real(wp) :: known(constraints%bodies), term   ! 0: not known yet
+    real(wp) :: known(constraints%bodies), term   ! 0: not known yet; of `bodies` alone
     integer :: entry, i
 
-    known = 0.0_wp
+    known(bodies) = 0.0_wp
     known(bodies(1)) = 1.0_wp
     do while (any(known(bodies) <= 0.0_wp))
       do i = 1, size(rows)

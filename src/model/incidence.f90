@@ -32,7 +32,7 @@ contains
     end if
   end subroutine add_coefficient
 
-  !> The pattern of eq. (21) for all elements of a bank, with k = factor * coefficient.
+  !> The pattern of eq. (21) for many elements, with k = factor * coefficient.
   pure subroutine add_coefficients(from, to, factor, coefficient, matrix)
     integer, intent(in) :: from(:), to(:)          !! [elements]
     real(wp), intent(in) :: factor

@@ -1,6 +1,7 @@
 !> Loads: the viscous resistance of eq. (5), M_r = -c omega.
 module nocdyn_loads
   use nocdyn_bank, only: bank_t, role_load
+  use nocdyn_elements, only: elements_t
   use nocdyn_kinds, only: wp
   use nocdyn_text, only: string_t
   implicit none (type, external)
@@ -8,11 +9,12 @@ module nocdyn_loads
 
   public :: new_loads
 
-  !> The coefficients c are the `damping` of the bank.
   type, extends(bank_t), public :: loads_t
+    real(wp), allocatable :: viscous(:, :)   !! c [N m s/rad], shape [lanes, loads]
   contains
     procedure :: evaluate
     procedure :: differentiate
+    procedure :: assess
   end type loads_t
 
 contains
@@ -26,26 +28,42 @@ contains
     integer :: e
 
     call bank%connect(role_load, size(viscous, 1), names, [(0, e=1, size(body))], body)
-    bank%damping = viscous
+    bank%viscous = viscous
   end function new_loads
 
-  subroutine evaluate(self, t)
-    class(loads_t), intent(inout) :: self
-    real(wp), contiguous, intent(in) :: t(:)
-    integer :: e, l
+  subroutine evaluate(self, time, angle, speed, restoring, working)
+    class(loads_t), intent(in) :: self
+    real(wp), intent(in) :: time(self%lanes), angle(self%values), speed(self%values)
+    real(wp), intent(inout) :: restoring(self%values), working(self%values)
 
-    do e = 1, size(self%to)
-      do l = 1, size(t)
-        self%working(l, e) = -self%damping(l, e) * self%speed(l, e)
-      end do
-    end do
+    call viscous_torques(self%values, self%viscous, speed, working)
   end subroutine evaluate
 
-  subroutine differentiate(self, t)
-    class(loads_t), intent(inout) :: self
-    real(wp), contiguous, intent(in) :: t(:)
+  !> Eq. (5).
+  pure subroutine viscous_torques(n, viscous, speed, working)
+    integer, intent(in) :: n
+    real(wp), intent(in) :: viscous(n), speed(n)
+    real(wp), intent(inout) :: working(n)
+    integer :: i
 
-    self%working_speed(:size(t), :) = -self%damping
+    do i = 1, n
+      working(i) = -viscous(i) * speed(i)
+    end do
+  end subroutine viscous_torques
+
+  subroutine differentiate(self, elements)
+    class(loads_t), intent(in) :: self
+    type(elements_t), intent(inout) :: elements
+
+    elements%working_speed(:, self%first:self%last()) = -self%viscous
   end subroutine differentiate
+
+  !> The coefficients c are those of C, eq. (22).
+  subroutine assess(self, elements)
+    class(loads_t), intent(in) :: self
+    type(elements_t), intent(inout) :: elements
+
+    elements%damping(:, self%first:self%last()) = self%viscous
+  end subroutine assess
 
 end module nocdyn_loads

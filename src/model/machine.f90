@@ -3,6 +3,7 @@ module nocdyn_machine
   use nocdyn_bank, only: bank_slot_t
   use nocdyn_constraints, only: constraints_t
   use nocdyn_coordinates, only: coordinates_t
+  use nocdyn_elements, only: elements_t, new_elements
   use nocdyn_geared_groups, only: geared_group_t
   use nocdyn_kinds, only: wp
   use nocdyn_text, only: string_t
@@ -17,14 +18,20 @@ module nocdyn_machine
     real(wp), allocatable :: start_angle(:, :)      !! [rad]
     real(wp), allocatable :: start_speed(:, :)      !! [rad/s], obeys the constraints
     type(bank_slot_t), allocatable :: banks(:)
+    type(elements_t) :: elements                    !! of all banks, after `number_elements`
+    integer, allocatable :: accounted(:)            !! elements whose power may be integrated, [accounts]
     type(constraints_t) :: constraints
     type(geared_group_t), allocatable :: groups(:)
     type(coordinates_t) :: coordinates
   contains
+    procedure :: number_elements
     procedure :: accounts
     procedure :: accounted_name
     procedure :: evaluate
+    procedure :: evaluate_elements
     procedure :: differentiate
+    procedure :: differentiate_elements
+    procedure :: assess
     procedure :: power
     procedure :: kinetic_energy
     procedure :: stored_energy
@@ -32,32 +39,42 @@ module nocdyn_machine
 
 contains
 
-  !> How many elements have their power integrated.
+  !> Numbers the elements of all banks through; to be called once the banks are there.
+  subroutine number_elements(self)
+    class(machine_t), intent(inout) :: self
+    integer :: i, total
+
+    total = 0
+    do i = 1, size(self%banks)
+      self%banks(i)%bank%first = total + 1
+      self%banks(i)%bank%first_value = self%lanes * total + 1
+      total = self%banks(i)%bank%last()
+    end do
+    self%elements = new_elements(self%lanes, [(self%banks(i)%bank%from, i=1, size(self%banks))], &
+                                 [(self%banks(i)%bank%to, i=1, size(self%banks))])
+    self%accounted = [(self%banks(i)%bank%first - 1 + self%banks(i)%bank%accounted, i=1, size(self%banks))]
+  end subroutine number_elements
+
+  !> How many elements may have their power integrated.
   pure integer function accounts(self)
     class(machine_t), intent(in) :: self
-    integer :: i
 
-    accounts = 0
-    do i = 1, size(self%banks)
-      accounts = accounts + size(self%banks(i)%bank%accounted)
-    end do
+    accounts = size(self%accounted)
   end function accounts
 
   !> Name of the element whose power is integrated as number `index`.
   pure function accounted_name(self, index) result(name)
     class(machine_t), intent(in) :: self
-    integer, intent(in) :: index
+    integer, intent(in) :: index   !! 1 to accounts
     character(len=:), allocatable :: name
-    integer :: i, before
+    integer :: i
 
-    before = 0
     do i = 1, size(self%banks)
-      associate (bank => self%banks(i)%bank)
-        if (index <= before + size(bank%accounted)) then
-          name = bank%names(bank%accounted(index - before))%text
+      associate (bank => self%banks(i)%bank, element => self%accounted(index))
+        if (element <= bank%last()) then
+          name = bank%names(element - bank%first + 1)%text
           return
         end if
-        before = before + size(bank%accounted)
       end associate
     end do
     error stop 'nocdyn_machine: there are not so many accounted elements'
@@ -69,45 +86,84 @@ contains
     real(wp), contiguous, intent(in) :: t(:)
     real(wp), contiguous, intent(in) :: phi(:, 0:), omega(:, 0:)   !! [lanes, ground and bodies]
     real(wp), contiguous, intent(inout) :: torque(:, 0:)
-    integer :: i
 
-    torque(:, :) = 0.0_wp
-    do i = 1, size(self%banks)
-      associate (bank => self%banks(i)%bank)
-        call bank%gather(phi, omega)
-        call bank%evaluate(t)
-        call bank%scatter(torque)
-      end associate
-    end do
+    call self%elements%gather(phi, omega)
+    call self%evaluate_elements(t)
+    call self%elements%scatter(torque)
   end subroutine evaluate
 
-  !> Evaluates all elements and their derivatives, which stay in the banks.
+  !> The moments of all elements from their angles and speeds.
+  subroutine evaluate_elements(self, t)
+    class(machine_t), intent(inout) :: self
+    real(wp), intent(in) :: t(self%lanes)
+
+    associate (elements => self%elements)
+      call evaluate_banks(self%banks, self%lanes, size(elements%angle), t, elements%angle, elements%speed, &
+                          elements%restoring, elements%working)
+    end associate
+  end subroutine evaluate_elements
+
+  !> Hands every bank its part of the values, by address alone.
+  subroutine evaluate_banks(banks, lanes, n, t, angle, speed, restoring, working)
+    type(bank_slot_t), intent(in) :: banks(:)
+    integer, intent(in) :: lanes, n   ! lanes * elements
+    real(wp), intent(in) :: t(lanes), angle(n), speed(n)
+    real(wp), intent(inout) :: restoring(n), working(n)
+    integer :: i
+
+    do i = 1, size(banks)
+      associate (bank => banks(i)%bank)
+        if (bank%values == 0) cycle
+        call bank%evaluate(t, angle(bank%first_value), speed(bank%first_value), restoring(bank%first_value), &
+                           working(bank%first_value))
+      end associate
+    end do
+  end subroutine evaluate_banks
+
+  !> The moments of all elements and their derivatives.
   subroutine differentiate(self, t, phi, omega)
     class(machine_t), intent(inout) :: self
     real(wp), contiguous, intent(in) :: t(:)
-    real(wp), contiguous, intent(in) :: phi(:, 0:), omega(:, 0:)
+    real(wp), contiguous, intent(in) :: phi(:, 0:), omega(:, 0:)   !! [lanes, ground and bodies]
+
+    call self%elements%gather(phi, omega)
+    call self%evaluate_elements(t)
+    call self%differentiate_elements(t)
+  end subroutine differentiate
+
+  !> The derivatives of the moments, after `evaluate_elements`.
+  subroutine differentiate_elements(self, t)
+    class(machine_t), intent(inout) :: self
+    real(wp), intent(in) :: t(self%lanes)
+    integer :: i
+
+    self%elements%time(:) = t
+    do i = 1, size(self%banks)
+      if (self%banks(i)%bank%values > 0) call self%banks(i)%bank%differentiate(self%elements)
+    end do
+  end subroutine differentiate_elements
+
+  !> Stored energies, secant stiffnesses and dampings of all elements from their angles.
+  subroutine assess(self)
+    class(machine_t), intent(inout) :: self
     integer :: i
 
     do i = 1, size(self%banks)
-      associate (bank => self%banks(i)%bank)
-        call bank%gather(phi, omega)
-        call bank%evaluate(t)
-        call bank%differentiate(t)
-      end associate
+      if (self%banks(i)%bank%values > 0) call self%banks(i)%bank%assess(self%elements)
     end do
-  end subroutine differentiate
+  end subroutine assess
 
-  !> Power of the accounted elements after `evaluate`, positive into the machine [W], shape [lanes, accounts].
+  !> Power of the accounted elements after `evaluate`, positive into the machine [W].
   subroutine power(self, watts)
     class(machine_t), intent(in) :: self
-    real(wp), contiguous, intent(inout) :: watts(:, :)
-    integer :: i, last, next
+    real(wp), intent(inout) :: watts(self%lanes, size(self%accounted))
+    integer :: e, k, l
 
-    next = 1
-    do i = 1, size(self%banks)
-      last = next + size(self%banks(i)%bank%accounted) - 1
-      call self%banks(i)%bank%power(watts(:, next:last))
-      next = last + 1
+    do k = 1, size(self%accounted)
+      e = self%accounted(k)
+      do l = 1, self%lanes
+        watts(l, k) = self%elements%working(l, e) * self%elements%speed(l, e)
+      end do
     end do
   end subroutine power
 
@@ -126,13 +182,9 @@ contains
     class(machine_t), intent(inout) :: self
     integer, intent(in) :: lane
     real(wp) :: energy
-    integer :: i
 
-    energy = 0.0_wp
-    do i = 1, size(self%banks)
-      call self%banks(i)%bank%assess()
-      energy = energy + sum(self%banks(i)%bank%stored(lane, :))
-    end do
+    call self%assess()
+    energy = sum(self%elements%stored(lane, :))
   end function stored_energy
 
 end module nocdyn_machine

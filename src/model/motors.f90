@@ -1,6 +1,7 @@
 !> Motors with a quadratic torque-speed curve, eq. (20): M_m = A - B omega - C omega^2.
 module nocdyn_motors
   use nocdyn_bank, only: bank_t, role_motor
+  use nocdyn_elements, only: elements_t
   use nocdyn_kinds, only: wp
   use nocdyn_text, only: string_t
   implicit none (type, external)
@@ -33,26 +34,35 @@ contains
     bank%c = c
   end function new_motors
 
-  subroutine evaluate(self, t)
-    class(motors_t), intent(inout) :: self
-    real(wp), contiguous, intent(in) :: t(:)
-    integer :: e, l
+  subroutine evaluate(self, time, angle, speed, restoring, working)
+    class(motors_t), intent(in) :: self
+    real(wp), intent(in) :: time(self%lanes), angle(self%values), speed(self%values)
+    real(wp), intent(inout) :: restoring(self%values), working(self%values)
 
-    do e = 1, size(self%to)
-      do l = 1, size(t)
-        self%working(l, e) = self%a(l, e) - (self%b(l, e) + self%c(l, e) * self%speed(l, e)) * self%speed(l, e)
-      end do
-    end do
+    call motor_torques(self%values, self%a, self%b, self%c, speed, working)
   end subroutine evaluate
 
-  subroutine differentiate(self, t)
-    class(motors_t), intent(inout) :: self
-    real(wp), contiguous, intent(in) :: t(:)
-    integer :: e, l
+  !> Eq. (20).
+  pure subroutine motor_torques(n, a, b, c, speed, working)
+    integer, intent(in) :: n
+    real(wp), intent(in) :: a(n), b(n), c(n), speed(n)
+    real(wp), intent(inout) :: working(n)
+    integer :: i
+
+    do i = 1, n
+      working(i) = a(i) - (b(i) + c(i) * speed(i)) * speed(i)
+    end do
+  end subroutine motor_torques
+
+  subroutine differentiate(self, elements)
+    class(motors_t), intent(in) :: self
+    type(elements_t), intent(inout) :: elements
+    integer :: e, i, l
 
     do e = 1, size(self%to)
-      do l = 1, size(t)
-        self%working_speed(l, e) = -self%b(l, e) - 2.0_wp * self%c(l, e) * self%speed(l, e)
+      i = self%first + e - 1
+      do l = 1, self%lanes
+        elements%working_speed(l, i) = -self%b(l, e) - 2.0_wp * self%c(l, e) * elements%speed(l, i)
       end do
     end do
   end subroutine differentiate

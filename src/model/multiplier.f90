@@ -4,7 +4,6 @@ module nocdyn_multiplier
   use nocdyn_kinds, only: wp
   use nocdyn_lapack_lu, only: lu_factor, lu_solve
   use nocdyn_machine, only: machine_t
-  use nocdyn_system, only: evaluation_fine
   implicit none (type, external)
   private
 
@@ -23,13 +22,14 @@ module nocdyn_multiplier
 contains
 
   !> The formulation of a machine; its matrix is factored here.
-  function new_multiplier(machine) result(self)
+  function new_multiplier(machine, audited) result(self)
     type(machine_t), intent(in) :: machine
+    logical, intent(in) :: audited   !! whether the works of the accounted elements are integrated
     type(multiplier_t) :: self
     integer :: b, g, l, order
     logical :: is_singular
 
-    call self%attach_bodies(machine, 2 * machine%bodies)
+    call self%attach_bodies(machine, 2 * machine%bodies, audited)
     self%kept = [(machine%groups(g)%kept, g=1, size(machine%groups))]
     order = machine%bodies + size(self%kept)
     allocate (self%factors(order, order, machine%lanes), source=0.0_wp)
@@ -49,10 +49,10 @@ contains
 
   subroutine derivative(self, t, y, dydt, status)
     class(multiplier_t), intent(inout) :: self
-    real(wp), contiguous, intent(in) :: t(:)
-    real(wp), contiguous, intent(in) :: y(:, :)
-    real(wp), contiguous, intent(inout) :: dydt(:, :)
-    integer, contiguous, intent(inout) :: status(:)
+    real(wp), intent(in) :: t(self%lanes)
+    real(wp), intent(in) :: y(self%lanes, self%states + self%quadratures)
+    real(wp), intent(inout) :: dydt(self%lanes, self%states + self%quadratures)
+    integer, intent(inout) :: status(self%lanes)
     integer :: l, n
 
     n = self%machine%bodies
@@ -65,8 +65,7 @@ contains
       dydt(l, :n) = self%solution(:n, l)
     end do
     dydt(:, n + 1:2 * n) = y(:, :n)
-    call self%machine%power(dydt(:, 2 * n + 1:))
-    status = evaluation_fine
+    if (self%quadratures > 0) call self%machine%power(dydt(:, 2 * n + 1:))
   end subroutine derivative
 
   !> lambda of the system itself, shared out where rows are redundant.

@@ -2,7 +2,7 @@
 module nocdyn_paper
   use nocdyn_bank, only: role_coupling, role_excitation, role_load, role_motor
   use nocdyn_body_formulation, only: body_formulation_t, jacobian_of_bodies, observe_bodies, start_of_bodies
-  use nocdyn_incidence, only: add_coefficient, add_moment
+  use nocdyn_incidence, only: add_coefficients, add_moment
   use nocdyn_kinds, only: wp
   use nocdyn_lapack, only: pseudo_inverse
   use nocdyn_lapack_lu, only: lu_factor, lu_solve
@@ -10,7 +10,6 @@ module nocdyn_paper
   use nocdyn_paper_matrices, only: constrained_inertia, constrained_matrix, constrained_vector, damping_2, damping_3, &
                                    damping_matrix, elastic_moments, inertia_2, inertia_3, inertia_matrix, stiffness_2, &
                                    stiffness_3, stiffness_matrix, tangent_matrix, torque_2, torque_3, torque_vector
-  use nocdyn_system, only: evaluation_fine
   implicit none (type, external)
   private
 
@@ -43,8 +42,9 @@ module nocdyn_paper
 contains
 
   !> The formulation of a machine; J_3 is assembled and factored here.
-  function new_paper(machine) result(self)
+  function new_paper(machine, audited) result(self)
     type(machine_t), intent(in) :: machine
+    logical, intent(in) :: audited   !! whether the works of the accounted elements are integrated
     type(paper_t) :: self
     integer :: b, g, l, n
     logical :: is_singular
@@ -52,7 +52,7 @@ contains
     real(wp) :: inertia_of_2(2 * machine%bodies, 2 * machine%bodies)
 
     n = machine%bodies
-    call self%attach_bodies(machine, 3 * n)
+    call self%attach_bodies(machine, 3 * n, audited)
     call allocate_matrices(n, self%work)
     allocate (self%complement(n, machine%coordinates%freedoms, machine%lanes))
     allocate (self%factors(3 * n, 3 * n, machine%lanes), self%pivots(3 * n, machine%lanes))
@@ -134,27 +134,24 @@ contains
 
   subroutine derivative(self, t, y, dydt, status)
     class(paper_t), intent(inout) :: self
-    real(wp), contiguous, intent(in) :: t(:)
-    real(wp), contiguous, intent(in) :: y(:, :)
-    real(wp), contiguous, intent(inout) :: dydt(:, :)
-    integer, contiguous, intent(inout) :: status(:)
-    integer :: i, l, n
+    real(wp), intent(in) :: t(self%lanes)
+    real(wp), intent(in) :: y(self%lanes, self%states + self%quadratures)
+    real(wp), intent(inout) :: dydt(self%lanes, self%states + self%quadratures)
+    integer, intent(inout) :: status(self%lanes)
+    integer :: l, n
 
     n = self%machine%bodies
     call self%place(y)
     call self%machine%evaluate(t, self%phi, self%omega, self%torque)
-    do i = 1, size(self%machine%banks)
-      call self%machine%banks(i)%bank%assess()
-      call self%machine%banks(i)%bank%differentiate(t)
-    end do
+    call self%machine%assess()
+    call self%machine%differentiate_elements(t)
     do l = 1, self%lanes
       call assemble(self%machine, l, self%complement(:, :, l), self%work)
       self%work%beta(:) = y(l, :3 * n)
       call solve_generalised_system(self%factors(:, :, l), self%pivots(:, l), self%work)
       dydt(l, :3 * n) = self%work%beta
     end do
-    call self%machine%power(dydt(:, 3 * n + 1:))
-    status = evaluation_fine
+    if (self%quadratures > 0) call self%machine%power(dydt(:, 3 * n + 1:))
   end subroutine derivative
 
   !> The matrices of eqs. (16)-(72) of one lane, up to those of eq. (43).
@@ -202,30 +199,35 @@ contains
   !> Adds the rows F' = K_4 omega.
   subroutine jacobian(self, t, y, dfdy, dfdt, status)
     class(paper_t), intent(inout) :: self
-    real(wp), contiguous, intent(in) :: t(:)
-    real(wp), contiguous, intent(in) :: y(:, :)
-    real(wp), contiguous, intent(inout) :: dfdy(:, :, :)
-    real(wp), contiguous, intent(inout) :: dfdt(:, :)
-    integer, contiguous, intent(inout) :: status(:)
-    integer :: e, i, l, n
+    real(wp), intent(in) :: t(self%lanes)
+    real(wp), intent(in) :: y(self%lanes, self%states + self%quadratures)
+    real(wp), contiguous, intent(inout) :: dfdy(:, :)
+    real(wp), intent(inout) :: dfdt(self%lanes, self%states + self%quadratures)
+    integer, intent(inout) :: status(self%lanes)
+
+    call jacobian_of_bodies(self, t, y, dfdy, dfdt, status)
+    call fill_moment_rows(self, size(dfdt, 2), dfdy)
+  end subroutine jacobian
+
+  !> The derivatives of F' = K_4 omega by omega and phi.
+  subroutine fill_moment_rows(self, components, dfdy)
+    type(paper_t), intent(inout) :: self
+    integer, intent(in) :: components
+    real(wp), intent(inout) :: dfdy(self%lanes, components, self%states)
+    integer :: l, n
 
     n = self%machine%bodies
-    call jacobian_of_bodies(self, t, y, dfdy, dfdt, status)
-    do l = 1, self%lanes
-      call tangent_matrix(self%machine, l, self%work%tangent)
-      dfdy(l, 2 * n + 1:3 * n, :n) = self%work%tangent
-      self%work%tangent(:, :) = 0.0_wp
-      do i = 1, size(self%machine%banks)
-        associate (bank => self%machine%banks(i)%bank)
-          do e = 1, size(bank%to)
-            call add_coefficient(bank%from(e), bank%to(e), -bank%restoring_curvature(l, e) * bank%speed(l, e), &
-                                 self%work%tangent)
-          end do
-        end associate
+    associate (elements => self%machine%elements)
+      do l = 1, self%lanes
+        call tangent_matrix(self%machine, l, self%work%tangent)
+        dfdy(l, 2 * n + 1:3 * n, :n) = self%work%tangent
+        self%work%tangent(:, :) = 0.0_wp
+        call add_coefficients(elements%from, elements%to, -1.0_wp, &
+                              elements%restoring_curvature(l, :) * elements%speed(l, :), self%work%tangent)
+        dfdy(l, 2 * n + 1:3 * n, n + 1:2 * n) = self%work%tangent
       end do
-      dfdy(l, 2 * n + 1:3 * n, n + 1:2 * n) = self%work%tangent
-    end do
-  end subroutine jacobian
+    end associate
+  end subroutine fill_moment_rows
 
   !> The moments of the couplings are then read from the states F: of all moments that add up to F on the bodies, those
   !> nearest to the law's (where the couplings form no loop, F determines them).
@@ -241,16 +243,15 @@ contains
       call elastic_moments(self%machine, l, self%work%term)
       column = 0
       do i = 1, size(self%machine%banks)
-        associate (bank => self%machine%banks(i)%bank)
-          if (bank%role /= role_coupling) cycle
-          do e = 1, size(bank%to)
-            column = column + 1
+        if (self%machine%banks(i)%bank%role /= role_coupling) cycle
+        do e = self%machine%banks(i)%bank%first, self%machine%banks(i)%bank%last()
+          column = column + 1
+          associate (moment => self%machine%elements%restoring(l, e))
             do b = 1, n
-              bank%restoring(l, e) = bank%restoring(l, e) &
-                                     + self%moment_of_bodies(column, b) * (y(l, 2 * n + b) - self%work%term(b))
+              moment = moment + self%moment_of_bodies(column, b) * (y(l, 2 * n + b) - self%work%term(b))
             end do
-          end do
-        end associate
+          end associate
+        end do
       end do
     end do
   end subroutine observe

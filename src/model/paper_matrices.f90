@@ -1,7 +1,7 @@
 !> The matrices and vectors of the paper, eqs. (13)-(72), for any machine of n bodies.
 !>
-!> They are those of one lane at the angles and speeds at which the machine was last brought by `evaluate`,
-!> `differentiate` and by `assess` of its banks. What a law has beyond -K12 u - c u' (the rest twist of a coupling,
+!> They are those of one lane at the angles and speeds to which the machine was last brought by `evaluate`,
+!> `differentiate` and `assess`. What a law has beyond -K12 u - c u' (the rest twist of a coupling,
 !> the torque of a motor) stands in Q. Every procedure overwrites its last argument and allocates nothing.
 module nocdyn_paper_matrices
   use nocdyn_incidence, only: add_coefficients, add_moment
@@ -42,11 +42,12 @@ contains
 
     torque = 0.0_wp
     do i = 1, size(machine%banks)
-      associate (bank => machine%banks(i)%bank)
+      associate (bank => machine%banks(i)%bank, elements => machine%elements)
         if (bank%role /= role) cycle
-        do e = 1, size(bank%to)
-          call add_moment(bank%from(e), bank%to(e), (bank%restoring(lane, e) + bank%secant(lane, e) * bank%angle(lane, e)) &
-                          + (bank%working(lane, e) + bank%damping(lane, e) * bank%speed(lane, e)), torque)
+        do e = bank%first, bank%last()
+          call add_moment(elements%from(e), elements%to(e), &
+                          (elements%restoring(lane, e) + elements%secant(lane, e) * elements%angle(lane, e)) &
+                          + (elements%working(lane, e) + elements%damping(lane, e) * elements%speed(lane, e)), torque)
         end do
       end associate
     end do
@@ -57,14 +58,9 @@ contains
     type(machine_t), intent(in) :: machine
     integer, intent(in) :: lane
     real(wp), intent(inout) :: stiffness(:, :)
-    integer :: i
 
     stiffness = 0.0_wp
-    do i = 1, size(machine%banks)
-      associate (bank => machine%banks(i)%bank)
-        call add_coefficients(bank%from, bank%to, 1.0_wp, bank%secant(lane, :), stiffness)
-      end associate
-    end do
+    call add_coefficients(machine%elements%from, machine%elements%to, 1.0_wp, machine%elements%secant(lane, :), stiffness)
   end subroutine stiffness_matrix
 
   !> C of eq. (22) from viscous loads and the damping of couplings, [n, n].
@@ -72,14 +68,9 @@ contains
     type(machine_t), intent(in) :: machine
     integer, intent(in) :: lane
     real(wp), intent(inout) :: damping(:, :)
-    integer :: i
 
     damping = 0.0_wp
-    do i = 1, size(machine%banks)
-      associate (bank => machine%banks(i)%bank)
-        call add_coefficients(bank%from, bank%to, 1.0_wp, bank%damping(lane, :), damping)
-      end associate
-    end do
+    call add_coefficients(machine%elements%from, machine%elements%to, 1.0_wp, machine%elements%damping(lane, :), damping)
   end subroutine damping_matrix
 
   !> K_4 of eqs. (62)-(72) from the tangent stiffnesses K1 + 3 k1 w^2, [n, n]; the derivative of the elastic moments is
@@ -88,14 +79,9 @@ contains
     type(machine_t), intent(in) :: machine
     integer, intent(in) :: lane
     real(wp), intent(inout) :: tangent(:, :)
-    integer :: i
 
     tangent = 0.0_wp
-    do i = 1, size(machine%banks)
-      associate (bank => machine%banks(i)%bank)
-        call add_coefficients(bank%from, bank%to, -1.0_wp, bank%restoring_angle(lane, :), tangent)
-      end associate
-    end do
+    call add_coefficients(machine%elements%from, machine%elements%to, -1.0_wp, machine%elements%restoring_angle(lane, :), tangent)
   end subroutine tangent_matrix
 
   !> F of eqs. (48)-(51): the elastic moment that acts on each body, [n].
@@ -103,16 +89,14 @@ contains
     type(machine_t), intent(in) :: machine
     integer, intent(in) :: lane
     real(wp), intent(inout) :: moments(:)
-    integer :: e, i
+    integer :: e
 
     moments = 0.0_wp
-    do i = 1, size(machine%banks)
-      associate (bank => machine%banks(i)%bank)
-        do e = 1, size(bank%to)
-          call add_moment(bank%from(e), bank%to(e), bank%restoring(lane, e), moments)
-        end do
-      end associate
-    end do
+    associate (elements => machine%elements)
+      do e = 1, size(elements%to)
+        call add_moment(elements%from(e), elements%to(e), elements%restoring(lane, e), moments)
+      end do
+    end associate
   end subroutine elastic_moments
 
   !> F' of eqs. (47), (52)-(57): K_4 omega, [n].

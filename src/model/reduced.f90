@@ -1,30 +1,33 @@
 !> The reduced formulation: L_tau^T J L_tau q'' = L_tau^T (Q + C omega + K phi), states q', q and the works.
+!>
+!> What the bodies do is not formed on the way: the angles of the elements are u = u_start + U q, their speeds
+!> u' = U q', and their moments M give q'' = R M with R = (L_tau^T J L_tau)^-1 L_tau^T B, where the columns of B are
+!> the elements' unit moments on their two bodies and U = B^T L_tau.
 module nocdyn_reduced
-  use nocdyn_bank, only: bank_t
-  use nocdyn_coordinates, only: coordinates_t
+  use nocdyn_element_coordinates, only: element_coordinates_t, new_element_coordinates
   use nocdyn_formulation, only: formulation_t
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
-  use nocdyn_system, only: evaluation_fine
+  use nocdyn_reduced_jacobian, only: new_reduced_jacobian, reduced_jacobian_t
+  use nocdyn_sparse_map, only: new_sparse_map, sparse_map_t, transposed_order
+  use nocdyn_system, only: pattern_t
   use nocdyn_text, only: quoted
   implicit none (type, external)
   private
 
   public :: new_reduced
 
-  !> The entries of the coordinates that an element's relative angle depends on, with the sign of its terminal.
-  type :: terminals_t
-    integer, allocatable :: first(:)    !! [elements + 1]
-    integer, allocatable :: entry(:)
-    real(wp), allocatable :: sign(:)    !! 1 for `to`, -1 for `from`
-  end type terminals_t
-
   !> q is counted from the start: phi = start_angle + L_tau q.
   type, extends(formulation_t), public :: reduced_t
-    type(terminals_t), allocatable, private :: terminals(:)   !! of each bank
+    real(wp), allocatable, private :: start_twist(:, :)        !! u_start [rad], [lanes, elements]
+    type(sparse_map_t), private :: twists                      !! U
+    type(sparse_map_t), private :: accelerations               !! R
+    type(reduced_jacobian_t), private :: sums                  !! R diag U
+    real(wp), allocatable, private :: none(:, :)               !! zeros, [lanes, elements]
   contains
     procedure :: derivative
     procedure :: jacobian
+    procedure :: jacobian_pattern
     procedure :: component_name
     procedure :: start
     procedure :: place
@@ -34,61 +37,39 @@ module nocdyn_reduced
 contains
 
   !> The formulation of a machine whose coordinates are known.
-  function new_reduced(machine) result(self)
+  function new_reduced(machine, audited) result(self)
     type(machine_t), intent(in) :: machine
+    logical, intent(in) :: audited   !! whether the works of the accounted elements are integrated
     type(reduced_t) :: self
-    integer :: i
+    type(element_coordinates_t) :: incidence
+    real(wp), allocatable :: angle(:, :)
 
-    call self%attach(machine)
+    call self%attach(machine, audited)
     self%states = 2 * machine%coordinates%freedoms
-    allocate (self%terminals(size(machine%banks)))
-    do i = 1, size(machine%banks)
-      self%terminals(i) = terminals_of(machine%banks(i)%bank, machine%coordinates)
-    end do
+    incidence = new_element_coordinates(machine%elements, machine%coordinates)
+    self%twists = new_sparse_map(incidence%first, incidence%coordinate, incidence%ratio)
+    self%accelerations = response_map(incidence, machine%coordinates%freedoms)
+    self%sums = new_reduced_jacobian(machine%coordinates%freedoms, incidence, machine%accounted(:self%quadratures))
+    allocate (angle(machine%lanes, 0:machine%bodies), source=0.0_wp)
+    angle(:, 1:) = machine%start_angle
+    self%start_twist = angle(:, machine%elements%to) - angle(:, machine%elements%from)
+    allocate (self%none, source=0.0_wp * self%start_twist)
   end function new_reduced
 
-  function terminals_of(bank, coordinates) result(terminals)
-    class(bank_t), intent(in) :: bank
-    type(coordinates_t), intent(in) :: coordinates
-    type(terminals_t) :: terminals
-    integer :: e, next
+  !> R, whose rows are the coordinates.
+  function response_map(incidence, freedoms) result(map)
+    type(element_coordinates_t), intent(in) :: incidence
+    integer, intent(in) :: freedoms
+    type(sparse_map_t) :: map
+    integer :: element_of(size(incidence%coordinate)), order(size(incidence%coordinate)), first(freedoms + 1)
+    integer :: e
 
-    allocate (terminals%first(size(bank%to) + 1))
-    terminals%first(1) = 1
-    do e = 1, size(bank%to)
-      terminals%first(e + 1) = terminals%first(e) + entries(coordinates, bank%to(e)) + entries(coordinates, bank%from(e))
+    do e = 1, size(incidence%first) - 1
+      element_of(incidence%first(e):incidence%first(e + 1) - 1) = e
     end do
-    allocate (terminals%entry(terminals%first(size(terminals%first)) - 1))
-    allocate (terminals%sign(size(terminals%entry)))
-    do e = 1, size(bank%to)
-      next = terminals%first(e)
-      call append(coordinates, bank%to(e), 1.0_wp, terminals, next)
-      call append(coordinates, bank%from(e), -1.0_wp, terminals, next)
-    end do
-  end function terminals_of
-
-  pure integer function entries(coordinates, body)
-    type(coordinates_t), intent(in) :: coordinates
-    integer, intent(in) :: body
-
-    entries = 0
-    if (body > 0) entries = coordinates%first(body + 1) - coordinates%first(body)
-  end function entries
-
-  subroutine append(coordinates, body, sign, terminals, next)
-    type(coordinates_t), intent(in) :: coordinates
-    integer, intent(in) :: body
-    real(wp), intent(in) :: sign
-    type(terminals_t), intent(inout) :: terminals
-    integer, intent(inout) :: next
-    integer :: i
-
-    do i = 0, entries(coordinates, body) - 1
-      terminals%entry(next) = coordinates%first(body) + i
-      terminals%sign(next) = sign
-      next = next + 1
-    end do
-  end subroutine append
+    call transposed_order(incidence%coordinate, freedoms, order, first)
+    map = new_sparse_map(first, element_of(order), incidence%response(:, order))
+  end function response_map
 
   function start(self) result(y)
     class(reduced_t), intent(in) :: self
@@ -126,121 +107,72 @@ contains
 
   subroutine derivative(self, t, y, dydt, status)
     class(reduced_t), intent(inout) :: self
-    real(wp), contiguous, intent(in) :: t(:)
-    real(wp), contiguous, intent(in) :: y(:, :)
-    real(wp), contiguous, intent(inout) :: dydt(:, :)
-    integer, contiguous, intent(inout) :: status(:)
-    integer :: f
+    real(wp), intent(in) :: t(self%lanes)
+    real(wp), intent(in) :: y(self%lanes, self%states + self%quadratures)
+    real(wp), intent(inout) :: dydt(self%lanes, self%states + self%quadratures)
+    integer, intent(inout) :: status(self%lanes)
 
-    f = self%machine%coordinates%freedoms
-    call self%place(y)
-    call self%machine%evaluate(t, self%phi, self%omega, self%torque)
-    call accelerate(self%machine%coordinates, self%torque, dydt)
-    dydt(:, f + 1:2 * f) = y(:, :f)
-    call self%machine%power(dydt(:, 2 * f + 1:))
-    status = evaluation_fine
+    call advance(self, self%lanes * self%machine%coordinates%freedoms, self%quadratures, t, y, dydt)
   end subroutine derivative
 
-  !> q'' = (L_tau^T J L_tau)^-1 L_tau^T T.
-  subroutine accelerate(coordinates, torque, acceleration)
-    type(coordinates_t), intent(in) :: coordinates
-    real(wp), contiguous, intent(in) :: torque(:, 0:)           !! [lanes, ground and bodies]
-    real(wp), contiguous, intent(inout) :: acceleration(:, :)   !! [lanes, at least freedoms]
-    integer :: b, c, k, l
+  !> The derivative of the speeds and angles of the coordinates, which are here columns of their own, and of the works.
+  subroutine advance(self, n, quadratures, t, y, dydt)
+    type(reduced_t), intent(inout) :: self
+    integer, intent(in) :: n   !! lanes * freedoms
+    integer, intent(in) :: quadratures
+    real(wp), intent(in) :: t(self%lanes)
+    real(wp), intent(in) :: y(n, 2)
+    real(wp), intent(inout) :: dydt(2 * n + self%lanes * quadratures)
+    integer :: i
 
-    acceleration(:, :coordinates%freedoms) = 0.0_wp
-    do b = 1, size(torque, 2) - 1
-      do k = coordinates%first(b), coordinates%first(b + 1) - 1
-        c = coordinates%coordinate(k)
-        do l = 1, size(torque, 1)
-          acceleration(l, c) = acceleration(l, c) + coordinates%response(l, k) * torque(l, b)
-        end do
-      end do
+    call turn(self, n, t, y)
+    call self%accelerations%map_sum(self%machine%elements%restoring, self%machine%elements%working, dydt)
+    do i = 1, n
+      dydt(n + i) = y(i, 1)
     end do
-  end subroutine accelerate
+    if (quadratures > 0) call self%machine%power(dydt(2 * n + 1))
+  end subroutine advance
+
+  !> Brings the elements to a state and evaluates them.
+  subroutine turn(self, n, t, y)
+    type(reduced_t), intent(inout) :: self
+    integer, intent(in) :: n   !! lanes * freedoms
+    real(wp), intent(in) :: t(self%lanes)
+    real(wp), intent(in) :: y(n, 2)
+
+    call self%twists%map_pair(self%start_twist, y(:, 2), y(:, 1), self%machine%elements%angle, self%machine%elements%speed)
+    call self%machine%evaluate_elements(t)
+  end subroutine turn
 
   subroutine jacobian(self, t, y, dfdy, dfdt, status)
     class(reduced_t), intent(inout) :: self
-    real(wp), contiguous, intent(in) :: t(:)
-    real(wp), contiguous, intent(in) :: y(:, :)
-    real(wp), contiguous, intent(inout) :: dfdy(:, :, :)
-    real(wp), contiguous, intent(inout) :: dfdt(:, :)
-    integer, contiguous, intent(inout) :: status(:)
-    integer :: c, f, i, work
+    real(wp), intent(in) :: t(self%lanes)
+    real(wp), intent(in) :: y(self%lanes, self%states + self%quadratures)
+    real(wp), contiguous, intent(inout) :: dfdy(:, :)
+    real(wp), intent(inout) :: dfdt(self%lanes, self%states + self%quadratures)
+    integer, intent(inout) :: status(self%lanes)
+    integer :: e, f, k
 
     f = self%machine%coordinates%freedoms
-    call self%place(y)
-    call self%machine%differentiate(t, self%phi, self%omega)
-    dfdy(:, :, :) = 0.0_wp
-    dfdt(:, :) = 0.0_wp
-    do c = 1, f
-      dfdy(:, f + c, c) = 1.0_wp
-    end do
-    work = 2 * f
-    do i = 1, size(self%machine%banks)
-      associate (bank => self%machine%banks(i)%bank)
-        call add_accelerations(bank, self%terminals(i), self%machine%coordinates, dfdy, dfdt)
-        call add_powers(bank, self%terminals(i), self%machine%coordinates, work, dfdy, dfdt)
-        work = work + size(bank%accounted)
-      end associate
-    end do
-    status = evaluation_fine
+    associate (machine => self%machine, elements => self%machine%elements)
+      call turn(self, self%lanes * f, t, y)
+      call machine%differentiate_elements(t)
+      call self%sums%fill(elements, dfdy)
+      call self%accelerations%map_sum(self%none, elements%working_time, dfdt)
+      dfdt(:, f + 1:2 * f) = 0.0_wp
+      do k = 1, self%quadratures
+        e = machine%accounted(k)
+        dfdt(:, 2 * f + k) = elements%working_time(:, e) * elements%speed(:, e)
+      end do
+    end associate
   end subroutine jacobian
 
-  !> The rows q'' of the Jacobian: every element couples the coordinates of its two bodies.
-  subroutine add_accelerations(bank, terminals, coordinates, dfdy, dfdt)
-    class(bank_t), intent(in) :: bank
-    type(terminals_t), intent(in) :: terminals
-    type(coordinates_t), intent(in) :: coordinates
-    real(wp), contiguous, intent(inout) :: dfdy(:, :, :)
-    real(wp), contiguous, intent(inout) :: dfdt(:, :)
-    real(wp) :: response
-    integer :: c, e, f, i, j, l, q
+  function jacobian_pattern(self) result(pattern)
+    class(reduced_t), intent(in) :: self
+    type(pattern_t) :: pattern
 
-    f = coordinates%freedoms
-    do e = 1, size(bank%to)
-      do i = terminals%first(e), terminals%first(e + 1) - 1
-        c = coordinates%coordinate(terminals%entry(i))
-        do l = 1, size(dfdt, 1)
-          response = terminals%sign(i) * coordinates%response(l, terminals%entry(i))
-          dfdt(l, c) = dfdt(l, c) + response * bank%working_time(l, e)
-          do j = terminals%first(e), terminals%first(e + 1) - 1
-            q = coordinates%coordinate(terminals%entry(j))
-            associate (gain => response * terminals%sign(j) * coordinates%ratio(l, terminals%entry(j)))
-              dfdy(l, c, q) = dfdy(l, c, q) + gain * bank%working_speed(l, e)
-              dfdy(l, c, f + q) = dfdy(l, c, f + q) + gain * (bank%restoring_angle(l, e) + bank%working_angle(l, e))
-            end associate
-          end do
-        end do
-      end do
-    end do
-  end subroutine add_accelerations
-
-  !> The rows of the integrated works: the power is M u', M the working moment.
-  subroutine add_powers(bank, terminals, coordinates, row, dfdy, dfdt)
-    class(bank_t), intent(in) :: bank
-    type(terminals_t), intent(in) :: terminals
-    type(coordinates_t), intent(in) :: coordinates
-    integer, intent(in) :: row   !! the row before the bank's first
-    real(wp), contiguous, intent(inout) :: dfdy(:, :, :)
-    real(wp), contiguous, intent(inout) :: dfdt(:, :)
-    integer :: a, e, f, j, l, q
-
-    f = coordinates%freedoms
-    do a = 1, size(bank%accounted)
-      e = bank%accounted(a)
-      do l = 1, size(dfdt, 1)
-        dfdt(l, row + a) = bank%working_time(l, e) * bank%speed(l, e)
-        do j = terminals%first(e), terminals%first(e + 1) - 1
-          q = coordinates%coordinate(terminals%entry(j))
-          associate (ratio => terminals%sign(j) * coordinates%ratio(l, terminals%entry(j)), speed => bank%speed(l, e))
-            dfdy(l, row + a, q) = dfdy(l, row + a, q) + ratio * (bank%working(l, e) + speed * bank%working_speed(l, e))
-            dfdy(l, row + a, f + q) = dfdy(l, row + a, f + q) + ratio * speed * bank%working_angle(l, e)
-          end associate
-        end do
-      end do
-    end do
-  end subroutine add_powers
+    pattern = self%sums%pattern
+  end function jacobian_pattern
 
   !> Tooth forces straight from the torques of the elements.
   subroutine reactions(self, lane, lambda)

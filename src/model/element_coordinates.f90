@@ -1,0 +1,82 @@
+!> How the elements of a machine depend on its coordinates, and its coordinates on the elements.
+module nocdyn_element_coordinates
+  use nocdyn_coordinates, only: coordinates_t
+  use nocdyn_elements, only: elements_t
+  use nocdyn_kinds, only: wp
+  implicit none (type, external)
+  private
+
+  public :: new_element_coordinates
+
+  !> Element e has the entries first(e) to first(e + 1) - 1, one for each coordinate of its two bodies: its speed is the
+  !> sum of ratio * q'(coordinate), and its moment M adds response * M to q''(coordinate).
+  type, public :: element_coordinates_t
+    integer, allocatable :: first(:)           !! [elements + 1]
+    integer, allocatable :: coordinate(:)      !! [entries]
+    real(wp), allocatable :: ratio(:, :)       !! row of L_tau of `to` minus that of `from`, [lanes, entries]
+    real(wp), allocatable :: response(:, :)    !! the same difference of ((L_tau^T J L_tau)^-1 L_tau^T)^T, [lanes, entries]
+  end type element_coordinates_t
+
+contains
+
+  function new_element_coordinates(elements, coordinates) result(self)
+    type(elements_t), intent(in) :: elements
+    type(coordinates_t), intent(in) :: coordinates
+    type(element_coordinates_t) :: self
+    integer :: place(coordinates%freedoms)   ! the entry of a coordinate that an element already has
+    integer :: e, entries
+
+    entries = 0
+    do e = 1, size(elements%to)
+      entries = entries + body_entries(coordinates, elements%to(e)) + body_entries(coordinates, elements%from(e))
+    end do
+    allocate (self%first(size(elements%to) + 1), self%coordinate(entries))
+    allocate (self%ratio(size(elements%time), entries), source=0.0_wp)
+    allocate (self%response, source=self%ratio)
+    place = 0
+    self%first(1) = 1
+    do e = 1, size(elements%to)
+      self%first(e + 1) = self%first(e)
+      call add_body(coordinates, elements%to(e), 1.0_wp, self%first(e), self%first(e + 1), place, self)
+      call add_body(coordinates, elements%from(e), -1.0_wp, self%first(e), self%first(e + 1), place, self)
+    end do
+    entries = self%first(size(self%first)) - 1
+    self%coordinate = self%coordinate(:entries)
+    self%ratio = self%ratio(:, :entries)
+    self%response = self%response(:, :entries)
+  end function new_element_coordinates
+
+  pure integer function body_entries(coordinates, body)
+    type(coordinates_t), intent(in) :: coordinates
+    integer, intent(in) :: body
+
+    body_entries = 0
+    if (body > 0) body_entries = coordinates%first(body + 1) - coordinates%first(body)
+  end function body_entries
+
+  !> Adds the coordinates of a body to those of an element; both bodies may have the same.
+  pure subroutine add_body(coordinates, body, sign, begin, next, place, self)
+    type(coordinates_t), intent(in) :: coordinates
+    integer, intent(in) :: body           !! 0 = ground, which has none
+    real(wp), intent(in) :: sign
+    integer, intent(in) :: begin          !! first entry of the element
+    integer, intent(inout) :: next        !! its next free entry
+    integer, intent(inout) :: place(:)
+    type(element_coordinates_t), intent(inout) :: self
+    integer :: c, k
+
+    do k = 1, body_entries(coordinates, body)
+      associate (of_body => coordinates%first(body) + k - 1)
+        c = coordinates%coordinate(of_body)
+        if (place(c) < begin) then
+          place(c) = next
+          self%coordinate(next) = c
+          next = next + 1
+        end if
+        self%ratio(:, place(c)) = self%ratio(:, place(c)) + sign * coordinates%ratio(:, of_body)
+        self%response(:, place(c)) = self%response(:, place(c)) + sign * coordinates%response(:, of_body)
+      end associate
+    end do
+  end subroutine add_body
+
+end module nocdyn_element_coordinates

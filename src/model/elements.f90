@@ -1,0 +1,84 @@
+!> The elements of a machine, of all banks numbered through: what they join and their values, on a block of lanes.
+module nocdyn_elements
+  use nocdyn_kinds, only: wp
+  implicit none (type, external)
+  private
+
+  public :: new_elements
+
+  !> Every element acts between two bodies along its relative angle u = phi_to - phi_from. Its bank finds its moment
+  !> M(t, u, u') = restoring + working, which acts on `to`, and -M on `from`; body 0 is the ground.
+  type, public :: elements_t
+    integer, allocatable :: from(:), to(:)         !! bodies, [elements]
+    real(wp), allocatable :: time(:)               !! t of the derivatives [s], [lanes]
+    real(wp), allocatable :: angle(:, :)           !! u [rad], shape [lanes, elements] as all that follow
+    real(wp), allocatable :: speed(:, :)           !! u' [rad/s]
+    ! by `evaluate` of the banks:
+    real(wp), allocatable :: restoring(:, :)       !! part of M with a potential, a function of u alone [N m]
+    real(wp), allocatable :: working(:, :)         !! the rest of M, whose power enters or leaves the machine [N m]
+    ! by `differentiate`:
+    real(wp), allocatable :: restoring_angle(:, :)       !! derivative of `restoring` by u
+    real(wp), allocatable :: restoring_curvature(:, :)   !! second derivative of `restoring` by u
+    real(wp), allocatable :: working_angle(:, :)         !! derivative of `working` by u
+    real(wp), allocatable :: working_speed(:, :)         !! derivative of `working` by u'
+    real(wp), allocatable :: working_time(:, :)          !! derivative of `working` by t
+    ! by `assess`:
+    real(wp), allocatable :: stored(:, :)          !! potential energy of `restoring` [J]
+    real(wp), allocatable :: secant(:, :)          !! secant stiffness K12 of eq. (3), the -K12 u in `restoring` [N m/rad]
+    real(wp), allocatable :: damping(:, :)         !! c, the -c u' in `working` [N m s/rad]
+  contains
+    procedure :: gather
+    procedure :: scatter
+  end type elements_t
+
+contains
+
+  !> Elements between the given bodies, at rest and without moments.
+  function new_elements(lanes, from, to) result(self)
+    integer, intent(in) :: lanes
+    integer, intent(in) :: from(:), to(:)
+    type(elements_t) :: self
+
+    allocate (self%from, source=from)
+    allocate (self%to, source=to)
+    allocate (self%time(lanes), source=0.0_wp)
+    allocate (self%angle(lanes, size(to)), source=0.0_wp)
+    allocate (self%speed, self%restoring, self%working, source=self%angle)
+    allocate (self%restoring_angle, self%restoring_curvature, source=self%angle)
+    allocate (self%working_angle, self%working_speed, self%working_time, source=self%angle)
+    allocate (self%stored, self%secant, self%damping, source=self%angle)
+  end function new_elements
+
+  !> Relative angles and speeds of the elements from those of the bodies.
+  subroutine gather(self, phi, omega)
+    class(elements_t), intent(inout) :: self
+    real(wp), contiguous, intent(in) :: phi(:, 0:)     !! [lanes, ground and bodies] [rad]
+    real(wp), contiguous, intent(in) :: omega(:, 0:)   !! [rad/s]
+    integer :: e, l
+
+    do e = 1, size(self%to)
+      do l = 1, size(self%time)
+        self%angle(l, e) = phi(l, self%to(e)) - phi(l, self%from(e))
+        self%speed(l, e) = omega(l, self%to(e)) - omega(l, self%from(e))
+      end do
+    end do
+  end subroutine gather
+
+  !> The torques of the elements on the bodies, and on the ground.
+  subroutine scatter(self, torque)
+    class(elements_t), intent(in) :: self
+    real(wp), contiguous, intent(inout) :: torque(:, 0:)   !! [lanes, ground and bodies] [N m]
+    real(wp) :: moment
+    integer :: e, l
+
+    torque(:, :) = 0.0_wp
+    do e = 1, size(self%to)
+      do l = 1, size(self%time)
+        moment = self%restoring(l, e) + self%working(l, e)
+        torque(l, self%to(e)) = torque(l, self%to(e)) + moment
+        torque(l, self%from(e)) = torque(l, self%from(e)) - moment
+      end do
+    end do
+  end subroutine scatter
+
+end module nocdyn_elements

@@ -1,0 +1,156 @@
+!> The sparse Jacobian of the reduced formulation.
+!>
+!> With u' = U q' and q'' = R M, the derivative of q'' by q' is R diag(dM/du') U, that by q is R diag(dM/du) U: each
+!> element adds a product to the position of every pair of its coordinates. The products response * ratio are formed
+!> once, as are the positions; filling takes time linear in their number.
+module nocdyn_reduced_jacobian
+  use nocdyn_element_coordinates, only: element_coordinates_t
+  use nocdyn_elements, only: elements_t
+  use nocdyn_kinds, only: wp
+  use nocdyn_sparse_map, only: transposed_order
+  use nocdyn_system, only: pattern_t
+  implicit none (type, external)
+  private
+
+  public :: new_reduced_jacobian
+
+  !> Values: the block dq''/dq', dq''/dq with the same pattern, the ones of dq/dt = q', then dW'/dq' and dW'/dq of each
+  !> entry of an accounted element, in turn.
+  type, public :: reduced_jacobian_t
+    type(pattern_t) :: pattern
+    integer, private :: freedoms = 0
+    integer, private :: pairs = 0                      !! positions of dq''/dq'
+    integer, allocatable, private :: element(:)        !! of each product
+    integer, allocatable, private :: place(:)          !! of each product, 1 to pairs
+    real(wp), allocatable, private :: product(:, :)    !! response * ratio, [lanes, products]
+    integer, allocatable, private :: worker(:)         !! accounted element of each work's entry
+    real(wp), allocatable, private :: ratio(:, :)      !! of that entry, [lanes, work's entries]
+  contains
+    procedure :: fill
+  end type reduced_jacobian_t
+
+contains
+
+  function new_reduced_jacobian(freedoms, incidence, accounted) result(self)
+    integer, intent(in) :: freedoms
+    type(element_coordinates_t), intent(in) :: incidence
+    integer, intent(in) :: accounted(:)   !! elements whose works follow the states
+    type(reduced_jacobian_t) :: self
+    integer, allocatable :: row(:), column(:)
+    integer :: c, e
+
+    self%freedoms = freedoms
+    associate (entries => incidence%first(2:) - incidence%first(:size(incidence%first) - 1))
+      allocate (self%element(sum(entries**2)), self%place(sum(entries**2)), row(sum(entries**2)), column(sum(entries**2)))
+    end associate
+    allocate (self%product(size(incidence%ratio, 1), size(self%element)))
+    call form_products(freedoms, incidence, row, column, self)
+    row = row(:self%pairs)
+    column = column(:self%pairs)
+    self%pattern%row = [row, row, [(freedoms + c, c=1, freedoms)]]
+    self%pattern%column = [column, freedoms + column, [(c, c=1, freedoms)]]
+    call append_works(freedoms, incidence, accounted, self)
+    self%worker = [(spread(accounted(e), 1, incidence%first(accounted(e) + 1) - incidence%first(accounted(e))), &
+                    e=1, size(accounted))]
+  end function new_reduced_jacobian
+
+  !> The products of all pairs of entries of an element, column by column, and their distinct positions.
+  subroutine form_products(freedoms, incidence, row, column, self)
+    integer, intent(in) :: freedoms
+    type(element_coordinates_t), intent(in) :: incidence
+    integer, intent(inout) :: row(:), column(:)   !! of each position
+    type(reduced_jacobian_t), intent(inout) :: self
+    integer :: element_of(size(incidence%coordinate)), order(size(incidence%coordinate)), first(freedoms + 1)
+    integer :: place(freedoms)   ! the position in this column, if not below `begin`
+    integer :: a, b, begin, e, i, n, q
+
+    do e = 1, size(incidence%first) - 1
+      element_of(incidence%first(e):incidence%first(e + 1) - 1) = e
+    end do
+    call transposed_order(incidence%coordinate, freedoms, order, first)
+    place = 0
+    n = 0
+    do q = 1, freedoms
+      begin = self%pairs + 1
+      do i = first(q), first(q + 1) - 1
+        b = order(i)
+        e = element_of(b)
+        do a = incidence%first(e), incidence%first(e + 1) - 1
+          associate (at => place(incidence%coordinate(a)))
+            if (at < begin) then
+              self%pairs = self%pairs + 1
+              at = self%pairs
+              row(at) = incidence%coordinate(a)
+              column(at) = q
+            end if
+            n = n + 1
+            self%element(n) = e
+            self%place(n) = at
+            self%product(:, n) = incidence%response(:, a) * incidence%ratio(:, b)
+          end associate
+        end do
+      end do
+    end do
+  end subroutine form_products
+
+  !> The positions of the works' rows: two for each entry of an accounted element.
+  subroutine append_works(freedoms, incidence, accounted, self)
+    integer, intent(in) :: freedoms
+    type(element_coordinates_t), intent(in) :: incidence
+    integer, intent(in) :: accounted(:)
+    type(reduced_jacobian_t), intent(inout) :: self
+    integer, allocatable :: row(:), column(:), entry(:)
+    integer :: i, k, n
+
+    n = 0
+    do k = 1, size(accounted)
+      n = n + incidence%first(accounted(k) + 1) - incidence%first(accounted(k))
+    end do
+    allocate (row(2 * n), column(2 * n), entry(n))
+    n = 0
+    do k = 1, size(accounted)
+      do i = incidence%first(accounted(k)), incidence%first(accounted(k) + 1) - 1
+        n = n + 1
+        entry(n) = i
+        row(2 * n - 1:2 * n) = 2 * freedoms + k
+        column(2 * n - 1) = incidence%coordinate(i)
+        column(2 * n) = freedoms + incidence%coordinate(i)
+      end do
+    end do
+    self%ratio = incidence%ratio(:, entry)
+    self%pattern%row = [self%pattern%row, row]
+    self%pattern%column = [self%pattern%column, column]
+  end subroutine append_works
+
+  !> The values at the positions of `pattern`, from the elements after `differentiate`.
+  subroutine fill(self, elements, dfdy)
+    class(reduced_jacobian_t), intent(in) :: self
+    type(elements_t), intent(in) :: elements
+    real(wp), contiguous, intent(inout) :: dfdy(:, :)   !! [lanes, positions]
+    integer :: at, e, l, n
+
+    dfdy(:, :2 * self%pairs) = 0.0_wp
+    dfdy(:, 2 * self%pairs + 1:2 * self%pairs + self%freedoms) = 1.0_wp
+    do n = 1, size(self%element)
+      e = self%element(n)
+      at = self%place(n)
+      do l = 1, size(dfdy, 1)
+        dfdy(l, at) = dfdy(l, at) + self%product(l, n) * elements%working_speed(l, e)
+        dfdy(l, self%pairs + at) = dfdy(l, self%pairs + at) &
+                                   + self%product(l, n) * (elements%restoring_angle(l, e) + elements%working_angle(l, e))
+      end do
+    end do
+    at = 2 * self%pairs + self%freedoms
+    do n = 1, size(self%worker)
+      e = self%worker(n)
+      do l = 1, size(dfdy, 1)
+        associate (speed => elements%speed(l, e), ratio => self%ratio(l, n))
+          dfdy(l, at + 1) = ratio * (elements%working(l, e) + speed * elements%working_speed(l, e))
+          dfdy(l, at + 2) = ratio * speed * elements%working_angle(l, e)
+        end associate
+      end do
+      at = at + 2
+    end do
+  end subroutine fill
+
+end module nocdyn_reduced_jacobian

@@ -1,0 +1,330 @@
+!> Sparse linear maps on blocks of lanes, applied row by row: every result is a sum of its own, and nothing is scattered.
+!>
+!> The terms of a row are added in the order of its entries, in every lane and in each of the loops below alike, so
+!> that a lane's result is the same to the last bit in a block of any size.
+module nocdyn_sparse_map
+  use nocdyn_kinds, only: wp
+  implicit none (type, external)
+  private
+
+  public :: new_sparse_map, transposed_order
+
+  !> With one lane, many consecutive rows whose columns all advance by one from row to row, as those of a chain do, make
+  !> a stretch: its entries are stored diagonal by diagonal, and the loop over its rows is a vector loop without indices.
+  !> All other rows are loose, their entries stored row by row; with many lanes all rows are, and the loops over the
+  !> lanes are the vector loops.
+  type, public :: sparse_map_t
+    integer, private :: lanes = 1
+    integer, private :: all_rows = 0
+    integer, private :: columns = 0                      !! the last that has an entry
+    integer, private :: loose_rows = 0
+    integer, private :: stretches = 0
+    integer, allocatable, private :: row(:)              !! each loose row
+    integer, allocatable, private :: first(:)            !! its first entry, [loose_rows + 1]
+    integer, allocatable, private :: first_row(:)        !! of each stretch
+    integer, allocatable, private :: rows(:)             !! of each stretch
+    integer, allocatable, private :: width(:)            !! entries of each of its rows, at least 1
+    integer, allocatable, private :: first_entry(:)      !! of each stretch
+    integer, allocatable, private :: column(:)           !! [entries]
+    real(wp), allocatable, private :: coefficient(:, :)  !! [lanes, entries]
+  contains
+    procedure :: map_pair
+    procedure :: map_sum
+  end type sparse_map_t
+
+  integer, parameter :: strip = 256   !! rows of a stretch that stay in the first cache from diagonal to diagonal
+  integer, parameter :: short = 16    !! fewer rows are not worth a vector loop
+
+contains
+
+  !> A map from its rows: row r has the entries first(r) to first(r + 1) - 1.
+  function new_sparse_map(first, column, coefficient) result(self)
+    integer, intent(in) :: first(:)               !! [rows + 1]
+    integer, intent(in) :: column(:)              !! [entries]
+    real(wp), intent(in) :: coefficient(:, :)     !! [lanes, entries]
+    type(sparse_map_t) :: self
+    integer :: order(size(column)), straight(size(first) - 1)
+    integer :: begin, rows, width
+
+    rows = size(first) - 1
+    self%lanes = size(coefficient, 1)
+    self%all_rows = rows
+    self%columns = maxval([0, column])
+    allocate (self%row(rows), self%first(rows + 1))
+    allocate (self%first_row(rows / short), self%first_entry(rows / short))
+    allocate (self%rows(rows / short), self%width(rows / short))
+    self%first(1) = 1
+    straight = straight_runs(first, column)
+    begin = 1
+    do while (begin <= rows)
+      width = first(begin + 1) - first(begin)
+      if (self%lanes == 1 .and. width > 0 .and. straight(begin) >= short) then
+        self%stretches = self%stretches + 1
+        self%first_row(self%stretches) = begin
+        self%rows(self%stretches) = straight(begin)
+        self%width(self%stretches) = width
+      else
+        call append_loose_rows(first, begin, begin + straight(begin) - 1, order, self)
+      end if
+      begin = begin + straight(begin)
+    end do
+    call append_stretches(first, order, self)
+    allocate (self%column(size(column)), self%coefficient(self%lanes, size(column)))
+    self%column(:) = column(order)
+    self%coefficient(:, :) = coefficient(:, order)
+  end function new_sparse_map
+
+  !> How many rows from each row on have columns that advance by one from row to row.
+  pure function straight_runs(first, column) result(straight)
+    integer, intent(in) :: first(:), column(:)
+    integer :: straight(size(first) - 1)
+    integer :: r, width
+
+    straight = 1
+    do r = size(straight) - 1, 1, -1
+      width = first(r + 1) - first(r)
+      if (first(r + 2) - first(r + 1) /= width) cycle
+      if (all(column(first(r + 1):first(r + 2) - 1) == column(first(r):first(r + 1) - 1) + 1)) then
+        straight(r) = straight(r + 1) + 1
+      end if
+    end do
+  end function straight_runs
+
+  subroutine append_loose_rows(first, begin, end, order, self)
+    integer, intent(in) :: first(:), begin, end
+    integer, intent(inout) :: order(:)
+    type(sparse_map_t), intent(inout) :: self
+    integer :: entry, row
+
+    do row = begin, end
+      associate (next => self%first(self%loose_rows + 1), entries => first(row + 1) - first(row))
+        order(next:next + entries - 1) = [(entry, entry=first(row), first(row + 1) - 1)]
+        self%first(self%loose_rows + 2) = next + entries
+      end associate
+      self%loose_rows = self%loose_rows + 1
+      self%row(self%loose_rows) = row
+    end do
+  end subroutine append_loose_rows
+
+  !> The entries of the stretches follow those of the loose rows.
+  subroutine append_stretches(first, order, self)
+    integer, intent(in) :: first(:)
+    integer, intent(inout) :: order(:)
+    type(sparse_map_t), intent(inout) :: self
+    integer :: i, j, next, s
+
+    next = self%first(self%loose_rows + 1)
+    do s = 1, self%stretches
+      self%first_entry(s) = next
+      do j = 0, self%width(s) - 1
+        order(next:next + self%rows(s) - 1) = [(first(self%first_row(s) + i) + j, i=0, self%rows(s) - 1)]
+        next = next + self%rows(s)
+      end do
+    end do
+  end subroutine append_stretches
+
+  !> Order of the entries of some rows in which they are sorted by their columns, and where those begin in it.
+  pure subroutine transposed_order(column, columns, order, first)
+    integer, intent(in) :: column(:)     !! [entries]
+    integer, intent(in) :: columns
+    integer, intent(out) :: order(:)     !! [entries]
+    integer, intent(out) :: first(:)     !! [columns + 1]
+    integer :: next(columns), i
+
+    first = 0
+    do i = 1, size(column)
+      first(column(i) + 1) = first(column(i) + 1) + 1
+    end do
+    first(1) = 1
+    do i = 1, columns
+      first(i + 1) = first(i) + first(i + 1)
+    end do
+    next = first(:columns)
+    do i = 1, size(column)
+      order(next(column(i))) = i
+      next(column(i)) = next(column(i)) + 1
+    end do
+  end subroutine transposed_order
+
+  !> u = offset + map x and v = map y.
+  subroutine map_pair(self, offset, x, y, u, v)
+    class(sparse_map_t), intent(in) :: self
+    real(wp), intent(in) :: offset(self%lanes * self%all_rows)                                  !! [lanes, rows]
+    real(wp), intent(in) :: x(self%lanes * self%columns), y(self%lanes * self%columns)          !! [lanes, columns]
+    real(wp), intent(inout) :: u(self%lanes * self%all_rows), v(self%lanes * self%all_rows)     !! [lanes, rows]
+    integer :: s
+
+    if (self%lanes > 1) then
+      call pair_on_lanes(self%lanes, self%all_rows, self%columns, size(self%column), self%first, self%column, &
+                         self%coefficient, offset, x, y, u, v)
+      return
+    end if
+    call pair_of_rows(self%loose_rows, self%all_rows, self%columns, size(self%column), self%row, self%first, self%column, &
+                      self%coefficient, offset, x, y, u, v)
+    do s = 1, self%stretches
+      associate (entry => self%first_entry(s), row => self%first_row(s))
+        call pair_of_stretch(self%rows(s), self%width(s), self%columns, self%column(entry), self%coefficient(1, entry), &
+                             offset(row), x, y, u(row), v(row))
+      end associate
+    end do
+  end subroutine map_pair
+
+  pure subroutine pair_of_rows(rows, all_rows, columns, entries, row, first, column, coefficient, offset, x, y, u, v)
+    integer, intent(in) :: rows, all_rows, columns, entries
+    integer, intent(in) :: row(rows), first(rows + 1), column(entries)
+    real(wp), intent(in) :: coefficient(entries), offset(all_rows), x(columns), y(columns)
+    real(wp), intent(inout) :: u(all_rows), v(all_rows)
+    real(wp) :: sum_of_x, sum_of_y
+    integer :: i, k
+
+    do i = 1, rows
+      sum_of_x = offset(row(i))
+      sum_of_y = 0.0_wp
+      do k = first(i), first(i + 1) - 1
+        sum_of_x = sum_of_x + coefficient(k) * x(column(k))
+        sum_of_y = sum_of_y + coefficient(k) * y(column(k))
+      end do
+      u(row(i)) = sum_of_x
+      v(row(i)) = sum_of_y
+    end do
+  end subroutine pair_of_rows
+
+  pure subroutine pair_of_stretch(rows, width, columns, column, coefficient, offset, x, y, u, v)
+    integer, intent(in) :: rows, width, columns
+    integer, intent(in) :: column(rows, width)
+    real(wp), intent(in) :: coefficient(rows, width), offset(rows), x(columns), y(columns)
+    real(wp), intent(inout) :: u(rows), v(rows)
+    integer :: begin, c, i, k
+
+    do begin = 1, rows, strip
+      c = column(1, 1) - 1
+      do i = begin, min(begin + strip - 1, rows)
+        u(i) = offset(i) + coefficient(i, 1) * x(c + i)
+        v(i) = 0.0_wp + coefficient(i, 1) * y(c + i)
+      end do
+      do k = 2, width
+        c = column(1, k) - 1
+        do i = begin, min(begin + strip - 1, rows)
+          u(i) = u(i) + coefficient(i, k) * x(c + i)
+          v(i) = v(i) + coefficient(i, k) * y(c + i)
+        end do
+      end do
+    end do
+  end subroutine pair_of_stretch
+
+  pure subroutine pair_on_lanes(lanes, rows, columns, entries, first, column, coefficient, offset, x, y, u, v)
+    integer, intent(in) :: lanes, rows, columns, entries
+    integer, intent(in) :: first(rows + 1), column(entries)
+    real(wp), intent(in) :: coefficient(lanes, entries), offset(lanes, rows), x(lanes, columns), y(lanes, columns)
+    real(wp), intent(inout) :: u(lanes, rows), v(lanes, rows)
+    integer :: c, i, k, l
+
+    do i = 1, rows
+      k = first(i)
+      if (k == first(i + 1)) then
+        u(:, i) = offset(:, i)
+        v(:, i) = 0.0_wp
+        cycle
+      end if
+      c = column(k)
+      do l = 1, lanes
+        u(l, i) = offset(l, i) + coefficient(l, k) * x(l, c)
+        v(l, i) = 0.0_wp + coefficient(l, k) * y(l, c)
+      end do
+      do k = first(i) + 1, first(i + 1) - 1
+        c = column(k)
+        do l = 1, lanes
+          u(l, i) = u(l, i) + coefficient(l, k) * x(l, c)
+          v(l, i) = v(l, i) + coefficient(l, k) * y(l, c)
+        end do
+      end do
+    end do
+  end subroutine pair_on_lanes
+
+  !> u = map (x + y).
+  subroutine map_sum(self, x, y, u)
+    class(sparse_map_t), intent(in) :: self
+    real(wp), intent(in) :: x(self%lanes * self%columns), y(self%lanes * self%columns)   !! [lanes, columns]
+    real(wp), intent(inout) :: u(self%lanes * self%all_rows)                             !! [lanes, rows]
+    integer :: s
+
+    if (self%lanes > 1) then
+      call sum_on_lanes(self%lanes, self%all_rows, self%columns, size(self%column), self%first, self%column, &
+                        self%coefficient, x, y, u)
+      return
+    end if
+    call sum_of_rows(self%loose_rows, self%all_rows, self%columns, size(self%column), self%row, self%first, self%column, &
+                     self%coefficient, x, y, u)
+    do s = 1, self%stretches
+      associate (entry => self%first_entry(s))
+        call sum_of_stretch(self%rows(s), self%width(s), self%columns, self%column(entry), self%coefficient(1, entry), &
+                            x, y, u(self%first_row(s)))
+      end associate
+    end do
+  end subroutine map_sum
+
+  pure subroutine sum_of_rows(rows, all_rows, columns, entries, row, first, column, coefficient, x, y, u)
+    integer, intent(in) :: rows, all_rows, columns, entries
+    integer, intent(in) :: row(rows), first(rows + 1), column(entries)
+    real(wp), intent(in) :: coefficient(entries), x(columns), y(columns)
+    real(wp), intent(inout) :: u(all_rows)
+    real(wp) :: sum
+    integer :: i, k
+
+    do i = 1, rows
+      sum = 0.0_wp
+      do k = first(i), first(i + 1) - 1
+        sum = sum + coefficient(k) * (x(column(k)) + y(column(k)))
+      end do
+      u(row(i)) = sum
+    end do
+  end subroutine sum_of_rows
+
+  pure subroutine sum_of_stretch(rows, width, columns, column, coefficient, x, y, u)
+    integer, intent(in) :: rows, width, columns
+    integer, intent(in) :: column(rows, width)
+    real(wp), intent(in) :: coefficient(rows, width), x(columns), y(columns)
+    real(wp), intent(inout) :: u(rows)
+    integer :: begin, c, i, k
+
+    do begin = 1, rows, strip
+      c = column(1, 1) - 1
+      do i = begin, min(begin + strip - 1, rows)
+        u(i) = 0.0_wp + coefficient(i, 1) * (x(c + i) + y(c + i))
+      end do
+      do k = 2, width
+        c = column(1, k) - 1
+        do i = begin, min(begin + strip - 1, rows)
+          u(i) = u(i) + coefficient(i, k) * (x(c + i) + y(c + i))
+        end do
+      end do
+    end do
+  end subroutine sum_of_stretch
+
+  pure subroutine sum_on_lanes(lanes, rows, columns, entries, first, column, coefficient, x, y, u)
+    integer, intent(in) :: lanes, rows, columns, entries
+    integer, intent(in) :: first(rows + 1), column(entries)
+    real(wp), intent(in) :: coefficient(lanes, entries), x(lanes, columns), y(lanes, columns)
+    real(wp), intent(inout) :: u(lanes, rows)
+    integer :: c, i, k, l
+
+    do i = 1, rows
+      k = first(i)
+      if (k == first(i + 1)) then
+        u(:, i) = 0.0_wp
+        cycle
+      end if
+      c = column(k)
+      do l = 1, lanes
+        u(l, i) = 0.0_wp + coefficient(l, k) * (x(l, c) + y(l, c))
+      end do
+      do k = first(i) + 1, first(i + 1) - 1
+        c = column(k)
+        do l = 1, lanes
+          u(l, i) = u(l, i) + coefficient(l, k) * (x(l, c) + y(l, c))
+        end do
+      end do
+    end do
+  end subroutine sum_on_lanes
+
+end module nocdyn_sparse_map
