@@ -22,3 +22,9 @@ build_release() {
   [[ -f build/release/build.ninja ]] || quietly 'Configuring' cmake --preset release
   quietly 'Building nocdyn' cmake --build --preset release --target nocdyn_program
 }
+
+# build_bench: the program and those of bench/, up to date; to be called in the project's folder.
+build_bench() {
+  quietly 'Configuring' cmake --preset release -DNOCDYN_BENCH=ON
+  quietly 'Building nocdyn and the programs of bench' cmake --build --preset release --target nocdyn_program bench_programs
+}

@@ -1,18 +1,200 @@
 """What was measured, for people (Markdown) and for programs (JSON)."""
 
 import json
+import math
 import os
 import platform
+import subprocess
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
-from .measure import Workload, largest_error
+from . import targets
+from .chains import Scaling
+from .rounds import Point
+from .whole_process import Workload, largest_error
+from .work_precision import WorkPrecision
+
+PEERS = ("heyoka", "numbalsoda", "numba", "scipy", "numpy")
+VERDICTS = {"W1": targets.case2_verdicts, "W4": targets.stiff_case2_verdicts,
+            "W3": targets.chain_verdicts, "W3_stiff": targets.stiff_chain_verdicts}
 
 
-def markdown(workload: Workload) -> str:
+def verdicts(workload: Workload | WorkPrecision | Scaling) -> list[targets.Verdict]:
+    return VERDICTS[workload.name](workload) if workload.name in VERDICTS else []
+
+
+def markdown(workload: Workload | WorkPrecision | Scaling) -> str:
+    """One section."""
+    if isinstance(workload, WorkPrecision):
+        lines = _work_precision(workload)
+    elif isinstance(workload, Scaling):
+        lines = _scaling(workload)
+    else:
+        lines = _whole_process(workload)
+    return "\n".join([f"## {workload.title}", "", *lines, *(f"\n{verdict}." for verdict in verdicts(workload))])
+
+
+def write_report(measured: list, folder: Path, build: Path) -> None:
+    """Leaves bench.md and bench.json in the folder."""
+    folder.mkdir(parents=True, exist_ok=True)
+    machine = describe_machine(build)
+    sections = ["# Benchmarks", "\n".join(f"- {name}: {text}" for name, text in machine.items()),
+                "Times are the shortest of all rounds, taken in turns, in process unless the title says otherwise: start-up and "
+                "compilation do not count, nor does nocdyn's energy audit, which the others have not. Ratios travel to other machines, milliseconds do not."]
+    reached = [f"- {verdict}" for workload in measured for verdict in verdicts(workload)]
+    if reached:
+        sections.append("## Targets\n\n" + "\n".join(reached))
+    ratios = ratio_table(measured)
+    if ratios:
+        sections.append("## Ratios\n\nTime as a multiple of the fastest method of nocdyn; below 1 is faster than nocdyn.\n\n" + ratios)
+    sections += map(markdown, measured)
+    (folder / "bench.md").write_text("\n\n".join(sections) + "\n", encoding="utf-8")
+    content = {"machine": machine, "workloads": {workload.name: _content(workload) for workload in measured},
+               "targets": [{"sentence": verdict.sentence, "reached": verdict.is_reached}
+                           for workload in measured for verdict in verdicts(workload)]}
+    (folder / "bench.json").write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
+
+
+def describe_machine(build: Path) -> dict[str, str]:
+    """Processor, compiler flags, and the versions of what took part."""
+    return {
+        "processor": f"{_processor()}, {os.cpu_count()} cores, {platform.system()} {platform.machine()}",
+        "compiler": _first_line(["gfortran", "--version"]),
+        "flags": _cached(build, "CMAKE_Fortran_FLAGS") + _release_flags(build),
+        "SUNDIALS": _sundials_version(build),
+        "Python": platform.python_version(),
+        **{name: _package_version(name) for name in PEERS},
+    }
+
+
+def _processor() -> str:
+    try:
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
+    except OSError:
+        return platform.processor()
+    return next((line.partition(":")[2].strip() for line in lines if line.startswith("model name")), platform.processor())
+
+
+def _first_line(command: list[str]) -> str:
+    try:
+        return subprocess.run(command, capture_output=True, text=True, check=True).stdout.partition("\n")[0]
+    except (OSError, subprocess.CalledProcessError):
+        return "unknown"
+
+
+def _cached(build: Path, name: str) -> str:
+    cache = build / "CMakeCache.txt"
+    lines = cache.read_text(encoding="utf-8").splitlines() if cache.exists() else []
+    return next((line.partition("=")[2] for line in lines if line.startswith(name + ":")), "")
+
+
+def _release_flags(build: Path) -> str:
+    """The flags that Ninja compiles the library with."""
+    ninja = build / "build.ninja"
+    if not ninja.exists():
+        return "unknown"
+    text = ninja.read_text(encoding="utf-8")
+    place = text.find("build src/CMakeFiles/nocdyn.dir/integrate/integration.f90.o:")
+    return next((line.partition("=")[2].strip() for line in text[place:].splitlines() if line.startswith("  FLAGS =")), "unknown")
+
+
+def _sundials_version(build: Path) -> str:
+    header = Path(_cached(build, "SUNDIALS_INCLUDE_DIR")) / "sundials" / "sundials_config.h"
+    if not header.exists():
+        return "not there"
+    lines = header.read_text(encoding="utf-8").splitlines()
+    return next((line.split('"')[1] for line in lines if line.startswith("#define SUNDIALS_VERSION ")), "unknown")
+
+
+def _package_version(name: str) -> str:
+    try:
+        return version(name)
+    except PackageNotFoundError:
+        return "not there"
+
+
+def ratio_table(measured: list) -> str:
+    """All in-process workloads side by side, '' if there is none."""
+    columns = {}
+    for workload in measured:
+        if isinstance(workload, WorkPrecision):
+            for error in workload.errors_wanted:
+                columns[f"{workload.name}, error {error:.0e}"] = {
+                    contestant.label: workload.time_at(contestant, error) for contestant in workload.contestants}
+        elif isinstance(workload, Scaling):
+            for chain in workload.chains:
+                columns[f"{workload.name}, N = {chain.bodies}"] = {
+                    point.contestant.label: point.seconds for point in workload.points[chain]}
+    labels = list(dict.fromkeys(label for column in columns.values() for label in column))
+    rows = [[label] for label in labels]
+    for column in columns.values():
+        own = min((seconds for label, seconds in column.items() if label.startswith("nocdyn") and seconds), default=None)
+        for row in rows:
+            seconds = column.get(row[0])
+            row.append(f"{seconds / own:.3g}" if own and seconds else "-")
+    return "\n".join(_table(["", *columns], rows)) if columns else ""
+
+
+def _table(head: list[str], rows: list[list[str]]) -> list[str]:
+    return [f"| {' | '.join(cells)} |" for cells in (head, ["---"] + ["---:"] * (len(head) - 1), *rows)]
+
+
+def _milliseconds(seconds: float | None) -> str:
+    return "-" if seconds is None else f"{1e3 * seconds:.3g}"
+
+
+def _work_precision(workload: WorkPrecision) -> list[str]:
+    head = ["time, ms", *(f"error {error:.0e}" for error in workload.errors_wanted),
+            *(f"moment {error:.0e}" for error in workload.errors_wanted),
+            *(f"tol {tolerance:.0e} (error)" for tolerance in workload.tolerances_wanted)]
+    rows = []
+    for contestant in workload.contestants:
+        row = [contestant.label]
+        for kind in ("states", "moment"):
+            row += [_milliseconds(workload.time_at(contestant, error, kind)) for error in workload.errors_wanted]
+        for tolerance in workload.tolerances_wanted:
+            point = workload.point_at(contestant, tolerance)
+            row.append(f"{_milliseconds(point.seconds)} ({point.errors['states']:.0e})" if point else "-")
+        rows.append(row)
+    return [*_table(head, rows), "", "Errors are the largest absolute ones, of all states [rad, rad/s] or of the elastic moment [N m], "
+            "over all outputs; times between two tolerances are interpolated, linear in the logarithms; - : not reached before the sweep ends, at the "
+            "first run slower than 2 s (SciPy Radau: 8 s) or the tightest tolerance. rtol = atol.", "",
+            f"Reference: {workload.reference.note}; they differ by {workload.reference.distance:.1e}.", "",
+            *_notes(workload.contestants, workload.failures)]
+
+
+def _scaling(workload: Scaling) -> list[str]:
+    rows = []
+    for label in workload.labels:
+        found = [workload.point(chain, label) for chain in workload.chains]
+        rows.append([label, *(_milliseconds(point.seconds) if point else "-" for point in found),
+                     *(f"{1e6 * point.seconds / chain.bodies:.3g}" if point else "-" for chain, point in zip(workload.chains, found)),
+                     *(f"{point.errors['states']:.0e}" if point else "-" for point in found),
+                     *(_count(point) for point in found)])
+    lengths = [str(chain.bodies) for chain in workload.chains]
+    head = ["N =", *(f"{text}, ms" for text in lengths), *(f"{text}, us/N" for text in lengths),
+            *(f"{text}, error" for text in lengths), *(f"{text}, steps" for text in lengths)]
+    references = [f"{chain.bodies}: {reference.distance:.0e}" for chain, reference in workload.references.items()]
+    contestants = {contestant.label: contestant for chain in workload.chains for contestant in workload.contestants[chain]}
+    return [*_table(head, rows), "", "Errors are the largest absolute ones of the states at the end [rad, rad/s].", "",
+            f"Reference: {next(iter(workload.references.values())).note}; they differ by, at N = {', '.join(references)}.", "",
+            *_notes(list(contestants.values()), workload.failures)]
+
+
+def _count(point: Point | None) -> str:
+    return "-" if point is None or point.steps is None else str(point.steps)
+
+
+def _notes(contestants: list, failures: list[str]) -> list[str]:
+    alike: dict[str, list[str]] = {}
+    for contestant in contestants:
+        alike.setdefault(contestant.note, []).append(contestant.label)
+    return [*(f"- {'; '.join(labels)}: {note}" for note, labels in alike.items()), *(f"- {failure}" for failure in failures)]
+
+
+def _whole_process(workload: Workload) -> list[str]:
     first = workload.contestants[0]
     lines = [
-        f"## {workload.title}",
-        "",
         f"| | median of {len(first.seconds)}, ms | fastest, ms | ratio | largest error |",
         "| --- | ---: | ---: | ---: | ---: |",
     ]
@@ -22,26 +204,25 @@ def markdown(workload: Workload) -> str:
                      f"| {contestant.median / first.median:.2f} | {'' if error is None else f'{error:.1e}'} |")
     if workload.target:
         lines += ["", workload.target]
-    return "\n".join(lines)
+    return lines
 
 
-def write_report(workloads: list[Workload], folder: Path) -> None:
-    """Leaves bench.md and bench.json in the folder."""
-    folder.mkdir(parents=True, exist_ok=True)
-    machine = f"{os.cpu_count()} cores, {platform.machine()}, Python {platform.python_version()}"
-    text = "\n\n".join(["# Benchmarks", f"Measured on: {machine}. Ratios travel to other machines, milliseconds do not.",
-                        *map(markdown, workloads)])
-    (folder / "bench.md").write_text(text + "\n", encoding="utf-8")
-    content = {"machine": machine, "workloads": {workload.name: _content(workload) for workload in workloads}}
-    (folder / "bench.json").write_text(json.dumps(content, indent=2) + "\n", encoding="utf-8")
+def _error(trajectory: Path | None, reference: Path | None) -> float | None:
+    return largest_error(trajectory, reference) if trajectory and reference else None
 
 
-def _content(workload: Workload) -> dict:
+def _content(workload: Workload | WorkPrecision | Scaling) -> dict | list:
+    if isinstance(workload, WorkPrecision):
+        return [_point(point) for point in workload.points]
+    if isinstance(workload, Scaling):
+        return [{"rotors": chain.bodies, **_point(point)} for chain in workload.chains for point in workload.points[chain]]
     return {
         contestant.label: {"seconds": contestant.seconds, "largest_error": _error(contestant.trajectory, workload.reference)}
         for contestant in workload.contestants
     }
 
 
-def _error(trajectory: Path | None, reference: Path | None) -> float | None:
-    return largest_error(trajectory, reference) if trajectory and reference else None
+def _point(point: Point) -> dict:
+    return {"contestant": point.contestant.label, "rtol": point.rtol, "atol": point.atol, "seconds": point.seconds,
+            "median_seconds": point.median, "rounds": len(point.rounds), "steps": point.steps, "evaluations": point.evaluations,
+            "errors": {kind: error if math.isfinite(error) else None for kind, error in point.errors.items()}}

@@ -2,9 +2,16 @@
 
 import subprocess
 import sys
+from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 
-from .measure import Contestant, Workload
+from . import whole_process
+from .chains import Scaling
+from .peers import heyoka, numbalsoda, scipy
+from .problems import Case2, Chain
+from .programs import Programs
+from .work_precision import WorkPrecision
 
 ROOT = Path(__file__).resolve().parents[2]
 SCIPY_CASE = Path(__file__).with_name("scipy_case.py")
@@ -12,36 +19,95 @@ CASE2 = ROOT / "input" / "paper" / "case2.nml"
 REFERENCE_TOLERANCES = ("--set", "run.rtol=1e-13", "--set", "run.atol=1e-13")
 
 
-def start_up(nocdyn: Path, scratch: Path) -> Workload:
-    return Workload("start_up", "Start-up", [
-        Contestant("nocdyn --version", [nocdyn, "--version"]),
-        Contestant("Python", [sys.executable, "-c", "pass"]),
-        Contestant("Python and scipy.integrate", [sys.executable, "-c", "import scipy.integrate"]),
+@dataclass(frozen=True)
+class Bench:
+    """What all workloads get to know."""
+
+    nocdyn: Path  # the command
+    programs: Programs  # those of bench/
+    scratch: Path
+    is_quick: bool
+
+
+Workload = whole_process.Workload | WorkPrecision | Scaling
+
+
+def start_up(bench: Bench) -> whole_process.Workload:
+    return whole_process.Workload("start_up", "Start-up", [
+        whole_process.Contestant("nocdyn --version", [bench.nocdyn, "--version"]),
+        whole_process.Contestant("Python", [sys.executable, "-c", "pass"]),
+        whole_process.Contestant("Python and scipy.integrate", [sys.executable, "-c", "import scipy.integrate"]),
     ])
 
 
-def case2(nocdyn: Path, scratch: Path) -> Workload:
+def case2(bench: Bench) -> whole_process.Workload:
     """The paper's case 2 as a whole process, 1001 rows written, at the tolerances of its input (1e-9)."""
-    def run(label: str, *settings: str) -> Contestant:
-        folder = scratch / "_".join(("nocdyn", *settings))
+    def run(label: str, *settings: str) -> whole_process.Contestant:
+        folder = bench.scratch / "_".join(("nocdyn", *settings))
         options = [option for setting in settings for option in ("--set", f"run.{setting}")]
-        return Contestant(label, [nocdyn, "run", "--quiet", "--out", folder, *options, CASE2], folder / "trajectory.csv")
+        return whole_process.Contestant(label, [bench.nocdyn, "run", "--quiet", "--out", folder, *options, CASE2],
+                                        folder / "trajectory.csv")
 
-    def scipy(method: str) -> Contestant:
-        file = scratch / f"scipy_{method}.csv"
-        return Contestant(f"SciPy {method}", [sys.executable, SCIPY_CASE, "--method", method, file], file)
+    def scipy_process(method: str) -> whole_process.Contestant:
+        file = bench.scratch / f"scipy_{method}.csv"
+        return whole_process.Contestant(f"SciPy {method}", [sys.executable, SCIPY_CASE, "--method", method, file], file)
 
-    reference = scratch / "reference"
-    subprocess.run([nocdyn, "run", "--quiet", "--out", reference, *REFERENCE_TOLERANCES, CASE2], check=True)
-    return Workload("case2", "Paper, case 2, whole process", [
+    reference = bench.scratch / "reference"
+    subprocess.run([bench.nocdyn, "run", "--quiet", "--out", reference, *REFERENCE_TOLERANCES, CASE2], check=True)
+    return whole_process.Workload("case2", "Paper, case 2, whole process", [
         run("nocdyn"),
         run("nocdyn, formulation paper", "formulation=paper"),
         run("nocdyn, formulation multiplier", "formulation=multiplier"),
         run("nocdyn, method rosenbrock", "method=rosenbrock"),
-        scipy("LSODA"),
-        scipy("DOP853"),
-        scipy("RK45"),
+        scipy_process("LSODA"),
+        scipy_process("DOP853"),
+        scipy_process("RK45"),
     ], reference / "trajectory.csv", rival="SciPy LSODA", factor=20.0)
 
 
-WORKLOADS = {"start_up": start_up, "case2": case2}
+def w1(bench: Bench) -> WorkPrecision:
+    problem = Case2()
+    return WorkPrecision("W1", "W1: case 2, 1001 outputs, in process", problem, [
+        *bench.programs.nocdyn(problem, ["rk45", "rk853", "auto", "rodas4", "rodas5p"]),
+        bench.programs.handwritten(),
+        *heyoka.contestants(problem),
+        *numbalsoda.contestants(problem, ["DOP853, dense", "LSODA"]),
+        *bench.programs.sundials(problem, ["adams", "bdf", "bdf2", "erk5"]),
+        *scipy.contestants(problem, ["DOP853"] if bench.is_quick else ["RK45", "DOP853", "LSODA"]),
+    ], errors_wanted=[1e-6, 1e-9, 1e-12])
+
+
+def w3(bench: Bench) -> Scaling:
+    chains = [Chain(bodies) for bodies in (10, 100, 1000, 10000)]
+    return Scaling("W3", "W3: chain of N rotors, rtol 1e-6, atol 1e-8", chains, {chain: [
+        *bench.programs.nocdyn(chain, ["rk45", "rk853", "auto"]),
+        *numbalsoda.contestants(chain, ["DOP853"]),
+        *(numbalsoda.contestants(chain, ["LSODA"]) if chain.bodies <= 100 else []),  # its Jacobian is dense
+        *heyoka.contestants(chain),
+        *bench.programs.sundials(chain, ["adams", "bdf", "erk5", "erk8"]),
+        *scipy.contestants(chain, ["ode DOP853", "LSODA"]),
+    ] for chain in chains}, reference_tolerance=1e-12)
+
+
+def w3_stiff(bench: Bench) -> Scaling:
+    chains = [Chain(bodies, 1.0e8, 1.0e9, t_end=0.01) for bodies in (10, 100, 1000, 10000)]
+    return Scaling("W3_stiff", "W3, implicit: the chain with stiffnesses 1e8 and 1e9, to 0.01 s", chains, {chain: [
+        *bench.programs.nocdyn(chain, ["rodas4", "rodas5p", "auto"]),
+        *bench.programs.sundials(chain, ["bdf", "bdf2"]),
+    ] for chain in chains}, reference_tolerance=1e-12)
+
+
+def w4(bench: Bench) -> WorkPrecision:
+    problem = Case2(1.0e8, 1.0e9, 1.0e-4)
+    return WorkPrecision("W4", "W4: case 2 with K1 = 1e8, k1 = 1e9, J3 = 1e-4, 1001 outputs, in process", problem, [
+        *bench.programs.nocdyn(problem, ["rodas4", "rodas5p", "auto", "rk45", "rk853"]),
+        *heyoka.contestants(problem),
+        *numbalsoda.contestants(problem, ["DOP853", "LSODA"]),
+        *bench.programs.sundials(problem, ["bdf2", "bdf"]),
+        *scipy.contestants(problem, [] if bench.is_quick else ["Radau"]),
+    ], errors_wanted=[1e-4, 1e-6], tolerances_wanted=[1e-6])
+
+
+WORKLOADS: dict[str, Callable[[Bench], Workload]] = {
+    "start_up": start_up, "case2": case2, "W1": w1, "W3": w3, "W3_stiff": w3_stiff, "W4": w4,
+}

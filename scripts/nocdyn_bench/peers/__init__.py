@@ -1,0 +1,1 @@
+"""Contestants from PyPI, timed in this process."""
