@@ -29,7 +29,7 @@ contains
     real(wp), intent(inout) :: x(n)
     integer :: i
 
-    if (count(abs(x) > largest) == 0) then
+    if (all_moderate(n, x)) then
       do i = 1, n
         x(i) = sine(x(i))
       end do
@@ -51,7 +51,7 @@ contains
     real(wp), intent(inout) :: x(n)
     integer :: i
 
-    if (count(abs(x) > largest) == 0) then
+    if (all_moderate(n, x)) then
       do i = 1, n
         x(i) = cosine(x(i))
       end do
@@ -66,6 +66,18 @@ contains
       end do
     end if
   end subroutine cosines
+
+  !> Whether no argument is larger than `largest` in size.
+  pure logical function all_moderate(n, x)
+    integer, intent(in) :: n
+    real(wp), intent(in) :: x(n)
+
+    if (n == 1) then
+      all_moderate = abs(x(1)) <= largest
+    else
+      all_moderate = count(abs(x) > largest) == 0
+    end if
+  end function all_moderate
 
   pure real(wp) function sine(x)
     real(wp), intent(in) :: x

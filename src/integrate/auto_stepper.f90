@@ -59,6 +59,7 @@ contains
     stepper%order = stepper%explicit%order
     stepper%error_order = stepper%explicit%error_order
     stepper%degree = max(stepper%explicit%degree, stepper%implicit%degree)
+    stepper%most_growth = stepper%explicit%most_growth
     stepper%has_coarse_error = stepper%explicit%has_coarse_error
   end function auto_stepper
 
@@ -105,6 +106,7 @@ contains
     do lane = 1, trial%lanes
       trial%implicit(lane) = self%is_implicit(lane)
       trial%error_order(lane) = merge(self%implicit%error_order, self%explicit%error_order, self%is_implicit(lane))
+      trial%most_growth(lane) = merge(self%implicit%most_growth, self%explicit%most_growth, self%is_implicit(lane))
     end do
     if (.not. any(self%is_implicit)) then
       call self%explicit%attempt(system, trial)
@@ -192,9 +194,14 @@ contains
     real(wp), contiguous, intent(inout) :: coefficients(:, :, :)
     integer :: lane, power
 
-    coefficients(:, :, :) = 0.0_wp
+    coefficients(:, :, self%explicit%degree + 1:) = 0.0_wp
+    if (.not. any(self%is_implicit)) then
+      call self%explicit%interpolate(system, trial, wanted, coefficients(:, :, :self%explicit%degree))
+      return
+    end if
     self%mask(:) = wanted .and. .not. self%is_implicit
     if (any(self%mask)) call self%explicit%interpolate(system, trial, self%mask, coefficients(:, :, :self%explicit%degree))
+    self%coefficients(:, :, self%implicit%degree + 1:) = 0.0_wp
     self%mask(:) = wanted .and. self%is_implicit
     if (.not. any(self%mask)) return
     call self%implicit%interpolate(system, trial, self%mask, self%coefficients(:, :, :self%implicit%degree))

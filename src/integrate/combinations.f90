@@ -1,10 +1,11 @@
 !> Linear combinations of stages: the inner loops of every one-step method.
 module nocdyn_combinations
+  use nocdyn_finite, only: is_finite
   use nocdyn_kinds, only: wp
   implicit none (type, external)
   private
 
-  public :: combination, combine, padded_columns
+  public :: combination, set_offsets, combine, padded_columns
 
   integer, parameter :: most_terms = 12     !! of a row of any table
   integer, parameter, public :: width = 4   !! all arrays here consist of whole vectors of this length
@@ -14,6 +15,7 @@ module nocdyn_combinations
     integer :: terms = 0
     real(wp) :: weights(most_terms) = 0.0_wp
     integer :: stages(most_terms) = 0
+    integer :: offsets(most_terms) = 0   !! of these stages in an array of all stages
   end type combination_t
 
 contains
@@ -33,6 +35,14 @@ contains
     end do
   end function combination
 
+  !> Finds the stages in an array [length, stages].
+  elemental subroutine set_offsets(combination, length)
+    type(combination_t), intent(inout) :: combination
+    integer, intent(in) :: length   !! of a stage
+
+    combination%offsets = length * (combination%stages - 1)
+  end subroutine set_offsets
+
   !> Columns, at least one, of an array [lanes, columns] that holds all components and consists of whole vectors.
   pure integer function padded_columns(lanes, components)
     integer, intent(in) :: lanes, components
@@ -45,28 +55,38 @@ contains
 
   !> y = x + h * (sum of weights times stages), in one pass. Every number goes through the same operations in the same
   !> order wherever it stands in the arrays, so that a lane's result does not depend on its place in a block.
-  pure subroutine combine(n, stages, combination, k, x, h, y)
-    integer, intent(in) :: n        !! length of the arrays, whole vectors
-    integer, intent(in) :: stages
-    type(combination_t), intent(in) :: combination
-    real(wp), intent(in) :: k(n, stages), x(n), h(n)
+  pure subroutine combine(n, combination, k, x, h, y, all_finite)
+    integer, intent(in) :: n                             !! length of the arrays, whole vectors
+    type(combination_t), intent(in) :: combination       !! with offsets
+    real(wp), intent(in) :: k(*)                         !! the stages, [n, stages]
+    real(wp), intent(in) :: x(n), h(n)
     real(wp), intent(inout) :: y(n)
+    logical, intent(out) :: all_finite                   !! whether no element of y is infinite or NaN
+    real(wp) :: total(width)   ! of the sizes, finite if they all are
+    integer :: i
 
-    if (combination%terms <= 4) then
-      call combine_few(n, stages, combination%terms, combination%weights, combination%stages, k, x, h, y)
-    else if (combination%terms <= 8) then
-      call combine_several(n, stages, combination%terms, combination%weights, combination%stages, k, x, h, y)
-    else
-      call combine_many(n, stages, combination%terms, combination%weights, combination%stages, k, x, h, y)
-    end if
+    associate (terms => combination%terms, w => combination%weights, o => combination%offsets)
+      if (terms <= 4) then
+        call combine_few(n, terms, w, o, k, x, h, y)
+      else if (terms <= 8) then
+        call combine_several(n, terms, w, o, k, x, h, y)
+      else
+        call combine_many(n, terms, w, o, k, x, h, y)
+      end if
+    end associate
+    total = 0.0_wp
+    do i = 1, n, width
+      total = total + abs(y(i:i + 3))
+    end do
+    all_finite = is_finite((total(1) + total(2)) + (total(3) + total(4)))
   end subroutine combine
 
   !> Sums of up to four terms.
-  pure subroutine combine_few(n, stages, terms, w, s, k, x, h, y)
-    integer, intent(in) :: n, stages, terms
-    real(wp), intent(in) :: w(terms)
-    integer, intent(in) :: s(terms)
-    real(wp), intent(in) :: k(n, stages), x(n), h(n)
+  pure subroutine combine_few(n, terms, w, o, k, x, h, y)
+    integer, intent(in) :: n, terms
+    real(wp), intent(in) :: w(most_terms)
+    integer, intent(in) :: o(most_terms)
+    real(wp), intent(in) :: k(*), x(n), h(n)
     real(wp), intent(inout) :: y(n)
     integer :: i
 
@@ -75,99 +95,107 @@ contains
       y = x
     case (1)
       do i = 1, n, width
-        y(i:i + 3) = x(i:i + 3) + h(i:i + 3) * (w(1) * k(i:i + 3, s(1)))
+        y(i:i + 3) = x(i:i + 3) + h(i:i + 3) * (w(1) * k(i + o(1):i + 3 + o(1)))
       end do
     case (2)
       do i = 1, n, width
-        y(i:i + 3) = x(i:i + 3) + h(i:i + 3) * (w(1) * k(i:i + 3, s(1)) + w(2) * k(i:i + 3, s(2)))
+        y(i:i + 3) = x(i:i + 3) + h(i:i + 3) * (w(1) * k(i + o(1):i + 3 + o(1)) + w(2) * k(i + o(2):i + 3 + o(2)))
       end do
     case (3)
       do i = 1, n, width
-        y(i:i + 3) = x(i:i + 3) + h(i:i + 3) * (w(1) * k(i:i + 3, s(1)) + w(2) * k(i:i + 3, s(2)) &
-                                   + w(3) * k(i:i + 3, s(3)))
+        y(i:i + 3) = x(i:i + 3) + h(i:i + 3) * (w(1) * k(i + o(1):i + 3 + o(1)) + w(2) * k(i + o(2):i + 3 + o(2)) &
+                                   + w(3) * k(i + o(3):i + 3 + o(3)))
       end do
     case (4)
       do i = 1, n, width
-        y(i:i + 3) = x(i:i + 3) + h(i:i + 3) * (w(1) * k(i:i + 3, s(1)) + w(2) * k(i:i + 3, s(2)) &
-                                   + w(3) * k(i:i + 3, s(3)) + w(4) * k(i:i + 3, s(4)))
+        y(i:i + 3) = x(i:i + 3) + h(i:i + 3) * (w(1) * k(i + o(1):i + 3 + o(1)) + w(2) * k(i + o(2):i + 3 + o(2)) &
+                                   + w(3) * k(i + o(3):i + 3 + o(3)) + w(4) * k(i + o(4):i + 3 + o(4)))
       end do
     end select
   end subroutine combine_few
 
   !> Sums of five to eight terms.
-  pure subroutine combine_several(n, stages, terms, w, s, k, x, h, y)
-    integer, intent(in) :: n, stages, terms
-    real(wp), intent(in) :: w(terms)
-    integer, intent(in) :: s(terms)
-    real(wp), intent(in) :: k(n, stages), x(n), h(n)
+  pure subroutine combine_several(n, terms, w, o, k, x, h, y)
+    integer, intent(in) :: n, terms
+    real(wp), intent(in) :: w(most_terms)
+    integer, intent(in) :: o(most_terms)
+    real(wp), intent(in) :: k(*), x(n), h(n)
     real(wp), intent(inout) :: y(n)
     integer :: i
 
     select case (terms)
     case (5)
       do i = 1, n, width
-        y(i:i + 3) = x(i:i + 3) + h(i:i + 3) * (w(1) * k(i:i + 3, s(1)) + w(2) * k(i:i + 3, s(2)) &
-                                   + w(3) * k(i:i + 3, s(3)) + w(4) * k(i:i + 3, s(4)) + w(5) * k(i:i + 3, s(5)))
+        y(i:i + 3) = x(i:i + 3) + h(i:i + 3) * (w(1) * k(i + o(1):i + 3 + o(1)) + w(2) * k(i + o(2):i + 3 + o(2)) &
+                                   + w(3) * k(i + o(3):i + 3 + o(3)) + w(4) * k(i + o(4):i + 3 + o(4)) &
+                                   + w(5) * k(i + o(5):i + 3 + o(5)))
       end do
     case (6)
       do i = 1, n, width
-        y(i:i + 3) = x(i:i + 3) + h(i:i + 3) * (w(1) * k(i:i + 3, s(1)) + w(2) * k(i:i + 3, s(2)) &
-                                   + w(3) * k(i:i + 3, s(3)) + w(4) * k(i:i + 3, s(4)) + w(5) * k(i:i + 3, s(5)) &
-                                   + w(6) * k(i:i + 3, s(6)))
+        y(i:i + 3) = x(i:i + 3) + h(i:i + 3) * (w(1) * k(i + o(1):i + 3 + o(1)) + w(2) * k(i + o(2):i + 3 + o(2)) &
+                                   + w(3) * k(i + o(3):i + 3 + o(3)) + w(4) * k(i + o(4):i + 3 + o(4)) &
+                                   + w(5) * k(i + o(5):i + 3 + o(5)) + w(6) * k(i + o(6):i + 3 + o(6)))
       end do
     case (7)
       do i = 1, n, width
-        y(i:i + 3) = x(i:i + 3) + h(i:i + 3) * (w(1) * k(i:i + 3, s(1)) + w(2) * k(i:i + 3, s(2)) &
-                                   + w(3) * k(i:i + 3, s(3)) + w(4) * k(i:i + 3, s(4)) + w(5) * k(i:i + 3, s(5)) &
-                                   + w(6) * k(i:i + 3, s(6)) + w(7) * k(i:i + 3, s(7)))
+        y(i:i + 3) = x(i:i + 3) + h(i:i + 3) * (w(1) * k(i + o(1):i + 3 + o(1)) + w(2) * k(i + o(2):i + 3 + o(2)) &
+                                   + w(3) * k(i + o(3):i + 3 + o(3)) + w(4) * k(i + o(4):i + 3 + o(4)) &
+                                   + w(5) * k(i + o(5):i + 3 + o(5)) + w(6) * k(i + o(6):i + 3 + o(6)) &
+                                   + w(7) * k(i + o(7):i + 3 + o(7)))
       end do
     case (8)
       do i = 1, n, width
-        y(i:i + 3) = x(i:i + 3) + h(i:i + 3) * (w(1) * k(i:i + 3, s(1)) + w(2) * k(i:i + 3, s(2)) &
-                                   + w(3) * k(i:i + 3, s(3)) + w(4) * k(i:i + 3, s(4)) + w(5) * k(i:i + 3, s(5)) &
-                                   + w(6) * k(i:i + 3, s(6)) + w(7) * k(i:i + 3, s(7)) + w(8) * k(i:i + 3, s(8)))
+        y(i:i + 3) = x(i:i + 3) + h(i:i + 3) * (w(1) * k(i + o(1):i + 3 + o(1)) + w(2) * k(i + o(2):i + 3 + o(2)) &
+                                   + w(3) * k(i + o(3):i + 3 + o(3)) + w(4) * k(i + o(4):i + 3 + o(4)) &
+                                   + w(5) * k(i + o(5):i + 3 + o(5)) + w(6) * k(i + o(6):i + 3 + o(6)) &
+                                   + w(7) * k(i + o(7):i + 3 + o(7)) + w(8) * k(i + o(8):i + 3 + o(8)))
       end do
     end select
   end subroutine combine_several
 
   !> Sums of nine to twelve terms.
-  pure subroutine combine_many(n, stages, terms, w, s, k, x, h, y)
-    integer, intent(in) :: n, stages, terms
-    real(wp), intent(in) :: w(terms)
-    integer, intent(in) :: s(terms)
-    real(wp), intent(in) :: k(n, stages), x(n), h(n)
+  pure subroutine combine_many(n, terms, w, o, k, x, h, y)
+    integer, intent(in) :: n, terms
+    real(wp), intent(in) :: w(most_terms)
+    integer, intent(in) :: o(most_terms)
+    real(wp), intent(in) :: k(*), x(n), h(n)
     real(wp), intent(inout) :: y(n)
     integer :: i
 
     select case (terms)
     case (9)
       do i = 1, n, width
-        y(i:i + 3) = x(i:i + 3) + h(i:i + 3) * (w(1) * k(i:i + 3, s(1)) + w(2) * k(i:i + 3, s(2)) &
-                                   + w(3) * k(i:i + 3, s(3)) + w(4) * k(i:i + 3, s(4)) + w(5) * k(i:i + 3, s(5)) &
-                                   + w(6) * k(i:i + 3, s(6)) + w(7) * k(i:i + 3, s(7)) + w(8) * k(i:i + 3, s(8)) &
-                                   + w(9) * k(i:i + 3, s(9)))
+        y(i:i + 3) = x(i:i + 3) + h(i:i + 3) * (w(1) * k(i + o(1):i + 3 + o(1)) + w(2) * k(i + o(2):i + 3 + o(2)) &
+                                   + w(3) * k(i + o(3):i + 3 + o(3)) + w(4) * k(i + o(4):i + 3 + o(4)) &
+                                   + w(5) * k(i + o(5):i + 3 + o(5)) + w(6) * k(i + o(6):i + 3 + o(6)) &
+                                   + w(7) * k(i + o(7):i + 3 + o(7)) + w(8) * k(i + o(8):i + 3 + o(8)) &
+                                   + w(9) * k(i + o(9):i + 3 + o(9)))
       end do
     case (10)
       do i = 1, n, width
-        y(i:i + 3) = x(i:i + 3) + h(i:i + 3) * (w(1) * k(i:i + 3, s(1)) + w(2) * k(i:i + 3, s(2)) &
-                                   + w(3) * k(i:i + 3, s(3)) + w(4) * k(i:i + 3, s(4)) + w(5) * k(i:i + 3, s(5)) &
-                                   + w(6) * k(i:i + 3, s(6)) + w(7) * k(i:i + 3, s(7)) + w(8) * k(i:i + 3, s(8)) &
-                                   + w(9) * k(i:i + 3, s(9)) + w(10) * k(i:i + 3, s(10)))
+        y(i:i + 3) = x(i:i + 3) + h(i:i + 3) * (w(1) * k(i + o(1):i + 3 + o(1)) + w(2) * k(i + o(2):i + 3 + o(2)) &
+                                   + w(3) * k(i + o(3):i + 3 + o(3)) + w(4) * k(i + o(4):i + 3 + o(4)) &
+                                   + w(5) * k(i + o(5):i + 3 + o(5)) + w(6) * k(i + o(6):i + 3 + o(6)) &
+                                   + w(7) * k(i + o(7):i + 3 + o(7)) + w(8) * k(i + o(8):i + 3 + o(8)) &
+                                   + w(9) * k(i + o(9):i + 3 + o(9)) + w(10) * k(i + o(10):i + 3 + o(10)))
       end do
     case (11)
       do i = 1, n, width
-        y(i:i + 3) = x(i:i + 3) + h(i:i + 3) * (w(1) * k(i:i + 3, s(1)) + w(2) * k(i:i + 3, s(2)) &
-                                   + w(3) * k(i:i + 3, s(3)) + w(4) * k(i:i + 3, s(4)) + w(5) * k(i:i + 3, s(5)) &
-                                   + w(6) * k(i:i + 3, s(6)) + w(7) * k(i:i + 3, s(7)) + w(8) * k(i:i + 3, s(8)) &
-                                   + w(9) * k(i:i + 3, s(9)) + w(10) * k(i:i + 3, s(10)) + w(11) * k(i:i + 3, s(11)))
+        y(i:i + 3) = x(i:i + 3) + h(i:i + 3) * (w(1) * k(i + o(1):i + 3 + o(1)) + w(2) * k(i + o(2):i + 3 + o(2)) &
+                                   + w(3) * k(i + o(3):i + 3 + o(3)) + w(4) * k(i + o(4):i + 3 + o(4)) &
+                                   + w(5) * k(i + o(5):i + 3 + o(5)) + w(6) * k(i + o(6):i + 3 + o(6)) &
+                                   + w(7) * k(i + o(7):i + 3 + o(7)) + w(8) * k(i + o(8):i + 3 + o(8)) &
+                                   + w(9) * k(i + o(9):i + 3 + o(9)) + w(10) * k(i + o(10):i + 3 + o(10)) &
+                                   + w(11) * k(i + o(11):i + 3 + o(11)))
       end do
     case (12)
       do i = 1, n, width
-        y(i:i + 3) = x(i:i + 3) + h(i:i + 3) * (w(1) * k(i:i + 3, s(1)) + w(2) * k(i:i + 3, s(2)) &
-                                   + w(3) * k(i:i + 3, s(3)) + w(4) * k(i:i + 3, s(4)) + w(5) * k(i:i + 3, s(5)) &
-                                   + w(6) * k(i:i + 3, s(6)) + w(7) * k(i:i + 3, s(7)) + w(8) * k(i:i + 3, s(8)) &
-                                   + w(9) * k(i:i + 3, s(9)) + w(10) * k(i:i + 3, s(10)) + w(11) * k(i:i + 3, s(11)) &
-                                   + w(12) * k(i:i + 3, s(12)))
+        y(i:i + 3) = x(i:i + 3) + h(i:i + 3) * (w(1) * k(i + o(1):i + 3 + o(1)) + w(2) * k(i + o(2):i + 3 + o(2)) &
+                                   + w(3) * k(i + o(3):i + 3 + o(3)) + w(4) * k(i + o(4):i + 3 + o(4)) &
+                                   + w(5) * k(i + o(5):i + 3 + o(5)) + w(6) * k(i + o(6):i + 3 + o(6)) &
+                                   + w(7) * k(i + o(7):i + 3 + o(7)) + w(8) * k(i + o(8):i + 3 + o(8)) &
+                                   + w(9) * k(i + o(9):i + 3 + o(9)) + w(10) * k(i + o(10):i + 3 + o(10)) &
+                                   + w(11) * k(i + o(11):i + 3 + o(11)) + w(12) * k(i + o(12):i + 3 + o(12)))
       end do
     end select
   end subroutine combine_many

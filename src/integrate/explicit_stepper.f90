@@ -39,6 +39,7 @@ contains
 
     stepper%order = table%order
     stepper%error_order = table%error_order
+    stepper%most_growth = table%most_growth
     stepper%degree = size(table%dense, 2)
     stepper%first_same_as_last = table%first_same_as_last
     allocate (stepper%c, source=table%c)
@@ -82,17 +83,30 @@ contains
     do stage = 2, last
       if (.not. any(trial%working)) exit
       call inner_state(self%stages, trial, stage, self%y_stage)
-      self%t_stage(:) = trial%t + self%c(stage) * trial%h
+      call place_stage(trial%lanes, trial%t, trial%h, self%c(stage), self%t_stage)
       call evaluate(trial, system, self%t_stage, self%y_stage, self%stages%k(1, 1, stage))
     end do
     call update_state(self%stages, trial)
     if (self%first_same_as_last) then
-      self%t_stage(:) = trial%t + trial%h
+      call place_stage(trial%lanes, trial%t, trial%h, 1.0_wp, self%t_stage)
       call evaluate_finite(trial, system, self%t_stage, trial%y_new, self%stages%k(1, 1, self%stages%step))
     end if
     call estimate_error(self%stages, trial)
     call count_evaluations(trial)
   end subroutine attempt
+
+  !> Times of a stage.
+  pure subroutine place_stage(lanes, t, h, c, t_stage)
+    integer, intent(in) :: lanes
+    real(wp), intent(in) :: t(lanes), h(lanes), c
+    real(wp), intent(inout) :: t_stage(lanes)
+
+    if (lanes == 1) then
+      t_stage(1) = t(1) + c * h(1)
+    else
+      t_stage = t + c * h
+    end if
+  end subroutine place_stage
 
   subroutine renew_first_stage(self, system, trial)
     class(explicit_stepper_t), intent(inout) :: self
@@ -116,7 +130,7 @@ contains
       trial%working(:) = wanted
       do stage = self%stages%step + 1, self%stages%all
         call inner_state(self%stages, trial, stage, self%y_stage)
-        self%t_stage(:) = trial%t + self%c(stage) * trial%h
+        call place_stage(trial%lanes, trial%t, trial%h, self%c(stage), self%t_stage)
         call evaluate_finite(trial, system, self%t_stage, self%y_stage, self%stages%k(1, 1, stage))
       end do
       call count_evaluations(trial)

@@ -20,6 +20,7 @@ module nocdyn_explicit_tables
     integer :: error_order                   !! the estimated error of a step falls as h^(error_order + 1)
     integer :: dense_order                   !! of the solution inside a step
     logical :: first_same_as_last            !! the last stage is f(t + h, y_new), the first stage of the next step
+    real(wp) :: most_growth = 6.0_wp         !! of the step size, in the authors' code
     real(wp) :: stability_border = 0.0_wp    !! just within the stability domain on the negative real axis
     real(wp), allocatable :: a(:, :)         !! strictly lower triangular, shape [all stages, all stages]
     real(wp), allocatable :: b(:)            !! shape [stages]
@@ -43,6 +44,7 @@ contains
     table%error_order = 4
     table%dense_order = 4
     table%first_same_as_last = .true.
+    table%most_growth = 10.0_wp
     table%stability_border = 3.25_wp
     allocate (table%a(7, 7), table%b(7), table%c(7), table%error(7), table%dense(7, 4), source=0.0_wp)
     table%c(:) = [0.0_wp, 1.0_wp / 5, 3.0_wp / 10, 4.0_wp / 5, 8.0_wp / 9, 1.0_wp, 1.0_wp]

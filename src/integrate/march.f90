@@ -53,6 +53,7 @@ contains
     call stepper%prepare(system)
     call allocate_trial(march%trial, system)
     march%trial%error_order(:) = stepper%error_order
+    march%trial%most_growth(:) = stepper%most_growth
     march%trial%has_coarse_deviation = stepper%has_coarse_error
     march%control = step_control(system%lanes, settings%rtol, settings%atol, times(size(times)), settings%longest_step)
     march%first_step = settings%first_step
@@ -184,7 +185,7 @@ contains
       if (.not. march%occupied(lane) .or. outcome%status(lane) /= integration_running) cycle
       march%accepted(lane) = march%accepted(lane) .and. march%trial%verdict(lane) == trial_fine
       if (march%accepted(lane)) then
-        call lengthen(march%control, lane, march%trial%error_order(lane), outcome%h(lane))
+        call lengthen(march%control, lane, march%trial%error_order(lane), march%trial%most_growth(lane), outcome%h(lane))
         call note_method(outcome, lane, march%trial%t(lane), march%trial%implicit(lane))
         if (march%control%reaches_end(lane)) outcome%status(lane) = integration_done
       else

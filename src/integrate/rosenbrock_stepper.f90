@@ -1,6 +1,6 @@
 !> Steps of any Rosenbrock method with the exact Jacobian.
 module nocdyn_rosenbrock_stepper
-  use nocdyn_combinations, only: combination, combination_t, combine
+  use nocdyn_combinations, only: combination, combination_t, combine, set_offsets
   use nocdyn_kinds, only: wp
   use nocdyn_rosenbrock_tables, only: rosenbrock_table_t
   use nocdyn_spectra, only: allocate_spectra, dominate, spectra_t
@@ -66,6 +66,7 @@ contains
     class(system_t), intent(in) :: system
 
     call allocate_stages(self%stages, system)
+    call set_offsets(self%coupling, size(self%stages%zero))
     call allocate_stage_system(self%stage_system, system)
     call allocate_spectra(self%spectra, system)
     if (allocated(self%slope)) deallocate (self%t_stage, self%y_stage, self%f, self%r, self%one, self%slope, &
@@ -140,8 +141,9 @@ contains
     type(trial_t), intent(in) :: trial
     integer, intent(in) :: stage
     real(wp), intent(in) :: f(trial%length)
+    logical :: all_finite
 
-    call combine(trial%length, self%stages%all, self%coupling(stage), self%stages%k, f, self%one, self%r)
+    call combine(trial%length, self%coupling(stage), self%stages%k, f, self%one, self%r, all_finite)
     if (abs(self%gamma_sum(stage)) > 0) then
       call add_time_derivative(trial%lanes * trial%components, self%gamma_sum(stage), trial%h_spread, &
                                self%stage_system%dfdt, self%r)

@@ -1,7 +1,7 @@
 !> The stages of a one-step method on a block of lanes, and the sums that are formed of them.
 module nocdyn_stages
-  use nocdyn_combinations, only: combination, combination_t, combine, padded_columns
-  use nocdyn_finite, only: all_finite, is_finite
+  use nocdyn_combinations, only: combination, combination_t, combine, padded_columns, set_offsets
+  use nocdyn_finite, only: is_finite
   use nocdyn_kinds, only: wp
   use nocdyn_system, only: system_t
   use nocdyn_trial, only: park, park_infinities, trial_not_finite, trial_t
@@ -54,6 +54,11 @@ contains
     if (allocated(self%k)) deallocate (self%k, self%zero)
     associate (lanes => system%lanes, columns => padded_columns(system%lanes, system%states + system%quadratures))
       allocate (self%k(lanes, columns, self%all), self%zero(lanes, columns), source=0.0_wp)
+      call set_offsets(self%inner, lanes * columns)
+      call set_offsets(self%update, lanes * columns)
+      call set_offsets(self%error, lanes * columns)
+      call set_offsets(self%coarse_error, lanes * columns)
+      call set_offsets(self%dense, lanes * columns)
     end associate
   end subroutine allocate_stages
 
@@ -63,9 +68,10 @@ contains
     type(trial_t), intent(inout) :: trial
     integer, intent(in) :: stage
     real(wp), intent(inout) :: y(trial%length)
+    logical :: all_finite
 
-    call combine(trial%length, self%all, self%inner(stage), self%k, trial%y, trial%h_spread, y)
-    if (.not. all_finite(trial%length, y)) call leave_infinities(self, trial, y)
+    call combine(trial%length, self%inner(stage), self%k, trial%y, trial%h_spread, y, all_finite)
+    if (.not. all_finite) call leave_infinities(self, trial, y)
   end subroutine inner_state
 
   !> Parks the lanes where y is not finite, at their start and with nothing in the stages that led there.
@@ -87,9 +93,10 @@ contains
   pure subroutine update_state(self, trial)
     type(stages_t), intent(in) :: self
     type(trial_t), intent(inout) :: trial
+    logical :: all_finite
 
-    call combine(trial%length, self%all, self%update, self%k, trial%y, trial%h_spread, trial%y_new)
-    if (.not. all_finite(trial%length, trial%y_new)) call park_infinities(trial, trial%y_new)
+    call combine(trial%length, self%update, self%k, trial%y, trial%h_spread, trial%y_new, all_finite)
+    if (.not. all_finite) call park_infinities(trial, trial%y_new)
   end subroutine update_state
 
   !> The deviations of y_new from the embedded solutions, once all stages of the step are known; a lane where one overflows
@@ -97,12 +104,13 @@ contains
   pure subroutine estimate_error(self, trial)
     type(stages_t), intent(in) :: self
     type(trial_t), intent(inout) :: trial
+    logical :: all_finite
 
-    call combine(trial%length, self%all, self%error, self%k, self%zero, trial%h_spread, trial%deviation)
-    if (.not. all_finite(trial%length, trial%deviation)) call park_infinities(trial, trial%deviation)
+    call combine(trial%length, self%error, self%k, self%zero, trial%h_spread, trial%deviation, all_finite)
+    if (.not. all_finite) call park_infinities(trial, trial%deviation)
     if (.not. trial%has_coarse_deviation) return
-    call combine(trial%length, self%all, self%coarse_error, self%k, self%zero, trial%h_spread, trial%coarse_deviation)
-    if (.not. all_finite(trial%length, trial%coarse_deviation)) call park_infinities(trial, trial%coarse_deviation)
+    call combine(trial%length, self%coarse_error, self%k, self%zero, trial%h_spread, trial%coarse_deviation, all_finite)
+    if (.not. all_finite) call park_infinities(trial, trial%coarse_deviation)
   end subroutine estimate_error
 
   !> The solution inside the last step: y + sum over p of coefficients(:, :, p) theta^p.
@@ -110,10 +118,11 @@ contains
     type(stages_t), intent(in) :: self
     type(trial_t), intent(in) :: trial
     real(wp), intent(inout) :: coefficients(trial%length, size(self%dense))   !! [lanes * padded columns, degree]
+    logical :: all_finite
     integer :: power
 
     do power = 1, size(self%dense)
-      call combine(trial%length, self%all, self%dense(power), self%k, self%zero, trial%h_spread, coefficients(:, power))
+      call combine(trial%length, self%dense(power), self%k, self%zero, trial%h_spread, coefficients(:, power), all_finite)
     end do
   end subroutine expand
 

@@ -12,7 +12,6 @@ module nocdyn_step_control
   real(wp), parameter :: integral_loss = 0.75_wp   !! what beta takes from the exponent of the present error
   real(wp), parameter :: safety = 0.9_wp
   real(wp), parameter :: least_change = 0.2_wp
-  real(wp), parameter :: most_change = 10.0_wp
   real(wp), parameter :: end_stretch = 1.01_wp     !! a step is stretched by up to 1 % to end on the final time
   real(wp), parameter :: least_old_error = 1.0e-4_wp
   real(wp), parameter :: coarse_share = 0.01_wp    !! of a coarse error estimate in the combination of Hairer's DOP853
@@ -144,16 +143,17 @@ contains
   end function is_within
 
   !> PI control after an accepted step of size h.
-  pure subroutine lengthen(control, lane, error_order, h)
+  pure subroutine lengthen(control, lane, error_order, most_growth, h)
     type(step_control_t), intent(inout) :: control
     integer, intent(in) :: lane
     integer, intent(in) :: error_order   !! the error falls as h^(error_order + 1)
+    real(wp), intent(in) :: most_growth
     real(wp), intent(in) :: h
     real(wp) :: log_error, change
 
     log_error = 0.5_wp * log(max(control%mean_square(lane), no_error))
     change = safety * exp(beta * control%log_error(lane) - present_exponent(error_order) * log_error)
-    change = max(least_change, min(change, most_change))
+    change = max(least_change, min(change, most_growth))
     if (control%was_rejected(lane)) change = min(change, 1.0_wp)
     control%log_error(lane) = max(log_error, log(least_old_error))
     control%was_rejected(lane) = .false.

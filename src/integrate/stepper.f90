@@ -9,6 +9,7 @@ module nocdyn_stepper
   type, abstract, public :: stepper_t
     integer :: order = 0         !! of y_new
     integer :: error_order = 0   !! the error estimate falls as h^(error_order + 1)
+    real(wp) :: most_growth = 6.0_wp   !! of the step size from one step to the next
     integer :: degree = 0        !! of the polynomials inside a step
     logical :: has_coarse_error = .false.   !! whether there are two error estimates
   contains

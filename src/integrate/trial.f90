@@ -34,6 +34,7 @@ module nocdyn_trial
     real(wp), allocatable :: scratch(:)            !! work space, shape [lanes]
     logical, allocatable :: implicit(:)            !! lanes that an implicit method moves
     integer, allocatable :: error_order(:)         !! of the method that moves the lane
+    real(wp), allocatable :: most_growth(:)        !! of its step size
     integer, allocatable :: verdict(:)             !! trial_... of each lane
     integer, allocatable :: culprit(:)             !! component that is not finite, 0 if there is none
     integer, allocatable :: status(:)              !! answers to the last evaluation; evaluation_fine between evaluations
@@ -58,7 +59,7 @@ contains
       trial%states = system%states
       trial%components = components
       trial%length = lanes * columns
-      allocate (trial%t(lanes), trial%h(lanes), trial%scratch(lanes), source=0.0_wp)
+      allocate (trial%t(lanes), trial%h(lanes), trial%scratch(lanes), trial%most_growth(lanes), source=0.0_wp)
       allocate (trial%h_spread(lanes, columns), trial%y(lanes, columns), trial%y_new(lanes, columns), &
                 trial%deviation(lanes, columns), trial%coarse_deviation(lanes, columns), trial%slope(lanes, columns), &
                 source=0.0_wp)

@@ -50,11 +50,17 @@ contains
     real(wp), intent(inout) :: working(n)
     integer :: i, l
 
-    do i = 0, n - lanes, lanes
-      do l = 1, lanes
-        working(i + l) = frequency(i + l) * time(l) + phase(i + l)
+    if (lanes == 1) then
+      do i = 1, n
+        working(i) = frequency(i) * time(1) + phase(i)
       end do
-    end do
+    else
+      do i = 0, n - lanes, lanes
+        do l = 1, lanes
+          working(i + l) = frequency(i + l) * time(l) + phase(i + l)
+        end do
+      end do
+    end if
     call sines(n, working)
     do i = 1, n
       working(i) = amplitude(i) * working(i)

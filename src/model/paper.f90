@@ -2,7 +2,7 @@
 module nocdyn_paper
   use nocdyn_bank, only: role_coupling, role_excitation, role_load, role_motor
   use nocdyn_body_formulation, only: body_formulation_t, jacobian_of_bodies, observe_bodies, start_of_bodies
-  use nocdyn_incidence, only: add_coefficients, add_moment
+  use nocdyn_incidence, only: add_coefficient, add_moment
   use nocdyn_kinds, only: wp
   use nocdyn_lapack, only: pseudo_inverse
   use nocdyn_lapack_lu, only: lu_factor, lu_solve
@@ -214,7 +214,7 @@ contains
     type(paper_t), intent(inout) :: self
     integer, intent(in) :: components
     real(wp), intent(inout) :: dfdy(self%lanes, components, self%states)
-    integer :: l, n
+    integer :: e, l, n
 
     n = self%machine%bodies
     associate (elements => self%machine%elements)
@@ -222,8 +222,10 @@ contains
         call tangent_matrix(self%machine, l, self%work%tangent)
         dfdy(l, 2 * n + 1:3 * n, :n) = self%work%tangent
         self%work%tangent(:, :) = 0.0_wp
-        call add_coefficients(elements%from, elements%to, -1.0_wp, &
-                              elements%restoring_curvature(l, :) * elements%speed(l, :), self%work%tangent)
+        do e = 1, size(elements%to)
+          call add_coefficient(elements%from(e), elements%to(e), -elements%restoring_curvature(l, e) * elements%speed(l, e), &
+                               self%work%tangent)
+        end do
         dfdy(l, 2 * n + 1:3 * n, n + 1:2 * n) = self%work%tangent
       end do
     end associate
