@@ -1,6 +1,6 @@
 !> Linear combinations of stages: the inner loops of every one-step method.
 module nocdyn_combinations
-  use nocdyn_finite, only: is_finite
+  use, intrinsic :: iso_fortran_env, only: int64
   use nocdyn_kinds, only: wp
   implicit none (type, external)
   private
@@ -8,6 +8,7 @@ module nocdyn_combinations
   public :: combination, set_offsets, combine, padded_columns
 
   integer, parameter :: most_terms = 12     !! of a row of any table
+  integer(int64), parameter :: exponent_mask = shiftl(2047_int64, 52)   ! all ones in a number that is not finite
   integer, parameter, public :: width = 4   !! all arrays here consist of whole vectors of this length
 
   !> The non-zero weights of a row of a method's table and the stages that they belong to.
@@ -15,7 +16,9 @@ module nocdyn_combinations
     integer :: terms = 0
     real(wp) :: weights(most_terms) = 0.0_wp
     integer :: stages(most_terms) = 0
-    integer :: offsets(most_terms) = 0   !! of these stages in an array of all stages
+    integer :: length = 0                !! of a stage
+    integer :: extent = 0                !! of all stages together
+    integer :: offsets(most_terms) = 0   !! of these stages among them
   end type combination_t
 
 contains
@@ -36,10 +39,13 @@ contains
   end function combination
 
   !> Finds the stages in an array [length, stages].
-  elemental subroutine set_offsets(combination, length)
+  elemental subroutine set_offsets(combination, length, stages)
     type(combination_t), intent(inout) :: combination
-    integer, intent(in) :: length   !! of a stage
+    integer, intent(in) :: length   !! of a stage, whole vectors
+    integer, intent(in) :: stages
 
+    combination%length = length
+    combination%extent = length * stages
     combination%offsets = length * (combination%stages - 1)
   end subroutine set_offsets
 
@@ -55,38 +61,38 @@ contains
 
   !> y = x + h * (sum of weights times stages), in one pass. Every number goes through the same operations in the same
   !> order wherever it stands in the arrays, so that a lane's result does not depend on its place in a block.
-  pure subroutine combine(n, combination, k, x, h, y, all_finite)
-    integer, intent(in) :: n                             !! length of the arrays, whole vectors
+  pure subroutine combine(combination, k, x, h, y, all_finite)
     type(combination_t), intent(in) :: combination       !! with offsets
-    real(wp), intent(in) :: k(*)                         !! the stages, [n, stages]
-    real(wp), intent(in) :: x(n), h(n)
-    real(wp), intent(inout) :: y(n)
+    real(wp), intent(in) :: k(combination%extent)        !! the stages, one after the other
+    real(wp), intent(in) :: x(combination%length), h(combination%length)
+    real(wp), intent(inout) :: y(combination%length)
     logical, intent(out) :: all_finite                   !! whether no element of y is infinite or NaN
     real(wp) :: total(width)   ! of the sizes, finite if they all are
     integer :: i
 
-    associate (terms => combination%terms, w => combination%weights, o => combination%offsets)
+    associate (n => combination%length, m => combination%extent, terms => combination%terms, w => combination%weights, &
+               o => combination%offsets)
       if (terms <= 4) then
-        call combine_few(n, terms, w, o, k, x, h, y)
+        call combine_few(n, m, terms, w, o, k, x, h, y)
       else if (terms <= 8) then
-        call combine_several(n, terms, w, o, k, x, h, y)
+        call combine_several(n, m, terms, w, o, k, x, h, y)
       else
-        call combine_many(n, terms, w, o, k, x, h, y)
+        call combine_many(n, m, terms, w, o, k, x, h, y)
       end if
     end associate
     total = 0.0_wp
-    do i = 1, n, width
+    do i = 1, combination%length, width
       total = total + abs(y(i:i + 3))
     end do
-    all_finite = is_finite((total(1) + total(2)) + (total(3) + total(4)))
+    all_finite = iand(transfer((total(1) + total(2)) + (total(3) + total(4)), exponent_mask), exponent_mask) /= exponent_mask
   end subroutine combine
 
   !> Sums of up to four terms.
-  pure subroutine combine_few(n, terms, w, o, k, x, h, y)
-    integer, intent(in) :: n, terms
+  pure subroutine combine_few(n, m, terms, w, o, k, x, h, y)
+    integer, intent(in) :: n, m, terms
     real(wp), intent(in) :: w(most_terms)
     integer, intent(in) :: o(most_terms)
-    real(wp), intent(in) :: k(*), x(n), h(n)
+    real(wp), intent(in) :: k(m), x(n), h(n)
     real(wp), intent(inout) :: y(n)
     integer :: i
 
@@ -111,15 +117,17 @@ contains
         y(i:i + 3) = x(i:i + 3) + h(i:i + 3) * (w(1) * k(i + o(1):i + 3 + o(1)) + w(2) * k(i + o(2):i + 3 + o(2)) &
                                    + w(3) * k(i + o(3):i + 3 + o(3)) + w(4) * k(i + o(4):i + 3 + o(4)))
       end do
+    case default
+      error stop 'nocdyn_combinations: a sum of so many terms belongs elsewhere'
     end select
   end subroutine combine_few
 
   !> Sums of five to eight terms.
-  pure subroutine combine_several(n, terms, w, o, k, x, h, y)
-    integer, intent(in) :: n, terms
+  pure subroutine combine_several(n, m, terms, w, o, k, x, h, y)
+    integer, intent(in) :: n, m, terms
     real(wp), intent(in) :: w(most_terms)
     integer, intent(in) :: o(most_terms)
-    real(wp), intent(in) :: k(*), x(n), h(n)
+    real(wp), intent(in) :: k(m), x(n), h(n)
     real(wp), intent(inout) :: y(n)
     integer :: i
 
@@ -150,15 +158,17 @@ contains
                                    + w(5) * k(i + o(5):i + 3 + o(5)) + w(6) * k(i + o(6):i + 3 + o(6)) &
                                    + w(7) * k(i + o(7):i + 3 + o(7)) + w(8) * k(i + o(8):i + 3 + o(8)))
       end do
+    case default
+      error stop 'nocdyn_combinations: a sum of so many terms belongs elsewhere'
     end select
   end subroutine combine_several
 
   !> Sums of nine to twelve terms.
-  pure subroutine combine_many(n, terms, w, o, k, x, h, y)
-    integer, intent(in) :: n, terms
+  pure subroutine combine_many(n, m, terms, w, o, k, x, h, y)
+    integer, intent(in) :: n, m, terms
     real(wp), intent(in) :: w(most_terms)
     integer, intent(in) :: o(most_terms)
-    real(wp), intent(in) :: k(*), x(n), h(n)
+    real(wp), intent(in) :: k(m), x(n), h(n)
     real(wp), intent(inout) :: y(n)
     integer :: i
 
@@ -197,6 +207,8 @@ contains
                                    + w(9) * k(i + o(9):i + 3 + o(9)) + w(10) * k(i + o(10):i + 3 + o(10)) &
                                    + w(11) * k(i + o(11):i + 3 + o(11)) + w(12) * k(i + o(12):i + 3 + o(12)))
       end do
+    case default
+      error stop 'nocdyn_combinations: a sum of so many terms belongs elsewhere'
     end select
   end subroutine combine_many
 

@@ -5,7 +5,7 @@ module nocdyn_plain_system
   implicit none (type, external)
   private
 
-  public :: plain_system
+  public :: plain_system, plain_derivative_interface, plain_jacobian_interface
 
   abstract interface
 
@@ -41,17 +41,15 @@ module nocdyn_plain_system
 
 contains
 
-  !> The system y' = f(t, y) of `states` equations; `f_jacobian` may be null.
-  function plain_system(states, f, f_jacobian) result(system)
+  !> The system y' = f(t, y) of `states` equations; its `f_jacobian` may be set afterwards.
+  function plain_system(states, f) result(system)
     integer, intent(in) :: states
     procedure(plain_derivative_interface) :: f
-    procedure(plain_jacobian_interface), pointer, intent(in) :: f_jacobian
     type(plain_system_t) :: system
 
     system%lanes = 1
     system%states = states
     system%f => f
-    system%f_jacobian => f_jacobian
     allocate (system%dydt(states), system%shifted_dydt(states), system%shifted_y(states), system%dfdy(states, states), &
               source=0.0_wp)
   end function plain_system

@@ -66,7 +66,7 @@ contains
     class(system_t), intent(in) :: system
 
     call allocate_stages(self%stages, system)
-    call set_offsets(self%coupling, size(self%stages%zero))
+    call set_offsets(self%coupling, size(self%stages%zero), self%stages%all)
     call allocate_stage_system(self%stage_system, system)
     call allocate_spectra(self%spectra, system)
     if (allocated(self%slope)) deallocate (self%t_stage, self%y_stage, self%f, self%r, self%one, self%slope, &
@@ -143,7 +143,7 @@ contains
     real(wp), intent(in) :: f(trial%length)
     logical :: all_finite
 
-    call combine(trial%length, self%coupling(stage), self%stages%k, f, self%one, self%r, all_finite)
+    call combine(self%coupling(stage), self%stages%k, f, self%one, self%r, all_finite)
     if (abs(self%gamma_sum(stage)) > 0) then
       call add_time_derivative(trial%lanes * trial%components, self%gamma_sum(stage), trial%h_spread, &
                                self%stage_system%dfdt, self%r)

@@ -54,11 +54,11 @@ contains
     if (allocated(self%k)) deallocate (self%k, self%zero)
     associate (lanes => system%lanes, columns => padded_columns(system%lanes, system%states + system%quadratures))
       allocate (self%k(lanes, columns, self%all), self%zero(lanes, columns), source=0.0_wp)
-      call set_offsets(self%inner, lanes * columns)
-      call set_offsets(self%update, lanes * columns)
-      call set_offsets(self%error, lanes * columns)
-      call set_offsets(self%coarse_error, lanes * columns)
-      call set_offsets(self%dense, lanes * columns)
+      call set_offsets(self%inner, lanes * columns, self%all)
+      call set_offsets(self%update, lanes * columns, self%all)
+      call set_offsets(self%error, lanes * columns, self%all)
+      call set_offsets(self%coarse_error, lanes * columns, self%all)
+      call set_offsets(self%dense, lanes * columns, self%all)
     end associate
   end subroutine allocate_stages
 
@@ -70,7 +70,7 @@ contains
     real(wp), intent(inout) :: y(trial%length)
     logical :: all_finite
 
-    call combine(trial%length, self%inner(stage), self%k, trial%y, trial%h_spread, y, all_finite)
+    call combine(self%inner(stage), self%k, trial%y, trial%h_spread, y, all_finite)
     if (.not. all_finite) call leave_infinities(self, trial, y)
   end subroutine inner_state
 
@@ -95,7 +95,7 @@ contains
     type(trial_t), intent(inout) :: trial
     logical :: all_finite
 
-    call combine(trial%length, self%update, self%k, trial%y, trial%h_spread, trial%y_new, all_finite)
+    call combine(self%update, self%k, trial%y, trial%h_spread, trial%y_new, all_finite)
     if (.not. all_finite) call park_infinities(trial, trial%y_new)
   end subroutine update_state
 
@@ -106,10 +106,10 @@ contains
     type(trial_t), intent(inout) :: trial
     logical :: all_finite
 
-    call combine(trial%length, self%error, self%k, self%zero, trial%h_spread, trial%deviation, all_finite)
+    call combine(self%error, self%k, self%zero, trial%h_spread, trial%deviation, all_finite)
     if (.not. all_finite) call park_infinities(trial, trial%deviation)
     if (.not. trial%has_coarse_deviation) return
-    call combine(trial%length, self%coarse_error, self%k, self%zero, trial%h_spread, trial%coarse_deviation, all_finite)
+    call combine(self%coarse_error, self%k, self%zero, trial%h_spread, trial%coarse_deviation, all_finite)
     if (.not. all_finite) call park_infinities(trial, trial%coarse_deviation)
   end subroutine estimate_error
 
@@ -122,7 +122,7 @@ contains
     integer :: power
 
     do power = 1, size(self%dense)
-      call combine(trial%length, self%dense(power), self%k, self%zero, trial%h_spread, coefficients(:, power), all_finite)
+      call combine(self%dense(power), self%k, self%zero, trial%h_spread, coefficients(:, power), all_finite)
     end do
   end subroutine expand
 

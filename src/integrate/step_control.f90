@@ -58,12 +58,12 @@ contains
     control%was_rejected(lane) = .false.
   end subroutine restart
 
-  !> No step can be shorter: ten spacings of the numbers at t.
+  !> No step can be shorter: ten times what rounding makes of t.
   elemental function smallest_step(t)
     real(wp), intent(in) :: t
     real(wp) :: smallest_step
 
-    smallest_step = 10 * spacing(t)
+    smallest_step = 10 * max(epsilon(t) * abs(t), tiny(t))
   end function smallest_step
 
   !> Sets the size of the next attempt of a lane, so that no sliver is left before the final time.

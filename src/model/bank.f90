@@ -1,12 +1,14 @@
 !> Elements of one kind, evaluated together on a block of lanes.
 !>
 !> The values of all elements of a machine are numbered through (`elements_t`); a bank works on its own contiguous
-!> part of them, from its element `first` on, by loops over all lanes and elements at once.
-!> A new kind of element extends `bank_t` by its law and the derivatives of that law.
+!> part of them, from its element `first` on. What of its law is a polynomial it hands over as coefficients, so that the
+!> elements of all banks are evaluated in one loop (`polynomial_laws_t`); what is not, it adds by procedures of its own.
+!> A new kind of element extends `bank_t` by either or both.
 module nocdyn_bank
   use nocdyn_elements, only: elements_t
   use nocdyn_text, only: string_t
   use nocdyn_kinds, only: wp
+  use nocdyn_polynomial_laws, only: polynomial_laws_t
   implicit none (type, external)
   private
 
@@ -34,9 +36,11 @@ module nocdyn_bank
     integer :: first = 1                     !! number of its first element in the machine
     integer :: values = 0                    !! lanes * elements
     integer :: first_value = 1               !! the place of lane 1 of `first` in the values of the machine
+    logical :: is_polynomial = .true.        !! whether `polynomials` says all of its law
   contains
-    procedure(evaluate_interface), deferred :: evaluate
-    procedure(differentiate_interface), deferred :: differentiate
+    procedure :: polynomials
+    procedure :: evaluate
+    procedure :: differentiate
     procedure :: assess
     procedure :: connect
     procedure :: last
@@ -49,27 +53,6 @@ module nocdyn_bank
   type, public :: bank_slot_t
     class(bank_t), allocatable :: bank
   end type bank_slot_t
-
-  abstract interface
-
-    !> The moments of the bank's elements. All arrays but `time` are flat: the lanes of its first element, then those of
-    !> its second, and so on. What is always zero need not be written.
-    subroutine evaluate_interface(self, time, angle, speed, restoring, working)
-      import :: bank_t, wp
-      class(bank_t), intent(in) :: self
-      real(wp), intent(in) :: time(self%lanes)                                  !! t [s]
-      real(wp), intent(in) :: angle(self%values), speed(self%values)            !! u [rad], u' [rad/s]
-      real(wp), intent(inout) :: restoring(self%values), working(self%values)   !! [N m]
-    end subroutine evaluate_interface
-
-    !> Fills the derivatives of `restoring` and `working` of the bank's elements. What is always zero need not be written.
-    subroutine differentiate_interface(self, elements)
-      import :: bank_t, elements_t
-      class(bank_t), intent(in) :: self
-      type(elements_t), intent(inout) :: elements   !! of the machine
-    end subroutine differentiate_interface
-
-  end interface
 
 contains
 
@@ -105,14 +88,31 @@ contains
     is_source = self%role == role_motor .or. self%role == role_excitation
   end function is_source
 
-  !> Fills `stored`, `secant` and `damping` of its elements from their angles: by default all are zero.
+  !> Puts the coefficients of its elements into those of the machine, which are zero before: by default there are none.
+  subroutine polynomials(self, laws)
+    class(bank_t), intent(in) :: self
+    type(polynomial_laws_t), intent(inout) :: laws   !! of the machine
+  end subroutine polynomials
+
+  !> Adds what is not polynomial to the moments of the bank's elements. All arrays but `time` are flat: the lanes of its
+  !> first element, then those of its second, and so on.
+  subroutine evaluate(self, time, angle, speed, restoring, working)
+    class(bank_t), intent(in) :: self
+    real(wp), intent(in) :: time(self%lanes)                                  !! t [s]
+    real(wp), intent(in) :: angle(self%values), speed(self%values)            !! u [rad], u' [rad/s]
+    real(wp), intent(inout) :: restoring(self%values), working(self%values)   !! [N m]
+  end subroutine evaluate
+
+  !> Adds the derivatives of what `evaluate` adds.
+  subroutine differentiate(self, elements)
+    class(bank_t), intent(in) :: self
+    type(elements_t), intent(inout) :: elements   !! of the machine
+  end subroutine differentiate
+
+  !> Adds the potential energies, secant stiffnesses and dampings of what `evaluate` adds.
   subroutine assess(self, elements)
     class(bank_t), intent(in) :: self
     type(elements_t), intent(inout) :: elements   !! of the machine
-
-    elements%stored(:, self%first:self%last()) = 0.0_wp
-    elements%secant(:, self%first:self%last()) = 0.0_wp
-    elements%damping(:, self%first:self%last()) = 0.0_wp
   end subroutine assess
 
   !> The columns of the bank in the table of results: by default the torque of each element.

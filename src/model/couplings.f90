@@ -3,6 +3,7 @@ module nocdyn_couplings
   use nocdyn_bank, only: bank_t, quantity_t, role_coupling
   use nocdyn_elements, only: elements_t
   use nocdyn_kinds, only: wp
+  use nocdyn_polynomial_laws, only: polynomial_laws_t
   use nocdyn_text, only: string_t
   implicit none (type, external)
   private
@@ -16,9 +17,7 @@ module nocdyn_couplings
     real(wp), allocatable :: damping(:, :)           !! d [N m s/rad]
     real(wp), allocatable :: rest_twist(:, :)        !! [rad]
   contains
-    procedure :: evaluate
-    procedure :: differentiate
-    procedure :: assess
+    procedure :: polynomials
     procedure :: quantities
     procedure :: observe
   end type couplings_t
@@ -46,65 +45,18 @@ contains
     bank%accounted = pack([(e, e=1, size(to))], any(abs(damping) > 0.0_wp, dim=1))
   end function new_couplings
 
-  subroutine evaluate(self, time, angle, speed, restoring, working)
+  subroutine polynomials(self, laws)
     class(couplings_t), intent(in) :: self
-    real(wp), intent(in) :: time(self%lanes), angle(self%values), speed(self%values)
-    real(wp), intent(inout) :: restoring(self%values), working(self%values)
+    type(polynomial_laws_t), intent(inout) :: laws
 
-    call spring_moments(self%values, self%stiffness, self%cubic_stiffness, self%damping, self%rest_twist, angle, speed, &
-                        restoring, working)
-  end subroutine evaluate
-
-  !> Eqs. (3), (49), (50), in the restoring sense.
-  pure subroutine spring_moments(n, stiffness, cubic_stiffness, damping, rest_twist, angle, speed, restoring, working)
-    integer, intent(in) :: n
-    real(wp), intent(in) :: stiffness(n), cubic_stiffness(n), damping(n), rest_twist(n), angle(n), speed(n)
-    real(wp), intent(inout) :: restoring(n), working(n)
-    real(wp) :: w
-    integer :: i
-
-    do i = 1, n
-      w = angle(i) - rest_twist(i)
-      restoring(i) = -(stiffness(i) + cubic_stiffness(i) * w * w) * w
-      working(i) = -damping(i) * speed(i)
-    end do
-  end subroutine spring_moments
-
-  !> The tangent stiffness K1 + 3 k1 w^2 of eqs. (64)-(68), negative.
-  subroutine differentiate(self, elements)
-    class(couplings_t), intent(in) :: self
-    type(elements_t), intent(inout) :: elements
-    real(wp) :: w
-    integer :: e, i, l
-
-    do e = 1, size(self%to)
-      i = self%first + e - 1
-      do l = 1, self%lanes
-        w = elements%angle(l, i) - self%rest_twist(l, e)
-        elements%restoring_angle(l, i) = -(self%stiffness(l, e) + 3.0_wp * self%cubic_stiffness(l, e) * w * w)
-        elements%restoring_curvature(l, i) = -6.0_wp * self%cubic_stiffness(l, e) * w
-        elements%working_speed(l, i) = -self%damping(l, e)
-      end do
-    end do
-  end subroutine differentiate
-
-  !> Stored energy K1 w^2 / 2 + k1 w^4 / 4 and the secant stiffness K12 of eq. (3).
-  subroutine assess(self, elements)
-    class(couplings_t), intent(in) :: self
-    type(elements_t), intent(inout) :: elements
-    real(wp) :: w2
-    integer :: e, i, l
-
-    do e = 1, size(self%to)
-      i = self%first + e - 1
-      do l = 1, self%lanes
-        w2 = (elements%angle(l, i) - self%rest_twist(l, e))**2
-        elements%secant(l, i) = self%stiffness(l, e) + self%cubic_stiffness(l, e) * w2
-        elements%stored(l, i) = (0.5_wp * self%stiffness(l, e) + 0.25_wp * self%cubic_stiffness(l, e) * w2) * w2
-        elements%damping(l, i) = self%damping(l, e)
-      end do
-    end do
-  end subroutine assess
+    associate (first => self%first, last => self%last())
+      laws%rest(:, first:last) = self%rest_twist
+      laws%linear(:, first:last) = self%stiffness
+      laws%cubic(:, first:last) = self%cubic_stiffness
+      laws%by_speed(:, first:last) = -self%damping
+      laws%damping(:, first:last) = self%damping
+    end associate
+  end subroutine polynomials
 
   function quantities(self) result(columns)
     class(couplings_t), intent(in) :: self

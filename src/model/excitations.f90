@@ -19,6 +19,8 @@ module nocdyn_excitations
     procedure :: differentiate
   end type excitations_t
 
+  integer, parameter :: strip = 64   ! arguments whose sines are taken at a time
+
 contains
 
   !> A bank of excitations, each on one body.
@@ -29,6 +31,7 @@ contains
     type(excitations_t) :: bank
     integer :: e
 
+    bank%is_polynomial = .false.
     call bank%connect(role_excitation, size(amplitude, 1), names, [(0, e=1, size(body))], body)
     bank%amplitude = amplitude
     bank%frequency = frequency
@@ -48,38 +51,44 @@ contains
     integer, intent(in) :: lanes, n
     real(wp), intent(in) :: amplitude(n), frequency(n), phase(n), time(lanes)
     real(wp), intent(inout) :: working(n)
-    integer :: i, l
+    real(wp) :: wave(strip)
+    integer :: before, i, length, next
 
-    if (lanes == 1) then
-      do i = 1, n
-        working(i) = frequency(i) * time(1) + phase(i)
-      end do
-    else
-      do i = 0, n - lanes, lanes
-        do l = 1, lanes
-          working(i + l) = frequency(i + l) * time(l) + phase(i + l)
+    before = 0
+    do while (before < n)
+      next = modulo(before, lanes)   ! lane, counted from 0
+      length = min(strip, merge(n - before, lanes - next, lanes == 1))
+      if (lanes == 1) then
+        do i = 1, length
+          wave(i) = frequency(before + i) * time(1) + phase(before + i)
         end do
+      else
+        do i = 1, length
+          wave(i) = frequency(before + i) * time(next + i) + phase(before + i)
+        end do
+      end if
+      call sines(length, wave)
+      do i = 1, length
+        working(before + i) = working(before + i) + amplitude(before + i) * wave(i)
       end do
-    end if
-    call sines(n, working)
-    do i = 1, n
-      working(i) = amplitude(i) * working(i)
+      before = before + length
     end do
   end subroutine harmonic_torques
 
   subroutine differentiate(self, elements)
     class(excitations_t), intent(in) :: self
     type(elements_t), intent(inout) :: elements
+    real(wp) :: wave(1)
     integer :: e, l
 
     associate (slope => elements%working_time(:, self%first:self%last()))
       do e = 1, size(self%to)
         do l = 1, self%lanes
-          slope(l, e) = self%frequency(l, e) * elements%time(l) + self%phase(l, e)
+          wave(1) = self%frequency(l, e) * elements%time(l) + self%phase(l, e)
+          call cosines(1, wave)
+          slope(l, e) = slope(l, e) + self%amplitude(l, e) * self%frequency(l, e) * wave(1)
         end do
       end do
-      call cosines(size(slope), slope)
-      slope = self%amplitude * self%frequency * slope
     end associate
   end subroutine differentiate
 

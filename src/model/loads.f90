@@ -1,8 +1,8 @@
 !> Loads: the viscous resistance of eq. (5), M_r = -c omega.
 module nocdyn_loads
   use nocdyn_bank, only: bank_t, role_load
-  use nocdyn_elements, only: elements_t
   use nocdyn_kinds, only: wp
+  use nocdyn_polynomial_laws, only: polynomial_laws_t
   use nocdyn_text, only: string_t
   implicit none (type, external)
   private
@@ -12,9 +12,7 @@ module nocdyn_loads
   type, extends(bank_t), public :: loads_t
     real(wp), allocatable :: viscous(:, :)   !! c [N m s/rad], shape [lanes, loads]
   contains
-    procedure :: evaluate
-    procedure :: differentiate
-    procedure :: assess
+    procedure :: polynomials
   end type loads_t
 
 contains
@@ -31,39 +29,13 @@ contains
     bank%viscous = viscous
   end function new_loads
 
-  subroutine evaluate(self, time, angle, speed, restoring, working)
-    class(loads_t), intent(in) :: self
-    real(wp), intent(in) :: time(self%lanes), angle(self%values), speed(self%values)
-    real(wp), intent(inout) :: restoring(self%values), working(self%values)
-
-    call viscous_torques(self%values, self%viscous, speed, working)
-  end subroutine evaluate
-
-  !> Eq. (5).
-  pure subroutine viscous_torques(n, viscous, speed, working)
-    integer, intent(in) :: n
-    real(wp), intent(in) :: viscous(n), speed(n)
-    real(wp), intent(inout) :: working(n)
-    integer :: i
-
-    do i = 1, n
-      working(i) = -viscous(i) * speed(i)
-    end do
-  end subroutine viscous_torques
-
-  subroutine differentiate(self, elements)
-    class(loads_t), intent(in) :: self
-    type(elements_t), intent(inout) :: elements
-
-    elements%working_speed(:, self%first:self%last()) = -self%viscous
-  end subroutine differentiate
-
   !> The coefficients c are those of C, eq. (22).
-  subroutine assess(self, elements)
+  subroutine polynomials(self, laws)
     class(loads_t), intent(in) :: self
-    type(elements_t), intent(inout) :: elements
+    type(polynomial_laws_t), intent(inout) :: laws
 
-    elements%damping(:, self%first:self%last()) = self%viscous
-  end subroutine assess
+    laws%by_speed(:, self%first:self%last()) = -self%viscous
+    laws%damping(:, self%first:self%last()) = self%viscous
+  end subroutine polynomials
 
 end module nocdyn_loads

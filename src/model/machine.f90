@@ -1,11 +1,12 @@
 !> A machine: bodies, banks of elements, constraints and the coordinates that they leave, on a block of lanes.
 module nocdyn_machine
-  use nocdyn_bank, only: bank_slot_t
+  use nocdyn_bank, only: bank_slot_t, bank_t
   use nocdyn_constraints, only: constraints_t
   use nocdyn_coordinates, only: coordinates_t
   use nocdyn_elements, only: elements_t, new_elements
   use nocdyn_geared_groups, only: geared_group_t
   use nocdyn_kinds, only: wp
+  use nocdyn_polynomial_laws, only: new_polynomial_laws, polynomial_laws_t
   use nocdyn_text, only: string_t
   implicit none (type, external)
   private
@@ -19,6 +20,8 @@ module nocdyn_machine
     real(wp), allocatable :: start_speed(:, :)      !! [rad/s], obeys the constraints
     type(bank_slot_t), allocatable :: banks(:)
     type(elements_t) :: elements                    !! of all banks, after `number_elements`
+    type(polynomial_laws_t) :: laws                 !! what of their laws is polynomial, after `number_elements`
+    integer, allocatable :: other_banks(:)          !! those whose laws are more than that
     integer, allocatable :: accounted(:)            !! elements whose power may be integrated, [accounts]
     type(constraints_t) :: constraints
     type(geared_group_t), allocatable :: groups(:)
@@ -52,6 +55,12 @@ contains
     end do
     self%elements = new_elements(self%lanes, [(self%banks(i)%bank%from, i=1, size(self%banks))], &
                                  [(self%banks(i)%bank%to, i=1, size(self%banks))])
+    self%laws = new_polynomial_laws(self%lanes, total)
+    do i = 1, size(self%banks)
+      call self%banks(i)%bank%polynomials(self%laws)
+    end do
+    self%other_banks = pack([(i, i=1, size(self%banks))], [(self%banks(i)%bank%values > 0 .and. &
+                                                            .not. self%banks(i)%bank%is_polynomial, i=1, size(self%banks))])
     self%accounted = [(self%banks(i)%bank%first - 1 + self%banks(i)%bank%accounted, i=1, size(self%banks))]
   end subroutine number_elements
 
@@ -97,28 +106,27 @@ contains
     class(machine_t), intent(inout) :: self
     real(wp), intent(in) :: t(self%lanes)
 
-    associate (elements => self%elements)
-      call evaluate_banks(self%banks, self%lanes, size(elements%angle), t, elements%angle, elements%speed, &
-                          elements%restoring, elements%working)
-    end associate
-  end subroutine evaluate_elements
-
-  !> Hands every bank its part of the values, by address alone.
-  subroutine evaluate_banks(banks, lanes, n, t, angle, speed, restoring, working)
-    type(bank_slot_t), intent(in) :: banks(:)
-    integer, intent(in) :: lanes, n   ! lanes * elements
-    real(wp), intent(in) :: t(lanes), angle(n), speed(n)
-    real(wp), intent(inout) :: restoring(n), working(n)
     integer :: i
 
-    do i = 1, size(banks)
-      associate (bank => banks(i)%bank)
-        if (bank%values == 0) cycle
-        call bank%evaluate(t, angle(bank%first_value), speed(bank%first_value), restoring(bank%first_value), &
-                           working(bank%first_value))
+    call self%laws%evaluate(self%elements)
+    do i = 1, size(self%other_banks)
+      associate (bank => self%banks(self%other_banks(i))%bank, elements => self%elements)
+        call evaluate_bank(bank, size(elements%angle), t, elements%angle, elements%speed, elements%restoring, elements%working)
       end associate
     end do
-  end subroutine evaluate_banks
+  end subroutine evaluate_elements
+
+  !> Hands a bank its part of the values, by address alone.
+  subroutine evaluate_bank(bank, n, t, angle, speed, restoring, working)
+    class(bank_t), intent(in) :: bank
+    integer, intent(in) :: n   ! lanes * elements
+    real(wp), intent(in) :: t(bank%lanes), angle(n), speed(n)
+    real(wp), intent(inout) :: restoring(n), working(n)
+
+    associate (first => bank%first_value)
+      call bank%evaluate(t, angle(first), speed(first), restoring(first), working(first))
+    end associate
+  end subroutine evaluate_bank
 
   !> The moments of all elements and their derivatives.
   subroutine differentiate(self, t, phi, omega)
@@ -138,8 +146,9 @@ contains
     integer :: i
 
     self%elements%time(:) = t
-    do i = 1, size(self%banks)
-      if (self%banks(i)%bank%values > 0) call self%banks(i)%bank%differentiate(self%elements)
+    call self%laws%differentiate(self%elements)
+    do i = 1, size(self%other_banks)
+      call self%banks(self%other_banks(i))%bank%differentiate(self%elements)
     end do
   end subroutine differentiate_elements
 
@@ -148,8 +157,9 @@ contains
     class(machine_t), intent(inout) :: self
     integer :: i
 
-    do i = 1, size(self%banks)
-      if (self%banks(i)%bank%values > 0) call self%banks(i)%bank%assess(self%elements)
+    call self%laws%assess(self%elements)
+    do i = 1, size(self%other_banks)
+      call self%banks(self%other_banks(i))%bank%assess(self%elements)
     end do
   end subroutine assess
 

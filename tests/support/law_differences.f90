@@ -6,6 +6,7 @@ module nocdyn_test_law_differences
   use nocdyn_bank, only: bank_t
   use nocdyn_elements, only: elements_t, new_elements
   use nocdyn_kinds, only: wp
+  use nocdyn_polynomial_laws, only: new_polynomial_laws, polynomial_laws_t
   implicit none (type, external)
   private
 
@@ -38,7 +39,13 @@ contains
   subroutine evaluate_all(bank, elements)
     class(bank_t), intent(in) :: bank
     type(elements_t), intent(inout) :: elements
+    type(polynomial_laws_t) :: laws
 
+    laws = new_polynomial_laws(bank%lanes, size(bank%to))
+    call bank%polynomials(laws)
+    call laws%evaluate(elements)
+    call laws%differentiate(elements)
+    call laws%assess(elements)
     call bank%evaluate(elements%time, elements%angle, elements%speed, elements%restoring, elements%working)
     call bank%differentiate(elements)
     call bank%assess(elements)
