@@ -12,7 +12,7 @@ module nocdyn_vector_functions
   implicit none (type, external)
   private
 
-  public :: sines, cosines
+  public :: sine_of, sines, cosines
 
   real(wp), parameter :: pi_high = 3.1415926535846666_wp         ! 35 bits
   real(wp), parameter :: pi_middle = 5.1266883031679116e-12_wp   ! the next 35 bits
@@ -22,6 +22,17 @@ module nocdyn_vector_functions
   real(wp), parameter :: largest = 4.0e5_wp   ! keeps k below 2^17; larger arguments go, one by one, to the intrinsic functions
 
 contains
+
+  !> sin(x), with the bits that `sines` gives.
+  pure real(wp) function sine_of(x)
+    real(wp), intent(in) :: x
+
+    if (abs(x) <= largest) then
+      sine_of = sine(x)
+    else
+      sine_of = sin(x)
+    end if
+  end function sine_of
 
   !> Replaces each x by sin(x).
   pure subroutine sines(n, x)

@@ -4,7 +4,7 @@ module nocdyn_excitations
   use nocdyn_elements, only: elements_t
   use nocdyn_kinds, only: wp
   use nocdyn_text, only: string_t
-  use nocdyn_vector_functions, only: cosines, sines
+  use nocdyn_vector_functions, only: cosines, sine_of, sines
   implicit none (type, external)
   private
 
@@ -54,6 +54,10 @@ contains
     real(wp) :: wave(strip)
     integer :: before, i, length, next
 
+    if (n == 1) then
+      working(1) = working(1) + amplitude(1) * sine_of(frequency(1) * time(1) + phase(1))
+      return
+    end if
     before = 0
     do while (before < n)
       next = modulo(before, lanes)   ! lane, counted from 0
