@@ -1,7 +1,6 @@
 !> From the input to the model: bodies, banks, constraints and coordinates.
 module nocdyn_assembly
   use nocdyn_bank, only: bank_slot_t
-  use nocdyn_banded_matrix, only: half_bandwidths
   use nocdyn_complement, only: complement_natural, complement_negated, complement_scaled
   use nocdyn_constraint_analysis, only: analyse_constraints
   use nocdyn_constraints, only: constraints_t, new_constraints
@@ -16,9 +15,7 @@ module nocdyn_assembly
   use nocdyn_machine, only: machine_t
   use nocdyn_motors, only: new_motors
   use nocdyn_multiplier, only: new_multiplier
-  use nocdyn_ordering, only: reverse_cuthill_mckee
   use nocdyn_paper, only: new_paper
-  use nocdyn_pattern_entries, only: entries_t, state_entries
   use nocdyn_reduced, only: new_reduced
   use nocdyn_schema, only: ground
   use nocdyn_text, only: quoted, rounded_text, string_t, to_text
@@ -26,9 +23,7 @@ module nocdyn_assembly
   implicit none (type, external)
   private
 
-  public :: assemble_machine, check_size, check_jacobian, new_formulation
-
-  integer, parameter :: largest_matrix = 6000   ! rows: 0.3 GB each, and there are several
+  public :: assemble_machine, new_formulation
 
   !> Start speeds break a gear when the sum of the row exceeds this times the sum of its absolute terms.
   real(wp), parameter :: speed_tolerance = 1.0e-9_wp
@@ -76,51 +71,6 @@ contains
     machine%coordinates = new_coordinates(machine%constraints, machine%groups, machine%inertia, wanted, &
                                           complement_choice(run%text('complement')))
   end subroutine assemble_machine
-
-  !> Refuses machines for whose dense matrices two formulations have no memory.
-  subroutine check_size(input, machine, error)
-    type(input_t), intent(in) :: input
-    type(machine_t), intent(in) :: machine
-    type(error_t), allocatable, intent(out) :: error
-    type(group_t) :: run
-    integer :: order
-
-    run = input%single('run')
-    select case (run%text('formulation'))
-    case ('paper')
-      order = 3 * machine%bodies
-    case ('multiplier')
-      order = 2 * machine%bodies
-    case default
-      order = 0
-    end select
-    if (order <= largest_matrix) return
-    call raise(error, exit_input, input%file // ': this machine needs dense matrices of ' // to_text(order) // &
-               ' rows, at most ' // to_text(largest_matrix) // ' are allowed; formulation = ' // &
-               quoted('reduced') // ' needs none')
-  end subroutine check_size
-
-  !> Refuses machines whose Jacobian is neither small nor of a narrow band where the method stores its factors.
-  subroutine check_jacobian(input, formulation, error)
-    type(input_t), intent(in) :: input
-    class(formulation_t), intent(in) :: formulation
-    type(error_t), allocatable, intent(out) :: error
-    type(group_t) :: run
-    type(entries_t) :: entries
-    integer :: lower, upper
-    real(wp) :: rows
-
-    run = input%single('run')
-    if (any(run%text('method') == ['rk45 ', 'rk853']) .or. formulation%states <= largest_matrix) return
-    entries = state_entries(formulation%jacobian_pattern(), formulation%states)
-    call half_bandwidths(reverse_cuthill_mckee(formulation%states, entries%row, entries%column), entries, lower, upper)
-    rows = min(2.0_wp * lower + upper + 1.0_wp, real(formulation%states, wp))
-    if (rows * formulation%states <= real(largest_matrix, wp)**2) return
-    call raise(error, exit_input, input%file // ': this machine needs a Jacobian of ' // to_text(formulation%states) // &
-               ' columns and a band of ' // to_text(nint(rows)) // ' rows, at most as many entries as ' // &
-               to_text(largest_matrix) // ' x ' // to_text(largest_matrix) // ' are allowed; method = ' // &
-               quoted('rk45') // ' needs none')
-  end subroutine check_jacobian
 
   !> The system that an integrator solves, by the word of the input.
   subroutine new_formulation(word, machine, formulation, audited)

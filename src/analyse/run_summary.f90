@@ -5,20 +5,27 @@ module nocdyn_run_summary
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
   use nocdyn_machine_report, only: coordinate_names
-  use nocdyn_outcome, only: outcome_t
+  use nocdyn_outcome, only: most_switches, outcome_t
+  use nocdyn_system, only: ranges_t
   use nocdyn_text, only: rounded_text, string_t
   use nocdyn_version, only: compiler_text, version
   implicit none (type, external)
   private
 
-  public :: start_extremes, update_extremes, audit_note, summary_json
+  public :: start_extremes, update_extremes, widen_extremes, audit_note, summary_json
 
   !> A note is made of an energy residual above this share of the energy turned over: the motion is then not to be trusted.
   real(wp), parameter :: audit_limit = 0.01_wp
 
-  !> Smallest and largest values of the columns of the table among its rows, with their times.
+  !> An extreme beyond that of the rows by this share of the largest value or less is rounding: a machine at rest at the
+  !> start has its smallest energy there.
+  real(wp), parameter :: rounding_limit = 16 * epsilon(1.0_wp)
+
+  !> Smallest and largest values of the columns of the table, with their times: of the rows, after `widen_extremes` of the
+  !> motion between them too.
   type, public :: extremes_t
     integer :: rows = 0
+    logical :: are_continuous = .false.   !! whether the motion between the rows is accounted for
     real(wp), allocatable :: lowest(:), lowest_time(:), highest(:), highest_time(:), last(:)   !! [columns]
   end type extremes_t
 
@@ -28,6 +35,7 @@ module nocdyn_run_summary
     type(string_t), allocatable :: notes(:)         !! what is worth knowing of the machine
     type(string_t), allocatable :: labels(:)        !! of the columns
     type(extremes_t) :: extremes
+    character(len=:), allocatable :: method         !! that integrated
     type(outcome_t) :: outcome
     real(wp) :: wall_time = 0.0_wp                  !! of integration and writing of the trajectory [s]
   end type run_summary_t
@@ -63,6 +71,27 @@ contains
     extremes%last(:) = row
     extremes%rows = extremes%rows + 1
   end subroutine update_extremes
+
+  !> Takes in the extremes of the motion where they lie beyond those of the rows by more than rounding.
+  pure subroutine widen_extremes(extremes, ranges)
+    type(extremes_t), intent(inout) :: extremes
+    type(ranges_t), intent(in) :: ranges   !! of the columns
+    real(wp) :: rounding
+    integer :: i
+
+    do i = 1, size(extremes%last)
+      rounding = rounding_limit * max(abs(ranges%lowest(i)), abs(ranges%highest(i)))
+      if (ranges%lowest(i) < extremes%lowest(i) - rounding) then
+        extremes%lowest(i) = ranges%lowest(i)
+        extremes%lowest_time(i) = ranges%lowest_time(i)
+      end if
+      if (ranges%highest(i) > extremes%highest(i) + rounding) then
+        extremes%highest(i) = ranges%highest(i)
+        extremes%highest_time(i) = ranges%highest_time(i)
+      end if
+    end do
+    extremes%are_continuous = .true.
+  end subroutine widen_extremes
 
   !> A sentence if the energy audit does not close, else nothing. The last five columns are the energies, the residual last.
   function audit_note(extremes) result(note)
@@ -101,6 +130,7 @@ contains
     call put_machine(json, machine, summary)
     call put_settings(json, input%single('run'))
     call put_counts(json, summary)
+    call put_method(json, summary)
     call put_columns(json, summary)
     call json%close()
     text = json%text()
@@ -154,12 +184,39 @@ contains
     call json%put('wall_time_s', summary%wall_time)
   end subroutine put_counts
 
+  !> The method that integrated, its steps of either kind, and the first of its switches.
+  subroutine put_method(json, summary)
+    type(json_t), intent(inout) :: json
+    type(run_summary_t), intent(in) :: summary
+    integer :: i
+    logical :: to_implicit
+
+    associate (outcome => summary%outcome)
+      call json%open('method')
+      call json%put('name', summary%method)
+      call json%put('explicit_steps', outcome%accepted(1) - outcome%implicit_steps(1))
+      call json%put('implicit_steps', outcome%implicit_steps(1))
+      call json%put('switches', outcome%switches(1))
+      call json%open_list('first_switches')
+      do i = 1, min(outcome%switches(1), most_switches)
+        to_implicit = outcome%implicit(1) .eqv. mod(outcome%switches(1) - i, 2) == 0   ! switches alternate
+        call json%open()
+        call json%put('time', outcome%switch_times(i, 1))
+        call json%put('to', trim(merge('implicit', 'explicit', to_implicit)))
+        call json%close()
+      end do
+      call json%close_list()
+      call json%close()
+    end associate
+  end subroutine put_method
+
   !> Extremes and last value of every column but the time.
   subroutine put_columns(json, summary)
     type(json_t), intent(inout) :: json
     type(run_summary_t), intent(in) :: summary
     integer :: i
 
+    call json%put('extremes', trim(merge('of the motion', 'of the rows  ', summary%extremes%are_continuous)))
     call json%open('columns')
     associate (extremes => summary%extremes)
       do i = 2, merge(size(summary%labels), 1, extremes%rows > 0)

@@ -7,7 +7,7 @@ module nocdyn_summary_table
   implicit none (type, external)
   private
 
-  public :: summary_line, summary_table
+  public :: summary_line, summary_table, method_line
 
   integer, parameter :: most_rows = 60    ! a larger machine has its table in summary.json
   integer, parameter :: digits = 7        ! significant digits shown
@@ -28,20 +28,38 @@ contains
            ' ms; results in ' // folder
   end function summary_line
 
+  !> One line on what 'auto' did; empty if it never switched.
+  function method_line(input, summary) result(text)
+    type(input_t), intent(in) :: input
+    type(run_summary_t), intent(in) :: summary
+    character(len=:), allocatable :: text
+
+    text = ''
+    associate (outcome => summary%outcome)
+      if (outcome%switches(1) == 0) return
+      text = input%file // ': stiff: implicit steps from t = ' // rounded_text(outcome%switch_times(1, 1), digits) // ' s'
+      if (outcome%switches(1) > 1) text = text // ' (' // to_text(outcome%switches(1)) // ' switches in all)'
+      text = text // ', ' // to_text(outcome%implicit_steps(1)) // ' of ' // to_text(outcome%accepted(1)) // ' steps'
+    end associate
+  end function method_line
+
   !> Title, and last, smallest and largest value of every column with the times of the extremes.
   function summary_table(input, summary) result(text)
     type(input_t), intent(in) :: input
     type(run_summary_t), intent(in) :: summary
     character(len=:), allocatable :: text
     type(group_t) :: about
+    character(len=:), allocatable :: heading
     integer :: i, label_width, rows
 
     about = input%single('case')
     text = about%text('title')
     if (len(text) > 0) text = text // new_line('a')
     rows = min(size(summary%labels), most_rows)
-    label_width = maxval([(len(summary%labels(i)%text), i=2, rows)])
-    text = text // padded('of ' // to_text(summary%extremes%rows) // ' rows:', label_width) // right('the last') // &
+    heading = 'of ' // to_text(summary%extremes%rows) // ' rows:'
+    if (summary%extremes%are_continuous) heading = 'of the motion:'
+    label_width = max(len(heading), maxval([(len(summary%labels(i)%text), i=2, rows)]))
+    text = text // padded(heading, label_width) // right('the last') // &
            right('smallest') // right('at t [s]') // right('largest') // right('at t [s]')
     associate (extremes => summary%extremes)
       do i = 2, rows

@@ -22,6 +22,7 @@ module nocdyn_trajectory_table
     real(wp), private :: t(1) = 0.0_wp
     real(wp), allocatable, private :: y(:, :)      !! [1, states + quadratures]
     real(wp), allocatable, private :: values(:)    !! of one quantity of a bank, work space
+    logical, allocatable, private :: is_source(:)  !! whether a work counts as put in, [quadratures]
     real(wp), private :: start_energy = 0.0_wp
   contains
     procedure :: fill
@@ -45,6 +46,7 @@ contains
         table%columns(i)%quantities = banks(i)%bank%quantities()
       end do
       allocate (table%values(maxval([(size(banks(i)%bank%to), i=1, size(banks))])))
+      table%is_source = [(spread(banks(i)%bank%is_source(), 1, size(banks(i)%bank%accounted)), i=1, size(banks))]
     end associate
     table%labels = column_labels(formulation%machine, table%columns)
     table%y = formulation%start()
@@ -124,12 +126,16 @@ contains
       next = 2 + 2 * machine%bodies
       do i = 1, size(self%columns)
         do q = 1, size(self%columns(i)%quantities)
-          associate (elements => self%columns(i)%quantities(q)%elements, values => self%values(:size(machine%banks(i)%bank%to)))
-            call machine%banks(i)%bank%observe(machine%elements, q, 1, values)
-            do e = 1, size(elements)
-              row(next) = values(elements(e))
-              next = next + 1
-            end do
+          associate (elements => self%columns(i)%quantities(q)%elements, members => size(machine%banks(i)%bank%to))
+            if (size(elements) == members) then
+              call machine%banks(i)%bank%observe(machine%elements, q, 1, row(next:next + members - 1))
+            else
+              call machine%banks(i)%bank%observe(machine%elements, q, 1, self%values(:members))
+              do e = 1, size(elements)
+                row(next + e - 1) = self%values(elements(e))
+              end do
+            end if
+            next = next + size(elements)
           end associate
         end do
       end do
@@ -143,20 +149,17 @@ contains
     class(trajectory_table_t), intent(inout) :: self
     real(wp), intent(out) :: energies(5)
     real(wp) :: work_in, work_out
-    integer :: i, last, next
+    integer :: i
 
     work_in = 0.0_wp
     work_out = 0.0_wp
-    next = self%formulation%states + 1
-    do i = 1, size(self%formulation%machine%banks)
-      associate (bank => self%formulation%machine%banks(i)%bank)
-        last = next + size(bank%accounted) - 1
-        if (bank%is_source()) then
-          work_in = work_in + sum(self%y(1, next:last))
+    do i = 1, size(self%is_source)
+      associate (work => self%y(1, self%formulation%states + i))
+        if (self%is_source(i)) then
+          work_in = work_in + work
         else
-          work_out = work_out - sum(self%y(1, next:last))
+          work_out = work_out - work
         end if
-        next = last + 1
       end associate
     end do
     energies(1) = kinetic_energy(self%formulation)

@@ -1,7 +1,7 @@
 !> What does the machine do over time: integrates an input and writes its results.
 module nocdyn_transient
   use, intrinsic :: iso_fortran_env, only: int64
-  use nocdyn_assembly, only: assemble_machine, check_jacobian, check_size, new_formulation
+  use nocdyn_assembly, only: assemble_machine, new_formulation
   use nocdyn_csv, only: write_header, write_row
   use nocdyn_errors, only: error_t, exit_failed, raise
   use nocdyn_formulation, only: formulation_t
@@ -16,8 +16,10 @@ module nocdyn_transient
   use nocdyn_output_file, only: output_file_t
   use nocdyn_output_times, only: check_output_times, output_times
   use nocdyn_posix, only: is_interrupted, remove_file
-  use nocdyn_run_summary, only: audit_note, run_summary_t, start_extremes, summary_json, update_extremes
-  use nocdyn_system, only: observer_t
+  use nocdyn_run_summary, only: audit_note, run_summary_t, start_extremes, summary_json, update_extremes, widen_extremes
+  use nocdyn_size_limits, only: check_size, choose_method
+  use nocdyn_system, only: observer_t, ranges_t
+  use nocdyn_text, only: string_t
   use nocdyn_trajectory_table, only: new_trajectory_table, trajectory_table_t
   implicit none (type, external)
   private
@@ -41,17 +43,20 @@ module nocdyn_transient
     end subroutine update_interface
   end interface
 
-  !> Writes the rows and keeps their extremes.
+  !> Writes the rows and keeps the extremes of their columns.
   type, extends(observer_t) :: recorder_t
     type(trajectory_table_t) :: table
     type(output_file_t) :: file
     type(run_summary_t) :: summary
     real(wp), allocatable :: row(:)
     real(wp) :: t_start, t_end
+    logical :: follows = .false.   !! whether the columns have been followed between the rows
     class(progress_t), pointer :: progress => null()
   contains
     procedure :: record
     procedure :: stops
+    procedure :: tracked_values
+    procedure :: take_ranges
   end type recorder_t
 
 contains
@@ -70,6 +75,8 @@ contains
     type(group_t) :: run
     type(outcome_t) :: outcome
     type(error_t), allocatable :: write_error
+    type(string_t), allocatable :: notes(:)
+    character(len=:), allocatable :: method
     real(wp), allocatable :: times(:)
 
     call check_output_times(input, error)
@@ -78,10 +85,12 @@ contains
     if (allocated(error)) return
     run = input%single('run')
     call new_formulation(run%text('formulation'), machine, formulation)
-    call check_jacobian(input, formulation, error)
+    call choose_method(input, formulation, method, notes, error)
     if (allocated(error)) return
     times = output_times(input)
     call start_recorder(recorder, formulation, times, folder, progress)
+    recorder%summary%method = method
+    recorder%summary%notes = [recorder%summary%notes, notes]
     call solve(formulation, run, times, recorder, outcome, error)
     if (.not. allocated(outcome%status)) then   ! a setting was refused
       call recorder%file%discard()
@@ -107,6 +116,7 @@ contains
     recorder%summary%labels = recorder%table%labels
     recorder%summary%notes = redundancy_notes(formulation%machine)
     allocate (recorder%row(size(recorder%table%labels)))
+    recorder%tracked = size(recorder%row)
     call start_extremes(recorder%summary%extremes, size(recorder%row))
     call recorder%file%open(folder, trajectory_file)
     call write_header(recorder%file, recorder%table%labels)
@@ -124,7 +134,7 @@ contains
     real(wp), allocatable :: y(:, :)
     integer(int64) :: began, ended, rate
 
-    settings%method = run%text('method')
+    settings%method = recorder%summary%method
     settings%rtol = run%number('rtol')
     settings%atol = run%number('atol')
     settings%max_steps = run%whole_number('max_steps')
@@ -207,6 +217,29 @@ contains
     call update_extremes(self%summary%extremes, self%row)
     call write_row(self%file, self%row)
   end subroutine record
+
+  !> The columns of the table between its rows.
+  subroutine tracked_values(self, lane, t, y, values)
+    class(recorder_t), intent(inout) :: self
+    integer, intent(in) :: lane
+    real(wp), intent(in) :: t
+    real(wp), contiguous, intent(in) :: y(:)
+    real(wp), contiguous, intent(inout) :: values(:)
+
+    if (lane /= 1) error stop 'nocdyn_transient: a run is one lane'
+    call self%table%fill(t, y, values)
+    self%follows = .true.
+  end subroutine tracked_values
+
+  !> The extremes of the motion; a run that fails at its start has none.
+  subroutine take_ranges(self, lane, ranges)
+    class(recorder_t), intent(inout) :: self
+    integer, intent(in) :: lane
+    type(ranges_t), intent(in) :: ranges
+
+    if (lane /= 1) error stop 'nocdyn_transient: a run is one lane'
+    if (self%follows) call widen_extremes(self%summary%extremes, ranges)
+  end subroutine take_ranges
 
   !> Stops on Ctrl-C and when the file cannot be written.
   function stops(self, t)

@@ -7,7 +7,7 @@ module nocdyn_run_command
   use nocdyn_input_reader, only: read_input
   use nocdyn_posix, only: is_interrupted, watch_interrupts
   use nocdyn_run_summary, only: run_summary_t
-  use nocdyn_summary_table, only: summary_line, summary_table
+  use nocdyn_summary_table, only: method_line, summary_line, summary_table
   use nocdyn_text, only: quoted, string_t, to_text
   use nocdyn_transient, only: partial_file, run_transient
   implicit none (type, external)
@@ -82,6 +82,7 @@ contains
         call say(input%file // ': note: ' // summary%notes(i)%text)
       end do
       if (size(arguments%operands) == 1) call say(summary_table(input, summary))
+      if (len(method_line(input, summary)) > 0) call say(method_line(input, summary))
       call say(summary_line(input, summary, folder))
     end if
   end subroutine run_file

@@ -11,7 +11,7 @@ module nocdyn_integration_settings
   integer, parameter :: most_steps = 100000000   !! so that the count of evaluations fits a default integer
 
   type, public :: integration_settings_t
-    character(len=16) :: method = 'rk45'            !! one of `method_names`
+    character(len=16) :: method = 'auto'            !! one of `method_names`
     real(wp) :: rtol = 1.0e-6_wp                    !! relative tolerance, at least the spacing of numbers
     real(wp) :: atol = 1.0e-9_wp                    !! absolute tolerance, positive
     real(wp) :: first_step = 0.0_wp                 !! 0: found automatically

@@ -15,21 +15,26 @@ module nocdyn_json
   contains
     procedure :: open => open_object
     procedure :: close => close_object
+    procedure :: open_list
+    procedure :: close_list
     procedure :: text
     generic :: put => put_text, put_texts, put_number, put_integer
     procedure, private :: put_text, put_texts, put_number, put_integer
     procedure, private :: begin_member
+    procedure, private :: begin_item
   end type json_t
 
 contains
 
-  !> Begins an object; the outermost one has no key.
+  !> Begins an object; the outermost one and those of a list have no key.
   subroutine open_object(self, key)
     class(json_t), intent(inout) :: self
     character(len=*), intent(in), optional :: key
 
     if (present(key)) then
       call self%begin_member(key)
+    else if (self%depth > 0) then
+      call self%begin_item()
     end if
     call self%buffer%append('{')
     self%depth = self%depth + 1
@@ -45,6 +50,26 @@ contains
     if (self%depth == 0) call self%buffer%append(new_line('a'))
     self%is_first = .false.
   end subroutine close_object
+
+  !> Begins a list, of objects.
+  subroutine open_list(self, key)
+    class(json_t), intent(inout) :: self
+    character(len=*), intent(in) :: key
+
+    call self%begin_member(key)
+    call self%buffer%append('[')
+    self%depth = self%depth + 1
+    self%is_first = .true.
+  end subroutine open_list
+
+  subroutine close_list(self)
+    class(json_t), intent(inout) :: self
+
+    self%depth = self%depth - 1
+    if (.not. self%is_first) call self%buffer%append(new_line('a') // repeat('  ', self%depth))
+    call self%buffer%append(']')
+    self%is_first = .false.
+  end subroutine close_list
 
   !> All that was put so far.
   pure function text(self)
@@ -104,10 +129,18 @@ contains
     class(json_t), intent(inout) :: self
     character(len=*), intent(in) :: key
 
-    if (.not. self%is_first) call self%buffer%append(',')
-    call self%buffer%append(new_line('a') // repeat('  ', self%depth) // escaped(key) // ': ')
-    self%is_first = .false.
+    call self%begin_item()
+    call self%buffer%append(escaped(key) // ': ')
   end subroutine begin_member
+
+  !> A line of its own, after a comma if it is not the first.
+  subroutine begin_item(self)
+    class(json_t), intent(inout) :: self
+
+    if (.not. self%is_first) call self%buffer%append(',')
+    call self%buffer%append(new_line('a') // repeat('  ', self%depth))
+    self%is_first = .false.
+  end subroutine begin_item
 
   !> A JSON string with its quotes; control characters, which no input has, become blanks.
   pure function escaped(text)

@@ -1,4 +1,5 @@
 """What the documentation claims about the program, its sources and its tests."""
+import importlib.util
 import os
 import re
 import subprocess
@@ -69,6 +70,50 @@ def test_tests_that_pages_name_exist(page):
 def test_files_that_pages_name_exist(page):
     for path in re.findall(r"`((?:src|docs|tests|scripts|input)/[\w./]+)`", page.read_text()):
         assert (SOURCE / path).exists(), f"there is no {path}"
+
+
+@pytest.fixture(scope="module")
+def fill_pages():
+    description = importlib.util.spec_from_file_location("fill_pages", SOURCE / "docs" / "fill_pages.py")
+    module = importlib.util.module_from_spec(description)
+    description.loader.exec_module(module)
+    return module
+
+
+@pytest.mark.parametrize("page", sorted(PAGES.glob("*.md")), ids=name_of)
+def test_pages_quote_files_as_they_are(page, fill_pages):
+    text = page.read_text(encoding="utf-8")
+    assert fill_pages.filled(text) == text, "scripts/docs --refresh puts the files into the pages"
+
+
+def test_every_file_of_the_examples_is_quoted():
+    quoted = {name for page in PAGES.glob("*.md") for name in re.findall(r"<!-- fill: file (\S+) -->", page.read_text(encoding="utf-8"))}
+    files = {name_of(path) for path in (SOURCE / "docs" / "examples").iterdir()}
+    assert files == {name for name in quoted if name.startswith("docs/examples/")}
+
+
+def test_every_place_of_a_page_is_filled():
+    for page in PAGES.glob("*.md"):
+        for what, content in re.findall(r"<!-- fill: (.*?) -->\n(.*?)<!-- filled -->", page.read_text(encoding="utf-8"), re.DOTALL):
+            assert content.strip(), f"{page.name}: nothing at {what}"
+
+
+def test_tables_pictures_and_sections_go_to_their_places(fill_pages, tmp_path, monkeypatch):
+    monkeypatch.setattr(fill_pages, "ROOT", tmp_path)
+    (tmp_path / "docs" / "media").mkdir(parents=True)
+    (tmp_path / "curve.svg").write_text("<svg/>")
+    (tmp_path / "bench.md").write_text("# Title\n\n- processor: fast\n\n## W3: chain\n\n| a |\n\nW3: wanted 1: **missed**.\n\n## W4: x\n\ny\n")
+    (tmp_path / "digits.md").write_text("digits\n\n| 1 |\n| - |\n\nprices\n\n| 2 |\n| - |\n")
+    places = ["table digits 2", "bench", "bench W3:", "picture curve", "run nothing"]
+    page = "\n".join(f"<!-- fill: {place} -->\nold\n<!-- filled -->" for place in places)
+    contents = ["| 2 |\n| - |", "- processor: fast", "*W3: chain*\n\n| a |", "![curve](../media/curve.svg)"]
+    expected = [f"<!-- fill: {place} -->\n\n{content}\n\n<!-- filled -->" for place, content in zip(places, contents)]
+    new = fill_pages.filled(page, tables=tmp_path, bench=tmp_path)
+    assert new == "\n".join([*expected, "<!-- fill: run nothing -->\nold\n<!-- filled -->"])
+    assert fill_pages.filled(new, tables=tmp_path, bench=tmp_path) == new
+    assert (tmp_path / "docs" / "media" / "curve.svg").exists()
+    with pytest.raises(fill_pages.NotThere, match="table 3"):
+        fill_pages.filled("<!-- fill: table digits 3 -->\n<!-- filled -->", tables=tmp_path)
 
 
 def equations(text):

@@ -51,6 +51,27 @@ def test_a_failed_run_keeps_the_rows_until_then(nocdyn):
     assert 1.3 < summary["time_reached"] < 1.4
 
 
+@pytest.mark.parametrize("method", ["auto", "rk45", "rodas5p"])
+def test_a_failed_run_has_the_extremes_up_to_where_it_came(nocdyn, method):
+    nocdyn.write("exploding.nml", EXPLODING)
+    nocdyn("run", "exploding.nml", "--out", "out", "--set", f"run.method={method}")
+    summary = nocdyn.summary("out")
+    speed = summary["columns"]["omega_disc [rad/s]"]
+    assert summary["extremes"] == "of the motion"
+    assert speed["max"] > 10 * speed["last"]  # the last row is at 1.3 s
+    assert 1.3 < speed["time_of_max"] <= summary["time_reached"]
+
+
+@pytest.mark.skipif(TRAPS_EXCEPTIONS, reason="the debug build traps the overflow")
+def test_a_run_that_cannot_start_has_the_extremes_of_its_row(nocdyn):
+    nocdyn.write("exploding.nml", EXPLODING)
+    nocdyn("run", "exploding.nml", "--out", "out", "--set", "body.disc.angle=1e200")
+    summary = nocdyn.summary("out")
+    assert (summary["extremes"], summary["counts"]["rows"]) == ("of the rows", 1)
+    angle = summary["columns"]["phi_disc [rad]"]
+    assert angle["min"] == angle["max"] == angle["last"] == 1e200
+
+
 def test_too_few_steps_are_a_failure_that_names_the_key(nocdyn):
     outcome = nocdyn("run", CASE_2, "--out", "out", "--set", "run.max_steps=5")
     assert outcome.returncode == 1
@@ -89,6 +110,7 @@ def test_an_interrupted_run_leaves_a_partial_result(nocdyn, number):
     assert summary["status"] == "interrupted"
     _, rows = nocdyn.table("out", "trajectory.partial.csv")
     assert [row[0] for row in rows] == list(range(int(summary["time_reached"]) + 1))
+    assert summary["extremes"] == "of the motion"
 
 
 def test_an_interruption_ends_the_whole_list_of_files(nocdyn):

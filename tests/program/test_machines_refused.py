@@ -1,5 +1,8 @@
 """Machines that cannot be, and notes on those that can: file, line, group and name."""
 
+import subprocess
+import sys
+
 import pytest
 from conftest import CASE_2
 
@@ -103,3 +106,69 @@ def test_dense_matrices_too_large_for_memory_are_refused(nocdyn, bodies, overrid
     assert outcome.returncode == 2
     assert outcome.stderr.startswith(f"nocdyn: large.nml: this machine needs dense matrices of {rows} rows, at most 6000")
     assert nocdyn("run", "large.nml").returncode == 0
+
+
+@pytest.fixture(scope="module")
+def hub(shared_nocdyn):
+    """A disc with so many branches that no order of the states makes the band of the Jacobian narrow."""
+    branches = [
+        f"&body name = 'b{i}' inertia = 1.0 /\n&coupling name = 'c{i}' bodies = 'hub', 'b{i}' stiffness = 1.0 /" for i in range(3000)
+    ]
+    lines = ["&body name = 'hub' inertia = 1.0 speed = 1.0 /", *branches, "&run t_end = 0.01 method = 'auto' /"]
+    shared_nocdyn.write("hub.nml", "\n".join([*lines, "&output points = 2 /\n"]))
+    return shared_nocdyn
+
+
+def peak_memory(nocdyn, *words):
+    """Of a run that succeeds [MB], and its output."""
+    file = nocdyn.folder / "peak"
+    limits = "import resource, subprocess, sys; out = subprocess.run(sys.argv[2:], capture_output=True, text=True, check=True)"
+    script = f"{limits}; open(sys.argv[1], 'w').write(str(resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss)); print(out.stdout)"
+    command = [sys.executable, "-c", script, file, nocdyn.executable, *words]
+    output = subprocess.run(command, cwd=nocdyn.folder, check=True, capture_output=True, text=True).stdout
+    return int(file.read_text()) / 1024, output
+
+
+NEED = (
+    "a matrix of 6002 x 6002 entries for this machine, whose couplings leave no narrower band;"
+    " at most 6000 x 6000 are allowed"
+)
+
+
+@pytest.mark.parametrize("method", ["rosenbrock", "rodas4", "rodas5p"])
+def test_implicit_methods_are_refused_where_their_matrix_is_too_large(hub, method):
+    outcome = hub("run", "hub.nml", "--out", "refused", "--set", f"run.method={method}")
+    assert (outcome.returncode, outcome.stdout) == (2, "")
+    place = f"--set run.method={method}: &run"
+    assert outcome.stderr == f"nocdyn: {place}: method = '{method}' needs {NEED}; method = 'rk853' needs none\n"
+    assert not (hub.folder / "refused").exists()
+
+
+@pytest.mark.parametrize("method", ["rk45", "rk853"])
+def test_explicit_methods_run_where_a_matrix_would_be_too_large(hub, method):
+    outcome = hub("run", "hub.nml", "--out", "out", "--set", f"run.method={method}")
+    assert (outcome.returncode, outcome.stderr) == (0, "")
+    assert "note" not in outcome.stdout
+
+
+def test_auto_does_without_a_matrix_that_is_too_large_and_says_so(hub):
+    megabytes, output = peak_memory(hub, "run", "hub.nml", "--out", "out")
+    note = f"method = 'auto' takes explicit steps alone, those of 'rk853': implicit ones need {NEED}"
+    assert f"hub.nml: note: {note}\n" in output
+    summary = hub.summary("out")
+    assert summary["machine"]["notes"] == [note]
+    assert (summary["settings"]["method"], summary["method"]["name"]) == ("auto", "rk853")
+    assert megabytes < 150  # the matrix alone would have 288
+    hub("run", "hub.nml", "--out", "explicit", "--set", "run.method=rk853")
+    assert (hub.folder / "out/trajectory.csv").read_bytes() == (hub.folder / "explicit/trajectory.csv").read_bytes()
+
+
+def test_a_long_chain_keeps_its_implicit_steps(nocdyn):
+    bodies = "".join(f"&body name = 'b{i}' inertia = 1.0 speed = {i % 2} /\n" for i in range(3001))
+    couplings = "".join(f"&coupling name = 'c{i}' bodies = 'b{i}', 'b{i + 1}' stiffness = 1.0 /\n" for i in range(3000))
+    nocdyn.write("chain.nml", bodies + couplings + "&run t_end = 0.01 /\n&output points = 2 /\n")
+    for method in ("auto", "rodas5p"):
+        outcome = nocdyn("run", "chain.nml", "--out", "out", "--set", f"run.method={method}")
+        assert (outcome.returncode, outcome.stderr) == (0, "")
+        assert "note" not in outcome.stdout
+        assert nocdyn.summary("out")["method"]["name"] == method

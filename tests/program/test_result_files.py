@@ -1,6 +1,7 @@
 """trajectory.csv, summary.json and input.nml."""
 
 import json
+import math
 import re
 from decimal import Decimal
 
@@ -183,19 +184,145 @@ def test_the_rosenbrock_method_counts_its_jacobians(nocdyn):
 
 
 @pytest.mark.parametrize("folder", ["case2", "full"])
-def test_the_summary_has_the_extremes_of_every_column(case_2, full, folder):
+def test_no_row_lies_outside_the_extremes(case_2, full, folder):
     table = columns(case_2, folder)
     times = table.pop("t [s]")
-    extremes = case_2.summary(folder)["columns"]
-    assert list(extremes) == list(table)
+    summary = case_2.summary(folder)
+    assert summary["extremes"] == "of the motion"
+    assert list(summary["columns"]) == list(table)
     for name, column in table.items():
-        assert extremes[name] == {
-            "min": min(column),
-            "time_of_min": times[column.index(min(column))],
-            "max": max(column),
-            "time_of_max": times[column.index(max(column))],
-            "last": column[-1],
+        extremes = summary["columns"][name]
+        assert extremes["min"] <= min(column) and max(column) <= extremes["max"]
+        assert times[0] <= extremes["time_of_min"] <= times[-1] and times[0] <= extremes["time_of_max"] <= times[-1]
+        assert extremes["last"] == column[-1]
+
+
+def parabola(times, values, i, t):
+    """The value at t of the parabola through the rows i - 1, i and i + 1; the rows are evenly spaced."""
+    before, middle, after = values[i - 1 : i + 2]
+    x = (t - times[i]) / (times[i] - times[i - 1])
+    return middle + x * ((after - before) / 2 + x * (after - 2 * middle + before) / 2)
+
+
+def peak(values, i):
+    before, middle, after = values[i - 1 : i + 2]
+    bend = after - 2 * middle + before
+    return middle - (after - before) ** 2 / (8 * bend) if bend else middle
+
+
+@pytest.mark.parametrize("path", [CASE_2, FULL], ids=["case2", "full"])
+@pytest.mark.parametrize("method", ["auto", "rk45", "rodas5p"])
+def test_the_extremes_are_those_of_the_motion_between_the_rows(nocdyn, path, method):
+    common = ["run.t_end=3", f"run.method={method}", "run.rtol=1e-9", "run.atol=1e-9"]
+    words = [word for override in common for word in ("--set", override)]
+    assert nocdyn("run", path, "--out", "coarse", *words, "--set", "output.points=3").returncode == 0
+    assert nocdyn("run", path, "--out", "fine", *words, "--set", "output.points=20001").returncode == 0
+    table = columns(nocdyn, "fine")
+    times = table.pop("t [s]")
+    table.pop("energy_residual [J]")  # what the tolerances leave, not smooth
+    for name, column in table.items():
+        found = nocdyn.summary("coarse")["columns"][name]
+        # parabolas through rows 0.15 ms apart are right to 1e-10, the solution has kinks of its tolerance
+        close = {"rel": 1e-7, "abs": 1e-7 * max(map(abs, column))}
+        for extreme, sign in (("min", -1), ("max", 1)):
+            values = [sign * value for value in column]
+            i = min(max(values.index(max(values)), 1), len(values) - 2)
+            sampled = max(values[0], values[-1], peak(values, i) if values[i] == max(values) else values[0])
+            assert sign * found[extreme] == pytest.approx(sampled, **close)
+            t = found[f"time_of_{extreme}"]
+            i = min(max(round((t - times[0]) / (times[1] - times[0])), 1), len(times) - 2)
+            assert sign * parabola(times, values, i, t) == pytest.approx(found[extreme], **close)
+
+
+OSCILLATOR = """\
+&body name = 'disc' inertia = 0.5 speed = 3.0 /
+&coupling name = 'spring' bodies = 'ground', 'disc' stiffness = 8.0 /
+&run t_end = 2.0 rtol = 1e-12 atol = 1e-12 /
+&output points = 2 /
+"""
+
+
+@pytest.mark.parametrize("method", ["auto", "rk45", "rk853", "rodas4", "rodas5p"])
+def test_the_extremes_of_an_oscillator_are_those_of_the_sine(nocdyn, method):
+    nocdyn.write("oscillator.nml", OSCILLATOR)
+    assert nocdyn("run", "oscillator.nml", "--out", "out", "--set", f"run.method={method}").returncode == 0
+    found = nocdyn.summary("out")["columns"]
+    quarter = math.pi / 8  # of the period: 4 rad/s
+    expected = {
+        "phi_disc [rad]": (-0.75, 3 * quarter, 0.75, quarter),
+        "omega_disc [rad/s]": (-3.0, 2 * quarter, 3.0, 0.0),
+        "moment_spring [N m]": (-6.0, 3 * quarter, 6.0, quarter),
+    }
+    for name, values in expected.items():
+        keys = ("min", "time_of_min", "max", "time_of_max")
+        # the values are right to the error of the solution, the times to its square root
+        assert [found[name][key] for key in keys[::2]] == pytest.approx(values[::2], rel=1e-9)
+        times = [found[name][key] % (4 * quarter) for key in keys[1::2]]
+        assert times == pytest.approx(values[1::2], abs=1e-4)
+
+
+def test_the_printed_table_has_the_extremes_of_the_motion(nocdyn):
+    nocdyn.write("oscillator.nml", OSCILLATOR)
+    lines = nocdyn("run", "oscillator.nml").stdout.splitlines()
+    assert lines[0].split() == "of the motion: the last smallest at t [s] largest at t [s]".split()
+    name, unit, _, smallest, _, largest, _ = lines[1].split()
+    assert (name, unit, smallest, largest) == ("phi_disc", "[rad]", "-0.75", "0.75")
+
+
+def test_the_summary_tells_the_steps_of_either_kind(nocdyn):
+    for method, kind in (("rk45", "explicit"), ("rodas5p", "implicit")):
+        nocdyn("run", CASE_2, "--out", "out", "--set", f"run.method={method}", "--set", "run.rtol=1e-6")
+        summary = nocdyn.summary("out")
+        other = "implicit" if kind == "explicit" else "explicit"
+        assert summary["method"] == {
+            "name": method,
+            f"{kind}_steps": summary["counts"]["accepted_steps"],
+            f"{other}_steps": 0,
+            "switches": 0,
+            "first_switches": [],
         }
+
+
+def test_the_summary_tells_when_auto_switched(nocdyn):
+    outcome = nocdyn("run", CASE_2, "--out", "out", "--set", "run.method=auto", "--set", "coupling.coupling.damping=1e6")
+    summary = nocdyn.summary("out")
+    method = summary["method"]
+    assert method["explicit_steps"] > 0 and method["implicit_steps"] > 0
+    assert method["explicit_steps"] + method["implicit_steps"] == summary["counts"]["accepted_steps"]
+    assert method["switches"] == 1
+    (switch,) = method["first_switches"]
+    assert switch["to"] == "implicit" and 0 < switch["time"] < 0.01
+    line = outcome.stdout.splitlines()[-2]
+    assert line.startswith(f"{CASE_2}: stiff: implicit steps from t = 0.000")
+    assert line.endswith(f", {method['implicit_steps']} of {summary['counts']['accepted_steps']} steps")
+
+
+# The fan holds the disc at the speed of the torque, the faster the more stiffly; the torque vanishes every 4 pi s.
+WAVERING = """\
+&body name = 'disc' inertia = 0.01 /
+&motor name = 'fan' body = 'disc' a = 1.0 b = 0.0 c = 1.0e4 /
+&excitation name = 'slow' body = 'disc' amplitude = 1.0 frequency = 0.5 /
+&run t_end = 30.0 method = 'auto' rtol = 1e-5 atol = 1e-8 /
+&output points = 2 /
+"""
+
+
+def test_the_summary_tells_every_switch_with_its_direction(nocdyn):
+    nocdyn.write("wavering.nml", WAVERING)
+    outcome = nocdyn("run", "wavering.nml", "--out", "out")
+    method = nocdyn.summary("out")["method"]
+    switches = method["first_switches"]
+    assert method["switches"] == len(switches) == 5
+    assert [switch["to"] for switch in switches] == ["implicit", "explicit", "implicit", "explicit", "implicit"]
+    times = [switch["time"] for switch in switches]
+    assert times == sorted(times)
+    for i, calm in ((1, 3 * math.pi), (3, 7 * math.pi)):
+        assert times[i] < calm + 0.1 and calm < times[i + 1] < calm + 0.5
+    assert " s (5 switches in all), " in outcome.stdout
+
+
+def test_a_machine_that_is_not_stiff_is_not_said_to_be(nocdyn):
+    assert "stiff" not in nocdyn("run", CASE_2, "--out", "out", "--set", "run.method=auto").stdout
 
 
 def test_a_title_with_odd_characters_survives(nocdyn):

@@ -145,7 +145,7 @@ contains
     namelist /run/ t_start, t_end, method, rtol, atol, formulation, independent, complement, max_steps
 
     t_start = 0.0_wp
-    method = 'rk45'
+    method = 'auto'
     rtol = 1.0e-6_wp
     atol = 1.0e-9_wp
     formulation = 'reduced'

@@ -1,0 +1,90 @@
+!> Which machines are too large for a formulation or a method, and what then.
+module nocdyn_size_limits
+  use nocdyn_banded_matrix, only: half_bandwidths
+  use nocdyn_errors, only: error_t, exit_input, raise
+  use nocdyn_formulation, only: formulation_t
+  use nocdyn_input, only: group_t, input_t
+  use nocdyn_kinds, only: wp
+  use nocdyn_machine, only: machine_t
+  use nocdyn_ordering, only: reverse_cuthill_mckee
+  use nocdyn_pattern_entries, only: entries_t, state_entries
+  use nocdyn_text, only: quoted, string_t, to_text
+  implicit none (type, external)
+  private
+
+  public :: check_size, choose_method
+
+  integer, parameter :: largest_matrix = 6000   ! rows: 0.3 GB each, and there are several
+
+contains
+
+  !> Refuses machines for whose dense matrices two formulations have no memory.
+  subroutine check_size(input, machine, error)
+    type(input_t), intent(in) :: input
+    type(machine_t), intent(in) :: machine
+    type(error_t), allocatable, intent(out) :: error
+    type(group_t) :: run
+    integer :: order
+
+    run = input%single('run')
+    select case (run%text('formulation'))
+    case ('paper')
+      order = 3 * machine%bodies
+    case ('multiplier')
+      order = 2 * machine%bodies
+    case default
+      order = 0
+    end select
+    if (order <= largest_matrix) return
+    call raise(error, exit_input, input%file // ': this machine needs dense matrices of ' // to_text(order) // &
+               ' rows, at most ' // to_text(largest_matrix) // ' are allowed; formulation = ' // &
+               quoted('reduced') // ' needs none')
+  end subroutine check_size
+
+  !> The method that is integrated with: the one of the input, but the explicit part of 'auto' alone, with a note, where
+  !> the stage matrix of its implicit part would be too large. An implicit method is refused there.
+  subroutine choose_method(input, formulation, method, notes, error)
+    type(input_t), intent(in) :: input
+    class(formulation_t), intent(in) :: formulation
+    character(len=:), allocatable, intent(out) :: method
+    type(string_t), allocatable, intent(out) :: notes(:)
+    type(error_t), allocatable, intent(out) :: error
+    type(group_t) :: run
+    integer, allocatable :: indices(:)
+    character(len=:), allocatable :: need
+    integer :: rows
+
+    allocate (notes(0))
+    run = input%single('run')
+    method = run%text('method')
+    if (any(method == [character(len=5) :: 'rk45', 'rk853']) .or. formulation%states <= largest_matrix) return
+    rows = stage_matrix_rows(formulation)
+    if (real(rows, wp) * formulation%states <= real(largest_matrix, wp)**2) return
+    need = 'a matrix of ' // to_text(rows) // ' x ' // to_text(formulation%states) // &
+           ' entries for this machine, whose couplings leave no narrower band; at most ' // to_text(largest_matrix) // ' x ' // &
+           to_text(largest_matrix) // ' are allowed'
+    if (method == 'auto') then
+      method = 'rk853'
+      notes = [string_t('method = ' // quoted('auto') // ' takes explicit steps alone, those of ' // quoted(method) // &
+                        ': implicit ones need ' // need)]
+    else
+      allocate (indices, source=input%groups_named('run'))
+      call raise(error, exit_input, input%place(indices(1), 'method') // ': method = ' // quoted(method) // ' needs ' // need // &
+                 '; method = ' // quoted('rk853') // ' needs none')
+    end if
+  end subroutine choose_method
+
+  !> Rows in which the factors of a stage matrix are stored: those of its band with the fill-in of the interchanges, at
+  !> most all.
+  function stage_matrix_rows(formulation) result(rows)
+    class(formulation_t), intent(in) :: formulation
+    integer :: rows
+    type(entries_t) :: entries
+    integer :: lower, upper
+
+    entries = state_entries(formulation%jacobian_pattern(), formulation%states)
+    call half_bandwidths(reverse_cuthill_mckee(formulation%states, entries%row, entries%column), entries, lower, upper)
+    rows = min(2 * lower + upper + 1, formulation%states)
+  end function stage_matrix_rows
+
+end module nocdyn_size_limits
