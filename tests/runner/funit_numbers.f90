@@ -79,24 +79,25 @@ contains
     logical :: halting(size(ieee_usual))
 
     if (.not. conformable(left, right, message, location)) return
-    l = expanded(left, size(right%values))
+    allocate (l, source=expanded(left, size(right%values)))
+    allocate (holds(size(l)), source=.false.)
     allowed = 0
     if (present(tolerance)) allowed = tolerance
     call suspend_halting(halting)
     associate (r => right%values)
       select case (relation)
         case ('==')
-          holds = (l <= r .and. l >= r) .or. abs(r - l) <= allowed   ! equal infinities have no difference
+          holds(:) = (l <= r .and. l >= r) .or. abs(r - l) <= allowed   ! equal infinities have no difference
         case ('/=')
-          holds = abs(r - l) > allowed
+          holds(:) = abs(r - l) > allowed
         case ('<')
-          holds = l < r
+          holds(:) = l < r
         case ('<=')
-          holds = l <= r
+          holds(:) = l <= r
         case ('>')
-          holds = l > r
+          holds(:) = l > r
         case ('>=')
-          holds = l >= r
+          holds(:) = l >= r
         case default
           error stop 'funit_numbers: unknown relation'
       end select
@@ -117,9 +118,10 @@ contains
     logical :: halting(size(ieee_usual))
 
     if (.not. conformable(expected, actual, message, location)) return
-    e = expanded(expected, size(actual%values))
+    allocate (e, source=expanded(expected, size(actual%values)))
+    allocate (holds(size(e)), source=.false.)
     call suspend_halting(halting)
-    holds = abs(actual%values - e) <= tolerance * abs(e) .and. abs(e) > 0
+    holds(:) = abs(actual%values - e) <= tolerance * abs(e) .and. abs(e) > 0
     call resume_halting(halting)
     call report_first(holds, e, '== relatively', actual, tolerance, message, location)
   end subroutine require_relatively_equal
