@@ -107,10 +107,11 @@ contains
     queue%watcher => watcher
   end function swing_queue
 
-  subroutine next(self, system, lane, y, found)
+  subroutine next(self, system, lane, t, y, found)
     class(swing_queue_t), intent(inout) :: self
     class(system_t), intent(inout) :: system
     integer, intent(in) :: lane
+    real(wp), intent(inout) :: t
     real(wp), contiguous, intent(inout) :: y(:)
     logical, intent(out) :: found
 

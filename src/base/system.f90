@@ -44,12 +44,13 @@ module nocdyn_system
   !> Receives the solution at the requested times, is told of events and extremes, and may stop the integration.
   !>
   !> An event is a root of a function of time and state, found on the solution inside the steps. The tracked functions
-  !> are followed between the steps too: `ranges` receives their extremes in continuous time.
-  type, abstract, public :: observer_t
+  !> are followed between the steps too: `take_ranges` receives their extremes in continuous time. By default an observer
+  !> wants to know nothing.
+  type, public :: observer_t
     integer, allocatable :: directions(:)   !! event_... of each event function; not allocated: there are none
     integer :: tracked = 0                  !! number of tracked functions
   contains
-    procedure(record_interface), deferred :: record
+    procedure :: record
     procedure :: stops
     procedure :: event_values
     procedure :: happen
@@ -85,15 +86,6 @@ module nocdyn_system
       integer, intent(inout) :: status(self%lanes)                                  !! evaluation_fine on entry
     end subroutine jacobian_interface
 
-    !> One requested time of one lane; the calls of a lane come in the order of its times.
-    subroutine record_interface(self, lane, t, y)
-      import :: observer_t, wp
-      class(observer_t), intent(inout) :: self
-      integer, intent(in) :: lane
-      real(wp), intent(in) :: t
-      real(wp), contiguous, intent(in) :: y(:)   !! [states + quadratures]
-    end subroutine record_interface
-
   end interface
 
 contains
@@ -124,6 +116,14 @@ contains
     name = 'component ' // to_text(index)
     if (index > self%states) name = 'quadrature ' // to_text(index - self%states)
   end function component_name
+
+  !> One requested time of one lane; the calls of a lane come in the order of its times.
+  subroutine record(self, lane, t, y)
+    class(observer_t), intent(inout) :: self
+    integer, intent(in) :: lane
+    real(wp), intent(in) :: t
+    real(wp), contiguous, intent(in) :: y(:)   !! [states + quadratures]
+  end subroutine record
 
   !> Asked after every step: true ends the integration of all lanes.
   function stops(self, t)

@@ -90,6 +90,7 @@ contains
     logical, intent(in) :: starting(:)
 
     call self%explicit%begin(trial, starting)
+    call self%implicit%forget(starting)
     where (starting)
       self%is_implicit = .false.
       self%hits = 0

@@ -1,4 +1,4 @@
-!> Events: roots of functions g(t, y) on the solution inside the steps.
+!> Roots of functions g(t, y), the events, on the solution inside the steps.
 !>
 !> The sign of each function is compared at the ends of a few equal parts of every step; a change of sign is followed to
 !> the last bits of the time. Reaching zero counts as an event, leaving it does not, so that a function that is zero at

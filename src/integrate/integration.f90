@@ -69,7 +69,7 @@ contains
     call allocate_outcome(outcome, system%lanes)
     call prepare(march, stepper, system, settings, times, observer)
     do
-      call fill_lanes(march, stepper, system, queue, times(1), observer, outcome)
+      call fill_lanes(march, stepper, system, queue, times, observer, outcome)
       if (.not. any(march%occupied)) exit
       call set_out_lanes(march, outcome)
       call stepper%attempt(system, march%trial)

@@ -74,51 +74,59 @@ contains
   end subroutine prepare
 
   !> Gives the free lanes their next variants and starts them.
-  subroutine fill_lanes(march, stepper, system, queue, t_start, observer, outcome)
+  subroutine fill_lanes(march, stepper, system, queue, times, observer, outcome)
     type(march_t), intent(inout) :: march
     class(stepper_t), intent(inout) :: stepper
     class(system_t), intent(inout) :: system
     class(queue_t), intent(inout) :: queue
-    real(wp), intent(in) :: t_start
+    real(wp), contiguous, intent(in) :: times(:)
     class(observer_t), intent(inout) :: observer
     type(outcome_t), intent(inout) :: outcome
+    real(wp) :: t
     integer :: lane
 
     do lane = 1, size(march%occupied)
       march%starting(lane) = .false.
       if (march%occupied(lane)) cycle
-      call queue%next(system, lane, march%sample, march%starting(lane))
+      t = times(1)
+      call queue%next(system, lane, t, march%sample, march%starting(lane))
       march%occupied(lane) = march%starting(lane)
-      if (march%starting(lane)) call place_start(march, lane, t_start, outcome)
+      if (march%starting(lane)) call place_start(march, lane, t, times, outcome)
     end do
-    if (any(march%starting)) call start_lanes(march, stepper, system, observer, outcome)
+    if (any(march%starting)) call start_lanes(march, stepper, system, times, observer, outcome)
   end subroutine fill_lanes
 
   !> Puts the state in `sample` at the start of a lane that has done nothing yet.
-  subroutine place_start(march, lane, t_start, outcome)
+  subroutine place_start(march, lane, t, times, outcome)
     type(march_t), intent(inout) :: march
     integer, intent(in) :: lane
-    real(wp), intent(in) :: t_start
+    real(wp), intent(in) :: t
+    real(wp), contiguous, intent(in) :: times(:)
     type(outcome_t), intent(inout) :: outcome
 
     associate (trial => march%trial)
-      trial%t(lane) = t_start
+      trial%t(lane) = t
       trial%y(lane, :trial%components) = march%sample
       trial%evaluations(lane) = 0
       trial%jacobians(lane) = 0
       trial%factorisations(lane) = 0
       trial%implicit(lane) = .false.
     end associate
+    if (.not. (t >= times(1) .and. t < times(size(times)))) error stop 'nocdyn_march: a variant must start within the times'
     march%next(lane) = 2
+    do while (times(march%next(lane)) <= t)
+      march%next(lane) = march%next(lane) + 1
+    end do
     call restart(march%control, lane)
     call reset_outcome(outcome, lane)
   end subroutine place_start
 
-  !> Records the start, evaluates the slope there and chooses the first step of the lanes in `starting`.
-  subroutine start_lanes(march, stepper, system, observer, outcome)
+  !> Records the start if it is a requested time, evaluates the slope there and chooses the first step of the lanes in `starting`.
+  subroutine start_lanes(march, stepper, system, times, observer, outcome)
     type(march_t), intent(inout) :: march
     class(stepper_t), intent(inout) :: stepper
     class(system_t), intent(inout) :: system
+    real(wp), contiguous, intent(in) :: times(:)
     class(observer_t), intent(inout) :: observer
     type(outcome_t), intent(inout) :: outcome
     integer :: lane
@@ -130,7 +138,7 @@ contains
       do lane = 1, trial%lanes
         if (.not. march%starting(lane)) cycle
         march%sample(:) = trial%y(lane, :trial%components)
-        call observer%record(lane, trial%t(lane), march%sample)
+        if (times(march%next(lane) - 1) >= trial%t(lane)) call observer%record(lane, trial%t(lane), march%sample)
         march%control%h(lane) = march%first_step
         if (.not. trial%working(lane)) then
           outcome%status(lane) = merge(integration_not_finite, integration_gave_up, trial%verdict(lane) == trial_not_finite)

@@ -19,11 +19,12 @@ module nocdyn_queue
   abstract interface
 
     !> Puts the numbers of the next variant into a lane of the system, and its start into y.
-    subroutine next_interface(self, system, lane, y, found)
+    subroutine next_interface(self, system, lane, t, y, found)
       import :: queue_t, system_t, wp
       class(queue_t), intent(inout) :: self
       class(system_t), intent(inout) :: system
       integer, intent(in) :: lane
+      real(wp), intent(inout) :: t                  !! the first requested time; may be set to a later start
       real(wp), contiguous, intent(inout) :: y(:)   !! [states + quadratures]
       logical, intent(out) :: found                 !! false: there is no variant left
     end subroutine next_interface
@@ -60,10 +61,11 @@ contains
     allocate (queue%begun(size(y, 1)), source=.false.)
   end function one_each
 
-  subroutine next(self, system, lane, y, found)
+  subroutine next(self, system, lane, t, y, found)
     class(one_each_t), intent(inout) :: self
     class(system_t), intent(inout) :: system
     integer, intent(in) :: lane
+    real(wp), intent(inout) :: t
     real(wp), contiguous, intent(inout) :: y(:)
     logical, intent(out) :: found
 

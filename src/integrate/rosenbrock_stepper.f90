@@ -3,7 +3,7 @@ module nocdyn_rosenbrock_stepper
   use nocdyn_combinations, only: combination, combination_t, combine, set_offsets
   use nocdyn_kinds, only: wp
   use nocdyn_rosenbrock_tables, only: rosenbrock_table_t
-  use nocdyn_spectra, only: allocate_spectra, dominate, spectra_t
+  use nocdyn_spectra, only: allocate_spectra, dominate, restart_spectrum, spectra_t
   use nocdyn_stage_systems, only: allocate_stage_system, factor, renew_jacobian, solve, stage_system_t
   use nocdyn_stages, only: allocate_stages, estimate_error, expand, inner_state, set_weights, stages_t, update_state
   use nocdyn_stepper, only: stepper_t
@@ -38,6 +38,7 @@ module nocdyn_rosenbrock_stepper
     procedure :: interpolate
     procedure :: accept
     procedure :: stiffness
+    procedure :: forget
   end type rosenbrock_stepper_t
 
 contains
@@ -178,6 +179,17 @@ contains
     self%no_slope(:) = self%no_slope .or. accepted
     self%no_jacobian(:) = self%no_jacobian .or. accepted
   end subroutine accept
+
+  !> Forgets the spectra of lanes that start.
+  pure subroutine forget(self, starting)
+    class(rosenbrock_stepper_t), intent(inout) :: self
+    logical, intent(in) :: starting(:)
+    integer :: lane
+
+    do lane = 1, size(starting)
+      if (starting(lane)) call restart_spectrum(self%spectra, lane)
+    end do
+  end subroutine forget
 
   !> |h lambda| of the dominant eigenvalue of the Jacobian at the start of the step.
   function stiffness(self, trial, lane) result(ratio)

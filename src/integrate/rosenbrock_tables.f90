@@ -28,7 +28,7 @@ module nocdyn_rosenbrock_tables
 
 contains
 
-  !> RODAS: order 4(3), stiffly accurate, L-stable, with a dense output of order 3.
+  !> RODAS, of order 4(3), stiffly accurate, L-stable, with a dense output of order 3.
   function rodas4() result(table)
     type(rosenbrock_table_t) :: table
 
@@ -75,7 +75,7 @@ contains
     dense(:, 3) = -s
   end function rodas_dense
 
-  !> RODAS5P: order 5(4), stiffly accurate, L-stable, with a dense output of order 4; no loss of order on stiff problems of
+  !> RODAS5P, of order 5(4), stiffly accurate, L-stable, with a dense output of order 4; no loss of order on stiff problems of
   !> Prothero and Robinson's kind.
   function rodas5p() result(table)
     type(rosenbrock_table_t) :: table

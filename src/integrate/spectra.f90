@@ -5,7 +5,7 @@ module nocdyn_spectra
   implicit none (type, external)
   private
 
-  public :: allocate_spectra, dominate
+  public :: allocate_spectra, restart_spectrum, dominate
 
   !> A power iteration that goes on from step to step.
   type, public :: spectra_t
@@ -32,11 +32,22 @@ contains
     spectra%column(:) = pattern%column(spectra%position)
     allocate (spectra%image(system%states), spectra%vector(system%states, system%lanes), source=0.0_wp)
     do lane = 1, system%lanes
-      do i = 1, system%states
-        spectra%vector(i, lane) = (1 + 0.5_wp * mod(i, 3)) / sqrt(real(system%states, wp))
-      end do
+      call restart_spectrum(spectra, lane)
     end do
   end subroutine allocate_spectra
+
+  !> Forgets what has been found in a lane.
+  pure subroutine restart_spectrum(spectra, lane)
+    type(spectra_t), intent(inout) :: spectra
+    integer, intent(in) :: lane
+    integer :: i
+
+    associate (states => size(spectra%vector, 1))
+      do i = 1, states
+        spectra%vector(i, lane) = (1 + 0.5_wp * mod(i, 3)) / sqrt(real(states, wp))
+      end do
+    end associate
+  end subroutine restart_spectrum
 
   !> Size of the dominant eigenvalue, by two steps of the iteration: the mean growth over both also measures a pair of
   !> conjugate eigenvalues.

@@ -14,7 +14,7 @@ module nocdyn_reduced_jacobian
 
   public :: new_reduced_jacobian
 
-  !> Values: the block dq''/dq', dq''/dq with the same pattern, the ones of dq/dt = q', then dW'/dq' and dW'/dq of each
+  !> The values are the block dq''/dq', dq''/dq with the same pattern, the ones of dq/dt = q', then dW'/dq' and dW'/dq of each
   !> entry of an accounted element, in turn.
   type, public :: reduced_jacobian_t
     type(pattern_t) :: pattern
