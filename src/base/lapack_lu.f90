@@ -55,7 +55,7 @@ contains
     else
       call dgetrf(n, n, matrix, n, pivots, info)
     end if
-    if (info < 0) error stop 'nocdyn_lapack_lu: dgetrf refused an argument'
+    if (info < 0) error stop 'nocdyn_lapack_lu: dgetrf or dgetf2 refused an argument'
     singular = info > 0
   end subroutine lu_factor
 

@@ -5,7 +5,7 @@
 !> never reads another lane's numbers.
 !>
 !> The last `quadratures` components of a state are pure integrals: nothing depends on them, and they do not take
-!> part in error control. An integrator solves linear systems only for the first `states` components.
+!> part in error control (a system of nothing else has none). An integrator solves linear systems only for the first `states` components.
 !>
 !> The Jacobian is a list of values at the positions that `jacobian_pattern` names once, before the integration: all
 !> of them column by column unless a system knows better.
@@ -125,7 +125,7 @@ contains
     real(wp), contiguous, intent(in) :: y(:)   !! [states + quadratures]
   end subroutine record
 
-  !> Asked after every step: true ends the integration of all lanes.
+  !> Asked after every attempted step while a lane is running: true ends the integration of all lanes.
   function stops(self, t)
     class(observer_t), intent(inout) :: self
     real(wp), intent(in) :: t   !! time reached by the slowest lane

@@ -90,7 +90,7 @@ contains
     logical, intent(in) :: starting(:)
 
     call self%explicit%begin(trial, starting)
-    call self%implicit%forget(starting)
+    call self%implicit%forget(starting)   ! its slopes and Jacobians are renewed when the lane switches
     where (starting)
       self%is_implicit = .false.
       self%hits = 0
@@ -109,7 +109,7 @@ contains
       trial%error_order(lane) = merge(self%implicit%error_order, self%explicit%error_order, self%is_implicit(lane))
       trial%most_growth(lane) = merge(self%implicit%most_growth, self%explicit%most_growth, self%is_implicit(lane))
     end do
-    if (.not. any(self%is_implicit)) then
+    if (.not. any(self%is_implicit .and. trial%working)) then
       call self%explicit%attempt(system, trial)
     else if (all(self%is_implicit .or. .not. trial%working)) then
       call self%implicit%attempt(system, trial)
@@ -230,6 +230,7 @@ contains
     self%is_implicit(:) = self%is_implicit .neqv. self%mask
     call self%explicit%renew(self%mask)
     call self%implicit%accept(self%mask)
+    call self%implicit%forget(self%mask)
   end subroutine accept
 
   !> Counts what an accepted step says about the stiffness of its lane.

@@ -5,6 +5,7 @@
 !> the start, or stays zero for a while, makes none by that.
 module nocdyn_events
   use nocdyn_dense_output, only: dense_output_t, sample
+  use nocdyn_finite, only: is_finite
   use nocdyn_kinds, only: wp
   use nocdyn_system, only: event_falling, event_rising, observer_t
   use nocdyn_trial, only: trial_t
@@ -72,8 +73,9 @@ contains
     events%g_before(:) = events%last(dense%lane, :)
     do part = 1, parts
       theta = real(part, wp) / parts
-      call evaluate(events, observer, dense, theta, events%g)
+      call evaluate(observer, dense, theta, events%y, events%g)
       do function = 1, size(events%g)
+        if (.not. is_finite(events%g(function))) cycle
         if (is_event(events%side(dense%lane, function), events%g(function), events%directions(function))) then
           call find_root(events, observer, dense, function, theta - 1.0_wp / parts, theta, root)
           call insert(events, function, root)
@@ -102,15 +104,15 @@ contains
   end function is_event
 
   !> The event functions at a place in the step.
-  subroutine evaluate(events, observer, dense, theta, g)
-    type(events_t), intent(inout) :: events
+  subroutine evaluate(observer, dense, theta, y, g)
     class(observer_t), intent(inout) :: observer
     type(dense_output_t), intent(inout) :: dense
     real(wp), intent(in) :: theta
+    real(wp), contiguous, intent(inout) :: y(:)   !! the state there
     real(wp), contiguous, intent(inout) :: g(:)
 
-    call sample(dense, theta, events%y)
-    call observer%event_values(dense%lane, dense%t + theta * dense%h, events%y, g)
+    call sample(dense, theta, y)
+    call observer%event_values(dense%lane, dense%t + theta * dense%h, y, g)
   end subroutine evaluate
 
   !> Root of one function between the places `before` and `after`, to the spacing of the times there: the place where it is
@@ -133,7 +135,7 @@ contains
     fraction = 0.5_wp
     do while (abs(ga) > 0 .and. abs(b - a) > 2 * tolerance)
       x = a + fraction * (b - a)
-      call evaluate(events, observer, dense, x, events%g_root)
+      call evaluate(observer, dense, x, events%y, events%g_root)
       if (sign_of(events%g_root(function)) == sign_of(ga)) then
         c = a
         gc = ga

@@ -78,7 +78,7 @@ contains
     type(trial_t), intent(inout) :: trial
     integer :: stage, last
 
-    if (any(self%moved)) call renew_first_stage(self, system, trial)
+    if (any(self%moved .and. trial%working)) call renew_first_stage(self, system, trial)
     last = merge(self%stages%step - 1, self%stages%step, self%first_same_as_last)
     do stage = 2, last
       if (.not. any(trial%working)) exit

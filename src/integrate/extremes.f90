@@ -95,44 +95,46 @@ contains
       call observer%tracked_values(dense%lane, t, extremes%y, extremes%values(:, i))
     end do
     extremes%last(:, dense%lane) = extremes%values(:, last)
-    call widen(extremes, extremes%ranges(dense%lane), dense%t, t_end)
+    call widen(last, extremes%places, extremes%to_powers, extremes%values, extremes%ranges(dense%lane), dense%t, t_end)
   end subroutine follow_extremes
 
-  !> Widens the ranges by the polynomials through `values`, over the times from t_start to t_end.
-  pure subroutine widen(extremes, ranges, t_start, t_end)
-    type(extremes_t), intent(in) :: extremes
+  !> Widens the ranges by the polynomials through `values_of`, over the times from t_start to t_end.
+  pure subroutine widen(n, places, to_powers, values_of, ranges, t_start, t_end)
+    integer, intent(in) :: n   !! places
+    real(wp), intent(in) :: places(n), to_powers(n, n)
+    real(wp), contiguous, intent(in) :: values_of(:, :)   !! [functions, places]
     type(ranges_t), intent(inout) :: ranges
     real(wp), intent(in) :: t_start, t_end
     real(wp) :: values(most_places), lowest, highest, margin
-    integer :: function, places
+    integer :: function
 
-    places = size(extremes%places)
-    do function = 1, size(extremes%values, 1)
-      values(:places) = extremes%values(function, :)
-      lowest = minval(values(:places))
-      highest = maxval(values(:places))
+    do function = 1, size(values_of, 1)
+      values(:n) = values_of(function, :)
+      lowest = minval(values(:n))
+      highest = maxval(values(:n))
       margin = overshoot * (highest - lowest)
       if (highest + margin > ranges%highest(function)) then
-        call raise(extremes, values, t_start, t_end, ranges%highest(function), ranges%highest_time(function))
+        call raise(n, places, to_powers, values, t_start, t_end, ranges%highest(function), ranges%highest_time(function))
       end if
       if (lowest - margin < ranges%lowest(function)) then
-        values(:places) = -values(:places)
+        values(:n) = -values(:n)
         ranges%lowest(function) = -ranges%lowest(function)
-        call raise(extremes, values, t_start, t_end, ranges%lowest(function), ranges%lowest_time(function))
+        call raise(n, places, to_powers, values, t_start, t_end, ranges%lowest(function), ranges%lowest_time(function))
         ranges%lowest(function) = -ranges%lowest(function)
       end if
     end do
   end subroutine widen
 
   !> Raises `highest` to the largest value of the polynomial through `values`, if that is larger.
-  pure subroutine raise(extremes, values, t_start, t_end, highest, time)
-    type(extremes_t), intent(in) :: extremes
+  pure subroutine raise(n, places, to_powers, values, t_start, t_end, highest, time)
+    integer, intent(in) :: n
+    real(wp), intent(in) :: places(n), to_powers(n, n)
     real(wp), intent(in) :: values(most_places)
     real(wp), intent(in) :: t_start, t_end
     real(wp), intent(inout) :: highest, time
     real(wp) :: place, peak
 
-    call find_peak(size(extremes%places), extremes%places, extremes%to_powers, values, place, peak)
+    call find_peak(n, places, to_powers, values, place, peak)
     if (peak <= highest) return
     highest = peak
     time = t_start + 0.5_wp * (1 + place) * (t_end - t_start)

@@ -90,9 +90,18 @@ contains
     class(observer_t), intent(inout) :: observer
     type(outcome_t), intent(inout) :: outcome
 
-    if (.not. any(outcome%status == integration_running)) return
-    if (.not. observer%stops(minval(march%trial%t, mask=outcome%status == integration_running))) return
-    where (outcome%status == integration_running) outcome%status = integration_interrupted
+    real(wp) :: slowest
+    integer :: lane
+
+    slowest = huge(slowest)
+    do lane = 1, size(outcome%status)
+      if (outcome%status(lane) == integration_running) slowest = min(slowest, march%trial%t(lane))
+    end do
+    if (slowest >= huge(slowest)) return
+    if (.not. observer%stops(slowest)) return
+    do lane = 1, size(outcome%status)
+      if (outcome%status(lane) == integration_running) outcome%status(lane) = integration_interrupted
+    end do
   end subroutine interrupt_if_asked
 
 end module nocdyn_integration

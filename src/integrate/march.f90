@@ -29,12 +29,13 @@ module nocdyn_march
     integer :: max_steps
     logical :: has_events = .false.
     logical :: has_extremes = .false.
+    logical :: is_exhausted = .false.                !! the queue has no variant left
     logical, allocatable :: occupied(:)              !! lanes that hold a variant
     logical, allocatable :: starting(:)              !! lanes that have just been given one
     logical, allocatable :: accepted(:)              !! lanes whose last attempt was accepted
     logical, allocatable :: wanted(:)                !! lanes whose solution inside the last step is wanted
     real(wp), allocatable :: t_new(:)                !! end of the last attempt of each lane
-    integer, allocatable :: next(:)                  !! first requested time of each lane that is not recorded yet
+    integer, allocatable :: next(:)                  !! number of the first requested time of each lane that is not recorded yet
     real(wp), allocatable :: sample(:)               !! one lane's state at a requested time
     real(wp), allocatable :: coefficients(:, :, :)   !! of the solution inside the last step
   end type march_t
@@ -52,6 +53,7 @@ contains
 
     call stepper%prepare(system)
     call allocate_trial(march%trial, system)
+    march%trial%t(:) = times(1)
     march%trial%error_order(:) = stepper%error_order
     march%trial%most_growth(:) = stepper%most_growth
     march%trial%has_coarse_deviation = stepper%has_coarse_error
@@ -85,12 +87,14 @@ contains
     real(wp) :: t
     integer :: lane
 
+    if (march%is_exhausted .or. all(march%occupied)) return
     do lane = 1, size(march%occupied)
       march%starting(lane) = .false.
-      if (march%occupied(lane)) cycle
+      if (march%occupied(lane) .or. march%is_exhausted) cycle
       t = times(1)
       call queue%next(system, lane, t, march%sample, march%starting(lane))
       march%occupied(lane) = march%starting(lane)
+      march%is_exhausted = .not. march%starting(lane)
       if (march%starting(lane)) call place_start(march, lane, t, times, outcome)
     end do
     if (any(march%starting)) call start_lanes(march, stepper, system, times, observer, outcome)
@@ -186,7 +190,7 @@ contains
     do lane = 1, march%trial%lanes
       march%accepted(lane) = march%trial%working(lane) .and. is_within(march%control%mean_square(lane))
       march%wanted(lane) = march%accepted(lane) &
-                           .and. (march%has_events .or. march%has_extremes .or. times(march%next(lane)) < march%t_new(lane))
+                           .and. (march%has_events .or. march%has_extremes .or. next_time(march, lane, times) < march%t_new(lane))
     end do
     if (any(march%wanted)) call stepper%interpolate(system, march%trial, march%wanted, march%coefficients)
     do lane = 1, march%trial%lanes
@@ -247,7 +251,7 @@ contains
       if (.not. march%accepted(lane)) cycle
       if (march%wanted(lane)) call take_lane(march%dense, march%trial, march%coefficients, lane)
       if (march%has_events) call pass_events(march, lane, times, observer, outcome)
-      if (times(march%next(lane)) <= march%t_new(lane)) call record_until(march, lane, march%t_new(lane), times, observer)
+      call record_until(march, lane, march%t_new(lane), times, observer)
       if (march%has_extremes) call follow_extremes(march%extremes, observer, march%dense, march%t_new(lane))
     end do
   end subroutine follow_lanes
@@ -277,6 +281,16 @@ contains
     end do
   end subroutine pass_events
 
+  !> First requested time of a lane that is not recorded yet; never, if there is none.
+  pure real(wp) function next_time(march, lane, times)
+    type(march_t), intent(in) :: march
+    integer, intent(in) :: lane
+    real(wp), contiguous, intent(in) :: times(:)
+
+    next_time = huge(next_time)
+    if (march%next(lane) <= size(times)) next_time = times(march%next(lane))
+  end function next_time
+
   !> Records the requested times up to t that have not been recorded yet.
   subroutine record_until(march, lane, t, times, observer)
     type(march_t), intent(inout) :: march
@@ -288,7 +302,8 @@ contains
     integer :: next
 
     next = march%next(lane)
-    do while (times(next) <= t)
+    do while (next <= size(times))
+      if (times(next) > t) exit
       if (times(next) < march%t_new(lane)) then
         theta = (times(next) - march%dense%t) / march%dense%h
         call sample(march%dense, theta, march%sample)
@@ -296,7 +311,6 @@ contains
         march%sample(:) = march%trial%y_new(lane, :march%trial%components)
       end if
       call observer%record(lane, times(next), march%sample)
-      if (next == size(times)) exit
       next = next + 1
     end do
     march%next(lane) = next
@@ -338,7 +352,7 @@ contains
       outcome%evaluations(lane) = march%trial%evaluations(lane)
       outcome%jacobians(lane) = march%trial%jacobians(lane)
       outcome%factorisations(lane) = march%trial%factorisations(lane)
-      if (march%has_extremes) call observer%take_ranges(lane, march%extremes%ranges(lane))
+      if (march%has_extremes .and. outcome%steps(lane) > 0) call observer%take_ranges(lane, march%extremes%ranges(lane))
       march%sample(:) = march%trial%y(lane, :march%trial%components)
       call queue%finish(lane, march%sample, outcome)
     end do

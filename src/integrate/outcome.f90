@@ -17,6 +17,8 @@ module nocdyn_outcome
   integer, parameter, public :: integration_interrupted = 5  !! by the observer
   integer, parameter, public :: integration_stopped = 6      !! by a terminal event
 
+  integer, parameter, public :: integration_idle = 7         !! the lane has not been given anything
+
   integer, parameter, public :: most_switches = 32           !! whose times are kept
 
   !> Every array has one element per lane.
@@ -41,12 +43,12 @@ module nocdyn_outcome
 
 contains
 
-  !> Every lane is running and nothing has been counted.
+  !> No lane has been given anything.
   pure subroutine allocate_outcome(outcome, lanes)
     type(outcome_t), intent(out) :: outcome
     integer, intent(in) :: lanes
 
-    allocate (outcome%status(lanes), source=integration_running)
+    allocate (outcome%status(lanes), source=integration_idle)
     allocate (outcome%t(lanes), outcome%h(lanes), source=0.0_wp)
     allocate (outcome%component(lanes), outcome%steps(lanes), outcome%accepted(lanes), outcome%rejected(lanes), &
               outcome%evaluations(lanes), outcome%jacobians(lanes), outcome%factorisations(lanes), &
@@ -61,12 +63,15 @@ contains
     integer, intent(in) :: lane
 
     outcome%status(lane) = integration_running
+    outcome%h(lane) = 0.0_wp
     outcome%component(lane) = 0
     outcome%steps(lane) = 0
     outcome%accepted(lane) = 0
     outcome%rejected(lane) = 0
     outcome%implicit_steps(lane) = 0
     outcome%switches(lane) = 0
+    outcome%switch_times(:, lane) = 0.0_wp
+    outcome%implicit(lane) = .false.
   end subroutine reset_outcome
 
   !> Counts an accepted step, and a switch if its method is of the other kind than that of the step before.
@@ -109,6 +114,8 @@ contains
       sentence = not_finite_sentence(outcome, lane, system, when)
     case (integration_gave_up)
       sentence = gave_up_sentence(outcome%steps(lane) == 0, when)
+    case (integration_idle)
+      sentence = 'nothing has been integrated'
     case (integration_stopped)
       sentence = 'the integration was ended by an event at ' // when
     case (integration_interrupted)

@@ -28,7 +28,8 @@ module nocdyn_plain_system
 
   end interface
 
-  !> Without a Jacobian of its own it takes differences, as Hairer's RODAS does: one evaluation of f for each state.
+  !> Without a Jacobian of its own it takes differences, as Hairer's RODAS does: one evaluation of f for each state and two
+  !> more, which are not counted in the outcome.
   type, extends(system_t), public :: plain_system_t
     procedure(plain_derivative_interface), pointer, nopass :: f => null()
     procedure(plain_jacobian_interface), pointer, nopass :: f_jacobian => null()
@@ -107,7 +108,7 @@ contains
 
   elemental real(wp) function step_of(x)
     real(wp), intent(in) :: x
-    real(wp), parameter :: smallest = 1.0e-5_wp   !! of the sizes that the step is taken relative to
+    real(wp), parameter :: smallest = 1.0e-5_wp   !! size that any smaller one is taken for
 
     step_of = sqrt(epsilon(x) * max(smallest, abs(x)))
   end function step_of

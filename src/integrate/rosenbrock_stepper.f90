@@ -27,7 +27,7 @@ module nocdyn_rosenbrock_stepper
     real(wp), allocatable :: y_stage(:, :)
     real(wp), allocatable :: f(:, :)
     real(wp), allocatable :: r(:, :)                  !! right-hand side of the stage
-    real(wp), allocatable :: one(:, :)                !! ones, shape [lanes, components]
+    real(wp), allocatable :: one(:, :)                !! ones, shape [lanes, padded columns]
     real(wp), allocatable :: slope(:, :)              !! f(t, y) at the start of the step
     logical, allocatable :: no_slope(:)               !! lanes that moved since it was evaluated
     logical, allocatable :: no_jacobian(:)            !! lanes that moved since the Jacobian was evaluated
@@ -123,11 +123,11 @@ contains
     type(trial_t), intent(inout) :: trial
     integer :: lane
 
-    if (any(self%no_slope)) then
+    if (any(self%no_slope .and. trial%working)) then
       call evaluate_start(trial, system, self%no_slope, self%slope)
       self%no_slope(:) = self%no_slope .and. .not. trial%working
     end if
-    if (any(self%no_jacobian)) then
+    if (any(self%no_jacobian .and. trial%working)) then
       do lane = 1, trial%lanes
         if (self%no_jacobian(lane) .and. trial%working(lane)) trial%jacobians(lane) = trial%jacobians(lane) + 1
       end do
@@ -180,7 +180,7 @@ contains
     self%no_jacobian(:) = self%no_jacobian .or. accepted
   end subroutine accept
 
-  !> Forgets the spectra of lanes that start.
+  !> Forgets the spectra of lanes that start or begin to take these steps.
   pure subroutine forget(self, starting)
     class(rosenbrock_stepper_t), intent(inout) :: self
     logical, intent(in) :: starting(:)

@@ -4,7 +4,7 @@ module nocdyn_solve
   use nocdyn_integration, only: integrate
   use nocdyn_integration_settings, only: integration_settings_t
   use nocdyn_kinds, only: wp
-  use nocdyn_outcome, only: failure_sentence, integration_done, integration_stopped, outcome_t
+  use nocdyn_outcome, only: failure_sentence, integration_done, outcome_t
   use nocdyn_sampler, only: sampler, sampler_t
   use nocdyn_system, only: system_t
   implicit none (type, external)
@@ -32,7 +32,7 @@ contains
     call integrate(system, settings, times, state, samples, outcome, error)
     if (allocated(error)) return
     y(:, :samples%count(1)) = samples%y(:, :samples%count(1), 1)
-    if (outcome%status(1) == integration_done .or. outcome%status(1) == integration_stopped) return
+    if (outcome%status(1) == integration_done) return
     call raise(error, exit_failed, failure_sentence(outcome, 1, system, settings%rtol, settings%atol))
   end subroutine solve
 

@@ -7,12 +7,15 @@ module nocdyn_spectra
 
   public :: allocate_spectra, restart_spectrum, dominate
 
+  real(wp), parameter :: freshness = 1.0e-3_wp   !! of the start in the vector: another eigenvalue may come to dominate
+
   !> A power iteration that goes on from step to step.
   type, public :: spectra_t
     integer, allocatable, private :: position(:)   !! of the Jacobian's entries in the rows of states
     integer, allocatable, private :: row(:)
     integer, allocatable, private :: column(:)
     real(wp), allocatable, private :: vector(:, :) !! of unit length, shape [states, lanes]
+    real(wp), allocatable, private :: start(:)     !! of every iteration, of unit length, shape [states]
     real(wp), allocatable, private :: image(:)     !! shape [states]
   end type spectra_t
 
@@ -31,6 +34,9 @@ contains
     spectra%row(:) = pattern%row(spectra%position)   ! gfortran 12 counts from 0 with `source=` here
     spectra%column(:) = pattern%column(spectra%position)
     allocate (spectra%image(system%states), spectra%vector(system%states, system%lanes), source=0.0_wp)
+    allocate (spectra%start(system%states))
+    spectra%start(:) = [(1 + 0.5_wp * mod(i, 3), i=1, system%states)]
+    spectra%start(:) = spectra%start / max(norm2(spectra%start), tiny(1.0_wp))
     do lane = 1, system%lanes
       call restart_spectrum(spectra, lane)
     end do
@@ -40,13 +46,8 @@ contains
   pure subroutine restart_spectrum(spectra, lane)
     type(spectra_t), intent(inout) :: spectra
     integer, intent(in) :: lane
-    integer :: i
 
-    associate (states => size(spectra%vector, 1))
-      do i = 1, states
-        spectra%vector(i, lane) = (1 + 0.5_wp * mod(i, 3)) / sqrt(real(states, wp))
-      end do
-    end associate
+    spectra%vector(:, lane) = spectra%start
   end subroutine restart_spectrum
 
   !> Size of the dominant eigenvalue, by two steps of the iteration: the mean growth over both also measures a pair of
@@ -56,23 +57,27 @@ contains
     integer, intent(in) :: lane
     real(wp), contiguous, intent(in) :: dfdy(:, :)   !! shape [lanes, positions]
     real(wp), intent(out) :: size_of_eigenvalue
-    real(wp) :: growth(2), length
+    real(wp) :: growth(2)
     integer :: i
 
     growth(:) = 0.0_wp
-    length = norm2(spectra%vector(:, lane))
     do i = 1, 2
-      call multiply(spectra, dfdy, lane, spectra%vector(:, lane), spectra%image)
-      growth(i) = norm2(spectra%image) / length
-      length = 1.0_wp
+      call multiply(spectra%position, spectra%row, spectra%column, dfdy, lane, spectra%vector(:, lane), spectra%image)
+      growth(i) = norm2(spectra%image)
       if (.not. growth(i) > 0) exit
-      spectra%vector(:, lane) = spectra%image / norm2(spectra%image)
+      spectra%vector(:, lane) = spectra%image / growth(i)
     end do
     size_of_eigenvalue = sqrt(growth(1) * growth(2))
+    if (growth(2) > 0) then
+      spectra%vector(:, lane) = spectra%vector(:, lane) + freshness * spectra%start
+      spectra%vector(:, lane) = spectra%vector(:, lane) / norm2(spectra%vector(:, lane))
+    else
+      spectra%vector(:, lane) = spectra%start
+    end if
   end subroutine dominate
 
-  pure subroutine multiply(spectra, dfdy, lane, vector, image)
-    type(spectra_t), intent(in) :: spectra
+  pure subroutine multiply(position, row, column, dfdy, lane, vector, image)
+    integer, intent(in) :: position(:), row(:), column(:)
     real(wp), contiguous, intent(in) :: dfdy(:, :)
     integer, intent(in) :: lane
     real(wp), contiguous, intent(in) :: vector(:)
@@ -80,10 +85,8 @@ contains
     integer :: i
 
     image(:) = 0.0_wp
-    do i = 1, size(spectra%position)
-      associate (row => spectra%row(i))
-        image(row) = image(row) + dfdy(lane, spectra%position(i)) * vector(spectra%column(i))
-      end associate
+    do i = 1, size(position)
+      image(row(i)) = image(row(i)) + dfdy(lane, position(i)) * vector(column(i))
     end do
   end subroutine multiply
 

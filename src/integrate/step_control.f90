@@ -74,7 +74,7 @@ contains
     real(wp), intent(out) :: h
 
     h = max(min(control%h(lane), control%longest), smallest_step(t))
-    control%reaches_end(lane) = t + end_stretch * h >= control%t_end
+    control%reaches_end(lane) = t + end_stretch * h >= control%t_end .and. control%t_end - t <= control%longest
     if (control%reaches_end(lane)) h = control%t_end - t
   end subroutine propose
 

@@ -28,7 +28,7 @@ module nocdyn_trial
     real(wp), allocatable :: y_new(:, :)           !! state at t + h
     real(wp), allocatable :: deviation(:, :)       !! y_new minus the embedded solution
     real(wp), allocatable :: coarse_deviation(:, :)   !! the same of a coarser one, for methods with two estimates
-    real(wp), allocatable :: slope(:, :)           !! f(t, y) where the integration started
+    real(wp), allocatable :: slope(:, :)           !! f(t, y) when a lane was last started
     logical, allocatable :: working(:)             !! lanes that take part and have not failed
     logical :: has_coarse_deviation = .false.
     real(wp), allocatable :: scratch(:)            !! work space, shape [lanes]
@@ -50,7 +50,6 @@ contains
   subroutine allocate_trial(trial, system)
     type(trial_t), intent(out) :: trial
     class(system_t), intent(in) :: system
-
     integer :: columns
 
     associate (lanes => system%lanes, components => system%states + system%quadratures)

@@ -9,6 +9,7 @@ module nocdyn_relaxation
 
   type, extends(system_t), public :: relaxation_t
     real(wp), allocatable :: mu(:)
+    integer :: jacobians_made = 0   !! calls of `jacobian`
   contains
     procedure :: derivative
     procedure :: jacobian
@@ -44,6 +45,7 @@ contains
     real(wp), intent(inout) :: dfdt(self%lanes, self%states + self%quadratures)
     integer, intent(inout) :: status(self%lanes)
 
+    self%jacobians_made = self%jacobians_made + 1
     dfdy(:, 1) = 0.0_wp
     dfdy(:, 2) = -2 * self%mu * y(:, 1) * y(:, 2) - 1
     dfdy(:, 3) = 1.0_wp
