@@ -3,7 +3,7 @@ module nocdyn_machine_report
   use nocdyn_bank, only: role_names
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
-  use nocdyn_text, only: joined, quoted, rounded_text, string_t, to_text
+  use nocdyn_text, only: append, joined, quoted, rounded_text, selected, string_t, to_text
   use nocdyn_text_buffer, only: text_buffer_t
   implicit none (type, external)
   private
@@ -17,7 +17,7 @@ contains
     type(machine_t), intent(in) :: machine
     type(string_t), allocatable :: names(:)
 
-    names = machine%names(machine%coordinates%body)
+    allocate (names, source=selected(machine%names, machine%coordinates%body))
   end function coordinate_names
 
   !> One sentence for every redundant gear.
@@ -30,9 +30,9 @@ contains
     do g = 1, size(machine%groups)
       do r = 1, size(machine%groups(g)%redundancies)
         associate (redundancy => machine%groups(g)%redundancies(r), names => machine%constraints%names)
-          notes = [notes, string_t('gear ' // quoted(names(redundancy%row)%text) // ' only repeats ' // &
-                                   joined(names(redundancy%repeats), ', ') // '; their reactions are not unique, ' // &
-                                   'and those of smallest norm are reported')]
+          call append(notes, 'gear ' // quoted(names(redundancy%row)%text) // ' only repeats ' // &
+                             joined(selected(names, redundancy%repeats), ', ') // '; their reactions are not unique, ' // &
+                             'and those of smallest norm are reported')
         end associate
       end do
     end do

@@ -5,6 +5,7 @@ module nocdyn_matrix_report
   use nocdyn_kinds, only: wp
   use nocdyn_lapack_lu, only: lu_factor, lu_solve
   use nocdyn_machine, only: machine_t
+  use nocdyn_machine_report, only: coordinate_names
   use nocdyn_paper_matrices, only: constrained_inertia, constrained_matrix, constrained_vector, damping_2, damping_3, &
                                    damping_matrix, elastic_moments, elastic_rates, inertia_2, inertia_3, inertia_matrix, &
                                    stacked_2, stacked_3, stiffness_2, stiffness_3, stiffness_matrix, tangent_matrix, &
@@ -45,7 +46,7 @@ contains
     equations%n = machine%bodies
     call place(equations%machine, t_start)
     call equations%report%append_line('Bodies 1 to ' // to_text(machine%bodies) // ': ' // joined(machine%names, ', '))
-    call equations%report%append_line('Coordinates: ' // joined(machine%names(machine%coordinates%body), ', '))
+    call equations%report%append_line('Coordinates: ' // joined(coordinate_names(machine), ', '))
     call equations%report%append_line('At the start: t = ' // rounded_text(t_start, digits) // ' s')
     call report_free_bodies(equations)
     call report_constraints(equations)

@@ -7,12 +7,12 @@ module nocdyn_run_summary
   use nocdyn_machine_report, only: coordinate_names
   use nocdyn_outcome, only: most_switches, outcome_t
   use nocdyn_system, only: ranges_t
-  use nocdyn_text, only: rounded_text, string_t
+  use nocdyn_text, only: append, rounded_text, string_t
   use nocdyn_version, only: compiler_text, version
   implicit none (type, external)
   private
 
-  public :: start_extremes, update_extremes, widen_extremes, audit_note, summary_json
+  public :: start_extremes, update_extremes, widen_extremes, audit_energy, summary_json
 
   !> A note is made of an energy residual above this share of the energy turned over: the motion is then not to be trusted.
   real(wp), parameter :: audit_limit = 0.01_wp
@@ -93,21 +93,20 @@ contains
     extremes%are_continuous = .true.
   end subroutine widen_extremes
 
-  !> A sentence if the energy audit does not close, else nothing. The last five columns are the energies, the residual last.
-  function audit_note(extremes) result(note)
+  !> Adds a note if the energy audit does not close. The last five columns are the energies, the residual last.
+  subroutine audit_energy(extremes, notes)
     type(extremes_t), intent(in) :: extremes
-    type(string_t), allocatable :: note(:)
+    type(string_t), allocatable, intent(inout) :: notes(:)
     real(wp) :: residual, turned_over
     integer :: columns
 
-    allocate (note(0))
     columns = size(extremes%last)
     residual = max(abs(extremes%lowest(columns)), abs(extremes%highest(columns)))
     turned_over = maxval(max(abs(extremes%lowest(columns - 4:columns - 1)), abs(extremes%highest(columns - 4:columns - 1))))
     if (extremes%rows == 0 .or. residual <= audit_limit * turned_over) return
-    note = [string_t('the energy does not add up: energy_residual reaches ' // rounded_text(residual, 3) // &
-                     ' J where at most ' // rounded_text(turned_over, 3) // ' J were turned over; tighten rtol and atol')]
-  end function audit_note
+    call append(notes, 'the energy does not add up: energy_residual reaches ' // rounded_text(residual, 3) // &
+                       ' J where at most ' // rounded_text(turned_over, 3) // ' J were turned over; tighten rtol and atol')
+  end subroutine audit_energy
 
   !> The text of summary.json; `input` and `machine` are those of the run.
   function summary_json(input, machine, summary) result(text)

@@ -8,7 +8,7 @@ module nocdyn_size_limits
   use nocdyn_machine, only: machine_t
   use nocdyn_ordering, only: reverse_cuthill_mckee
   use nocdyn_pattern_entries, only: entries_t, state_entries
-  use nocdyn_text, only: quoted, string_t, to_text
+  use nocdyn_text, only: append, quoted, string_t, to_text
   implicit none (type, external)
   private
 
@@ -65,8 +65,8 @@ contains
            to_text(largest_matrix) // ' are allowed'
     if (method == 'auto') then
       method = 'rk853'
-      notes = [string_t('method = ' // quoted('auto') // ' takes explicit steps alone, those of ' // quoted(method) // &
-                        ': implicit ones need ' // need)]
+      call append(notes, 'method = ' // quoted('auto') // ' takes explicit steps alone, those of ' // quoted(method) // &
+                         ': implicit ones need ' // need)
     else
       allocate (indices, source=input%groups_named('run'))
       call raise(error, exit_input, input%place(indices(1), 'method') // ': method = ' // quoted(method) // ' needs ' // need // &

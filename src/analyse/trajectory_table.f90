@@ -4,7 +4,7 @@ module nocdyn_trajectory_table
   use nocdyn_formulation, only: formulation_t
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
-  use nocdyn_text, only: string_t
+  use nocdyn_text, only: string_t, strings
   implicit none (type, external)
   private
 
@@ -75,8 +75,8 @@ contains
       labels(next)%text = 'reaction_' // machine%constraints%names(i)%text // ' [' // machine%constraints%units(i)%text // ']'
       next = next + 1
     end do
-    labels(next:) = [string_t('kinetic_energy [J]'), string_t('elastic_energy [J]'), string_t('work_in [J]'), &
-                     string_t('work_out [J]'), string_t('energy_residual [J]')]
+    labels(next:) = strings([character(len=19) :: 'kinetic_energy [J]', 'elastic_energy [J]', 'work_in [J]', &
+                             'work_out [J]', 'energy_residual [J]'])
   end function column_labels
 
   subroutine label_bank(names, quantities, labels, next)

@@ -16,7 +16,7 @@ module nocdyn_transient
   use nocdyn_output_file, only: output_file_t
   use nocdyn_output_times, only: check_output_times, output_times
   use nocdyn_posix, only: is_interrupted, remove_file
-  use nocdyn_run_summary, only: audit_note, run_summary_t, start_extremes, summary_json, update_extremes, widen_extremes
+  use nocdyn_run_summary, only: audit_energy, run_summary_t, start_extremes, summary_json, update_extremes, widen_extremes
   use nocdyn_size_limits, only: check_size, choose_method
   use nocdyn_system, only: observer_t, ranges_t
   use nocdyn_text, only: string_t
@@ -155,7 +155,7 @@ contains
     type(run_summary_t), intent(inout) :: summary
 
     summary%outcome = outcome
-    summary%notes = [summary%notes, audit_note(summary%extremes)]
+    call audit_energy(summary%extremes, summary%notes)
     if (.not. allocated(error)) return
     summary%message = error%message
     summary%status = 'failed'

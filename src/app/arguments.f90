@@ -1,7 +1,7 @@
 !> The command line: command, files and options.
 module nocdyn_arguments
   use nocdyn_errors, only: error_t, exit_input, raise
-  use nocdyn_text, only: joined, nearest_word, quoted, string_t
+  use nocdyn_text, only: append, joined, nearest_word, quoted, string_t, strings
   implicit none (type, external)
   private
 
@@ -34,7 +34,7 @@ contains
   function command_names() result(names)
     type(string_t), allocatable :: names(:)
 
-    names = [string_t('run'), string_t('check'), string_t('matrices'), string_t('new'), string_t('help')]
+    allocate (names, source=strings([character(len=8) :: 'run', 'check', 'matrices', 'new', 'help']))
   end function command_names
 
   !> Takes the words apart; wrong usage is an error with exit code 2.
@@ -55,7 +55,7 @@ contains
       else if (takes_options .and. index(words(i)%text, '-') == 1 .and. len(words(i)%text) > 1) then
         call take_option(words, i, arguments, error)
       else
-        arguments%operands = [arguments%operands, words(i)]
+        call append(arguments%operands, words(i)%text)
       end if
       i = i + 1
     end do
@@ -81,8 +81,11 @@ contains
     case ('--version', '-V')
       arguments%command = 'version'
     case default
-      names = command_names()
-      if (index(arguments%command, '-') == 1) names = [names, string_t('--help'), string_t('--version')]
+      allocate (names, source=command_names())
+      if (index(arguments%command, '-') == 1) then
+        call append(names, '--help')
+        call append(names, '--version')
+      end if
       if (any([(names(i)%text == arguments%command, i=1, size(names))])) return
       call raise(error, exit_input, unknown_word(arguments%command, 'a command', names))
     end select
@@ -95,7 +98,6 @@ contains
     type(arguments_t), intent(inout) :: arguments
     type(error_t), allocatable, intent(out) :: error
     character(len=:), allocatable :: name, value
-    type(string_t), allocatable :: options(:)
     integer :: equals
 
     equals = index(words(i)%text // '=', '=')
@@ -120,8 +122,8 @@ contains
       call move_alloc(arguments%command, arguments%operands(1)%text)
       arguments%command = 'help'
     case default
-      options = [string_t('--out'), string_t('--set'), string_t('--quiet'), string_t('--help')]
-      call raise(error, exit_input, unknown_word(name, 'an option', options))
+      call raise(error, exit_input, unknown_word(name, 'an option', &
+                                                 strings([character(len=7) :: '--out', '--set', '--quiet', '--help'])))
     end select
   end subroutine take_option
 
@@ -134,7 +136,7 @@ contains
       call raise(error, exit_input, name // ' needs a value: ' // &
                  trim(merge('--out DIR       ', '--set PATH=VALUE', name == '--out')))
     else if (name == '--set') then
-      arguments%overrides = [arguments%overrides, string_t(value)]
+      call append(arguments%overrides, value)
     else if (allocated(arguments%out)) then
       call raise(error, exit_input, '--out is given twice')
     else

@@ -5,7 +5,8 @@
 !> never reads another lane's numbers.
 !>
 !> The last `quadratures` components of a state are pure integrals: nothing depends on them, and they do not take
-!> part in error control (a system of nothing else has none). An integrator solves linear systems only for the first `states` components.
+!> part in error control (a system of nothing else has none). An integrator solves linear systems only for the first
+!> `states` components.
 !>
 !> The Jacobian is a list of values at the positions that `jacobian_pattern` names once, before the integration: all
 !> of them column by column unless a system knows better.

@@ -5,11 +5,12 @@ module nocdyn_text
   implicit none (type, external)
   private
 
-  public :: to_text, rounded_text, write_number, lower_case, quoted, joined, nearest_word
+  public :: to_text, rounded_text, write_number, lower_case, quoted, joined, nearest_word, strings, append, selected
 
   integer, parameter, public :: number_width = 32   !! no number of `write_number` is longer
 
-  !> A text of any length, for arrays of texts.
+  !> A text of any length, for arrays of texts. gfortran 12 never frees the texts of an array constructor with `string_t(...)`
+  !> nor those of an argument with a vector subscript; `strings`, `append` and `selected` do without.
   type, public :: string_t
     character(len=:), allocatable :: text
   end type string_t
@@ -111,6 +112,46 @@ contains
       joined = joined // quoted(texts(i)%text)
     end do
   end function joined
+
+  !> The words without their trailing blanks.
+  pure function strings(words) result(list)
+    character(len=*), intent(in) :: words(:)
+    type(string_t), allocatable :: list(:)
+    integer :: i
+
+    allocate (list(size(words)))
+    do i = 1, size(words)
+      list(i)%text = trim(words(i))
+    end do
+  end function strings
+
+  !> The texts with these indices, in their order.
+  pure function selected(texts, indices) result(list)
+    type(string_t), intent(in) :: texts(:)
+    integer, intent(in) :: indices(:)
+    type(string_t), allocatable :: list(:)
+    integer :: i
+
+    allocate (list(size(indices)))
+    do i = 1, size(indices)
+      list(i)%text = texts(indices(i))%text
+    end do
+  end function selected
+
+  !> Lengthens the list by one text, kept as it is.
+  pure subroutine append(list, text)
+    type(string_t), allocatable, intent(inout) :: list(:)
+    character(len=*), intent(in) :: text
+    type(string_t), allocatable :: longer(:)
+    integer :: i
+
+    allocate (longer(size(list) + 1))
+    do i = 1, size(list)
+      call move_alloc(list(i)%text, longer(i)%text)
+    end do
+    longer(size(longer))%text = text
+    call move_alloc(longer, list)
+  end subroutine append
 
   !> Index of the candidate that `word` was probably meant to be, 0 if none is near.
   pure function nearest_word(word, candidates) result(nearest)

@@ -4,7 +4,7 @@
 !> checking, help, template and reference follow from the rows.
 module nocdyn_schema
   use nocdyn_kinds, only: wp
-  use nocdyn_text, only: string_t
+  use nocdyn_text, only: append, string_t
   implicit none (type, external)
   private
 
@@ -259,7 +259,7 @@ contains
     first = 1
     do while (len_trim(allowed%words(first:)) > 0)
       length = index(allowed%words(first:) // ' ', ' ') - 1
-      words = [words, string_t(allowed%words(first:first + length - 1))]
+      call append(words, allowed%words(first:first + length - 1))
       first = first + length + 1
       if (first > len(allowed%words)) exit
     end do

@@ -2,11 +2,11 @@
 module nocdyn_constraint_analysis
   use nocdyn_complement, only: natural_complement
   use nocdyn_constraints, only: constraints_t
-  use nocdyn_geared_groups, only: find_groups, geared_group_t, redundancy_t
+  use nocdyn_geared_groups, only: find_groups, geared_group_t
   use nocdyn_errors, only: error_t, exit_input, raise
   use nocdyn_kinds, only: wp
   use nocdyn_lapack, only: pivoted_rank, pseudo_inverse
-  use nocdyn_text, only: joined, quoted, rounded_text, string_t, to_text
+  use nocdyn_text, only: joined, quoted, rounded_text, selected, string_t, to_text
   implicit none (type, external)
   private
 
@@ -45,25 +45,31 @@ contains
   subroutine sift_rows(constraints, group)
     type(constraints_t), intent(in) :: constraints
     type(geared_group_t), intent(inout) :: group
+    integer, allocatable :: redundant(:)
     integer :: pivots(size(group%bodies))
     integer :: i, rank
 
-    allocate (group%redundancies(0))
     call pivoted_rank(paced_rows(constraints, group, group%rows), rank_tolerance, rank, pivots)
     if (rank == size(group%rows)) then
       group%kept = group%rows
+      allocate (group%redundancies(0))
       return
     end if
-    allocate (group%kept(0))
+    allocate (group%kept(0), redundant(0))
     do i = 1, size(group%rows)
       associate (row => group%rows(i))
         call pivoted_rank(paced_rows(constraints, group, [group%kept, row]), rank_tolerance, rank, pivots)
         if (rank > size(group%kept)) then
           group%kept = [group%kept, row]
         else
-          group%redundancies = [group%redundancies, redundancy_t(row, combination(constraints, group, row))]
+          redundant = [redundant, row]
         end if
       end associate
+    end do
+    allocate (group%redundancies(size(redundant)))
+    do i = 1, size(redundant)
+      group%redundancies(i)%row = redundant(i)
+      allocate (group%redundancies(i)%repeats, source=combination(constraints, group, redundant(i)))
     end do
   end subroutine sift_rows
 
@@ -88,7 +94,7 @@ contains
     matrix = unit_rows(constraints%block(1, rows, group%bodies) * spread(group%pace, 1, size(rows)))
   end function paced_rows
 
-  !> The kept rows that together say what `row` says.
+  !> The kept rows before `row` that together say what it says.
   function combination(constraints, group, row) result(rows)
     type(constraints_t), intent(in) :: constraints
     type(geared_group_t), intent(in) :: group
@@ -97,7 +103,7 @@ contains
     real(wp) :: wanted(1, size(group%bodies))
 
     wanted = paced_rows(constraints, group, [row])
-    rows = contributing_rows(constraints, group, group%kept, wanted(1, :))
+    rows = contributing_rows(constraints, group, pack(group%kept, group%kept < row), wanted(1, :))
   end function combination
 
   !> The rows with a share in the least-squares representation of the relation `wanted` by `rows`.
@@ -128,7 +134,7 @@ contains
       associate (locked => locked_bodies(constraints, group, group%kept(:k)))
         if (size(locked) == 0) cycle
         culprit = group%kept(k)
-        call raise(error, exit_input, 'locks ' // joined(body_names(locked), ', ') // &
+        call raise(error, exit_input, 'locks ' // joined(selected(body_names, locked), ', ') // &
                    contradiction(constraints, body_names, group, group%kept(:k - 1), culprit))
         return
       end associate
@@ -189,8 +195,9 @@ contains
     relation(a) = -fixed
     associate (rows => contributing_rows(constraints, group, earlier, relation))
       text = ': it drives ' // quoted(body_names(group%bodies(b))%text) // ' at ' // rounded_text(asked, ratio_digits) // &
-             ' times ' // quoted(body_names(group%bodies(a))%text) // ', but ' // joined(constraints%names(rows), ', ') // &
-             ' already ' // trim(merge('drives', 'drive ', size(rows) == 1)) // ' it at ' // &
+             ' times ' // quoted(body_names(group%bodies(a))%text) // ', but ' // &
+             joined(selected(constraints%names, rows), ', ') // ' already ' // &
+             trim(merge('drives', 'drive ', size(rows) == 1)) // ' it at ' // &
              rounded_text(fixed * group%pace(b) / group%pace(a), ratio_digits) // ' times'
     end associate
   end function contradiction
@@ -213,13 +220,14 @@ contains
     end if
     group%independent = pack(wanted, [(any(group%bodies == wanted(i)), i=1, size(wanted))])
     if (size(group%independent) /= freedoms) then
-      call raise(error, exit_input, count_message(body_names(group%bodies), body_names(group%independent), freedoms))
+      call raise(error, exit_input, count_message(selected(body_names, group%bodies), &
+                                           selected(body_names, group%independent), freedoms))
       return
     end if
     others = pack(group%bodies, [(all(group%independent /= group%bodies(i)), i=1, size(group%bodies))])
     rank = 0
     if (size(others) == size(group%kept)) call pivoted_rank(dependent_columns(), rank_tolerance, rank, pivots(:size(others)))
-    if (rank < size(group%kept)) call raise(error, exit_input, joined(body_names(group%independent), ', ') // &
+    if (rank < size(group%kept)) call raise(error, exit_input, joined(selected(body_names, group%independent), ', ') // &
                                             ' cannot be independent: the constraints relate their speeds')
 
   contains

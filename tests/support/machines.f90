@@ -11,7 +11,7 @@ module nocdyn_test_machines
   use nocdyn_loads, only: new_loads
   use nocdyn_machine, only: machine_t
   use nocdyn_motors, only: new_motors
-  use nocdyn_text, only: string_t, to_text
+  use nocdyn_text, only: string_t, strings, to_text
   implicit none (type, external)
   private
 
@@ -27,13 +27,13 @@ contains
     type(machine_t) :: machine
 
     machine = bare_machine(row([10.0_wp, 5.0_wp, 5.0_wp]))
-    machine%names = [string_t('motor'), string_t('pinion'), string_t('machine')]
-    call install(machine%banks, new_couplings([string_t('coupling')], [1], [2], row([100.0_wp]), row([10.0_wp]), &
+    machine%names = strings([character(len=7) :: 'motor', 'pinion', 'machine'])
+    call install(machine%banks, new_couplings(strings(['coupling']), [1], [2], row([100.0_wp]), row([10.0_wp]), &
                                               row([0.0_wp]), row([0.0_wp])))
-    call install(machine%banks, new_motors([string_t('drive')], [1], row([200.0_wp]), row([10.0_wp]), row([1.0_wp])))
-    call install(machine%banks, new_loads([string_t('work')], [3], row([100.0_wp])))
+    call install(machine%banks, new_motors(strings(['drive']), [1], row([200.0_wp]), row([10.0_wp]), row([1.0_wp])))
+    call install(machine%banks, new_loads(strings(['work']), [3], row([100.0_wp])))
     if (abs(amplitude) > 0.0_wp) then
-      call install(machine%banks, new_excitations([string_t('shaker')], [1], row([amplitude]), row([5.0_wp]), &
+      call install(machine%banks, new_excitations(strings(['shaker']), [1], row([amplitude]), row([5.0_wp]), &
                                                   row([0.0_wp])))
     end if
     machine%constraints = gear_rows(3, reshape([2, 3], [2, 1]), row([2.0_wp, 3.0_wp]))
@@ -161,7 +161,7 @@ contains
     integer :: i
 
     associate (gears => size(wheels, 2))
-      constraints = new_constraints(bodies, numbered_names('gear', gears), [(string_t('N'), i=1, gears)], &
+      constraints = new_constraints(bodies, numbered_names('gear', gears), strings([('N', i=1, gears)]), &
                                     [(2 * i - 1, i=1, gears + 1)], reshape(wheels, [2 * gears]), coefficients)
     end associate
   end function gear_rows

@@ -55,8 +55,8 @@ contains
     integer, allocatable :: wheels(:, :)
     integer :: i
 
-    wheels = random_wheels(layout, size(speed, 2))
-    measure = drawn(lanes, 0.5_wp, 2.0_wp, size(wheels, 2))
+    allocate (wheels, source=random_wheels(layout, size(speed, 2)))
+    allocate (measure, source=drawn(lanes, 0.5_wp, 2.0_wp, size(wheels, 2)))
     allocate (coefficients(size(lanes), size(wheels)))
     do i = 1, size(wheels, 2)
       coefficients(:, 2 * i - 1) = measure(:, i) * speed(:, wheels(2, i))
