@@ -56,7 +56,7 @@ contains
     if (allocated(self%moved)) deallocate (self%moved, self%t_stage, self%y_stage)
     allocate (self%moved(system%lanes), source=.false.)
     allocate (self%t_stage(system%lanes), source=0.0_wp)
-    allocate (self%y_stage, source=self%stages%zero)
+    allocate (self%y_stage, source=self%stages%k(:, :, 1))
   end subroutine prepare
 
   subroutine begin(self, trial, starting)

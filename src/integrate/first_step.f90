@@ -29,7 +29,7 @@ contains
     class(system_t), intent(inout) :: system
     type(trial_t), intent(inout) :: trial   !! t, y, slope and the lanes at work; h, y_new and deviation are scratch
     real(wp) :: slope, steepest, longer
-    integer :: lane
+    integer :: component, lane
 
     do lane = 1, trial%lanes
       trial%h(lane) = 0.0_wp
@@ -39,7 +39,9 @@ contains
     end do
     call set_out(trial)
     trial%scratch(:) = trial%t + trial%h
-    trial%y_new(:, :) = trial%y + trial%h_spread * trial%slope
+    do component = 1, trial%components
+      trial%y_new(:, component) = trial%y(:, component) + trial%h * trial%slope(:, component)
+    end do
     call evaluate_finite(trial, system, trial%scratch, trial%y_new, trial%deviation)
     call count_evaluations(trial)
     trial%deviation(:, :) = trial%deviation - trial%slope

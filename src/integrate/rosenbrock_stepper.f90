@@ -27,7 +27,7 @@ module nocdyn_rosenbrock_stepper
     real(wp), allocatable :: y_stage(:, :)
     real(wp), allocatable :: f(:, :)
     real(wp), allocatable :: r(:, :)                  !! right-hand side of the stage
-    real(wp), allocatable :: one(:, :)                !! ones, shape [lanes, padded columns]
+    real(wp), allocatable :: one(:)                   !! ones for any strip
     real(wp), allocatable :: slope(:, :)              !! f(t, y) at the start of the step
     logical, allocatable :: no_slope(:)               !! lanes that moved since it was evaluated
     logical, allocatable :: no_jacobian(:)            !! lanes that moved since the Jacobian was evaluated
@@ -67,14 +67,14 @@ contains
     class(system_t), intent(in) :: system
 
     call allocate_stages(self%stages, system)
-    call set_offsets(self%coupling, size(self%stages%zero), self%stages%all)
+    call set_offsets(self%coupling, size(self%stages%k(:, :, 1)), self%stages%all)
     call allocate_stage_system(self%stage_system, system)
     call allocate_spectra(self%spectra, system)
     if (allocated(self%slope)) deallocate (self%t_stage, self%y_stage, self%f, self%r, self%one, self%slope, &
                                            self%no_slope, self%no_jacobian)
     associate (lanes => system%lanes)
       allocate (self%t_stage(lanes), source=0.0_wp)
-      allocate (self%y_stage, self%f, self%r, self%slope, source=self%stages%zero)
+      allocate (self%y_stage, self%f, self%r, self%slope, source=self%stages%k(:, :, 1))
       allocate (self%one, source=self%stages%zero + 1)
       allocate (self%no_slope(lanes), self%no_jacobian(lanes), source=.true.)
     end associate
@@ -144,21 +144,24 @@ contains
     real(wp), intent(in) :: f(trial%length)
     logical :: all_finite
 
-    call combine(self%coupling(stage), self%stages%k, f, self%one, self%r, all_finite)
+    call combine(self%coupling(stage), self%stages%k, trial%length, f, size(self%one), self%one, self%r, all_finite)
     if (abs(self%gamma_sum(stage)) > 0) then
-      call add_time_derivative(trial%lanes * trial%components, self%gamma_sum(stage), trial%h_spread, &
+      call add_time_derivative(trial%lanes, trial%components, self%gamma_sum(stage), trial%h, &
                                self%stage_system%dfdt, self%r)
     end if
     call solve(self%stage_system, trial, self%gamma, self%r, self%stages%k(:, :, stage))
   end subroutine solve_stage
 
-  pure subroutine add_time_derivative(n, gamma_sum, h, dfdt, r)
-    integer, intent(in) :: n
+  pure subroutine add_time_derivative(lanes, components, gamma_sum, h, dfdt, r)
+    integer, intent(in) :: lanes, components
     real(wp), intent(in) :: gamma_sum
-    real(wp), intent(in) :: h(n), dfdt(n)
-    real(wp), intent(inout) :: r(n)
+    real(wp), intent(in) :: h(lanes), dfdt(lanes, components)
+    real(wp), intent(inout) :: r(lanes, components)
+    integer :: component
 
-    r = r + h * (gamma_sum * dfdt)
+    do component = 1, components
+      r(:, component) = r(:, component) + h * (gamma_sum * dfdt(:, component))
+    end do
   end subroutine add_time_derivative
 
   subroutine interpolate(self, system, trial, wanted, coefficients)

@@ -1,6 +1,6 @@
 !> The stages of a one-step method on a block of lanes, and the sums that are formed of them.
 module nocdyn_stages
-  use nocdyn_combinations, only: combination, combination_t, combine, padded_columns, set_offsets
+  use nocdyn_combinations, only: combination, combination_t, combine, padded_columns, set_offsets, strip
   use nocdyn_finite, only: is_finite
   use nocdyn_kinds, only: wp
   use nocdyn_system, only: system_t
@@ -19,7 +19,7 @@ module nocdyn_stages
     type(combination_t) :: coarse_error                !! weights of the coarse deviation; no terms: there is none
     type(combination_t), allocatable :: dense(:)       !! weights of each power of theta = (time - t) / h
     real(wp), allocatable :: k(:, :, :)                !! the stages, shape [lanes, padded columns, all]
-    real(wp), allocatable :: zero(:, :)                !! zeros, shape [lanes, padded columns]
+    real(wp), allocatable :: zero(:)                   !! zeros for any strip
   end type stages_t
 
 contains
@@ -53,7 +53,7 @@ contains
 
     if (allocated(self%k)) deallocate (self%k, self%zero)
     associate (lanes => system%lanes, columns => padded_columns(system%lanes, system%states + system%quadratures))
-      allocate (self%k(lanes, columns, self%all), self%zero(lanes, columns), source=0.0_wp)
+      allocate (self%k(lanes, columns, self%all), self%zero(min(lanes * columns, strip)), source=0.0_wp)
       call set_offsets(self%inner, lanes * columns, self%all)
       call set_offsets(self%update, lanes * columns, self%all)
       call set_offsets(self%error, lanes * columns, self%all)
@@ -70,7 +70,7 @@ contains
     real(wp), intent(inout) :: y(trial%length)
     logical :: all_finite
 
-    call combine(self%inner(stage), self%k, trial%y, trial%h_spread, y, all_finite)
+    call combine(self%inner(stage), self%k, trial%length, trial%y, size(trial%h_spread), trial%h_spread, y, all_finite)
     if (.not. all_finite) call leave_infinities(self, trial, y)
   end subroutine inner_state
 
@@ -95,9 +95,21 @@ contains
     type(trial_t), intent(inout) :: trial
     logical :: all_finite
 
-    call combine(self%update, self%k, trial%y, trial%h_spread, trial%y_new, all_finite)
+    call combine(self%update, self%k, trial%length, trial%y, size(trial%h_spread), trial%h_spread, trial%y_new, &
+                 all_finite)
     if (.not. all_finite) call park_infinities(trial, trial%y_new)
   end subroutine update_state
+
+  !> h times a sum of stages.
+  pure subroutine weigh(combination, self, trial, y, all_finite)
+    type(combination_t), intent(in) :: combination
+    type(stages_t), intent(in) :: self
+    type(trial_t), intent(in) :: trial
+    real(wp), intent(inout) :: y(trial%length)
+    logical, intent(out) :: all_finite
+
+    call combine(combination, self%k, size(self%zero), self%zero, size(trial%h_spread), trial%h_spread, y, all_finite)
+  end subroutine weigh
 
   !> The deviations of y_new from the embedded solutions, once all stages of the step are known; a lane where one overflows
   !> is parked.
@@ -106,10 +118,10 @@ contains
     type(trial_t), intent(inout) :: trial
     logical :: all_finite
 
-    call combine(self%error, self%k, self%zero, trial%h_spread, trial%deviation, all_finite)
+    call weigh(self%error, self, trial, trial%deviation, all_finite)
     if (.not. all_finite) call park_infinities(trial, trial%deviation)
     if (.not. trial%has_coarse_deviation) return
-    call combine(self%coarse_error, self%k, self%zero, trial%h_spread, trial%coarse_deviation, all_finite)
+    call weigh(self%coarse_error, self, trial, trial%coarse_deviation, all_finite)
     if (.not. all_finite) call park_infinities(trial, trial%coarse_deviation)
   end subroutine estimate_error
 
@@ -122,7 +134,7 @@ contains
     integer :: power
 
     do power = 1, size(self%dense)
-      call combine(self%dense(power), self%k, self%zero, trial%h_spread, coefficients(:, power), all_finite)
+      call weigh(self%dense(power), self, trial, coefficients(:, power), all_finite)
     end do
   end subroutine expand
 

@@ -1,6 +1,6 @@
 !> One attempted step of every lane of a block: what the steppers read and what they leave.
 module nocdyn_trial
-  use nocdyn_combinations, only: padded_columns
+  use nocdyn_combinations, only: padded_columns, strip
   use nocdyn_finite, only: all_finite, is_finite
   use nocdyn_kinds, only: wp
   use nocdyn_system, only: evaluation_fine, evaluation_give_up, evaluation_shorten, system_t
@@ -23,8 +23,8 @@ module nocdyn_trial
     integer :: length                              !! of the state arrays: whole vectors, the rest after the components is 0
     real(wp), allocatable :: t(:)                  !! start of the step
     real(wp), allocatable :: h(:)                  !! size of the step, 0 for a lane that is not working
-    real(wp), allocatable :: h_spread(:, :)        !! h of each lane, repeated; shape [lanes, padded columns] as all these
-    real(wp), allocatable :: y(:, :)               !! state at t
+    real(wp), allocatable :: h_spread(:, :)        !! h of each lane, repeated; [lanes, padded columns], of one lane a strip at most
+    real(wp), allocatable :: y(:, :)               !! state at t, shape [lanes, padded columns] as all these
     real(wp), allocatable :: y_new(:, :)           !! state at t + h
     real(wp), allocatable :: deviation(:, :)       !! y_new minus the embedded solution
     real(wp), allocatable :: coarse_deviation(:, :)   !! the same of a coarser one, for methods with two estimates
@@ -59,9 +59,9 @@ contains
       trial%components = components
       trial%length = lanes * columns
       allocate (trial%t(lanes), trial%h(lanes), trial%scratch(lanes), trial%most_growth(lanes), source=0.0_wp)
-      allocate (trial%h_spread(lanes, columns), trial%y(lanes, columns), trial%y_new(lanes, columns), &
-                trial%deviation(lanes, columns), trial%coarse_deviation(lanes, columns), trial%slope(lanes, columns), &
-                source=0.0_wp)
+      allocate (trial%h_spread(lanes, merge(min(columns, strip), columns, lanes == 1)), source=0.0_wp)
+      allocate (trial%y(lanes, columns), trial%y_new(lanes, columns), trial%deviation(lanes, columns), &
+                trial%coarse_deviation(lanes, columns), trial%slope(lanes, columns), source=0.0_wp)
       allocate (trial%working(lanes), source=.true.)
       allocate (trial%implicit(lanes), source=.false.)
       allocate (trial%error_order(lanes), trial%verdict(lanes), trial%culprit(lanes), trial%status(lanes), &
