@@ -11,6 +11,7 @@ module nocdyn_sparse_map
 
   !> With one lane, many consecutive rows whose columns all advance by one from row to row, as those of a chain do, make
   !> a stretch: its entries are stored diagonal by diagonal, and the loop over its rows is a vector loop without indices.
+  !> A stretch with the same coefficients in all rows is even, and only the entries of its first row are stored.
   !> All other rows are loose, their entries stored row by row; with many lanes all rows are, and the loops over the
   !> lanes are the vector loops.
   type, public :: sparse_map_t
@@ -24,6 +25,7 @@ module nocdyn_sparse_map
     integer, allocatable, private :: first_row(:)        !! of each stretch
     integer, allocatable, private :: rows(:)             !! of each stretch
     integer, allocatable, private :: width(:)            !! entries of each of its rows, at least 1
+    logical, allocatable, private :: is_even(:)          !! of each stretch
     integer, allocatable, private :: first_entry(:)      !! of each stretch
     integer, allocatable, private :: column(:)           !! [entries]
     real(wp), allocatable, private :: coefficient(:, :)  !! [lanes, entries]
@@ -44,7 +46,7 @@ contains
     real(wp), intent(in) :: coefficient(:, :)     !! [lanes, entries]
     type(sparse_map_t) :: self
     integer :: order(size(column)), straight(size(first) - 1)
-    integer :: begin, rows, width
+    integer :: begin, entries, rows, width
 
     rows = size(first) - 1
     self%lanes = size(coefficient, 1)
@@ -52,7 +54,7 @@ contains
     self%columns = maxval([0, column])
     allocate (self%row(rows), self%first(rows + 1))
     allocate (self%first_row(rows / short), self%first_entry(rows / short))
-    allocate (self%rows(rows / short), self%width(rows / short))
+    allocate (self%rows(rows / short), self%width(rows / short), self%is_even(rows / short))
     self%first(1) = 1
     straight = straight_runs(first, column)
     begin = 1
@@ -63,15 +65,16 @@ contains
         self%first_row(self%stretches) = begin
         self%rows(self%stretches) = straight(begin)
         self%width(self%stretches) = width
+        self%is_even(self%stretches) = has_equal_rows(width, straight(begin), coefficient(1, first(begin):))
       else
         call append_loose_rows(first, begin, begin + straight(begin) - 1, order, self)
       end if
       begin = begin + straight(begin)
     end do
-    call append_stretches(first, order, self)
-    allocate (self%column(size(column)), self%coefficient(self%lanes, size(column)))
-    self%column(:) = column(order)
-    self%coefficient(:, :) = coefficient(:, order)
+    call append_stretches(first, order, entries, self)
+    allocate (self%column(entries), self%coefficient(self%lanes, entries))
+    self%column(:) = column(order(:entries))
+    self%coefficient(:, :) = coefficient(:, order(:entries))
   end function new_sparse_map
 
   !> How many rows from each row on have columns that advance by one from row to row.
@@ -90,6 +93,17 @@ contains
     end do
   end function straight_runs
 
+  pure logical function has_equal_rows(width, rows, coefficient)
+    integer, intent(in) :: width, rows
+    real(wp), intent(in) :: coefficient(width, rows)
+    integer :: i
+
+    do i = 2, rows
+      has_equal_rows = all(abs(coefficient(:, i) - coefficient(:, 1)) <= 0.0_wp)
+      if (.not. has_equal_rows) return
+    end do
+  end function has_equal_rows
+
   subroutine append_loose_rows(first, begin, end, order, self)
     integer, intent(in) :: first(:), begin, end
     integer, intent(inout) :: order(:)
@@ -107,18 +121,20 @@ contains
   end subroutine append_loose_rows
 
   !> The entries of the stretches follow those of the loose rows.
-  subroutine append_stretches(first, order, self)
+  subroutine append_stretches(first, order, entries, self)
     integer, intent(in) :: first(:)
     integer, intent(inout) :: order(:)
+    integer, intent(out) :: entries   !! that are stored
     type(sparse_map_t), intent(inout) :: self
-    integer :: i, j, next, s
+    integer :: i, j, rows, s
 
-    next = self%first(self%loose_rows + 1)
+    entries = self%first(self%loose_rows + 1) - 1
     do s = 1, self%stretches
-      self%first_entry(s) = next
+      self%first_entry(s) = entries + 1
+      rows = merge(1, self%rows(s), self%is_even(s))
       do j = 0, self%width(s) - 1
-        order(next:next + self%rows(s) - 1) = [(first(self%first_row(s) + i) + j, i=0, self%rows(s) - 1)]
-        next = next + self%rows(s)
+        order(entries + 1:entries + rows) = [(first(self%first_row(s) + i) + j, i=0, rows - 1)]
+        entries = entries + rows
       end do
     end do
   end subroutine append_stretches
@@ -163,8 +179,13 @@ contains
                       self%coefficient, offset, x, y, u, v)
     do s = 1, self%stretches
       associate (entry => self%first_entry(s), row => self%first_row(s))
-        call pair_of_stretch(self%rows(s), self%width(s), self%columns, self%column(entry), self%coefficient(1, entry), &
-                             offset(row), x, y, u(row), v(row))
+        if (self%is_even(s)) then
+          call pair_of_even_stretch(self%rows(s), self%width(s), self%columns, self%column(entry), &
+                                    self%coefficient(1, entry), offset(row), x, y, u(row), v(row))
+        else
+          call pair_of_stretch(self%rows(s), self%width(s), self%columns, self%column(entry), self%coefficient(1, entry), &
+                               offset(row), x, y, u(row), v(row))
+        end if
       end associate
     end do
   end subroutine map_pair
@@ -212,6 +233,41 @@ contains
     end do
   end subroutine pair_of_stretch
 
+  pure subroutine pair_of_even_stretch(rows, width, columns, column, coefficient, offset, x, y, u, v)
+    integer, intent(in) :: rows, width, columns
+    integer, intent(in) :: column(width)
+    real(wp), intent(in) :: coefficient(width), offset(rows), x(columns), y(columns)
+    real(wp), intent(inout) :: u(rows), v(rows)
+    real(wp) :: a, b
+    integer :: begin, c, d, i, k
+
+    if (width == 2) then
+      a = coefficient(1)
+      b = coefficient(2)
+      c = column(1) - 1
+      d = column(2) - 1
+      do i = 1, rows
+        u(i) = (offset(i) + a * x(c + i)) + b * x(d + i)
+        v(i) = (0.0_wp + a * y(c + i)) + b * y(d + i)
+      end do
+      return
+    end if
+    do begin = 1, rows, strip
+      c = column(1) - 1
+      do i = begin, min(begin + strip - 1, rows)
+        u(i) = offset(i) + coefficient(1) * x(c + i)
+        v(i) = 0.0_wp + coefficient(1) * y(c + i)
+      end do
+      do k = 2, width
+        c = column(k) - 1
+        do i = begin, min(begin + strip - 1, rows)
+          u(i) = u(i) + coefficient(k) * x(c + i)
+          v(i) = v(i) + coefficient(k) * y(c + i)
+        end do
+      end do
+    end do
+  end subroutine pair_of_even_stretch
+
   pure subroutine pair_on_lanes(lanes, rows, columns, entries, first, column, coefficient, offset, x, y, u, v)
     integer, intent(in) :: lanes, rows, columns, entries
     integer, intent(in) :: first(rows + 1), column(entries)
@@ -257,8 +313,13 @@ contains
                      self%coefficient, x, y, u)
     do s = 1, self%stretches
       associate (entry => self%first_entry(s))
-        call sum_of_stretch(self%rows(s), self%width(s), self%columns, self%column(entry), self%coefficient(1, entry), &
-                            x, y, u(self%first_row(s)))
+        if (self%is_even(s)) then
+          call sum_of_even_stretch(self%rows(s), self%width(s), self%columns, self%column(entry), &
+                                   self%coefficient(1, entry), x, y, u(self%first_row(s)))
+        else
+          call sum_of_stretch(self%rows(s), self%width(s), self%columns, self%column(entry), self%coefficient(1, entry), &
+                              x, y, u(self%first_row(s)))
+        end if
       end associate
     end do
   end subroutine map_sum
@@ -300,6 +361,38 @@ contains
       end do
     end do
   end subroutine sum_of_stretch
+
+  pure subroutine sum_of_even_stretch(rows, width, columns, column, coefficient, x, y, u)
+    integer, intent(in) :: rows, width, columns
+    integer, intent(in) :: column(width)
+    real(wp), intent(in) :: coefficient(width), x(columns), y(columns)
+    real(wp), intent(inout) :: u(rows)
+    real(wp) :: a, b
+    integer :: begin, c, d, i, k
+
+    if (width == 2) then
+      a = coefficient(1)
+      b = coefficient(2)
+      c = column(1) - 1
+      d = column(2) - 1
+      do i = 1, rows
+        u(i) = (0.0_wp + a * (x(c + i) + y(c + i))) + b * (x(d + i) + y(d + i))
+      end do
+      return
+    end if
+    do begin = 1, rows, strip
+      c = column(1) - 1
+      do i = begin, min(begin + strip - 1, rows)
+        u(i) = 0.0_wp + coefficient(1) * (x(c + i) + y(c + i))
+      end do
+      do k = 2, width
+        c = column(k) - 1
+        do i = begin, min(begin + strip - 1, rows)
+          u(i) = u(i) + coefficient(k) * (x(c + i) + y(c + i))
+        end do
+      end do
+    end do
+  end subroutine sum_of_even_stretch
 
   pure subroutine sum_on_lanes(lanes, rows, columns, entries, first, column, coefficient, x, y, u)
     integer, intent(in) :: lanes, rows, columns, entries
