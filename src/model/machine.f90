@@ -59,6 +59,7 @@ contains
     do i = 1, size(self%banks)
       call self%banks(i)%bank%polynomials(self%laws)
     end do
+    call self%laws%divide()
     self%other_banks = pack([(i, i=1, size(self%banks))], [(self%banks(i)%bank%values > 0 .and. &
                                                             .not. self%banks(i)%bank%is_polynomial, i=1, size(self%banks))])
     self%accounted = [(self%banks(i)%bank%first - 1 + self%banks(i)%bank%accounted, i=1, size(self%banks))]

@@ -1,6 +1,9 @@
-!> Laws of elements that are polynomials, in one vector loop over the elements of all banks.
+!> Laws of elements that are polynomials, in vector loops over the elements of all banks.
 !>
 !> restoring = -(linear + cubic w^2) w with w = u - rest, working = constant + (by_speed + by_speed_squared u') u'.
+!>
+!> What a large machine spends on them is the time to read their coefficients. Those of a bare element, as a coupling that
+!> rests at no twist is, are linear, cubic and by_speed alone, and of long runs of such elements no others are read.
 module nocdyn_polynomial_laws
   use nocdyn_elements, only: elements_t
   use nocdyn_kinds, only: wp
@@ -18,11 +21,18 @@ module nocdyn_polynomial_laws
     real(wp), allocatable :: by_speed(:, :)           !! [N m s/rad]
     real(wp), allocatable :: by_speed_squared(:, :)   !! [N m s2/rad2]
     real(wp), allocatable :: damping(:, :)            !! what of -by_speed is in C, eq. (22) [N m s/rad]
+    logical, private :: is_divided = .false.          !! into parts that are evaluated one after the other
+    integer, private :: parts = 0
+    integer, allocatable, private :: first(:)         !! element of each part, [parts + 1]
+    logical, allocatable, private :: is_bare(:)       !! of each part: whether all its elements are
   contains
+    procedure :: divide
     procedure :: evaluate
     procedure :: differentiate
     procedure :: assess
   end type polynomial_laws_t
+
+  integer, parameter :: short = 64   ! values [lanes, elements] that are not worth a loop of their own
 
 contains
 
@@ -33,19 +43,82 @@ contains
 
     allocate (self%rest(lanes, elements), source=0.0_wp)
     allocate (self%linear, self%cubic, self%constant, self%by_speed, self%by_speed_squared, self%damping, source=self%rest)
+    allocate (self%first(elements + 1), source=1)
+    allocate (self%is_bare(elements), source=.false.)
   end function new_polynomial_laws
+
+  !> Tells the long runs of bare elements from the others, once the coefficients are set.
+  subroutine divide(self)
+    class(polynomial_laws_t), intent(inout) :: self
+    integer :: e, run
+    logical :: is_long
+
+    self%parts = 0
+    e = 1
+    do while (e <= size(self%rest, 2))
+      run = bare_run(self, e)
+      is_long = size(self%rest, 1) * run >= short
+      if (is_long .or. self%parts == 0) then
+        call begin_part()
+      else if (self%is_bare(self%parts)) then
+        call begin_part()
+      end if
+      e = e + max(run, 1)
+    end do
+    self%first(self%parts + 1) = e
+    self%is_divided = any(self%is_bare(:self%parts))
+
+  contains
+
+    subroutine begin_part()
+      self%parts = self%parts + 1
+      self%first(self%parts) = e
+      self%is_bare(self%parts) = is_long
+    end subroutine begin_part
+
+  end subroutine divide
+
+  !> How many elements from `first` on are bare in all lanes.
+  pure integer function bare_run(self, first)
+    type(polynomial_laws_t), intent(in) :: self
+    integer, intent(in) :: first
+    integer :: e
+
+    bare_run = 0
+    do e = first, size(self%rest, 2)
+      if (any(abs(self%rest(:, e)) + abs(self%constant(:, e)) + abs(self%by_speed_squared(:, e)) > 0)) return
+      bare_run = bare_run + 1
+    end do
+  end function bare_run
 
   !> Eqs. (3), (49), (50) in the restoring sense; eqs. (5) and (20). Sets the moments of all elements.
   subroutine evaluate(self, elements)
     class(polynomial_laws_t), intent(in) :: self
     type(elements_t), intent(inout) :: elements
 
-    call moments(size(self%rest), self%rest, self%linear, self%cubic, self%constant, self%by_speed, self%by_speed_squared, &
-                 elements%angle, elements%speed, elements%restoring, elements%working)
+    integer :: part
+
+    if (.not. self%is_divided) then
+      call moments(size(self%rest), self%rest, self%linear, self%cubic, self%constant, self%by_speed, self%by_speed_squared, &
+                   elements%angle, elements%speed, elements%restoring, elements%working)
+      return
+    end if
+    do part = 1, self%parts
+      associate (e => self%first(part), n => size(self%rest, 1) * (self%first(part + 1) - self%first(part)))
+        if (self%is_bare(part)) then
+          call bare_moments(n, self%linear(1, e), self%cubic(1, e), self%by_speed(1, e), elements%angle(1, e), &
+                            elements%speed(1, e), elements%restoring(1, e), elements%working(1, e))
+        else
+          call moments(n, self%rest(1, e), self%linear(1, e), self%cubic(1, e), self%constant(1, e), self%by_speed(1, e), &
+                       self%by_speed_squared(1, e), elements%angle(1, e), elements%speed(1, e), elements%restoring(1, e), &
+                       elements%working(1, e))
+        end if
+      end associate
+    end do
   end subroutine evaluate
 
   pure subroutine moments(n, rest, linear, cubic, constant, by_speed, by_speed_squared, angle, speed, restoring, working)
-    integer, intent(in) :: n   !! lanes * elements
+    integer, intent(in) :: n   !! values of the part
     real(wp), intent(in), dimension(n) :: rest, linear, cubic, constant, by_speed, by_speed_squared, angle, speed
     real(wp), intent(inout) :: restoring(n), working(n)
     real(wp) :: w
@@ -57,6 +130,19 @@ contains
       working(i) = constant(i) + (by_speed(i) + by_speed_squared(i) * speed(i)) * speed(i)
     end do
   end subroutine moments
+
+  !> The same for bare elements, to the last bit: the zero keeps the sign of a zero.
+  pure subroutine bare_moments(n, linear, cubic, by_speed, angle, speed, restoring, working)
+    integer, intent(in) :: n   !! values of the part
+    real(wp), intent(in), dimension(n) :: linear, cubic, by_speed, angle, speed
+    real(wp), intent(inout) :: restoring(n), working(n)
+    integer :: i
+
+    do i = 1, n
+      restoring(i) = -(linear(i) + cubic(i) * angle(i) * angle(i)) * angle(i)
+      working(i) = 0.0_wp + by_speed(i) * speed(i)
+    end do
+  end subroutine bare_moments
 
   !> Sets the derivatives of the moments: the tangent stiffness K1 + 3 k1 w^2 of eqs. (64)-(68), negative, and the others.
   subroutine differentiate(self, elements)
