@@ -12,11 +12,11 @@ module nocdyn_combinations
   integer, parameter, public :: width = 4   !! all arrays here consist of whole vectors of this length
   integer, parameter, public :: strip = 256 !! numbers of each stage that are combined at a time
 
-  !> The non-zero weights of a row of a method's table and the stages that they belong to.
+  !> The non-zero weights of a row of a method's table and where the stages are that they belong to.
   type, public :: combination_t
     integer :: terms = 0
     real(wp) :: weights(most_terms) = 0.0_wp
-    integer :: stages(most_terms) = 0
+    integer :: stages(most_terms) = 0    !! places among all stages
     integer :: length = 0                !! of a stage
     integer :: extent = 0                !! of all stages together
     integer :: offsets(most_terms) = 0   !! of these stages among them
@@ -60,46 +60,24 @@ contains
     end do
   end function padded_columns
 
-  !> y = x + h * (sum of weights times stages), strip by strip. Every number goes through the same operations in the same
-  !> order wherever it stands in the arrays, so that a lane's result does not depend on its place in a block.
+  !> y = x + h * (sum of weights times stages). Every number goes through the same operations in the same order wherever it
+  !> stands in the arrays, so that a lane's result does not depend on its place in a block.
   !>
   !> x and h may be shorter than the stages: then they are as long as a strip, and serve every strip alike.
-  pure subroutine combine(combination, k, x_length, x, h_length, h, y, all_finite)
+  pure recursive subroutine combine(combination, k, x_length, x, h_length, h, y, all_finite)
     type(combination_t), intent(in) :: combination   !! with offsets
     real(wp), intent(in) :: k(combination%extent)    !! the stages, one after the other
     integer, intent(in) :: x_length, h_length        !! the length of a stage, or `strip` if that is less
     real(wp), intent(in) :: x(x_length), h(h_length)
     real(wp), intent(inout) :: y(combination%length)
     logical, intent(out) :: all_finite               !! whether no element of y is infinite or NaN
-    type(combination_t) :: part
-    logical :: part_is_finite
-    integer :: before
-
-    if (combination%length <= strip) then
-      call combine_strip(combination, k, x, h, y, all_finite)
-      return
-    end if
-    part = combination
-    all_finite = .true.
-    do before = 0, combination%length - 1, strip
-      part%length = min(strip, combination%length - before)
-      part%extent = combination%extent - before
-      call combine_strip(part, k(before + 1), x(merge(before, 0, x_length > strip) + 1), &
-                         h(merge(before, 0, h_length > strip) + 1), y(before + 1), part_is_finite)
-      all_finite = all_finite .and. part_is_finite
-    end do
-  end subroutine combine
-
-  !> One strip, which stays in the first cache from the sums to the question whether they are finite.
-  pure subroutine combine_strip(combination, k, x, h, y, all_finite)
-    type(combination_t), intent(in) :: combination       !! the length is that of the strip
-    real(wp), intent(in) :: k(combination%extent)
-    real(wp), intent(in) :: x(combination%length), h(combination%length)
-    real(wp), intent(inout) :: y(combination%length)
-    logical, intent(out) :: all_finite
     real(wp) :: total(width)   ! of the sizes, finite if they all are
     integer :: i
 
+    if (combination%length > strip) then
+      call combine_strips(combination, k, x_length, x, h_length, h, y, all_finite)
+      return
+    end if
     associate (n => combination%length, m => combination%extent, terms => combination%terms, w => combination%weights, &
                o => combination%offsets)
       if (terms <= 4) then
@@ -115,7 +93,30 @@ contains
       total = total + abs(y(i:i + 3))
     end do
     all_finite = iand(transfer((total(1) + total(2)) + (total(3) + total(4)), exponent_mask), exponent_mask) /= exponent_mask
-  end subroutine combine_strip
+  end subroutine combine
+
+  !> The same strip by strip, each of which stays in the first cache until it is known to be finite.
+  pure recursive subroutine combine_strips(combination, k, x_length, x, h_length, h, y, all_finite)
+    type(combination_t), intent(in) :: combination
+    real(wp), intent(in) :: k(combination%extent)
+    integer, intent(in) :: x_length, h_length
+    real(wp), intent(in) :: x(x_length), h(h_length)
+    real(wp), intent(inout) :: y(combination%length)
+    logical, intent(out) :: all_finite
+    type(combination_t) :: part
+    logical :: is_finite
+    integer :: before
+
+    part = combination
+    all_finite = .true.
+    do before = 0, combination%length - 1, strip
+      part%length = min(strip, combination%length - before)
+      part%extent = combination%extent - before
+      call combine(part, k(before + 1), part%length, x(merge(before, 0, x_length > strip) + 1), &
+                   part%length, h(merge(before, 0, h_length > strip) + 1), y(before + 1), is_finite)
+      all_finite = all_finite .and. is_finite
+    end do
+  end subroutine combine_strips
 
   !> Sums of up to four terms.
   pure subroutine combine_few(n, m, terms, w, o, k, x, h, y)

@@ -3,7 +3,8 @@ module nocdyn_explicit_stepper
   use nocdyn_combinations, only: combination
   use nocdyn_explicit_tables, only: explicit_table_t
   use nocdyn_kinds, only: wp
-  use nocdyn_stages, only: allocate_stages, estimate_error, expand, inner_state, set_weights, stages_t, update_state
+  use nocdyn_stages, only: allocate_stages, estimate_error, expand, inner_state, set_weights, share_places, stages_t, &
+    update_state
   use nocdyn_stepper, only: stepper_t
   use nocdyn_system, only: system_t
   use nocdyn_trial, only: count_evaluations, evaluate, evaluate_finite, evaluate_start, trial_t
@@ -46,6 +47,7 @@ contains
     call set_weights(stepper%stages, table%a, table%b, table%error, table%dense)
     stepper%has_coarse_error = allocated(table%coarse_error)
     if (stepper%has_coarse_error) stepper%stages%coarse_error = combination(table%coarse_error)
+    call share_places(stepper%stages)
   end function explicit_stepper
 
   subroutine prepare(self, system)
@@ -84,12 +86,12 @@ contains
       if (.not. any(trial%working)) exit
       call inner_state(self%stages, trial, stage, self%y_stage)
       call place_stage(trial%lanes, trial%t, trial%h, self%c(stage), self%t_stage)
-      call evaluate(trial, system, self%t_stage, self%y_stage, self%stages%k(1, 1, stage))
+      call evaluate(trial, system, self%t_stage, self%y_stage, self%stages%k(1, 1, self%stages%place(stage)))
     end do
     call update_state(self%stages, trial)
     if (self%first_same_as_last) then
       call place_stage(trial%lanes, trial%t, trial%h, 1.0_wp, self%t_stage)
-      call evaluate_finite(trial, system, self%t_stage, trial%y_new, self%stages%k(1, 1, self%stages%step))
+      call evaluate_finite(trial, system, self%t_stage, trial%y_new, self%stages%k(1, 1, self%stages%place(self%stages%step)))
     end if
     call estimate_error(self%stages, trial)
     call count_evaluations(trial)
@@ -131,7 +133,7 @@ contains
       do stage = self%stages%step + 1, self%stages%all
         call inner_state(self%stages, trial, stage, self%y_stage)
         call place_stage(trial%lanes, trial%t, trial%h, self%c(stage), self%t_stage)
-        call evaluate_finite(trial, system, self%t_stage, self%y_stage, self%stages%k(1, 1, stage))
+        call evaluate_finite(trial, system, self%t_stage, self%y_stage, self%stages%k(1, 1, self%stages%place(stage)))
       end do
       call count_evaluations(trial)
     end if
@@ -147,7 +149,7 @@ contains
       self%moved(:) = self%moved .or. accepted
       return
     end if
-    associate (k => self%stages%k, last => self%stages%step)
+    associate (k => self%stages%k, last => self%stages%place(self%stages%step))
       if (all(accepted)) then
         k(:, :, 1) = k(:, :, last)
       else
@@ -181,9 +183,10 @@ contains
 
     slopes = 0.0_wp
     states = 0.0_wp
-    associate (k => self%stages%k, last => self%stages%step)
+    associate (k => self%stages%k, last => self%stages%place(self%stages%step), &
+               before => self%stages%place(self%stages%step - 1))
       do i = 1, trial%states
-        slopes = slopes + min(abs(k(lane, i, last) - k(lane, i, last - 1)), largest)**2
+        slopes = slopes + min(abs(k(lane, i, last) - k(lane, i, before)), largest)**2
         states = states + min(abs(trial%y_new(lane, i) - self%y_stage(lane, i)), largest)**2
       end do
     end associate

@@ -8,7 +8,7 @@ module nocdyn_stages
   implicit none (type, external)
   private
 
-  public :: set_weights, allocate_stages, inner_state, update_state, estimate_error, expand
+  public :: set_weights, share_places, allocate_stages, inner_state, update_state, estimate_error, expand
 
   type, public :: stages_t
     integer :: step = 0                                !! stages that a step needs
@@ -18,7 +18,9 @@ module nocdyn_stages
     type(combination_t) :: error                       !! weights of the deviation
     type(combination_t) :: coarse_error                !! weights of the coarse deviation; no terms: there is none
     type(combination_t), allocatable :: dense(:)       !! weights of each power of theta = (time - t) / h
-    real(wp), allocatable :: k(:, :, :)                !! the stages, shape [lanes, padded columns, all]
+    integer :: places = 0                              !! for stages in `k`
+    integer, allocatable :: place(:)                   !! of each stage in `k`, [all]
+    real(wp), allocatable :: k(:, :, :)                !! the stages, shape [lanes, padded columns, places]
     real(wp), allocatable :: zero(:)                   !! zeros for any strip
   end type stages_t
 
@@ -35,6 +37,8 @@ contains
 
     self%step = size(update)
     self%all = size(inner, 1)
+    self%places = self%all
+    self%place = [(i, i=1, self%all)]
     allocate (self%inner(self%all), self%dense(size(dense, 2)))
     do i = 1, self%all
       self%inner(i) = combination(inner(i, :))
@@ -46,6 +50,65 @@ contains
     end do
   end subroutine set_weights
 
+  !> Lets every stage take the place of one that nothing reads any more, once all weights are there: stage i is written
+  !> after its state has been formed. The first stage and the last two of the step keep their places throughout.
+  pure subroutine share_places(self)
+    type(stages_t), intent(inout) :: self
+    integer :: last_read(self%all)   ! first stage that may overwrite each stage
+    integer :: owner(self%all)       ! stage in each place
+    integer :: i, place, stage
+
+    last_read = 0
+    do stage = 2, self%all
+      call note_reads(self%inner(stage), stage, last_read)
+    end do
+    call note_reads(self%update, self%step + 1, last_read)
+    call note_reads(self%error, self%step + 1, last_read)
+    call note_reads(self%coarse_error, self%step + 1, last_read)
+    do i = 1, size(self%dense)
+      call note_reads(self%dense(i), self%all + 1, last_read)
+    end do
+    last_read([1, self%step - 1, self%step]) = self%all + 1
+    self%places = 0
+    do stage = 1, self%all
+      do place = 1, self%places
+        if (last_read(owner(place)) <= stage) exit
+      end do
+      self%places = max(self%places, place)
+      owner(place) = stage
+      self%place(stage) = place
+    end do
+    do stage = 1, self%all
+      call relocate(self%inner(stage), self%place)
+    end do
+    call relocate(self%update, self%place)
+    call relocate(self%error, self%place)
+    call relocate(self%coarse_error, self%place)
+    do i = 1, size(self%dense)
+      call relocate(self%dense(i), self%place)
+    end do
+  end subroutine share_places
+
+  !> Has a combination read its stages at their places.
+  pure subroutine relocate(combination, place)
+    type(combination_t), intent(inout) :: combination
+    integer, intent(in) :: place(:)   !! of each stage
+
+    associate (read => combination%stages(:combination%terms))
+      read = place(read)
+    end associate
+  end subroutine relocate
+
+  pure subroutine note_reads(combination, stage, last_read)
+    type(combination_t), intent(in) :: combination
+    integer, intent(in) :: stage
+    integer, intent(inout) :: last_read(:)
+
+    associate (read => combination%stages(:combination%terms))
+      last_read(read) = max(last_read(read), stage)
+    end associate
+  end subroutine note_reads
+
   !> Room for the stages of every lane.
   subroutine allocate_stages(self, system)
     type(stages_t), intent(inout) :: self
@@ -53,12 +116,12 @@ contains
 
     if (allocated(self%k)) deallocate (self%k, self%zero)
     associate (lanes => system%lanes, columns => padded_columns(system%lanes, system%states + system%quadratures))
-      allocate (self%k(lanes, columns, self%all), self%zero(min(lanes * columns, strip)), source=0.0_wp)
-      call set_offsets(self%inner, lanes * columns, self%all)
-      call set_offsets(self%update, lanes * columns, self%all)
-      call set_offsets(self%error, lanes * columns, self%all)
-      call set_offsets(self%coarse_error, lanes * columns, self%all)
-      call set_offsets(self%dense, lanes * columns, self%all)
+      allocate (self%k(lanes, columns, self%places), self%zero(min(lanes * columns, strip)), source=0.0_wp)
+      call set_offsets(self%inner, lanes * columns, self%places)
+      call set_offsets(self%update, lanes * columns, self%places)
+      call set_offsets(self%error, lanes * columns, self%places)
+      call set_offsets(self%coarse_error, lanes * columns, self%places)
+      call set_offsets(self%dense, lanes * columns, self%places)
     end associate
   end subroutine allocate_stages
 
