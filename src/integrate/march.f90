@@ -319,14 +319,17 @@ contains
   !> The accepted lanes move to the end of their step.
   subroutine advance_lanes(march)
     type(march_t), intent(inout) :: march
+    real(wp), allocatable :: spare(:, :)
     integer :: lane, component
 
     associate (trial => march%trial, accepted => march%accepted)
       do lane = 1, trial%lanes
         if (accepted(lane)) trial%t(lane) = march%t_new(lane)
       end do
-      if (all(accepted)) then
-        trial%y(:, :) = trial%y_new
+      if (all(accepted)) then   ! the arrays change their names: nothing asks for y_new any more
+        call move_alloc(trial%y, spare)
+        call move_alloc(trial%y_new, trial%y)
+        call move_alloc(spare, trial%y_new)
       else
         do component = 1, trial%components
           do lane = 1, trial%lanes

@@ -133,7 +133,7 @@ contains
     real(wp), intent(inout) :: y(trial%length)
     logical :: all_finite
 
-    call combine(self%inner(stage), self%k, trial%length, trial%y, size(trial%h_spread), trial%h_spread, y, all_finite)
+    call combine(self%inner(stage), self%k, trial%length, trial%y, trial%h_length, trial%h_spread, y, all_finite)
     if (.not. all_finite) call leave_infinities(self, trial, y)
   end subroutine inner_state
 
@@ -158,8 +158,7 @@ contains
     type(trial_t), intent(inout) :: trial
     logical :: all_finite
 
-    call combine(self%update, self%k, trial%length, trial%y, size(trial%h_spread), trial%h_spread, trial%y_new, &
-                 all_finite)
+    call combine(self%update, self%k, trial%length, trial%y, trial%h_length, trial%h_spread, trial%y_new, all_finite)
     if (.not. all_finite) call park_infinities(trial, trial%y_new)
   end subroutine update_state
 
@@ -171,7 +170,7 @@ contains
     real(wp), intent(inout) :: y(trial%length)
     logical, intent(out) :: all_finite
 
-    call combine(combination, self%k, size(self%zero), self%zero, size(trial%h_spread), trial%h_spread, y, all_finite)
+    call combine(combination, self%k, size(self%zero), self%zero, trial%h_length, trial%h_spread, y, all_finite)
   end subroutine weigh
 
   !> The deviations of y_new from the embedded solutions, once all stages of the step are known; a lane where one overflows

@@ -21,9 +21,10 @@ module nocdyn_trial
     integer :: states
     integer :: components                          !! states and quadratures
     integer :: length                              !! of the state arrays: whole vectors, the rest after the components is 0
+    integer :: h_length                            !! of h_spread: the same, of one lane a strip at most
     real(wp), allocatable :: t(:)                  !! start of the step
     real(wp), allocatable :: h(:)                  !! size of the step, 0 for a lane that is not working
-    real(wp), allocatable :: h_spread(:, :)        !! h of each lane, repeated; [lanes, padded columns], of one lane a strip at most
+    real(wp), allocatable :: h_spread(:, :)        !! h of each lane, repeated
     real(wp), allocatable :: y(:, :)               !! state at t, shape [lanes, padded columns] as all these
     real(wp), allocatable :: y_new(:, :)           !! state at t + h
     real(wp), allocatable :: deviation(:, :)       !! y_new minus the embedded solution
@@ -59,7 +60,8 @@ contains
       trial%components = components
       trial%length = lanes * columns
       allocate (trial%t(lanes), trial%h(lanes), trial%scratch(lanes), trial%most_growth(lanes), source=0.0_wp)
-      allocate (trial%h_spread(lanes, merge(min(columns, strip), columns, lanes == 1)), source=0.0_wp)
+      trial%h_length = merge(min(columns, strip), lanes * columns, lanes == 1)
+      allocate (trial%h_spread(lanes, trial%h_length / lanes), source=0.0_wp)
       allocate (trial%y(lanes, columns), trial%y_new(lanes, columns), trial%deviation(lanes, columns), &
                 trial%coarse_deviation(lanes, columns), trial%slope(lanes, columns), source=0.0_wp)
       allocate (trial%working(lanes), source=.true.)

@@ -96,13 +96,20 @@ contains
     class(polynomial_laws_t), intent(in) :: self
     type(elements_t), intent(inout) :: elements
 
-    integer :: part
 
-    if (.not. self%is_divided) then
+    if (self%is_divided) then
+      call evaluate_parts(self, elements)
+    else
       call moments(size(self%rest), self%rest, self%linear, self%cubic, self%constant, self%by_speed, self%by_speed_squared, &
                    elements%angle, elements%speed, elements%restoring, elements%working)
-      return
     end if
+  end subroutine evaluate
+
+  subroutine evaluate_parts(self, elements)
+    type(polynomial_laws_t), intent(in) :: self
+    type(elements_t), intent(inout) :: elements
+    integer :: part
+
     do part = 1, self%parts
       associate (e => self%first(part), n => size(self%rest, 1) * (self%first(part + 1) - self%first(part)))
         if (self%is_bare(part)) then
@@ -115,7 +122,7 @@ contains
         end if
       end associate
     end do
-  end subroutine evaluate
+  end subroutine evaluate_parts
 
   pure subroutine moments(n, rest, linear, cubic, constant, by_speed, by_speed_squared, angle, speed, restoring, working)
     integer, intent(in) :: n   !! values of the part
