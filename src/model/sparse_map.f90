@@ -4,6 +4,7 @@
 !> that a lane's result is the same to the last bit in a block of any size.
 module nocdyn_sparse_map
   use nocdyn_kinds, only: wp
+  use nocdyn_stretches, only: pair_of_even_stretch, pair_of_stretch, sum_of_even_stretch, sum_of_stretch
   implicit none (type, external)
   private
 
@@ -34,8 +35,7 @@ module nocdyn_sparse_map
     procedure :: map_sum
   end type sparse_map_t
 
-  integer, parameter :: strip = 256   !! rows of a stretch that stay in the first cache from diagonal to diagonal
-  integer, parameter :: short = 16    !! fewer rows are not worth a vector loop
+  integer, parameter :: short = 16   !! fewer rows are not worth a vector loop
 
 contains
 
@@ -65,7 +65,7 @@ contains
         self%first_row(self%stretches) = begin
         self%rows(self%stretches) = straight(begin)
         self%width(self%stretches) = width
-        self%is_even(self%stretches) = has_equal_rows(width, straight(begin), coefficient(1, first(begin):))
+        self%is_even(self%stretches) = has_equal_rows(first(begin), width, straight(begin), coefficient)
       else
         call append_loose_rows(first, begin, begin + straight(begin) - 1, order, self)
       end if
@@ -93,15 +93,17 @@ contains
     end do
   end function straight_runs
 
-  pure logical function has_equal_rows(width, rows, coefficient)
+  pure logical function has_equal_rows(first, width, rows, coefficient)
+    integer, intent(in) :: first   !! entry of the first of these rows
     integer, intent(in) :: width, rows
-    real(wp), intent(in) :: coefficient(width, rows)
-    integer :: i
+    real(wp), intent(in) :: coefficient(:, :)   !! [lanes, entries]
+    integer :: k
 
-    do i = 2, rows
-      has_equal_rows = all(abs(coefficient(:, i) - coefficient(:, 1)) <= 0.0_wp)
-      if (.not. has_equal_rows) return
+    has_equal_rows = .false.
+    do k = first + width, first + width * rows - 1
+      if (any(abs(coefficient(:, k) - coefficient(:, k - width)) > 0)) return
     end do
+    has_equal_rows = .true.
   end function has_equal_rows
 
   subroutine append_loose_rows(first, begin, end, order, self)
@@ -210,64 +212,6 @@ contains
     end do
   end subroutine pair_of_rows
 
-  pure subroutine pair_of_stretch(rows, width, columns, column, coefficient, offset, x, y, u, v)
-    integer, intent(in) :: rows, width, columns
-    integer, intent(in) :: column(rows, width)
-    real(wp), intent(in) :: coefficient(rows, width), offset(rows), x(columns), y(columns)
-    real(wp), intent(inout) :: u(rows), v(rows)
-    integer :: begin, c, i, k
-
-    do begin = 1, rows, strip
-      c = column(1, 1) - 1
-      do i = begin, min(begin + strip - 1, rows)
-        u(i) = offset(i) + coefficient(i, 1) * x(c + i)
-        v(i) = 0.0_wp + coefficient(i, 1) * y(c + i)
-      end do
-      do k = 2, width
-        c = column(1, k) - 1
-        do i = begin, min(begin + strip - 1, rows)
-          u(i) = u(i) + coefficient(i, k) * x(c + i)
-          v(i) = v(i) + coefficient(i, k) * y(c + i)
-        end do
-      end do
-    end do
-  end subroutine pair_of_stretch
-
-  pure subroutine pair_of_even_stretch(rows, width, columns, column, coefficient, offset, x, y, u, v)
-    integer, intent(in) :: rows, width, columns
-    integer, intent(in) :: column(width)
-    real(wp), intent(in) :: coefficient(width), offset(rows), x(columns), y(columns)
-    real(wp), intent(inout) :: u(rows), v(rows)
-    real(wp) :: a, b
-    integer :: begin, c, d, i, k
-
-    if (width == 2) then
-      a = coefficient(1)
-      b = coefficient(2)
-      c = column(1) - 1
-      d = column(2) - 1
-      do i = 1, rows
-        u(i) = (offset(i) + a * x(c + i)) + b * x(d + i)
-        v(i) = (0.0_wp + a * y(c + i)) + b * y(d + i)
-      end do
-      return
-    end if
-    do begin = 1, rows, strip
-      c = column(1) - 1
-      do i = begin, min(begin + strip - 1, rows)
-        u(i) = offset(i) + coefficient(1) * x(c + i)
-        v(i) = 0.0_wp + coefficient(1) * y(c + i)
-      end do
-      do k = 2, width
-        c = column(k) - 1
-        do i = begin, min(begin + strip - 1, rows)
-          u(i) = u(i) + coefficient(k) * x(c + i)
-          v(i) = v(i) + coefficient(k) * y(c + i)
-        end do
-      end do
-    end do
-  end subroutine pair_of_even_stretch
-
   pure subroutine pair_on_lanes(lanes, rows, columns, entries, first, column, coefficient, offset, x, y, u, v)
     integer, intent(in) :: lanes, rows, columns, entries
     integer, intent(in) :: first(rows + 1), column(entries)
@@ -340,59 +284,6 @@ contains
       u(row(i)) = sum
     end do
   end subroutine sum_of_rows
-
-  pure subroutine sum_of_stretch(rows, width, columns, column, coefficient, x, y, u)
-    integer, intent(in) :: rows, width, columns
-    integer, intent(in) :: column(rows, width)
-    real(wp), intent(in) :: coefficient(rows, width), x(columns), y(columns)
-    real(wp), intent(inout) :: u(rows)
-    integer :: begin, c, i, k
-
-    do begin = 1, rows, strip
-      c = column(1, 1) - 1
-      do i = begin, min(begin + strip - 1, rows)
-        u(i) = 0.0_wp + coefficient(i, 1) * (x(c + i) + y(c + i))
-      end do
-      do k = 2, width
-        c = column(1, k) - 1
-        do i = begin, min(begin + strip - 1, rows)
-          u(i) = u(i) + coefficient(i, k) * (x(c + i) + y(c + i))
-        end do
-      end do
-    end do
-  end subroutine sum_of_stretch
-
-  pure subroutine sum_of_even_stretch(rows, width, columns, column, coefficient, x, y, u)
-    integer, intent(in) :: rows, width, columns
-    integer, intent(in) :: column(width)
-    real(wp), intent(in) :: coefficient(width), x(columns), y(columns)
-    real(wp), intent(inout) :: u(rows)
-    real(wp) :: a, b
-    integer :: begin, c, d, i, k
-
-    if (width == 2) then
-      a = coefficient(1)
-      b = coefficient(2)
-      c = column(1) - 1
-      d = column(2) - 1
-      do i = 1, rows
-        u(i) = (0.0_wp + a * (x(c + i) + y(c + i))) + b * (x(d + i) + y(d + i))
-      end do
-      return
-    end if
-    do begin = 1, rows, strip
-      c = column(1) - 1
-      do i = begin, min(begin + strip - 1, rows)
-        u(i) = 0.0_wp + coefficient(1) * (x(c + i) + y(c + i))
-      end do
-      do k = 2, width
-        c = column(k) - 1
-        do i = begin, min(begin + strip - 1, rows)
-          u(i) = u(i) + coefficient(k) * (x(c + i) + y(c + i))
-        end do
-      end do
-    end do
-  end subroutine sum_of_even_stretch
 
   pure subroutine sum_on_lanes(lanes, rows, columns, entries, first, column, coefficient, x, y, u)
     integer, intent(in) :: lanes, rows, columns, entries
