@@ -21,6 +21,7 @@ module nocdyn_polynomial_laws
     real(wp), allocatable :: by_speed(:, :)           !! [N m s/rad]
     real(wp), allocatable :: by_speed_squared(:, :)   !! [N m s2/rad2]
     real(wp), allocatable :: damping(:, :)            !! what of -by_speed is in C, eq. (22) [N m s/rad]
+    integer, private :: values = 0                    !! lanes * elements
     logical, private :: is_divided = .false.          !! into parts that are evaluated one after the other
     integer, private :: parts = 0
     integer, allocatable, private :: first(:)         !! element of each part, [parts + 1]
@@ -43,6 +44,7 @@ contains
 
     allocate (self%rest(lanes, elements), source=0.0_wp)
     allocate (self%linear, self%cubic, self%constant, self%by_speed, self%by_speed_squared, self%damping, source=self%rest)
+    self%values = lanes * elements
     allocate (self%first(elements + 1), source=1)
     allocate (self%is_bare(elements), source=.false.)
   end function new_polynomial_laws
@@ -100,7 +102,7 @@ contains
     if (self%is_divided) then
       call evaluate_parts(self, elements)
     else
-      call moments(size(self%rest), self%rest, self%linear, self%cubic, self%constant, self%by_speed, self%by_speed_squared, &
+      call moments(self%values, self%rest, self%linear, self%cubic, self%constant, self%by_speed, self%by_speed_squared, &
                    elements%angle, elements%speed, elements%restoring, elements%working)
     end if
   end subroutine evaluate

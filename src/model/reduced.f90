@@ -47,12 +47,13 @@ contains
     call self%attach(machine, audited)
     self%states = 2 * machine%coordinates%freedoms
     incidence = new_element_coordinates(machine%elements, machine%coordinates)
-    self%twists = new_sparse_map(incidence%first, incidence%coordinate, incidence%ratio)
     self%accelerations = response_map(incidence, machine%coordinates%freedoms)
     self%sums = new_reduced_jacobian(machine%coordinates%freedoms, incidence, machine%accounted(:self%quadratures))
     allocate (angle(machine%lanes, 0:machine%bodies), source=0.0_wp)
     angle(:, 1:) = machine%start_angle
     self%start_twist = angle(:, machine%elements%to) - angle(:, machine%elements%from)
+    self%twists = new_sparse_map(incidence%first, incidence%coordinate, incidence%ratio, &
+                                 without_offset=.not. any(abs(self%start_twist) > 0))
     allocate (self%none, source=0.0_wp * self%start_twist)
   end function new_reduced
 

@@ -21,6 +21,7 @@ module nocdyn_sparse_map
     integer, private :: columns = 0                      !! the last that has an entry
     integer, private :: loose_rows = 0
     integer, private :: stretches = 0
+    logical, private :: without_offset = .false.         !! in even stretches offsets need not be read
     integer, allocatable, private :: row(:)              !! each loose row
     integer, allocatable, private :: first(:)            !! its first entry, [loose_rows + 1]
     integer, allocatable, private :: first_row(:)        !! of each stretch
@@ -40,16 +41,18 @@ module nocdyn_sparse_map
 contains
 
   !> A map from its rows: row r has the entries first(r) to first(r + 1) - 1.
-  function new_sparse_map(first, column, coefficient) result(self)
+  function new_sparse_map(first, column, coefficient, without_offset) result(self)
     integer, intent(in) :: first(:)               !! [rows + 1]
     integer, intent(in) :: column(:)              !! [entries]
     real(wp), intent(in) :: coefficient(:, :)     !! [lanes, entries]
+    logical, intent(in), optional :: without_offset   !! whether all offsets handed to `map_pair` will be zero: .false.
     type(sparse_map_t) :: self
     integer :: order(size(column)), straight(size(first) - 1)
     integer :: begin, entries, rows, width
 
     rows = size(first) - 1
     self%lanes = size(coefficient, 1)
+    if (present(without_offset)) self%without_offset = without_offset
     self%all_rows = rows
     self%columns = maxval([0, column])
     allocate (self%row(rows), self%first(rows + 1))
@@ -183,7 +186,7 @@ contains
       associate (entry => self%first_entry(s), row => self%first_row(s))
         if (self%is_even(s)) then
           call pair_of_even_stretch(self%rows(s), self%width(s), self%columns, self%column(entry), &
-                                    self%coefficient(1, entry), offset(row), x, y, u(row), v(row))
+                                    self%coefficient(1, entry), self%without_offset, offset(row), x, y, u(row), v(row))
         else
           call pair_of_stretch(self%rows(s), self%width(s), self%columns, self%column(entry), self%coefficient(1, entry), &
                                offset(row), x, y, u(row), v(row))

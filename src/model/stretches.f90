@@ -36,9 +36,10 @@ contains
     end do
   end subroutine pair_of_stretch
 
-  pure subroutine pair_of_even_stretch(rows, width, columns, column, coefficient, offset, x, y, u, v)
+  pure subroutine pair_of_even_stretch(rows, width, columns, column, coefficient, without_offset, offset, x, y, u, v)
     integer, intent(in) :: rows, width, columns
     integer, intent(in) :: column(width)
+    logical, intent(in) :: without_offset   !! whether `offset` is zero
     real(wp), intent(in) :: coefficient(width), offset(rows), x(columns), y(columns)
     real(wp), intent(inout) :: u(rows), v(rows)
     real(wp) :: a, b
@@ -49,10 +50,17 @@ contains
       b = coefficient(2)
       c = column(1) - 1
       d = column(2) - 1
-      do i = 1, rows
-        u(i) = (offset(i) + a * x(c + i)) + b * x(d + i)
-        v(i) = (0.0_wp + a * y(c + i)) + b * y(d + i)
-      end do
+      if (without_offset) then
+        do i = 1, rows
+          u(i) = (0.0_wp + a * x(c + i)) + b * x(d + i)
+          v(i) = (0.0_wp + a * y(c + i)) + b * y(d + i)
+        end do
+      else
+        do i = 1, rows
+          u(i) = (offset(i) + a * x(c + i)) + b * x(d + i)
+          v(i) = (0.0_wp + a * y(c + i)) + b * y(d + i)
+        end do
+      end if
       return
     end if
     do begin = 1, rows, strip
