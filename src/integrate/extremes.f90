@@ -40,7 +40,6 @@ contains
     logical :: is_singular
     integer :: i, lane
 
-    if (degree >= most_places) error stop 'nocdyn_extremes: the solution inside the step has too many coefficients'
     allocate (extremes%places(degree + 1))
     extremes%places(:) = [(-cos(pi * i / degree), i=0, degree)]
     do i = 0, degree

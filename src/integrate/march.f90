@@ -152,19 +152,24 @@ contains
           if (march%has_extremes) call start_extremes(march%extremes, observer, trial, lane)
         end if
       end do
-      if (march%first_step <= 0) call guess_first_steps(march%control, stepper%order, system, trial)
+      if (march%first_step <= 0 .and. .not. stepper%plans_steps) call guess_first_steps(march%control, stepper%order, system, trial)
     end associate
   end subroutine start_lanes
 
   !> The next attempt of the lanes that are still running.
-  subroutine set_out_lanes(march, outcome)
+  subroutine set_out_lanes(march, stepper, system, outcome)
     type(march_t), intent(inout) :: march
+    class(stepper_t), intent(inout) :: stepper
+    class(system_t), intent(inout) :: system
     type(outcome_t), intent(inout) :: outcome
     integer :: lane
 
     associate (trial => march%trial)
       do lane = 1, trial%lanes
         trial%working(lane) = march%occupied(lane) .and. outcome%status(lane) == integration_running
+      end do
+      if (stepper%plans_steps) call stepper%plan(system, trial, march%control)
+      do lane = 1, trial%lanes
         trial%h(lane) = 0.0_wp
         if (.not. trial%working(lane)) cycle
         call propose(march%control, lane, trial%t(lane), trial%h(lane))
@@ -186,7 +191,7 @@ contains
     type(outcome_t), intent(inout) :: outcome
     integer :: lane
 
-    call weigh_error(march%control, march%trial)
+    if (.not. stepper%plans_steps) call weigh_error(march%control, march%trial)
     do lane = 1, march%trial%lanes
       march%accepted(lane) = march%trial%working(lane) .and. is_within(march%control%mean_square(lane))
       march%wanted(lane) = march%accepted(lane) &
@@ -197,7 +202,9 @@ contains
       if (.not. march%occupied(lane) .or. outcome%status(lane) /= integration_running) cycle
       march%accepted(lane) = march%accepted(lane) .and. march%trial%verdict(lane) == trial_fine
       if (march%accepted(lane)) then
-        call lengthen(march%control, lane, march%trial%error_order(lane), march%trial%most_growth(lane), outcome%h(lane))
+        if (.not. stepper%plans_steps) then
+          call lengthen(march%control, lane, march%trial%error_order(lane), march%trial%most_growth(lane), outcome%h(lane))
+        end if
         call note_method(outcome, lane, march%trial%t(lane), march%trial%implicit(lane))
         if (march%control%reaches_end(lane)) outcome%status(lane) = integration_done
       else
@@ -234,6 +241,7 @@ contains
           outcome%component(lane) = trial%culprit(lane)
         case default
           outcome%status(lane) = integration_step_too_small
+          outcome%component(lane) = trial%culprit(lane)
         end select
       end if
     end associate

@@ -75,7 +75,7 @@ module nocdyn_schema
   type(allowed_t), parameter :: steps = allowed_t(low=1.0_wp, high=1.0e8_wp)
   type(allowed_t), parameter :: from_2 = allowed_t(low=2.0_wp)
   type(allowed_t), parameter :: tolerance = allowed_t(low=1.0e-14_wp, high=0.1_wp)
-  type(allowed_t), parameter :: methods = allowed_t(words='auto rk45 rk853 rosenbrock rodas4 rodas5p')
+  type(allowed_t), parameter :: methods = allowed_t(words='auto rk45 rk853 rosenbrock rodas4 rodas5p taylor')
   character(len=*), parameter :: default_method = "'auto'"
   type(allowed_t), parameter :: formulations = allowed_t(words='reduced paper multiplier')
   type(allowed_t), parameter :: complements = allowed_t(words='natural scaled negated')

@@ -42,6 +42,8 @@ module nocdyn_bank
     procedure :: evaluate
     procedure :: differentiate
     procedure :: assess
+    procedure :: has_series
+    procedure :: series
     procedure :: connect
     procedure :: last
     procedure :: is_source
@@ -114,6 +116,24 @@ contains
     class(bank_t), intent(in) :: self
     type(elements_t), intent(inout) :: elements   !! of the machine
   end subroutine assess
+
+  !> Whether the moments have a Taylor series: that of `polynomials`, and that of `evaluate` by `series`.
+  pure logical function has_series(self)
+    class(bank_t), intent(in) :: self
+
+    has_series = self%is_polynomial
+  end function has_series
+
+  !> Adds the Taylor coefficients number k of what `evaluate` adds. Those of the angles and speeds are known up to k, those of
+  !> the moments up to k - 1. The arrays begin with the bank's first value, and column j holds the coefficients number j.
+  subroutine series(self, k, stride, time, angle, speed, restoring, working)
+    class(bank_t), intent(in) :: self
+    integer, intent(in) :: k
+    integer, intent(in) :: stride   !! values of the machine
+    real(wp), intent(in) :: time(self%lanes)
+    real(wp), intent(in) :: angle(stride, 0:*), speed(stride, 0:*)
+    real(wp), intent(inout) :: restoring(stride, 0:*), working(stride, 0:*)
+  end subroutine series
 
   !> The columns of the bank in the table of results: by default the torque of each element.
   function quantities(self) result(columns)

@@ -17,6 +17,8 @@ module nocdyn_excitations
   contains
     procedure :: evaluate
     procedure :: differentiate
+    procedure :: has_series
+    procedure :: series
   end type excitations_t
 
   integer, parameter :: strip = 64   ! arguments whose sines are taken at a time
@@ -78,6 +80,49 @@ contains
       before = before + length
     end do
   end subroutine harmonic_torques
+
+  pure logical function has_series(self)
+    class(excitations_t), intent(in) :: self
+
+    has_series = .true.
+  end function has_series
+
+  subroutine series(self, k, stride, time, angle, speed, restoring, working)
+    class(excitations_t), intent(in) :: self
+    integer, intent(in) :: k, stride
+    real(wp), intent(in) :: time(self%lanes)
+    real(wp), intent(in) :: angle(stride, 0:*), speed(stride, 0:*)
+    real(wp), intent(inout) :: restoring(stride, 0:*), working(stride, 0:*)
+
+    call harmonic_series(self%lanes, self%values, k, stride, self%amplitude, self%frequency, self%phase, time, working)
+  end subroutine series
+
+  !> M'' = -omega_p^2 M, from M and M' at the given time.
+  pure subroutine harmonic_series(lanes, n, k, stride, amplitude, frequency, phase, time, working)
+    integer, intent(in) :: lanes, n, k, stride
+    real(wp), intent(in) :: amplitude(n), frequency(n), phase(n), time(lanes)
+    real(wp), intent(inout) :: working(stride, 0:k)
+    real(wp) :: factor
+    integer :: i
+
+    if (k > 1) then
+      factor = -1.0_wp / (k * (k - 1))
+      do i = 1, n
+        working(i, k) = factor * frequency(i)**2 * working(i, k - 2)
+      end do
+      return
+    end if
+    do i = 1, n
+      working(i, k) = frequency(i) * time(1 + modulo(i - 1, lanes)) + phase(i)
+    end do
+    if (k == 0) then
+      call sines(n, working(:n, 0))
+      working(:n, 0) = amplitude * working(:n, 0)
+    else
+      call cosines(n, working(:n, 1))
+      working(:n, 1) = amplitude * frequency * working(:n, 1)
+    end if
+  end subroutine harmonic_series
 
   subroutine differentiate(self, elements)
     class(excitations_t), intent(in) :: self

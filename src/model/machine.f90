@@ -1,13 +1,14 @@
 !> A machine: bodies, banks of elements, constraints and the coordinates that they leave, on a block of lanes.
 module nocdyn_machine
-  use nocdyn_bank, only: bank_slot_t, bank_t
+  use nocdyn_bank, only: bank_slot_t, bank_t, role_names
   use nocdyn_constraints, only: constraints_t
   use nocdyn_coordinates, only: coordinates_t
   use nocdyn_elements, only: elements_t, new_elements
   use nocdyn_geared_groups, only: geared_group_t
+  use nocdyn_element_series, only: element_series_t, polynomial_series
   use nocdyn_kinds, only: wp
   use nocdyn_polynomial_laws, only: new_polynomial_laws, polynomial_laws_t
-  use nocdyn_text, only: string_t
+  use nocdyn_text, only: quoted, string_t
   implicit none (type, external)
   private
 
@@ -35,6 +36,8 @@ module nocdyn_machine
     procedure :: differentiate
     procedure :: differentiate_elements
     procedure :: assess
+    procedure :: series_obstacle
+    procedure :: expand_elements
     procedure :: power
     procedure :: kinetic_energy
     procedure :: stored_energy
@@ -162,6 +165,51 @@ contains
       call self%banks(self%other_banks(i))%bank%assess(self%elements)
     end do
   end subroutine assess
+
+  !> The first element that has no Taylor series, as a sentence; empty if all have one.
+  function series_obstacle(self) result(obstacle)
+    class(machine_t), intent(in) :: self
+    character(len=:), allocatable :: obstacle
+    integer :: i
+
+    obstacle = ''
+    do i = 1, size(self%banks)
+      associate (bank => self%banks(i)%bank)
+        if (size(bank%to) == 0 .or. bank%has_series()) cycle
+        obstacle = trim(role_names(bank%role)) // ' ' // quoted(bank%names(1)%text) // ' has no Taylor series'
+        return
+      end associate
+    end do
+  end function series_obstacle
+
+  !> The Taylor coefficients number k of the moments of all elements, from those of their angles and speeds.
+  subroutine expand_elements(self, k, t, series)
+    class(machine_t), intent(in) :: self
+    integer, intent(in) :: k
+    real(wp), intent(in) :: t(self%lanes)
+    type(element_series_t), intent(inout) :: series
+    integer :: i
+
+    call polynomial_series(self%laws, k, series)
+    do i = 1, size(self%other_banks)
+      associate (bank => self%banks(self%other_banks(i))%bank)
+        call expand_bank(bank, k, series%values, t, series%angle, series%speed, series%restoring, series%working)
+      end associate
+    end do
+  end subroutine expand_elements
+
+  !> Hands a bank its part of the values, by address alone.
+  subroutine expand_bank(bank, k, n, t, angle, speed, restoring, working)
+    class(bank_t), intent(in) :: bank
+    integer, intent(in) :: k
+    integer, intent(in) :: n   ! lanes * elements
+    real(wp), intent(in) :: t(bank%lanes), angle(n, 0:k), speed(n, 0:k)
+    real(wp), intent(inout) :: restoring(n, 0:k), working(n, 0:k)
+
+    associate (first => bank%first_value)
+      call bank%series(k, n, t, angle(first, 0), speed(first, 0), restoring(first, 0), working(first, 0))
+    end associate
+  end subroutine expand_bank
 
   !> Power of the accounted elements after `evaluate`, positive into the machine [W].
   subroutine power(self, watts)

@@ -5,6 +5,7 @@
 !> the elements' unit moments on their two bodies and U = B^T L_tau.
 module nocdyn_reduced
   use nocdyn_element_coordinates, only: element_coordinates_t, new_element_coordinates
+  use nocdyn_element_series, only: element_series_t, integrate_powers, new_element_series
   use nocdyn_formulation, only: formulation_t
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
@@ -23,12 +24,16 @@ module nocdyn_reduced
     type(sparse_map_t), private :: twists                      !! U
     type(sparse_map_t), private :: accelerations               !! R
     type(reduced_jacobian_t), private :: sums                  !! R diag U
+    type(element_series_t), private :: series_of_elements      !! after `prepare_series`
     real(wp), allocatable, private :: none(:, :)               !! zeros, [lanes, elements]
   contains
     procedure :: derivative
     procedure :: jacobian
     procedure :: jacobian_pattern
     procedure :: component_name
+    procedure :: series_obstacle
+    procedure :: prepare_series
+    procedure :: series
     procedure :: start
     procedure :: place
     procedure :: reactions
@@ -143,6 +148,74 @@ contains
     call self%twists%map_pair(self%start_twist, y(:, 2), y(:, 1), self%machine%elements%angle, self%machine%elements%speed)
     call self%machine%evaluate_elements(t)
   end subroutine turn
+
+  function series_obstacle(self) result(obstacle)
+    class(reduced_t), intent(in) :: self
+    character(len=:), allocatable :: obstacle
+
+    obstacle = self%machine%series_obstacle()
+  end function series_obstacle
+
+  subroutine prepare_series(self, order)
+    class(reduced_t), intent(inout) :: self
+    integer, intent(in) :: order
+
+    self%series_of_elements = new_element_series(self%machine%laws, order)
+  end subroutine prepare_series
+
+  subroutine series(self, order, columns, t, y, status)
+    class(reduced_t), intent(inout) :: self
+    integer, intent(in) :: order, columns
+    real(wp), intent(in) :: t(self%lanes)
+    real(wp), intent(inout) :: y(self%lanes, columns, 0:order)
+    integer, intent(inout) :: status(self%lanes)
+
+    call expand(self, order, self%lanes * self%machine%coordinates%freedoms, self%lanes * columns, self%quadratures, t, y)
+  end subroutine series
+
+  !> The coefficients number k + 1 of q', q and the works follow from those number k: q''_k = R M_k, U q' = u'.
+  subroutine expand(self, order, n, length, quadratures, t, y)
+    class(reduced_t), intent(inout) :: self
+    integer, intent(in) :: order
+    integer, intent(in) :: n        !! lanes * freedoms
+    integer, intent(in) :: length   !! lanes * columns
+    integer, intent(in) :: quadratures
+    real(wp), intent(in) :: t(self%lanes)
+    real(wp), intent(inout) :: y(length, 0:order)
+    integer :: k
+
+    associate (elements => self%series_of_elements)
+      call self%twists%map_pair(self%start_twist, y(n + 1, 0), y(1, 0), elements%angle, elements%speed)
+      do k = 0, order - 1
+        if (k > 0) then
+          call integrate_speeds(elements%values, elements%inverse(k), elements%speed(1, k - 1), elements%angle(1, k))
+          call self%twists%map_one(y(1, k), elements%speed(1, k))
+        end if
+        call self%machine%expand_elements(k, t, elements)
+        call self%accelerations%map_sum(elements%restoring(1, k), elements%working(1, k), y(1, k + 1))
+        call integrate_coordinates(n, elements%inverse(k + 1), y(1, k), y(1, k + 1))
+        if (quadratures > 0) call integrate_powers(elements, k, self%lanes, self%machine%accounted, y(2 * n + 1, k + 1))
+      end do
+    end associate
+  end subroutine expand
+
+  pure subroutine integrate_speeds(n, inverse, speed, angle)
+    integer, intent(in) :: n
+    real(wp), intent(in) :: inverse, speed(n)
+    real(wp), intent(inout) :: angle(n)
+
+    angle = inverse * speed
+  end subroutine integrate_speeds
+
+  !> The next coefficients of q' from those of q'', which are in their place, and of q from the present ones of q'.
+  pure subroutine integrate_coordinates(n, inverse, y, y_next)
+    integer, intent(in) :: n
+    real(wp), intent(in) :: inverse, y(n)
+    real(wp), intent(inout) :: y_next(n, 2)
+
+    y_next(:, 1) = inverse * y_next(:, 1)
+    y_next(:, 2) = inverse * y
+  end subroutine integrate_coordinates
 
   subroutine jacobian(self, t, y, dfdy, dfdt, status)
     class(reduced_t), intent(inout) :: self

@@ -28,6 +28,7 @@ module nocdyn_sparse_map
     integer, allocatable, private :: column(:)           !! [entries]
     real(wp), allocatable, private :: coefficient(:, :)  !! [lanes, entries]
   contains
+    procedure :: map_one
     procedure :: map_pair
     procedure :: map_sum
   end type sparse_map_t
@@ -240,6 +241,92 @@ contains
       end do
     end do
   end subroutine pair_on_lanes
+
+  !> u = map x.
+  subroutine map_one(self, x, u)
+    class(sparse_map_t), intent(in) :: self
+    real(wp), intent(in) :: x(self%lanes * self%columns)        !! [lanes, columns]
+    real(wp), intent(inout) :: u(self%lanes * self%all_rows)    !! [lanes, rows]
+    integer :: s
+
+    if (self%lanes > 1) then
+      call one_on_lanes(self%lanes, self%all_rows, self%columns, size(self%column), self%first, self%column, &
+                        self%coefficient, x, u)
+      return
+    end if
+    call one_of_rows(self%loose_rows, self%all_rows, self%columns, size(self%column), self%row, self%first, self%column, &
+                     self%coefficient, x, u)
+    do s = 1, self%stretches
+      associate (entry => self%first_entry(s))
+        call one_of_stretch(self%rows(s), self%width(s), self%columns, self%column(entry), self%coefficient(1, entry), &
+                            x, u(self%first_row(s)))
+      end associate
+    end do
+  end subroutine map_one
+
+  pure subroutine one_of_rows(rows, all_rows, columns, entries, row, first, column, coefficient, x, u)
+    integer, intent(in) :: rows, all_rows, columns, entries
+    integer, intent(in) :: row(rows), first(rows + 1), column(entries)
+    real(wp), intent(in) :: coefficient(entries), x(columns)
+    real(wp), intent(inout) :: u(all_rows)
+    real(wp) :: sum
+    integer :: i, k
+
+    do i = 1, rows
+      sum = 0.0_wp
+      do k = first(i), first(i + 1) - 1
+        sum = sum + coefficient(k) * x(column(k))
+      end do
+      u(row(i)) = sum
+    end do
+  end subroutine one_of_rows
+
+  pure subroutine one_of_stretch(rows, width, columns, column, coefficient, x, u)
+    integer, intent(in) :: rows, width, columns
+    integer, intent(in) :: column(rows, width)
+    real(wp), intent(in) :: coefficient(rows, width), x(columns)
+    real(wp), intent(inout) :: u(rows)
+    integer :: begin, c, i, k
+
+    do begin = 1, rows, strip
+      c = column(1, 1) - 1
+      do i = begin, min(begin + strip - 1, rows)
+        u(i) = 0.0_wp + coefficient(i, 1) * x(c + i)
+      end do
+      do k = 2, width
+        c = column(1, k) - 1
+        do i = begin, min(begin + strip - 1, rows)
+          u(i) = u(i) + coefficient(i, k) * x(c + i)
+        end do
+      end do
+    end do
+  end subroutine one_of_stretch
+
+  pure subroutine one_on_lanes(lanes, rows, columns, entries, first, column, coefficient, x, u)
+    integer, intent(in) :: lanes, rows, columns, entries
+    integer, intent(in) :: first(rows + 1), column(entries)
+    real(wp), intent(in) :: coefficient(lanes, entries), x(lanes, columns)
+    real(wp), intent(inout) :: u(lanes, rows)
+    integer :: c, i, k, l
+
+    do i = 1, rows
+      k = first(i)
+      if (k == first(i + 1)) then
+        u(:, i) = 0.0_wp
+        cycle
+      end if
+      c = column(k)
+      do l = 1, lanes
+        u(l, i) = 0.0_wp + coefficient(l, k) * x(l, c)
+      end do
+      do k = first(i) + 1, first(i + 1) - 1
+        c = column(k)
+        do l = 1, lanes
+          u(l, i) = u(l, i) + coefficient(l, k) * x(l, c)
+        end do
+      end do
+    end do
+  end subroutine one_on_lanes
 
   !> u = map (x + y).
   subroutine map_sum(self, x, y, u)

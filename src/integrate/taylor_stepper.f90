@@ -1,0 +1,211 @@
+!> Steps along the Taylor series of the solution, of one order throughout.
+!>
+!> A step is as long as the last two coefficients allow: h = min over j = p - 1, p of ||y_j||^(-1/j), with the largest
+!> |y_j| / (atol + rtol |y|) of the states as norm, so that the terms h^j y_j are not larger than the tolerance. With
+!> the order p = 1 - ln(rtol) / 2, for which the work is least if it grows as p^2, that is the step rho / e^2 of A. Jorba,
+!> M. Zou, A software package for the numerical integration of ODEs by means of high-order Taylor methods, Experimental
+!> Mathematics 14 (2005) 99-117, for any mixture of the two tolerances. No step is judged after it has been taken.
+module nocdyn_taylor_stepper
+  use nocdyn_combinations, only: padded_columns
+  use nocdyn_finite, only: all_finite, is_finite
+  use nocdyn_kinds, only: wp
+  use nocdyn_step_control, only: smallest_step, step_control_t
+  use nocdyn_stepper, only: stepper_t
+  use nocdyn_system, only: evaluation_fine, system_t
+  use nocdyn_trial, only: park, park_infinities, trial_fine, trial_not_finite, trial_shorten, trial_t
+  implicit none (type, external)
+  private
+
+  public :: taylor_stepper
+
+  integer, parameter :: least_order = 4
+
+  type, extends(stepper_t), public :: taylor_stepper_t
+    private
+    real(wp), allocatable :: series(:, :, :)   !! y_0, y_1, ... of each lane, [lanes, padded columns, 0:order]
+    real(wp), allocatable :: power(:)          !! of the step size, [lanes]
+    logical, allocatable :: moved(:)           !! lanes that have moved since they were expanded
+    integer, allocatable :: verdict(:)         !! trial_... on the series of each lane
+    integer, allocatable :: culprit(:)         !! component that the verdict is due to, 0 if there is none
+  contains
+    procedure :: plan
+    procedure :: prepare
+    procedure :: begin
+    procedure :: attempt
+    procedure :: interpolate
+    procedure :: accept
+  end type taylor_stepper_t
+
+contains
+
+  !> The stepper whose order suits a tolerance, or of a given order.
+  pure function taylor_stepper(rtol, order) result(stepper)
+    real(wp), intent(in) :: rtol
+    integer, intent(in), optional :: order   !! at least 2
+    type(taylor_stepper_t) :: stepper
+
+    stepper%order = max(least_order, ceiling(1 - 0.5_wp * log(rtol)))
+    if (present(order)) stepper%order = order
+    stepper%error_order = stepper%order
+    stepper%degree = stepper%order
+    stepper%needs_series = .true.
+    stepper%plans_steps = .true.
+  end function taylor_stepper
+
+  subroutine prepare(self, system)
+    class(taylor_stepper_t), intent(inout) :: self
+    class(system_t), intent(in) :: system
+
+    if (allocated(self%series)) deallocate (self%series, self%power, self%moved, self%verdict, self%culprit)
+    associate (lanes => system%lanes)
+      allocate (self%series(lanes, padded_columns(lanes, system%states + system%quadratures), 0:self%order), source=0.0_wp)
+      allocate (self%power(lanes), source=0.0_wp)
+      allocate (self%moved(lanes), source=.true.)
+      allocate (self%verdict(lanes), source=trial_fine)
+      allocate (self%culprit(lanes), source=0)
+    end associate
+  end subroutine prepare
+
+  subroutine begin(self, trial, starting)
+    class(taylor_stepper_t), intent(inout) :: self
+    type(trial_t), intent(inout) :: trial
+    logical, intent(in) :: starting(:)
+
+    self%moved(:) = self%moved .or. starting
+  end subroutine begin
+
+  !> Expands the lanes that have moved and sets their steps; a lane that cannot be expanded is parked by `attempt`.
+  subroutine plan(self, system, trial, control)
+    class(taylor_stepper_t), intent(inout) :: self
+    class(system_t), intent(inout) :: system
+    type(trial_t), intent(inout) :: trial
+    type(step_control_t), intent(inout) :: control
+    logical :: are_finite
+    integer :: lane
+
+    if (.not. any(self%moved .and. trial%working)) return
+    self%series(:, :, 0) = trial%y
+    call system%series(self%order, size(self%series, 2), trial%t, self%series, trial%status)
+    are_finite = all_finite(size(self%series), self%series)
+    do lane = 1, trial%lanes
+      if (.not. (self%moved(lane) .and. trial%working(lane))) cycle
+      self%moved(lane) = .false.
+      trial%evaluations(lane) = trial%evaluations(lane) + 1
+      self%verdict(lane) = trial%status(lane)
+      self%culprit(lane) = 0
+      if (.not. are_finite) call find_infinity(self, lane)
+      if (self%verdict(lane) == trial_fine) call set_step(self, trial, control, lane)
+      if (self%verdict(lane) == trial_fine) cycle
+      control%h(lane) = 0.0_wp
+      self%series(lane, :, 1:) = 0.0_wp
+    end do
+    trial%status(:) = evaluation_fine
+  end subroutine plan
+
+  subroutine find_infinity(self, lane)
+    type(taylor_stepper_t), intent(inout) :: self
+    integer, intent(in) :: lane
+    integer :: component
+
+    do component = 1, size(self%series, 2)
+      if (all(is_finite(self%series(lane, component, :)))) cycle
+      self%verdict(lane) = trial_not_finite
+      self%culprit(lane) = component
+      return
+    end do
+  end subroutine find_infinity
+
+  !> The step that the last two coefficients of a lane allow; a verdict if it is too short for the time.
+  subroutine set_step(self, trial, control, lane)
+    type(taylor_stepper_t), intent(inout) :: self
+    type(trial_t), intent(in) :: trial
+    type(step_control_t), intent(inout) :: control
+    integer, intent(in) :: lane
+    real(wp) :: last, last_but_one, log_h
+
+    associate (p => self%order, y => self%series)
+      last = norm(trial%lanes, trial%states, lane, control, y(:, :, 0), y(:, :, p))
+      last_but_one = norm(trial%lanes, trial%states, lane, control, y(:, :, 0), y(:, :, p - 1))
+      log_h = min(log_of_step(last, p), log_of_step(last_but_one, p - 1))
+      control%h(lane) = exp(log_h)
+      if (control%h(lane) > smallest_step(trial%t(lane))) return
+      self%verdict(lane) = trial_shorten
+      self%culprit(lane) = maxloc(abs(y(lane, :trial%states, p)), dim=1)
+    end associate
+  end subroutine set_step
+
+  !> Logarithm of size^(-1/j); large, but no infinity, for a coefficient of zero.
+  pure real(wp) function log_of_step(size, j)
+    real(wp), intent(in) :: size
+    integer, intent(in) :: j
+    real(wp), parameter :: smallest = 1.0e-300_wp
+
+    log_of_step = -log(max(size, smallest)) / j
+  end function log_of_step
+
+  !> Largest |y_j| / (atol + rtol |y|) of the states of a lane.
+  pure real(wp) function norm(lanes, states, lane, control, y, y_j)
+    integer, intent(in) :: lanes, states, lane
+    type(step_control_t), intent(in) :: control
+    real(wp), intent(in) :: y(lanes, states), y_j(lanes, states)
+    integer :: i
+
+    norm = 0.0_wp
+    do i = 1, states
+      norm = max(norm, abs(y_j(lane, i)) / (control%atol + control%rtol * abs(y(lane, i))))
+    end do
+  end function norm
+
+  !> The sum of the series at the end of the step.
+  subroutine attempt(self, system, trial)
+    class(taylor_stepper_t), intent(inout) :: self
+    class(system_t), intent(inout) :: system
+    type(trial_t), intent(inout) :: trial
+    integer :: lane
+
+    do lane = 1, trial%lanes
+      if (self%verdict(lane) /= trial_fine) call park(trial, lane, self%verdict(lane), self%culprit(lane))
+    end do
+    call sum_series(trial%length, self%order, self%series, trial%h_spread, trial%y_new)
+    if (.not. all_finite(trial%length, trial%y_new)) call park_infinities(trial, trial%y_new)
+  end subroutine attempt
+
+  !> y = sum over k of h^k series(:, k).
+  pure subroutine sum_series(n, order, series, h, y)
+    integer, intent(in) :: n, order
+    real(wp), intent(in) :: series(n, 0:order), h(n)
+    real(wp), intent(inout) :: y(n)
+    integer :: k
+
+    y = series(:, order)
+    do k = order - 1, 0, -1
+      y = series(:, k) + h * y
+    end do
+  end subroutine sum_series
+
+  !> The series itself, in powers of theta.
+  subroutine interpolate(self, system, trial, wanted, coefficients)
+    class(taylor_stepper_t), intent(inout) :: self
+    class(system_t), intent(inout) :: system
+    type(trial_t), intent(inout) :: trial
+    logical, intent(in) :: wanted(:)
+    real(wp), contiguous, intent(inout) :: coefficients(:, :, :)
+    integer :: column, k
+
+    self%power(:) = 1.0_wp
+    do k = 1, self%order
+      self%power(:) = self%power * trial%h
+      do column = 1, size(coefficients, 2)
+        coefficients(:, column, k) = self%power * self%series(:, column, k)
+      end do
+    end do
+  end subroutine interpolate
+
+  subroutine accept(self, accepted)
+    class(taylor_stepper_t), intent(inout) :: self
+    logical, intent(in) :: accepted(:)
+
+    self%moved(:) = self%moved .or. accepted
+  end subroutine accept
+
+end module nocdyn_taylor_stepper
