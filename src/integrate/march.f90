@@ -1,6 +1,6 @@
 !> The march of a block of lanes through time: each lane at its own pace, all of them in one loop.
 module nocdyn_march
-  use nocdyn_dense_output, only: allocate_dense_output, dense_output_t, sample, take_lane
+  use nocdyn_dense_output, only: allocate_dense_output, batch, dense_output_t, sample, sample_batch, take_lane
   use nocdyn_events, only: allocate_events, events_t, find_events, start_events
   use nocdyn_extremes, only: allocate_extremes, extremes_t, follow_extremes, start_extremes
   use nocdyn_first_step, only: guess_first_steps
@@ -306,22 +306,31 @@ contains
     real(wp), intent(in) :: t
     real(wp), contiguous, intent(in) :: times(:)
     class(observer_t), intent(inout) :: observer
-    real(wp) :: theta
-    integer :: next
+    real(wp) :: theta(batch)
+    integer :: ahead, i
 
-    next = march%next(lane)
-    do while (next <= size(times))
-      if (times(next) > t) exit
-      if (times(next) < march%t_new(lane)) then
-        theta = (times(next) - march%dense%t) / march%dense%h
-        call sample(march%dense, theta, march%sample)
-      else
-        march%sample(:) = march%trial%y_new(lane, :march%trial%components)
-      end if
+    associate (next => march%next(lane))
+      do while (next <= size(times))
+        theta = 0.0_wp
+        ahead = 0
+        do while (ahead < min(batch, size(times) + 1 - next))
+          if (times(next + ahead) > t .or. times(next + ahead) >= march%t_new(lane)) exit
+          ahead = ahead + 1
+          theta(ahead) = (times(next + ahead - 1) - march%dense%t) / march%dense%h
+        end do
+        if (ahead == 0) exit
+        call sample_batch(march%dense, theta)
+        do i = 1, ahead
+          call observer%record(lane, times(next), march%dense%states(:march%trial%components, i))
+          next = next + 1
+        end do
+      end do
+      if (next > size(times)) return
+      if (times(next) > t) return
+      march%sample(:) = march%trial%y_new(lane, :march%trial%components)
       call observer%record(lane, times(next), march%sample)
       next = next + 1
-    end do
-    march%next(lane) = next
+    end associate
   end subroutine record_until
 
   !> The accepted lanes move to the end of their step.

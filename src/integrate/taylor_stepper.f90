@@ -6,7 +6,7 @@
 !> M. Zou, A software package for the numerical integration of ODEs by means of high-order Taylor methods, Experimental
 !> Mathematics 14 (2005) 99-117, for any mixture of the two tolerances. No step is judged after it has been taken.
 module nocdyn_taylor_stepper
-  use nocdyn_combinations, only: padded_columns
+  use nocdyn_combinations, only: padded_columns, width
   use nocdyn_finite, only: all_finite, is_finite
   use nocdyn_kinds, only: wp
   use nocdyn_step_control, only: smallest_step, step_control_t
@@ -23,7 +23,6 @@ module nocdyn_taylor_stepper
   type, extends(stepper_t), public :: taylor_stepper_t
     private
     real(wp), allocatable :: series(:, :, :)   !! y_0, y_1, ... of each lane, [lanes, padded columns, 0:order]
-    real(wp), allocatable :: power(:)          !! of the step size, [lanes]
     logical, allocatable :: moved(:)           !! lanes that have moved since they were expanded
     integer, allocatable :: verdict(:)         !! trial_... on the series of each lane
     integer, allocatable :: culprit(:)         !! component that the verdict is due to, 0 if there is none
@@ -44,7 +43,7 @@ contains
     integer, intent(in), optional :: order   !! at least 2
     type(taylor_stepper_t) :: stepper
 
-    stepper%order = max(least_order, ceiling(1 - 0.5_wp * log(rtol)))
+    stepper%order = max(least_order, ceiling(1 - 0.7_wp * log(rtol)))
     if (present(order)) stepper%order = order
     stepper%error_order = stepper%order
     stepper%degree = stepper%order
@@ -56,10 +55,9 @@ contains
     class(taylor_stepper_t), intent(inout) :: self
     class(system_t), intent(in) :: system
 
-    if (allocated(self%series)) deallocate (self%series, self%power, self%moved, self%verdict, self%culprit)
+    if (allocated(self%series)) deallocate (self%series, self%moved, self%verdict, self%culprit)
     associate (lanes => system%lanes)
       allocate (self%series(lanes, padded_columns(lanes, system%states + system%quadratures), 0:self%order), source=0.0_wp)
-      allocate (self%power(lanes), source=0.0_wp)
       allocate (self%moved(lanes), source=.true.)
       allocate (self%verdict(lanes), source=trial_fine)
       allocate (self%culprit(lanes), source=0)
@@ -172,14 +170,19 @@ contains
 
   !> y = sum over k of h^k series(:, k).
   pure subroutine sum_series(n, order, series, h, y)
-    integer, intent(in) :: n, order
+    integer, intent(in) :: n   !! whole vectors
+    integer, intent(in) :: order
     real(wp), intent(in) :: series(n, 0:order), h(n)
     real(wp), intent(inout) :: y(n)
-    integer :: k
+    real(wp) :: sum(width)
+    integer :: i, k
 
-    y = series(:, order)
-    do k = order - 1, 0, -1
-      y = series(:, k) + h * y
+    do i = 1, n, width
+      sum = series(i:i + width - 1, order)
+      do k = order - 1, 0, -1
+        sum = series(i:i + width - 1, k) + h(i:i + width - 1) * sum
+      end do
+      y(i:i + width - 1) = sum
     end do
   end subroutine sum_series
 
@@ -190,16 +193,27 @@ contains
     type(trial_t), intent(inout) :: trial
     logical, intent(in) :: wanted(:)
     real(wp), contiguous, intent(inout) :: coefficients(:, :, :)
-    integer :: column, k
 
-    self%power(:) = 1.0_wp
-    do k = 1, self%order
-      self%power(:) = self%power * trial%h
-      do column = 1, size(coefficients, 2)
-        coefficients(:, column, k) = self%power * self%series(:, column, k)
+    call scale_series(trial%length, self%order, self%series, trial%h_spread, coefficients)
+  end subroutine interpolate
+
+  !> c(:, k) = h^k series(:, k).
+  pure subroutine scale_series(n, order, series, h, c)
+    integer, intent(in) :: n   !! whole vectors
+    integer, intent(in) :: order
+    real(wp), intent(in) :: series(n, 0:order), h(n)
+    real(wp), intent(inout) :: c(n, order)
+    real(wp) :: power(width)
+    integer :: i, k
+
+    do i = 1, n, width
+      power = 1.0_wp
+      do k = 1, order
+        power = power * h(i:i + width - 1)
+        c(i:i + width - 1, k) = power * series(i:i + width - 1, k)
       end do
     end do
-  end subroutine interpolate
+  end subroutine scale_series
 
   subroutine accept(self, accepted)
     class(taylor_stepper_t), intent(inout) :: self

@@ -37,12 +37,14 @@ module nocdyn_bank
     integer :: values = 0                    !! lanes * elements
     integer :: first_value = 1               !! the place of lane 1 of `first` in the values of the machine
     logical :: is_polynomial = .true.        !! whether `polynomials` says all of its law
+    logical :: is_external = .false.         !! whether the rest of its law depends on the time alone
   contains
     procedure :: polynomials
     procedure :: evaluate
     procedure :: differentiate
     procedure :: assess
     procedure :: has_series
+    procedure :: drive
     procedure :: series
     procedure :: connect
     procedure :: last
@@ -117,19 +119,29 @@ contains
     type(elements_t), intent(inout) :: elements   !! of the machine
   end subroutine assess
 
-  !> Whether the moments have a Taylor series: that of `polynomials`, and that of `evaluate` by `series`.
+  !> Whether the moments have a Taylor series: that of `polynomials`, and that of `evaluate` by `drive` and `series`.
   pure logical function has_series(self)
     class(bank_t), intent(in) :: self
 
     has_series = self%is_polynomial
   end function has_series
 
-  !> Adds the Taylor coefficients number k of what `evaluate` adds. Those of the angles and speeds are known up to k, those of
-  !> the moments up to k - 1. The arrays begin with the bank's first value, and column j holds the coefficients number j.
+  !> Sets the Taylor coefficients, number 0 to last, of what of `working` depends on the time alone. Here and in `series`
+  !> the arrays begin with the bank's first value, and column k holds the coefficients number k.
+  subroutine drive(self, last, stride, time, working)
+    class(bank_t), intent(in) :: self
+    integer, intent(in) :: last
+    integer, intent(in) :: stride   !! from column to column
+    real(wp), intent(in) :: time(self%lanes)
+    real(wp), intent(inout) :: working(stride, 0:*)
+  end subroutine drive
+
+  !> Adds the Taylor coefficients number k of the rest of what `evaluate` adds. Those of the angles and speeds are known up
+  !> to k, those of the moments up to k - 1.
   subroutine series(self, k, stride, time, angle, speed, restoring, working)
     class(bank_t), intent(in) :: self
     integer, intent(in) :: k
-    integer, intent(in) :: stride   !! values of the machine
+    integer, intent(in) :: stride
     real(wp), intent(in) :: time(self%lanes)
     real(wp), intent(in) :: angle(stride, 0:*), speed(stride, 0:*)
     real(wp), intent(inout) :: restoring(stride, 0:*), working(stride, 0:*)

@@ -5,7 +5,7 @@
 !> the elements' unit moments on their two bodies and U = B^T L_tau.
 module nocdyn_reduced
   use nocdyn_element_coordinates, only: element_coordinates_t, new_element_coordinates
-  use nocdyn_element_series, only: element_series_t, integrate_powers, new_element_series
+  use nocdyn_element_series, only: add_moments, element_series_t, integrate_powers, new_element_series, whole_vectors
   use nocdyn_formulation, only: formulation_t
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
@@ -25,6 +25,7 @@ module nocdyn_reduced
     type(sparse_map_t), private :: accelerations               !! R
     type(reduced_jacobian_t), private :: sums                  !! R diag U
     type(element_series_t), private :: series_of_elements      !! after `prepare_series`
+    real(wp), allocatable, private :: acceleration(:)          !! coefficients of q'', [lanes * freedoms in whole vectors]
     real(wp), allocatable, private :: none(:, :)               !! zeros, [lanes, elements]
   contains
     procedure :: derivative
@@ -161,6 +162,8 @@ contains
     integer, intent(in) :: order
 
     self%series_of_elements = new_element_series(self%machine%laws, order)
+    if (allocated(self%acceleration)) deallocate (self%acceleration)
+    allocate (self%acceleration(whole_vectors(self%lanes * self%machine%coordinates%freedoms)), source=0.0_wp)
   end subroutine prepare_series
 
   subroutine series(self, order, columns, t, y, status)
@@ -185,36 +188,30 @@ contains
     integer :: k
 
     associate (elements => self%series_of_elements)
+      call self%machine%drive_elements(t, elements)
       call self%twists%map_pair(self%start_twist, y(n + 1, 0), y(1, 0), elements%angle, elements%speed)
       do k = 0, order - 1
-        if (k > 0) then
-          call integrate_speeds(elements%values, elements%inverse(k), elements%speed(1, k - 1), elements%angle(1, k))
-          call self%twists%map_one(y(1, k), elements%speed(1, k))
-        end if
+        if (k > 0) call self%twists%map_one(y(1, k), elements%speed(1, k))
         call self%machine%expand_elements(k, t, elements)
-        call self%accelerations%map_sum(elements%restoring(1, k), elements%working(1, k), y(1, k + 1))
-        call integrate_coordinates(n, elements%inverse(k + 1), y(1, k), y(1, k + 1))
+        call add_moments(elements, k)
+        call self%accelerations%map_one(elements%moment, self%acceleration)
+        call integrate_coordinates(n, elements%inverse(k + 1), self%acceleration, y(1, k), y(1, k + 1))
         if (quadratures > 0) call integrate_powers(elements, k, self%lanes, self%machine%accounted, y(2 * n + 1, k + 1))
       end do
     end associate
   end subroutine expand
 
-  pure subroutine integrate_speeds(n, inverse, speed, angle)
+  !> The next coefficients of q' from those of q'', and of q from those of q'.
+  pure subroutine integrate_coordinates(n, inverse, acceleration, speed, y)
     integer, intent(in) :: n
-    real(wp), intent(in) :: inverse, speed(n)
-    real(wp), intent(inout) :: angle(n)
+    real(wp), intent(in) :: inverse, acceleration(n), speed(n)
+    real(wp), intent(inout) :: y(n, 2)
+    integer :: i
 
-    angle = inverse * speed
-  end subroutine integrate_speeds
-
-  !> The next coefficients of q' from those of q'', which are in their place, and of q from the present ones of q'.
-  pure subroutine integrate_coordinates(n, inverse, y, y_next)
-    integer, intent(in) :: n
-    real(wp), intent(in) :: inverse, y(n)
-    real(wp), intent(inout) :: y_next(n, 2)
-
-    y_next(:, 1) = inverse * y_next(:, 1)
-    y_next(:, 2) = inverse * y
+    do i = 1, n
+      y(i, 1) = inverse * acceleration(i)
+      y(i, 2) = inverse * speed(i)
+    end do
   end subroutine integrate_coordinates
 
   subroutine jacobian(self, t, y, dfdy, dfdt, status)

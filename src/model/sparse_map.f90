@@ -1,9 +1,11 @@
 !> Sparse linear maps on blocks of lanes, applied row by row: every result is a sum of its own, and nothing is scattered.
 !>
 !> The terms of a row are added in the order of its entries, in every lane and in each of the loops below alike, so
-!> that a lane's result is the same to the last bit in a block of any size.
+!> that a lane's result is the same to the last bit in a block of any size. Where columns ascend in every row, the dense
+!> form of small maps keeps to that order too.
 module nocdyn_sparse_map
   use nocdyn_kinds, only: wp
+  use nocdyn_map_products, only: dense_columns, multiply_dense, multiply_lanes, multiply_rows, multiply_stretch, strip, width
   implicit none (type, external)
   private
 
@@ -27,14 +29,15 @@ module nocdyn_sparse_map
     integer, allocatable, private :: first_entry(:)      !! of each stretch
     integer, allocatable, private :: column(:)           !! [entries]
     real(wp), allocatable, private :: coefficient(:, :)  !! [lanes, entries]
+    real(wp), allocatable, private :: dense(:, :)        !! the matrix of a small map with one lane, [whole vectors, columns]
   contains
     procedure :: map_one
     procedure :: map_pair
     procedure :: map_sum
   end type sparse_map_t
 
-  integer, parameter :: strip = 256   !! rows of a stretch that stay in the first cache from diagonal to diagonal
   integer, parameter :: short = 16    !! fewer rows are not worth a vector loop
+  integer, parameter :: most_dense = 256   !! numbers in the matrix of a small map
 
 contains
 
@@ -73,6 +76,9 @@ contains
     allocate (self%column(size(column)), self%coefficient(self%lanes, size(column)))
     self%column(:) = column(order)
     self%coefficient(:, :) = coefficient(:, order)
+    if (self%lanes == 1 .and. (rows + width) * self%columns <= most_dense) then
+      allocate (self%dense, source=dense_columns(first, column, coefficient(1, :), self%columns))
+    end if
   end function new_sparse_map
 
   !> How many rows from each row on have columns that advance by one from row to row.
@@ -146,6 +152,31 @@ contains
       next(column(i)) = next(column(i)) + 1
     end do
   end subroutine transposed_order
+
+  !> u = map x; u has room for whole vectors, what follows its rows may be overwritten.
+  subroutine map_one(self, x, u)
+    class(sparse_map_t), intent(in) :: self
+    real(wp), intent(in) :: x(self%lanes * self%columns)        !! [lanes, columns]
+    real(wp), intent(inout) :: u(self%lanes * self%all_rows)    !! [lanes, rows]
+    integer :: s
+
+    if (allocated(self%dense)) then
+      call multiply_dense(size(self%dense, 1), self%columns, self%dense, x, u)
+      return
+    else if (self%lanes > 1) then
+      call multiply_lanes(self%lanes, self%all_rows, self%columns, size(self%column), self%first, self%column, &
+                          self%coefficient, x, u)
+      return
+    end if
+    call multiply_rows(self%loose_rows, self%all_rows, self%columns, size(self%column), self%row, self%first, self%column, &
+                       self%coefficient, x, u)
+    do s = 1, self%stretches
+      associate (entry => self%first_entry(s))
+        call multiply_stretch(self%rows(s), self%width(s), self%columns, self%column(entry), self%coefficient(1, entry), &
+                              x, u(self%first_row(s)))
+      end associate
+    end do
+  end subroutine map_one
 
   !> u = offset + map x and v = map y.
   subroutine map_pair(self, offset, x, y, u, v)
@@ -241,92 +272,6 @@ contains
       end do
     end do
   end subroutine pair_on_lanes
-
-  !> u = map x.
-  subroutine map_one(self, x, u)
-    class(sparse_map_t), intent(in) :: self
-    real(wp), intent(in) :: x(self%lanes * self%columns)        !! [lanes, columns]
-    real(wp), intent(inout) :: u(self%lanes * self%all_rows)    !! [lanes, rows]
-    integer :: s
-
-    if (self%lanes > 1) then
-      call one_on_lanes(self%lanes, self%all_rows, self%columns, size(self%column), self%first, self%column, &
-                        self%coefficient, x, u)
-      return
-    end if
-    call one_of_rows(self%loose_rows, self%all_rows, self%columns, size(self%column), self%row, self%first, self%column, &
-                     self%coefficient, x, u)
-    do s = 1, self%stretches
-      associate (entry => self%first_entry(s))
-        call one_of_stretch(self%rows(s), self%width(s), self%columns, self%column(entry), self%coefficient(1, entry), &
-                            x, u(self%first_row(s)))
-      end associate
-    end do
-  end subroutine map_one
-
-  pure subroutine one_of_rows(rows, all_rows, columns, entries, row, first, column, coefficient, x, u)
-    integer, intent(in) :: rows, all_rows, columns, entries
-    integer, intent(in) :: row(rows), first(rows + 1), column(entries)
-    real(wp), intent(in) :: coefficient(entries), x(columns)
-    real(wp), intent(inout) :: u(all_rows)
-    real(wp) :: sum
-    integer :: i, k
-
-    do i = 1, rows
-      sum = 0.0_wp
-      do k = first(i), first(i + 1) - 1
-        sum = sum + coefficient(k) * x(column(k))
-      end do
-      u(row(i)) = sum
-    end do
-  end subroutine one_of_rows
-
-  pure subroutine one_of_stretch(rows, width, columns, column, coefficient, x, u)
-    integer, intent(in) :: rows, width, columns
-    integer, intent(in) :: column(rows, width)
-    real(wp), intent(in) :: coefficient(rows, width), x(columns)
-    real(wp), intent(inout) :: u(rows)
-    integer :: begin, c, i, k
-
-    do begin = 1, rows, strip
-      c = column(1, 1) - 1
-      do i = begin, min(begin + strip - 1, rows)
-        u(i) = 0.0_wp + coefficient(i, 1) * x(c + i)
-      end do
-      do k = 2, width
-        c = column(1, k) - 1
-        do i = begin, min(begin + strip - 1, rows)
-          u(i) = u(i) + coefficient(i, k) * x(c + i)
-        end do
-      end do
-    end do
-  end subroutine one_of_stretch
-
-  pure subroutine one_on_lanes(lanes, rows, columns, entries, first, column, coefficient, x, u)
-    integer, intent(in) :: lanes, rows, columns, entries
-    integer, intent(in) :: first(rows + 1), column(entries)
-    real(wp), intent(in) :: coefficient(lanes, entries), x(lanes, columns)
-    real(wp), intent(inout) :: u(lanes, rows)
-    integer :: c, i, k, l
-
-    do i = 1, rows
-      k = first(i)
-      if (k == first(i + 1)) then
-        u(:, i) = 0.0_wp
-        cycle
-      end if
-      c = column(k)
-      do l = 1, lanes
-        u(l, i) = 0.0_wp + coefficient(l, k) * x(l, c)
-      end do
-      do k = first(i) + 1, first(i + 1) - 1
-        c = column(k)
-        do l = 1, lanes
-          u(l, i) = u(l, i) + coefficient(l, k) * x(l, c)
-        end do
-      end do
-    end do
-  end subroutine one_on_lanes
 
   !> u = map (x + y).
   subroutine map_sum(self, x, y, u)
