@@ -5,7 +5,6 @@ module nocdyn_machine
   use nocdyn_coordinates, only: coordinates_t
   use nocdyn_elements, only: elements_t, new_elements
   use nocdyn_geared_groups, only: geared_group_t
-  use nocdyn_element_series, only: element_series_t, expand_polynomials
   use nocdyn_kinds, only: wp
   use nocdyn_polynomial_laws, only: new_polynomial_laws, polynomial_laws_t
   use nocdyn_text, only: quoted, string_t
@@ -37,8 +36,6 @@ module nocdyn_machine
     procedure :: differentiate_elements
     procedure :: assess
     procedure :: series_obstacle
-    procedure :: drive_elements
-    procedure :: expand_elements
     procedure :: power
     procedure :: kinetic_energy
     procedure :: stored_energy
@@ -182,40 +179,6 @@ contains
       end associate
     end do
   end function series_obstacle
-
-  !> The Taylor coefficients of the external moments, before `expand_elements`.
-  subroutine drive_elements(self, t, series)
-    class(machine_t), intent(in) :: self
-    real(wp), intent(in) :: t(self%lanes)
-    type(element_series_t), intent(inout) :: series
-    integer :: i
-
-    do i = 1, size(self%other_banks)
-      associate (bank => self%banks(self%other_banks(i))%bank)
-        call bank%drive(series%last, series%stride, t, series%external(bank%first_value, 0))
-      end associate
-    end do
-  end subroutine drive_elements
-
-  !> The Taylor coefficients number k of the moments of all elements, from those of their angles and speeds.
-  subroutine expand_elements(self, k, t, series)
-    class(machine_t), intent(in) :: self
-    integer, intent(in) :: k
-    real(wp), intent(in) :: t(self%lanes)
-    type(element_series_t), intent(inout) :: series
-    integer :: i
-
-    call expand_polynomials(series, k)
-    do i = 1, size(self%other_banks)
-      associate (bank => self%banks(self%other_banks(i))%bank)
-        if (bank%is_external) cycle
-        associate (first => bank%first_value)
-          call bank%series(k, series%stride, t, series%angle(first, 0), series%speed(first, 0), series%restoring(first, 0), &
-                           series%working(first, 0))
-        end associate
-      end associate
-    end do
-  end subroutine expand_elements
 
   !> Power of the accounted elements after `evaluate`, positive into the machine [W].
   subroutine power(self, watts)

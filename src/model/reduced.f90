@@ -5,11 +5,11 @@
 !> the elements' unit moments on their two bodies and U = B^T L_tau.
 module nocdyn_reduced
   use nocdyn_element_coordinates, only: element_coordinates_t, new_element_coordinates
-  use nocdyn_element_series, only: add_moments, element_series_t, integrate_powers, new_element_series, whole_vectors
   use nocdyn_formulation, only: formulation_t
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
   use nocdyn_reduced_jacobian, only: new_reduced_jacobian, reduced_jacobian_t
+  use nocdyn_reduced_series, only: new_reduced_series, reduced_series_t
   use nocdyn_sparse_map, only: new_sparse_map, sparse_map_t, transposed_order
   use nocdyn_system, only: pattern_t
   use nocdyn_text, only: quoted
@@ -24,8 +24,7 @@ module nocdyn_reduced
     type(sparse_map_t), private :: twists                      !! U
     type(sparse_map_t), private :: accelerations               !! R
     type(reduced_jacobian_t), private :: sums                  !! R diag U
-    type(element_series_t), private :: series_of_elements      !! after `prepare_series`
-    real(wp), allocatable, private :: acceleration(:)          !! coefficients of q'', [lanes * freedoms in whole vectors]
+    type(reduced_series_t), private :: motion                  !! after `prepare_series`
     real(wp), allocatable, private :: none(:, :)               !! zeros, [lanes, elements]
   contains
     procedure :: derivative
@@ -161,9 +160,7 @@ contains
     class(reduced_t), intent(inout) :: self
     integer, intent(in) :: order
 
-    self%series_of_elements = new_element_series(self%machine%laws, order)
-    if (allocated(self%acceleration)) deallocate (self%acceleration)
-    allocate (self%acceleration(whole_vectors(self%lanes * self%machine%coordinates%freedoms)), source=0.0_wp)
+    self%motion = new_reduced_series(self%machine, self%twists, self%accelerations, self%is_audited, order)
   end subroutine prepare_series
 
   subroutine series(self, order, columns, t, y, status)
@@ -173,46 +170,9 @@ contains
     real(wp), intent(inout) :: y(self%lanes, columns, 0:order)
     integer, intent(inout) :: status(self%lanes)
 
-    call expand(self, order, self%lanes * self%machine%coordinates%freedoms, self%lanes * columns, self%quadratures, t, y)
+    call self%motion%expand(self%machine, self%twists, self%accelerations, self%start_twist, &
+                            self%lanes * self%machine%coordinates%freedoms, self%lanes * columns, t, y)
   end subroutine series
-
-  !> The coefficients number k + 1 of q', q and the works follow from those number k: q''_k = R M_k, U q' = u'.
-  subroutine expand(self, order, n, length, quadratures, t, y)
-    class(reduced_t), intent(inout) :: self
-    integer, intent(in) :: order
-    integer, intent(in) :: n        !! lanes * freedoms
-    integer, intent(in) :: length   !! lanes * columns
-    integer, intent(in) :: quadratures
-    real(wp), intent(in) :: t(self%lanes)
-    real(wp), intent(inout) :: y(length, 0:order)
-    integer :: k
-
-    associate (elements => self%series_of_elements)
-      call self%machine%drive_elements(t, elements)
-      call self%twists%map_pair(self%start_twist, y(n + 1, 0), y(1, 0), elements%angle, elements%speed)
-      do k = 0, order - 1
-        if (k > 0) call self%twists%map_one(y(1, k), elements%speed(1, k))
-        call self%machine%expand_elements(k, t, elements)
-        call add_moments(elements, k)
-        call self%accelerations%map_one(elements%moment, self%acceleration)
-        call integrate_coordinates(n, elements%inverse(k + 1), self%acceleration, y(1, k), y(1, k + 1))
-        if (quadratures > 0) call integrate_powers(elements, k, self%lanes, self%machine%accounted, y(2 * n + 1, k + 1))
-      end do
-    end associate
-  end subroutine expand
-
-  !> The next coefficients of q' from those of q'', and of q from those of q'.
-  pure subroutine integrate_coordinates(n, inverse, acceleration, speed, y)
-    integer, intent(in) :: n
-    real(wp), intent(in) :: inverse, acceleration(n), speed(n)
-    real(wp), intent(inout) :: y(n, 2)
-    integer :: i
-
-    do i = 1, n
-      y(i, 1) = inverse * acceleration(i)
-      y(i, 2) = inverse * speed(i)
-    end do
-  end subroutine integrate_coordinates
 
   subroutine jacobian(self, t, y, dfdy, dfdt, status)
     class(reduced_t), intent(inout) :: self

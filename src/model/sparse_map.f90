@@ -1,11 +1,10 @@
 !> Sparse linear maps on blocks of lanes, applied row by row: every result is a sum of its own, and nothing is scattered.
 !>
 !> The terms of a row are added in the order of its entries, in every lane and in each of the loops below alike, so
-!> that a lane's result is the same to the last bit in a block of any size. Where columns ascend in every row, the dense
-!> form of small maps keeps to that order too.
+!> that a lane's result is the same to the last bit in a block of any size.
 module nocdyn_sparse_map
   use nocdyn_kinds, only: wp
-  use nocdyn_map_products, only: dense_columns, multiply_dense, multiply_lanes, multiply_rows, multiply_stretch, strip, width
+  use nocdyn_map_products, only: multiply_lanes, multiply_rows, multiply_stretch, strip
   implicit none (type, external)
   private
 
@@ -29,7 +28,6 @@ module nocdyn_sparse_map
     integer, allocatable, private :: first_entry(:)      !! of each stretch
     integer, allocatable, private :: column(:)           !! [entries]
     real(wp), allocatable, private :: coefficient(:, :)  !! [lanes, entries]
-    real(wp), allocatable, private :: dense(:, :)        !! the matrix of a small map with one lane, [whole vectors, columns]
   contains
     procedure :: map_one
     procedure :: map_pair
@@ -37,7 +35,6 @@ module nocdyn_sparse_map
   end type sparse_map_t
 
   integer, parameter :: short = 16    !! fewer rows are not worth a vector loop
-  integer, parameter :: most_dense = 256   !! numbers in the matrix of a small map
 
 contains
 
@@ -76,9 +73,6 @@ contains
     allocate (self%column(size(column)), self%coefficient(self%lanes, size(column)))
     self%column(:) = column(order)
     self%coefficient(:, :) = coefficient(:, order)
-    if (self%lanes == 1 .and. (rows + width) * self%columns <= most_dense) then
-      allocate (self%dense, source=dense_columns(first, column, coefficient(1, :), self%columns))
-    end if
   end function new_sparse_map
 
   !> How many rows from each row on have columns that advance by one from row to row.
@@ -153,17 +147,14 @@ contains
     end do
   end subroutine transposed_order
 
-  !> u = map x; u has room for whole vectors, what follows its rows may be overwritten.
+  !> u = map x.
   subroutine map_one(self, x, u)
     class(sparse_map_t), intent(in) :: self
     real(wp), intent(in) :: x(self%lanes * self%columns)        !! [lanes, columns]
     real(wp), intent(inout) :: u(self%lanes * self%all_rows)    !! [lanes, rows]
     integer :: s
 
-    if (allocated(self%dense)) then
-      call multiply_dense(size(self%dense, 1), self%columns, self%dense, x, u)
-      return
-    else if (self%lanes > 1) then
+    if (self%lanes > 1) then
       call multiply_lanes(self%lanes, self%all_rows, self%columns, size(self%column), self%first, self%column, &
                           self%coefficient, x, u)
       return

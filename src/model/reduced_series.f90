@@ -1,0 +1,388 @@
+!> Taylor series of the motion of a machine in its reduced formulation, by recurrence from one coefficient to the next.
+!>
+!> With the coefficients of q' up to number k, those of the elements are u'_k = U q'_k and u_k = u'_(k-1) / k; their laws give
+!> the moments M_k, and (k + 1) q'_(k+1) = R M_k. Products in the laws are sums over pairs of coefficients,
+!> (f g)_k = sum of f_j g_(k-j). They begin in the middle, with the pairs that have been known for longest, and end with
+!> the newest coefficients, so that a processor need not wait for those.
+!>
+!> Arrays are filled up with zeros to whole vectors: every number goes through the same operations wherever it stands.
+!> Each procedure of the recurrence is called from one place, so that compilers put it there.
+module nocdyn_reduced_series
+  use nocdyn_kinds, only: wp
+  use nocdyn_machine, only: machine_t
+  use nocdyn_polynomial_laws, only: polynomial_laws_t
+  use nocdyn_sparse_map, only: sparse_map_t
+  implicit none (type, external)
+  private
+
+  public :: new_reduced_series
+
+  integer, parameter :: width = 4          ! of a vector
+  integer, parameter :: most_dense = 256   ! numbers in the matrix of a map that is worth its zeros
+
+  !> Column k of an array holds the coefficients number k, the k-th derivatives over k factorial.
+  type, public :: reduced_series_t
+    private
+    integer :: order = 0                       !! of the series of the state
+    integer :: lanes = 1
+    logical :: is_audited = .false.            !! whether the works are integrated
+    integer :: stride = 0                      !! lanes * elements in whole vectors
+    logical :: is_dense = .false.              !! whether the maps are multiplied out
+    real(wp), allocatable :: angle(:, :)       !! u, [stride, 0:order - 1] as all these
+    real(wp), allocatable :: speed(:, :)       !! u'
+    real(wp), allocatable :: restoring(:, :)   !! as in `elements_t`
+    real(wp), allocatable :: working(:, :)
+    real(wp), allocatable :: external(:, :)    !! what of `working` depends on the time alone
+    real(wp), allocatable :: acceleration(:)   !! present coefficients of q'', [lanes * freedoms in whole vectors]
+    real(wp), allocatable :: inverse(:)        !! 1 / k, [order]
+    real(wp), allocatable :: rest(:)           !! as in `polynomial_laws_t`, [stride]
+    real(wp), allocatable :: linear(:)
+    real(wp), allocatable :: by_speed(:)
+    real(wp), allocatable :: twists(:, :)      !! U, [stride, freedoms], if it is dense
+    real(wp), allocatable :: responses(:, :)   !! R, [freedoms in whole vectors, elements], if it is dense
+    integer, allocatable :: inner_banks(:)     !! whose laws are more than polynomials and external torques
+    integer, allocatable :: cubed(:)           !! elements with a term by (u - rest)^3
+    integer, allocatable :: squared(:)         !! elements with a term by u'^2
+    integer :: powers = 0                      !! lanes * (cubed and squared elements) in whole vectors
+    integer :: cubes = 0                       !! lanes * cubed elements in whole vectors
+    real(wp), allocatable :: factor(:)         !! of the powers, [powers]
+    real(wp), allocatable :: base(:, :)        !! series of what is raised, [powers, 0:order - 1]
+    real(wp), allocatable :: square(:, :)      !! of its square
+    real(wp), allocatable :: cube(:)           !! present coefficients of its cube, [cubes]
+  contains
+    procedure :: expand
+  end type reduced_series_t
+
+contains
+
+  !> Room for series up to an order, and what their coefficients need of the machine.
+  function new_reduced_series(machine, twists, accelerations, audited, order) result(self)
+    type(machine_t), intent(in) :: machine
+    type(sparse_map_t), intent(in) :: twists          !! U
+    type(sparse_map_t), intent(in) :: accelerations   !! R
+    logical, intent(in) :: audited                    !! whether the works are integrated
+    integer, intent(in) :: order
+    type(reduced_series_t) :: self
+    integer :: b, i, k
+
+    self%order = order
+    self%lanes = machine%lanes
+    self%is_audited = audited .and. machine%accounts() > 0
+    associate (values => size(machine%laws%rest), n => machine%lanes * machine%coordinates%freedoms, banks => machine%banks)
+      self%stride = whole_vectors(values)
+      allocate (self%angle(self%stride, 0:order - 1), source=0.0_wp)
+      allocate (self%speed, self%restoring, self%working, self%external, source=self%angle)
+      allocate (self%rest(self%stride), source=0.0_wp)
+      allocate (self%linear, self%by_speed, source=self%rest)
+      self%rest(:values) = reshape(machine%laws%rest, [values])
+      self%linear(:values) = reshape(machine%laws%linear, [values])
+      self%by_speed(:values) = reshape(machine%laws%by_speed, [values])
+      self%external(:values, 0) = reshape(machine%laws%constant, [values])
+      allocate (self%acceleration(whole_vectors(n)), source=0.0_wp)
+      allocate (self%inverse(order))
+      self%inverse(:) = [(1.0_wp / k, k=1, order)]
+      self%inner_banks = pack(machine%other_banks, [(.not. banks(machine%other_banks(b))%bank%is_external, &
+                                                     b=1, size(machine%other_banks))])
+      self%is_dense = self%lanes == 1 .and. max(self%stride * n, size(self%acceleration) * values) <= most_dense
+      if (self%is_dense) then
+        allocate (self%twists(self%stride, n), self%responses(size(self%acceleration), values), source=0.0_wp)
+        do i = 1, n
+          call twists%map_one(unit(n, i), self%twists(:, i))
+        end do
+        do i = 1, values
+          call accelerations%map_one(unit(values, i), self%responses(:, i))
+        end do
+      end if
+    end associate
+    call place_powers(self, machine%laws)
+  end function new_reduced_series
+
+  !> The length of so many numbers in whole vectors.
+  pure integer function whole_vectors(numbers)
+    integer, intent(in) :: numbers
+
+    whole_vectors = width * ((numbers + width - 1) / width)
+  end function whole_vectors
+
+  pure function unit(n, i) result(vector)
+    integer, intent(in) :: n, i
+    real(wp) :: vector(n)
+
+    vector = 0.0_wp
+    vector(i) = 1.0_wp
+  end function unit
+
+  !> Places the powers of all lanes beside each other, the cubes first.
+  pure subroutine place_powers(self, laws)
+    type(reduced_series_t), intent(inout) :: self
+    type(polynomial_laws_t), intent(in) :: laws
+    integer :: e
+
+    self%cubed = pack([(e, e=1, size(laws%rest, 2))], any(abs(laws%cubic) > 0, dim=1))
+    self%squared = pack([(e, e=1, size(laws%rest, 2))], any(abs(laws%by_speed_squared) > 0, dim=1))
+    associate (cubes => self%lanes * size(self%cubed), squares => self%lanes * size(self%squared))
+      self%cubes = whole_vectors(cubes)
+      self%powers = whole_vectors(cubes + squares)
+      allocate (self%factor(self%powers), self%cube(self%cubes), source=0.0_wp)
+      self%factor(:cubes) = reshape(-laws%cubic(:, self%cubed), [cubes])
+      self%factor(cubes + 1:cubes + squares) = reshape(laws%by_speed_squared(:, self%squared), [squares])
+    end associate
+    allocate (self%base(self%powers, 0:self%order - 1), source=0.0_wp)
+    allocate (self%square, source=self%base)
+  end subroutine place_powers
+
+  !> The coefficients number 1 to order of q', q and the works of the accounted elements, which follow each other in y.
+  subroutine expand(self, machine, twists, accelerations, start_twist, n, length, t, y)
+    class(reduced_series_t), intent(inout) :: self
+    type(machine_t), intent(in) :: machine
+    type(sparse_map_t), intent(in) :: twists, accelerations
+    integer, intent(in) :: n                          !! lanes * freedoms
+    integer, intent(in) :: length                     !! of a column of y
+    real(wp), intent(in) :: start_twist(:, :)          !! [lanes, elements]
+    real(wp), intent(in) :: t(self%lanes)
+    real(wp), intent(inout) :: y(length, 0:self%order)
+    integer :: k
+
+    call drive(self, machine, t)
+    call twists%map_pair(start_twist, y(n + 1, 0), y(1, 0), self%angle, self%speed)
+    do k = 0, self%order - 1
+      if (k == 0) then
+        call begin_moments(self%stride, self%rest, self%linear, self%by_speed, self%external, self%angle, self%speed, &
+                           self%restoring, self%working)
+      else
+        if (self%is_dense) then
+          call turn_dense(self%stride, n, self%twists, y(1, k), self%speed(1, k))
+        else
+          call twists%map_one(y(1, k), self%speed(1, k))
+        end if
+        call continue_moments(self%stride, k, self%inverse(k), self%linear, self%by_speed, self%external, self%speed, &
+                              self%angle, self%restoring, self%working)
+      end if
+      if (self%powers > 0) call add_powers(self, k)
+      if (size(self%inner_banks) > 0) call add_banks(self, machine, k, t)
+      if (self%is_dense) then
+        call accelerate_dense(size(self%acceleration), size(self%responses, 2), self%responses, self%restoring(1, k), &
+                              self%working(1, k), self%acceleration)
+      else
+        call accelerations%map_sum(self%restoring(1, k), self%working(1, k), self%acceleration)
+      end if
+      call integrate_coordinates(n, self%inverse(k + 1), self%acceleration, y(1, k), y(1, k + 1))
+      if (self%is_audited) call integrate_powers(self, machine, k, y(2 * n + 1, k + 1))
+    end do
+  end subroutine expand
+
+  !> The coefficients of the external torques.
+  subroutine drive(self, machine, t)
+    type(reduced_series_t), intent(inout) :: self
+    type(machine_t), intent(in) :: machine
+    real(wp), intent(in) :: t(self%lanes)
+    integer :: i
+
+    do i = 1, size(machine%other_banks)
+      associate (bank => machine%banks(machine%other_banks(i))%bank)
+        call bank%drive(self%order - 1, self%stride, t, self%external(bank%first_value, 0))
+      end associate
+    end do
+  end subroutine drive
+
+  !> What the inner banks add to the moments.
+  subroutine add_banks(self, machine, k, t)
+    type(reduced_series_t), intent(inout) :: self
+    type(machine_t), intent(in) :: machine
+    integer, intent(in) :: k
+    real(wp), intent(in) :: t(self%lanes)
+    integer :: i
+
+    do i = 1, size(self%inner_banks)
+      associate (bank => machine%banks(self%inner_banks(i))%bank)
+        associate (first => bank%first_value)
+          call bank%series(k, self%stride, t, self%angle(first, 0), self%speed(first, 0), self%restoring(first, 0), &
+                           self%working(first, 0))
+        end associate
+      end associate
+    end do
+  end subroutine add_banks
+
+  !> The moments at the start of the step, without the powers.
+  pure subroutine begin_moments(n, rest, linear, by_speed, external, angle, speed, restoring, working)
+    integer, intent(in) :: n
+    real(wp), intent(in), dimension(n) :: rest, linear, by_speed, external, angle, speed
+    real(wp), intent(inout) :: restoring(n), working(n)
+
+    restoring = -linear * (angle - rest)
+    working = external + by_speed * speed
+  end subroutine begin_moments
+
+  !> u'_k = U q'_k.
+  pure subroutine turn_dense(rows, columns, matrix, x, u)
+    integer, intent(in) :: rows   !! whole vectors
+    integer, intent(in) :: columns
+    real(wp), intent(in) :: matrix(rows, columns), x(columns)
+    real(wp), intent(inout) :: u(rows)
+    real(wp) :: sum(width)
+    integer :: c, i
+
+    do i = 1, rows, width
+      sum = 0.0_wp
+      do c = 1, columns
+        sum = sum + matrix(i:i + width - 1, c) * x(c)
+      end do
+      u(i:i + width - 1) = sum
+    end do
+  end subroutine turn_dense
+
+  !> u_k, and the moments without the powers.
+  pure subroutine continue_moments(n, k, inverse, linear, by_speed, external, speed, angle, restoring, working)
+    integer, intent(in) :: n, k
+    real(wp), intent(in) :: inverse   !! 1 / k
+    real(wp), intent(in) :: linear(n), by_speed(n), external(n, 0:k), speed(n, 0:k)
+    real(wp), intent(inout) :: angle(n, 0:k), restoring(n, 0:k), working(n, 0:k)
+    integer :: i
+
+    do i = 1, n, width
+      associate (j => i + width - 1)
+        angle(i:j, k) = inverse * speed(i:j, k - 1)
+        restoring(i:j, k) = -linear(i:j) * angle(i:j, k)
+        working(i:j, k) = external(i:j, k) + by_speed(i:j) * speed(i:j, k)
+      end associate
+    end do
+  end subroutine continue_moments
+
+  !> Adds -cubic (u - rest)^3 and by_speed_squared u'^2.
+  subroutine add_powers(self, k)
+    type(reduced_series_t), intent(inout) :: self
+    integer, intent(in) :: k
+    integer :: e, l, place
+
+    place = 0
+    do e = 1, size(self%cubed)
+      associate (before => (self%cubed(e) - 1) * self%lanes)
+        do l = 1, self%lanes
+          self%base(place + l, k) = self%angle(before + l, k)
+          if (k == 0) self%base(place + l, k) = self%base(place + l, k) - self%rest(before + l)
+        end do
+      end associate
+      place = place + self%lanes
+    end do
+    do e = 1, size(self%squared)
+      associate (before => (self%squared(e) - 1) * self%lanes)
+        do l = 1, self%lanes
+          self%base(place + l, k) = self%speed(before + l, k)
+        end do
+      end associate
+      place = place + self%lanes
+    end do
+    call raise_to_two(self%powers, k, self%base, self%square)
+    call raise_to_three(self%powers, self%cubes, k, self%base, self%square, self%cube)
+    place = 0
+    do e = 1, size(self%cubed)
+      associate (before => (self%cubed(e) - 1) * self%lanes)
+        do l = 1, self%lanes
+          self%restoring(before + l, k) = self%restoring(before + l, k) + self%factor(place + l) * self%cube(place + l)
+        end do
+      end associate
+      place = place + self%lanes
+    end do
+    do e = 1, size(self%squared)
+      associate (before => (self%squared(e) - 1) * self%lanes)
+        do l = 1, self%lanes
+          self%working(before + l, k) = self%working(before + l, k) + self%factor(place + l) * self%square(place + l, k)
+        end do
+      end associate
+      place = place + self%lanes
+    end do
+  end subroutine add_powers
+
+  !> The coefficients number k of f^2, each pair of different coefficients counted once and doubled.
+  pure subroutine raise_to_two(n, k, f, f2)
+    integer, intent(in) :: n, k
+    real(wp), intent(in) :: f(n, 0:k)
+    real(wp), intent(inout) :: f2(n, 0:k)
+    real(wp) :: sum(width)
+    integer :: i, j
+
+    do i = 1, n, width
+      sum = 0.0_wp
+      do j = (k + 1) / 2 - 1, 0, -1
+        sum = sum + f(i:i + width - 1, j) * f(i:i + width - 1, k - j)
+      end do
+      sum = sum + sum
+      if (modulo(k, 2) == 0) sum = sum + f(i:i + width - 1, k / 2) * f(i:i + width - 1, k / 2)
+      f2(i:i + width - 1, k) = sum
+    end do
+  end subroutine raise_to_two
+
+  !> The coefficients number k of f f^2, for the first of the powers.
+  pure subroutine raise_to_three(n, cubes, k, f, f2, f3)
+    integer, intent(in) :: n, cubes, k
+    real(wp), intent(in) :: f(n, 0:k), f2(n, 0:k)
+    real(wp), intent(inout) :: f3(cubes)
+    real(wp) :: sum(width)
+    integer :: i, j
+
+    do i = 1, cubes, width
+      sum = 0.0_wp
+      if (modulo(k, 2) == 0) sum = f(i:i + width - 1, k / 2) * f2(i:i + width - 1, k / 2)
+      do j = (k + 1) / 2 - 1, 0, -1
+        sum = sum + (f(i:i + width - 1, j) * f2(i:i + width - 1, k - j) + f(i:i + width - 1, k - j) * f2(i:i + width - 1, j))
+      end do
+      f3(i:i + width - 1) = sum
+    end do
+  end subroutine raise_to_three
+
+  !> q''_k = R M_k.
+  pure subroutine accelerate_dense(rows, columns, matrix, restoring, working, acceleration)
+    integer, intent(in) :: rows   !! whole vectors
+    integer, intent(in) :: columns
+    real(wp), intent(in) :: matrix(rows, columns), restoring(columns), working(columns)
+    real(wp), intent(inout) :: acceleration(rows)
+    real(wp) :: sum(width)
+    integer :: c, i
+
+    do i = 1, rows, width
+      sum = 0.0_wp
+      do c = 1, columns
+        sum = sum + matrix(i:i + width - 1, c) * (restoring(c) + working(c))
+      end do
+      acceleration(i:i + width - 1) = sum
+    end do
+  end subroutine accelerate_dense
+
+  !> The next coefficients of q' from those of q'', and of q from those of q'.
+  pure subroutine integrate_coordinates(n, inverse, acceleration, speed, y)
+    integer, intent(in) :: n
+    real(wp), intent(in) :: inverse, acceleration(n), speed(n)
+    real(wp), intent(inout) :: y(n, 2)
+    integer :: i
+
+    do i = 1, n
+      y(i, 1) = inverse * acceleration(i)
+      y(i, 2) = inverse * speed(i)
+    end do
+  end subroutine integrate_coordinates
+
+  !> The next coefficients of the works of the accounted elements, whose powers are `working` times the speed.
+  subroutine integrate_powers(self, machine, k, work)
+    type(reduced_series_t), intent(in) :: self
+    type(machine_t), intent(in) :: machine
+    integer, intent(in) :: k
+    real(wp), intent(inout) :: work(self%lanes, size(machine%accounted))
+    integer :: a, before, j, l
+
+    do a = 1, size(machine%accounted)
+      before = (machine%accounted(a) - 1) * self%lanes
+      do l = 1, self%lanes
+        work(l, a) = 0.0_wp
+      end do
+      do j = 0, k
+        do l = 1, self%lanes
+          work(l, a) = work(l, a) + self%working(before + l, j) * self%speed(before + l, k - j)
+        end do
+      end do
+      do l = 1, self%lanes
+        work(l, a) = self%inverse(k + 1) * work(l, a)
+      end do
+    end do
+  end subroutine integrate_powers
+
+end module nocdyn_reduced_series
