@@ -136,8 +136,8 @@ contains
     real(wp), intent(inout) :: working(stride, 0:*)
   end subroutine drive
 
-  !> Adds the Taylor coefficients number k of the rest of what `evaluate` adds. Those of the angles and speeds are known up
-  !> to k, those of the moments up to k - 1.
+  !> Adds the Taylor coefficients number k of the rest of what `evaluate` adds. Those of the angles, which are counted from
+  !> the rest in `polynomials`, and speeds are known up to k, those of the moments up to k - 1.
   subroutine series(self, k, stride, time, angle, speed, restoring, working)
     class(bank_t), intent(in) :: self
     integer, intent(in) :: k

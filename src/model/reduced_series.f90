@@ -28,27 +28,25 @@ module nocdyn_reduced_series
     logical :: is_audited = .false.            !! whether the works are integrated
     integer :: stride = 0                      !! lanes * elements in whole vectors
     logical :: is_dense = .false.              !! whether the maps are multiplied out
-    real(wp), allocatable :: angle(:, :)       !! u, [stride, 0:order - 1] as all these
+    real(wp), allocatable :: angle(:, :)       !! u - rest, [stride, 0:order - 1] as all these
     real(wp), allocatable :: speed(:, :)       !! u'
     real(wp), allocatable :: restoring(:, :)   !! as in `elements_t`
     real(wp), allocatable :: working(:, :)
     real(wp), allocatable :: external(:, :)    !! what of `working` depends on the time alone
+    real(wp), allocatable :: moment(:)         !! present coefficients of the whole moments, [stride]
     real(wp), allocatable :: acceleration(:)   !! present coefficients of q'', [lanes * freedoms in whole vectors]
     real(wp), allocatable :: inverse(:)        !! 1 / k, [order]
     real(wp), allocatable :: rest(:)           !! as in `polynomial_laws_t`, [stride]
     real(wp), allocatable :: linear(:)
+    real(wp), allocatable :: cubic(:)
     real(wp), allocatable :: by_speed(:)
+    real(wp), allocatable :: by_speed_squared(:)
     real(wp), allocatable :: twists(:, :)      !! U, [stride, freedoms], if it is dense
     real(wp), allocatable :: responses(:, :)   !! R, [freedoms in whole vectors, elements], if it is dense
     integer, allocatable :: inner_banks(:)     !! whose laws are more than polynomials and external torques
-    integer, allocatable :: cubed(:)           !! elements with a term by (u - rest)^3
-    integer, allocatable :: squared(:)         !! elements with a term by u'^2
-    integer :: powers = 0                      !! lanes * (cubed and squared elements) in whole vectors
-    integer :: cubes = 0                       !! lanes * cubed elements in whole vectors
-    real(wp), allocatable :: factor(:)         !! of the powers, [powers]
-    real(wp), allocatable :: base(:, :)        !! series of what is raised, [powers, 0:order - 1]
-    real(wp), allocatable :: square(:, :)      !! of its square
-    real(wp), allocatable :: cube(:)           !! present coefficients of its cube, [cubes]
+    integer, allocatable :: cubed(:)           !! first values of the vectors with terms by (u - rest)^3
+    integer, allocatable :: squared(:)         !! first values of the vectors with terms by u'^2
+    real(wp), allocatable :: square(:, :)      !! (u - rest)^2 in those of `cubed`
   contains
     procedure :: expand
   end type reduced_series_t
@@ -71,12 +69,14 @@ contains
     associate (values => size(machine%laws%rest), n => machine%lanes * machine%coordinates%freedoms, banks => machine%banks)
       self%stride = whole_vectors(values)
       allocate (self%angle(self%stride, 0:order - 1), source=0.0_wp)
-      allocate (self%speed, self%restoring, self%working, self%external, source=self%angle)
+      allocate (self%speed, self%restoring, self%working, self%external, self%square, source=self%angle)
       allocate (self%rest(self%stride), source=0.0_wp)
-      allocate (self%linear, self%by_speed, source=self%rest)
+      allocate (self%linear, self%cubic, self%by_speed, self%by_speed_squared, self%moment, source=self%rest)
       self%rest(:values) = reshape(machine%laws%rest, [values])
       self%linear(:values) = reshape(machine%laws%linear, [values])
+      self%cubic(:values) = reshape(machine%laws%cubic, [values])
       self%by_speed(:values) = reshape(machine%laws%by_speed, [values])
+      self%by_speed_squared(:values) = reshape(machine%laws%by_speed_squared, [values])
       self%external(:values, 0) = reshape(machine%laws%constant, [values])
       allocate (self%acceleration(whole_vectors(n)), source=0.0_wp)
       allocate (self%inverse(order))
@@ -94,7 +94,8 @@ contains
         end do
       end if
     end associate
-    call place_powers(self, machine%laws)
+    self%cubed = vectors_of(self%cubic)
+    self%squared = vectors_of(self%by_speed_squared)
   end function new_reduced_series
 
   !> The length of so many numbers in whole vectors.
@@ -112,24 +113,14 @@ contains
     vector(i) = 1.0_wp
   end function unit
 
-  !> Places the powers of all lanes beside each other, the cubes first.
-  pure subroutine place_powers(self, laws)
-    type(reduced_series_t), intent(inout) :: self
-    type(polynomial_laws_t), intent(in) :: laws
-    integer :: e
+  !> The first values of the vectors that are not all zero.
+  pure function vectors_of(x) result(firsts)
+    real(wp), intent(in) :: x(:)   !! in whole vectors
+    integer, allocatable :: firsts(:)
+    integer :: i
 
-    self%cubed = pack([(e, e=1, size(laws%rest, 2))], any(abs(laws%cubic) > 0, dim=1))
-    self%squared = pack([(e, e=1, size(laws%rest, 2))], any(abs(laws%by_speed_squared) > 0, dim=1))
-    associate (cubes => self%lanes * size(self%cubed), squares => self%lanes * size(self%squared))
-      self%cubes = whole_vectors(cubes)
-      self%powers = whole_vectors(cubes + squares)
-      allocate (self%factor(self%powers), self%cube(self%cubes), source=0.0_wp)
-      self%factor(:cubes) = reshape(-laws%cubic(:, self%cubed), [cubes])
-      self%factor(cubes + 1:cubes + squares) = reshape(laws%by_speed_squared(:, self%squared), [squares])
-    end associate
-    allocate (self%base(self%powers, 0:self%order - 1), source=0.0_wp)
-    allocate (self%square, source=self%base)
-  end subroutine place_powers
+    firsts = pack([(i, i=1, size(x), width)], [(any(abs(x(i:i + width - 1)) > 0), i=1, size(x), width)])
+  end function vectors_of
 
   !> The coefficients number 1 to order of q', q and the works of the accounted elements, which follow each other in y.
   subroutine expand(self, machine, twists, accelerations, start_twist, n, length, t, y)
@@ -158,13 +149,14 @@ contains
         call continue_moments(self%stride, k, self%inverse(k), self%linear, self%by_speed, self%external, self%speed, &
                               self%angle, self%restoring, self%working)
       end if
-      if (self%powers > 0) call add_powers(self, k)
+      if (size(self%cubed) > 0) call add_cubes(self%stride, k, self%cubed, self%cubic, self%angle, self%square, self%restoring)
+      if (size(self%squared) > 0) call add_squares(self%stride, k, self%squared, self%by_speed_squared, self%speed, self%working)
       if (size(self%inner_banks) > 0) call add_banks(self, machine, k, t)
+      call add(self%stride, self%restoring(1, k), self%working(1, k), self%moment)
       if (self%is_dense) then
-        call accelerate_dense(size(self%acceleration), size(self%responses, 2), self%responses, self%restoring(1, k), &
-                              self%working(1, k), self%acceleration)
+        call accelerate_dense(size(self%acceleration), size(self%responses, 2), self%responses, self%moment, self%acceleration)
       else
-        call accelerations%map_sum(self%restoring(1, k), self%working(1, k), self%acceleration)
+        call accelerations%map_one(self%moment, self%acceleration)
       end if
       call integrate_coordinates(n, self%inverse(k + 1), self%acceleration, y(1, k), y(1, k + 1))
       if (self%is_audited) call integrate_powers(self, machine, k, y(2 * n + 1, k + 1))
@@ -206,10 +198,12 @@ contains
   !> The moments at the start of the step, without the powers.
   pure subroutine begin_moments(n, rest, linear, by_speed, external, angle, speed, restoring, working)
     integer, intent(in) :: n
-    real(wp), intent(in), dimension(n) :: rest, linear, by_speed, external, angle, speed
+    real(wp), intent(in), dimension(n) :: rest, linear, by_speed, external, speed
+    real(wp), intent(inout) :: angle(n)   !! u, on return less `rest`
     real(wp), intent(inout) :: restoring(n), working(n)
 
-    restoring = -linear * (angle - rest)
+    angle = angle - rest
+    restoring = -linear * angle
     working = external + by_speed * speed
   end subroutine begin_moments
 
@@ -248,93 +242,70 @@ contains
     end do
   end subroutine continue_moments
 
-  !> Adds -cubic (u - rest)^3 and by_speed_squared u'^2.
-  subroutine add_powers(self, k)
-    type(reduced_series_t), intent(inout) :: self
-    integer, intent(in) :: k
-    integer :: e, l, place
-
-    place = 0
-    do e = 1, size(self%cubed)
-      associate (before => (self%cubed(e) - 1) * self%lanes)
-        do l = 1, self%lanes
-          self%base(place + l, k) = self%angle(before + l, k)
-          if (k == 0) self%base(place + l, k) = self%base(place + l, k) - self%rest(before + l)
-        end do
-      end associate
-      place = place + self%lanes
-    end do
-    do e = 1, size(self%squared)
-      associate (before => (self%squared(e) - 1) * self%lanes)
-        do l = 1, self%lanes
-          self%base(place + l, k) = self%speed(before + l, k)
-        end do
-      end associate
-      place = place + self%lanes
-    end do
-    call raise_to_two(self%powers, k, self%base, self%square)
-    call raise_to_three(self%powers, self%cubes, k, self%base, self%square, self%cube)
-    place = 0
-    do e = 1, size(self%cubed)
-      associate (before => (self%cubed(e) - 1) * self%lanes)
-        do l = 1, self%lanes
-          self%restoring(before + l, k) = self%restoring(before + l, k) + self%factor(place + l) * self%cube(place + l)
-        end do
-      end associate
-      place = place + self%lanes
-    end do
-    do e = 1, size(self%squared)
-      associate (before => (self%squared(e) - 1) * self%lanes)
-        do l = 1, self%lanes
-          self%working(before + l, k) = self%working(before + l, k) + self%factor(place + l) * self%square(place + l, k)
-        end do
-      end associate
-      place = place + self%lanes
-    end do
-  end subroutine add_powers
-
-  !> The coefficients number k of f^2, each pair of different coefficients counted once and doubled.
-  pure subroutine raise_to_two(n, k, f, f2)
+  !> Adds -cubic (u - rest)^3. The coefficients of the square count each pair of different coefficients once, doubled.
+  pure subroutine add_cubes(n, k, strips, cubic, w, w2, restoring)
     integer, intent(in) :: n, k
-    real(wp), intent(in) :: f(n, 0:k)
-    real(wp), intent(inout) :: f2(n, 0:k)
+    integer, intent(in) :: strips(:)   !! of values with such terms
+    real(wp), intent(in) :: cubic(n), w(n, 0:k)
+    real(wp), intent(inout) :: w2(n, 0:k), restoring(n, 0:k)
     real(wp) :: sum(width)
-    integer :: i, j
+    integer :: i, j, s
 
-    do i = 1, n, width
+    do s = 1, size(strips)
+      i = strips(s)
       sum = 0.0_wp
       do j = (k + 1) / 2 - 1, 0, -1
-        sum = sum + f(i:i + width - 1, j) * f(i:i + width - 1, k - j)
+        sum = sum + w(i:i + width - 1, j) * w(i:i + width - 1, k - j)
       end do
       sum = sum + sum
-      if (modulo(k, 2) == 0) sum = sum + f(i:i + width - 1, k / 2) * f(i:i + width - 1, k / 2)
-      f2(i:i + width - 1, k) = sum
-    end do
-  end subroutine raise_to_two
-
-  !> The coefficients number k of f f^2, for the first of the powers.
-  pure subroutine raise_to_three(n, cubes, k, f, f2, f3)
-    integer, intent(in) :: n, cubes, k
-    real(wp), intent(in) :: f(n, 0:k), f2(n, 0:k)
-    real(wp), intent(inout) :: f3(cubes)
-    real(wp) :: sum(width)
-    integer :: i, j
-
-    do i = 1, cubes, width
+      if (modulo(k, 2) == 0) sum = sum + w(i:i + width - 1, k / 2) * w(i:i + width - 1, k / 2)
+      w2(i:i + width - 1, k) = sum
       sum = 0.0_wp
-      if (modulo(k, 2) == 0) sum = f(i:i + width - 1, k / 2) * f2(i:i + width - 1, k / 2)
+      if (modulo(k, 2) == 0) sum = w(i:i + width - 1, k / 2) * w2(i:i + width - 1, k / 2)
       do j = (k + 1) / 2 - 1, 0, -1
-        sum = sum + (f(i:i + width - 1, j) * f2(i:i + width - 1, k - j) + f(i:i + width - 1, k - j) * f2(i:i + width - 1, j))
+        sum = sum + (w(i:i + width - 1, j) * w2(i:i + width - 1, k - j) + w(i:i + width - 1, k - j) * w2(i:i + width - 1, j))
       end do
-      f3(i:i + width - 1) = sum
+      restoring(i:i + width - 1, k) = restoring(i:i + width - 1, k) - cubic(i:i + width - 1) * sum
     end do
-  end subroutine raise_to_three
+  end subroutine add_cubes
+
+  !> Adds by_speed_squared u'^2.
+  pure subroutine add_squares(n, k, strips, by_speed_squared, speed, working)
+    integer, intent(in) :: n, k
+    integer, intent(in) :: strips(:)   !! of values with such terms
+    real(wp), intent(in) :: by_speed_squared(n), speed(n, 0:k)
+    real(wp), intent(inout) :: working(n, 0:k)
+    real(wp) :: sum(width)
+    integer :: i, j, s
+
+    do s = 1, size(strips)
+      i = strips(s)
+      sum = 0.0_wp
+      do j = (k + 1) / 2 - 1, 0, -1
+        sum = sum + speed(i:i + width - 1, j) * speed(i:i + width - 1, k - j)
+      end do
+      sum = sum + sum
+      if (modulo(k, 2) == 0) sum = sum + speed(i:i + width - 1, k / 2) * speed(i:i + width - 1, k / 2)
+      working(i:i + width - 1, k) = working(i:i + width - 1, k) + by_speed_squared(i:i + width - 1) * sum
+    end do
+  end subroutine add_squares
+
+  pure subroutine add(n, restoring, working, moment)
+    integer, intent(in) :: n
+    real(wp), intent(in) :: restoring(n), working(n)
+    real(wp), intent(inout) :: moment(n)
+    integer :: i
+
+    do i = 1, n, width
+      moment(i:i + width - 1) = restoring(i:i + width - 1) + working(i:i + width - 1)
+    end do
+  end subroutine add
 
   !> q''_k = R M_k.
-  pure subroutine accelerate_dense(rows, columns, matrix, restoring, working, acceleration)
+  pure subroutine accelerate_dense(rows, columns, matrix, moment, acceleration)
     integer, intent(in) :: rows   !! whole vectors
     integer, intent(in) :: columns
-    real(wp), intent(in) :: matrix(rows, columns), restoring(columns), working(columns)
+    real(wp), intent(in) :: matrix(rows, columns), moment(columns)
     real(wp), intent(inout) :: acceleration(rows)
     real(wp) :: sum(width)
     integer :: c, i
@@ -342,7 +313,7 @@ contains
     do i = 1, rows, width
       sum = 0.0_wp
       do c = 1, columns
-        sum = sum + matrix(i:i + width - 1, c) * (restoring(c) + working(c))
+        sum = sum + matrix(i:i + width - 1, c) * moment(c)
       end do
       acceleration(i:i + width - 1) = sum
     end do
@@ -355,10 +326,18 @@ contains
     real(wp), intent(inout) :: y(n, 2)
     integer :: i
 
-    do i = 1, n
-      y(i, 1) = inverse * acceleration(i)
-      y(i, 2) = inverse * speed(i)
-    end do
+    if (n < width) then
+      !GCC$ novector
+      do i = 1, n
+        y(i, 1) = inverse * acceleration(i)
+        y(i, 2) = inverse * speed(i)
+      end do
+    else
+      do i = 1, n
+        y(i, 1) = inverse * acceleration(i)
+        y(i, 2) = inverse * speed(i)
+      end do
+    end if
   end subroutine integrate_coordinates
 
   !> The next coefficients of the works of the accounted elements, whose powers are `working` times the speed.
