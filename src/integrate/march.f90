@@ -72,7 +72,7 @@ contains
     if (march%has_extremes) call allocate_extremes(march%extremes, observer%tracked, stepper%degree, march%trial)
     if (.not. allocated(observer%directions)) return
     march%has_events = size(observer%directions) > 0
-    if (march%has_events) call allocate_events(march%events, observer, march%trial)
+    if (march%has_events) call allocate_events(march%events, observer, stepper%degree, march%trial)
   end subroutine prepare
 
   !> Gives the free lanes their next variants and starts them.

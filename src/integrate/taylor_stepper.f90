@@ -1,10 +1,10 @@
 !> Steps along the Taylor series of the solution, of one order throughout.
 !>
-!> A step is as long as the last two coefficients allow: h = min over j = p - 1, p of ||y_j||^(-1/j), with the largest
-!> |y_j| / (atol + rtol |y|) of the states as norm, so that the terms h^j y_j are not larger than the tolerance. With
-!> the order p = 1 - ln(rtol) / 2, for which the work is least if it grows as p^2, that is the step rho / e^2 of A. Jorba,
-!> M. Zou, A software package for the numerical integration of ODEs by means of high-order Taylor methods, Experimental
-!> Mathematics 14 (2005) 99-117, for any mixture of the two tolerances. No step is judged after it has been taken.
+!> A step is as long as the last two coefficients allow: h is the smaller of ||y_j||^(-1/j), j = p - 1 and p, with the
+!> largest |y_j| / (atol + rtol |y|) of the states as norm: the terms h^j y_j do not exceed the tolerance. No step is judged
+!> after it has been taken. With p = 1 - ln(tol) / 2 that is the step rho / e^2 of A. Jorba, M. Zou, A software package for
+!> the numerical integration of ODEs by means of high-order Taylor methods, Experimental Mathematics 14 (2005) 99-117,
+!> who take the work for proportional to p^2. Here it grows more slowly, as long as p is small, and the order is higher.
 module nocdyn_taylor_stepper
   use nocdyn_combinations, only: padded_columns, width
   use nocdyn_finite, only: all_finite, is_finite
@@ -18,7 +18,7 @@ module nocdyn_taylor_stepper
 
   public :: taylor_stepper
 
-  integer, parameter :: least_order = 4
+  real(wp), parameter :: order_offset = 3.0_wp, order_slope = 0.7_wp   !! of the order over -ln(tolerance), by measurement
 
   type, extends(stepper_t), public :: taylor_stepper_t
     private
@@ -43,7 +43,7 @@ contains
     integer, intent(in), optional :: order   !! at least 2
     type(taylor_stepper_t) :: stepper
 
-    stepper%order = max(least_order, ceiling(1 - 0.7_wp * log(rtol)))
+    stepper%order = ceiling(order_offset - order_slope * log(rtol))
     if (present(order)) stepper%order = order
     stepper%error_order = stepper%order
     stepper%degree = stepper%order
