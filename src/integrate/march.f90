@@ -168,7 +168,7 @@ contains
       do lane = 1, trial%lanes
         trial%working(lane) = march%occupied(lane) .and. outcome%status(lane) == integration_running
       end do
-      if (stepper%plans_steps) call stepper%plan(system, trial, march%control)
+      if (stepper%plans_steps) call plan_steps(march, stepper, system, outcome)
       do lane = 1, trial%lanes
         trial%h(lane) = 0.0_wp
         if (.not. trial%working(lane)) cycle
@@ -181,6 +181,21 @@ contains
       call set_out(trial)
     end associate
   end subroutine set_out_lanes
+
+  !> Lets the stepper choose the steps; the first is not longer than the one that was asked for.
+  subroutine plan_steps(march, stepper, system, outcome)
+    type(march_t), intent(inout) :: march
+    class(stepper_t), intent(inout) :: stepper
+    class(system_t), intent(inout) :: system
+    type(outcome_t), intent(in) :: outcome
+    integer :: lane
+
+    call stepper%plan(system, march%trial, march%control)
+    if (march%first_step <= 0) return
+    do lane = 1, march%trial%lanes
+      if (outcome%steps(lane) == 0) march%control%h(lane) = min(march%control%h(lane), march%first_step)
+    end do
+  end subroutine plan_steps
 
   !> Accepts or rejects the last attempt of each lane, and ends the lanes that cannot go on.
   subroutine judge_lanes(march, stepper, system, times, outcome)

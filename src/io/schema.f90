@@ -155,7 +155,7 @@ module nocdyn_schema
     key_rule_t('run',        't_end',           a_number,       1, 's',           required,    anything, &
       'time of the end, after t_start'), &
     key_rule_t('run',        'method',          a_word,         1, '',            default_method, methods, &
-      'explicit: rk45, rk853, taylor; implicit: rodas4 = rosenbrock, rodas5p; auto: rk853 or rodas5p'), &
+      'explicit: rk45, rk853, taylor; implicit: rodas4 = rosenbrock, rodas5p; auto: two of them'), &
     key_rule_t('run',        'rtol',            a_number,       1, '',            '1e-6',      tolerance, &
       'relative error tolerated in a step'), &
     key_rule_t('run',        'atol',            a_number,       1, '',            '1e-9',      positive, &

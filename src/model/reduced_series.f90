@@ -129,7 +129,7 @@ contains
     type(sparse_map_t), intent(in) :: twists, accelerations
     integer, intent(in) :: n                          !! lanes * freedoms
     integer, intent(in) :: length                     !! of a column of y
-    real(wp), intent(in) :: start_twist(:, :)          !! [lanes, elements]
+    real(wp), contiguous, intent(in) :: start_twist(:, :)   !! [lanes, elements]
     real(wp), intent(in) :: t(self%lanes)
     real(wp), intent(inout) :: y(length, 0:self%order)
     integer :: k

@@ -242,7 +242,7 @@ OSCILLATOR = """\
 """
 
 
-@pytest.mark.parametrize("method", ["auto", "rk45", "rk853", "rodas4", "rodas5p"])
+@pytest.mark.parametrize("method", ["auto", "rk45", "rk853", "rodas4", "rodas5p", "taylor"])
 def test_the_extremes_of_an_oscillator_are_those_of_the_sine(nocdyn, method):
     nocdyn.write("oscillator.nml", OSCILLATOR)
     assert nocdyn("run", "oscillator.nml", "--out", "out", "--set", f"run.method={method}").returncode == 0
