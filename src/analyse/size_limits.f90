@@ -88,8 +88,8 @@ contains
     obstacle = formulation%series_obstacle()
     if (len(obstacle) == 0) return
     allocate (indices, source=input%groups_named('run'))
-    call raise(error, exit_input, input%place(indices(1), 'method') // ': method = ' // quoted('taylor') // ' cannot be used: ' // &
-               obstacle)
+    call raise(error, exit_input, input%place(indices(1), 'method') // ': method = ' // quoted('taylor') // &
+               ' cannot be used: ' // obstacle)
   end subroutine refuse_missing_series
 
   !> Rows in which the factors of a stage matrix are stored: those of its band with the fill-in of the interchanges, at

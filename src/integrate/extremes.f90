@@ -43,8 +43,8 @@ contains
     do i = 0, degree
       extremes%places(i + 1) = -cos(pi * i / degree)
       do k = 0, degree
-        extremes%to_series(k + 1, i + 1) = 2 * end_weight(i, degree) * end_weight(k, degree) * cos(pi * k * (degree - i) / degree) &
-                                           / degree
+        extremes%to_series(k + 1, i + 1) = 2 * end_weight(i, degree) * end_weight(k, degree) / degree &
+                                           * cos(pi * k * (degree - i) / degree)
       end do
     end do
     allocate (extremes%ranges(trial%lanes))

@@ -152,7 +152,8 @@ contains
           if (march%has_extremes) call start_extremes(march%extremes, observer, trial, lane)
         end if
       end do
-      if (march%first_step <= 0 .and. .not. stepper%plans_steps) call guess_first_steps(march%control, stepper%order, system, trial)
+      if (march%first_step > 0 .or. stepper%plans_steps) return
+      call guess_first_steps(march%control, stepper%order, system, trial)
     end associate
   end subroutine start_lanes
 

@@ -133,7 +133,7 @@ contains
     integer, intent(in) :: last
     integer, intent(in) :: stride   !! from column to column
     real(wp), intent(in) :: time(self%lanes)
-    real(wp), intent(inout) :: working(stride, 0:*)
+    real(wp), intent(inout) :: working(stride, 0:last)
   end subroutine drive
 
   !> Adds the Taylor coefficients number k of the rest of what `evaluate` adds. Those of the angles, which are counted from
@@ -143,8 +143,8 @@ contains
     integer, intent(in) :: k
     integer, intent(in) :: stride
     real(wp), intent(in) :: time(self%lanes)
-    real(wp), intent(in) :: angle(stride, 0:*), speed(stride, 0:*)
-    real(wp), intent(inout) :: restoring(stride, 0:*), working(stride, 0:*)
+    real(wp), intent(in) :: angle(stride, 0:k), speed(stride, 0:k)
+    real(wp), intent(inout) :: restoring(stride, 0:k), working(stride, 0:k)
   end subroutine series
 
   !> The columns of the bank in the table of results: by default the torque of each element.

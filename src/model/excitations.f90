@@ -92,7 +92,7 @@ contains
     class(excitations_t), intent(in) :: self
     integer, intent(in) :: last, stride
     real(wp), intent(in) :: time(self%lanes)
-    real(wp), intent(inout) :: working(stride, 0:*)
+    real(wp), intent(inout) :: working(stride, 0:last)
 
     call harmonic_series(self%lanes, self%values, last, stride, self%amplitude, self%frequency, self%phase, time, working)
   end subroutine drive

@@ -28,7 +28,7 @@ module nocdyn_reduced_series
     logical :: is_audited = .false.            !! whether the works are integrated
     integer :: stride = 0                      !! lanes * elements in whole vectors
     logical :: is_dense = .false.              !! whether the maps are multiplied out
-    real(wp), allocatable :: angle(:, :)       !! u - rest, [stride, 0:order - 1] as all these
+    real(wp), allocatable :: angle(:, :)       !! u - rest, [stride, 0:order] as all these, the last column for the banks' offsets
     real(wp), allocatable :: speed(:, :)       !! u'
     real(wp), allocatable :: restoring(:, :)   !! as in `elements_t`
     real(wp), allocatable :: working(:, :)
@@ -68,7 +68,7 @@ contains
     self%is_audited = audited .and. machine%accounts() > 0
     associate (values => size(machine%laws%rest), n => machine%lanes * machine%coordinates%freedoms, banks => machine%banks)
       self%stride = whole_vectors(values)
-      allocate (self%angle(self%stride, 0:order - 1), source=0.0_wp)
+      allocate (self%angle(self%stride, 0:order), source=0.0_wp)
       allocate (self%speed, self%restoring, self%working, self%external, self%square, source=self%angle)
       allocate (self%rest(self%stride), source=0.0_wp)
       allocate (self%linear, self%cubic, self%by_speed, self%by_speed_squared, self%moment, source=self%rest)

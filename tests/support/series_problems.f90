@@ -9,6 +9,8 @@ module nocdyn_series_problems
 
   public :: burst_problem
 
+  integer, parameter, public :: answer_nan = -1   !! of a `burst_t`: its series are not finite
+
   !> The Duffing oscillator of `duffing_problem`.
   type, extends(duffing_t), public :: duffing_series_t
     real(wp), allocatable :: square(:, :)   !! of x, [lanes, 0:order - 1]
@@ -29,7 +31,7 @@ module nocdyn_series_problems
   !> u' = u^2, whose solution u = u0 / (1 - u0 t) ends at t = 1 / u0; beyond u = limit the answer is `answer`.
   type, extends(system_t), public :: burst_t
     real(wp), allocatable :: limit(:)
-    integer, allocatable :: answer(:)    !! evaluation_...
+    integer, allocatable :: answer(:)    !! evaluation_... or answer_nan
     integer :: expansions = 0
   contains
     procedure :: derivative => burst_derivative
@@ -136,7 +138,7 @@ contains
     integer, intent(inout) :: status(self%lanes)
 
     dydt(:, 1) = y(:, 1)**2
-    where (y(:, 1) > self%limit .and. t >= 0) status = self%answer
+    where (y(:, 1) > self%limit .and. t >= 0) status = max(evaluation_fine, self%answer)
   end subroutine burst_derivative
 
   subroutine burst_jacobian(self, t, y, dfdy, dfdt, status)
@@ -149,7 +151,7 @@ contains
 
     dfdy(:, 1) = 2 * y(:, 1)
     dfdt(:, 1) = 0.0_wp * t
-    where (y(:, 1) > self%limit) status = self%answer
+    where (y(:, 1) > self%limit) status = max(evaluation_fine, self%answer)
   end subroutine burst_jacobian
 
   function burst_obstacle(self) result(obstacle)
@@ -183,7 +185,18 @@ contains
       end do
       y(:, 1, k + 1) = y(:, 1, k + 1) / (k + 1)
     end do
-    where (y(:, 1, 0) > self%limit .and. t >= 0) status = self%answer
+    where (y(:, 1, 0) > self%limit .and. t >= 0)
+      status = max(evaluation_fine, self%answer)
+      y(:, 1, 2) = merge(quiet_nan(), y(:, 1, 2), self%answer == answer_nan)
+    end where
   end subroutine burst_series
+
+  !> NaN that raises no exception when it is made or copied.
+  pure function quiet_nan() result(nan)
+    use, intrinsic :: iso_fortran_env, only: int64
+    real(wp) :: nan
+
+    nan = transfer(int(z'7FF8000000000000', int64), nan)
+  end function quiet_nan
 
 end module nocdyn_series_problems
