@@ -6,7 +6,7 @@
 !> the newest coefficients, so that a processor need not wait for those.
 !>
 !> Arrays are filled up with zeros to whole vectors: every number goes through the same operations wherever it stands.
-!> Each procedure of the recurrence is called from one place, so that compilers put it there.
+!> All procedures of the recurrence are here, so that compilers put them into its loop.
 module nocdyn_reduced_series
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
@@ -61,42 +61,58 @@ contains
     logical, intent(in) :: audited                    !! whether the works are integrated
     integer, intent(in) :: order
     type(reduced_series_t) :: self
-    integer :: b, i, k
+    integer :: b, k
 
     self%order = order
     self%lanes = machine%lanes
     self%is_audited = audited .and. machine%accounts() > 0
-    associate (values => size(machine%laws%rest), n => machine%lanes * machine%coordinates%freedoms, banks => machine%banks)
-      self%stride = whole_vectors(values)
-      allocate (self%angle(self%stride, 0:order), source=0.0_wp)
-      allocate (self%speed, self%restoring, self%working, self%external, self%square, source=self%angle)
-      allocate (self%rest(self%stride), source=0.0_wp)
-      allocate (self%linear, self%cubic, self%by_speed, self%by_speed_squared, self%moment, source=self%rest)
-      self%rest(:values) = reshape(machine%laws%rest, [values])
-      self%linear(:values) = reshape(machine%laws%linear, [values])
-      self%cubic(:values) = reshape(machine%laws%cubic, [values])
-      self%by_speed(:values) = reshape(machine%laws%by_speed, [values])
-      self%by_speed_squared(:values) = reshape(machine%laws%by_speed_squared, [values])
-      self%external(:values, 0) = reshape(machine%laws%constant, [values])
-      allocate (self%acceleration(whole_vectors(n)), source=0.0_wp)
-      allocate (self%inverse(order))
-      self%inverse(:) = [(1.0_wp / k, k=1, order)]
-      self%inner_banks = pack(machine%other_banks, [(.not. banks(machine%other_banks(b))%bank%is_external, &
-                                                     b=1, size(machine%other_banks))])
-      self%is_dense = self%lanes == 1 .and. max(self%stride * n, size(self%acceleration) * values) <= most_dense
-      if (self%is_dense) then
-        allocate (self%twists(self%stride, n), self%responses(size(self%acceleration), values), source=0.0_wp)
-        do i = 1, n
-          call twists%map_one(unit(n, i), self%twists(:, i))
-        end do
-        do i = 1, values
-          call accelerations%map_one(unit(values, i), self%responses(:, i))
-        end do
-      end if
-    end associate
+    self%stride = whole_vectors(size(machine%laws%rest))
+    allocate (self%angle(self%stride, 0:order), source=0.0_wp)
+    allocate (self%speed, self%restoring, self%working, self%external, self%square, source=self%angle)
+    allocate (self%acceleration(whole_vectors(machine%lanes * machine%coordinates%freedoms)), source=0.0_wp)
+    allocate (self%inverse(order))
+    self%inverse(:) = [(1.0_wp / k, k=1, order)]
+    self%inner_banks = pack(machine%other_banks, [(.not. machine%banks(machine%other_banks(b))%bank%is_external, &
+                                                   b=1, size(machine%other_banks))])
+    call take_laws(self, machine%laws, size(machine%laws%rest))
+    call multiply_out(self, twists, accelerations, machine%coordinates%freedoms, size(machine%elements%to))
+  end function new_reduced_series
+
+  !> The coefficients of the laws, and which vectors have terms of higher degree.
+  subroutine take_laws(self, laws, values)
+    type(reduced_series_t), intent(inout) :: self
+    type(polynomial_laws_t), intent(in) :: laws
+    integer, intent(in) :: values   !! lanes * elements
+
+    allocate (self%rest(self%stride), source=0.0_wp)
+    allocate (self%linear, self%cubic, self%by_speed, self%by_speed_squared, self%moment, source=self%rest)
+    self%rest(:values) = reshape(laws%rest, [values])
+    self%linear(:values) = reshape(laws%linear, [values])
+    self%cubic(:values) = reshape(laws%cubic, [values])
+    self%by_speed(:values) = reshape(laws%by_speed, [values])
+    self%by_speed_squared(:values) = reshape(laws%by_speed_squared, [values])
+    self%external(:values, 0) = reshape(laws%constant, [values])
     self%cubed = vectors_of(self%cubic)
     self%squared = vectors_of(self%by_speed_squared)
-  end function new_reduced_series
+  end subroutine take_laws
+
+  !> The matrices of the maps, if they are small.
+  subroutine multiply_out(self, twists, accelerations, freedoms, elements)
+    type(reduced_series_t), intent(inout) :: self
+    type(sparse_map_t), intent(in) :: twists, accelerations
+    integer, intent(in) :: freedoms, elements
+    integer :: i
+
+    self%is_dense = self%lanes == 1 .and. max(self%stride * freedoms, size(self%acceleration) * elements) <= most_dense
+    if (.not. self%is_dense) return
+    allocate (self%twists(self%stride, freedoms), self%responses(size(self%acceleration), elements), source=0.0_wp)
+    do i = 1, freedoms
+      call twists%map_one(unit(freedoms, i), self%twists(:, i))
+    end do
+    do i = 1, elements
+      call accelerations%map_one(unit(elements, i), self%responses(:, i))
+    end do
+  end subroutine multiply_out
 
   !> The length of so many numbers in whole vectors.
   pure integer function whole_vectors(numbers)
@@ -137,27 +153,9 @@ contains
     call drive(self, machine, t)
     call twists%map_pair(start_twist, y(n + 1, 0), y(1, 0), self%angle, self%speed)
     do k = 0, self%order - 1
-      if (k == 0) then
-        call begin_moments(self%stride, self%rest, self%linear, self%by_speed, self%external, self%angle, self%speed, &
-                           self%restoring, self%working)
-      else
-        if (self%is_dense) then
-          call turn_dense(self%stride, n, self%twists, y(1, k), self%speed(1, k))
-        else
-          call twists%map_one(y(1, k), self%speed(1, k))
-        end if
-        call continue_moments(self%stride, k, self%inverse(k), self%linear, self%by_speed, self%external, self%speed, &
-                              self%angle, self%restoring, self%working)
-      end if
-      if (size(self%cubed) > 0) call add_cubes(self%stride, k, self%cubed, self%cubic, self%angle, self%square, self%restoring)
-      if (size(self%squared) > 0) call add_squares(self%stride, k, self%squared, self%by_speed_squared, self%speed, self%working)
-      if (size(self%inner_banks) > 0) call add_banks(self, machine, k, t)
-      call add(self%stride, self%restoring(1, k), self%working(1, k), self%moment)
-      if (self%is_dense) then
-        call accelerate_dense(size(self%acceleration), size(self%responses, 2), self%responses, self%moment, self%acceleration)
-      else
-        call accelerations%map_one(self%moment, self%acceleration)
-      end if
+      if (k > 0) call turn(self, twists, n, y(1, k), self%speed(1, k))
+      call find_moments(self, machine, k, t)
+      call accelerate(self, accelerations)
       call integrate_coordinates(n, self%inverse(k + 1), self%acceleration, y(1, k), y(1, k + 1))
       if (self%is_audited) call integrate_powers(self, machine, k, y(2 * n + 1, k + 1))
     end do
@@ -176,6 +174,57 @@ contains
       end associate
     end do
   end subroutine drive
+
+  !> u'_k = U q'_k.
+  subroutine turn(self, twists, n, q, u)
+    type(reduced_series_t), intent(in) :: self
+    type(sparse_map_t), intent(in) :: twists
+    integer, intent(in) :: n
+    real(wp), intent(in) :: q(n)
+    real(wp), intent(inout) :: u(self%stride)
+
+    if (self%is_dense) then
+      call multiply(self%stride, n, self%twists, q, u)
+    else
+      call twists%map_one(q, u)
+    end if
+  end subroutine turn
+
+  !> u_k, and the moments number k.
+  subroutine find_moments(self, machine, k, t)
+    type(reduced_series_t), intent(inout) :: self
+    type(machine_t), intent(in) :: machine
+    integer, intent(in) :: k
+    real(wp), intent(in) :: t(self%lanes)
+
+    if (k == 0) then
+      call begin_moments(self%stride, self%rest, self%linear, self%by_speed, self%external, self%angle, self%speed, &
+                         self%restoring, self%working)
+    else
+      call continue_moments(self%stride, k, self%inverse(k), self%linear, self%by_speed, self%external, self%speed, &
+                            self%angle, self%restoring, self%working)
+    end if
+    if (size(self%cubed) > 0) then
+      call add_cubes(self%stride, k, self%cubed, self%cubic, self%angle, self%square, self%restoring)
+    end if
+    if (size(self%squared) > 0) then
+      call add_squares(self%stride, k, self%squared, self%by_speed_squared, self%speed, self%working)
+    end if
+    if (size(self%inner_banks) > 0) call add_banks(self, machine, k, t)
+    call add(self%stride, self%restoring(1, k), self%working(1, k), self%moment)
+  end subroutine find_moments
+
+  !> q''_k = R M_k.
+  subroutine accelerate(self, accelerations)
+    type(reduced_series_t), intent(inout) :: self
+    type(sparse_map_t), intent(in) :: accelerations
+
+    if (self%is_dense) then
+      call multiply(size(self%acceleration), size(self%responses, 2), self%responses, self%moment, self%acceleration)
+    else
+      call accelerations%map_one(self%moment, self%acceleration)
+    end if
+  end subroutine accelerate
 
   !> What the inner banks add to the moments.
   subroutine add_banks(self, machine, k, t)
@@ -207,8 +256,8 @@ contains
     working = external + by_speed * speed
   end subroutine begin_moments
 
-  !> u'_k = U q'_k.
-  pure subroutine turn_dense(rows, columns, matrix, x, u)
+  !> u = matrix x, zeros included.
+  pure subroutine multiply(rows, columns, matrix, x, u)
     integer, intent(in) :: rows   !! whole vectors
     integer, intent(in) :: columns
     real(wp), intent(in) :: matrix(rows, columns), x(columns)
@@ -223,7 +272,7 @@ contains
       end do
       u(i:i + width - 1) = sum
     end do
-  end subroutine turn_dense
+  end subroutine multiply
 
   !> u_k, and the moments without the powers.
   pure subroutine continue_moments(n, k, inverse, linear, by_speed, external, speed, angle, restoring, working)
@@ -300,24 +349,6 @@ contains
       moment(i:i + width - 1) = restoring(i:i + width - 1) + working(i:i + width - 1)
     end do
   end subroutine add
-
-  !> q''_k = R M_k.
-  pure subroutine accelerate_dense(rows, columns, matrix, moment, acceleration)
-    integer, intent(in) :: rows   !! whole vectors
-    integer, intent(in) :: columns
-    real(wp), intent(in) :: matrix(rows, columns), moment(columns)
-    real(wp), intent(inout) :: acceleration(rows)
-    real(wp) :: sum(width)
-    integer :: c, i
-
-    do i = 1, rows, width
-      sum = 0.0_wp
-      do c = 1, columns
-        sum = sum + matrix(i:i + width - 1, c) * moment(c)
-      end do
-      acceleration(i:i + width - 1) = sum
-    end do
-  end subroutine accelerate_dense
 
   !> The next coefficients of q' from those of q'', and of q from those of q'.
   pure subroutine integrate_coordinates(n, inverse, acceleration, speed, y)
