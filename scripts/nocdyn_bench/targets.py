@@ -60,7 +60,12 @@ def case2_verdicts(workload: WorkPrecision) -> list[Verdict]:
     own = [contestant for contestant in workload.contestants if contestant.is_nocdyn]
     peers = [contestant for contestant in workload.contestants if not contestant.is_nocdyn]
     hand = [contestant for contestant in peers if contestant.label == "hand-written loop"]
-    return [at_error(workload, 1e-6, own, hand, 1.5), at_error(workload, 1e-9, own, peers, 1.5)]
+    series = [contestant for contestant in peers if contestant.label.startswith("heyoka")]
+    return [
+        at_error(workload, 1e-6, own, hand, 1.5),
+        at_error(workload, 1e-9, own, peers, 1.5),
+        at_error(workload, 1e-12, own, series, 1.2),
+    ]
 
 
 def stiff_case2_verdicts(workload: WorkPrecision) -> list[Verdict]:

@@ -68,7 +68,7 @@ def case2(bench: Bench) -> whole_process.Workload:
 def w1(bench: Bench) -> WorkPrecision:
     problem = Case2()
     return WorkPrecision("W1", "W1: case 2, 1001 outputs, in process", problem, [
-        *bench.programs.nocdyn(problem, ["rk45", "rk853", "auto", "rodas4", "rodas5p"]),
+        *bench.programs.nocdyn(problem, ["rk45", "rk853", "taylor", "auto", "rodas4", "rodas5p"]),
         bench.programs.handwritten(),
         *heyoka.contestants(problem),
         *numbalsoda.contestants(problem, ["DOP853, dense", "LSODA"]),
@@ -80,7 +80,7 @@ def w1(bench: Bench) -> WorkPrecision:
 def w3(bench: Bench) -> Scaling:
     chains = [Chain(bodies) for bodies in (10, 100, 1000, 10000)]
     return Scaling("W3", "W3: chain of N rotors, rtol 1e-6, atol 1e-8", chains, {chain: [
-        *bench.programs.nocdyn(chain, ["rk45", "rk853", "auto"]),
+        *bench.programs.nocdyn(chain, ["rk45", "rk853", "taylor", "auto"]),
         *numbalsoda.contestants(chain, ["DOP853"]),
         *(numbalsoda.contestants(chain, ["LSODA"]) if chain.bodies <= 100 else []),  # its Jacobian is dense
         *heyoka.contestants(chain),
@@ -100,7 +100,7 @@ def w3_stiff(bench: Bench) -> Scaling:
 def w4(bench: Bench) -> WorkPrecision:
     problem = Case2(1.0e8, 1.0e9, 1.0e-4)
     return WorkPrecision("W4", "W4: case 2 with K1 = 1e8, k1 = 1e9, J3 = 1e-4, 1001 outputs, in process", problem, [
-        *bench.programs.nocdyn(problem, ["rodas4", "rodas5p", "auto", "rk45", "rk853"]),
+        *bench.programs.nocdyn(problem, ["rodas4", "rodas5p", "auto", "rk45", "rk853", "taylor"]),
         *heyoka.contestants(problem),
         *numbalsoda.contestants(problem, ["DOP853", "LSODA"]),
         *bench.programs.sundials(problem, ["bdf2", "bdf"]),

@@ -1,4 +1,4 @@
-!> Which machines are too large for a formulation or a method, and what then.
+!> Which machines are too large for a formulation or a method, or have no Taylor series, and what then.
 module nocdyn_size_limits
   use nocdyn_banded_matrix, only: half_bandwidths
   use nocdyn_errors, only: error_t, exit_input, raise
@@ -42,7 +42,8 @@ contains
   end subroutine check_size
 
   !> The method that is integrated with: the one of the input, but the explicit part of 'auto' alone, with a note, where
-  !> the stage matrix of its implicit part would be too large. An implicit method is refused there.
+  !> the stage matrix of its implicit part would be too large. An implicit method is refused there, and 'taylor' where
+  !> something has no Taylor series.
   subroutine choose_method(input, formulation, method, notes, error)
     type(input_t), intent(in) :: input
     class(formulation_t), intent(in) :: formulation
@@ -57,7 +58,9 @@ contains
     allocate (notes(0))
     run = input%single('run')
     method = run%text('method')
-    if (any(method == [character(len=5) :: 'rk45', 'rk853']) .or. formulation%states <= largest_matrix) return
+    if (method == 'taylor') call refuse_missing_series(input, formulation, error)
+    if (allocated(error)) return
+    if (any(method == [character(len=6) :: 'rk45', 'rk853', 'taylor']) .or. formulation%states <= largest_matrix) return
     rows = stage_matrix_rows(formulation)
     if (real(rows, wp) * formulation%states <= real(largest_matrix, wp)**2) return
     need = 'a matrix of ' // to_text(rows) // ' x ' // to_text(formulation%states) // &
@@ -73,6 +76,21 @@ contains
                  '; method = ' // quoted('rk853') // ' needs none')
     end if
   end subroutine choose_method
+
+  !> Method 'taylor' needs the Taylor series of every element in the equations that are integrated.
+  subroutine refuse_missing_series(input, formulation, error)
+    type(input_t), intent(in) :: input
+    class(formulation_t), intent(in) :: formulation
+    type(error_t), allocatable, intent(out) :: error
+    integer, allocatable :: indices(:)
+    character(len=:), allocatable :: obstacle
+
+    obstacle = formulation%series_obstacle()
+    if (len(obstacle) == 0) return
+    allocate (indices, source=input%groups_named('run'))
+    call raise(error, exit_input, input%place(indices(1), 'method') // ': method = ' // quoted('taylor') // &
+               ' cannot be used: ' // obstacle)
+  end subroutine refuse_missing_series
 
   !> Rows in which the factors of a stage matrix are stored: those of its band with the fill-in of the interchanges, at
   !> most all.

@@ -10,6 +10,8 @@
 !>
 !> The Jacobian is a list of values at the positions that `jacobian_pattern` names once, before the integration: all
 !> of them column by column unless a system knows better.
+!>
+!> A system may give the Taylor series of its solution, for methods that are made of it; by default it has none.
 module nocdyn_system
   use nocdyn_kinds, only: wp
   use nocdyn_text, only: to_text
@@ -36,6 +38,9 @@ module nocdyn_system
     procedure(jacobian_interface), deferred :: jacobian
     procedure :: jacobian_pattern
     procedure :: component_name
+    procedure :: series_obstacle
+    procedure :: prepare_series
+    procedure :: series
   end type system_t
 
   integer, parameter, public :: event_any = 0       !! every change of sign
@@ -117,6 +122,34 @@ contains
     name = 'component ' // to_text(index)
     if (index > self%states) name = 'quadrature ' // to_text(index - self%states)
   end function component_name
+
+  !> Why there is no Taylor series of the solution, e.g. "coupling 'x' has no Taylor series"; empty if there is one.
+  function series_obstacle(self) result(obstacle)
+    class(system_t), intent(in) :: self
+    character(len=:), allocatable :: obstacle
+
+    obstacle = 'the system has no Taylor series'
+  end function series_obstacle
+
+  !> Allocates what `series` needs up to an order; called once, before the integration.
+  subroutine prepare_series(self, order)
+    class(system_t), intent(inout) :: self
+    integer, intent(in) :: order   !! at least 2
+
+    error stop 'nocdyn_system: a system with a Taylor series overrides prepare_series'
+  end subroutine prepare_series
+
+  !> The Taylor coefficients y^(k)(t) / k!, k = 1 to order, of the solution through (t, y(:, :, 0)).
+  subroutine series(self, order, columns, t, y, status)
+    class(system_t), intent(inout) :: self
+    integer, intent(in) :: order     !! that of `prepare_series`
+    integer, intent(in) :: columns   !! states + quadratures, and padding
+    real(wp), intent(in) :: t(self%lanes)
+    real(wp), intent(inout) :: y(self%lanes, columns, 0:order)
+    integer, intent(inout) :: status(self%lanes)   !! evaluation_fine on entry
+
+    error stop 'nocdyn_system: a system with a Taylor series overrides series'
+  end subroutine series
 
   !> One requested time of one lane; the calls of a lane come in the order of its times.
   subroutine record(self, lane, t, y)

@@ -6,12 +6,15 @@ module nocdyn_dense_output
   implicit none (type, external)
   private
 
-  public :: allocate_dense_output, take_lane, sample
+  public :: allocate_dense_output, take_lane, sample, sample_batch
+
+  integer, parameter, public :: batch = 8   !! places that are looked at together, so that their sums need not wait for each other
 
   !> y(t + theta h) = sum over p = 0 to degree of c(:, p) theta^p.
   type, public :: dense_output_t
     integer :: lane = 0                         !! that the polynomials belong to
     real(wp) :: t = 0.0_wp, h = 0.0_wp          !! its last step
+    real(wp), allocatable :: states(:, :)       !! of the last batch, [whole vectors of components, batch]
     real(wp), allocatable, private :: c(:, :)   !! [whole vectors of components, 0:degree]
     real(wp), allocatable, private :: y(:)      !! [whole vectors of components]
   end type dense_output_t
@@ -26,7 +29,7 @@ contains
     integer :: length
 
     length = width * ((components + width - 1) / width)
-    allocate (dense%c(length, 0:degree), dense%y(length), source=0.0_wp)
+    allocate (dense%c(length, 0:degree), dense%y(length), dense%states(length, batch), source=0.0_wp)
   end subroutine allocate_dense_output
 
   !> Takes over the polynomials of one lane of a block.
@@ -57,6 +60,37 @@ contains
     call evaluate(size(dense%y), ubound(dense%c, 2), theta, dense%c, dense%y)
     y(:) = dense%y(:size(y))
   end subroutine sample
+
+  !> The states at t + theta h of several places, the same to the last bit as those of `sample`.
+  pure subroutine sample_batch(dense, theta)
+    type(dense_output_t), intent(inout) :: dense
+    real(wp), intent(in) :: theta(batch)   !! 0 to 1
+
+    call evaluate_batch(size(dense%y), ubound(dense%c, 2), theta, dense%c, dense%states)
+  end subroutine sample_batch
+
+  pure subroutine evaluate_batch(n, degree, x, c, y)
+    integer, intent(in) :: n, degree
+    real(wp), intent(in) :: x(batch)
+    real(wp), intent(in) :: c(n, 0:degree)
+    real(wp), intent(inout) :: y(n, batch)
+    real(wp) :: sum(width, batch)
+    integer :: b, i, p
+
+    do i = 1, n, width
+      do b = 1, batch
+        sum(:, b) = c(i:i + width - 1, degree)
+      end do
+      do p = degree - 1, 0, -1
+        do b = 1, batch
+          sum(:, b) = c(i:i + width - 1, p) + x(b) * sum(:, b)
+        end do
+      end do
+      do b = 1, batch
+        y(i:i + width - 1, b) = sum(:, b)
+      end do
+    end do
+  end subroutine evaluate_batch
 
   !> Written out for the degrees of the methods, so that the loop over the components is the innermost.
   pure subroutine evaluate(n, degree, x, c, y)

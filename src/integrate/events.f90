@@ -14,9 +14,10 @@ module nocdyn_events
 
   public :: allocate_events, start_events, find_events
 
-  integer, parameter :: parts = 4   !! of a step
+  integer, parameter :: least_parts = 4   !! of a step; more for solutions of higher degree, whose steps are longer
 
   type, public :: events_t
+    integer, private :: parts = least_parts !! of a step
     integer :: found = 0                    !! events in the last step of the lane that was searched
     integer, allocatable :: which(:)        !! event functions, in the order of their times
     real(wp), allocatable :: theta(:)       !! places in the step
@@ -32,15 +33,17 @@ module nocdyn_events
 contains
 
   !> Room for the event functions of an observer.
-  subroutine allocate_events(events, observer, trial)
+  subroutine allocate_events(events, observer, degree, trial)
     type(events_t), intent(out) :: events
     class(observer_t), intent(in) :: observer   !! with `directions`
+    integer, intent(in) :: degree               !! of the solution inside the step
     type(trial_t), intent(in) :: trial
 
+    events%parts = max(least_parts, degree / 2)
     allocate (events%directions, source=observer%directions)
     associate (functions => size(observer%directions))
-      allocate (events%which(parts * functions), source=0)
-      allocate (events%theta(parts * functions), source=0.0_wp)
+      allocate (events%which(events%parts * functions), source=0)
+      allocate (events%theta(events%parts * functions), source=0.0_wp)
       allocate (events%side(trial%lanes, functions), source=0)
       allocate (events%last(trial%lanes, functions), source=0.0_wp)
       allocate (events%g(functions), events%g_before(functions), events%g_root(functions), events%y(trial%components), &
@@ -71,13 +74,13 @@ contains
 
     events%found = 0
     events%g_before(:) = events%last(dense%lane, :)
-    do part = 1, parts
-      theta = real(part, wp) / parts
+    do part = 1, events%parts
+      theta = real(part, wp) / events%parts
       call evaluate(observer, dense, theta, events%y, events%g)
       do function = 1, size(events%g)
         if (.not. is_finite(events%g(function))) cycle
         if (is_event(events%side(dense%lane, function), events%g(function), events%directions(function))) then
-          call find_root(events, observer, dense, function, theta - 1.0_wp / parts, theta, root)
+          call find_root(events, observer, dense, function, theta - 1.0_wp / events%parts, theta, root)
           call insert(events, function, root)
         end if
         events%side(dense%lane, function) = sign_of(events%g(function))

@@ -2,11 +2,11 @@
 !>
 !> In every step each function is replaced by the polynomial through its values at a few places of the solution inside the
 !> step (Chebyshev-Lobatto places, as many as that solution has coefficients: a linear function of the state is met
-!> exactly). Its critical points are found to machine precision wherever they can exceed the extremes so far.
+!> exactly). Its critical points are found to machine precision wherever they can exceed the extremes so far. The polynomials
+!> are sums of Chebyshev polynomials, which are well-conditioned at any degree.
 module nocdyn_extremes
   use nocdyn_dense_output, only: dense_output_t, sample
   use nocdyn_kinds, only: wp
-  use nocdyn_lapack, only: invert
   use nocdyn_system, only: observer_t, ranges_t
   use nocdyn_trial, only: trial_t
   implicit none (type, external)
@@ -15,14 +15,14 @@ module nocdyn_extremes
   public :: allocate_extremes, start_extremes, follow_extremes
 
   real(wp), parameter :: overshoot = 0.25_wp   !! of the spread of the values: no polynomial is expected to pass them by more
-  integer, parameter :: most_places = 16       !! in a step
+  integer, parameter :: most_places = 40       !! in a step
   integer, parameter :: most_newton_steps = 60   !! bisection alone would need as many
 
   type, public :: extremes_t
     type(ranges_t), allocatable :: ranges(:)               !! [lanes]
     real(wp), allocatable, private :: last(:, :)           !! values at the end of the last step, [functions, lanes]
     real(wp), allocatable, private :: places(:)            !! in the step, -1 to 1, [places]
-    real(wp), allocatable, private :: to_powers(:, :)      !! from values to coefficients of the powers 0, 1, ... of the place
+    real(wp), allocatable, private :: to_series(:, :)      !! from values to the coefficients of T_0, T_1, ...
     real(wp), allocatable, private :: values(:, :)         !! [functions, places]
     real(wp), allocatable, private :: y(:)                 !! [components]
   end type extremes_t
@@ -36,18 +36,17 @@ contains
     integer, intent(in) :: degree
     type(trial_t), intent(in) :: trial
     real(wp), parameter :: pi = acos(-1.0_wp)
-    real(wp) :: powers(degree + 1, degree + 1), log_determinant
-    logical :: is_singular
-    integer :: i, lane
+    integer :: i, k, lane
 
     if (degree >= most_places) error stop 'nocdyn_extremes: the solution inside the step has too many coefficients'
-    allocate (extremes%places(degree + 1))
-    extremes%places(:) = [(-cos(pi * i / degree), i=0, degree)]
+    allocate (extremes%places(degree + 1), extremes%to_series(degree + 1, degree + 1))
     do i = 0, degree
-      powers(:, i + 1) = extremes%places**i
+      extremes%places(i + 1) = -cos(pi * i / degree)
+      do k = 0, degree
+        extremes%to_series(k + 1, i + 1) = 2 * end_weight(i, degree) * end_weight(k, degree) / degree &
+                                           * cos(pi * k * (degree - i) / degree)
+      end do
     end do
-    call invert(powers, extremes%to_powers, log_determinant, is_singular)
-    if (is_singular) error stop 'nocdyn_extremes: two places are the same'
     allocate (extremes%ranges(trial%lanes))
     do lane = 1, trial%lanes
       associate (ranges => extremes%ranges(lane))
@@ -58,6 +57,13 @@ contains
     allocate (extremes%last(functions, trial%lanes), extremes%values(functions, degree + 1), extremes%y(trial%components), &
               source=0.0_wp)
   end subroutine allocate_extremes
+
+  !> 1/2 for the first and the last term of the sums that interpolate at Chebyshev-Lobatto places.
+  pure real(wp) function end_weight(i, last)
+    integer, intent(in) :: i, last
+
+    end_weight = merge(0.5_wp, 1.0_wp, i == 0 .or. i == last)
+  end function end_weight
 
   !> The ranges of a lane at its start.
   subroutine start_extremes(extremes, observer, trial, lane)
@@ -95,13 +101,13 @@ contains
       call observer%tracked_values(dense%lane, t, extremes%y, extremes%values(:, i))
     end do
     extremes%last(:, dense%lane) = extremes%values(:, last)
-    call widen(last, extremes%places, extremes%to_powers, extremes%values, extremes%ranges(dense%lane), dense%t, t_end)
+    call widen(last, extremes%places, extremes%to_series, extremes%values, extremes%ranges(dense%lane), dense%t, t_end)
   end subroutine follow_extremes
 
   !> Widens the ranges by the polynomials through `values_of`, over the times from t_start to t_end.
-  pure subroutine widen(n, places, to_powers, values_of, ranges, t_start, t_end)
+  pure subroutine widen(n, places, to_series, values_of, ranges, t_start, t_end)
     integer, intent(in) :: n   !! places
-    real(wp), intent(in) :: places(n), to_powers(n, n)
+    real(wp), intent(in) :: places(n), to_series(n, n)
     real(wp), contiguous, intent(in) :: values_of(:, :)   !! [functions, places]
     type(ranges_t), intent(inout) :: ranges
     real(wp), intent(in) :: t_start, t_end
@@ -114,27 +120,27 @@ contains
       highest = maxval(values(:n))
       margin = overshoot * (highest - lowest)
       if (highest + margin > ranges%highest(function)) then
-        call raise(n, places, to_powers, values, t_start, t_end, ranges%highest(function), ranges%highest_time(function))
+        call raise(n, places, to_series, values, t_start, t_end, ranges%highest(function), ranges%highest_time(function))
       end if
       if (lowest - margin < ranges%lowest(function)) then
         values(:n) = -values(:n)
         ranges%lowest(function) = -ranges%lowest(function)
-        call raise(n, places, to_powers, values, t_start, t_end, ranges%lowest(function), ranges%lowest_time(function))
+        call raise(n, places, to_series, values, t_start, t_end, ranges%lowest(function), ranges%lowest_time(function))
         ranges%lowest(function) = -ranges%lowest(function)
       end if
     end do
   end subroutine widen
 
   !> Raises `highest` to the largest value of the polynomial through `values`, if that is larger.
-  pure subroutine raise(n, places, to_powers, values, t_start, t_end, highest, time)
+  pure subroutine raise(n, places, to_series, values, t_start, t_end, highest, time)
     integer, intent(in) :: n
-    real(wp), intent(in) :: places(n), to_powers(n, n)
+    real(wp), intent(in) :: places(n), to_series(n, n)
     real(wp), intent(in) :: values(most_places)
     real(wp), intent(in) :: t_start, t_end
     real(wp), intent(inout) :: highest, time
     real(wp) :: place, peak
 
-    call find_peak(n, places, to_powers, values, place, peak)
+    call find_peak(n, places, to_series, values, place, peak)
     if (peak <= highest) return
     highest = peak
     time = t_start + 0.5_wp * (1 + place) * (t_end - t_start)
@@ -143,11 +149,12 @@ contains
 
   !> The largest value of the polynomial through `values` and its place, by Newton's method on the derivative with
   !> bisection as safeguard, between the neighbours of the largest of the values.
-  pure subroutine find_peak(n, places, to_powers, values, place, peak)
+  pure subroutine find_peak(n, places, to_series, values, place, peak)
     integer, intent(in) :: n
-    real(wp), intent(in) :: places(n), to_powers(n, n), values(n)
+    real(wp), intent(in) :: places(n), to_series(n, n), values(n)
     real(wp), intent(out) :: place, peak
-    real(wp) :: c(most_places), below, above, candidate, slope, curvature
+    real(wp), dimension(most_places) :: c, slopes, curvatures   ! coefficients of the polynomial and of its derivatives
+    real(wp) :: below, above, candidate, slope, curvature
     integer :: i, step
 
     i = maxloc(values, dim=1)
@@ -155,15 +162,17 @@ contains
     peak = values(i)
     c(:n) = 0.0_wp
     do step = 1, n
-      c(:n) = c(:n) + to_powers(:, step) * values(step)
+      c(:n) = c(:n) + to_series(:, step) * values(step)
     end do
+    call differentiate(n, c, slopes)
     below = places(max(i - 1, 1))
     above = places(min(i + 1, n))
-    if (derivative(n, c, below) <= 0 .or. derivative(n, c, above) >= 0) return
+    if (series_value(n, slopes, below) <= 0 .or. series_value(n, slopes, above) >= 0) return
+    call differentiate(n, slopes, curvatures)
     candidate = place
     do step = 1, most_newton_steps
-      slope = derivative(n, c, candidate)
-      curvature = second_derivative(n, c, candidate)
+      slope = series_value(n, slopes, candidate)
+      curvature = series_value(n, curvatures, candidate)
       if (slope > 0) then
         below = candidate
       else
@@ -176,40 +185,40 @@ contains
       if (abs(candidate - place) <= epsilon(place)) exit
       place = candidate
     end do
-    peak = max(peak, polynomial(n, c, place))
+    peak = max(peak, series_value(n, c, place))
   end subroutine find_peak
 
-  pure real(wp) function polynomial(n, c, x)
+  !> The coefficients of the derivative of a sum of Chebyshev polynomials: d_(k-1) = d_(k+1) + 2 k c_k, the first halved.
+  pure subroutine differentiate(n, c, d)
+    integer, intent(in) :: n
+    real(wp), intent(in) :: c(n)   !! of T_0 to T_(n-1)
+    real(wp), intent(inout) :: d(n)
+    real(wp) :: after(most_places + 2)
+    integer :: k
+
+    after(:n + 2) = 0.0_wp
+    do k = n - 1, 1, -1
+      after(k) = after(k + 2) + 2 * k * c(k + 1)
+    end do
+    d = after(:n)
+    d(1) = 0.5_wp * d(1)
+  end subroutine differentiate
+
+  !> The sum of Chebyshev polynomials at x, by Clenshaw's recurrence.
+  pure real(wp) function series_value(n, c, x)
     integer, intent(in) :: n
     real(wp), intent(in) :: c(n), x
-    integer :: i
+    real(wp) :: last, last_but_one, next
+    integer :: k
 
-    polynomial = c(n)
-    do i = n - 1, 1, -1
-      polynomial = c(i) + x * polynomial
+    last = 0.0_wp
+    last_but_one = 0.0_wp
+    do k = n, 2, -1
+      next = c(k) + 2 * x * last - last_but_one
+      last_but_one = last
+      last = next
     end do
-  end function polynomial
-
-  pure real(wp) function derivative(n, c, x)
-    integer, intent(in) :: n
-    real(wp), intent(in) :: c(n), x
-    integer :: i
-
-    derivative = (n - 1) * c(n)
-    do i = n - 1, 2, -1
-      derivative = (i - 1) * c(i) + x * derivative
-    end do
-  end function derivative
-
-  pure real(wp) function second_derivative(n, c, x)
-    integer, intent(in) :: n
-    real(wp), intent(in) :: c(n), x
-    integer :: i
-
-    second_derivative = (n - 1) * (n - 2) * c(n)
-    do i = n - 1, 3, -1
-      second_derivative = (i - 1) * (i - 2) * c(i) + x * second_derivative
-    end do
-  end function second_derivative
+    series_value = c(1) + x * last - last_but_one
+  end function series_value
 
 end module nocdyn_extremes

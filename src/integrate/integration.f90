@@ -1,6 +1,6 @@
 !> Integration of a block of lanes from the first to the last requested time.
 module nocdyn_integration
-  use nocdyn_errors, only: error_t
+  use nocdyn_errors, only: error_t, exit_input, raise
   use nocdyn_integration_settings, only: check_settings, integration_settings_t
   use nocdyn_kinds, only: wp
   use nocdyn_march, only: advance_lanes, empty_lanes, fill_lanes, follow_lanes, judge_lanes, march_t, prepare, set_out_lanes
@@ -9,6 +9,7 @@ module nocdyn_integration
   use nocdyn_queue, only: one_each, one_each_t, queue_t
   use nocdyn_stepper, only: stepper_t
   use nocdyn_system, only: observer_t, system_t
+  use nocdyn_text, only: quoted
   implicit none (type, external)
   private
 
@@ -48,10 +49,25 @@ contains
 
     call check_settings(settings, error)
     if (allocated(error)) return
-    call select_method(trim(settings%method), stepper, error)
+    call select_method(settings, stepper, error)
+    if (.not. allocated(error)) call refuse_missing_series(stepper, system, settings, error)
     if (allocated(error)) return
     call integrate_with(stepper, system, settings, times, queue, observer, outcome)
   end subroutine integrate_queue
+
+  !> A method that is made of Taylor series needs a system that has them.
+  subroutine refuse_missing_series(stepper, system, settings, error)
+    class(stepper_t), intent(in) :: stepper
+    class(system_t), intent(in) :: system
+    type(integration_settings_t), intent(in) :: settings
+    type(error_t), allocatable, intent(out) :: error
+    character(len=:), allocatable :: obstacle
+
+    if (.not. stepper%needs_series) return
+    obstacle = system%series_obstacle()
+    if (len(obstacle) == 0) return
+    call raise(error, exit_input, 'method ' // quoted(trim(settings%method)) // ' cannot be used: ' // obstacle)
+  end subroutine refuse_missing_series
 
   !> The same with any stepper and with settings that have been checked.
   subroutine integrate_with(stepper, system, settings, times, queue, observer, outcome)
@@ -67,11 +83,12 @@ contains
     if (size(times) < 2) error stop 'nocdyn_integration: times needs a start and an end'
     if (.not. all(times(2:) > times(:size(times) - 1))) error stop 'nocdyn_integration: times must ascend'
     call allocate_outcome(outcome, system%lanes)
+    if (stepper%needs_series) call system%prepare_series(stepper%order)
     call prepare(march, stepper, system, settings, times, observer)
     do
       call fill_lanes(march, stepper, system, queue, times, observer, outcome)
       if (.not. any(march%occupied)) exit
-      call set_out_lanes(march, outcome)
+      call set_out_lanes(march, stepper, system, outcome)
       call stepper%attempt(system, march%trial)
       call judge_lanes(march, stepper, system, times, outcome)
       if (any(march%accepted)) then

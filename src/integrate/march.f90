@@ -1,6 +1,6 @@
 !> The march of a block of lanes through time: each lane at its own pace, all of them in one loop.
 module nocdyn_march
-  use nocdyn_dense_output, only: allocate_dense_output, dense_output_t, sample, take_lane
+  use nocdyn_dense_output, only: allocate_dense_output, batch, dense_output_t, sample, sample_batch, take_lane
   use nocdyn_events, only: allocate_events, events_t, find_events, start_events
   use nocdyn_extremes, only: allocate_extremes, extremes_t, follow_extremes, start_extremes
   use nocdyn_first_step, only: guess_first_steps
@@ -72,7 +72,7 @@ contains
     if (march%has_extremes) call allocate_extremes(march%extremes, observer%tracked, stepper%degree, march%trial)
     if (.not. allocated(observer%directions)) return
     march%has_events = size(observer%directions) > 0
-    if (march%has_events) call allocate_events(march%events, observer, march%trial)
+    if (march%has_events) call allocate_events(march%events, observer, stepper%degree, march%trial)
   end subroutine prepare
 
   !> Gives the free lanes their next variants and starts them.
@@ -152,19 +152,25 @@ contains
           if (march%has_extremes) call start_extremes(march%extremes, observer, trial, lane)
         end if
       end do
-      if (march%first_step <= 0) call guess_first_steps(march%control, stepper%order, system, trial)
+      if (march%first_step > 0 .or. stepper%plans_steps) return
+      call guess_first_steps(march%control, stepper%order, system, trial)
     end associate
   end subroutine start_lanes
 
   !> The next attempt of the lanes that are still running.
-  subroutine set_out_lanes(march, outcome)
+  subroutine set_out_lanes(march, stepper, system, outcome)
     type(march_t), intent(inout) :: march
+    class(stepper_t), intent(inout) :: stepper
+    class(system_t), intent(inout) :: system
     type(outcome_t), intent(inout) :: outcome
     integer :: lane
 
     associate (trial => march%trial)
       do lane = 1, trial%lanes
         trial%working(lane) = march%occupied(lane) .and. outcome%status(lane) == integration_running
+      end do
+      if (stepper%plans_steps) call plan_steps(march, stepper, system, outcome)
+      do lane = 1, trial%lanes
         trial%h(lane) = 0.0_wp
         if (.not. trial%working(lane)) cycle
         call propose(march%control, lane, trial%t(lane), trial%h(lane))
@@ -177,6 +183,21 @@ contains
     end associate
   end subroutine set_out_lanes
 
+  !> Lets the stepper choose the steps; the first is not longer than the one that was asked for.
+  subroutine plan_steps(march, stepper, system, outcome)
+    type(march_t), intent(inout) :: march
+    class(stepper_t), intent(inout) :: stepper
+    class(system_t), intent(inout) :: system
+    type(outcome_t), intent(in) :: outcome
+    integer :: lane
+
+    call stepper%plan(system, march%trial, march%control)
+    if (march%first_step <= 0) return
+    do lane = 1, march%trial%lanes
+      if (outcome%steps(lane) == 0) march%control%h(lane) = min(march%control%h(lane), march%first_step)
+    end do
+  end subroutine plan_steps
+
   !> Accepts or rejects the last attempt of each lane, and ends the lanes that cannot go on.
   subroutine judge_lanes(march, stepper, system, times, outcome)
     type(march_t), intent(inout) :: march
@@ -186,7 +207,7 @@ contains
     type(outcome_t), intent(inout) :: outcome
     integer :: lane
 
-    call weigh_error(march%control, march%trial)
+    if (.not. stepper%plans_steps) call weigh_error(march%control, march%trial)
     do lane = 1, march%trial%lanes
       march%accepted(lane) = march%trial%working(lane) .and. is_within(march%control%mean_square(lane))
       march%wanted(lane) = march%accepted(lane) &
@@ -197,7 +218,9 @@ contains
       if (.not. march%occupied(lane) .or. outcome%status(lane) /= integration_running) cycle
       march%accepted(lane) = march%accepted(lane) .and. march%trial%verdict(lane) == trial_fine
       if (march%accepted(lane)) then
-        call lengthen(march%control, lane, march%trial%error_order(lane), march%trial%most_growth(lane), outcome%h(lane))
+        if (.not. stepper%plans_steps) then
+          call lengthen(march%control, lane, march%trial%error_order(lane), march%trial%most_growth(lane), outcome%h(lane))
+        end if
         call note_method(outcome, lane, march%trial%t(lane), march%trial%implicit(lane))
         if (march%control%reaches_end(lane)) outcome%status(lane) = integration_done
       else
@@ -234,6 +257,7 @@ contains
           outcome%component(lane) = trial%culprit(lane)
         case default
           outcome%status(lane) = integration_step_too_small
+          outcome%component(lane) = trial%culprit(lane)
         end select
       end if
     end associate
@@ -298,22 +322,31 @@ contains
     real(wp), intent(in) :: t
     real(wp), contiguous, intent(in) :: times(:)
     class(observer_t), intent(inout) :: observer
-    real(wp) :: theta
-    integer :: next
+    real(wp) :: theta(batch)
+    integer :: ahead, i
 
-    next = march%next(lane)
-    do while (next <= size(times))
-      if (times(next) > t) exit
-      if (times(next) < march%t_new(lane)) then
-        theta = (times(next) - march%dense%t) / march%dense%h
-        call sample(march%dense, theta, march%sample)
-      else
-        march%sample(:) = march%trial%y_new(lane, :march%trial%components)
-      end if
+    associate (next => march%next(lane))
+      do while (next <= size(times))
+        theta = 0.0_wp
+        ahead = 0
+        do while (ahead < min(batch, size(times) + 1 - next))
+          if (times(next + ahead) > t .or. times(next + ahead) >= march%t_new(lane)) exit
+          ahead = ahead + 1
+          theta(ahead) = (times(next + ahead - 1) - march%dense%t) / march%dense%h
+        end do
+        if (ahead == 0) exit
+        call sample_batch(march%dense, theta)
+        do i = 1, ahead
+          call observer%record(lane, times(next), march%dense%states(:march%trial%components, i))
+          next = next + 1
+        end do
+      end do
+      if (next > size(times)) return
+      if (times(next) > t) return
+      march%sample(:) = march%trial%y_new(lane, :march%trial%components)
       call observer%record(lane, times(next), march%sample)
       next = next + 1
-    end do
-    march%next(lane) = next
+    end associate
   end subroutine record_until
 
   !> The accepted lanes move to the end of their step.

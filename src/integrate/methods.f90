@@ -4,9 +4,11 @@ module nocdyn_methods
   use nocdyn_errors, only: error_t, exit_input, raise
   use nocdyn_explicit_stepper, only: explicit_stepper
   use nocdyn_explicit_tables, only: dormand_prince_5, dormand_prince_8
+  use nocdyn_integration_settings, only: integration_settings_t
   use nocdyn_rosenbrock_stepper, only: rosenbrock_stepper
   use nocdyn_rosenbrock_tables, only: rodas4, rodas5p
   use nocdyn_stepper, only: stepper_t
+  use nocdyn_taylor_stepper, only: taylor_stepper
   use nocdyn_text, only: joined, nearest_word, quoted, string_t
   implicit none (type, external)
   private
@@ -14,18 +16,18 @@ module nocdyn_methods
   public :: select_method
 
   !> All names that `select_method` knows; 'rosenbrock' is another name of 'rodas4'.
-  character(len=10), parameter, public :: method_names(6) = &
-    [character(len=10) :: 'auto', 'rk45', 'rk853', 'rosenbrock', 'rodas4', 'rodas5p']
+  character(len=10), parameter, public :: method_names(7) = &
+    [character(len=10) :: 'auto', 'rk45', 'rk853', 'rosenbrock', 'rodas4', 'rodas5p', 'taylor']
 
 contains
 
-  !> The stepper of a name in `method_names`.
-  subroutine select_method(name, stepper, error)
-    character(len=*), intent(in) :: name
+  !> The stepper of the method that the settings name, one of `method_names`.
+  subroutine select_method(settings, stepper, error)
+    type(integration_settings_t), intent(in) :: settings
     class(stepper_t), allocatable, intent(out) :: stepper
     type(error_t), allocatable, intent(out) :: error   !! allocated if there is no such method
 
-    select case (name)
+    select case (settings%method)
     case ('auto')
       allocate (stepper, source=auto_stepper(dormand_prince_8(), rodas5p()))
     case ('rk45')
@@ -36,8 +38,10 @@ contains
       allocate (stepper, source=rosenbrock_stepper(rodas4()))
     case ('rodas5p')
       allocate (stepper, source=rosenbrock_stepper(rodas5p()))
+    case ('taylor')
+      allocate (stepper, source=taylor_stepper(settings%rtol))
     case default
-      call raise(error, exit_input, unknown_method(name))
+      call raise(error, exit_input, unknown_method(trim(settings%method)))
     end select
   end subroutine select_method
 

@@ -1,6 +1,7 @@
 !> What the march asks of every one-step method.
 module nocdyn_stepper
   use nocdyn_kinds, only: wp
+  use nocdyn_step_control, only: step_control_t
   use nocdyn_system, only: system_t
   use nocdyn_trial, only: trial_t
   implicit none (type, external)
@@ -12,7 +13,10 @@ module nocdyn_stepper
     real(wp) :: most_growth = 6.0_wp   !! of the step size from one step to the next
     integer :: degree = 0        !! of the polynomials inside a step
     logical :: has_coarse_error = .false.   !! whether there are two error estimates
+    logical :: needs_series = .false.       !! whether the system must have a Taylor series
+    logical :: plans_steps = .false.        !! whether `plan` chooses the sizes of the steps, which then have no error estimate
   contains
+    procedure :: plan
     procedure(prepare_interface), deferred :: prepare
     procedure(begin_interface), deferred :: begin
     procedure(attempt_interface), deferred :: attempt
@@ -64,5 +68,17 @@ module nocdyn_stepper
     end subroutine accept_interface
 
   end interface
+
+contains
+
+  !> Sets control%h of the lanes that are working and have moved since the last call.
+  subroutine plan(self, system, trial, control)
+    class(stepper_t), intent(inout) :: self
+    class(system_t), intent(inout) :: system
+    type(trial_t), intent(inout) :: trial
+    type(step_control_t), intent(inout) :: control
+
+    error stop 'nocdyn_stepper: a stepper that plans its steps overrides plan'
+  end subroutine plan
 
 end module nocdyn_stepper

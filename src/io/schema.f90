@@ -75,7 +75,7 @@ module nocdyn_schema
   type(allowed_t), parameter :: steps = allowed_t(low=1.0_wp, high=1.0e8_wp)
   type(allowed_t), parameter :: from_2 = allowed_t(low=2.0_wp)
   type(allowed_t), parameter :: tolerance = allowed_t(low=1.0e-14_wp, high=0.1_wp)
-  type(allowed_t), parameter :: methods = allowed_t(words='auto rk45 rk853 rosenbrock rodas4 rodas5p')
+  type(allowed_t), parameter :: methods = allowed_t(words='auto rk45 rk853 rosenbrock rodas4 rodas5p taylor')
   character(len=*), parameter :: default_method = "'auto'"
   type(allowed_t), parameter :: formulations = allowed_t(words='reduced paper multiplier')
   type(allowed_t), parameter :: complements = allowed_t(words='natural scaled negated')
@@ -155,7 +155,7 @@ module nocdyn_schema
     key_rule_t('run',        't_end',           a_number,       1, 's',           required,    anything, &
       'time of the end, after t_start'), &
     key_rule_t('run',        'method',          a_word,         1, '',            default_method, methods, &
-      'explicit: rk45, rk853; implicit: rodas4 = rosenbrock, rodas5p; auto: rk853 or rodas5p'), &
+      'explicit: rk45, rk853, taylor; implicit: rodas4 = rosenbrock, rodas5p; auto: two of them'), &
     key_rule_t('run',        'rtol',            a_number,       1, '',            '1e-6',      tolerance, &
       'relative error tolerated in a step'), &
     key_rule_t('run',        'atol',            a_number,       1, '',            '1e-9',      positive, &

@@ -37,11 +37,15 @@ module nocdyn_bank
     integer :: values = 0                    !! lanes * elements
     integer :: first_value = 1               !! the place of lane 1 of `first` in the values of the machine
     logical :: is_polynomial = .true.        !! whether `polynomials` says all of its law
+    logical :: is_external = .false.         !! whether the rest of its law depends on the time alone
   contains
     procedure :: polynomials
     procedure :: evaluate
     procedure :: differentiate
     procedure :: assess
+    procedure :: has_series
+    procedure :: drive
+    procedure :: series
     procedure :: connect
     procedure :: last
     procedure :: is_source
@@ -114,6 +118,34 @@ contains
     class(bank_t), intent(in) :: self
     type(elements_t), intent(inout) :: elements   !! of the machine
   end subroutine assess
+
+  !> Whether the moments have a Taylor series: that of `polynomials`, and that of `evaluate` by `drive` and `series`.
+  pure logical function has_series(self)
+    class(bank_t), intent(in) :: self
+
+    has_series = self%is_polynomial
+  end function has_series
+
+  !> Sets the Taylor coefficients, number 0 to last, of what of `working` depends on the time alone. Here and in `series`
+  !> the arrays begin with the bank's first value, and column k holds the coefficients number k.
+  subroutine drive(self, last, stride, time, working)
+    class(bank_t), intent(in) :: self
+    integer, intent(in) :: last
+    integer, intent(in) :: stride   !! from column to column
+    real(wp), intent(in) :: time(self%lanes)
+    real(wp), intent(inout) :: working(stride, 0:last)
+  end subroutine drive
+
+  !> Adds the Taylor coefficients number k of the rest of what `evaluate` adds. Those of the angles, which are counted from
+  !> the rest in `polynomials`, and speeds are known up to k, those of the moments up to k - 1.
+  subroutine series(self, k, stride, time, angle, speed, restoring, working)
+    class(bank_t), intent(in) :: self
+    integer, intent(in) :: k
+    integer, intent(in) :: stride
+    real(wp), intent(in) :: time(self%lanes)
+    real(wp), intent(in) :: angle(stride, 0:k), speed(stride, 0:k)
+    real(wp), intent(inout) :: restoring(stride, 0:k), working(stride, 0:k)
+  end subroutine series
 
   !> The columns of the bank in the table of results: by default the torque of each element.
   function quantities(self) result(columns)

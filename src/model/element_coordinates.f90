@@ -8,8 +8,8 @@ module nocdyn_element_coordinates
 
   public :: new_element_coordinates
 
-  !> Element e has the entries first(e) to first(e + 1) - 1, one for each coordinate of its two bodies: its speed is the
-  !> sum of ratio * q'(coordinate), and its moment M adds response * M to q''(coordinate).
+  !> Element e has the entries first(e) to first(e + 1) - 1, one for each coordinate of its two bodies, in ascending order:
+  !> its speed is the sum of ratio * q'(coordinate), and its moment M adds response * M to q''(coordinate).
   type, public :: element_coordinates_t
     integer, allocatable :: first(:)           !! [elements + 1]
     integer, allocatable :: coordinate(:)      !! [entries]
@@ -39,6 +39,7 @@ contains
       self%first(e + 1) = self%first(e)
       call add_body(coordinates, elements%to(e), 1.0_wp, self%first(e), self%first(e + 1), place, self)
       call add_body(coordinates, elements%from(e), -1.0_wp, self%first(e), self%first(e + 1), place, self)
+      call sort_entries(self, self%first(e), self%first(e + 1) - 1)
     end do
     entries = self%first(size(self%first)) - 1
     self%coordinate = self%coordinate(:entries)
@@ -78,5 +79,21 @@ contains
       end associate
     end do
   end subroutine add_body
+
+  !> Puts the entries of an element into the order of their coordinates.
+  pure subroutine sort_entries(self, begin, end)
+    type(element_coordinates_t), intent(inout) :: self
+    integer, intent(in) :: begin, end
+    integer :: least, k, other
+
+    do k = begin, end - 1
+      least = k - 1 + minloc(self%coordinate(k:end), dim=1)
+      other = self%coordinate(k)
+      self%coordinate(k) = self%coordinate(least)
+      self%coordinate(least) = other
+      self%ratio(:, [k, least]) = self%ratio(:, [least, k])
+      self%response(:, [k, least]) = self%response(:, [least, k])
+    end do
+  end subroutine sort_entries
 
 end module nocdyn_element_coordinates

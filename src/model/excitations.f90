@@ -17,6 +17,8 @@ module nocdyn_excitations
   contains
     procedure :: evaluate
     procedure :: differentiate
+    procedure :: has_series
+    procedure :: drive
   end type excitations_t
 
   integer, parameter :: strip = 64   ! arguments whose sines are taken at a time
@@ -32,6 +34,7 @@ contains
     integer :: e
 
     bank%is_polynomial = .false.
+    bank%is_external = .true.
     call bank%connect(role_excitation, size(amplitude, 1), names, [(0, e=1, size(body))], body)
     bank%amplitude = amplitude
     bank%frequency = frequency
@@ -78,6 +81,50 @@ contains
       before = before + length
     end do
   end subroutine harmonic_torques
+
+  pure logical function has_series(self)
+    class(excitations_t), intent(in) :: self
+
+    has_series = .true.
+  end function has_series
+
+  subroutine drive(self, last, stride, time, working)
+    class(excitations_t), intent(in) :: self
+    integer, intent(in) :: last, stride
+    real(wp), intent(in) :: time(self%lanes)
+    real(wp), intent(inout) :: working(stride, 0:last)
+
+    call harmonic_series(self%lanes, self%values, last, stride, self%amplitude, self%frequency, self%phase, time, working)
+  end subroutine drive
+
+  !> M'' = -omega_p^2 M, from M and M' at the given time.
+  pure subroutine harmonic_series(lanes, n, last, stride, amplitude, frequency, phase, time, working)
+    integer, intent(in) :: lanes, n, last, stride
+    real(wp), intent(in) :: amplitude(n), frequency(n), phase(n), time(lanes)
+    real(wp), intent(inout) :: working(stride, 0:last)
+    real(wp) :: factor
+    integer :: e, i, k, l
+
+    do e = 1, n / lanes
+      do l = 1, lanes
+        i = (e - 1) * lanes + l
+        working(i, 0) = frequency(i) * time(l) + phase(i)
+      end do
+    end do
+    working(:n, 1) = working(:n, 0)
+    call sines(n, working(:n, 0))
+    call cosines(n, working(:n, 1))
+    do i = 1, n
+      working(i, 0) = amplitude(i) * working(i, 0)
+      working(i, 1) = amplitude(i) * frequency(i) * working(i, 1)
+    end do
+    do k = 2, last
+      factor = -1.0_wp / (k * (k - 1))
+      do i = 1, n
+        working(i, k) = factor * frequency(i)**2 * working(i, k - 2)
+      end do
+    end do
+  end subroutine harmonic_series
 
   subroutine differentiate(self, elements)
     class(excitations_t), intent(in) :: self

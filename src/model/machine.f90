@@ -1,13 +1,13 @@
 !> A machine: bodies, banks of elements, constraints and the coordinates that they leave, on a block of lanes.
 module nocdyn_machine
-  use nocdyn_bank, only: bank_slot_t, bank_t
+  use nocdyn_bank, only: bank_slot_t, bank_t, role_names
   use nocdyn_constraints, only: constraints_t
   use nocdyn_coordinates, only: coordinates_t
   use nocdyn_elements, only: elements_t, new_elements
   use nocdyn_geared_groups, only: geared_group_t
   use nocdyn_kinds, only: wp
   use nocdyn_polynomial_laws, only: new_polynomial_laws, polynomial_laws_t
-  use nocdyn_text, only: string_t
+  use nocdyn_text, only: quoted, string_t
   implicit none (type, external)
   private
 
@@ -35,6 +35,7 @@ module nocdyn_machine
     procedure :: differentiate
     procedure :: differentiate_elements
     procedure :: assess
+    procedure :: series_obstacle
     procedure :: power
     procedure :: kinetic_energy
     procedure :: stored_energy
@@ -163,6 +164,22 @@ contains
       call self%banks(self%other_banks(i))%bank%assess(self%elements)
     end do
   end subroutine assess
+
+  !> The first element that has no Taylor series, as a sentence; empty if all have one.
+  function series_obstacle(self) result(obstacle)
+    class(machine_t), intent(in) :: self
+    character(len=:), allocatable :: obstacle
+    integer :: i
+
+    obstacle = ''
+    do i = 1, size(self%banks)
+      associate (bank => self%banks(i)%bank)
+        if (size(bank%to) == 0 .or. bank%has_series()) cycle
+        obstacle = trim(role_names(bank%role)) // ' ' // quoted(bank%names(1)%text) // ' has no Taylor series'
+        return
+      end associate
+    end do
+  end function series_obstacle
 
   !> Power of the accounted elements after `evaluate`, positive into the machine [W].
   subroutine power(self, watts)

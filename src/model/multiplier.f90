@@ -17,6 +17,7 @@ module nocdyn_multiplier
   contains
     procedure :: derivative
     procedure :: reactions
+    procedure :: series_obstacle
   end type multiplier_t
 
 contains
@@ -86,5 +87,12 @@ contains
       end associate
     end do
   end subroutine reactions
+
+  function series_obstacle(self) result(obstacle)
+    class(multiplier_t), intent(in) :: self
+    character(len=:), allocatable :: obstacle
+
+    obstacle = "formulation 'multiplier' has no Taylor series; 'reduced' has one"
+  end function series_obstacle
 
 end module nocdyn_multiplier

@@ -37,6 +37,7 @@ module nocdyn_paper
     procedure :: start
     procedure :: observe
     procedure :: reactions
+    procedure :: series_obstacle
   end type paper_t
 
 contains
@@ -267,5 +268,12 @@ contains
     self%work%term(:) = self%machine%inertia(lane, :) * self%slope(lane, :self%machine%bodies) - self%torque(lane, 1:)
     call self%machine%coordinates%reactions_of_imbalances(lane, self%work%term, lambda)
   end subroutine reactions
+
+  function series_obstacle(self) result(obstacle)
+    class(paper_t), intent(in) :: self
+    character(len=:), allocatable :: obstacle
+
+    obstacle = "formulation 'paper' has no Taylor series; 'reduced' has one"
+  end function series_obstacle
 
 end module nocdyn_paper

@@ -9,6 +9,7 @@ module nocdyn_reduced
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
   use nocdyn_reduced_jacobian, only: new_reduced_jacobian, reduced_jacobian_t
+  use nocdyn_reduced_series, only: new_reduced_series, reduced_series_t
   use nocdyn_sparse_map, only: new_sparse_map, sparse_map_t, transposed_order
   use nocdyn_system, only: pattern_t
   use nocdyn_text, only: quoted
@@ -23,12 +24,16 @@ module nocdyn_reduced
     type(sparse_map_t), private :: twists                      !! U
     type(sparse_map_t), private :: accelerations               !! R
     type(reduced_jacobian_t), private :: sums                  !! R diag U
+    type(reduced_series_t), private :: motion                  !! after `prepare_series`
     real(wp), allocatable, private :: none(:, :)               !! zeros, [lanes, elements]
   contains
     procedure :: derivative
     procedure :: jacobian
     procedure :: jacobian_pattern
     procedure :: component_name
+    procedure :: series_obstacle
+    procedure :: prepare_series
+    procedure :: series
     procedure :: start
     procedure :: place
     procedure :: reactions
@@ -144,6 +149,31 @@ contains
     call self%twists%map_pair(self%start_twist, y(:, 2), y(:, 1), self%machine%elements%angle, self%machine%elements%speed)
     call self%machine%evaluate_elements(t)
   end subroutine turn
+
+  function series_obstacle(self) result(obstacle)
+    class(reduced_t), intent(in) :: self
+    character(len=:), allocatable :: obstacle
+
+    obstacle = self%machine%series_obstacle()
+  end function series_obstacle
+
+  subroutine prepare_series(self, order)
+    class(reduced_t), intent(inout) :: self
+    integer, intent(in) :: order
+
+    self%motion = new_reduced_series(self%machine, self%twists, self%accelerations, self%is_audited, order)
+  end subroutine prepare_series
+
+  subroutine series(self, order, columns, t, y, status)
+    class(reduced_t), intent(inout) :: self
+    integer, intent(in) :: order, columns
+    real(wp), intent(in) :: t(self%lanes)
+    real(wp), intent(inout) :: y(self%lanes, columns, 0:order)
+    integer, intent(inout) :: status(self%lanes)
+
+    call self%motion%expand(self%machine, self%twists, self%accelerations, self%start_twist, &
+                            self%lanes * self%machine%coordinates%freedoms, self%lanes * columns, t, y)
+  end subroutine series
 
   subroutine jacobian(self, t, y, dfdy, dfdt, status)
     class(reduced_t), intent(inout) :: self

@@ -4,7 +4,9 @@
 !> that a lane's result is the same to the last bit in a block of any size.
 module nocdyn_sparse_map
   use nocdyn_kinds, only: wp
-  use nocdyn_stretches, only: pair_of_even_stretch, pair_of_stretch, sum_of_even_stretch, sum_of_stretch
+  use nocdyn_map_products, only: multiply_lanes, multiply_rows
+  use nocdyn_stretches, only: multiply_even_stretch, multiply_stretch, pair_of_even_stretch, pair_of_stretch, &
+    sum_of_even_stretch, sum_of_stretch
   implicit none (type, external)
   private
 
@@ -32,6 +34,7 @@ module nocdyn_sparse_map
     integer, allocatable, private :: column(:)           !! [entries]
     real(wp), allocatable, private :: coefficient(:, :)  !! [lanes, entries]
   contains
+    procedure :: map_one
     procedure :: map_pair
     procedure :: map_sum
   end type sparse_map_t
@@ -166,6 +169,33 @@ contains
       next(column(i)) = next(column(i)) + 1
     end do
   end subroutine transposed_order
+
+  !> u = map x.
+  subroutine map_one(self, x, u)
+    class(sparse_map_t), intent(in) :: self
+    real(wp), intent(in) :: x(self%lanes * self%columns)        !! [lanes, columns]
+    real(wp), intent(inout) :: u(self%lanes * self%all_rows)    !! [lanes, rows]
+    integer :: s
+
+    if (self%lanes > 1) then
+      call multiply_lanes(self%lanes, self%all_rows, self%columns, size(self%column), self%first, self%column, &
+                          self%coefficient, x, u)
+      return
+    end if
+    call multiply_rows(self%loose_rows, self%all_rows, self%columns, size(self%column), self%row, self%first, self%column, &
+                       self%coefficient, x, u)
+    do s = 1, self%stretches
+      associate (entry => self%first_entry(s))
+        if (self%is_even(s)) then
+          call multiply_even_stretch(self%rows(s), self%width(s), self%columns, self%column(entry), &
+                                     self%coefficient(1, entry), x, u(self%first_row(s)))
+        else
+          call multiply_stretch(self%rows(s), self%width(s), self%columns, self%column(entry), self%coefficient(1, entry), &
+                                x, u(self%first_row(s)))
+        end if
+      end associate
+    end do
+  end subroutine map_one
 
   !> u = offset + map x and v = map y.
   subroutine map_pair(self, offset, x, y, u, v)

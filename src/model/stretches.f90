@@ -1,17 +1,59 @@
 !> The vector loops of a sparse map over rows whose columns all advance by one from row to row.
 !>
-!> `pair`: u = offset + map x and v = map y; `sum`: u = map (x + y). A stretch is given diagonal by diagonal, an even one,
+!> `multiply`: u = map x; `pair`: u = offset + map x and v = map y; `sum`: u = map (x + y). A stretch is given diagonal by diagonal, an even one,
 !> whose rows all have the same coefficients, by its first row. The terms of a row are added one after the other.
 module nocdyn_stretches
   use nocdyn_kinds, only: wp
   implicit none (type, external)
   private
 
-  public :: pair_of_stretch, pair_of_even_stretch, sum_of_stretch, sum_of_even_stretch
+  public :: multiply_stretch, multiply_even_stretch, pair_of_stretch, pair_of_even_stretch, sum_of_stretch, sum_of_even_stretch
 
   integer, parameter :: strip = 256   !! rows that stay in the first cache from diagonal to diagonal
 
 contains
+
+  pure subroutine multiply_stretch(rows, width, columns, column, coefficient, x, u)
+    integer, intent(in) :: rows, width, columns
+    integer, intent(in) :: column(rows, width)
+    real(wp), intent(in) :: coefficient(rows, width), x(columns)
+    real(wp), intent(inout) :: u(rows)
+    integer :: begin, c, i, k
+
+    do begin = 1, rows, strip
+      c = column(1, 1) - 1
+      do i = begin, min(begin + strip - 1, rows)
+        u(i) = 0.0_wp + coefficient(i, 1) * x(c + i)
+      end do
+      do k = 2, width
+        c = column(1, k) - 1
+        do i = begin, min(begin + strip - 1, rows)
+          u(i) = u(i) + coefficient(i, k) * x(c + i)
+        end do
+      end do
+    end do
+  end subroutine multiply_stretch
+
+  pure subroutine multiply_even_stretch(rows, width, columns, column, coefficient, x, u)
+    integer, intent(in) :: rows, width, columns
+    integer, intent(in) :: column(width)
+    real(wp), intent(in) :: coefficient(width), x(columns)
+    real(wp), intent(inout) :: u(rows)
+    integer :: begin, c, i, k
+
+    do begin = 1, rows, strip
+      c = column(1) - 1
+      do i = begin, min(begin + strip - 1, rows)
+        u(i) = 0.0_wp + coefficient(1) * x(c + i)
+      end do
+      do k = 2, width
+        c = column(k) - 1
+        do i = begin, min(begin + strip - 1, rows)
+          u(i) = u(i) + coefficient(k) * x(c + i)
+        end do
+      end do
+    end do
+  end subroutine multiply_even_stretch
 
   pure subroutine pair_of_stretch(rows, width, columns, column, coefficient, offset, x, y, u, v)
     integer, intent(in) :: rows, width, columns

@@ -172,3 +172,14 @@ def test_a_long_chain_keeps_its_implicit_steps(nocdyn):
         assert (outcome.returncode, outcome.stderr) == (0, "")
         assert "note" not in outcome.stdout
         assert nocdyn.summary("out")["method"]["name"] == method
+
+
+@pytest.mark.parametrize("formulation", ["paper", "multiplier"])
+def test_a_formulation_without_taylor_series_is_refused(nocdyn, formulation):
+    outcome = nocdyn("run", CASE_2, "--out", "out", "--set", "run.method=taylor", "--set", f"run.formulation={formulation}")
+    assert outcome.returncode == 2
+    assert outcome.stderr == (
+        "nocdyn: --set run.method=taylor: &run: method = 'taylor' cannot be used: "
+        f"formulation '{formulation}' has no Taylor series; 'reduced' has one\n"
+    )
+    assert not (nocdyn.folder / "out").exists()

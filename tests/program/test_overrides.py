@@ -61,7 +61,7 @@ def test_an_override_applies_to_every_file(nocdyn, spinner):
         ("load.work.viscous=-1", "viscous = -1 is out of range; allowed: >= 0"),
         ("load.work.viscous=much", "viscous = much is not a number"),
         ("gear.reducer.radii=1,2,3", "radii has 3 values (1, 2, 3); allowed: 2"),
-        ("run.method=euler", "'auto', 'rk45', 'rk853', 'rosenbrock', 'rodas4', 'rodas5p'"),
+        ("run.method=euler", "'auto', 'rk45', 'rk853', 'rosenbrock', 'rodas4', 'rodas5p', 'taylor'"),
         ("motor.drive.body=moter", "there is no &body 'moter'; did you mean 'motor'?"),
     ],
 )

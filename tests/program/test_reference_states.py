@@ -52,6 +52,32 @@ def test_the_state_at_the_end_is_the_reference(runs, path, method, formulation, 
 
 
 @pytest.mark.parametrize("path", REFERENCE, ids=STEM.get)
+@pytest.mark.parametrize("complement", COMPLEMENTS)
+def test_taylor_series_lead_to_the_reference(runs, shared_nocdyn, path, complement):
+    words = ("--set", "run.method=taylor", "--set", f"run.complement={complement}")
+    assert shared_nocdyn("run", path, "--out", "out", "-q", *TIGHT, *words).returncode == 0
+    header, rows = shared_nocdyn.table("out")
+    table = dict(zip(header, zip(*rows)))
+    assert [table[name][-1] for name in COLUMNS] == pytest.approx(REFERENCE[path], rel=1e-11)
+    expected = runs[path, "rk45", "reduced", complement]
+    for name in COLUMNS:
+        largest = max(map(abs, expected[name]))
+        assert max(abs(a - b) for a, b in zip(table[name], expected[name])) < ACCURACY["rk45"] * largest
+    assert max(map(abs, table["energy_residual [J]"])) < 1e-10 * table["work_in [J]"][-1]
+
+
+def test_extremes_are_those_of_another_method(shared_nocdyn):
+    extremes = {}
+    for method in ("taylor", "rk853"):
+        shared_nocdyn("run", CASE_2, "--out", "out", "-q", *TIGHT, "--set", f"run.method={method}")
+        extremes[method] = shared_nocdyn.summary("out")["columns"]
+    for name, other in extremes["rk853"].items():
+        if name != "energy_residual [J]":
+            found = extremes["taylor"][name]
+            assert [found[key] for key in ("min", "max")] == pytest.approx([other["min"], other["max"]], rel=1e-9, abs=1e-9)
+
+
+@pytest.mark.parametrize("path", REFERENCE, ids=STEM.get)
 def test_all_runs_agree_at_every_time(runs, path):
     expected = runs[path, "rk45", "reduced", "natural"]
     for (other, method, _, _), table in runs.items():

@@ -1,0 +1,229 @@
+!> Steps along the Taylor series of the solution, of one order throughout.
+!>
+!> A step is as long as the last two coefficients allow: h is the smaller of ||y_j||^(-1/j), j = p - 1 and p, with the
+!> largest |y_j| / (atol + rtol |y|) of the states as norm: the terms h^j y_j do not exceed the tolerance. No step is judged
+!> after it has been taken. With p = 1 - ln(tol) / 2 that is the step rho / e^2 of A. Jorba, M. Zou, A software package for
+!> the numerical integration of ODEs by means of high-order Taylor methods, Experimental Mathematics 14 (2005) 99-117,
+!> who take the work for proportional to p^2. Here it grows more slowly, as long as p is small, and the order is higher.
+module nocdyn_taylor_stepper
+  use nocdyn_combinations, only: padded_columns, width
+  use nocdyn_finite, only: all_finite, is_finite
+  use nocdyn_kinds, only: wp
+  use nocdyn_step_control, only: smallest_step, step_control_t
+  use nocdyn_stepper, only: stepper_t
+  use nocdyn_system, only: evaluation_fine, system_t
+  use nocdyn_trial, only: park, park_infinities, trial_fine, trial_not_finite, trial_shorten, trial_t
+  implicit none (type, external)
+  private
+
+  public :: taylor_stepper
+
+  real(wp), parameter :: order_offset = 3.0_wp, order_slope = 0.7_wp   !! of the order over -ln(tolerance), by measurement
+
+  type, extends(stepper_t), public :: taylor_stepper_t
+    private
+    real(wp), allocatable :: series(:, :, :)   !! y_0, y_1, ... of each lane, [lanes, padded columns, 0:order]
+    logical, allocatable :: moved(:)           !! lanes that have moved since they were expanded
+    integer, allocatable :: verdict(:)         !! trial_... on the series of each lane
+    integer, allocatable :: culprit(:)         !! component that the verdict is due to, 0 if there is none
+  contains
+    procedure :: plan
+    procedure :: prepare
+    procedure :: begin
+    procedure :: attempt
+    procedure :: interpolate
+    procedure :: accept
+  end type taylor_stepper_t
+
+contains
+
+  !> The stepper whose order suits a tolerance, or of a given order.
+  pure function taylor_stepper(rtol, order) result(stepper)
+    real(wp), intent(in) :: rtol
+    integer, intent(in), optional :: order   !! at least 2
+    type(taylor_stepper_t) :: stepper
+
+    stepper%order = ceiling(order_offset - order_slope * log(rtol))
+    if (present(order)) stepper%order = order
+    stepper%error_order = stepper%order
+    stepper%degree = stepper%order
+    stepper%needs_series = .true.
+    stepper%plans_steps = .true.
+  end function taylor_stepper
+
+  subroutine prepare(self, system)
+    class(taylor_stepper_t), intent(inout) :: self
+    class(system_t), intent(in) :: system
+
+    if (allocated(self%series)) deallocate (self%series, self%moved, self%verdict, self%culprit)
+    associate (lanes => system%lanes)
+      allocate (self%series(lanes, padded_columns(lanes, system%states + system%quadratures), 0:self%order), source=0.0_wp)
+      allocate (self%moved(lanes), source=.true.)
+      allocate (self%verdict(lanes), source=trial_fine)
+      allocate (self%culprit(lanes), source=0)
+    end associate
+  end subroutine prepare
+
+  subroutine begin(self, trial, starting)
+    class(taylor_stepper_t), intent(inout) :: self
+    type(trial_t), intent(inout) :: trial
+    logical, intent(in) :: starting(:)
+
+    self%moved(:) = self%moved .or. starting
+  end subroutine begin
+
+  !> Expands the lanes that have moved and sets their steps; a lane that cannot be expanded is parked by `attempt`.
+  subroutine plan(self, system, trial, control)
+    class(taylor_stepper_t), intent(inout) :: self
+    class(system_t), intent(inout) :: system
+    type(trial_t), intent(inout) :: trial
+    type(step_control_t), intent(inout) :: control
+    logical :: are_finite
+    integer :: lane
+
+    if (.not. any(self%moved .and. trial%working)) return
+    self%series(:, :, 0) = trial%y
+    call system%series(self%order, size(self%series, 2), trial%t, self%series, trial%status)
+    are_finite = all_finite(size(self%series), self%series)
+    do lane = 1, trial%lanes
+      if (.not. (self%moved(lane) .and. trial%working(lane))) cycle
+      self%moved(lane) = .false.
+      trial%evaluations(lane) = trial%evaluations(lane) + 1
+      self%verdict(lane) = trial%status(lane)
+      self%culprit(lane) = 0
+      if (.not. are_finite) call find_infinity(self, lane)
+      if (self%verdict(lane) == trial_fine) call set_step(self, trial, control, lane)
+      if (self%verdict(lane) == trial_fine) cycle
+      control%h(lane) = 0.0_wp
+      self%series(lane, :, 1:) = 0.0_wp
+    end do
+    trial%status(:) = evaluation_fine
+  end subroutine plan
+
+  subroutine find_infinity(self, lane)
+    type(taylor_stepper_t), intent(inout) :: self
+    integer, intent(in) :: lane
+    integer :: component
+
+    do component = 1, size(self%series, 2)
+      if (all(is_finite(self%series(lane, component, :)))) cycle
+      self%verdict(lane) = trial_not_finite
+      self%culprit(lane) = component
+      return
+    end do
+  end subroutine find_infinity
+
+  !> The step that the last two coefficients of a lane allow; a verdict if it is too short for the time.
+  subroutine set_step(self, trial, control, lane)
+    type(taylor_stepper_t), intent(inout) :: self
+    type(trial_t), intent(in) :: trial
+    type(step_control_t), intent(inout) :: control
+    integer, intent(in) :: lane
+    real(wp) :: last, last_but_one, log_h
+
+    associate (p => self%order, y => self%series)
+      last = norm(trial%lanes, trial%states, lane, control, y(:, :, 0), y(:, :, p))
+      last_but_one = norm(trial%lanes, trial%states, lane, control, y(:, :, 0), y(:, :, p - 1))
+      log_h = min(log_of_step(last, p), log_of_step(last_but_one, p - 1))
+      control%h(lane) = exp(log_h)
+      if (control%h(lane) > smallest_step(trial%t(lane))) return
+      self%verdict(lane) = trial_shorten
+      self%culprit(lane) = maxloc(abs(y(lane, :trial%states, p)), dim=1)
+    end associate
+  end subroutine set_step
+
+  !> Logarithm of size^(-1/j); large, but no infinity, for a coefficient of zero.
+  pure real(wp) function log_of_step(size, j)
+    real(wp), intent(in) :: size
+    integer, intent(in) :: j
+    real(wp), parameter :: smallest = 1.0e-300_wp
+
+    log_of_step = -log(max(size, smallest)) / j
+  end function log_of_step
+
+  !> Largest |y_j| / (atol + rtol |y|) of the states of a lane.
+  pure real(wp) function norm(lanes, states, lane, control, y, y_j)
+    integer, intent(in) :: lanes, states, lane
+    type(step_control_t), intent(in) :: control
+    real(wp), intent(in) :: y(lanes, states), y_j(lanes, states)
+    integer :: i
+
+    norm = 0.0_wp
+    do i = 1, states
+      norm = max(norm, abs(y_j(lane, i)) / (control%atol + control%rtol * abs(y(lane, i))))
+    end do
+  end function norm
+
+  !> The sum of the series at the end of the step.
+  subroutine attempt(self, system, trial)
+    class(taylor_stepper_t), intent(inout) :: self
+    class(system_t), intent(inout) :: system
+    type(trial_t), intent(inout) :: trial
+    integer :: lane
+
+    do lane = 1, trial%lanes
+      if (self%verdict(lane) /= trial_fine) call park(trial, lane, self%verdict(lane), self%culprit(lane))
+    end do
+    call sum_series(trial%length, self%order, self%series, trial%h_length, trial%h_spread, trial%y_new)
+    if (.not. all_finite(trial%length, trial%y_new)) call park_infinities(trial, trial%y_new)
+  end subroutine attempt
+
+  !> y = sum over k of h^k series(:, k).
+  pure subroutine sum_series(n, order, series, h_length, h, y)
+    integer, intent(in) :: n          !! whole vectors
+    integer, intent(in) :: order
+    integer, intent(in) :: h_length   !! n, or less if h serves all vectors alike
+    real(wp), intent(in) :: series(n, 0:order), h(h_length)
+    real(wp), intent(inout) :: y(n)
+    real(wp) :: sum(width)
+    integer :: i, j, k
+
+    do i = 1, n, width
+      j = merge(i, 1, h_length == n)
+      sum = series(i:i + width - 1, order)
+      do k = order - 1, 0, -1
+        sum = series(i:i + width - 1, k) + h(j:j + width - 1) * sum
+      end do
+      y(i:i + width - 1) = sum
+    end do
+  end subroutine sum_series
+
+  !> The series itself, in powers of theta.
+  subroutine interpolate(self, system, trial, wanted, coefficients)
+    class(taylor_stepper_t), intent(inout) :: self
+    class(system_t), intent(inout) :: system
+    type(trial_t), intent(inout) :: trial
+    logical, intent(in) :: wanted(:)
+    real(wp), contiguous, intent(inout) :: coefficients(:, :, :)
+
+    call scale_series(trial%length, self%order, self%series, trial%h_length, trial%h_spread, coefficients)
+  end subroutine interpolate
+
+  !> c(:, k) = h^k series(:, k).
+  pure subroutine scale_series(n, order, series, h_length, h, c)
+    integer, intent(in) :: n          !! whole vectors
+    integer, intent(in) :: order
+    integer, intent(in) :: h_length   !! n, or less if h serves all vectors alike
+    real(wp), intent(in) :: series(n, 0:order), h(h_length)
+    real(wp), intent(inout) :: c(n, order)
+    real(wp) :: power(width)
+    integer :: i, j, k
+
+    do i = 1, n, width
+      j = merge(i, 1, h_length == n)
+      power = 1.0_wp
+      do k = 1, order
+        power = power * h(j:j + width - 1)
+        c(i:i + width - 1, k) = power * series(i:i + width - 1, k)
+      end do
+    end do
+  end subroutine scale_series
+
+  subroutine accept(self, accepted)
+    class(taylor_stepper_t), intent(inout) :: self
+    logical, intent(in) :: accepted(:)
+
+    self%moved(:) = self%moved .or. accepted
+  end subroutine accept
+
+end module nocdyn_taylor_stepper
