@@ -1,7 +1,8 @@
 !> The vector loops of a sparse map over rows whose columns all advance by one from row to row.
 !>
-!> `multiply`: u = map x; `pair`: u = offset + map x and v = map y; `sum`: u = map (x + y). A stretch is given diagonal by diagonal, an even one,
-!> whose rows all have the same coefficients, by its first row. The terms of a row are added one after the other.
+!> `multiply`: u = map x; `pair`: u = offset + map x and v = map y; `sum`: u = map (x + y). A stretch is given diagonal by
+!> diagonal, an even one, whose rows all have the same coefficients, by its first row. The terms of a row are added one
+!> after the other.
 module nocdyn_stretches
   use nocdyn_kinds, only: wp
   implicit none (type, external)
