@@ -19,7 +19,7 @@ module nocdyn_explicit_stepper
     logical :: first_same_as_last
     real(wp), allocatable :: c(:)                !! places of the stages in the step
     real(wp), allocatable :: t_stage(:)
-    real(wp), allocatable :: y_stage(:, :)
+    real(wp), allocatable :: y_stage(:, :)       !! in the columns of a stage
     logical, allocatable :: moved(:)             !! lanes whose first stage is not known yet
   contains
     procedure :: prepare
@@ -69,7 +69,7 @@ contains
 
     do lane = 1, size(starting)
       if (.not. starting(lane)) cycle
-      self%stages%k(lane, :, 1) = trial%slope(lane, :)
+      self%stages%k(lane, self%stages%begin:self%stages%end, 1) = trial%slope(lane, :)
       self%moved(lane) = .false.
     end do
   end subroutine begin
@@ -78,20 +78,21 @@ contains
     class(explicit_stepper_t), intent(inout) :: self
     class(system_t), intent(inout) :: system
     type(trial_t), intent(inout) :: trial
-    integer :: stage, last
+    integer :: begin, last, stage
 
+    begin = self%stages%begin
     if (any(self%moved .and. trial%working)) call renew_first_stage(self, system, trial)
     last = merge(self%stages%step - 1, self%stages%step, self%first_same_as_last)
     do stage = 2, last
       if (.not. any(trial%working)) exit
-      call inner_state(self%stages, trial, stage, self%y_stage)
+      call inner_state(self%stages, trial, stage, self%y_stage(1, begin))
       call place_stage(trial%lanes, trial%t, trial%h, self%c(stage), self%t_stage)
-      call evaluate(trial, system, self%t_stage, self%y_stage, self%stages%k(1, 1, self%stages%place(stage)))
+      call evaluate(trial, system, self%t_stage, self%y_stage(1, begin), self%stages%k(1, begin, self%stages%place(stage)))
     end do
     call update_state(self%stages, trial)
     if (self%first_same_as_last) then
       call place_stage(trial%lanes, trial%t, trial%h, 1.0_wp, self%t_stage)
-      call evaluate_finite(trial, system, self%t_stage, trial%y_new, self%stages%k(1, 1, self%stages%place(self%stages%step)))
+      call evaluate_finite(trial, system, self%t_stage, trial%y_new, self%stages%k(1, begin, self%stages%place(self%stages%step)))
     end if
     call estimate_error(self%stages, trial)
     call count_evaluations(trial)
@@ -115,7 +116,7 @@ contains
     class(system_t), intent(inout) :: system
     type(trial_t), intent(inout) :: trial
 
-    call evaluate_start(trial, system, self%moved, self%stages%k(1, 1, 1))
+    call evaluate_start(trial, system, self%moved, self%stages%k(1, self%stages%begin, 1))
     self%moved(:) = self%moved .and. .not. trial%working
   end subroutine renew_first_stage
 
@@ -126,14 +127,16 @@ contains
     type(trial_t), intent(inout) :: trial
     logical, intent(in) :: wanted(:)
     real(wp), contiguous, intent(inout) :: coefficients(:, :, :)
-    integer :: stage
+    integer :: begin, stage
 
+    begin = self%stages%begin
     if (self%stages%all > self%stages%step) then
       trial%working(:) = wanted
       do stage = self%stages%step + 1, self%stages%all
-        call inner_state(self%stages, trial, stage, self%y_stage)
+        call inner_state(self%stages, trial, stage, self%y_stage(1, begin))
         call place_stage(trial%lanes, trial%t, trial%h, self%c(stage), self%t_stage)
-        call evaluate_finite(trial, system, self%t_stage, self%y_stage, self%stages%k(1, 1, self%stages%place(stage)))
+        call evaluate_finite(trial, system, self%t_stage, self%y_stage(1, begin), &
+                             self%stages%k(1, begin, self%stages%place(stage)))
       end do
       call count_evaluations(trial)
     end if
@@ -184,10 +187,10 @@ contains
     slopes = 0.0_wp
     states = 0.0_wp
     associate (k => self%stages%k, last => self%stages%place(self%stages%step), &
-               before => self%stages%place(self%stages%step - 1))
+               before => self%stages%place(self%stages%step - 1), start => self%stages%begin - 1)
       do i = 1, trial%states
-        slopes = slopes + min(abs(k(lane, i, last) - k(lane, i, before)), largest)**2
-        states = states + min(abs(trial%y_new(lane, i) - self%y_stage(lane, i)), largest)**2
+        slopes = slopes + min(abs(k(lane, start + i, last) - k(lane, start + i, before)), largest)**2
+        states = states + min(abs(trial%y_new(lane, i) - self%y_stage(lane, start + i)), largest)**2
       end do
     end associate
     ratio = 0.0_wp
