@@ -31,6 +31,7 @@ module nocdyn_bank
     integer, allocatable :: from(:)          !! body, 0 = ground
     integer, allocatable :: to(:)            !! body, 0 = ground
     integer, allocatable :: accounted(:)     !! elements whose power is integrated, numbered within the bank
+    integer, allocatable :: elastic(:)       !! elements that can have a restoring moment, numbered within the bank
     integer :: role = role_coupling          !! role_...: which term of eq. (12) the bank belongs to
     integer :: lanes = 1
     integer :: first = 1                     !! number of its first element in the machine
@@ -42,6 +43,7 @@ module nocdyn_bank
     procedure :: evaluate
     procedure :: differentiate
     procedure :: assess
+    procedure :: settle
     procedure :: connect
     procedure :: last
     procedure :: is_source
@@ -72,6 +74,7 @@ contains
     self%from = from
     self%to = to
     self%accounted = [(e, e=1, size(to))]
+    self%elastic = [(e, e=1, merge(size(to), 0, role == role_coupling))]
   end subroutine connect
 
   !> Number of its last element in the machine.
@@ -114,6 +117,12 @@ contains
     class(bank_t), intent(in) :: self
     type(elements_t), intent(inout) :: elements   !! of the machine
   end subroutine assess
+
+  !> Replaces torques that depend on the time, or on the angle of a body that turns, by the mean torques of a machine that
+  !> has run for long: by default there are none.
+  subroutine settle(self)
+    class(bank_t), intent(inout) :: self
+  end subroutine settle
 
   !> The columns of the bank in the table of results: by default the torque of each element.
   function quantities(self) result(columns)

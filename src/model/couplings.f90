@@ -43,6 +43,7 @@ contains
     bank%damping = damping
     bank%rest_twist = rest_twist
     bank%accounted = pack([(e, e=1, size(to))], any(abs(damping) > 0.0_wp, dim=1))
+    bank%elastic = pack([(e, e=1, size(to))], any(abs(stiffness) > 0.0_wp .or. abs(cubic_stiffness) > 0.0_wp, dim=1))
   end function new_couplings
 
   subroutine polynomials(self, laws)

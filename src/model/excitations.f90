@@ -17,6 +17,7 @@ module nocdyn_excitations
   contains
     procedure :: evaluate
     procedure :: differentiate
+    procedure :: settle
   end type excitations_t
 
   integer, parameter :: strip = 64   ! arguments whose sines are taken at a time
@@ -95,5 +96,12 @@ contains
       end do
     end associate
   end subroutine differentiate
+
+  !> The mean of a sine is zero.
+  subroutine settle(self)
+    class(excitations_t), intent(inout) :: self
+
+    self%amplitude = 0.0_wp
+  end subroutine settle
 
 end module nocdyn_excitations

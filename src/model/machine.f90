@@ -28,6 +28,9 @@ module nocdyn_machine
     type(coordinates_t) :: coordinates
   contains
     procedure :: number_elements
+    procedure :: settle
+    procedure :: elastic
+    procedure :: element_name
     procedure :: accounts
     procedure :: accounted_name
     procedure :: evaluate
@@ -64,6 +67,26 @@ contains
     self%accounted = [(self%banks(i)%bank%first - 1 + self%banks(i)%bank%accounted, i=1, size(self%banks))]
   end subroutine number_elements
 
+  !> Leaves the mean torques of a machine that has run for long.
+  subroutine settle(self)
+    class(machine_t), intent(inout) :: self
+    integer :: i
+
+    do i = 1, size(self%banks)
+      call self%banks(i)%bank%settle()
+    end do
+    call self%number_elements()
+  end subroutine settle
+
+  !> The elements that can have a restoring moment.
+  pure function elastic(self) result(elements)
+    class(machine_t), intent(in) :: self
+    integer, allocatable :: elements(:)
+    integer :: i
+
+    elements = [(self%banks(i)%bank%first - 1 + self%banks(i)%bank%elastic, i=1, size(self%banks))]
+  end function elastic
+
   !> How many elements may have their power integrated.
   pure integer function accounts(self)
     class(machine_t), intent(in) :: self
@@ -76,18 +99,26 @@ contains
     class(machine_t), intent(in) :: self
     integer, intent(in) :: index   !! 1 to accounts
     character(len=:), allocatable :: name
+
+    name = self%element_name(self%accounted(index))
+  end function accounted_name
+
+  pure function element_name(self, element) result(name)
+    class(machine_t), intent(in) :: self
+    integer, intent(in) :: element
+    character(len=:), allocatable :: name
     integer :: i
 
     do i = 1, size(self%banks)
-      associate (bank => self%banks(i)%bank, element => self%accounted(index))
+      associate (bank => self%banks(i)%bank)
         if (element <= bank%last()) then
           name = bank%names(element - bank%first + 1)%text
           return
         end if
       end associate
     end do
-    error stop 'nocdyn_machine: there are not so many accounted elements'
-  end function accounted_name
+    error stop 'nocdyn_machine: there are not so many elements'
+  end function element_name
 
   !> The torques T = Q + C omega + K phi of all elements on the bodies, the right-hand side of eq. (12) without reactions.
   subroutine evaluate(self, t, phi, omega, torque)
