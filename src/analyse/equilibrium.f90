@@ -14,7 +14,7 @@ module nocdyn_equilibrium
   implicit none (type, external)
   private
 
-  public :: find_equilibria, nearest_equilibrium
+  public :: find_equilibria, judge_equilibria, nearest_equilibrium
 
   integer, parameter :: most_combinations = 64   !! of the solutions of independent parts of a machine
   integer, parameter :: most_states = 1000       !! whose eigenvalues are found to state the stability, in some seconds
@@ -23,9 +23,9 @@ module nocdyn_equilibrium
 
   type, public :: equilibrium_t
     real(wp), allocatable :: y(:, :)          !! state of the reduced formulation without works, [1, states]
-    character(len=14) :: stability = ''       !! stable, unstable, neutral, not determined
-    real(wp) :: growth = 0.0_wp               !! largest real part of the eigenvalues but those of rigid rotation [1/s]
-    logical, allocatable :: is_idle(:)        !! rigid motions that nothing drives or brakes
+    character(len=14) :: stability = 'not determined'   !! stable, unstable, neutral, not determined
+    real(wp) :: growth = 0.0_wp               !! largest real part of the eigenvalues but those of idle motions [1/s]
+    integer :: idle = 0                       !! rigid motions that nothing drives or brakes
   end type equilibrium_t
 
 contains
@@ -59,11 +59,19 @@ contains
                                                 ': any speed is steady, and the one of the start is kept')
     end do
     call combine(balance, blocks, equilibria, notes, error)
-    if (allocated(error)) return
+  end subroutine find_equilibria
+
+  !> States the stability of every steady state.
+  subroutine judge_equilibria(formulation, t, equilibria)
+    class(formulation_t), intent(inout) :: formulation
+    real(wp), intent(in) :: t
+    type(equilibrium_t), intent(inout) :: equilibria(:)
+    integer :: i
+
     do i = 1, size(equilibria)
       call judge(formulation, t, equilibria(i))
     end do
-  end subroutine find_equilibria
+  end subroutine judge_equilibria
 
   !> Every combination of the solutions of the blocks, with its twists.
   subroutine combine(balance, blocks, equilibria, notes, error)
@@ -86,7 +94,7 @@ contains
       end do
       call complete(balance, z, found, is_found)
       if (is_found) then
-        found%is_idle = [(any(blocks(:)%is_idle .and. first_members(blocks) == i), i=1, balance%motions%freedoms())]
+        found%idle = count(blocks%is_idle)
         equilibria = [equilibria, found]
       else
         call append(notes, 'the torques balance at ' // speed_text(balance, z) // &
@@ -97,14 +105,6 @@ contains
     if (size(equilibria) > 0) return
     call raise(error, exit_failed, 'there is no steady state: ' // notes(size(notes))%text)
   end subroutine combine
-
-  pure function first_members(blocks) result(members)
-    type(block_solutions_t), intent(in) :: blocks(:)
-    integer :: members(size(blocks))
-    integer :: i
-
-    members = [(blocks(i)%members(1), i=1, size(blocks))]
-  end function first_members
 
   !> The next combination; false after the last.
   logical function advance(blocks, choice)
@@ -155,7 +155,7 @@ contains
     allocate (values(size(linear%matrix, 1)), vectors(size(linear%matrix, 1), size(linear%matrix, 1)))
     call eigenvectors(linear%matrix, values, vectors, has_failed)
     if (has_failed) return
-    equilibrium%growth = maxval(real(values, wp))
+    equilibrium%growth = growth_rate(values, equilibrium%idle)
     if (equilibrium%growth < -rounding * maxval(abs(values))) then
       equilibrium%stability = 'stable'
     else if (equilibrium%growth > rounding * maxval(abs(values))) then
@@ -164,6 +164,21 @@ contains
       equilibrium%stability = 'neutral'
     end if
   end subroutine judge
+
+  !> The largest real part of the eigenvalues, but for the smallest of them, which are those of idle motions.
+  pure real(wp) function growth_rate(values, idle)
+    complex(wp), intent(in) :: values(:)
+    integer, intent(in) :: idle   !! how many do not count
+    logical :: counts(size(values))
+    integer :: i
+
+    counts = .true.
+    do i = 1, idle
+      counts(minloc(abs(values), dim=1, mask=counts)) = .false.
+    end do
+    growth_rate = 0.0_wp
+    if (any(counts)) growth_rate = maxval(real(values, wp), mask=counts)
+  end function growth_rate
 
   !> The steady state whose kinetic energy relative to the start is the least, of the stable ones if there are any.
   function nearest_equilibrium(formulation, equilibria) result(nearest)

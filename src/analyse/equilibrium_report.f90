@@ -1,15 +1,16 @@
 !> The steady states of a machine as a person and as a program read them.
 module nocdyn_equilibrium_report
-  use nocdyn_bank, only: role_names
+  use nocdyn_bank, only: role_coupling, role_names
   use nocdyn_equilibrium, only: equilibrium_t
   use nocdyn_formulation, only: formulation_t
   use nocdyn_input, only: group_t, input_t
   use nocdyn_json, only: json_t
   use nocdyn_kinds, only: wp
+  use nocdyn_machine, only: machine_t
   use nocdyn_machine_report, only: coordinate_names
   use nocdyn_reduced, only: new_reduced
   use nocdyn_table_text, only: cell, cell_digits, padded, text_width
-  use nocdyn_text, only: rounded_text, string_t, to_text
+  use nocdyn_text, only: rounded_text, selected, string_t, to_text
   use nocdyn_text_buffer, only: text_buffer_t
   use nocdyn_trajectory_table, only: new_trajectory_table, trajectory_table_t
   use nocdyn_version, only: compiler_text, version
@@ -43,18 +44,15 @@ contains
     type(equilibrium_report_t) :: self
     type(trajectory_table_t) :: table
     real(wp), allocatable :: row(:), watts(:, :), y(:)
-    integer :: first, i, k, last
+    integer, allocatable :: told(:)                 !! columns
+    integer :: i, k
 
     allocate (self%equilibria, source=equilibria)
     allocate (self%notes, source=notes)
     allocate (self%coordinates, source=coordinate_names(formulation%machine))
     table = new_trajectory_table(new_reduced(formulation%machine, .true.), t)
-    first = 2 + formulation%machine%bodies
-    last = size(table%labels) - trailing
-    allocate (self%labels(last - first + 1))
-    do i = 1, size(self%labels)
-      self%labels(i)%text = table%labels(first + i - 1)%text
-    end do
+    told = steady_columns(table, formulation%machine)
+    allocate (self%labels, source=selected(table%labels, told))
     allocate (self%workers, source=worker_names(table%formulation))
     allocate (self%values(size(self%labels), size(equilibria)), self%power(size(self%workers), size(equilibria)))
     allocate (row(size(table%labels)), watts(1, size(self%workers)))
@@ -62,10 +60,32 @@ contains
       y = [equilibria(k)%y(1, :), (0.0_wp, i=1, size(self%workers))]
       call table%fill(t, y, row)
       call table%formulation%machine%power(watts)
-      self%values(:, k) = row(first:last)
+      self%values(:, k) = row(told)
       self%power(:, k) = watts(1, :)
     end do
   end function new_equilibrium_report
+
+  !> The columns that do not change in steady running: no angles, and no twists of couplings that slip.
+  function steady_columns(table, machine) result(columns)
+    type(trajectory_table_t), intent(in) :: table
+    type(machine_t), intent(in) :: machine
+    integer, allocatable :: columns(:)
+    logical :: is_steady(size(table%labels))
+    integer :: b, c, e
+
+    is_steady = .true.
+    is_steady(:1 + machine%bodies) = .false.
+    is_steady(size(is_steady) - trailing + 1:) = .false.
+    do b = 1, size(machine%banks)
+      associate (bank => machine%banks(b)%bank)
+        do e = 1, merge(size(bank%names), 0, bank%role == role_coupling)
+          if (any(bank%elastic == e)) cycle
+          is_steady = is_steady .and. [(table%labels(c)%text /= 'twist_' // bank%names(e)%text // ' [rad]', c=1, size(is_steady))]
+        end do
+      end associate
+    end do
+    columns = pack([(c, c=1, size(is_steady))], is_steady)
+  end function steady_columns
 
   !> "motor drive".
   function worker_names(formulation) result(names)

@@ -3,21 +3,24 @@ module nocdyn_analysis_commands
   use nocdyn_arguments, only: arguments_t
   use nocdyn_assembly, only: assemble_machine
   use nocdyn_console, only: complain, say
-  use nocdyn_equilibrium, only: equilibrium_t, find_equilibria
+  use nocdyn_equilibrium, only: equilibrium_t, find_equilibria, judge_equilibria
   use nocdyn_equilibrium_report, only: equilibrium_json, equilibrium_report_t, equilibrium_text, new_equilibrium_report
   use nocdyn_errors, only: error_t, exit_done, exit_failed
   use nocdyn_formulation, only: formulation_t
   use nocdyn_input, only: group_t, input_t
   use nocdyn_input_reader, only: read_input
   use nocdyn_machine, only: machine_t
+  use nocdyn_modes_report, only: modes_csv, modes_json, modes_report_t, modes_text, new_modes_report
+  use nocdyn_operating_point, only: find_operating_point, operating_point_t
   use nocdyn_output_file, only: write_whole
   use nocdyn_output_times, only: check_output_times
   use nocdyn_result_folders, only: plain_path, refuse_shared_folders, stem
+  use nocdyn_size_limits, only: check_dense_size
   use nocdyn_text, only: string_t
   implicit none (type, external)
   private
 
-  public :: equilibrium_command
+  public :: equilibrium_command, modes_command
 
 contains
 
@@ -38,6 +41,24 @@ contains
       if (allocated(error)) call count_failure(error, code)
     end do
   end subroutine equilibrium_command
+
+  !> The modes of every file; the exit code is the worst of all.
+  subroutine modes_command(arguments, code)
+    type(arguments_t), intent(in) :: arguments
+    integer, intent(out) :: code
+    type(string_t), allocatable :: folders(:)
+    type(error_t), allocatable :: error
+    integer :: i
+
+    code = exit_done
+    call result_folders(arguments, folders, error)
+    if (allocated(error)) call count_failure(error, code)
+    if (code /= exit_done) return
+    do i = 1, size(folders)
+      call analyse_modes(arguments, i, folders(i)%text, error)
+      if (allocated(error)) call count_failure(error, code)
+    end do
+  end subroutine modes_command
 
   subroutine count_failure(error, code)
     type(error_t), intent(in) :: error
@@ -94,7 +115,10 @@ contains
     run = input%single('run')
     associate (t_start => run%number('t_start'))
       call find_equilibria(machine, t_start, formulation, equilibria, notes, error)
-      if (.not. allocated(error)) report = new_equilibrium_report(formulation, t_start, equilibria, notes)
+      if (.not. allocated(error)) then
+        call judge_equilibria(formulation, t_start, equilibria)
+        report = new_equilibrium_report(formulation, t_start, equilibria, notes)
+      end if
     end associate
     if (allocated(error)) then
       if (error%code == exit_failed) error%message = input%file // ': ' // error%message
@@ -103,5 +127,34 @@ contains
     call say(equilibrium_text(input%file, report))
     if (folder /= '') call write_whole(folder, 'equilibrium.json', equilibrium_json(input, report), error)
   end subroutine analyse_equilibrium
+
+  subroutine analyse_modes(arguments, number, folder, error)
+    type(arguments_t), intent(in) :: arguments
+    integer, intent(in) :: number
+    character(len=*), intent(in) :: folder   !! '' if nothing is to be written
+    type(error_t), allocatable, intent(out) :: error
+    type(input_t) :: input
+    type(machine_t) :: machine
+    type(operating_point_t) :: point
+    type(modes_report_t) :: report
+
+    call read_machine(arguments, number, input, machine, error)
+    if (.not. allocated(error)) call check_dense_size(input, machine, error)
+    if (allocated(error)) return
+    if (allocated(arguments%at)) then
+      call find_operating_point(input, machine, arguments%at, point, error)
+    else
+      call find_operating_point(input, machine, 'equilibrium', point, error)
+    end if
+    if (.not. allocated(error)) call new_modes_report(point, report, error)
+    if (allocated(error)) then
+      if (error%code == exit_failed) error%message = input%file // ': ' // error%message
+      return
+    end if
+    call say(modes_text(input%file, report))
+    if (folder == '') return
+    call write_whole(folder, 'modes.csv', modes_csv(report), error)
+    if (.not. allocated(error)) call write_whole(folder, 'modes.json', modes_json(input, report), error)
+  end subroutine analyse_modes
 
 end module nocdyn_analysis_commands
