@@ -1,6 +1,7 @@
 !> The steady states of a machine as a person and as a program read them.
 module nocdyn_equilibrium_report
-  use nocdyn_bank, only: role_coupling, role_names
+  use nocdyn_bank, only: role_coupling
+  use nocdyn_energy_account, only: worker_names
   use nocdyn_equilibrium, only: equilibrium_t
   use nocdyn_formulation, only: formulation_t
   use nocdyn_input, only: group_t, input_t
@@ -53,7 +54,7 @@ contains
     table = new_trajectory_table(new_reduced(formulation%machine, .true.), t)
     told = steady_columns(table, formulation%machine)
     allocate (self%labels, source=selected(table%labels, told))
-    allocate (self%workers, source=worker_names(table%formulation))
+    allocate (self%workers, source=worker_names(formulation%machine))
     allocate (self%values(size(self%labels), size(equilibria)), self%power(size(self%workers), size(equilibria)))
     allocate (row(size(table%labels)), watts(1, size(self%workers)))
     do k = 1, size(equilibria)
@@ -86,24 +87,6 @@ contains
     end do
     columns = pack([(c, c=1, size(is_steady))], is_steady)
   end function steady_columns
-
-  !> "motor drive".
-  function worker_names(formulation) result(names)
-    class(formulation_t), intent(in) :: formulation
-    type(string_t), allocatable :: names(:)
-    integer :: e, i, next
-
-    allocate (names(formulation%machine%accounts()))
-    next = 1
-    associate (banks => formulation%machine%banks)
-      do i = 1, size(banks)
-        do e = 1, size(banks(i)%bank%accounted)
-          names(next)%text = trim(role_names(banks(i)%bank%role)) // ' ' // banks(i)%bank%names(banks(i)%bank%accounted(e))%text
-          next = next + 1
-        end do
-      end do
-    end associate
-  end function worker_names
 
   !> A table for every steady state.
   function equilibrium_text(file, self) result(text)

@@ -1,5 +1,6 @@
 !> The summary of a run: what summary.json and the printed table tell.
 module nocdyn_run_summary
+  use nocdyn_energy_account, only: energy_account_t, put_account
   use nocdyn_input, only: group_t, input_t
   use nocdyn_json, only: json_t
   use nocdyn_kinds, only: wp
@@ -37,6 +38,7 @@ module nocdyn_run_summary
     type(extremes_t) :: extremes
     character(len=:), allocatable :: method         !! that integrated
     type(outcome_t) :: outcome
+    type(energy_account_t), allocatable :: account  !! from the start to the last row; not allocated if there are no rows
     real(wp) :: wall_time = 0.0_wp                  !! of integration and writing of the trajectory [s]
   end type run_summary_t
 
@@ -130,6 +132,7 @@ contains
     call put_settings(json, input%single('run'))
     call put_counts(json, summary)
     call put_method(json, summary)
+    if (allocated(summary%account)) call put_account(json, summary%account)
     call put_columns(json, summary)
     call json%close()
     text = json%text()

@@ -1,5 +1,6 @@
 !> The summary of a run as a person reads it.
 module nocdyn_summary_table
+  use nocdyn_energy_account, only: account_text
   use nocdyn_input, only: group_t, input_t
   use nocdyn_kinds, only: wp
   use nocdyn_run_summary, only: run_summary_t
@@ -42,7 +43,8 @@ contains
     end associate
   end function method_line
 
-  !> Title, and last, smallest and largest value of every column with the times of the extremes.
+  !> Title, and last, smallest and largest value of every column with the times of the extremes; then where the
+  !> energy came from and went to.
   function summary_table(input, summary) result(text)
     type(input_t), intent(in) :: input
     type(run_summary_t), intent(in) :: summary
@@ -69,6 +71,7 @@ contains
     end associate
     if (rows < size(summary%labels)) text = text // new_line('a') // '(' // to_text(size(summary%labels) - rows) // &
                                             ' more columns in summary.json)'
+    if (allocated(summary%account)) text = text // new_line('a') // account_text(summary%account)
   end function summary_table
 
 end module nocdyn_summary_table

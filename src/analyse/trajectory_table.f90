@@ -1,6 +1,7 @@
 !> The columns of trajectory.csv: labels, and the values of a machine at a time and state.
 module nocdyn_trajectory_table
   use nocdyn_bank, only: quantity_t
+  use nocdyn_energy_account, only: energy_account_t, worker_names
   use nocdyn_formulation, only: formulation_t
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
@@ -24,8 +25,11 @@ module nocdyn_trajectory_table
     real(wp), allocatable, private :: values(:)    !! of one quantity of a bank, work space
     logical, allocatable, private :: is_source(:)  !! whether a work counts as put in, [quadratures]
     real(wp), private :: start_energy = 0.0_wp
+    real(wp), private :: start_kinetic = 0.0_wp
+    real(wp), allocatable, private :: start_stored(:)   !! of the elastic elements
   contains
     procedure :: fill
+    procedure :: account
     procedure, private :: audit
   end type trajectory_table_t
 
@@ -51,7 +55,9 @@ contains
     table%labels = column_labels(formulation%machine, table%columns)
     table%y = formulation%start()
     call table%formulation%observe([t_start], table%y)
-    table%start_energy = kinetic_energy(table%formulation) + table%formulation%machine%stored_energy(1)
+    table%start_kinetic = kinetic_energy(table%formulation)
+    table%start_energy = table%start_kinetic + table%formulation%machine%stored_energy(1)
+    allocate (table%start_stored, source=stored_energies(table%formulation%machine))
   end function new_trajectory_table
 
   !> Labels in the order in which `fill` gives the values.
@@ -168,6 +174,38 @@ contains
     energies(4) = work_out
     energies(5) = (energies(1) + energies(2) - self%start_energy) - (work_in - work_out)
   end subroutine audit
+
+  !> Works and energies from the start to time t and state y.
+  subroutine account(self, t, y, energies)
+    class(trajectory_table_t), intent(inout) :: self
+    real(wp), intent(in) :: t
+    real(wp), contiguous, intent(in) :: y(:)   !! [states + quadratures]
+    type(energy_account_t), intent(out) :: energies
+    real(wp) :: row(size(self%labels))
+    integer :: e
+
+    call self%fill(t, y, row)
+    associate (machine => self%formulation%machine, elastic => self%formulation%machine%elastic())
+      allocate (energies%workers, source=worker_names(machine))
+      allocate (energies%work, source=y(self%formulation%states + 1:))
+      allocate (energies%stores(size(elastic)))
+      do e = 1, size(elastic)
+        energies%stores(e)%text = machine%element_name(elastic(e))
+      end do
+      allocate (energies%stored_start, source=self%start_stored)
+      allocate (energies%stored_end, source=stored_energies(machine))
+    end associate
+    energies%kinetic_start = self%start_kinetic
+    energies%kinetic_end = kinetic_energy(self%formulation)
+  end subroutine account
+
+  !> Of the elastic elements, after `stored_energy` of the machine [J].
+  function stored_energies(machine) result(energies)
+    type(machine_t), intent(in) :: machine
+    real(wp), allocatable :: energies(:)
+
+    allocate (energies, source=machine%elements%stored(1, machine%elastic()))
+  end function stored_energies
 
   pure function kinetic_energy(formulation) result(energy)
     class(formulation_t), intent(in) :: formulation

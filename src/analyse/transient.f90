@@ -49,6 +49,8 @@ module nocdyn_transient
     type(output_file_t) :: file
     type(run_summary_t) :: summary
     real(wp), allocatable :: row(:)
+    real(wp) :: last_time = 0.0_wp         !! of the rows
+    real(wp), allocatable :: last_state(:)
     real(wp) :: t_start, t_end
     logical :: follows = .false.   !! whether the columns have been followed between the rows
     class(progress_t), pointer :: progress => null()
@@ -97,6 +99,10 @@ contains
       return
     end if
     call conclude(outcome, error, recorder%summary)
+    if (recorder%summary%extremes%rows > 0) then
+      allocate (recorder%summary%account)
+      call recorder%table%account(recorder%last_time, recorder%last_state, recorder%summary%account)
+    end if
     call write_results(input, machine, recorder, folder, write_error)
     if (allocated(write_error)) call move_alloc(write_error, error)
     summary = recorder%summary
@@ -116,6 +122,7 @@ contains
     recorder%summary%labels = recorder%table%labels
     recorder%summary%notes = redundancy_notes(formulation%machine)
     allocate (recorder%row(size(recorder%table%labels)))
+    allocate (recorder%last_state(formulation%states + formulation%quadratures), source=0.0_wp)
     recorder%tracked = size(recorder%row)
     call start_extremes(recorder%summary%extremes, size(recorder%row))
     call recorder%file%open(folder, trajectory_file)
@@ -216,6 +223,8 @@ contains
     call self%table%fill(t, y, self%row)
     call update_extremes(self%summary%extremes, self%row)
     call write_row(self%file, self%row)
+    self%last_time = t
+    self%last_state(:) = y
   end subroutine record
 
   !> The columns of the table between its rows.
