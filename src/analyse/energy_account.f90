@@ -80,6 +80,7 @@ contains
   end subroutine put_account
 
   !> Who put energy in and where it went, in shares of all that was put in; the largest of each, and the others together.
+  !> Empty if no energy was turned over.
   function account_text(self) result(text)
     type(energy_account_t), intent(in) :: self
     character(len=:), allocatable :: text
@@ -87,7 +88,9 @@ contains
     type(text_buffer_t) :: report
     integer :: i, width
 
+    text = ''
     allocate (entries, source=all_entries(self))
+    if (all(abs(entries%energy) <= 0.0_wp)) return
     width = len('what does not add up')
     do i = 1, size(entries)
       if (abs(entries(i)%energy) > 0.0_wp) width = max(width, text_width(entries(i)%name) + 2)

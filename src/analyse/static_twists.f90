@@ -25,7 +25,7 @@ module nocdyn_static_twists
     integer, allocatable :: place(:)         !! of each coordinate in the band, 0 if it is free
     integer :: width = 0                     !! diagonals beside the main one
     real(wp), allocatable :: band(:, :)
-    real(wp), allocatable :: shield(:)       !! what raises the diagonal, [unknown]
+    real(wp), allocatable :: shield(:)       !! what raises the diagonal: its largest elements so far, 1 before, [unknown]
     real(wp), allocatable :: outer(:)        !! torques of all other elements, [coordinates]
     real(wp), allocatable :: torque(:)       !! residual, [coordinates]
     real(wp), allocatable :: size(:)         !! sum of its absolute terms
@@ -82,7 +82,7 @@ contains
     goes_down = self%energy <= energy + rounding * turned
   end function goes_down
 
-  !> The order of the coordinates, the torques of the other elements, and the shield.
+  !> The order of the coordinates and the torques of the other elements.
   subroutine set_up(balance, self)
     type(torque_balance_t), intent(inout) :: balance
     type(stiffness_t), intent(out) :: self
@@ -103,7 +103,6 @@ contains
     allocate (self%band(3 * self%width + 1, size(self%unknown)), self%shield(size(self%unknown)), source=0.0_wp)
     allocate (self%outer(size(number)), self%torque(size(number)), self%size(size(number)), source=0.0_wp)
     call find_outer(balance, self)
-    call find_shield(balance, self)
   end subroutine set_up
 
   !> Pairs of coordinates that an elastic element joins, each once.
@@ -159,33 +158,6 @@ contains
       end do
     end associate
   end subroutine find_outer
-
-  !> For every coordinate the stiffness that its elastic elements have over a radian, one where they have none.
-  subroutine find_shield(balance, self)
-    type(torque_balance_t), intent(inout) :: balance
-    type(stiffness_t), intent(inout) :: self
-    real(wp) :: stiffness(size(balance%formulation%machine%elements%to))
-    integer :: e, i, k, side
-
-    stiffness = 0.0_wp
-    associate (elements => balance%formulation%machine%elements, incidence => balance%incidence)
-      do side = -1, 1, 2
-        elements%angle = real(side, wp)
-        elements%speed = 0.0_wp
-        call balance%formulation%machine%evaluate_elements(balance%t)
-        stiffness = max(stiffness, abs(elements%restoring(1, :)))
-      end do
-      do i = 1, size(balance%elastic)
-        e = balance%elastic(i)
-        do k = incidence%first(e), incidence%first(e + 1) - 1
-          if (self%place(incidence%coordinate(k)) == 0) cycle
-          associate (shield => self%shield(self%place(incidence%coordinate(k))))
-            shield = shield + merge(stiffness(e), 1.0_wp, stiffness(e) > 0.0_wp) * incidence%ratio(1, k)**2
-          end associate
-        end do
-      end do
-    end associate
-  end subroutine find_shield
 
   !> The elements at the angles q: residual torques and energy.
   subroutine load(balance, q, self)
@@ -245,7 +217,8 @@ contains
         end do
       end do
     end associate
-    self%band(diagonal, :) = self%band(diagonal, :) + raise * self%shield
+    self%shield = max(self%shield, self%band(diagonal, :))
+    self%band(diagonal, :) = self%band(diagonal, :) + raise * merge(self%shield, 1.0_wp, self%shield > 0.0_wp)
     x = self%torque(self%unknown)
     call band_factor(self%width, self%width, self%band, pivots, is_singular)
     if (is_singular) return

@@ -50,7 +50,7 @@ contains
     type(run_summary_t), intent(in) :: summary
     character(len=:), allocatable :: text
     type(group_t) :: about
-    character(len=:), allocatable :: heading
+    character(len=:), allocatable :: account, heading
     integer :: i, label_width, rows
 
     about = input%single('case')
@@ -71,7 +71,9 @@ contains
     end associate
     if (rows < size(summary%labels)) text = text // new_line('a') // '(' // to_text(size(summary%labels) - rows) // &
                                             ' more columns in summary.json)'
-    if (allocated(summary%account)) text = text // new_line('a') // account_text(summary%account)
+    if (.not. allocated(summary%account)) return
+    account = account_text(summary%account)
+    if (len(account) > 0) text = text // new_line('a') // account
   end function summary_table
 
 end module nocdyn_summary_table

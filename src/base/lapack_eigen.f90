@@ -91,15 +91,15 @@ contains
     real(wp) :: none(1, 1), room(1)
     integer :: info, m, n
 
-    m = size(matrix, 1)
+    m = max(1, size(matrix, 1))   ! a row of zeros for none: DGESVD leaves the vectors of no rows as they are
     n = size(matrix, 2)
     values = 0.0_wp
-    allocate (a(max(1, m), n), source=0.0_wp)
-    a(:m, :) = matrix
+    allocate (a(m, n), source=0.0_wp)
+    a(:size(matrix, 1), :) = matrix
     allocate (transposed(n, n))
-    call dgesvd('N', 'A', m, n, a, max(1, m), values, none, 1, transposed, n, room, -1, info)
-    allocate (work(max(1, int(room(1)))))
-    call dgesvd('N', 'A', m, n, a, max(1, m), values, none, 1, transposed, n, work, size(work), info)
+    call dgesvd('N', 'A', m, n, a, m, values, none, 1, transposed, n, room, -1, info)
+    allocate (work(int(room(1))))
+    call dgesvd('N', 'A', m, n, a, m, values, none, 1, transposed, n, work, size(work), info)
     vectors = transpose(transposed)
     has_failed = info /= 0
   end subroutine singular_vectors
