@@ -148,19 +148,19 @@ contains
   function order_of(modes) result(order)
     type(mode_t), intent(in) :: modes(:)
     integer :: order(size(modes))
-    real(wp) :: key(size(modes), 2)
+    real(wp) :: key(2, size(modes))
     integer :: i, k, moved
 
     do i = 1, size(modes)
-      key(i, 1) = real(modes(i)%kind, wp)
-      key(i, 2) = merge(aimag(modes(i)%eigenvalue), abs(modes(i)%eigenvalue), modes(i)%kind == mode_oscillating)
+      key(1, i) = real(modes(i)%kind, wp)
+      key(2, i) = merge(aimag(modes(i)%eigenvalue), abs(modes(i)%eigenvalue), modes(i)%kind == mode_oscillating)
     end do
     order = [(i, i=1, size(modes))]
     do i = 2, size(modes)
       moved = order(i)
       k = i - 1
       do while (k >= 1)
-        if (.not. comes_before(key(moved, :), key(order(k), :))) exit
+        if (.not. comes_before(key(:, moved), key(:, order(k)))) exit
         order(k + 1) = order(k)
         k = k - 1
       end do

@@ -53,7 +53,7 @@ contains
     if (allocated(error)) return
     call point%formulation%place(point%y)
     allocate (self%omega, source=point%formulation%omega(1, 1:))
-    allocate (self%stiffness, source=linear%stiffness(self%elastic))
+    self%stiffness = linear%stiffness(self%elastic)
     self%t = point%t
     self%point = point%text
     allocate (self%notes, source=point%notes)

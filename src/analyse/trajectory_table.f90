@@ -203,8 +203,14 @@ contains
   function stored_energies(machine) result(energies)
     type(machine_t), intent(in) :: machine
     real(wp), allocatable :: energies(:)
+    integer, allocatable :: elastic(:)
+    integer :: i
 
-    allocate (energies, source=machine%elements%stored(1, machine%elastic()))
+    allocate (elastic, source=machine%elastic())
+    allocate (energies(size(elastic)))
+    do i = 1, size(elastic)
+      energies(i) = machine%elements%stored(1, elastic(i))
+    end do
   end function stored_energies
 
   pure function kinetic_energy(formulation) result(energy)
