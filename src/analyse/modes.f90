@@ -44,8 +44,9 @@ contains
     integer, intent(in) :: elastic(:)                   !! elements whose shares in the potential energy are told
     type(mode_t), allocatable, intent(out) :: modes(:)
     type(error_t), allocatable, intent(out) :: error
-    complex(wp), allocatable :: values(:), vectors(:, :)
-    integer :: i, k, states
+    complex(wp), allocatable :: speeds(:, :), twists(:, :), values(:), vectors(:, :)
+    integer, allocatable :: kept(:)
+    integer :: i, states
     logical :: has_failed
 
     states = size(linear%matrix, 1)
@@ -56,12 +57,12 @@ contains
       return
     end if
     call clear_rounding(values)
-    allocate (modes(count(aimag(values) >= 0.0_wp)))
-    k = 0
-    do i = 1, states
-      if (aimag(values(i)) < 0.0_wp) cycle
-      k = k + 1
-      modes(k) = mode_of(formulation, linear, elastic, values(i), vectors(:, i))
+    kept = pack([(i, i=1, states)], aimag(values) >= 0.0_wp)
+    call trace(linear, elastic, vectors(:, kept), speeds, twists)
+    allocate (modes(size(kept)))
+    do i = 1, size(kept)
+      call fill_mode(linear, elastic, values(kept(i)), vectors(:, kept(i)), twists(:, i), modes(i))
+      call place_bodies(formulation, speeds(:, i), modes(i))
     end do
     modes = modes(order_of(modes))
   end subroutine find_modes
@@ -81,33 +82,41 @@ contains
     end do
   end subroutine clear_rounding
 
-  !> One mode from its eigenvector (p, e, inner states).
-  function mode_of(formulation, linear, elastic, eigenvalue, vector) result(mode)
-    class(formulation_t), intent(in) :: formulation
+  !> Speeds of the coordinates and twists of the elastic elements in all modes, from the eigenvectors (p, e, inner states).
+  subroutine trace(linear, elastic, vectors, speeds, twists)
+    type(linearisation_t), intent(in) :: linear
+    integer, intent(in) :: elastic(:)
+    complex(wp), intent(in) :: vectors(:, :)
+    complex(wp), allocatable, intent(out) :: speeds(:, :)   !! [coordinates, modes]
+    complex(wp), allocatable, intent(out) :: twists(:, :)   !! [elastic, modes]
+    real(wp), allocatable :: angles(:, :)
+    integer :: i, n
+
+    n = size(linear%natural)
+    allocate (angles(size(elastic), size(linear%flexible)))
+    do i = 1, size(linear%flexible)
+      angles(:, i) = linear%twists(elastic, linear%flexible(i)) / abs(linear%natural(linear%flexible(i)))
+    end do
+    speeds = matmul(cmplx(linear%shapes, kind=wp), vectors(:n, :))
+    twists = matmul(cmplx(angles, kind=wp), vectors(n + 1:n + size(linear%flexible), :))
+  end subroutine trace
+
+  !> What a mode is, and its potential energies.
+  subroutine fill_mode(linear, elastic, eigenvalue, vector, twist, mode)
     type(linearisation_t), intent(in) :: linear
     integer, intent(in) :: elastic(:)
     complex(wp), intent(in) :: eigenvalue
     complex(wp), intent(in) :: vector(:)
-    type(mode_t) :: mode
-    complex(wp) :: speeds(size(linear%natural)), twist
+    complex(wp), intent(in) :: twist(:)   !! of `elastic`
+    type(mode_t), intent(inout) :: mode
     real(wp) :: rigid_part
-    integer :: i, n
 
-    n = size(linear%natural)
     mode%eigenvalue = eigenvalue
-    mode%undamped = linear%natural(maxloc(abs(vector(:n)), dim=1)) / (2.0_wp * pi)
-    do i = 1, n
-      speeds(i) = sum(linear%shapes(i, :) * vector(:n))
-    end do
-    call place_bodies(formulation, speeds, mode)
-    allocate (mode%potential(size(elastic)))
-    associate (flexible => linear%flexible)
-      do i = 1, size(elastic)
-        twist = sum(linear%twists(elastic(i), flexible) / abs(linear%natural(flexible)) * vector(n + 1:n + size(flexible)))
-        mode%potential(i) = linear%stiffness(elastic(i)) * abs(twist)**2
-      end do
-      rigid_part = 1.0_wp - sum(abs(vector(flexible))**2) / max(sum(abs(vector(:n))**2), tiny(1.0_wp))
+    associate (rates => vector(:size(linear%natural)))
+      mode%undamped = linear%natural(maxloc(abs(rates), dim=1)) / (2.0_wp * pi)
+      rigid_part = 1.0_wp - sum(abs(rates(linear%flexible))**2) / max(sum(abs(rates)**2), tiny(1.0_wp))
     end associate
+    mode%potential = linear%stiffness(elastic) * abs(twist)**2
     if (sum(abs(mode%potential)) > 0.0_wp) mode%potential = mode%potential / sum(abs(mode%potential))
     if (aimag(eigenvalue) > 0.0_wp) then
       mode%kind = mode_oscillating
@@ -118,7 +127,7 @@ contains
     else
       mode%kind = mode_overdamped
     end if
-  end function mode_of
+  end subroutine fill_mode
 
   !> Shape and kinetic energies of the bodies from the speeds of the coordinates.
   subroutine place_bodies(formulation, speeds, mode)

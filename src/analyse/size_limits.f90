@@ -15,7 +15,7 @@ module nocdyn_size_limits
   public :: check_size, check_dense_size, choose_method
 
   integer, parameter :: largest_matrix = 6000   ! rows: 0.3 GB each, and there are several
-  integer, parameter :: largest_problem = 4000  ! states of an eigenvalue problem: some minutes
+  integer, parameter :: largest_problem = 3000  ! states of an eigenvalue problem: some minutes
 
 contains
 
