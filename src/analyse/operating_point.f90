@@ -11,7 +11,7 @@ module nocdyn_operating_point
   use nocdyn_reduced, only: new_reduced
   use nocdyn_size_limits, only: choose_method
   use nocdyn_solve, only: solve
-  use nocdyn_text, only: append, quoted, rounded_text, string_t, to_text
+  use nocdyn_text, only: append, string_t, to_text
   implicit none (type, external)
   private
 

@@ -98,11 +98,7 @@ contains
       call recorder%file%discard()
       return
     end if
-    call conclude(outcome, error, recorder%summary)
-    if (recorder%summary%extremes%rows > 0) then
-      allocate (recorder%summary%account)
-      call recorder%table%account(recorder%last_time, recorder%last_state, recorder%summary%account)
-    end if
+    call conclude(outcome, error, recorder)
     call write_results(input, machine, recorder, folder, write_error)
     if (allocated(write_error)) call move_alloc(write_error, error)
     summary = recorder%summary
@@ -156,17 +152,24 @@ contains
     end if
   end subroutine solve
 
-  subroutine conclude(outcome, error, summary)
+  !> What the summary tells of the whole run.
+  subroutine conclude(outcome, error, recorder)
     type(outcome_t), intent(in) :: outcome
     type(error_t), allocatable, intent(in) :: error
-    type(run_summary_t), intent(inout) :: summary
+    type(recorder_t), intent(inout) :: recorder
 
-    summary%outcome = outcome
-    call audit_energy(summary%extremes, summary%notes)
-    if (.not. allocated(error)) return
-    summary%message = error%message
-    summary%status = 'failed'
-    if (outcome%status(1) == integration_interrupted) summary%status = 'interrupted'
+    associate (summary => recorder%summary)
+      summary%outcome = outcome
+      call audit_energy(summary%extremes, summary%notes)
+      if (summary%extremes%rows > 0) then
+        allocate (summary%account)
+        call recorder%table%account(recorder%last_time, recorder%last_state, summary%account)
+      end if
+      if (.not. allocated(error)) return
+      summary%message = error%message
+      summary%status = 'failed'
+      if (outcome%status(1) == integration_interrupted) summary%status = 'interrupted'
+    end associate
   end subroutine conclude
 
   !> Gives the three files their names once all are written: a full disk leaves the results of an earlier run alone.

@@ -10,7 +10,8 @@ module nocdyn_analysis_commands
   use nocdyn_input, only: group_t, input_t
   use nocdyn_input_reader, only: read_input
   use nocdyn_machine, only: machine_t
-  use nocdyn_modes_report, only: modes_csv, modes_json, modes_report_t, modes_text, new_modes_report
+  use nocdyn_modes_files, only: modes_csv, modes_json
+  use nocdyn_modes_report, only: modes_report_t, modes_text, new_modes_report
   use nocdyn_operating_point, only: find_operating_point, operating_point_t
   use nocdyn_output_file, only: write_whole
   use nocdyn_output_times, only: check_output_times

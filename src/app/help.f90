@@ -16,17 +16,7 @@ contains
 
     select case (command)
     case ('')
-      text = 'nocdyn: dynamics of drivetrains: rotating bodies, nonlinear elastic couplings, gears.' // nl // nl // &
-             '  nocdyn run FILE...         integrate machines and write their results' // nl // &
-             '  nocdyn check FILE...       read and analyse, integrate nothing' // nl // &
-             '  nocdyn equilibrium FILE... steady running: speeds, torques, twists, powers, stability' // nl // &
-             '  nocdyn modes FILE...       natural frequencies, damping, shapes and energies of the modes' // nl // &
-             '  nocdyn matrices FILE       print the matrices of the method for a machine' // nl // &
-             '  nocdyn new FILE            write a commented input to start from' // nl // &
-             '  nocdyn help [COMMAND]      help on a command' // nl // &
-             '  nocdyn help input [GROUP]  the groups and keys of an input file' // nl // &
-             '  nocdyn --version' // nl // nl // &
-             'Exit codes: 0 done, 1 a computation failed, 2 wrong usage or input, 3 a file cannot be read or written.'
+      text = overview()
     case ('run')
       text = 'nocdyn run FILE... [--out DIR] [--set PATH=VALUE]... [--quiet]' // nl // nl // &
              'Integrates every input file and writes trajectory.csv, summary.json and input.nml.' // nl // nl // &
@@ -67,5 +57,21 @@ contains
       text = ''
     end select
   end function command_help
+
+  pure function overview() result(text)
+    character(len=:), allocatable :: text
+
+    text = 'nocdyn: dynamics of drivetrains: rotating bodies, nonlinear elastic couplings, gears.' // nl // nl // &
+           '  nocdyn run FILE...         integrate machines and write their results' // nl // &
+           '  nocdyn check FILE...       read and analyse, integrate nothing' // nl // &
+           '  nocdyn equilibrium FILE... steady running: speeds, torques, twists, powers, stability' // nl // &
+           '  nocdyn modes FILE...       natural frequencies, damping, shapes and energies of the modes' // nl // &
+           '  nocdyn matrices FILE       print the matrices of the method for a machine' // nl // &
+           '  nocdyn new FILE            write a commented input to start from' // nl // &
+           '  nocdyn help [COMMAND]      help on a command' // nl // &
+           '  nocdyn help input [GROUP]  the groups and keys of an input file' // nl // &
+           '  nocdyn --version' // nl // nl // &
+           'Exit codes: 0 done, 1 a computation failed, 2 wrong usage or input, 3 a file cannot be read or written.'
+  end function overview
 
 end module nocdyn_help

@@ -75,7 +75,7 @@ def test_a_uniform_chain_has_the_frequencies_of_its_closed_form(nocdyn):
     expected = [100 * sin(k * pi / (2 * count)) / pi for k in range(1, count)]
     assert oscillations(content) == pytest.approx(expected, rel=EXACT)
     text = nocdyn("modes", nocdyn.folder / "machine.nml").stdout
-    assert "  (159 more in modes.csv and modes.json)\n" in text and "shape of mode" not in text
+    assert "  (159 more in modes.csv)\n" in text and "shape of mode" not in text
 
 
 def test_a_softer_shaft_between_gears_counts_with_the_square_of_the_ratio(nocdyn):
