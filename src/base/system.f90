@@ -10,6 +10,10 @@
 !>
 !> The Jacobian is a list of values at the positions that `jacobian_pattern` names once, before the integration: all
 !> of them column by column unless a system knows better.
+!>
+!> A system whose right-hand side has kinks or jumps evaluates it on a *branch*, which an integrator leaves alone during a
+!> step, and extends the branch's formula smoothly beyond its border. A step whose solution leaves the branch ends at the
+!> crossing, where a switch function falls through zero; the system goes over to the next branch, and the lane starts anew.
 module nocdyn_system
   use nocdyn_kinds, only: wp
   use nocdyn_text, only: to_text
@@ -31,11 +35,15 @@ module nocdyn_system
     integer :: lanes = 1         !! copies of the system in the block
     integer :: states = 0        !! components under error control
     integer :: quadratures = 0   !! components that follow them and only accumulate
+    integer :: switches = 0      !! functions whose fall through zero ends a step
   contains
     procedure(derivative_interface), deferred :: derivative
     procedure(jacobian_interface), deferred :: jacobian
     procedure :: jacobian_pattern
     procedure :: component_name
+    procedure :: enter
+    procedure :: switch_values
+    procedure :: cross
   end type system_t
 
   integer, parameter, public :: event_any = 0       !! every change of sign
@@ -117,6 +125,36 @@ contains
     name = 'component ' // to_text(index)
     if (index > self%states) name = 'quadrature ' // to_text(index - self%states)
   end function component_name
+
+  !> A lane starts at (t, y): its branches are chosen there.
+  subroutine enter(self, lane, t, y)
+    class(system_t), intent(inout) :: self
+    integer, intent(in) :: lane
+    real(wp), intent(in) :: t
+    real(wp), contiguous, intent(in) :: y(:)   !! [states + quadratures]
+  end subroutine enter
+
+  !> The switch functions of a lane: positive while its branches hold.
+  subroutine switch_values(self, lane, t, y, g)
+    class(system_t), intent(inout) :: self
+    integer, intent(in) :: lane
+    real(wp), intent(in) :: t
+    real(wp), contiguous, intent(in) :: y(:)      !! [states + quadratures]
+    real(wp), contiguous, intent(inout) :: g(:)   !! [switches]
+
+    error stop 'nocdyn_system: a system with switches overrides switch_values'
+  end subroutine switch_values
+
+  !> A lane goes over to the branch beyond the border at which a switch function has fallen through zero; it is positive again.
+  subroutine cross(self, lane, which, t, y)
+    class(system_t), intent(inout) :: self
+    integer, intent(in) :: lane
+    integer, intent(in) :: which   !! 1 to switches
+    real(wp), intent(in) :: t
+    real(wp), contiguous, intent(in) :: y(:)   !! [states + quadratures]
+
+    error stop 'nocdyn_system: a system with switches overrides cross'
+  end subroutine cross
 
   !> One requested time of one lane; the calls of a lane come in the order of its times.
   subroutine record(self, lane, t, y)

@@ -57,6 +57,7 @@ contains
 
     n = self%machine%bodies
     call self%place(y)
+    call self%place_inner(y(:, self%mechanical + 1:))
     call self%machine%evaluate(t, self%phi, self%omega, self%torque)
     do l = 1, self%lanes
       self%solution(:n, l) = self%torque(l, 1:)
@@ -65,7 +66,8 @@ contains
       dydt(l, :n) = self%solution(:n, l)
     end do
     dydt(:, n + 1:2 * n) = y(:, :n)
-    if (self%quadratures > 0) call self%machine%power(dydt(:, 2 * n + 1:))
+    if (self%inner > 0) dydt(:, self%mechanical + 1:self%states) = self%machine%elements%inner%rate
+    if (self%quadratures > 0) call self%machine%power(dydt(:, self%states + 1:))
   end subroutine derivative
 
   !> lambda of the system itself, shared out where rows are redundant.

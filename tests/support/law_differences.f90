@@ -32,7 +32,9 @@ contains
     class(bank_t), intent(in) :: bank
     type(elements_t) :: elements
 
-    elements = new_elements(bank%lanes, bank%from, bank%to)
+    integer :: e
+
+    elements = new_elements(bank%lanes, bank%from, bank%to, [(bank%inner, e=1, size(bank%to))])
   end function elements_of
 
   !> All that a bank finds for its elements at their angles, speeds and time.
