@@ -10,10 +10,6 @@
 !>
 !> The Jacobian is a list of values at the positions that `jacobian_pattern` names once, before the integration: all
 !> of them column by column unless a system knows better.
-!>
-!> A system whose right-hand side has kinks or jumps evaluates it on a *branch*, which an integrator leaves alone during a
-!> step, and extends the branch's formula smoothly beyond its border. A step whose solution leaves the branch ends at the
-!> crossing, where a switch function falls through zero; the system goes over to the next branch, and the lane starts anew.
 module nocdyn_system
   use nocdyn_kinds, only: wp
   use nocdyn_text, only: to_text
@@ -44,6 +40,7 @@ module nocdyn_system
     procedure :: enter
     procedure :: switch_values
     procedure :: cross
+    procedure :: switch_name
   end type system_t
 
   integer, parameter, public :: event_any = 0       !! every change of sign
@@ -126,7 +123,7 @@ contains
     if (index > self%states) name = 'quadrature ' // to_text(index - self%states)
   end function component_name
 
-  !> A lane starts at (t, y): its branches are chosen there.
+  !> A lane starts at (t, y): the place to choose its branches.
   subroutine enter(self, lane, t, y)
     class(system_t), intent(inout) :: self
     integer, intent(in) :: lane
@@ -134,7 +131,7 @@ contains
     real(wp), contiguous, intent(in) :: y(:)   !! [states + quadratures]
   end subroutine enter
 
-  !> The switch functions of a lane: positive while its branches hold.
+  !> The functions that are positive while the branches of a lane hold.
   subroutine switch_values(self, lane, t, y, g)
     class(system_t), intent(inout) :: self
     integer, intent(in) :: lane
@@ -145,16 +142,26 @@ contains
     error stop 'nocdyn_system: a system with switches overrides switch_values'
   end subroutine switch_values
 
-  !> A lane goes over to the branch beyond the border at which a switch function has fallen through zero; it is positive again.
+  !> A lane goes to the branch beyond a function, whose value here must be zero or positive then. A border that is
+  !> widened a little, so that it is positive, keeps rounding from crossing back.
   subroutine cross(self, lane, which, t, y)
     class(system_t), intent(inout) :: self
     integer, intent(in) :: lane
-    integer, intent(in) :: which   !! 1 to switches
+    integer, intent(in) :: which               !! number of the function
     real(wp), intent(in) :: t
     real(wp), contiguous, intent(in) :: y(:)   !! [states + quadratures]
 
     error stop 'nocdyn_system: a system with switches overrides cross'
   end subroutine cross
+
+  !> What function `which` is called in a message, e.g. "gap of 'coupling'".
+  function switch_name(self, which) result(name)
+    class(system_t), intent(in) :: self
+    integer, intent(in) :: which
+    character(len=:), allocatable :: name
+
+    name = 'switch ' // to_text(which)
+  end function switch_name
 
   !> One requested time of one lane; the calls of a lane come in the order of its times.
   subroutine record(self, lane, t, y)
