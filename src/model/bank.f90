@@ -20,6 +20,8 @@ module nocdyn_bank
   implicit none (type, external)
   private
 
+  public :: time_reached
+
   integer, parameter, public :: role_coupling = 1     !! in K and C of eqs. (21), (22); stores energy
   integer, parameter, public :: role_load = 2         !! in C of eq. (22); takes energy out
   integer, parameter, public :: role_motor = 3        !! in Q_m of eq. (18); puts energy in
@@ -78,6 +80,14 @@ module nocdyn_bank
   end type bank_slot_t
 
 contains
+
+  !> A time as it is compared with those at which a law changes: the end of a step may miss them by rounding.
+  pure function time_reached(t)
+    real(wp), intent(in) :: t
+    real(wp) :: time_reached
+
+    time_reached = t + 8.0_wp * spacing(t)
+  end function time_reached
 
   !> Sets the connectivity; every extension's constructor calls it, with `inner` set where its elements have inner states.
   subroutine connect(self, role, lanes, names, from, to)

@@ -24,6 +24,7 @@ module nocdyn_curves
   contains
     procedure :: segment
     procedure :: margin
+    procedure :: room_above
     procedure :: value
     procedure :: slope
     procedure :: curvature
@@ -132,13 +133,21 @@ contains
     real(wp), intent(in) :: width   !! by which the ends are moved, relative to the largest point
     real(wp) :: margin
 
-    margin = huge(margin)
-    associate (n => size(self%knot))
-      if (segment > 0) margin = x - self%knot(segment)
-      if (segment < n) margin = min(margin, self%knot(segment + 1) - x)
-      margin = margin + width * max(abs(self%knot(1)), abs(self%knot(n)))
-    end associate
+    margin = self%room_above(segment, x)
+    if (segment > 0) margin = min(margin, x - self%knot(segment))
+    margin = margin + width * max(abs(self%knot(1)), abs(self%knot(size(self%knot))))
   end function margin
+
+  !> How far x is below the upper end of a segment.
+  pure function room_above(self, segment, x) result(room)
+    class(curve_t), intent(in) :: self
+    integer, intent(in) :: segment
+    real(wp), intent(in) :: x
+    real(wp) :: room
+
+    room = huge(room)
+    if (segment < size(self%knot)) room = self%knot(segment + 1) - x
+  end function room_above
 
   pure function value(self, segment, x)
     class(curve_t), intent(in) :: self
