@@ -26,17 +26,16 @@ contains
     integer, intent(in) :: lanes
     integer, intent(in) :: members(:)   !! states of each element of the machine
     type(inner_states_t) :: self
-    integer :: e, s
+    integer :: e, next
 
     self%count = sum(members)
-    allocate (self%element, source=[(spread(e, 1, members(e)), e=1, size(members))])
-    allocate (self%members, source=members(self%element))
-    allocate (self%first(self%count))
-    do s = 1, self%count
-      self%first(s) = s
-      if (s > 1) then
-        if (self%element(s - 1) == self%element(s)) self%first(s) = self%first(s - 1)
-      end if
+    allocate (self%element(self%count), self%first(self%count), self%members(self%count))
+    next = 1
+    do e = 1, size(members)
+      self%element(next:next + members(e) - 1) = e
+      self%first(next:next + members(e) - 1) = next
+      self%members(next:next + members(e) - 1) = members(e)
+      next = next + members(e)
     end do
     allocate (self%value(lanes, self%count), source=0.0_wp)
     allocate (self%rate, self%working, self%rate_speed, source=self%value)
