@@ -1,8 +1,8 @@
 !> The schema as people read it: help on the terminal, an annotated example file, a reference page.
 module nocdyn_schema_help
-  use nocdyn_schema, only: a_flag, a_number, a_word, an_integer, body_or_ground, examples, first_key, &
-    group_rule_index, group_rules, key_rule_t, key_rules, last_key, required, unset
-  use nocdyn_schema_text, only: allowed_text, alternative_of, group_names, kind_text, occurrence_text, suggestion
+  use nocdyn_schema, only: examples, first_key, group_rule_index, group_rules, key_rules, last_key
+  use nocdyn_schema_rules, only: a_flag, a_number, a_word, an_integer, body_or_ground, example_t, key_rule_t, required, unset
+  use nocdyn_schema_text, only: allowed_text, group_names, kind_text, occurrence_text, suggestion
   use nocdyn_errors, only: error_t, exit_input, raise
   use nocdyn_text, only: lower_case
   use nocdyn_text_buffer, only: text_buffer_t
@@ -31,7 +31,7 @@ contains
     end do
     call buffer%append_line('Example')
     do rule = 1, size(group_rules)
-      call append_examples(buffer, rule)
+      call append_examples(buffer, rule, .true.)
     end do
     text = buffer%text()
   end function input_help
@@ -53,7 +53,7 @@ contains
     end if
     call append_group_help(buffer, rule)
     call buffer%append_line('Example')
-    call append_examples(buffer, rule)
+    call append_examples(buffer, rule, .false.)
     text = buffer%text()
   end subroutine group_help
 
@@ -73,7 +73,7 @@ contains
         call buffer%append_line('!   ' // key_rules(key)%name // short_rule(key_rules(key)))
         call buffer%append_line('!     ' // trim(key_rules(key)%help))
       end do
-      call append_examples(buffer, rule)
+      call append_examples(buffer, rule, .true.)
     end do
     text = buffer%text()
   end function input_template
@@ -111,7 +111,7 @@ contains
     end do
     call buffer%append_line('')
     call buffer%append_line('```')
-    call append_examples(buffer, rule)
+    call append_examples(buffer, rule, .false.)
     call buffer%append_line('```')
   end subroutine append_reference
 
@@ -160,18 +160,35 @@ contains
     else
       text = 'optional'
     end if
-    if (alternative_of(rule) /= '') text = text // ', or ' // alternative_of(rule) // ' instead'
   end function default_text
 
-  subroutine append_examples(buffer, rule)
+  subroutine append_examples(buffer, rule, only_template)
     type(text_buffer_t), intent(inout) :: buffer
     integer, intent(in) :: rule
+    logical, intent(in) :: only_template   !! without the further examples
     integer :: i
 
     do i = 1, size(examples)
-      if (examples(i)%group /= group_rules(rule)%name) cycle
-      call buffer%append_line('&' // examples(i)%group(:longest_group) // ' ' // trim(examples(i)%text) // ' /')
+      if (examples(i)%group /= group_rules(rule)%name .or. (only_template .and. .not. examples(i)%is_in_template)) cycle
+      call buffer%append_line(example_text(examples(i)))
     end do
   end subroutine append_examples
+
+  !> A whole group.
+  pure function example_text(example) result(text)
+    type(example_t), intent(in) :: example
+    character(len=:), allocatable :: text
+    integer :: bar, first
+
+    text = '&' // example%group(:longest_group) // ' '
+    first = 1
+    do
+      bar = index(example%text(first:), '|')
+      if (bar == 0) exit
+      text = text // example%text(first:first + bar - 2) // new_line('a') // repeat(' ', longest_group + 2)
+      first = first + bar
+    end do
+    text = text // trim(example%text(first:)) // ' /'
+  end function example_text
 
 end module nocdyn_schema_help
