@@ -68,7 +68,7 @@ contains
       call read_line(text(start:content_end(text, start, last)), reading, values, rows)
       start = last + 2
     end do
-    call conclude(reading, rows)
+    call conclude(reading, rows, index(text, achar(0)) > 0)
     first = values(1, :rows)
     second = values(2, :rows)
     call move_alloc(reading%complaints, complaints)
@@ -208,11 +208,16 @@ contains
   end subroutine complain
 
   !> Complaints about the file as a whole.
-  subroutine conclude(reading, rows)
+  subroutine conclude(reading, rows, is_binary)
     type(reading_t), intent(inout) :: reading
     integer, intent(in) :: rows
+    logical, intent(in) :: is_binary
 
-    if (reading%wrong > most_complaints) then
+    if (is_binary) then
+      deallocate (reading%complaints)
+      allocate (reading%complaints(0))
+      call append(reading%complaints, reading%file // ': not a text file')
+    else if (reading%wrong > most_complaints) then
       call append(reading%complaints, reading%file // ': ' // to_text(reading%wrong - most_complaints) // &
                   ' more lines are wrong')
     else if (reading%wrong == 0 .and. rows < 2) then
