@@ -43,7 +43,7 @@ module nocdyn_input
     type(string_t), allocatable :: overrides(:)   !! PATH=VALUE, as given
     type(group_t), allocatable :: groups(:)       !! single groups that the file lacks stand at the end
   contains
-    procedure :: groups_named   !! indices of the groups of one kind
+    procedure :: groups_named   !! indices of the groups of one kind, perhaps only of one law
     procedure :: single         !! the one group of a kind that occurs once
     procedure :: label          !! "&gear 'reducer'"
     procedure :: place          !! where a group or a key comes from, to begin a message with
@@ -169,15 +169,21 @@ contains
     error stop 'nocdyn_input: a key was asked for that the schema does not have'
   end function key_position
 
-  pure function groups_named(self, kind) result(indices)
+  pure function groups_named(self, kind, law) result(indices)
     class(input_t), intent(in) :: self
     character(len=*), intent(in) :: kind
+    character(len=*), optional, intent(in) :: law   !! only those whose key `kind` has this value
     integer, allocatable :: indices(:)
+    logical :: is_wanted(size(self%groups))
     integer :: i
 
     if (all(group_rules%name /= kind)) error stop 'nocdyn_input: a group was asked for that the schema does not have'
-    allocate (indices(count([(self%groups(i)%kind == kind, i=1, size(self%groups))])))
-    indices = pack([(i, i=1, size(self%groups))], [(self%groups(i)%kind == kind, i=1, size(self%groups))])
+    do i = 1, size(self%groups)
+      is_wanted(i) = self%groups(i)%kind == kind
+      if (is_wanted(i) .and. present(law)) is_wanted(i) = self%groups(i)%text('kind') == law
+    end do
+    allocate (indices(count(is_wanted)))
+    indices = pack([(i, i=1, size(is_wanted))], is_wanted)
   end function groups_named
 
   pure function single(self, kind) result(group)
