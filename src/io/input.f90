@@ -15,6 +15,9 @@ module nocdyn_input
     integer, allocatable :: whole_numbers(:)
     logical, allocatable :: flags(:)
     type(string_t), allocatable :: texts(:)
+  contains
+    procedure :: has_any
+    procedure :: count => count_of
   end type value_t
 
   !> One group of the file. Asking for a key that the schema lacks, or with another type, is an error of the program.
@@ -50,6 +53,24 @@ module nocdyn_input
   end type input_t
 
 contains
+
+  !> Whether a key has a value, perhaps an empty list.
+  pure logical function has_any(self)
+    class(value_t), intent(in) :: self
+
+    has_any = allocated(self%numbers) .or. allocated(self%whole_numbers) .or. allocated(self%flags) .or. allocated(self%texts)
+  end function has_any
+
+  !> How many values a key has.
+  pure integer function count_of(self)
+    class(value_t), intent(in) :: self
+
+    count_of = 0
+    if (allocated(self%numbers)) count_of = size(self%numbers)
+    if (allocated(self%whole_numbers)) count_of = size(self%whole_numbers)
+    if (allocated(self%flags)) count_of = size(self%flags)
+    if (allocated(self%texts)) count_of = size(self%texts)
+  end function count_of
 
   pure real(wp) function number(self, key, absent)
     class(group_t), intent(in) :: self
@@ -151,10 +172,7 @@ contains
     class(group_t), intent(in) :: self
     character(len=*), intent(in) :: key
 
-    associate (value => self%values(self%key_position(key)))
-      has_value = allocated(value%numbers) .or. allocated(value%whole_numbers) .or. allocated(value%flags) &
-        .or. allocated(value%texts)
-    end associate
+    has_value = self%values(self%key_position(key))%has_any()
   end function has_value
 
   pure integer function key_position(self, key)

@@ -120,31 +120,31 @@ contains
     integer :: first, i
 
     do first = 1, size(lists)
-      if (allocated(group%values(lists(first))%numbers)) exit
+      if (group%values(lists(first))%has_any()) exit
     end do
     if (first > size(lists)) return
     first_rule = work%key(lists(first))
     do i = 1, size(lists)
       rule = work%key(lists(i))
       associate (value => group%values(lists(i)), reference => group%values(lists(first)))
-        if (allocated(value%numbers)) then
-          if (size(value%numbers) == size(reference%numbers)) cycle
-          call mistakes%add(max(value%line, reference%line), work%index, trim(rule%name) // ' has ' // counted(value%numbers) // &
-                            ' and ' // trim(first_rule%name) // ' has ' // counted(reference%numbers) // &
-                            '; needed: as many of each', max(value%override, reference%override))
+        if (value%has_any()) then
+          if (value%count() == reference%count()) cycle
+          call mistakes%add(max(value%line, reference%line), work%index, trim(rule%name) // ' has ' // counted(value) // &
+                            ' and ' // trim(first_rule%name) // ' has ' // counted(reference) // '; needed: as many of each', &
+                            max(value%override, reference%override))
         else if (rule%default == unset .and. .not. (work%may_miss(lists(i)) .or. work%drafts(lists(i))%is_said())) then
           call mistakes%add(reference%line, work%index, trim(rule%name) // ' is missing; needed: ' // &
-                            counted(reference%numbers) // ', one for each of ' // trim(first_rule%name), reference%override)
+                            counted(reference) // ', one for each of ' // trim(first_rule%name), reference%override)
         end if
       end associate
     end do
   end subroutine check_lengths
 
-  pure function counted(numbers) result(text)
-    real(wp), intent(in) :: numbers(:)
+  pure function counted(value) result(text)
+    type(value_t), intent(in) :: value
     character(len=:), allocatable :: text
 
-    text = to_text(size(numbers)) // trim(merge(' value ', ' values', size(numbers) == 1))
+    text = to_text(value%count()) // trim(merge(' value ', ' values', value%count() == 1))
   end function counted
 
 end module nocdyn_input_columns
