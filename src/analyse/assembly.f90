@@ -62,13 +62,13 @@ contains
 
     run = input%single('run')
     wanted = bodies_of(run, 'independent', directory)
-    call analyse_constraints(machine%constraints, machine%names, wanted, machine%groups, culprit, error)
+    call analyse_constraints(machine%constraints, machine%names, wanted, machine%trains, machine%groups, culprit, error)
     if (.not. allocated(error)) call refuse_start_speeds(machine, culprit, error)
     if (allocated(error)) then
       call tell_place(input, culprit, error)
       return
     end if
-    machine%coordinates = new_coordinates(machine%constraints, machine%groups, machine%inertia, wanted, &
+    machine%coordinates = new_coordinates(machine%constraints, machine%trains, machine%groups, machine%inertia, wanted, &
                                           complement_choice(run%text('complement')))
   end subroutine assemble_machine
 

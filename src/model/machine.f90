@@ -7,6 +7,7 @@ module nocdyn_machine
   use nocdyn_geared_groups, only: geared_group_t
   use nocdyn_kinds, only: wp
   use nocdyn_polynomial_laws, only: new_polynomial_laws, polynomial_laws_t
+  use nocdyn_rigid_trains, only: rigid_trains_t
   use nocdyn_text, only: string_t
   implicit none (type, external)
   private
@@ -24,6 +25,7 @@ module nocdyn_machine
     integer, allocatable :: other_banks(:)          !! those whose laws are more than that
     integer, allocatable :: accounted(:)            !! elements whose power may be integrated, [accounts]
     type(constraints_t) :: constraints
+    type(rigid_trains_t) :: trains
     type(geared_group_t), allocatable :: groups(:)
     type(coordinates_t) :: coordinates
   contains
