@@ -17,7 +17,7 @@ module nocdyn_assembly
   use nocdyn_multiplier, only: new_multiplier
   use nocdyn_paper, only: new_paper
   use nocdyn_reduced, only: new_reduced
-  use nocdyn_schema, only: ground
+  use nocdyn_schema_rules, only: ground
   use nocdyn_text, only: quoted, rounded_text, string_t, to_text
   use nocdyn_text_order, only: find_order, first_position
   implicit none (type, external)
@@ -139,7 +139,7 @@ contains
     end do
   end function names_of
 
-  !> One key of all groups of a kind as the parameters of a single lane, [1, groups].
+  !> One key of all groups of a kind as the parameters of a single lane, [1, groups]; 0 where it is unset.
   function lane_of(input, kind, key) result(values)
     type(input_t), intent(in) :: input
     character(len=*), intent(in) :: kind, key
@@ -150,7 +150,7 @@ contains
     allocate (indices, source=input%groups_named(kind))
     allocate (values(1, size(indices)))
     do i = 1, size(indices)
-      values(1, i) = input%groups(indices(i))%number(key)
+      values(1, i) = input%groups(indices(i))%number(key, absent=0.0_wp)
     end do
   end function lane_of
 

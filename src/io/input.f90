@@ -51,14 +51,20 @@ module nocdyn_input
 
 contains
 
-  pure real(wp) function number(self, key)
+  pure real(wp) function number(self, key, absent)
     class(group_t), intent(in) :: self
     character(len=*), intent(in) :: key
+    real(wp), optional, intent(in) :: absent   !! answer if the key is unset
     integer :: k
 
     k = self%key_position(key)
-    if (.not. allocated(self%values(k)%numbers)) error stop 'nocdyn_input: number() of a key without a number'
-    number = self%values(k)%numbers(1)
+    if (allocated(self%values(k)%numbers)) then
+      number = self%values(k)%numbers(1)
+    else if (present(absent)) then
+      number = absent
+    else
+      error stop 'nocdyn_input: number() of a key without a number'
+    end if
   end function number
 
   pure integer function whole_number(self, key)

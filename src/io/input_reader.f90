@@ -8,7 +8,8 @@ module nocdyn_input_reader
   use nocdyn_mistakes, only: mistake_t, mistakes_t, no_line
   use nocdyn_namelist, only: namelist_group_t, namelist_t
   use nocdyn_namelist_scanner, only: scan_namelist
-  use nocdyn_schema, only: at_least_once, exactly_once, group_rule_index, group_rules, is_single
+  use nocdyn_schema, only: group_rule_index, group_rules, is_single
+  use nocdyn_schema_rules, only: at_least_once, exactly_once
   use nocdyn_schema_text, only: group_names, occurrence_text, suggestion
   use nocdyn_text, only: nearest_word, quoted, string_t, to_text
   use nocdyn_text_buffer, only: text_buffer_t
@@ -62,7 +63,7 @@ contains
     call refuse_unused(input%groups, parsed, mistakes)
     call check_doubled_names(input%groups, mistakes)
     call check_references(input%groups, bodies_are_known(input%groups), mistakes)
-    if (mistakes%count > 0) call raise(error, exit_input, report(input, mistakes))
+    if (mistakes%count > 0) call raise(error, mistakes%worst_code(), report(input, mistakes))
   end subroutine read_input_text
 
   !> All groups of the file, then the single groups that it lacks.
@@ -72,8 +73,10 @@ contains
     type(input_t), intent(inout) :: input
     type(mistakes_t), intent(inout) :: mistakes
     integer, allocatable :: added(:)
+    character(len=:), allocatable :: folder
     integer :: g, n
 
+    folder = input%file(:index(input%file, '/', back=.true.))
     call find_absent_groups(namelist, overrides, added)
     n = namelist%group_count
     allocate (input%groups(n + size(added)))
@@ -83,14 +86,14 @@ contains
         if (g > n) then
           group%rule = added(g - n)
           group%kind = trim(group_rules(group%rule)%name)
-          call read_group(namelist, namelist_group_t(), g, overrides, group, mistakes)
+          call read_group(namelist, namelist_group_t(), g, overrides, folder, group, mistakes)
           cycle
         end if
         group%kind = namelist%groups(g)%name
         group%rule = group_rule_index(group%kind)
         group%line = namelist%groups(g)%line
         if (group%rule > 0) then
-          call read_group(namelist, namelist%groups(g), g, overrides, group, mistakes)
+          call read_group(namelist, namelist%groups(g), g, overrides, folder, group, mistakes)
         else
           call mistakes%add(group%line, g, 'there is no such group' // suggestion(group%kind, group_names()))
         end if
