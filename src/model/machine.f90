@@ -12,6 +12,13 @@ module nocdyn_machine
   implicit none (type, external)
   private
 
+  !> What happened to start speeds that violated constraints and were projected.
+  type, public :: start_shock_t
+    integer, allocatable :: row(:)            !! the violated ones
+    real(wp), allocatable :: impulse(:)       !! in each of them, [unit of its multiplier * s]
+    real(wp) :: energy_lost = 0.0_wp          !! [J]
+  end type start_shock_t
+
   type, public :: machine_t
     integer :: lanes = 1
     integer :: bodies = 0
@@ -19,6 +26,7 @@ module nocdyn_machine
     real(wp), allocatable :: inertia(:, :)          !! J [kg m2], shape [lanes, bodies]
     real(wp), allocatable :: start_angle(:, :)      !! [rad]
     real(wp), allocatable :: start_speed(:, :)      !! [rad/s], obeys the constraints
+    type(start_shock_t), allocatable :: shock       !! if the start speeds of the input had to be projected
     type(bank_slot_t), allocatable :: banks(:)
     type(elements_t) :: elements                    !! of all banks, after `number_elements`
     type(polynomial_laws_t) :: laws                 !! what of their laws is polynomial, after `number_elements`
