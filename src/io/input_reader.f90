@@ -2,6 +2,7 @@
 module nocdyn_input_reader
   use nocdyn_errors, only: error_t, exit_input, raise
   use nocdyn_input, only: group_t, input_t
+  use nocdyn_input_constraints, only: check_constraints
   use nocdyn_input_group, only: read_group
   use nocdyn_input_names, only: check_doubled_names, check_references, collect_names
   use nocdyn_input_overrides, only: override_t, read_overrides
@@ -64,6 +65,7 @@ contains
     call refuse_unused(input%groups, parsed, mistakes)
     call check_doubled_names(input%groups, mistakes)
     call check_references(input%groups, bodies_are_known(input%groups), mistakes)
+    call check_constraints(input%groups, mistakes)
     if (mistakes%count > 0) call raise(error, mistakes%worst_code(), report(input, mistakes))
   end subroutine read_input_text
 

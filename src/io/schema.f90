@@ -4,6 +4,7 @@
 !> checking, help, template and reference follow from the rows. The rows of large groups stand in modules of their own.
 module nocdyn_schema
   use nocdyn_kinds, only: wp
+  use nocdyn_schema_constraints, only: constraint_alternatives, constraint_examples, constraint_groups, constraint_keys
   use nocdyn_schema_couplings, only: coupling_alternatives, coupling_columns, coupling_examples, coupling_keys, coupling_needs
   use nocdyn_schema_rules, only: a_body, a_flag, a_kind, a_file, a_name, a_number, a_text, a_word, allowed_t, alternative_t, &
     an_integer, any_number, any_times, anything, at_least_once, at_most_once, body_or_ground, columns_t, exactly_once, &
@@ -22,12 +23,13 @@ module nocdyn_schema
   character(len=*), parameter :: default_method = "'auto'"
   type(allowed_t), parameter :: formulations = allowed_t(words='reduced paper multiplier')
   type(allowed_t), parameter :: complements = allowed_t(words='natural scaled negated')
+  type(allowed_t), parameter :: starts = allowed_t(words='given projected')
 
   type(group_rule_t), parameter, public :: group_rules(*) = [ &
     group_rule_t('case',       at_most_once,  '',         'What the file is about.'), &
     group_rule_t('body',       at_least_once, 'body',     'A rigid body that turns about its axis.'), &
     group_rule_t('coupling',   any_times,     'coupling', 'An elastic coupling of two bodies, or of a body and the ground.'), &
-    group_rule_t('gear',       any_times,     'gear',     'A rigid gear: R1 omega_1 + R2 omega_2 = 0, a minus if internal.'), &
+    constraint_groups, &
     group_rule_t('motor',      any_times,     'torque',   'A driving torque on a body, by a law of its speed.'), &
     group_rule_t('load',       any_times,     'torque',   'A resisting torque on a body: the sum of the terms that are given.'), &
     group_rule_t('excitation', any_times,     'torque',   'A torque on a body, by a law of time or of its angle.'), &
@@ -45,16 +47,6 @@ module nocdyn_schema
       'angle at the start'), &
     key_rule_t('body',       'speed',           a_number,       1, 'rad/s',       '0',         anything, &
       'speed at the start; geared bodies must start with speeds that fit the gears'), &
-    key_rule_t('gear',       'name',            a_name,         1, '',            required,    anything, &
-      'what results and messages call it'), &
-    key_rule_t('gear',       'bodies',          a_body,         2, '',            required,    anything, &
-      'the two wheels'), &
-    key_rule_t('gear',       'radii',           a_number,       2, 'm',           unset,       positive, &
-      'pitch radii, in the order of the bodies'), &
-    key_rule_t('gear',       'teeth',           an_integer,     2, '',            unset,       from_1, &
-      'numbers of teeth, in the order of the bodies'), &
-    key_rule_t('gear',       'internal',        a_flag,         1, '',            '.false.',   anything, &
-      'an internal gear: both wheels turn in the same direction'), &
     key_rule_t('run',        't_start',         a_number,       1, 's',           '0',         anything, &
       'time of the start'), &
     key_rule_t('run',        't_end',           a_number,       1, 's',           required,    anything, &
@@ -71,6 +63,8 @@ module nocdyn_schema
       'bodies whose speeds are the coordinates; found if not given'), &
     key_rule_t('run',        'complement',      a_word,         1, '',            "'natural'", complements, &
       'which orthogonal complement of the gear constraints'), &
+    key_rule_t('run',        'start',           a_word,         1, '',            "'given'",   starts, &
+      'start speeds that violate a constraint: refused, or projected onto the nearest that do not'), &
     key_rule_t('run',        'max_steps',       an_integer,     1, '',            '1000000',   steps, &
       'the run fails after this many steps'), &
     key_rule_t('output',     'interval',        a_number,       1, 's',           unset,       positive, &
@@ -83,12 +77,11 @@ module nocdyn_schema
   type(kind_rule_t), parameter, public :: kind_rules(*) = torque_kinds
 
   type(key_rule_t), parameter, public :: key_rules(*) = &
-    [frame_keys, coupling_keys, motor_keys, load_keys, excitation_keys]
+    [frame_keys, coupling_keys, constraint_keys, motor_keys, load_keys, excitation_keys]
 
   type(alternative_t), parameter, public :: alternatives(*) = [ &
-    alternative_t('gear',   'radii',    'teeth', is_needed=.true.), &
     alternative_t('output', 'interval', 'points'), &
-    coupling_alternatives, torque_alternatives]
+    coupling_alternatives, constraint_alternatives, torque_alternatives]
 
   type(need_t), parameter, public :: needs(*) = [coupling_needs, torque_needs]
 
@@ -102,10 +95,9 @@ module nocdyn_schema
     example_t('body',       "name = 'motor'    inertia = 10.0"), &
     example_t('body',       "name = 'pinion'   inertia = 5.0"), &
     example_t('body',       "name = 'machine'  inertia = 5.0"), &
-    example_t('gear',       "name = 'reducer'  bodies = 'pinion', 'machine' radii = 2.0, 3.0"), &
     example_t('run',        "t_end = 10.0  method = 'rk45'  rtol = 1.0e-9  atol = 1.0e-9"), &
     example_t('output',     'interval = 0.01'), &
-    coupling_examples, torque_examples]
+    coupling_examples, constraint_examples, torque_examples]
 
 contains
 

@@ -7,10 +7,18 @@ module nocdyn_machine
   use nocdyn_geared_groups, only: geared_group_t
   use nocdyn_kinds, only: wp
   use nocdyn_polynomial_laws, only: new_polynomial_laws, polynomial_laws_t
+  use nocdyn_rigid_trains, only: rigid_trains_t
   use nocdyn_switches, only: new_switches, switches_t
   use nocdyn_text, only: quoted, string_t
   implicit none (type, external)
   private
+
+  !> What happened to start speeds that violated constraints and were projected.
+  type, public :: start_shock_t
+    integer, allocatable :: row(:)            !! the violated ones
+    real(wp), allocatable :: impulse(:)       !! in each of them, [unit of its multiplier * s]
+    real(wp) :: energy_lost = 0.0_wp          !! [J]
+  end type start_shock_t
 
   type, public :: machine_t
     integer :: lanes = 1
@@ -19,6 +27,7 @@ module nocdyn_machine
     real(wp), allocatable :: inertia(:, :)          !! J [kg m2], shape [lanes, bodies]
     real(wp), allocatable :: start_angle(:, :)      !! [rad]
     real(wp), allocatable :: start_speed(:, :)      !! [rad/s], obeys the constraints
+    type(start_shock_t), allocatable :: shock       !! if the start speeds of the input had to be projected
     type(bank_slot_t), allocatable :: banks(:)
     type(elements_t) :: elements                    !! of all banks, after `number_elements`
     type(polynomial_laws_t) :: laws                 !! what of their laws is polynomial, after `number_elements`
@@ -27,6 +36,7 @@ module nocdyn_machine
     type(switches_t) :: switches                    !! of all banks, after `number_elements`
     integer, allocatable :: accounted(:)            !! elements whose power may be integrated, [accounts]
     type(constraints_t) :: constraints
+    type(rigid_trains_t) :: trains
     type(geared_group_t), allocatable :: groups(:)
     type(coordinates_t) :: coordinates
   contains

@@ -75,18 +75,13 @@ contains
     class(multiplier_t), intent(inout) :: self
     integer, intent(in) :: lane
     real(wp), intent(out) :: lambda(:)
-    integer :: g, i, next
+    integer :: i
 
-    next = self%machine%bodies + 1
-    do g = 1, size(self%machine%coordinates%blocks)
-      associate (block => self%machine%coordinates%blocks(g))
-        do i = 1, size(block%rows)
-          lambda(block%rows(i)) = dot_product(block%of_kept(i, :, lane), &
-                                              self%solution(next:next + size(block%kept) - 1, lane))
-        end do
-        next = next + size(block%kept)
-      end associate
+    lambda = 0.0_wp
+    do i = 1, size(self%kept)
+      lambda(self%kept(i)) = self%solution(self%machine%bodies + i, lane)
     end do
+    call self%machine%coordinates%sweep%share(lane, lambda)
   end subroutine reactions
 
 end module nocdyn_multiplier

@@ -190,9 +190,9 @@ contains
     integer :: culprit
 
     call machine%number_elements()
-    call analyse_constraints(machine%constraints, machine%names, wanted, machine%groups, culprit, error)
+    call analyse_constraints(machine%constraints, machine%names, wanted, machine%trains, machine%groups, culprit, error)
     if (allocated(error)) error stop 'nocdyn_test_machines: a machine to test with has gears that lock'
-    machine%coordinates = new_coordinates(machine%constraints, machine%groups, machine%inertia, wanted, choice)
+    machine%coordinates = new_coordinates(machine%constraints, machine%trains, machine%groups, machine%inertia, wanted, choice)
   end subroutine finish
 
   function numbered_names(stem, count) result(names)
