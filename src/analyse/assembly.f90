@@ -1,25 +1,22 @@
 !> From the input to the model: bodies, banks, constraints and coordinates.
 module nocdyn_assembly
-  use nocdyn_bank, only: bank_slot_t
   use nocdyn_body_directory, only: bodies_of, directory_t, new_directory
   use nocdyn_complement, only: complement_natural, complement_negated, complement_scaled
   use nocdyn_constraint_analysis, only: analyse_constraints
   use nocdyn_constraint_assembly, only: assemble_constraints, constraint_groups
   use nocdyn_coordinates, only: new_coordinates
-  use nocdyn_couplings, only: new_couplings
+  use nocdyn_coupling_assembly, only: add_couplings, check_couplings
+  use nocdyn_element_numbers, only: names_of, numbers_of
   use nocdyn_errors, only: error_t
-  use nocdyn_excitations, only: new_excitations
   use nocdyn_formulation, only: formulation_t
   use nocdyn_input, only: group_t, input_t
-  use nocdyn_kinds, only: wp
-  use nocdyn_loads, only: new_loads
   use nocdyn_machine, only: machine_t
-  use nocdyn_motors, only: new_motors
+  use nocdyn_motor_assembly, only: add_motors
   use nocdyn_multiplier, only: new_multiplier
   use nocdyn_paper, only: new_paper
   use nocdyn_reduced, only: new_reduced
   use nocdyn_start_speeds, only: fit_start_speeds
-  use nocdyn_text, only: string_t
+  use nocdyn_torque_assembly, only: add_excitations, add_loads
   implicit none (type, external)
   private
 
@@ -34,15 +31,22 @@ contains
     type(error_t), allocatable, intent(out) :: error
     type(directory_t) :: directory
 
-    machine%names = names_of(input, 'body')
-    machine%bodies = size(machine%names)
-    machine%inertia = lane_of(input, 'body', 'inertia')
-    machine%start_angle = lane_of(input, 'body', 'angle')
-    machine%start_speed = lane_of(input, 'body', 'speed')
+    associate (bodies => input%groups_named('body'))
+      machine%names = names_of(input, bodies)
+      machine%bodies = size(bodies)
+      machine%inertia = numbers_of(input, bodies, 'inertia')
+      machine%start_angle = numbers_of(input, bodies, 'angle')
+      machine%start_speed = numbers_of(input, bodies, 'speed')
+    end associate
     directory = new_directory(machine%names)
     call assemble_constraints(input, directory, machine%constraints, error)
+    if (.not. allocated(error)) call check_couplings(input, error)
     if (allocated(error)) return
-    machine%banks = element_banks(input, directory)
+    allocate (machine%banks(0))
+    call add_couplings(input, directory, machine%banks)
+    call add_motors(input, directory, machine%banks)
+    call add_loads(input, directory, machine%banks)
+    call add_excitations(input, directory, machine%banks)
     call machine%number_elements()
     call constrain(input, directory, machine, error)
   end subroutine assemble_machine
@@ -120,72 +124,5 @@ contains
       error%message = input%place(indices(1), 'independent') // ': independent ' // error%message
     end if
   end subroutine tell_place
-
-  function names_of(input, kind) result(names)
-    type(input_t), intent(in) :: input
-    character(len=*), intent(in) :: kind
-    type(string_t), allocatable :: names(:)
-    integer, allocatable :: indices(:)
-    integer :: i
-
-    allocate (indices, source=input%groups_named(kind))
-    allocate (names(size(indices)))
-    do i = 1, size(indices)
-      names(i)%text = input%groups(indices(i))%name
-    end do
-  end function names_of
-
-  !> One key of all groups of a kind as the parameters of a single lane, [1, groups]; 0 where it is unset.
-  function lane_of(input, kind, key) result(values)
-    type(input_t), intent(in) :: input
-    character(len=*), intent(in) :: kind, key
-    real(wp), allocatable :: values(:, :)
-    integer, allocatable :: indices(:)
-    integer :: i
-
-    allocate (indices, source=input%groups_named(kind))
-    allocate (values(1, size(indices)))
-    do i = 1, size(indices)
-      values(1, i) = input%groups(indices(i))%number(key, absent=0.0_wp)
-    end do
-  end function lane_of
-
-  !> Value number `which` of a key that names bodies, of all groups of a kind.
-  function ends_of(input, kind, key, which, directory) result(chosen)
-    type(input_t), intent(in) :: input
-    character(len=*), intent(in) :: kind, key
-    integer, intent(in) :: which
-    type(directory_t), intent(in) :: directory
-    integer, allocatable :: chosen(:)
-    integer, allocatable :: bodies(:), indices(:)
-    integer :: i
-
-    allocate (indices, source=input%groups_named(kind))
-    allocate (chosen(size(indices)))
-    do i = 1, size(indices)
-      bodies = bodies_of(input%groups(indices(i)), key, directory)
-      chosen(i) = bodies(which)
-    end do
-  end function ends_of
-
-  function element_banks(input, directory) result(banks)
-    type(input_t), intent(in) :: input
-    type(directory_t), intent(in) :: directory
-    type(bank_slot_t), allocatable :: banks(:)
-
-    ! `allocate (source=)`: gfortran 12 corrupts the heap on assignment to a polymorphic component of an array element
-    allocate (banks(4))
-    allocate (banks(1)%bank, source=new_couplings(names_of(input, 'coupling'), &
-              ends_of(input, 'coupling', 'bodies', 1, directory), ends_of(input, 'coupling', 'bodies', 2, directory), &
-              lane_of(input, 'coupling', 'stiffness'), lane_of(input, 'coupling', 'cubic_stiffness'), &
-              lane_of(input, 'coupling', 'damping'), lane_of(input, 'coupling', 'rest_twist')))
-    allocate (banks(2)%bank, source=new_motors(names_of(input, 'motor'), ends_of(input, 'motor', 'body', 1, directory), &
-              lane_of(input, 'motor', 'a'), lane_of(input, 'motor', 'b'), lane_of(input, 'motor', 'c')))
-    allocate (banks(3)%bank, source=new_loads(names_of(input, 'load'), ends_of(input, 'load', 'body', 1, directory), &
-              lane_of(input, 'load', 'viscous')))
-    allocate (banks(4)%bank, source=new_excitations(names_of(input, 'excitation'), &
-              ends_of(input, 'excitation', 'body', 1, directory), lane_of(input, 'excitation', 'amplitude'), &
-              lane_of(input, 'excitation', 'frequency'), lane_of(input, 'excitation', 'phase')))
-  end function element_banks
 
 end module nocdyn_assembly

@@ -1,6 +1,6 @@
 !> What can be said of a machine before it moves: bodies, gears, coordinates, redundancies.
 module nocdyn_machine_report
-  use nocdyn_bank, only: role_names
+  use nocdyn_bank, only: role_coupling, role_excitation, role_load, role_motor, role_names
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
   use nocdyn_rigid_trains, only: ratio_tolerance
@@ -108,12 +108,13 @@ contains
     character(len=:), allocatable :: text
     type(text_buffer_t) :: report
     type(string_t), allocatable :: notes(:)
+    integer, parameter :: roles(4) = [role_coupling, role_motor, role_load, role_excitation]
     integer :: i
 
     call report%append(file // ': ' // counted(machine%bodies, 'body', 'bodies') // counted_constraints(machine))
-    do i = 1, size(machine%banks)
-      call report%append(', ' // counted(size(machine%banks(i)%bank%to), trim(role_names(machine%banks(i)%bank%role)), &
-                                         trim(role_names(machine%banks(i)%bank%role)) // 's'))
+    do i = 1, size(roles)
+      call report%append(', ' // counted(elements_of(machine, roles(i)), trim(role_names(roles(i))), &
+                                         trim(role_names(roles(i))) // 's'))
     end do
     call put_line(report, counted(machine%coordinates%freedoms, 'degree', 'degrees') // ' of freedom')
     call put_groups(report, machine)
@@ -125,6 +126,18 @@ contains
     end do
     text = report%text()
   end function machine_report
+
+  !> Elements of all banks of one role.
+  pure integer function elements_of(machine, role)
+    type(machine_t), intent(in) :: machine
+    integer, intent(in) :: role
+    integer :: i
+
+    elements_of = 0
+    do i = 1, size(machine%banks)
+      if (machine%banks(i)%bank%role == role) elements_of = elements_of + size(machine%banks(i)%bank%to)
+    end do
+  end function elements_of
 
   subroutine put_line(report, text)
     type(text_buffer_t), intent(inout) :: report

@@ -20,7 +20,7 @@ module nocdyn_bank
   implicit none (type, external)
   private
 
-  public :: time_reached
+  public :: append_bank, time_reached
 
   integer, parameter, public :: role_coupling = 1     !! in K and C of eqs. (21), (22); stores energy
   integer, parameter, public :: role_load = 2         !! in C of eq. (22); takes energy out
@@ -49,6 +49,7 @@ module nocdyn_bank
     integer :: values = 0                    !! lanes * elements
     integer :: first_value = 1               !! the place of lane 1 of `first` in the values of the machine
     logical :: is_polynomial = .true.        !! whether `polynomials` says all of its law
+    logical :: is_of_paper = .true.          !! whether its law is that of eqs. (3), (5), (17) or (20)
     integer :: inner = 0                     !! inner states of each element
     integer :: first_inner = 1               !! number of the first inner state of `first` in the machine
     integer :: inner_values = 0              !! lanes * inner * elements
@@ -80,6 +81,22 @@ module nocdyn_bank
   end type bank_slot_t
 
 contains
+
+  !> Adds a bank behind the others.
+  subroutine append_bank(banks, bank)
+    type(bank_slot_t), allocatable, intent(inout) :: banks(:)
+    class(bank_t), intent(in) :: bank
+    type(bank_slot_t), allocatable :: longer(:)
+    integer :: i
+
+    allocate (longer(size(banks) + 1))
+    do i = 1, size(banks)
+      call move_alloc(banks(i)%bank, longer(i)%bank)
+    end do
+    ! `allocate (source=)`: gfortran 12 corrupts the heap on assignment to a polymorphic component of an array element
+    allocate (longer(size(longer))%bank, source=bank)
+    call move_alloc(longer, banks)
+  end subroutine append_bank
 
   !> A time as it is compared with those at which a law changes: the end of a step may miss them by rounding.
   pure function time_reached(t)

@@ -55,6 +55,7 @@ contains
     is_dissipative = any(abs(damping) > 0.0_wp, dim=1)
     if (present(friction)) then
       bank%is_polynomial = .false.
+      bank%is_of_paper = .false.
       allocate (bank%friction, source=friction)
       allocate (bank%friction_speed, source=friction_speed)
       is_dissipative = is_dissipative .or. any(abs(friction) > 0.0_wp, dim=1)
@@ -102,8 +103,9 @@ contains
     if (.not. allocated(self%friction)) return
     do e = 1, size(self%to)
       do l = 1, self%lanes
-        associate (slope => elements%working_speed(l, self%first + e - 1), speed => elements%speed(l, self%first + e - 1))
-          slope = slope - self%friction(l, e) / self%friction_speed(l, e) * (1.0_wp - tanh_of(speed / self%friction_speed(l, e))**2)
+        associate (slope => elements%working_speed(l, self%first + e - 1), scale => self%friction_speed(l, e), &
+                   speed => elements%speed(l, self%first + e - 1))
+          slope = slope - self%friction(l, e) / scale * (1.0_wp - tanh_of(speed / scale)**2)
         end associate
       end do
     end do

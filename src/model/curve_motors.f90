@@ -34,6 +34,7 @@ contains
     integer :: e
 
     bank%is_polynomial = .false.
+    bank%is_of_paper = .false.
     call bank%connect(role_motor, lanes, names, [(0, e=1, size(body))], body)
     allocate (bank%curve, source=curve)
     if (curve%has_segments()) call bank%let_switch([(e, e=1, size(body))])

@@ -1,6 +1,6 @@
 !> Direct-current motors with an inductance: torque k i, inductance i' = y voltage - resistance i - k omega, i = 0 at the start.
 module nocdyn_dc_motors
-  use nocdyn_bank, only: bank_t, role_motor
+  use nocdyn_bank, only: bank_t, quantity_t, role_motor
   use nocdyn_elements, only: elements_t
   use nocdyn_governors, only: governor_t
   use nocdyn_kinds, only: wp
@@ -25,6 +25,8 @@ module nocdyn_dc_motors
     procedure :: choose
     procedure :: margin
     procedure :: switch_name
+    procedure :: quantities
+    procedure :: observe
   end type dc_motors_t
 
 contains
@@ -39,6 +41,7 @@ contains
     integer :: e
 
     bank%is_polynomial = .false.
+    bank%is_of_paper = .false.
     bank%inner = 1
     if (present(governor)) bank%inner = 2
     call bank%connect(role_motor, size(voltage, 1), names, [(0, e=1, size(body))], body)
@@ -156,5 +159,40 @@ contains
 
     name = 'limit of the governor'
   end function switch_name
+
+  !> Torque, current and, with a governor, throttle.
+  function quantities(self) result(columns)
+    class(dc_motors_t), intent(in) :: self
+    type(quantity_t), allocatable :: columns(:)
+    integer :: e
+
+    allocate (columns(1 + self%inner))
+    columns(1) = quantity_t('torque', 'N m', [(e, e=1, size(self%to))])
+    columns(2) = quantity_t('current', 'A', [(e, e=1, size(self%to))])
+    if (allocated(self%governor)) columns(3) = quantity_t('throttle', '1', [(e, e=1, size(self%to))])
+  end function quantities
+
+  pure subroutine observe(self, elements, quantity, lane, values)
+    class(dc_motors_t), intent(in) :: self
+    type(elements_t), intent(in) :: elements
+    integer, intent(in) :: quantity
+    integer, intent(in) :: lane
+    real(wp), intent(out) :: values(:)
+    integer :: e
+
+    do e = 1, size(self%to)
+      associate (speed => elements%speed(lane, self%first + e - 1), &
+                 inner => elements%inner%value(lane, self%first_inner + self%inner * (e - 1):))
+        select case (quantity)
+        case (1)
+          values(e) = elements%working(lane, self%first + e - 1)
+        case (2)
+          values(e) = inner(1)
+        case default
+          values(e) = self%governor%throttle(lane, e, self%branch(lane, e), inner(2), speed)
+        end select
+      end associate
+    end do
+  end subroutine observe
 
 end module nocdyn_dc_motors

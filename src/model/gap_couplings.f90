@@ -126,12 +126,12 @@ contains
     do e = 1, size(self%to)
       i = self%first + e - 1
       do l = 1, self%lanes
-        associate (branch => self%branch(l, e))
+        associate (branch => self%branch(l, e), curvature => elements%restoring_curvature(l, i))
           if (branch == free) cycle
           x = penetration(self, branch, l, e, elements%angle(l, i))
           stiffness = elastic_slope(self%coefficient(:, l, e), x)
           elements%restoring_angle(l, i) = elements%restoring_angle(l, i) - stiffness
-          elements%restoring_curvature(l, i) = elements%restoring_curvature(l, i) - elastic_curvature(self%coefficient(:, l, e), x)
+          curvature = curvature - elastic_curvature(self%coefficient(:, l, e), x)
           elements%working_angle(l, i) = elements%working_angle(l, i) - damping_moment(branch, stiffness, 0.0_wp)
           elements%working_speed(l, i) = elements%working_speed(l, i) - damping_moment(branch, 0.0_wp, self%damping(l, e))
         end associate

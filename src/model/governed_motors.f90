@@ -1,5 +1,6 @@
 !> Motors whose torque a governor throttles.
 module nocdyn_governed_motors
+  use nocdyn_bank, only: quantity_t
   use nocdyn_curve_motors, only: curve_motors_t, new_curve_motors
   use nocdyn_elements, only: elements_t
   use nocdyn_governors, only: governor_t
@@ -27,6 +28,8 @@ module nocdyn_governed_motors
     procedure :: choose
     procedure :: margin
     procedure :: switch_name
+    procedure :: quantities
+    procedure :: observe
     procedure, private :: first_governor
   end type governed_motors_t
 
@@ -177,5 +180,35 @@ contains
     name = 'point in the table'
     if (switch > self%first_governor()) name = 'limit of the governor'
   end function switch_name
+
+  !> Torque and throttle.
+  function quantities(self) result(columns)
+    class(governed_motors_t), intent(in) :: self
+    type(quantity_t), allocatable :: columns(:)
+    integer :: e
+
+    allocate (columns(2))
+    columns(1) = quantity_t('torque', 'N m', [(e, e=1, size(self%to))])
+    columns(2) = quantity_t('throttle', '1', [(e, e=1, size(self%to))])
+  end function quantities
+
+  pure subroutine observe(self, elements, quantity, lane, values)
+    class(governed_motors_t), intent(in) :: self
+    type(elements_t), intent(in) :: elements
+    integer, intent(in) :: quantity
+    integer, intent(in) :: lane
+    real(wp), intent(out) :: values(:)
+    integer :: e
+
+    if (quantity == 1) then
+      values = elements%working(lane, self%first:self%last())
+    else
+      do e = 1, size(self%to)
+        values(e) = self%governor%throttle(lane, e, self%branch(lane, self%first_governor() + e), &
+                                           elements%inner%value(lane, self%first_inner + e - 1), &
+                                           elements%speed(lane, self%first + e - 1))
+      end do
+    end if
+  end subroutine observe
 
 end module nocdyn_governed_motors

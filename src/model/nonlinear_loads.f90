@@ -31,6 +31,7 @@ contains
 
     bank%loads_t = new_loads(names, body, viscous)
     bank%is_polynomial = .false.
+    bank%is_of_paper = .false.
     allocate (bank%quadratic, source=quadratic)
     allocate (bank%constant, source=constant)
     allocate (bank%constant_speed, source=constant_speed)

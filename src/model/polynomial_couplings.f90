@@ -34,6 +34,7 @@ contains
     bank%couplings_t = new_couplings(names, from, to, 0.0_wp * damping, 0.0_wp * damping, damping, rest_twist, &
                                      friction, friction_speed)
     bank%is_polynomial = .false.
+    bank%is_of_paper = .false.
     bank%order = size(coefficient, 1)
     allocate (bank%coefficient, source=coefficient)
   end function new_polynomial_couplings

@@ -35,6 +35,7 @@ contains
     bank%couplings_t = new_couplings(names, from, to, 0.0_wp * stiffness, 0.0_wp * stiffness, damping, rest_twist, &
                                      friction, friction_speed)
     bank%is_polynomial = .false.
+    bank%is_of_paper = .false.
     allocate (bank%initial_stiffness, source=stiffness)
     allocate (bank%saturation, source=saturation)
   end function new_saturated_couplings
@@ -68,11 +69,12 @@ contains
     do e = 1, size(self%to)
       i = self%first + e - 1
       do l = 1, self%lanes
-        associate (stiffness => self%initial_stiffness(l, e), saturation => self%saturation(l, e))
+        associate (stiffness => self%initial_stiffness(l, e), saturation => self%saturation(l, e), &
+                   curvature => elements%restoring_curvature(l, i))
           part = tanh_of(stiffness * (elements%angle(l, i) - self%rest_twist(l, e)) / saturation)
           tangent = stiffness * (1.0_wp - part**2)
           elements%restoring_angle(l, i) = elements%restoring_angle(l, i) - tangent
-          elements%restoring_curvature(l, i) = elements%restoring_curvature(l, i) + 2.0_wp * part * tangent * stiffness / saturation
+          curvature = curvature + 2.0_wp * part * tangent * stiffness / saturation
         end associate
       end do
     end do

@@ -38,6 +38,7 @@ contains
     bank%couplings_t = new_couplings(names, from, to, 0.0_wp * damping, 0.0_wp * damping, damping, rest_twist, &
                                      friction, friction_speed)
     bank%is_polynomial = .false.
+    bank%is_of_paper = .false.
     allocate (bank%curve, source=curve)
     call bank%let_switch([(e, e=1, size(to))])
   end function new_table_couplings

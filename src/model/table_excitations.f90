@@ -32,6 +32,7 @@ contains
     integer :: e
 
     bank%is_polynomial = .false.
+    bank%is_of_paper = .false.
     call bank%connect(role_excitation, size(curve, 1), names, [(0, e=1, size(body))], body)
     allocate (bank%curve, source=curve)
     call bank%let_switch([(e, e=1, size(body))])

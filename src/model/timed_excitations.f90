@@ -42,6 +42,7 @@ contains
     integer :: e
 
     bank%is_polynomial = .false.
+    bank%is_of_paper = .false.
     call bank%connect(role_excitation, size(amplitude, 1), names, [(0, e=1, size(body))], body)
     allocate (bank%shape, source=shape)
     allocate (bank%amplitude, source=amplitude)
@@ -71,13 +72,14 @@ contains
     real(wp), intent(in) :: time
     real(wp) :: part
 
-    part = 0.0_wp
     select case (self%branch(lane, excitation))
+    case (before)
+      part = 0.0_wp
     case (during)
       part = (time - self%begin(lane, excitation)) / self%duration(lane, excitation)
       if (self%shape(excitation) == shape_pulse) part = sine_of(pi * part)
-    case (after)
-      if (self%shape(excitation) /= shape_pulse) part = 1.0_wp
+    case default
+      part = merge(0.0_wp, 1.0_wp, self%shape(excitation) == shape_pulse)
     end select
   end function part_of_amplitude
 

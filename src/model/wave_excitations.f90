@@ -36,6 +36,7 @@ contains
     integer :: e
 
     bank%is_polynomial = .false.
+    bank%is_of_paper = .false.
     call bank%connect(role_excitation, size(amplitude, 1), names, [(0, e=1, size(body))], body)
     allocate (bank%owner, source=owner)
     allocate (bank%amplitude, source=amplitude)

@@ -1,5 +1,6 @@
 !> Machines with elements of every kind.
 module nocdyn_test_full_machines
+  use nocdyn_bank, only: append_bank
   use nocdyn_curve_motors, only: new_curve_motors
   use nocdyn_curves, only: curve_t, extrapolation_constant, extrapolation_linear, interpolation_cubic, interpolation_linear, &
                            new_curve
@@ -15,7 +16,7 @@ module nocdyn_test_full_machines
   use nocdyn_table_couplings, only: new_table_couplings
   use nocdyn_table_excitations, only: new_table_excitations
   use nocdyn_table_loads, only: new_table_loads
-  use nocdyn_test_machines, only: append_bank, finish, numbered_names
+  use nocdyn_test_machines, only: finish, numbered_names
   use nocdyn_test_random_machines, only: random_machine
   use nocdyn_timed_excitations, only: new_timed_excitations, shape_pulse, shape_ramp, shape_step
   use nocdyn_torque_curves, only: induction_curve_t, quadratic_curve_t, table_curve_t
@@ -80,15 +81,19 @@ contains
     end do
     associate (one => numbers(1.0_wp, variants, 2), friction => numbers(4.0_wp, variants, 2), &
                friction_speed => numbers(0.5_wp, variants, 2))
-      call append_bank(machine, new_polynomial_couplings(numbered_names('polynomial', 2), [0, 1], [1, bodies], coefficient, one, &
-                                                         0.1_wp * one, friction, friction_speed))
-      call append_bank(machine, new_gap_couplings(numbered_names('gap', 2), [bodies, 0], [1, 2], coefficient, 4.0_wp * one, &
-                                                  0.1_wp * one, 0.3_wp * one))
-      call append_bank(machine, new_saturated_couplings(numbered_names('clutch', 2), [1, 2], [2, 0], 80.0_wp * one, 20.0_wp * one, &
-                                                        0.0_wp * one, 0.1_wp * one, friction, friction_speed))
-      call append_bank(machine, new_table_couplings(numbered_names('rubber', 2), [0, 1], [2, 2], &
-                                                    curves(twist, moment, interpolation_cubic, extrapolation_linear, variants, 2), &
-                                                    one, 0.1_wp * one))
+      call append_bank(machine%banks, &
+                       new_polynomial_couplings(numbered_names('polynomial', 2), [0, 1], [1, bodies], coefficient, one, &
+                                                0.1_wp * one, friction, friction_speed))
+      call append_bank(machine%banks, &
+                       new_gap_couplings(numbered_names('gap', 2), [bodies, 0], [1, 2], coefficient, 4.0_wp * one, &
+                                         0.1_wp * one, 0.3_wp * one))
+      call append_bank(machine%banks, &
+                       new_saturated_couplings(numbered_names('clutch', 2), [1, 2], [2, 0], 80.0_wp * one, 20.0_wp * one, &
+                                               0.0_wp * one, 0.1_wp * one, friction, friction_speed))
+      call append_bank(machine%banks, &
+                       new_table_couplings(numbered_names('rubber', 2), [0, 1], [2, 2], &
+                                           curves(twist, moment, interpolation_cubic, extrapolation_linear, variants, 2), &
+                                           one, 0.1_wp * one))
     end associate
   end subroutine add_couplings
 
@@ -113,14 +118,20 @@ contains
     allocate (governor%time, source=numbers(0.4_wp, variants, 1))
     allocate (governor%start, source=numbers(0.5_wp, variants, 1))
     associate (one => numbers(1.0_wp, variants, 1))
-      call append_bank(machine, new_curve_motors(numbered_names('induction', 1), [1], size(variants), induction))
-      call append_bank(machine, new_curve_motors(numbered_names('table', 1), [bodies], size(variants), table))
-      call append_bank(machine, new_governed_motors(numbered_names('governed', 1), [2], quadratic, governor, 2.0_wp * one))
-      call append_bank(machine, new_governed_motors(numbered_names('throttled', 1), [1], table, governor, 0.0_wp * one))
-      call append_bank(machine, new_dc_motors(numbered_names('dc', 1), [2], 24.0_wp * one, 2.0_wp * one, 1.5_wp * one, &
-                                              0.5_wp * one))
-      call append_bank(machine, new_dc_motors(numbered_names('drive', 1), [bodies], 24.0_wp * one, 2.0_wp * one, 1.5_wp * one, &
-                                              0.5_wp * one, governor))
+      call append_bank(machine%banks, &
+                       new_curve_motors(numbered_names('induction', 1), [1], size(variants), induction))
+      call append_bank(machine%banks, &
+                       new_curve_motors(numbered_names('table', 1), [bodies], size(variants), table))
+      call append_bank(machine%banks, &
+                       new_governed_motors(numbered_names('governed', 1), [2], quadratic, governor, 2.0_wp * one))
+      call append_bank(machine%banks, &
+                       new_governed_motors(numbered_names('throttled', 1), [1], table, governor, 0.0_wp * one))
+      call append_bank(machine%banks, &
+                       new_dc_motors(numbered_names('dc', 1), [2], 24.0_wp * one, 2.0_wp * one, 1.5_wp * one, &
+                                     0.5_wp * one))
+      call append_bank(machine%banks, &
+                       new_dc_motors(numbered_names('drive', 1), [bodies], 24.0_wp * one, 2.0_wp * one, 1.5_wp * one, &
+                                     0.5_wp * one, governor))
     end associate
   end subroutine add_motors
 
@@ -129,11 +140,13 @@ contains
     type(machine_t), intent(inout) :: machine
 
     associate (one => numbers(1.0_wp, variants, 2))
-      call append_bank(machine, new_nonlinear_loads(numbered_names('fan', 2), [1, bodies], one, 0.5_wp * one, &
-                                                    5.0_wp * one, 0.7_wp * one))
-      call append_bank(machine, new_table_loads(numbered_names('mill', 2), [2, 2], one, 0.5_wp * one, 0.0_wp * one, one, &
-                                                curves([-2.0_wp, 0.0_wp, 2.5_wp], [-10.0_wp, 0.0_wp, 30.0_wp], &
-                                                       interpolation_cubic, extrapolation_constant, variants, 2)))
+      call append_bank(machine%banks, &
+                       new_nonlinear_loads(numbered_names('fan', 2), [1, bodies], one, 0.5_wp * one, &
+                                           5.0_wp * one, 0.7_wp * one))
+      call append_bank(machine%banks, &
+                       new_table_loads(numbered_names('mill', 2), [2, 2], one, 0.5_wp * one, 0.0_wp * one, one, &
+                                       curves([-2.0_wp, 0.0_wp, 2.5_wp], [-10.0_wp, 0.0_wp, 30.0_wp], &
+                                              interpolation_cubic, extrapolation_constant, variants, 2)))
     end associate
   end subroutine add_loads
 
@@ -142,15 +155,18 @@ contains
     type(machine_t), intent(inout) :: machine
 
     associate (one => numbers(1.0_wp, variants, 3))
-      call append_bank(machine, new_wave_excitations(numbered_names('gas', 2), [1, bodies], [1, 1, 2], 9.0_wp * one, &
-                                                     spread([0.0_wp, 0.0_wp, 3.0_wp], 1, size(variants)), &
-                                                     spread([0.5_wp, 1.0_wp, -2.0_wp], 1, size(variants)), 0.4_wp * one))
-      call append_bank(machine, new_timed_excitations(numbered_names('impact', 3), [1, 2, bodies], &
-                                                      [shape_step, shape_ramp, shape_pulse], 12.0_wp * one, &
-                                                      0.35_wp * one, 0.2_wp * one))
-      call append_bank(machine, new_table_excitations(numbered_names('record', 1), [2], &
-                                                      curves([0.1_wp, 0.3_wp, 0.6_wp], [0.0_wp, 20.0_wp, -10.0_wp], &
-                                                             interpolation_linear, extrapolation_constant, variants, 1)))
+      call append_bank(machine%banks, &
+                       new_wave_excitations(numbered_names('gas', 2), [1, bodies], [1, 1, 2], 9.0_wp * one, &
+                                            spread([0.0_wp, 0.0_wp, 3.0_wp], 1, size(variants)), &
+                                            spread([0.5_wp, 1.0_wp, -2.0_wp], 1, size(variants)), 0.4_wp * one))
+      call append_bank(machine%banks, &
+                       new_timed_excitations(numbered_names('impact', 3), [1, 2, bodies], &
+                                             [shape_step, shape_ramp, shape_pulse], 12.0_wp * one, &
+                                             0.35_wp * one, 0.2_wp * one))
+      call append_bank(machine%banks, &
+                       new_table_excitations(numbered_names('record', 1), [2], &
+                                             curves([0.1_wp, 0.3_wp, 0.6_wp], [0.0_wp, 20.0_wp, -10.0_wp], &
+                                                    interpolation_linear, extrapolation_constant, variants, 1)))
     end associate
   end subroutine add_excitations
 

@@ -16,7 +16,7 @@ module nocdyn_test_machines
   private
 
   public :: paper_machine, damped_chain, long_chain, branched_train, gear_loop, bare_machine
-  public :: install, append_bank, gear_rows, numbered_names, finish, row
+  public :: install, gear_rows, numbered_names, finish, row
 
 contains
 
@@ -151,21 +151,6 @@ contains
       allocate (slot%bank, source=bank)
     end associate
   end subroutine install
-
-  !> Adds a bank behind the others.
-  subroutine append_bank(machine, bank)
-    type(machine_t), intent(inout) :: machine
-    class(bank_t), intent(in) :: bank
-    type(bank_slot_t), allocatable :: longer(:)
-    integer :: i
-
-    allocate (longer(size(machine%banks) + 1))
-    do i = 1, size(machine%banks)
-      call move_alloc(machine%banks(i)%bank, longer(i)%bank)
-    end do
-    allocate (longer(size(longer))%bank, source=bank)
-    call move_alloc(longer, machine%banks)
-  end subroutine append_bank
 
   !> Gears 'gear1', 'gear2' ... between two bodies each.
   function gear_rows(bodies, wheels, coefficients) result(constraints)
