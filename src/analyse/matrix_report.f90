@@ -73,8 +73,8 @@ contains
       end associate
     end do
     if (size(names) == 0) return
-    call equations%report%append_line('Laws that are not those of the paper: ' // joined(names, ', ') // '. Of these K has the ' // &
-                                      'elastic moment over the twist, K_4 its slope, C what is viscous, Q the rest of the ' // &
+    call equations%report%append_line('Laws that are not those of the paper: ' // joined(names, ', ') // &
+                                      '. Of these K has the elastic moment over the twist, K_4 its slope, C what is viscous, Q the rest of the ' // &
                                       'moment, all at this state; currents and governors are not in beta.')
   end subroutine report_other_laws
 
