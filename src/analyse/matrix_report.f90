@@ -74,9 +74,8 @@ contains
     end do
     if (size(names) == 0) return
     call equations%report%append_line('Laws that are not those of the paper: ' // joined(names, ', ') // '.')
-    call equations%report%append_line('Of these K has the elastic moment over the twist, K_4 its slope, C what is viscous, Q the ' // &
-                                      'rest of the moment, all at the start;')
-    call equations%report%append_line('currents and governors are not in beta.')
+    call equations%report%append_line('Of these K has the elastic moment over the twist, K_4 its slope, C what is viscous,')
+    call equations%report%append_line('Q the rest of the moment, all at the start; currents and governors are not in beta.')
   end subroutine report_other_laws
 
   !> Brings all elements of the machine to the start.
