@@ -16,6 +16,8 @@ module nocdyn_equilibrium
 
   public :: find_equilibria, judge_equilibria, nearest_equilibrium
 
+  real(wp), parameter, public :: late = 1.0e30_wp   !! when all that changes once has changed [s]
+
   integer, parameter :: most_combinations = 64   !! of the solutions of independent parts of a machine
   integer, parameter :: most_states = 1000       !! whose eigenvalues are found to state the stability, in some seconds
   integer, parameter :: most_names = 5           !! bodies that a message names
@@ -31,9 +33,8 @@ module nocdyn_equilibrium
 contains
 
   !> All steady states that were found of a machine. Its mean torques are those of `formulation`, which is made here.
-  subroutine find_equilibria(machine, t, formulation, equilibria, notes, error)
+  subroutine find_equilibria(machine, formulation, equilibria, notes, error)
     type(machine_t), intent(in) :: machine
-    real(wp), intent(in) :: t                                      !! where torques that depend on nothing are taken
     class(formulation_t), allocatable, intent(out) :: formulation
     type(equilibrium_t), allocatable, intent(out) :: equilibria(:)
     type(string_t), allocatable, intent(out) :: notes(:)
@@ -46,7 +47,7 @@ contains
     settled = machine
     call settled%settle()
     allocate (formulation, source=new_reduced(settled, .false.))
-    balance = new_torque_balance(formulation, t)
+    balance = new_torque_balance(formulation, late)
     call search_balance(balance, blocks)
     allocate (notes(0))
     do i = 1, size(blocks)
@@ -62,14 +63,13 @@ contains
   end subroutine find_equilibria
 
   !> States the stability of every steady state.
-  subroutine judge_equilibria(formulation, t, equilibria)
+  subroutine judge_equilibria(formulation, equilibria)
     class(formulation_t), intent(inout) :: formulation
-    real(wp), intent(in) :: t
     type(equilibrium_t), intent(inout) :: equilibria(:)
     integer :: i
 
     do i = 1, size(equilibria)
-      call judge(formulation, t, equilibria(i))
+      call judge(formulation, equilibria(i))
     end do
   end subroutine judge_equilibria
 
@@ -138,9 +138,8 @@ contains
   end subroutine complete
 
   !> States the stability by the eigenvalues of the linearisation, where there are not too many.
-  subroutine judge(formulation, t, equilibrium)
+  subroutine judge(formulation, equilibrium)
     class(formulation_t), intent(inout) :: formulation
-    real(wp), intent(in) :: t
     type(equilibrium_t), intent(inout) :: equilibrium
     real(wp), parameter :: rounding = 1.0e-10_wp   ! of the largest eigenvalue
     type(linearisation_t) :: linear
@@ -150,7 +149,7 @@ contains
 
     equilibrium%stability = 'not determined'
     if (formulation%states > most_states) return
-    call linearise(formulation, t, equilibrium%y, linear, error)
+    call linearise(formulation, late, equilibrium%y, linear, error)
     if (allocated(error)) return
     allocate (values(size(linear%matrix, 1)), vectors(size(linear%matrix, 1), size(linear%matrix, 1)))
     call eigenvectors(linear%matrix, values, vectors, has_failed)

@@ -2,7 +2,7 @@
 module nocdyn_equilibrium_report
   use nocdyn_bank, only: role_coupling
   use nocdyn_energy_account, only: worker_names
-  use nocdyn_equilibrium, only: equilibrium_t
+  use nocdyn_equilibrium, only: equilibrium_t, late
   use nocdyn_formulation, only: formulation_t
   use nocdyn_input, only: group_t, input_t
   use nocdyn_json, only: json_t
@@ -37,9 +37,8 @@ module nocdyn_equilibrium_report
 contains
 
   !> Evaluates the columns of trajectory.csv at the steady states.
-  function new_equilibrium_report(formulation, t, equilibria, notes) result(self)
+  function new_equilibrium_report(formulation, equilibria, notes) result(self)
     class(formulation_t), intent(in) :: formulation
-    real(wp), intent(in) :: t
     type(equilibrium_t), intent(in) :: equilibria(:)
     type(string_t), intent(in) :: notes(:)
     type(equilibrium_report_t) :: self
@@ -51,7 +50,7 @@ contains
     allocate (self%equilibria, source=equilibria)
     allocate (self%notes, source=notes)
     allocate (self%coordinates, source=coordinate_names(formulation%machine))
-    table = new_trajectory_table(new_reduced(formulation%machine, .true.), t)
+    table = new_trajectory_table(new_reduced(formulation%machine, .true.), late)
     told = steady_columns(table, formulation%machine)
     allocate (self%labels, source=selected(table%labels, told))
     allocate (self%workers, source=worker_names(formulation%machine))
@@ -59,7 +58,7 @@ contains
     allocate (row(size(table%labels)), watts(1, size(self%workers)))
     do k = 1, size(equilibria)
       y = [equilibria(k)%y(1, :), (0.0_wp, i=1, size(self%workers))]
-      call table%fill(t, y, row)
+      call table%fill(late, y, row)
       call table%formulation%machine%power(watts)
       self%values(:, k) = row(told)
       self%power(:, k) = watts(1, :)

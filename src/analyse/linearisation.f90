@@ -50,6 +50,7 @@ contains
     pattern = formulation%jacobian_pattern()
     allocate (slopes(1, size(pattern%row)))
     status = 0
+    call formulation%enter(1, t, y(1, :))
     call formulation%jacobian([t], y, slopes, dfdt, status)
     incidence = new_element_coordinates(formulation%machine%elements, formulation%machine%coordinates)
     associate (elements => formulation%machine%elements)

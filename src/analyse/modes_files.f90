@@ -1,5 +1,6 @@
 !> The modes of a machine as a program reads them: modes.csv and modes.json.
 module nocdyn_modes_files
+  use nocdyn_equilibrium, only: late
   use nocdyn_input, only: group_t, input_t
   use nocdyn_json, only: json_t
   use nocdyn_kinds, only: wp
@@ -106,7 +107,7 @@ contains
     about = input%single('case')
     call json%put('title', about%text('title'))
     call json%put('about', self%point)
-    call json%put('time_s', self%t)
+    if (self%t < late) call json%put('time_s', self%t)
     call json%put('notes', self%notes)
     call put_train(json, self)
     call json%open_list('modes')

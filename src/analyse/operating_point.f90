@@ -1,6 +1,6 @@
 !> The state about which a machine is linearised.
 module nocdyn_operating_point
-  use nocdyn_equilibrium, only: equilibrium_t, find_equilibria, judge_equilibria, nearest_equilibrium
+  use nocdyn_equilibrium, only: equilibrium_t, find_equilibria, judge_equilibria, late, nearest_equilibrium
   use nocdyn_errors, only: error_t, exit_input, raise
   use nocdyn_formulation, only: formulation_t
   use nocdyn_input, only: group_t, input_t
@@ -67,10 +67,11 @@ contains
     type(equilibrium_t), allocatable :: equilibria(:)
     integer :: nearest
 
-    call find_equilibria(machine, point%t, point%formulation, equilibria, point%notes, error)
+    call find_equilibria(machine, point%formulation, equilibria, point%notes, error)
     if (allocated(error)) return
-    if (size(equilibria) > 1) call judge_equilibria(point%formulation, point%t, equilibria)
+    if (size(equilibria) > 1) call judge_equilibria(point%formulation, equilibria)
     nearest = nearest_equilibrium(point%formulation, equilibria)
+    point%t = late
     point%y = equilibria(nearest)%y
     point%text = 'the steady state'
     if (size(equilibria) == 1) return
@@ -91,6 +92,7 @@ contains
     allocate (point%formulation, source=new_reduced(settled, .false.))
     point%y = point%formulation%start()
     point%y(1, :settled%coordinates%freedoms) = 0.0_wp
+    point%t = late
     point%text = 'rest'
   end subroutine take_rest
 

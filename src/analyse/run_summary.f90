@@ -5,7 +5,7 @@ module nocdyn_run_summary
   use nocdyn_json, only: json_t
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
-  use nocdyn_machine_report, only: coordinate_names
+  use nocdyn_machine_report, only: coordinate_names, number_of
   use nocdyn_outcome, only: most_switches, outcome_t
   use nocdyn_system, only: ranges_t
   use nocdyn_text, only: append, rounded_text, string_t
@@ -145,7 +145,8 @@ contains
 
     call json%open('machine')
     call json%put('bodies', machine%bodies)
-    call json%put('gears', machine%constraints%rows())
+    call json%put('gears', number_of(machine, 'gear'))
+    call json%put('constraints', machine%constraints%rows())
     call json%put('degrees_of_freedom', machine%coordinates%freedoms)
     call json%put('independent', coordinate_names(machine))
     call json%put('notes', summary%notes)

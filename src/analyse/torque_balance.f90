@@ -206,6 +206,7 @@ contains
   subroutine evaluate_state(self)
     class(torque_balance_t), intent(inout) :: self
 
+    call self%formulation%enter(1, self%t(1), self%y(1, :))
     call self%formulation%derivative(self%t, self%y, self%rate, self%status)
   end subroutine evaluate_state
 

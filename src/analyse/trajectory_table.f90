@@ -1,6 +1,7 @@
 !> The columns of trajectory.csv: labels, and the values of a machine at a time and state.
 module nocdyn_trajectory_table
   use nocdyn_bank, only: quantity_t
+  use nocdyn_constraints, only: constraints_t
   use nocdyn_energy_account, only: energy_account_t, worker_names
   use nocdyn_formulation, only: formulation_t
   use nocdyn_kinds, only: wp
@@ -23,6 +24,7 @@ module nocdyn_trajectory_table
     real(wp), private :: t(1) = 0.0_wp
     real(wp), allocatable, private :: y(:, :)      !! [1, states + quadratures]
     real(wp), allocatable, private :: values(:)    !! of one quantity of a bank, work space
+    real(wp), allocatable, private :: lambda(:)    !! multipliers, work space, [rows]
     logical, allocatable, private :: is_source(:)  !! whether a work counts as put in, [quadratures]
     real(wp), private :: start_energy = 0.0_wp
     real(wp), private :: start_kinetic = 0.0_wp
@@ -52,6 +54,7 @@ contains
       allocate (table%values(maxval([(size(banks(i)%bank%to), i=1, size(banks))])))
       table%is_source = [(spread(banks(i)%bank%is_source(), 1, size(banks(i)%bank%accounted)), i=1, size(banks))]
     end associate
+    allocate (table%lambda(formulation%machine%constraints%rows()))
     table%labels = column_labels(formulation%machine, table%columns)
     table%y = formulation%start()
     call table%formulation%observe([t_start], table%y)
@@ -77,10 +80,7 @@ contains
     do i = 1, size(columns)
       call label_bank(machine%banks(i)%bank%names, columns(i)%quantities, labels, next)
     end do
-    do i = 1, machine%constraints%rows()
-      labels(next)%text = 'reaction_' // machine%constraints%names(i)%text // ' [' // machine%constraints%units(i)%text // ']'
-      next = next + 1
-    end do
+    call label_reactions(machine%constraints, labels, next)
     labels(next:) = strings([character(len=19) :: 'kinetic_energy [J]', 'elastic_energy [J]', 'work_in [J]', &
                              'work_out [J]', 'energy_residual [J]'])
   end function column_labels
@@ -101,12 +101,32 @@ contains
     end do
   end subroutine label_bank
 
+  !> Each row's multiplier, then the torques on those of its members that have a column.
+  subroutine label_reactions(constraints, labels, next)
+    type(constraints_t), intent(in) :: constraints
+    type(string_t), intent(inout) :: labels(:)
+    integer, intent(inout) :: next
+    integer :: member, row
+
+    member = 1
+    do row = 1, constraints%rows()
+      labels(next)%text = 'reaction_' // constraints%names(row)%text // ' [' // constraints%units(row)%text // ']'
+      next = next + 1
+      do while (member <= size(constraints%members%row))
+        if (constraints%members%row(member) /= row) exit
+        labels(next)%text = 'reaction_' // constraints%names(row)%text // '_' // constraints%members%names(member)%text // ' [N m]'
+        next = next + 1
+        member = member + 1
+      end do
+    end do
+  end subroutine label_reactions
+
   pure integer function column_count(machine, columns)
     type(machine_t), intent(in) :: machine
     type(bank_columns_t), intent(in) :: columns(:)
     integer :: i, q
 
-    column_count = 1 + 2 * machine%bodies + machine%constraints%rows() + 5
+    column_count = 1 + 2 * machine%bodies + machine%constraints%rows() + size(machine%constraints%members%row) + 5
     do i = 1, size(columns)
       do q = 1, size(columns(i)%quantities)
         column_count = column_count + size(columns(i)%quantities(q)%elements)
@@ -145,10 +165,32 @@ contains
           end associate
         end do
       end do
-      call self%formulation%reactions(1, row(next:next + machine%constraints%rows() - 1))
+      call self%formulation%reactions(1, self%lambda)
+      call fill_reactions(machine%constraints, self%lambda, row(next:size(row) - 5))
       call self%audit(row(size(row) - 4:))
     end associate
   end subroutine fill
+
+  !> Multipliers and torques on members, in the order of `label_reactions`.
+  pure subroutine fill_reactions(constraints, lambda, values)
+    type(constraints_t), intent(in) :: constraints
+    real(wp), intent(in) :: lambda(:)
+    real(wp), intent(out) :: values(:)
+    integer :: member, next, row
+
+    member = 1
+    next = 1
+    do row = 1, size(lambda)
+      values(next) = lambda(row)
+      next = next + 1
+      do while (member <= size(constraints%members%row))
+        if (constraints%members%row(member) /= row) exit
+        values(next) = constraints%members%factor(1, member) * lambda(row)
+        next = next + 1
+        member = member + 1
+      end do
+    end do
+  end subroutine fill_reactions
 
   !> Kinetic and elastic energy, work put in, work taken out, and what does not add up.
   subroutine audit(self, energies)

@@ -11,7 +11,7 @@ module nocdyn_transient
   use nocdyn_integration_settings, only: integration_settings_t
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
-  use nocdyn_machine_report, only: redundancy_notes
+  use nocdyn_machine_report, only: machine_notes
   use nocdyn_outcome, only: failure_sentence, integration_done, integration_interrupted, outcome_t
   use nocdyn_output_file, only: output_file_t
   use nocdyn_output_times, only: check_output_times, output_times
@@ -116,7 +116,7 @@ contains
     recorder%t_end = times(size(times))
     recorder%progress => progress
     recorder%summary%labels = recorder%table%labels
-    recorder%summary%notes = redundancy_notes(formulation%machine)
+    recorder%summary%notes = machine_notes(formulation%machine)
     allocate (recorder%row(size(recorder%table%labels)))
     allocate (recorder%last_state(formulation%states + formulation%quadratures), source=0.0_wp)
     recorder%tracked = size(recorder%row)

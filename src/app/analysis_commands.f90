@@ -7,7 +7,7 @@ module nocdyn_analysis_commands
   use nocdyn_equilibrium_report, only: equilibrium_json, equilibrium_report_t, equilibrium_text, new_equilibrium_report
   use nocdyn_errors, only: error_t, exit_done, exit_failed
   use nocdyn_formulation, only: formulation_t
-  use nocdyn_input, only: group_t, input_t
+  use nocdyn_input, only: input_t
   use nocdyn_input_reader, only: read_input
   use nocdyn_machine, only: machine_t
   use nocdyn_modes_files, only: modes_csv, modes_json
@@ -105,7 +105,6 @@ contains
     type(error_t), allocatable, intent(out) :: error
     type(input_t) :: input
     type(machine_t) :: machine
-    type(group_t) :: run
     class(formulation_t), allocatable :: formulation
     type(equilibrium_t), allocatable :: equilibria(:)
     type(equilibrium_report_t) :: report
@@ -113,18 +112,13 @@ contains
 
     call read_machine(arguments, number, input, machine, error)
     if (allocated(error)) return
-    run = input%single('run')
-    associate (t_start => run%number('t_start'))
-      call find_equilibria(machine, t_start, formulation, equilibria, notes, error)
-      if (.not. allocated(error)) then
-        call judge_equilibria(formulation, t_start, equilibria)
-        report = new_equilibrium_report(formulation, t_start, equilibria, notes)
-      end if
-    end associate
+    call find_equilibria(machine, formulation, equilibria, notes, error)
     if (allocated(error)) then
       if (error%code == exit_failed) error%message = input%file // ': ' // error%message
       return
     end if
+    call judge_equilibria(formulation, equilibria)
+    report = new_equilibrium_report(formulation, equilibria, notes)
     call say(equilibrium_text(input%file, report))
     if (folder /= '') call write_whole(folder, 'equilibrium.json', equilibrium_json(input, report), error)
   end subroutine analyse_equilibrium

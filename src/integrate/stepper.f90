@@ -18,6 +18,7 @@ module nocdyn_stepper
     procedure(attempt_interface), deferred :: attempt
     procedure(interpolate_interface), deferred :: interpolate
     procedure(accept_interface), deferred :: accept
+    procedure :: resume
   end type stepper_t
 
   abstract interface
@@ -64,5 +65,16 @@ module nocdyn_stepper
     end subroutine accept_interface
 
   end interface
+
+contains
+
+  !> Takes over trial%slope = f(t, y) of lanes whose equations have changed where they are, after `accept`.
+  subroutine resume(self, trial, resuming)
+    class(stepper_t), intent(inout) :: self
+    type(trial_t), intent(inout) :: trial
+    logical, intent(in) :: resuming(:)
+
+    call self%begin(trial, resuming)
+  end subroutine resume
 
 end module nocdyn_stepper

@@ -15,6 +15,8 @@ module nocdyn_element_coordinates
     integer, allocatable :: coordinate(:)      !! [entries]
     real(wp), allocatable :: ratio(:, :)       !! row of L_tau of `to` minus that of `from`, [lanes, entries]
     real(wp), allocatable :: response(:, :)    !! the same difference of ((L_tau^T J L_tau)^-1 L_tau^T)^T, [lanes, entries]
+  contains
+    procedure :: selected
   end type element_coordinates_t
 
 contains
@@ -45,6 +47,25 @@ contains
     self%ratio = self%ratio(:, :entries)
     self%response = self%response(:, :entries)
   end function new_element_coordinates
+
+  !> Those of some elements, in the given order.
+  function selected(self, elements) result(some)
+    class(element_coordinates_t), intent(in) :: self
+    integer, intent(in) :: elements(:)
+    type(element_coordinates_t) :: some
+    integer, allocatable :: entry(:)
+    integer :: i, k
+
+    allocate (some%first(size(elements) + 1))
+    some%first(1) = 1
+    do i = 1, size(elements)
+      some%first(i + 1) = some%first(i) + self%first(elements(i) + 1) - self%first(elements(i))
+    end do
+    entry = [([(k, k=self%first(elements(i)), self%first(elements(i) + 1) - 1)], i=1, size(elements))]
+    some%coordinate = self%coordinate(entry)
+    some%ratio = self%ratio(:, entry)
+    some%response = self%response(:, entry)
+  end function selected
 
   pure integer function body_entries(coordinates, body)
     type(coordinates_t), intent(in) :: coordinates

@@ -102,6 +102,7 @@ contains
     class(excitations_t), intent(inout) :: self
 
     self%amplitude = 0.0_wp
+    self%frequency = 0.0_wp
   end subroutine settle
 
 end module nocdyn_excitations

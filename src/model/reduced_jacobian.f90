@@ -31,10 +31,11 @@ module nocdyn_reduced_jacobian
 
 contains
 
-  function new_reduced_jacobian(freedoms, incidence, accounted) result(self)
+  function new_reduced_jacobian(freedoms, incidence, accounted, inner) result(self)
     integer, intent(in) :: freedoms
     type(element_coordinates_t), intent(in) :: incidence
     integer, intent(in) :: accounted(:)   !! elements whose works follow the states
+    integer, intent(in) :: inner          !! states between those of the coordinates and the works
     type(reduced_jacobian_t) :: self
     integer, allocatable :: row(:), column(:)
     integer :: c, e
@@ -49,7 +50,7 @@ contains
     column = column(:self%pairs)
     self%pattern%row = [row, row, [(freedoms + c, c=1, freedoms)]]
     self%pattern%column = [column, freedoms + column, [(c, c=1, freedoms)]]
-    call append_works(freedoms, incidence, accounted, self)
+    call append_works(freedoms, incidence, accounted, 2 * freedoms + inner, self)
     self%worker = [(spread(accounted(e), 1, incidence%first(accounted(e) + 1) - incidence%first(accounted(e))), &
                     e=1, size(accounted))]
   end function new_reduced_jacobian
@@ -94,10 +95,11 @@ contains
   end subroutine form_products
 
   !> The positions of the works' rows: two for each entry of an accounted element.
-  subroutine append_works(freedoms, incidence, accounted, self)
+  subroutine append_works(freedoms, incidence, accounted, states, self)
     integer, intent(in) :: freedoms
     type(element_coordinates_t), intent(in) :: incidence
     integer, intent(in) :: accounted(:)
+    integer, intent(in) :: states
     type(reduced_jacobian_t), intent(inout) :: self
     integer, allocatable :: row(:), column(:), entry(:)
     integer :: i, k, n
@@ -112,7 +114,7 @@ contains
       do i = incidence%first(accounted(k)), incidence%first(accounted(k) + 1) - 1
         n = n + 1
         entry(n) = i
-        row(2 * n - 1:2 * n) = 2 * freedoms + k
+        row(2 * n - 1:2 * n) = states + k
         column(2 * n - 1) = incidence%coordinate(i)
         column(2 * n) = freedoms + incidence%coordinate(i)
       end do

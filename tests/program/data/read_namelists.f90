@@ -5,6 +5,7 @@ program read_namelists
 
   integer, parameter :: wp = real64
   integer, parameter :: most_bodies = 8       ! in a list
+  integer, parameter :: most_numbers = 16     ! in a list
   real(wp), parameter :: not_given = -huge(1.0_wp)
   character(len=256) :: file
   integer :: unit
@@ -53,22 +54,34 @@ contains
   end subroutine read_bodies
 
   subroutine read_couplings()
-    character(len=64) :: name, bodies(2)
-    real(wp) :: stiffness, cubic_stiffness, damping, rest_twist
+    character(len=64) :: name, bodies(2), interpolation, extrapolation
+    real(wp) :: stiffness, cubic_stiffness, damping, rest_twist, gap, saturation, friction, friction_speed
+    real(wp), dimension(most_numbers) :: polynomial, table_twist, table_moment
     integer :: status
-    namelist /coupling/ name, bodies, stiffness, cubic_stiffness, damping, rest_twist
+    namelist /coupling/ name, bodies, stiffness, cubic_stiffness, polynomial, damping, rest_twist, gap, saturation, friction, &
+      friction_speed, table_twist, table_moment, interpolation, extrapolation
 
     rewind (unit)
     do
       stiffness = 0.0_wp
       cubic_stiffness = 0.0_wp
+      polynomial = not_given
       damping = 0.0_wp
       rest_twist = 0.0_wp
+      gap = 0.0_wp
+      saturation = not_given
+      friction = 0.0_wp
+      friction_speed = 0.01_wp
+      table_twist = not_given
+      table_moment = not_given
+      interpolation = 'linear'
+      extrapolation = 'linear'
       read (unit, nml=coupling, iostat=status)
       if (is_iostat_end(status)) exit
       if (status /= 0) error stop 'coupling'
-      print '(*(g0, 1x))', 'coupling', trim(name), trim(bodies(1)), trim(bodies(2)), stiffness, cubic_stiffness, damping, &
-        rest_twist
+      print '(*(g0, 1x))', 'coupling', trim(name), trim(bodies(1)), trim(bodies(2)), stiffness, cubic_stiffness, polynomial, &
+        damping, rest_twist, gap, saturation, friction, friction_speed, table_twist, table_moment, trim(interpolation), &
+        trim(extrapolation)
     end do
   end subroutine read_couplings
 
@@ -92,49 +105,100 @@ contains
   end subroutine read_gears
 
   subroutine read_motors()
-    character(len=64) :: name, body
-    real(wp) :: a, b, c
+    character(len=64) :: name, body, kind, interpolation, extrapolation
+    real(wp) :: a, b, c, torque, breakdown_torque, breakdown_slip, synchronous_speed, voltage, resistance, flux_constant
+    real(wp) :: inductance, governor_speed, governor_gain, governor_time, governor_start
+    real(wp), dimension(most_numbers) :: table_speed, table_torque
     integer :: status
-    namelist /motor/ name, body, a, b, c
+    namelist /motor/ name, body, kind, a, b, c, torque, table_speed, table_torque, interpolation, extrapolation, &
+      breakdown_torque, breakdown_slip, synchronous_speed, voltage, resistance, flux_constant, inductance, governor_speed, &
+      governor_gain, governor_time, governor_start
 
     rewind (unit)
     do
+      kind = 'quadratic'
+      interpolation = 'linear'
+      extrapolation = 'linear'
+      a = not_given
+      b = not_given
+      c = not_given
+      torque = not_given
+      breakdown_torque = not_given
+      breakdown_slip = not_given
+      synchronous_speed = not_given
+      voltage = not_given
+      resistance = not_given
+      flux_constant = not_given
+      inductance = 0.0_wp
+      governor_speed = not_given
+      governor_gain = not_given
+      governor_time = not_given
+      governor_start = 1.0_wp
+      table_speed = not_given
+      table_torque = not_given
       read (unit, nml=motor, iostat=status)
       if (is_iostat_end(status)) exit
       if (status /= 0) error stop 'motor'
-      print '(*(g0, 1x))', 'motor', trim(name), trim(body), a, b, c
+      print '(*(g0, 1x))', 'motor', trim(name), trim(body), trim(kind), a, b, c, torque, table_speed, table_torque, &
+        trim(interpolation), trim(extrapolation), breakdown_torque, breakdown_slip, synchronous_speed, voltage, resistance, &
+        flux_constant, inductance, governor_speed, governor_gain, governor_time, governor_start
     end do
   end subroutine read_motors
 
   subroutine read_loads()
-    character(len=64) :: name, body
-    real(wp) :: viscous
+    character(len=64) :: name, body, interpolation, extrapolation
+    real(wp) :: viscous, quadratic, constant, constant_speed
+    real(wp), dimension(most_numbers) :: table_speed, table_torque
     integer :: status
-    namelist /load/ name, body, viscous
+    namelist /load/ name, body, viscous, quadratic, constant, constant_speed, table_speed, table_torque, interpolation, &
+      extrapolation
 
     rewind (unit)
     do
       viscous = 0.0_wp
+      quadratic = 0.0_wp
+      constant = 0.0_wp
+      constant_speed = 0.01_wp
+      table_speed = not_given
+      table_torque = not_given
+      interpolation = 'linear'
+      extrapolation = 'linear'
       read (unit, nml=load, iostat=status)
       if (is_iostat_end(status)) exit
       if (status /= 0) error stop 'load'
-      print '(*(g0, 1x))', 'load', trim(name), trim(body), viscous
+      print '(*(g0, 1x))', 'load', trim(name), trim(body), viscous, quadratic, constant, constant_speed, table_speed, &
+        table_torque, trim(interpolation), trim(extrapolation)
     end do
   end subroutine read_loads
 
   subroutine read_excitations()
-    character(len=64) :: name, body
-    real(wp) :: amplitude, frequency, phase
-    integer :: status
-    namelist /excitation/ name, body, amplitude, frequency, phase
+    character(len=64) :: name, body, kind, interpolation
+    real(wp) :: amplitude, frequency, phase, time, duration
+    real(wp), dimension(most_numbers) :: orders, amplitudes, phases, table_time, table_torque
+    integer :: pole_pairs, status
+    namelist /excitation/ name, body, kind, amplitude, frequency, phase, orders, amplitudes, phases, table_time, &
+      table_torque, interpolation, time, duration, pole_pairs
 
     rewind (unit)
     do
+      kind = 'harmonic'
+      amplitude = not_given
+      frequency = not_given
       phase = 0.0_wp
+      orders = not_given
+      amplitudes = not_given
+      phases = 0.0_wp
+      table_time = not_given
+      table_torque = not_given
+      interpolation = 'linear'
+      time = not_given
+      duration = not_given
+      pole_pairs = 0
       read (unit, nml=excitation, iostat=status)
       if (is_iostat_end(status)) exit
       if (status /= 0) error stop 'excitation'
-      print '(*(g0, 1x))', 'excitation', trim(name), trim(body), amplitude, frequency, phase
+      print '(*(g0, 1x))', 'excitation', trim(name), trim(body), trim(kind), amplitude, frequency, phase, orders, amplitudes, &
+        phases, table_time, table_torque, trim(interpolation), time, duration, pole_pairs
     end do
   end subroutine read_excitations
 
