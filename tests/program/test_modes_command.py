@@ -135,6 +135,44 @@ def test_the_run_up_of_a_machine_is_its_rigid_body_mode(nocdyn):
     assert rigid["kinetic_share"] == pytest.approx([0.5 / 1.05, 0.3 / 1.05, 0.25 / 1.05], rel=1e-2)
 
 
+def test_the_current_of_a_dc_motor_is_a_state_more(nocdyn):
+    text = """\
+&body name = 'rotor' inertia = 2.0 /
+&motor name = 'drive' body = 'rotor' kind = 'dc' voltage = 100.0 resistance = 0.5 flux_constant = 1.2 inductance = 0.1 /
+&load name = 'air' body = 'rotor' viscous = 0.4 /
+&run t_end = 1.0 /
+"""
+    content = modes_of(nocdyn, text)
+    # J w' = k i - c w, L i' = U - R i - k w
+    trace, determinant = -(0.4 / 2 + 0.5 / 0.1), (0.4 * 0.5 + 1.2**2) / (2 * 0.1)
+    (mode,) = content["modes"]
+    assert mode["eigenvalue_1_s"] == pytest.approx([trace / 2, sqrt(determinant - trace**2 / 4)], rel=EXACT)
+
+
+def test_a_wind_turbine_train_swings_as_its_planetary_set_couples_it(nocdyn):
+    text = """\
+&body name = 'rotor' inertia = 5000.0 /
+&body name = 'carrier' inertia = 0.001 /
+&body name = 'sun' inertia = 1e-6 /
+&body name = 'generator' inertia = 60.0 /
+&coupling name = 'main' bodies = 'rotor', 'carrier' stiffness = 1e7 /
+&coupling name = 'high' bodies = 'sun', 'generator' stiffness = 1e5 /
+&planetary name = 'set' sun = 'sun' ring = 'ground' carrier = 'carrier' teeth = 20, 80 /
+&run t_end = 1.0 /
+"""
+    # the sun turns five times as fast: two masses and two springs in series, seen from the generator
+    stiffness = 1 / (25 / 1e7 + 1 / 1e5)
+    lowest = sqrt(stiffness * (25 / 5000 + 1 / 60)) / (2 * pi)
+    assert oscillations(modes_of(nocdyn, text))[0] == pytest.approx(lowest, rel=1e-5)  # the light bodies count little
+
+
+def test_a_gap_that_is_open_has_no_stiffness_and_a_closed_one_has(nocdyn):
+    gap = TWO_ROTORS.replace("stiffness", "gap = 0.1 stiffness")
+    assert oscillations(modes_of(nocdyn, gap, "--at", "rest")) == []
+    closed = gap.replace("inertia = 8.3", "inertia = 8.3 angle = 0.06")
+    assert oscillations(modes_of(nocdyn, closed, "--at", "rest")) == [pytest.approx(TWO_ROTORS_FREQUENCY, abs=1e-9)]
+
+
 def test_unstable_modes_are_told(nocdyn):
     rising = TRAIN.replace("a = 30.0 b = 0.0", "a = 0.0 b = -2.0").replace("viscous = 0.8", "viscous = 0.0")
     content = modes_of(nocdyn, rising, "--at", "rest")
