@@ -106,7 +106,7 @@ contains
 
     do part = 1, parts - 1
       do function = 1, size(switching%g)
-        if (any(sign_of(switching%watched%values(function, part - 1:part + 1)) <= 0)) cycle
+        if (.not. may_dip(switching%watched%values(function, part - 1:part + 1))) cycle
         call find_dip(switching%watched, system, observer, dense, function, part, bracket, found)
         if (.not. found) cycle
         call find_root(switching%watched, system, observer, dense, bracket, root)
@@ -114,6 +114,14 @@ contains
       end do
     end do
   end subroutine find_short_falls
+
+  !> Whether the parabola through three equidistant positive values has its minimum between them.
+  pure logical function may_dip(g)
+    real(wp), intent(in) :: g(3)
+
+    may_dip = all(sign_of(g) > 0)
+    if (may_dip) may_dip = abs(g(3) - g(1)) < 2 * ((g(3) - g(2)) - (g(2) - g(1)))
+  end function may_dip
 
   pure subroutine keep_first(switching, lane, function, root, theta)
     type(switching_t), intent(inout) :: switching

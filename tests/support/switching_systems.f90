@@ -1,7 +1,7 @@
 !> Systems that change their branches, with solutions in closed form: an oscillator with play, switches at given times, a relay.
 module nocdyn_switching_systems
   use nocdyn_kinds, only: wp
-  use nocdyn_system, only: system_t
+  use nocdyn_system, only: evaluation_give_up, system_t
   use nocdyn_text, only: to_text
   implicit none (type, external)
   private
@@ -26,6 +26,7 @@ module nocdyn_switching_systems
   type, extends(system_t), public :: clock_t
     real(wp), allocatable :: time(:, :)       !! [switches, lanes]
     real(wp) :: rate = 0.0_wp
+    integer :: refused = huge(1)              !! so many passed times, and the slope cannot be evaluated
     logical, allocatable :: passed(:, :)
     integer, allocatable :: calls(:)          !! of `cross`, by the switches
   contains
@@ -198,6 +199,7 @@ contains
     integer, intent(inout) :: status(self%lanes)
 
     dydt(:, 1) = count(self%passed, dim=1) - self%rate * y(:, 1)
+    where (count(self%passed, dim=1) >= self%refused) status = evaluation_give_up
   end subroutine clock_derivative
 
   subroutine clock_jacobian(self, t, y, dfdy, dfdt, status)
