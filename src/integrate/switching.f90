@@ -106,7 +106,9 @@ contains
 
     do part = 1, parts - 1
       do function = 1, size(switching%g)
-        if (.not. may_dip(switching%watched%values(function, part - 1:part + 1))) cycle
+        associate (g => switching%watched%values)
+          if (.not. may_dip(g(function, part - 1), g(function, part), g(function, part + 1))) cycle
+        end associate
         call find_dip(switching%watched, system, observer, dense, function, part, bracket, found)
         if (.not. found) cycle
         call find_root(switching%watched, system, observer, dense, bracket, root)
@@ -116,11 +118,11 @@ contains
   end subroutine find_short_falls
 
   !> Whether the parabola through three equidistant positive values has its minimum between them.
-  pure logical function may_dip(g)
-    real(wp), intent(in) :: g(3)
+  pure logical function may_dip(before, middle, after)
+    real(wp), intent(in) :: before, middle, after
 
-    may_dip = all(sign_of(g) > 0)
-    if (may_dip) may_dip = abs(g(3) - g(1)) < 2 * ((g(3) - g(2)) - (g(2) - g(1)))
+    may_dip = min(sign_of(before), sign_of(middle), sign_of(after)) > 0
+    if (may_dip) may_dip = abs(after - before) < 2 * ((after - middle) - (middle - before))
   end function may_dip
 
   pure subroutine keep_first(switching, lane, function, root, theta)
