@@ -10,7 +10,7 @@ module nocdyn_matrix_report
                                    damping_matrix, elastic_moments, elastic_rates, inertia_2, inertia_3, inertia_matrix, &
                                    stacked_2, stacked_3, stiffness_2, stiffness_3, stiffness_matrix, tangent_matrix, &
                                    torque_2, torque_3, torque_vector, unit_matrix, zero_matrix
-  use nocdyn_text, only: append, joined, quoted, rounded_text, string_t, to_text
+  use nocdyn_text, only: append, joined, rounded_text, string_t, to_text
   use nocdyn_text_buffer, only: text_buffer_t
   implicit none (type, external)
   private
@@ -61,22 +61,34 @@ contains
   subroutine report_other_laws(equations)
     type(equations_t), intent(inout) :: equations
     type(string_t), allocatable :: names(:)
-    integer :: e, i
+    integer :: i, role
 
-    allocate (names(0))
-    do i = 1, size(equations%machine%banks)
-      associate (bank => equations%machine%banks(i)%bank)
-        if (bank%is_of_paper) cycle
-        do e = 1, size(bank%names)
-          call append(names, trim(role_names(bank%role)) // ' ' // quoted(bank%names(e)%text))
-        end do
-      end associate
+    if (all([(equations%machine%banks(i)%bank%is_of_paper, i=1, size(equations%machine%banks))])) return
+    do role = 1, size(role_names)
+      call collect_other_laws(equations%machine, role, names)
+      if (size(names) == 0) cycle
+      call equations%report%append_line('Not by the laws of the paper: ' // trim(role_names(role)) // ' ' // joined(names, ', '))
     end do
-    if (size(names) == 0) return
-    call equations%report%append_line('Laws that are not those of the paper: ' // joined(names, ', ') // '.')
     call equations%report%append_line('Of these K has the elastic moment over the twist, K_4 its slope, C what is viscous,')
     call equations%report%append_line('Q the rest of the moment, all at the start; currents and governors are not in beta.')
   end subroutine report_other_laws
+
+  subroutine collect_other_laws(machine, role, names)
+    type(machine_t), intent(in) :: machine
+    integer, intent(in) :: role
+    type(string_t), allocatable, intent(out) :: names(:)
+    integer :: e, i
+
+    allocate (names(0))
+    do i = 1, size(machine%banks)
+      associate (bank => machine%banks(i)%bank)
+        if (bank%is_of_paper .or. bank%role /= role) cycle
+        do e = 1, size(bank%names)
+          call append(names, bank%names(e)%text)
+        end do
+      end associate
+    end do
+  end subroutine collect_other_laws
 
   !> Brings all elements of the machine to the start.
   subroutine place(machine, t_start)

@@ -51,7 +51,10 @@ contains
     call find_fall(march%switching, system, observer, march%dense, until)
     if (march%switching%due(lane) == 0) return
     t = march%trial%t(lane) + until * march%trial%h(lane)
-    if (t >= march%t_new(lane)) return
+    if (t >= march%t_new(lane)) then
+      until = 1.0_wp
+      return
+    end if
     march%t_new(lane) = t
     call sample(march%dense, until, march%sample)
     march%trial%y_new(lane, :march%trial%components) = march%sample

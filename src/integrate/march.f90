@@ -34,7 +34,7 @@ module nocdyn_march
     logical :: has_switches = .false.
     logical :: is_exhausted = .false.                !! the queue has no variant left
     logical, allocatable :: occupied(:)              !! lanes that hold a variant
-    logical, allocatable :: starting(:)              !! lanes that have just been given one
+    logical, allocatable :: starting(:)              !! lanes that have just been given one, or go on from branch to branch
     logical, allocatable :: accepted(:)              !! lanes whose last attempt was accepted
     logical, allocatable :: wanted(:)                !! lanes whose solution inside the last step is wanted
     real(wp), allocatable :: t_new(:)                !! end of the last attempt of each lane

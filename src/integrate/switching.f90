@@ -106,7 +106,9 @@ contains
 
     do part = 1, parts - 1
       do function = 1, size(switching%g)
-        if (any(sign_of(switching%watched%values(function, part - 1:part + 1)) <= 0)) cycle
+        associate (g => switching%watched%values)
+          if (.not. may_dip(g(function, part - 1), g(function, part), g(function, part + 1))) cycle
+        end associate
         call find_dip(switching%watched, system, observer, dense, function, part, bracket, found)
         if (.not. found) cycle
         call find_root(switching%watched, system, observer, dense, bracket, root)
@@ -114,6 +116,14 @@ contains
       end do
     end do
   end subroutine find_short_falls
+
+  !> Whether the parabola through three equidistant positive values has its minimum between them.
+  pure logical function may_dip(before, middle, after)
+    real(wp), intent(in) :: before, middle, after
+
+    may_dip = min(sign_of(before), sign_of(middle), sign_of(after)) > 0
+    if (may_dip) may_dip = abs(after - before) < 2 * ((after - middle) - (middle - before))
+  end function may_dip
 
   pure subroutine keep_first(switching, lane, function, root, theta)
     type(switching_t), intent(inout) :: switching

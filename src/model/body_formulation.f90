@@ -79,7 +79,7 @@ contains
     real(wp), contiguous, intent(in) :: y(:, :)
 
     call self%place(y)
-    call self%choose_branches(t, y)
+    if (self%switches > 0) call self%choose_branches(t, y)
     call self%derivative(t, y, self%slope, self%status)
   end subroutine observe_bodies
 

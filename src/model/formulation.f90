@@ -101,7 +101,6 @@ contains
     real(wp), contiguous, intent(in) :: t(:)
     real(wp), contiguous, intent(in) :: y(:, :)
 
-    if (self%switches == 0) return
     call self%place_inner(y(:, self%mechanical + 1:))
     call self%machine%choose_all(t, self%phi, self%omega)
   end subroutine choose_branches
@@ -114,8 +113,8 @@ contains
     real(wp), contiguous, intent(in) :: y(:, :)
 
     call self%place(y)
-    call self%choose_branches(t, y)
-    call self%place_inner(y(:, self%mechanical + 1:))
+    if (self%switches > 0) call self%choose_branches(t, y)
+    if (self%inner > 0) call self%place_inner(y(:, self%mechanical + 1:))
     call self%machine%evaluate(t, self%phi, self%omega, self%torque)
   end subroutine observe
 

@@ -228,6 +228,7 @@ contains
         call evaluate_bank(bank, size(elements%angle), t, elements%angle, elements%speed, elements%restoring, elements%working)
       end associate
     end do
+    if (self%elements%inner%count == 0) return
     do i = 1, size(self%inner_banks)
       associate (bank => self%banks(self%inner_banks(i))%bank, elements => self%elements, inner => self%elements%inner)
         call evaluate_inner_of_bank(bank, size(elements%angle), size(inner%value), elements%speed, inner%value, &
