@@ -13,6 +13,7 @@ module nocdyn_linearisation
   use nocdyn_formulation, only: formulation_t
   use nocdyn_kinds, only: wp
   use nocdyn_lapack_eigen, only: cholesky_factor, divide_left, divide_right, singular_vectors, symmetric_eigenvectors
+  use nocdyn_one_lane, only: choose_branches
   use nocdyn_system, only: pattern_t
   implicit none (type, external)
   private
@@ -50,7 +51,7 @@ contains
     pattern = formulation%jacobian_pattern()
     allocate (slopes(1, size(pattern%row)))
     status = 0
-    call formulation%enter(1, t, y(1, :))
+    call choose_branches(formulation, t, y)
     call formulation%jacobian([t], y, slopes, dfdt, status)
     incidence = new_element_coordinates(formulation%machine%elements, formulation%machine%coordinates)
     associate (elements => formulation%machine%elements)

@@ -7,6 +7,7 @@ module nocdyn_torque_balance
   use nocdyn_element_coordinates, only: element_coordinates_t, new_element_coordinates
   use nocdyn_formulation, only: formulation_t
   use nocdyn_kinds, only: wp
+  use nocdyn_one_lane, only: choose_branches
   use nocdyn_rigid_motions, only: new_rigid_motions, rigid_motions_t
   use nocdyn_system, only: pattern_t
   implicit none (type, external)
@@ -206,7 +207,7 @@ contains
   subroutine evaluate_state(self)
     class(torque_balance_t), intent(inout) :: self
 
-    call self%formulation%enter(1, self%t(1), self%y(1, :))
+    call choose_branches(self%formulation, self%t(1), self%y)
     call self%formulation%derivative(self%t, self%y, self%rate, self%status)
   end subroutine evaluate_state
 
