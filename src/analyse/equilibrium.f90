@@ -92,7 +92,8 @@ contains
       do i = 1, size(blocks)
         z(blocks(i)%members) = blocks(i)%values(:, choice(i))
       end do
-      call complete(balance, z, found, is_found)
+      call complete(balance, z, found, is_found, error)
+      if (allocated(error)) return
       if (is_found) then
         found%idle = count(blocks%is_idle)
         equilibria = [equilibria, found]
@@ -122,16 +123,17 @@ contains
   end function advance
 
   !> The state with these speeds and inner states, and with the twists that belong to them.
-  subroutine complete(balance, z, equilibrium, is_found)
+  subroutine complete(balance, z, equilibrium, is_found, error)
     type(torque_balance_t), intent(inout) :: balance
     real(wp), intent(in) :: z(:)
     type(equilibrium_t), intent(out) :: equilibrium
     logical, intent(out) :: is_found
+    type(error_t), allocatable, intent(out) :: error
     real(wp) :: q(balance%coordinates)
 
     q = 0.0_wp
     call balance%evaluate(z)
-    call find_twists(balance, q, is_found)
+    call find_twists(balance, q, is_found, error)
     call balance%place(z)
     balance%y(1, size(q) + 1:2 * size(q)) = q
     equilibrium%y = balance%y

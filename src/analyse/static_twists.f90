@@ -6,16 +6,19 @@
 !> good order of the coordinates.
 module nocdyn_static_twists
   use nocdyn_banded_matrix, only: half_bandwidths
+  use nocdyn_errors, only: error_t, exit_input, raise
   use nocdyn_kinds, only: wp
   use nocdyn_lapack_band, only: band_factor, band_solve
   use nocdyn_ordering, only: reverse_cuthill_mckee
   use nocdyn_pattern_entries, only: entries_t
+  use nocdyn_text, only: to_text
   use nocdyn_torque_balance, only: torque_balance_t
   implicit none (type, external)
   private
 
   public :: find_twists
 
+  integer, parameter :: largest_matrix = 6000   ! rows and columns of a dense matrix of as many entries as are allowed
   real(wp), parameter :: balanced = 1.0e-13_wp   ! of the torques' terms: what is left is rounding
   real(wp), parameter :: farthest = 1.0e8_wp     ! rad: twists beyond this carry nothing that nearer ones do not
 
@@ -35,38 +38,40 @@ module nocdyn_static_twists
 contains
 
   !> The angles q of the coordinates, the free ones at their start; `balance` is at the speeds, by `evaluate`.
-  subroutine find_twists(balance, q, is_found)
+  subroutine find_twists(balance, q, is_found, error)
     type(torque_balance_t), intent(inout) :: balance
     real(wp), intent(inout) :: q(:)      !! [coordinates], where to begin
     logical, intent(out) :: is_found
+    type(error_t), allocatable, intent(out) :: error   !! if the stiffness matrix is too large
     integer, parameter :: most_steps = 500
     type(stiffness_t) :: self
-    real(wp) :: raise, trial(size(q)), step(size(q))
+    real(wp) :: lift, trial(size(q)), step(size(q))
     real(wp) :: energy
     integer :: i
     logical :: is_singular
 
-    call set_up(balance, self)
+    is_found = .false.
+    call set_up(balance, self, error)
+    if (allocated(error)) return
     call load(balance, q, self)
-    raise = 0.0_wp
-    is_found = .true.
+    lift = 0.0_wp
     do i = 1, most_steps
       is_found = all(abs(self%torque(self%unknown)) <= balanced * self%size(self%unknown))
       if (is_found) exit
       energy = self%energy
-      call solve(balance, raise, self, step, is_singular)
+      call solve(balance, lift, self, step, is_singular)
       trial = q + step
       if (.not. is_singular) call load(balance, trial, self)
       if (.not. is_singular .and. goes_down(self, energy, step)) then
         q = trial
-        raise = merge(0.0_wp, 0.1_wp * raise, raise < 1.0e-8_wp)
+        lift = merge(0.0_wp, 0.1_wp * lift, lift < 1.0e-8_wp)
         is_found = all(abs(step) <= 4 * spacing(abs(q)))
         if (is_found) exit
       else
         call load(balance, q, self)
-        raise = max(10.0_wp * raise, 1.0e-6_wp)
+        lift = max(10.0_wp * lift, 1.0e-6_wp)
       end if
-      if (raise > 1.0e12_wp .or. maxval(abs(q)) > farthest) exit
+      if (lift > 1.0e12_wp .or. maxval(abs(q)) > farthest) exit
     end do
   end subroutine find_twists
 
@@ -83,9 +88,10 @@ contains
   end function goes_down
 
   !> The order of the coordinates and the torques of the other elements.
-  subroutine set_up(balance, self)
-    type(torque_balance_t), intent(inout) :: balance
+  subroutine set_up(balance, self, error)
+    type(torque_balance_t), intent(in) :: balance
     type(stiffness_t), intent(out) :: self
+    type(error_t), allocatable, intent(out) :: error
     type(entries_t) :: entries
     integer :: number(balance%coordinates), order(balance%coordinates - balance%motions%freedoms())
     integer :: c, upper
@@ -97,6 +103,12 @@ contains
     entries = joined_coordinates(balance, number)
     order = reverse_cuthill_mckee(size(order), entries%row, entries%column)
     call half_bandwidths(order, entries, self%width, upper)
+    if ((3.0_wp * self%width + 1.0_wp) * size(order) > real(largest_matrix, wp)**2) then
+      call raise(error, exit_input, 'the twists need a matrix of ' // to_text(3 * self%width + 1) // ' x ' // &
+                 to_text(size(order)) // ' entries for this machine, whose couplings leave no narrower band; at most ' // &
+                 to_text(largest_matrix) // ' x ' // to_text(largest_matrix) // ' are allowed')
+      return
+    end if
     self%unknown = self%unknown(order)
     allocate (self%place(size(number)), source=0)
     self%place(self%unknown) = [(c, c=1, size(self%unknown))]
@@ -187,10 +199,10 @@ contains
     end associate
   end subroutine load
 
-  !> Solves (K + raise * shield) step = torque at the elements of the last `load`.
-  subroutine solve(balance, raise, self, step, is_singular)
+  !> Solves (K + lift * shield) step = torque at the elements of the last `load`.
+  subroutine solve(balance, lift, self, step, is_singular)
     type(torque_balance_t), intent(in) :: balance
-    real(wp), intent(in) :: raise
+    real(wp), intent(in) :: lift
     type(stiffness_t), intent(inout) :: self
     real(wp), intent(out) :: step(:)
     logical, intent(out) :: is_singular
@@ -218,7 +230,7 @@ contains
       end do
     end associate
     self%shield = max(self%shield, self%band(diagonal, :))
-    self%band(diagonal, :) = self%band(diagonal, :) + raise * merge(self%shield, 1.0_wp, self%shield > 0.0_wp)
+    self%band(diagonal, :) = self%band(diagonal, :) + lift * merge(self%shield, 1.0_wp, self%shield > 0.0_wp)
     x = self%torque(self%unknown)
     call band_factor(self%width, self%width, self%band, pivots, is_singular)
     if (is_singular) return

@@ -114,7 +114,7 @@ contains
     if (allocated(error)) return
     call find_equilibria(machine, formulation, equilibria, notes, error)
     if (allocated(error)) then
-      if (error%code == exit_failed) error%message = input%file // ': ' // error%message
+      error%message = input%file // ': ' // error%message
       return
     end if
     call judge_equilibria(formulation, equilibria)

@@ -140,6 +140,12 @@ def test_what_nothing_drives_keeps_the_speed_of_its_start(nocdyn):
     assert "note: nothing drives or brakes 'idler', 'disc': any speed is steady, and the one of the start is kept" in outcome.stdout
     (state,) = steady_states(nocdyn)
     assert state["values"]["omega_disc [rad/s]"] == pytest.approx(2, rel=EXACT)  # the angular momentum stays
+    assert state["stability"] == "neutral"  # the joint has no damping
+
+
+def test_a_free_body_beside_a_stable_machine_leaves_it_stable(nocdyn):
+    (state,) = analyse(nocdyn, TRAIN + "&body name = 'idler' inertia = 2.0 /\n")
+    assert state["stability"] == "stable"
 
 
 def test_machines_side_by_side_have_every_combination(nocdyn):
@@ -348,6 +354,18 @@ def test_couplings_that_cannot_carry_the_torque_are_refused(nocdyn):
     assert "no steady state: the torques balance at 600 rad/s of 'motor', but no twists of the couplings carry them" in refusal(
         nocdyn, soft
     )
+
+
+def test_a_machine_whose_stiffness_matrix_has_no_narrow_band_is_refused(nocdyn):
+    count = 4000
+    bodies = "".join(f"&body name = 'b{i}' inertia = 1.0 /\n" for i in range(count))
+    spokes = "".join(f"&coupling name = 's{i}' bodies = 'b0', 'b{i}' stiffness = 9.0 /\n" for i in range(1, count))
+    loads = "".join(f"&load name = 'l{i}' body = 'b{i}' viscous = 1.0 /\n" for i in range(10))
+    hub = "&coupling name = 'wall' bodies = 'ground', 'b0' stiffness = 9.0 /\n"
+    outcome = nocdyn("equilibrium", nocdyn.write("star.nml", bodies + spokes + hub + loads + "&run t_end = 1.0 /\n"))
+    assert (outcome.returncode, outcome.stdout) == (2, "")
+    assert "star.nml: the twists need a matrix of " in outcome.stderr
+    assert "whose couplings leave no narrower band; at most 6000 x 6000 are allowed" in outcome.stderr
 
 
 def test_five_bodies_are_named_and_the_others_counted(nocdyn):

@@ -86,6 +86,18 @@ def test_a_softer_shaft_between_gears_counts_with_the_square_of_the_ratio(nocdyn
     assert oscillations(at_rest, "undamped_frequency_Hz") == [pytest.approx(sqrt(800 * (1 / 0.5 + 1 / 0.55)) / (2 * pi), rel=EXACT)]
 
 
+def test_at_rest_the_speeds_of_the_start_do_not_count(nocdyn):
+    text = """\
+&body name = 'disc' inertia = 2.0 speed = 5.0 /
+&motor name = 'm' body = 'disc' a = 10.0 b = 1.0 c = 3.0 /
+&run t_end = 1.0 /
+"""
+    rest, start = (modes_of(nocdyn, text, "--at", at) for at in ("rest", "0"))
+    assert (rest["speed_rad_s"], start["speed_rad_s"]) == ([0], [pytest.approx(5)])
+    assert rest["modes"][0]["time_constant_s"] == pytest.approx(2 / 1, rel=EXACT)
+    assert start["modes"][0]["time_constant_s"] == pytest.approx(2 / (1 + 2 * 3 * 5), rel=EXACT)
+
+
 def test_the_start_of_a_run_is_rest_if_it_starts_at_rest(nocdyn):
     frequencies = [oscillations(modes_of(nocdyn, TRAIN, "--at", at)) for at in ("rest", "0")]
     assert frequencies[0] == frequencies[1]
