@@ -40,7 +40,7 @@ contains
     integer :: lane, r
     real(wp), allocatable :: coefficient(:, :)
 
-    self%row = pack([(r, r=1, constraints%rows())], [(constraints%entries(r) /= 2, r=1, constraints%rows())])
+    allocate (self%row, source=pack([(r, r=1, constraints%rows())], [(constraints%entries(r) /= 2, r=1, constraints%rows())]))
     call gather_trains(constraints, trains, self%row, first, train, entry_of)
     allocate (coefficient(size(constraints%coefficient, 1), size(train)))
     do lane = 1, size(coefficient, 1)
