@@ -4,7 +4,7 @@ module nocdyn_input_columns
   use nocdyn_input_work, only: work_t
   use nocdyn_kinds, only: wp
   use nocdyn_mistakes, only: mistakes_t
-  use nocdyn_schema, only: columns, group_rules
+  use nocdyn_schema_relations, only: key_sets_t
   use nocdyn_schema_rules, only: key_rule_t, unset
   use nocdyn_table_file, only: read_table_file
   use nocdyn_text, only: string_t, to_text
@@ -16,19 +16,19 @@ module nocdyn_input_columns
 contains
 
   !> Puts the tables of files into the lists, and checks the lists that the input itself gives.
-  subroutine complete_columns(work, folder, group, mistakes)
+  subroutine complete_columns(work, columns, folder, group, mistakes)
     type(work_t), intent(in) :: work
+    type(key_sets_t), intent(in) :: columns(:)
     character(len=*), intent(in) :: folder   !! of the input file, with a slash at its end, or ''
     type(group_t), intent(inout) :: group
     type(mistakes_t), intent(inout) :: mistakes
     integer :: c
 
     do c = 1, size(columns)
-      if (columns(c)%group /= group_rules(work%rule)%name) cycle
-      if (columns(c)%file /= '') then
-        call complete_table(work, folder, work%positions(columns(c)%keys), work%positions(columns(c)%file), group, mistakes)
+      if (size(columns(c)%second) == 1) then
+        call complete_table(work, folder, columns(c)%first, columns(c)%second(1), group, mistakes)
       else
-        call check_lengths(work, group, work%positions(columns(c)%keys), mistakes)
+        call check_lengths(work, group, columns(c)%first, mistakes)
       end if
     end do
   end subroutine complete_columns
@@ -36,12 +36,12 @@ contains
   subroutine complete_table(work, folder, lists, file, group, mistakes)
     type(work_t), intent(in) :: work
     character(len=*), intent(in) :: folder
-    integer, intent(in) :: lists(2), file(1)   !! positions of keys
+    integer, intent(in) :: lists(2), file   !! positions of keys
     type(group_t), intent(inout) :: group
     type(mistakes_t), intent(inout) :: mistakes
 
-    if (allocated(group%values(file(1))%texts)) then
-      call read_columns(folder, group, file(1), lists, work, mistakes)
+    if (allocated(group%values(file)%texts)) then
+      call read_columns(folder, group, file, lists, work, mistakes)
     else
       call check_ascent(work, group%values(lists(1)), lists(1), mistakes)
       call check_lengths(work, group, lists, mistakes)
@@ -120,31 +120,31 @@ contains
     integer :: first, i
 
     do first = 1, size(lists)
-      if (allocated(group%values(lists(first))%numbers)) exit
+      if (group%values(lists(first))%has_any()) exit
     end do
     if (first > size(lists)) return
     first_rule = work%key(lists(first))
     do i = 1, size(lists)
       rule = work%key(lists(i))
       associate (value => group%values(lists(i)), reference => group%values(lists(first)))
-        if (allocated(value%numbers)) then
-          if (size(value%numbers) == size(reference%numbers)) cycle
-          call mistakes%add(max(value%line, reference%line), work%index, trim(rule%name) // ' has ' // counted(value%numbers) // &
-                            ' and ' // trim(first_rule%name) // ' has ' // counted(reference%numbers) // &
-                            '; needed: as many of each', max(value%override, reference%override))
+        if (value%has_any()) then
+          if (value%count() == reference%count()) cycle
+          call mistakes%add(max(value%line, reference%line), work%index, trim(rule%name) // ' has ' // counted(value) // &
+                            ' and ' // trim(first_rule%name) // ' has ' // counted(reference) // '; needed: as many of each', &
+                            max(value%override, reference%override))
         else if (rule%default == unset .and. .not. (work%may_miss(lists(i)) .or. work%drafts(lists(i))%is_said())) then
           call mistakes%add(reference%line, work%index, trim(rule%name) // ' is missing; needed: ' // &
-                            counted(reference%numbers) // ', one for each of ' // trim(first_rule%name), reference%override)
+                            counted(reference) // ', one for each of ' // trim(first_rule%name), reference%override)
         end if
       end associate
     end do
   end subroutine check_lengths
 
-  pure function counted(numbers) result(text)
-    real(wp), intent(in) :: numbers(:)
+  pure function counted(value) result(text)
+    type(value_t), intent(in) :: value
     character(len=:), allocatable :: text
 
-    text = to_text(size(numbers)) // trim(merge(' value ', ' values', size(numbers) == 1))
+    text = to_text(value%count()) // trim(merge(' value ', ' values', value%count() == 1))
   end function counted
 
 end module nocdyn_input_columns

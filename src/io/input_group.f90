@@ -9,6 +9,7 @@ module nocdyn_input_group
   use nocdyn_mistakes, only: mistakes_t, no_line
   use nocdyn_namelist, only: assignment_t, namelist_group_t, namelist_t
   use nocdyn_schema, only: group_rules, key_rule_index, key_rules, orders
+  use nocdyn_schema_relations, only: relations_t
   use nocdyn_schema_rules, only: a_name, key_rule_t, required, unset
   use nocdyn_schema_text, only: allowed_text, key_names, suggestion
   use nocdyn_text, only: lower_case, nearest_word, to_text
@@ -20,12 +21,13 @@ module nocdyn_input_group
 contains
 
   !> Reads the group `index` of the input; `source` is empty for a single group that the file lacks.
-  subroutine read_group(namelist, source, index, overrides, folder, group, mistakes)
+  subroutine read_group(namelist, source, index, overrides, folder, relations, group, mistakes)
     type(namelist_t), intent(in) :: namelist
     type(namelist_group_t), intent(in) :: source
     integer, intent(in) :: index
     type(override_t), intent(inout) :: overrides(:)
     character(len=*), intent(in) :: folder  !! of the input file, with a slash at its end, or ''
+    type(relations_t), intent(in) :: relations   !! of the keys of this kind of group
     type(group_t), intent(inout) :: group   !! `rule`, `kind` and `line` are known
     type(mistakes_t), intent(inout) :: mistakes
     type(work_t), allocatable :: work
@@ -36,11 +38,11 @@ contains
     call take_assignments(namelist, source, work, mistakes)
     group%name = name_of(work)
     call take_overrides(group%name, overrides, work, mistakes)
-    call relate_keys(work, mistakes)
+    call relate_keys(work, relations, mistakes)
     do i = 1, size(work%drafts)
       call complete(work, i, group%values(i), mistakes)
     end do
-    call complete_columns(work, folder, group, mistakes)
+    call complete_columns(work, relations%columns, folder, group, mistakes)
     call check_orders(group, index, mistakes)
   end subroutine read_group
 

@@ -10,6 +10,7 @@ module nocdyn_input_reader
   use nocdyn_namelist, only: namelist_group_t, namelist_t
   use nocdyn_namelist_scanner, only: scan_namelist
   use nocdyn_schema, only: group_rule_index, group_rules, is_single
+  use nocdyn_schema_relations, only: relations_of, relations_t
   use nocdyn_schema_rules, only: at_least_once, exactly_once
   use nocdyn_schema_text, only: group_names, occurrence_text, suggestion
   use nocdyn_text, only: nearest_word, quoted, string_t, to_text
@@ -76,8 +77,12 @@ contains
     type(mistakes_t), intent(inout) :: mistakes
     integer, allocatable :: added(:)
     character(len=:), allocatable :: folder
+    type(relations_t) :: relations(size(group_rules))
     integer :: g, n
 
+    do g = 1, size(relations)
+      relations(g) = relations_of(g)
+    end do
     folder = input%file(:index(input%file, '/', back=.true.))
     call find_absent_groups(namelist, overrides, added)
     n = namelist%group_count
@@ -88,14 +93,14 @@ contains
         if (g > n) then
           group%rule = added(g - n)
           group%kind = trim(group_rules(group%rule)%name)
-          call read_group(namelist, namelist_group_t(), g, overrides, folder, group, mistakes)
+          call read_group(namelist, namelist_group_t(), g, overrides, folder, relations(group%rule), group, mistakes)
           cycle
         end if
         group%kind = namelist%groups(g)%name
         group%rule = group_rule_index(group%kind)
         group%line = namelist%groups(g)%line
         if (group%rule > 0) then
-          call read_group(namelist, namelist%groups(g), g, overrides, folder, group, mistakes)
+          call read_group(namelist, namelist%groups(g), g, overrides, folder, relations(group%rule), group, mistakes)
         else
           call mistakes%add(group%line, g, 'there is no such group' // suggestion(group%kind, group_names()))
         end if

@@ -5,8 +5,9 @@ module nocdyn_input_relations
   use nocdyn_kinds, only: wp
   use nocdyn_literals, only: literal_fine, read_real
   use nocdyn_mistakes, only: mistakes_t
-  use nocdyn_schema, only: alternatives, columns, group_rules, has_word, needs, words_of
-  use nocdyn_schema_rules, only: a_kind, any_number, key_rule_t, unset
+  use nocdyn_schema, only: has_word, words_of
+  use nocdyn_schema_relations, only: relations_t
+  use nocdyn_schema_rules, only: any_number, key_rule_t, unset
   use nocdyn_schema_text, only: kinds_text, listed
   use nocdyn_text, only: lower_case, quoted, string_t
   implicit none (type, external)
@@ -17,38 +18,34 @@ module nocdyn_input_relations
 contains
 
   !> Refuses what does not go together, and rules out the keys that have no value here.
-  subroutine relate_keys(work, mistakes)
+  subroutine relate_keys(work, relations, mistakes)
     type(work_t), intent(inout) :: work
+    type(relations_t), intent(in) :: relations
     type(mistakes_t), intent(inout) :: mistakes
     integer :: i
 
-    call keep_keys_of_kind(work, mistakes)
-    do i = 1, size(alternatives)
-      if (alternatives(i)%group /= group_rules(work%rule)%name) cycle
-      call choose(work, work%positions(alternatives(i)%first), work%positions(alternatives(i)%second), &
-                  alternatives(i)%is_needed, mistakes)
+    if (relations%kind > 0) call keep_keys_of_kind(work, relations%kind, mistakes)
+    do i = 1, size(relations%alternatives)
+      associate (sets => relations%alternatives(i))
+        call choose(work, sets%first, sets%second, sets%is_needed, mistakes)
+      end associate
     end do
-    do i = 1, size(needs)
-      if (needs(i)%group /= group_rules(work%rule)%name) cycle
-      call check_need(work, work%positions(needs(i)%keys), work%positions(needs(i)%needed), mistakes)
+    do i = 1, size(relations%needs)
+      call check_need(work, relations%needs(i)%first, relations%needs(i)%second, mistakes)
     end do
-    do i = 1, size(columns)
-      if (columns(i)%group == group_rules(work%rule)%name) call lengthen(work, work%positions(columns(i)%keys))
+    do i = 1, size(relations%columns)
+      call lengthen(work, relations%columns(i)%first)
     end do
   end subroutine relate_keys
 
-  subroutine keep_keys_of_kind(work, mistakes)
+  subroutine keep_keys_of_kind(work, key, mistakes)
     type(work_t), intent(inout) :: work
+    integer, intent(in) :: key   !! position of `kind`
     type(mistakes_t), intent(inout) :: mistakes
     character(len=:), allocatable :: kind
     type(key_rule_t) :: rule
-    integer :: i, key
+    integer :: i
 
-    do key = size(work%drafts), 1, -1
-      rule = work%key(key)
-      if (rule%kind == a_kind) exit
-    end do
-    if (key == 0) return
     call find_kind(work, key, kind)
     do i = 1, size(work%drafts)
       rule = work%key(i)

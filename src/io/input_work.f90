@@ -1,9 +1,8 @@
 !> The keys of one group on their way from texts to values.
 module nocdyn_input_work
   use nocdyn_input_draft, only: draft_t
-  use nocdyn_schema, only: first_key, key_rule_index, key_rules, last_key, words_in
+  use nocdyn_schema, only: first_key, key_rules, last_key
   use nocdyn_schema_rules, only: key_rule_t, unset
-  use nocdyn_text, only: string_t
   implicit none (type, external)
   private
 
@@ -22,7 +21,6 @@ module nocdyn_input_work
     integer, allocatable :: length(:)           !! how many values a default has
   contains
     procedure :: key
-    procedure :: positions
     procedure :: first_said
     procedure :: has_value
     procedure :: is_overridden
@@ -55,21 +53,6 @@ contains
 
     key = key_rules(self%first + position - 1)
   end function key
-
-  !> Positions of keys that are separated by blanks.
-  pure function positions(self, keys)
-    class(work_t), intent(in) :: self
-    character(len=*), intent(in) :: keys
-    integer, allocatable :: positions(:)
-    type(string_t), allocatable :: names(:)
-    integer :: i
-
-    allocate (names, source=words_in(keys))
-    allocate (positions(size(names)))
-    do i = 1, size(names)
-      positions(i) = key_rule_index(self%rule, names(i)%text) - self%first + 1
-    end do
-  end function positions
 
   !> The first of these positions with a value from the file or an override, 0 if there is none; overrides come before the file.
   pure integer function first_said(self, positions) result(said)

@@ -117,7 +117,7 @@ contains
     allocate (known(0))
     do key = first_key(rule), last_key(rule)
       if (.not. has_word(key_rules(key)%kinds, kind_rules(kind)%word)) cycle
-      if (index(key_rules(key)%kinds, trim(kind_rules(kind)%word)) == 1) then
+      if (index(key_rules(key)%kinds, trim(kind_rules(kind)%word) // ' ') == 1) then
         call append_key(buffer, key_rules(key), margin)
       else
         call append(known, trim(key_rules(key)%name))

@@ -70,7 +70,7 @@ module nocdyn_schema_rules
     character(len=48) :: keys, needed
   end type need_t
 
-  !> Lists of numbers that have the same length and need each other; a list with a default may be absent.
+  !> Lists that have the same length and need each other; a list of numbers with a default may be absent.
   type, public :: columns_t
     character(len=12) :: group
     character(len=48) :: keys          !! separated by blanks

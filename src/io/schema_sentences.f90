@@ -1,9 +1,9 @@
 !> How the keys of a group go together, in sentences for help and reference.
 module nocdyn_schema_sentences
-  use nocdyn_schema, only: alternatives, columns, group_rules, has_word, needs, words_in
+  use nocdyn_schema, only: alternatives, columns, group_rules, has_word, key_rule_index, key_rules, needs, words_in
   use nocdyn_schema_rules, only: alternative_t, columns_t, key_rule_t, required, unset
   use nocdyn_schema_text, only: listed
-  use nocdyn_text, only: append, string_t
+  use nocdyn_text, only: append, string_t, to_text
   implicit none (type, external)
   private
 
@@ -54,7 +54,7 @@ contains
                   listed(words_in(needs(i)%needed), ' or ') // '.')
     end do
     do i = 1, size(columns)
-      if (columns(i)%group == group_rules(group_rule)%name) call append(sentences, sentence_on_columns(columns(i)))
+      if (columns(i)%group == group_rules(group_rule)%name) call append(sentences, sentence_on_columns(group_rule, columns(i)))
     end do
   end function sentences_on
 
@@ -72,13 +72,17 @@ contains
     end if
   end function sentence_on
 
-  pure function sentence_on_columns(rule) result(text)
+  pure function sentence_on_columns(group_rule, rule) result(text)
+    integer, intent(in) :: group_rule
     type(columns_t), intent(in) :: rule
     character(len=:), allocatable :: text
     type(string_t), allocatable :: lists(:)
+    integer :: least
 
     allocate (lists, source=words_in(rule%keys))
+    least = key_rules(key_rule_index(group_rule, lists(1)%text))%least
     text = listed(lists, ' and ') // ' have the same number of values'
+    if (least > 1) text = text // ', ' // to_text(least) // ' at least'
     if (rule%file /= '') text = text // '; ' // lists(1)%text // ' ascends'
     text = text // '.'
   end function sentence_on_columns

@@ -104,7 +104,7 @@ def test_new_explains_every_key(nocdyn):
     nocdyn("new", "mine.nml")
     comments = [line for line in (nocdyn.folder / "mine.nml").read_text().splitlines() if line.startswith("!")]
     for key in ("inertia", "cubic_stiffness", "teeth", "viscous", "max_steps", "directory"):
-        assert any(line.startswith(f"!   {key}") for line in comments)
+        assert any(line.startswith(f"!     {key} ") for line in comments)
 
 
 def test_new_makes_the_folder(nocdyn):
