@@ -217,8 +217,7 @@ contains
     type(machine_t), intent(in) :: machine
     integer, intent(in) :: body
     character(len=:), allocatable :: text
-    character(len=:), allocatable :: term
-    real(wp) :: largest
+    real(wp) :: factor, largest
     integer :: entry, terms
 
     associate (first => machine%coordinates%first(body), last => machine%coordinates%first(body + 1) - 1)
@@ -229,13 +228,12 @@ contains
         if (abs(machine%coordinates%ratio(1, entry)) <= ratio_tolerance * largest) cycle
         terms = terms + 1
         if (terms > most_names) cycle
-        associate (independent => machine%coordinates%body(machine%coordinates%coordinate(entry)), &
-                   ratio => machine%coordinates%ratio(1, entry))
-          term = rounded_text(ratio / own_ratio(machine, independent), 7) // ' * speed of ' // &
-                 quoted(machine%names(independent)%text)
+        associate (independent => machine%coordinates%body(machine%coordinates%coordinate(entry)))
+          factor = machine%coordinates%ratio(1, entry) / own_ratio(machine, independent)
+          if (terms > 1) text = text // trim(merge(' -', ' +', factor < 0.0_wp))
+          if (terms > 1) factor = abs(factor)
+          text = text // ' ' // rounded_text(factor, 7) // ' * speed of ' // quoted(machine%names(independent)%text)
         end associate
-        if (terms > 1) text = text // ' +'
-        text = text // ' ' // term
       end do
       if (terms > most_names) text = text // ' + ' // to_text(terms - most_names) // ' more terms'
       if (terms == 0) text = text // ' 0'
