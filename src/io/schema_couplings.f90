@@ -57,7 +57,7 @@ module nocdyn_schema_couplings
 
   type(example_t), parameter, public :: coupling_examples(*) = [ &
     example_t('coupling', "name = 'coupling' bodies = 'motor', 'pinion' stiffness = 100.0 cubic_stiffness = 10.0"), &
-    example_t('coupling', "name = 'splines'  bodies = 'motor', 'pinion'|" // &
+    example_t('coupling', "name = 'splines' bodies = 'motor', 'pinion'|" // &
                           'stiffness = 1.0e5 gap = 0.02 damping = 5.0', .false.), &
     example_t('coupling', "name = 'clutch'   bodies = 'motor', 'pinion' friction = 50.0", .false.), &
     example_t('coupling', "name = 'rubber'   bodies = 'motor', 'pinion'|" // &
