@@ -175,13 +175,15 @@ contains
       redundant = redundant + size(machine%groups(g)%redundancies)
       if (found > most_lines) cycle
       text = 'geared together: ' // joined(selected(machine%names, machine%groups(g)%bodies), ', ', most_names)
-      if (size(machine%groups(g)%independent) > 1) &
+      if (size(machine%groups(g)%independent) > 1) then
         text = text // ' with ' // to_text(size(machine%groups(g)%independent)) // ' degrees of freedom'
+      end if
       call put_line(report, text)
     end do
     if (found > most_lines) call put_line(report, 'and ' // to_text(found - most_lines) // ' more groups of geared bodies')
-    if (redundant > 0) call put_line(report, counted(redundant, 'constraint repeats', 'constraints repeat') // &
-                                     ' others; ratios agree where they differ by less than 1e-9 of their size')
+    if (redundant == 0) return
+    call put_line(report, counted(redundant, 'constraint repeats', 'constraints repeat') // &
+                  ' others; ratios agree where they differ by less than 1e-9 of their size')
   end subroutine put_groups
 
   !> The speeds of the bodies that are no coordinates.

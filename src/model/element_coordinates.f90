@@ -15,6 +15,8 @@ module nocdyn_element_coordinates
     integer, allocatable :: coordinate(:)      !! [entries]
     real(wp), allocatable :: ratio(:, :)       !! row of L_tau of `to` minus that of `from`, [lanes, entries]
     real(wp), allocatable :: response(:, :)    !! the same difference of ((L_tau^T J L_tau)^-1 L_tau^T)^T, [lanes, entries]
+  contains
+    procedure :: has_ratio
   end type element_coordinates_t
 
 contains
@@ -45,6 +47,14 @@ contains
     self%ratio = self%ratio(:, :entries)
     self%response = self%response(:, :entries)
   end function new_element_coordinates
+
+  !> Whether an element turns with the coordinate of an entry. In a group of several freedoms it may respond without.
+  pure logical function has_ratio(self, entry)
+    class(element_coordinates_t), intent(in) :: self
+    integer, intent(in) :: entry
+
+    has_ratio = any(abs(self%ratio(:, entry)) > 0.0_wp)
+  end function has_ratio
 
   pure integer function body_entries(coordinates, body)
     type(coordinates_t), intent(in) :: coordinates
