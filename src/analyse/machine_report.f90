@@ -188,13 +188,15 @@ contains
       redundant = redundant + size(machine%groups(g)%redundancies)
       if (found > most_lines) cycle
       text = 'geared together: ' // joined(selected(machine%names, machine%groups(g)%bodies), ', ', most_names)
-      if (size(machine%groups(g)%independent) > 1) &
+      if (size(machine%groups(g)%independent) > 1) then
         text = text // ' with ' // to_text(size(machine%groups(g)%independent)) // ' degrees of freedom'
+      end if
       call put_line(report, text)
     end do
     if (found > most_lines) call put_line(report, 'and ' // to_text(found - most_lines) // ' more groups of geared bodies')
-    if (redundant > 0) call put_line(report, counted(redundant, 'constraint repeats', 'constraints repeat') // &
-                                     ' others; ratios agree where they differ by less than 1e-9 of their size')
+    if (redundant == 0) return
+    call put_line(report, counted(redundant, 'constraint repeats', 'constraints repeat') // &
+                  ' others; ratios agree where they differ by less than 1e-9 of their size')
   end subroutine put_groups
 
   !> The speeds of the bodies that are no coordinates.
@@ -230,8 +232,7 @@ contains
     type(machine_t), intent(in) :: machine
     integer, intent(in) :: body
     character(len=:), allocatable :: text
-    character(len=:), allocatable :: term
-    real(wp) :: largest
+    real(wp) :: factor, largest
     integer :: entry, terms
 
     associate (first => machine%coordinates%first(body), last => machine%coordinates%first(body + 1) - 1)
@@ -242,13 +243,12 @@ contains
         if (abs(machine%coordinates%ratio(1, entry)) <= ratio_tolerance * largest) cycle
         terms = terms + 1
         if (terms > most_names) cycle
-        associate (independent => machine%coordinates%body(machine%coordinates%coordinate(entry)), &
-                   ratio => machine%coordinates%ratio(1, entry))
-          term = rounded_text(ratio / own_ratio(machine, independent), 7) // ' * speed of ' // &
-                 quoted(machine%names(independent)%text)
+        associate (independent => machine%coordinates%body(machine%coordinates%coordinate(entry)))
+          factor = machine%coordinates%ratio(1, entry) / own_ratio(machine, independent)
+          if (terms > 1) text = text // trim(merge(' -', ' +', factor < 0.0_wp))
+          if (terms > 1) factor = abs(factor)
+          text = text // ' ' // rounded_text(factor, 7) // ' * speed of ' // quoted(machine%names(independent)%text)
         end associate
-        if (terms > 1) text = text // ' +'
-        text = text // ' ' // term
       end do
       if (terms > most_names) text = text // ' + ' // to_text(terms - most_names) // ' more terms'
       if (terms == 0) text = text // ' 0'

@@ -114,7 +114,8 @@ contains
       next = next + 1
       do while (member <= size(constraints%members%row))
         if (constraints%members%row(member) /= row) exit
-        labels(next)%text = 'reaction_' // constraints%names(row)%text // '_' // constraints%members%names(member)%text // ' [N m]'
+        labels(next)%text = 'reaction_' // constraints%names(row)%text // '_' // &
+                            constraints%members%names(member)%text // ' [N m]'
         next = next + 1
         member = member + 1
       end do

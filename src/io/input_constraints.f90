@@ -26,6 +26,7 @@ contains
         call check_members(groups(g), g, mistakes)
       case ('constraint')
         call check_coefficients(groups(g), g, mistakes)
+      case default   ! no joint, or a gear, which the schema alone describes
       end select
     end do
   end subroutine check_constraints

@@ -53,6 +53,6 @@ module nocdyn_schema_constraints
     example_t('gear',         "name = 'reducer'  bodies = 'pinion', 'machine' radii = 2.0, 3.0"), &
     example_t('planetary',    "name = 'stage'    sun = 'pinion' ring = 'ground' carrier = 'machine' teeth = 20, 70", .false.), &
     example_t('differential', "name = 'axle'     sides = 'left', 'right' case = 'machine'", .false.), &
-    example_t('constraint',   "name = 'summing'  bodies = 'motor', 'pinion', 'machine' coefficients = 1.0, 0.5, -2.0", .false.)]
+    example_t('constraint',   "name = 'summing'  bodies = 'motor', 'pinion', 'machine' coefficients = 1, 0.5, -2", .false.)]
 
 end module nocdyn_schema_constraints

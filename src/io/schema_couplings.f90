@@ -56,8 +56,8 @@ module nocdyn_schema_couplings
     columns_t('coupling', 'table_twist table_moment', 'table_file')]
 
   type(example_t), parameter, public :: coupling_examples(*) = [ &
-    example_t('coupling', "name = 'coupling' bodies = 'motor', 'pinion' stiffness = 100.0 cubic_stiffness = 10.0"), &
-    example_t('coupling', "name = 'splines'  bodies = 'motor', 'pinion'|" // &
+    example_t('coupling', "name = 'coupling' bodies = 'motor', 'pinion' stiffness = 100.0 cubic_stiffness = 10"), &
+    example_t('coupling', "name = 'splines' bodies = 'motor', 'pinion'|" // &
                           'stiffness = 1.0e5 gap = 0.02 damping = 5.0', .false.), &
     example_t('coupling', "name = 'clutch'   bodies = 'motor', 'pinion' friction = 50.0", .false.), &
     example_t('coupling', "name = 'rubber'   bodies = 'motor', 'pinion'|" // &

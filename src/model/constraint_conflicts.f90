@@ -96,7 +96,7 @@ contains
     integer :: entry, i, place(relations%between%bodies)
 
     is_locked = .false.
-    trains = [elimination%core_trains, distinct_trains(relations%between, elimination%relation)]
+    allocate (trains, source=[elimination%core_trains, distinct_trains(relations%between, elimination%relation)])
     place(trains) = [(i, i=1, size(trains))]
     place(elimination%free) = [(size(trains) + i, i=1, size(elimination%free))]
     call find_motion(relations, elimination, place, size(trains) + size(elimination%free), 1, found)

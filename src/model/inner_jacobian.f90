@@ -13,7 +13,7 @@ module nocdyn_inner_jacobian
 
   public :: new_inner_jacobian
 
-  !> The values are, for each inner state in turn: dq''/dz and dr/dq' of each entry of its element, dr/dz of each inner state
+  !> The values are, for each inner state in turn: dq''/dz and, where it turns with the coordinate, dr/dq' of each entry of its element, dr/dz of each inner state
   !> of that element, dW'/dz if its work is integrated.
   type, public :: inner_jacobian_t
     type(pattern_t) :: pattern
@@ -38,15 +38,16 @@ contains
     work = 0
     work(accounted) = [(i, i=1, size(accounted))]
     self%before = before
-    self%incidence = incidence%selected(inner%element)
+    self%incidence = incidence%selected(inner%element, turning=.false.)
     self%is_accounted = work(inner%element) > 0
-    next = 2 * size(self%incidence%coordinate) + sum(inner%members) + count(self%is_accounted)
+    next = size(self%incidence%coordinate) + sum(inner%members) + count(self%is_accounted) &
+           + count([(self%incidence%has_ratio(i), i=1, size(self%incidence%coordinate))])
     allocate (self%pattern%row(next), self%pattern%column(next))
     next = 1
     do s = 1, inner%count
       do i = self%incidence%first(s), self%incidence%first(s + 1) - 1
         call put(self%incidence%coordinate(i), 2 * freedoms + s, self%pattern, next)
-        call put(2 * freedoms + s, self%incidence%coordinate(i), self%pattern, next)
+        if (self%incidence%has_ratio(i)) call put(2 * freedoms + s, self%incidence%coordinate(i), self%pattern, next)
       end do
       do i = 0, inner%members(s) - 1
         call put(2 * freedoms + s, 2 * freedoms + inner%first(s) + i, self%pattern, next)
@@ -78,9 +79,11 @@ contains
     associate (inner => elements%inner, incidence => self%incidence)
       do s = 1, inner%count
         do i = incidence%first(s), incidence%first(s + 1) - 1
-          dfdy(:, at + 1) = incidence%response(:, i) * inner%working(:, s)
-          dfdy(:, at + 2) = incidence%ratio(:, i) * inner%rate_speed(:, s)
-          at = at + 2
+          at = at + 1
+          dfdy(:, at) = incidence%response(:, i) * inner%working(:, s)
+          if (.not. incidence%has_ratio(i)) cycle
+          at = at + 1
+          dfdy(:, at) = incidence%ratio(:, i) * inner%rate_speed(:, s)
         end do
         do i = 1, inner%members(s)
           dfdy(:, at + i) = inner%rate_inner(:, i, s)

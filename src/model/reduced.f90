@@ -51,17 +51,37 @@ contains
 
     call self%attach(machine, 2 * machine%coordinates%freedoms, audited)
     incidence = new_element_coordinates(machine%elements, machine%coordinates)
-    self%twists = new_sparse_map(incidence%first, incidence%coordinate, incidence%ratio)
+    self%twists = twist_map(incidence)
     self%accelerations = response_map(incidence, machine%coordinates%freedoms)
     self%sums = new_reduced_jacobian(machine%coordinates%freedoms, incidence, machine%accounted(:self%quadratures), self%inner)
     self%inner_rows = new_inner_jacobian(machine%coordinates%freedoms, incidence, machine%accounted(:self%quadratures), &
                                          machine%elements%inner, size(self%sums%pattern%row))
-    self%switching = incidence%selected(machine%switches%element)
+    self%switching = incidence%selected(machine%switches%element, turning=.true.)
     allocate (angle(machine%lanes, 0:machine%bodies), source=0.0_wp)
     angle(:, 1:) = machine%start_angle
     self%start_twist = angle(:, machine%elements%to) - angle(:, machine%elements%from)
     allocate (self%none, source=0.0_wp * self%start_twist)
   end function new_reduced
+
+  !> U, whose rows are the elements.
+  function twist_map(incidence) result(map)
+    type(element_coordinates_t), intent(in) :: incidence
+    type(sparse_map_t) :: map
+    integer :: kept(size(incidence%coordinate)), first(size(incidence%first))
+    integer :: e, entry, next
+
+    next = 1
+    do e = 1, size(first) - 1
+      first(e) = next
+      do entry = incidence%first(e), incidence%first(e + 1) - 1
+        if (.not. incidence%has_ratio(entry)) cycle
+        kept(next) = entry
+        next = next + 1
+      end do
+    end do
+    first(size(first)) = next
+    map = new_sparse_map(first, incidence%coordinate(kept(:next - 1)), incidence%ratio(:, kept(:next - 1)))
+  end function twist_map
 
   !> R, whose rows are the coordinates.
   function response_map(incidence, freedoms) result(map)

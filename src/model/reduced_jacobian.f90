@@ -38,12 +38,11 @@ contains
     integer, intent(in) :: inner          !! states between those of the coordinates and the works
     type(reduced_jacobian_t) :: self
     integer, allocatable :: row(:), column(:)
-    integer :: c, e
+    integer :: c, e, products
 
     self%freedoms = freedoms
-    associate (entries => incidence%first(2:) - incidence%first(:size(incidence%first) - 1))
-      allocate (self%element(sum(entries**2)), self%place(sum(entries**2)), row(sum(entries**2)), column(sum(entries**2)))
-    end associate
+    products = product_count(incidence)
+    allocate (self%element(products), self%place(products), row(products), column(products))
     allocate (self%product(size(incidence%ratio, 1), size(self%element)))
     call form_products(freedoms, incidence, row, column, self)
     row = row(:self%pairs)
@@ -55,7 +54,20 @@ contains
                     e=1, size(accounted))]
   end function new_reduced_jacobian
 
-  !> The products of all pairs of entries of an element, column by column, and their distinct positions.
+  !> Pairs of entries of an element of which the second has a ratio.
+  pure integer function product_count(incidence) result(products)
+    type(element_coordinates_t), intent(in) :: incidence
+    integer :: b, e
+
+    products = 0
+    do e = 1, size(incidence%first) - 1
+      do b = incidence%first(e), incidence%first(e + 1) - 1
+        if (incidence%has_ratio(b)) products = products + incidence%first(e + 1) - incidence%first(e)
+      end do
+    end do
+  end function product_count
+
+  !> The products of those pairs, column by column, and their distinct positions.
   subroutine form_products(freedoms, incidence, row, column, self)
     integer, intent(in) :: freedoms
     type(element_coordinates_t), intent(in) :: incidence
@@ -75,6 +87,7 @@ contains
       begin = self%pairs + 1
       do i = first(q), first(q + 1) - 1
         b = order(i)
+        if (.not. incidence%has_ratio(b)) cycle
         e = element_of(b)
         do a = incidence%first(e), incidence%first(e + 1) - 1
           associate (at => place(incidence%coordinate(a)))

@@ -40,7 +40,7 @@ contains
     integer :: lane, r
     real(wp), allocatable :: coefficient(:, :)
 
-    self%row = pack([(r, r=1, constraints%rows())], [(constraints%entries(r) /= 2, r=1, constraints%rows())])
+    allocate (self%row, source=pack([(r, r=1, constraints%rows())], [(constraints%entries(r) /= 2, r=1, constraints%rows())]))
     call gather_trains(constraints, trains, self%row, first, train, entry_of)
     allocate (coefficient(size(constraints%coefficient, 1), size(train)))
     do lane = 1, size(coefficient, 1)
@@ -233,13 +233,15 @@ contains
     integer, intent(in) :: lead         !! whose moment is not carried further: the lead of a train; 0: none
     integer, allocatable :: rows(:)
     integer, allocatable :: taking(:)
-    real(wp), allocatable :: weight(:)
+    real(wp), allocatable :: sizes(:)
     real(wp) :: moment(constraints%bodies)
     integer :: i, r
 
     taking = pack([(i, i=1, size(lambda))], abs(lambda) > 0.0_wp)
-    weight = abs(lambda(taking)) * row_sizes(self%between, taking)
-    taking = pack(taking, weight > ratio_tolerance * maxval(weight))
+    sizes = row_sizes(self%between, taking)
+    associate (weight => abs(lambda(taking)) * sizes)   ! a relation of size 0 says nothing between trains, but in them
+      taking = pack(taking, sizes <= 0.0_wp .or. weight > ratio_tolerance * maxval(weight))
+    end associate
     moment = 0.0_wp
     if (lead > 0) moment(lead) = -1.0_wp
     do i = 1, size(taking)
@@ -261,7 +263,7 @@ contains
     real(wp) :: pace(between%bodies)
     integer :: i
 
-    trains = distinct_trains(between, relations)
+    allocate (trains, source=distinct_trains(between, relations))
     pace(trains) = paces(between, relations, trains)
     do i = 1, size(relations)
       associate (first => between%first(relations(i)), last => between%first(relations(i) + 1) - 1)

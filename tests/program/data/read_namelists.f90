@@ -16,6 +16,9 @@ program read_namelists
   call read_bodies()
   call read_couplings()
   call read_gears()
+  call read_planetaries()
+  call read_differentials()
+  call read_constraints()
   call read_motors()
   call read_loads()
   call read_excitations()
@@ -103,6 +106,51 @@ contains
       print '(*(g0, 1x))', 'gear', trim(name), trim(bodies(1)), trim(bodies(2)), radii, teeth, internal
     end do
   end subroutine read_gears
+
+  subroutine read_planetaries()
+    character(len=64) :: name, sun, ring, carrier
+    integer :: teeth(2), status
+    namelist /planetary/ name, sun, ring, carrier, teeth
+
+    rewind (unit)
+    do
+      read (unit, nml=planetary, iostat=status)
+      if (is_iostat_end(status)) exit
+      if (status /= 0) error stop 'planetary'
+      print '(*(g0, 1x))', 'planetary', trim(name), trim(sun), trim(ring), trim(carrier), teeth
+    end do
+  end subroutine read_planetaries
+
+  subroutine read_differentials()
+    character(len=64) :: name, sides(2), case
+    integer :: status
+    namelist /differential/ name, sides, case
+
+    rewind (unit)
+    do
+      read (unit, nml=differential, iostat=status)
+      if (is_iostat_end(status)) exit
+      if (status /= 0) error stop 'differential'
+      print '(*(g0, 1x))', 'differential', trim(name), trim(sides(1)), trim(sides(2)), trim(case)
+    end do
+  end subroutine read_differentials
+
+  subroutine read_constraints()
+    character(len=64) :: name, bodies(most_bodies)
+    real(wp) :: coefficients(most_bodies)
+    integer :: i, status
+    namelist /constraint/ name, bodies, coefficients
+
+    rewind (unit)
+    do
+      bodies = ''
+      coefficients = not_given
+      read (unit, nml=constraint, iostat=status)
+      if (is_iostat_end(status)) exit
+      if (status /= 0) error stop 'constraint'
+      print '(*(g0, 1x))', 'constraint', trim(name), (trim(bodies(i)), i=1, most_bodies), coefficients
+    end do
+  end subroutine read_constraints
 
   subroutine read_motors()
     character(len=64) :: name, body, kind, interpolation, extrapolation
@@ -204,9 +252,9 @@ contains
 
   subroutine read_run()
     real(wp) :: t_start, t_end, rtol, atol
-    character(len=64) :: method, formulation, complement, independent(most_bodies)
+    character(len=64) :: method, formulation, complement, start, independent(most_bodies)
     integer :: max_steps, i
-    namelist /run/ t_start, t_end, method, rtol, atol, formulation, independent, complement, max_steps
+    namelist /run/ t_start, t_end, method, rtol, atol, formulation, independent, complement, start, max_steps
 
     t_start = 0.0_wp
     method = 'auto'
@@ -215,11 +263,12 @@ contains
     formulation = 'reduced'
     independent = ''
     complement = 'natural'
+    start = 'given'
     max_steps = 1000000
     rewind (unit)
     read (unit, nml=run)
-    print '(*(g0, 1x))', 'run', t_start, t_end, trim(method), rtol, atol, trim(formulation), trim(complement), max_steps, &
-      (trim(independent(i)), i=1, most_bodies)
+    print '(*(g0, 1x))', 'run', t_start, t_end, trim(method), rtol, atol, trim(formulation), trim(complement), trim(start), &
+      max_steps, (trim(independent(i)), i=1, most_bodies)
   end subroutine read_run
 
   subroutine read_output()
