@@ -114,7 +114,7 @@ contains
     real(wp), allocatable :: rows(:, :)
     integer :: dependent, fine, middle
 
-    left = core
+    allocate (left, source=core)
     allocate (rows, source=paced_rows(relations%between, core, distinct_trains(relations%between, core)))
     fine = 0
     do

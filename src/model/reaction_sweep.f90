@@ -62,7 +62,7 @@ contains
     integer :: entry, i, lanes, next
 
     lanes = size(constraints%coefficient, 1)
-    self%train = trains%train
+    allocate (self%train, source=trains%train)
     self%relations = relations
     allocate (self%ratio(lanes, constraints%bodies), self%moment(constraints%bodies))
     allocate (self%of_trains(size(trains%lead)), self%of_relations(size(relations%row)))
