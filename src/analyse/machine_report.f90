@@ -1,14 +1,19 @@
 !> What can be said of a machine before it moves: bodies, gears, coordinates, redundancies.
 module nocdyn_machine_report
-  use nocdyn_bank, only: role_names
+  use nocdyn_bank, only: role_coupling, role_excitation, role_load, role_motor, role_names
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
+  use nocdyn_rigid_trains, only: ratio_tolerance
   use nocdyn_text, only: append, joined, quoted, rounded_text, selected, string_t, to_text
   use nocdyn_text_buffer, only: text_buffer_t
   implicit none (type, external)
   private
 
-  public :: coordinate_names, machine_report, redundancy_notes
+  public :: coordinate_names, machine_report, machine_notes, number_of
+
+  integer, parameter :: most_names = 12    ! in a line
+  integer, parameter :: most_lines = 40    ! of one sort in a report
+  integer, parameter :: most_notes = 12    ! of one sort
 
 contains
 
@@ -20,50 +25,197 @@ contains
     allocate (names, source=selected(machine%names, machine%coordinates%body))
   end function coordinate_names
 
-  !> One sentence for every redundant gear.
-  function redundancy_notes(machine) result(notes)
+  !> What is worth knowing before the machine moves: redundant constraints, and what projected start speeds cost.
+  function machine_notes(machine) result(notes)
     type(machine_t), intent(in) :: machine
     type(string_t), allocatable :: notes(:)
-    integer :: g, r
 
     allocate (notes(0))
+    call note_redundancies(machine, notes)
+    if (allocated(machine%shock)) call note_shock(machine, notes)
+  end function machine_notes
+
+  !> One sentence for every redundant constraint.
+  subroutine note_redundancies(machine, notes)
+    type(machine_t), intent(in) :: machine
+    type(string_t), allocatable, intent(inout) :: notes(:)
+    integer :: found, g, r
+
+    found = 0
     do g = 1, size(machine%groups)
       do r = 1, size(machine%groups(g)%redundancies)
-        associate (redundancy => machine%groups(g)%redundancies(r), names => machine%constraints%names)
-          call append(notes, 'gear ' // quoted(names(redundancy%row)%text) // ' only repeats ' // &
-                             joined(selected(names, redundancy%repeats), ', ') // '; their reactions are not unique, ' // &
-                             'and those of smallest norm are reported')
+        found = found + 1
+        if (found > most_notes) cycle
+        associate (redundancy => machine%groups(g)%redundancies(r), constraints => machine%constraints)
+          call append(notes, label(machine, redundancy%row) // ' repeats what ' // &
+                             joined(selected(constraints%names, redundancy%repeats), ', ', most_names) // ' already ' // &
+                             trim(merge('fixes', 'fix  ', size(redundancy%repeats) == 1)) // '; its ' // &
+                             reaction_word(machine, redundancy%row) // ' not unique, the smallest-norm share is reported')
         end associate
       end do
     end do
-  end function redundancy_notes
+    if (found > most_notes) call append(notes, to_text(found - most_notes) // ' more constraints repeat others')
+  end subroutine note_redundancies
 
-  !> What `nocdyn check` prints: counts, coordinates, ratios of geared bodies, redundant gears.
+  !> What the multiplier of a row is, with its verb.
+  function reaction_word(machine, row) result(word)
+    type(machine_t), intent(in) :: machine
+    integer, intent(in) :: row
+    character(len=:), allocatable :: word
+
+    select case (machine%constraints%kinds(row)%text)
+    case ('gear')
+      word = 'torque is'
+      if (machine%constraints%units(row)%text == 'N') word = 'tooth force is'
+    case ('planetary', 'differential')
+      word = 'torques are'
+    case default
+      word = 'multiplier is'
+    end select
+  end function reaction_word
+
+  subroutine note_shock(machine, notes)
+    type(machine_t), intent(in) :: machine
+    type(string_t), allocatable, intent(inout) :: notes(:)
+    character(len=:), allocatable :: text
+    integer :: i
+
+    text = 'the start speeds were projected onto the constraints: impulse'
+    associate (shock => machine%shock)
+      do i = 1, min(size(shock%row), most_names)
+        if (i > 1) text = text // ','
+        text = text // ' ' // rounded_text(shock%impulse(i), 7) // ' ' // machine%constraints%units(shock%row(i))%text // &
+               ' s in ' // label(machine, shock%row(i))
+      end do
+      if (size(shock%row) > most_names) text = text // ' and ' // to_text(size(shock%row) - most_names) // ' more'
+      call append(notes, text // '; kinetic energy lost: ' // rounded_text(shock%energy_lost, 7) // ' J')
+    end associate
+  end subroutine note_shock
+
+  !> "gear 'reducer'".
+  function label(machine, row)
+    type(machine_t), intent(in) :: machine
+    integer, intent(in) :: row
+    character(len=:), allocatable :: label
+
+    label = machine%constraints%kinds(row)%text // ' ' // quoted(machine%constraints%names(row)%text)
+  end function label
+
+  !> What `nocdyn check` prints: counts, bodies geared together, coordinates, ratios of geared bodies, notes.
   function machine_report(file, machine) result(text)
     character(len=*), intent(in) :: file
     type(machine_t), intent(in) :: machine
     character(len=:), allocatable :: text
     type(text_buffer_t) :: report
     type(string_t), allocatable :: notes(:)
-    integer :: b, i
+    integer, parameter :: roles(4) = [role_coupling, role_motor, role_load, role_excitation]
+    integer :: i
 
-    call report%append(file // ': ' // counted(machine%bodies, 'body', 'bodies') // ', ' // &
-                       counted(machine%constraints%rows(), 'gear', 'gears'))
-    do i = 1, size(machine%banks)
-      call report%append(', ' // counted(size(machine%banks(i)%bank%to), trim(role_names(machine%banks(i)%bank%role)), &
-                                         trim(role_names(machine%banks(i)%bank%role)) // 's'))
+    call report%append(file // ': ' // counted(machine%bodies, 'body', 'bodies') // counted_constraints(machine))
+    do i = 1, size(roles)
+      call report%append(', ' // counted(elements_of(machine, roles(i)), trim(role_names(roles(i))), &
+                                         trim(role_names(roles(i))) // 's'))
     end do
-    call report%append(new_line('a') // '  ' // counted(machine%coordinates%freedoms, 'degree', 'degrees') // ' of freedom')
-    call report%append(new_line('a') // '  coordinates: ' // joined(coordinate_names(machine), ', '))
-    do b = 1, machine%bodies
-      if (all(machine%coordinates%body /= b)) call report%append(new_line('a') // '  ' // speed_relation(machine, b))
-    end do
-    allocate (notes, source=redundancy_notes(machine))
+    call put_line(report, counted(machine%coordinates%freedoms, 'degree', 'degrees') // ' of freedom')
+    call put_groups(report, machine)
+    call put_line(report, 'coordinates: ' // joined(coordinate_names(machine), ', ', most_lines))
+    call put_relations(report, machine)
+    allocate (notes, source=machine_notes(machine))
     do i = 1, size(notes)
-      call report%append(new_line('a') // '  note: ' // notes(i)%text)
+      call put_line(report, 'note: ' // notes(i)%text)
     end do
     text = report%text()
   end function machine_report
+
+  !> Elements of all banks of one role.
+  pure integer function elements_of(machine, role)
+    type(machine_t), intent(in) :: machine
+    integer, intent(in) :: role
+    integer :: i
+
+    elements_of = 0
+    do i = 1, size(machine%banks)
+      if (machine%banks(i)%bank%role == role) elements_of = elements_of + size(machine%banks(i)%bank%to)
+    end do
+  end function elements_of
+
+  subroutine put_line(report, text)
+    type(text_buffer_t), intent(inout) :: report
+    character(len=*), intent(in) :: text
+
+    call report%append(new_line('a') // '  ' // text)
+  end subroutine put_line
+
+  !> ", 2 gears", and the other kinds of constraints that there are.
+  function counted_constraints(machine) result(text)
+    type(machine_t), intent(in) :: machine
+    character(len=:), allocatable :: text
+    integer :: number
+
+    text = ', ' // counted(number_of(machine, 'gear'), 'gear', 'gears')
+    number = number_of(machine, 'planetary')
+    if (number > 0) text = text // ', ' // counted(number, 'planetary set', 'planetary sets')
+    number = number_of(machine, 'differential')
+    if (number > 0) text = text // ', ' // counted(number, 'differential', 'differentials')
+    number = number_of(machine, 'constraint')
+    if (number > 0) text = text // ', ' // counted(number, 'constraint', 'constraints')
+  end function counted_constraints
+
+  !> Rows of one kind.
+  integer function number_of(machine, kind) result(number)
+    type(machine_t), intent(in) :: machine
+    character(len=*), intent(in) :: kind
+    integer :: row
+
+    number = 0
+    do row = 1, machine%constraints%rows()
+      if (machine%constraints%kinds(row)%text == kind) number = number + 1
+    end do
+  end function number_of
+
+  !> Which bodies are geared together.
+  subroutine put_groups(report, machine)
+    type(text_buffer_t), intent(inout) :: report
+    type(machine_t), intent(in) :: machine
+    character(len=:), allocatable :: text
+    integer :: found, g, redundant
+
+    found = 0
+    redundant = 0
+    do g = 1, size(machine%groups)
+      if (size(machine%groups(g)%rows) == 0) cycle
+      found = found + 1
+      redundant = redundant + size(machine%groups(g)%redundancies)
+      if (found > most_lines) cycle
+      text = 'geared together: ' // joined(selected(machine%names, machine%groups(g)%bodies), ', ', most_names)
+      if (size(machine%groups(g)%independent) > 1) then
+        text = text // ' with ' // to_text(size(machine%groups(g)%independent)) // ' degrees of freedom'
+      end if
+      call put_line(report, text)
+    end do
+    if (found > most_lines) call put_line(report, 'and ' // to_text(found - most_lines) // ' more groups of geared bodies')
+    if (redundant == 0) return
+    call put_line(report, counted(redundant, 'constraint repeats', 'constraints repeat') // &
+                  ' others; ratios agree where they differ by less than 1e-9 of their size')
+  end subroutine put_groups
+
+  !> The speeds of the bodies that are no coordinates.
+  subroutine put_relations(report, machine)
+    type(text_buffer_t), intent(inout) :: report
+    type(machine_t), intent(in) :: machine
+    logical :: is_coordinate(machine%bodies)
+    integer :: b, found
+
+    is_coordinate = .false.
+    is_coordinate(machine%coordinates%body) = .true.
+    found = 0
+    do b = 1, machine%bodies
+      if (is_coordinate(b)) cycle
+      found = found + 1
+      if (found <= most_lines) call put_line(report, speed_relation(machine, b))
+    end do
+    if (found > most_lines) call put_line(report, 'and ' // to_text(found - most_lines) // ' more speeds that follow')
+  end subroutine put_relations
 
   !> "1 gear", "2 gears".
   function counted(number, singular, plural) result(text)
@@ -80,18 +232,27 @@ contains
     type(machine_t), intent(in) :: machine
     integer, intent(in) :: body
     character(len=:), allocatable :: text
-    integer :: entry, start
+    real(wp) :: factor, largest
+    integer :: entry, terms
 
-    start = machine%coordinates%first(body)
-    text = 'speed of ' // quoted(machine%names(body)%text) // ' ='
-    do entry = start, machine%coordinates%first(body + 1) - 1
-      associate (independent => machine%coordinates%body(machine%coordinates%coordinate(entry)), &
-                 ratio => machine%coordinates%ratio(1, entry))
-        if (entry > start) text = text // ' +'
-        text = text // ' ' // rounded_text(ratio / own_ratio(machine, independent), 7) // ' * speed of ' // &
-               quoted(machine%names(independent)%text)
-      end associate
-    end do
+    associate (first => machine%coordinates%first(body), last => machine%coordinates%first(body + 1) - 1)
+      largest = maxval(abs(machine%coordinates%ratio(1, first:last)))
+      text = 'speed of ' // quoted(machine%names(body)%text) // ' ='
+      terms = 0
+      do entry = first, last
+        if (abs(machine%coordinates%ratio(1, entry)) <= ratio_tolerance * largest) cycle
+        terms = terms + 1
+        if (terms > most_names) cycle
+        associate (independent => machine%coordinates%body(machine%coordinates%coordinate(entry)))
+          factor = machine%coordinates%ratio(1, entry) / own_ratio(machine, independent)
+          if (terms > 1) text = text // trim(merge(' -', ' +', factor < 0.0_wp))
+          if (terms > 1) factor = abs(factor)
+          text = text // ' ' // rounded_text(factor, 7) // ' * speed of ' // quoted(machine%names(independent)%text)
+        end associate
+      end do
+      if (terms > most_names) text = text // ' + ' // to_text(terms - most_names) // ' more terms'
+      if (terms == 0) text = text // ' 0'
+    end associate
   end function speed_relation
 
   !> How far an independent body itself turns with its coordinate: 1 with the natural complement.

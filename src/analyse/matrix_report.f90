@@ -1,6 +1,6 @@
 !> Every matrix and vector of the paper for a machine at its start, labelled with equation numbers.
 module nocdyn_matrix_report
-  use nocdyn_bank, only: role_coupling, role_excitation, role_load, role_motor
+  use nocdyn_bank, only: role_coupling, role_excitation, role_load, role_motor, role_names
   use nocdyn_complement, only: coordinate_selector, extended_constraint
   use nocdyn_kinds, only: wp
   use nocdyn_lapack_lu, only: lu_factor, lu_solve
@@ -10,7 +10,7 @@ module nocdyn_matrix_report
                                    damping_matrix, elastic_moments, elastic_rates, inertia_2, inertia_3, inertia_matrix, &
                                    stacked_2, stacked_3, stiffness_2, stiffness_3, stiffness_matrix, tangent_matrix, &
                                    torque_2, torque_3, torque_vector, unit_matrix, zero_matrix
-  use nocdyn_text, only: joined, rounded_text, to_text
+  use nocdyn_text, only: append, joined, rounded_text, string_t, to_text
   use nocdyn_text_buffer, only: text_buffer_t
   implicit none (type, external)
   private
@@ -48,6 +48,7 @@ contains
     call equations%report%append_line('Bodies 1 to ' // to_text(machine%bodies) // ': ' // joined(machine%names, ', '))
     call equations%report%append_line('Coordinates: ' // joined(coordinate_names(machine), ', '))
     call equations%report%append_line('At the start: t = ' // rounded_text(t_start, digits) // ' s')
+    call report_other_laws(equations)
     call report_free_bodies(equations)
     call report_constraints(equations)
     call report_projection(equations)
@@ -55,6 +56,39 @@ contains
     call report_moments_as_states(equations)
     text = equations%report%text()
   end function matrix_report
+
+  !> What the matrices mean for elements whose laws are not those of the paper.
+  subroutine report_other_laws(equations)
+    type(equations_t), intent(inout) :: equations
+    type(string_t), allocatable :: names(:)
+    integer :: i, role
+
+    if (all([(equations%machine%banks(i)%bank%is_of_paper, i=1, size(equations%machine%banks))])) return
+    do role = 1, size(role_names)
+      call collect_other_laws(equations%machine, role, names)
+      if (size(names) == 0) cycle
+      call equations%report%append_line('Not by the laws of the paper: ' // trim(role_names(role)) // ' ' // joined(names, ', '))
+    end do
+    call equations%report%append_line('Of these K has the elastic moment over the twist, K_4 its slope, C what is viscous,')
+    call equations%report%append_line('Q the rest of the moment, all at the start; currents and governors are not in beta.')
+  end subroutine report_other_laws
+
+  subroutine collect_other_laws(machine, role, names)
+    type(machine_t), intent(in) :: machine
+    integer, intent(in) :: role
+    type(string_t), allocatable, intent(out) :: names(:)
+    integer :: e, i
+
+    allocate (names(0))
+    do i = 1, size(machine%banks)
+      associate (bank => machine%banks(i)%bank)
+        if (bank%is_of_paper .or. bank%role /= role) cycle
+        do e = 1, size(bank%names)
+          call append(names, bank%names(e)%text)
+        end do
+      end associate
+    end do
+  end subroutine collect_other_laws
 
   !> Brings all elements of the machine to the start.
   subroutine place(machine, t_start)
@@ -66,6 +100,8 @@ contains
     omega = 0.0_wp
     phi(:, 1:) = machine%start_angle
     omega(:, 1:) = machine%start_speed
+    machine%elements%inner%value = machine%start_inner()
+    call machine%choose_all([t_start], phi, omega)
     call machine%differentiate([t_start], phi, omega)
     call machine%assess()
   end subroutine place

@@ -1,10 +1,11 @@
 !> The summary of a run: what summary.json and the printed table tell.
 module nocdyn_run_summary
+  use nocdyn_energy_account, only: energy_account_t, put_account
   use nocdyn_input, only: group_t, input_t
   use nocdyn_json, only: json_t
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
-  use nocdyn_machine_report, only: coordinate_names
+  use nocdyn_machine_report, only: coordinate_names, number_of
   use nocdyn_outcome, only: most_switches, outcome_t
   use nocdyn_system, only: ranges_t
   use nocdyn_text, only: append, rounded_text, string_t
@@ -37,6 +38,7 @@ module nocdyn_run_summary
     type(extremes_t) :: extremes
     character(len=:), allocatable :: method         !! that integrated
     type(outcome_t) :: outcome
+    type(energy_account_t), allocatable :: account  !! from the start to the last row; not allocated if there are no rows
     real(wp) :: wall_time = 0.0_wp                  !! of integration and writing of the trajectory [s]
   end type run_summary_t
 
@@ -130,6 +132,7 @@ contains
     call put_settings(json, input%single('run'))
     call put_counts(json, summary)
     call put_method(json, summary)
+    if (allocated(summary%account)) call put_account(json, summary%account)
     call put_columns(json, summary)
     call json%close()
     text = json%text()
@@ -142,7 +145,8 @@ contains
 
     call json%open('machine')
     call json%put('bodies', machine%bodies)
-    call json%put('gears', machine%constraints%rows())
+    call json%put('gears', number_of(machine, 'gear'))
+    call json%put('constraints', machine%constraints%rows())
     call json%put('degrees_of_freedom', machine%coordinates%freedoms)
     call json%put('independent', coordinate_names(machine))
     call json%put('notes', summary%notes)

@@ -12,9 +12,10 @@ module nocdyn_size_limits
   implicit none (type, external)
   private
 
-  public :: check_size, choose_method
+  public :: check_size, check_dense_size, choose_method
 
   integer, parameter :: largest_matrix = 6000   ! rows: 0.3 GB each, and there are several
+  integer, parameter :: largest_problem = 3000  ! states of an eigenvalue problem: some minutes
 
 contains
 
@@ -40,6 +41,17 @@ contains
                ' rows, at most ' // to_text(largest_matrix) // ' are allowed; formulation = ' // &
                quoted('reduced') // ' needs none')
   end subroutine check_size
+
+  !> Refuses machines whose eigenvalues would take too long.
+  subroutine check_dense_size(input, machine, error)
+    type(input_t), intent(in) :: input
+    type(machine_t), intent(in) :: machine
+    type(error_t), allocatable, intent(out) :: error
+
+    if (2 * machine%coordinates%freedoms <= largest_problem) return
+    call raise(error, exit_input, input%file // ': the modes of this machine are those of a dense matrix of ' // &
+               to_text(2 * machine%coordinates%freedoms) // ' states; at most ' // to_text(largest_problem) // ' are allowed')
+  end subroutine check_dense_size
 
   !> The method that is integrated with: the one of the input, but the explicit part of 'auto' alone, with a note, where
   !> the stage matrix of its implicit part would be too large. An implicit method is refused there, and 'taylor' where

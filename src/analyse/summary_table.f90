@@ -1,8 +1,10 @@
 !> The summary of a run as a person reads it.
 module nocdyn_summary_table
+  use nocdyn_energy_account, only: account_text
   use nocdyn_input, only: group_t, input_t
   use nocdyn_kinds, only: wp
   use nocdyn_run_summary, only: run_summary_t
+  use nocdyn_table_text, only: cell, cell_digits, padded, right
   use nocdyn_text, only: rounded_text, to_text
   implicit none (type, external)
   private
@@ -10,8 +12,6 @@ module nocdyn_summary_table
   public :: summary_line, summary_table, method_line
 
   integer, parameter :: most_rows = 60    ! a larger machine has its table in summary.json
-  integer, parameter :: digits = 7        ! significant digits shown
-  integer, parameter :: width = 15        ! of a column
 
 contains
 
@@ -37,19 +37,20 @@ contains
     text = ''
     associate (outcome => summary%outcome)
       if (outcome%switches(1) == 0) return
-      text = input%file // ': stiff: implicit steps from t = ' // rounded_text(outcome%switch_times(1, 1), digits) // ' s'
+      text = input%file // ': stiff: implicit steps from t = ' // rounded_text(outcome%switch_times(1, 1), cell_digits) // ' s'
       if (outcome%switches(1) > 1) text = text // ' (' // to_text(outcome%switches(1)) // ' switches in all)'
       text = text // ', ' // to_text(outcome%implicit_steps(1)) // ' of ' // to_text(outcome%accepted(1)) // ' steps'
     end associate
   end function method_line
 
-  !> Title, and last, smallest and largest value of every column with the times of the extremes.
+  !> Title, and last, smallest and largest value of every column with the times of the extremes; then where the
+  !> energy came from and went to.
   function summary_table(input, summary) result(text)
     type(input_t), intent(in) :: input
     type(run_summary_t), intent(in) :: summary
     character(len=:), allocatable :: text
     type(group_t) :: about
-    character(len=:), allocatable :: heading
+    character(len=:), allocatable :: account, heading
     integer :: i, label_width, rows
 
     about = input%single('case')
@@ -70,31 +71,9 @@ contains
     end associate
     if (rows < size(summary%labels)) text = text // new_line('a') // '(' // to_text(size(summary%labels) - rows) // &
                                             ' more columns in summary.json)'
+    if (.not. allocated(summary%account)) return
+    account = account_text(summary%account)
+    if (len(account) > 0) text = text // new_line('a') // account
   end function summary_table
-
-  function cell(value)
-    real(wp), intent(in) :: value
-    character(len=width) :: cell
-
-    cell = right(rounded_text(value, digits))
-  end function cell
-
-  pure function right(text) result(aligned)
-    character(len=*), intent(in) :: text
-    character(len=width) :: aligned
-
-    aligned = adjustr(repeat(' ', max(0, width - len(text))) // text)
-  end function right
-
-  !> Text followed by blanks; bytes of a character beyond its first in UTF-8 take no room.
-  pure function padded(text, length)
-    character(len=*), intent(in) :: text
-    integer, intent(in) :: length
-    character(len=:), allocatable :: padded
-    integer :: continuation_bytes, i
-
-    continuation_bytes = count([(iachar(text(i:i)) >= 128 .and. iachar(text(i:i)) < 192, i=1, len(text))])
-    padded = text // repeat(' ', max(0, length - len(text) + continuation_bytes))
-  end function padded
 
 end module nocdyn_summary_table

@@ -1,6 +1,8 @@
 !> The columns of trajectory.csv: labels, and the values of a machine at a time and state.
 module nocdyn_trajectory_table
   use nocdyn_bank, only: quantity_t
+  use nocdyn_constraints, only: constraints_t
+  use nocdyn_energy_account, only: energy_account_t, worker_names
   use nocdyn_formulation, only: formulation_t
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
@@ -22,10 +24,14 @@ module nocdyn_trajectory_table
     real(wp), private :: t(1) = 0.0_wp
     real(wp), allocatable, private :: y(:, :)      !! [1, states + quadratures]
     real(wp), allocatable, private :: values(:)    !! of one quantity of a bank, work space
+    real(wp), allocatable, private :: lambda(:)    !! multipliers, work space, [rows]
     logical, allocatable, private :: is_source(:)  !! whether a work counts as put in, [quadratures]
     real(wp), private :: start_energy = 0.0_wp
+    real(wp), private :: start_kinetic = 0.0_wp
+    real(wp), allocatable, private :: start_stored(:)   !! of the elastic elements
   contains
     procedure :: fill
+    procedure :: account
     procedure, private :: audit
   end type trajectory_table_t
 
@@ -48,10 +54,13 @@ contains
       allocate (table%values(maxval([(size(banks(i)%bank%to), i=1, size(banks))])))
       table%is_source = [(spread(banks(i)%bank%is_source(), 1, size(banks(i)%bank%accounted)), i=1, size(banks))]
     end associate
+    allocate (table%lambda(formulation%machine%constraints%rows()))
     table%labels = column_labels(formulation%machine, table%columns)
     table%y = formulation%start()
     call table%formulation%observe([t_start], table%y)
-    table%start_energy = kinetic_energy(table%formulation) + table%formulation%machine%stored_energy(1)
+    table%start_kinetic = kinetic_energy(table%formulation)
+    table%start_energy = table%start_kinetic + table%formulation%machine%stored_energy(1)
+    allocate (table%start_stored, source=stored_energies(table%formulation%machine))
   end function new_trajectory_table
 
   !> Labels in the order in which `fill` gives the values.
@@ -71,10 +80,7 @@ contains
     do i = 1, size(columns)
       call label_bank(machine%banks(i)%bank%names, columns(i)%quantities, labels, next)
     end do
-    do i = 1, machine%constraints%rows()
-      labels(next)%text = 'reaction_' // machine%constraints%names(i)%text // ' [' // machine%constraints%units(i)%text // ']'
-      next = next + 1
-    end do
+    call label_reactions(machine%constraints, labels, next)
     labels(next:) = strings([character(len=19) :: 'kinetic_energy [J]', 'elastic_energy [J]', 'work_in [J]', &
                              'work_out [J]', 'energy_residual [J]'])
   end function column_labels
@@ -95,12 +101,33 @@ contains
     end do
   end subroutine label_bank
 
+  !> Each row's multiplier, then the torques on those of its members that have a column.
+  subroutine label_reactions(constraints, labels, next)
+    type(constraints_t), intent(in) :: constraints
+    type(string_t), intent(inout) :: labels(:)
+    integer, intent(inout) :: next
+    integer :: member, row
+
+    member = 1
+    do row = 1, constraints%rows()
+      labels(next)%text = 'reaction_' // constraints%names(row)%text // ' [' // constraints%units(row)%text // ']'
+      next = next + 1
+      do while (member <= size(constraints%members%row))
+        if (constraints%members%row(member) /= row) exit
+        labels(next)%text = 'reaction_' // constraints%names(row)%text // '_' // &
+                            constraints%members%names(member)%text // ' [N m]'
+        next = next + 1
+        member = member + 1
+      end do
+    end do
+  end subroutine label_reactions
+
   pure integer function column_count(machine, columns)
     type(machine_t), intent(in) :: machine
     type(bank_columns_t), intent(in) :: columns(:)
     integer :: i, q
 
-    column_count = 1 + 2 * machine%bodies + machine%constraints%rows() + 5
+    column_count = 1 + 2 * machine%bodies + machine%constraints%rows() + size(machine%constraints%members%row) + 5
     do i = 1, size(columns)
       do q = 1, size(columns(i)%quantities)
         column_count = column_count + size(columns(i)%quantities(q)%elements)
@@ -139,10 +166,32 @@ contains
           end associate
         end do
       end do
-      call self%formulation%reactions(1, row(next:next + machine%constraints%rows() - 1))
+      call self%formulation%reactions(1, self%lambda)
+      call fill_reactions(machine%constraints, self%lambda, row(next:size(row) - 5))
       call self%audit(row(size(row) - 4:))
     end associate
   end subroutine fill
+
+  !> Multipliers and torques on members, in the order of `label_reactions`.
+  pure subroutine fill_reactions(constraints, lambda, values)
+    type(constraints_t), intent(in) :: constraints
+    real(wp), intent(in) :: lambda(:)
+    real(wp), intent(out) :: values(:)
+    integer :: member, next, row
+
+    member = 1
+    next = 1
+    do row = 1, size(lambda)
+      values(next) = lambda(row)
+      next = next + 1
+      do while (member <= size(constraints%members%row))
+        if (constraints%members%row(member) /= row) exit
+        values(next) = constraints%members%factor(1, member) * lambda(row)
+        next = next + 1
+        member = member + 1
+      end do
+    end do
+  end subroutine fill_reactions
 
   !> Kinetic and elastic energy, work put in, work taken out, and what does not add up.
   subroutine audit(self, energies)
@@ -168,6 +217,44 @@ contains
     energies(4) = work_out
     energies(5) = (energies(1) + energies(2) - self%start_energy) - (work_in - work_out)
   end subroutine audit
+
+  !> Works and energies from the start to time t and state y.
+  subroutine account(self, t, y, energies)
+    class(trajectory_table_t), intent(inout) :: self
+    real(wp), intent(in) :: t
+    real(wp), contiguous, intent(in) :: y(:)   !! [states + quadratures]
+    type(energy_account_t), intent(out) :: energies
+    real(wp) :: row(size(self%labels))
+    integer :: e
+
+    call self%fill(t, y, row)
+    associate (machine => self%formulation%machine, elastic => self%formulation%machine%elastic())
+      allocate (energies%workers, source=worker_names(machine))
+      allocate (energies%work, source=y(self%formulation%states + 1:))
+      allocate (energies%stores(size(elastic)))
+      do e = 1, size(elastic)
+        energies%stores(e)%text = machine%element_name(elastic(e))
+      end do
+      allocate (energies%stored_start, source=self%start_stored)
+      allocate (energies%stored_end, source=stored_energies(machine))
+    end associate
+    energies%kinetic_start = self%start_kinetic
+    energies%kinetic_end = kinetic_energy(self%formulation)
+  end subroutine account
+
+  !> Of the elastic elements, after `stored_energy` of the machine [J].
+  function stored_energies(machine) result(energies)
+    type(machine_t), intent(in) :: machine
+    real(wp), allocatable :: energies(:)
+    integer, allocatable :: elastic(:)
+    integer :: i
+
+    allocate (elastic, source=machine%elastic())
+    allocate (energies(size(elastic)))
+    do i = 1, size(elastic)
+      energies(i) = machine%elements%stored(1, elastic(i))
+    end do
+  end function stored_energies
 
   pure function kinetic_energy(formulation) result(energy)
     class(formulation_t), intent(in) :: formulation

@@ -11,7 +11,7 @@ module nocdyn_transient
   use nocdyn_integration_settings, only: integration_settings_t
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
-  use nocdyn_machine_report, only: redundancy_notes
+  use nocdyn_machine_report, only: machine_notes
   use nocdyn_outcome, only: failure_sentence, integration_done, integration_interrupted, outcome_t
   use nocdyn_output_file, only: output_file_t
   use nocdyn_output_times, only: check_output_times, output_times
@@ -49,6 +49,8 @@ module nocdyn_transient
     type(output_file_t) :: file
     type(run_summary_t) :: summary
     real(wp), allocatable :: row(:)
+    real(wp) :: last_time = 0.0_wp         !! of the rows
+    real(wp), allocatable :: last_state(:)
     real(wp) :: t_start, t_end
     logical :: follows = .false.   !! whether the columns have been followed between the rows
     class(progress_t), pointer :: progress => null()
@@ -96,7 +98,7 @@ contains
       call recorder%file%discard()
       return
     end if
-    call conclude(outcome, error, recorder%summary)
+    call conclude(outcome, error, recorder)
     call write_results(input, machine, recorder, folder, write_error)
     if (allocated(write_error)) call move_alloc(write_error, error)
     summary = recorder%summary
@@ -114,8 +116,9 @@ contains
     recorder%t_end = times(size(times))
     recorder%progress => progress
     recorder%summary%labels = recorder%table%labels
-    recorder%summary%notes = redundancy_notes(formulation%machine)
+    recorder%summary%notes = machine_notes(formulation%machine)
     allocate (recorder%row(size(recorder%table%labels)))
+    allocate (recorder%last_state(formulation%states + formulation%quadratures), source=0.0_wp)
     recorder%tracked = size(recorder%row)
     call start_extremes(recorder%summary%extremes, size(recorder%row))
     call recorder%file%open(folder, trajectory_file)
@@ -149,17 +152,24 @@ contains
     end if
   end subroutine solve
 
-  subroutine conclude(outcome, error, summary)
+  !> What the summary tells of the whole run.
+  subroutine conclude(outcome, error, recorder)
     type(outcome_t), intent(in) :: outcome
     type(error_t), allocatable, intent(in) :: error
-    type(run_summary_t), intent(inout) :: summary
+    type(recorder_t), intent(inout) :: recorder
 
-    summary%outcome = outcome
-    call audit_energy(summary%extremes, summary%notes)
-    if (.not. allocated(error)) return
-    summary%message = error%message
-    summary%status = 'failed'
-    if (outcome%status(1) == integration_interrupted) summary%status = 'interrupted'
+    associate (summary => recorder%summary)
+      summary%outcome = outcome
+      call audit_energy(summary%extremes, summary%notes)
+      if (summary%extremes%rows > 0) then
+        allocate (summary%account)
+        call recorder%table%account(recorder%last_time, recorder%last_state, summary%account)
+      end if
+      if (.not. allocated(error)) return
+      summary%message = error%message
+      summary%status = 'failed'
+      if (outcome%status(1) == integration_interrupted) summary%status = 'interrupted'
+    end associate
   end subroutine conclude
 
   !> Gives the three files their names once all are written: a full disk leaves the results of an earlier run alone.
@@ -216,6 +226,8 @@ contains
     call self%table%fill(t, y, self%row)
     call update_extremes(self%summary%extremes, self%row)
     call write_row(self%file, self%row)
+    self%last_time = t
+    self%last_state(:) = y
   end subroutine record
 
   !> The columns of the table between its rows.

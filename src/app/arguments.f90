@@ -12,6 +12,7 @@ module nocdyn_arguments
     type(string_t), allocatable :: operands(:)    !! files, or the topic of `help`
     character(len=:), allocatable :: out          !! --out, not allocated if absent
     type(string_t), allocatable :: overrides(:)   !! PATH=VALUE of every --set
+    character(len=:), allocatable :: at           !! --at, not allocated if absent
     logical :: is_quiet = .false.
   end type arguments_t
 
@@ -34,7 +35,8 @@ contains
   function command_names() result(names)
     type(string_t), allocatable :: names(:)
 
-    allocate (names, source=strings([character(len=8) :: 'run', 'check', 'matrices', 'new', 'help']))
+    allocate (names, source=strings([character(len=11) :: 'run', 'check', 'equilibrium', 'modes', 'matrices', 'new', &
+                                                          'help']))
   end function command_names
 
   !> Takes the words apart; wrong usage is an error with exit code 2.
@@ -106,7 +108,7 @@ contains
     case ('--quiet', '-q')
       arguments%is_quiet = .true.
       if (equals <= len(words(i)%text)) call raise(error, exit_input, '--quiet takes no value')
-    case ('--out', '--set')
+    case ('--out', '--set', '--at')
       if (equals <= len(words(i)%text)) then
         value = words(i)%text(equals + 1:)
       else if (i < size(words)) then
@@ -123,7 +125,7 @@ contains
       arguments%command = 'help'
     case default
       call raise(error, exit_input, unknown_word(name, 'an option', &
-                                                 strings([character(len=7) :: '--out', '--set', '--quiet', '--help'])))
+                                                 strings([character(len=7) :: '--out', '--set', '--at', '--quiet', '--help'])))
     end select
   end subroutine take_option
 
@@ -133,16 +135,32 @@ contains
     type(error_t), allocatable, intent(out) :: error
 
     if (value == '') then
-      call raise(error, exit_input, name // ' needs a value: ' // &
-                 trim(merge('--out DIR       ', '--set PATH=VALUE', name == '--out')))
+      call raise(error, exit_input, name // ' needs a value: ' // option_form(name))
     else if (name == '--set') then
       call append(arguments%overrides, value)
-    else if (allocated(arguments%out)) then
-      call raise(error, exit_input, '--out is given twice')
-    else
+    else if (name == '--out') then
+      if (allocated(arguments%out)) call raise(error, exit_input, '--out is given twice')
       arguments%out = value
+    else
+      if (allocated(arguments%at)) call raise(error, exit_input, '--at is given twice')
+      arguments%at = value
     end if
   end subroutine take_value
+
+  !> How an option is written.
+  pure function option_form(name) result(form)
+    character(len=*), intent(in) :: name
+    character(len=:), allocatable :: form
+
+    select case (name)
+    case ('--out')
+      form = '--out DIR'
+    case ('--set')
+      form = '--set PATH=VALUE'
+    case default
+      form = '--at equilibrium, --at rest or --at TIME'
+    end select
+  end function option_form
 
   !> "'rnu' is not a command; did you mean 'run'? allowed: 'run', ..."
   function unknown_word(word, what, known) result(message)
@@ -164,19 +182,30 @@ contains
     integer :: operands
 
     operands = size(arguments%operands)
-    if (allocated(arguments%out) .and. arguments%command /= 'run') then
-      call raise(error, exit_input, '--out is an option of nocdyn run')
-    else if (arguments%is_quiet .and. arguments%command /= 'run') then
+    if (allocated(arguments%out) .and. .not. is_one_of('run equilibrium modes')) then
+      call raise(error, exit_input, '--out is an option of nocdyn run, equilibrium and modes')
+    else if (arguments%is_quiet .and. .not. is_one_of('run')) then
       call raise(error, exit_input, '--quiet is an option of nocdyn run')
-    else if (size(arguments%overrides) > 0 .and. all(arguments%command /= ['run     ', 'check   ', 'matrices'])) then
-      call raise(error, exit_input, '--set is an option of nocdyn run, check and matrices')
-    else if (any(arguments%command == ['run     ', 'check   ']) .and. operands == 0) then
+    else if (allocated(arguments%at) .and. .not. is_one_of('modes')) then
+      call raise(error, exit_input, '--at is an option of nocdyn modes')
+    else if (size(arguments%overrides) > 0 .and. .not. is_one_of('run check equilibrium modes matrices')) then
+      call raise(error, exit_input, '--set is an option of nocdyn run, check, equilibrium, modes and matrices')
+    else if (is_one_of('run check equilibrium modes') .and. operands == 0) then
       call raise(error, exit_input, 'an input file is missing: nocdyn ' // arguments%command // ' FILE...')
-    else if (any(arguments%command == ['matrices', 'new     ']) .and. operands /= 1) then
+    else if (is_one_of('matrices new') .and. operands /= 1) then
       call raise(error, exit_input, 'exactly one file is needed: nocdyn ' // arguments%command // ' FILE')
-    else if (arguments%command == 'version' .and. operands > 0) then
+    else if (is_one_of('version') .and. operands > 0) then
       call raise(error, exit_input, '--version takes no arguments')
     end if
+
+  contains
+
+    pure logical function is_one_of(commands)
+      character(len=*), intent(in) :: commands   !! separated by blanks
+
+      is_one_of = index(' ' // commands // ' ', ' ' // arguments%command // ' ') > 0
+    end function is_one_of
+
   end subroutine check_usage
 
 end module nocdyn_arguments

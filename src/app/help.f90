@@ -16,15 +16,7 @@ contains
 
     select case (command)
     case ('')
-      text = 'nocdyn: dynamics of drivetrains: rotating bodies, nonlinear elastic couplings, gears.' // nl // nl // &
-             '  nocdyn run FILE...         integrate machines and write their results' // nl // &
-             '  nocdyn check FILE...       read and analyse, integrate nothing' // nl // &
-             '  nocdyn matrices FILE       print the matrices of the method for a machine' // nl // &
-             '  nocdyn new FILE            write a commented input to start from' // nl // &
-             '  nocdyn help [COMMAND]      help on a command' // nl // &
-             '  nocdyn help input [GROUP]  the groups and keys of an input file' // nl // &
-             '  nocdyn --version' // nl // nl // &
-             'Exit codes: 0 done, 1 a computation failed, 2 wrong usage or input, 3 a file cannot be read or written.'
+      text = overview()
     case ('run')
       text = 'nocdyn run FILE... [--out DIR] [--set PATH=VALUE]... [--quiet]' // nl // nl // &
              'Integrates every input file and writes trajectory.csv, summary.json and input.nml.' // nl // nl // &
@@ -38,6 +30,21 @@ contains
       text = 'nocdyn check FILE... [--set PATH=VALUE]...' // nl // nl // &
              'Reads the files and analyses the machines: every mistake with its line, degrees of freedom,' // nl // &
              'independent coordinates, ratios between geared bodies, redundant gears.'
+    case ('equilibrium')
+      text = 'nocdyn equilibrium FILE... [--set PATH=VALUE]... [--out DIR]' // nl // nl // &
+             'Finds the steady states of the machines: constant speeds at which the mean torques balance, and the' // nl // &
+             'twists with which the couplings carry them. Several solutions of a motor curve are told apart, with' // nl // &
+             'their stability. Excitations count with their mean.' // nl // nl // &
+             '  --out DIR          write equilibrium.json to DIR, with several files to DIR/<name of the file>' // nl // nl // &
+             'Exit code 1: nothing balances the torques.'
+    case ('modes')
+      text = 'nocdyn modes FILE... [--at equilibrium|rest|TIME] [--set PATH=VALUE]... [--out DIR]' // nl // nl // &
+             'Linearises the machines and prints their natural frequencies, damping ratios, time constants and' // nl // &
+             'where the energy of each mode is.' // nl // nl // &
+             '  --at equilibrium   about the steady state (default): of several, the stable one nearest to the start' // nl // &
+             '  --at rest          at the start angles, with all speeds zero and mean torques' // nl // &
+             '  --at TIME          at a time of the run [s], which is integrated up to there' // nl // &
+             '  --out DIR          write modes.csv and modes.json to DIR, with several files to DIR/<name of the file>'
     case ('matrices')
       text = 'nocdyn matrices FILE [--set PATH=VALUE]...' // nl // nl // &
              'Prints every matrix and vector of the method for the machine at its start, with the number of' // nl // &
@@ -50,5 +57,21 @@ contains
       text = ''
     end select
   end function command_help
+
+  pure function overview() result(text)
+    character(len=:), allocatable :: text
+
+    text = 'nocdyn: dynamics of drivetrains: rotating bodies, nonlinear elastic couplings, gears.' // nl // nl // &
+           '  nocdyn run FILE...         integrate machines and write their results' // nl // &
+           '  nocdyn check FILE...       read and analyse, integrate nothing' // nl // &
+           '  nocdyn equilibrium FILE... steady running: speeds, torques, twists, powers, stability' // nl // &
+           '  nocdyn modes FILE...       natural frequencies, damping, shapes and energies of the modes' // nl // &
+           '  nocdyn matrices FILE       print the matrices of the method for a machine' // nl // &
+           '  nocdyn new FILE            write a commented input to start from' // nl // &
+           '  nocdyn help [COMMAND]      help on a command' // nl // &
+           '  nocdyn help input [GROUP]  the groups and keys of an input file' // nl // &
+           '  nocdyn --version' // nl // nl // &
+           'Exit codes: 0 done, 1 a computation failed, 2 wrong usage or input, 3 a file cannot be read or written.'
+  end function overview
 
 end module nocdyn_help

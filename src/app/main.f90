@@ -1,5 +1,6 @@
 !> nocdyn: dynamics of drivetrains from namelist files.
 program nocdyn
+  use nocdyn_analysis_commands, only: equilibrium_command, modes_command
   use nocdyn_arguments, only: arguments_t, command_line, parse_arguments
   use nocdyn_commands, only: check_command, help_command, matrices_command, new_command, version_command
   use nocdyn_console, only: complain, output_is_lost
@@ -23,6 +24,10 @@ program nocdyn
     call run_command(arguments, code)
   case ('check')
     call check_command(arguments, code)
+  case ('equilibrium')
+    call equilibrium_command(arguments, code)
+  case ('modes')
+    call modes_command(arguments, code)
   case ('matrices')
     call matrices_command(arguments, code)
   case ('new')

@@ -33,6 +33,7 @@ module nocdyn_system
     integer :: lanes = 1         !! copies of the system in the block
     integer :: states = 0        !! components under error control
     integer :: quadratures = 0   !! components that follow them and only accumulate
+    integer :: switches = 0      !! functions whose fall through zero ends a step
   contains
     procedure(derivative_interface), deferred :: derivative
     procedure(jacobian_interface), deferred :: jacobian
@@ -41,6 +42,10 @@ module nocdyn_system
     procedure :: series_obstacle
     procedure :: prepare_series
     procedure :: series
+    procedure :: enter
+    procedure :: switch_values
+    procedure :: cross
+    procedure :: switch_name
   end type system_t
 
   integer, parameter, public :: event_any = 0       !! every change of sign
@@ -150,6 +155,46 @@ contains
 
     error stop 'nocdyn_system: a system with a Taylor series overrides series'
   end subroutine series
+
+  !> A lane starts at (t, y): the place to choose its branches.
+  subroutine enter(self, lane, t, y)
+    class(system_t), intent(inout) :: self
+    integer, intent(in) :: lane
+    real(wp), intent(in) :: t
+    real(wp), contiguous, intent(in) :: y(:)   !! [states + quadratures]
+  end subroutine enter
+
+  !> The functions that are positive while the branches of a lane hold.
+  subroutine switch_values(self, lane, t, y, g)
+    class(system_t), intent(inout) :: self
+    integer, intent(in) :: lane
+    real(wp), intent(in) :: t
+    real(wp), contiguous, intent(in) :: y(:)      !! [states + quadratures]
+    real(wp), contiguous, intent(inout) :: g(:)   !! [switches]
+
+    error stop 'nocdyn_system: a system with switches overrides switch_values'
+  end subroutine switch_values
+
+  !> A lane goes to the branch beyond a function, whose value here must be zero or positive then. A border that is
+  !> widened a little, so that it is positive, keeps rounding from crossing back.
+  subroutine cross(self, lane, which, t, y)
+    class(system_t), intent(inout) :: self
+    integer, intent(in) :: lane
+    integer, intent(in) :: which               !! number of the function
+    real(wp), intent(in) :: t
+    real(wp), contiguous, intent(in) :: y(:)   !! [states + quadratures]
+
+    error stop 'nocdyn_system: a system with switches overrides cross'
+  end subroutine cross
+
+  !> What function `which` is called in a message, e.g. "gap of 'coupling'".
+  function switch_name(self, which) result(name)
+    class(system_t), intent(in) :: self
+    integer, intent(in) :: which
+    character(len=:), allocatable :: name
+
+    name = 'switch ' // to_text(which)
+  end function switch_name
 
   !> One requested time of one lane; the calls of a lane come in the order of its times.
   subroutine record(self, lane, t, y)

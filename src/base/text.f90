@@ -99,18 +99,22 @@ contains
     quoted = "'" // text // "'"
   end function quoted
 
-  !> The texts in quotes, separated by `separator`.
-  pure function joined(texts, separator)
+  !> The texts in quotes, separated by `separator`; of more than `most` the first ones "and N more".
+  pure function joined(texts, separator, most)
     type(string_t), intent(in) :: texts(:)
     character(len=*), intent(in) :: separator
+    integer, intent(in), optional :: most   !! absent: all are written
     character(len=:), allocatable :: joined
-    integer :: i
+    integer :: i, last
 
+    last = size(texts)
+    if (present(most)) last = min(most, last)
     joined = ''
-    do i = 1, size(texts)
+    do i = 1, last
       if (i > 1) joined = joined // separator
       joined = joined // quoted(texts(i)%text)
     end do
+    if (last < size(texts)) joined = joined // ' and ' // to_text(size(texts) - last) // ' more'
   end function joined
 
   !> The words without their trailing blanks.

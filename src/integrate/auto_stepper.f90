@@ -43,6 +43,7 @@ module nocdyn_auto_stepper
     procedure :: attempt
     procedure :: interpolate
     procedure :: accept
+    procedure :: resume
   end type auto_stepper_t
 
 contains
@@ -232,6 +233,18 @@ contains
     call self%implicit%accept(self%mask)
     call self%implicit%forget(self%mask)
   end subroutine accept
+
+  !> Each lane goes on with its kind of method and with what it knows of its stiffness.
+  subroutine resume(self, trial, resuming)
+    class(auto_stepper_t), intent(inout) :: self
+    type(trial_t), intent(inout) :: trial
+    logical, intent(in) :: resuming(:)
+
+    self%mask(:) = resuming .and. .not. self%is_implicit
+    if (any(self%mask)) call self%explicit%begin(trial, self%mask)
+    self%mask(:) = resuming .and. self%is_implicit
+    if (any(self%mask)) call self%implicit%begin(trial, self%mask)
+  end subroutine resume
 
   !> Counts what an accepted step says about the stiffness of its lane.
   pure subroutine weigh_stiffness(self, lane, switches)

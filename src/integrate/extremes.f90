@@ -12,7 +12,7 @@ module nocdyn_extremes
   implicit none (type, external)
   private
 
-  public :: allocate_extremes, start_extremes, follow_extremes
+  public :: allocate_extremes, start_extremes, resume_extremes, follow_extremes
 
   real(wp), parameter :: overshoot = 0.25_wp   !! of the spread of the values: no polynomial is expected to pass them by more
   integer, parameter :: most_places = 40       !! in a step
@@ -72,8 +72,7 @@ contains
     type(trial_t), intent(in) :: trial
     integer, intent(in) :: lane
 
-    extremes%y(:) = trial%y(lane, :trial%components)
-    call observer%tracked_values(lane, trial%t(lane), extremes%y, extremes%last(:, lane))
+    call resume_extremes(extremes, observer, trial, lane)
     associate (ranges => extremes%ranges(lane))
       ranges%lowest(:) = extremes%last(:, lane)
       ranges%highest(:) = extremes%last(:, lane)
@@ -81,6 +80,17 @@ contains
       ranges%highest_time(:) = trial%t(lane)
     end associate
   end subroutine start_extremes
+
+  !> Takes the tracked functions anew where a lane is: they may have jumped.
+  subroutine resume_extremes(extremes, observer, trial, lane)
+    type(extremes_t), intent(inout) :: extremes
+    class(observer_t), intent(inout) :: observer
+    type(trial_t), intent(in) :: trial
+    integer, intent(in) :: lane
+
+    extremes%y(:) = trial%y(lane, :trial%components)
+    call observer%tracked_values(lane, trial%t(lane), extremes%y, extremes%last(:, lane))
+  end subroutine resume_extremes
 
   !> Widens the ranges of a lane by its last step, up to t_end.
   subroutine follow_extremes(extremes, observer, dense, t_end)

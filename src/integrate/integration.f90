@@ -1,9 +1,10 @@
 !> Integration of a block of lanes from the first to the last requested time.
 module nocdyn_integration
   use nocdyn_errors, only: error_t, exit_input, raise
+  use nocdyn_following, only: cross_lanes, follow_lanes
   use nocdyn_integration_settings, only: check_settings, integration_settings_t
   use nocdyn_kinds, only: wp
-  use nocdyn_march, only: advance_lanes, empty_lanes, fill_lanes, follow_lanes, judge_lanes, march_t, prepare, set_out_lanes
+  use nocdyn_march, only: advance_lanes, empty_lanes, fill_lanes, judge_lanes, march_t, prepare, set_out_lanes
   use nocdyn_methods, only: select_method
   use nocdyn_outcome, only: allocate_outcome, integration_interrupted, integration_running, outcome_t
   use nocdyn_queue, only: one_each, one_each_t, queue_t
@@ -92,9 +93,10 @@ contains
       call stepper%attempt(system, march%trial)
       call judge_lanes(march, stepper, system, times, outcome)
       if (any(march%accepted)) then
-        call follow_lanes(march, times, observer, outcome)
+        call follow_lanes(march, system, times, observer, outcome)
         call advance_lanes(march)
         call stepper%accept(march%accepted)
+        if (march%has_switches) call cross_lanes(march, stepper, system, observer, outcome)
       end if
       call interrupt_if_asked(march, observer, outcome)
       call empty_lanes(march, queue, observer, outcome)

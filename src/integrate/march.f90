@@ -1,23 +1,24 @@
 !> The march of a block of lanes through time: each lane at its own pace, all of them in one loop.
 module nocdyn_march
-  use nocdyn_dense_output, only: allocate_dense_output, batch, dense_output_t, sample, sample_batch, take_lane
-  use nocdyn_events, only: allocate_events, events_t, find_events, start_events
-  use nocdyn_extremes, only: allocate_extremes, extremes_t, follow_extremes, start_extremes
+  use nocdyn_dense_output, only: allocate_dense_output, dense_output_t
+  use nocdyn_events, only: allocate_events, events_t, start_events
+  use nocdyn_extremes, only: allocate_extremes, extremes_t, start_extremes
   use nocdyn_first_step, only: guess_first_steps
   use nocdyn_integration_settings, only: integration_settings_t
   use nocdyn_kinds, only: wp
   use nocdyn_outcome, only: integration_done, integration_gave_up, integration_not_finite, integration_running, &
-    integration_step_too_small, integration_stopped, integration_too_many_steps, note_method, outcome_t, reset_outcome
+    integration_step_too_small, integration_too_many_steps, note_method, outcome_t, reset_outcome
   use nocdyn_queue, only: queue_t
   use nocdyn_step_control, only: is_within, lengthen, propose, reduce, restart, shorten, smallest_step, step_control, &
     step_control_t, weigh_error
   use nocdyn_stepper, only: stepper_t
+  use nocdyn_switching, only: allocate_switching, start_switching, switching_t
   use nocdyn_system, only: observer_t, system_t
   use nocdyn_trial, only: allocate_trial, evaluate_start, set_out, trial_fine, trial_give_up, trial_not_finite, trial_t
   implicit none (type, external)
   private
 
-  public :: prepare, fill_lanes, set_out_lanes, judge_lanes, follow_lanes, advance_lanes, empty_lanes
+  public :: prepare, fill_lanes, start_slopes, set_out_lanes, judge_lanes, advance_lanes, empty_lanes
 
   type, public :: march_t
     type(trial_t) :: trial
@@ -25,13 +26,15 @@ module nocdyn_march
     type(dense_output_t) :: dense                    !! the lane that is looked at
     type(events_t) :: events
     type(extremes_t) :: extremes
+    type(switching_t) :: switching
     real(wp) :: first_step                           !! 0: find it
     integer :: max_steps
     logical :: has_events = .false.
     logical :: has_extremes = .false.
+    logical :: has_switches = .false.
     logical :: is_exhausted = .false.                !! the queue has no variant left
     logical, allocatable :: occupied(:)              !! lanes that hold a variant
-    logical, allocatable :: starting(:)              !! lanes that have just been given one
+    logical, allocatable :: starting(:)              !! lanes that have just been given one, or go on from branch to branch
     logical, allocatable :: accepted(:)              !! lanes whose last attempt was accepted
     logical, allocatable :: wanted(:)                !! lanes whose solution inside the last step is wanted
     real(wp), allocatable :: t_new(:)                !! end of the last attempt of each lane
@@ -68,6 +71,10 @@ contains
       allocate (march%coefficients(lanes, size(march%trial%y, 2), stepper%degree), source=0.0_wp)
     end associate
     call allocate_dense_output(march%dense, march%trial%components, stepper%degree)
+    march%has_switches = system%switches > 0
+    if (march%has_switches) then
+      call allocate_switching(march%switching, system, stepper%degree, march%trial, times(size(times)) - times(1))
+    end if
     march%has_extremes = observer%tracked > 0
     if (march%has_extremes) call allocate_extremes(march%extremes, observer%tracked, stepper%degree, march%trial)
     if (.not. allocated(observer%directions)) return
@@ -136,26 +143,57 @@ contains
     integer :: lane
 
     associate (trial => march%trial)
-      trial%working(:) = march%starting
-      call evaluate_start(trial, system, march%starting, trial%slope)
+      do lane = 1, trial%lanes
+        if (march%starting(lane)) call enter_branches(march, system, observer, lane, outcome)
+      end do
+      call start_slopes(march, system, outcome)
       call stepper%begin(trial, march%starting)
       do lane = 1, trial%lanes
         if (.not. march%starting(lane)) cycle
         march%sample(:) = trial%y(lane, :trial%components)
         if (times(march%next(lane) - 1) >= trial%t(lane)) call observer%record(lane, trial%t(lane), march%sample)
         march%control%h(lane) = march%first_step
-        if (.not. trial%working(lane)) then
-          outcome%status(lane) = merge(integration_not_finite, integration_gave_up, trial%verdict(lane) == trial_not_finite)
-          outcome%component(lane) = trial%culprit(lane)
-        else
-          if (march%has_events) call start_events(march%events, observer, trial, lane)
-          if (march%has_extremes) call start_extremes(march%extremes, observer, trial, lane)
-        end if
+        if (.not. trial%working(lane)) cycle
+        if (march%has_events) call start_events(march%events, system, observer, trial, lane)
+        if (march%has_extremes) call start_extremes(march%extremes, observer, trial, lane)
       end do
       if (march%first_step > 0 .or. stepper%plans_steps) return
       call guess_first_steps(march%control, stepper%order, system, trial)
     end associate
   end subroutine start_lanes
+
+  subroutine enter_branches(march, system, observer, lane, outcome)
+    type(march_t), intent(inout) :: march
+    class(system_t), intent(inout) :: system
+    class(observer_t), intent(inout) :: observer
+    integer, intent(in) :: lane
+    type(outcome_t), intent(inout) :: outcome
+
+    associate (trial => march%trial)
+      march%sample(:) = trial%y(lane, :trial%components)
+      call system%enter(lane, trial%t(lane), march%sample)
+      if (march%has_switches) call start_switching(march%switching, system, observer, trial, lane, outcome)
+    end associate
+  end subroutine enter_branches
+
+  !> Evaluates the slope where the lanes in `starting` are, and ends those where that fails.
+  subroutine start_slopes(march, system, outcome)
+    type(march_t), intent(inout) :: march
+    class(system_t), intent(inout) :: system
+    type(outcome_t), intent(inout) :: outcome
+    integer :: lane
+
+    associate (trial => march%trial)
+      trial%working(:) = march%starting
+      call evaluate_start(trial, system, march%starting, trial%slope)
+      do lane = 1, trial%lanes
+        if (.not. march%starting(lane) .or. trial%working(lane)) cycle
+        if (outcome%status(lane) /= integration_running) cycle
+        outcome%status(lane) = merge(integration_not_finite, integration_gave_up, trial%verdict(lane) == trial_not_finite)
+        outcome%component(lane) = trial%culprit(lane)
+      end do
+    end associate
+  end subroutine start_slopes
 
   !> The next attempt of the lanes that are still running.
   subroutine set_out_lanes(march, stepper, system, outcome)
@@ -211,7 +249,8 @@ contains
     do lane = 1, march%trial%lanes
       march%accepted(lane) = march%trial%working(lane) .and. is_within(march%control%mean_square(lane))
       march%wanted(lane) = march%accepted(lane) &
-                           .and. (march%has_events .or. march%has_extremes .or. next_time(march, lane, times) < march%t_new(lane))
+                           .and. (march%has_events .or. march%has_extremes .or. march%has_switches &
+                                  .or. next_time(march, lane, times) < march%t_new(lane))
     end do
     if (any(march%wanted)) call stepper%interpolate(system, march%trial, march%wanted, march%coefficients)
     do lane = 1, march%trial%lanes
@@ -263,48 +302,6 @@ contains
     end associate
   end subroutine judge_rejection
 
-  !> Tells the observer what lies in the accepted steps: requested times, events, extremes.
-  subroutine follow_lanes(march, times, observer, outcome)
-    type(march_t), intent(inout) :: march
-    real(wp), contiguous, intent(in) :: times(:)
-    class(observer_t), intent(inout) :: observer
-    type(outcome_t), intent(inout) :: outcome
-    integer :: lane
-
-    do lane = 1, march%trial%lanes
-      if (.not. march%accepted(lane)) cycle
-      if (march%wanted(lane)) call take_lane(march%dense, march%trial, march%coefficients, lane)
-      if (march%has_events) call pass_events(march, lane, times, observer, outcome)
-      call record_until(march, lane, march%t_new(lane), times, observer)
-      if (march%has_extremes) call follow_extremes(march%extremes, observer, march%dense, march%t_new(lane))
-    end do
-  end subroutine follow_lanes
-
-  !> The events of a lane in their order, with the requested times between them; a terminal event ends the step and the lane.
-  subroutine pass_events(march, lane, times, observer, outcome)
-    type(march_t), intent(inout) :: march
-    integer, intent(in) :: lane
-    real(wp), contiguous, intent(in) :: times(:)
-    class(observer_t), intent(inout) :: observer
-    type(outcome_t), intent(inout) :: outcome
-    real(wp) :: t
-    logical :: is_terminal
-    integer :: i
-
-    call find_events(march%events, observer, march%dense)
-    do i = 1, march%events%found
-      t = min(march%trial%t(lane) + march%events%theta(i) * march%trial%h(lane), march%t_new(lane))
-      call record_until(march, lane, t, times, observer)
-      call sample(march%dense, march%events%theta(i), march%sample)
-      call observer%happen(lane, march%events%which(i), t, march%sample, is_terminal)
-      if (.not. is_terminal) cycle
-      outcome%status(lane) = integration_stopped
-      march%t_new(lane) = t
-      march%trial%y_new(lane, :march%trial%components) = march%sample
-      exit
-    end do
-  end subroutine pass_events
-
   !> First requested time of a lane that is not recorded yet; never, if there is none.
   pure real(wp) function next_time(march, lane, times)
     type(march_t), intent(in) :: march
@@ -314,40 +311,6 @@ contains
     next_time = huge(next_time)
     if (march%next(lane) <= size(times)) next_time = times(march%next(lane))
   end function next_time
-
-  !> Records the requested times up to t that have not been recorded yet.
-  subroutine record_until(march, lane, t, times, observer)
-    type(march_t), intent(inout) :: march
-    integer, intent(in) :: lane
-    real(wp), intent(in) :: t
-    real(wp), contiguous, intent(in) :: times(:)
-    class(observer_t), intent(inout) :: observer
-    real(wp) :: theta(batch)
-    integer :: ahead, i
-
-    associate (next => march%next(lane))
-      do while (next <= size(times))
-        theta = 0.0_wp
-        ahead = 0
-        do while (ahead < min(batch, size(times) + 1 - next))
-          if (times(next + ahead) > t .or. times(next + ahead) >= march%t_new(lane)) exit
-          ahead = ahead + 1
-          theta(ahead) = (times(next + ahead - 1) - march%dense%t) / march%dense%h
-        end do
-        if (ahead == 0) exit
-        call sample_batch(march%dense, theta)
-        do i = 1, ahead
-          call observer%record(lane, times(next), march%dense%states(:march%trial%components, i))
-          next = next + 1
-        end do
-      end do
-      if (next > size(times)) return
-      if (times(next) > t) return
-      march%sample(:) = march%trial%y_new(lane, :march%trial%components)
-      call observer%record(lane, times(next), march%sample)
-      next = next + 1
-    end associate
-  end subroutine record_until
 
   !> The accepted lanes move to the end of their step.
   subroutine advance_lanes(march)

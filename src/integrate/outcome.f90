@@ -6,7 +6,7 @@ module nocdyn_outcome
   implicit none (type, external)
   private
 
-  public :: allocate_outcome, reset_outcome, note_method, failure_sentence
+  public :: allocate_outcome, reset_outcome, note_method, note_crossing, failure_sentence
 
   integer, parameter, public :: integration_running = -1
   integer, parameter, public :: integration_done = 0
@@ -18,6 +18,7 @@ module nocdyn_outcome
   integer, parameter, public :: integration_stopped = 6      !! by a terminal event
 
   integer, parameter, public :: integration_idle = 7         !! the lane has not been given anything
+  integer, parameter, public :: integration_chattering = 8   !! the system changes its branches without end at one time
 
   integer, parameter, public :: most_switches = 32           !! whose times are kept
 
@@ -37,6 +38,8 @@ module nocdyn_outcome
     integer, allocatable :: switches(:)         !! between explicit and implicit method
     real(wp), allocatable :: switch_times(:, :) !! of the first switches, [most_switches, lanes]
     logical, allocatable :: implicit(:)         !! whether the last accepted step was an implicit method's
+    integer, allocatable :: crossings(:)        !! changes of branches of the system
+    integer, allocatable :: last_crossed(:)     !! number of the system's switch, 0 if there was none
   end type outcome_t
 
   integer, parameter :: digits = 6   ! of the numbers in messages
@@ -52,7 +55,8 @@ contains
     allocate (outcome%t(lanes), outcome%h(lanes), source=0.0_wp)
     allocate (outcome%component(lanes), outcome%steps(lanes), outcome%accepted(lanes), outcome%rejected(lanes), &
               outcome%evaluations(lanes), outcome%jacobians(lanes), outcome%factorisations(lanes), &
-              outcome%implicit_steps(lanes), outcome%switches(lanes), source=0)
+              outcome%implicit_steps(lanes), outcome%switches(lanes), outcome%crossings(lanes), &
+              outcome%last_crossed(lanes), source=0)
     allocate (outcome%switch_times(most_switches, lanes), source=0.0_wp)
     allocate (outcome%implicit(lanes), source=.false.)
   end subroutine allocate_outcome
@@ -72,6 +76,8 @@ contains
     outcome%switches(lane) = 0
     outcome%switch_times(:, lane) = 0.0_wp
     outcome%implicit(lane) = .false.
+    outcome%crossings(lane) = 0
+    outcome%last_crossed(lane) = 0
   end subroutine reset_outcome
 
   !> Counts an accepted step, and a switch if its method is of the other kind than that of the step before.
@@ -90,6 +96,16 @@ contains
     outcome%implicit(lane) = implicit
   end subroutine note_method
 
+  !> Counts a change of a branch.
+  pure subroutine note_crossing(outcome, lane, which)
+    type(outcome_t), intent(inout) :: outcome
+    integer, intent(in) :: lane
+    integer, intent(in) :: which   !! number of the system's switch
+
+    outcome%crossings(lane) = outcome%crossings(lane) + 1
+    outcome%last_crossed(lane) = which
+  end subroutine note_crossing
+
   !> What happened to a lane, when, to which state, and what to try; for the person at the keyboard.
   function failure_sentence(outcome, lane, system, rtol, atol) result(sentence)
     type(outcome_t), intent(in) :: outcome
@@ -106,10 +122,9 @@ contains
     case (integration_step_too_small)
       sentence = too_small_sentence(outcome, lane, system, rtol, atol, when)
     case (integration_too_many_steps)
-      sentence = 'the integration stopped at ' // when // ' after ' // to_text(outcome%steps(lane)) // &
-        ' steps, the most that max_steps allows (last step ' // rounded_text(outcome%h(lane), digits) // &
-        ' s): raise max_steps, or loosen rtol and atol'
-      if (outcome%jacobians(lane) == 0) sentence = sentence // ', or, if the system is stiff, take an implicit method'
+      sentence = too_many_sentence(outcome, lane, system, when)
+    case (integration_chattering)
+      sentence = chattering_sentence(system%switch_name(outcome%last_crossed(lane)), outcome%crossings(lane), when)
     case (integration_not_finite)
       sentence = not_finite_sentence(outcome, lane, system, when)
     case (integration_gave_up)
@@ -124,6 +139,33 @@ contains
       error stop 'nocdyn_outcome: an integration that is running has no outcome'
     end select
   end function failure_sentence
+
+  function too_many_sentence(outcome, lane, system, when) result(sentence)
+    type(outcome_t), intent(in) :: outcome
+    integer, intent(in) :: lane
+    class(system_t), intent(in) :: system
+    character(len=*), intent(in) :: when
+    character(len=:), allocatable :: sentence
+
+    sentence = 'the integration stopped at ' // when // ' after ' // to_text(outcome%steps(lane)) // &
+      ' steps, the most that max_steps allows (last step ' // rounded_text(outcome%h(lane), digits) // ' s): '
+    if (2 * outcome%crossings(lane) > outcome%steps(lane)) then
+      sentence = sentence // to_text(outcome%crossings(lane)) // ' changes of branches have ended steps, the last at the ' // &
+        system%switch_name(outcome%last_crossed(lane)) // '; '
+    end if
+    sentence = sentence // 'raise max_steps, or loosen rtol and atol'
+    if (outcome%jacobians(lane) == 0) sentence = sentence // ', or, if the system is stiff, take an implicit method'
+  end function too_many_sentence
+
+  function chattering_sentence(name, crossings, when) result(sentence)
+    character(len=*), intent(in) :: name
+    integer, intent(in) :: crossings
+    character(len=*), intent(in) :: when
+    character(len=:), allocatable :: sentence
+
+    sentence = 'the equations change to and fro without end at ' // when // ', at the ' // name // ' (' // to_text(crossings) // &
+      ' changes of branches so far): both sides drive the solution back to the border between them; make the change smooth'
+  end function chattering_sentence
 
   function too_small_sentence(outcome, lane, system, rtol, atol, when) result(sentence)
     type(outcome_t), intent(in) :: outcome

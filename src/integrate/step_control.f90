@@ -5,7 +5,7 @@ module nocdyn_step_control
   implicit none (type, external)
   private
 
-  public :: step_control, restart, weigh_error, is_within, lengthen, reduce, shorten, propose, smallest_step
+  public :: step_control, restart, resume, weigh_error, is_within, lengthen, reduce, shorten, propose, smallest_step
 
   ! The constants of Hairer's DOPRI5, for any order of the error estimate.
   real(wp), parameter :: beta = 0.04_wp            !! weight of the last error in the PI controller
@@ -57,6 +57,16 @@ contains
     control%log_error(lane) = log(least_old_error)
     control%was_rejected(lane) = .false.
   end subroutine restart
+
+  !> A lane goes on within a step of size h, with other equations: what is known of the errors is forgotten, the size is not.
+  pure subroutine resume(control, lane, h)
+    type(step_control_t), intent(inout) :: control
+    integer, intent(in) :: lane
+    real(wp), intent(in) :: h
+
+    call restart(control, lane)
+    control%h(lane) = min(control%h(lane), h)
+  end subroutine resume
 
   !> No step can be shorter: ten times what rounding makes of t.
   elemental function smallest_step(t)

@@ -22,6 +22,7 @@ module nocdyn_stepper
     procedure(attempt_interface), deferred :: attempt
     procedure(interpolate_interface), deferred :: interpolate
     procedure(accept_interface), deferred :: accept
+    procedure :: resume
   end type stepper_t
 
   abstract interface
@@ -80,5 +81,14 @@ contains
 
     error stop 'nocdyn_stepper: a stepper that plans its steps overrides plan'
   end subroutine plan
+
+  !> Takes over trial%slope = f(t, y) of lanes whose equations have changed where they are, after `accept`.
+  subroutine resume(self, trial, resuming)
+    class(stepper_t), intent(inout) :: self
+    type(trial_t), intent(inout) :: trial
+    logical, intent(in) :: resuming(:)
+
+    call self%begin(trial, resuming)
+  end subroutine resume
 
 end module nocdyn_stepper

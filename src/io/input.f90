@@ -15,6 +15,9 @@ module nocdyn_input
     integer, allocatable :: whole_numbers(:)
     logical, allocatable :: flags(:)
     type(string_t), allocatable :: texts(:)
+  contains
+    procedure :: has_any
+    procedure :: count => count_of
   end type value_t
 
   !> One group of the file. Asking for a key that the schema lacks, or with another type, is an error of the program.
@@ -43,7 +46,7 @@ module nocdyn_input
     type(string_t), allocatable :: overrides(:)   !! PATH=VALUE, as given
     type(group_t), allocatable :: groups(:)       !! single groups that the file lacks stand at the end
   contains
-    procedure :: groups_named   !! indices of the groups of one kind
+    procedure :: groups_named   !! indices of the groups of one kind, perhaps only of one law
     procedure :: single         !! the one group of a kind that occurs once
     procedure :: label          !! "&gear 'reducer'"
     procedure :: place          !! where a group or a key comes from, to begin a message with
@@ -51,14 +54,38 @@ module nocdyn_input
 
 contains
 
-  pure real(wp) function number(self, key)
+  !> Whether a key has a value, perhaps an empty list.
+  pure logical function has_any(self)
+    class(value_t), intent(in) :: self
+
+    has_any = allocated(self%numbers) .or. allocated(self%whole_numbers) .or. allocated(self%flags) .or. allocated(self%texts)
+  end function has_any
+
+  !> How many values a key has.
+  pure integer function count_of(self)
+    class(value_t), intent(in) :: self
+
+    count_of = 0
+    if (allocated(self%numbers)) count_of = size(self%numbers)
+    if (allocated(self%whole_numbers)) count_of = size(self%whole_numbers)
+    if (allocated(self%flags)) count_of = size(self%flags)
+    if (allocated(self%texts)) count_of = size(self%texts)
+  end function count_of
+
+  pure real(wp) function number(self, key, absent)
     class(group_t), intent(in) :: self
     character(len=*), intent(in) :: key
+    real(wp), optional, intent(in) :: absent   !! answer if the key is unset
     integer :: k
 
     k = self%key_position(key)
-    if (.not. allocated(self%values(k)%numbers)) error stop 'nocdyn_input: number() of a key without a number'
-    number = self%values(k)%numbers(1)
+    if (allocated(self%values(k)%numbers)) then
+      number = self%values(k)%numbers(1)
+    else if (present(absent)) then
+      number = absent
+    else
+      error stop 'nocdyn_input: number() of a key without a number'
+    end if
   end function number
 
   pure integer function whole_number(self, key)
@@ -145,10 +172,7 @@ contains
     class(group_t), intent(in) :: self
     character(len=*), intent(in) :: key
 
-    associate (value => self%values(self%key_position(key)))
-      has_value = allocated(value%numbers) .or. allocated(value%whole_numbers) .or. allocated(value%flags) &
-        .or. allocated(value%texts)
-    end associate
+    has_value = self%values(self%key_position(key))%has_any()
   end function has_value
 
   pure integer function key_position(self, key)
@@ -163,15 +187,21 @@ contains
     error stop 'nocdyn_input: a key was asked for that the schema does not have'
   end function key_position
 
-  pure function groups_named(self, kind) result(indices)
+  pure function groups_named(self, kind, law) result(indices)
     class(input_t), intent(in) :: self
     character(len=*), intent(in) :: kind
+    character(len=*), optional, intent(in) :: law   !! only those whose key `kind` has this value
     integer, allocatable :: indices(:)
+    logical :: is_wanted(size(self%groups))
     integer :: i
 
     if (all(group_rules%name /= kind)) error stop 'nocdyn_input: a group was asked for that the schema does not have'
-    allocate (indices(count([(self%groups(i)%kind == kind, i=1, size(self%groups))])))
-    indices = pack([(i, i=1, size(self%groups))], [(self%groups(i)%kind == kind, i=1, size(self%groups))])
+    do i = 1, size(self%groups)
+      is_wanted(i) = self%groups(i)%kind == kind
+      if (is_wanted(i) .and. present(law)) is_wanted(i) = self%groups(i)%text('kind') == law
+    end do
+    allocate (indices(count(is_wanted)))
+    indices = pack([(i, i=1, size(is_wanted))], is_wanted)
   end function groups_named
 
   pure function single(self, kind) result(group)

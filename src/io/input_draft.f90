@@ -1,7 +1,7 @@
 !> What a file and its overrides say about one key, before it is known whether that makes sense.
 module nocdyn_input_draft
   use nocdyn_namelist, only: assignment_t, namelist_t
-  use nocdyn_schema, only: any_number, key_rule_t, required, unset
+  use nocdyn_schema_rules, only: any_number, key_rule_t, required, unset
   use nocdyn_text, only: to_text
   implicit none (type, external)
   private
@@ -167,12 +167,13 @@ contains
   end subroutine fill
 
   !> Each value of which nothing is said becomes the default, if there is one.
-  subroutine fill_default(self, rule)
+  subroutine fill_default(self, rule, length)
     class(draft_t), intent(inout) :: self
     type(key_rule_t), intent(in) :: rule
+    integer, intent(in) :: length   !! how many values the key has at least
     integer :: i
 
-    call widen(self, rule%count)
+    call widen(self, length)
     if (rule%default == required .or. rule%default == unset) return
     do i = 1, size(self%slots)
       if (allocated(self%slots(i)%text)) cycle

@@ -1,13 +1,16 @@
 !> One group of the input: what file and overrides say, completed by defaults and checked by itself.
 module nocdyn_input_group
-  use nocdyn_input, only: group_t
-  use nocdyn_input_draft, only: draft_t
+  use nocdyn_input, only: group_t, value_t
+  use nocdyn_input_columns, only: complete_columns
   use nocdyn_input_overrides, only: override_t
+  use nocdyn_input_relations, only: relate_keys
   use nocdyn_input_values, only: convert
+  use nocdyn_input_work, only: new_work, work_t
   use nocdyn_mistakes, only: mistakes_t, no_line
   use nocdyn_namelist, only: assignment_t, namelist_group_t, namelist_t
-  use nocdyn_schema, only: a_name, alternatives, first_key, group_rules, key_rule_index, key_rule_t, key_rules, &
-    last_key, orders, unset
+  use nocdyn_schema, only: group_rules, key_rule_index, key_rules, orders
+  use nocdyn_schema_relations, only: relations_t
+  use nocdyn_schema_rules, only: a_name, key_rule_t, required, unset
   use nocdyn_schema_text, only: allowed_text, key_names, suggestion
   use nocdyn_text, only: lower_case, nearest_word, to_text
   implicit none (type, external)
@@ -15,42 +18,31 @@ module nocdyn_input_group
 
   public :: read_group
 
-  !> The drafts of one group on their way to values.
-  type :: work_t
-    integer :: index = 0                      !! of the group in the input
-    integer :: rule = 0
-    integer :: first = 0                      !! row of its first key
-    type(draft_t), allocatable :: drafts(:)
-    logical, allocatable :: may_miss(:)       !! no value, and no mistake: unset, or part of what was not understood
-  end type work_t
-
 contains
 
   !> Reads the group `index` of the input; `source` is empty for a single group that the file lacks.
-  subroutine read_group(namelist, source, index, overrides, group, mistakes)
+  subroutine read_group(namelist, source, index, overrides, folder, relations, group, mistakes)
     type(namelist_t), intent(in) :: namelist
     type(namelist_group_t), intent(in) :: source
     integer, intent(in) :: index
     type(override_t), intent(inout) :: overrides(:)
+    character(len=*), intent(in) :: folder  !! of the input file, with a slash at its end, or ''
+    type(relations_t), intent(in) :: relations   !! of the keys of this kind of group
     type(group_t), intent(inout) :: group   !! `rule`, `kind` and `line` are known
     type(mistakes_t), intent(inout) :: mistakes
-    type(work_t) :: work
-    integer :: i, keys
+    type(work_t), allocatable :: work
+    integer :: i
 
-    work%index = index
-    work%rule = group%rule
-    work%first = first_key(group%rule)
-    keys = last_key(group%rule) - work%first + 1
-    allocate (work%drafts(keys), group%values(keys))
-    allocate (work%may_miss(keys), source=source%is_damaged)
-
+    allocate (work, source=new_work(index, group%rule, group%line, source%is_damaged))
+    allocate (group%values(size(work%drafts)))
     call take_assignments(namelist, source, work, mistakes)
     group%name = name_of(work)
     call take_overrides(group%name, overrides, work, mistakes)
-    call choose_alternatives(group%line, work, mistakes)
-    do i = 1, keys
-      call complete(work, i, group, mistakes)
+    call relate_keys(work, relations, mistakes)
+    do i = 1, size(work%drafts)
+      call complete(work, i, group%values(i), mistakes)
     end do
+    call complete_columns(work, relations%columns, folder, group, mistakes)
     call check_orders(group, index, mistakes)
   end subroutine read_group
 
@@ -140,89 +132,38 @@ contains
     end do
   end subroutine take_overrides
 
-  !> Leaves one key of each pair of alternatives; an override wins over the file.
-  subroutine choose_alternatives(line, work, mistakes)
-    integer, intent(in) :: line
-    type(work_t), intent(inout) :: work
-    type(mistakes_t), intent(inout) :: mistakes
-    integer :: a, first, second
-
-    do a = 1, size(alternatives)
-      if (alternatives(a)%group /= group_rules(work%rule)%name) cycle
-      first = key_rule_index(work%rule, trim(alternatives(a)%first)) - work%first + 1
-      second = key_rule_index(work%rule, trim(alternatives(a)%second)) - work%first + 1
-      if (work%drafts(first)%is_said() .and. work%drafts(second)%is_said()) then
-        call resolve_both(work, first, second, mistakes)
-      else if (work%drafts(first)%is_said()) then
-        work%may_miss(second) = .true.
-      else if (work%drafts(second)%is_said()) then
-        work%may_miss(first) = .true.
-      else if (is_without_any(work, first, second)) then
-        call mistakes%add(line, work%index, trim(alternatives(a)%first) // ' or ' // trim(alternatives(a)%second) &
-          // ' is missing; one of them is needed')
-      end if
-    end do
-  end subroutine choose_alternatives
-
-  !> Whether neither of two keys has a default or may miss.
-  pure logical function is_without_any(work, first, second)
-    type(work_t), intent(in) :: work
-    integer, intent(in) :: first, second
-
-    is_without_any = .not. any(work%may_miss([first, second])) &
-      .and. key_rules(work%first - 1 + first)%default == unset .and. key_rules(work%first - 1 + second)%default == unset
-  end function is_without_any
-
-  subroutine resolve_both(work, first, second, mistakes)
-    type(work_t), intent(inout) :: work
-    integer, intent(in) :: first, second   !! positions of two keys that are both written
-    type(mistakes_t), intent(inout) :: mistakes
-    integer :: dropped, kept
-
-    kept = first
-    dropped = second
-    if (work%drafts(second)%override > 0) then
-      kept = second
-      dropped = first
-    end if
-    if ((work%drafts(first)%override > 0) .eqv. (work%drafts(second)%override > 0)) then
-      call mistakes%add(max(work%drafts(first)%line, work%drafts(second)%line), work%index, &
-        trim(key_rules(work%first - 1 + first)%name) // ' and ' // trim(key_rules(work%first - 1 + second)%name) &
-        // ' are both given; allowed: one of them', max(work%drafts(first)%override, work%drafts(second)%override))
-    end if
-    work%drafts(dropped) = draft_t()
-    work%may_miss(dropped) = .true.
-  end subroutine resolve_both
-
   !> Fills defaults in and converts.
-  subroutine complete(work, i, group, mistakes)
+  subroutine complete(work, i, value, mistakes)
     type(work_t), intent(inout) :: work
     integer, intent(in) :: i
-    type(group_t), intent(inout) :: group
+    type(value_t), intent(inout) :: value
     type(mistakes_t), intent(inout) :: mistakes
     type(key_rule_t) :: rule
-    integer :: line, said
+    character(len=:), allocatable :: complaint
+    integer :: known, said
 
-    rule = key_rules(work%first + i - 1)
-    associate (draft => work%drafts(i), value => group%values(i))
+    rule = work%key(i)
+    associate (draft => work%drafts(i))
       said = draft%values_said()
       value%is_given = said > 0
       value%line = draft%line
       value%override = draft%override
-      if (draft%is_damaged .or. (said == 0 .and. (work%may_miss(i) .or. rule%default == unset))) return
+      if (draft%is_damaged .or. (said == 0 .and. (work%may_miss(i) .or. work%is_out(i) .or. rule%default == unset))) return
 
-      call draft%fill_default(rule)
-      line = merge(draft%line, group%line, draft%line > 0)
-      if (draft%values_said() == size(draft%slots)) then
-        call convert(draft, rule, work%index, value, mistakes)
-      else if (said == 0 .and. .not. draft%is_written) then
-        call mistakes%add(line, work%index, trim(rule%name) // ' is missing; needed: ' // allowed_text(rule))
-      else if (said == 0) then
-        call mistakes%add(line, work%index, trim(rule%name) // ' has no value; needed: ' // allowed_text(rule))
+      call draft%fill_default(rule, work%length(i))
+      known = draft%values_said()
+      if (known == 0 .and. rule%default /= required) return
+      if (known == 0) then
+        complaint = trim(merge(' has no value', ' is missing  ', draft%is_written)) // '; needed: ' // allowed_text(rule)
+      else if (known < size(draft%slots)) then
+        complaint = ' has ' // counted(said) // '; needed: ' // to_text(size(draft%slots))
+      else if (known < rule%least) then
+        complaint = ' has ' // counted(known) // '; needed: at least ' // to_text(rule%least)
       else
-        call mistakes%add(line, work%index, trim(rule%name) // ' has ' // counted(said) // '; needed: ' &
-          // to_text(size(draft%slots)), draft%override)
+        call convert(draft, rule, work%index, value, mistakes)
+        return
       end if
+      call mistakes%add(merge(draft%line, work%line, draft%line > 0), work%index, trim(rule%name) // complaint, draft%override)
     end associate
   end subroutine complete
 

@@ -2,7 +2,8 @@
 module nocdyn_input_names
   use nocdyn_input, only: group_t, value_t
   use nocdyn_mistakes, only: mistakes_t
-  use nocdyn_schema, only: a_body, body_or_ground, first_key, ground, group_rules, key_rule_t, key_rules
+  use nocdyn_schema, only: first_key, group_rules, key_rules
+  use nocdyn_schema_rules, only: a_body, body_or_ground, ground, key_rule_t
   use nocdyn_schema_text, only: suggestion
   use nocdyn_text, only: quoted, string_t, to_text
   use nocdyn_text_order, only: first_position, find_order

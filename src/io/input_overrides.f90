@@ -4,8 +4,8 @@ module nocdyn_input_overrides
   use nocdyn_namelist, only: assignment_t, item_t, namelist_t
   use nocdyn_namelist_scanner, only: scan_value
   use nocdyn_namelist_values, only: read_subscript
-  use nocdyn_schema, only: a_name, group_rule_index, group_rules, holds_texts, is_single, key_rule_index, key_rule_t, &
-    key_rules
+  use nocdyn_schema, only: group_rule_index, group_rules, holds_texts, is_single, key_rule_index, key_rules
+  use nocdyn_schema_rules, only: a_name, key_rule_t
   use nocdyn_schema_text, only: group_names, key_names, suggestion
   use nocdyn_text, only: lower_case, string_t
   implicit none (type, external)

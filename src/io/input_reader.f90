@@ -2,13 +2,16 @@
 module nocdyn_input_reader
   use nocdyn_errors, only: error_t, exit_input, raise
   use nocdyn_input, only: group_t, input_t
+  use nocdyn_input_constraints, only: check_constraints
   use nocdyn_input_group, only: read_group
   use nocdyn_input_names, only: check_doubled_names, check_references, collect_names
   use nocdyn_input_overrides, only: override_t, read_overrides
   use nocdyn_mistakes, only: mistake_t, mistakes_t, no_line
   use nocdyn_namelist, only: namelist_group_t, namelist_t
   use nocdyn_namelist_scanner, only: scan_namelist
-  use nocdyn_schema, only: at_least_once, exactly_once, group_rule_index, group_rules, is_single
+  use nocdyn_schema, only: group_rule_index, group_rules, is_single
+  use nocdyn_schema_relations, only: relations_of, relations_t
+  use nocdyn_schema_rules, only: at_least_once, exactly_once
   use nocdyn_schema_text, only: group_names, occurrence_text, suggestion
   use nocdyn_text, only: nearest_word, quoted, string_t, to_text
   use nocdyn_text_buffer, only: text_buffer_t
@@ -62,7 +65,8 @@ contains
     call refuse_unused(input%groups, parsed, mistakes)
     call check_doubled_names(input%groups, mistakes)
     call check_references(input%groups, bodies_are_known(input%groups), mistakes)
-    if (mistakes%count > 0) call raise(error, exit_input, report(input, mistakes))
+    call check_constraints(input%groups, mistakes)
+    if (mistakes%count > 0) call raise(error, mistakes%worst_code(), report(input, mistakes))
   end subroutine read_input_text
 
   !> All groups of the file, then the single groups that it lacks.
@@ -72,8 +76,14 @@ contains
     type(input_t), intent(inout) :: input
     type(mistakes_t), intent(inout) :: mistakes
     integer, allocatable :: added(:)
+    character(len=:), allocatable :: folder
+    type(relations_t) :: relations(size(group_rules))
     integer :: g, n
 
+    do g = 1, size(relations)
+      relations(g) = relations_of(g)
+    end do
+    folder = input%file(:index(input%file, '/', back=.true.))
     call find_absent_groups(namelist, overrides, added)
     n = namelist%group_count
     allocate (input%groups(n + size(added)))
@@ -83,14 +93,14 @@ contains
         if (g > n) then
           group%rule = added(g - n)
           group%kind = trim(group_rules(group%rule)%name)
-          call read_group(namelist, namelist_group_t(), g, overrides, group, mistakes)
+          call read_group(namelist, namelist_group_t(), g, overrides, folder, relations(group%rule), group, mistakes)
           cycle
         end if
         group%kind = namelist%groups(g)%name
         group%rule = group_rule_index(group%kind)
         group%line = namelist%groups(g)%line
         if (group%rule > 0) then
-          call read_group(namelist, namelist%groups(g), g, overrides, group, mistakes)
+          call read_group(namelist, namelist%groups(g), g, overrides, folder, relations(group%rule), group, mistakes)
         else
           call mistakes%add(group%line, g, 'there is no such group' // suggestion(group%kind, group_names()))
         end if

@@ -4,8 +4,9 @@ module nocdyn_input_values
   use nocdyn_input_draft, only: draft_t, slot_t
   use nocdyn_kinds, only: wp
   use nocdyn_literals, only: literal_fine, literal_not_finite, literal_too_large, read_integer, read_logical, read_real
-  use nocdyn_schema, only: a_body, a_flag, a_name, a_number, a_word, allowed_t, an_integer, ground, holds_texts, &
-    key_rule_t, longest_name, words_of
+  use nocdyn_schema, only: holds_texts, words_of
+  use nocdyn_schema_rules, only: a_body, a_file, a_flag, a_kind, a_name, a_number, a_word, allowed_t, an_integer, &
+    ground, key_rule_t, longest_name
   use nocdyn_schema_text, only: allowed_text
   use nocdyn_mistakes, only: mistakes_t
   use nocdyn_text, only: joined, lower_case, nearest_word, string_t, to_text
@@ -146,6 +147,7 @@ contains
 
     is_outside = value < allowed%low .or. value > allowed%high
     if (allowed%excludes_low) is_outside = is_outside .or. .not. value > allowed%low
+    if (allowed%excludes_zero) is_outside = is_outside .or. abs(value) <= 0.0_wp
   end function is_outside
 
   subroutine check_text(rule, value, complaint)
@@ -158,8 +160,10 @@ contains
       complaint = name_complaint(value%text)
     case (a_body)
       if (value%text == ground) complaint = ': the ground is not allowed here; allowed: name of a &body'
-    case (a_word)
-      call check_word(words_of(rule%allowed), value, complaint)
+    case (a_word, a_kind)
+      call check_word(words_of(rule), value, complaint)
+    case (a_file)
+      if (value%text == '') complaint = ' is not the name of a file'
     case default
       complaint = ''
     end select

@@ -18,8 +18,8 @@ module nocdyn_json
     procedure :: open_list
     procedure :: close_list
     procedure :: text
-    generic :: put => put_text, put_texts, put_number, put_integer
-    procedure, private :: put_text, put_texts, put_number, put_integer
+    generic :: put => put_text, put_texts, put_number, put_numbers, put_integer, put_integers
+    procedure, private :: put_text, put_texts, put_number, put_numbers, put_integer, put_integers
     procedure, private :: begin_member
     procedure, private :: begin_item
   end type json_t
@@ -109,12 +109,35 @@ contains
     real(wp), intent(in) :: value
 
     call self%begin_member(key)
-    if (ieee_is_finite(value)) then
-      call self%buffer%append(to_text(value))
-    else
-      call self%buffer%append('null')
-    end if
+    call append_number(self%buffer, value)
   end subroutine put_number
+
+  !> A list of numbers, on one line.
+  subroutine put_numbers(self, key, values)
+    class(json_t), intent(inout) :: self
+    character(len=*), intent(in) :: key
+    real(wp), intent(in) :: values(:)
+    integer :: i
+
+    call self%begin_member(key)
+    call self%buffer%append('[')
+    do i = 1, size(values)
+      if (i > 1) call self%buffer%append(', ')
+      call append_number(self%buffer, values(i))
+    end do
+    call self%buffer%append(']')
+  end subroutine put_numbers
+
+  subroutine append_number(buffer, value)
+    type(text_buffer_t), intent(inout) :: buffer
+    real(wp), intent(in) :: value
+
+    if (ieee_is_finite(value)) then
+      call buffer%append(to_text(value))
+    else
+      call buffer%append('null')
+    end if
+  end subroutine append_number
 
   subroutine put_integer(self, key, value)
     class(json_t), intent(inout) :: self
@@ -124,6 +147,22 @@ contains
     call self%begin_member(key)
     call self%buffer%append(to_text(value))
   end subroutine put_integer
+
+  !> A list of whole numbers, on one line.
+  subroutine put_integers(self, key, values)
+    class(json_t), intent(inout) :: self
+    character(len=*), intent(in) :: key
+    integer, intent(in) :: values(:)
+    integer :: i
+
+    call self%begin_member(key)
+    call self%buffer%append('[')
+    do i = 1, size(values)
+      if (i > 1) call self%buffer%append(', ')
+      call self%buffer%append(to_text(values(i)))
+    end do
+    call self%buffer%append(']')
+  end subroutine put_integers
 
   subroutine begin_member(self, key)
     class(json_t), intent(inout) :: self

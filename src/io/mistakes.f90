@@ -1,5 +1,6 @@
 !> The mistakes of an input, collected so that all are reported in one go.
 module nocdyn_mistakes
+  use nocdyn_errors, only: exit_input
   use nocdyn_text, only: string_t
   use nocdyn_text_order, only: find_order
   implicit none (type, external)
@@ -12,6 +13,7 @@ module nocdyn_mistakes
     integer :: line = no_line
     integer :: group = 0      !! index in the file, 0: outside groups
     integer :: override = 0   !! index of the override that is wrong, 0: the file is
+    integer :: code = exit_input   !! exit code of the program
     character(len=:), allocatable :: text
   end type mistake_t
 
@@ -21,15 +23,16 @@ module nocdyn_mistakes
   contains
     procedure :: add
     procedure :: find_order_by_line
+    procedure :: worst_code
   end type mistakes_t
 
 contains
 
-  subroutine add(self, line, group, text, override)
+  subroutine add(self, line, group, text, override, code)
     class(mistakes_t), intent(inout) :: self
     integer, intent(in) :: line, group
     character(len=*), intent(in) :: text
-    integer, optional, intent(in) :: override
+    integer, optional, intent(in) :: override, code
     type(mistake_t), allocatable :: longer(:)
 
     if (.not. allocated(self%list)) allocate (self%list(16))
@@ -43,6 +46,7 @@ contains
       mistake%line = line
       mistake%group = group
       if (present(override)) mistake%override = override
+      if (present(code)) mistake%code = code
       mistake%text = text
     end associate
   end subroutine add
@@ -62,5 +66,13 @@ contains
     end do
     call find_order(keys, order)
   end subroutine find_order_by_line
+
+  !> The largest exit code of all mistakes.
+  pure integer function worst_code(self)
+    class(mistakes_t), intent(in) :: self
+
+    worst_code = exit_input
+    if (self%count > 0) worst_code = maxval(self%list(:self%count)%code)
+  end function worst_code
 
 end module nocdyn_mistakes

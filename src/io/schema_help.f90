@@ -1,18 +1,21 @@
-!> The schema as people read it: help on the terminal, an annotated example file, a reference page.
+!> The schema as people read it on the terminal: help, and an annotated example file.
 module nocdyn_schema_help
-  use nocdyn_schema, only: a_flag, a_number, a_word, an_integer, body_or_ground, examples, first_key, &
-    group_rule_index, group_rules, key_rule_t, key_rules, last_key, required, unset
-  use nocdyn_schema_text, only: allowed_text, alternative_of, group_names, kind_text, occurrence_text, suggestion
   use nocdyn_errors, only: error_t, exit_input, raise
-  use nocdyn_text, only: lower_case
+  use nocdyn_schema, only: examples, first_key, group_rule_index, group_rules, has_word, key_rules, kind_rules, last_key
+  use nocdyn_schema_rules, only: a_flag, a_kind, a_number, a_word, an_integer, body_or_ground, example_t, key_rule_t
+  use nocdyn_schema_sentences, only: default_text, sentences_on
+  use nocdyn_schema_text, only: allowed_text, group_names, kind_text, listed, occurrence_text, suggestion
+  use nocdyn_text, only: append, lower_case, quoted, string_t
   use nocdyn_text_buffer, only: text_buffer_t
   implicit none (type, external)
   private
 
-  public :: input_help, group_help, input_template, input_reference
+  public :: input_help, group_help, input_template, append_examples
 
   integer, parameter :: longest_group = maxval(len_trim(group_rules%name))
-  integer, parameter :: column = 36   !! width of type and allowed values
+  integer, parameter :: column = 38       !! width of type and allowed values
+  integer, parameter :: line_width = 96   !! of sentences
+  character(len=*), parameter :: comment = '! '
 
 contains
 
@@ -27,16 +30,17 @@ contains
     call buffer%append_line("comment. 'nocdyn new FILE' writes the example below with these explanations.")
     call buffer%append_line('')
     do rule = 1, size(group_rules)
-      call append_group_help(buffer, rule)
+      call append_group(buffer, rule, '')
+      call buffer%append_line('')
     end do
     call buffer%append_line('Example')
     do rule = 1, size(group_rules)
-      call append_examples(buffer, rule)
+      call append_examples(buffer, rule, .true.)
     end do
     text = buffer%text()
   end function input_help
 
-  !> One group with its keys and an example.
+  !> One group with its keys and examples.
   subroutine group_help(group, text, error)
     character(len=*), intent(in) :: group   !! with or without &
     character(len=:), allocatable, intent(out) :: text
@@ -51,9 +55,10 @@ contains
       call raise(error, exit_input, "there is no group '" // name // "'" // suggestion(name, group_names()))
       return
     end if
-    call append_group_help(buffer, rule)
-    call buffer%append_line('Example')
-    call append_examples(buffer, rule)
+    call append_group(buffer, rule, '')
+    call buffer%append_line('')
+    call buffer%append_line(trim(merge('Examples', 'Example ', count(examples%group == group_rules(rule)%name) > 1)))
+    call append_examples(buffer, rule, .false.)
     text = buffer%text()
   end subroutine group_help
 
@@ -61,117 +66,151 @@ contains
   function input_template() result(text)
     character(len=:), allocatable :: text
     type(text_buffer_t) :: buffer
-    integer :: key, rule
+    integer :: rule
 
     call buffer%append_line("! An input of nocdyn. 'nocdyn check FILE' checks it, 'nocdyn run FILE' computes it.")
     call buffer%append_line('! SI units; texts in quotes; what stands behind an exclamation mark is a comment.')
     do rule = 1, size(group_rules)
       call buffer%append_line('')
-      call buffer%append_line('! &' // trim(group_rules(rule)%name) // ', ' &
-        // occurrence_text(group_rules(rule)%occurrence) // ': ' // trim(group_rules(rule)%help))
-      do key = first_key(rule), last_key(rule)
-        call buffer%append_line('!   ' // key_rules(key)%name // short_rule(key_rules(key)))
-        call buffer%append_line('!     ' // trim(key_rules(key)%help))
-      end do
-      call append_examples(buffer, rule)
+      call append_group(buffer, rule, comment)
+      call append_examples(buffer, rule, .true.)
     end do
     text = buffer%text()
   end function input_template
 
-  !> A page in Markdown.
-  function input_reference() result(text)
-    character(len=:), allocatable :: text
-    type(text_buffer_t) :: buffer
-    integer :: rule
-
-    call buffer%append_line('# Input reference')
-    call buffer%append_line('')
-    call buffer%append_line('An input file is a Fortran namelist in SI units. Groups stand in any order.')
-    do rule = 1, size(group_rules)
-      call append_reference(buffer, rule)
-    end do
-    text = buffer%text()
-  end function input_reference
-
-  subroutine append_reference(buffer, rule)
+  !> A group's keys: those before its kind and the kind itself, those of each kind, those behind.
+  subroutine append_group(buffer, rule, margin)
     type(text_buffer_t), intent(inout) :: buffer
     integer, intent(in) :: rule
-    integer :: key
+    character(len=*), intent(in) :: margin   !! at the begin of each line
+    integer :: k, key, kind_key
 
-    call buffer%append_line('')
-    call buffer%append_line('## `&' // trim(group_rules(rule)%name) // '`')
-    call buffer%append_line('')
-    call buffer%append_line(trim(group_rules(rule)%help) // ' Given ' // occurrence_text(group_rules(rule)%occurrence) // '.')
-    call buffer%append_line('')
-    call buffer%append_line('| key | type | default | allowed | meaning |')
-    call buffer%append_line('| --- | --- | --- | --- | --- |')
+    call buffer%append_line(margin // '&' // trim(group_rules(rule)%name) // ', ' // &
+                            occurrence_text(group_rules(rule)%occurrence))
+    call buffer%append_line(margin // '  ' // trim(group_rules(rule)%help))
+    kind_key = last_key(rule)
     do key = first_key(rule), last_key(rule)
-      call buffer%append_line('| `' // trim(key_rules(key)%name) // '` | ' // kind_text(key_rules(key)) // ' | ' &
-        // default_text(key_rules(key)) // ' | ' // allowed_text(key_rules(key)) // ' | ' // trim(key_rules(key)%help) // ' |')
+      if (key_rules(key)%kind == a_kind) kind_key = key
     end do
-    call buffer%append_line('')
-    call buffer%append_line('```')
-    call append_examples(buffer, rule)
-    call buffer%append_line('```')
-  end subroutine append_reference
+    do key = first_key(rule), kind_key
+      call append_key(buffer, key_rules(key), margin)
+    end do
+    do k = 1, size(kind_rules)
+      if (kind_rules(k)%group == group_rules(rule)%name) call append_kind(buffer, k, rule, margin)
+    end do
+    if (any(key_rules(kind_key + 1:last_key(rule))%kinds == '')) call buffer%append_line(margin // '  of every kind')
+    do key = kind_key + 1, last_key(rule)
+      if (key_rules(key)%kinds == '') call append_key(buffer, key_rules(key), margin)
+    end do
+    call append_sentences(buffer, rule, margin)
+  end subroutine append_group
 
-  subroutine append_group_help(buffer, rule)
+  !> The law of a kind and its keys; those that an earlier kind has too are only named.
+  subroutine append_kind(buffer, kind, rule, margin)
     type(text_buffer_t), intent(inout) :: buffer
-    integer, intent(in) :: rule
+    integer, intent(in) :: kind, rule
+    character(len=*), intent(in) :: margin
+    type(string_t), allocatable :: known(:)
     integer :: key
 
-    call buffer%append_line('&' // trim(group_rules(rule)%name) // ', ' // occurrence_text(group_rules(rule)%occurrence))
-    call buffer%append_line('  ' // trim(group_rules(rule)%help))
+    call buffer%append_line(margin // '  kind = ' // quoted(trim(kind_rules(kind)%word)) // ': ' // trim(kind_rules(kind)%help))
+    allocate (known(0))
     do key = first_key(rule), last_key(rule)
-      call buffer%append_line('    ' // key_rules(key)%name // short_rule(key_rules(key)))
-      call buffer%append_line('        ' // trim(key_rules(key)%help))
+      if (.not. has_word(key_rules(key)%kinds, kind_rules(kind)%word)) cycle
+      if (index(key_rules(key)%kinds, trim(kind_rules(kind)%word) // ' ') == 1) then
+        call append_key(buffer, key_rules(key), margin)
+      else
+        call append(known, trim(key_rules(key)%name))
+      end if
     end do
-    call buffer%append_line('')
-  end subroutine append_group_help
+    if (size(known) > 0) call buffer%append_line(margin // '    ' // listed(known, ' and ') // ' as above')
+  end subroutine append_kind
+
+  subroutine append_key(buffer, rule, margin)
+    type(text_buffer_t), intent(inout) :: buffer
+    type(key_rule_t), intent(in) :: rule
+    character(len=*), intent(in) :: margin
+
+    call buffer%append_line(margin // '    ' // rule%name // short_rule(rule))
+    call buffer%append_line(margin // '      ' // trim(rule%help))
+  end subroutine append_key
 
   !> Type, allowed values and default in one line, the default in a column of its own.
   function short_rule(rule) result(text)
     type(key_rule_t), intent(in) :: rule
     character(len=:), allocatable :: text
-    character(len=column) :: values
 
     select case (rule%kind)
     case (a_number, an_integer)
-      values = kind_text(rule) // ', ' // allowed_text(rule)
+      text = kind_text(rule) // ', ' // allowed_text(rule)
     case (a_word, a_flag)
-      values = allowed_text(rule)
+      text = allowed_text(rule)
+    case (a_kind)
+      text = 'one of those below'
     case (body_or_ground)
-      values = kind_text(rule) // " or 'ground'"
+      text = kind_text(rule) // " or 'ground'"
     case default
-      values = kind_text(rule)
+      text = kind_text(rule)
     end select
-    text = ' ' // values // ' ' // default_text(rule)
+    text = ' ' // text // repeat(' ', max(0, column - len(text))) // ' ' // default_text(rule)
   end function short_rule
 
-  !> "required", "default 0", "or teeth" ...
-  function default_text(rule) result(text)
-    type(key_rule_t), intent(in) :: rule
-    character(len=:), allocatable :: text
-
-    if (rule%default == required) then
-      text = 'required'
-    else if (rule%default /= unset) then
-      text = 'default ' // trim(rule%default)
-    else
-      text = 'optional'
-    end if
-    if (alternative_of(rule) /= '') text = text // ', or ' // alternative_of(rule) // ' instead'
-  end function default_text
-
-  subroutine append_examples(buffer, rule)
+  subroutine append_sentences(buffer, rule, margin)
     type(text_buffer_t), intent(inout) :: buffer
     integer, intent(in) :: rule
+    character(len=*), intent(in) :: margin
+    type(string_t), allocatable :: sentences(:)
+    integer :: i
+
+    allocate (sentences, source=sentences_on(rule))
+    do i = 1, size(sentences)
+      call append_wrapped(buffer, sentences(i)%text, margin // '  ')
+    end do
+  end subroutine append_sentences
+
+  !> A sentence on as many lines as it needs.
+  subroutine append_wrapped(buffer, text, margin)
+    type(text_buffer_t), intent(inout) :: buffer
+    character(len=*), intent(in) :: text, margin
+    integer :: first, last
+
+    first = 1
+    do
+      last = len(text)
+      if (len(text) - first >= line_width) last = first - 1 + index(text(first:first + line_width - 1), ' ', back=.true.)
+      call buffer%append_line(margin // repeat('  ', merge(0, 1, first == 1)) // trim(text(first:last)))
+      first = last + 1
+      if (first > len(text)) exit
+    end do
+  end subroutine append_wrapped
+
+  subroutine append_examples(buffer, rule, only_template)
+    type(text_buffer_t), intent(inout) :: buffer
+    integer, intent(in) :: rule
+    logical, intent(in) :: only_template   !! without the further examples
     integer :: i
 
     do i = 1, size(examples)
-      if (examples(i)%group /= group_rules(rule)%name) cycle
-      call buffer%append_line('&' // examples(i)%group(:longest_group) // ' ' // trim(examples(i)%text) // ' /')
+      if (examples(i)%group /= group_rules(rule)%name .or. (only_template .and. .not. examples(i)%is_in_template)) cycle
+      call buffer%append_line(example_text(examples(i)))
     end do
   end subroutine append_examples
+
+  !> A whole group.
+  pure function example_text(example) result(text)
+    type(example_t), intent(in) :: example
+    character(len=:), allocatable :: text
+    integer :: bar, first
+
+    text = '&' // example%group(:longest_group) // ' '
+    first = 1
+    do
+      bar = index(example%text(first:), '|')
+      if (bar == 0) exit
+      text = text // example%text(first:first + bar - 2) // new_line('a') // repeat(' ', longest_group + 2)
+      first = first + bar
+    end do
+    text = text // trim(example%text(first:)) // ' /'
+  end function example_text
 
 end module nocdyn_schema_help

@@ -1,14 +1,14 @@
 !> Rows of the schema in words, for messages and help.
 module nocdyn_schema_text
   use nocdyn_kinds, only: wp
-  use nocdyn_schema, only: a_body, a_flag, a_name, a_number, a_text, a_word, allowed_t, alternatives, &
-    an_integer, any_number, at_least_once, at_most_once, body_or_ground, exactly_once, first_key, &
-    group_rules, key_rule_t, key_rules, last_key, words_of
-  use nocdyn_text, only: joined, nearest_word, string_t, to_text
+  use nocdyn_schema, only: first_key, group_rules, key_rules, last_key, words_in, words_of
+  use nocdyn_schema_rules, only: a_body, a_file, a_flag, a_kind, a_name, a_number, a_text, a_word, allowed_t, &
+    an_integer, any_number, at_least_once, at_most_once, body_or_ground, exactly_once, key_rule_t
+  use nocdyn_text, only: joined, nearest_word, quoted, string_t, to_text
   implicit none (type, external)
   private
 
-  public :: allowed_text, alternative_of, kind_text, occurrence_text, group_names, key_names, suggestion
+  public :: allowed_text, kind_text, kinds_text, listed, occurrence_text, group_names, key_names, suggestion
 
 contains
 
@@ -22,14 +22,16 @@ contains
       text = range_text(rule%allowed)
       if (text == '') text = 'any value'
       if (rule%unit /= '') text = text // ' [' // trim(rule%unit) // ']'
-    case (a_word)
-      text = joined(words_of(rule%allowed), ', ')
+    case (a_word, a_kind)
+      text = joined(words_of(rule), ', ')
     case (a_flag)
       text = '.true., .false.'
     case (a_body)
       text = 'name of a &body'
     case (body_or_ground)
       text = "name of a &body, or 'ground'"
+    case (a_file)
+      text = 'path of a file'
     case (a_name)
       text = 'a name of its own'
     case default
@@ -48,6 +50,8 @@ contains
     else if (allowed%low > -huge(1.0_wp)) then
       text = '>= ' // to_text(allowed%low)
       if (allowed%excludes_low) text = '> ' // to_text(allowed%low)
+    else if (allowed%excludes_zero) then
+      text = 'not 0'
     end if
   end function range_text
 
@@ -59,11 +63,13 @@ contains
     select case (rule%kind)
     case (a_text)
       text = noun('text', 'texts', rule%count)
+    case (a_file)
+      text = noun('file', 'files', rule%count)
     case (a_name)
       text = noun('name', 'names', rule%count)
     case (a_body, body_or_ground)
       text = noun('body', 'bodies', rule%count)
-    case (a_word)
+    case (a_word, a_kind)
       text = noun('word', 'words', rule%count)
     case (a_number)
       text = noun('number', 'numbers', rule%count)
@@ -89,19 +95,36 @@ contains
     end select
   end function noun
 
-  !> The key that may stand instead of this one, '' if there is none.
-  pure function alternative_of(rule) result(key)
+  !> The words of `kind` that have a key: "'ramp' or 'pulse'".
+  pure function kinds_text(rule) result(text)
     type(key_rule_t), intent(in) :: rule
-    character(len=:), allocatable :: key
+    character(len=:), allocatable :: text
+    type(string_t), allocatable :: words(:)
     integer :: i
 
-    key = ''
-    do i = 1, size(alternatives)
-      if (alternatives(i)%group /= rule%group) cycle
-      if (alternatives(i)%first == rule%name) key = trim(alternatives(i)%second)
-      if (alternatives(i)%second == rule%name) key = trim(alternatives(i)%first)
+    allocate (words, source=words_in(rule%kinds))
+    do i = 1, size(words)
+      words(i)%text = quoted(words(i)%text)
     end do
-  end function alternative_of
+    text = listed(words, ' or ')
+  end function kinds_text
+
+  !> "a, b or c".
+  pure function listed(texts, conjunction) result(text)
+    type(string_t), intent(in) :: texts(:)
+    character(len=*), intent(in) :: conjunction   !! ' or ', ' and '
+    character(len=:), allocatable :: text
+    integer :: i
+
+    text = texts(1)%text
+    do i = 2, size(texts)
+      if (i < size(texts)) then
+        text = text // ', ' // texts(i)%text
+      else
+        text = text // conjunction // texts(i)%text
+      end if
+    end do
+  end function listed
 
   !> How often a group may occur, in words.
   pure function occurrence_text(occurrence) result(text)

@@ -4,6 +4,14 @@
 !> part of them, from its element `first` on. What of its law is a polynomial it hands over as coefficients, so that the
 !> elements of all banks are evaluated in one loop (`polynomial_laws_t`); what is not, it adds by procedures of its own.
 !> A new kind of element extends `bank_t` by either or both.
+!>
+!> An element may have states of its own, its *inner states* (the integral of a governor, an armature current), whose rates
+!> depend on its speed and on its inner states alone; all elements of a bank have as many.
+!>
+!> A law with kinks is evaluated on a *branch* that only `choose` changes: one formula, extended smoothly beyond its
+!> borders. The branches part the plane of the law's variables and are chosen by where these are, so that a law has no
+!> memory. Each border of a branch is moved outwards by a tiny part `border_width` of the law's scale: a lane that has just
+!> crossed it is well inside its new branch.
 module nocdyn_bank
   use nocdyn_elements, only: elements_t
   use nocdyn_text, only: string_t
@@ -12,10 +20,14 @@ module nocdyn_bank
   implicit none (type, external)
   private
 
+  public :: append_bank, time_reached
+
   integer, parameter, public :: role_coupling = 1     !! in K and C of eqs. (21), (22); stores energy
   integer, parameter, public :: role_load = 2         !! in C of eq. (22); takes energy out
   integer, parameter, public :: role_motor = 3        !! in Q_m of eq. (18); puts energy in
   integer, parameter, public :: role_excitation = 4   !! in Q_0 of eq. (17); puts energy in
+
+  real(wp), parameter, public :: border_width = 1.0e-10_wp   !! of borders of branches, relative to the scale of a law
 
   character(len=*), parameter, public :: role_names(4) = ['coupling  ', 'load      ', 'motor     ', 'excitation']
 
@@ -31,6 +43,7 @@ module nocdyn_bank
     integer, allocatable :: from(:)          !! body, 0 = ground
     integer, allocatable :: to(:)            !! body, 0 = ground
     integer, allocatable :: accounted(:)     !! elements whose power is integrated, numbered within the bank
+    integer, allocatable :: elastic(:)       !! elements that can have a restoring moment, numbered within the bank
     integer :: role = role_coupling          !! role_...: which term of eq. (12) the bank belongs to
     integer :: lanes = 1
     integer :: first = 1                     !! number of its first element in the machine
@@ -38,6 +51,13 @@ module nocdyn_bank
     integer :: first_value = 1               !! the place of lane 1 of `first` in the values of the machine
     logical :: is_polynomial = .true.        !! whether `polynomials` says all of its law
     logical :: is_external = .false.         !! whether the rest of its law depends on the time alone
+    logical :: is_of_paper = .true.          !! whether its law is that of eqs. (3), (5), (17) or (20)
+    integer :: inner = 0                     !! inner states of each element
+    integer :: first_inner = 1               !! number of the first inner state of `first` in the machine
+    integer :: inner_values = 0              !! lanes * inner * elements
+    integer :: first_inner_value = 1         !! the place of lane 1 of `first_inner`
+    integer, allocatable :: switching(:)     !! element of each switch, numbered within the bank
+    integer, allocatable :: branch(:, :)     !! present branch of each switch, [lanes, switches]
   contains
     procedure :: polynomials
     procedure :: evaluate
@@ -46,7 +66,15 @@ module nocdyn_bank
     procedure :: has_series
     procedure :: drive
     procedure :: series
+    procedure :: settle
+    procedure :: start_inner
+    procedure :: evaluate_inner
+    procedure :: inner_name
+    procedure :: choose
+    procedure :: margin
+    procedure :: switch_name
     procedure :: connect
+    procedure :: let_switch
     procedure :: last
     procedure :: is_source
     procedure :: quantities
@@ -60,7 +88,31 @@ module nocdyn_bank
 
 contains
 
-  !> Sets the connectivity; every extension's constructor calls it.
+  !> Adds a bank behind the others.
+  subroutine append_bank(banks, bank)
+    type(bank_slot_t), allocatable, intent(inout) :: banks(:)
+    class(bank_t), intent(in) :: bank
+    type(bank_slot_t), allocatable :: longer(:)
+    integer :: i
+
+    allocate (longer(size(banks) + 1))
+    do i = 1, size(banks)
+      call move_alloc(banks(i)%bank, longer(i)%bank)
+    end do
+    ! `allocate (source=)`: gfortran 12 corrupts the heap on assignment to a polymorphic component of an array element
+    allocate (longer(size(longer))%bank, source=bank)
+    call move_alloc(longer, banks)
+  end subroutine append_bank
+
+  !> A time as it is compared with those at which a law changes: the end of a step may miss them by rounding.
+  pure function time_reached(t)
+    real(wp), intent(in) :: t
+    real(wp) :: time_reached
+
+    time_reached = t + 8.0_wp * spacing(t)
+  end function time_reached
+
+  !> Sets the connectivity; every extension's constructor calls it, with `inner` set where its elements have inner states.
   subroutine connect(self, role, lanes, names, from, to)
     class(bank_t), intent(inout) :: self
     integer, intent(in) :: role
@@ -76,7 +128,20 @@ contains
     self%from = from
     self%to = to
     self%accounted = [(e, e=1, size(to))]
+    self%elastic = [(e, e=1, merge(size(to), 0, role == role_coupling))]
+    self%inner_values = lanes * self%inner * size(to)
+    call self%let_switch([integer ::])
   end subroutine connect
+
+  !> Gives elements one switch each; the branches are 0 until they are chosen.
+  subroutine let_switch(self, elements)
+    class(bank_t), intent(inout) :: self
+    integer, intent(in) :: elements(:)   !! numbered within the bank
+
+    self%switching = elements
+    if (allocated(self%branch)) deallocate (self%branch)
+    allocate (self%branch(self%lanes, size(elements)), source=0)
+  end subroutine let_switch
 
   !> Number of its last element in the machine.
   pure integer function last(self)
@@ -146,6 +211,76 @@ contains
     real(wp), intent(in) :: angle(stride, 0:k), speed(stride, 0:k)
     real(wp), intent(inout) :: restoring(stride, 0:k), working(stride, 0:k)
   end subroutine series
+
+  !> Replaces torques that go on changing, with the time or with the angle of a body that turns, by their means: by default
+  !> there are none. What comes to an end, as a step does, is found by evaluating at a late time.
+  subroutine settle(self)
+    class(bank_t), intent(inout) :: self
+  end subroutine settle
+
+  !> The inner states at the start, 0 by default.
+  subroutine start_inner(self, speed, inner)
+    class(bank_t), intent(in) :: self
+    real(wp), intent(in) :: speed(self%values)             !! u' at the start [rad/s]
+    real(wp), intent(inout) :: inner(self%inner_values)    !! [lanes, inner, elements]
+
+    inner = 0.0_wp
+  end subroutine start_inner
+
+  !> Brings the inner states into `working`, which holds what `evaluate` and the polynomials gave, and sets their rates.
+  subroutine evaluate_inner(self, speed, inner, working, rate)
+    class(bank_t), intent(in) :: self
+    real(wp), intent(in) :: speed(self%values)             !! u' [rad/s]
+    real(wp), intent(in) :: inner(self%inner_values)       !! [lanes, inner, elements]
+    real(wp), intent(inout) :: working(self%values)        !! [N m]
+    real(wp), intent(inout) :: rate(self%inner_values)     !! [lanes, inner, elements]
+
+    error stop 'nocdyn_bank: a bank with inner states overrides evaluate_inner'
+  end subroutine evaluate_inner
+
+  !> What an inner state is, e.g. 'armature current'.
+  function inner_name(self, index) result(name)
+    class(bank_t), intent(in) :: self
+    integer, intent(in) :: index   !! 1 to inner
+    character(len=:), allocatable :: name
+
+    name = ''
+    error stop 'nocdyn_bank: a bank with inner states overrides inner_name'
+  end function inner_name
+
+  !> Chooses the branch of a switch in which a lane is.
+  subroutine choose(self, switch, lane, t, angle, speed, inner)
+    class(bank_t), intent(inout) :: self
+    integer, intent(in) :: switch, lane
+    real(wp), intent(in) :: t              !! [s]
+    real(wp), intent(in) :: angle, speed   !! u [rad], u' [rad/s] of the switching element
+    real(wp), intent(in) :: inner(:)       !! its inner states
+
+    error stop 'nocdyn_bank: a bank with switches overrides choose'
+  end subroutine choose
+
+  !> How far a lane is from the nearest border of its present branch: negative beyond it, continuous.
+  pure function margin(self, switch, lane, t, angle, speed, inner)
+    class(bank_t), intent(in) :: self
+    integer, intent(in) :: switch, lane
+    real(wp), intent(in) :: t              !! [s]
+    real(wp), intent(in) :: angle, speed   !! u [rad], u' [rad/s] of the switching element
+    real(wp), intent(in) :: inner(:)       !! its inner states
+    real(wp) :: margin
+
+    margin = 0.0_wp
+    error stop 'nocdyn_bank: a bank with switches overrides margin'
+  end function margin
+
+  !> What the borders of a switch are, e.g. 'edge of the gap'.
+  function switch_name(self, switch) result(name)
+    class(bank_t), intent(in) :: self
+    integer, intent(in) :: switch
+    character(len=:), allocatable :: name
+
+    name = ''
+    error stop 'nocdyn_bank: a bank with switches overrides switch_name'
+  end function switch_name
 
   !> The columns of the bank in the table of results: by default the torque of each element.
   function quantities(self) result(columns)

@@ -11,7 +11,7 @@ module nocdyn_body_formulation
 
   public :: start_of_bodies, observe_bodies, jacobian_of_bodies   ! for extensions that add to them
 
-  !> Extensions find the accelerations; the first 2n states are omega, phi, further states may follow.
+  !> Extensions find the accelerations; the first 2n states are omega, phi, further mechanical states may follow.
   type, abstract, extends(formulation_t), public :: body_formulation_t
     real(wp), allocatable :: slope(:, :)         !! y' at the state last observed, [lanes, states + quadratures]
     integer, allocatable :: status(:)            !! of that evaluation, [lanes]
@@ -19,6 +19,7 @@ module nocdyn_body_formulation
     real(wp), allocatable :: by_angle(:, :)      !! derivative of T by phi, [bodies, bodies], work space
     real(wp), allocatable :: by_speed(:, :)      !! derivative of T by omega
     real(wp), allocatable :: by_time(:)          !! derivative of T by t
+    real(wp), allocatable :: by_inner(:)         !! derivative of T by an inner state
   contains
     procedure :: attach_bodies
     procedure :: start => start_of_bodies
@@ -26,30 +27,30 @@ module nocdyn_body_formulation
     procedure :: observe => observe_bodies
     procedure :: jacobian => jacobian_of_bodies
     procedure :: component_name
+    procedure :: switch_motion
   end type body_formulation_t
 
 contains
 
-  subroutine attach_bodies(self, machine, states, audited)
+  subroutine attach_bodies(self, machine, mechanical, audited)
     class(body_formulation_t), intent(inout) :: self
     type(machine_t), intent(in) :: machine
-    integer, intent(in) :: states   !! at least 2 * bodies
+    integer, intent(in) :: mechanical   !! states, at least 2 * bodies
     logical, intent(in) :: audited
     integer :: l
 
-    call self%attach(machine, audited)
-    self%states = states
-    allocate (self%slope(self%lanes, states + self%quadratures), source=0.0_wp)
+    call self%attach(machine, mechanical, audited)
+    allocate (self%slope(self%lanes, self%states + self%quadratures), source=0.0_wp)
     allocate (self%status(self%lanes), source=evaluation_fine)
     allocate (self%mobility(machine%bodies, machine%bodies, self%lanes))
     allocate (self%by_angle(machine%bodies, machine%bodies), self%by_speed(machine%bodies, machine%bodies))
-    allocate (self%by_time(machine%bodies))
+    allocate (self%by_time(machine%bodies), self%by_inner(machine%bodies))
     do l = 1, self%lanes
       self%mobility(:, :, l) = machine%coordinates%mobility(l)
     end do
   end subroutine attach_bodies
 
-  !> Start speeds and angles; further states and the works are zero.
+  !> Start speeds, angles and inner states; further mechanical states and the works are zero.
   function start_of_bodies(self) result(y)
     class(body_formulation_t), intent(in) :: self
     real(wp), allocatable :: y(:, :)
@@ -57,6 +58,7 @@ contains
     allocate (y(self%lanes, self%states + self%quadratures), source=0.0_wp)
     y(:, :self%machine%bodies) = self%machine%start_speed
     y(:, self%machine%bodies + 1:2 * self%machine%bodies) = self%machine%start_angle
+    y(:, self%mechanical + 1:self%states) = self%machine%start_inner()
   end function start_of_bodies
 
   subroutine place(self, y)
@@ -76,8 +78,32 @@ contains
     real(wp), contiguous, intent(in) :: t(:)
     real(wp), contiguous, intent(in) :: y(:, :)
 
+    call self%place(y)
+    if (self%switches > 0) call self%choose_branches(t, y)
     call self%derivative(t, y, self%slope, self%status)
   end subroutine observe_bodies
+
+  pure subroutine switch_motion(self, lane, switch, y, angle, speed)
+    class(body_formulation_t), intent(in) :: self
+    integer, intent(in) :: lane, switch
+    real(wp), contiguous, intent(in) :: y(:)
+    real(wp), intent(out) :: angle, speed
+
+    angle = 0.0_wp
+    speed = 0.0_wp
+    associate (n => self%machine%bodies, e => self%machine%switches%element(switch))
+      associate (from => self%machine%elements%from(e), to => self%machine%elements%to(e))
+        if (to > 0) then
+          angle = y(n + to)
+          speed = y(to)
+        end if
+        if (from > 0) then
+          angle = angle - y(n + from)
+          speed = speed - y(from)
+        end if
+      end associate
+    end associate
+  end subroutine switch_motion
 
   !> omega' = mobility T(phi, omega, t), phi' = omega, and the works; further states are the extension's.
   subroutine jacobian_of_bodies(self, t, y, dfdy, dfdt, status)
@@ -103,6 +129,7 @@ contains
 
     n = self%machine%bodies
     call self%place(y)
+    call self%place_inner(y(:, self%mechanical + 1:))
     call self%machine%differentiate(t, self%phi, self%omega)
     dfdy = 0.0_wp
     dfdt = 0.0_wp
@@ -115,6 +142,7 @@ contains
       end do
       call multiply(self%mobility(:, :, l), self%by_time, dfdt(l, :n))
       call differentiate_powers(self, l, dfdy(l, :, :), dfdt(l, :))
+      call differentiate_inner(self, l, dfdy(l, :, :))
     end do
   end subroutine fill_of_bodies
 
@@ -158,6 +186,32 @@ contains
     end associate
   end subroutine differentiate_powers
 
+  !> The columns and rows of the inner states of one lane.
+  subroutine differentiate_inner(self, lane, dfdy)
+    class(body_formulation_t), intent(inout) :: self
+    integer, intent(in) :: lane
+    real(wp), intent(inout) :: dfdy(:, :)
+    integer :: e, i, k, n, s
+
+    n = self%machine%bodies
+    associate (elements => self%machine%elements, inner => self%machine%elements%inner)
+      do s = 1, self%inner
+        e = inner%element(s)
+        self%by_inner(:) = 0.0_wp
+        call add_moment(elements%from(e), elements%to(e), inner%working(lane, s), self%by_inner)
+        call multiply(self%mobility(:, :, lane), self%by_inner, dfdy(:n, self%mechanical + s))
+        call add_moment(elements%from(e), elements%to(e), inner%rate_speed(lane, s), dfdy(self%mechanical + s, :n))
+        do i = 1, inner%members(s)
+          dfdy(self%mechanical + s, self%mechanical + inner%first(s) + i - 1) = inner%rate_inner(lane, i, s)
+        end do
+        do k = 1, self%quadratures
+          if (self%machine%accounted(k) /= e) cycle
+          dfdy(self%states + k, self%mechanical + s) = elements%speed(lane, e) * inner%working(lane, s)
+        end do
+      end do
+    end associate
+  end subroutine differentiate_inner
+
   pure subroutine multiply(matrix, vector, product)
     real(wp), intent(in) :: matrix(:, :), vector(:)
     real(wp), intent(inout) :: product(:)
@@ -179,8 +233,10 @@ contains
         name = 'speed of ' // quoted(self%machine%names(index)%text)
       else if (index <= 2 * n) then
         name = 'angle of ' // quoted(self%machine%names(index - n)%text)
-      else if (index <= self%states) then
+      else if (index <= self%mechanical) then
         name = 'elastic moment on ' // quoted(self%machine%names(index - 2 * n)%text)
+      else if (index <= self%states) then
+        name = self%machine%inner_name(index - self%mechanical)
       else
         name = 'work of ' // quoted(self%machine%accounted_name(index - self%states))
       end if

@@ -1,264 +1,257 @@
 !> What the constraint rows allow: rank, redundant rows, locked bodies, independent coordinates, group by group.
+!>
+!> Rows of two bodies come first: they tie the bodies to rigid trains, in time linear in their number. What the other rows
+!> add is a small problem between trains, of which only the core that does not peel is dense.
 module nocdyn_constraint_analysis
-  use nocdyn_complement, only: natural_complement
+  use nocdyn_constraint_conflicts, only: locked_trains, refuse_locked, refuse_loop
   use nocdyn_constraints, only: constraints_t
+  use nocdyn_coordinate_choice, only: choose_coordinates, eliminate
+  use nocdyn_errors, only: error_t
   use nocdyn_geared_groups, only: find_groups, geared_group_t
-  use nocdyn_errors, only: error_t, exit_input, raise
   use nocdyn_kinds, only: wp
-  use nocdyn_lapack, only: pivoted_rank, pseudo_inverse
-  use nocdyn_text, only: joined, quoted, rounded_text, selected, string_t, to_text
+  use nocdyn_lapack, only: pivoted_rank
+  use nocdyn_rigid_trains, only: find_trains, ratio_tolerance, rigid_trains_t
+  use nocdyn_sparse_map, only: transposed_order
+  use nocdyn_text, only: string_t
+  use nocdyn_train_motion, only: find_loads, find_motion, train_motion_t
+  use nocdyn_train_relations, only: distinct_trains, new_relations, paced_rows, peeling_t, train_relations_t
   implicit none (type, external)
   private
 
   public :: analyse_constraints
 
-  !> Rows of unit length count as dependent below this: decimals such as 0.1 * 3 against 0.3 agree, ratios that
-  !> differ in the ninth digit do not.
-  real(wp), parameter :: rank_tolerance = 1.0e-10_wp
-
-  integer, parameter :: ratio_digits = 12   ! enough to tell two ratios apart, without the noise of rounding
-
 contains
 
-  !> Finds the groups and analyses each; locked bodies and unusable coordinates are errors.
-  subroutine analyse_constraints(constraints, body_names, wanted, groups, culprit, error)
+  !> Finds the trains and groups and analyses them; locked bodies and unusable coordinates are errors.
+  subroutine analyse_constraints(constraints, body_names, wanted, trains, groups, culprit, error)
     type(constraints_t), intent(in) :: constraints
     type(string_t), intent(in) :: body_names(:)
-    integer, intent(in) :: wanted(:)       !! bodies that are to be the coordinates; empty: found by pivoting
+    integer, intent(in) :: wanted(:)                 !! bodies that are to be the coordinates; empty: found here
+    type(rigid_trains_t), intent(out) :: trains      !! led by the coordinates, or by their fastest bodies
     type(geared_group_t), allocatable, intent(out) :: groups(:)
-    integer, intent(out) :: culprit        !! row that the error is about, 0 if it is about `wanted`
+    integer, intent(out) :: culprit                  !! row that the error is about, 0 if it is about `wanted`
+    type(error_t), allocatable, intent(out) :: error
+    type(train_relations_t) :: relations
+    integer, allocatable :: group_of(:)
+    logical, allocatable :: is_kept(:)
+    integer :: r
+
+    call find_groups(constraints, groups, group_of)
+    call find_trains(constraints, trains, is_kept)
+    culprit = first_contradiction(constraints, trains, is_kept)
+    if (culprit > 0) then
+      call refuse_loop(constraints, body_names, trains, culprit, error)
+      return
+    end if
+    call trains%choose_leads(constraints, trains%fastest_bodies(constraints))
+    relations = new_relations(constraints, trains)
+    call distribute_trains(group_of(trains%lead), groups)
+    call sift_relations(relations, group_of(trains%lead), size(groups), is_kept)
+    do r = 1, size(groups)
+      groups(r)%kept = pack(groups(r)%rows, is_kept(groups(r)%rows))
+    end do
+    call eliminate(relations, is_kept(relations%row), group_of, trains, groups)
+    call refuse_locks(constraints, body_names, trains, relations, groups, culprit, error)
+    if (allocated(error)) return
+    call explain_redundancies(constraints, trains, relations, groups)
+    call choose_coordinates(constraints, body_names, wanted, group_of, is_kept, trains, groups, error)
+  end subroutine analyse_constraints
+
+  !> The first row of two bodies that closes a loop with another ratio than that of the rows before it, 0 if none does.
+  integer function first_contradiction(constraints, trains, is_tied) result(row)
+    type(constraints_t), intent(in) :: constraints
+    type(rigid_trains_t), intent(in) :: trains
+    logical, intent(in) :: is_tied(:)
+    integer, allocatable :: loops(:)
+    integer :: r
+
+    loops = pack([(r, r=1, constraints%rows())], [(constraints%entries(r) == 2 .and. .not. is_tied(r), r=1, constraints%rows())])
+    row = findloc(trains%contradicts(constraints, loops), .true., dim=1)
+    if (row > 0) row = loops(row)
+  end function first_contradiction
+
+  subroutine distribute_trains(group_of, groups)
+    integer, intent(in) :: group_of(:)   !! [trains]
+    type(geared_group_t), intent(inout) :: groups(:)
+    integer :: first(size(groups) + 1), g, order(size(group_of))
+
+    call transposed_order(group_of, size(groups), order, first)
+    do g = 1, size(groups)
+      groups(g)%trains = order(first(g):first(g + 1) - 1)
+    end do
+  end subroutine distribute_trains
+
+  !> Keeps, in the order of the input, the relations that are independent of those before them; all that peel are.
+  subroutine sift_relations(relations, group_of, groups, is_kept)
+    type(train_relations_t), intent(in) :: relations
+    integer, intent(in) :: group_of(:)         !! of the trains
+    integer, intent(in) :: groups
+    logical, intent(inout) :: is_kept(:)       !! rows
+    type(peeling_t) :: peeling
+    integer, allocatable :: order(:)
+    integer :: first(groups + 1), g, i
+    logical :: all_relations(size(relations%row)), no_train(size(group_of))
+
+    all_relations = .true.
+    no_train = .false.
+    is_kept(relations%row) = .true.
+    peeling = relations%peel(all_relations, no_train)
+    if (size(peeling%core) == 0) return
+    allocate (order(size(peeling%core)))
+    call transposed_order([(group_of(relations%between%body(relations%between%first(peeling%core(i)))), &
+                            i=1, size(peeling%core))], groups, order, first)
+    do g = 1, groups
+      if (first(g + 1) > first(g)) call sift_core(relations, peeling%core(order(first(g):first(g + 1) - 1)), is_kept)
+    end do
+  end subroutine sift_relations
+
+  !> Drops the first relation that does not raise the rank (column-pivoted QR), and so on until the rank is full.
+  subroutine sift_core(relations, core, is_kept)
+    type(train_relations_t), intent(in) :: relations
+    integer, intent(in) :: core(:)
+    logical, intent(inout) :: is_kept(:)
+    integer, allocatable :: left(:)
+    real(wp), allocatable :: rows(:, :)
+    integer :: dependent, fine, middle
+
+    allocate (left, source=core)
+    allocate (rows, source=paced_rows(relations%between, core, distinct_trains(relations%between, core)))
+    fine = 0
+    do
+      dependent = size(left) + 1
+      if (rank_of(rows(:size(left), :)) == size(left)) exit
+      do while (dependent - fine > 1)
+        middle = (fine + dependent) / 2
+        if (rank_of(rows(:middle, :)) == middle) then
+          fine = middle
+        else
+          dependent = middle
+        end if
+      end do
+      is_kept(relations%row(left(dependent))) = .false.
+      rows(dependent:size(left) - 1, :) = rows(dependent + 1:size(left), :)
+      left = [left(:dependent - 1), left(dependent + 1:)]
+    end do
+  end subroutine sift_core
+
+  integer function rank_of(rows)
+    real(wp), intent(in) :: rows(:, :)
+    integer :: pivots(size(rows, 2))
+
+    rank_of = 0
+    if (all(abs(rows) <= 0.0_wp)) return
+    call pivoted_rank(rows, ratio_tolerance, rank_of, pivots)
+  end function rank_of
+
+  !> Error for the first group that relations lock.
+  subroutine refuse_locks(constraints, body_names, trains, relations, groups, culprit, error)
+    type(constraints_t), intent(in) :: constraints
+    type(string_t), intent(in) :: body_names(:)
+    type(rigid_trains_t), intent(in) :: trains
+    type(train_relations_t), intent(in) :: relations
+    type(geared_group_t), intent(in) :: groups(:)
+    integer, intent(inout) :: culprit
     type(error_t), allocatable, intent(out) :: error
     integer :: g
 
-    call find_groups(constraints, groups)
-    culprit = 0
     do g = 1, size(groups)
-      call sift_rows(constraints, groups(g))
-      call refuse_locks(constraints, body_names, groups(g), culprit, error)
-      if (allocated(error)) return
-      call choose_coordinates(constraints, body_names, wanted, groups(g), error)
-      if (allocated(error)) return
-    end do
-  end subroutine analyse_constraints
-
-  !> Keeps, in the order of the input, the rows that are independent of those before them.
-  subroutine sift_rows(constraints, group)
-    type(constraints_t), intent(in) :: constraints
-    type(geared_group_t), intent(inout) :: group
-    integer, allocatable :: redundant(:)
-    integer :: pivots(size(group%bodies))
-    integer :: i, rank
-
-    call pivoted_rank(paced_rows(constraints, group, group%rows), rank_tolerance, rank, pivots)
-    if (rank == size(group%rows)) then
-      group%kept = group%rows
-      allocate (group%redundancies(0))
-      return
-    end if
-    allocate (group%kept(0), redundant(0))
-    do i = 1, size(group%rows)
-      associate (row => group%rows(i))
-        call pivoted_rank(paced_rows(constraints, group, [group%kept, row]), rank_tolerance, rank, pivots)
-        if (rank > size(group%kept)) then
-          group%kept = [group%kept, row]
-        else
-          redundant = [redundant, row]
-        end if
-      end associate
-    end do
-    allocate (group%redundancies(size(redundant)))
-    do i = 1, size(redundant)
-      group%redundancies(i)%row = redundant(i)
-      allocate (group%redundancies(i)%repeats, source=combination(constraints, group, redundant(i)))
-    end do
-  end subroutine sift_rows
-
-  !> L_lambda of the group with every row scaled to unit length, so that metres and teeth compare.
-  pure function unit_rows(matrix) result(scaled)
-    real(wp), intent(in) :: matrix(:, :)
-    real(wp) :: scaled(size(matrix, 1), size(matrix, 2))
-    integer :: i
-
-    do i = 1, size(matrix, 1)
-      scaled(i, :) = matrix(i, :) / norm2(matrix(i, :))
-    end do
-  end function unit_rows
-
-  !> The same for speeds measured by the pace of each body, so that a long reduction is not taken for a lock.
-  pure function paced_rows(constraints, group, rows) result(matrix)
-    type(constraints_t), intent(in) :: constraints
-    type(geared_group_t), intent(in) :: group
-    integer, intent(in) :: rows(:)
-    real(wp) :: matrix(size(rows), size(group%bodies))
-
-    matrix = unit_rows(constraints%block(1, rows, group%bodies) * spread(group%pace, 1, size(rows)))
-  end function paced_rows
-
-  !> The kept rows before `row` that together say what it says.
-  function combination(constraints, group, row) result(rows)
-    type(constraints_t), intent(in) :: constraints
-    type(geared_group_t), intent(in) :: group
-    integer, intent(in) :: row
-    integer, allocatable :: rows(:)
-    real(wp) :: wanted(1, size(group%bodies))
-
-    wanted = paced_rows(constraints, group, [row])
-    rows = contributing_rows(constraints, group, pack(group%kept, group%kept < row), wanted(1, :))
-  end function combination
-
-  !> The rows with a share in the least-squares representation of the relation `wanted` by `rows`.
-  function contributing_rows(constraints, group, rows, wanted) result(contributing)
-    type(constraints_t), intent(in) :: constraints
-    type(geared_group_t), intent(in) :: group
-    integer, intent(in) :: rows(:)
-    real(wp), intent(in) :: wanted(:)   !! between paced speeds
-    integer, allocatable :: contributing(:)
-    real(wp) :: inverse(size(rows), size(group%bodies)), share(size(rows))
-
-    inverse = pseudo_inverse(transpose(paced_rows(constraints, group, rows)), rank_tolerance)
-    share = matmul(inverse, wanted)
-    contributing = pack(rows, abs(share) > sqrt(rank_tolerance) * maxval(abs(share)))
-  end function contributing_rows
-
-  !> Error if the kept rows leave a body no motion: the row with which the lock begins is the culprit.
-  subroutine refuse_locks(constraints, body_names, group, culprit, error)
-    type(constraints_t), intent(in) :: constraints
-    type(string_t), intent(in) :: body_names(:)
-    type(geared_group_t), intent(in) :: group
-    integer, intent(inout) :: culprit
-    type(error_t), allocatable, intent(out) :: error
-    integer :: k
-
-    if (size(locked_bodies(constraints, group, group%kept)) == 0) return
-    do k = 1, size(group%kept)
-      associate (locked => locked_bodies(constraints, group, group%kept(:k)))
-        if (size(locked) == 0) cycle
-        culprit = group%kept(k)
-        call raise(error, exit_input, 'locks ' // joined(selected(body_names, locked), ', ') // &
-                   contradiction(constraints, body_names, group, group%kept(:k - 1), culprit))
+      associate (elimination => groups(g)%elimination)
+        if (size(elimination%relation) + size(elimination%core) == 0) cycle
+        if (.not. any(locked_trains(relations, elimination))) cycle
+        call refuse_locked(constraints, body_names, trains, relations, &
+                           [elimination%relation, elimination%core], culprit, error)
         return
       end associate
     end do
   end subroutine refuse_locks
 
-  !> Bodies whose row of the complement of `rows` is zero.
-  function locked_bodies(constraints, group, rows) result(locked)
+  !> The kept rows that each redundant row repeats.
+  subroutine explain_redundancies(constraints, trains, relations, groups)
     type(constraints_t), intent(in) :: constraints
-    type(geared_group_t), intent(in) :: group
+    type(rigid_trains_t), intent(in) :: trains
+    type(train_relations_t), intent(in) :: relations
+    type(geared_group_t), intent(inout) :: groups(:)
+    integer, allocatable :: bodies(:), redundant(:), rows(:)
+    integer :: g, i, next
+
+    do g = 1, size(groups)
+      associate (group => groups(g))
+        allocate (group%redundancies(size(group%rows) - size(group%kept)))
+        if (size(group%redundancies) == 0) cycle
+        allocate (redundant, source=other_rows(group%rows, group%kept))
+        do i = 1, size(redundant)
+          group%redundancies(i)%row = redundant(i)
+          next = constraints%first(redundant(i))
+          if (constraints%entries(redundant(i)) == 2) then
+            call trains%find_path(constraints%body(next), constraints%body(next + 1), bodies, rows)
+            group%redundancies(i)%repeats = ascending(rows)
+          else
+            group%redundancies(i)%repeats = repeated_rows(constraints, trains, relations, group, redundant(i))
+          end if
+        end do
+        deallocate (redundant)
+      end associate
+    end do
+  end subroutine explain_redundancies
+
+  !> What is in the first of two ascending lists and not in the second.
+  pure function other_rows(rows, kept) result(others)
+    integer, intent(in) :: rows(:), kept(:)
+    integer :: others(size(rows) - size(kept))
+    integer :: i, k, next
+
+    next = 1
+    k = 0
+    do i = 1, size(rows)
+      if (next <= size(kept)) then
+        if (rows(i) == kept(next)) then
+          next = next + 1
+          cycle
+        end if
+      end if
+      k = k + 1
+      others(k) = rows(i)
+    end do
+  end function other_rows
+
+  pure function ascending(rows) result(sorted)
     integer, intent(in) :: rows(:)
-    integer, allocatable :: locked(:)
-    real(wp), allocatable :: motion(:, :)
+    integer, allocatable :: sorted(:)
+    logical :: is_there(minval(rows):maxval(rows))
+    integer :: i
 
-    allocate (motion, source=allowed_motion(constraints, group, rows))
-    locked = pack(group%bodies, maxval(abs(motion), dim=2) <= rank_tolerance)
-  end function locked_bodies
+    is_there = .false.
+    is_there(rows) = .true.
+    sorted = pack([(i, i=lbound(is_there, 1), ubound(is_there, 1))], is_there)
+  end function ascending
 
-  !> The natural complement of `rows` for paced speeds with coordinates found by pivoting, shape [bodies, freedoms].
-  function allowed_motion(constraints, group, rows) result(motion)
+  !> The rows of a group whose reactions together do what that of a redundant relation does.
+  function repeated_rows(constraints, trains, relations, group, row) result(rows)
     type(constraints_t), intent(in) :: constraints
+    type(rigid_trains_t), intent(in) :: trains
+    type(train_relations_t), intent(in) :: relations
     type(geared_group_t), intent(in) :: group
-    integer, intent(in) :: rows(:)
-    real(wp), allocatable :: motion(:, :)
-    real(wp), allocatable :: dual(:, :)
-    real(wp) :: matrix(size(rows), size(group%bodies)), log_determinant
-    integer :: pivots(size(group%bodies)), rank
-    logical :: is_singular
+    integer, intent(in) :: row
+    integer, allocatable :: rows(:)
+    type(train_motion_t) :: found
+    integer :: place(size(trains%lead)), relation
+    real(wp) :: lambda(size(relations%row)), moment(size(trains%lead))
 
-    matrix = paced_rows(constraints, group, rows)
-    call pivoted_rank(matrix, rank_tolerance, rank, pivots)
-    call natural_complement(matrix, pivots(rank + 1:), motion, dual, log_determinant, is_singular)
-    if (is_singular) error stop 'nocdyn_constraint_analysis: rows must be independent here'
-  end function allowed_motion
-
-  !> For a row between two bodies whose ratio `earlier` rows fix already: who drives what at which ratio.
-  function contradiction(constraints, body_names, group, earlier, row) result(text)
-    type(constraints_t), intent(in) :: constraints
-    type(string_t), intent(in) :: body_names(:)
-    type(geared_group_t), intent(in) :: group
-    integer, intent(in) :: earlier(:), row
-    character(len=:), allocatable :: text
-    real(wp), allocatable :: motion(:, :)
-    real(wp) :: relation(size(group%bodies)), fixed, asked
-    integer :: a, b, first
-
-    text = ''
-    first = constraints%first(row)
-    if (constraints%first(row + 1) - first /= 2) return
-    a = findloc(group%bodies, constraints%body(first), dim=1)
-    b = findloc(group%bodies, constraints%body(first + 1), dim=1)
-    allocate (motion, source=allowed_motion(constraints, group, earlier))
-    fixed = dot_product(motion(a, :), motion(b, :)) / dot_product(motion(a, :), motion(a, :))
-    if (maxval(abs(motion(b, :) - fixed * motion(a, :))) > rank_tolerance) return
-    asked = -constraints%coefficient(1, first) / constraints%coefficient(1, first + 1)
-    relation = 0.0_wp
-    relation(b) = 1.0_wp
-    relation(a) = -fixed
-    associate (rows => contributing_rows(constraints, group, earlier, relation))
-      text = ': it drives ' // quoted(body_names(group%bodies(b))%text) // ' at ' // rounded_text(asked, ratio_digits) // &
-             ' times ' // quoted(body_names(group%bodies(a))%text) // ', but ' // &
-             joined(selected(constraints%names, rows), ', ') // ' already ' // &
-             trim(merge('drives', 'drive ', size(rows) == 1)) // ' it at ' // &
-             rounded_text(fixed * group%pace(b) / group%pace(a), ratio_digits) // ' times'
+    place(group%trains) = [(relation, relation=1, size(group%trains))]
+    relation = findloc(relations%row, row, dim=1)
+    moment = 0.0_wp
+    associate (between => relations%between)
+      associate (first => between%first(relation), last => between%first(relation + 1) - 1)
+        moment(between%body(first:last)) = between%coefficient(1, first:last)
+      end associate
     end associate
-  end function contradiction
-
-  !> The independent bodies of the group: the wanted ones, or those that pivoting leaves over.
-  subroutine choose_coordinates(constraints, body_names, wanted, group, error)
-    type(constraints_t), intent(in) :: constraints
-    type(string_t), intent(in) :: body_names(:)
-    integer, intent(in) :: wanted(:)
-    type(geared_group_t), intent(inout) :: group
-    type(error_t), allocatable, intent(out) :: error
-    integer, allocatable :: others(:)
-    integer :: pivots(size(group%bodies)), freedoms, i, rank
-
-    freedoms = size(group%bodies) - size(group%kept)
-    if (size(wanted) == 0) then
-      call pivoted_rank(unit_rows(constraints%block(1, group%kept, group%bodies)), rank_tolerance, rank, pivots)
-      group%independent = pack(group%bodies, [(all(pivots(:size(group%kept)) /= i), i=1, size(group%bodies))])
-      return
-    end if
-    group%independent = pack(wanted, [(any(group%bodies == wanted(i)), i=1, size(wanted))])
-    if (size(group%independent) /= freedoms) then
-      call raise(error, exit_input, count_message(selected(body_names, group%bodies), &
-                                           selected(body_names, group%independent), freedoms))
-      return
-    end if
-    others = pack(group%bodies, [(all(group%independent /= group%bodies(i)), i=1, size(group%bodies))])
-    rank = 0
-    if (size(others) == size(group%kept)) call pivoted_rank(dependent_columns(), rank_tolerance, rank, pivots(:size(others)))
-    if (rank < size(group%kept)) call raise(error, exit_input, joined(selected(body_names, group%independent), ', ') // &
-                                            ' cannot be independent: the constraints relate their speeds')
-
-  contains
-
-    function dependent_columns() result(matrix)
-      real(wp) :: matrix(size(group%kept), size(others))
-      real(wp) :: all_columns(size(group%kept), size(group%bodies))
-      integer :: k
-
-      all_columns = paced_rows(constraints, group, group%kept)
-      matrix = all_columns(:, [(findloc(group%bodies, others(k), dim=1), k=1, size(others))])
-    end function dependent_columns
-
-  end subroutine choose_coordinates
-
-  function count_message(bodies, named, freedoms) result(text)
-    type(string_t), intent(in) :: bodies(:), named(:)
-    integer, intent(in) :: freedoms
-    character(len=:), allocatable :: text
-
-    if (size(bodies) == 1) then
-      text = 'must name ' // joined(bodies, ', ') // ' once: no gear joins it to another body'
-    else
-      text = 'must name exactly ' // to_text(freedoms) // ' of the bodies ' // joined(bodies, ', ') // &
-             ', which are geared together'
-    end if
-    if (size(named) == 0) then
-      text = text // '; it names none of them'
-    else
-      text = text // '; it names ' // joined(named, ', ')
-    end if
-  end function count_message
+    call find_motion(relations, group%elimination, place, size(group%trains), 1, found)
+    lambda = 0.0_wp
+    call find_loads(relations, group%elimination, found%dual, 1, moment, lambda)
+    lambda = -lambda
+    lambda(relation) = 1.0_wp
+    rows = relations%loaded_rows(constraints, trains, lambda, 0)
+    rows = pack(rows, rows /= row)
+  end function repeated_rows
 
 end module nocdyn_constraint_analysis

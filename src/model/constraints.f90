@@ -1,22 +1,33 @@
 !> The rigid part of a machine: rows of L_lambda, eqs. (8), (23), each a linear relation between body speeds.
 module nocdyn_constraints
   use nocdyn_kinds, only: wp
-  use nocdyn_text, only: string_t
+  use nocdyn_text, only: string_t, strings
   implicit none (type, external)
   private
 
   public :: new_constraints
 
+  !> Torques that rows exert on some of their members, reported beside the multipliers: factor * multiplier.
+  type, public :: member_torques_t
+    type(string_t), allocatable :: names(:)   !! of the members, such as 'ring'
+    integer, allocatable :: row(:)            !! ascending
+    real(wp), allocatable :: factor(:, :)     !! coefficient of the member in the row, [lanes, members]
+  end type member_torques_t
+
   !> Row r: sum over its entries of coefficient * omega(body) = 0, entries first(r) to first(r + 1) - 1.
   type, public :: constraints_t
     integer :: bodies = 0                        !! of the machine
+    type(string_t), allocatable :: kinds(:)      !! what the input calls the rows, such as 'gear'
     type(string_t), allocatable :: names(:)      !! of the rows
     type(string_t), allocatable :: units(:)      !! of their multipliers
     integer, allocatable :: first(:)             !! [rows + 1]
-    integer, allocatable :: body(:)              !! [entries]
+    integer, allocatable :: body(:)              !! [entries], different ones in each row
     real(wp), allocatable :: coefficient(:, :)   !! never 0, [lanes, entries]
+    type(member_torques_t) :: members
   contains
     procedure :: rows
+    procedure :: entries
+    procedure :: split_pair
     procedure :: block
     procedure :: residual
   end type constraints_t
@@ -24,15 +35,32 @@ module nocdyn_constraints
 contains
 
   !> Rows from their entries; the arrays are described at `constraints_t`.
-  function new_constraints(bodies, names, units, first, body, coefficient) result(constraints)
+  function new_constraints(bodies, names, units, first, body, coefficient, kinds, members) result(constraints)
     integer, intent(in) :: bodies
     type(string_t), intent(in) :: names(:), units(:)
     integer, intent(in) :: first(:), body(:)
     real(wp), intent(in) :: coefficient(:, :)
+    type(string_t), intent(in), optional :: kinds(:)            !! absent: all are 'constraint'
+    type(member_torques_t), intent(in), optional :: members     !! absent: none
     type(constraints_t) :: constraints
 
     if (size(first) /= size(names) + 1) error stop 'nocdyn_constraints: first must have one entry more than names'
-    constraints = constraints_t(bodies, names, units, first, body, coefficient)
+    constraints%bodies = bodies
+    allocate (constraints%names, source=names)
+    allocate (constraints%units, source=units)
+    allocate (constraints%first, source=first)
+    allocate (constraints%body, source=body)
+    allocate (constraints%coefficient, source=coefficient)
+    if (present(kinds)) then
+      allocate (constraints%kinds, source=kinds)
+    else
+      allocate (constraints%kinds, source=strings(spread('constraint', 1, size(names))))
+    end if
+    if (present(members)) then
+      constraints%members = members
+    else
+      allocate (constraints%members%names(0), constraints%members%row(0), constraints%members%factor(size(coefficient, 1), 0))
+    end if
   end function new_constraints
 
   pure integer function rows(self)
@@ -41,12 +69,37 @@ contains
     rows = size(self%names)
   end function rows
 
-  !> The dense part of L_lambda in the given rows and columns.
+  !> How many bodies a row relates.
+  pure integer function entries(self, row)
+    class(constraints_t), intent(in) :: self
+    integer, intent(in) :: row
+
+    entries = self%first(row + 1) - self%first(row)
+  end function entries
+
+  !> The coefficients of a body and of the other one in a row of two.
+  pure subroutine split_pair(self, lane, row, body, own, other)
+    class(constraints_t), intent(in) :: self
+    integer, intent(in) :: lane, row, body
+    real(wp), intent(out) :: own, other
+
+    associate (first => self%first(row))
+      if (self%body(first) == body) then
+        own = self%coefficient(lane, first)
+        other = self%coefficient(lane, first + 1)
+      else
+        own = self%coefficient(lane, first + 1)
+        other = self%coefficient(lane, first)
+      end if
+    end associate
+  end subroutine split_pair
+
+  !> The dense part of L_lambda in the given rows and columns; entries in other columns are left out.
   pure function block(self, lane, chosen, bodies) result(dense)
     class(constraints_t), intent(in) :: self
     integer, intent(in) :: lane
     integer, intent(in) :: chosen(:)   !! rows
-    integer, intent(in) :: bodies(:)   !! columns; no row may have an entry outside them
+    integer, intent(in) :: bodies(:)   !! columns
     real(wp) :: dense(size(chosen), size(bodies))
     integer :: column, entry, i
 
@@ -54,7 +107,7 @@ contains
     do i = 1, size(chosen)
       do entry = self%first(chosen(i)), self%first(chosen(i) + 1) - 1
         column = findloc(bodies, self%body(entry), dim=1)
-        dense(i, column) = dense(i, column) + self%coefficient(lane, entry)
+        if (column > 0) dense(i, column) = self%coefficient(lane, entry)
       end do
     end do
   end function block

@@ -1,10 +1,13 @@
 !> Elastic couplings: the nonlinear spring of eqs. (2), (3) with viscous damping and a twist at which it rests.
+!>
+!> A slipping clutch beside the spring resists with friction tanh(u' / friction_speed). Its work and the damping's are one.
 module nocdyn_couplings
   use nocdyn_bank, only: bank_t, quantity_t, role_coupling
   use nocdyn_elements, only: elements_t
   use nocdyn_kinds, only: wp
   use nocdyn_polynomial_laws, only: polynomial_laws_t
   use nocdyn_text, only: string_t
+  use nocdyn_vector_functions, only: tanh_of
   implicit none (type, external)
   private
 
@@ -16,8 +19,12 @@ module nocdyn_couplings
     real(wp), allocatable :: cubic_stiffness(:, :)   !! k1 [N m/rad3], of either sign
     real(wp), allocatable :: damping(:, :)           !! d [N m s/rad]
     real(wp), allocatable :: rest_twist(:, :)        !! [rad]
+    real(wp), allocatable :: friction(:, :)          !! [N m]; not allocated: none
+    real(wp), allocatable :: friction_speed(:, :)    !! [rad/s]
   contains
     procedure :: polynomials
+    procedure :: evaluate
+    procedure :: differentiate
     procedure :: quantities
     procedure :: observe
   end type couplings_t
@@ -26,23 +33,35 @@ module nocdyn_couplings
 
 contains
 
-  !> A bank of couplings; those without damping in any lane are not accounted.
-  function new_couplings(names, from, to, stiffness, cubic_stiffness, damping, rest_twist) result(bank)
+  !> A bank of couplings; those without damping and friction in any lane are not accounted.
+  function new_couplings(names, from, to, stiffness, cubic_stiffness, damping, rest_twist, friction, friction_speed) result(bank)
     type(string_t), intent(in) :: names(:)
     integer, intent(in) :: from(:), to(:)              !! bodies, 0 = ground
     real(wp), intent(in) :: stiffness(:, :)            !! [N m/rad], shape [lanes, couplings] as all parameters
     real(wp), intent(in) :: cubic_stiffness(:, :)      !! [N m/rad3]
     real(wp), intent(in) :: damping(:, :)              !! [N m s/rad]
     real(wp), intent(in) :: rest_twist(:, :)           !! [rad]
+    real(wp), intent(in), optional :: friction(:, :)         !! [N m]; absent: none
+    real(wp), intent(in), optional :: friction_speed(:, :)   !! [rad/s], positive
     type(couplings_t) :: bank
     integer :: e
+    logical :: is_dissipative(size(to))
 
     call bank%connect(role_coupling, size(stiffness, 1), names, from, to)
     bank%stiffness = stiffness
     bank%cubic_stiffness = cubic_stiffness
     bank%damping = damping
     bank%rest_twist = rest_twist
-    bank%accounted = pack([(e, e=1, size(to))], any(abs(damping) > 0.0_wp, dim=1))
+    is_dissipative = any(abs(damping) > 0.0_wp, dim=1)
+    if (present(friction)) then
+      bank%is_polynomial = .false.
+      bank%is_of_paper = .false.
+      allocate (bank%friction, source=friction)
+      allocate (bank%friction_speed, source=friction_speed)
+      is_dissipative = is_dissipative .or. any(abs(friction) > 0.0_wp, dim=1)
+    end if
+    bank%accounted = pack([(e, e=1, size(to))], is_dissipative)
+    bank%elastic = pack([(e, e=1, size(to))], any(abs(stiffness) > 0.0_wp .or. abs(cubic_stiffness) > 0.0_wp, dim=1))
   end function new_couplings
 
   subroutine polynomials(self, laws)
@@ -57,6 +76,41 @@ contains
       laws%damping(:, first:last) = self%damping
     end associate
   end subroutine polynomials
+
+  subroutine evaluate(self, time, angle, speed, restoring, working)
+    class(couplings_t), intent(in) :: self
+    real(wp), intent(in) :: time(self%lanes), angle(self%values), speed(self%values)
+    real(wp), intent(inout) :: restoring(self%values), working(self%values)
+
+    if (allocated(self%friction)) call add_friction(self%values, self%friction, self%friction_speed, speed, working)
+  end subroutine evaluate
+
+  pure subroutine add_friction(n, friction, friction_speed, speed, working)
+    integer, intent(in) :: n
+    real(wp), intent(in) :: friction(n), friction_speed(n), speed(n)
+    real(wp), intent(inout) :: working(n)
+    integer :: i
+
+    do i = 1, n
+      working(i) = working(i) - friction(i) * tanh_of(speed(i) / friction_speed(i))
+    end do
+  end subroutine add_friction
+
+  subroutine differentiate(self, elements)
+    class(couplings_t), intent(in) :: self
+    type(elements_t), intent(inout) :: elements
+    integer :: e, l
+
+    if (.not. allocated(self%friction)) return
+    do e = 1, size(self%to)
+      do l = 1, self%lanes
+        associate (slope => elements%working_speed(l, self%first + e - 1), scale => self%friction_speed(l, e), &
+                   speed => elements%speed(l, self%first + e - 1))
+          slope = slope - self%friction(l, e) / scale * (1.0_wp - tanh_of(speed / scale)**2)
+        end associate
+      end do
+    end do
+  end subroutine differentiate
 
   function quantities(self) result(columns)
     class(couplings_t), intent(in) :: self

@@ -15,6 +15,9 @@ module nocdyn_element_coordinates
     integer, allocatable :: coordinate(:)      !! [entries]
     real(wp), allocatable :: ratio(:, :)       !! row of L_tau of `to` minus that of `from`, [lanes, entries]
     real(wp), allocatable :: response(:, :)    !! the same difference of ((L_tau^T J L_tau)^-1 L_tau^T)^T, [lanes, entries]
+  contains
+    procedure :: selected
+    procedure :: has_ratio
   end type element_coordinates_t
 
 contains
@@ -46,6 +49,40 @@ contains
     self%ratio = self%ratio(:, :entries)
     self%response = self%response(:, :entries)
   end function new_element_coordinates
+
+  !> Those of some elements, in the given order.
+  function selected(self, elements, turning) result(some)
+    class(element_coordinates_t), intent(in) :: self
+    integer, intent(in) :: elements(:)
+    logical, intent(in) :: turning   !! whether entries without ratio are left out
+    type(element_coordinates_t) :: some
+    integer, allocatable :: entry(:)
+    integer :: i, k, next
+
+    allocate (entry(sum(self%first(elements + 1) - self%first(elements))), some%first(size(elements) + 1))
+    next = 1
+    do i = 1, size(elements)
+      some%first(i) = next
+      do k = self%first(elements(i)), self%first(elements(i) + 1) - 1
+        if (turning .and. .not. self%has_ratio(k)) cycle
+        entry(next) = k
+        next = next + 1
+      end do
+    end do
+    some%first(size(some%first)) = next
+    allocate (some%coordinate(next - 1), some%ratio(size(self%ratio, 1), next - 1), some%response(size(self%ratio, 1), next - 1))
+    some%coordinate(:) = self%coordinate(entry(:next - 1))
+    some%ratio(:, :) = self%ratio(:, entry(:next - 1))
+    some%response(:, :) = self%response(:, entry(:next - 1))
+  end function selected
+
+  !> Whether an element turns with the coordinate of an entry. In a group of several freedoms it may respond without.
+  pure logical function has_ratio(self, entry)
+    class(element_coordinates_t), intent(in) :: self
+    integer, intent(in) :: entry
+
+    has_ratio = any(abs(self%ratio(:, entry)) > 0.0_wp)
+  end function has_ratio
 
   pure integer function body_entries(coordinates, body)
     type(coordinates_t), intent(in) :: coordinates

@@ -1,5 +1,6 @@
 !> The elements of a machine, of all banks numbered through: what they join and their values, on a block of lanes.
 module nocdyn_elements
+  use nocdyn_inner_states, only: inner_states_t, new_inner_states
   use nocdyn_kinds, only: wp
   implicit none (type, external)
   private
@@ -26,6 +27,7 @@ module nocdyn_elements
     real(wp), allocatable :: stored(:, :)          !! potential energy of `restoring` [J]
     real(wp), allocatable :: secant(:, :)          !! secant stiffness K12 of eq. (3), the -K12 u in `restoring` [N m/rad]
     real(wp), allocatable :: damping(:, :)         !! c, the -c u' in `working` [N m s/rad]
+    type(inner_states_t) :: inner
   contains
     procedure :: gather
     procedure :: scatter
@@ -34,9 +36,10 @@ module nocdyn_elements
 contains
 
   !> Elements between the given bodies, at rest and without moments.
-  function new_elements(lanes, from, to) result(self)
+  function new_elements(lanes, from, to, inner) result(self)
     integer, intent(in) :: lanes
     integer, intent(in) :: from(:), to(:)
+    integer, intent(in) :: inner(:)   !! inner states of each
     type(elements_t) :: self
 
     allocate (self%from, source=from)
@@ -47,6 +50,7 @@ contains
     allocate (self%restoring_angle, self%restoring_curvature, source=self%angle)
     allocate (self%working_angle, self%working_speed, self%working_time, source=self%angle)
     allocate (self%stored, self%secant, self%damping, source=self%angle)
+    self%inner = new_inner_states(lanes, inner)
   end function new_elements
 
   !> Relative angles and speeds of the elements from those of the bodies.

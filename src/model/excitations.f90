@@ -19,6 +19,7 @@ module nocdyn_excitations
     procedure :: differentiate
     procedure :: has_series
     procedure :: drive
+    procedure :: settle
   end type excitations_t
 
   integer, parameter :: strip = 64   ! arguments whose sines are taken at a time
@@ -142,5 +143,13 @@ contains
       end do
     end associate
   end subroutine differentiate
+
+  !> The mean of a sine is zero.
+  subroutine settle(self)
+    class(excitations_t), intent(inout) :: self
+
+    self%amplitude = 0.0_wp
+    self%frequency = 0.0_wp
+  end subroutine settle
 
 end module nocdyn_excitations

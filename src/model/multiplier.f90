@@ -58,6 +58,7 @@ contains
 
     n = self%machine%bodies
     call self%place(y)
+    call self%place_inner(y(:, self%mechanical + 1:))
     call self%machine%evaluate(t, self%phi, self%omega, self%torque)
     do l = 1, self%lanes
       self%solution(:n, l) = self%torque(l, 1:)
@@ -66,7 +67,8 @@ contains
       dydt(l, :n) = self%solution(:n, l)
     end do
     dydt(:, n + 1:2 * n) = y(:, :n)
-    if (self%quadratures > 0) call self%machine%power(dydt(:, 2 * n + 1:))
+    if (self%inner > 0) dydt(:, self%mechanical + 1:self%states) = self%machine%elements%inner%rate
+    if (self%quadratures > 0) call self%machine%power(dydt(:, self%states + 1:))
   end subroutine derivative
 
   !> lambda of the system itself, shared out where rows are redundant.
@@ -74,18 +76,13 @@ contains
     class(multiplier_t), intent(inout) :: self
     integer, intent(in) :: lane
     real(wp), intent(out) :: lambda(:)
-    integer :: g, i, next
+    integer :: i
 
-    next = self%machine%bodies + 1
-    do g = 1, size(self%machine%coordinates%blocks)
-      associate (block => self%machine%coordinates%blocks(g))
-        do i = 1, size(block%rows)
-          lambda(block%rows(i)) = dot_product(block%of_kept(i, :, lane), &
-                                              self%solution(next:next + size(block%kept) - 1, lane))
-        end do
-        next = next + size(block%kept)
-      end associate
+    lambda = 0.0_wp
+    do i = 1, size(self%kept)
+      lambda(self%kept(i)) = self%solution(self%machine%bodies + i, lane)
     end do
+    call self%machine%coordinates%sweep%share(lane, lambda)
   end subroutine reactions
 
   function series_obstacle(self) result(obstacle)

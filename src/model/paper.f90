@@ -126,6 +126,8 @@ contains
     t = 0.0_wp
     phi(:, 1:) = self%machine%start_angle
     machine = self%machine
+    if (self%inner > 0) machine%elements%inner%value = machine%start_inner()
+    call machine%choose_all(t, phi, omega)
     call machine%evaluate(t, phi, omega, torque)
     do l = 1, self%lanes
       call elastic_moments(machine, l, moments)
@@ -143,6 +145,7 @@ contains
 
     n = self%machine%bodies
     call self%place(y)
+    call self%place_inner(y(:, self%mechanical + 1:))
     call self%machine%evaluate(t, self%phi, self%omega, self%torque)
     call self%machine%assess()
     call self%machine%differentiate_elements(t)
@@ -152,7 +155,8 @@ contains
       call solve_generalised_system(self%factors(:, :, l), self%pivots(:, l), self%work)
       dydt(l, :3 * n) = self%work%beta
     end do
-    if (self%quadratures > 0) call self%machine%power(dydt(:, 3 * n + 1:))
+    if (self%inner > 0) dydt(:, self%mechanical + 1:self%states) = self%machine%elements%inner%rate
+    if (self%quadratures > 0) call self%machine%power(dydt(:, self%states + 1:))
   end subroutine derivative
 
   !> The matrices of eqs. (16)-(72) of one lane, up to those of eq. (43).

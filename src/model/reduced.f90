@@ -1,4 +1,5 @@
-!> The reduced formulation: L_tau^T J L_tau q'' = L_tau^T (Q + C omega + K phi), states q', q and the works.
+!> The reduced formulation: L_tau^T J L_tau q'' = L_tau^T (Q + C omega + K phi), states q', q, the inner states z of the
+!> elements, and the works.
 !>
 !> What the bodies do is not formed on the way: the angles of the elements are u = u_start + U q, their speeds
 !> u' = U q', and their moments M give q'' = R M with R = (L_tau^T J L_tau)^-1 L_tau^T B, where the columns of B are
@@ -6,6 +7,7 @@
 module nocdyn_reduced
   use nocdyn_element_coordinates, only: element_coordinates_t, new_element_coordinates
   use nocdyn_formulation, only: formulation_t
+  use nocdyn_inner_jacobian, only: inner_jacobian_t, new_inner_jacobian
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
   use nocdyn_reduced_jacobian, only: new_reduced_jacobian, reduced_jacobian_t
@@ -25,6 +27,8 @@ module nocdyn_reduced
     type(sparse_map_t), private :: accelerations               !! R
     type(reduced_jacobian_t), private :: sums                  !! R diag U
     type(reduced_series_t), private :: motion                  !! after `prepare_series`
+    type(inner_jacobian_t), private :: inner_rows              !! of the inner states
+    type(element_coordinates_t), private :: switching          !! of the switching elements
     real(wp), allocatable, private :: none(:, :)               !! zeros, [lanes, elements]
   contains
     procedure :: derivative
@@ -37,6 +41,7 @@ module nocdyn_reduced
     procedure :: start
     procedure :: place
     procedure :: reactions
+    procedure :: switch_motion
   end type reduced_t
 
 contains
@@ -49,18 +54,40 @@ contains
     type(element_coordinates_t) :: incidence
     real(wp), allocatable :: angle(:, :)
 
-    call self%attach(machine, audited)
-    self%states = 2 * machine%coordinates%freedoms
+    call self%attach(machine, 2 * machine%coordinates%freedoms, audited)
     incidence = new_element_coordinates(machine%elements, machine%coordinates)
     self%accelerations = response_map(incidence, machine%coordinates%freedoms)
-    self%sums = new_reduced_jacobian(machine%coordinates%freedoms, incidence, machine%accounted(:self%quadratures))
+    self%sums = new_reduced_jacobian(machine%coordinates%freedoms, incidence, machine%accounted(:self%quadratures), self%inner)
+    self%inner_rows = new_inner_jacobian(machine%coordinates%freedoms, incidence, machine%accounted(:self%quadratures), &
+                                         machine%elements%inner, size(self%sums%pattern%row))
+    self%switching = incidence%selected(machine%switches%element, turning=.true.)
     allocate (angle(machine%lanes, 0:machine%bodies), source=0.0_wp)
     angle(:, 1:) = machine%start_angle
     self%start_twist = angle(:, machine%elements%to) - angle(:, machine%elements%from)
-    self%twists = new_sparse_map(incidence%first, incidence%coordinate, incidence%ratio, &
-                                 without_offset=.not. any(abs(self%start_twist) > 0))
+    self%twists = twist_map(incidence, without_offset=.not. any(abs(self%start_twist) > 0))
     allocate (self%none, source=0.0_wp * self%start_twist)
   end function new_reduced
+
+  !> U, whose rows are the elements.
+  function twist_map(incidence, without_offset) result(map)
+    type(element_coordinates_t), intent(in) :: incidence
+    logical, intent(in) :: without_offset   !! whether the start twists are zero
+    type(sparse_map_t) :: map
+    integer :: kept(size(incidence%coordinate)), first(size(incidence%first))
+    integer :: e, entry, next
+
+    next = 1
+    do e = 1, size(first) - 1
+      first(e) = next
+      do entry = incidence%first(e), incidence%first(e + 1) - 1
+        if (.not. incidence%has_ratio(entry)) cycle
+        kept(next) = entry
+        next = next + 1
+      end do
+    end do
+    first(size(first)) = next
+    map = new_sparse_map(first, incidence%coordinate(kept(:next - 1)), incidence%ratio(:, kept(:next - 1)), without_offset)
+  end function twist_map
 
   !> R, whose rows are the coordinates.
   function response_map(incidence, freedoms) result(map)
@@ -87,6 +114,7 @@ contains
       call self%machine%coordinates%project(l, self%machine%inertia(l, :), self%machine%start_speed(l, :), &
                                             y(l, :self%machine%coordinates%freedoms))
     end do
+    y(:, self%mechanical + 1:self%states) = self%machine%start_inner()
   end function start
 
   !> omega = L_tau q', eq. (82) of section 5.
@@ -118,35 +146,39 @@ contains
     real(wp), intent(inout) :: dydt(self%lanes, self%states + self%quadratures)
     integer, intent(inout) :: status(self%lanes)
 
-    call advance(self, self%lanes * self%machine%coordinates%freedoms, self%quadratures, t, y, dydt)
+    call advance(self, self%lanes * self%machine%coordinates%freedoms, self%lanes * self%inner, self%quadratures, t, y, dydt)
   end subroutine derivative
 
-  !> The derivative of the speeds and angles of the coordinates, which are here columns of their own, and of the works.
-  subroutine advance(self, n, quadratures, t, y, dydt)
+  !> The derivatives of the speeds and angles of the coordinates, of the inner states and of the works, one after the other.
+  subroutine advance(self, n, inner, quadratures, t, y, dydt)
     type(reduced_t), intent(inout) :: self
-    integer, intent(in) :: n   !! lanes * freedoms
+    integer, intent(in) :: n       !! lanes * freedoms
+    integer, intent(in) :: inner   !! lanes * inner states
     integer, intent(in) :: quadratures
     real(wp), intent(in) :: t(self%lanes)
-    real(wp), intent(in) :: y(n, 2)
-    real(wp), intent(inout) :: dydt(2 * n + self%lanes * quadratures)
+    real(wp), intent(in) :: y(2 * n + inner)
+    real(wp), intent(inout) :: dydt(2 * n + inner + self%lanes * quadratures)
     integer :: i
 
-    call turn(self, n, t, y)
+    call turn(self, n, inner, t, y)
     call self%accelerations%map_sum(self%machine%elements%restoring, self%machine%elements%working, dydt)
     do i = 1, n
-      dydt(n + i) = y(i, 1)
+      dydt(n + i) = y(i)
     end do
-    if (quadratures > 0) call self%machine%power(dydt(2 * n + 1))
+    if (inner > 0) call copy(inner, self%machine%elements%inner%rate, dydt(2 * n + 1))
+    if (quadratures > 0) call self%machine%power(dydt(2 * n + inner + 1))
   end subroutine advance
 
   !> Brings the elements to a state and evaluates them.
-  subroutine turn(self, n, t, y)
+  subroutine turn(self, n, inner, t, y)
     type(reduced_t), intent(inout) :: self
-    integer, intent(in) :: n   !! lanes * freedoms
+    integer, intent(in) :: n       !! lanes * freedoms
+    integer, intent(in) :: inner   !! lanes * inner states
     real(wp), intent(in) :: t(self%lanes)
-    real(wp), intent(in) :: y(n, 2)
+    real(wp), intent(in) :: y(2 * n + inner)
 
-    call self%twists%map_pair(self%start_twist, y(:, 2), y(:, 1), self%machine%elements%angle, self%machine%elements%speed)
+    call self%twists%map_pair(self%start_twist, y(n + 1), y(1), self%machine%elements%angle, self%machine%elements%speed)
+    if (inner > 0) call copy(inner, y(2 * n + 1), self%machine%elements%inner%value)
     call self%machine%evaluate_elements(t)
   end subroutine turn
 
@@ -175,6 +207,31 @@ contains
                             self%lanes * self%machine%coordinates%freedoms, self%lanes * columns, t, y)
   end subroutine series
 
+  pure subroutine copy(n, x, y)
+    integer, intent(in) :: n
+    real(wp), intent(in) :: x(n)
+    real(wp), intent(inout) :: y(n)
+
+    y = x
+  end subroutine copy
+
+  pure subroutine switch_motion(self, lane, switch, y, angle, speed)
+    class(reduced_t), intent(in) :: self
+    integer, intent(in) :: lane, switch
+    real(wp), contiguous, intent(in) :: y(:)
+    real(wp), intent(out) :: angle, speed
+    integer :: k
+
+    angle = self%start_twist(lane, self%machine%switches%element(switch))
+    speed = 0.0_wp
+    associate (switching => self%switching, f => self%machine%coordinates%freedoms)
+      do k = switching%first(switch), switching%first(switch + 1) - 1
+        angle = angle + switching%ratio(lane, k) * y(f + switching%coordinate(k))
+        speed = speed + switching%ratio(lane, k) * y(switching%coordinate(k))
+      end do
+    end associate
+  end subroutine switch_motion
+
   subroutine jacobian(self, t, y, dfdy, dfdt, status)
     class(reduced_t), intent(inout) :: self
     real(wp), intent(in) :: t(self%lanes)
@@ -186,14 +243,15 @@ contains
 
     f = self%machine%coordinates%freedoms
     associate (machine => self%machine, elements => self%machine%elements)
-      call turn(self, self%lanes * f, t, y)
+      call turn(self, self%lanes * f, self%lanes * self%inner, t, y)
       call machine%differentiate_elements(t)
       call self%sums%fill(elements, dfdy)
+      if (self%inner > 0) call self%inner_rows%fill(elements, dfdy)
       call self%accelerations%map_sum(self%none, elements%working_time, dfdt)
-      dfdt(:, f + 1:2 * f) = 0.0_wp
+      dfdt(:, f + 1:self%states) = 0.0_wp
       do k = 1, self%quadratures
         e = machine%accounted(k)
-        dfdt(:, 2 * f + k) = elements%working_time(:, e) * elements%speed(:, e)
+        dfdt(:, self%states + k) = elements%working_time(:, e) * elements%speed(:, e)
       end do
     end associate
   end subroutine jacobian
@@ -202,7 +260,8 @@ contains
     class(reduced_t), intent(in) :: self
     type(pattern_t) :: pattern
 
-    pattern = self%sums%pattern
+    allocate (pattern%row, source=[self%sums%pattern%row, self%inner_rows%pattern%row])
+    allocate (pattern%column, source=[self%sums%pattern%column, self%inner_rows%pattern%column])
   end function jacobian_pattern
 
   !> Tooth forces straight from the torques of the elements.
@@ -222,8 +281,10 @@ contains
     associate (coordinates => self%machine%coordinates)
       if (index <= coordinates%freedoms) then
         name = 'speed of ' // quoted(self%machine%names(coordinates%body(index))%text)
-      else if (index <= self%states) then
+      else if (index <= self%mechanical) then
         name = 'angle of ' // quoted(self%machine%names(coordinates%body(index - coordinates%freedoms))%text)
+      else if (index <= self%states) then
+        name = self%machine%inner_name(index - self%mechanical)
       else
         name = 'work of ' // quoted(self%machine%accounted_name(index - self%states))
       end if

@@ -31,30 +31,43 @@ module nocdyn_reduced_jacobian
 
 contains
 
-  function new_reduced_jacobian(freedoms, incidence, accounted) result(self)
+  function new_reduced_jacobian(freedoms, incidence, accounted, inner) result(self)
     integer, intent(in) :: freedoms
     type(element_coordinates_t), intent(in) :: incidence
     integer, intent(in) :: accounted(:)   !! elements whose works follow the states
+    integer, intent(in) :: inner          !! states between those of the coordinates and the works
     type(reduced_jacobian_t) :: self
     integer, allocatable :: row(:), column(:)
-    integer :: c, e
+    integer :: c, e, products
 
     self%freedoms = freedoms
-    associate (entries => incidence%first(2:) - incidence%first(:size(incidence%first) - 1))
-      allocate (self%element(sum(entries**2)), self%place(sum(entries**2)), row(sum(entries**2)), column(sum(entries**2)))
-    end associate
+    products = product_count(incidence)
+    allocate (self%element(products), self%place(products), row(products), column(products))
     allocate (self%product(size(incidence%ratio, 1), size(self%element)))
     call form_products(freedoms, incidence, row, column, self)
     row = row(:self%pairs)
     column = column(:self%pairs)
     self%pattern%row = [row, row, [(freedoms + c, c=1, freedoms)]]
     self%pattern%column = [column, freedoms + column, [(c, c=1, freedoms)]]
-    call append_works(freedoms, incidence, accounted, self)
+    call append_works(freedoms, incidence, accounted, 2 * freedoms + inner, self)
     self%worker = [(spread(accounted(e), 1, incidence%first(accounted(e) + 1) - incidence%first(accounted(e))), &
                     e=1, size(accounted))]
   end function new_reduced_jacobian
 
-  !> The products of all pairs of entries of an element, column by column, and their distinct positions.
+  !> Pairs of entries of an element of which the second has a ratio.
+  pure integer function product_count(incidence) result(products)
+    type(element_coordinates_t), intent(in) :: incidence
+    integer :: b, e
+
+    products = 0
+    do e = 1, size(incidence%first) - 1
+      do b = incidence%first(e), incidence%first(e + 1) - 1
+        if (incidence%has_ratio(b)) products = products + incidence%first(e + 1) - incidence%first(e)
+      end do
+    end do
+  end function product_count
+
+  !> The products of those pairs, column by column, and their distinct positions.
   subroutine form_products(freedoms, incidence, row, column, self)
     integer, intent(in) :: freedoms
     type(element_coordinates_t), intent(in) :: incidence
@@ -74,6 +87,7 @@ contains
       begin = self%pairs + 1
       do i = first(q), first(q + 1) - 1
         b = order(i)
+        if (.not. incidence%has_ratio(b)) cycle
         e = element_of(b)
         do a = incidence%first(e), incidence%first(e + 1) - 1
           associate (at => place(incidence%coordinate(a)))
@@ -94,10 +108,11 @@ contains
   end subroutine form_products
 
   !> The positions of the works' rows: two for each entry of an accounted element.
-  subroutine append_works(freedoms, incidence, accounted, self)
+  subroutine append_works(freedoms, incidence, accounted, states, self)
     integer, intent(in) :: freedoms
     type(element_coordinates_t), intent(in) :: incidence
     integer, intent(in) :: accounted(:)
+    integer, intent(in) :: states
     type(reduced_jacobian_t), intent(inout) :: self
     integer, allocatable :: row(:), column(:), entry(:)
     integer :: i, k, n
@@ -112,7 +127,7 @@ contains
       do i = incidence%first(accounted(k)), incidence%first(accounted(k) + 1) - 1
         n = n + 1
         entry(n) = i
-        row(2 * n - 1:2 * n) = 2 * freedoms + k
+        row(2 * n - 1:2 * n) = states + k
         column(2 * n - 1) = incidence%coordinate(i)
         column(2 * n) = freedoms + incidence%coordinate(i)
       end do

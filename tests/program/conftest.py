@@ -4,6 +4,7 @@ import csv
 import json
 import os
 import subprocess
+import sys
 import time
 from pathlib import Path
 
@@ -89,3 +90,13 @@ SPINNER = """\
 @pytest.fixture
 def spinner(nocdyn):
     return nocdyn.write("spinner.nml", SPINNER)
+
+
+def peak_memory(nocdyn, *words):
+    """Of a run that succeeds [MB], and its output."""
+    file = nocdyn.folder / "peak"
+    limits = "import resource, subprocess, sys; out = subprocess.run(sys.argv[2:], capture_output=True, text=True, check=True)"
+    script = f"{limits}; open(sys.argv[1], 'w').write(str(resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss)); print(out.stdout)"
+    command = [sys.executable, "-c", script, file, nocdyn.executable, *words]
+    output = subprocess.run(command, cwd=nocdyn.folder, check=True, capture_output=True, text=True).stdout
+    return int(file.read_text()) / 1024, output

@@ -10,6 +10,9 @@ from conftest import CASE_2, DATA
 # The buffer of summary.json grows by doubling: another length of its numbers may be one doubling more or less.
 DOUBLINGS = 1
 
+# Where a summary has many numbers, some of other lengths may need another piece of memory each.
+NUMBERS = 5
+
 
 @pytest.fixture(scope="module")
 def counter(tmp_path_factory):
@@ -53,3 +56,14 @@ def test_nothing_is_allocated_when_auto_switches(nocdyn, counter):
     assert steps["switches"] == more_steps["switches"] == 1  # the summary names each switch
     assert more_steps["implicit_steps"] > 2 * steps["implicit_steps"] > 0
     assert abs(many - few) <= DOUBLINGS
+
+
+@pytest.mark.parametrize("method", ["auto", "rk45", "rodas5p"])
+@pytest.mark.parametrize("formulation", ["reduced", "paper", "multiplier"])
+def test_nothing_is_allocated_by_elements_of_every_kind(nocdyn, counter, formulation, method):
+    common = [f"run.formulation={formulation}", f"run.method={method}", "run.rtol=1e-6", "run.atol=1e-6"]
+    few = allocations(nocdyn, counter, DATA / "every_kind.nml", *common, "run.t_end=0.5")
+    steps = nocdyn.summary("out")["counts"]["accepted_steps"]
+    many = allocations(nocdyn, counter, DATA / "every_kind.nml", *common, "run.t_end=10")
+    assert nocdyn.summary("out")["counts"]["accepted_steps"] > steps + 100
+    assert abs(many - few) <= NUMBERS

@@ -15,10 +15,16 @@ def one_line(text):
     ("words", "complaint"),
     [
         ([], "a command is missing"),
-        (["rnu", "x.nml"], "'rnu' is not a command; did you mean 'run'? allowed: 'run', 'check', 'matrices', 'new', 'help'"),
+        (
+            ["rnu", "x.nml"],
+            "'rnu' is not a command; did you mean 'run'? "
+            "allowed: 'run', 'check', 'equilibrium', 'modes', 'matrices', 'new', 'help'",
+        ),
         (["simulate"], "'simulate' is not a command"),
         (["run"], "an input file is missing: nocdyn run FILE..."),
         (["check"], "an input file is missing: nocdyn check FILE..."),
+        (["equilibrium"], "an input file is missing: nocdyn equilibrium FILE..."),
+        (["modes"], "an input file is missing: nocdyn modes FILE..."),
         (["matrices"], "exactly one file is needed: nocdyn matrices FILE"),
         (["matrices", CASE_1, CASE_2], "exactly one file is needed: nocdyn matrices FILE"),
         (["new"], "exactly one file is needed: nocdyn new FILE"),
@@ -29,13 +35,20 @@ def one_line(text):
         (["run", CASE_1, "--set"], "--set needs a value: --set PATH=VALUE\n"),
         (["run", CASE_1, "--out", "a", "--out", "b"], "--out is given twice"),
         (["run", CASE_1, "--quiet=yes"], "--quiet takes no value"),
-        (["check", CASE_1, "--out", "a"], "--out is an option of nocdyn run"),
+        (["check", CASE_1, "--out", "a"], "--out is an option of nocdyn run, equilibrium and modes"),
+        (["modes", CASE_1, "--at"], "--at needs a value: --at equilibrium, --at rest or --at TIME\n"),
+        (["modes", CASE_1, "--at", "rest", "--at=0"], "--at is given twice"),
+        (["equilibrium", CASE_1, "--at", "rest"], "--at is an option of nocdyn modes"),
+        (["modes", CASE_1, "--quiet"], "--quiet is an option of nocdyn run"),
         (["check", CASE_1, "--quiet"], "--quiet is an option of nocdyn run"),
-        (["new", "a.nml", "--set", "run.t_end=1"], "--set is an option of nocdyn run, check and matrices"),
+        (["new", "a.nml", "--set", "run.t_end=1"], "--set is an option of nocdyn run, check, equilibrium, modes and matrices"),
         (["--version", "now"], "--version takes no arguments"),
         (["help", "gear"], "'gear' is a group of the input: nocdyn help input gear"),
         (["--versoin"], "'--versoin' is not a command; did you mean '--version'?"),
-        (["help", "simulate"], "there is no help on 'simulate'; try 'run', 'check', 'matrices', 'new', 'help' or 'input'"),
+        (
+            ["help", "simulate"],
+            "there is no help on 'simulate'; try 'run', 'check', 'equilibrium', 'modes', 'matrices', 'new', 'help' or 'input'",
+        ),
         (["help", "input", "boddy"], "there is no group 'boddy'; did you mean 'body'?"),
     ],
 )
@@ -51,12 +64,13 @@ def test_wrong_usage_is_refused_with_code_2(nocdyn, words, complaint):
 def test_help_names_every_command_and_the_exit_codes(nocdyn, words):
     outcome = nocdyn(*words)
     assert (outcome.returncode, outcome.stderr) == (0, "")
-    for command in ("run FILE", "check FILE", "matrices FILE", "new FILE", "help [COMMAND]", "help input", "--version"):
+    commands = ("run", "check", "equilibrium", "modes", "matrices", "new")
+    for command in (*(f"{command} FILE" for command in commands), "help [COMMAND]", "help input", "--version"):
         assert f"nocdyn {command}" in outcome.stdout
     assert "0 done, 1 a computation failed, 2 wrong usage or input, 3 a file cannot be read or written" in outcome.stdout
 
 
-@pytest.mark.parametrize("command", ["run", "check", "matrices", "new", "help"])
+@pytest.mark.parametrize("command", ["run", "check", "equilibrium", "modes", "matrices", "new", "help"])
 def test_every_command_has_help_by_two_ways(nocdyn, command):
     by_command = nocdyn("help", command)
     assert by_command.returncode == 0
@@ -104,7 +118,7 @@ def test_new_explains_every_key(nocdyn):
     nocdyn("new", "mine.nml")
     comments = [line for line in (nocdyn.folder / "mine.nml").read_text().splitlines() if line.startswith("!")]
     for key in ("inertia", "cubic_stiffness", "teeth", "viscous", "max_steps", "directory"):
-        assert any(line.startswith(f"!   {key}") for line in comments)
+        assert any(line.startswith(f"!     {key} ") for line in comments)
 
 
 def test_new_makes_the_folder(nocdyn):

@@ -167,13 +167,13 @@ def reference():
 
 
 def keys_of_help(text):
-    """Group -> [(key, default)] as `nocdyn help input` prints them."""
+    """Group -> {(key, default)} as `nocdyn help input` prints them."""
     groups = {}
     for line in text.split("\nExample")[0].splitlines():
         if group := re.match(r"&(\w+), ", line):
-            keys = groups.setdefault(group[1], [])
-        elif key := re.match(r" {4}(\w+) .*?\s((?:required|default|optional).*)$", line):
-            keys.append((key[1], key[2]))
+            keys = groups.setdefault(group[1], set())
+        elif key := re.match(r" {4}(\w+) .*?\s((?:required|default|optional|this or).*)$", line):
+            keys.add((key[1], key[2]))
     return groups
 
 
@@ -181,6 +181,6 @@ def test_input_reference_has_the_groups_keys_and_defaults_of_the_help(nocdyn, re
     groups = {}
     for section in re.split(r"^## `&", reference, flags=re.MULTILINE)[1:]:
         rows = re.findall(r"^\| `(\w+)` \|([^|]*)\|([^|]*)\|([^|]*)\|([^|]*)\|$", section, re.MULTILINE)
-        groups[section.split("`")[0]] = [(row[0], row[2].strip()) for row in rows]
+        groups[section.split("`")[0]] = {(row[0], row[2].strip()) for row in rows}
     assert groups == keys_of_help(nocdyn("help", "input").stdout)
     assert len(groups) >= 9 and all(groups.values())

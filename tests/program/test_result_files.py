@@ -152,6 +152,7 @@ def test_the_summary_tells_what_was_done(case_2):
     assert summary["machine"] == {
         "bodies": 3,
         "gears": 1,
+        "constraints": 1,
         "degrees_of_freedom": 2,
         "independent": ["motor", "pinion"],
         "notes": [],

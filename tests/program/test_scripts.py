@@ -129,6 +129,52 @@ def test_numbers_of_another_machine_are_refused(tmp_path, monkeypatch):
     assert "not the paper's machine" in refusal(monkeypatch, "paper_numbers", results)
 
 
+def modes_of(folder: Path, text: str) -> Path:
+    file = folder / "machine.nml"
+    file.write_text(text, encoding="utf-8")
+    subprocess.run([NOCDYN, "modes", file, "--out", folder / "modes"], check=True, capture_output=True)
+    return folder / "modes"
+
+
+def test_modes_of_a_geared_machine_on_the_ground_are_drawn(tmp_path, monkeypatch):
+    results = modes_of(tmp_path, """
+&case title = 'Costs $5' /
+&body name = 'a $ b' inertia = 1.0 /
+&body name = 'wheel' inertia = 1.0 /
+&body name = 'disc' inertia = 1.0 /
+&coupling name = 'mount' bodies = 'ground', 'a $ b' stiffness = 100.0 damping = 5.0 /
+&coupling name = 'shaft' bodies = 'wheel', 'disc' stiffness = 100.0 damping = 0.1 /
+&gear name = 'g' bodies = 'a $ b', 'wheel' teeth = 20, 50 /
+&run t_end = 1.0 /
+""")
+    call(monkeypatch, "mode_figures", results)
+    assert_figures(results / "figures", "modes")
+    text = (results / "figures" / "modes.svg").read_text(encoding="utf-8")
+    assert "1 : -0.4" in text and "Costs $5: modes about the steady state" in text.replace("\\$", "$")
+
+
+def test_many_modes_of_many_bodies_are_drawn_in_several_figures(tmp_path, monkeypatch):
+    results = modes_of(tmp_path, chain(30, "t_end = 1.0"))
+    call(monkeypatch, "mode_figures", results, "--modes", 8)
+    assert_figures(results / "figures", "modes", "modes_2")
+
+
+@pytest.mark.parametrize(("content", "message"), [
+    (None, "no modes.json here; 'nocdyn modes FILE --out "),
+    ("{", "modes.json: cannot be read: "),
+    ("{}", "this is no modes.json of nocdyn"),
+])
+def test_a_folder_without_modes_is_refused(tmp_path, monkeypatch, content, message):
+    if content is not None:
+        (tmp_path / "modes.json").write_text(content)
+    assert message in refusal(monkeypatch, "mode_figures", tmp_path)
+
+
+def test_a_machine_that_does_not_oscillate_is_refused(tmp_path, monkeypatch):
+    results = modes_of(tmp_path, chain(1, "t_end = 1.0"))
+    assert "nothing to draw: no mode oscillates" in refusal(monkeypatch, "mode_figures", results)
+
+
 @pytest.mark.parametrize(("files", "message"), [
     (None, "there is no such results folder"),
     ({}, "no trajectory.csv here"),

@@ -1,7 +1,6 @@
 !> Derivatives by central differences of fourth order, against which the analytic ones are checked.
 !>
-!> They are exact for polynomials of degree four, which all laws but the harmonic one are, so that a large step is
-!> best: only rounding remains.
+!> They are exact for polynomials of degree four, for which a large step is best: only rounding remains.
 module nocdyn_test_differences
   use nocdyn_kinds, only: wp
   use nocdyn_system, only: evaluation_fine, pattern_t, system_t
@@ -18,15 +17,18 @@ module nocdyn_test_differences
 contains
 
   !> Derivatives of a system's right-hand side.
-  subroutine difference_system(system, t, y, dfdy, dfdt)
+  subroutine difference_system(system, t, y, dfdy, dfdt, step)
     class(system_t), intent(inout) :: system
     real(wp), contiguous, intent(in) :: t(:)
     real(wp), contiguous, intent(in) :: y(:, :)
     real(wp), contiguous, intent(inout) :: dfdy(:, :, :)   !! shape [lanes, components, states]
     real(wp), contiguous, intent(inout) :: dfdt(:, :)
-    real(wp) :: moved(size(y, 1), size(y, 2)), slope(size(y, 1), size(y, 2))
+    real(wp), intent(in), optional :: step   !! of the states; absent: 0.1
+    real(wp) :: by, moved(size(y, 1), size(y, 2)), slope(size(y, 1), size(y, 2))
     integer :: j, k, status(size(t))
 
+    by = state_step
+    if (present(step)) by = step
     dfdy = 0.0_wp
     dfdt = 0.0_wp
     status = evaluation_fine
@@ -35,9 +37,9 @@ contains
       dfdt = dfdt + weight(k) / time_step * slope
       do j = 1, system%states
         moved = y
-        moved(:, j) = y(:, j) + offset(k) * state_step
+        moved(:, j) = y(:, j) + offset(k) * by
         call system%derivative(t, moved, slope, status)
-        dfdy(:, :, j) = dfdy(:, :, j) + weight(k) / state_step * slope
+        dfdy(:, :, j) = dfdy(:, :, j) + weight(k) / by * slope
       end do
     end do
   end subroutine difference_system

@@ -1,7 +1,7 @@
 !> Derivatives of the laws of banks by central differences of fourth order, against which the analytic ones are checked.
 !>
-!> They are exact for polynomials of degree four, which all laws but the harmonic one are, so that a large step is
-!> best: only rounding remains.
+!> They are exact for polynomials of degree four, for which a large step is best: only rounding remains. The branches of a
+!> bank stay as they are.
 module nocdyn_test_law_differences
   use nocdyn_bank, only: bank_t
   use nocdyn_elements, only: elements_t, new_elements
@@ -10,9 +10,10 @@ module nocdyn_test_law_differences
   implicit none (type, external)
   private
 
-  public :: difference_laws, elements_of, evaluate_all
+  public :: difference_laws, elements_of, evaluate_all, choose_branches, margins_of
 
   integer, parameter, public :: by_angle = 1, by_speed = 2, by_time = 3
+  integer, parameter, public :: by_inner = 3   !! + number of the inner state of each element
 
   real(wp), parameter :: offset(4) = [-2.0_wp, -1.0_wp, 1.0_wp, 2.0_wp]
   real(wp), parameter :: weight(4) = [1.0_wp, -8.0_wp, 8.0_wp, -1.0_wp] / 12.0_wp
@@ -23,6 +24,7 @@ module nocdyn_test_law_differences
   type, public :: law_slopes_t
     real(wp), allocatable :: restoring(:, :), working(:, :), stored(:, :)
     real(wp), allocatable :: tangent(:, :)   !! of `restoring_angle`
+    real(wp), allocatable :: rate(:, :)      !! of the inner states, [lanes, inner states]
   end type law_slopes_t
 
 contains
@@ -32,7 +34,9 @@ contains
     class(bank_t), intent(in) :: bank
     type(elements_t) :: elements
 
-    elements = new_elements(bank%lanes, bank%from, bank%to)
+    integer :: e
+
+    elements = new_elements(bank%lanes, bank%from, bank%to, [(bank%inner, e=1, size(bank%to))])
   end function elements_of
 
   !> All that a bank finds for its elements at their angles, speeds and time.
@@ -47,33 +51,85 @@ contains
     call laws%differentiate(elements)
     call laws%assess(elements)
     call bank%evaluate(elements%time, elements%angle, elements%speed, elements%restoring, elements%working)
+    if (bank%inner > 0) then
+      call bank%evaluate_inner(elements%speed, elements%inner%value, elements%working, elements%inner%rate)
+    end if
     call bank%differentiate(elements)
     call bank%assess(elements)
   end subroutine evaluate_all
 
-  !> Derivatives of the laws of a bank by its angles, its speeds or the time.
-  function difference_laws(bank, elements, variable) result(slopes)
+  !> Puts every lane of a bank on the branches in which its elements are.
+  subroutine choose_branches(bank, elements)
+    class(bank_t), intent(inout) :: bank
+    type(elements_t), intent(in) :: elements
+    integer :: k, l
+
+    do k = 1, size(bank%switching)
+      associate (e => bank%switching(k))
+        do l = 1, bank%lanes
+          call bank%choose(k, l, elements%time(l), elements%angle(l, e), elements%speed(l, e), inner_of(bank, elements, l, e))
+        end do
+      end associate
+    end do
+  end subroutine choose_branches
+
+  !> How far the lanes are from the borders of their branches, [lanes, switches].
+  function margins_of(bank, elements) result(margins)
+    class(bank_t), intent(in) :: bank
+    type(elements_t), intent(in) :: elements
+    real(wp) :: margins(bank%lanes, size(bank%switching))
+    integer :: k, l
+
+    do k = 1, size(bank%switching)
+      associate (e => bank%switching(k))
+        do l = 1, bank%lanes
+          margins(l, k) = bank%margin(k, l, elements%time(l), elements%angle(l, e), elements%speed(l, e), &
+                                      inner_of(bank, elements, l, e))
+        end do
+      end associate
+    end do
+  end function margins_of
+
+  function inner_of(bank, elements, lane, element) result(inner)
+    class(bank_t), intent(in) :: bank
+    type(elements_t), intent(in) :: elements
+    integer, intent(in) :: lane, element
+    real(wp) :: inner(bank%inner)
+
+    inner = elements%inner%value(lane, (element - 1) * bank%inner + 1:element * bank%inner)
+  end function inner_of
+
+  !> Derivatives of the laws of a bank by its angles, its speeds, the time or an inner state.
+  function difference_laws(bank, elements, variable, by) result(slopes)
     class(bank_t), intent(in) :: bank
     type(elements_t), intent(in) :: elements
     integer, intent(in) :: variable   !! by_...
+    real(wp), intent(in), optional :: by   !! step; absent: 0.1, in time 0.001
     type(law_slopes_t) :: slopes
     type(elements_t) :: moved
     real(wp) :: gain, step
     integer :: k
 
     allocate (slopes%restoring, slopes%working, slopes%stored, slopes%tangent, source=0.0_wp * elements%angle)
+    allocate (slopes%rate, source=0.0_wp * elements%inner%value)
     step = merge(time_step, state_step, variable == by_time)
+    if (present(by)) step = by
     do k = 1, size(offset)
       moved = elements
       if (variable == by_angle) moved%angle = elements%angle + offset(k) * step
       if (variable == by_speed) moved%speed = elements%speed + offset(k) * step
       if (variable == by_time) moved%time = elements%time + offset(k) * step
+      if (variable > by_inner) then
+        moved%inner%value(:, variable - by_inner::bank%inner) = elements%inner%value(:, variable - by_inner::bank%inner) &
+                                                                + offset(k) * step
+      end if
       call evaluate_all(bank, moved)
       gain = weight(k) / step
       slopes%restoring = slopes%restoring + gain * moved%restoring
       slopes%working = slopes%working + gain * moved%working
       slopes%stored = slopes%stored + gain * moved%stored
       slopes%tangent = slopes%tangent + gain * moved%restoring_angle
+      slopes%rate = slopes%rate + gain * moved%inner%rate
     end do
   end function difference_laws
 

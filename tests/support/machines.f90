@@ -16,7 +16,7 @@ module nocdyn_test_machines
   private
 
   public :: paper_machine, damped_chain, long_chain, branched_train, gear_loop, bare_machine
-  public :: install, gear_rows, numbered_names, finish
+  public :: install, gear_rows, numbered_names, finish, row
 
 contains
 
@@ -175,9 +175,9 @@ contains
     integer :: culprit
 
     call machine%number_elements()
-    call analyse_constraints(machine%constraints, machine%names, wanted, machine%groups, culprit, error)
+    call analyse_constraints(machine%constraints, machine%names, wanted, machine%trains, machine%groups, culprit, error)
     if (allocated(error)) error stop 'nocdyn_test_machines: a machine to test with has gears that lock'
-    machine%coordinates = new_coordinates(machine%constraints, machine%groups, machine%inertia, wanted, choice)
+    machine%coordinates = new_coordinates(machine%constraints, machine%trains, machine%groups, machine%inertia, wanted, choice)
   end subroutine finish
 
   function numbered_names(stem, count) result(names)

@@ -13,6 +13,7 @@ module nocdyn_test_random_machines
   private
 
   public :: random_machine
+  public :: add_couplings, add_torques, drawn   ! for machines with other constraints
 
 contains
 

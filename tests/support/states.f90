@@ -12,7 +12,7 @@ module nocdyn_test_states
   implicit none (type, external)
   private
 
-  public :: draw_state, state_of, bring_to, formulate
+  public :: draw_state, state_of, bring_to, enter_all, formulate
 
   !> What `formulate` knows, to loop over.
   integer, parameter, public :: reduced = 1, paper = 2, multiplier = 3
@@ -59,20 +59,24 @@ contains
     end do
   end subroutine draw_state
 
-  !> The state vector of a formulation for given angles and speeds, without works, [lanes, states + quadratures].
+  !> The state vector of a formulation for given angles and speeds, without works, [lanes, states + quadratures]. The inner
+  !> states are between 0.2 and 0.8.
   function state_of(formulation, phi, omega) result(y)
     class(formulation_t), intent(in) :: formulation
     real(wp), contiguous, intent(in) :: phi(:, 0:), omega(:, 0:)   !! [lanes, ground and bodies]
     real(wp), allocatable :: y(:, :)
+    integer :: s
 
     allocate (y(formulation%lanes, formulation%states + formulation%quadratures), source=0.0_wp)
+    y(:, formulation%mechanical + 1:formulation%states) = &
+      spread([(0.5_wp + 0.3_wp * sin(real(s, wp)), s=1, formulation%inner)], 1, formulation%lanes)
     select type (formulation)
     type is (reduced_t)
       call place_coordinates(formulation%machine, phi, omega, y)
     class is (body_formulation_t)
       y(:, :formulation%machine%bodies) = omega(:, 1:)
       y(:, formulation%machine%bodies + 1:2 * formulation%machine%bodies) = phi(:, 1:)
-      if (formulation%states > 2 * formulation%machine%bodies) call place_moments(formulation%machine, phi, omega, y)
+      if (formulation%mechanical > 2 * formulation%machine%bodies) call place_moments(formulation%machine, phi, omega, y)
     end select
   end function state_of
 
@@ -101,12 +105,27 @@ contains
 
     n = machine%bodies
     copy = machine
+    call copy%choose_all([(0.0_wp, l=1, machine%lanes)], phi, omega)
     call bring_to(copy, [(0.0_wp, l=1, machine%lanes)], phi, omega)
     do l = 1, machine%lanes
       call elastic_moments(copy, l, moments)
       y(l, 2 * n + 1:3 * n) = moments
     end do
   end subroutine place_moments
+
+  !> Puts all lanes on the branches in which they are.
+  subroutine enter_all(formulation, t, y)
+    class(formulation_t), intent(inout) :: formulation
+    real(wp), intent(in) :: t(:)
+    real(wp), intent(in) :: y(:, :)
+    real(wp) :: state(size(y, 2))
+    integer :: l
+
+    do l = 1, formulation%lanes
+      state = y(l, :)
+      call formulation%enter(l, t(l), state)
+    end do
+  end subroutine enter_all
 
   !> Brings the elements to a state, with all that the paper's matrices are read from.
   subroutine bring_to(machine, t, phi, omega)

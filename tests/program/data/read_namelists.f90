@@ -5,6 +5,7 @@ program read_namelists
 
   integer, parameter :: wp = real64
   integer, parameter :: most_bodies = 8       ! in a list
+  integer, parameter :: most_numbers = 16     ! in a list
   real(wp), parameter :: not_given = -huge(1.0_wp)
   character(len=256) :: file
   integer :: unit
@@ -15,6 +16,9 @@ program read_namelists
   call read_bodies()
   call read_couplings()
   call read_gears()
+  call read_planetaries()
+  call read_differentials()
+  call read_constraints()
   call read_motors()
   call read_loads()
   call read_excitations()
@@ -53,22 +57,34 @@ contains
   end subroutine read_bodies
 
   subroutine read_couplings()
-    character(len=64) :: name, bodies(2)
-    real(wp) :: stiffness, cubic_stiffness, damping, rest_twist
+    character(len=64) :: name, bodies(2), interpolation, extrapolation
+    real(wp) :: stiffness, cubic_stiffness, damping, rest_twist, gap, saturation, friction, friction_speed
+    real(wp), dimension(most_numbers) :: polynomial, table_twist, table_moment
     integer :: status
-    namelist /coupling/ name, bodies, stiffness, cubic_stiffness, damping, rest_twist
+    namelist /coupling/ name, bodies, stiffness, cubic_stiffness, polynomial, damping, rest_twist, gap, saturation, friction, &
+      friction_speed, table_twist, table_moment, interpolation, extrapolation
 
     rewind (unit)
     do
       stiffness = 0.0_wp
       cubic_stiffness = 0.0_wp
+      polynomial = not_given
       damping = 0.0_wp
       rest_twist = 0.0_wp
+      gap = 0.0_wp
+      saturation = not_given
+      friction = 0.0_wp
+      friction_speed = 0.01_wp
+      table_twist = not_given
+      table_moment = not_given
+      interpolation = 'linear'
+      extrapolation = 'linear'
       read (unit, nml=coupling, iostat=status)
       if (is_iostat_end(status)) exit
       if (status /= 0) error stop 'coupling'
-      print '(*(g0, 1x))', 'coupling', trim(name), trim(bodies(1)), trim(bodies(2)), stiffness, cubic_stiffness, damping, &
-        rest_twist
+      print '(*(g0, 1x))', 'coupling', trim(name), trim(bodies(1)), trim(bodies(2)), stiffness, cubic_stiffness, polynomial, &
+        damping, rest_twist, gap, saturation, friction, friction_speed, table_twist, table_moment, trim(interpolation), &
+        trim(extrapolation)
     end do
   end subroutine read_couplings
 
@@ -91,58 +107,154 @@ contains
     end do
   end subroutine read_gears
 
-  subroutine read_motors()
-    character(len=64) :: name, body
-    real(wp) :: a, b, c
-    integer :: status
-    namelist /motor/ name, body, a, b, c
+  subroutine read_planetaries()
+    character(len=64) :: name, sun, ring, carrier
+    integer :: teeth(2), status
+    namelist /planetary/ name, sun, ring, carrier, teeth
 
     rewind (unit)
     do
+      read (unit, nml=planetary, iostat=status)
+      if (is_iostat_end(status)) exit
+      if (status /= 0) error stop 'planetary'
+      print '(*(g0, 1x))', 'planetary', trim(name), trim(sun), trim(ring), trim(carrier), teeth
+    end do
+  end subroutine read_planetaries
+
+  subroutine read_differentials()
+    character(len=64) :: name, sides(2), case
+    integer :: status
+    namelist /differential/ name, sides, case
+
+    rewind (unit)
+    do
+      read (unit, nml=differential, iostat=status)
+      if (is_iostat_end(status)) exit
+      if (status /= 0) error stop 'differential'
+      print '(*(g0, 1x))', 'differential', trim(name), trim(sides(1)), trim(sides(2)), trim(case)
+    end do
+  end subroutine read_differentials
+
+  subroutine read_constraints()
+    character(len=64) :: name, bodies(most_bodies)
+    real(wp) :: coefficients(most_bodies)
+    integer :: i, status
+    namelist /constraint/ name, bodies, coefficients
+
+    rewind (unit)
+    do
+      bodies = ''
+      coefficients = not_given
+      read (unit, nml=constraint, iostat=status)
+      if (is_iostat_end(status)) exit
+      if (status /= 0) error stop 'constraint'
+      print '(*(g0, 1x))', 'constraint', trim(name), (trim(bodies(i)), i=1, most_bodies), coefficients
+    end do
+  end subroutine read_constraints
+
+  subroutine read_motors()
+    character(len=64) :: name, body, kind, interpolation, extrapolation
+    real(wp) :: a, b, c, torque, breakdown_torque, breakdown_slip, synchronous_speed, voltage, resistance, flux_constant
+    real(wp) :: inductance, governor_speed, governor_gain, governor_time, governor_start
+    real(wp), dimension(most_numbers) :: table_speed, table_torque
+    integer :: status
+    namelist /motor/ name, body, kind, a, b, c, torque, table_speed, table_torque, interpolation, extrapolation, &
+      breakdown_torque, breakdown_slip, synchronous_speed, voltage, resistance, flux_constant, inductance, governor_speed, &
+      governor_gain, governor_time, governor_start
+
+    rewind (unit)
+    do
+      kind = 'quadratic'
+      interpolation = 'linear'
+      extrapolation = 'linear'
+      a = not_given
+      b = not_given
+      c = not_given
+      torque = not_given
+      breakdown_torque = not_given
+      breakdown_slip = not_given
+      synchronous_speed = not_given
+      voltage = not_given
+      resistance = not_given
+      flux_constant = not_given
+      inductance = 0.0_wp
+      governor_speed = not_given
+      governor_gain = not_given
+      governor_time = not_given
+      governor_start = 1.0_wp
+      table_speed = not_given
+      table_torque = not_given
       read (unit, nml=motor, iostat=status)
       if (is_iostat_end(status)) exit
       if (status /= 0) error stop 'motor'
-      print '(*(g0, 1x))', 'motor', trim(name), trim(body), a, b, c
+      print '(*(g0, 1x))', 'motor', trim(name), trim(body), trim(kind), a, b, c, torque, table_speed, table_torque, &
+        trim(interpolation), trim(extrapolation), breakdown_torque, breakdown_slip, synchronous_speed, voltage, resistance, &
+        flux_constant, inductance, governor_speed, governor_gain, governor_time, governor_start
     end do
   end subroutine read_motors
 
   subroutine read_loads()
-    character(len=64) :: name, body
-    real(wp) :: viscous
+    character(len=64) :: name, body, interpolation, extrapolation
+    real(wp) :: viscous, quadratic, constant, constant_speed
+    real(wp), dimension(most_numbers) :: table_speed, table_torque
     integer :: status
-    namelist /load/ name, body, viscous
+    namelist /load/ name, body, viscous, quadratic, constant, constant_speed, table_speed, table_torque, interpolation, &
+      extrapolation
 
     rewind (unit)
     do
       viscous = 0.0_wp
+      quadratic = 0.0_wp
+      constant = 0.0_wp
+      constant_speed = 0.01_wp
+      table_speed = not_given
+      table_torque = not_given
+      interpolation = 'linear'
+      extrapolation = 'linear'
       read (unit, nml=load, iostat=status)
       if (is_iostat_end(status)) exit
       if (status /= 0) error stop 'load'
-      print '(*(g0, 1x))', 'load', trim(name), trim(body), viscous
+      print '(*(g0, 1x))', 'load', trim(name), trim(body), viscous, quadratic, constant, constant_speed, table_speed, &
+        table_torque, trim(interpolation), trim(extrapolation)
     end do
   end subroutine read_loads
 
   subroutine read_excitations()
-    character(len=64) :: name, body
-    real(wp) :: amplitude, frequency, phase
-    integer :: status
-    namelist /excitation/ name, body, amplitude, frequency, phase
+    character(len=64) :: name, body, kind, interpolation
+    real(wp) :: amplitude, frequency, phase, time, duration
+    real(wp), dimension(most_numbers) :: orders, amplitudes, phases, table_time, table_torque
+    integer :: pole_pairs, status
+    namelist /excitation/ name, body, kind, amplitude, frequency, phase, orders, amplitudes, phases, table_time, &
+      table_torque, interpolation, time, duration, pole_pairs
 
     rewind (unit)
     do
+      kind = 'harmonic'
+      amplitude = not_given
+      frequency = not_given
       phase = 0.0_wp
+      orders = not_given
+      amplitudes = not_given
+      phases = 0.0_wp
+      table_time = not_given
+      table_torque = not_given
+      interpolation = 'linear'
+      time = not_given
+      duration = not_given
+      pole_pairs = 0
       read (unit, nml=excitation, iostat=status)
       if (is_iostat_end(status)) exit
       if (status /= 0) error stop 'excitation'
-      print '(*(g0, 1x))', 'excitation', trim(name), trim(body), amplitude, frequency, phase
+      print '(*(g0, 1x))', 'excitation', trim(name), trim(body), trim(kind), amplitude, frequency, phase, orders, amplitudes, &
+        phases, table_time, table_torque, trim(interpolation), time, duration, pole_pairs
     end do
   end subroutine read_excitations
 
   subroutine read_run()
     real(wp) :: t_start, t_end, rtol, atol
-    character(len=64) :: method, formulation, complement, independent(most_bodies)
+    character(len=64) :: method, formulation, complement, start, independent(most_bodies)
     integer :: max_steps, i
-    namelist /run/ t_start, t_end, method, rtol, atol, formulation, independent, complement, max_steps
+    namelist /run/ t_start, t_end, method, rtol, atol, formulation, independent, complement, start, max_steps
 
     t_start = 0.0_wp
     method = 'auto'
@@ -151,11 +263,12 @@ contains
     formulation = 'reduced'
     independent = ''
     complement = 'natural'
+    start = 'given'
     max_steps = 1000000
     rewind (unit)
     read (unit, nml=run)
-    print '(*(g0, 1x))', 'run', t_start, t_end, trim(method), rtol, atol, trim(formulation), trim(complement), max_steps, &
-      (trim(independent(i)), i=1, most_bodies)
+    print '(*(g0, 1x))', 'run', t_start, t_end, trim(method), rtol, atol, trim(formulation), trim(complement), trim(start), &
+      max_steps, (trim(independent(i)), i=1, most_bodies)
   end subroutine read_run
 
   subroutine read_output()

@@ -1,0 +1,152 @@
+"""Draws the modes that 'nocdyn modes --out' wrote: shapes along the train, and where their energies are."""
+
+import argparse
+import json
+import math
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from matplotlib import pyplot
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from .results import ResultsError
+from .style import COLOURS, REFERENCE, WIDTH, add_title, plain, save
+
+MOST_NAMES = 24  # bodies that are named on the axis
+MOST_MODES = 6  # of a figure
+SHAPE, KINETIC, POTENTIAL = COLOURS[0], COLOURS[0], COLOURS[1]
+STRETCH = 0.06  # room above and below the largest motion
+
+
+@dataclass(frozen=True)
+class Modes:
+    folder: Path
+    content: dict  # of modes.json
+
+    @property
+    def title(self) -> str:
+        return f"{self.content['title'] or Path(self.content['input']).name}: modes about {self.content['about']}"
+
+    @property
+    def bodies(self) -> list[str]:
+        return self.content["bodies"]
+
+    @property
+    def oscillating(self) -> list[dict]:
+        return [mode for mode in self.content["modes"] if mode["kind"] == "oscillating"]
+
+    def joints(self, kind: str) -> list[dict]:
+        """Couplings or gears between two bodies, with the places of these."""
+        joints = [joint | {"places": [body - 1 for body in joint["bodies"]]} for joint in self.content[kind]]
+        return [joint for joint in joints if min(joint["places"]) >= 0]
+
+
+def read_modes(folder: Path) -> Modes:
+    file = folder / "modes.json"
+    try:
+        content = json.loads(file.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise ResultsError(f"{folder}: no modes.json here; 'nocdyn modes FILE --out {folder}' writes it") from None
+    except (OSError, ValueError) as error:
+        raise ResultsError(f"{file}: cannot be read: {error}") from None
+    if not isinstance(content, dict) or not {"bodies", "couplings", "gears", "modes", "about"} <= content.keys():
+        raise ResultsError(f"{file}: this is no modes.json of nocdyn")
+    modes = Modes(folder, content)
+    if not modes.oscillating:
+        raise ResultsError(f"{file}: nothing to draw: no mode oscillates")
+    return modes
+
+
+def draw_modes(modes: Modes, chosen: list[dict]) -> Figure:
+    """A row for every mode: its shape, and the shares of bodies and couplings in its energies."""
+    figure, grid = pyplot.subplots(len(chosen), 2, squeeze=False, sharex="col", figsize=(1.5 * WIDTH, 1.9 * len(chosen) + 1.1),
+                                   width_ratios=(3, 2))
+    for (shape, energy), mode in zip(grid, chosen):
+        _draw_shape(shape, modes, mode)
+        _draw_energy(energy, modes, mode)
+    _name_bodies(grid[-1, 0], modes)
+    _name_bodies(grid[-1, 1], modes)
+    grid[0, 1].legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
+    return figure
+
+
+def _draw_shape(axes: Axes, modes: Modes, mode: dict) -> None:
+    """What moves in phase with the largest motion; what does not shows by its amplitude, an open circle."""
+    amplitude = np.array(mode["shape"])
+    motion = amplitude * np.cos(np.radians(mode["phase_deg"]))
+    few = len(motion) <= MOST_NAMES
+    axes.axhline(0.0, color="0.5", linewidth=0.6)
+    for coupling in modes.joints("couplings"):
+        axes.plot(coupling["places"], motion[coupling["places"]], color=SHAPE, linewidth=1.3)
+    for gear in modes.joints("gears"):
+        axes.plot(gear["places"], motion[gear["places"]], **REFERENCE)
+        if few:
+            axes.annotate(f"1 : {gear['ratio']:.3g}", (np.mean(gear["places"]), np.mean(motion[gear["places"]])), fontsize=8,
+                          color="0.35", ha="center", va="center", bbox={"facecolor": "white", "edgecolor": "none", "pad": 1})
+    places = np.arange(len(motion))
+    if few:
+        axes.vlines(places, 0.0, motion, color=SHAPE, linewidth=4, alpha=0.35)
+        axes.plot(places, motion, "o", color=SHAPE, markersize=4)
+        lagging = amplitude - np.abs(motion) > 0.02
+        axes.plot(places[lagging], np.copysign(amplitude, motion)[lagging], "o", color=SHAPE, markersize=5, fillstyle="none")
+    axes.set_ylim(-1 - STRETCH, 1 + STRETCH)
+    damping = mode["damping_ratio"]
+    axes.set_title(f"mode {mode['mode']}: {mode['frequency_Hz']:.5g} Hz, damping ratio {damping:.3g}"
+                   + (", unstable" if damping < 0 else ""), loc="left")
+
+
+def _draw_energy(axes: Axes, modes: Modes, mode: dict) -> None:
+    """Kinetic energy of the bodies upwards, potential energy of the couplings downwards, between their bodies."""
+    bodies = np.arange(len(modes.bodies))
+    ends = [[body - 1 for body in coupling["bodies"] if body > 0] for coupling in modes.content["couplings"]]
+    places = np.array([np.mean(places) for places in ends])
+    axes.bar(bodies, 100 * np.array(mode["kinetic_share"]), width=0.8, color=KINETIC, label="kinetic energy\nin bodies [%]")
+    axes.bar(places, -100 * np.array(mode["potential_share"]), width=0.5, color=POTENTIAL,
+             label="potential energy\nin couplings [%]")
+    axes.axhline(0.0, color="0.5", linewidth=0.6)
+    axes.yaxis.set_major_formatter(lambda value, _: f"{abs(value):g}")
+
+
+def _name_bodies(axes: Axes, modes: Modes) -> None:
+    count = len(modes.bodies)
+    places = np.arange(count) if count <= MOST_NAMES else np.unique(np.linspace(0, count - 1, 8).round().astype(int))
+    slanted = sum(len(modes.bodies[place]) for place in places) > 40
+    axes.set_xticks(places, [plain(modes.bodies[place]) for place in places], rotation=45 if slanted else 0,
+                    ha="right" if slanted else "center")
+
+
+def draw_all(modes: Modes, most: int, folder: Path) -> list[str]:
+    """Saves figures of the first modes, a few in each, and gives their names."""
+    chosen = modes.oscillating[:most]
+    names = []
+    for part in range(math.ceil(len(chosen) / MOST_MODES)):
+        figure = draw_modes(modes, chosen[part * MOST_MODES:(part + 1) * MOST_MODES])
+        add_title(figure, modes.title)
+        names.append("modes" if part == 0 else f"modes_{part + 1}")
+        save(figure, folder, names[-1])
+    return names
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(prog="scripts/plot_modes", description=__doc__)
+    parser.add_argument("results", type=Path, metavar="RESULTS", help="folder that 'nocdyn modes --out' wrote")
+    parser.add_argument("--modes", type=int, default=2 * MOST_MODES, metavar="N",
+                        help=f"how many modes are drawn, from the lowest on ({2 * MOST_MODES})")
+    parser.add_argument("--out", type=Path, metavar="DIR",
+                        help="where the figures go, as PNG, SVG and PDF (RESULTS/figures)")
+    arguments = parser.parse_args()
+    if arguments.modes < 1:
+        parser.error("--modes must be at least 1")
+    folder = arguments.out or arguments.results / "figures"
+    try:
+        names = draw_all(read_modes(arguments.results), arguments.modes, folder)
+    except ResultsError as error:
+        sys.exit(f"{parser.prog}: {error}")
+    print(f"{', '.join(names)} (PNG, SVG, PDF) are in {folder}")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,339 @@
+!> Finds the speeds at which the torques on a machine balance.
+!>
+!> Unknowns that no equation joins are searched for by themselves. A single speed is searched for over the whole range:
+!> every change of sign of the torque, and every pair of them that hides between two points of the scan, is refined.
+!> Several unknowns are searched for by Newton's method from many starts.
+module nocdyn_balance_search
+  use nocdyn_kinds, only: wp
+  use nocdyn_lapack, only: pseudo_inverse
+  use nocdyn_torque_balance, only: torque_balance_t
+  implicit none (type, external)
+  private
+
+  public :: search_balance
+
+  integer, parameter :: decades = 6              !! speeds of the fastest body from 1e-6 to 1e6 rad/s, of either sign
+  integer, parameter :: points_per_decade = 100
+  integer, parameter :: most_solutions = 64      !! of a machine
+  real(wp), parameter :: rounding = 8 * epsilon(1.0_wp)   !! a sum that is smaller than its terms by this is zero
+  real(wp), parameter :: same = 1.0e-7_wp        !! relative distance below which two solutions are one
+
+  !> All solutions of one block, and what is to be said if there is none.
+  type, public :: block_solutions_t
+    integer, allocatable :: members(:)           !! unknowns
+    real(wp), allocatable :: values(:, :)        !! [members, solutions]
+    logical :: is_idle = .false.                 !! nothing acts: any speed is steady, and the one of the start is kept
+    real(wp) :: least_torque = huge(1.0_wp)      !! smallest imbalance that was met, with its sign [N m]
+    real(wp) :: least_speed = 0.0_wp             !! there [rad/s]
+  end type block_solutions_t
+
+contains
+
+  !> The solutions of every block.
+  subroutine search_balance(balance, blocks)
+    type(torque_balance_t), intent(inout) :: balance
+    type(block_solutions_t), allocatable, intent(out) :: blocks(:)
+    integer :: block_of(balance%unknowns()), i, k, member
+    real(wp) :: z(balance%unknowns())
+
+    block_of = balance%blocks()
+    z = balance%start()
+    allocate (blocks(count(block_of == [(i, i=1, size(block_of))])))
+    k = 0
+    do i = 1, size(block_of)
+      if (block_of(i) /= i) cycle
+      k = k + 1
+      blocks(k)%members = pack([(member, member=1, size(block_of))], block_of == i)
+      allocate (blocks(k)%values(size(blocks(k)%members), 0))
+      if (size(blocks(k)%members) == 1 .and. i <= balance%motions%freedoms()) then
+        call scan(balance, z, blocks(k))
+      else
+        call try_starts(balance, z, blocks(k))
+      end if
+    end do
+  end subroutine search_balance
+
+  !> All speeds of a single freedom where the torque changes its sign.
+  subroutine scan(balance, z, block)
+    type(torque_balance_t), intent(inout) :: balance
+    real(wp), intent(in) :: z(:)
+    type(block_solutions_t), intent(inout) :: block
+    real(wp) :: grid(-2 * decades * points_per_decade - 1:2 * decades * points_per_decade + 1)
+    real(wp) :: torque(lbound(grid, 1):ubound(grid, 1))
+    integer :: i
+
+    call lay_out(balance, block%members(1), grid)
+    do i = lbound(grid, 1), ubound(grid, 1)
+      torque(i) = imbalance(balance, z, block%members(1), grid(i))
+      if (abs(torque(i)) < abs(block%least_torque)) then
+        block%least_torque = torque(i)
+        block%least_speed = grid(i)
+      end if
+    end do
+    block%is_idle = all(abs(torque) <= 0.0_wp)
+    if (block%is_idle) then
+      call add(z(block%members), block)
+      return
+    end if
+    do i = lbound(grid, 1), ubound(grid, 1)
+      call look_around(balance, z, grid, torque, lbound(grid, 1), i, block)
+    end do
+  end subroutine scan
+
+  !> Speeds that grow geometrically on both sides of zero; `fastest` is the speed of the fastest body per speed of the freedom.
+  subroutine lay_out(balance, freedom, grid)
+    type(torque_balance_t), intent(in) :: balance
+    integer, intent(in) :: freedom
+    real(wp), intent(out) :: grid(-2 * decades * points_per_decade - 1:)
+    real(wp) :: unit(balance%motions%freedoms()), fastest
+    integer :: i
+
+    unit = 0.0_wp
+    unit(freedom) = 1.0_wp
+    fastest = maxval(abs(balance%body_speeds(unit)))
+    grid(0) = 0.0_wp
+    do i = 1, ubound(grid, 1)
+      grid(i) = 10.0_wp**(real(i - 1, wp) / points_per_decade - decades) / fastest
+      grid(-i) = -grid(i)
+    end do
+  end subroutine lay_out
+
+  !> The solutions between this point of the scan and the next, and in the pair of intervals around it.
+  subroutine look_around(balance, z, grid, torque, lower, i, block)
+    type(torque_balance_t), intent(inout) :: balance
+    real(wp), intent(in) :: z(:)
+    integer, intent(in) :: lower, i
+    real(wp), intent(in) :: grid(lower:), torque(lower:)
+    type(block_solutions_t), intent(inout) :: block
+    real(wp) :: middle, top
+
+    associate (member => block%members(1), n => ubound(grid, 1))
+      if (abs(torque(i)) <= 0.0_wp) then
+        if (i > lower) then
+          if (abs(torque(i - 1)) <= 0.0_wp) return   ! a range of speeds, of which the first stands for all
+        end if
+        call add([grid(i)], block)
+      else if (i < n) then
+        if (torque(i) * torque(i + 1) < 0.0_wp) then
+          call refine(balance, z, grid(i), grid(i + 1), torque(i), block)
+        else if (i > lower) then
+          if (.not. is_dip(torque(i - 1:i + 1))) return
+          call descend(balance, z, member, grid(i - 1), grid(i + 1), middle, top)
+          if (abs(top) <= 0.0_wp) then
+            call add([middle], block)
+          else if (top * torque(i) < 0.0_wp) then
+            call refine(balance, z, grid(i - 1), middle, torque(i - 1), block)
+            call refine(balance, z, middle, grid(i + 1), top, block)
+          end if
+        end if
+      end if
+    end associate
+  end subroutine look_around
+
+  !> Whether the middle one of three torques of the same sign is the smallest.
+  pure logical function is_dip(torque)
+    real(wp), intent(in) :: torque(3)
+
+    is_dip = torque(1) * torque(2) > 0.0_wp .and. torque(3) * torque(2) > 0.0_wp .and. &
+             abs(torque(2)) <= abs(torque(1)) .and. abs(torque(2)) <= abs(torque(3))
+  end function is_dip
+
+  !> The torque along a freedom when it has this speed; zero if it is no more than rounding.
+  function imbalance(balance, z, member, speed) result(torque)
+    type(torque_balance_t), intent(inout) :: balance
+    real(wp), intent(in) :: z(:)
+    integer, intent(in) :: member
+    real(wp), intent(in) :: speed
+    real(wp) :: torque
+    real(wp) :: trial(size(z))
+
+    trial = z
+    trial(member) = speed
+    call balance%evaluate(trial)
+    torque = balance%residual(member)
+    if (abs(torque) <= rounding * balance%size(member)) torque = 0.0_wp
+  end function imbalance
+
+  !> The smallest torque between two speeds, by golden sections until its sign changes or the interval is used up.
+  subroutine descend(balance, z, member, left, right, middle, torque)
+    type(torque_balance_t), intent(inout) :: balance
+    real(wp), intent(in) :: z(:)
+    integer, intent(in) :: member
+    real(wp), intent(in) :: left, right
+    real(wp), intent(out) :: middle, torque
+    real(wp), parameter :: golden = 0.6180339887498949_wp
+    integer, parameter :: sections = 40   ! beyond 37 the torque at a minimum changes by rounding alone
+    real(wp) :: a, b, inner(2), value(2), sign_outside
+    integer :: i
+
+    a = left
+    b = right
+    sign_outside = imbalance(balance, z, member, left)
+    inner = [b - golden * (b - a), a + golden * (b - a)]
+    do i = 1, 2
+      value(i) = imbalance(balance, z, member, inner(i))
+    end do
+    do i = 1, sections
+      if (any(value * sign_outside <= 0.0_wp)) exit
+      if (abs(value(1)) < abs(value(2))) then
+        b = inner(2)
+        inner = [b - golden * (b - a), inner(1)]
+        value = [imbalance(balance, z, member, inner(1)), value(1)]
+      else
+        a = inner(1)
+        inner = [inner(2), a + golden * (b - a)]
+        value = [value(2), imbalance(balance, z, member, inner(2))]
+      end if
+    end do
+    i = merge(1, 2, value(1) * sign_outside < value(2) * sign_outside)
+    middle = inner(i)
+    torque = value(i)
+  end subroutine descend
+
+  !> The root between two speeds with torques of different sign: Newton's method, bisection where it leaves the bracket.
+  subroutine refine(balance, z, left, right, left_torque, block)
+    type(torque_balance_t), intent(inout) :: balance
+    real(wp), intent(in) :: z(:)
+    real(wp), intent(in) :: left, right, left_torque
+    type(block_solutions_t), intent(inout) :: block
+    integer, parameter :: most_steps = 200
+    real(wp) :: a, b, slopes(size(z), size(z)), speed, step, torque
+    integer :: i
+
+    associate (member => block%members(1))
+      a = left
+      b = right
+      speed = 0.5_wp * (a + b)
+      do i = 1, most_steps
+        torque = imbalance(balance, z, member, speed)
+        if (abs(torque) <= 0.0_wp) exit
+        if (torque * left_torque > 0.0_wp) then
+          a = speed
+        else
+          b = speed
+        end if
+        call balance%differentiate(slopes)
+        step = 0.0_wp
+        if (abs(slopes(member, member)) > 0.0_wp) step = -torque / slopes(member, member)
+        if (abs(slopes(member, member)) <= 0.0_wp .or. speed + step <= a .or. speed + step >= b) then
+          step = 0.5_wp * (a + b) - speed
+        end if
+        speed = speed + step
+        if (abs(step) <= spacing(speed)) exit
+      end do
+      call add([speed], block)
+    end associate
+  end subroutine refine
+
+  !> Keeps a solution unless it is there already.
+  subroutine add(values, block)
+    real(wp), intent(in) :: values(:)
+    type(block_solutions_t), intent(inout) :: block
+    integer :: i
+
+    do i = 1, size(block%values, 2)
+      if (all(abs(values - block%values(:, i)) <= same * max(abs(values), abs(block%values(:, i)), same))) return
+    end do
+    if (size(block%values, 2) < most_solutions) then
+      block%values = reshape([block%values, values], [size(values), size(block%values, 2) + 1])
+    end if
+  end subroutine add
+
+  !> Newton's method from the start of the machine and from speeds of many sizes, alone and together.
+  subroutine try_starts(balance, z, block)
+    type(torque_balance_t), intent(inout) :: balance
+    real(wp), intent(in) :: z(:)
+    type(block_solutions_t), intent(inout) :: block
+    real(wp), parameter :: speeds(9) = [0.0_wp, 1.0_wp, -1.0_wp, 10.0_wp, -10.0_wp, 100.0_wp, -100.0_wp, 1000.0_wp, -1000.0_wp]
+    real(wp) :: trial(size(z))
+    integer :: i, j, moving
+
+    associate (members => block%members)
+      moving = count(members <= balance%motions%freedoms())
+      trial = z
+      call newton(balance, trial, block)
+      do i = 1, size(speeds)
+        do j = 1, merge(size(speeds), 1, moving > 1)
+          trial = z
+          trial(members(:moving)) = speeds(i)
+          if (moving > 0) trial(members(1)) = speeds(merge(j, i, moving > 1))
+          call newton(balance, trial, block)
+        end do
+      end do
+    end associate
+  end subroutine try_starts
+
+  !> Newton's method with steps of least norm, halved until the residuals fall; what converges is kept.
+  subroutine newton(balance, z, block)
+    type(torque_balance_t), intent(inout) :: balance
+    real(wp), intent(inout) :: z(:)
+    type(block_solutions_t), intent(inout) :: block
+    integer, parameter :: most_steps = 100
+    real(wp), parameter :: singular = 1.0e-13_wp, tiny_step = 1.0e-13_wp
+    real(wp) :: slopes(size(z), size(z)), step(size(block%members)), weight(size(block%members)), before, factor
+    integer :: i
+
+    associate (members => block%members)
+      call balance%evaluate(z)
+      do i = 1, most_steps
+        if (is_balanced(balance, members)) exit
+        call balance%differentiate(slopes)
+        weight = 1.0_wp / max(maxval(abs(slopes(members, members)), dim=2), tiny(1.0_wp)**0.25_wp)
+        before = norm2(weight * balance%residual(members))
+        step = -matmul(pseudo_inverse(spread(weight, 2, size(members)) * slopes(members, members), singular), &
+                       weight * balance%residual(members))
+        factor = 1.0_wp
+        do while (factor > 1.0e-6_wp)
+          call balance%evaluate(moved(z, members, factor * step))
+          if (norm2(weight * balance%residual(members)) < (1.0_wp - 1.0e-4_wp * factor) * before) exit
+          factor = 0.5_wp * factor
+        end do
+        if (factor <= 1.0e-6_wp) exit
+        z(members) = z(members) + factor * step
+        if (all(abs(step) <= tiny_step * abs(z(members)))) exit
+      end do
+      call balance%evaluate(z)
+      if (is_nearly_balanced(balance, members)) call add(z(members), block)
+      if (abs(balance%residual(members(1))) < abs(block%least_torque)) then
+        block%least_torque = balance%residual(members(1))
+        block%least_speed = z(members(1))
+      end if
+    end associate
+  end subroutine newton
+
+  pure function moved(z, members, step)
+    real(wp), intent(in) :: z(:), step(:)
+    integer, intent(in) :: members(:)
+    real(wp) :: moved(size(z))
+
+    moved = z
+    moved(members) = moved(members) + step
+  end function moved
+
+  pure logical function is_balanced(balance, members)
+    type(torque_balance_t), intent(in) :: balance
+    integer, intent(in) :: members(:)
+
+    is_balanced = all(abs(balance%residual(members)) <= epsilon(1.0_wp) * balance%size(members))
+  end function is_balanced
+
+  !> Whether Newton's method has ended at a root: the residuals are rounding, of torques or of rates.
+  pure logical function is_nearly_balanced(balance, members)
+    type(torque_balance_t), intent(in) :: balance
+    integer, intent(in) :: members(:)
+    real(wp), parameter :: near = 1.0e-10_wp
+    integer :: i
+
+    is_nearly_balanced = .true.
+    do i = 1, size(members)
+      associate (residual => abs(balance%residual(members(i))))
+        if (members(i) <= balance%motions%freedoms()) then
+          is_nearly_balanced = is_nearly_balanced .and. residual <= near * balance%size(members(i))
+        else
+          is_nearly_balanced = is_nearly_balanced .and. residual <= near
+        end if
+      end associate
+    end do
+  end function is_nearly_balanced
+
+end module nocdyn_balance_search

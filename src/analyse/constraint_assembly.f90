@@ -1,0 +1,178 @@
+!> From the rigid joints of an input to constraint rows, in the order of the file.
+module nocdyn_constraint_assembly
+  use nocdyn_body_directory, only: bodies_of, directory_t
+  use nocdyn_constraints, only: constraints_t, member_torques_t, new_constraints
+  use nocdyn_errors, only: error_t, exit_input, raise
+  use nocdyn_input, only: group_t, input_t
+  use nocdyn_kinds, only: wp
+  use nocdyn_text, only: string_t
+  use nocdyn_text_order, only: find_order, first_position
+  implicit none (type, external)
+  private
+
+  public :: assemble_constraints, constraint_groups
+
+  !> One row before the ground is dropped; `members` names those members whose torque has a column of its own.
+  type :: joint_t
+    integer, allocatable :: bodies(:)             !! 0: the ground
+    real(wp), allocatable :: coefficients(:)
+    character(len=3) :: unit = 'N m'
+    character(len=7), allocatable :: members(:)   !! of each body, '' without a column
+  end type joint_t
+
+contains
+
+  !> The groups of the input that are rows, in the order of the file.
+  function constraint_groups(input) result(indices)
+    type(input_t), intent(in) :: input
+    integer, allocatable :: indices(:)
+    character(len=*), parameter :: kinds(4) = [character(len=12) :: 'gear', 'planetary', 'differential', 'constraint']
+    integer :: i
+
+    indices = pack([(i, i=1, size(input%groups))], [(any(kinds == input%groups(i)%kind), i=1, size(input%groups))])
+  end function constraint_groups
+
+  !> All rows; two columns of the results with one name are an error.
+  subroutine assemble_constraints(input, directory, constraints, error)
+    type(input_t), intent(in) :: input
+    type(directory_t), intent(in) :: directory
+    type(constraints_t), intent(out) :: constraints
+    type(error_t), allocatable, intent(out) :: error
+    type(joint_t), allocatable :: joints(:)
+    integer, allocatable :: indices(:)
+    integer :: i
+
+    allocate (indices, source=constraint_groups(input))
+    allocate (joints(size(indices)))
+    do i = 1, size(indices)
+      call read_joint(input%groups(indices(i)), directory, joints(i))
+    end do
+    call form_rows(input, indices, joints, size(directory%names), constraints)
+    call refuse_equal_columns(input, indices, constraints, error)
+  end subroutine assemble_constraints
+
+  subroutine read_joint(group, directory, joint)
+    type(group_t), intent(in) :: group
+    type(directory_t), intent(in) :: directory
+    type(joint_t), intent(out) :: joint
+
+    select case (group%kind)
+    case ('gear')
+      call read_gear(group, directory, joint)
+    case ('planetary')
+      call read_planetary(group, directory, joint)
+    case ('differential')
+      joint%bodies = [bodies_of(group, 'sides', directory), bodies_of(group, 'case', directory)]
+      joint%coefficients = [1.0_wp, 1.0_wp, -2.0_wp]
+      joint%members = [character(len=7) :: '', '', 'case']
+    case ('constraint')
+      joint%bodies = bodies_of(group, 'bodies', directory)
+      joint%coefficients = group%numbers('coefficients')
+      allocate (joint%members(size(joint%bodies)))
+      joint%members(:) = ''
+    case default
+      error stop 'nocdyn_constraint_assembly: this group is no constraint'
+    end select
+  end subroutine read_joint
+
+  !> Eq. (8): R1 omega_1 + R2 omega_2 = 0, a minus for an internal gear.
+  !>
+  !> With radii the multiplier is the tooth force [N]; with teeth the row is scaled so that it is the torque on the
+  !> first body [N m].
+  subroutine read_gear(gear, directory, joint)
+    type(group_t), intent(in) :: gear
+    type(directory_t), intent(in) :: directory
+    type(joint_t), intent(inout) :: joint
+
+    joint%bodies = bodies_of(gear, 'bodies', directory)
+    if (gear%has_value('radii')) then
+      joint%coefficients = gear%numbers('radii')
+      joint%unit = 'N'
+    else
+      joint%coefficients = real(gear%whole_numbers('teeth'), wp)
+      joint%coefficients = joint%coefficients / joint%coefficients(1)
+    end if
+    if (gear%flag('internal')) joint%coefficients(2) = -joint%coefficients(2)
+    joint%members = [character(len=7) :: '', '']
+  end subroutine read_gear
+
+  !> Willis: z_s omega_s + z_r omega_r - (z_s + z_r) omega_c = 0, scaled so that the multiplier is the torque on the sun.
+  subroutine read_planetary(planetary, directory, joint)
+    type(group_t), intent(in) :: planetary
+    type(directory_t), intent(in) :: directory
+    type(joint_t), intent(inout) :: joint
+
+    joint%bodies = [bodies_of(planetary, 'sun', directory), bodies_of(planetary, 'ring', directory), &
+                    bodies_of(planetary, 'carrier', directory)]
+    associate (teeth => real(planetary%whole_numbers('teeth'), wp))
+      joint%coefficients = [1.0_wp, teeth(2) / teeth(1), -(teeth(1) + teeth(2)) / teeth(1)]
+    end associate
+    joint%members = [character(len=7) :: '', 'ring', 'carrier']
+  end subroutine read_planetary
+
+  !> Rows without the ground, which has no speed; its torque may still have a column.
+  subroutine form_rows(input, indices, joints, bodies, constraints)
+    type(input_t), intent(in) :: input
+    integer, intent(in) :: indices(:)   !! groups of the rows
+    type(joint_t), intent(in) :: joints(:)
+    integer, intent(in) :: bodies
+    type(constraints_t), intent(out) :: constraints
+    type(string_t), allocatable :: kinds(:), names(:), units(:)
+    type(member_torques_t) :: members
+    integer, allocatable :: body(:), first(:)
+    real(wp), allocatable :: coefficient(:, :)
+    integer :: i, k, m, next
+
+    associate (entries => sum([(count(joints(i)%bodies > 0), i=1, size(joints))]), &
+               columns => sum([(count(joints(i)%members /= ''), i=1, size(joints))]))
+      allocate (body(entries), coefficient(1, entries), first(size(joints) + 1))
+      allocate (members%names(columns), members%row(columns), members%factor(1, columns))
+    end associate
+    allocate (kinds(size(joints)), names(size(joints)), units(size(joints)))
+    m = 0
+    next = 1
+    do i = 1, size(joints)
+      kinds(i)%text = input%groups(indices(i))%kind
+      names(i)%text = input%groups(indices(i))%name
+      units(i)%text = trim(joints(i)%unit)
+      first(i) = next
+      do k = 1, size(joints(i)%bodies)
+        if (joints(i)%members(k) /= '') then
+          m = m + 1
+          members%names(m)%text = trim(joints(i)%members(k))
+          members%row(m) = i
+          members%factor(1, m) = joints(i)%coefficients(k)
+        end if
+        if (joints(i)%bodies(k) == 0) cycle
+        body(next) = joints(i)%bodies(k)
+        coefficient(1, next) = joints(i)%coefficients(k)
+        next = next + 1
+      end do
+    end do
+    first(size(first)) = next
+    constraints = new_constraints(bodies, names, units, first, body, coefficient, kinds, members)
+  end subroutine form_rows
+
+  !> reaction_NAME_MEMBER must not be reaction_NAME of another constraint.
+  subroutine refuse_equal_columns(input, indices, constraints, error)
+    type(input_t), intent(in) :: input
+    integer, intent(in) :: indices(:)
+    type(constraints_t), intent(in) :: constraints
+    type(error_t), allocatable, intent(out) :: error
+    character(len=:), allocatable :: name
+    integer, allocatable :: order(:)
+    integer :: m, other
+
+    if (size(constraints%members%row) == 0) return
+    call find_order(constraints%names, order)
+    do m = 1, size(constraints%members%row)
+      name = constraints%names(constraints%members%row(m))%text // '_' // constraints%members%names(m)%text
+      other = first_position(name, constraints%names, order)
+      if (other == 0) cycle
+      call raise(error, exit_input, input%place(indices(constraints%members%row(m))) // ': its column reaction_' // name // &
+                 ' would have the name of that of ' // input%label(indices(other)) // '; allowed: another name')
+      return
+    end do
+  end subroutine refuse_equal_columns
+
+end module nocdyn_constraint_assembly

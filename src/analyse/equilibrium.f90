@@ -1,0 +1,288 @@
+!> How does the machine run when it has run for long: constant speeds, mean torques, constant twists.
+module nocdyn_equilibrium
+  use nocdyn_balance_search, only: block_solutions_t, search_balance
+  use nocdyn_errors, only: error_t, exit_failed, raise
+  use nocdyn_formulation, only: formulation_t
+  use nocdyn_kinds, only: wp
+  use nocdyn_lapack_eigen, only: eigenvectors
+  use nocdyn_linearisation, only: linearisation_t, linearise
+  use nocdyn_machine, only: machine_t
+  use nocdyn_reduced, only: new_reduced
+  use nocdyn_static_twists, only: find_twists
+  use nocdyn_text, only: append, joined, quoted, rounded_text, selected, string_t, to_text
+  use nocdyn_torque_balance, only: new_torque_balance, torque_balance_t
+  implicit none (type, external)
+  private
+
+  public :: find_equilibria, judge_equilibria, nearest_equilibrium
+
+  real(wp), parameter, public :: late = 1.0e30_wp   !! when all that changes once has changed [s]
+
+  integer, parameter :: most_combinations = 64   !! of the solutions of independent parts of a machine
+  integer, parameter :: most_states = 1000       !! whose eigenvalues are found to state the stability, in some seconds
+  integer, parameter :: most_names = 5           !! bodies that a message names
+  integer, parameter :: digits = 6
+
+  type, public :: equilibrium_t
+    real(wp), allocatable :: y(:, :)          !! state of the reduced formulation without works, [1, states]
+    character(len=14) :: stability = 'not determined'   !! stable, unstable, neutral, not determined
+    real(wp) :: growth = 0.0_wp               !! largest real part of the eigenvalues but those of idle motions [1/s]
+    integer :: idle = 0                       !! rigid motions that nothing drives or brakes
+  end type equilibrium_t
+
+contains
+
+  !> All steady states that were found of a machine. Its mean torques are those of `formulation`, which is made here.
+  subroutine find_equilibria(machine, formulation, equilibria, notes, error)
+    type(machine_t), intent(in) :: machine
+    class(formulation_t), allocatable, intent(out) :: formulation
+    type(equilibrium_t), allocatable, intent(out) :: equilibria(:)
+    type(string_t), allocatable, intent(out) :: notes(:)
+    type(error_t), allocatable, intent(out) :: error               !! if there is none
+    type(machine_t) :: settled
+    type(torque_balance_t) :: balance
+    type(block_solutions_t), allocatable :: blocks(:)
+    integer :: i
+
+    settled = machine
+    call settled%settle()
+    allocate (formulation, source=new_reduced(settled, .false.))
+    balance = new_torque_balance(formulation, late)
+    call search_balance(balance, blocks)
+    allocate (notes(0))
+    do i = 1, size(blocks)
+      if (size(blocks(i)%values, 2) > 0) cycle
+      call raise(error, exit_failed, no_balance_sentence(balance, blocks(i)))
+      return
+    end do
+    do i = 1, size(blocks)
+      if (blocks(i)%is_idle) call append(notes, 'nothing drives or brakes ' // moving_bodies(balance, blocks(i)%members) // &
+                                                ': any speed is steady, and the one of the start is kept')
+    end do
+    call combine(balance, blocks, equilibria, notes, error)
+  end subroutine find_equilibria
+
+  !> States the stability of every steady state.
+  subroutine judge_equilibria(formulation, equilibria)
+    class(formulation_t), intent(inout) :: formulation
+    type(equilibrium_t), intent(inout) :: equilibria(:)
+    integer :: i
+
+    do i = 1, size(equilibria)
+      call judge(formulation, equilibria(i))
+    end do
+  end subroutine judge_equilibria
+
+  !> Every combination of the solutions of the blocks, with its twists.
+  subroutine combine(balance, blocks, equilibria, notes, error)
+    type(torque_balance_t), intent(inout) :: balance
+    type(block_solutions_t), intent(in) :: blocks(:)
+    type(equilibrium_t), allocatable, intent(out) :: equilibria(:)
+    type(string_t), allocatable, intent(inout) :: notes(:)
+    type(error_t), allocatable, intent(out) :: error
+    integer :: choice(size(blocks)), i, number
+    real(wp) :: z(balance%unknowns())
+    type(equilibrium_t) :: found
+    logical :: is_found
+
+    allocate (equilibria(0))
+    choice = 1
+    z = 0.0_wp
+    do number = 1, most_combinations
+      do i = 1, size(blocks)
+        z(blocks(i)%members) = blocks(i)%values(:, choice(i))
+      end do
+      call complete(balance, z, found, is_found, error)
+      if (allocated(error)) return
+      if (is_found) then
+        found%idle = count(blocks%is_idle)
+        equilibria = [equilibria, found]
+      else
+        call append(notes, 'the torques balance at ' // speed_text(balance, z) // &
+                           ', but no twists of the couplings carry them')
+      end if
+      if (.not. advance(blocks, choice)) exit
+    end do
+    if (size(equilibria) > 0) return
+    call raise(error, exit_failed, 'there is no steady state: ' // notes(size(notes))%text)
+  end subroutine combine
+
+  !> The next combination; false after the last.
+  logical function advance(blocks, choice)
+    type(block_solutions_t), intent(in) :: blocks(:)
+    integer, intent(inout) :: choice(:)
+    integer :: i
+
+    advance = .true.
+    do i = 1, size(blocks)
+      choice(i) = choice(i) + 1
+      if (choice(i) <= size(blocks(i)%values, 2)) return
+      choice(i) = 1
+    end do
+    advance = .false.
+  end function advance
+
+  !> The state with these speeds and inner states, and with the twists that belong to them.
+  subroutine complete(balance, z, equilibrium, is_found, error)
+    type(torque_balance_t), intent(inout) :: balance
+    real(wp), intent(in) :: z(:)
+    type(equilibrium_t), intent(out) :: equilibrium
+    logical, intent(out) :: is_found
+    type(error_t), allocatable, intent(out) :: error
+    real(wp) :: q(balance%coordinates)
+
+    q = 0.0_wp
+    call balance%evaluate(z)
+    call find_twists(balance, q, is_found, error)
+    call balance%place(z)
+    balance%y(1, size(q) + 1:2 * size(q)) = q
+    equilibrium%y = balance%y
+  end subroutine complete
+
+  !> States the stability by the eigenvalues of the linearisation, where there are not too many.
+  subroutine judge(formulation, equilibrium)
+    class(formulation_t), intent(inout) :: formulation
+    type(equilibrium_t), intent(inout) :: equilibrium
+    real(wp), parameter :: rounding = 1.0e-10_wp   ! of the largest eigenvalue
+    type(linearisation_t) :: linear
+    type(error_t), allocatable :: error
+    complex(wp), allocatable :: values(:), vectors(:, :)
+    logical :: has_failed
+
+    equilibrium%stability = 'not determined'
+    if (formulation%states > most_states) return
+    call linearise(formulation, late, equilibrium%y, linear, error)
+    if (allocated(error)) return
+    allocate (values(size(linear%matrix, 1)), vectors(size(linear%matrix, 1), size(linear%matrix, 1)))
+    call eigenvectors(linear%matrix, values, vectors, has_failed)
+    if (has_failed) return
+    equilibrium%growth = growth_rate(values, equilibrium%idle)
+    if (equilibrium%growth < -rounding * maxval(abs(values))) then
+      equilibrium%stability = 'stable'
+    else if (equilibrium%growth > rounding * maxval(abs(values))) then
+      equilibrium%stability = 'unstable'
+    else
+      equilibrium%stability = 'neutral'
+    end if
+  end subroutine judge
+
+  !> The largest real part of the eigenvalues, but for the smallest of them, which are those of idle motions.
+  pure real(wp) function growth_rate(values, idle)
+    complex(wp), intent(in) :: values(:)
+    integer, intent(in) :: idle   !! how many do not count
+    logical :: counts(size(values))
+    integer :: i
+
+    counts = .true.
+    do i = 1, idle
+      counts(minloc(abs(values), dim=1, mask=counts)) = .false.
+    end do
+    growth_rate = 0.0_wp
+    if (any(counts)) growth_rate = maxval(real(values, wp), mask=counts)
+  end function growth_rate
+
+  !> The steady state whose kinetic energy relative to the start is the least, of the stable ones if there are any.
+  function nearest_equilibrium(formulation, equilibria) result(nearest)
+    class(formulation_t), intent(inout) :: formulation
+    type(equilibrium_t), intent(in) :: equilibria(:)
+    integer :: nearest
+    real(wp) :: distance, least
+    real(wp) :: start(formulation%machine%bodies)
+    integer :: i
+    logical :: has_stable
+
+    call formulation%place(formulation%start())
+    start = formulation%omega(1, 1:)
+    has_stable = any(equilibria%stability == 'stable')
+    least = huge(least)
+    nearest = 1
+    do i = 1, size(equilibria)
+      if (has_stable .and. equilibria(i)%stability /= 'stable') cycle
+      call formulation%place(equilibria(i)%y)
+      distance = formulation%machine%kinetic_energy(1, formulation%omega(1, 1:) - start)
+      if (distance >= least) cycle
+      least = distance
+      nearest = i
+    end do
+  end function nearest_equilibrium
+
+  !> Why a block has no solution.
+  function no_balance_sentence(balance, block) result(sentence)
+    type(torque_balance_t), intent(inout) :: balance
+    type(block_solutions_t), intent(in) :: block
+    character(len=:), allocatable :: sentence
+    real(wp) :: z(balance%unknowns()), slopes(balance%unknowns(), balance%unknowns())
+
+    sentence = 'there is no steady state: nothing balances '
+    if (any(block%members > balance%motions%freedoms()) .or. size(block%members) > 1) then
+      sentence = sentence // 'the torques on ' // moving_bodies(balance, block%members) // &
+                 '; Newton''s method found no solution from any start'
+      return
+    end if
+    z = balance%start()
+    call balance%evaluate(z)
+    call balance%differentiate(slopes)
+    associate (member => block%members(1))
+      if (abs(slopes(member, member)) <= 0.0_wp) then
+        sentence = sentence // rounded_text(block%least_torque, digits) // ' N m on ' // &
+                   moving_bodies(balance, block%members) // ' at any speed; a load is missing, or a motor whose torque falls'
+      else
+        sentence = sentence // 'the torques on ' // moving_bodies(balance, block%members) // ' at any speed; at least ' // &
+                   rounded_text(block%least_torque, digits) // ' N m are left over, at ' // &
+                   rounded_text(block%least_speed, digits) // ' rad/s of ' // &
+                   quoted(body_of(balance, member))
+      end if
+    end associate
+  end function no_balance_sentence
+
+  !> The body that stands for a rigid motion.
+  function body_of(balance, freedom) result(name)
+    type(torque_balance_t), intent(in) :: balance
+    integer, intent(in) :: freedom
+    character(len=:), allocatable :: name
+
+    associate (machine => balance%formulation%machine)
+      name = machine%names(machine%coordinates%body(balance%motions%free(freedom)))%text
+    end associate
+  end function body_of
+
+  !> The names of the bodies that turn in these rigid motions.
+  function moving_bodies(balance, members) result(text)
+    type(torque_balance_t), intent(in) :: balance
+    integer, intent(in) :: members(:)
+    character(len=:), allocatable :: text
+    real(wp) :: unit(balance%motions%freedoms())
+    logical :: moves(balance%formulation%machine%bodies)
+    integer, allocatable :: bodies(:)
+    integer :: b, i
+
+    moves = .false.
+    do i = 1, size(members)
+      if (members(i) > size(unit)) cycle
+      unit = 0.0_wp
+      unit(members(i)) = 1.0_wp
+      moves = moves .or. abs(balance%body_speeds(unit)) > 0.0_wp
+    end do
+    bodies = pack([(b, b=1, size(moves))], moves)
+    associate (names => balance%formulation%machine%names)
+      text = joined(selected(names, bodies(:min(size(bodies), most_names))), ', ')
+    end associate
+    if (size(bodies) > most_names) text = text // ' and ' // to_text(size(bodies) - most_names) // ' more'
+  end function moving_bodies
+
+  !> "12.5 rad/s of 'motor'".
+  function speed_text(balance, z) result(text)
+    type(torque_balance_t), intent(in) :: balance
+    real(wp), intent(in) :: z(:)
+    character(len=:), allocatable :: text
+    integer :: i
+
+    text = ''
+    do i = 1, min(balance%motions%freedoms(), most_names)
+      if (i > 1) text = text // ', '
+      text = text // rounded_text(z(i), digits) // ' rad/s of ' // quoted(body_of(balance, i))
+    end do
+    if (text == '') text = 'rest'
+  end function speed_text
+
+end module nocdyn_equilibrium

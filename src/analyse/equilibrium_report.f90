@@ -1,0 +1,212 @@
+!> The steady states of a machine as a person and as a program read them.
+module nocdyn_equilibrium_report
+  use nocdyn_bank, only: role_coupling
+  use nocdyn_energy_account, only: worker_names
+  use nocdyn_equilibrium, only: equilibrium_t, late
+  use nocdyn_formulation, only: formulation_t
+  use nocdyn_input, only: group_t, input_t
+  use nocdyn_json, only: json_t
+  use nocdyn_kinds, only: wp
+  use nocdyn_machine, only: machine_t
+  use nocdyn_machine_report, only: coordinate_names
+  use nocdyn_reduced, only: new_reduced
+  use nocdyn_table_text, only: cell, cell_digits, padded, text_width
+  use nocdyn_text, only: rounded_text, selected, string_t, to_text
+  use nocdyn_text_buffer, only: text_buffer_t
+  use nocdyn_trajectory_table, only: new_trajectory_table, trajectory_table_t
+  use nocdyn_version, only: compiler_text, version
+  implicit none (type, external)
+  private
+
+  public :: equilibrium_json, equilibrium_text, new_equilibrium_report
+
+  integer, parameter :: most_rows = 60      ! a larger machine has its table in equilibrium.json
+  integer, parameter :: trailing = 3        ! columns of works and the residual, which a steady state has none of
+
+  !> Everything that is told, one column per steady state.
+  type, public :: equilibrium_report_t
+    type(equilibrium_t), allocatable :: equilibria(:)
+    type(string_t), allocatable :: notes(:)
+    type(string_t), allocatable :: labels(:)       !! as in trajectory.csv: speeds, twists, moments, torques, reactions, energies
+    real(wp), allocatable :: values(:, :)          !! [labels, equilibria]
+    type(string_t), allocatable :: workers(:)      !! elements whose power counts, with their kind
+    real(wp), allocatable :: power(:, :)           !! into the machine [W], [workers, equilibria]
+    type(string_t), allocatable :: coordinates(:)
+  end type equilibrium_report_t
+
+contains
+
+  !> Evaluates the columns of trajectory.csv at the steady states.
+  function new_equilibrium_report(formulation, equilibria, notes) result(self)
+    class(formulation_t), intent(in) :: formulation
+    type(equilibrium_t), intent(in) :: equilibria(:)
+    type(string_t), intent(in) :: notes(:)
+    type(equilibrium_report_t) :: self
+    type(trajectory_table_t) :: table
+    real(wp), allocatable :: row(:), watts(:, :), y(:)
+    integer, allocatable :: told(:)                 !! columns
+    integer :: i, k
+
+    allocate (self%equilibria, source=equilibria)
+    allocate (self%notes, source=notes)
+    allocate (self%coordinates, source=coordinate_names(formulation%machine))
+    table = new_trajectory_table(new_reduced(formulation%machine, .true.), late)
+    told = steady_columns(table, formulation%machine)
+    allocate (self%labels, source=selected(table%labels, told))
+    allocate (self%workers, source=worker_names(formulation%machine))
+    allocate (self%values(size(self%labels), size(equilibria)), self%power(size(self%workers), size(equilibria)))
+    allocate (row(size(table%labels)), watts(1, size(self%workers)))
+    do k = 1, size(equilibria)
+      y = [equilibria(k)%y(1, :), (0.0_wp, i=1, size(self%workers))]
+      call table%fill(late, y, row)
+      call table%formulation%machine%power(watts)
+      self%values(:, k) = row(told)
+      self%power(:, k) = watts(1, :)
+    end do
+  end function new_equilibrium_report
+
+  !> The columns that do not change in steady running: no angles, and no twists of couplings that slip.
+  function steady_columns(table, machine) result(columns)
+    type(trajectory_table_t), intent(in) :: table
+    type(machine_t), intent(in) :: machine
+    integer, allocatable :: columns(:)
+    logical :: is_steady(size(table%labels))
+    integer :: b, c, e
+
+    is_steady = .true.
+    is_steady(:1 + machine%bodies) = .false.
+    is_steady(size(is_steady) - trailing + 1:) = .false.
+    do b = 1, size(machine%banks)
+      associate (bank => machine%banks(b)%bank)
+        do e = 1, merge(size(bank%names), 0, bank%role == role_coupling)
+          if (any(bank%elastic == e)) cycle
+          is_steady = is_steady .and. [(table%labels(c)%text /= 'twist_' // bank%names(e)%text // ' [rad]', c=1, size(is_steady))]
+        end do
+      end associate
+    end do
+    columns = pack([(c, c=1, size(is_steady))], is_steady)
+  end function steady_columns
+
+  !> A table for every steady state.
+  function equilibrium_text(file, self) result(text)
+    character(len=*), intent(in) :: file
+    type(equilibrium_report_t), intent(in) :: self
+    character(len=:), allocatable :: text
+    type(text_buffer_t) :: report
+    integer :: i, k
+
+    do i = 1, size(self%notes)
+      call report%append_line(file // ': note: ' // self%notes(i)%text)
+    end do
+    do k = 1, size(self%equilibria)
+      if (size(self%equilibria) == 1) then
+        call report%append_line(file // ': steady state, ' // stability_text(self%equilibria(k)))
+      else
+        call report%append_line(file // ': steady state ' // to_text(k) // ' of ' // to_text(size(self%equilibria)) // &
+                                ', ' // stability_text(self%equilibria(k)))
+      end if
+      call put_rows(self%labels, self%values(:, k), report)
+      call put_power(self%workers, self%power(:, k), report)
+    end do
+    text = report%text()
+  end function equilibrium_text
+
+  !> "stable: disturbances decay at 0.5 1/s or faster".
+  function stability_text(equilibrium) result(text)
+    type(equilibrium_t), intent(in) :: equilibrium
+    character(len=:), allocatable :: text
+
+    select case (equilibrium%stability)
+    case ('stable')
+      text = 'stable: disturbances decay with ' // rounded_text(-equilibrium%growth, 4) // ' 1/s or faster'
+    case ('unstable')
+      text = 'unstable: a disturbance grows with ' // rounded_text(equilibrium%growth, 4) // ' 1/s'
+    case ('neutral')
+      text = 'neutral: some disturbances neither grow nor decay'
+    case default
+      text = 'of which the stability is not determined'
+    end select
+  end function stability_text
+
+  subroutine put_rows(labels, values, report)
+    type(string_t), intent(in) :: labels(:)
+    real(wp), intent(in) :: values(:)
+    type(text_buffer_t), intent(inout) :: report
+    integer :: i, rows, width
+
+    rows = min(size(labels), most_rows)
+    width = maxval([(text_width(labels(i)%text), i=1, rows)])
+    do i = 1, rows
+      call report%append_line('  ' // padded(labels(i)%text, width) // cell(values(i)))
+    end do
+    if (rows < size(labels)) call report%append_line('  (' // to_text(size(labels) - rows) // ' more values in equilibrium.json)')
+  end subroutine put_rows
+
+  !> Who puts power in, who takes it out, and what does not add up.
+  subroutine put_power(workers, power, report)
+    type(string_t), intent(in) :: workers(:)
+    real(wp), intent(in) :: power(:)
+    type(text_buffer_t), intent(inout) :: report
+    integer :: i, rows, width
+
+    if (size(workers) == 0) return
+    rows = min(size(workers), most_rows)
+    width = max(len('power into the machine [W]'), maxval([(text_width(workers(i)%text), i=1, rows)]))
+    call report%append_line('  power into the machine [W]')
+    do i = 1, rows
+      call report%append_line('  ' // padded(workers(i)%text, width) // cell(power(i)))
+    end do
+    if (rows < size(workers)) call report%append_line('  (' // to_text(size(workers) - rows) // ' more in equilibrium.json)')
+    call report%append_line('  ' // padded('in all', width) // cell(sum(power)) // ', of ' // &
+                            rounded_text(sum(max(power, 0.0_wp)), cell_digits) // ' put in')
+  end subroutine put_power
+
+  !> The text of equilibrium.json.
+  function equilibrium_json(input, self) result(text)
+    type(input_t), intent(in) :: input
+    type(equilibrium_report_t), intent(in) :: self
+    character(len=:), allocatable :: text
+    type(json_t) :: json
+    type(group_t) :: about
+    integer :: k
+
+    call json%open()
+    call json%put('program', 'nocdyn')
+    call json%put('version', version)
+    call json%put('compiler', compiler_text())
+    call json%put('input', input%file)
+    about = input%single('case')
+    call json%put('title', about%text('title'))
+    call json%put('independent', self%coordinates)
+    call json%put('notes', self%notes)
+    call json%open_list('steady_states')
+    do k = 1, size(self%equilibria)
+      call json%open()
+      call json%put('stability', trim(self%equilibria(k)%stability))
+      if (self%equilibria(k)%stability /= 'not determined') call json%put('growth_rate_1_s', self%equilibria(k)%growth)
+      call put_members(json, 'values', self%labels, self%values(:, k))
+      call put_members(json, 'power_W', self%workers, self%power(:, k))
+      call json%put('power_put_in_W', sum(max(self%power(:, k), 0.0_wp)))
+      call json%put('power_residual_W', sum(self%power(:, k)))
+      call json%close()
+    end do
+    call json%close_list()
+    call json%close()
+    text = json%text()
+  end function equilibrium_json
+
+  subroutine put_members(json, key, labels, values)
+    type(json_t), intent(inout) :: json
+    character(len=*), intent(in) :: key
+    type(string_t), intent(in) :: labels(:)
+    real(wp), intent(in) :: values(:)
+    integer :: i
+
+    call json%open(key)
+    do i = 1, size(labels)
+      call json%put(labels(i)%text, values(i))
+    end do
+    call json%close()
+  end subroutine put_members
+
+end module nocdyn_equilibrium_report

@@ -1,0 +1,214 @@
+!> A machine linearised at a state: M q'' + C q' + K q = 0 in modal coordinates, with the inner states of its elements.
+!>
+!> K = U^T diag(k) U with the tangent stiffnesses k of the elements and the map U from coordinates to twists; M = R^T R.
+!> The undamped modes are the right singular vectors of diag(sqrt(k)) U R^-1, and its singular values the natural
+!> frequencies: their error is a rounding of the highest frequency, where the eigenvalues of K and M have one of its
+!> square. Only where a stiffness is negative the symmetric eigenproblem is solved.
+!>
+!> The first-order states are p = rates of the modal coordinates, e = natural frequency * modal coordinate of those that
+!> are not rigid, and the inner states. Then |p|^2 and |e|^2 are twice the energies, and rigid rotation is no state.
+module nocdyn_linearisation
+  use nocdyn_element_coordinates, only: element_coordinates_t, new_element_coordinates
+  use nocdyn_errors, only: error_t, exit_failed, raise
+  use nocdyn_formulation, only: formulation_t
+  use nocdyn_kinds, only: wp
+  use nocdyn_lapack_eigen, only: cholesky_factor, divide_left, divide_right, singular_vectors, symmetric_eigenvectors
+  use nocdyn_one_lane, only: choose_branches
+  use nocdyn_system, only: pattern_t
+  implicit none (type, external)
+  private
+
+  public :: linearise
+
+  !> Rigid motions are modes whose natural frequency is below these shares of the highest one: rounding of the singular
+  !> values, and of the eigenvalues, which are squares.
+  real(wp), parameter :: rigid_share = 1.0e-12_wp, rigid_share_of_squares = 1.0e-13_wp
+
+  type, public :: linearisation_t
+    real(wp), allocatable :: shapes(:, :)        !! modes in the coordinates q, M-normalised, [coordinates, modes]
+    real(wp), allocatable :: twists(:, :)        !! the same for the twists of all elements, [elements, modes]
+    real(wp), allocatable :: natural(:)          !! natural frequencies, negative of unstable modes [rad/s]
+    integer, allocatable :: flexible(:)          !! modes that are not rigid
+    real(wp), allocatable :: stiffness(:)        !! k of all elements [N m/rad]
+    real(wp), allocatable :: matrix(:, :)        !! of the first-order system, [modes + flexible + inner states]
+  end type linearisation_t
+
+contains
+
+  !> Linearises a formulation without works, one lane, at time t and state y.
+  subroutine linearise(formulation, t, y, self, error)
+    class(formulation_t), intent(inout) :: formulation
+    real(wp), intent(in) :: t
+    real(wp), contiguous, intent(in) :: y(:, :)   !! [1, states]
+    type(linearisation_t), intent(out) :: self
+    type(error_t), allocatable, intent(out) :: error
+    type(element_coordinates_t) :: incidence
+    type(pattern_t) :: pattern
+    real(wp), allocatable :: slopes(:, :)
+    real(wp) :: dfdt(1, formulation%states)
+    integer :: status(1)
+
+    pattern = formulation%jacobian_pattern()
+    allocate (slopes(1, size(pattern%row)))
+    status = 0
+    call choose_branches(formulation, t, y)
+    call formulation%jacobian([t], y, slopes, dfdt, status)
+    incidence = new_element_coordinates(formulation%machine%elements, formulation%machine%coordinates)
+    associate (elements => formulation%machine%elements)
+      self%stiffness = -(elements%restoring_angle(1, :) + elements%working_angle(1, :))
+    end associate
+    call find_modes(formulation, incidence, self, error)
+    if (allocated(error)) return
+    call assemble(formulation, self)
+    if (formulation%states > 2 * size(self%natural)) then
+      call add_inner(formulation, pattern, slopes(1, :), self)
+    end if
+  end subroutine linearise
+
+  !> The undamped modes.
+  subroutine find_modes(formulation, incidence, self, error)
+    class(formulation_t), intent(in) :: formulation
+    type(element_coordinates_t), intent(in) :: incidence
+    type(linearisation_t), intent(inout) :: self
+    type(error_t), allocatable, intent(out) :: error
+    real(wp), allocatable :: factor(:, :), flexibility(:, :)
+    logical :: has_failed
+    integer :: e, i
+
+    associate (f => formulation%machine%coordinates%freedoms, elastic => pack([(e, e=1, size(self%stiffness))], &
+                                                                              abs(self%stiffness) > 0.0_wp))
+      factor = mass_matrix(formulation)
+      call cholesky_factor(factor, has_failed)
+      if (has_failed) error stop 'nocdyn_linearisation: inertias must be positive'
+      allocate (flexibility(size(elastic), f), self%shapes(f, f), self%natural(f), source=0.0_wp)
+      do i = 1, size(elastic)
+        do e = incidence%first(elastic(i)), incidence%first(elastic(i) + 1) - 1
+          flexibility(i, incidence%coordinate(e)) = incidence%ratio(1, e) * sqrt(abs(self%stiffness(elastic(i))))
+        end do
+      end do
+      if (size(elastic) > 0) call divide_right(factor, flexibility)
+      call solve_undamped(flexibility, self%stiffness(elastic), self, has_failed)
+      if (has_failed) then
+        call raise(error, exit_failed, 'the natural frequencies were not found: LAPACK did not converge')
+        return
+      end if
+      call divide_left(factor, self%shapes)
+    end associate
+    allocate (self%twists(size(self%stiffness), size(self%natural)), source=0.0_wp)
+    do e = 1, size(self%stiffness)
+      do i = incidence%first(e), incidence%first(e + 1) - 1
+        self%twists(e, :) = self%twists(e, :) + incidence%ratio(1, i) * self%shapes(incidence%coordinate(i), :)
+      end do
+    end do
+  end subroutine find_modes
+
+  !> Natural frequencies, ascending, and orthonormal modes of B^T diag(sign of k) B.
+  subroutine solve_undamped(b, stiffness, self, has_failed)
+    real(wp), contiguous, intent(in) :: b(:, :)         !! diag(sqrt(|k|)) U R^-1
+    real(wp), intent(in) :: stiffness(:)                !! k
+    type(linearisation_t), intent(inout) :: self
+    logical, intent(out) :: has_failed
+    logical :: is_rigid(size(self%natural))
+    integer :: i
+
+    associate (natural => self%natural, n => size(self%natural))
+      if (all(stiffness >= 0.0_wp)) then
+        call singular_vectors(b, natural, self%shapes, has_failed)
+        natural = natural(n:1:-1)
+        self%shapes = self%shapes(:, n:1:-1)
+        is_rigid = natural <= rigid_share * natural(n)
+      else
+        call symmetric_eigenvectors(matmul(transpose(b), spread(sign(1.0_wp, stiffness), 2, n) * b), natural, &
+                                    self%shapes, has_failed)
+        is_rigid = abs(natural) <= rigid_share_of_squares * maxval(abs(natural))
+        natural = sign(sqrt(abs(natural)), natural)
+      end if
+      where (is_rigid) natural = 0.0_wp
+      self%flexible = pack([(i, i=1, n)], .not. is_rigid)
+    end associate
+  end subroutine solve_undamped
+
+  !> L_tau^T J L_tau.
+  function mass_matrix(formulation) result(mass)
+    class(formulation_t), intent(in) :: formulation
+    real(wp), allocatable :: mass(:, :)
+    integer :: b, i, k
+
+    associate (map => formulation%machine%coordinates)
+      allocate (mass(map%freedoms, map%freedoms), source=0.0_wp)
+      do b = 1, formulation%machine%bodies
+        do i = map%first(b), map%first(b + 1) - 1
+          do k = map%first(b), map%first(b + 1) - 1
+            associate (entry => mass(map%coordinate(k), map%coordinate(i)))
+              entry = entry + map%ratio(1, k) * formulation%machine%inertia(1, b) * map%ratio(1, i)
+            end associate
+          end do
+        end do
+      end do
+    end associate
+  end function mass_matrix
+
+  !> p' = -C p - sign(natural) |natural| e, e' = |natural| p.
+  subroutine assemble(formulation, self)
+    class(formulation_t), intent(in) :: formulation
+    type(linearisation_t), intent(inout) :: self
+    integer, allocatable :: working(:)
+    real(wp), allocatable :: rates(:, :)
+    integer :: e, i, n, states
+
+    n = size(self%natural)
+    states = n + size(self%flexible) + formulation%states - 2 * n
+    allocate (self%matrix(states, states), source=0.0_wp)
+    associate (damping => formulation%machine%elements%working_speed(1, :))
+      working = pack([(e, e=1, size(damping))], abs(damping) > 0.0_wp)
+      allocate (rates(size(working), n))
+      do i = 1, n
+        rates(:, i) = damping(working) * self%twists(working, i)
+      end do
+      self%matrix(:n, :n) = matmul(transpose(self%twists(working, :)), rates)
+    end associate
+    do i = 1, size(self%flexible)
+      associate (natural => self%natural(self%flexible(i)))
+        self%matrix(self%flexible(i), n + i) = -natural
+        self%matrix(n + i, self%flexible(i)) = abs(natural)
+      end associate
+    end do
+  end subroutine assemble
+
+  !> The rows and columns of the inner states; no inner state knows of a rigid rotation.
+  subroutine add_inner(formulation, pattern, slopes, self)
+    class(formulation_t), intent(in) :: formulation
+    type(pattern_t), intent(in) :: pattern
+    real(wp), intent(in) :: slopes(:)
+    type(linearisation_t), intent(inout) :: self
+    real(wp), allocatable :: by_inner(:, :), by_speed(:, :), by_angle(:, :)
+    integer :: i, n, p, before
+
+    n = size(self%natural)
+    before = n + size(self%flexible)
+    associate (inner => formulation%states - 2 * n)
+      allocate (by_inner(n, inner), by_speed(inner, n), by_angle(inner, n), source=0.0_wp)
+    end associate
+    do p = 1, size(slopes)
+      associate (row => pattern%row(p), column => pattern%column(p))
+        if (row <= n .and. column > 2 * n) then
+          by_inner(row, column - 2 * n) = slopes(p)
+        else if (row > 2 * n .and. column <= n) then
+          by_speed(row - 2 * n, column) = slopes(p)
+        else if (row > 2 * n .and. column <= 2 * n) then
+          by_angle(row - 2 * n, column - n) = slopes(p)
+        else if (row > 2 * n) then
+          self%matrix(before + row - 2 * n, before + column - 2 * n) = slopes(p)
+        end if
+      end associate
+    end do
+    self%matrix(:n, before + 1:) = matmul(transpose(self%shapes), matmul(mass_matrix(formulation), by_inner))
+    self%matrix(before + 1:, :n) = matmul(by_speed, self%shapes)
+    do i = 1, size(self%flexible)
+      associate (mode => self%flexible(i))
+        self%matrix(before + 1:, n + i) = matmul(by_angle, self%shapes(:, mode)) / abs(self%natural(mode))
+      end associate
+    end do
+  end subroutine add_inner
+
+end module nocdyn_linearisation

@@ -1,0 +1,215 @@
+!> The modes of a linearised machine: eigenvalues, shapes and where their energies are.
+module nocdyn_modes
+  use nocdyn_errors, only: error_t, exit_failed, raise
+  use nocdyn_formulation, only: formulation_t
+  use nocdyn_kinds, only: wp
+  use nocdyn_lapack_eigen, only: eigenvectors
+  use nocdyn_linearisation, only: linearisation_t
+  implicit none (type, external)
+  private
+
+  public :: find_modes
+
+  real(wp), parameter :: pi = acos(-1.0_wp)
+
+  integer, parameter, public :: mode_rigid = 1         !! the machine turns as a whole, without elastic energy
+  integer, parameter, public :: mode_oscillating = 2   !! a pair of complex eigenvalues
+  integer, parameter, public :: mode_overdamped = 3    !! a real eigenvalue, not positive
+  integer, parameter, public :: mode_diverging = 4     !! a positive real eigenvalue
+
+  character(len=*), parameter, public :: kind_names(4) = ['rigid body ', 'oscillating', 'overdamped ', 'diverging  ']
+
+  type, public :: mode_t
+    integer :: kind = mode_oscillating
+    complex(wp) :: eigenvalue = 0.0_wp            !! with an imaginary part that is not negative [1/s]
+    real(wp) :: undamped = 0.0_wp                 !! frequency of the undamped mode that it is most like, negative if that
+                                                  !! diverges [Hz]
+    complex(wp), allocatable :: shape(:)          !! motion of the bodies, the largest = 1
+    real(wp), allocatable :: kinetic(:)           !! share of each body in the kinetic energy
+    real(wp), allocatable :: potential(:)         !! share of each elastic element in the potential energy; negative where
+                                                  !! its stiffness is, all shares add up to 1 in absolute value
+  contains
+    procedure :: frequency
+    procedure :: damping_ratio
+    procedure :: time_constant
+    procedure :: is_unstable
+  end type mode_t
+
+contains
+
+  !> The modes: rigid bodies, oscillations by their frequencies, real eigenvalues by their size.
+  subroutine find_modes(formulation, linear, elastic, modes, error)
+    class(formulation_t), intent(in) :: formulation
+    type(linearisation_t), intent(in) :: linear
+    integer, intent(in) :: elastic(:)                   !! elements whose shares in the potential energy are told
+    type(mode_t), allocatable, intent(out) :: modes(:)
+    type(error_t), allocatable, intent(out) :: error
+    complex(wp), allocatable :: speeds(:, :), twists(:, :), values(:), vectors(:, :)
+    integer, allocatable :: kept(:)
+    integer :: i, states
+    logical :: has_failed
+
+    states = size(linear%matrix, 1)
+    allocate (values(states), vectors(states, states))
+    call eigenvectors(linear%matrix, values, vectors, has_failed)
+    if (has_failed) then
+      call raise(error, exit_failed, 'the modes were not found: LAPACK did not converge')
+      return
+    end if
+    call clear_rounding(values)
+    kept = pack([(i, i=1, states)], aimag(values) >= 0.0_wp)
+    call trace(linear, elastic, vectors(:, kept), speeds, twists)
+    allocate (modes(size(kept)))
+    do i = 1, size(kept)
+      call fill_mode(linear, elastic, values(kept(i)), vectors(:, kept(i)), twists(:, i), modes(i))
+      call place_bodies(formulation, speeds(:, i), modes(i))
+    end do
+    modes = modes(order_of(modes))
+  end subroutine find_modes
+
+  !> Parts of eigenvalues that are rounding of the largest one become zero.
+  pure subroutine clear_rounding(values)
+    complex(wp), intent(inout) :: values(:)
+    real(wp), parameter :: rounding = 1.0e-13_wp
+    real(wp) :: least, parts(2)
+    integer :: i
+
+    least = rounding * maxval(abs(values))
+    do i = 1, size(values)
+      parts = [real(values(i), wp), aimag(values(i))]
+      where (abs(parts) <= least) parts = 0.0_wp
+      values(i) = cmplx(parts(1), parts(2), wp)
+    end do
+  end subroutine clear_rounding
+
+  !> Speeds of the coordinates and twists of the elastic elements in all modes, from the eigenvectors (p, e, inner states).
+  subroutine trace(linear, elastic, vectors, speeds, twists)
+    type(linearisation_t), intent(in) :: linear
+    integer, intent(in) :: elastic(:)
+    complex(wp), intent(in) :: vectors(:, :)
+    complex(wp), allocatable, intent(out) :: speeds(:, :)   !! [coordinates, modes]
+    complex(wp), allocatable, intent(out) :: twists(:, :)   !! [elastic, modes]
+    real(wp), allocatable :: angles(:, :)
+    integer :: i, n
+
+    n = size(linear%natural)
+    allocate (angles(size(elastic), size(linear%flexible)))
+    do i = 1, size(linear%flexible)
+      angles(:, i) = linear%twists(elastic, linear%flexible(i)) / abs(linear%natural(linear%flexible(i)))
+    end do
+    speeds = matmul(cmplx(linear%shapes, kind=wp), vectors(:n, :))
+    twists = matmul(cmplx(angles, kind=wp), vectors(n + 1:n + size(linear%flexible), :))
+  end subroutine trace
+
+  !> What a mode is, and its potential energies.
+  subroutine fill_mode(linear, elastic, eigenvalue, vector, twist, mode)
+    type(linearisation_t), intent(in) :: linear
+    integer, intent(in) :: elastic(:)
+    complex(wp), intent(in) :: eigenvalue
+    complex(wp), intent(in) :: vector(:)
+    complex(wp), intent(in) :: twist(:)   !! of `elastic`
+    type(mode_t), intent(inout) :: mode
+    real(wp) :: rigid_part
+
+    mode%eigenvalue = eigenvalue
+    associate (rates => vector(:size(linear%natural)))
+      mode%undamped = linear%natural(maxloc(abs(rates), dim=1)) / (2.0_wp * pi)
+      rigid_part = 1.0_wp - sum(abs(rates(linear%flexible))**2) / max(sum(abs(rates)**2), tiny(1.0_wp))
+    end associate
+    mode%potential = linear%stiffness(elastic) * abs(twist)**2
+    if (sum(abs(mode%potential)) > 0.0_wp) mode%potential = mode%potential / sum(abs(mode%potential))
+    if (aimag(eigenvalue) > 0.0_wp) then
+      mode%kind = mode_oscillating
+    else if (rigid_part > 0.5_wp) then
+      mode%kind = mode_rigid
+    else if (real(eigenvalue, wp) > 0.0_wp) then
+      mode%kind = mode_diverging
+    else
+      mode%kind = mode_overdamped
+    end if
+  end subroutine fill_mode
+
+  !> Shape and kinetic energies of the bodies from the speeds of the coordinates.
+  subroutine place_bodies(formulation, speeds, mode)
+    class(formulation_t), intent(in) :: formulation
+    complex(wp), intent(in) :: speeds(:)
+    type(mode_t), intent(inout) :: mode
+    integer :: b, k
+
+    associate (map => formulation%machine%coordinates, bodies => formulation%machine%bodies)
+      allocate (mode%shape(bodies), mode%kinetic(bodies))
+      do b = 1, bodies
+        mode%shape(b) = 0.0_wp
+        do k = map%first(b), map%first(b + 1) - 1
+          mode%shape(b) = mode%shape(b) + map%ratio(1, k) * speeds(map%coordinate(k))
+        end do
+      end do
+    end associate
+    mode%kinetic = formulation%machine%inertia(1, :) * abs(mode%shape)**2
+    associate (total => sum(mode%kinetic), largest => mode%shape(maxloc(abs(mode%shape), dim=1)))
+      if (total <= 0.0_wp) return
+      mode%kinetic = mode%kinetic / total
+      mode%shape = mode%shape / largest
+    end associate
+  end subroutine place_bodies
+
+  !> Places of the modes in the order in which they are told.
+  function order_of(modes) result(order)
+    type(mode_t), intent(in) :: modes(:)
+    integer :: order(size(modes))
+    real(wp) :: key(2, size(modes))
+    integer :: i, k, moved
+
+    do i = 1, size(modes)
+      key(1, i) = real(modes(i)%kind, wp)
+      key(2, i) = merge(aimag(modes(i)%eigenvalue), abs(modes(i)%eigenvalue), modes(i)%kind == mode_oscillating)
+    end do
+    order = [(i, i=1, size(modes))]
+    do i = 2, size(modes)
+      moved = order(i)
+      k = i - 1
+      do while (k >= 1)
+        if (.not. comes_before(key(:, moved), key(:, order(k)))) exit
+        order(k + 1) = order(k)
+        k = k - 1
+      end do
+      order(k + 1) = moved
+    end do
+  end function order_of
+
+  pure logical function comes_before(one, other)
+    real(wp), intent(in) :: one(2), other(2)
+
+    comes_before = one(1) < other(1) .or. (one(1) <= other(1) .and. one(2) < other(2))
+  end function comes_before
+
+  !> Of the damped oscillation [Hz].
+  pure real(wp) function frequency(self)
+    class(mode_t), intent(in) :: self
+
+    frequency = aimag(self%eigenvalue) / (2.0_wp * pi)
+  end function frequency
+
+  !> -Re/|.| of the eigenvalue: 1 for what decays without oscillating, negative for what grows, 0 for what does neither.
+  pure real(wp) function damping_ratio(self)
+    class(mode_t), intent(in) :: self
+
+    damping_ratio = 0.0_wp
+    if (abs(self%eigenvalue) > 0.0_wp) damping_ratio = -real(self%eigenvalue, wp) / abs(self%eigenvalue)
+  end function damping_ratio
+
+  !> In which the mode decays to its e-th part, negative if it grows; huge if it does neither [s].
+  pure real(wp) function time_constant(self)
+    class(mode_t), intent(in) :: self
+
+    time_constant = huge(1.0_wp)
+    if (abs(real(self%eigenvalue, wp)) > 0.0_wp) time_constant = -1.0_wp / real(self%eigenvalue, wp)
+  end function time_constant
+
+  pure logical function is_unstable(self)
+    class(mode_t), intent(in) :: self
+
+    is_unstable = real(self%eigenvalue, wp) > 0.0_wp
+  end function is_unstable
+
+end module nocdyn_modes

@@ -1,0 +1,179 @@
+!> The modes of a machine as a program reads them: modes.csv and modes.json.
+module nocdyn_modes_files
+  use nocdyn_equilibrium, only: late
+  use nocdyn_input, only: group_t, input_t
+  use nocdyn_json, only: json_t
+  use nocdyn_kinds, only: wp
+  use nocdyn_modes, only: kind_names, mode_oscillating, mode_t
+  use nocdyn_modes_report, only: modes_report_t
+  use nocdyn_text, only: to_text
+  use nocdyn_text_buffer, only: text_buffer_t
+  use nocdyn_version, only: compiler_text, version
+  implicit none (type, external)
+  private
+
+  public :: modes_csv, modes_json
+
+  real(wp), parameter :: degree = acos(-1.0_wp) / 180.0_wp
+
+contains
+
+  !> The text of modes.csv: a row for every mode.
+  function modes_csv(self) result(text)
+    type(modes_report_t), intent(in) :: self
+    character(len=:), allocatable :: text
+    type(text_buffer_t) :: table
+    integer :: i, number
+
+    call table%append('mode,kind,frequency [Hz],undamped_frequency [Hz],damping_ratio,time_constant [s],' // &
+                      'real [1/s],imaginary [rad/s]')
+    call put_names('shape_', ' [1]')
+    call put_names('phase_', ' [deg]')
+    call put_names('kinetic_', ' [1]')
+    do i = 1, size(self%elastic)
+      call table%append(',potential_' // self%machine%element_name(self%elastic(i)) // ' [1]')
+    end do
+    call table%append(new_line('a'))
+    number = 0
+    do i = 1, size(self%modes)
+      if (self%modes(i)%kind == mode_oscillating) number = number + 1
+      call put_row(self%modes(i), number, table)
+    end do
+    text = table%text()
+
+  contains
+
+    subroutine put_names(prefix, unit)
+      character(len=*), intent(in) :: prefix, unit
+      integer :: b
+
+      do b = 1, self%machine%bodies
+        call table%append(',' // prefix // self%machine%names(b)%text // unit)
+      end do
+    end subroutine put_names
+
+  end function modes_csv
+
+  !> Modes that do not oscillate have no number, and those that neither decay nor grow no time constant.
+  subroutine put_row(mode, number, table)
+    type(mode_t), intent(in) :: mode
+    integer, intent(in) :: number
+    type(text_buffer_t), intent(inout) :: table
+
+    if (mode%kind == mode_oscillating) call table%append(to_text(number))
+    call table%append(',' // trim(kind_names(mode%kind)) // ',' // to_text(mode%frequency()) // ',' // &
+                      to_text(mode%undamped) // ',' // to_text(mode%damping_ratio()) // ',')
+    if (mode%time_constant() < huge(1.0_wp)) call table%append(to_text(mode%time_constant()))
+    call put_values([real(mode%eigenvalue, wp), aimag(mode%eigenvalue)], table)
+    call put_values(abs(mode%shape), table)
+    call put_values(phases(mode%shape), table)
+    call put_values(mode%kinetic, table)
+    call put_values(mode%potential, table)
+    call table%append(new_line('a'))
+  end subroutine put_row
+
+  subroutine put_values(values, table)
+    real(wp), intent(in) :: values(:)
+    type(text_buffer_t), intent(inout) :: table
+    integer :: i
+
+    do i = 1, size(values)
+      call table%append(',' // to_text(values(i)))
+    end do
+  end subroutine put_values
+
+  !> Before the largest motion [deg], -180 to 180; 0 of a body that does not move.
+  pure elemental real(wp) function phases(motion)
+    complex(wp), intent(in) :: motion
+
+    phases = 0.0_wp
+    if (abs(motion) > 0.0_wp) phases = atan2(aimag(motion), real(motion, wp)) / degree
+  end function phases
+
+  !> The text of modes.json: the train, the operating point and the modes; lists are in the order of the bodies, of the couplings.
+  function modes_json(input, self) result(text)
+    type(input_t), intent(in) :: input
+    type(modes_report_t), intent(in) :: self
+    character(len=:), allocatable :: text
+    type(json_t) :: json
+    type(group_t) :: about
+    integer :: i, number
+
+    call json%open()
+    call json%put('program', 'nocdyn')
+    call json%put('version', version)
+    call json%put('compiler', compiler_text())
+    call json%put('input', input%file)
+    about = input%single('case')
+    call json%put('title', about%text('title'))
+    call json%put('about', self%point)
+    if (self%t < late) call json%put('time_s', self%t)
+    call json%put('notes', self%notes)
+    call put_train(json, self)
+    call json%open_list('modes')
+    number = 0
+    do i = 1, size(self%modes)
+      if (self%modes(i)%kind == mode_oscillating) number = number + 1
+      call put_mode(json, self%modes(i), number)
+    end do
+    call json%close_list()
+    call json%close()
+    text = json%text()
+  end function modes_json
+
+  !> What is joined to what: bodies, elastic couplings, and gears with the speed of the second body at 1 of the first.
+  subroutine put_train(json, self)
+    type(json_t), intent(inout) :: json
+    type(modes_report_t), intent(in) :: self
+    integer :: e, i
+
+    call json%put('bodies', self%machine%names)
+    call json%put('inertia_kg_m2', self%machine%inertia(1, :))
+    call json%put('speed_rad_s', self%omega)
+    call json%open_list('couplings')
+    do i = 1, size(self%elastic)
+      e = self%elastic(i)
+      call json%open()
+      call json%put('name', self%machine%element_name(e))
+      call json%put('bodies', [self%machine%elements%from(e), self%machine%elements%to(e)])
+      call json%put('stiffness_N_m_rad', self%stiffness(i))
+      call json%close()
+    end do
+    call json%close_list()
+    call json%open_list('gears')
+    associate (rows => self%machine%constraints)
+      do i = 1, rows%rows()
+        associate (first => rows%first(i))
+          if (rows%first(i + 1) - first /= 2) cycle
+          call json%open()
+          call json%put('name', rows%names(i)%text)
+          call json%put('bodies', rows%body(first:first + 1))
+          call json%put('ratio', -rows%coefficient(1, first) / rows%coefficient(1, first + 1))
+          call json%close()
+        end associate
+      end do
+    end associate
+    call json%close_list()
+  end subroutine put_train
+
+  subroutine put_mode(json, mode, number)
+    type(json_t), intent(inout) :: json
+    type(mode_t), intent(in) :: mode
+    integer, intent(in) :: number
+
+    call json%open()
+    if (mode%kind == mode_oscillating) call json%put('mode', number)
+    call json%put('kind', trim(kind_names(mode%kind)))
+    call json%put('frequency_Hz', mode%frequency())
+    call json%put('undamped_frequency_Hz', mode%undamped)
+    call json%put('damping_ratio', mode%damping_ratio())
+    if (mode%time_constant() < huge(1.0_wp)) call json%put('time_constant_s', mode%time_constant())
+    call json%put('eigenvalue_1_s', [real(mode%eigenvalue, wp), aimag(mode%eigenvalue)])
+    call json%put('shape', abs(mode%shape))
+    call json%put('phase_deg', phases(mode%shape))
+    call json%put('kinetic_share', mode%kinetic)
+    call json%put('potential_share', mode%potential)
+    call json%close()
+  end subroutine put_mode
+
+end module nocdyn_modes_files

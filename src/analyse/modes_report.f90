@@ -1,0 +1,235 @@
+!> The modes of a machine as a person reads them.
+module nocdyn_modes_report
+  use nocdyn_errors, only: error_t
+  use nocdyn_kinds, only: wp
+  use nocdyn_linearisation, only: linearisation_t, linearise
+  use nocdyn_machine, only: machine_t
+  use nocdyn_modes, only: find_modes, kind_names, mode_diverging, mode_oscillating, mode_overdamped, mode_rigid, mode_t
+  use nocdyn_operating_point, only: operating_point_t
+  use nocdyn_table_text, only: cell, cell_width, padded, right, text_width
+  use nocdyn_text, only: rounded_text, string_t, to_text
+  use nocdyn_text_buffer, only: text_buffer_t
+  implicit none (type, external)
+  private
+
+  public :: new_modes_report, modes_text
+
+  integer, parameter :: most_modes = 40          ! of each kind that are printed; all are in modes.csv
+  integer, parameter :: most_shapes = 12         ! bodies and modes of which the shapes are printed
+  integer, parameter :: shapes_per_row = 6
+  integer, parameter :: most_shares = 3          ! bodies or couplings that are named for a mode
+  real(wp), parameter :: least_share = 0.02_wp   ! of an energy that is named
+
+  type, public :: modes_report_t
+    type(machine_t) :: machine
+    type(mode_t), allocatable :: modes(:)
+    integer, allocatable :: elastic(:)            !! elements whose potential energies are told
+    real(wp), allocatable :: stiffness(:)         !! tangent stiffness of `elastic` [N m/rad]
+    real(wp), allocatable :: omega(:)             !! speeds of the bodies at the operating point [rad/s]
+    real(wp) :: t = 0.0_wp
+    character(len=:), allocatable :: point        !! about which the machine is linearised
+    type(string_t), allocatable :: notes(:)
+  end type modes_report_t
+
+contains
+
+  !> Linearises at an operating point and finds the modes.
+  subroutine new_modes_report(point, self, error)
+    type(operating_point_t), intent(inout) :: point
+    type(modes_report_t), intent(out) :: self
+    type(error_t), allocatable, intent(out) :: error
+    type(linearisation_t) :: linear
+
+    call linearise(point%formulation, point%t, point%y, linear, error)
+    if (allocated(error)) return
+    self%machine = point%formulation%machine
+    allocate (self%elastic, source=self%machine%elastic())
+    call find_modes(point%formulation, linear, self%elastic, self%modes, error)
+    if (allocated(error)) return
+    call point%formulation%place(point%y)
+    allocate (self%omega, source=point%formulation%omega(1, 1:))
+    self%stiffness = linear%stiffness(self%elastic)
+    self%t = point%t
+    self%point = point%text
+    allocate (self%notes, source=point%notes)
+  end subroutine new_modes_report
+
+  !> Tables of the modes, and of the shapes of small machines.
+  function modes_text(file, self) result(text)
+    character(len=*), intent(in) :: file
+    type(modes_report_t), intent(in) :: self
+    character(len=:), allocatable :: text
+    type(text_buffer_t) :: report
+    integer :: i
+
+    do i = 1, size(self%notes)
+      call report%append_line(file // ': note: ' // self%notes(i)%text)
+    end do
+    call report%append_line(file // ': modes about ' // self%point)
+    call put_oscillations(self, report)
+    call put_real(self, mode_rigid, report)
+    call put_real(self, mode_overdamped, report)
+    call put_real(self, mode_diverging, report)
+    if (count(self%modes%kind == mode_oscillating) <= most_shapes .and. self%machine%bodies <= most_shapes) then
+      call put_shapes(self, report)
+    end if
+    text = report%text()
+  end function modes_text
+
+  !> A line for every oscillating mode.
+  subroutine put_oscillations(self, report)
+    type(modes_report_t), intent(in) :: self
+    type(text_buffer_t), intent(inout) :: report
+    integer, parameter :: number_width = 6
+    integer :: i, number, total, width
+
+    total = count(self%modes%kind == mode_oscillating)
+    if (total == 0) return
+    number = 0
+    width = len('kinetic energy in')
+    do i = 1, size(self%modes)
+      if (self%modes(i)%kind /= mode_oscillating .or. number == most_modes) cycle
+      number = number + 1
+      width = max(width, text_width(kinetic_text(self, self%modes(i))))
+    end do
+    call report%append_line('  mode' // right('frequency [Hz]') // right('undamped [Hz]') // right('damping ratio') // &
+                            right('decay time [s]') // '  ' // padded('kinetic energy in', width) // '  potential energy in')
+    number = 0
+    do i = 1, size(self%modes)
+      if (self%modes(i)%kind /= mode_oscillating) cycle
+      number = number + 1
+      if (number > most_modes) cycle
+      associate (mode => self%modes(i))
+        call report%append_line(repeat(' ', number_width - len(to_text(number))) // to_text(number) // cell(mode%frequency()) // &
+                                cell(mode%undamped) // cell(mode%damping_ratio()) // time_cell(mode) // '  ' // &
+                                padded(kinetic_text(self, mode), width) // '  ' // potential_text(self, mode) // &
+                                trim(merge(', unstable', '          ', mode%is_unstable())))
+      end associate
+    end do
+    if (total > most_modes) call report%append_line('  (' // to_text(total - most_modes) // ' more in modes.csv)')
+  end subroutine put_oscillations
+
+  function time_cell(mode) result(text)
+    type(mode_t), intent(in) :: mode
+    character(len=cell_width) :: text
+
+    text = right('none')
+    if (mode%time_constant() < huge(1.0_wp)) text = cell(mode%time_constant())
+  end function time_cell
+
+  !> A line for every mode of a kind that does not oscillate.
+  subroutine put_real(self, kind, report)
+    type(modes_report_t), intent(in) :: self
+    integer, intent(in) :: kind
+    type(text_buffer_t), intent(inout) :: report
+    integer :: i, number
+
+    number = 0
+    do i = 1, size(self%modes)
+      if (self%modes(i)%kind /= kind) cycle
+      number = number + 1
+      if (number > most_modes) cycle
+      call report%append_line('  ' // trim(kind_names(kind)) // ': ' // rate_text(self%modes(i)) // &
+                              '; kinetic energy in ' // kinetic_text(self, self%modes(i)))
+    end do
+    if (number > most_modes) call report%append_line('  (' // to_text(number - most_modes) // ' more in modes.csv)')
+  end subroutine put_real
+
+  function rate_text(mode) result(text)
+    type(mode_t), intent(in) :: mode
+    character(len=:), allocatable :: text
+
+    if (mode%time_constant() >= huge(1.0_wp)) then
+      text = 'neither decays nor grows'
+    else if (mode%is_unstable()) then
+      text = 'unstable, grows e-fold in ' // rounded_text(-mode%time_constant(), 6) // ' s'
+    else
+      text = 'decays with time constant ' // rounded_text(mode%time_constant(), 6) // ' s'
+    end if
+  end function rate_text
+
+  !> "motor 62 %, wheel 30 %".
+  function kinetic_text(self, mode) result(text)
+    type(modes_report_t), intent(in) :: self
+    type(mode_t), intent(in) :: mode
+    character(len=:), allocatable :: text
+    integer :: k, places(most_shares), shares
+
+    text = ''
+    call find_largest(mode%kinetic, places, shares)
+    do k = 1, shares
+      if (k > 1) text = text // ', '
+      text = text // self%machine%names(places(k))%text // ' ' // percent(mode%kinetic(places(k)))
+    end do
+  end function kinetic_text
+
+  function potential_text(self, mode) result(text)
+    type(modes_report_t), intent(in) :: self
+    type(mode_t), intent(in) :: mode
+    character(len=:), allocatable :: text
+    integer :: k, places(most_shares), shares
+
+    text = ''
+    call find_largest(mode%potential, places, shares)
+    do k = 1, shares
+      if (k > 1) text = text // ', '
+      text = text // self%machine%element_name(self%elastic(places(k))) // ' ' // percent(mode%potential(places(k)))
+    end do
+  end function potential_text
+
+  !> Places of the shares that are named, the largest first: one at least, if any is not zero.
+  pure subroutine find_largest(share, places, shares)
+    real(wp), intent(in) :: share(:)
+    integer, intent(out) :: places(most_shares), shares
+    real(wp) :: left(size(share))
+    integer :: k
+
+    left = abs(share)
+    shares = 0
+    places = 0
+    do k = 1, min(most_shares, size(share))
+      associate (place => maxloc(left, dim=1))
+        if (left(place) < merge(least_share, tiny(1.0_wp), k > 1)) return
+        places(k) = place
+        shares = k
+        left(place) = 0.0_wp
+      end associate
+    end do
+  end subroutine find_largest
+
+  function percent(share) result(text)
+    real(wp), intent(in) :: share
+    character(len=:), allocatable :: text
+
+    text = rounded_text(100.0_wp * share, merge(2, 1, abs(share) >= 0.01_wp)) // ' %'
+    if (abs(share) > 0.995_wp) text = to_text(nint(100.0_wp * share)) // ' %'
+  end function percent
+
+  !> The shapes as columns: the part in phase with the largest motion.
+  subroutine put_shapes(self, report)
+    type(modes_report_t), intent(in) :: self
+    type(text_buffer_t), intent(inout) :: report
+    integer, allocatable :: chosen(:)
+    character(len=:), allocatable :: line
+    integer :: b, first, i, last, width
+
+    chosen = pack([(i, i=1, size(self%modes))], self%modes%kind == mode_oscillating)
+    width = max(len('shape of mode'), maxval([(text_width(self%machine%names(b)%text), b=1, self%machine%bodies)]))
+    do first = 1, size(chosen), shapes_per_row
+      last = min(first + shapes_per_row - 1, size(chosen))
+      line = '  ' // padded('shape of mode', width)
+      do i = first, last
+        line = line // right(to_text(i))
+      end do
+      call report%append_line(line)
+      do b = 1, self%machine%bodies
+        line = '  ' // padded(self%machine%names(b)%text, width)
+        do i = first, last
+          line = line // right(rounded_text(real(self%modes(chosen(i))%shape(b), wp), 5))
+        end do
+        call report%append_line(line)
+      end do
+    end do
+  end subroutine put_shapes
+
+end module nocdyn_modes_report

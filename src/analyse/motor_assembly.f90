@@ -1,0 +1,160 @@
+!> The banks of motors of an input: one for each form of their laws that it has.
+module nocdyn_motor_assembly
+  use nocdyn_bank, only: append_bank, bank_slot_t
+  use nocdyn_body_directory, only: directory_t
+  use nocdyn_curve_motors, only: new_curve_motors
+  use nocdyn_dc_motors, only: new_dc_motors
+  use nocdyn_element_numbers, only: curves_of, ends_of, names_of, numbers_of
+  use nocdyn_governed_motors, only: new_governed_motors
+  use nocdyn_governors, only: governor_t
+  use nocdyn_input, only: group_t, input_t
+  use nocdyn_kinds, only: wp
+  use nocdyn_motors, only: new_motors
+  use nocdyn_text, only: string_t
+  use nocdyn_torque_curves, only: induction_curve_t, quadratic_curve_t, table_curve_t, torque_curve_t
+  implicit none (type, external)
+  private
+
+  public :: add_motors
+
+  integer, parameter :: quadratic = 1, induction = 2, table = 3, inductive = 4   ! forms
+
+contains
+
+  !> A motor with constant torque is a quadratic one, and so is a dc motor without inductance.
+  pure integer function form_of(group)
+    type(group_t), intent(in) :: group
+
+    select case (group%text('kind'))
+    case ('induction')
+      form_of = induction
+    case ('table')
+      form_of = table
+    case ('dc')
+      form_of = merge(inductive, quadratic, group%number('inductance') > 0)
+    case default
+      form_of = quadratic
+    end select
+  end function form_of
+
+  !> A bank of quadratic motors without governors in any case, the others where there are such motors.
+  subroutine add_motors(input, directory, banks)
+    type(input_t), intent(in) :: input
+    type(directory_t), intent(in) :: directory
+    type(bank_slot_t), allocatable, intent(inout) :: banks(:)
+    integer, allocatable :: free(:), governed(:), indices(:), some(:)
+    integer :: form, i
+
+    allocate (indices, source=input%groups_named('motor'))
+    do form = quadratic, inductive
+      some = pack(indices, [(form_of(input%groups(indices(i))) == form, i=1, size(indices))])
+      free = pack(some, [(.not. input%groups(some(i))%has_value('governor_speed'), i=1, size(some))])
+      governed = pack(some, [(input%groups(some(i))%has_value('governor_speed'), i=1, size(some))])
+      if (form == quadratic .or. size(free) > 0) call add_free(input, free, form, directory, banks)
+      if (size(governed) > 0) call add_governed(input, governed, form, directory, banks)
+    end do
+  end subroutine add_motors
+
+  subroutine add_free(input, indices, form, directory, banks)
+    type(input_t), intent(in) :: input
+    integer, intent(in) :: indices(:)
+    integer, intent(in) :: form
+    type(directory_t), intent(in) :: directory
+    type(bank_slot_t), allocatable, intent(inout) :: banks(:)
+    type(string_t), allocatable :: names(:)
+    class(torque_curve_t), allocatable :: curve
+    integer :: body(size(indices))
+
+    allocate (names, source=names_of(input, indices))
+    body = ends_of(input, indices, 'body', 1, directory)
+    select case (form)
+    case (quadratic)
+      call append_bank(banks, new_motors(names, body, standstill_torques(input, indices), &
+                                         numbers_of(input, indices, 'b') + drags(input, indices), &
+                                         numbers_of(input, indices, 'c')))
+    case (inductive)
+      call append_bank(banks, new_dc_motors(names, body, numbers_of(input, indices, 'voltage'), &
+                                            numbers_of(input, indices, 'resistance'), &
+                                            numbers_of(input, indices, 'flux_constant'), &
+                                            numbers_of(input, indices, 'inductance')))
+    case default
+      call make_curve(input, indices, form, curve)
+      call append_bank(banks, new_curve_motors(names, body, 1, curve))
+    end select
+  end subroutine add_free
+
+  subroutine add_governed(input, indices, form, directory, banks)
+    type(input_t), intent(in) :: input
+    integer, intent(in) :: indices(:)
+    integer, intent(in) :: form
+    type(directory_t), intent(in) :: directory
+    type(bank_slot_t), allocatable, intent(inout) :: banks(:)
+    type(string_t), allocatable :: names(:)
+    class(torque_curve_t), allocatable :: curve
+    type(governor_t) :: governor
+    integer :: body(size(indices))
+
+    allocate (names, source=names_of(input, indices))
+    body = ends_of(input, indices, 'body', 1, directory)
+    allocate (governor%set_speed, source=numbers_of(input, indices, 'governor_speed'))
+    allocate (governor%gain, source=numbers_of(input, indices, 'governor_gain'))
+    allocate (governor%time, source=numbers_of(input, indices, 'governor_time'))
+    allocate (governor%start, source=numbers_of(input, indices, 'governor_start'))
+    if (form == inductive) then
+      call append_bank(banks, new_dc_motors(names, body, numbers_of(input, indices, 'voltage'), &
+                                            numbers_of(input, indices, 'resistance'), &
+                                            numbers_of(input, indices, 'flux_constant'), &
+                                            numbers_of(input, indices, 'inductance'), governor))
+    else
+      call make_curve(input, indices, form, curve)
+      call append_bank(banks, new_governed_motors(names, body, curve, governor, drags(input, indices)))
+    end if
+  end subroutine add_governed
+
+  subroutine make_curve(input, indices, form, curve)
+    type(input_t), intent(in) :: input
+    integer, intent(in) :: indices(:)
+    integer, intent(in) :: form
+    class(torque_curve_t), allocatable, intent(out) :: curve
+    type(induction_curve_t) :: kloss
+    type(quadratic_curve_t) :: parabola
+    type(table_curve_t) :: points
+
+    select case (form)
+    case (quadratic)
+      allocate (parabola%a, source=standstill_torques(input, indices))
+      allocate (parabola%b, source=numbers_of(input, indices, 'b'))
+      allocate (parabola%c, source=numbers_of(input, indices, 'c'))
+      allocate (curve, source=parabola)
+    case (induction)
+      allocate (kloss%breakdown_torque, source=numbers_of(input, indices, 'breakdown_torque'))
+      allocate (kloss%breakdown_slip, source=numbers_of(input, indices, 'breakdown_slip'))
+      allocate (kloss%synchronous_speed, source=numbers_of(input, indices, 'synchronous_speed'))
+      allocate (curve, source=kloss)
+    case default
+      allocate (points%curve, source=curves_of(input, indices, 'table_speed', 'table_torque'))
+      allocate (curve, source=points)
+    end select
+  end subroutine make_curve
+
+  !> a of quadratic motors, the torque of constant ones, k voltage / resistance of dc motors without inductance.
+  function standstill_torques(input, indices) result(torques)
+    type(input_t), intent(in) :: input
+    integer, intent(in) :: indices(:)
+    real(wp) :: torques(1, size(indices))
+
+    torques = numbers_of(input, indices, 'a') + numbers_of(input, indices, 'torque') &
+              + numbers_of(input, indices, 'flux_constant') * numbers_of(input, indices, 'voltage') &
+              / numbers_of(input, indices, 'resistance', absent=1.0_wp)
+  end function standstill_torques
+
+  !> k^2 / resistance of dc motors without inductance, which no throttle changes [N m s/rad].
+  function drags(input, indices)
+    type(input_t), intent(in) :: input
+    integer, intent(in) :: indices(:)
+    real(wp) :: drags(1, size(indices))
+
+    drags = numbers_of(input, indices, 'flux_constant')**2 / numbers_of(input, indices, 'resistance', absent=1.0_wp)
+  end function drags
+
+end module nocdyn_motor_assembly

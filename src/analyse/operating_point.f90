@@ -1,0 +1,131 @@
+!> The state about which a machine is linearised.
+module nocdyn_operating_point
+  use nocdyn_equilibrium, only: equilibrium_t, find_equilibria, judge_equilibria, late, nearest_equilibrium
+  use nocdyn_errors, only: error_t, exit_input, raise
+  use nocdyn_formulation, only: formulation_t
+  use nocdyn_input, only: group_t, input_t
+  use nocdyn_integration_settings, only: integration_settings_t
+  use nocdyn_kinds, only: wp
+  use nocdyn_literals, only: literal_fine, read_real
+  use nocdyn_machine, only: machine_t
+  use nocdyn_reduced, only: new_reduced
+  use nocdyn_size_limits, only: choose_method
+  use nocdyn_solve, only: solve
+  use nocdyn_text, only: append, string_t, to_text
+  implicit none (type, external)
+  private
+
+  public :: find_operating_point
+
+  type, public :: operating_point_t
+    class(formulation_t), allocatable :: formulation   !! reduced, without works
+    real(wp) :: t = 0.0_wp
+    real(wp), allocatable :: y(:, :)                   !! [1, states]
+    character(len=:), allocatable :: text              !! 'the steady state', 'rest', 't = 2 s'
+    type(string_t), allocatable :: notes(:)
+  end type operating_point_t
+
+contains
+
+  !> `at` is 'equilibrium', 'rest' or a time of the run.
+  subroutine find_operating_point(input, machine, at, point, error)
+    type(input_t), intent(in) :: input
+    type(machine_t), intent(in) :: machine
+    character(len=*), intent(in) :: at
+    type(operating_point_t), intent(out) :: point
+    type(error_t), allocatable, intent(out) :: error
+    type(group_t) :: run
+    real(wp) :: time
+    integer :: status
+
+    run = input%single('run')
+    point%t = run%number('t_start')
+    allocate (point%notes(0))
+    select case (at)
+    case ('equilibrium')
+      call take_equilibrium(machine, point, error)
+    case ('rest')
+      call take_rest(machine, point)
+    case default
+      call read_real(at, time, status)
+      if (status /= literal_fine) then
+        call raise(error, exit_input, '--at ' // at // ': allowed: equilibrium, rest or a time of the run [s]')
+      else if (time < run%number('t_start') .or. time > run%number('t_end')) then
+        call raise(error, exit_input, input%file // ': --at ' // at // ' is no time of the run; allowed: ' // &
+                   to_text(run%number('t_start')) // ' to ' // to_text(run%number('t_end')) // ' s')
+      else
+        call take_time(input, machine, time, point, error)
+      end if
+    end select
+  end subroutine find_operating_point
+
+  !> The steady state, of several the one nearest to the start, of the stable ones if there are any.
+  subroutine take_equilibrium(machine, point, error)
+    type(machine_t), intent(in) :: machine
+    type(operating_point_t), intent(inout) :: point
+    type(error_t), allocatable, intent(out) :: error
+    type(equilibrium_t), allocatable :: equilibria(:)
+    integer :: nearest
+
+    call find_equilibria(machine, point%formulation, equilibria, point%notes, error)
+    if (allocated(error)) return
+    if (size(equilibria) > 1) call judge_equilibria(point%formulation, equilibria)
+    nearest = nearest_equilibrium(point%formulation, equilibria)
+    point%t = late
+    point%y = equilibria(nearest)%y
+    point%text = 'the steady state'
+    if (size(equilibria) == 1) return
+    call append(point%notes, 'there are ' // to_text(size(equilibria)) // ' steady states, ' // &
+                             to_text(count(equilibria%stability == 'stable')) // ' of them stable; this is the ' // &
+                             trim(merge('stable one', 'one       ', any(equilibria%stability == 'stable'))) // &
+                             ' nearest to the start: nocdyn equilibrium shows all')
+  end subroutine take_equilibrium
+
+  !> The start angles without speeds; the torques are the mean ones.
+  subroutine take_rest(machine, point)
+    type(machine_t), intent(in) :: machine
+    type(operating_point_t), intent(inout) :: point
+    type(machine_t) :: settled
+
+    settled = machine
+    call settled%settle()
+    allocate (point%formulation, source=new_reduced(settled, .false.))
+    point%y = point%formulation%start()
+    point%y(1, :settled%coordinates%freedoms) = 0.0_wp
+    point%t = late
+    point%text = 'rest'
+  end subroutine take_rest
+
+  !> The state at a time, by the method and tolerances of the run.
+  subroutine take_time(input, machine, time, point, error)
+    type(input_t), intent(in) :: input
+    type(machine_t), intent(in) :: machine
+    real(wp), intent(in) :: time
+    type(operating_point_t), intent(inout) :: point
+    type(error_t), allocatable, intent(out) :: error
+    type(integration_settings_t) :: settings
+    character(len=:), allocatable :: method
+    type(group_t) :: run
+    real(wp), allocatable :: states(:, :)
+
+    allocate (point%formulation, source=new_reduced(machine, .false.))
+    call choose_method(input, point%formulation, method, point%notes, error)
+    if (allocated(error)) return
+    run = input%single('run')
+    settings%method = method
+    settings%rtol = run%number('rtol')
+    settings%atol = run%number('atol')
+    settings%max_steps = run%whole_number('max_steps')
+    point%y = point%formulation%start()
+    if (time > point%t) then
+      allocate (states(size(point%y, 2), 2), source=0.0_wp)
+      states(:, 1) = point%y(1, :)
+      call solve(point%formulation, [point%t, time], settings, states, error)
+      if (allocated(error)) return
+      point%y(1, :) = states(:, 2)
+    end if
+    point%t = time
+    point%text = 't = ' // to_text(time) // ' s'
+  end subroutine take_time
+
+end module nocdyn_operating_point

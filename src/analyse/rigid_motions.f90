@@ -1,0 +1,214 @@
+!> The motions of a machine along which no coupling is twisted further: a basis of the null space of the map from the
+!> speeds of the coordinates to the rates of the elastic elements' twists.
+!>
+!> The rows of the map are eliminated one after the other, each at its highest coordinate, so that a coordinate is a
+!> combination of lower ones. A chain of n bodies takes time linear in n.
+module nocdyn_rigid_motions
+  use nocdyn_element_coordinates, only: element_coordinates_t
+  use nocdyn_kinds, only: wp
+  implicit none (type, external)
+  private
+
+  public :: new_rigid_motions
+
+  !> Speeds of coordinates that are combinations of others: q'(coordinate) = sum of ratio * q'(of).
+  type :: combination_t
+    integer, allocatable :: of(:)
+    real(wp), allocatable :: ratio(:)
+  end type combination_t
+
+  !> q'(c) is the sum of ratio * s(freedom) over the entries first(c) to first(c + 1) - 1.
+  type, public :: rigid_motions_t
+    integer, allocatable :: free(:)       !! coordinate whose speed is s, [freedoms]
+    integer, allocatable :: first(:)      !! [coordinates + 1]
+    integer, allocatable :: freedom(:)    !! [entries]
+    real(wp), allocatable :: ratio(:)     !! [entries]
+  contains
+    procedure :: freedoms
+    procedure :: speeds
+    procedure :: along
+  end type rigid_motions_t
+
+  !> A sparse row in the making.
+  type :: row_t
+    integer, allocatable :: active(:)     !! coordinates with an entry, the first `used`
+    integer :: used = 0
+    real(wp), allocatable :: value(:)     !! [coordinates]
+    real(wp), allocatable :: size(:)      !! sum of the absolute terms of `value`
+    logical, allocatable :: is_active(:)
+  end type row_t
+
+  real(wp), parameter :: rounding = 1.0e-10_wp   ! as the rank tolerance of the constraints: below this, terms cancel
+
+contains
+
+  !> The rigid motions of a machine whose elements depend on its coordinates by `incidence`.
+  function new_rigid_motions(freedoms, incidence, elastic) result(self)
+    integer, intent(in) :: freedoms                         !! number of coordinates
+    type(element_coordinates_t), intent(in) :: incidence    !! its first lane counts
+    integer, intent(in) :: elastic(:)                       !! elements that may not be twisted further
+    type(rigid_motions_t) :: self
+    type(combination_t) :: definition(freedoms)
+    type(row_t) :: row
+    integer :: e, k
+
+    allocate (row%active(freedoms), row%value(freedoms), row%size(freedoms), row%is_active(freedoms))
+    row%is_active = .false.
+    do e = 1, size(elastic)
+      do k = incidence%first(elastic(e)), incidence%first(elastic(e) + 1) - 1
+        call add(row, incidence%coordinate(k), incidence%ratio(1, k), abs(incidence%ratio(1, k)))
+      end do
+      call eliminate(row, definition)
+    end do
+    call resolve(definition, row, self)
+  end function new_rigid_motions
+
+  pure subroutine add(row, coordinate, value, size)
+    type(row_t), intent(inout) :: row
+    integer, intent(in) :: coordinate
+    real(wp), intent(in) :: value, size
+
+    if (.not. row%is_active(coordinate)) then
+      row%used = row%used + 1
+      row%active(row%used) = coordinate
+      row%is_active(coordinate) = .true.
+      row%value(coordinate) = 0.0_wp
+      row%size(coordinate) = 0.0_wp
+    end if
+    row%value(coordinate) = row%value(coordinate) + value
+    row%size(coordinate) = row%size(coordinate) + size
+  end subroutine add
+
+  !> Replaces the defined coordinates of a row until none is left.
+  pure subroutine substitute(row, definition)
+    type(row_t), intent(inout) :: row
+    type(combination_t), intent(in) :: definition(:)
+    integer :: c, i, place
+    real(wp) :: size, value
+
+    place = 1
+    do while (place <= row%used)
+      c = row%active(place)
+      if (.not. allocated(definition(c)%of)) then
+        place = place + 1
+        cycle
+      end if
+      value = row%value(c)
+      size = row%size(c)
+      row%is_active(c) = .false.
+      row%active(place) = row%active(row%used)
+      row%used = row%used - 1
+      do i = 1, ubound(definition(c)%of, 1)
+        call add(row, definition(c)%of(i), definition(c)%ratio(i) * value, abs(definition(c)%ratio(i)) * size)
+      end do
+      place = 1
+    end do
+  end subroutine substitute
+
+  !> Solves the row for its highest coordinate, which is thereby defined; clears the row.
+  pure subroutine eliminate(row, definition)
+    type(row_t), intent(inout) :: row
+    type(combination_t), intent(inout) :: definition(:)
+    integer, allocatable :: left(:)
+    integer :: c
+
+    call substitute(row, definition)
+    left = significant(row)
+    if (size(left) > 0) then
+      c = maxval(left)
+      left = pack(left, left /= c)
+      definition(c)%of = left
+      definition(c)%ratio = -row%value(left) / row%value(c)
+    end if
+    call clear(row)
+  end subroutine eliminate
+
+  !> The coordinates of a row whose terms do not cancel.
+  pure function significant(row) result(coordinates)
+    type(row_t), intent(in) :: row
+    integer, allocatable :: coordinates(:)
+
+    associate (active => row%active(:row%used))
+      coordinates = pack(active, abs(row%value(active)) > rounding * row%size(active))
+    end associate
+  end function significant
+
+  pure subroutine clear(row)
+    type(row_t), intent(inout) :: row
+
+    row%is_active(row%active(:row%used)) = .false.
+    row%used = 0
+  end subroutine clear
+
+  !> Every coordinate by the free ones.
+  pure subroutine resolve(definition, row, self)
+    type(combination_t), intent(inout) :: definition(:)
+    type(row_t), intent(inout) :: row
+    type(rigid_motions_t), intent(inout) :: self
+    integer :: c, i
+    integer :: freedom_of(size(definition))
+
+    self%free = pack([(c, c=1, size(definition))], [(.not. allocated(definition(c)%of), c=1, size(definition))])
+    freedom_of(self%free) = [(i, i=1, size(self%free))]
+    do c = 1, size(definition)
+      if (.not. allocated(definition(c)%of)) cycle
+      call add(row, c, 1.0_wp, 1.0_wp)
+      call substitute(row, definition)
+      definition(c)%of = significant(row)
+      definition(c)%ratio = row%value(definition(c)%of)
+      call clear(row)
+    end do
+    do i = 1, size(self%free)
+      definition(self%free(i))%of = [self%free(i)]
+      definition(self%free(i))%ratio = [1.0_wp]
+    end do
+    allocate (self%first(size(definition) + 1))
+    self%first(1) = 1
+    do c = 1, size(definition)
+      self%first(c + 1) = self%first(c) + size(definition(c)%of)
+    end do
+    allocate (self%freedom(self%first(size(definition) + 1) - 1), self%ratio(self%first(size(definition) + 1) - 1))
+    do c = 1, size(definition)
+      self%freedom(self%first(c):self%first(c + 1) - 1) = freedom_of(definition(c)%of)
+      self%ratio(self%first(c):self%first(c + 1) - 1) = definition(c)%ratio
+    end do
+  end subroutine resolve
+
+  !> Number of independent rigid motions.
+  pure integer function freedoms(self)
+    class(rigid_motions_t), intent(in) :: self
+
+    freedoms = size(self%free)
+  end function freedoms
+
+  !> Speeds q' of all coordinates from those of the freedoms.
+  pure function speeds(self, s) result(q_rate)
+    class(rigid_motions_t), intent(in) :: self
+    real(wp), intent(in) :: s(:)   !! [freedoms]
+    real(wp) :: q_rate(size(self%first) - 1)
+    integer :: c, k
+
+    do c = 1, size(q_rate)
+      q_rate(c) = 0.0_wp
+      do k = self%first(c), self%first(c + 1) - 1
+        q_rate(c) = q_rate(c) + self%ratio(k) * s(self%freedom(k))
+      end do
+    end do
+  end function speeds
+
+  !> What acts along each freedom of what acts along the coordinates: the transpose of `speeds`.
+  pure function along(self, torque) result(total)
+    class(rigid_motions_t), intent(in) :: self
+    real(wp), intent(in) :: torque(:)   !! [coordinates]
+    real(wp) :: total(size(self%free))
+    integer :: c, k
+
+    total = 0.0_wp
+    do c = 1, size(torque)
+      do k = self%first(c), self%first(c + 1) - 1
+        total(self%freedom(k)) = total(self%freedom(k)) + self%ratio(k) * torque(c)
+      end do
+    end do
+  end function along
+
+end module nocdyn_rigid_motions

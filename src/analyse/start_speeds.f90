@@ -1,0 +1,145 @@
+!> Start speeds that violate constraints: refused, or replaced by the nearest ones that do not.
+!>
+!> Nearest is by the inertias: omega* = L_tau (L_tau^T J L_tau)^-1 L_tau^T J omega has the smallest kinetic energy of
+!> the difference, and is what the bodies have after the impulses of a shock in the constraints.
+module nocdyn_start_speeds
+  use nocdyn_errors, only: error_t, exit_input, raise
+  use nocdyn_kinds, only: wp
+  use nocdyn_machine, only: machine_t
+  use nocdyn_text, only: quoted, rounded_text, to_text
+  implicit none (type, external)
+  private
+
+  public :: fit_start_speeds
+
+  !> Start speeds violate a row when its sum exceeds this times the sum of its absolute terms.
+  real(wp), parameter, public :: speed_tolerance = 1.0e-9_wp
+
+  integer, parameter :: most_bodies = 12   ! in a message
+  integer, parameter :: digits = 15        ! of the nearest speeds, which fit when written back
+
+contains
+
+  !> Checks the speeds, and projects those of the groups concerned if they may be.
+  subroutine fit_start_speeds(machine, may_project, culprit, error)
+    type(machine_t), intent(inout) :: machine
+    logical, intent(in) :: may_project
+    integer, intent(out) :: culprit   !! first row that is violated
+    type(error_t), allocatable, intent(out) :: error
+    real(wp) :: nearest(machine%bodies)
+    integer, allocatable :: violated(:)
+    integer :: row
+
+    culprit = 0
+    violated = pack([(row, row=1, machine%constraints%rows())], [(is_violated(machine, row), row=1, machine%constraints%rows())])
+    if (size(violated) == 0) return
+    nearest = nearest_speeds(machine, violated)
+    if (may_project) then
+      call project_start(violated, nearest, machine)
+    else
+      culprit = violated(1)
+      call raise(error, exit_input, complaint(machine, violated, nearest))
+    end if
+  end subroutine fit_start_speeds
+
+  logical function is_violated(machine, row)
+    type(machine_t), intent(in) :: machine
+    integer, intent(in) :: row
+    real(wp) :: residual, scale
+
+    call machine%constraints%residual(1, row, machine%start_speed(1, :), residual, scale)
+    is_violated = abs(residual) > speed_tolerance * scale
+  end function is_violated
+
+  !> The start speeds, projected in the groups of the violated rows.
+  function nearest_speeds(machine, violated) result(omega)
+    type(machine_t), intent(in) :: machine
+    integer, intent(in) :: violated(:)
+    real(wp) :: omega(machine%bodies)
+    real(wp) :: speed(machine%coordinates%freedoms)
+    integer :: b, g, i, k
+    logical :: is_row_violated(machine%constraints%rows())
+
+    omega = machine%start_speed(1, :)
+    call machine%coordinates%project(1, machine%inertia(1, :), omega, speed)
+    is_row_violated = .false.
+    is_row_violated(violated) = .true.
+    do g = 1, size(machine%groups)
+      if (.not. any(is_row_violated(machine%groups(g)%rows))) cycle
+      do i = 1, size(machine%groups(g)%bodies)
+        b = machine%groups(g)%bodies(i)
+        omega(b) = 0.0_wp
+        do k = machine%coordinates%first(b), machine%coordinates%first(b + 1) - 1
+          omega(b) = omega(b) + machine%coordinates%ratio(1, k) * speed(machine%coordinates%coordinate(k))
+        end do
+      end do
+    end do
+  end function nearest_speeds
+
+  !> Takes the nearest speeds and keeps the impulses, L_lambda^T Lambda = J (omega* - omega), and the energy lost.
+  subroutine project_start(violated, nearest, machine)
+    integer, intent(in) :: violated(:)
+    real(wp), intent(in) :: nearest(:)
+    type(machine_t), intent(inout) :: machine
+    real(wp) :: lambda(machine%constraints%rows()), change(machine%bodies)
+
+    change = nearest - machine%start_speed(1, :)
+    call machine%coordinates%reactions_of_imbalances(1, machine%inertia(1, :) * change, lambda)
+    allocate (machine%shock)
+    machine%shock%row = violated
+    machine%shock%impulse = lambda(violated)
+    machine%shock%energy_lost = 0.5_wp * sum(machine%inertia(1, :) * change**2)
+    machine%start_speed(1, :) = nearest
+  end subroutine project_start
+
+  !> "the start speeds violate this gear: 2 * 1 rad/s ('pinion') + ... = 2, which must be 0; nearest speeds that ...".
+  function complaint(machine, violated, nearest) result(text)
+    type(machine_t), intent(in) :: machine
+    integer, intent(in) :: violated(:)
+    real(wp), intent(in) :: nearest(:)
+    character(len=:), allocatable :: text
+    real(wp) :: residual, scale
+    integer :: b, named, others
+
+    call machine%constraints%residual(1, violated(1), machine%start_speed(1, :), residual, scale)
+    text = 'the start speeds violate it: ' // row_text(machine, violated(1)) // ' = ' // rounded_text(residual, 6) // &
+           ', which must be 0'
+    if (size(violated) > 1) text = text // ' (and ' // to_text(size(violated) - 1) // ' more)'
+    text = text // '; nearest speeds that fit:'
+    named = 0
+    others = 0
+    do b = 1, machine%bodies
+      if (abs(nearest(b) - machine%start_speed(1, b)) <= speed_tolerance * abs(nearest(b))) cycle
+      named = named + 1
+      if (named > most_bodies) then
+        others = others + 1
+        cycle
+      end if
+      if (named > 1) text = text // ','
+      text = text // ' ' // rounded_text(nearest(b), digits) // ' (' // quoted(machine%names(b)%text) // ')'
+    end do
+    if (others > 0) text = text // ' and ' // to_text(others) // ' more'
+    text = text // '; &run start = ' // quoted('projected') // ' takes them'
+  end function complaint
+
+  !> The left-hand side of a row with the start speeds in it, e.g. "2 * 1 rad/s ('pinion') + 3 * 0 rad/s ('machine')".
+  function row_text(machine, row) result(text)
+    type(machine_t), intent(in) :: machine
+    integer, intent(in) :: row
+    character(len=:), allocatable :: text
+    integer :: entry, last
+
+    text = ''
+    associate (rows => machine%constraints)
+      last = min(rows%first(row + 1) - 1, rows%first(row) + most_bodies - 1)
+      do entry = rows%first(row), last
+        if (entry > rows%first(row)) text = text // ' + '
+        text = text // to_text(rows%coefficient(1, entry)) // ' * ' // &
+               to_text(machine%start_speed(1, rows%body(entry))) // ' rad/s (' // &
+               quoted(machine%names(rows%body(entry))%text) // ')'
+      end do
+      if (last < rows%first(row + 1) - 1) text = text // ' + ' // to_text(rows%first(row + 1) - 1 - last) // ' more terms'
+    end associate
+  end function row_text
+
+end module nocdyn_start_speeds

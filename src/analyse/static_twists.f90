@@ -1,0 +1,242 @@
+!> The twists with which the couplings of a machine in steady running carry the torques.
+!>
+!> They are where the potential energy of the couplings, less the work of the torques on the coordinates, is smallest:
+!> found by Newton's method with the stiffness matrix, which is raised (K. Levenberg, Quart. Appl. Math. 2 (1944) 164)
+!> where a step would not lower the energy, as inside of a gap or where a spring softens. The matrix is a band in a
+!> good order of the coordinates.
+module nocdyn_static_twists
+  use nocdyn_banded_matrix, only: half_bandwidths
+  use nocdyn_errors, only: error_t, exit_input, raise
+  use nocdyn_kinds, only: wp
+  use nocdyn_lapack_band, only: band_factor, band_solve
+  use nocdyn_ordering, only: reverse_cuthill_mckee
+  use nocdyn_pattern_entries, only: entries_t
+  use nocdyn_text, only: to_text
+  use nocdyn_torque_balance, only: torque_balance_t
+  implicit none (type, external)
+  private
+
+  public :: find_twists
+
+  integer, parameter :: largest_matrix = 6000   ! rows and columns of a dense matrix of as many entries as are allowed
+  real(wp), parameter :: balanced = 1.0e-13_wp   ! of the torques' terms: what is left is rounding
+  real(wp), parameter :: farthest = 1.0e8_wp     ! rad: twists beyond this carry nothing that nearer ones do not
+
+  !> The stiffness matrix of the coordinates that are not free, and what is solved with it.
+  type :: stiffness_t
+    integer, allocatable :: unknown(:)       !! coordinates
+    integer, allocatable :: place(:)         !! of each coordinate in the band, 0 if it is free
+    integer :: width = 0                     !! diagonals beside the main one
+    real(wp), allocatable :: band(:, :)
+    real(wp), allocatable :: shield(:)       !! what raises the diagonal: its largest elements so far, 1 before, [unknown]
+    real(wp), allocatable :: outer(:)        !! torques of all other elements, [coordinates]
+    real(wp), allocatable :: torque(:)       !! residual, [coordinates]
+    real(wp), allocatable :: size(:)         !! sum of its absolute terms
+    real(wp) :: energy = 0.0_wp
+  end type stiffness_t
+
+contains
+
+  !> The angles q of the coordinates, the free ones at their start; `balance` is at the speeds, by `evaluate`.
+  subroutine find_twists(balance, q, is_found, error)
+    type(torque_balance_t), intent(inout) :: balance
+    real(wp), intent(inout) :: q(:)      !! [coordinates], where to begin
+    logical, intent(out) :: is_found
+    type(error_t), allocatable, intent(out) :: error   !! if the stiffness matrix is too large
+    integer, parameter :: most_steps = 500
+    type(stiffness_t) :: self
+    real(wp) :: lift, trial(size(q)), step(size(q))
+    real(wp) :: energy
+    integer :: i
+    logical :: is_singular
+
+    is_found = .false.
+    call set_up(balance, self, error)
+    if (allocated(error)) return
+    call load(balance, q, self)
+    lift = 0.0_wp
+    do i = 1, most_steps
+      is_found = all(abs(self%torque(self%unknown)) <= balanced * self%size(self%unknown))
+      if (is_found) exit
+      energy = self%energy
+      call solve(balance, lift, self, step, is_singular)
+      trial = q + step
+      if (.not. is_singular) call load(balance, trial, self)
+      if (.not. is_singular .and. goes_down(self, energy, step)) then
+        q = trial
+        lift = merge(0.0_wp, 0.1_wp * lift, lift < 1.0e-8_wp)
+        is_found = all(abs(step) <= 4 * spacing(abs(q)))
+        if (is_found) exit
+      else
+        call load(balance, q, self)
+        lift = max(10.0_wp * lift, 1.0e-6_wp)
+      end if
+      if (lift > 1.0e12_wp .or. maxval(abs(q)) > farthest) exit
+    end do
+  end subroutine find_twists
+
+  !> Whether a step has lowered the energy, or is so small that rounding hides it.
+  pure logical function goes_down(self, energy, step)
+    type(stiffness_t), intent(in) :: self
+    real(wp), intent(in) :: energy
+    real(wp), intent(in) :: step(:)
+    real(wp), parameter :: rounding = 1.0e-12_wp
+    real(wp) :: turned
+
+    turned = abs(energy) + sum(abs(self%outer * step))
+    goes_down = self%energy <= energy + rounding * turned
+  end function goes_down
+
+  !> The order of the coordinates and the torques of the other elements.
+  subroutine set_up(balance, self, error)
+    type(torque_balance_t), intent(in) :: balance
+    type(stiffness_t), intent(out) :: self
+    type(error_t), allocatable, intent(out) :: error
+    type(entries_t) :: entries
+    integer :: number(balance%coordinates), order(balance%coordinates - balance%motions%freedoms())
+    integer :: c, upper
+
+    number = 1
+    number(balance%motions%free) = 0
+    self%unknown = pack([(c, c=1, size(number))], number == 1)
+    number(self%unknown) = [(c, c=1, size(self%unknown))]
+    entries = joined_coordinates(balance, number)
+    order = reverse_cuthill_mckee(size(order), entries%row, entries%column)
+    call half_bandwidths(order, entries, self%width, upper)
+    if ((3.0_wp * self%width + 1.0_wp) * size(order) > real(largest_matrix, wp)**2) then
+      call raise(error, exit_input, 'the twists need a matrix of ' // to_text(3 * self%width + 1) // ' x ' // &
+                 to_text(size(order)) // ' entries for this machine, whose couplings leave no narrower band; at most ' // &
+                 to_text(largest_matrix) // ' x ' // to_text(largest_matrix) // ' are allowed')
+      return
+    end if
+    self%unknown = self%unknown(order)
+    allocate (self%place(size(number)), source=0)
+    self%place(self%unknown) = [(c, c=1, size(self%unknown))]
+    allocate (self%band(3 * self%width + 1, size(self%unknown)), self%shield(size(self%unknown)), source=0.0_wp)
+    allocate (self%outer(size(number)), self%torque(size(number)), self%size(size(number)), source=0.0_wp)
+    call find_outer(balance, self)
+  end subroutine set_up
+
+  !> Pairs of coordinates that an elastic element joins, each once.
+  function joined_coordinates(balance, number) result(entries)
+    type(torque_balance_t), intent(in) :: balance
+    integer, intent(in) :: number(:)   !! of each coordinate in the matrix, 0 if it has none
+    type(entries_t) :: entries
+    integer :: e, i, k, n
+
+    associate (first => balance%incidence%first, coordinate => balance%incidence%coordinate)
+      n = 0
+      do i = 1, size(balance%elastic)
+        e = balance%elastic(i)
+        n = n + (first(e + 1) - first(e))**2
+      end do
+      allocate (entries%row(n), entries%column(n))
+      n = 0
+      do i = 1, size(balance%elastic)
+        e = balance%elastic(i)
+        do k = first(e), first(e + 1) - 1
+          associate (members => number(coordinate(first(e):first(e + 1) - 1)))
+            if (number(coordinate(k)) == 0) cycle
+            entries%row(n + 1:n + count(members > 0)) = pack(members, members > 0)
+            entries%column(n + 1:n + count(members > 0)) = number(coordinate(k))
+            n = n + count(members > 0)
+          end associate
+        end do
+      end do
+    end associate
+    entries%row = entries%row(:n)
+    entries%column = entries%column(:n)
+  end function joined_coordinates
+
+  !> The torques of the elements that are not elastic, and of the elastic ones what does not depend on the twist.
+  subroutine find_outer(balance, self)
+    type(torque_balance_t), intent(in) :: balance
+    type(stiffness_t), intent(inout) :: self
+    real(wp) :: moment
+    logical :: is_elastic(size(balance%formulation%machine%elements%to))
+    integer :: e, k
+
+    is_elastic = .false.
+    is_elastic(balance%elastic) = .true.
+    associate (elements => balance%formulation%machine%elements, incidence => balance%incidence)
+      do e = 1, size(is_elastic)
+        moment = elements%working(1, e)
+        if (.not. is_elastic(e)) moment = moment + elements%restoring(1, e)
+        do k = incidence%first(e), incidence%first(e + 1) - 1
+          associate (c => incidence%coordinate(k))
+            self%outer(c) = self%outer(c) + incidence%ratio(1, k) * moment
+          end associate
+        end do
+      end do
+    end associate
+  end subroutine find_outer
+
+  !> The elements at the angles q: residual torques and energy.
+  subroutine load(balance, q, self)
+    type(torque_balance_t), intent(inout) :: balance
+    real(wp), intent(in) :: q(:)
+    type(stiffness_t), intent(inout) :: self
+    integer :: c, e, i, k
+    real(wp) :: term
+
+    balance%y(1, size(q) + 1:2 * size(q)) = q
+    call balance%evaluate_state()
+    call balance%formulation%machine%differentiate_elements(balance%t)
+    call balance%formulation%machine%assess()
+    self%torque = self%outer
+    self%size = abs(self%outer)
+    associate (elements => balance%formulation%machine%elements, incidence => balance%incidence)
+      self%energy = sum(elements%stored(1, balance%elastic)) - sum(self%outer * q)
+      do i = 1, size(balance%elastic)
+        e = balance%elastic(i)
+        do k = incidence%first(e), incidence%first(e + 1) - 1
+          c = incidence%coordinate(k)
+          term = incidence%ratio(1, k) * elements%restoring(1, e)
+          self%torque(c) = self%torque(c) + term
+          self%size(c) = self%size(c) + abs(term)
+        end do
+      end do
+    end associate
+  end subroutine load
+
+  !> Solves (K + lift * shield) step = torque at the elements of the last `load`.
+  subroutine solve(balance, lift, self, step, is_singular)
+    type(torque_balance_t), intent(in) :: balance
+    real(wp), intent(in) :: lift
+    type(stiffness_t), intent(inout) :: self
+    real(wp), intent(out) :: step(:)
+    logical, intent(out) :: is_singular
+    real(wp) :: x(size(self%unknown))
+    integer :: column, diagonal, e, i, k, l, pivots(size(self%unknown)), row
+
+    step = 0.0_wp
+    is_singular = .false.
+    if (size(self%unknown) == 0) return
+    self%band = 0.0_wp
+    diagonal = 2 * self%width + 1
+    associate (elements => balance%formulation%machine%elements, incidence => balance%incidence)
+      do i = 1, size(balance%elastic)
+        e = balance%elastic(i)
+        do k = incidence%first(e), incidence%first(e + 1) - 1
+          do l = incidence%first(e), incidence%first(e + 1) - 1
+            row = self%place(incidence%coordinate(k))
+            column = self%place(incidence%coordinate(l))
+            if (min(row, column) == 0) cycle
+            associate (entry => self%band(diagonal + row - column, column))
+              entry = entry - incidence%ratio(1, k) * incidence%ratio(1, l) * elements%restoring_angle(1, e)
+            end associate
+          end do
+        end do
+      end do
+    end associate
+    self%shield = max(self%shield, self%band(diagonal, :))
+    self%band(diagonal, :) = self%band(diagonal, :) + lift * merge(self%shield, 1.0_wp, self%shield > 0.0_wp)
+    x = self%torque(self%unknown)
+    call band_factor(self%width, self%width, self%band, pivots, is_singular)
+    if (is_singular) return
+    call band_solve(self%width, self%width, self%band, pivots, x)
+    step(self%unknown) = x
+    if (maxval(abs(x)) > farthest) is_singular = .true.
+  end subroutine solve
+
+end module nocdyn_static_twists

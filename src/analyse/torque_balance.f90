@@ -1,0 +1,349 @@
+!> The equations of steady running: along every rigid motion of a machine the torques balance, and the inner states of its
+!> elements rest.
+!>
+!> With the rigid motions q' = N s, elements whose twists stay do not count: the torques along s are the sum of
+!> G^T M over the other elements, whose speeds are G s. The unknowns are z = (s, inner states).
+module nocdyn_torque_balance
+  use nocdyn_element_coordinates, only: element_coordinates_t, new_element_coordinates
+  use nocdyn_formulation, only: formulation_t
+  use nocdyn_kinds, only: wp
+  use nocdyn_one_lane, only: choose_branches
+  use nocdyn_rigid_motions, only: new_rigid_motions, rigid_motions_t
+  use nocdyn_system, only: pattern_t
+  implicit none (type, external)
+  private
+
+  public :: new_torque_balance
+
+  type, public :: torque_balance_t
+    class(formulation_t), allocatable :: formulation
+    type(element_coordinates_t) :: incidence
+    type(rigid_motions_t) :: motions
+    integer, allocatable :: elastic(:)            !! elements that hold the rigid motions together
+    integer :: coordinates = 0
+    integer :: inner = 0                          !! states after the angles
+    real(wp), allocatable :: residual(:)          !! of the equations after `evaluate`: [N m], rates of the inner states
+    real(wp), allocatable :: size(:)              !! sum of the absolute terms of each
+    ! the rest is work space
+    real(wp) :: t(1) = 0.0_wp
+    integer :: status(1) = 0
+    integer, allocatable, private :: acting(:)    !! elements that are not elastic
+    integer, allocatable :: first(:)              !! [acting + 1]
+    integer, allocatable :: freedom(:)            !! [entries]
+    real(wp), allocatable, private :: ratio(:)    !! G, [entries]
+    type(pattern_t), private :: pattern
+    real(wp), allocatable :: y(:, :)              !! state after `place`, [1, states]
+    real(wp), allocatable, private :: rate(:, :), slopes(:, :)
+  contains
+    procedure :: unknowns
+    procedure :: start
+    procedure :: place
+    procedure :: evaluate
+    procedure :: evaluate_state
+    procedure :: differentiate
+    procedure :: blocks
+    procedure :: body_speeds
+  end type torque_balance_t
+
+contains
+
+  !> The equations of a machine; `formulation` is the reduced one of a settled machine, one lane, without works.
+  function new_torque_balance(formulation, t) result(self)
+    class(formulation_t), intent(in) :: formulation
+    real(wp), intent(in) :: t
+    type(torque_balance_t) :: self
+    logical :: is_elastic(size(formulation%machine%elements%to))
+    integer :: e
+
+    allocate (self%formulation, source=formulation)
+    associate (machine => formulation%machine)
+      self%coordinates = machine%coordinates%freedoms
+      self%inner = formulation%states - 2 * self%coordinates
+      self%incidence = new_element_coordinates(machine%elements, machine%coordinates)
+      self%elastic = machine%elastic()
+      is_elastic = .false.
+      is_elastic(self%elastic) = .true.
+      self%acting = pack([(e, e=1, size(is_elastic))], .not. is_elastic)
+      self%motions = new_rigid_motions(self%coordinates, self%incidence, self%elastic)
+    end associate
+    self%t = t
+    call gather_ratios(self)
+    self%pattern = formulation%jacobian_pattern()
+    allocate (self%y(1, formulation%states), self%rate(1, formulation%states), self%slopes(1, size(self%pattern%row)), &
+              source=0.0_wp)
+    allocate (self%residual(self%unknowns()), self%size(self%unknowns()), source=0.0_wp)
+  end function new_torque_balance
+
+  !> G = U N of the acting elements.
+  subroutine gather_ratios(self)
+    type(torque_balance_t), intent(inout) :: self
+    real(wp) :: row(self%motions%freedoms())
+    integer, allocatable :: touched(:)
+    integer :: i, k, next
+
+    associate (incidence => self%incidence, motions => self%motions)
+      allocate (self%first(size(self%acting) + 1))
+      self%first(1) = 1
+      self%freedom = [integer ::]
+      self%ratio = [real(wp) ::]
+      row = 0.0_wp
+      do i = 1, size(self%acting)
+        touched = [integer ::]
+        do k = incidence%first(self%acting(i)), incidence%first(self%acting(i) + 1) - 1
+          do next = motions%first(incidence%coordinate(k)), motions%first(incidence%coordinate(k) + 1) - 1
+            associate (s => motions%freedom(next))
+              if (all(touched /= s)) touched = [touched, s]
+              row(s) = row(s) + incidence%ratio(1, k) * motions%ratio(next)
+            end associate
+          end do
+        end do
+        self%freedom = [self%freedom, touched]
+        self%ratio = [self%ratio, row(touched)]
+        self%first(i + 1) = self%first(i) + size(touched)
+        row(touched) = 0.0_wp
+      end do
+    end associate
+  end subroutine gather_ratios
+
+  pure integer function unknowns(self)
+    class(torque_balance_t), intent(in) :: self
+
+    unknowns = self%motions%freedoms() + self%inner
+  end function unknowns
+
+  !> The unknowns at the start of the machine: rigid motions with the angular momenta of the start speeds.
+  function start(self) result(z)
+    class(torque_balance_t), intent(in) :: self
+    real(wp) :: z(self%unknowns())
+    real(wp), allocatable :: y(:, :)
+
+    allocate (y, source=self%formulation%start())
+    z(:self%motions%freedoms()) = mean_motion(self, y(1, :self%coordinates))
+    z(self%motions%freedoms() + 1:) = y(1, 2 * self%coordinates + 1:self%formulation%states)
+  end function start
+
+  !> Solves N^T M N s = N^T M q' by conjugate gradients: the matrix is well conditioned and never formed.
+  function mean_motion(self, q_rate) result(s)
+    class(torque_balance_t), intent(in) :: self
+    real(wp), intent(in) :: q_rate(:)
+    real(wp) :: s(self%motions%freedoms())
+    real(wp), dimension(size(s)) :: direction, image, rest
+    real(wp) :: norm, old_norm, scale
+    integer :: i
+
+    s = 0.0_wp
+    rest = self%motions%along(inertial_torque(self, q_rate))
+    direction = rest
+    norm = sum(rest**2)
+    scale = norm
+    do i = 1, 10 * size(s)
+      if (norm <= epsilon(norm)**2 * scale) exit
+      image = self%motions%along(inertial_torque(self, self%motions%speeds(direction)))
+      associate (step => norm / sum(direction * image))
+        s = s + step * direction
+        rest = rest - step * image
+      end associate
+      old_norm = norm
+      norm = sum(rest**2)
+      direction = rest + norm / old_norm * direction
+    end do
+  end function mean_motion
+
+  !> L_tau^T J L_tau v.
+  pure function inertial_torque(self, v) result(torque)
+    class(torque_balance_t), intent(in) :: self
+    real(wp), intent(in) :: v(:)   !! [coordinates]
+    real(wp) :: torque(size(v))
+    real(wp) :: momentum
+    integer :: b, k
+
+    torque = 0.0_wp
+    associate (machine => self%formulation%machine, map => self%formulation%machine%coordinates)
+      do b = 1, machine%bodies
+        momentum = 0.0_wp
+        do k = map%first(b), map%first(b + 1) - 1
+          momentum = momentum + map%ratio(1, k) * v(map%coordinate(k))
+        end do
+        momentum = momentum * machine%inertia(1, b)
+        do k = map%first(b), map%first(b + 1) - 1
+          torque(map%coordinate(k)) = torque(map%coordinate(k)) + map%ratio(1, k) * momentum
+        end do
+      end do
+    end associate
+  end function inertial_torque
+
+  !> Speeds of the bodies in the rigid motions s [rad/s].
+  pure function body_speeds(self, s) result(omega)
+    class(torque_balance_t), intent(in) :: self
+    real(wp), intent(in) :: s(:)
+    real(wp) :: omega(self%formulation%machine%bodies)
+    real(wp) :: v(self%coordinates)
+    integer :: b, k
+
+    v = self%motions%speeds(s)
+    associate (map => self%formulation%machine%coordinates)
+      do b = 1, size(omega)
+        omega(b) = 0.0_wp
+        do k = map%first(b), map%first(b + 1) - 1
+          omega(b) = omega(b) + map%ratio(1, k) * v(map%coordinate(k))
+        end do
+      end do
+    end associate
+  end function body_speeds
+
+  !> The state y of the unknowns, at the start angles.
+  subroutine place(self, z)
+    class(torque_balance_t), intent(inout) :: self
+    real(wp), intent(in) :: z(:)
+
+    associate (f => self%coordinates, s => z(:self%motions%freedoms()))
+      self%y(1, :f) = self%motions%speeds(s)
+      self%y(1, f + 1:2 * f) = 0.0_wp
+      self%y(1, 2 * f + 1:) = z(size(s) + 1:)
+    end associate
+  end subroutine place
+
+  !> Brings the elements to the state y.
+  subroutine evaluate_state(self)
+    class(torque_balance_t), intent(inout) :: self
+
+    call choose_branches(self%formulation, self%t(1), self%y)
+    call self%formulation%derivative(self%t, self%y, self%rate, self%status)
+  end subroutine evaluate_state
+
+  !> The residuals of the equations.
+  subroutine evaluate(self, z)
+    class(torque_balance_t), intent(inout) :: self
+    real(wp), intent(in) :: z(:)
+    real(wp) :: term
+    integer :: e, i, k
+
+    call self%place(z)
+    call self%evaluate_state()
+    self%residual = 0.0_wp
+    self%size = 0.0_wp
+    associate (elements => self%formulation%machine%elements)
+      do i = 1, size(self%acting)
+        e = self%acting(i)
+        do k = self%first(i), self%first(i + 1) - 1
+          term = self%ratio(k) * (elements%restoring(1, e) + elements%working(1, e))
+          self%residual(self%freedom(k)) = self%residual(self%freedom(k)) + term
+          self%size(self%freedom(k)) = self%size(self%freedom(k)) + abs(term)
+        end do
+      end do
+    end associate
+    associate (r => self%motions%freedoms(), f => self%coordinates)
+      self%residual(r + 1:) = self%rate(1, 2 * f + 1:)
+      self%size(r + 1:) = abs(self%rate(1, 2 * f + 1:))
+    end associate
+  end subroutine evaluate
+
+  !> The derivatives of the residuals by the unknowns, after `evaluate` at the same place.
+  subroutine differentiate(self, matrix)
+    class(torque_balance_t), intent(inout) :: self
+    real(wp), intent(out) :: matrix(:, :)   !! [unknowns, unknowns]
+    real(wp) :: dfdt(1, self%formulation%states)
+    integer :: e, i, j, k
+
+    matrix = 0.0_wp
+    call self%formulation%jacobian(self%t, self%y, self%slopes, dfdt, self%status)
+    associate (elements => self%formulation%machine%elements)
+      do i = 1, size(self%acting)
+        e = self%acting(i)
+        do k = self%first(i), self%first(i + 1) - 1
+          do j = self%first(i), self%first(i + 1) - 1
+            matrix(self%freedom(k), self%freedom(j)) = matrix(self%freedom(k), self%freedom(j)) &
+                                                       + self%ratio(k) * self%ratio(j) * elements%working_speed(1, e)
+          end do
+        end do
+      end do
+    end associate
+    if (self%inner > 0) call differentiate_inner(self, matrix)
+  end subroutine differentiate
+
+  !> The rows and columns of the inner states: N^T M dq''/dx, dx'/dq' N and dx'/dx.
+  subroutine differentiate_inner(self, matrix)
+    type(torque_balance_t), intent(in) :: self
+    real(wp), intent(inout) :: matrix(:, :)
+    real(wp) :: accelerations(self%coordinates, self%inner)
+    integer :: c, k, p, r
+
+    r = self%motions%freedoms()
+    accelerations = 0.0_wp
+    associate (f => self%coordinates, motions => self%motions)
+      do p = 1, size(self%pattern%row)
+        associate (row => self%pattern%row(p), column => self%pattern%column(p), slope => self%slopes(1, p))
+          if (row <= f .and. column > 2 * f) then
+            accelerations(row, column - 2 * f) = slope
+          else if (row > 2 * f .and. column > 2 * f) then
+            matrix(r + row - 2 * f, r + column - 2 * f) = slope
+          else if (row > 2 * f .and. column <= f) then
+            do k = motions%first(column), motions%first(column + 1) - 1
+              c = motions%freedom(k)
+              matrix(r + row - 2 * f, c) = matrix(r + row - 2 * f, c) + slope * motions%ratio(k)
+            end do
+          end if
+        end associate
+      end do
+    end associate
+    do k = 1, self%inner
+      matrix(:r, r + k) = self%motions%along(inertial_torque(self, accelerations(:, k)))
+    end do
+  end subroutine differentiate_inner
+
+  !> Unknowns that no equation joins have different numbers: their blocks can be solved one by one.
+  function blocks(self) result(block_of)
+    class(torque_balance_t), intent(in) :: self
+    integer :: block_of(self%unknowns())
+    integer :: i, k, p, r
+
+    r = self%motions%freedoms()
+    block_of = [(i, i=1, size(block_of))]
+    do i = 1, size(self%acting)
+      do k = self%first(i) + 1, self%first(i + 1) - 1
+        call join(self%freedom(self%first(i)), self%freedom(k), block_of)
+      end do
+    end do
+    associate (f => self%coordinates, motions => self%motions)
+      do p = 1, size(self%pattern%row)
+        associate (row => self%pattern%row(p), column => self%pattern%column(p))
+          if (max(row, column) <= 2 * f) cycle
+          if (min(row, column) > 2 * f) then
+            call join(r + row - 2 * f, r + column - 2 * f, block_of)
+          else
+            i = merge(min(row, column), min(row, column) - f, min(row, column) <= f)
+            do k = motions%first(i), motions%first(i + 1) - 1
+              call join(r + max(row, column) - 2 * f, motions%freedom(k), block_of)
+            end do
+          end if
+        end associate
+      end do
+    end associate
+    do i = 1, size(block_of)
+      block_of(i) = root(block_of, i)
+    end do
+  end function blocks
+
+  pure integer function root(block_of, member)
+    integer, intent(in) :: block_of(:), member
+
+    root = member
+    do while (block_of(root) /= root)
+      root = block_of(root)
+    end do
+  end function root
+
+  !> The lower root becomes that of both, so that members always point downwards.
+  pure subroutine join(one, other, block_of)
+    integer, intent(in) :: one, other
+    integer, intent(inout) :: block_of(:)
+    integer :: a, b
+
+    a = root(block_of, one)
+    b = root(block_of, other)
+    block_of(max(a, b)) = min(a, b)
+    block_of(one) = min(a, b)
+    block_of(other) = min(a, b)
+  end subroutine join
+
+end module nocdyn_torque_balance

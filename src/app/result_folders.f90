@@ -1,0 +1,58 @@
+!> The folders that results go to.
+module nocdyn_result_folders
+  use nocdyn_errors, only: error_t, exit_input, raise
+  use nocdyn_text, only: quoted, string_t
+  implicit none (type, external)
+  private
+
+  public :: plain_path, stem, refuse_shared_folders
+
+contains
+
+  !> The path without "." parts, doubled slashes and a last slash, so that equal folders have equal names.
+  pure function plain_path(path) result(plain)
+    character(len=*), intent(in) :: path
+    character(len=:), allocatable :: plain
+    integer :: first, last
+
+    plain = ''
+    first = 1
+    do while (first <= len(path))
+      last = first + index(path(first:) // '/', '/') - 2
+      if (path(first:last) /= '' .and. path(first:last) /= '.') plain = plain // '/' // path(first:last)
+      first = last + 2
+    end do
+    if (index(path, '/') /= 1) plain = plain(2:)
+    if (plain == '') plain = merge('/', '.', index(path, '/') == 1)
+  end function plain_path
+
+  !> The file's name without its folders and its last ending.
+  pure function stem(path)
+    character(len=*), intent(in) :: path
+    character(len=:), allocatable :: stem
+    integer :: dot
+
+    stem = path(index(path, '/', back=.true.) + 1:)
+    dot = index(stem, '.', back=.true.)
+    if (dot > 1) stem = stem(:dot - 1)
+  end function stem
+
+  !> Two files of one call must not write over each other.
+  subroutine refuse_shared_folders(files, folders, is_good, error)
+    type(string_t), intent(in) :: files(:), folders(:)
+    logical, intent(in) :: is_good(:)
+    type(error_t), allocatable, intent(out) :: error
+    integer :: i, k
+
+    do i = 2, size(folders)
+      if (.not. is_good(i)) cycle
+      do k = 1, i - 1
+        if (.not. is_good(k) .or. folders(k)%text /= folders(i)%text) cycle
+        call raise(error, exit_input, quoted(files(k)%text) // ' and ' // quoted(files(i)%text) // &
+                   ' would both write to ' // quoted(folders(i)%text) // '; nothing was run')
+        return
+      end do
+    end do
+  end subroutine refuse_shared_folders
+
+end module nocdyn_result_folders

@@ -1,0 +1,155 @@
+!> Dense eigenvalue problems, by LAPACK.
+module nocdyn_lapack_eigen
+  use nocdyn_kinds, only: wp
+  implicit none (type, external)
+  private
+
+  public :: cholesky_factor, divide_left, divide_right, singular_vectors, symmetric_eigenvectors, eigenvectors
+
+  interface
+    subroutine dpotrf(uplo, n, a, lda, info)
+      import :: wp
+      character, intent(in) :: uplo
+      integer, intent(in) :: n, lda
+      real(wp), intent(inout) :: a(lda, *)
+      integer, intent(out) :: info
+    end subroutine dpotrf
+
+    subroutine dtrsm(side, uplo, transa, diag, m, n, alpha, a, lda, b, ldb)
+      import :: wp
+      character, intent(in) :: side, uplo, transa, diag
+      integer, intent(in) :: m, n, lda, ldb
+      real(wp), intent(in) :: alpha, a(lda, *)
+      real(wp), intent(inout) :: b(ldb, *)
+    end subroutine dtrsm
+
+    subroutine dgesvd(jobu, jobvt, m, n, a, lda, s, u, ldu, vt, ldvt, work, lwork, info)
+      import :: wp
+      character, intent(in) :: jobu, jobvt
+      integer, intent(in) :: m, n, lda, ldu, ldvt, lwork
+      real(wp), intent(inout) :: a(lda, *)
+      real(wp), intent(out) :: s(*), u(ldu, *), vt(ldvt, *), work(*)
+      integer, intent(out) :: info
+    end subroutine dgesvd
+
+    subroutine dsyev(jobz, uplo, n, a, lda, w, work, lwork, info)
+      import :: wp
+      character, intent(in) :: jobz, uplo
+      integer, intent(in) :: n, lda, lwork
+      real(wp), intent(inout) :: a(lda, *)
+      real(wp), intent(out) :: w(*), work(*)
+      integer, intent(out) :: info
+    end subroutine dsyev
+
+    subroutine dgeev(jobvl, jobvr, n, a, lda, wr, wi, vl, ldvl, vr, ldvr, work, lwork, info)
+      import :: wp
+      character, intent(in) :: jobvl, jobvr
+      integer, intent(in) :: n, lda, ldvl, ldvr, lwork
+      real(wp), intent(inout) :: a(lda, *)
+      real(wp), intent(out) :: wr(*), wi(*), vl(ldvl, *), vr(ldvr, *), work(*)
+      integer, intent(out) :: info
+    end subroutine dgeev
+  end interface
+
+contains
+
+  !> A = R^T R by DPOTRF: R takes the place of the upper triangle of A.
+  subroutine cholesky_factor(matrix, is_indefinite)
+    real(wp), contiguous, intent(inout) :: matrix(:, :)
+    logical, intent(out) :: is_indefinite
+    integer :: info
+
+    call dpotrf('U', size(matrix, 1), matrix, max(1, size(matrix, 1)), info)
+    is_indefinite = info /= 0
+  end subroutine cholesky_factor
+
+  !> B becomes R^-1 B.
+  subroutine divide_left(factor, matrix)
+    real(wp), contiguous, intent(in) :: factor(:, :)      !! of `cholesky_factor`
+    real(wp), contiguous, intent(inout) :: matrix(:, :)
+
+    call dtrsm('L', 'U', 'N', 'N', size(matrix, 1), size(matrix, 2), 1.0_wp, factor, max(1, size(factor, 1)), &
+               matrix, max(1, size(matrix, 1)))
+  end subroutine divide_left
+
+  !> B becomes B R^-1.
+  subroutine divide_right(factor, matrix)
+    real(wp), contiguous, intent(in) :: factor(:, :)      !! of `cholesky_factor`
+    real(wp), contiguous, intent(inout) :: matrix(:, :)
+
+    call dtrsm('R', 'U', 'N', 'N', size(matrix, 1), size(matrix, 2), 1.0_wp, factor, max(1, size(factor, 1)), &
+               matrix, max(1, size(matrix, 1)))
+  end subroutine divide_right
+
+  !> Singular values, descending, and all right singular vectors, as columns (DGESVD).
+  subroutine singular_vectors(matrix, values, vectors, has_failed)
+    real(wp), intent(in) :: matrix(:, :)                  !! [m, n]
+    real(wp), intent(out) :: values(:)                    !! [n], zeros after the first min(m, n)
+    real(wp), intent(out) :: vectors(:, :)                !! [n, n]
+    logical, intent(out) :: has_failed
+    real(wp), allocatable :: a(:, :), transposed(:, :), work(:)
+    real(wp) :: none(1, 1), room(1)
+    integer :: info, m, n
+
+    m = max(1, size(matrix, 1))   ! a row of zeros for none: DGESVD leaves the vectors of no rows as they are
+    n = size(matrix, 2)
+    values = 0.0_wp
+    allocate (a(m, n), source=0.0_wp)
+    a(:size(matrix, 1), :) = matrix
+    allocate (transposed(n, n))
+    call dgesvd('N', 'A', m, n, a, m, values, none, 1, transposed, n, room, -1, info)
+    allocate (work(int(room(1))))
+    call dgesvd('N', 'A', m, n, a, m, values, none, 1, transposed, n, work, size(work), info)
+    vectors = transpose(transposed)
+    has_failed = info /= 0
+  end subroutine singular_vectors
+
+  !> Eigenvalues of a symmetric matrix, ascending, and orthonormal eigenvectors (DSYEV).
+  subroutine symmetric_eigenvectors(matrix, values, vectors, has_failed)
+    real(wp), intent(in) :: matrix(:, :)
+    real(wp), intent(out) :: values(:)
+    real(wp), contiguous, intent(out) :: vectors(:, :)    !! as columns
+    logical, intent(out) :: has_failed
+    real(wp), allocatable :: work(:)
+    integer :: info, n
+
+    n = size(matrix, 1)
+    allocate (work(max(1, 34 * n)))
+    vectors(:, :) = matrix
+    call dsyev('V', 'U', n, vectors, max(1, n), values, work, size(work), info)
+    has_failed = info /= 0
+  end subroutine symmetric_eigenvectors
+
+  !> Eigenvalues of a matrix, those of a pair one after the other, and right eigenvectors (DGEEV).
+  subroutine eigenvectors(matrix, values, vectors, has_failed)
+    real(wp), intent(in) :: matrix(:, :)
+    complex(wp), intent(out) :: values(:)
+    complex(wp), intent(out) :: vectors(:, :)             !! as columns
+    logical, intent(out) :: has_failed
+    real(wp), allocatable :: a(:, :), imaginary(:), right(:, :), work(:)
+    real(wp) :: none(1, 1), room(1)
+    real(wp), allocatable :: real_part(:)
+    integer :: i, info, n
+
+    n = size(matrix, 1)
+    allocate (a, source=matrix)
+    allocate (right(n, n), real_part(n), imaginary(n), source=0.0_wp)
+    has_failed = .false.
+    if (n == 0) return
+    call dgeev('N', 'V', n, a, n, real_part, imaginary, none, 1, right, n, room, -1, info)
+    allocate (work(int(room(1))))
+    call dgeev('N', 'V', n, a, n, real_part, imaginary, none, 1, right, n, work, size(work), info)
+    has_failed = info /= 0
+    values = cmplx(real_part, imaginary, wp)
+    do i = 1, n
+      if (imaginary(i) > 0.0_wp) then
+        vectors(:, i) = cmplx(right(:, i), right(:, i + 1), wp)
+      else if (imaginary(i) < 0.0_wp) then
+        vectors(:, i) = cmplx(right(:, i - 1), -right(:, i), wp)
+      else
+        vectors(:, i) = cmplx(right(:, i), 0.0_wp, wp)
+      end if
+    end do
+  end subroutine eigenvectors
+
+end module nocdyn_lapack_eigen

@@ -1,0 +1,150 @@
+!> Lists that belong together: as many values in each, the first of a table ascending, tables from files.
+module nocdyn_input_columns
+  use nocdyn_input, only: group_t, value_t
+  use nocdyn_input_work, only: work_t
+  use nocdyn_kinds, only: wp
+  use nocdyn_mistakes, only: mistakes_t
+  use nocdyn_schema_relations, only: key_sets_t
+  use nocdyn_schema_rules, only: key_rule_t, unset
+  use nocdyn_table_file, only: read_table_file
+  use nocdyn_text, only: string_t, to_text
+  implicit none (type, external)
+  private
+
+  public :: complete_columns
+
+contains
+
+  !> Puts the tables of files into the lists, and checks the lists that the input itself gives.
+  subroutine complete_columns(work, columns, folder, group, mistakes)
+    type(work_t), intent(in) :: work
+    type(key_sets_t), intent(in) :: columns(:)
+    character(len=*), intent(in) :: folder   !! of the input file, with a slash at its end, or ''
+    type(group_t), intent(inout) :: group
+    type(mistakes_t), intent(inout) :: mistakes
+    integer :: c
+
+    do c = 1, size(columns)
+      if (size(columns(c)%second) == 1) then
+        call complete_table(work, folder, columns(c)%first, columns(c)%second(1), group, mistakes)
+      else
+        call check_lengths(work, group, columns(c)%first, mistakes)
+      end if
+    end do
+  end subroutine complete_columns
+
+  subroutine complete_table(work, folder, lists, file, group, mistakes)
+    type(work_t), intent(in) :: work
+    character(len=*), intent(in) :: folder
+    integer, intent(in) :: lists(2), file   !! positions of keys
+    type(group_t), intent(inout) :: group
+    type(mistakes_t), intent(inout) :: mistakes
+
+    if (allocated(group%values(file)%texts)) then
+      call read_columns(folder, group, file, lists, work, mistakes)
+    else
+      call check_ascent(work, group%values(lists(1)), lists(1), mistakes)
+      call check_lengths(work, group, lists, mistakes)
+    end if
+  end subroutine complete_table
+
+  !> The two lists take the place of the file.
+  subroutine read_columns(folder, group, file, lists, work, mistakes)
+    character(len=*), intent(in) :: folder
+    type(group_t), intent(inout) :: group
+    integer, intent(in) :: file, lists(:)   !! positions of keys
+    type(work_t), intent(in) :: work
+    type(mistakes_t), intent(inout) :: mistakes
+    type(string_t), allocatable :: complaints(:)
+    type(key_rule_t) :: rule
+    type(value_t) :: source
+    integer :: code, i
+
+    rule = work%key(file)
+    source = group%values(file)
+    group%values(file) = value_t()
+    do i = 1, size(lists)
+      group%values(lists(i)) = value_t(source%is_given, source%line, source%override)
+    end do
+    call read_table_file(path_of(folder, source%texts(1)%text), group%values(lists(1))%numbers, &
+                         group%values(lists(2))%numbers, complaints, code)
+    do i = 1, size(complaints)
+      call mistakes%add(source%line, work%index, trim(rule%name) // ': ' // complaints(i)%text, source%override, code)
+    end do
+  end subroutine read_columns
+
+  !> A relative path begins in the folder.
+  pure function path_of(folder, path)
+    character(len=*), intent(in) :: folder, path
+    character(len=:), allocatable :: path_of
+
+    path_of = folder // path
+    if (path(1:1) == '/') path_of = path
+  end function path_of
+
+  subroutine check_ascent(work, value, position, mistakes)
+    type(work_t), intent(in) :: work
+    type(value_t), intent(in) :: value
+    integer, intent(in) :: position
+    type(mistakes_t), intent(inout) :: mistakes
+    type(key_rule_t) :: rule
+    integer :: i
+
+    if (.not. allocated(value%numbers)) return
+    rule = work%key(position)
+    do i = 2, size(value%numbers)
+      if (value%numbers(i) > value%numbers(i - 1)) cycle
+      call mistakes%add(max(value%line, work%drafts(position)%slots(i)%line), work%index, &
+                        element(rule, i, value) // ' is not above ' // element(rule, i - 1, value) // &
+                        '; needed: ascending values', value%override)
+    end do
+  end subroutine check_ascent
+
+  !> "table_speed(3) = 12".
+  function element(rule, i, value) result(text)
+    type(key_rule_t), intent(in) :: rule
+    integer, intent(in) :: i
+    type(value_t), intent(in) :: value
+    character(len=:), allocatable :: text
+
+    text = trim(rule%name) // '(' // to_text(i) // ') = ' // to_text(value%numbers(i))
+  end function element
+
+  !> Every list has as many values as the first one that is given.
+  subroutine check_lengths(work, group, lists, mistakes)
+    type(work_t), intent(in) :: work
+    type(group_t), intent(in) :: group
+    integer, intent(in) :: lists(:)   !! positions of keys
+    type(mistakes_t), intent(inout) :: mistakes
+    type(key_rule_t) :: rule, first_rule
+    integer :: first, i
+
+    do first = 1, size(lists)
+      if (group%values(lists(first))%has_any()) exit
+    end do
+    if (first > size(lists)) return
+    first_rule = work%key(lists(first))
+    do i = 1, size(lists)
+      rule = work%key(lists(i))
+      associate (value => group%values(lists(i)), reference => group%values(lists(first)))
+        if (value%has_any()) then
+          if (value%count() == reference%count()) cycle
+          call mistakes%add(max(value%line, reference%line), work%index, trim(rule%name) // ' has ' // counted(value) // &
+                            ' and ' // trim(first_rule%name) // ' has ' // counted(reference) // '; needed: as many of each', &
+                            max(value%override, reference%override))
+        else if (rule%default == unset .and. .not. (work%may_miss(lists(i)) .or. work%drafts(lists(i))%is_said())) then
+          call mistakes%add(reference%line, work%index, trim(rule%name) // ' is missing; needed: ' // &
+                            counted(reference) // ', one for each of ' // trim(first_rule%name), reference%override)
+        end if
+      end associate
+    end do
+  end subroutine check_lengths
+
+  pure function counted(value) result(text)
+    type(value_t), intent(in) :: value
+    character(len=:), allocatable :: text
+
+    text = to_text(value%count()) // trim(merge(' value ', ' values', value%count() == 1))
+  end function counted
+
+end module nocdyn_input_columns

@@ -1,0 +1,236 @@
+!> Which keys of a group may stand together: those of its kind, one set of alternatives, those whose needs are met. An
+!> override displaces what the file says against it; two statements of the same source against each other are a mistake.
+module nocdyn_input_relations
+  use nocdyn_input_work, only: work_t
+  use nocdyn_kinds, only: wp
+  use nocdyn_literals, only: literal_fine, read_real
+  use nocdyn_mistakes, only: mistakes_t
+  use nocdyn_schema, only: has_word, words_of
+  use nocdyn_schema_relations, only: relations_t
+  use nocdyn_schema_rules, only: any_number, key_rule_t, unset
+  use nocdyn_schema_text, only: kinds_text, listed
+  use nocdyn_text, only: lower_case, quoted, string_t
+  implicit none (type, external)
+  private
+
+  public :: relate_keys
+
+contains
+
+  !> Refuses what does not go together, and rules out the keys that have no value here.
+  subroutine relate_keys(work, relations, mistakes)
+    type(work_t), intent(inout) :: work
+    type(relations_t), intent(in) :: relations
+    type(mistakes_t), intent(inout) :: mistakes
+    integer :: i
+
+    if (relations%kind > 0) call keep_keys_of_kind(work, relations%kind, mistakes)
+    do i = 1, size(relations%alternatives)
+      associate (sets => relations%alternatives(i))
+        call choose(work, sets%first, sets%second, sets%is_needed, mistakes)
+      end associate
+    end do
+    do i = 1, size(relations%needs)
+      call check_need(work, relations%needs(i)%first, relations%needs(i)%second, mistakes)
+    end do
+    do i = 1, size(relations%columns)
+      call lengthen(work, relations%columns(i)%first)
+    end do
+  end subroutine relate_keys
+
+  subroutine keep_keys_of_kind(work, key, mistakes)
+    type(work_t), intent(inout) :: work
+    integer, intent(in) :: key   !! position of `kind`
+    type(mistakes_t), intent(inout) :: mistakes
+    character(len=:), allocatable :: kind
+    type(key_rule_t) :: rule
+    integer :: i
+
+    call find_kind(work, key, kind)
+    do i = 1, size(work%drafts)
+      rule = work%key(i)
+      if (rule%kinds == '') cycle
+      if (kind == '') then
+        work%may_miss(i) = .true.
+      else if (.not. has_word(rule%kinds, kind)) then
+        if (work%drafts(i)%is_said()) call refuse_foreign_key(work, i, key, kind, mistakes)
+        call work%rule_out(i)
+      end if
+    end do
+  end subroutine keep_keys_of_kind
+
+  !> The word of the key `kind`; '' if it is not one of the schema, which is reported with its value.
+  subroutine find_kind(work, key, kind)
+    type(work_t), intent(in) :: work
+    integer, intent(in) :: key
+    character(len=:), allocatable, intent(out) :: kind
+    type(key_rule_t) :: rule
+    type(string_t), allocatable :: words(:)
+    integer :: i
+
+    rule = work%key(key)
+    kind = ''
+    if (work%drafts(key)%is_damaged) return
+    if (.not. work%drafts(key)%is_said()) then
+      kind = rule%default(2:len_trim(rule%default) - 1)
+      return
+    end if
+    allocate (words, source=words_of(rule))
+    do i = 1, size(words)
+      if (lower_case(work%drafts(key)%slots(1)%text) == words(i)%text) kind = words(i)%text
+    end do
+  end subroutine find_kind
+
+  !> With the kind left to its default it was probably forgotten: then the keys of the default kind are not missed in addition.
+  subroutine refuse_foreign_key(work, position, kind_position, kind, mistakes)
+    type(work_t), intent(inout) :: work
+    integer, intent(in) :: position, kind_position
+    character(len=*), intent(in) :: kind
+    type(mistakes_t), intent(inout) :: mistakes
+    character(len=:), allocatable :: text
+    type(key_rule_t) :: rule
+    integer :: i
+
+    if (work%is_overridden(kind_position) .and. .not. work%is_overridden(position)) return
+    rule = work%key(position)
+    text = trim(rule%name) // ' belongs to kind = ' // kinds_text(rule) // '; here kind = ' // quoted(kind)
+    if (.not. work%drafts(kind_position)%is_said()) then
+      text = text // ', the default'
+      do i = 1, size(work%drafts)
+        rule = work%key(i)
+        if (has_word(rule%kinds, kind)) work%may_miss(i) = .true.
+      end do
+    end if
+    call mistakes%add(work%drafts(position)%line, work%index, text, work%drafts(position)%override)
+  end subroutine refuse_foreign_key
+
+  !> Leaves one of two sets of keys.
+  subroutine choose(work, first, second, is_needed, mistakes)
+    type(work_t), intent(inout) :: work
+    integer, intent(in) :: first(:), second(:)
+    logical, intent(in) :: is_needed
+    type(mistakes_t), intent(inout) :: mistakes
+    integer :: one, other
+
+    one = work%first_said(first)
+    other = work%first_said(second)
+    if (one > 0 .and. other > 0) then
+      call refuse_both(work, one, other, mistakes)
+      if (work%is_overridden(other) .and. .not. work%is_overridden(one)) one = 0
+    end if
+    if (one > 0) then
+      call displace(work, second)
+    else if (other > 0) then
+      call displace(work, first)
+    else if (is_needed .and. .not. any(work%may_miss([first, second]) .or. work%is_out([first, second]))) then
+      call mistakes%add(work%line, work%index, name_of(work, first(1)) // ' or ' // name_of(work, second(1)) // &
+                        ' is missing; one of them is needed')
+    end if
+  end subroutine choose
+
+  subroutine refuse_both(work, one, other, mistakes)
+    type(work_t), intent(in) :: work
+    integer, intent(in) :: one, other   !! positions of two keys that are both written
+    type(mistakes_t), intent(inout) :: mistakes
+
+    if (work%is_overridden(one) .neqv. work%is_overridden(other)) return
+    call mistakes%add(max(work%drafts(one)%line, work%drafts(other)%line), work%index, name_of(work, one) // ' and ' // &
+                      name_of(work, other) // ' are both given; allowed: one of them', &
+                      max(work%drafts(one)%override, work%drafts(other)%override))
+  end subroutine refuse_both
+
+  subroutine displace(work, positions)
+    type(work_t), intent(inout) :: work
+    integer, intent(in) :: positions(:)
+    integer :: i
+
+    do i = 1, size(positions)
+      work%is_displaced(positions(i)) = work%is_displaced(positions(i)) .or. work%drafts(positions(i))%is_said()
+      call work%rule_out(positions(i))
+    end do
+  end subroutine displace
+
+  !> Each of `keys` that is given needs one of `needed`.
+  subroutine check_need(work, keys, needed, mistakes)
+    type(work_t), intent(inout) :: work
+    integer, intent(in) :: keys(:), needed(:)
+    type(mistakes_t), intent(inout) :: mistakes
+    integer :: i
+
+    if (work%first_said(needed) > 0) return
+    do i = 1, size(keys)
+      if (.not. work%drafts(keys(i))%is_said()) then
+        if (.not. any_has_value(work, needed)) call work%rule_out(keys(i))
+      else if (any(work%is_displaced(needed)) .and. .not. work%is_overridden(keys(i))) then
+        call displace(work, keys(i:i))
+      else if (.not. (is_zero(work, keys(i)) .or. any(work%may_miss(needed)))) then
+        call mistakes%add(work%drafts(keys(i))%line, work%index, name_of(work, keys(i)) // ' needs ' // &
+                          names_of(work, needed), work%drafts(keys(i))%override)
+      end if
+    end do
+  end subroutine check_need
+
+  pure logical function any_has_value(work, positions)
+    type(work_t), intent(in) :: work
+    integer, intent(in) :: positions(:)
+    integer :: i
+
+    any_has_value = any([(work%has_value(positions(i)), i=1, size(positions))])
+  end function any_has_value
+
+  logical function is_zero(work, position)
+    type(work_t), intent(in) :: work
+    integer, intent(in) :: position
+    real(wp) :: value
+    integer :: status
+
+    is_zero = .false.
+    associate (draft => work%drafts(position))
+      if (draft%is_damaged) return
+      if (draft%values_said() /= 1 .or. size(draft%slots) /= 1) return
+      call read_real(draft%slots(1)%text, value, status)
+      is_zero = status == literal_fine .and. abs(value) <= 0.0_wp
+    end associate
+  end function is_zero
+
+  !> A list that is left to its default becomes as long as the first list beside it.
+  subroutine lengthen(work, positions)
+    type(work_t), intent(inout) :: work
+    integer, intent(in) :: positions(:)
+    type(key_rule_t) :: rule
+    integer :: i
+
+    if (.not. allocated(work%drafts(positions(1))%slots)) return
+    do i = 2, size(positions)
+      rule = work%key(positions(i))
+      if (work%drafts(positions(i))%is_said() .or. rule%default == unset .or. rule%count /= any_number) cycle
+      work%length(positions(i)) = size(work%drafts(positions(1))%slots)
+    end do
+  end subroutine lengthen
+
+  pure function name_of(work, position) result(name)
+    type(work_t), intent(in) :: work
+    integer, intent(in) :: position
+    character(len=:), allocatable :: name
+    type(key_rule_t) :: rule
+
+    rule = work%key(position)
+    name = trim(rule%name)
+  end function name_of
+
+  !> "a, b or c".
+  pure function names_of(work, positions) result(text)
+    type(work_t), intent(in) :: work
+    integer, intent(in) :: positions(:)
+    character(len=:), allocatable :: text
+    type(string_t), allocatable :: names(:)
+    integer :: i
+
+    allocate (names(size(positions)))
+    do i = 1, size(positions)
+      names(i)%text = name_of(work, positions(i))
+    end do
+    text = listed(names, ' or ')
+  end function names_of
+
+end module nocdyn_input_relations

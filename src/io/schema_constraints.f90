@@ -1,0 +1,58 @@
+!> Rows of the schema: keys of the rigid joints, &gear, &planetary, &differential and &constraint.
+module nocdyn_schema_constraints
+  use nocdyn_schema_rules, only: a_body, a_flag, a_name, a_number, alternative_t, an_integer, any_number, any_times, anything, &
+    body_or_ground, example_t, from_1, group_rule_t, key_rule_t, not_zero, positive, required, unset
+  implicit none (type, external)
+  private
+
+  type(group_rule_t), parameter, public :: constraint_groups(*) = [ &
+    group_rule_t('gear',         any_times, 'constraint', 'A rigid gear: R1 omega_1 + R2 omega_2 = 0, a minus if internal.'), &
+    group_rule_t('planetary',    any_times, 'constraint', &
+                 'A planetary gear set (Willis): z_s omega_s + z_r omega_r = (z_s + z_r) omega_c.'), &
+    group_rule_t('differential', any_times, 'constraint', 'A differential: omega_1 + omega_2 = 2 omega_case.'), &
+    group_rule_t('constraint',   any_times, 'constraint', 'Any rigid relation: the sum of coefficient * speed is 0.')]
+
+  type(key_rule_t), parameter, public :: constraint_keys(*) = [ &
+    key_rule_t('gear',       'name',            a_name,         1, '',            required,    anything, &
+      'what results and messages call it'), &
+    key_rule_t('gear',       'bodies',          body_or_ground, 2, '',            required,    anything, &
+      "the two wheels; 'ground' does not turn, and locks the other one"), &
+    key_rule_t('gear',       'radii',           a_number,       2, 'm',           unset,       positive, &
+      'pitch radii, in the order of the bodies'), &
+    key_rule_t('gear',       'teeth',           an_integer,     2, '',            unset,       from_1, &
+      'numbers of teeth, in the order of the bodies'), &
+    key_rule_t('gear',       'internal',        a_flag,         1, '',            '.false.',   anything, &
+      'an internal gear: both wheels turn in the same direction'), &
+    key_rule_t('planetary',  'name',            a_name,         1, '',            required,    anything, &
+      'what results and messages call it'), &
+    key_rule_t('planetary',  'sun',             body_or_ground, 1, '',            required,    anything, &
+      "the sun wheel; one of the three members may be 'ground', which does not turn"), &
+    key_rule_t('planetary',  'ring',            body_or_ground, 1, '',            required,    anything, &
+      'the ring, an internal wheel'), &
+    key_rule_t('planetary',  'carrier',         body_or_ground, 1, '',            required,    anything, &
+      'the carrier of the planets'), &
+    key_rule_t('planetary',  'teeth',           an_integer,     2, '',            required,    from_1, &
+      'numbers of teeth of sun and ring; the ring has more'), &
+    key_rule_t('differential', 'name',          a_name,         1, '',            required,    anything, &
+      'what results and messages call it'), &
+    key_rule_t('differential', 'sides',         body_or_ground, 2, '',            required,    anything, &
+      "the two side shafts; one of the three members may be 'ground', which does not turn"), &
+    key_rule_t('differential', 'case',          body_or_ground, 1, '',            required,    anything, &
+      'the case, which turns with the mean speed of the sides'), &
+    key_rule_t('constraint', 'name',            a_name,         1, '',            required,    anything, &
+      'what results and messages call it'), &
+    key_rule_t('constraint', 'bodies',          a_body,         any_number, '',   required,    anything, &
+      'the bodies whose speeds are related', least=1), &
+    key_rule_t('constraint', 'coefficients',    a_number,       any_number, '',   required,    not_zero, &
+      'as many numbers as bodies', least=1)]
+
+  type(alternative_t), parameter, public :: constraint_alternatives(*) = [ &
+    alternative_t('gear', 'radii', 'teeth', is_needed=.true.)]
+
+  type(example_t), parameter, public :: constraint_examples(*) = [ &
+    example_t('gear',         "name = 'reducer'  bodies = 'pinion', 'machine' radii = 2.0, 3.0"), &
+    example_t('planetary',    "name = 'stage'    sun = 'pinion' ring = 'ground' carrier = 'machine' teeth = 20, 70", .false.), &
+    example_t('differential', "name = 'axle'     sides = 'left', 'right' case = 'machine'", .false.), &
+    example_t('constraint',   "name = 'summing'  bodies = 'motor', 'pinion', 'machine' coefficients = 1, 0.5, -2", .false.)]
+
+end module nocdyn_schema_constraints

@@ -1,0 +1,98 @@
+!> The schema as a page of the documentation.
+module nocdyn_schema_reference
+  use nocdyn_schema, only: first_key, group_rules, has_word, key_rules, kind_rules, last_key
+  use nocdyn_schema_help, only: append_examples
+  use nocdyn_schema_rules, only: key_rule_t
+  use nocdyn_schema_sentences, only: default_text, sentences_on
+  use nocdyn_schema_text, only: allowed_text, kind_text, occurrence_text
+  use nocdyn_text, only: quoted, string_t
+  use nocdyn_text_buffer, only: text_buffer_t
+  implicit none (type, external)
+  private
+
+  public :: input_reference
+
+contains
+
+  !> A page in Markdown.
+  function input_reference() result(text)
+    character(len=:), allocatable :: text
+    type(text_buffer_t) :: buffer
+    integer :: rule
+
+    call buffer%append_line('# Input reference')
+    call buffer%append_line('')
+    call buffer%append_line('An input file is a Fortran namelist in SI units. Groups stand in any order.')
+    do rule = 1, size(group_rules)
+      call append_group(buffer, rule)
+    end do
+    text = buffer%text()
+  end function input_reference
+
+  subroutine append_group(buffer, rule)
+    type(text_buffer_t), intent(inout) :: buffer
+    integer, intent(in) :: rule
+    integer :: k, key
+
+    call buffer%append_line('')
+    call buffer%append_line('## `&' // trim(group_rules(rule)%name) // '`')
+    call buffer%append_line('')
+    call buffer%append_line(trim(group_rules(rule)%help) // ' Given ' // occurrence_text(group_rules(rule)%occurrence) // '.')
+    call append_head(buffer)
+    do key = first_key(rule), last_key(rule)
+      if (key_rules(key)%kinds == '') call append_key(buffer, key_rules(key))
+    end do
+    do k = 1, size(kind_rules)
+      if (kind_rules(k)%group == group_rules(rule)%name) call append_kind(buffer, k, rule)
+    end do
+    call append_sentences(buffer, rule)
+    call buffer%append_line('')
+    call buffer%append_line('```')
+    call append_examples(buffer, rule, .false.)
+    call buffer%append_line('```')
+  end subroutine append_group
+
+  !> The law of a kind and all its keys.
+  subroutine append_kind(buffer, kind, rule)
+    type(text_buffer_t), intent(inout) :: buffer
+    integer, intent(in) :: kind, rule
+    integer :: key
+
+    call buffer%append_line('')
+    call buffer%append_line('`kind = ' // quoted(trim(kind_rules(kind)%word)) // '`: ' // trim(kind_rules(kind)%help) // '.')
+    call append_head(buffer)
+    do key = first_key(rule), last_key(rule)
+      if (has_word(key_rules(key)%kinds, kind_rules(kind)%word)) call append_key(buffer, key_rules(key))
+    end do
+  end subroutine append_kind
+
+  subroutine append_head(buffer)
+    type(text_buffer_t), intent(inout) :: buffer
+
+    call buffer%append_line('')
+    call buffer%append_line('| key | type | default | allowed | meaning |')
+    call buffer%append_line('| --- | --- | --- | --- | --- |')
+  end subroutine append_head
+
+  subroutine append_key(buffer, rule)
+    type(text_buffer_t), intent(inout) :: buffer
+    type(key_rule_t), intent(in) :: rule
+
+    call buffer%append_line('| `' // trim(rule%name) // '` | ' // kind_text(rule) // ' | ' // default_text(rule) // ' | ' // &
+                            allowed_text(rule) // ' | ' // trim(rule%help) // ' |')
+  end subroutine append_key
+
+  subroutine append_sentences(buffer, rule)
+    type(text_buffer_t), intent(inout) :: buffer
+    integer, intent(in) :: rule
+    type(string_t), allocatable :: sentences(:)
+    integer :: i
+
+    allocate (sentences, source=sentences_on(rule))
+    if (size(sentences) > 0) call buffer%append_line('')
+    do i = 1, size(sentences)
+      call buffer%append_line(sentences(i)%text)
+    end do
+  end subroutine append_sentences
+
+end module nocdyn_schema_reference

@@ -1,0 +1,228 @@
+!> Tables in files: two columns of numbers, separated by blanks, tabs or a comma; # and ! begin comments.
+module nocdyn_table_file
+  use nocdyn_errors, only: error_t, exit_file, exit_input
+  use nocdyn_kinds, only: wp
+  use nocdyn_literals, only: literal_fine, literal_not_finite, literal_too_large, read_real
+  use nocdyn_text, only: append, quoted, string_t, to_text
+  use nocdyn_text_file, only: read_text_file
+  implicit none (type, external)
+  private
+
+  public :: read_table_file, read_table_text
+
+  integer, parameter :: most_complaints = 5   !! a file of another form has as many mistakes as lines
+  character(len=*), parameter :: line_end = achar(10), tab = achar(9), carriage_return = achar(13)
+  character(len=*), parameter :: byte_order_mark = char(239) // char(187) // char(191)
+  character(len=*), parameter :: blanks = ' ' // tab, comments = '#!'
+
+  !> What is known while the lines of a table go by.
+  type :: reading_t
+    character(len=:), allocatable :: file
+    integer :: line = 0
+    integer :: last_good = 0            !! line of the last row
+    integer :: wrong = 0                !! lines with a mistake
+    type(string_t), allocatable :: complaints(:)
+  end type reading_t
+
+contains
+
+  !> Reads a file of which the first column ascends and which has two rows at least.
+  subroutine read_table_file(file, first, second, complaints, code)
+    character(len=*), intent(in) :: file
+    real(wp), allocatable, intent(out) :: first(:), second(:)
+    type(string_t), allocatable, intent(out) :: complaints(:)   !! sentences that begin with file and line; empty: all is well
+    integer, intent(out) :: code                                !! exit code of the complaints
+    type(error_t), allocatable :: error
+    character(len=:), allocatable :: text
+
+    code = exit_input
+    call read_text_file(file, text, error)
+    if (.not. allocated(error)) then
+      call read_table_text(text, file, first, second, complaints)
+      return
+    end if
+    code = exit_file
+    allocate (complaints(0), first(0), second(0))
+    call append(complaints, error%message)
+  end subroutine read_table_file
+
+  subroutine read_table_text(text, file, first, second, complaints)
+    character(len=*), intent(in) :: text
+    character(len=*), intent(in) :: file   !! what complaints call it
+    real(wp), allocatable, intent(out) :: first(:), second(:)
+    type(string_t), allocatable, intent(out) :: complaints(:)
+    type(reading_t) :: reading
+    real(wp), allocatable :: values(:, :)
+    integer :: last, rows, start
+
+    allocate (values(2, lines_of(text)))
+    allocate (reading%complaints(0))
+    reading%file = file
+    rows = 0
+    start = 1
+    if (index(text, byte_order_mark) == 1) start = 1 + len(byte_order_mark)
+    do while (start <= len(text))
+      last = start - 2 + index(text(start:), line_end)
+      if (last < start - 1) last = len(text)
+      reading%line = reading%line + 1
+      call read_line(text(start:content_end(text, start, last)), reading, values, rows)
+      start = last + 2
+    end do
+    call conclude(reading, rows, index(text, achar(0)) > 0)
+    first = values(1, :rows)
+    second = values(2, :rows)
+    call move_alloc(reading%complaints, complaints)
+  end subroutine read_table_text
+
+  pure integer function lines_of(text) result(lines)
+    character(len=*), intent(in) :: text
+    integer :: i
+
+    lines = 1
+    do i = 1, len(text)
+      if (text(i:i) == line_end) lines = lines + 1
+    end do
+  end function lines_of
+
+  !> Last position of a line without its comment, blanks at its end, and the carriage return of other systems.
+  pure integer function content_end(text, first, last)
+    character(len=*), intent(in) :: text
+    integer, intent(in) :: first, last
+    integer :: comment
+
+    comment = scan(text(first:last), comments)
+    content_end = last
+    if (comment > 0) content_end = first + comment - 2
+    content_end = first - 1 + verify(text(first:content_end), blanks // carriage_return, back=.true.)
+  end function content_end
+
+  !> Takes one line over as the next row, or complains.
+  subroutine read_line(content, reading, values, rows)
+    character(len=*), intent(in) :: content
+    type(reading_t), intent(inout) :: reading
+    real(wp), intent(inout) :: values(:, :)   !! [2, lines]
+    integer, intent(inout) :: rows
+    integer :: begins(2), ends(2), found
+    character(len=:), allocatable :: complaint
+
+    if (content == '') return
+    call split(content, begins, ends, found)
+    if (found /= 2) then
+      complaint = to_text(found) // trim(merge(' column ', ' columns', found == 1)) // ' in ' // excerpt(content) // &
+                  '; needed: 2, separated by blanks or a comma'
+    else
+      call read_column(content(begins(1):ends(1)), 1, values(1, rows + 1), complaint)
+      if (complaint == '') call read_column(content(begins(2):ends(2)), 2, values(2, rows + 1), complaint)
+    end if
+    if (complaint /= '' .and. rows == 0 .and. reading%wrong == 0) complaint = complaint // header_hint(content)
+    if (complaint == '' .and. rows > 0) call check_ascent(values(1, rows:rows + 1), reading%last_good, complaint)
+    if (complaint /= '') then
+      call complain(reading, ':' // to_text(reading%line) // ': ' // complaint)
+    else
+      rows = rows + 1
+      reading%last_good = reading%line
+    end if
+  end subroutine read_line
+
+  !> Where the first two columns stand, and how many there are; a comma without a value before it counts as a column.
+  pure subroutine split(content, begins, ends, found)
+    character(len=*), intent(in) :: content   !! without blanks at its end
+    integer, intent(out) :: begins(2), ends(2)
+    integer, intent(out) :: found
+    integer :: first, last
+
+    found = 0
+    begins = 1
+    ends = 0
+    first = verify(content, blanks)
+    do while (first <= len(content))
+      last = first - 2 + scan(content(first:) // ',', blanks // ',')
+      found = found + 1
+      if (found <= 2) then
+        begins(found) = first
+        ends(found) = last
+      end if
+      first = last + verify(content(last + 1:) // '.', blanks)
+      if (first > len(content)) return
+      if (content(first:first) == ',') first = first + verify(content(first + 1:) // '.', blanks)
+      if (first > len(content)) found = found + 1   ! nothing behind the last comma
+    end do
+  end subroutine split
+
+  subroutine read_column(text, column, value, complaint)
+    character(len=*), intent(in) :: text
+    integer, intent(in) :: column
+    real(wp), intent(out) :: value
+    character(len=:), allocatable, intent(out) :: complaint
+    integer :: status
+
+    call read_real(text, value, status)
+    select case (status)
+    case (literal_fine)
+      complaint = ''
+      return
+    case (literal_not_finite)
+      complaint = 'is not a finite number'
+    case (literal_too_large)
+      complaint = 'is too large for a number'
+    case default
+      complaint = 'is not a number'
+    end select
+    complaint = 'column ' // to_text(column) // ', ' // excerpt(text) // ', ' // complaint
+  end subroutine read_column
+
+  !> A first line without any digit names the columns.
+  pure function header_hint(content) result(hint)
+    character(len=*), intent(in) :: content
+    character(len=:), allocatable :: hint
+
+    hint = ''
+    if (scan(content, '0123456789') == 0) hint = '; a line with names of columns must begin with #'
+  end function header_hint
+
+  subroutine check_ascent(pair, line, complaint)
+    real(wp), intent(in) :: pair(2)   !! first column of the last row and of this one
+    integer, intent(in) :: line       !! of the last row
+    character(len=:), allocatable, intent(inout) :: complaint
+
+    if (pair(2) > pair(1)) return
+    complaint = 'column 1, ' // to_text(pair(2)) // ', is not above ' // to_text(pair(1)) // ' on line ' // to_text(line) // &
+                '; needed: ascending values'
+  end subroutine check_ascent
+
+  pure function excerpt(text)
+    character(len=*), intent(in) :: text
+    character(len=:), allocatable :: excerpt
+    integer, parameter :: most = 40
+
+    excerpt = quoted(text)
+    if (len(text) > most) excerpt = quoted(text(:most) // '...')
+  end function excerpt
+
+  subroutine complain(reading, text)
+    type(reading_t), intent(inout) :: reading
+    character(len=*), intent(in) :: text
+
+    reading%wrong = reading%wrong + 1
+    if (reading%wrong <= most_complaints) call append(reading%complaints, reading%file // text)
+  end subroutine complain
+
+  !> Complaints about the file as a whole.
+  subroutine conclude(reading, rows, is_binary)
+    type(reading_t), intent(inout) :: reading
+    integer, intent(in) :: rows
+    logical, intent(in) :: is_binary
+
+    if (is_binary) then
+      deallocate (reading%complaints)
+      allocate (reading%complaints(0))
+      call append(reading%complaints, reading%file // ': not a text file')
+    else if (reading%wrong > most_complaints) then
+      call append(reading%complaints, reading%file // ': ' // to_text(reading%wrong - most_complaints) // &
+                  ' more lines are wrong')
+    else if (reading%wrong == 0 .and. rows < 2) then
+      call complain(reading, ': ' // to_text(rows) // trim(merge(' row ', ' rows', rows == 1)) // '; needed: at least 2')
+    end if
+  end subroutine conclude
+
+end module nocdyn_table_file

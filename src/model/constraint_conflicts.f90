@@ -1,0 +1,223 @@
+!> Rows that lock bodies: which ones, what they ask of each other, and the sentence that says so.
+module nocdyn_constraint_conflicts
+  use nocdyn_complement, only: natural_complement
+  use nocdyn_constraints, only: constraints_t
+  use nocdyn_coordinate_choice, only: pivoted_elimination
+  use nocdyn_errors, only: error_t, exit_input, raise
+  use nocdyn_kinds, only: wp
+  use nocdyn_lapack, only: pivoted_rank
+  use nocdyn_rigid_trains, only: ratio_tolerance, rigid_trains_t
+  use nocdyn_text, only: joined, quoted, rounded_text, selected, string_t
+  use nocdyn_train_motion, only: elimination_t, find_loads, find_motion, train_motion_t
+  use nocdyn_train_relations, only: distinct_trains, paced_rows, peeling_t, train_relations_t
+  implicit none (type, external)
+  private
+
+  public :: locked_trains, refuse_locked, refuse_loop
+
+  integer, parameter :: most_names = 12     ! in a message
+  integer, parameter :: ratio_digits = 12   ! enough to tell two ratios apart, without the noise of rounding
+
+contains
+
+  !> The error for a row of two bodies that closes a loop with another ratio.
+  subroutine refuse_loop(constraints, body_names, trains, row, error)
+    type(constraints_t), intent(in) :: constraints
+    type(string_t), intent(in) :: body_names(:)
+    type(rigid_trains_t), intent(in) :: trains
+    integer, intent(in) :: row
+    type(error_t), allocatable, intent(out) :: error
+    integer, allocatable :: bodies(:), rows(:), bodies_of_tree(:), bodies_of_row(:), way(:), other_way(:)
+    integer :: at, last
+
+    associate (first => constraints%first(row))
+      call trains%find_path(constraints%body(first), constraints%body(first + 1), bodies, rows)
+    end associate
+    last = size(bodies)
+    at = minloc(bodies, dim=1)
+    if (at < last) then
+      bodies_of_tree = bodies(at:)
+      way = rows(at:)
+      bodies_of_row = [bodies(at:1:-1), bodies(last)]
+      other_way = [rows(at - 1:1:-1), row]
+    else
+      bodies_of_tree = bodies(last:1:-1)
+      way = rows(last - 1:1:-1)
+      bodies_of_row = [bodies(last), bodies(1)]
+      other_way = [row]
+    end if
+    call raise(error, exit_input, 'locks ' // locked_names(body_names, trains, [trains%train(bodies(1))]) // ': ' // &
+               joined(selected(constraints%names, way), ', ', most_names) // ' and ' // &
+               joined(selected(constraints%names, other_way), ', ', most_names) // ' drive ' // &
+               quoted(body_names(bodies_of_tree(size(bodies_of_tree)))%text) // ' at ' // &
+               rounded_text(ratio_along(constraints, bodies_of_tree, way), ratio_digits) // ' and ' // &
+               rounded_text(ratio_along(constraints, bodies_of_row, other_way), ratio_digits) // ' times ' // &
+               quoted(body_names(bodies_of_tree(1))%text))
+  end subroutine refuse_loop
+
+  !> omega(last body) / omega(first body) along rows of two bodies.
+  pure real(wp) function ratio_along(constraints, bodies, rows) result(ratio)
+    type(constraints_t), intent(in) :: constraints
+    integer, intent(in) :: bodies(:)
+    integer, intent(in) :: rows(:)   !! rows(i) is between bodies(i) and bodies(i + 1)
+    integer :: i
+    real(wp) :: own, other
+
+    ratio = 1.0_wp
+    do i = 1, size(rows)
+      call constraints%split_pair(1, rows(i), bodies(i), own, other)
+      ratio = -ratio * own / other
+    end do
+  end function ratio_along
+
+  !> The bodies of some trains, in their order.
+  function locked_names(body_names, trains, locked) result(names)
+    type(string_t), intent(in) :: body_names(:)
+    type(rigid_trains_t), intent(in) :: trains
+    integer, intent(in) :: locked(:)   !! trains
+    character(len=:), allocatable :: names
+    integer :: b
+    logical :: is_locked(size(trains%lead))
+
+    is_locked = .false.
+    is_locked(locked) = .true.
+    names = joined(selected(body_names, pack([(b, b=1, size(body_names))], is_locked(trains%train))), ', ', most_names)
+  end function locked_names
+
+  !> Trains that relations leave no speed: those of the core whose row of the complement is zero, and those that relations
+  !> give from locked ones, or from speeds that cancel.
+  function locked_trains(relations, elimination) result(is_locked)
+    type(train_relations_t), intent(in) :: relations
+    type(elimination_t), intent(in) :: elimination
+    logical :: is_locked(relations%between%bodies)
+    type(train_motion_t) :: found
+    real(wp) :: bound(size(elimination%free)), speed(size(elimination%free))
+    integer, allocatable :: trains(:)
+    integer :: entry, i, place(relations%between%bodies)
+
+    is_locked = .false.
+    allocate (trains, source=[elimination%core_trains, distinct_trains(relations%between, elimination%relation)])
+    place(trains) = [(i, i=1, size(trains))]
+    place(elimination%free) = [(size(trains) + i, i=1, size(elimination%free))]
+    call find_motion(relations, elimination, place, size(trains) + size(elimination%free), 1, found)
+    if (size(elimination%core) > 0) is_locked(elimination%core_trains) = resting(relations, elimination)
+    associate (between => relations%between)
+      do i = size(elimination%relation), 1, -1
+        bound = 0.0_wp
+        speed = 0.0_wp
+        do entry = between%first(elimination%relation(i)), between%first(elimination%relation(i) + 1) - 1
+          associate (train => between%body(entry))
+            if (train == elimination%train(i) .or. is_locked(train)) cycle
+            speed = speed + between%coefficient(1, entry) * found%motion(place(train), :)
+            bound = bound + abs(between%coefficient(1, entry) * found%motion(place(train), :))
+          end associate
+        end do
+        is_locked(elimination%train(i)) = all(abs(speed) <= ratio_tolerance * bound)
+      end do
+    end associate
+  end function locked_trains
+
+  !> Whether the trains of the core rest, from its complement between paced speeds.
+  function resting(relations, elimination) result(rests)
+    type(train_relations_t), intent(in) :: relations
+    type(elimination_t), intent(in) :: elimination
+    logical :: rests(size(elimination%core_trains))
+    real(wp) :: rows(size(elimination%core), size(rests)), log_determinant
+    real(wp), allocatable :: dual(:, :), motion(:, :)
+    integer :: pivots(size(rests)), rank
+    logical :: is_singular
+
+    rows = paced_rows(relations%between, elimination%core, elimination%core_trains)
+    call pivoted_rank(rows, ratio_tolerance, rank, pivots)
+    call natural_complement(rows, pivots(rank + 1:), motion, dual, log_determinant, is_singular)
+    if (is_singular) error stop 'nocdyn_constraint_conflicts: relations must be independent here'
+    rests = .true.
+    if (size(motion, 2) > 0) rests = maxval(abs(motion), dim=2) <= ratio_tolerance
+  end function resting
+
+  !> The error for the first relation with which a lock begins, among those of a group that locks.
+  subroutine refuse_locked(constraints, body_names, trains, relations, members, culprit, error)
+    type(constraints_t), intent(in) :: constraints
+    type(string_t), intent(in) :: body_names(:)
+    type(rigid_trains_t), intent(in) :: trains
+    type(train_relations_t), intent(in) :: relations
+    integer, intent(in) :: members(:)      !! the independent relations of the group
+    integer, intent(out) :: culprit        !! constraint row
+    type(error_t), allocatable, intent(out) :: error
+    type(elimination_t) :: elimination
+    logical :: is_member(size(relations%row)), is_locked(size(trains%lead))
+    integer, allocatable :: inputs(:), rows(:)
+    integer :: fine, i, lock, middle
+
+    is_member = .false.
+    is_member(members) = .true.
+    inputs = pack([(i, i=1, size(is_member))], is_member)
+    fine = 0
+    lock = size(inputs)
+    do while (lock - fine > 1)
+      middle = (fine + lock) / 2
+      if (any(locked_trains(relations, partial_elimination(relations, inputs(:middle))))) then
+        lock = middle
+      else
+        fine = middle
+      end if
+    end do
+    culprit = relations%row(inputs(lock))
+    elimination = partial_elimination(relations, inputs(:lock))
+    is_locked = locked_trains(relations, elimination)
+    rows = locking_rows(constraints, trains, relations, elimination, findloc(is_locked, .true., dim=1))
+    rows = pack(rows, rows /= culprit)
+    call raise(error, exit_input, 'locks ' // locked_names(body_names, trains, pack([(i, i=1, size(is_locked))], is_locked)) // &
+               reason(selected(constraints%names, rows)))
+  end subroutine refuse_locked
+
+  !> Why the relations lock: the other rows that take part.
+  function reason(names) result(text)
+    type(string_t), intent(in) :: names(:)
+    character(len=:), allocatable :: text
+
+    if (size(names) == 0) then
+      text = ', as no other body in it turns'
+    else
+      text = ': together with ' // joined(names, ', ', most_names) // ' it leaves no speed but 0'
+    end if
+  end function reason
+
+  !> The elimination of some relations alone.
+  function partial_elimination(relations, chosen) result(elimination)
+    type(train_relations_t), intent(in) :: relations
+    integer, intent(in) :: chosen(:)
+    type(elimination_t) :: elimination
+    type(peeling_t) :: peeling
+    logical :: takes_part(size(relations%row)), no_train(relations%between%bodies)
+
+    takes_part = .false.
+    takes_part(chosen) = .true.
+    no_train = .false.
+    peeling = relations%peel(takes_part, no_train)
+    elimination = pivoted_elimination(relations, distinct_trains(relations%between, chosen), peeling%relation, &
+                                      peeling%train, peeling%core)
+  end function partial_elimination
+
+  !> The rows whose combination says that a train rests.
+  function locking_rows(constraints, trains, relations, elimination, locked) result(rows)
+    type(constraints_t), intent(in) :: constraints
+    type(rigid_trains_t), intent(in) :: trains
+    type(train_relations_t), intent(in) :: relations
+    type(elimination_t), intent(in) :: elimination
+    integer, intent(in) :: locked   !! train
+    integer, allocatable :: rows(:)
+    type(train_motion_t) :: found
+    real(wp) :: lambda(size(relations%row)), moment(size(trains%lead))
+    integer :: i, place(size(trains%lead))
+
+    place = [(i, i=1, size(place))]
+    call find_motion(relations, elimination, place, size(place), 1, found)
+    moment = 0.0_wp
+    moment(locked) = 1.0_wp
+    lambda = 0.0_wp
+    call find_loads(relations, elimination, found%dual, 1, moment, lambda)
+    rows = relations%loaded_rows(constraints, trains, lambda, trains%lead(locked))
+  end function locking_rows
+
+end module nocdyn_constraint_conflicts

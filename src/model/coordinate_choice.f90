@@ -1,0 +1,238 @@
+!> Which bodies are independent, and in which order the relations between trains give the others.
+module nocdyn_coordinate_choice
+  use nocdyn_constraints, only: constraints_t
+  use nocdyn_errors, only: error_t, exit_input, raise
+  use nocdyn_geared_groups, only: geared_group_t
+  use nocdyn_kinds, only: wp
+  use nocdyn_lapack, only: pivoted_rank
+  use nocdyn_rigid_trains, only: ratio_tolerance, rigid_trains_t, steepest
+  use nocdyn_sparse_map, only: transposed_order
+  use nocdyn_text, only: joined, quoted, selected, string_t, to_text
+  use nocdyn_train_motion, only: elimination_t
+  use nocdyn_train_relations, only: distinct_trains, new_relations, paced_rows, peeling_t, train_relations_t
+  implicit none (type, external)
+  private
+
+  public :: eliminate, choose_coordinates, pivoted_elimination
+
+  integer, parameter :: most_names = 12   ! in a message
+
+contains
+
+  !> Coordinates by peeling and pivoting: the leads of the trains that no relation gives.
+  subroutine eliminate(relations, takes_part, group_of, trains, groups)
+    type(train_relations_t), intent(in) :: relations
+    logical, intent(in) :: takes_part(:)   !! relations that are not redundant
+    integer, intent(in) :: group_of(:)     !! [bodies]
+    type(rigid_trains_t), intent(in) :: trains
+    type(geared_group_t), intent(inout) :: groups(:)
+    logical :: is_free_lead(size(group_of)), no_train(size(trains%lead))
+    integer :: g
+
+    no_train = .false.
+    call distribute(relations, relations%peel(takes_part, no_train), group_of(trains%lead), groups)
+    is_free_lead = .false.
+    do g = 1, size(groups)
+      associate (group => groups(g))
+        group%elimination = pivoted_elimination(relations, group%trains, group%elimination%relation, &
+                                                group%elimination%train, group%elimination%core)
+        is_free_lead(trains%lead(group%elimination%free)) = .true.
+        group%independent = pack(group%bodies, is_free_lead(group%bodies))
+        group%elimination%free = trains%train(group%independent)
+      end associate
+    end do
+  end subroutine eliminate
+
+  !> Hands what was peeled, and what was left, out to the groups.
+  subroutine distribute(relations, peeling, group_of, groups)
+    type(train_relations_t), intent(in) :: relations
+    type(peeling_t), intent(in) :: peeling
+    integer, intent(in) :: group_of(:)   !! [trains]
+    type(geared_group_t), intent(inout) :: groups(:)
+    integer :: first(size(groups) + 1), first_core(size(groups) + 1), g, i
+    integer :: core(size(peeling%core)), order(size(peeling%train))
+
+    call transposed_order(group_of(peeling%train), size(groups), order, first)
+    call transposed_order([(group_of(relations%between%body(relations%between%first(peeling%core(i)))), &
+                            i=1, size(peeling%core))], size(groups), core, first_core)
+    do g = 1, size(groups)
+      associate (elimination => groups(g)%elimination)
+        elimination%relation = peeling%relation(order(first(g):first(g + 1) - 1))
+        elimination%train = peeling%train(order(first(g):first(g + 1) - 1))
+        elimination%core = peeling%core(core(first_core(g):first_core(g + 1) - 1))
+        if (size(elimination%core) > 0) then
+          elimination%core_trains = distinct_trains(relations%between, elimination%core)
+        else
+          elimination%core_trains = elimination%core
+        end if
+      end associate
+    end do
+  end subroutine distribute
+
+  !> The elimination whose core gives the trains that column pivoting takes first, so that the fast ones stay free.
+  function pivoted_elimination(relations, trains, relation, train, core) result(elimination)
+    type(train_relations_t), intent(in) :: relations
+    integer, intent(in) :: trains(:)                !! among which the free ones are
+    integer, intent(in) :: relation(:), train(:)    !! peeled
+    integer, intent(in) :: core(:)
+    type(elimination_t) :: elimination
+    integer, allocatable :: pivots(:)
+    integer :: rank
+    logical :: is_given(relations%between%bodies)
+
+    allocate (elimination%relation, source=relation)
+    allocate (elimination%train, source=train)
+    allocate (elimination%core, source=core)
+    if (size(relation) + size(core) == 0) then
+      allocate (elimination%core_trains(0))
+      allocate (elimination%free, source=trains)
+      return
+    end if
+    allocate (elimination%core_trains, source=distinct_trains(relations%between, core))
+    is_given = .false.
+    is_given(train) = .true.
+    allocate (pivots(size(elimination%core_trains)))
+    call pivoted_rank(unit_rows(relations%between%block(1, core, elimination%core_trains)), ratio_tolerance, rank, pivots)
+    is_given(elimination%core_trains(pivots(:size(core)))) = .true.
+    allocate (elimination%free, source=pack(trains, .not. is_given(trains)))
+  end function pivoted_elimination
+
+  pure function unit_rows(matrix) result(scaled)
+    real(wp), intent(in) :: matrix(:, :)
+    real(wp) :: scaled(size(matrix, 1), size(matrix, 2))
+    integer :: i
+
+    do i = 1, size(matrix, 1)
+      scaled(i, :) = matrix(i, :) / norm2(matrix(i, :))
+    end do
+  end function unit_rows
+
+  !> Makes the wanted bodies the coordinates, where there are any; those that cannot be are an error.
+  subroutine choose_coordinates(constraints, body_names, wanted, group_of, is_kept, trains, groups, error)
+    type(constraints_t), intent(in) :: constraints
+    type(string_t), intent(in) :: body_names(:)
+    integer, intent(in) :: wanted(:), group_of(:)
+    logical, intent(in) :: is_kept(:)                   !! rows
+    type(rigid_trains_t), intent(inout) :: trains
+    type(geared_group_t), intent(inout) :: groups(:)    !! with coordinates that were found
+    type(error_t), allocatable, intent(out) :: error
+    type(train_relations_t) :: relations
+    logical :: is_barred(size(trains%lead))
+    integer :: g
+
+    if (size(wanted) == 0) return
+    call take_wanted(body_names, wanted, group_of, trains, groups, error)
+    if (allocated(error)) return
+    call lead_by(constraints, body_names, wanted, trains, error)
+    if (allocated(error)) return
+    relations = new_relations(constraints, trains)
+    is_barred = .false.
+    is_barred(trains%train(wanted)) = .true.
+    call distribute(relations, relations%peel(is_kept(relations%row), is_barred), group_of(trains%lead), groups)
+    do g = 1, size(groups)
+      groups(g)%elimination%free = trains%train(groups(g)%independent)
+      if (is_solvable(relations, groups(g)%elimination, is_barred)) cycle
+      call raise_related(body_names, groups(g)%independent, error)
+      return
+    end do
+  end subroutine choose_coordinates
+
+  !> Replaces the independent bodies of each group by the wanted ones in it, which must be as many, of different trains.
+  subroutine take_wanted(body_names, wanted, group_of, trains, groups, error)
+    type(string_t), intent(in) :: body_names(:)
+    integer, intent(in) :: wanted(:), group_of(:)
+    type(rigid_trains_t), intent(in) :: trains
+    type(geared_group_t), intent(inout) :: groups(:)
+    type(error_t), allocatable, intent(out) :: error
+    integer :: first(size(groups) + 1), order(size(wanted)), freedoms, g, k
+    logical :: is_taken(size(trains%lead))
+
+    is_taken = .false.
+    call transposed_order(group_of(wanted), size(groups), order, first)
+    do g = 1, size(groups)
+      freedoms = size(groups(g)%independent)
+      groups(g)%independent = wanted(order(first(g):first(g + 1) - 1))
+      if (size(groups(g)%independent) /= freedoms) then
+        call raise(error, exit_input, count_message(selected(body_names, groups(g)%bodies), &
+                                             selected(body_names, groups(g)%independent), freedoms))
+        return
+      end if
+      do k = 1, freedoms
+        associate (train => trains%train(groups(g)%independent(k)))
+          if (is_taken(train)) then
+            call raise_related(body_names, groups(g)%independent, error)
+            return
+          end if
+          is_taken(train) = .true.
+        end associate
+      end do
+    end do
+  end subroutine take_wanted
+
+  !> Makes the wanted bodies leads; an error where a body turns so much faster that numbers overflow.
+  subroutine lead_by(constraints, body_names, wanted, trains, error)
+    type(constraints_t), intent(in) :: constraints
+    type(string_t), intent(in) :: body_names(:)
+    integer, intent(in) :: wanted(:)
+    type(rigid_trains_t), intent(inout) :: trains
+    type(error_t), allocatable, intent(out) :: error
+    integer :: body(size(trains%lead)), largest(size(trains%lead)), leads(size(trains%lead)), t
+
+    leads = trains%lead
+    leads(trains%train(wanted)) = wanted
+    call trains%choose_leads(constraints, leads)
+    call trains%steepness(constraints, largest, body)
+    t = maxloc(largest, dim=1)
+    if (t == 0) return
+    if (largest(t) > steepest) call raise(error, exit_input, quoted(body_names(trains%lead(t))%text) // &
+                                          ' cannot be independent: ' // quoted(body_names(body(t))%text) // &
+                                          ' turns more than 1e150 times as fast')
+  end subroutine lead_by
+
+  !> Whether the core gives the trains that are not to be free.
+  logical function is_solvable(relations, elimination, is_barred)
+    type(train_relations_t), intent(in) :: relations
+    type(elimination_t), intent(in) :: elimination
+    logical, intent(in) :: is_barred(:)
+    real(wp), allocatable :: rows(:, :)
+    integer, allocatable :: dependent(:)
+    integer :: i, pivots(size(elimination%core)), rank
+
+    is_solvable = .true.
+    if (size(elimination%core) == 0) return
+    dependent = pack([(i, i=1, size(elimination%core_trains))], .not. is_barred(elimination%core_trains))
+    is_solvable = .false.
+    if (size(dependent) /= size(elimination%core)) return
+    allocate (rows, source=paced_rows(relations%between, elimination%core, elimination%core_trains))
+    call pivoted_rank(rows(:, dependent), ratio_tolerance, rank, pivots)
+    is_solvable = rank == size(dependent)
+  end function is_solvable
+
+  subroutine raise_related(body_names, independent, error)
+    type(string_t), intent(in) :: body_names(:)
+    integer, intent(in) :: independent(:)
+    type(error_t), allocatable, intent(inout) :: error
+
+    call raise(error, exit_input, joined(selected(body_names, independent), ', ', most_names) // &
+               ' cannot be independent: the constraints relate their speeds')
+  end subroutine raise_related
+
+  function count_message(bodies, named, freedoms) result(text)
+    type(string_t), intent(in) :: bodies(:), named(:)
+    integer, intent(in) :: freedoms
+    character(len=:), allocatable :: text
+
+    if (size(bodies) == 1) then
+      text = 'must name ' // joined(bodies, ', ') // ' once: no gear joins it to another body'
+    else
+      text = 'must name exactly ' // to_text(freedoms) // ' of the bodies ' // joined(bodies, ', ', most_names) // &
+             ', which are geared together'
+    end if
+    if (size(named) == 0) then
+      text = text // '; it names none of them'
+    else
+      text = text // '; it names ' // joined(named, ', ', most_names)
+    end if
+  end function count_message
+
+end module nocdyn_coordinate_choice

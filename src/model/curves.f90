@@ -1,0 +1,200 @@
+!> Functions given by points: piecewise linear, or piecewise cubic without overshoot.
+!>
+!> The cubic takes its slopes from F. N. Fritsch, J. Butland, SIAM J. Sci. Stat. Comput. 5 (1984) 300-304: between points
+!> it is monotone wherever the points are, by the criterion of F. N. Fritsch, R. E. Carlson, SIAM J. Numer. Anal. 17 (1980)
+!> 238-246. At the ends it takes their three-point formula, limited likewise, as PCHIM of SLATEC and SciPy do.
+module nocdyn_curves
+  use nocdyn_kinds, only: wp
+  implicit none (type, external)
+  private
+
+  public :: new_curve
+
+  integer, parameter, public :: interpolation_linear = 1, interpolation_cubic = 2
+  integer, parameter, public :: extrapolation_linear = 1     !! the end slope goes on
+  integer, parameter, public :: extrapolation_constant = 2   !! the end value holds
+
+  !> Segment s lies between points s and s + 1; segment 0 before the first point, the last one behind the last point. The
+  !> formula of a segment may be evaluated anywhere.
+  type, public :: curve_t
+    real(wp), allocatable, private :: knot(:)            !! ascending, at least 2
+    real(wp), allocatable, private :: origin(:)          !! where the polynomial of each segment begins, [0:points]
+    real(wp), allocatable, private :: coefficient(:, :)  !! of the powers of x - origin, [0:3, 0:points]
+    real(wp), allocatable, private :: area(:)            !! integral from the first point to the origin, [0:points]
+  contains
+    procedure :: segment
+    procedure :: margin
+    procedure :: room_above
+    procedure :: value
+    procedure :: slope
+    procedure :: curvature
+    procedure :: integral
+  end type curve_t
+
+contains
+
+  function new_curve(x, y, interpolation, extrapolation) result(self)
+    real(wp), intent(in) :: x(:)             !! ascending, at least 2
+    real(wp), intent(in) :: y(:)
+    integer, intent(in) :: interpolation     !! interpolation_...
+    integer, intent(in) :: extrapolation     !! extrapolation_...
+    type(curve_t) :: self
+    real(wp) :: h(size(x) - 1), secant(size(x) - 1), slope(size(x))
+    integer :: i, n
+
+    n = size(x)
+    if (n < 2) error stop 'nocdyn_curves: a curve has at least two points'
+    h = x(2:) - x(:n - 1)
+    if (any(h <= 0)) error stop 'nocdyn_curves: the points of a curve ascend'
+    secant = (y(2:) - y(:n - 1)) / h
+    allocate (self%knot, source=x)
+    allocate (self%origin(0:n), self%area(0:n), self%coefficient(0:3, 0:n), source=0.0_wp)
+    self%origin(:) = [x(1), x]
+    self%coefficient(0, :) = [y(1), y]
+    self%coefficient(1, 1:n - 1) = secant
+    slope = [secant, secant(n - 1)]
+    if (interpolation == interpolation_cubic .and. n > 2) then
+      slope = monotone_slopes(h, secant)
+      do i = 1, n - 1
+        self%coefficient(1, i) = slope(i)
+        self%coefficient(2, i) = (3.0_wp * secant(i) - 2.0_wp * slope(i) - slope(i + 1)) / h(i)
+        self%coefficient(3, i) = (slope(i) + slope(i + 1) - 2.0_wp * secant(i)) / h(i)**2
+      end do
+    end if
+    if (extrapolation == extrapolation_linear) self%coefficient(1, [0, n]) = slope([1, n])
+    do i = 1, n - 1
+      self%area(i + 1) = self%integral(i, x(i + 1))
+    end do
+  end function new_curve
+
+  !> Slopes at the points: weighted harmonic means of the secants beside them, 0 at extremes.
+  pure function monotone_slopes(h, secant) result(slope)
+    real(wp), intent(in) :: h(:), secant(:)   !! [points - 1], at least 2
+    real(wp) :: slope(size(h) + 1)
+    real(wp) :: after, before
+    integer :: i, n
+
+    n = size(h)
+    slope(1) = end_slope(h(1), h(2), secant(1), secant(2))
+    slope(n + 1) = end_slope(h(n), h(n - 1), secant(n), secant(n - 1))
+    do i = 2, n
+      slope(i) = 0.0_wp
+      if (have_same_sign(secant(i - 1), secant(i))) then
+        before = 2.0_wp * h(i) + h(i - 1)
+        after = h(i) + 2.0_wp * h(i - 1)
+        slope(i) = (before + after) / (before / secant(i - 1) + after / secant(i))
+      end if
+    end do
+  end function monotone_slopes
+
+  !> The slope at an end of the parabola through three points, limited so that the curve keeps the shape of the points.
+  pure function end_slope(h, next_h, secant, next_secant) result(slope)
+    real(wp), intent(in) :: h, next_h, secant, next_secant   !! from the end inwards
+    real(wp) :: slope
+
+    slope = ((2.0_wp * h + next_h) * secant - h * next_secant) / (h + next_h)
+    if (.not. have_same_sign(slope, secant)) then
+      slope = 0.0_wp
+    else if (.not. have_same_sign(secant, next_secant) .and. abs(slope) > 3.0_wp * abs(secant)) then
+      slope = 3.0_wp * secant
+    end if
+  end function end_slope
+
+  !> Zero has no sign.
+  pure logical function have_same_sign(a, b)
+    real(wp), intent(in) :: a, b
+
+    have_same_sign = (a > 0 .and. b > 0) .or. (a < 0 .and. b < 0)
+  end function have_same_sign
+
+  !> The segment in which x lies.
+  pure integer function segment(self, x)
+    class(curve_t), intent(in) :: self
+    real(wp), intent(in) :: x
+    integer :: last, middle
+
+    segment = 0
+    last = size(self%knot)
+    do while (segment < last)
+      middle = (segment + last + 1) / 2
+      if (x >= self%knot(middle)) then
+        segment = middle
+      else
+        last = middle - 1
+      end if
+    end do
+  end function segment
+
+  !> How far x is inside a segment whose ends are moved outwards, in units of x.
+  pure function margin(self, segment, x, width)
+    class(curve_t), intent(in) :: self
+    integer, intent(in) :: segment
+    real(wp), intent(in) :: x
+    real(wp), intent(in) :: width   !! by which the ends are moved, relative to the largest point
+    real(wp) :: margin
+
+    margin = self%room_above(segment, x)
+    if (segment > 0) margin = min(margin, x - self%knot(segment))
+    margin = margin + width * max(abs(self%knot(1)), abs(self%knot(size(self%knot))))
+  end function margin
+
+  !> How far x is below the upper end of a segment.
+  pure function room_above(self, segment, x) result(room)
+    class(curve_t), intent(in) :: self
+    integer, intent(in) :: segment
+    real(wp), intent(in) :: x
+    real(wp) :: room
+
+    room = huge(room)
+    if (segment < size(self%knot)) room = self%knot(segment + 1) - x
+  end function room_above
+
+  pure function value(self, segment, x)
+    class(curve_t), intent(in) :: self
+    integer, intent(in) :: segment
+    real(wp), intent(in) :: x
+    real(wp) :: d, value
+
+    d = x - self%origin(segment)
+    associate (c => self%coefficient(:, segment))
+      value = c(1) + d * (c(2) + d * (c(3) + d * c(4)))
+    end associate
+  end function value
+
+  pure function slope(self, segment, x)
+    class(curve_t), intent(in) :: self
+    integer, intent(in) :: segment
+    real(wp), intent(in) :: x
+    real(wp) :: d, slope
+
+    d = x - self%origin(segment)
+    associate (c => self%coefficient(:, segment))
+      slope = c(2) + d * (2.0_wp * c(3) + d * 3.0_wp * c(4))
+    end associate
+  end function slope
+
+  pure function curvature(self, segment, x)
+    class(curve_t), intent(in) :: self
+    integer, intent(in) :: segment
+    real(wp), intent(in) :: x
+    real(wp) :: curvature
+
+    associate (c => self%coefficient(:, segment))
+      curvature = 2.0_wp * c(3) + (x - self%origin(segment)) * 6.0_wp * c(4)
+    end associate
+  end function curvature
+
+  !> The integral from the first point to x.
+  pure function integral(self, segment, x)
+    class(curve_t), intent(in) :: self
+    integer, intent(in) :: segment   !! in which x lies
+    real(wp), intent(in) :: x
+    real(wp) :: d, integral
+
+    d = x - self%origin(segment)
+    associate (c => self%coefficient(:, segment))
+      integral = self%area(segment) + d * (c(1) + d * (c(2) / 2.0_wp + d * (c(3) / 3.0_wp + d * c(4) / 4.0_wp)))
+    end associate
+  end function integral
+
+end module nocdyn_curves

@@ -1,0 +1,198 @@
+!> Direct-current motors with an inductance: torque k i, inductance i' = y voltage - resistance i - k omega, i = 0 at the start.
+module nocdyn_dc_motors
+  use nocdyn_bank, only: bank_t, quantity_t, role_motor
+  use nocdyn_elements, only: elements_t
+  use nocdyn_governors, only: governor_t
+  use nocdyn_kinds, only: wp
+  use nocdyn_text, only: string_t
+  implicit none (type, external)
+  private
+
+  public :: new_dc_motors
+
+  !> The inner states of a motor are its armature current i and, where a governor throttles the voltage, its integral.
+  type, extends(bank_t), public :: dc_motors_t
+    real(wp), allocatable :: voltage(:, :)         !! [V], shape [lanes, motors] as all parameters
+    real(wp), allocatable :: resistance(:, :)      !! [Ohm]
+    real(wp), allocatable :: flux_constant(:, :)   !! k [V s/rad]
+    real(wp), allocatable :: inductance(:, :)      !! [H], positive
+    type(governor_t), allocatable :: governor
+  contains
+    procedure :: start_inner
+    procedure :: evaluate_inner
+    procedure :: differentiate
+    procedure :: inner_name
+    procedure :: choose
+    procedure :: margin
+    procedure :: switch_name
+    procedure :: quantities
+    procedure :: observe
+  end type dc_motors_t
+
+contains
+
+  !> A bank of motors, each on one body.
+  function new_dc_motors(names, body, voltage, resistance, flux_constant, inductance, governor) result(bank)
+    type(string_t), intent(in) :: names(:)
+    integer, intent(in) :: body(:)
+    real(wp), intent(in) :: voltage(:, :), resistance(:, :), flux_constant(:, :), inductance(:, :)   !! [lanes, motors]
+    type(governor_t), intent(in), optional :: governor   !! absent: no motor has one
+    type(dc_motors_t) :: bank
+    integer :: e
+
+    bank%is_polynomial = .false.
+    bank%is_of_paper = .false.
+    bank%inner = 1
+    if (present(governor)) bank%inner = 2
+    call bank%connect(role_motor, size(voltage, 1), names, [(0, e=1, size(body))], body)
+    allocate (bank%voltage, source=voltage)
+    allocate (bank%resistance, source=resistance)
+    allocate (bank%flux_constant, source=flux_constant)
+    allocate (bank%inductance, source=inductance)
+    if (.not. present(governor)) return
+    allocate (bank%governor, source=governor)
+    call bank%let_switch([(e, e=1, size(body))])
+  end function new_dc_motors
+
+  subroutine start_inner(self, speed, inner)
+    class(dc_motors_t), intent(in) :: self
+    real(wp), intent(in) :: speed(self%values)
+    real(wp), intent(inout) :: inner(self%inner_values)
+    integer :: e, l
+
+    inner = 0.0_wp
+    if (.not. allocated(self%governor)) return
+    do e = 1, size(self%to)
+      do l = 1, self%lanes
+        inner(self%lanes * (2 * e - 1) + l) = self%governor%start_integral(l, e, speed(self%lanes * (e - 1) + l))
+      end do
+    end do
+  end subroutine start_inner
+
+  subroutine evaluate_inner(self, speed, inner, working, rate)
+    class(dc_motors_t), intent(in) :: self
+    real(wp), intent(in) :: speed(self%values)
+    real(wp), intent(in) :: inner(self%inner_values)
+    real(wp), intent(inout) :: working(self%values)
+    real(wp), intent(inout) :: rate(self%inner_values)
+    real(wp) :: throttle
+    integer :: current, e, i, l
+
+    throttle = 1.0_wp
+    i = 0
+    do e = 1, size(self%to)
+      do l = 1, self%lanes
+        i = i + 1
+        current = self%lanes * self%inner * (e - 1) + l
+        if (allocated(self%governor)) then
+          associate (integral => current + self%lanes)
+            throttle = self%governor%throttle(l, e, self%branch(l, e), inner(integral), speed(i))
+            rate(integral) = (throttle - inner(integral)) / self%governor%time(l, e)
+          end associate
+        end if
+        working(i) = working(i) + self%flux_constant(l, e) * inner(current)
+        rate(current) = (throttle * self%voltage(l, e) - self%resistance(l, e) * inner(current) &
+                         - self%flux_constant(l, e) * speed(i)) / self%inductance(l, e)
+      end do
+    end do
+  end subroutine evaluate_inner
+
+  subroutine differentiate(self, elements)
+    class(dc_motors_t), intent(in) :: self
+    type(elements_t), intent(inout) :: elements
+    real(wp) :: by_integral, by_speed
+    integer :: e, l, s
+
+    do e = 1, size(self%to)
+      s = self%first_inner + self%inner * (e - 1)
+      do l = 1, self%lanes
+        associate (inner => elements%inner, inductance => self%inductance(l, e))
+          inner%working(l, s) = self%flux_constant(l, e)
+          inner%rate_speed(l, s) = -self%flux_constant(l, e) / inductance
+          inner%rate_inner(l, 1, s) = -self%resistance(l, e) / inductance
+          if (.not. allocated(self%governor)) cycle
+          by_integral = self%governor%throttle_integral(self%branch(l, e))
+          by_speed = -self%governor%gain(l, e) * by_integral
+          inner%rate_speed(l, s) = inner%rate_speed(l, s) + by_speed * self%voltage(l, e) / inductance
+          inner%rate_inner(l, 2, s) = by_integral * self%voltage(l, e) / inductance
+          inner%working(l, s + 1) = 0.0_wp
+          inner%rate_speed(l, s + 1) = by_speed / self%governor%time(l, e)
+          inner%rate_inner(l, 1, s + 1) = 0.0_wp
+          inner%rate_inner(l, 2, s + 1) = (by_integral - 1.0_wp) / self%governor%time(l, e)
+        end associate
+      end do
+    end do
+  end subroutine differentiate
+
+  function inner_name(self, index) result(name)
+    class(dc_motors_t), intent(in) :: self
+    integer, intent(in) :: index
+    character(len=:), allocatable :: name
+
+    name = 'armature current'
+    if (index == 2) name = 'governor integral'
+  end function inner_name
+
+  subroutine choose(self, switch, lane, t, angle, speed, inner)
+    class(dc_motors_t), intent(inout) :: self
+    integer, intent(in) :: switch, lane
+    real(wp), intent(in) :: t, angle, speed
+    real(wp), intent(in) :: inner(:)
+
+    self%branch(lane, switch) = self%governor%branch(lane, switch, inner(2), speed)
+  end subroutine choose
+
+  pure function margin(self, switch, lane, t, angle, speed, inner)
+    class(dc_motors_t), intent(in) :: self
+    integer, intent(in) :: switch, lane
+    real(wp), intent(in) :: t, angle, speed
+    real(wp), intent(in) :: inner(:)
+    real(wp) :: margin
+
+    margin = self%governor%margin(lane, switch, self%branch(lane, switch), inner(2), speed)
+  end function margin
+
+  function switch_name(self, switch) result(name)
+    class(dc_motors_t), intent(in) :: self
+    integer, intent(in) :: switch
+    character(len=:), allocatable :: name
+
+    name = 'limit of the governor'
+  end function switch_name
+
+  !> Torque, current and, with a governor, throttle.
+  function quantities(self) result(columns)
+    class(dc_motors_t), intent(in) :: self
+    type(quantity_t), allocatable :: columns(:)
+    integer :: e
+
+    allocate (columns(1 + self%inner))
+    columns(1) = quantity_t('torque', 'N m', [(e, e=1, size(self%to))])
+    columns(2) = quantity_t('current', 'A', [(e, e=1, size(self%to))])
+    if (allocated(self%governor)) columns(3) = quantity_t('throttle', '1', [(e, e=1, size(self%to))])
+  end function quantities
+
+  pure subroutine observe(self, elements, quantity, lane, values)
+    class(dc_motors_t), intent(in) :: self
+    type(elements_t), intent(in) :: elements
+    integer, intent(in) :: quantity
+    integer, intent(in) :: lane
+    real(wp), intent(out) :: values(:)
+    integer :: e
+
+    do e = 1, size(self%to)
+      associate (speed => elements%speed(lane, self%first + e - 1), &
+                 inner => elements%inner%value(lane, self%first_inner + self%inner * (e - 1):))
+        select case (quantity)
+        case (1)
+          values(e) = elements%working(lane, self%first + e - 1)
+        case (2)
+          values(e) = inner(1)
+        case default
+          values(e) = self%governor%throttle(lane, e, self%branch(lane, e), inner(2), speed)
+        end select
+      end associate
+    end do
+  end subroutine observe
+
+end module nocdyn_dc_motors

@@ -1,0 +1,238 @@
+!> Couplings with backlash: no moment in a gap, contact beyond its edges.
+!>
+!> In contact the elastic moment M is that of the penetration of the edge, and the damping moment is d u', limited to the size
+!> of M: contact never pulls, and its moment begins at zero. It is the law of `ElastoBacklash` of the Modelica Standard
+!> Library. What the limited damping does is work; while the bodies separate faster than the contact can follow, it is the
+!> opposite of the elastic moment, and takes the energy that the contact still stores.
+module nocdyn_gap_couplings
+  use nocdyn_bank, only: border_width
+  use nocdyn_elements, only: elements_t
+  use nocdyn_kinds, only: wp
+  use nocdyn_polynomial_couplings, only: elastic_curvature, elastic_energy, elastic_moment, elastic_slope, &
+                                         new_polynomial_couplings, polynomial_couplings_t
+  use nocdyn_polynomial_laws, only: polynomial_laws_t
+  use nocdyn_text, only: string_t
+  implicit none (type, external)
+  private
+
+  public :: new_gap_couplings
+
+  type, extends(polynomial_couplings_t), public :: gap_couplings_t
+    real(wp), allocatable :: gap(:, :)      !! total play [rad], positive, shape [lanes, couplings] as all that follow
+    real(wp), allocatable :: border(:, :)   !! by which borders are moved, as moment [N m]
+    real(wp), allocatable :: scale(:, :)    !! stiffness that makes a moment of a penetration [N m/rad]
+  contains
+    procedure :: polynomials
+    procedure :: evaluate
+    procedure :: differentiate
+    procedure :: assess
+    procedure :: choose
+    procedure :: margin
+    procedure :: switch_name
+  end type gap_couplings_t
+
+  ! the branches; negative ones are at the edge -gap / 2
+  integer, parameter :: free = 0
+  integer, parameter :: contact = 1      ! damping of d u'
+  integer, parameter :: closing = 2      ! it would be larger than the elastic moment, and is equal to it
+  integer, parameter :: separating = 3   ! the contact would pull; it has no moment
+
+contains
+
+  function new_gap_couplings(names, from, to, coefficient, damping, rest_twist, gap, friction, friction_speed) result(bank)
+    type(string_t), intent(in) :: names(:)
+    integer, intent(in) :: from(:), to(:)              !! bodies, 0 = ground
+    real(wp), intent(in) :: coefficient(:, :, :)       !! p_k [N m/rad^k], shape [order, lanes, couplings], some not zero
+    real(wp), intent(in) :: damping(:, :)              !! in contact [N m s/rad], shape [lanes, couplings] as all that follow
+    real(wp), intent(in) :: rest_twist(:, :)           !! at the middle of the gap [rad]
+    real(wp), intent(in) :: gap(:, :)                  !! total play [rad], positive
+    real(wp), intent(in), optional :: friction(:, :), friction_speed(:, :)   !! [N m], [rad/s]; absent: none
+    type(gap_couplings_t) :: bank
+    integer :: e, k, l
+
+    bank%polynomial_couplings_t = new_polynomial_couplings(names, from, to, coefficient, damping, rest_twist, &
+                                                           friction, friction_speed)
+    allocate (bank%gap, source=gap)
+    allocate (bank%border, bank%scale, source=0.0_wp * gap)
+    do e = 1, size(to)
+      do l = 1, size(gap, 1)
+        bank%scale(l, e) = sum([(abs(coefficient(k, l, e)) * gap(l, e)**(k - 1), k=1, size(coefficient, 1))])
+      end do
+    end do
+    if (any(bank%gap <= 0) .or. any(bank%scale <= 0)) error stop 'nocdyn_gap_couplings: gaps have widths and edges stiffness'
+    bank%border = border_width * bank%scale * bank%gap
+    call bank%let_switch([(e, e=1, size(to))])
+  end function new_gap_couplings
+
+  !> Nothing is polynomial across an edge.
+  subroutine polynomials(self, laws)
+    class(gap_couplings_t), intent(in) :: self
+    type(polynomial_laws_t), intent(inout) :: laws
+  end subroutine polynomials
+
+  !> Penetration of the edge at which a lane is, negative at the lower one.
+  pure function penetration(self, branch, lane, coupling, angle) result(x)
+    class(gap_couplings_t), intent(in) :: self
+    integer, intent(in) :: branch, lane, coupling
+    real(wp), intent(in) :: angle
+    real(wp) :: x
+
+    x = (angle - self%rest_twist(lane, coupling)) - sign(0.5_wp * self%gap(lane, coupling), real(branch, wp))
+  end function penetration
+
+  subroutine evaluate(self, time, angle, speed, restoring, working)
+    class(gap_couplings_t), intent(in) :: self
+    real(wp), intent(in) :: time(self%lanes), angle(self%values), speed(self%values)
+    real(wp), intent(inout) :: restoring(self%values), working(self%values)
+    real(wp) :: moment
+    integer :: e, i, l
+
+    i = 0
+    do e = 1, size(self%to)
+      do l = 1, self%lanes
+        i = i + 1
+        associate (branch => self%branch(l, e))
+          if (branch == free) cycle
+          moment = elastic_moment(self%coefficient(:, l, e), penetration(self, branch, l, e, angle(i)))
+          restoring(i) = restoring(i) - moment
+          working(i) = working(i) - damping_moment(branch, moment, self%damping(l, e) * speed(i))
+        end associate
+      end do
+    end do
+    call self%couplings_t%evaluate(time, angle, speed, restoring, working)
+  end subroutine evaluate
+
+  pure function damping_moment(branch, elastic, viscous) result(moment)
+    integer, intent(in) :: branch
+    real(wp), intent(in) :: elastic, viscous   !! M, d u'
+    real(wp) :: moment
+
+    select case (abs(branch))
+    case (contact)
+      moment = viscous
+    case (closing)
+      moment = elastic
+    case default
+      moment = -elastic
+    end select
+  end function damping_moment
+
+  subroutine differentiate(self, elements)
+    class(gap_couplings_t), intent(in) :: self
+    type(elements_t), intent(inout) :: elements
+    real(wp) :: stiffness, x
+    integer :: e, i, l
+
+    do e = 1, size(self%to)
+      i = self%first + e - 1
+      do l = 1, self%lanes
+        associate (branch => self%branch(l, e), curvature => elements%restoring_curvature(l, i))
+          if (branch == free) cycle
+          x = penetration(self, branch, l, e, elements%angle(l, i))
+          stiffness = elastic_slope(self%coefficient(:, l, e), x)
+          elements%restoring_angle(l, i) = elements%restoring_angle(l, i) - stiffness
+          curvature = curvature - elastic_curvature(self%coefficient(:, l, e), x)
+          elements%working_angle(l, i) = elements%working_angle(l, i) - damping_moment(branch, stiffness, 0.0_wp)
+          elements%working_speed(l, i) = elements%working_speed(l, i) - damping_moment(branch, 0.0_wp, self%damping(l, e))
+        end associate
+      end do
+    end do
+    call self%couplings_t%differentiate(elements)
+  end subroutine differentiate
+
+  subroutine assess(self, elements)
+    class(gap_couplings_t), intent(in) :: self
+    type(elements_t), intent(inout) :: elements
+    real(wp) :: x
+    integer :: e, i, l
+
+    do e = 1, size(self%to)
+      i = self%first + e - 1
+      do l = 1, self%lanes
+        associate (branch => self%branch(l, e))
+          if (branch == free) cycle
+          x = penetration(self, branch, l, e, elements%angle(l, i))
+          elements%stored(l, i) = elements%stored(l, i) + elastic_energy(self%coefficient(:, l, e), x)
+          elements%secant(l, i) = elements%secant(l, i) &
+                                  + elastic_moment(self%coefficient(:, l, e), x) / (elements%angle(l, i) - self%rest_twist(l, e))
+          if (abs(branch) == contact) elements%damping(l, i) = elements%damping(l, i) + self%damping(l, e)
+        end associate
+      end do
+    end do
+  end subroutine assess
+
+  !> The elastic and the viscous moment, both positive where they push.
+  pure subroutine contact_moments(self, side, lane, coupling, angle, speed, depth, elastic, viscous)
+    class(gap_couplings_t), intent(in) :: self
+    integer, intent(in) :: side             !! 1 or -1
+    integer, intent(in) :: lane, coupling
+    real(wp), intent(in) :: angle, speed
+    real(wp), intent(out) :: depth          !! of the penetration [rad]
+    real(wp), intent(out) :: elastic, viscous
+    real(wp) :: x
+
+    x = penetration(self, side, lane, coupling, angle)
+    depth = side * x
+    elastic = side * elastic_moment(self%coefficient(:, lane, coupling), x)
+    viscous = side * self%damping(lane, coupling) * speed
+  end subroutine contact_moments
+
+  subroutine choose(self, switch, lane, t, angle, speed, inner)
+    class(gap_couplings_t), intent(inout) :: self
+    integer, intent(in) :: switch, lane
+    real(wp), intent(in) :: t, angle, speed
+    real(wp), intent(in) :: inner(:)
+    real(wp) :: depth, elastic, viscous
+    integer :: side
+
+    side = merge(1, -1, angle > self%rest_twist(lane, switch))
+    call contact_moments(self, side, lane, switch, angle, speed, depth, elastic, viscous)
+    associate (branch => self%branch(lane, switch))
+      if (depth <= 0) then
+        branch = free
+      else if (elastic + min(viscous, 0.0_wp) < 0) then
+        branch = side * separating
+      else if (viscous > elastic) then
+        branch = side * closing
+      else
+        branch = side * contact
+      end if
+    end associate
+  end subroutine choose
+
+  pure function margin(self, switch, lane, t, angle, speed, inner)
+    class(gap_couplings_t), intent(in) :: self
+    integer, intent(in) :: switch, lane
+    real(wp), intent(in) :: t, angle, speed
+    real(wp), intent(in) :: inner(:)
+    real(wp) :: margin
+    real(wp) :: depth, elastic, viscous
+    integer :: side
+
+    associate (branch => self%branch(lane, switch), gap => self%gap(lane, switch))
+      side = sign(1, branch)
+      call contact_moments(self, side, lane, switch, angle, speed, depth, elastic, viscous)
+      depth = depth * self%scale(lane, switch)
+      select case (abs(branch))
+      case (free)
+        margin = self%scale(lane, switch) * (0.5_wp * gap - abs(angle - self%rest_twist(lane, switch)))
+      case (contact)
+        margin = min(depth, elastic - abs(viscous))
+      case (closing)
+        margin = min(depth, elastic, viscous - elastic)
+      case default
+        margin = min(depth, -(elastic + min(viscous, 0.0_wp)))
+      end select
+    end associate
+    margin = margin + self%border(lane, switch)
+  end function margin
+
+  function switch_name(self, switch) result(name)
+    class(gap_couplings_t), intent(in) :: self
+    integer, intent(in) :: switch
+    character(len=:), allocatable :: name
+
+    name = 'edge of the gap'
+  end function switch_name
+
+end module nocdyn_gap_couplings

@@ -1,0 +1,98 @@
+!> PI governors: the throttle y = clip(z + gain (set_speed - omega)) between 0 and 1, z' = (y - z) / time.
+!>
+!> Between its limits z' = gain (set_speed - omega) / time, the integral of a PI controller. At a limit z goes to the limit
+!> instead of away from it; a governor that stops integrating there would have to slide along the limit while it leaves it.
+!> (K. J. Astrom, T. Hagglund, PID Controllers, 2nd ed. 1995, section 3.5: tracking with the integral time.)
+module nocdyn_governors
+  use nocdyn_bank, only: border_width
+  use nocdyn_kinds, only: wp
+  implicit none (type, external)
+  private
+
+  !> The governors of the motors of a bank, shape [lanes, motors].
+  type, public :: governor_t
+    real(wp), allocatable :: set_speed(:, :)   !! [rad/s]
+    real(wp), allocatable :: gain(:, :)        !! [s/rad], not zero
+    real(wp), allocatable :: time(:, :)        !! integral time [s], positive
+    real(wp), allocatable :: start(:, :)       !! throttle at the start, 0 to 1
+  contains
+    procedure :: start_integral
+    procedure :: throttle
+    procedure :: throttle_integral
+    procedure :: branch
+    procedure :: margin
+  end type governor_t
+
+  integer, parameter :: closed = -1, governing = 0, open = 1   ! the branches
+
+contains
+
+  !> z with which the throttle has its value at the start.
+  pure function start_integral(self, lane, motor, speed) result(z)
+    class(governor_t), intent(in) :: self
+    integer, intent(in) :: lane, motor
+    real(wp), intent(in) :: speed
+    real(wp) :: z
+
+    z = self%start(lane, motor) - self%gain(lane, motor) * (self%set_speed(lane, motor) - speed)
+  end function start_integral
+
+  pure function throttle(self, lane, motor, branch, z, speed) result(y)
+    class(governor_t), intent(in) :: self
+    integer, intent(in) :: lane, motor, branch
+    real(wp), intent(in) :: z, speed
+    real(wp) :: y
+
+    select case (branch)
+    case (governing)
+      y = z + self%gain(lane, motor) * (self%set_speed(lane, motor) - speed)
+    case (open)
+      y = 1.0_wp
+    case default
+      y = 0.0_wp
+    end select
+  end function throttle
+
+  !> Derivative of the throttle by z; that by the speed is -gain times as large.
+  pure function throttle_integral(self, branch) result(slope)
+    class(governor_t), intent(in) :: self
+    integer, intent(in) :: branch
+    real(wp) :: slope
+
+    slope = merge(1.0_wp, 0.0_wp, branch == governing)
+  end function throttle_integral
+
+  !> The branch in which the throttle is.
+  pure integer function branch(self, lane, motor, z, speed)
+    class(governor_t), intent(in) :: self
+    integer, intent(in) :: lane, motor
+    real(wp), intent(in) :: z, speed
+
+    branch = governing
+    associate (y => self%throttle(lane, motor, governing, z, speed))
+      if (y < 0) branch = closed
+      if (y > 1) branch = open
+    end associate
+  end function branch
+
+  !> How far the throttle is inside a branch.
+  pure function margin(self, lane, motor, branch, z, speed)
+    class(governor_t), intent(in) :: self
+    integer, intent(in) :: lane, motor, branch
+    real(wp), intent(in) :: z, speed
+    real(wp) :: margin
+
+    associate (y => self%throttle(lane, motor, governing, z, speed))
+      select case (branch)
+      case (governing)
+        margin = min(y, 1.0_wp - y)
+      case (open)
+        margin = y - 1.0_wp
+      case default
+        margin = -y
+      end select
+    end associate
+    margin = margin + border_width
+  end function margin
+
+end module nocdyn_governors

@@ -1,0 +1,75 @@
+!> Loads that resist with c omega + quadratic |omega| omega + constant tanh(omega / constant_speed): fans and propellers, Coulomb
+!> friction made smooth.
+module nocdyn_nonlinear_loads
+  use nocdyn_elements, only: elements_t
+  use nocdyn_kinds, only: wp
+  use nocdyn_loads, only: loads_t, new_loads
+  use nocdyn_text, only: string_t
+  use nocdyn_vector_functions, only: tanh_of
+  implicit none (type, external)
+  private
+
+  public :: new_nonlinear_loads
+
+  type, extends(loads_t), public :: nonlinear_loads_t
+    real(wp), allocatable :: quadratic(:, :)        !! [N m s2/rad2], shape [lanes, loads] as all parameters
+    real(wp), allocatable :: constant(:, :)         !! [N m]
+    real(wp), allocatable :: constant_speed(:, :)   !! [rad/s], positive
+  contains
+    procedure :: evaluate
+    procedure :: differentiate
+  end type nonlinear_loads_t
+
+contains
+
+  !> A bank of loads, each on one body.
+  function new_nonlinear_loads(names, body, viscous, quadratic, constant, constant_speed) result(bank)
+    type(string_t), intent(in) :: names(:)
+    integer, intent(in) :: body(:)
+    real(wp), intent(in) :: viscous(:, :), quadratic(:, :), constant(:, :), constant_speed(:, :)   !! [lanes, loads]
+    type(nonlinear_loads_t) :: bank
+
+    bank%loads_t = new_loads(names, body, viscous)
+    bank%is_polynomial = .false.
+    bank%is_of_paper = .false.
+    allocate (bank%quadratic, source=quadratic)
+    allocate (bank%constant, source=constant)
+    allocate (bank%constant_speed, source=constant_speed)
+  end function new_nonlinear_loads
+
+  subroutine evaluate(self, time, angle, speed, restoring, working)
+    class(nonlinear_loads_t), intent(in) :: self
+    real(wp), intent(in) :: time(self%lanes), angle(self%values), speed(self%values)
+    real(wp), intent(inout) :: restoring(self%values), working(self%values)
+
+    call resist(self%values, self%quadratic, self%constant, self%constant_speed, speed, working)
+  end subroutine evaluate
+
+  pure subroutine resist(n, quadratic, constant, constant_speed, speed, working)
+    integer, intent(in) :: n
+    real(wp), intent(in) :: quadratic(n), constant(n), constant_speed(n), speed(n)
+    real(wp), intent(inout) :: working(n)
+    integer :: i
+
+    do i = 1, n
+      working(i) = working(i) - (quadratic(i) * abs(speed(i)) * speed(i) + constant(i) * tanh_of(speed(i) / constant_speed(i)))
+    end do
+  end subroutine resist
+
+  subroutine differentiate(self, elements)
+    class(nonlinear_loads_t), intent(in) :: self
+    type(elements_t), intent(inout) :: elements
+    integer :: e, l
+
+    do e = 1, size(self%to)
+      do l = 1, self%lanes
+        associate (slope => elements%working_speed(l, self%first + e - 1), speed => elements%speed(l, self%first + e - 1), &
+                   constant_speed => self%constant_speed(l, e))
+          slope = slope - (2.0_wp * self%quadratic(l, e) * abs(speed) &
+                           + self%constant(l, e) / constant_speed * (1.0_wp - tanh_of(speed / constant_speed)**2))
+        end associate
+      end do
+    end do
+  end subroutine differentiate
+
+end module nocdyn_nonlinear_loads

@@ -1,0 +1,155 @@
+!> Couplings whose elastic moment is a polynomial of any order of the twist.
+module nocdyn_polynomial_couplings
+  use nocdyn_couplings, only: couplings_t, new_couplings
+  use nocdyn_elements, only: elements_t
+  use nocdyn_kinds, only: wp
+  use nocdyn_text, only: string_t
+  implicit none (type, external)
+  private
+
+  public :: new_polynomial_couplings, elastic_coefficients, add_terms
+  public :: elastic_moment, elastic_slope, elastic_curvature, elastic_energy
+
+  !> M_el = -(p_1 w + p_2 w^2 + ...) on the second body, w = u - rest_twist; eqs. (2), (3) are p_1 and p_3.
+  type, extends(couplings_t), public :: polynomial_couplings_t
+    integer :: order = 1
+    real(wp), allocatable :: coefficient(:, :, :)   !! p_k [N m/rad^k], shape [order, lanes, couplings]
+  contains
+    procedure :: evaluate
+    procedure :: differentiate
+    procedure :: assess
+  end type polynomial_couplings_t
+
+contains
+
+  function new_polynomial_couplings(names, from, to, coefficient, damping, rest_twist, friction, friction_speed) result(bank)
+    type(string_t), intent(in) :: names(:)
+    integer, intent(in) :: from(:), to(:)              !! bodies, 0 = ground
+    real(wp), intent(in) :: coefficient(:, :, :)       !! p_k [N m/rad^k], shape [order, lanes, couplings]
+    real(wp), intent(in) :: damping(:, :)              !! [N m s/rad], shape [lanes, couplings] as all that follow
+    real(wp), intent(in) :: rest_twist(:, :)           !! [rad]
+    real(wp), intent(in), optional :: friction(:, :), friction_speed(:, :)   !! [N m], [rad/s]; absent: none
+    type(polynomial_couplings_t) :: bank
+    integer :: e
+
+    bank%couplings_t = new_couplings(names, from, to, 0.0_wp * damping, 0.0_wp * damping, damping, rest_twist, &
+                                     friction, friction_speed)
+    bank%is_polynomial = .false.
+    bank%is_of_paper = .false.
+    bank%order = size(coefficient, 1)
+    allocate (bank%coefficient, source=coefficient)
+    bank%elastic = pack([(e, e=1, size(to))], [(any(abs(coefficient(:, :, e)) > 0.0_wp), e=1, size(to))])
+  end function new_polynomial_couplings
+
+  !> p_1, p_2, ... of stiffnesses and further terms, of order 3 at least.
+  pure function elastic_coefficients(stiffness, cubic_stiffness, further) result(coefficient)
+    real(wp), intent(in) :: stiffness, cubic_stiffness   !! [N m/rad], [N m/rad3]
+    real(wp), intent(in) :: further(:)                   !! [N m/rad^k]
+    real(wp) :: coefficient(max(3, size(further)))
+
+    coefficient = 0.0_wp
+    coefficient(:size(further)) = further
+    coefficient(1) = coefficient(1) + stiffness
+    coefficient(3) = coefficient(3) + cubic_stiffness
+  end function elastic_coefficients
+
+  subroutine evaluate(self, time, angle, speed, restoring, working)
+    class(polynomial_couplings_t), intent(in) :: self
+    real(wp), intent(in) :: time(self%lanes), angle(self%values), speed(self%values)
+    real(wp), intent(inout) :: restoring(self%values), working(self%values)
+
+    call add_terms(self%values, self%order, self%coefficient, self%rest_twist, angle, restoring)
+    call self%couplings_t%evaluate(time, angle, speed, restoring, working)
+  end subroutine evaluate
+
+  pure subroutine add_terms(n, order, coefficient, rest, angle, restoring)
+    integer, intent(in) :: n, order
+    real(wp), intent(in) :: coefficient(order, n), rest(n), angle(n)
+    real(wp), intent(inout) :: restoring(n)
+    integer :: i
+
+    do i = 1, n
+      restoring(i) = restoring(i) - elastic_moment(coefficient(:, i), angle(i) - rest(i))
+    end do
+  end subroutine add_terms
+
+  subroutine differentiate(self, elements)
+    class(polynomial_couplings_t), intent(in) :: self
+    type(elements_t), intent(inout) :: elements
+    real(wp) :: w
+    integer :: e, i, l
+
+    do e = 1, size(self%to)
+      i = self%first + e - 1
+      do l = 1, self%lanes
+        w = elements%angle(l, i) - self%rest_twist(l, e)
+        elements%restoring_angle(l, i) = elements%restoring_angle(l, i) - elastic_slope(self%coefficient(:, l, e), w)
+        elements%restoring_curvature(l, i) = elements%restoring_curvature(l, i) - elastic_curvature(self%coefficient(:, l, e), w)
+      end do
+    end do
+    call self%couplings_t%differentiate(elements)
+  end subroutine differentiate
+
+  subroutine assess(self, elements)
+    class(polynomial_couplings_t), intent(in) :: self
+    type(elements_t), intent(inout) :: elements
+    real(wp) :: w
+    integer :: e, i, l
+
+    do e = 1, size(self%to)
+      i = self%first + e - 1
+      do l = 1, self%lanes
+        w = elements%angle(l, i) - self%rest_twist(l, e)
+        elements%stored(l, i) = elements%stored(l, i) + elastic_energy(self%coefficient(:, l, e), w)
+        elements%secant(l, i) = elements%secant(l, i) + self%coefficient(1, l, e) + elastic_moment(self%coefficient(2:, l, e), w)
+      end do
+    end do
+  end subroutine assess
+
+  !> p_1 w + p_2 w^2 + ...
+  pure function elastic_moment(p, w) result(moment)
+    real(wp), intent(in) :: p(:), w
+    real(wp) :: moment
+    integer :: k
+
+    moment = 0.0_wp
+    do k = size(p), 1, -1
+      moment = (moment + p(k)) * w
+    end do
+  end function elastic_moment
+
+  pure function elastic_slope(p, w) result(slope)
+    real(wp), intent(in) :: p(:), w
+    real(wp) :: slope
+    integer :: k
+
+    slope = 0.0_wp
+    do k = size(p), 1, -1
+      slope = slope * w + k * p(k)
+    end do
+  end function elastic_slope
+
+  pure function elastic_curvature(p, w) result(curvature)
+    real(wp), intent(in) :: p(:), w
+    real(wp) :: curvature
+    integer :: k
+
+    curvature = 0.0_wp
+    do k = size(p), 2, -1
+      curvature = curvature * w + k * (k - 1) * p(k)
+    end do
+  end function elastic_curvature
+
+  pure function elastic_energy(p, w) result(energy)
+    real(wp), intent(in) :: p(:), w
+    real(wp) :: energy
+    integer :: k
+
+    energy = 0.0_wp
+    do k = size(p), 1, -1
+      energy = (energy + p(k) / (k + 1)) * w
+    end do
+    energy = energy * w
+  end function elastic_energy
+
+end module nocdyn_polynomial_couplings

@@ -1,0 +1,117 @@
+!> Couplings whose elastic moment cannot exceed a limit: S tanh(K1 w / S) with w = u - rest_twist.
+module nocdyn_saturated_couplings
+  use nocdyn_couplings, only: couplings_t, new_couplings
+  use nocdyn_elements, only: elements_t
+  use nocdyn_kinds, only: wp
+  use nocdyn_text, only: string_t
+  use nocdyn_vector_functions, only: tanh_of
+  implicit none (type, external)
+  private
+
+  public :: new_saturated_couplings
+
+  type, extends(couplings_t), public :: saturated_couplings_t
+    real(wp), allocatable :: initial_stiffness(:, :)   !! K1 [N m/rad], positive, shape [lanes, couplings] as all parameters
+    real(wp), allocatable :: saturation(:, :)          !! S [N m], positive
+  contains
+    procedure :: evaluate
+    procedure :: differentiate
+    procedure :: assess
+  end type saturated_couplings_t
+
+contains
+
+  function new_saturated_couplings(names, from, to, stiffness, saturation, damping, rest_twist, friction, friction_speed) &
+    result(bank)
+    type(string_t), intent(in) :: names(:)
+    integer, intent(in) :: from(:), to(:)              !! bodies, 0 = ground
+    real(wp), intent(in) :: stiffness(:, :)            !! [N m/rad], positive, shape [lanes, couplings] as all parameters
+    real(wp), intent(in) :: saturation(:, :)           !! [N m], positive
+    real(wp), intent(in) :: damping(:, :)              !! [N m s/rad]
+    real(wp), intent(in) :: rest_twist(:, :)           !! [rad]
+    real(wp), intent(in), optional :: friction(:, :), friction_speed(:, :)   !! [N m], [rad/s]; absent: none
+    type(saturated_couplings_t) :: bank
+    integer :: e
+
+    bank%couplings_t = new_couplings(names, from, to, 0.0_wp * stiffness, 0.0_wp * stiffness, damping, rest_twist, &
+                                     friction, friction_speed)
+    bank%is_polynomial = .false.
+    bank%is_of_paper = .false.
+    allocate (bank%initial_stiffness, source=stiffness)
+    allocate (bank%saturation, source=saturation)
+    bank%elastic = [(e, e=1, size(to))]
+  end function new_saturated_couplings
+
+  subroutine evaluate(self, time, angle, speed, restoring, working)
+    class(saturated_couplings_t), intent(in) :: self
+    real(wp), intent(in) :: time(self%lanes), angle(self%values), speed(self%values)
+    real(wp), intent(inout) :: restoring(self%values), working(self%values)
+
+    call add_moments(self%values, self%initial_stiffness, self%saturation, self%rest_twist, angle, restoring)
+    call self%couplings_t%evaluate(time, angle, speed, restoring, working)
+  end subroutine evaluate
+
+  pure subroutine add_moments(n, stiffness, saturation, rest, angle, restoring)
+    integer, intent(in) :: n
+    real(wp), intent(in) :: stiffness(n), saturation(n), rest(n), angle(n)
+    real(wp), intent(inout) :: restoring(n)
+    integer :: i
+
+    do i = 1, n
+      restoring(i) = restoring(i) - saturation(i) * tanh_of(stiffness(i) * (angle(i) - rest(i)) / saturation(i))
+    end do
+  end subroutine add_moments
+
+  subroutine differentiate(self, elements)
+    class(saturated_couplings_t), intent(in) :: self
+    type(elements_t), intent(inout) :: elements
+    real(wp) :: part, tangent
+    integer :: e, i, l
+
+    do e = 1, size(self%to)
+      i = self%first + e - 1
+      do l = 1, self%lanes
+        associate (stiffness => self%initial_stiffness(l, e), saturation => self%saturation(l, e), &
+                   curvature => elements%restoring_curvature(l, i))
+          part = tanh_of(stiffness * (elements%angle(l, i) - self%rest_twist(l, e)) / saturation)
+          tangent = stiffness * (1.0_wp - part**2)
+          elements%restoring_angle(l, i) = elements%restoring_angle(l, i) - tangent
+          curvature = curvature + 2.0_wp * part * tangent * stiffness / saturation
+        end associate
+      end do
+    end do
+    call self%couplings_t%differentiate(elements)
+  end subroutine differentiate
+
+  !> The energy S^2 / K1 ln cosh(K1 w / S).
+  subroutine assess(self, elements)
+    class(saturated_couplings_t), intent(in) :: self
+    type(elements_t), intent(inout) :: elements
+    real(wp) :: w, x
+    integer :: e, i, l
+
+    do e = 1, size(self%to)
+      i = self%first + e - 1
+      do l = 1, self%lanes
+        associate (stiffness => self%initial_stiffness(l, e), saturation => self%saturation(l, e))
+          w = elements%angle(l, i) - self%rest_twist(l, e)
+          x = abs(stiffness * w / saturation)
+          elements%stored(l, i) = elements%stored(l, i) + saturation**2 / stiffness * log_cosh(x)
+          if (x > 0) elements%secant(l, i) = elements%secant(l, i) + saturation * tanh_of(x) / abs(w)
+        end associate
+      end do
+    end do
+  end subroutine assess
+
+  !> ln cosh x for x >= 0, where it would lose digits by its series x^2 / 2 - x^4 / 12 + x^6 / 45.
+  pure real(wp) function log_cosh(x)
+    real(wp), intent(in) :: x
+
+    if (x < 0.01_wp) then
+      log_cosh = x**2 * (0.5_wp + x**2 * (-1.0_wp / 12.0_wp + x**2 * (1.0_wp / 45.0_wp - x**2 * 17.0_wp / 2520.0_wp)))
+    else
+      log_cosh = x + log(0.5_wp * (1.0_wp + exp(-2.0_wp * x)))
+    end if
+  end function log_cosh
+
+end module nocdyn_saturated_couplings

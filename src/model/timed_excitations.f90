@@ -1,0 +1,166 @@
+!> Excitations that begin and end: steps, ramps and half-sine pulses.
+module nocdyn_timed_excitations
+  use nocdyn_bank, only: bank_t, role_excitation, time_reached
+  use nocdyn_elements, only: elements_t
+  use nocdyn_kinds, only: wp
+  use nocdyn_text, only: string_t
+  use nocdyn_vector_functions, only: cosines, sine_of
+  implicit none (type, external)
+  private
+
+  public :: new_timed_excitations
+
+  integer, parameter, public :: shape_step = 1    !! 0, then the amplitude
+  integer, parameter, public :: shape_ramp = 2    !! linear from 0 to the amplitude, which then holds
+  integer, parameter, public :: shape_pulse = 3   !! half a sine with the amplitude, then 0 again
+
+  type, extends(bank_t), public :: timed_excitations_t
+    integer, allocatable :: shape(:)           !! shape_... of each
+    real(wp), allocatable :: amplitude(:, :)   !! [N m], shape [lanes, excitations] as all that follow
+    real(wp), allocatable :: begin(:, :)       !! [s]
+    real(wp), allocatable :: duration(:, :)    !! [s], positive; of no meaning for steps
+  contains
+    procedure :: evaluate
+    procedure :: differentiate
+    procedure :: choose
+    procedure :: margin
+    procedure :: switch_name
+  end type timed_excitations_t
+
+  integer, parameter :: before = 0, during = 1, after = 2   ! the branches
+  real(wp), parameter :: pi = acos(-1.0_wp)
+
+contains
+
+  !> A bank of excitations, each on one body.
+  function new_timed_excitations(names, body, shape, amplitude, begin, duration) result(bank)
+    type(string_t), intent(in) :: names(:)
+    integer, intent(in) :: body(:)
+    integer, intent(in) :: shape(:)   !! shape_... of each
+    real(wp), intent(in) :: amplitude(:, :), begin(:, :), duration(:, :)   !! [lanes, excitations]
+    type(timed_excitations_t) :: bank
+    integer :: e
+
+    bank%is_polynomial = .false.
+    bank%is_of_paper = .false.
+    call bank%connect(role_excitation, size(amplitude, 1), names, [(0, e=1, size(body))], body)
+    allocate (bank%shape, source=shape)
+    allocate (bank%amplitude, source=amplitude)
+    allocate (bank%begin, source=begin)
+    allocate (bank%duration, source=duration)
+    call bank%let_switch([(e, e=1, size(body))])
+  end function new_timed_excitations
+
+  subroutine evaluate(self, time, angle, speed, restoring, working)
+    class(timed_excitations_t), intent(in) :: self
+    real(wp), intent(in) :: time(self%lanes), angle(self%values), speed(self%values)
+    real(wp), intent(inout) :: restoring(self%values), working(self%values)
+    integer :: e, i, l
+
+    i = 0
+    do e = 1, size(self%to)
+      do l = 1, self%lanes
+        i = i + 1
+        working(i) = working(i) + self%amplitude(l, e) * part_of_amplitude(self, l, e, time(l))
+      end do
+    end do
+  end subroutine evaluate
+
+  pure function part_of_amplitude(self, lane, excitation, time) result(part)
+    class(timed_excitations_t), intent(in) :: self
+    integer, intent(in) :: lane, excitation
+    real(wp), intent(in) :: time
+    real(wp) :: part
+
+    select case (self%branch(lane, excitation))
+    case (before)
+      part = 0.0_wp
+    case (during)
+      part = (time - self%begin(lane, excitation)) / self%duration(lane, excitation)
+      if (self%shape(excitation) == shape_pulse) part = sine_of(pi * part)
+    case default
+      part = merge(0.0_wp, 1.0_wp, self%shape(excitation) == shape_pulse)
+    end select
+  end function part_of_amplitude
+
+  subroutine differentiate(self, elements)
+    class(timed_excitations_t), intent(in) :: self
+    type(elements_t), intent(inout) :: elements
+    real(wp) :: wave(1)
+    integer :: e, l
+
+    do e = 1, size(self%to)
+      do l = 1, self%lanes
+        if (self%branch(l, e) /= during) cycle
+        wave(1) = 1.0_wp
+        if (self%shape(e) == shape_pulse) then
+          wave(1) = pi * (elements%time(l) - self%begin(l, e)) / self%duration(l, e)
+          call cosines(1, wave)
+          wave(1) = pi * wave(1)
+        end if
+        associate (slope => elements%working_time(l, self%first + e - 1))
+          slope = slope + self%amplitude(l, e) * wave(1) / self%duration(l, e)
+        end associate
+      end do
+    end do
+  end subroutine differentiate
+
+  !> When the change ends.
+  pure function end_of_change(self, lane, excitation) result(time)
+    class(timed_excitations_t), intent(in) :: self
+    integer, intent(in) :: lane, excitation
+    real(wp) :: time
+
+    time = self%begin(lane, excitation)
+    if (self%shape(excitation) /= shape_step) time = time + self%duration(lane, excitation)
+  end function end_of_change
+
+  subroutine choose(self, switch, lane, t, angle, speed, inner)
+    class(timed_excitations_t), intent(inout) :: self
+    integer, intent(in) :: switch, lane
+    real(wp), intent(in) :: t, angle, speed
+    real(wp), intent(in) :: inner(:)
+
+    if (time_reached(t) < self%begin(lane, switch)) then
+      self%branch(lane, switch) = before
+    else if (time_reached(t) < end_of_change(self, lane, switch)) then
+      self%branch(lane, switch) = during
+    else
+      self%branch(lane, switch) = after
+    end if
+  end subroutine choose
+
+  !> In seconds; a lane that has passed a border does not come back.
+  pure function margin(self, switch, lane, t, angle, speed, inner)
+    class(timed_excitations_t), intent(in) :: self
+    integer, intent(in) :: switch, lane
+    real(wp), intent(in) :: t, angle, speed
+    real(wp), intent(in) :: inner(:)
+    real(wp) :: margin
+
+    select case (self%branch(lane, switch))
+    case (before)
+      margin = self%begin(lane, switch) - t
+    case (during)
+      margin = end_of_change(self, lane, switch) - t
+    case default
+      margin = huge(margin)
+    end select
+  end function margin
+
+  function switch_name(self, switch) result(name)
+    class(timed_excitations_t), intent(in) :: self
+    integer, intent(in) :: switch
+    character(len=:), allocatable :: name
+
+    select case (self%shape(self%switching(switch)))
+    case (shape_step)
+      name = 'step'
+    case (shape_ramp)
+      name = 'end of the ramp'
+    case default
+      name = 'end of the pulse'
+    end select
+  end function switch_name
+
+end module nocdyn_timed_excitations

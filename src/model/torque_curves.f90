@@ -1,0 +1,170 @@
+!> Torques of motors over their speed.
+module nocdyn_torque_curves
+  use nocdyn_bank, only: border_width
+  use nocdyn_curves, only: curve_t
+  use nocdyn_kinds, only: wp
+  implicit none (type, external)
+  private
+
+  !> The curves of the motors of a bank.
+  type, abstract, public :: torque_curve_t
+  contains
+    procedure(torque_interface), deferred :: torque   !! [N m]
+    procedure(torque_interface), deferred :: slope    !! by the speed [N m s/rad]
+    procedure :: has_segments
+    procedure :: segment
+    procedure :: margin
+  end type torque_curve_t
+
+  abstract interface
+    pure function torque_interface(self, lane, motor, segment, speed) result(value)
+      import :: torque_curve_t, wp
+      class(torque_curve_t), intent(in) :: self
+      integer, intent(in) :: lane, motor
+      integer, intent(in) :: segment   !! of a curve that has some
+      real(wp), intent(in) :: speed    !! [rad/s]
+      real(wp) :: value
+    end function torque_interface
+  end interface
+
+  !> Eq. (20): A - B omega - C omega^2.
+  type, extends(torque_curve_t), public :: quadratic_curve_t
+    real(wp), allocatable :: a(:, :), b(:, :), c(:, :)   !! [N m], [N m s/rad], [N m s2/rad2]; shape [lanes, motors]
+  contains
+    procedure :: torque => quadratic_torque
+    procedure :: slope => quadratic_slope
+  end type quadratic_curve_t
+
+  !> Kloss: 2 T_k / (s / s_k + s_k / s) with the slip s = 1 - omega / synchronous_speed, as 2 T_k s s_k / (s^2 + s_k^2).
+  type, extends(torque_curve_t), public :: induction_curve_t
+    real(wp), allocatable :: breakdown_torque(:, :)    !! T_k [N m], shape [lanes, motors]
+    real(wp), allocatable :: breakdown_slip(:, :)      !! s_k, positive
+    real(wp), allocatable :: synchronous_speed(:, :)   !! [rad/s], not zero
+  contains
+    procedure :: torque => induction_torque
+    procedure :: slope => induction_slope
+  end type induction_curve_t
+
+  type, extends(torque_curve_t), public :: table_curve_t
+    type(curve_t), allocatable :: curve(:, :)   !! [N m] over [rad/s], shape [lanes, motors]
+  contains
+    procedure :: torque => table_torque
+    procedure :: slope => table_slope
+    procedure :: has_segments => table_has_segments
+    procedure :: segment => table_segment
+    procedure :: margin => table_margin
+  end type table_curve_t
+
+contains
+
+  !> Whether the formulas of the curves change from segment to segment.
+  pure logical function has_segments(self)
+    class(torque_curve_t), intent(in) :: self
+
+    has_segments = .false.
+  end function has_segments
+
+  !> The segment in which a speed is.
+  pure integer function segment(self, lane, motor, speed)
+    class(torque_curve_t), intent(in) :: self
+    integer, intent(in) :: lane, motor
+    real(wp), intent(in) :: speed
+
+    segment = 0
+  end function segment
+
+  !> How far a speed is inside a segment.
+  pure function margin(self, lane, motor, segment, speed)
+    class(torque_curve_t), intent(in) :: self
+    integer, intent(in) :: lane, motor, segment
+    real(wp), intent(in) :: speed
+    real(wp) :: margin
+
+    margin = huge(margin)
+  end function margin
+
+  pure function quadratic_torque(self, lane, motor, segment, speed) result(value)
+    class(quadratic_curve_t), intent(in) :: self
+    integer, intent(in) :: lane, motor, segment
+    real(wp), intent(in) :: speed
+    real(wp) :: value
+
+    value = self%a(lane, motor) - (self%b(lane, motor) + self%c(lane, motor) * speed) * speed
+  end function quadratic_torque
+
+  pure function quadratic_slope(self, lane, motor, segment, speed) result(value)
+    class(quadratic_curve_t), intent(in) :: self
+    integer, intent(in) :: lane, motor, segment
+    real(wp), intent(in) :: speed
+    real(wp) :: value
+
+    value = -(self%b(lane, motor) + 2.0_wp * self%c(lane, motor) * speed)
+  end function quadratic_slope
+
+  pure function induction_torque(self, lane, motor, segment, speed) result(value)
+    class(induction_curve_t), intent(in) :: self
+    integer, intent(in) :: lane, motor, segment
+    real(wp), intent(in) :: speed
+    real(wp) :: slip, value
+
+    slip = 1.0_wp - speed / self%synchronous_speed(lane, motor)
+    associate (s_k => self%breakdown_slip(lane, motor))
+      value = 2.0_wp * self%breakdown_torque(lane, motor) * slip * s_k / (slip**2 + s_k**2)
+    end associate
+  end function induction_torque
+
+  pure function induction_slope(self, lane, motor, segment, speed) result(value)
+    class(induction_curve_t), intent(in) :: self
+    integer, intent(in) :: lane, motor, segment
+    real(wp), intent(in) :: speed
+    real(wp) :: slip, value
+
+    slip = 1.0_wp - speed / self%synchronous_speed(lane, motor)
+    associate (s_k => self%breakdown_slip(lane, motor))
+      value = -2.0_wp * self%breakdown_torque(lane, motor) * s_k * (s_k**2 - slip**2) / (slip**2 + s_k**2)**2 &
+              / self%synchronous_speed(lane, motor)
+    end associate
+  end function induction_slope
+
+  pure function table_torque(self, lane, motor, segment, speed) result(value)
+    class(table_curve_t), intent(in) :: self
+    integer, intent(in) :: lane, motor, segment
+    real(wp), intent(in) :: speed
+    real(wp) :: value
+
+    value = self%curve(lane, motor)%value(segment, speed)
+  end function table_torque
+
+  pure function table_slope(self, lane, motor, segment, speed) result(value)
+    class(table_curve_t), intent(in) :: self
+    integer, intent(in) :: lane, motor, segment
+    real(wp), intent(in) :: speed
+    real(wp) :: value
+
+    value = self%curve(lane, motor)%slope(segment, speed)
+  end function table_slope
+
+  pure logical function table_has_segments(self)
+    class(table_curve_t), intent(in) :: self
+
+    table_has_segments = .true.
+  end function table_has_segments
+
+  pure integer function table_segment(self, lane, motor, speed)
+    class(table_curve_t), intent(in) :: self
+    integer, intent(in) :: lane, motor
+    real(wp), intent(in) :: speed
+
+    table_segment = self%curve(lane, motor)%segment(speed)
+  end function table_segment
+
+  pure function table_margin(self, lane, motor, segment, speed) result(margin)
+    class(table_curve_t), intent(in) :: self
+    integer, intent(in) :: lane, motor, segment
+    real(wp), intent(in) :: speed
+    real(wp) :: margin
+
+    margin = self%curve(lane, motor)%margin(segment, speed, border_width)
+  end function table_margin
+
+end module nocdyn_torque_curves

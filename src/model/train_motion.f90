@@ -1,0 +1,110 @@
+!> How the rigid trains of one group move, and how the relations between them are loaded: eqs. (73)-(82) for trains.
+!>
+!> L_lambda^ext of the trains is block triangular: relations that peel give one train each, by a division; the core is
+!> inverted by LAPACK. Speeds follow from the core outwards; multipliers, by the transposed equations, towards the core.
+module nocdyn_train_motion
+  use nocdyn_complement, only: natural_complement
+  use nocdyn_kinds, only: wp
+  use nocdyn_train_relations, only: train_relations_t
+  implicit none (type, external)
+  private
+
+  public :: find_motion, find_loads
+
+  !> Which train each relation of a group gives. Relations that are redundant have no part in it.
+  type, public :: elimination_t
+    integer, allocatable :: free(:)          !! trains whose leads are the coordinates, in their order
+    integer, allocatable :: relation(:)      !! relations that give one train each, none of which is in a later one
+    integer, allocatable :: train(:)         !! that train
+    integer, allocatable :: core(:)          !! relations that are solved together
+    integer, allocatable :: core_trains(:)   !! all trains in them
+  end type elimination_t
+
+  !> The motion of the trains of a group in one lane.
+  type, public :: train_motion_t
+    real(wp), allocatable :: motion(:, :)         !! L_tau of the leads, [trains of the group, free]
+    real(wp), allocatable :: dual(:, :)           !! D of the core, [core_trains, core]
+    real(wp) :: log_determinant = 0.0_wp          !! of |L_lambda^ext| of the trains
+  end type train_motion_t
+
+contains
+
+  !> L_tau of the trains, eq. (81).
+  subroutine find_motion(relations, elimination, place, trains, lane, found)
+    type(train_relations_t), intent(in) :: relations
+    type(elimination_t), intent(in) :: elimination
+    integer, intent(in) :: place(:)    !! of every train in its group
+    integer, intent(in) :: trains      !! in this group
+    integer, intent(in) :: lane
+    type(train_motion_t), intent(out) :: found
+    integer :: entry, i, k
+    real(wp) :: own
+
+    allocate (found%motion(trains, size(elimination%free)), source=0.0_wp)
+    do k = 1, size(elimination%free)
+      found%motion(place(elimination%free(k)), k) = 1.0_wp
+    end do
+    call move_core(relations, elimination, place, lane, found)
+    do i = size(elimination%relation), 1, -1
+      associate (relation => elimination%relation(i), train => elimination%train(i), between => relations%between)
+        own = relations%split(lane, relation, train)
+        found%log_determinant = found%log_determinant + log(abs(own))
+        do entry = between%first(relation), between%first(relation + 1) - 1
+          if (between%body(entry) == train) cycle
+          found%motion(place(train), :) = found%motion(place(train), :) &
+                                          - between%coefficient(lane, entry) / own * found%motion(place(between%body(entry)), :)
+        end do
+      end associate
+    end do
+  end subroutine find_motion
+
+  !> The natural complement of the core.
+  subroutine move_core(relations, elimination, place, lane, found)
+    type(train_relations_t), intent(in) :: relations
+    type(elimination_t), intent(in) :: elimination
+    integer, intent(in) :: place(:), lane
+    type(train_motion_t), intent(inout) :: found
+    real(wp), allocatable :: complement(:, :)
+    integer :: column(size(elimination%free)), k
+    logical :: is_singular
+
+    if (size(elimination%core) == 0) then
+      allocate (found%dual(0, 0))
+      return
+    end if
+    column = [(findloc(elimination%core_trains, elimination%free(k), dim=1), k=1, size(column))]
+    call natural_complement(relations%between%block(lane, elimination%core, elimination%core_trains), &
+                            pack(column, column > 0), complement, found%dual, found%log_determinant, is_singular)
+    if (is_singular) error stop 'nocdyn_train_motion: the constraints must have been analysed'
+    found%motion(place(elimination%core_trains), pack([(k, k=1, size(column))], column > 0)) = complement
+  end subroutine move_core
+
+  !> The multipliers of relations that balance moments on the trains; moments on the free trains are what is left over.
+  pure subroutine find_loads(relations, elimination, dual, lane, moment, lambda)
+    type(train_relations_t), intent(in) :: relations
+    type(elimination_t), intent(in) :: elimination
+    real(wp), intent(in) :: dual(:, :)
+    integer, intent(in) :: lane
+    real(wp), intent(inout) :: moment(:)   !! [all trains]; those of the relations that peel are taken off
+    real(wp), intent(inout) :: lambda(:)   !! [all relations], those of the elimination are set
+    integer :: entry, i, k
+
+    associate (between => relations%between)
+      do i = 1, size(elimination%relation)
+        associate (relation => elimination%relation(i))
+          lambda(relation) = moment(elimination%train(i)) / relations%split(lane, relation, elimination%train(i))
+          do entry = between%first(relation), between%first(relation + 1) - 1
+            moment(between%body(entry)) = moment(between%body(entry)) - between%coefficient(lane, entry) * lambda(relation)
+          end do
+        end associate
+      end do
+    end associate
+    do i = 1, size(elimination%core)
+      lambda(elimination%core(i)) = 0.0_wp
+      do k = 1, size(elimination%core_trains)
+        lambda(elimination%core(i)) = lambda(elimination%core(i)) + dual(k, i) * moment(elimination%core_trains(k))
+      end do
+    end do
+  end subroutine find_loads
+
+end module nocdyn_train_motion

@@ -1,0 +1,358 @@
+!> Rows that are not between two bodies, as relations between the speeds of rigid trains.
+!>
+!> A relation with a train that no other one has gives the speed of that train from the others. Relations are taken away
+!> one by one in this manner; those that are left, the core, are solved together by dense linear algebra.
+module nocdyn_train_relations
+  use nocdyn_constraints, only: constraints_t, new_constraints
+  use nocdyn_kinds, only: wp
+  use nocdyn_rigid_trains, only: ratio_tolerance, rigid_trains_t
+  use nocdyn_text, only: selected
+  implicit none (type, external)
+  private
+
+  public :: new_relations, paced_rows, distinct_trains
+
+  type, public :: train_relations_t
+    integer, allocatable :: row(:)     !! of the constraints, of each relation
+    type(constraints_t) :: between     !! the relations; its bodies are the trains, and it has zeros where terms cancel
+  contains
+    procedure :: peel
+    procedure :: split
+    procedure :: loaded_rows
+  end type train_relations_t
+
+  !> Relations in the order in which they are taken away: train(i) is in relation(i) and in none behind it.
+  type, public :: peeling_t
+    integer, allocatable :: relation(:), train(:)
+    integer, allocatable :: core(:)    !! relations that are left, ascending
+  end type peeling_t
+
+  real(wp), parameter :: weakest = 1.0e-3_wp   ! share of a relation's largest coefficient that may be divided by
+
+contains
+
+  !> The relations of a machine on all lanes.
+  function new_relations(constraints, trains) result(self)
+    type(constraints_t), intent(in) :: constraints
+    type(rigid_trains_t), intent(in) :: trains
+    type(train_relations_t) :: self
+    integer, allocatable :: first(:), train(:), entry_of(:)
+    integer :: lane, r
+    real(wp), allocatable :: coefficient(:, :)
+
+    allocate (self%row, source=pack([(r, r=1, constraints%rows())], [(constraints%entries(r) /= 2, r=1, constraints%rows())]))
+    call gather_trains(constraints, trains, self%row, first, train, entry_of)
+    allocate (coefficient(size(constraints%coefficient, 1), size(train)))
+    do lane = 1, size(coefficient, 1)
+      coefficient(lane, :) = summed(constraints, self%row, entry_of, trains%ratios(constraints, lane), lane, size(train))
+    end do
+    self%between = new_constraints(size(trains%lead), selected(constraints%names, self%row), &
+                                   selected(constraints%units, self%row), first, train, coefficient)
+  end function new_relations
+
+  !> The trains of each relation once, and where the entries of the rows are added.
+  subroutine gather_trains(constraints, trains, rows, first, train, entry_of)
+    type(constraints_t), intent(in) :: constraints
+    type(rigid_trains_t), intent(in) :: trains
+    integer, intent(in) :: rows(:)
+    integer, allocatable, intent(out) :: first(:), train(:)
+    integer, allocatable, intent(out) :: entry_of(:)   !! of each entry of `rows`, one after another
+    integer :: at(size(trains%lead)), entry, i, k, next
+
+    k = sum([(constraints%entries(rows(i)), i=1, size(rows))])
+    allocate (first(size(rows) + 1), train(k), entry_of(k))
+    at = 0
+    k = 0
+    next = 1
+    do i = 1, size(rows)
+      first(i) = next
+      do entry = constraints%first(rows(i)), constraints%first(rows(i) + 1) - 1
+        associate (t => trains%train(constraints%body(entry)))
+          if (at(t) < first(i)) then
+            at(t) = next
+            train(next) = t
+            next = next + 1
+          end if
+          k = k + 1
+          entry_of(k) = at(t)
+        end associate
+      end do
+    end do
+    first(size(first)) = next
+    train = train(:next - 1)
+  end subroutine gather_trains
+
+  !> The coefficients between trains of one lane, 0 where those of the bodies cancel.
+  function summed(constraints, rows, entry_of, ratio, lane, entries) result(coefficient)
+    type(constraints_t), intent(in) :: constraints
+    integer, intent(in) :: rows(:), entry_of(:), lane, entries
+    real(wp), intent(in) :: ratio(:)   !! of each body to its lead
+    real(wp) :: coefficient(entries), bound(entries), term
+    integer :: entry, i, k
+
+    coefficient = 0.0_wp
+    bound = 0.0_wp
+    k = 0
+    do i = 1, size(rows)
+      do entry = constraints%first(rows(i)), constraints%first(rows(i) + 1) - 1
+        k = k + 1
+        term = constraints%coefficient(lane, entry) * ratio(constraints%body(entry))
+        coefficient(entry_of(k)) = coefficient(entry_of(k)) + term
+        bound(entry_of(k)) = bound(entry_of(k)) + abs(term)
+      end do
+    end do
+    where (abs(coefficient) <= ratio_tolerance * bound) coefficient = 0.0_wp
+  end function summed
+
+  !> The coefficient of one train in a relation.
+  pure real(wp) function split(self, lane, relation, train) result(coefficient)
+    class(train_relations_t), intent(in) :: self
+    integer, intent(in) :: lane, relation, train
+    integer :: entry
+
+    do entry = self%between%first(relation), self%between%first(relation + 1) - 1
+      if (self%between%body(entry) == train) coefficient = self%between%coefficient(lane, entry)
+    end do
+  end function split
+
+  !> Takes away what can be, by the coefficients of the first lane.
+  function peel(self, takes_part, is_barred) result(peeling)
+    class(train_relations_t), intent(in) :: self
+    logical, intent(in) :: takes_part(:)   !! [relations]
+    logical, intent(in) :: is_barred(:)    !! trains whose speeds are not to be given by others, [trains]
+    type(peeling_t) :: peeling
+    integer, allocatable :: first(:), of_train(:)
+    integer :: uses(size(is_barred)), waiting(size(takes_part) + size(self%between%body))
+    integer :: entry, i, last, train
+    logical :: is_left(size(takes_part))
+
+    call relations_of_trains(self%between, takes_part, first, of_train)
+    uses = first(2:) - first(:size(uses))
+    is_left = takes_part
+    allocate (peeling%relation(count(takes_part)), peeling%train(count(takes_part)))
+    last = count(takes_part)
+    waiting(:last) = pack([(i, i=1, size(takes_part))], takes_part)
+    peeling%core = waiting(:last)
+    i = 0
+    do entry = 1, size(waiting)
+      if (entry > last) exit
+      associate (relation => waiting(entry))
+        if (.not. is_left(relation)) cycle
+        train = end_of(self%between, relation, uses, is_barred)
+        if (train == 0) cycle
+        i = i + 1
+        peeling%relation(i) = relation
+        peeling%train(i) = train
+        is_left(relation) = .false.
+        call leave(self%between, relation, first, of_train, is_left, uses, waiting, last)
+      end associate
+    end do
+    peeling%relation = peeling%relation(:i)
+    peeling%train = peeling%train(:i)
+    peeling%core = pack(peeling%core, is_left(peeling%core))
+  end function peel
+
+  !> The train that only this relation has, with the largest coefficient; 0 if there is none fit to be divided by.
+  pure integer function end_of(between, relation, uses, is_barred) result(train)
+    type(constraints_t), intent(in) :: between
+    integer, intent(in) :: relation, uses(:)
+    logical, intent(in) :: is_barred(:)
+    real(wp) :: largest
+    integer :: entry
+
+    associate (first => between%first(relation), last => between%first(relation + 1) - 1)
+      largest = weakest * maxval(abs(between%coefficient(1, first:last)))
+      train = 0
+      do entry = first, last
+        if (uses(between%body(entry)) /= 1 .or. is_barred(between%body(entry))) cycle
+        if (abs(between%coefficient(1, entry)) <= largest) cycle
+        largest = abs(between%coefficient(1, entry))
+        train = between%body(entry)
+      end do
+    end associate
+  end function end_of
+
+  !> A relation that is taken away may leave trains that only one other relation has: that one is looked at again.
+  pure subroutine leave(between, relation, first, of_train, is_left, uses, waiting, last)
+    type(constraints_t), intent(in) :: between
+    integer, intent(in) :: relation, first(:), of_train(:)
+    logical, intent(in) :: is_left(:)
+    integer, intent(inout) :: uses(:), waiting(:), last
+    integer :: entry, k
+
+    do entry = between%first(relation), between%first(relation + 1) - 1
+      associate (train => between%body(entry))
+        uses(train) = uses(train) - 1
+        if (uses(train) /= 1) cycle
+        do k = first(train), first(train + 1) - 1
+          if (.not. is_left(of_train(k))) cycle
+          last = last + 1
+          waiting(last) = of_train(k)
+        end do
+      end associate
+    end do
+  end subroutine leave
+
+  !> The relations of each train: of_train(first(t)) to of_train(first(t + 1) - 1).
+  subroutine relations_of_trains(between, takes_part, first, of_train)
+    type(constraints_t), intent(in) :: between
+    logical, intent(in) :: takes_part(:)
+    integer, allocatable, intent(out) :: first(:), of_train(:)
+    integer :: next(between%bodies), entry, r, t
+
+    next = 0
+    do r = 1, size(takes_part)
+      if (.not. takes_part(r)) cycle
+      associate (trains => between%body(between%first(r):between%first(r + 1) - 1))
+        next(trains) = next(trains) + 1
+      end associate
+    end do
+    allocate (first(between%bodies + 1), of_train(sum(next)))
+    first(1) = 1
+    do t = 1, between%bodies
+      first(t + 1) = first(t) + next(t)
+    end do
+    next = first(:between%bodies)
+    do r = 1, size(takes_part)
+      if (.not. takes_part(r)) cycle
+      do entry = between%first(r), between%first(r + 1) - 1
+        t = between%body(entry)
+        of_train(next(t)) = r
+        next(t) = next(t) + 1
+      end do
+    end do
+  end subroutine relations_of_trains
+
+  !> The constraint rows that take part where the relations have these multipliers, ascending: those relations whose
+  !> multiplier is more than rounding, and the rows of trees that they load. In the first lane.
+  function loaded_rows(self, constraints, trains, lambda, lead) result(rows)
+    class(train_relations_t), intent(in) :: self
+    type(constraints_t), intent(in) :: constraints
+    type(rigid_trains_t), intent(in) :: trains
+    real(wp), intent(in) :: lambda(:)   !! [relations]
+    integer, intent(in) :: lead         !! whose moment is not carried further: the lead of a train; 0: none
+    integer, allocatable :: rows(:)
+    integer, allocatable :: taking(:)
+    real(wp), allocatable :: sizes(:)
+    real(wp) :: moment(constraints%bodies)
+    integer :: i, r
+
+    taking = pack([(i, i=1, size(lambda))], abs(lambda) > 0.0_wp)
+    sizes = row_sizes(self%between, taking)
+    associate (weight => abs(lambda(taking)) * sizes)   ! a relation of size 0 says nothing between trains, but in them
+      taking = pack(taking, sizes <= 0.0_wp .or. weight > ratio_tolerance * maxval(weight))
+    end associate
+    moment = 0.0_wp
+    if (lead > 0) moment(lead) = -1.0_wp
+    do i = 1, size(taking)
+      r = self%row(taking(i))
+      associate (first => constraints%first(r), last => constraints%first(r + 1) - 1)
+        moment(constraints%body(first:last)) = moment(constraints%body(first:last)) &
+                                               + lambda(taking(i)) * constraints%coefficient(1, first:last)
+      end associate
+    end do
+    rows = merged(self%row(taking), trains%loaded_rows(constraints, moment))
+  end function loaded_rows
+
+  !> The largest term of each relation where the trains turn at their pace.
+  function row_sizes(between, relations) result(sizes)
+    type(constraints_t), intent(in) :: between
+    integer, intent(in) :: relations(:)
+    real(wp) :: sizes(size(relations))
+    integer, allocatable :: trains(:)
+    real(wp) :: pace(between%bodies)
+    integer :: i
+
+    allocate (trains, source=distinct_trains(between, relations))
+    pace(trains) = paces(between, relations, trains)
+    do i = 1, size(relations)
+      associate (first => between%first(relations(i)), last => between%first(relations(i) + 1) - 1)
+        sizes(i) = maxval(abs(between%coefficient(1, first:last)) * pace(between%body(first:last)))
+      end associate
+    end do
+  end function row_sizes
+
+  !> Two ascending lists without common members as one.
+  pure function merged(a, b) result(list)
+    integer, intent(in) :: a(:), b(:)
+    integer :: list(size(a) + size(b))
+    integer :: i, k
+
+    k = 1
+    do i = 1, size(list)
+      if (k > size(b)) then
+        list(i) = a(i - k + 1)
+      else if (i - k + 1 > size(a)) then
+        list(i) = b(k)
+        k = k + 1
+      else if (a(i - k + 1) < b(k)) then
+        list(i) = a(i - k + 1)
+      else
+        list(i) = b(k)
+        k = k + 1
+      end if
+    end do
+  end function merged
+
+  !> The trains of some relations, ascending.
+  function distinct_trains(between, relations) result(trains)
+    type(constraints_t), intent(in) :: between
+    integer, intent(in) :: relations(:)
+    integer, allocatable :: trains(:)
+    logical :: is_there(between%bodies)
+    integer :: i, t
+
+    is_there = .false.
+    do i = 1, size(relations)
+      is_there(between%body(between%first(relations(i)):between%first(relations(i) + 1) - 1)) = .true.
+    end do
+    trains = pack([(t, t=1, size(is_there))], is_there)
+  end function distinct_trains
+
+  !> Relations of the first lane as rows of unit length between speeds that are measured by the pace of each train, so that
+  !> metres and teeth compare and a large ratio is not taken for a lock.
+  function paced_rows(between, relations, trains) result(matrix)
+    type(constraints_t), intent(in) :: between
+    integer, intent(in) :: relations(:), trains(:)
+    real(wp) :: matrix(size(relations), size(trains))
+    integer :: i
+
+    matrix = between%block(1, relations, trains) * spread(paces(between, relations, trains), 1, size(relations))
+    do i = 1, size(matrix, 1)
+      if (norm2(matrix(i, :)) > 0.0_wp) matrix(i, :) = matrix(i, :) / norm2(matrix(i, :))
+    end do
+  end function paced_rows
+
+  !> Speeds that make the terms of each relation alike, carried from train to train: the measure of what is small.
+  pure function paces(between, relations, trains) result(pace)
+    type(constraints_t), intent(in) :: between
+    integer, intent(in) :: relations(:), trains(:)
+    real(wp) :: pace(size(trains))
+    real(wp) :: known(between%bodies), largest   ! 0: not known yet
+    integer :: entry, i, k, unknown
+
+    known = 0.0_wp
+    do
+      unknown = count(known(trains) <= 0.0_wp)
+      if (unknown == 0) exit
+      k = findloc(known(trains) <= 0.0_wp, .true., dim=1)
+      known(trains(k)) = 1.0_wp
+      do while (count(known(trains) <= 0.0_wp) < unknown)
+        unknown = count(known(trains) <= 0.0_wp)
+        do i = 1, size(relations)
+          associate (first => between%first(relations(i)), last => between%first(relations(i) + 1) - 1)
+            largest = maxval(abs(between%coefficient(1, first:last)) * known(between%body(first:last)))
+            if (largest <= 0.0_wp) cycle
+            do entry = first, last
+              associate (speed => known(between%body(entry)), c => abs(between%coefficient(1, entry)))
+                if (speed <= 0.0_wp .and. c > 0.0_wp) speed = largest / c
+              end associate
+            end do
+          end associate
+        end do
+      end do
+    end do
+    pace = known(trains)
+  end function paces
+
+end module nocdyn_train_relations

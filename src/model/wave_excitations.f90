@@ -1,0 +1,90 @@
+!> Excitations that are sums of sines of the time and of the angle of their body: sum of A sin(f t + order u + phase).
+!>
+!> Engine orders have f = 0. The pulsation of a synchronous motor with p pole pairs during its start, at twice the slip
+!> frequency, has f = 2 omega_mains and the order -2 p.
+module nocdyn_wave_excitations
+  use nocdyn_bank, only: bank_t, role_excitation
+  use nocdyn_elements, only: elements_t
+  use nocdyn_kinds, only: wp
+  use nocdyn_text, only: string_t
+  use nocdyn_vector_functions, only: cosines, sine_of
+  implicit none (type, external)
+  private
+
+  public :: new_wave_excitations
+
+  type, extends(bank_t), public :: wave_excitations_t
+    integer, allocatable :: owner(:)           !! excitation of each term
+    real(wp), allocatable :: amplitude(:, :)   !! A [N m], shape [lanes, terms] as all that follow
+    real(wp), allocatable :: frequency(:, :)   !! f [rad/s]
+    real(wp), allocatable :: order(:, :)
+    real(wp), allocatable :: phase(:, :)       !! [rad]
+  contains
+    procedure :: evaluate
+    procedure :: differentiate
+    procedure :: settle
+  end type wave_excitations_t
+
+contains
+
+  !> A bank of excitations, each on one body.
+  function new_wave_excitations(names, body, owner, amplitude, frequency, order, phase) result(bank)
+    type(string_t), intent(in) :: names(:)
+    integer, intent(in) :: body(:)
+    integer, intent(in) :: owner(:)   !! excitation of each term
+    real(wp), intent(in) :: amplitude(:, :), frequency(:, :), order(:, :), phase(:, :)   !! [lanes, terms]
+    type(wave_excitations_t) :: bank
+    integer :: e
+
+    bank%is_polynomial = .false.
+    bank%is_of_paper = .false.
+    call bank%connect(role_excitation, size(amplitude, 1), names, [(0, e=1, size(body))], body)
+    allocate (bank%owner, source=owner)
+    allocate (bank%amplitude, source=amplitude)
+    allocate (bank%frequency, source=frequency)
+    allocate (bank%order, source=order)
+    allocate (bank%phase, source=phase)
+  end function new_wave_excitations
+
+  subroutine evaluate(self, time, angle, speed, restoring, working)
+    class(wave_excitations_t), intent(in) :: self
+    real(wp), intent(in) :: time(self%lanes), angle(self%values), speed(self%values)
+    real(wp), intent(inout) :: restoring(self%values), working(self%values)
+    integer :: i, k, l
+
+    do k = 1, size(self%owner)
+      do l = 1, self%lanes
+        i = self%lanes * (self%owner(k) - 1) + l
+        working(i) = working(i) + self%amplitude(l, k) * sine_of(self%frequency(l, k) * time(l) + self%order(l, k) * angle(i) &
+                                                                 + self%phase(l, k))
+      end do
+    end do
+  end subroutine evaluate
+
+  subroutine differentiate(self, elements)
+    class(wave_excitations_t), intent(in) :: self
+    type(elements_t), intent(inout) :: elements
+    real(wp) :: wave(1)
+    integer :: i, k, l
+
+    do k = 1, size(self%owner)
+      i = self%first + self%owner(k) - 1
+      do l = 1, self%lanes
+        wave(1) = self%frequency(l, k) * elements%time(l) + self%order(l, k) * elements%angle(l, i) + self%phase(l, k)
+        call cosines(1, wave)
+        wave(1) = self%amplitude(l, k) * wave(1)
+        elements%working_angle(l, i) = elements%working_angle(l, i) + self%order(l, k) * wave(1)
+        elements%working_time(l, i) = elements%working_time(l, i) + self%frequency(l, k) * wave(1)
+      end do
+    end do
+  end subroutine differentiate
+
+  !> The mean of a sine is zero.
+  subroutine settle(self)
+    class(wave_excitations_t), intent(inout) :: self
+
+    self%amplitude = 0.0_wp
+    self%frequency = 0.0_wp
+  end subroutine settle
+
+end module nocdyn_wave_excitations

@@ -1,0 +1,52 @@
+"""Tables in files beside the input."""
+
+import f90nml
+
+MACHINE = """&body name = 'b' inertia = 1.0 /
+&load name = 'l' body = 'b' table_file = 'tables/load.csv' interpolation = 'cubic' /
+&run t_end = 0.1 /
+&output points = 3 /
+"""
+
+
+def write(nocdyn, table):
+    (nocdyn.folder / "in/tables").mkdir(parents=True)
+    (nocdyn.folder / "in/m.nml").write_text(MACHINE)
+    (nocdyn.folder / "in/tables/load.csv").write_bytes(table)
+    return nocdyn.folder / "in/m.nml"
+
+
+def test_the_results_hold_the_values_and_not_the_file(nocdyn):
+    path = write(nocdyn, b"# speed, torque\r\n-1.0, -2.5\r\n0.1, 0.2\r\n1e1, 3\r\n")
+    assert nocdyn("run", path, "--out", "out").returncode == 0
+    load = f90nml.read(nocdyn.folder / "out/input.nml")["load"]
+    assert load["table_speed"] == [-1.0, 0.1, 10.0]
+    assert load["table_torque"] == [-2.5, 0.2, 3.0]
+    assert load["interpolation"] == "cubic"
+    assert "table_file" not in load
+    assert nocdyn("run", "out/input.nml", "--out", "again").returncode == 0
+    assert (nocdyn.folder / "again/input.nml").read_text() == (nocdyn.folder / "out/input.nml").read_text()
+
+
+def test_a_long_table_is_read_back_by_f90nml(nocdyn):
+    rows = [(i / 7, (i * 7919 % 1000) / 3) for i in range(2000)]
+    path = write(nocdyn, "".join(f"{x!r} {y!r}\n" for x, y in rows).encode())
+    assert nocdyn("run", path, "--out", "out").returncode == 0
+    load = f90nml.read(nocdyn.folder / "out/input.nml")["load"]
+    assert list(zip(load["table_speed"], load["table_torque"])) == rows
+
+
+def test_mistakes_in_a_file_are_told_with_its_line(nocdyn):
+    path = write(nocdyn, b"0 1\n1 x\n")
+    outcome = nocdyn("check", path)
+    assert outcome.returncode == 2
+    place = f"nocdyn: {path}:2: &load 'l': table_file: {path.parent}/tables/load.csv"
+    assert outcome.stderr == f"{place}:2: column 2, 'x', is not a number\n"
+
+
+def test_a_missing_file_has_exit_code_3(nocdyn):
+    path = write(nocdyn, b"")
+    (path.parent / "tables/load.csv").unlink()
+    outcome = nocdyn("check", path)
+    assert outcome.returncode == 3
+    assert outcome.stderr.endswith("/in/tables/load.csv: cannot be read: there is no such file\n")

@@ -1,0 +1,173 @@
+!> Machines with elements of every kind.
+module nocdyn_test_full_machines
+  use nocdyn_bank, only: append_bank
+  use nocdyn_curve_motors, only: new_curve_motors
+  use nocdyn_curves, only: curve_t, extrapolation_constant, extrapolation_linear, interpolation_cubic, interpolation_linear, &
+                           new_curve
+  use nocdyn_dc_motors, only: new_dc_motors
+  use nocdyn_gap_couplings, only: new_gap_couplings
+  use nocdyn_governed_motors, only: new_governed_motors
+  use nocdyn_governors, only: governor_t
+  use nocdyn_kinds, only: wp
+  use nocdyn_machine, only: machine_t
+  use nocdyn_nonlinear_loads, only: new_nonlinear_loads
+  use nocdyn_polynomial_couplings, only: new_polynomial_couplings
+  use nocdyn_saturated_couplings, only: new_saturated_couplings
+  use nocdyn_table_couplings, only: new_table_couplings
+  use nocdyn_table_excitations, only: new_table_excitations
+  use nocdyn_table_loads, only: new_table_loads
+  use nocdyn_test_machines, only: finish, numbered_names
+  use nocdyn_test_random_machines, only: random_machine
+  use nocdyn_timed_excitations, only: new_timed_excitations, shape_pulse, shape_ramp, shape_step
+  use nocdyn_torque_curves, only: induction_curve_t, quadratic_curve_t, table_curve_t
+  use nocdyn_wave_excitations, only: new_wave_excitations
+  implicit none (type, external)
+  private
+
+  public :: full_machine
+
+contains
+
+  !> A random machine with further elements of every kind; the numbers of a lane depend on its variant.
+  function full_machine(seed, bodies, variants, wanted, choice) result(machine)
+    integer, intent(in) :: seed
+    integer, intent(in) :: bodies        !! at least 2
+    integer, intent(in) :: variants(:)   !! of each lane
+    integer, intent(in) :: wanted(:)     !! bodies that are to be the coordinates, none to have them found
+    integer, intent(in) :: choice        !! complement_...
+    type(machine_t) :: machine
+
+    machine = random_machine(seed, bodies, variants, wanted, choice)
+    call add_couplings(bodies, variants, machine)
+    call add_motors(bodies, variants, machine)
+    call add_loads(bodies, variants, machine)
+    call add_excitations(bodies, variants, machine)
+    call finish(machine, wanted, choice)
+  end function full_machine
+
+  !> The same number for every element, a little different in every lane.
+  pure function numbers(value, variants, count)
+    real(wp), intent(in) :: value
+    integer, intent(in) :: variants(:), count
+    real(wp) :: numbers(size(variants), count)
+
+    numbers = spread(value * (1.0_wp + 0.03_wp * variants), 2, count)
+  end function numbers
+
+  !> A curve that is a little different in every lane.
+  function curves(x, y, interpolation, extrapolation, variants, count) result(all_curves)
+    real(wp), intent(in) :: x(:), y(:)
+    integer, intent(in) :: interpolation, extrapolation
+    integer, intent(in) :: variants(:), count
+    type(curve_t) :: all_curves(size(variants), count)
+    integer :: e, l
+
+    do e = 1, count
+      do l = 1, size(variants)
+        all_curves(l, e) = new_curve(x, y * (1.0_wp + 0.03_wp * variants(l)), interpolation, extrapolation)
+      end do
+    end do
+  end function curves
+
+  subroutine add_couplings(bodies, variants, machine)
+    integer, intent(in) :: bodies, variants(:)
+    type(machine_t), intent(inout) :: machine
+    real(wp), parameter :: twist(4) = [-0.5_wp, -0.1_wp, 0.2_wp, 0.6_wp], moment(4) = [-30.0_wp, -4.0_wp, 5.0_wp, 60.0_wp]
+    real(wp) :: coefficient(5, size(variants), 2)
+    integer :: k
+
+    do k = 1, 5
+      coefficient(k, :, :) = numbers(50.0_wp / k, variants, 2)
+    end do
+    associate (one => numbers(1.0_wp, variants, 2), friction => numbers(4.0_wp, variants, 2), &
+               friction_speed => numbers(0.5_wp, variants, 2))
+      call append_bank(machine%banks, &
+                       new_polynomial_couplings(numbered_names('polynomial', 2), [0, 1], [1, bodies], coefficient, one, &
+                                                0.1_wp * one, friction, friction_speed))
+      call append_bank(machine%banks, &
+                       new_gap_couplings(numbered_names('gap', 2), [bodies, 0], [1, 2], coefficient, 4.0_wp * one, &
+                                         0.1_wp * one, 0.3_wp * one))
+      call append_bank(machine%banks, &
+                       new_saturated_couplings(numbered_names('clutch', 2), [1, 2], [2, 0], 80.0_wp * one, 20.0_wp * one, &
+                                               0.0_wp * one, 0.1_wp * one, friction, friction_speed))
+      call append_bank(machine%banks, &
+                       new_table_couplings(numbered_names('rubber', 2), [0, 1], [2, 2], &
+                                           curves(twist, moment, interpolation_cubic, extrapolation_linear, variants, 2), &
+                                           one, 0.1_wp * one))
+    end associate
+  end subroutine add_couplings
+
+  subroutine add_motors(bodies, variants, machine)
+    integer, intent(in) :: bodies, variants(:)
+    type(machine_t), intent(inout) :: machine
+    type(governor_t) :: governor
+    type(induction_curve_t) :: induction
+    type(quadratic_curve_t) :: quadratic
+    type(table_curve_t) :: table
+
+    allocate (induction%breakdown_torque, source=numbers(60.0_wp, variants, 1))
+    allocate (induction%breakdown_slip, source=numbers(0.3_wp, variants, 1))
+    allocate (induction%synchronous_speed, source=numbers(10.0_wp, variants, 1))
+    allocate (table%curve, source=curves([-4.0_wp, 0.0_wp, 1.0_wp, 4.0_wp], [50.0_wp, 60.0_wp, 40.0_wp, -30.0_wp], &
+                                         interpolation_linear, extrapolation_linear, variants, 1))
+    allocate (quadratic%a, source=numbers(30.0_wp, variants, 1))
+    allocate (quadratic%b, source=numbers(3.0_wp, variants, 1))
+    allocate (quadratic%c, source=numbers(0.1_wp, variants, 1))
+    allocate (governor%set_speed, source=numbers(1.0_wp, variants, 1))
+    allocate (governor%gain, source=numbers(0.3_wp, variants, 1))
+    allocate (governor%time, source=numbers(0.4_wp, variants, 1))
+    allocate (governor%start, source=numbers(0.5_wp, variants, 1))
+    associate (one => numbers(1.0_wp, variants, 1))
+      call append_bank(machine%banks, &
+                       new_curve_motors(numbered_names('induction', 1), [1], size(variants), induction))
+      call append_bank(machine%banks, &
+                       new_curve_motors(numbered_names('table', 1), [bodies], size(variants), table))
+      call append_bank(machine%banks, &
+                       new_governed_motors(numbered_names('governed', 1), [2], quadratic, governor, 2.0_wp * one))
+      call append_bank(machine%banks, &
+                       new_governed_motors(numbered_names('throttled', 1), [1], table, governor, 0.0_wp * one))
+      call append_bank(machine%banks, &
+                       new_dc_motors(numbered_names('dc', 1), [2], 24.0_wp * one, 2.0_wp * one, 1.5_wp * one, &
+                                     0.5_wp * one))
+      call append_bank(machine%banks, &
+                       new_dc_motors(numbered_names('drive', 1), [bodies], 24.0_wp * one, 2.0_wp * one, 1.5_wp * one, &
+                                     0.5_wp * one, governor))
+    end associate
+  end subroutine add_motors
+
+  subroutine add_loads(bodies, variants, machine)
+    integer, intent(in) :: bodies, variants(:)
+    type(machine_t), intent(inout) :: machine
+
+    associate (one => numbers(1.0_wp, variants, 2))
+      call append_bank(machine%banks, &
+                       new_nonlinear_loads(numbered_names('fan', 2), [1, bodies], one, 0.5_wp * one, &
+                                           5.0_wp * one, 0.7_wp * one))
+      call append_bank(machine%banks, &
+                       new_table_loads(numbered_names('mill', 2), [2, 2], one, 0.5_wp * one, 0.0_wp * one, one, &
+                                       curves([-2.0_wp, 0.0_wp, 2.5_wp], [-10.0_wp, 0.0_wp, 30.0_wp], &
+                                              interpolation_cubic, extrapolation_constant, variants, 2)))
+    end associate
+  end subroutine add_loads
+
+  subroutine add_excitations(bodies, variants, machine)
+    integer, intent(in) :: bodies, variants(:)
+    type(machine_t), intent(inout) :: machine
+
+    associate (one => numbers(1.0_wp, variants, 3))
+      call append_bank(machine%banks, &
+                       new_wave_excitations(numbered_names('gas', 2), [1, bodies], [1, 1, 2], 9.0_wp * one, &
+                                            spread([0.0_wp, 0.0_wp, 3.0_wp], 1, size(variants)), &
+                                            spread([0.5_wp, 1.0_wp, -2.0_wp], 1, size(variants)), 0.4_wp * one))
+      call append_bank(machine%banks, &
+                       new_timed_excitations(numbered_names('impact', 3), [1, 2, bodies], &
+                                             [shape_step, shape_ramp, shape_pulse], 12.0_wp * one, &
+                                             0.35_wp * one, 0.2_wp * one))
+      call append_bank(machine%banks, &
+                       new_table_excitations(numbered_names('record', 1), [2], &
+                                             curves([0.1_wp, 0.3_wp, 0.6_wp], [0.0_wp, 20.0_wp, -10.0_wp], &
+                                                    interpolation_linear, extrapolation_constant, variants, 1)))
+    end associate
+  end subroutine add_excitations
+
+end module nocdyn_test_full_machines

@@ -1,0 +1,88 @@
+!> How well the derivatives and energies of a bank of one element and lane fit its law.
+module nocdyn_test_law_checks
+  use nocdyn_bank, only: bank_t
+  use nocdyn_elements, only: elements_t
+  use nocdyn_kinds, only: wp
+  use nocdyn_test_law_differences, only: by_angle, by_inner, by_speed, by_time, choose_branches, difference_laws, elements_of, &
+                                         evaluate_all, law_slopes_t
+  implicit none (type, external)
+  private
+
+  public :: law_error, energy_error
+
+  real(wp), parameter :: step = 1.0e-3_wp   !! leaves step^4 / 30 of a fifth derivative, and rounding of 1e-13
+
+contains
+
+  !> The largest difference between a derivative and its finite difference, relative to the largest derivative or 1.
+  function law_error(bank, angle, speed, time, inner) result(error)
+    class(bank_t), intent(inout) :: bank   !! its branches are chosen
+    real(wp), intent(in) :: angle, speed
+    real(wp), intent(in), optional :: time
+    real(wp), intent(in), optional :: inner(:)
+    real(wp) :: error
+    type(elements_t) :: elements
+    type(law_slopes_t) :: slopes
+    integer :: s
+
+    elements = elements_of(bank)
+    elements%angle = angle
+    elements%speed = speed
+    if (present(time)) elements%time = time
+    if (present(inner)) elements%inner%value(1, :) = inner
+    call choose_branches(bank, elements)
+    call evaluate_all(bank, elements)
+    error = 0.0_wp
+    slopes = difference_laws(bank, elements, by_angle, step)
+    error = max(error, misfit(slopes%restoring, elements%restoring_angle), misfit(slopes%working, elements%working_angle))
+    error = max(error, misfit(slopes%tangent, elements%restoring_curvature), misfit(-slopes%stored, elements%restoring))
+    error = max(error, maxval([0.0_wp, abs(slopes%rate)]))
+    slopes = difference_laws(bank, elements, by_speed, step)
+    error = max(error, misfit(slopes%working, elements%working_speed), maxval(abs(slopes%restoring)))
+    error = max(error, misfit(slopes%rate, elements%inner%rate_speed))
+    slopes = difference_laws(bank, elements, by_time, step)
+    error = max(error, misfit(slopes%working, elements%working_time), maxval(abs(slopes%restoring)))
+    error = max(error, maxval([0.0_wp, abs(slopes%rate)]))
+    do s = 1, bank%inner
+      slopes = difference_laws(bank, elements, by_inner + s, step)
+      error = max(error, misfit(slopes%working, elements%inner%working(:, s:s)), maxval(abs(slopes%restoring)))
+      error = max(error, misfit(slopes%rate, elements%inner%rate_inner(:, s, :)))
+    end do
+  end function law_error
+
+  pure function misfit(expected, found)
+    real(wp), intent(in) :: expected(:, :), found(:, :)
+    real(wp) :: misfit
+
+    misfit = maxval([0.0_wp, abs(expected - found)]) / max(1.0_wp, maxval([0.0_wp, abs(expected)]))
+  end function misfit
+
+  !> The difference between the growth of the stored energy and the integral of the restoring moment by the trapezoidal rule,
+  !> relative to the largest energy; the angle passes through all branches on the way.
+  function energy_error(bank, low, high) result(error)
+    class(bank_t), intent(inout) :: bank
+    real(wp), intent(in) :: low, high   !! angles
+    real(wp) :: error
+    type(elements_t) :: elements
+    integer, parameter :: steps = 20000
+    real(wp) :: area, before, largest, start
+    integer :: i
+
+    elements = elements_of(bank)
+    area = 0.0_wp
+    before = 0.0_wp
+    start = 0.0_wp
+    largest = 0.0_wp
+    do i = 0, steps
+      elements%angle = low + (high - low) * i / steps
+      call choose_branches(bank, elements)
+      call evaluate_all(bank, elements)
+      if (i == 0) start = elements%stored(1, 1)
+      if (i > 0) area = area - 0.5_wp * (before + elements%restoring(1, 1)) * (high - low) / steps
+      before = elements%restoring(1, 1)
+      largest = max(largest, abs(elements%stored(1, 1)))
+    end do
+    error = abs(elements%stored(1, 1) - start - area) / largest
+  end function energy_error
+
+end module nocdyn_test_law_checks
