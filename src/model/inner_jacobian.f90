@@ -13,8 +13,8 @@ module nocdyn_inner_jacobian
 
   public :: new_inner_jacobian
 
-  !> The values are, for each inner state in turn: dq''/dz and, where it turns with the coordinate, dr/dq' of each entry of its element, dr/dz of each inner state
-  !> of that element, dW'/dz if its work is integrated.
+  !> The values are, for each inner state in turn: dq''/dz and, where it turns with the coordinate, dr/dq' of each entry of its
+  !> element; dr/dz of each inner state of that element; dW'/dz if its work is integrated.
   type, public :: inner_jacobian_t
     type(pattern_t) :: pattern
     integer, private :: before = 0                          !! positions of the Jacobian before these
