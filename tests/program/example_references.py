@@ -516,36 +516,28 @@ def dc_governed():
     shaft, drive, viscous = m.coupling["shaft"], m.motor["drive"], m.load["friction"]["viscous"]
     gain, flux = drive["governor_gain"], drive["flux_constant"]
 
-    def deviation(y):
-        return drive["governor_speed"] - y[2]
-
     def throttle(y):
-        return y[5] + gain * deviation(y)
+        return y[5] + gain * (drive["governor_speed"] - y[2])
 
-    # mode: limit at which the throttle is, and whether the integrator waits
-    def rate(t, y, mode, middle):
-        limit, waits = mode
+    # mode: the limit at which the throttle is; there the integrator follows it with the integral time
+    def rate(t, y, limit, middle):
         moment = shaft["stiffness"] * (y[1] - y[0]) + shaft["damping"] * (y[3] - y[2])
         steps = sum(group["amplitude"] for group in m.excitation.values() if middle > group["time"])
         opened = throttle(y) if limit is None else limit
         current = (drive["voltage"] * opened - drive["resistance"] * y[4] - flux * y[2]) / drive["inductance"]
         return [y[2], y[3], (flux * y[4] + moment) / armature, (steps - viscous * y[3] - moment) / machine, current,
-                0.0 if waits else gain * deviation(y) / drive["governor_time"]]
+                (opened - y[5]) / drive["governor_time"]]
 
-    def borders(mode):
-        limit, waits = mode
+    def borders(limit):
         if limit is None:
-            yield lambda t, y: 1 - throttle(y), (1, True)
-            yield lambda t, y: throttle(y), (0, True)
-            return
-        side = 1 if limit == 1 else -1
-        yield lambda t, y: side * (throttle(y) - limit), (None, False)
-        # where the deviation would drive it further, the integrator waits
-        yield lambda t, y: side * deviation(y) * (1 if waits else -1), (limit, not waits)
+            yield lambda t, y: 1 - throttle(y), 1
+            yield lambda t, y: throttle(y), 0
+        else:
+            yield lambda t, y: (throttle(y) - limit) * (1 if limit == 1 else -1), None
 
     speed = m.start("speed", "armature", "machine")
     start = [0.0, 0.0, *speed, 0.0, drive["governor_start"] - gain * (drive["governor_speed"] - speed[0])]
-    motion = motion_of(rate, start, m.end(), (None, False), borders, [group["time"] for group in m.excitation.values()])
+    motion = motion_of(rate, start, m.end(), None, borders, [group["time"] for group in m.excitation.values()])
     y = motion.at(m.end())
     return {"phi_armature [rad]": y[0], "omega_armature [rad/s]": y[2], "omega_machine [rad/s]": y[3],
             "torque_drive [N m]": flux * y[4], "max torque_drive [N m]": motion.largest(lambda t, y, mode: flux * y[4]),
