@@ -591,7 +591,7 @@ def natural_frequencies(inertia, stiffness):
 
 def frequencies():
     """Natural frequencies [Hz] by machine."""
-    ieee, ship, chain = example("ieee_first_benchmark"), example("ship_turbine"), example("chain_200")
+    ieee, ship = example("ieee_first_benchmark"), example("ship_turbine")
     discs, wind = Machine(DATA / "two_discs.nml"), example("wind_turbine")
     reduced = [wind.inertia("rotor"), wind.inertia("carrier") + 36 * wind.inertia("sun") + 24.25**2 * wind.inertia("intermediate")
                + 97**2 * wind.inertia("generator")]
@@ -600,9 +600,42 @@ def frequencies():
         "ieee_first_benchmark": natural_frequencies(np.diag(ieee.inertia()), chain_stiffness(
             [group["stiffness"] for group in ieee.coupling.values()])),
         "ship_turbine": natural_frequencies(*ship_matrices(ship)[:2]),
+        # the published ones
         "ship_turbine without pinions": natural_frequencies(*ship_matrices(ship, pinions=False)[:2]),
         "wind_turbine": natural_frequencies(np.diag(reduced), chain_stiffness([wind.coupling["main_shaft"]["stiffness"]])),
-        "chain_200": 2 * np.sqrt(2.0e4 / 0.02) * np.sin(np.arange(1, 200) * np.pi / 400)[:5] / (2 * np.pi) if chain else None}
+        # the five lowest
+        "chain_200": 2 * np.sqrt(2.0e4 / 0.02) * np.sin(np.arange(1, 200) * np.pi / 400)[:5] / (2 * np.pi)}
+
+
+def steady_speeds():
+    """Speeds [rad/s] at which the torques balance when all disturbances are over: steps and ramps hold, what oscillates has no mean."""
+    fan, wind, ship, split = (example(name) for name in ("fan_start", "wind_turbine", "ship_turbine", "torque_split"))
+    start, engine_, dc = example("synchronous_start"), example("engine"), example("dc_governed")
+
+    def fan_balance(w):
+        return kloss(fan.motor["motor"], w) - fan.load["air"]["viscous"] * w - fan.load["air"]["quadratic"] * w**2
+
+    def ship_balance(w):
+        steam = sum(ratio * (ship.motor[name]["a"] - ship.motor[name]["b"] * ratio * w)
+                    for name, ratio in (("hp_steam", 9.4094 * 7.82365 / 0.94094), ("lp_steam", 9.4094 * 4.00424 / 0.94094)))
+        return steam - ship.load["water"]["quadratic"] * w**2
+
+    cage = Curve(start.table(start.motor["cage"]), cubic=True)
+
+    def start_balance(w):
+        return cage(cage.segment(w), w) - 6 * start.load["gas"]["quadratic"] * (6 * w)**2
+
+    pinion = 124 / 32 * 176 / 27
+    turbine = split.motor["turbine"]["torque"] + split.excitation["cut"]["amplitude"]
+    return {
+        "fan_start": ("omega_fan [rad/s]", brentq(fan_balance, 140, 157, xtol=1e-13)),
+        "wind_turbine": ("omega_generator [rad/s]", np.sqrt((wind.motor["wind"]["torque"] + wind.excitation["gust"]["amplitude"])
+                                                            / 97 / wind.load["grid"]["quadratic"])),
+        "ship_turbine": ("omega_propeller [rad/s]", brentq(ship_balance, 1, 10, xtol=1e-13)),
+        "torque_split": ("omega_rotor [rad/s]", np.sqrt(turbine * pinion / split.load["air"]["quadratic"])),
+        "synchronous_start": ("omega_motor [rad/s]", brentq(start_balance, 150, 157.08, xtol=1e-13)),
+        "engine": ("omega_generator [rad/s]", engine_.motor["gas"]["torque"] / engine_.load["grid"]["viscous"]),
+        "dc_governed": ("omega_machine [rad/s]", dc.motor["drive"]["governor_speed"])}
 
 
 EXAMPLE_MACHINES = (three_rotors, backlash, fan_start, wind_turbine, ship_turbine, torque_split, rolling_mill, engine, chain_200,
@@ -616,9 +649,12 @@ def main(names):
             for column, value in function().items():
                 print(f'        "{column}": {value:.13g},')
             print("    },", flush=True)
+    if not names or "steady_speeds" in names:
+        for name, (column, value) in steady_speeds().items():
+            print(f'    "{name}": ("{column}", {value:.13g}),')
     if not names or "frequencies" in names:
         for name, values in frequencies().items():
-            print(f'    "{name}": [{", ".join(f"{value:.11g}" for value in values)}],')
+            print(f'    "{name}": [{", ".join(f"{value:.13g}" for value in values)}],')
 
 
 if __name__ == "__main__":
