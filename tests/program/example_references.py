@@ -329,8 +329,11 @@ def ship_matrices(m, pinions=True):
         twist[f"{side}_quill"], twist[f"{side}_shaft"] = unit[i] - pinion, unit[i + 1] - driver
         for name, row in ((f"{side}_pinion", pinion), (f"{side}_driver", driver)):
             inertia += pinions * m.inertia(name) * np.outer(row, row)
-    sums = {key: sum(m.coupling[name][key] * np.outer(row, row) for name, row in twist.items()) for key in ("stiffness", "damping")}
-    return inertia, sums["stiffness"], sums["damping"]
+
+    def summed(key):
+        return sum(m.coupling[name][key] * np.outer(row, row) for name, row in twist.items())
+
+    return inertia, summed("stiffness"), summed("damping")
 
 
 def ship_turbine():
@@ -569,7 +572,8 @@ def differential():
         at_input, moments = sides(y)
         slip = np.array([group["friction"] * np.tanh((y[11] - y[9 + i]) / group["friction_speed"])
                          for i, group in enumerate(tyres)])
-        drag = resistance["constant"] * np.tanh(y[11] / resistance["constant_speed"]) + resistance["quadratic"] * abs(y[11]) * y[11]
+        drag = resistance["constant"] * np.tanh(y[11] / resistance["constant_speed"])
+        drag += resistance["quadratic"] * abs(y[11]) * y[11]
         axle = np.linalg.solve(inertia, moments + at_input * to_input / 2)
         wheels = (slip - moments) / [j["left_wheel"], j["right_wheel"]]
         return [*y[6:], (curve(segment, y[6]) - at_input) / j["engine"], *axle, *wheels, (-slip.sum() - drag) / j["vehicle"]]
@@ -608,7 +612,7 @@ def frequencies():
 
 
 def steady_speeds():
-    """Speeds [rad/s] at which the torques balance when all disturbances are over: steps and ramps hold, what oscillates has no mean."""
+    """Speeds [rad/s] at which the torques balance when all disturbances are over: steps and ramps hold, waves have no mean."""
     fan, wind, ship, split = (example(name) for name in ("fan_start", "wind_turbine", "ship_turbine", "torque_split"))
     start, engine_, dc = example("synchronous_start"), example("engine"), example("dc_governed")
 
@@ -639,7 +643,8 @@ def steady_speeds():
 
 
 EXAMPLE_MACHINES = (three_rotors, backlash, fan_start, wind_turbine, ship_turbine, torque_split, rolling_mill, engine, chain_200,
-                    synchronous_start, ieee_first_benchmark, dc_governed, differential, motor_coupling_gear, kloss_run_up, fan_law)
+                    synchronous_start, ieee_first_benchmark, dc_governed, differential, motor_coupling_gear, kloss_run_up,
+                    fan_law)
 
 
 def main(names):

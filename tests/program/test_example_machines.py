@@ -315,7 +315,10 @@ def test_the_torques_balance_at_the_steady_speed(nocdyn, name):
 
 
 # Those that take less than a second.
-@pytest.mark.parametrize("name", ["three_rotors", "backlash", "torque_split", "chain_200", "ieee_first_benchmark", "kloss_run_up"])
+QUICK = ["three_rotors", "backlash", "torque_split", "chain_200", "ieee_first_benchmark", "kloss_run_up"]
+
+
+@pytest.mark.parametrize("name", QUICK)
 def test_the_reference_is_what_its_program_computes(name):
     pytest.importorskip("scipy")
     import example_references
