@@ -70,12 +70,12 @@ REFERENCE = {
     },
     "engine": {
         "omega_ring [rad/s]": 188.6124928622,
-        "omega_hub [rad/s]": 188.6991786839,
-        "omega_cylinder_6 [rad/s]": 188.4711445102,
+        "omega_hub [rad/s]": 188.6991786865,
+        "omega_cylinder_6 [rad/s]": 188.4711445109,
         "omega_generator [rad/s]": 188.7559998666,
         "phi_flywheel [rad]": 94.42126426481,
-        "max moment_crank_8 [N m]": 1290.243183633,
-        "min moment_rubber [N m]": -742.5608305423,
+        "max moment_crank_8 [N m]": 1290.243183637,
+        "min moment_rubber [N m]": -742.5608305434,
     },
     "chain_200": {
         "phi_r001 [rad]": 0.0636619819447,
