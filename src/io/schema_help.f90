@@ -14,6 +14,7 @@ module nocdyn_schema_help
 
   integer, parameter :: longest_group = maxval(len_trim(group_rules%name))
   integer, parameter :: column = 38       !! width of type and allowed values
+  integer, parameter :: longest = 54      !! that the default may follow in the same line
   integer, parameter :: line_width = 96   !! of sentences
   character(len=*), parameter :: comment = '! '
 
@@ -131,13 +132,14 @@ contains
     type(key_rule_t), intent(in) :: rule
     character(len=*), intent(in) :: margin
 
-    call buffer%append_line(margin // '    ' // rule%name // short_rule(rule))
+    call buffer%append_line(margin // '    ' // rule%name // short_rule(rule, margin))
     call buffer%append_line(margin // '      ' // trim(rule%help))
   end subroutine append_key
 
-  !> Type, allowed values and default in one line, the default in a column of its own.
-  function short_rule(rule) result(text)
+  !> Type, allowed values and default in one line, the default in a column of its own; in a line of its own after long ones.
+  function short_rule(rule, margin) result(text)
     type(key_rule_t), intent(in) :: rule
+    character(len=*), intent(in) :: margin   !! of the lines
     character(len=:), allocatable :: text
 
     select case (rule%kind)
@@ -152,7 +154,13 @@ contains
     case default
       text = kind_text(rule)
     end select
-    text = ' ' // text // repeat(' ', max(0, column - len(text))) // ' ' // default_text(rule)
+    text = ' ' // text
+    if (len(text) > longest) then
+      text = text // new_line('a') // margin // repeat(' ', 5 + len(rule%name) + column)
+    else
+      text = text // repeat(' ', max(0, column + 1 - len(text)))
+    end if
+    text = text // ' ' // default_text(rule)
   end function short_rule
 
   subroutine append_sentences(buffer, rule, margin)
