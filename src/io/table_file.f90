@@ -115,7 +115,7 @@ contains
       if (complaint == '') call read_column(content(begins(2):ends(2)), 2, values(2, rows + 1), complaint)
     end if
     if (complaint /= '' .and. rows == 0 .and. reading%wrong == 0) complaint = complaint // header_hint(content)
-    if (complaint == '' .and. rows > 0) call check_ascent(values(1, rows:rows + 1), reading%last_good, complaint)
+    if (complaint == '' .and. rows > 0) call check_ascent(values(1, rows), values(1, rows + 1), reading%last_good, complaint)
     if (complaint /= '') then
       call complain(reading, ':' // to_text(reading%line) // ': ' // complaint)
     else
@@ -180,13 +180,13 @@ contains
     if (scan(content, '0123456789') == 0) hint = '; a line with names of columns must begin with #'
   end function header_hint
 
-  subroutine check_ascent(pair, line, complaint)
-    real(wp), intent(in) :: pair(2)   !! first column of the last row and of this one
-    integer, intent(in) :: line       !! of the last row
+  subroutine check_ascent(last, this, line, complaint)
+    real(wp), intent(in) :: last, this   !! first column of the last row and of this one
+    integer, intent(in) :: line          !! of the last row
     character(len=:), allocatable, intent(inout) :: complaint
 
-    if (pair(2) > pair(1)) return
-    complaint = 'column 1, ' // to_text(pair(2)) // ', is not above ' // to_text(pair(1)) // ' on line ' // to_text(line) // &
+    if (this > last) return
+    complaint = 'column 1, ' // to_text(this) // ', is not above ' // to_text(last) // ' on line ' // to_text(line) // &
                 '; needed: ascending values'
   end subroutine check_ascent
 

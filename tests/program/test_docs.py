@@ -169,7 +169,8 @@ def reference():
 def keys_of_help(text):
     """Group -> {(key, default)} as `nocdyn help input` prints them."""
     groups = {}
-    for line in text.split("\nExample")[0].splitlines():
+    one_line_each = re.sub(r"\n {40,}(?=default )", " ", text.split("\nExample")[0])
+    for line in one_line_each.splitlines():
         if group := re.match(r"&(\w+), ", line):
             keys = groups.setdefault(group[1], set())
         elif key := re.match(r" {4}(\w+) .*?\s((?:required|default|optional|this or).*)$", line):
