@@ -15,6 +15,7 @@ module nocdyn_start_speeds
   !> Start speeds violate a row when its sum exceeds this times the sum of its absolute terms.
   real(wp), parameter, public :: speed_tolerance = 1.0e-9_wp
 
+  real(wp), parameter :: least_impulse = 1.0e-12_wp   ! of the largest one; smaller ones are rounding
   integer, parameter :: most_bodies = 12   ! in a message
   integer, parameter :: digits = 15        ! of the nearest speeds, which fit when written back
 
@@ -35,7 +36,7 @@ contains
     if (size(violated) == 0) return
     nearest = nearest_speeds(machine, violated)
     if (may_project) then
-      call project_start(violated, nearest, machine)
+      call project_start(nearest, machine)
     else
       culprit = violated(1)
       call raise(error, exit_input, complaint(machine, violated, nearest))
@@ -77,17 +78,17 @@ contains
   end function nearest_speeds
 
   !> Takes the nearest speeds and keeps the impulses, L_lambda^T Lambda = J (omega* - omega), and the energy lost.
-  subroutine project_start(violated, nearest, machine)
-    integer, intent(in) :: violated(:)
+  subroutine project_start(nearest, machine)
     real(wp), intent(in) :: nearest(:)
     type(machine_t), intent(inout) :: machine
     real(wp) :: lambda(machine%constraints%rows()), change(machine%bodies)
+    integer :: row
 
     change = nearest - machine%start_speed(1, :)
     call machine%coordinates%reactions_of_imbalances(1, machine%inertia(1, :) * change, lambda)
     allocate (machine%shock)
-    machine%shock%row = violated
-    machine%shock%impulse = lambda(violated)
+    machine%shock%row = pack([(row, row=1, size(lambda))], abs(lambda) > least_impulse * maxval(abs(lambda)))
+    machine%shock%impulse = lambda(machine%shock%row)
     machine%shock%energy_lost = 0.5_wp * sum(machine%inertia(1, :) * change**2)
     machine%start_speed(1, :) = nearest
   end subroutine project_start

@@ -15,7 +15,7 @@ module nocdyn_machine
 
   !> What happened to start speeds that violated constraints and were projected.
   type, public :: start_shock_t
-    integer, allocatable :: row(:)            !! the violated ones
+    integer, allocatable :: row(:)            !! those with an impulse: violated ones, and others geared to them
     real(wp), allocatable :: impulse(:)       !! in each of them, [unit of its multiplier * s]
     real(wp) :: energy_lost = 0.0_wp          !! [J]
   end type start_shock_t
