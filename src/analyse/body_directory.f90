@@ -18,6 +18,7 @@ module nocdyn_body_directory
 
 contains
 
+  !> The places of these bodies, sorted by name.
   function new_directory(names) result(directory)
     type(string_t), intent(in) :: names(:)
     type(directory_t) :: directory

@@ -13,6 +13,7 @@ module nocdyn_element_numbers
 
 contains
 
+  !> The names of some groups.
   function names_of(input, indices) result(names)
     type(input_t), intent(in) :: input
     integer, intent(in) :: indices(:)   !! of the groups

@@ -20,6 +20,7 @@ contains
     cell = right(rounded_text(value, cell_digits))
   end function cell
 
+  !> Text at the right end of a cell.
   pure function right(text) result(aligned)
     character(len=*), intent(in) :: text
     character(len=cell_width) :: aligned

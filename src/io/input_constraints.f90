@@ -12,6 +12,7 @@ module nocdyn_input_constraints
 
 contains
 
+  !> What the groups of rigid joints ask of their own keys: different members, teeth with room for planets, lists of equal length.
   subroutine check_constraints(groups, mistakes)
     type(group_t), intent(in) :: groups(:)
     type(mistakes_t), intent(inout) :: mistakes

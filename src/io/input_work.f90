@@ -29,6 +29,7 @@ module nocdyn_input_work
 
 contains
 
+  !> A group of which no key has been read.
   pure function new_work(index, rule, line, is_damaged) result(work)
     integer, intent(in) :: index, rule, line
     logical, intent(in) :: is_damaged   !! the group has parts that were not understood

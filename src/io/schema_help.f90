@@ -192,6 +192,7 @@ contains
     end do
   end subroutine append_wrapped
 
+  !> The example groups of one rule.
   subroutine append_examples(buffer, rule, only_template)
     type(text_buffer_t), intent(inout) :: buffer
     integer, intent(in) :: rule

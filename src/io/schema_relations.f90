@@ -23,6 +23,7 @@ module nocdyn_schema_relations
 
 contains
 
+  !> The relations between keys of one group, by the places of the keys in it.
   pure function relations_of(group_rule) result(relations)
     integer, intent(in) :: group_rule
     type(relations_t) :: relations

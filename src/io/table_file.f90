@@ -46,6 +46,7 @@ contains
     call append(complaints, error%message)
   end subroutine read_table_file
 
+  !> Two columns of numbers, the first ascending; without complaints there are at least two rows.
   subroutine read_table_text(text, file, first, second, complaints)
     character(len=*), intent(in) :: text
     character(len=*), intent(in) :: file   !! what complaints call it

@@ -33,6 +33,7 @@ module nocdyn_curves
 
 contains
 
+  !> A curve through points; cubic: slopes of Fritsch and Butland, monotone between neighbours.
   function new_curve(x, y, interpolation, extrapolation) result(self)
     real(wp), intent(in) :: x(:)             !! ascending, at least 2
     real(wp), intent(in) :: y(:)

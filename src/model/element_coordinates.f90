@@ -22,6 +22,7 @@ module nocdyn_element_coordinates
 
 contains
 
+  !> The coordinates of the bodies at both ends of every element.
   function new_element_coordinates(elements, coordinates) result(self)
     type(elements_t), intent(in) :: elements
     type(coordinates_t), intent(in) :: coordinates

@@ -39,6 +39,7 @@ module nocdyn_gap_couplings
 
 contains
 
+  !> Couplings with play, the elastic moment being sum p_k x^k of the penetration x.
   function new_gap_couplings(names, from, to, coefficient, damping, rest_twist, gap, friction, friction_speed) result(bank)
     type(string_t), intent(in) :: names(:)
     integer, intent(in) :: from(:), to(:)              !! bodies, 0 = ground

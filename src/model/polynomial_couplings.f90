@@ -22,6 +22,7 @@ module nocdyn_polynomial_couplings
 
 contains
 
+  !> Couplings with the elastic moment sum p_k w^k.
   function new_polynomial_couplings(names, from, to, coefficient, damping, rest_twist, friction, friction_speed) result(bank)
     type(string_t), intent(in) :: names(:)
     integer, intent(in) :: from(:), to(:)              !! bodies, 0 = ground
@@ -62,6 +63,7 @@ contains
     call self%couplings_t%evaluate(time, angle, speed, restoring, working)
   end subroutine evaluate
 
+  !> Adds -sum p_k w^k, w = angle - rest.
   pure subroutine add_terms(n, order, coefficient, rest, angle, restoring)
     integer, intent(in) :: n, order
     real(wp), intent(in) :: coefficient(order, n), rest(n), angle(n)
@@ -118,6 +120,7 @@ contains
     end do
   end function elastic_moment
 
+  !> d/dw of sum p_k w^k.
   pure function elastic_slope(p, w) result(slope)
     real(wp), intent(in) :: p(:), w
     real(wp) :: slope
@@ -129,6 +132,7 @@ contains
     end do
   end function elastic_slope
 
+  !> d2/dw2 of sum p_k w^k.
   pure function elastic_curvature(p, w) result(curvature)
     real(wp), intent(in) :: p(:), w
     real(wp) :: curvature
@@ -140,6 +144,7 @@ contains
     end do
   end function elastic_curvature
 
+  !> sum p_k w^(k+1) / (k + 1).
   pure function elastic_energy(p, w) result(energy)
     real(wp), intent(in) :: p(:), w
     real(wp) :: energy

@@ -31,6 +31,7 @@ module nocdyn_reduced_jacobian
 
 contains
 
+  !> The positions of the Jacobian of the reduced formulation.
   function new_reduced_jacobian(freedoms, incidence, accounted, inner) result(self)
     integer, intent(in) :: freedoms
     type(element_coordinates_t), intent(in) :: incidence

@@ -21,6 +21,7 @@ module nocdyn_saturated_couplings
 
 contains
 
+  !> Couplings with the elastic moment saturation * tanh(stiffness * w / saturation).
   function new_saturated_couplings(names, from, to, stiffness, saturation, damping, rest_twist, friction, friction_speed) &
     result(bank)
     type(string_t), intent(in) :: names(:)

@@ -14,6 +14,7 @@ module nocdyn_stretches
 
 contains
 
+  !> u = A x for rows with coefficients of their own.
   pure subroutine multiply_stretch(rows, width, columns, column, coefficient, x, u)
     integer, intent(in) :: rows, width, columns
     integer, intent(in) :: column(rows, width)
@@ -35,6 +36,7 @@ contains
     end do
   end subroutine multiply_stretch
 
+  !> u = A x for rows with equal coefficients.
   pure subroutine multiply_even_stretch(rows, width, columns, column, coefficient, x, u)
     integer, intent(in) :: rows, width, columns
     integer, intent(in) :: column(width)
@@ -56,6 +58,7 @@ contains
     end do
   end subroutine multiply_even_stretch
 
+  !> u = offset + A x and v = A y.
   pure subroutine pair_of_stretch(rows, width, columns, column, coefficient, offset, x, y, u, v)
     integer, intent(in) :: rows, width, columns
     integer, intent(in) :: column(rows, width)
@@ -79,6 +82,7 @@ contains
     end do
   end subroutine pair_of_stretch
 
+  !> u = offset + A x and v = A y for rows with equal coefficients.
   pure subroutine pair_of_even_stretch(rows, width, columns, column, coefficient, without_offset, offset, x, y, u, v)
     integer, intent(in) :: rows, width, columns
     integer, intent(in) :: column(width)
@@ -122,6 +126,7 @@ contains
     end do
   end subroutine pair_of_even_stretch
 
+  !> u = A (x + y).
   pure subroutine sum_of_stretch(rows, width, columns, column, coefficient, x, y, u)
     integer, intent(in) :: rows, width, columns
     integer, intent(in) :: column(rows, width)
@@ -143,6 +148,7 @@ contains
     end do
   end subroutine sum_of_stretch
 
+  !> u = A (x + y) for rows with equal coefficients.
   pure subroutine sum_of_even_stretch(rows, width, columns, column, coefficient, x, y, u)
     integer, intent(in) :: rows, width, columns
     integer, intent(in) :: column(width)

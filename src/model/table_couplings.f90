@@ -25,6 +25,7 @@ module nocdyn_table_couplings
 
 contains
 
+  !> Couplings with the elastic moment of a curve over the twist.
   function new_table_couplings(names, from, to, curve, damping, rest_twist, friction, friction_speed) result(bank)
     type(string_t), intent(in) :: names(:)
     integer, intent(in) :: from(:), to(:)              !! bodies, 0 = ground

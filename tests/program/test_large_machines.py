@@ -1,9 +1,10 @@
 """Machines of thousands of bodies: memory in proportion to their number, and results that are right."""
 
 import math
+import resource
 
 import pytest
-from conftest import peak_memory
+from conftest import TRAPS_EXCEPTIONS, peak_memory
 
 STAGES = 2000
 OUTPUT = "&load name = 'load' body = 'b0' viscous = 0.1 /\n&motor name = 'motor' body = 'b0' a = 10 b = 0 c = 0 /\n"
@@ -72,3 +73,40 @@ def test_a_chain_of_10000_bodies_needs_memory_in_proportion(nocdyn):
     nocdyn.write("chain.nml", "\n".join(lines) + "\n" + OUTPUT + RUN)
     megabytes, _ = peak_memory(nocdyn, "check", "chain.nml")
     assert megabytes < 200  # a dense matrix has 800
+
+
+without_checks = pytest.mark.skipif(TRAPS_EXCEPTIONS, reason="the debug build checks every index")
+
+
+def chain(count):
+    lines = [f"&body name = 'b{i}' inertia = 1.0 speed = {i % 2} /" for i in range(count)]
+    lines += [f"&coupling name = 'c{i}' bodies = 'b{i}', 'b{i + 1}' stiffness = 1e4 damping = 1.0 /" for i in range(count - 1)]
+    return "\n".join(lines) + "\n" + OUTPUT + "&run t_end = 0.02 /\n"
+
+
+def processor_time(nocdyn, *words):
+    """The least of three runs [s]."""
+    times = []
+    for _ in range(3):
+        before = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
+        assert nocdyn(*words).returncode == 0
+        times.append(resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - before)
+    return min(times)
+
+
+@without_checks
+@pytest.mark.parametrize("method", ["rk853", "rodas5p"])
+def test_the_time_of_a_run_grows_with_the_length_of_a_chain(nocdyn, method):
+    times = []
+    for count in (1500, 6000):
+        nocdyn.write("chain.nml", chain(count))
+        words = ("--set", f"run.method={method}", "--set", "output.points=2")
+        times.append(processor_time(nocdyn, "run", "chain.nml", "--out", "out", "-q", *words))
+    assert times[1] < 8 * times[0]  # four bodies for one: 4 times, and 16 where a matrix were dense
+
+
+@without_checks
+@pytest.mark.parametrize("text", [chain(10000), train(1)], ids=["chain of 10000 bodies", "train of 2000 stages"])
+def test_large_machines_are_read_analysed_and_set_up_in_less_than_a_second(nocdyn, text):
+    nocdyn.write("large.nml", text)
+    assert processor_time(nocdyn, "check", "large.nml") < 1
