@@ -146,9 +146,12 @@ def test_joints_of_three_bodies_that_lock_are_refused_with_the_rows_involved(noc
     )
 
 
+FIRST = "&gear name = 'g' bodies = 'a', 'b' radii = 0.1, 0.3 /\n"
+
+
 @pytest.mark.parametrize("second", ["radii = 0.3, 0.9", "radii = 0.7, 2.1", "teeth = 19, 57", "radii = 0.1, 0.30000000000000004"])
 def test_ratios_that_decimals_round_differently_agree(nocdyn, second):
-    gears = f"&gear name = 'g' bodies = 'a', 'b' radii = 0.1, 0.3 /\n&gear name = 'h' bodies = 'a', 'b' {second} /\n"
+    gears = f"{FIRST}&gear name = 'h' bodies = 'a', 'b' {second} /\n"
     outcome = nocdyn("check", nocdyn.write("decimals.nml", gears + THREE))
     assert (outcome.returncode, outcome.stderr) == (0, "")
     assert "  1 constraint repeats others; ratios agree where they differ by less than 1e-9 of their size\n" in outcome.stdout
@@ -156,7 +159,7 @@ def test_ratios_that_decimals_round_differently_agree(nocdyn, second):
 
 
 def test_ratios_that_differ_by_more_than_the_tolerance_lock(nocdyn):
-    gears = "&gear name = 'g' bodies = 'a', 'b' radii = 0.1, 0.3 /\n&gear name = 'h' bodies = 'a', 'b' radii = 0.1, 0.3000000009 /\n"
+    gears = FIRST + "&gear name = 'h' bodies = 'a', 'b' radii = 0.1, 0.3000000009 /\n"
     assert "locks 'a', 'b': 'g' and 'h' drive 'b' at " in refusal(nocdyn, "check", gears + THREE)
 
 
@@ -196,9 +199,9 @@ def test_projected_start_speeds_come_with_impulse_and_energy_lost(nocdyn, formul
 
 
 def test_the_impulse_of_a_projected_start_passes_through_joints_that_fit(nocdyn):
-    # 'h' holds at the start; momentum 1 - 3 - 2 along the train, inertia 6: speeds -+2/3
-    further = "&body name = 'c' inertia = 2.0 speed = -1.0 /\n&gear name = 'h' bodies = 'b', 'c' teeth = 20, 40 /\n"
-    text = PAIR.format(a=1.0, b=1.0, start="start = 'projected'") + further.replace("-1.0", "-0.5").replace("= 2.0", "= 8.0")
+    # 'h' holds at the start; seen from 'b' momentum -1 + 3 + 2, inertia 1 + 3 + 2: speed 2/3
+    further = "&body name = 'c' inertia = 8.0 speed = -0.5 /\n&gear name = 'h' bodies = 'b', 'c' teeth = 20, 40 /\n"
+    text = PAIR.format(a=1.0, b=1.0, start="start = 'projected'") + further
     note = (
         "the start speeds were projected onto the constraints: impulse -3.333333 N s in gear 'g', 0.6666667 N m s in gear 'h'; "
         "kinetic energy lost: 1.666667 J"
