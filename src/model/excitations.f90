@@ -144,11 +144,11 @@ contains
     end associate
   end subroutine differentiate
 
-  !> The mean of a sine is zero.
+  !> The mean of a sine is zero; without a frequency it is a constant.
   subroutine settle(self)
     class(excitations_t), intent(inout) :: self
 
-    self%amplitude = 0.0_wp
+    where (abs(self%frequency) > 0.0_wp) self%amplitude = 0.0_wp
     self%frequency = 0.0_wp
   end subroutine settle
 
