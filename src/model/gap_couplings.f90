@@ -62,8 +62,18 @@ contains
     end do
     if (any(bank%gap <= 0) .or. any(bank%scale <= 0)) error stop 'nocdyn_gap_couplings: gaps have widths and edges stiffness'
     bank%border = border_width * bank%scale * bank%gap
+    bank%accounted = pack([(e, e=1, size(to))], [(any(bank%accounted == e) .or. can_pull(coefficient(:, :, e)), &
+                                                  e=1, size(to))])
     call bank%let_switch([(e, e=1, size(to))])
   end function new_gap_couplings
+
+  !> Whether the elastic moment of a contact can change its sign. A contact that would pull gives up what it stores, which is
+  !> work even without damping.
+  pure logical function can_pull(coefficient)
+    real(wp), intent(in) :: coefficient(:, :)   !! p_k, shape [order, lanes]
+
+    can_pull = any(coefficient(1::2, :) < 0) .or. any(abs(coefficient(2::2, :)) > 0)
+  end function can_pull
 
   !> Nothing is polynomial across an edge.
   subroutine polynomials(self, laws)
