@@ -13,7 +13,7 @@ module nocdyn_constraint_analysis
   use nocdyn_rigid_trains, only: find_trains, ratio_tolerance, rigid_trains_t
   use nocdyn_sparse_map, only: transposed_order
   use nocdyn_text, only: string_t
-  use nocdyn_train_motion, only: find_loads, find_motion, train_motion_t
+  use nocdyn_train_motion, only: elimination_t, find_loads, find_motion, train_motion_t
   use nocdyn_train_relations, only: distinct_trains, new_relations, paced_rows, peeling_t, train_relations_t
   implicit none (type, external)
   private
@@ -105,17 +105,22 @@ contains
     end do
   end subroutine sift_relations
 
-  !> Drops the first relation that does not raise the rank (column-pivoted QR), and so on until the rank is full.
+  !> Drops the relations that are combinations of those before them; then, where rounding hid one, the first that does not
+  !> raise the rank (column-pivoted QR), and so on until the rank is full.
   subroutine sift_core(relations, core, is_kept)
     type(train_relations_t), intent(in) :: relations
     integer, intent(in) :: core(:)
     logical, intent(inout) :: is_kept(:)
     integer, allocatable :: left(:)
     real(wp), allocatable :: rows(:, :)
-    integer :: dependent, fine, middle
+    integer :: dependent, fine, i, middle
+    logical :: adds(size(core))
 
-    allocate (left, source=core)
     allocate (rows, source=paced_rows(relations%between, core, distinct_trains(relations%between, core)))
+    adds = new_directions(rows)
+    is_kept(relations%row(pack(core, .not. adds))) = .false.
+    left = pack(core, adds)
+    rows(:size(left), :) = rows(pack([(i, i=1, size(core))], adds), :)
     fine = 0
     do
       dependent = size(left) + 1
@@ -133,6 +138,28 @@ contains
       left = [left(:dependent - 1), left(dependent + 1:)]
     end do
   end subroutine sift_core
+
+  !> Which rows of unit length have a part that is no combination of those before them: Gram and Schmidt, each twice.
+  function new_directions(rows) result(adds)
+    real(wp), intent(in) :: rows(:, :)
+    logical :: adds(size(rows, 1))
+    real(wp) :: basis(size(rows, 2), size(rows, 1)), part(size(rows, 2))   ! the basis is orthonormal
+    integer :: i, k, n, pass
+
+    n = 0
+    do i = 1, size(rows, 1)
+      part = rows(i, :)
+      do pass = 1, 2
+        do k = 1, n
+          part = part - dot_product(basis(:, k), part) * basis(:, k)
+        end do
+      end do
+      adds(i) = norm2(part) > ratio_tolerance
+      if (.not. adds(i)) cycle
+      n = n + 1
+      basis(:, n) = part / norm2(part)
+    end do
+  end function new_directions
 
   integer function rank_of(rows)
     real(wp), intent(in) :: rows(:, :)
@@ -171,14 +198,17 @@ contains
     type(rigid_trains_t), intent(in) :: trains
     type(train_relations_t), intent(in) :: relations
     type(geared_group_t), intent(inout) :: groups(:)
+    type(train_motion_t) :: found
     integer, allocatable :: bodies(:), redundant(:), rows(:)
-    integer :: g, i, next
+    integer :: g, i, k, next, place(size(trains%lead))
 
     do g = 1, size(groups)
       associate (group => groups(g))
         allocate (group%redundancies(size(group%rows) - size(group%kept)))
         if (size(group%redundancies) == 0) cycle
         allocate (redundant, source=other_rows(group%rows, group%kept))
+        place(group%trains) = [(k, k=1, size(group%trains))]
+        call find_motion(relations, group%elimination, place, size(group%trains), 1, found)
         do i = 1, size(redundant)
           group%redundancies(i)%row = redundant(i)
           next = constraints%first(redundant(i))
@@ -186,7 +216,8 @@ contains
             call trains%find_path(constraints%body(next), constraints%body(next + 1), bodies, rows)
             group%redundancies(i)%repeats = ascending(rows)
           else
-            group%redundancies(i)%repeats = repeated_rows(constraints, trains, relations, group, redundant(i))
+            group%redundancies(i)%repeats = repeated_rows(constraints, trains, relations, group%elimination, found%dual, &
+                                                          redundant(i))
           end if
         end do
         deallocate (redundant)
@@ -226,18 +257,17 @@ contains
   end function ascending
 
   !> The rows of a group whose reactions together do what that of a redundant relation does.
-  function repeated_rows(constraints, trains, relations, group, row) result(rows)
+  function repeated_rows(constraints, trains, relations, elimination, dual, row) result(rows)
     type(constraints_t), intent(in) :: constraints
     type(rigid_trains_t), intent(in) :: trains
     type(train_relations_t), intent(in) :: relations
-    type(geared_group_t), intent(in) :: group
+    type(elimination_t), intent(in) :: elimination   !! of the group
+    real(wp), intent(in) :: dual(:, :)               !! D of its core
     integer, intent(in) :: row
     integer, allocatable :: rows(:)
-    type(train_motion_t) :: found
-    integer :: place(size(trains%lead)), relation
+    integer :: relation
     real(wp) :: lambda(size(relations%row)), moment(size(trains%lead))
 
-    place(group%trains) = [(relation, relation=1, size(group%trains))]
     relation = findloc(relations%row, row, dim=1)
     moment = 0.0_wp
     associate (between => relations%between)
@@ -245,9 +275,8 @@ contains
         moment(between%body(first:last)) = between%coefficient(1, first:last)
       end associate
     end associate
-    call find_motion(relations, group%elimination, place, size(group%trains), 1, found)
     lambda = 0.0_wp
-    call find_loads(relations, group%elimination, found%dual, 1, moment, lambda)
+    call find_loads(relations, elimination, dual, 1, moment, lambda)
     lambda = -lambda
     lambda(relation) = 1.0_wp
     rows = relations%loaded_rows(constraints, trains, lambda, 0)
