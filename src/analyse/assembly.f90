@@ -4,7 +4,7 @@ module nocdyn_assembly
   use nocdyn_complement, only: complement_natural, complement_negated, complement_scaled
   use nocdyn_constraint_analysis, only: analyse_constraints
   use nocdyn_constraint_assembly, only: assemble_constraints, constraint_groups
-  use nocdyn_coordinates, only: new_coordinates
+  use nocdyn_coordinates, only: build_coordinates
   use nocdyn_coupling_assembly, only: add_couplings, check_couplings
   use nocdyn_element_numbers, only: names_of, numbers_of
   use nocdyn_errors, only: error_t
@@ -65,10 +65,10 @@ contains
     wanted = bodies_of(run, 'independent', directory)
     call analyse_constraints(machine%constraints, machine%names, wanted, machine%trains, machine%groups, culprit, error)
     if (.not. allocated(error)) then
-      machine%coordinates = new_coordinates(machine%constraints, machine%trains, machine%groups, machine%inertia, wanted, &
-                                            complement_choice(run%text('complement')))
-      call fit_start_speeds(machine, run%text('start') == 'projected', culprit, error)
+      call build_coordinates(machine%constraints, machine%names, machine%trains, machine%groups, machine%inertia, wanted, &
+                             complement_choice(run%text('complement')), machine%coordinates, error)
     end if
+    if (.not. allocated(error)) call fit_start_speeds(machine, run%text('start') == 'projected', culprit, error)
     if (allocated(error)) call tell_place(input, culprit, error)
   end subroutine constrain
 

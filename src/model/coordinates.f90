@@ -6,17 +6,21 @@
 module nocdyn_coordinates
   use nocdyn_complement, only: complement_factor
   use nocdyn_constraints, only: constraints_t
+  use nocdyn_errors, only: error_t, exit_input, raise
   use nocdyn_geared_groups, only: geared_group_t
   use nocdyn_kinds, only: wp
   use nocdyn_lapack, only: solve_positive_definite
   use nocdyn_reaction_sweep, only: new_reaction_sweep, reaction_sweep_t
   use nocdyn_rigid_trains, only: rigid_trains_t
+  use nocdyn_text, only: joined, selected, string_t
   use nocdyn_train_motion, only: find_motion, train_motion_t
   use nocdyn_train_relations, only: new_relations, train_relations_t
   implicit none (type, external)
   private
 
-  public :: new_coordinates
+  public :: build_coordinates
+
+  integer, parameter :: most_names = 12   ! in a message
 
   type, public :: coordinates_t
     integer :: freedoms = 0                    !! length of q
@@ -40,18 +44,20 @@ module nocdyn_coordinates
 
 contains
 
-  !> Builds the operators group by group.
-  function new_coordinates(constraints, trains, groups, inertia, wanted, choice) result(self)
+  !> Builds the operators group by group; a group whose mass matrix rounding makes indefinite is an error.
+  subroutine build_coordinates(constraints, body_names, trains, groups, inertia, wanted, choice, self, error)
     type(constraints_t), intent(in) :: constraints
+    type(string_t), intent(in) :: body_names(:)
     type(rigid_trains_t), intent(in) :: trains
     type(geared_group_t), intent(in) :: groups(:)   !! analysed
     real(wp), intent(in) :: inertia(:, :)           !! [lanes, bodies] [kg m2]
     integer, intent(in) :: wanted(:)                !! order of the coordinates as bodies; empty: ascending bodies
     integer, intent(in) :: choice                   !! complement_...
-    type(coordinates_t) :: self
+    type(coordinates_t), intent(out) :: self
+    type(error_t), allocatable, intent(out) :: error
     type(train_relations_t) :: relations
     integer :: first_coordinate(size(inertia, 2)), place(size(trains%lead))
-    integer :: g, k, lane
+    integer :: culprit, g, k, lane
 
     call number_coordinates(groups, wanted, self, first_coordinate)
     call lay_out_entries(groups, first_coordinate, size(inertia, 2), size(inertia, 1), self)
@@ -61,13 +67,18 @@ contains
     end do
     self%sweep = new_reaction_sweep(constraints, trains, relations, groups)
     do lane = 1, size(inertia, 1)
-      call fill_lane(constraints, trains, relations, groups, place, inertia(lane, :), choice, lane, self)
+      call fill_lane(constraints, trains, relations, groups, place, inertia(lane, :), choice, lane, self, culprit)
+      if (culprit > 0) then
+        call raise(error, exit_input, joined(selected(body_names, groups(culprit)%independent), ', ', most_names) // &
+                   ' cannot be independent: rounding hides what differs between their speeds; name faster bodies')
+        return
+      end if
     end do
     call self%sweep%share_out(constraints, groups)
     self%geared = geared_bodies(groups, size(inertia, 2))
     self%inertia = inertia
     allocate (self%imbalance(size(inertia, 2)), self%acceleration(self%freedoms))
-  end function new_coordinates
+  end subroutine build_coordinates
 
   !> The bodies in groups with rows, ascending.
   pure function geared_bodies(groups, bodies) result(geared)
@@ -129,7 +140,7 @@ contains
     allocate (self%response, source=self%ratio)
   end subroutine lay_out_entries
 
-  subroutine fill_lane(constraints, trains, relations, groups, place, inertia, choice, lane, self)
+  subroutine fill_lane(constraints, trains, relations, groups, place, inertia, choice, lane, self, culprit)
     type(constraints_t), intent(in) :: constraints
     type(rigid_trains_t), intent(in) :: trains
     type(train_relations_t), intent(in) :: relations
@@ -138,17 +149,24 @@ contains
     real(wp), intent(in) :: inertia(:)
     integer, intent(in) :: choice, lane
     type(coordinates_t), intent(inout) :: self
+    integer, intent(out) :: culprit    !! group whose mass matrix is not positive definite, 0 if there is none
     type(train_motion_t) :: found
     real(wp) :: factor, ratio(size(inertia))
     integer :: g
+    logical :: is_indefinite
 
+    culprit = 0
     ratio = trains%ratios(constraints, lane)
     do g = 1, size(groups)
       call find_motion(relations, groups(g)%elimination, place, size(groups(g)%trains), lane, found)
       factor = complement_factor(choice, found%log_determinant + pair_determinant(constraints, trains, groups(g)%bodies, lane), &
                                  size(groups(g)%kept))
       call fill_entries(groups(g)%bodies, place(trains%train(groups(g)%bodies)), inertia(groups(g)%bodies), &
-                        ratio(groups(g)%bodies), factor * found%motion, lane, self)
+                        ratio(groups(g)%bodies), factor * found%motion, lane, self, is_indefinite)
+      if (is_indefinite) then
+        culprit = g
+        return
+      end if
       call self%sweep%take_core(g, lane, found%dual)
     end do
     call self%sweep%take_ratios(lane, ratio)
@@ -171,7 +189,7 @@ contains
   end function pair_determinant
 
   !> L_tau of the group, and its response from the mass matrix L_tau^T J L_tau, factored once.
-  subroutine fill_entries(bodies, train, inertia, ratio, motion, lane, self)
+  subroutine fill_entries(bodies, train, inertia, ratio, motion, lane, self, is_indefinite)
     integer, intent(in) :: bodies(:)
     integer, intent(in) :: train(:)          !! of `bodies`, in the group
     real(wp), intent(in) :: inertia(:)       !! of `bodies`
@@ -179,10 +197,10 @@ contains
     real(wp), intent(in) :: motion(:, :)     !! L_tau of the leads, [trains, coordinates of the group]
     integer, intent(in) :: lane
     type(coordinates_t), intent(inout) :: self
+    logical, intent(out) :: is_indefinite    !! the mass matrix is, and nothing is filled
     real(wp), allocatable :: response(:, :)
     real(wp) :: mass(size(motion, 1)), momentum(size(motion, 1), size(motion, 2))
     integer :: i, k
-    logical :: is_indefinite
 
     mass = 0.0_wp
     do i = 1, size(bodies)
@@ -192,7 +210,7 @@ contains
       momentum(:, k) = mass * motion(:, k)
     end do
     call solve_positive_definite(matmul(transpose(motion), momentum), transpose(motion), response, is_indefinite)
-    if (is_indefinite) error stop 'nocdyn_coordinates: inertias must be positive'
+    if (is_indefinite) return
     do i = 1, size(bodies)
       k = self%first(bodies(i))
       self%ratio(lane, k:k + size(motion, 2) - 1) = ratio(i) * motion(train(i), :)

@@ -3,7 +3,7 @@ module nocdyn_test_machines
   use nocdyn_bank, only: bank_slot_t, bank_t
   use nocdyn_constraint_analysis, only: analyse_constraints
   use nocdyn_constraints, only: constraints_t, new_constraints
-  use nocdyn_coordinates, only: new_coordinates
+  use nocdyn_coordinates, only: build_coordinates
   use nocdyn_couplings, only: new_couplings
   use nocdyn_errors, only: error_t
   use nocdyn_excitations, only: new_excitations
@@ -177,7 +177,9 @@ contains
     call machine%number_elements()
     call analyse_constraints(machine%constraints, machine%names, wanted, machine%trains, machine%groups, culprit, error)
     if (allocated(error)) error stop 'nocdyn_test_machines: a machine to test with has gears that lock'
-    machine%coordinates = new_coordinates(machine%constraints, machine%trains, machine%groups, machine%inertia, wanted, choice)
+    call build_coordinates(machine%constraints, machine%names, machine%trains, machine%groups, machine%inertia, wanted, choice, &
+                           machine%coordinates, error)
+    if (allocated(error)) error stop 'nocdyn_test_machines: a machine to test with has gears that are too steep'
   end subroutine finish
 
   function numbered_names(stem, count) result(names)
