@@ -7,7 +7,7 @@ module nocdyn_polynomial_couplings
   implicit none (type, external)
   private
 
-  public :: new_polynomial_couplings, elastic_coefficients, add_terms
+  public :: new_polynomial_couplings, elastic_coefficients
   public :: elastic_moment, elastic_slope, elastic_curvature, elastic_energy
 
   !> M_el = -(p_1 w + p_2 w^2 + ...) on the second body, w = u - rest_twist; eqs. (2), (3) are p_1 and p_3.

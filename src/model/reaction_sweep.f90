@@ -3,7 +3,8 @@
 !> The transposed equations of L_lambda^ext are swept from the outside inwards: the relations between trains first, then in
 !> each train every body hands what is left over on it to its parent through the row between them. What redundant rows
 !> carry is then shared out so that the norm of the reactions is smallest. All work is linear in the entries of the rows
-!> but for the dense cores of relations and the loops that redundant rows close.
+!> but for the dense cores of relations and the loops that redundant rows close. To set it up takes a sweep for each
+!> redundant row.
 module nocdyn_reaction_sweep
   use nocdyn_constraints, only: constraints_t
   use nocdyn_geared_groups, only: geared_group_t
@@ -37,7 +38,6 @@ module nocdyn_reaction_sweep
     integer, allocatable :: child(:), parent(:), row(:)   !! the pairs of all trains, from the outside inwards
     real(wp), allocatable :: own(:, :), other(:, :)       !! coefficients of child and parent, [lanes, pairs]
     type(shared_loads_t) :: shares
-    real(wp), allocatable :: moment(:)         !! left over on each body, work space
     real(wp), allocatable :: of_trains(:)      !! moments on trains, work space
     real(wp), allocatable :: of_relations(:)   !! multipliers, work space
   contains
@@ -64,7 +64,7 @@ contains
     lanes = size(constraints%coefficient, 1)
     allocate (self%train, source=trains%train)
     self%relations = relations
-    allocate (self%ratio(lanes, constraints%bodies), self%moment(constraints%bodies))
+    allocate (self%ratio(lanes, constraints%bodies))
     allocate (self%of_trains(size(trains%lead)), self%of_relations(size(relations%row)))
     next = sum([(constraints%entries(relations%row(i)), i=1, size(relations%row))])
     allocate (self%first(size(relations%row) + 1), self%body(next), self%coefficient(lanes, next))
