@@ -1,6 +1,7 @@
 !> The rigid part of a machine: rows of L_lambda, eqs. (8), (23), each a linear relation between body speeds.
 module nocdyn_constraints
   use nocdyn_kinds, only: wp
+  use nocdyn_sparse_map, only: transposed_order
   use nocdyn_text, only: string_t, strings
   implicit none (type, external)
   private
@@ -28,6 +29,7 @@ module nocdyn_constraints
     procedure :: rows
     procedure :: entries
     procedure :: split_pair
+    procedure :: list_rows
     procedure :: block
     procedure :: residual
   end type constraints_t
@@ -93,6 +95,29 @@ contains
       end if
     end associate
   end subroutine split_pair
+
+  !> The chosen rows that each body is in, ascending: row(first(b)) to row(first(b + 1) - 1).
+  subroutine list_rows(self, is_chosen, first, row)
+    class(constraints_t), intent(in) :: self
+    logical, intent(in) :: is_chosen(:)   !! [rows]
+    integer, allocatable, intent(out) :: first(:), row(:)
+    integer :: body(size(self%body)), row_of(size(self%body))   ! of each entry of a chosen row
+    integer, allocatable :: order(:)
+    integer :: entry, n, r
+
+    n = 0
+    do r = 1, size(is_chosen)
+      if (.not. is_chosen(r)) cycle
+      do entry = self%first(r), self%first(r + 1) - 1
+        n = n + 1
+        body(n) = self%body(entry)
+        row_of(n) = r
+      end do
+    end do
+    allocate (first(self%bodies + 1), order(n))
+    call transposed_order(body(:n), self%bodies, order, first)
+    row = row_of(order)
+  end subroutine list_rows
 
   !> The dense part of L_lambda in the given rows and columns; entries in other columns are left out.
   pure function block(self, lane, chosen, bodies) result(dense)

@@ -99,7 +99,7 @@ contains
     integer, allocatable :: first(:), rows(:)
     integer :: b, begin, k, next, other, r, t
 
-    call rows_of_bodies(constraints, is_tied, first, rows)
+    call constraints%list_rows(is_tied, first, rows)
     associate (n => constraints%bodies)
       allocate (trains%order(n), trains%place(n), trains%train(n))
       allocate (trains%parent(n), trains%parent_row(n), source=0)
@@ -127,36 +127,6 @@ contains
       end do
     end do
   end subroutine lay_out
-
-  !> The tied rows of each body: rows(first(b)) to rows(first(b + 1) - 1).
-  subroutine rows_of_bodies(constraints, is_tied, first, rows)
-    type(constraints_t), intent(in) :: constraints
-    logical, intent(in) :: is_tied(:)
-    integer, allocatable, intent(out) :: first(:), rows(:)
-    integer :: next(constraints%bodies), b, entry, r
-
-    next = 0
-    do r = 1, size(is_tied)
-      if (.not. is_tied(r)) cycle
-      do entry = constraints%first(r), constraints%first(r) + 1
-        next(constraints%body(entry)) = next(constraints%body(entry)) + 1
-      end do
-    end do
-    allocate (first(constraints%bodies + 1), rows(sum(next)))
-    first(1) = 1
-    do b = 1, constraints%bodies
-      first(b + 1) = first(b) + next(b)
-    end do
-    next = first(:constraints%bodies)
-    do r = 1, size(is_tied)
-      if (.not. is_tied(r)) cycle
-      do entry = constraints%first(r), constraints%first(r) + 1
-        b = constraints%body(entry)
-        rows(next(b)) = r
-        next(b) = next(b) + 1
-      end do
-    end do
-  end subroutine rows_of_bodies
 
   !> omega(body) = fraction * 2**exponent * omega(lead of its train), with 1/2 <= |fraction| < 1.
   subroutine scaled_ratios(self, constraints, lane, fractions, exponents)

@@ -126,7 +126,7 @@ contains
     integer :: entry, i, last, train
     logical :: is_left(size(takes_part))
 
-    call relations_of_trains(self%between, takes_part, first, of_train)
+    call self%between%list_rows(takes_part, first, of_train)
     uses = first(2:) - first(:size(uses))
     is_left = takes_part
     allocate (peeling%relation(count(takes_part)), peeling%train(count(takes_part)))
@@ -192,36 +192,6 @@ contains
       end associate
     end do
   end subroutine leave
-
-  !> The relations of each train: of_train(first(t)) to of_train(first(t + 1) - 1).
-  subroutine relations_of_trains(between, takes_part, first, of_train)
-    type(constraints_t), intent(in) :: between
-    logical, intent(in) :: takes_part(:)
-    integer, allocatable, intent(out) :: first(:), of_train(:)
-    integer :: next(between%bodies), entry, r, t
-
-    next = 0
-    do r = 1, size(takes_part)
-      if (.not. takes_part(r)) cycle
-      associate (trains => between%body(between%first(r):between%first(r + 1) - 1))
-        next(trains) = next(trains) + 1
-      end associate
-    end do
-    allocate (first(between%bodies + 1), of_train(sum(next)))
-    first(1) = 1
-    do t = 1, between%bodies
-      first(t + 1) = first(t) + next(t)
-    end do
-    next = first(:between%bodies)
-    do r = 1, size(takes_part)
-      if (.not. takes_part(r)) cycle
-      do entry = between%first(r), between%first(r + 1) - 1
-        t = between%body(entry)
-        of_train(next(t)) = r
-        next(t) = next(t) + 1
-      end do
-    end do
-  end subroutine relations_of_trains
 
   !> The constraint rows that take part where the relations have these multipliers, ascending: those relations whose
   !> multiplier is more than rounding, and the rows of trees that they load. In the first lane.
