@@ -140,6 +140,7 @@ contains
     allocate (self%response, source=self%ratio)
   end subroutine lay_out_entries
 
+  !> L_tau of one lane, group by group, and what the sweep of its reactions needs.
   subroutine fill_lane(constraints, trains, relations, groups, place, inertia, choice, lane, self, culprit)
     type(constraints_t), intent(in) :: constraints
     type(rigid_trains_t), intent(in) :: trains

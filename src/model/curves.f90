@@ -33,7 +33,7 @@ module nocdyn_curves
 
 contains
 
-  !> A curve through points; cubic: slopes of Fritsch and Butland, monotone between neighbours.
+  !> The curve through points (x, y); two of them make a straight line, however they are joined.
   function new_curve(x, y, interpolation, extrapolation) result(self)
     real(wp), intent(in) :: x(:)             !! ascending, at least 2
     real(wp), intent(in) :: y(:)

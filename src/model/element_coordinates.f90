@@ -22,7 +22,7 @@ module nocdyn_element_coordinates
 
 contains
 
-  !> The coordinates of the bodies at both ends of every element.
+  !> The entries of all elements; both bodies of one may have the same coordinates, whose entries are then one.
   function new_element_coordinates(elements, coordinates) result(self)
     type(elements_t), intent(in) :: elements
     type(coordinates_t), intent(in) :: coordinates

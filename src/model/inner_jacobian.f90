@@ -26,7 +26,7 @@ module nocdyn_inner_jacobian
 
 contains
 
-  !> The positions of the derivatives by and of inner states.
+  !> The positions; the rows of the inner states follow those of the coordinates, those of the works come last.
   function new_inner_jacobian(freedoms, incidence, accounted, inner, before) result(self)
     integer, intent(in) :: freedoms
     type(element_coordinates_t), intent(in) :: incidence

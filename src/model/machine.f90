@@ -221,7 +221,6 @@ contains
   subroutine evaluate_elements(self, t)
     class(machine_t), intent(inout) :: self
     real(wp), intent(in) :: t(self%lanes)
-
     integer :: i
 
     call self%laws%evaluate(self%elements)

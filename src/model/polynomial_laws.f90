@@ -98,7 +98,6 @@ contains
     class(polynomial_laws_t), intent(in) :: self
     type(elements_t), intent(inout) :: elements
 
-
     if (self%is_divided) then
       call evaluate_parts(self, elements)
     else

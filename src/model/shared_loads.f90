@@ -76,6 +76,7 @@ contains
     end do
   end subroutine join
 
+  !> Hands the rows and the redundancies out to the blocks, in their order.
   subroutine fill_blocks(groups, block_of, lanes, blocks)
     type(geared_group_t), intent(in) :: groups(:)
     integer, intent(in) :: block_of(:)   !! of each row, 0: of none
