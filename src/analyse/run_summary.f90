@@ -180,6 +180,7 @@ contains
       call json%put('evaluations', outcome%evaluations(1))
       call json%put('jacobians', outcome%jacobians(1))
       call json%put('factorisations', outcome%factorisations(1))
+      call json%put('crossings', outcome%crossings(1))
       call json%put('rows', summary%extremes%rows)
       call json%close()
       call json%put('time_reached', outcome%t(1))

@@ -23,8 +23,9 @@ contains
     character(len=:), allocatable :: text
 
     text = input%file // ': done at t = ' // to_text(summary%outcome%t(1)) // ' s, ' // &
-           to_text(summary%outcome%accepted(1)) // ' steps (' // to_text(summary%outcome%rejected(1)) // ' rejected), ' // &
-           to_text(summary%extremes%rows) // ' rows, ' // rounded_text(1000.0_wp * summary%wall_time, 3) // &
+           to_text(summary%outcome%accepted(1)) // ' steps (' // to_text(summary%outcome%rejected(1)) // ' rejected), '
+    if (summary%outcome%crossings(1) > 0) text = text // to_text(summary%outcome%crossings(1)) // ' kinks or jumps crossed, '
+    text = text // to_text(summary%extremes%rows) // ' rows, ' // rounded_text(1000.0_wp * summary%wall_time, 3) // &
            ' ms; results in ' // folder
   end function summary_line
 

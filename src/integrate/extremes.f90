@@ -15,6 +15,7 @@ module nocdyn_extremes
   public :: allocate_extremes, start_extremes, resume_extremes, follow_extremes
 
   real(wp), parameter :: overshoot = 0.25_wp   !! of the spread of the values: no polynomial is expected to pass them by more
+  real(wp), parameter :: right_before = 64.0_wp   !! spacings of the times: more than an observer may allow for their rounding
   integer, parameter :: most_places = 40       !! in a step
   integer, parameter :: most_newton_steps = 60   !! bisection alone would need as many
 
@@ -92,12 +93,14 @@ contains
     call observer%tracked_values(lane, trial%t(lane), extremes%y, extremes%last(:, lane))
   end subroutine resume_extremes
 
-  !> Widens the ranges of a lane by its last step, up to t_end.
-  subroutine follow_extremes(extremes, observer, dense, t_end)
+  !> Widens the ranges of a lane by its last step, up to t_end. A function that jumps at a crossing there is taken right before:
+  !> a jump is no part of the step, and would spoil the polynomial.
+  subroutine follow_extremes(extremes, observer, dense, t_end, ends_at_crossing)
     type(extremes_t), intent(inout) :: extremes
     class(observer_t), intent(inout) :: observer
     type(dense_output_t), intent(inout) :: dense   !! of the lane
     real(wp), intent(in) :: t_end
+    logical, intent(in) :: ends_at_crossing
     real(wp) :: t, half, middle
     integer :: i, last
 
@@ -107,6 +110,7 @@ contains
     extremes%values(:, 1) = extremes%last(:, dense%lane)
     do i = 2, last
       t = middle + extremes%places(i) * half
+      if (i == last .and. ends_at_crossing) t = max(dense%t, t_end - right_before * spacing(t_end))
       call sample(dense, min(1.0_wp, (t - dense%t) / dense%h), extremes%y)
       call observer%tracked_values(dense%lane, t, extremes%y, extremes%values(:, i))
     end do

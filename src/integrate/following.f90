@@ -25,16 +25,21 @@ contains
     class(observer_t), intent(inout) :: observer
     type(outcome_t), intent(inout) :: outcome
     real(wp) :: until   ! place in the step
+    logical :: crosses
     integer :: lane
 
     do lane = 1, march%trial%lanes
       if (.not. march%accepted(lane)) cycle
       if (march%wanted(lane)) call take_lane(march%dense, march%trial, march%coefficients, lane)
       until = 1.0_wp
-      if (march%has_switches) call end_at_crossing(march, system, observer, lane, outcome, until)
+      crosses = .false.
+      if (march%has_switches) then
+        call end_at_crossing(march, system, observer, lane, outcome, until)
+        crosses = march%switching%due(lane) > 0
+      end if
       if (march%has_events) call pass_events(march, system, lane, until, times, observer, outcome)
       call record_until(march, lane, march%t_new(lane), times, observer)
-      if (march%has_extremes) call follow_extremes(march%extremes, observer, march%dense, march%t_new(lane))
+      if (march%has_extremes) call follow_extremes(march%extremes, observer, march%dense, march%t_new(lane), crosses)
     end do
   end subroutine follow_lanes
 

@@ -6,8 +6,8 @@ module nocdyn_switching
   use nocdyn_outcome, only: integration_chattering, note_crossing, outcome_t
   use nocdyn_system, only: observer_t, system_t
   use nocdyn_trial, only: trial_t
-  use nocdyn_watched_functions, only: allocate_watched, bracket_t, find_dip, find_root, part_of_step, place, scan_step, &
-    sign_of, start_watched, watched_t
+  use nocdyn_watched_functions, only: allocate_watched, bracket_t, evaluate, find_dip, find_root, part_of_step, place, &
+    scan_step, sign_of, start_watched, watched_t
   implicit none (type, external)
   private
 
@@ -23,7 +23,7 @@ module nocdyn_switching
     real(wp), allocatable, private :: last_time(:)         !! of a crossing of each lane
     integer, allocatable, private :: repeats(:, :)         !! crossings since the lane made progress, [lanes, functions]
     type(watched_t), private :: watched
-    real(wp), allocatable, private :: g(:)
+    real(wp), allocatable, private :: g(:)                 !! functions where a lane crosses, or at the first fall found so far
     real(wp), allocatable, private :: y(:)
   end type switching_t
 
@@ -67,7 +67,6 @@ contains
     class(observer_t), intent(inout) :: observer
     type(dense_output_t), intent(inout) :: dense    !! of the lane
     real(wp), intent(out) :: theta                  !! 1 if none falls
-    real(wp) :: root
     integer :: function, part
 
     theta = 1.0_wp
@@ -77,13 +76,10 @@ contains
       do function = 1, size(switching%g)
         associate (side => switching%watched%side(dense%lane, function), g => switching%watched%values(function, part))
           if (.not. is_finite(g)) cycle
-          root = place(switching%watched, part - 1, 1.0_wp)
           if (side > 0 .and. g <= 0) then
-            call find_root(switching%watched, system, observer, dense, &
-                           part_of_step(switching%watched, function, part, 1.0_wp), root)
-            call keep_first(switching, dense%lane, function, root, theta)
+            call find_fall_of(switching, system, observer, dense, part_of_step(switching%watched, function, part, 1.0_wp), theta)
           else if (side == 0 .and. g < 0) then
-            call keep_first(switching, dense%lane, function, root, theta)
+            call keep_first(switching, dense%lane, function, place(switching%watched, part - 1, 1.0_wp), theta)
           end if
           side = sign_of(g)
         end associate
@@ -92,6 +88,34 @@ contains
     end do
     call find_short_falls(switching, system, observer, dense, theta)
   end subroutine find_fall
+
+  !> The fall of one function in a bracket, if it comes before that at theta. Of many functions that fall in one part of a step
+  !> only few are followed to their roots: most are seen to be positive at the first fall known so far.
+  subroutine find_fall_of(switching, system, observer, dense, whole, theta)
+    type(switching_t), intent(inout) :: switching
+    class(system_t), intent(inout) :: system
+    class(observer_t), intent(inout) :: observer
+    type(dense_output_t), intent(inout) :: dense
+    type(bracket_t), intent(in) :: whole
+    real(wp), intent(inout) :: theta
+    type(bracket_t) :: bracket
+    real(wp) :: root
+
+    bracket = whole
+    if (switching%due(dense%lane) > 0) then
+      if (theta <= bracket%before) return
+      if (theta < bracket%after .and. is_finite(switching%g(bracket%function))) then
+        if (switching%g(bracket%function) > 0) return
+        bracket%after = theta
+        bracket%g_after = switching%g(bracket%function)
+      end if
+    end if
+    call find_root(switching%watched, system, observer, dense, bracket, root)
+    call keep_first(switching, dense%lane, bracket%function, root, theta)
+    if (switching%due(dense%lane) == bracket%function) then
+      call evaluate(.true., system, observer, dense, theta, switching%y, switching%g)
+    end if
+  end subroutine find_fall_of
 
   !> The same for falls from which a function comes back before the end of a part, as at a grazing contact.
   subroutine find_short_falls(switching, system, observer, dense, theta)
@@ -106,6 +130,7 @@ contains
     logical :: found
 
     do part = 1, switching%watched%parts - 1
+      if (place(switching%watched, part - 1, 1.0_wp) >= theta) exit
       do function = 1, size(switching%g)
         associate (g => switching%watched%values)
           if (.not. may_dip(g(function, part - 1), g(function, part), g(function, part + 1))) cycle

@@ -11,7 +11,7 @@ module nocdyn_watched_functions
   implicit none (type, external)
   private
 
-  public :: allocate_watched, start_watched, scan_step, place, part_of_step, find_root, find_dip, sign_of
+  public :: allocate_watched, start_watched, scan_step, evaluate, place, part_of_step, find_root, find_dip, sign_of
 
   integer, parameter :: least_parts = 4                 !! of a step; more for solutions of higher degree, whose steps are longer
   integer, parameter :: most_dip_steps = 10

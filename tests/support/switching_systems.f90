@@ -29,6 +29,7 @@ module nocdyn_switching_systems
     integer :: refused = huge(1)              !! so many passed times, and the slope cannot be evaluated
     logical, allocatable :: passed(:, :)
     integer, allocatable :: calls(:)          !! of `cross`, by the switches
+    integer :: looks = 0                      !! calls of `switch_values`
   contains
     procedure :: derivative => clock_derivative
     procedure :: jacobian => clock_jacobian
@@ -231,6 +232,7 @@ contains
     real(wp), contiguous, intent(inout) :: g(:)
 
     g(:) = merge(1.0_wp, self%time(:, lane) - t, self%passed(:, lane))
+    self%looks = self%looks + 1
   end subroutine clock_values
 
   subroutine clock_cross(self, lane, which, t, y)
