@@ -208,7 +208,7 @@ contains
     integer :: i, r
 
     taking = pack([(i, i=1, size(lambda))], abs(lambda) > 0.0_wp)
-    sizes = row_sizes(self%between, taking)
+    allocate (sizes, source=row_sizes(self%between, taking))
     associate (weight => abs(lambda(taking)) * sizes)   ! a relation of size 0 says nothing between trains, but in them
       taking = pack(taking, sizes <= 0.0_wp .or. weight > ratio_tolerance * maxval(weight))
     end associate

@@ -184,6 +184,33 @@ def test_the_rosenbrock_method_counts_its_jacobians(nocdyn):
     assert counts["factorisations"] == counts["accepted_steps"] + counts["rejected_steps"]
 
 
+# The disc of `sqrt(k / J) = 2 rad/s` starts at its largest angle and passes the edges of its gap, then the step comes.
+KINKS = """\
+&body name = 'disc' inertia = 1.0 angle = 0.75 /
+&coupling name = 'play' bodies = 'ground', 'disc' stiffness = 4.0 gap = 0.5 /
+&excitation name = 'blow' body = 'disc' kind = 'step' amplitude = -3.0 time = 1.0 /
+&run t_end = 1.1 method = '{method}' rtol = 1e-9 /
+&output points = 3 /
+"""
+
+
+@pytest.mark.parametrize("method", ["auto", "rk45", "rk853", "rodas4", "rodas5p"])
+def test_the_summary_counts_crossings(nocdyn, method):
+    nocdyn.write("kinks.nml", KINKS.format(method=method))
+    outcome = nocdyn("run", "kinks.nml", "--out", "out")
+    # out of contact at pi / 4, with a speed of 1 rad/s to the other edge beyond 1 s: 0.25 - (1 - pi / 4) > -0.25
+    summary = nocdyn.summary("out")
+    assert summary["counts"]["crossings"] == 2
+    assert " rejected), 2 kinks or jumps crossed, 3 rows, " in outcome.stdout.splitlines()[-1]
+    blow = summary["columns"]["torque_blow [N m]"]
+    assert (blow["max"], blow["time_of_max"], blow["min"]) == (0, 0, -3)
+    assert summary["columns"]["moment_play [N m]"]["min"] == 0
+
+
+def test_a_run_without_kinks_crosses_none(case_2):
+    assert case_2.summary("case2")["counts"]["crossings"] == 0
+
+
 @pytest.mark.parametrize("folder", ["case2", "full"])
 def test_no_row_lies_outside_the_extremes(case_2, full, folder):
     table = columns(case_2, folder)

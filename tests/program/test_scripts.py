@@ -278,3 +278,19 @@ def test_setup_refuses_an_unknown_part(bare_machine):
     result = bare_machine.setup("building")
     assert result.returncode == 2
     assert "there is no part 'building'" in result.stderr
+
+
+def test_the_cost_of_a_step_is_measured_for_every_kind_of_machine():
+    command = [sys.executable, "-m", "nocdyn_bench.scale", "--nocdyn", NOCDYN, "--sizes", "10", "20", "--rounds", "1", "--methods", "rk45"]
+    outcome = subprocess.run(command, capture_output=True, text=True, env=os.environ | {"PYTHONPATH": str(SCRIPTS)})
+    assert (outcome.returncode, outcome.stderr) == (0, "")
+    header, _, *rows = [line.strip("| ").split(" | ") for line in outcome.stdout.splitlines()[2:]]
+    assert header == ["machine", "method", "10", "20"]
+    assert [row[:2] for row in rows] == [[kind, "rk45"] for kind in ("chain", "gaps", "train", "pairs")]
+    assert all(float(cell.split()[0]) > 0 for row in rows for cell in row[2:])
+
+
+def test_sizes_that_make_no_machine_are_refused():
+    command = [sys.executable, "-m", "nocdyn_bench.scale", "--nocdyn", NOCDYN, "--sizes", "2"]
+    outcome = subprocess.run(command, capture_output=True, text=True, env=os.environ | {"PYTHONPATH": str(SCRIPTS)})
+    assert outcome.returncode == 2 and "--sizes must be at least 4" in outcome.stderr
