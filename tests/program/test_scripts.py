@@ -281,7 +281,8 @@ def test_setup_refuses_an_unknown_part(bare_machine):
 
 
 def test_the_cost_of_a_step_is_measured_for_every_kind_of_machine():
-    command = [sys.executable, "-m", "nocdyn_bench.scale", "--nocdyn", NOCDYN, "--sizes", "10", "20", "--rounds", "1", "--methods", "rk45"]
+    options = ["--nocdyn", NOCDYN, "--sizes", "10", "20", "--rounds", "1", "--methods", "rk45"]
+    command = [sys.executable, "-m", "nocdyn_bench.scale", *options]
     outcome = subprocess.run(command, capture_output=True, text=True, env=os.environ | {"PYTHONPATH": str(SCRIPTS)})
     assert (outcome.returncode, outcome.stderr) == (0, "")
     header, _, *rows = [line.strip("| ").split(" | ") for line in outcome.stdout.splitlines()[2:]]
