@@ -87,3 +87,56 @@ def test_a_run_that_fails_has_the_account_of_its_rows(nocdyn):
     account = nocdyn.summary("results/case2")["energy_account"]
     header, rows = nocdyn.table("results/case2", "trajectory.partial.csv")
     assert account["kinetic_J"][1] == rows[-1][header.index("kinetic_energy [J]")]
+
+
+ROTOR = "&body name = 'rotor' inertia = 2.0 speed = {speed} /\n{elements}\n&run t_end = 5.0 rtol = 1e-10 atol = 1e-10 {run} /\n"
+LISTS = {
+    # what an element takes out stands on the other side, whatever its kind
+    "a dc motor that drives": (
+        ROTOR.format(speed=0.0, run="", elements="&motor name = 'dc' body = 'rotor' kind = 'dc' voltage = 100.0 resistance = 0.5 "
+                     "flux_constant = 1.2 inductance = 0.01 /\n&load name = 'mill' body = 'rotor' viscous = 0.8 /"),
+        ["motor dc"], ["load mill", "kinetic energy"],
+    ),
+    "a dc motor that brakes": (
+        ROTOR.format(speed=200.0, run="", elements="&motor name = 'dc' body = 'rotor' kind = 'dc' voltage = 0.0 resistance = 0.5 "
+                     "flux_constant = 1.2 inductance = 0.01 /"),
+        ["kinetic energy"], ["motor dc"],
+    ),
+    "a load that drives": (
+        ROTOR.format(speed=0.0, run="", elements="&load name = 'river' body = 'rotor' table_speed = -10.0, 10.0 "
+                     "table_torque = -5.0, -5.0 /\n&motor name = 'brake' body = 'rotor' a = 0.0 b = 1.0 c = 0.0 /"),
+        ["load river"], ["motor brake", "kinetic energy"],
+    ),
+    "a gap that is hit": (
+        ROTOR.format(speed=5.0, run="", elements="&coupling name = 'stop' bodies = 'ground', 'rotor' stiffness = 2e4 damping = 50.0 "
+                     "gap = 0.8 rest_twist = -1.0 /"),
+        ["stored in stop", "kinetic energy"], ["coupling stop"],
+    ),
+    "a start that is projected": (
+        ROTOR.format(speed=20.0, run="start = 'projected'", elements="&body name = 'wheel' inertia = 3.0 /\n"
+                     "&gear name = 'mesh' bodies = 'rotor', 'wheel' teeth = 20, 40 /\n&load name = 'drag' body = 'rotor' viscous = 0.8 /"),
+        ["kinetic energy"], ["load drag"],
+    ),
+}
+
+
+@pytest.mark.parametrize("machine", LISTS)
+def test_every_entry_stands_on_its_side_and_both_sides_add_up(nocdyn, machine):
+    text, sources, sinks = LISTS[machine]
+    _, table = nocdyn("run", nocdyn.write("machine.nml", text)).stdout.split("energy came from [J]\n")
+    sides = table.split("what does not add up")[0].split("and went to [J]\n")
+    entries = [{name.strip(): float(energy) for name, energy, *_ in (line.rsplit(maxsplit=3) for line in side.splitlines())}
+               for side in sides]
+    assert [sorted(side) for side in entries] == [sorted(sources), sorted(sinks)]
+    came, went = (sum(side.values()) for side in entries)
+    account = nocdyn.summary("results/machine")["energy_account"]
+    assert came == pytest.approx(went, rel=1e-5)  # seven digits are printed, and the step control leaves a residual
+    assert abs(account["residual_J"]) < 1e-5 * came
+
+
+def test_the_energy_that_a_projected_start_loses_is_no_part_of_the_run(nocdyn):
+    outcome = nocdyn("run", nocdyn.write("machine.nml", LISTS["a start that is projected"][0]))
+    speed = 2 * 20 / (2 + 3 * 0.5**2)  # the wheel turns half as fast, backwards
+    start = 0.5 * (2 + 3 * 0.5**2) * speed**2
+    assert f"kinetic energy lost: {0.5 * 2 * 20**2 - start:.4f} J" in outcome.stdout + outcome.stderr
+    assert nocdyn.summary("results/machine")["energy_account"]["kinetic_J"][0] == pytest.approx(start, rel=1e-12)
