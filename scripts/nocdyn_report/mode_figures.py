@@ -16,6 +16,7 @@ from .results import ResultsError
 from .style import COLOURS, REFERENCE, WIDTH, add_title, plain, save
 
 MOST_NAMES = 24  # bodies that are named on the axis
+MOST_LETTERS = 24  # of names that stand side by side under the narrower axes
 MOST_MODES = 6  # of a figure
 SHAPE, KINETIC, POTENTIAL = COLOURS[0], COLOURS[0], COLOURS[1]
 STRETCH = 0.06  # room above and below the largest motion
@@ -28,7 +29,7 @@ class Modes:
 
     @property
     def title(self) -> str:
-        return f"{self.content['title'] or Path(self.content['input']).name}: modes about {self.content['about']}"
+        return f"{self.content['title'] or Path(self.content['input']).name}\nmodes about {self.content['about']}"
 
     @property
     def bodies(self) -> list[str]:
@@ -36,7 +37,8 @@ class Modes:
 
     @property
     def oscillating(self) -> list[dict]:
-        return [mode for mode in self.content["modes"] if mode["kind"] == "oscillating"]
+        """Those that are drawn; of large machines the file has the shapes of the first modes only."""
+        return [mode for mode in self.content["modes"] if mode["kind"] == "oscillating" and "shape" in mode]
 
     def joints(self, kind: str) -> list[dict]:
         """Couplings or gears between two bodies, with the places of these."""
@@ -113,7 +115,7 @@ def _draw_energy(axes: Axes, modes: Modes, mode: dict) -> None:
 def _name_bodies(axes: Axes, modes: Modes) -> None:
     count = len(modes.bodies)
     places = np.arange(count) if count <= MOST_NAMES else np.unique(np.linspace(0, count - 1, 8).round().astype(int))
-    slanted = sum(len(modes.bodies[place]) for place in places) > 40
+    slanted = sum(len(modes.bodies[place]) for place in places) > MOST_LETTERS
     axes.set_xticks(places, [plain(modes.bodies[place]) for place in places], rotation=45 if slanted else 0,
                     ha="right" if slanted else "center")
 

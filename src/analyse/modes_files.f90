@@ -37,7 +37,7 @@ contains
     number = 0
     do i = 1, size(self%modes)
       if (self%modes(i)%kind == mode_oscillating) number = number + 1
-      call put_row(self%modes(i), number, table)
+      call put_row(self%modes(i), number, i <= self%shapes, table)
     end do
     text = table%text()
 
@@ -55,9 +55,10 @@ contains
   end function modes_csv
 
   !> Modes that do not oscillate have no number, and those that neither decay nor grow no time constant.
-  subroutine put_row(mode, number, table)
+  subroutine put_row(mode, number, has_shape, table)
     type(mode_t), intent(in) :: mode
     integer, intent(in) :: number
+    logical, intent(in) :: has_shape   !! the cells of the shape and of the shares are empty otherwise
     type(text_buffer_t), intent(inout) :: table
 
     if (mode%kind == mode_oscillating) call table%append(to_text(number))
@@ -65,10 +66,14 @@ contains
                       to_text(mode%undamped) // ',' // to_text(mode%damping_ratio()) // ',')
     if (mode%time_constant() < huge(1.0_wp)) call table%append(to_text(mode%time_constant()))
     call put_values([real(mode%eigenvalue, wp), aimag(mode%eigenvalue)], table)
-    call put_values(abs(mode%shape), table)
-    call put_values(phases(mode%shape), table)
-    call put_values(mode%kinetic, table)
-    call put_values(mode%potential, table)
+    if (has_shape) then
+      call put_values(abs(mode%shape), table)
+      call put_values(phases(mode%shape), table)
+      call put_values(mode%kinetic, table)
+      call put_values(mode%potential, table)
+    else
+      call table%append(repeat(',', 3 * size(mode%shape) + size(mode%potential)))
+    end if
     call table%append(new_line('a'))
   end subroutine put_row
 
@@ -114,7 +119,7 @@ contains
     number = 0
     do i = 1, size(self%modes)
       if (self%modes(i)%kind == mode_oscillating) number = number + 1
-      call put_mode(json, self%modes(i), number)
+      call put_mode(json, self%modes(i), number, i <= self%shapes)
     end do
     call json%close_list()
     call json%close()
@@ -156,10 +161,11 @@ contains
     call json%close_list()
   end subroutine put_train
 
-  subroutine put_mode(json, mode, number)
+  subroutine put_mode(json, mode, number, has_shape)
     type(json_t), intent(inout) :: json
     type(mode_t), intent(in) :: mode
     integer, intent(in) :: number
+    logical, intent(in) :: has_shape
 
     call json%open()
     if (mode%kind == mode_oscillating) call json%put('mode', number)
@@ -169,10 +175,12 @@ contains
     call json%put('damping_ratio', mode%damping_ratio())
     if (mode%time_constant() < huge(1.0_wp)) call json%put('time_constant_s', mode%time_constant())
     call json%put('eigenvalue_1_s', [real(mode%eigenvalue, wp), aimag(mode%eigenvalue)])
-    call json%put('shape', abs(mode%shape))
-    call json%put('phase_deg', phases(mode%shape))
-    call json%put('kinetic_share', mode%kinetic)
-    call json%put('potential_share', mode%potential)
+    if (has_shape) then
+      call json%put('shape', abs(mode%shape))
+      call json%put('phase_deg', phases(mode%shape))
+      call json%put('kinetic_share', mode%kinetic)
+      call json%put('potential_share', mode%potential)
+    end if
     call json%close()
   end subroutine put_mode
 

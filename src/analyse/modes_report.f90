@@ -7,7 +7,7 @@ module nocdyn_modes_report
   use nocdyn_modes, only: find_modes, kind_names, mode_diverging, mode_oscillating, mode_overdamped, mode_rigid, mode_t
   use nocdyn_operating_point, only: operating_point_t
   use nocdyn_table_text, only: cell, cell_width, padded, right, text_width
-  use nocdyn_text, only: rounded_text, string_t, to_text
+  use nocdyn_text, only: append, rounded_text, string_t, to_text
   use nocdyn_text_buffer, only: text_buffer_t
   implicit none (type, external)
   private
@@ -18,11 +18,13 @@ module nocdyn_modes_report
   integer, parameter :: most_shapes = 12         ! bodies and modes of which the shapes are printed
   integer, parameter :: shapes_per_row = 6
   integer, parameter :: most_shares = 3          ! bodies or couplings that are named for a mode
+  integer, parameter :: most_values = 1000000    ! of shapes and shares in a file
   real(wp), parameter :: least_share = 0.02_wp   ! of an energy that is named
 
   type, public :: modes_report_t
     type(machine_t) :: machine
     type(mode_t), allocatable :: modes(:)
+    integer :: shapes = 0                         !! modes whose shapes and shares the files tell, the first ones
     integer, allocatable :: elastic(:)            !! elements whose potential energies are told
     real(wp), allocatable :: stiffness(:)         !! tangent stiffness of `elastic` [N m/rad]
     real(wp), allocatable :: omega(:)             !! speeds of the bodies at the operating point [rad/s]
@@ -52,6 +54,11 @@ contains
     self%t = point%t
     self%point = point%text
     allocate (self%notes, source=point%notes)
+    self%shapes = min(size(self%modes), most_values / (3 * self%machine%bodies + size(self%elastic)))
+    if (self%shapes < size(self%modes)) then
+      call append(self%notes, 'of the ' // to_text(size(self%modes)) // ' modes, modes.csv and modes.json have the ' // &
+                              'shapes and energies of the first ' // to_text(self%shapes))
+    end if
   end subroutine new_modes_report
 
   !> Tables of the modes, and of the shapes of small machines.

@@ -370,3 +370,19 @@ def test_a_machine_with_too_many_states_is_refused(nocdyn):
     outcome = nocdyn("modes", nocdyn.write("many.nml", bodies + "&run t_end = 1.0 /\n"))
     assert (outcome.returncode, outcome.stdout) == (2, "")
     assert "many.nml: the modes of this machine are those of a dense matrix of 3002 states; at most 3000 are allowed" in outcome.stderr
+
+
+def test_the_files_of_a_large_machine_have_the_shapes_of_its_first_modes(nocdyn):
+    # trains of four geared bodies each, whose motions are rigid
+    count = 1240
+    bodies = "".join(f"&body name = 'b{i}' inertia = 1.0 /\n" for i in range(count))
+    rails = "".join(f"&gear name = 'g{i}' bodies = 'b{i}', 'b{i + 1}' teeth = 1, 1 /\n" for i in range(count - 1) if i % 4)
+    path = nocdyn.write("large.nml", bodies + rails + "&run t_end = 1.0 /\n")
+    outcome = nocdyn("modes", path, "--at", "rest", "--out", "out")
+    modes = json.loads((nocdyn.folder / "out/modes.json").read_text())["modes"]
+    told = 1000000 // (3 * count)
+    assert f"note: of the {len(modes)} modes, modes.csv and modes.json have the shapes and energies of the first {told}\n" in outcome.stdout
+    assert ["shape" in mode for mode in modes] == [True] * told + [False] * (len(modes) - told)
+    rows = list(csv.reader((nocdyn.folder / "out/modes.csv").read_text().splitlines()))
+    assert {len(row) for row in rows} == {8 + 3 * count}
+    assert rows[told][8] != "" and set(rows[told + 1][8:]) == {""}
