@@ -22,6 +22,7 @@ module nocdyn_balance_search
   type, public :: block_solutions_t
     integer, allocatable :: members(:)           !! unknowns
     real(wp), allocatable :: values(:, :)        !! [members, solutions]
+    logical, allocatable :: is_range(:)          !! whether a solution stands for a range of others, [solutions]
     logical :: is_idle = .false.                 !! nothing acts: any speed is steady, and the one of the start is kept
     real(wp) :: least_torque = huge(1.0_wp)      !! smallest imbalance that was met, with its sign [N m]
     real(wp) :: least_speed = 0.0_wp             !! there [rad/s]
@@ -44,7 +45,7 @@ contains
       if (block_of(i) /= i) cycle
       k = k + 1
       blocks(k)%members = pack([(member, member=1, size(block_of))], block_of == i)
-      allocate (blocks(k)%values(size(blocks(k)%members), 0))
+      allocate (blocks(k)%values(size(blocks(k)%members), 0), blocks(k)%is_range(0))
       if (size(blocks(k)%members) == 1 .and. i <= balance%motions%freedoms()) then
         call scan(balance, z, blocks(k))
       else
@@ -109,10 +110,7 @@ contains
 
     associate (member => block%members(1), n => ubound(grid, 1))
       if (abs(torque(i)) <= 0.0_wp) then
-        if (i > lower) then
-          if (abs(torque(i - 1)) <= 0.0_wp) return   ! a range of speeds, of which the first stands for all
-        end if
-        call add([grid(i)], block)
+        call add_range(z(member), grid, torque, lower, i, block)
       else if (i < n) then
         if (torque(i) * torque(i + 1) < 0.0_wp) then
           call refine(balance, z, grid(i), grid(i + 1), torque(i), block)
@@ -129,6 +127,24 @@ contains
       end if
     end associate
   end subroutine look_around
+
+  !> A point of the scan where the torques balance, or the speed nearest to `start` of the range that begins there.
+  subroutine add_range(start, grid, torque, lower, i, block)
+    real(wp), intent(in) :: start
+    integer, intent(in) :: lower, i
+    real(wp), intent(in) :: grid(lower:), torque(lower:)
+    type(block_solutions_t), intent(inout) :: block
+    integer :: last
+
+    if (i > lower) then
+      if (abs(torque(i - 1)) <= 0.0_wp) return
+    end if
+    do last = i, ubound(grid, 1) - 1
+      if (abs(torque(last + 1)) > 0.0_wp) exit
+    end do
+    call add([max(grid(i), min(start, grid(last)))], block)
+    if (last > i) block%is_range(size(block%is_range)) = .true.
+  end subroutine add_range
 
   !> Whether the middle one of three torques of the same sign is the smallest.
   pure logical function is_dip(torque)
@@ -232,10 +248,11 @@ contains
     integer :: i
 
     do i = 1, size(block%values, 2)
-      if (all(abs(values - block%values(:, i)) <= same * max(abs(values), abs(block%values(:, i)), same))) return
+      if (is_same(values, block%values(:, i))) return
     end do
     if (size(block%values, 2) < most_solutions) then
       block%values = reshape([block%values, values], [size(values), size(block%values, 2) + 1])
+      block%is_range = [block%is_range, .false.]
     end if
   end subroutine add
 
@@ -293,13 +310,53 @@ contains
         if (all(abs(step) <= tiny_step * abs(z(members)))) exit
       end do
       call balance%evaluate(z)
-      if (is_nearly_balanced(balance, members)) call add(z(members), block)
+      if (is_nearly_balanced(balance, members)) call add_or_join(balance, z, block)
+      call balance%evaluate(z)
       if (abs(balance%residual(members(1))) < abs(block%least_torque)) then
         block%least_torque = balance%residual(members(1))
         block%least_speed = z(members(1))
       end if
     end associate
   end subroutine newton
+
+  !> Keeps a solution unless one is there already to which a range of others leads.
+  subroutine add_or_join(balance, z, block)
+    type(torque_balance_t), intent(inout) :: balance
+    real(wp), intent(in) :: z(:)
+    type(block_solutions_t), intent(inout) :: block
+    integer :: i
+
+    do i = 1, size(block%values, 2)
+      if (.not. is_joined(balance, z, block%members, block%values(:, i))) cycle
+      if (.not. is_same(z(block%members), block%values(:, i))) block%is_range(i) = .true.
+      return
+    end do
+    call add(z(block%members), block)
+  end subroutine add_or_join
+
+  !> Whether the torques balance all the way between two solutions, at some points of it.
+  logical function is_joined(balance, z, members, other)
+    type(torque_balance_t), intent(inout) :: balance
+    real(wp), intent(in) :: z(:)
+    integer, intent(in) :: members(:)
+    real(wp), intent(in) :: other(:)   !! [members]
+    integer, parameter :: intervals = 8
+    integer :: i
+
+    is_joined = is_same(z(members), other)
+    if (is_joined) return
+    do i = 1, intervals - 1
+      call balance%evaluate(moved(z, members, real(i, wp) / intervals * (other - z(members))))
+      if (.not. is_nearly_balanced(balance, members)) return
+    end do
+    is_joined = .true.
+  end function is_joined
+
+  pure logical function is_same(one, other)
+    real(wp), intent(in) :: one(:), other(:)
+
+    is_same = all(abs(one - other) <= same * max(abs(one), abs(other), same))
+  end function is_same
 
   pure function moved(z, members, step)
     real(wp), intent(in) :: z(:), step(:)

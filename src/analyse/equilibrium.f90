@@ -8,7 +8,7 @@ module nocdyn_equilibrium
   use nocdyn_linearisation, only: linearisation_t, linearise
   use nocdyn_machine, only: machine_t
   use nocdyn_reduced, only: new_reduced
-  use nocdyn_static_twists, only: find_twists
+  use nocdyn_static_twists, only: find_twists, loose_elements
   use nocdyn_text, only: append, joined, quoted, rounded_text, selected, string_t, to_text
   use nocdyn_torque_balance, only: new_torque_balance, torque_balance_t
   implicit none (type, external)
@@ -95,10 +95,11 @@ contains
       call complete(balance, z, found, is_found, error)
       if (allocated(error)) return
       if (is_found) then
-        found%idle = count(blocks%is_idle)
+        found%idle = count(blocks%is_idle .or. [(blocks(i)%is_range(choice(i)), i=1, size(blocks))])
         equilibria = [equilibria, found]
+        call note_ranges(balance, blocks, choice, z, notes)
       else
-        call append(notes, 'the torques balance at ' // speed_text(balance, z) // &
+        call append(notes, 'the torques balance at ' // speed_text(balance, z, [(i, i=1, size(z))]) // &
                            ', but no twists of the couplings carry them')
       end if
       if (.not. advance(blocks, choice)) exit
@@ -106,6 +107,47 @@ contains
     if (size(equilibria) > 0) return
     call raise(error, exit_failed, 'there is no steady state: ' // notes(size(notes))%text)
   end subroutine combine
+
+  !> What else is steady beside a solution: other speeds, other twists.
+  subroutine note_ranges(balance, blocks, choice, z, notes)
+    type(torque_balance_t), intent(in) :: balance      !! at the solution, with its twists
+    type(block_solutions_t), intent(in) :: blocks(:)
+    integer, intent(in) :: choice(:)
+    real(wp), intent(in) :: z(:)
+    type(string_t), allocatable, intent(inout) :: notes(:)
+    integer, allocatable :: loose(:)
+    character(len=:), allocatable :: names
+    integer :: i
+
+    do i = 1, size(blocks)
+      if (.not. blocks(i)%is_range(choice(i))) cycle
+      call append_new(notes, 'the torques on ' // moving_bodies(balance, blocks(i)%members) // ' balance over a range of ' // &
+                             'speeds: any of them is steady, and of those that were found the one nearest to the start is ' // &
+                             'kept, ' // speed_text(balance, z, blocks(i)%members))
+    end do
+    loose = loose_elements(balance)
+    if (size(loose) == 0) return
+    names = ''
+    do i = 1, min(size(loose), most_names)
+      if (i > 1) names = names // ', '
+      names = names // quoted(balance%formulation%machine%element_name(loose(i)))
+    end do
+    if (size(loose) > most_names) names = names // ' and ' // to_text(size(loose) - most_names) // ' more'
+    call append_new(notes, 'inside an open gap, or where a law is level, any twist is steady: of ' // names // &
+                           ' one near the start is kept')
+  end subroutine note_ranges
+
+  !> Appends a note that is not there yet.
+  subroutine append_new(notes, text)
+    type(string_t), allocatable, intent(inout) :: notes(:)
+    character(len=*), intent(in) :: text
+    integer :: i
+
+    do i = 1, size(notes)
+      if (notes(i)%text == text) return
+    end do
+    call append(notes, text)
+  end subroutine append_new
 
   !> The next combination; false after the last.
   logical function advance(blocks, choice)
@@ -271,16 +313,19 @@ contains
   end function moving_bodies
 
   !> "12.5 rad/s of 'motor'".
-  function speed_text(balance, z) result(text)
+  function speed_text(balance, z, members) result(text)
     type(torque_balance_t), intent(in) :: balance
     real(wp), intent(in) :: z(:)
+    integer, intent(in) :: members(:)   !! unknowns, of which the freedoms are told
     character(len=:), allocatable :: text
+    integer, allocatable :: freedoms(:)
     integer :: i
 
     text = ''
-    do i = 1, min(balance%motions%freedoms(), most_names)
+    freedoms = pack(members, members <= balance%motions%freedoms())
+    do i = 1, min(size(freedoms), most_names)
       if (i > 1) text = text // ', '
-      text = text // rounded_text(z(i), digits) // ' rad/s of ' // quoted(body_of(balance, i))
+      text = text // rounded_text(z(freedoms(i)), digits) // ' rad/s of ' // quoted(body_of(balance, freedoms(i)))
     end do
     if (text == '') text = 'rest'
   end function speed_text

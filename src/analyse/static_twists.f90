@@ -11,15 +11,17 @@ module nocdyn_static_twists
   use nocdyn_lapack_band, only: band_factor, band_solve
   use nocdyn_ordering, only: reverse_cuthill_mckee
   use nocdyn_pattern_entries, only: entries_t
+  use nocdyn_rigid_motions, only: new_rigid_motions, rigid_motions_t
   use nocdyn_text, only: to_text
   use nocdyn_torque_balance, only: torque_balance_t
   implicit none (type, external)
   private
 
-  public :: find_twists
+  public :: find_twists, loose_elements
 
   integer, parameter :: largest_matrix = 6000   ! rows and columns of a dense matrix of as many entries as are allowed
   real(wp), parameter :: balanced = 1.0e-13_wp   ! of the torques' terms: what is left is rounding
+  real(wp), parameter :: angle_rounding = 16 * epsilon(1.0_wp)   ! of the angles, of which an elastic moment tells a difference
   real(wp), parameter :: farthest = 1.0e8_wp     ! rad: twists beyond this carry nothing that nearer ones do not
 
   !> The stiffness matrix of the coordinates that are not free, and what is solved with it.
@@ -30,8 +32,10 @@ module nocdyn_static_twists
     real(wp), allocatable :: band(:, :)
     real(wp), allocatable :: shield(:)       !! what raises the diagonal: its largest elements so far, 1 before, [unknown]
     real(wp), allocatable :: outer(:)        !! torques of all other elements, [coordinates]
+    real(wp), allocatable :: outer_size(:)   !! sum of their absolute terms
+    real(wp) :: floor = 0.0_wp               !! rounding of the solution where little acts [N m]
     real(wp), allocatable :: torque(:)       !! residual, [coordinates]
-    real(wp), allocatable :: size(:)         !! sum of its absolute terms
+    real(wp), allocatable :: tolerance(:)    !! what may be left of it: rounding of its terms and of the angles
     real(wp) :: energy = 0.0_wp
   end type stiffness_t
 
@@ -44,9 +48,10 @@ contains
     logical, intent(out) :: is_found
     type(error_t), allocatable, intent(out) :: error   !! if the stiffness matrix is too large
     integer, parameter :: most_steps = 500
+    real(wp), parameter :: stalled = 1.0e3_wp   ! what is left and falls no further is rounding that no estimate foresees
     type(stiffness_t) :: self
     real(wp) :: lift, trial(size(q)), step(size(q))
-    real(wp) :: energy
+    real(wp) :: energy, excess, last_excess
     integer :: i
     logical :: is_singular
 
@@ -55,9 +60,12 @@ contains
     if (allocated(error)) return
     call load(balance, q, self)
     lift = 0.0_wp
+    last_excess = huge(1.0_wp)
     do i = 1, most_steps
-      is_found = all(abs(self%torque(self%unknown)) <= balanced * self%size(self%unknown))
+      excess = torque_excess(self)
+      is_found = excess <= 1.0_wp .or. (excess <= stalled .and. excess > 0.5_wp * last_excess)
       if (is_found) exit
+      last_excess = excess
       energy = self%energy
       call solve(balance, lift, self, step, is_singular)
       trial = q + step
@@ -74,6 +82,60 @@ contains
       if (lift > 1.0e12_wp .or. maxval(abs(q)) > farthest) exit
     end do
   end subroutine find_twists
+
+  !> Elastic elements whose twists are not determined: where the machine stands, they and all others beside them have no
+  !> stiffness.
+  function loose_elements(balance) result(loose)
+    type(torque_balance_t), intent(in) :: balance   !! after `find_twists`
+    integer, allocatable :: loose(:)
+    type(rigid_motions_t) :: motions
+    integer, allocatable :: slack(:)
+    integer :: i
+
+    associate (stiffness => balance%formulation%machine%elements%restoring_angle(1, balance%elastic))
+      slack = pack(balance%elastic, abs(stiffness) <= 0.0_wp)
+      if (size(slack) > 0) motions = new_rigid_motions(balance%coordinates, balance%incidence, &
+                                                       pack(balance%elastic, abs(stiffness) > 0.0_wp))
+    end associate
+    loose = pack(slack, [(is_twisted(balance, motions, slack(i)), i=1, size(slack))])
+  end function loose_elements
+
+  !> Whether a rigid motion twists an element.
+  pure logical function is_twisted(balance, motions, element)
+    type(torque_balance_t), intent(in) :: balance
+    type(rigid_motions_t), intent(in) :: motions
+    integer, intent(in) :: element
+    real(wp), parameter :: rounding = 1.0e-10_wp   ! of the terms of the rate of twist
+    real(wp) :: rate(motions%freedoms()), scale(motions%freedoms())
+    integer :: i, k
+
+    rate = 0.0_wp
+    scale = 0.0_wp
+    do k = balance%incidence%first(element), balance%incidence%first(element + 1) - 1
+      associate (c => balance%incidence%coordinate(k), ratio => balance%incidence%ratio(1, k))
+        do i = motions%first(c), motions%first(c + 1) - 1
+          associate (freedom => motions%freedom(i))
+            rate(freedom) = rate(freedom) + ratio * motions%ratio(i)
+            scale(freedom) = scale(freedom) + abs(ratio * motions%ratio(i))
+          end associate
+        end do
+      end associate
+    end do
+    is_twisted = any(abs(rate) > rounding * scale)
+  end function is_twisted
+
+  !> The largest of the torques that are left over, in units of what may be left.
+  pure real(wp) function torque_excess(self)
+    type(stiffness_t), intent(in) :: self
+
+    integer :: c, i
+
+    torque_excess = 0.0_wp
+    do i = 1, size(self%unknown)
+      c = self%unknown(i)
+      if (abs(self%torque(c)) > 0.0_wp) torque_excess = max(torque_excess, abs(self%torque(c)) / self%tolerance(c))
+    end do
+  end function torque_excess
 
   !> Whether a step has lowered the energy, or is so small that rounding hides it.
   pure logical function goes_down(self, energy, step)
@@ -113,8 +175,10 @@ contains
     allocate (self%place(size(number)), source=0)
     self%place(self%unknown) = [(c, c=1, size(self%unknown))]
     allocate (self%band(3 * self%width + 1, size(self%unknown)), self%shield(size(self%unknown)), source=0.0_wp)
-    allocate (self%outer(size(number)), self%torque(size(number)), self%size(size(number)), source=0.0_wp)
+    allocate (self%outer(size(number)), self%torque(size(number)), source=0.0_wp)
+    allocate (self%outer_size, self%tolerance, source=self%outer)
     call find_outer(balance, self)
+    if (size(self%outer) > 0) self%floor = max(0.01_wp * epsilon(1.0_wp) * maxval(self%outer_size), tiny(1.0_wp))
   end subroutine set_up
 
   !> Pairs of coordinates that an elastic element joins, each once.
@@ -165,6 +229,7 @@ contains
         do k = incidence%first(e), incidence%first(e + 1) - 1
           associate (c => incidence%coordinate(k))
             self%outer(c) = self%outer(c) + incidence%ratio(1, k) * moment
+            self%outer_size(c) = self%outer_size(c) + abs(incidence%ratio(1, k) * moment)
           end associate
         end do
       end do
@@ -177,23 +242,25 @@ contains
     real(wp), intent(in) :: q(:)
     type(stiffness_t), intent(inout) :: self
     integer :: c, e, i, k
-    real(wp) :: term
+    real(wp) :: rounding
 
     balance%y(1, size(q) + 1:2 * size(q)) = q
     call balance%evaluate_state()
     call balance%formulation%machine%differentiate_elements(balance%t)
     call balance%formulation%machine%assess()
     self%torque = self%outer
-    self%size = abs(self%outer)
-    associate (elements => balance%formulation%machine%elements, incidence => balance%incidence)
+    self%tolerance = self%floor + balanced * self%outer_size
+    associate (elements => balance%formulation%machine%elements, incidence => balance%incidence, &
+               phi => balance%formulation%phi)
       self%energy = sum(elements%stored(1, balance%elastic)) - sum(self%outer * q)
       do i = 1, size(balance%elastic)
         e = balance%elastic(i)
+        rounding = balanced * abs(elements%restoring(1, e)) + angle_rounding * abs(elements%restoring_angle(1, e)) &
+                   * (abs(phi(1, elements%to(e))) + abs(phi(1, elements%from(e))))
         do k = incidence%first(e), incidence%first(e + 1) - 1
           c = incidence%coordinate(k)
-          term = incidence%ratio(1, k) * elements%restoring(1, e)
-          self%torque(c) = self%torque(c) + term
-          self%size(c) = self%size(c) + abs(term)
+          self%torque(c) = self%torque(c) + incidence%ratio(1, k) * elements%restoring(1, e)
+          self%tolerance(c) = self%tolerance(c) + abs(incidence%ratio(1, k)) * rounding
         end do
       end do
     end associate

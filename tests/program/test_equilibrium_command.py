@@ -4,7 +4,7 @@ import json
 from math import atanh, sqrt, tanh
 
 import pytest
-from conftest import CASE_1, CASE_2, SPINNER
+from conftest import CASE_1, CASE_2, DATA, SPINNER
 
 # What is printed has seven digits; what is written is exact to rounding.
 PRINTED = 1e-6
@@ -373,3 +373,61 @@ def test_five_bodies_are_named_and_the_others_counted(nocdyn):
     shafts = "".join(f"&coupling name = 's{i}' bodies = 'b{i}', 'b{i + 1}' stiffness = 9.0 /\n" for i in range(7))
     text = bodies + shafts + "&motor name = 'm' body = 'b0' a = 1.0 b = 0.0 c = 0.0 /\n&run t_end = 1.0 /\n"
     assert "1 N m on 'b0', 'b1', 'b2', 'b3', 'b4' and 3 more at any speed" in refusal(nocdyn, text)
+
+
+def test_a_speed_at_which_constant_torques_balance_is_not_determined_and_that_of_the_start_is_kept(nocdyn):
+    text = """\
+&body name = 'drum' inertia = 2.0 speed = {speed} /
+&motor name = 'drive' body = 'drum' kind = 'constant' torque = 10.0 /
+&load name = 'hoist' body = 'drum' constant = 10.0 /
+&run t_end = 1.0 /
+"""
+    outcome = nocdyn("equilibrium", nocdyn.write("machine.nml", text.format(speed=20.0)), "--out", "out")
+    assert ("note: the torques on 'drum' balance over a range of speeds: any of them is steady, and of those that were found the one "
+            "nearest to the start is kept, 20 rad/s of 'drum'\n") in outcome.stdout
+    (state,) = steady_states(nocdyn)
+    assert (state["values"]["omega_drum [rad/s]"], state["stability"]) == (pytest.approx(20, rel=EXACT), "neutral")
+    # at rest nothing brakes; the range begins where the hyperbolic tangent is 1 to rounding, tanh(18.4) = 1 - 2e-16
+    (state,) = analyse(nocdyn, text.format(speed=0.0))
+    assert 0.15 < state["values"]["omega_drum [rad/s]"] < 0.2
+
+
+def test_a_clutch_that_slips_at_the_torque_of_its_motor_has_one_range_of_speeds(nocdyn):
+    text = SHAFT.format(shaft="friction = 10.0", motor="kind = 'constant' torque = 10.0", load="viscous = 0.5")
+    outcome = nocdyn("equilibrium", nocdyn.write("machine.nml", text.replace("stiffness = 1000.0 damping = 2.0", "")), "--out", "out")
+    assert "the torques on 'rotor', 'fan' balance over a range of speeds" in outcome.stdout
+    (state,) = steady_states(nocdyn)
+    assert state["values"]["omega_fan [rad/s]"] == pytest.approx(20, rel=1e-9)
+
+
+GAP = """\
+&body name = 'rotor' inertia = 2.0 /
+&body name = 'fan' inertia = 1.0 /
+&coupling name = 'claw' bodies = 'rotor', 'fan' stiffness = 1e3 damping = 1.0 gap = 0.1 /
+&motor name = 'drive' body = 'rotor' a = 10.0 b = 1.0 c = 0.0 /
+&run t_end = 1.0 /
+"""
+ANY_TWIST = "inside an open gap, or where a law is level, any twist is steady: of 'claw' one near the start is kept"
+
+
+def test_any_twist_inside_an_open_gap_is_steady_and_a_note_says_so(nocdyn):
+    assert f"note: {ANY_TWIST}\n" in nocdyn("equilibrium", nocdyn.write("machine.nml", GAP)).stdout
+
+
+@pytest.mark.parametrize(
+    "beside",
+    ["&load name = 'air' body = 'fan' viscous = 0.5 /", "&coupling name = 'spring' bodies = 'rotor', 'fan' stiffness = 9.0 /"],
+)
+def test_a_gap_that_a_torque_closes_or_a_spring_holds_has_one_twist(nocdyn, beside):
+    outcome = nocdyn("equilibrium", nocdyn.write("machine.nml", GAP + beside + "\n"))
+    assert outcome.returncode == 0 and ANY_TWIST not in outcome.stdout
+
+
+def test_branches_without_load_keep_no_preloaded_loop_from_its_twists(nocdyn):
+    assert nocdyn("equilibrium", DATA / "branches_without_load.nml", "--out", "out").returncode == 0
+    (state,) = steady_states(nocdyn)
+    moment = {label: value for label, value in state["values"].items() if label.startswith("moment")}
+    motor = 74.314362  # N m, through c3, c4 and c5 to the sun; carrier and ring have (z_s + z_r)/z_s and z_r/z_s of it
+    assert [moment[f"moment_c{i} [N m]"] for i in (3, 4, 5)] == pytest.approx([-motor] * 3, rel=1e-11)
+    assert moment["moment_c9 [N m]"] == pytest.approx(-motor * 98 / 29, rel=1e-11)
+    assert [moment[f"moment_c{i} [N m]"] for i in (0, 1, 2, 10, 11)] == pytest.approx([0] * 5, abs=1e-10)
