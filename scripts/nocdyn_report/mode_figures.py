@@ -28,8 +28,8 @@ class Modes:
     content: dict  # of modes.json
 
     @property
-    def title(self) -> str:
-        return f"{self.content['title'] or Path(self.content['input']).name}\nmodes about {self.content['about']}"
+    def titles(self) -> tuple[str, str]:
+        return self.content["title"] or Path(self.content["input"]).name, f"modes about {self.content['about']}"
 
     @property
     def bodies(self) -> list[str]:
@@ -64,7 +64,7 @@ def read_modes(folder: Path) -> Modes:
 
 def draw_modes(modes: Modes, chosen: list[dict]) -> Figure:
     """A row for every mode: its shape, and the shares of bodies and couplings in its energies."""
-    figure, grid = pyplot.subplots(len(chosen), 2, squeeze=False, sharex="col", figsize=(1.5 * WIDTH, 1.9 * len(chosen) + 1.1),
+    figure, grid = pyplot.subplots(len(chosen), 2, squeeze=False, sharex="col", figsize=(1.5 * WIDTH, 1.9 * len(chosen) + 1.6),
                                    width_ratios=(3, 2))
     for (shape, energy), mode in zip(grid, chosen):
         _draw_shape(shape, modes, mode)
@@ -126,7 +126,7 @@ def draw_all(modes: Modes, most: int, folder: Path) -> list[str]:
     names = []
     for part in range(math.ceil(len(chosen) / MOST_MODES)):
         figure = draw_modes(modes, chosen[part * MOST_MODES:(part + 1) * MOST_MODES])
-        add_title(figure, modes.title)
+        add_title(figure, *modes.titles)
         names.append("modes" if part == 0 else f"modes_{part + 1}")
         save(figure, folder, names[-1])
     return names
