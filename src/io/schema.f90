@@ -64,7 +64,7 @@ module nocdyn_schema
     key_rule_t('run',        'complement',      a_word,         1, '',            "'natural'", complements, &
       'which orthogonal complement of the gear constraints'), &
     key_rule_t('run',        'start',           a_word,         1, '',            "'given'",   starts, &
-      'start speeds that violate a constraint: refused, or projected onto the nearest that do not'), &
+      'start speeds that violate a constraint: refused, or changed as an impact in the gears would'), &
     key_rule_t('run',        'max_steps',       an_integer,     1, '',            '1000000',   steps, &
       'the run fails after this many steps'), &
     key_rule_t('output',     'interval',        a_number,       1, 's',           unset,       positive, &

@@ -30,7 +30,7 @@ module nocdyn_schema_constraints
     key_rule_t('planetary',  'ring',            body_or_ground, 1, '',            required,    anything, &
       'the ring, an internal wheel'), &
     key_rule_t('planetary',  'carrier',         body_or_ground, 1, '',            required,    anything, &
-      'the carrier of the planets'), &
+      'the carrier; the mass of the planets counts with it, their spin does not count'), &
     key_rule_t('planetary',  'teeth',           an_integer,     2, '',            required,    from_1, &
       'numbers of teeth of sun and ring; the ring has more'), &
     key_rule_t('differential', 'name',          a_name,         1, '',            required,    anything, &

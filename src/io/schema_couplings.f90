@@ -19,7 +19,7 @@ module nocdyn_schema_couplings
     key_rule_t('coupling',   'polynomial',      a_number,       any_number, 'N m/rad^k', unset, anything, &
       'p_1, p_2, ...: p_k w^k, w = twist - rest_twist, are added to the elastic moment', least=1), &
     key_rule_t('coupling',   'damping',         a_number,       1, 'N m s/rad',   '0',         not_negative, &
-      'moment per rate of twist'), &
+      'moment per rate of twist; with a gap only in contact, at most as large as the elastic moment'), &
     key_rule_t('coupling',   'rest_twist',      a_number,       1, 'rad',         '0',         anything, &
       'twist without elastic moment'), &
     key_rule_t('coupling',   'gap',             a_number,       1, 'rad',         '0',         not_negative, &
@@ -37,7 +37,7 @@ module nocdyn_schema_couplings
     key_rule_t('coupling',   'table_file',      a_file,         1, '',            unset,       anything, &
       'file with the table: two columns, twist - rest_twist [rad] and moment [N m]'), &
     key_rule_t('coupling',   'interpolation',   a_word,         1, '',            linear,      interpolations, &
-      'between the points: straight lines, or the monotone cubic of Fritsch and Carlson'), &
+      'between the points: straight lines, or the monotone cubic of Fritsch and Butland'), &
     key_rule_t('coupling',   'extrapolation',   a_word,         1, '',            linear,      extrapolations, &
       'beyond the table: its end slope goes on, or its end value holds')]
 

@@ -44,7 +44,7 @@ module nocdyn_schema_torques
     key_rule_t('motor',      'table_file',      a_file,         1, '',            unset,       anything, &
       'file with the table: two columns, speed [rad/s] and torque [N m]', 'table'), &
     key_rule_t('motor',      'interpolation',   a_word,         1, '',            linear,      interpolations, &
-      'between the points: straight lines, or the monotone cubic of Fritsch and Carlson', 'table'), &
+      'between the points: straight lines, or the monotone cubic of Fritsch and Butland', 'table'), &
     key_rule_t('motor',      'extrapolation',   a_word,         1, '',            linear,      extrapolations, &
       'beyond the table: its end slope goes on, or its end value holds', 'table'), &
     key_rule_t('motor',      'breakdown_torque', a_number,      1, 'N m',         required,    not_zero, &
@@ -64,9 +64,9 @@ module nocdyn_schema_torques
     key_rule_t('motor',      'governor_speed',  a_number,       1, 'rad/s',       unset,       anything, &
       'speed that a PI governor keeps by a throttle from 0 to 1 on the torque (dc: on the voltage)'), &
     key_rule_t('motor',      'governor_gain',   a_number,       1, 's/rad',       unset,       not_zero, &
-      'throttle per deviation of the speed; negative for a motor that turns backwards'), &
+      'throttle = z + governor_gain (governor_speed - omega); the gain of a backward motor is negative'), &
     key_rule_t('motor',      'governor_time',   a_number,       1, 's',           unset,       positive, &
-      'integral time of the governor'), &
+      'integral time: z'' = (throttle - z) / governor_time'), &
     key_rule_t('motor',      'governor_start',  a_number,       1, '',            '1',         from_0_to_1, &
       'throttle at the start')]
 
@@ -90,7 +90,7 @@ module nocdyn_schema_torques
     key_rule_t('load',       'table_file',      a_file,         1, '',            unset,       anything, &
       'file with the table: two columns, speed [rad/s] and resisting torque [N m]'), &
     key_rule_t('load',       'interpolation',   a_word,         1, '',            linear,      interpolations, &
-      'between the points: straight lines, or the monotone cubic of Fritsch and Carlson'), &
+      'between the points: straight lines, or the monotone cubic of Fritsch and Butland'), &
     key_rule_t('load',       'extrapolation',   a_word,         1, '',            linear,      extrapolations, &
       'beyond the table: its end slope goes on, or its end value holds')]
 
@@ -120,7 +120,7 @@ module nocdyn_schema_torques
     key_rule_t('excitation', 'table_file',      a_file,         1, '',            unset,       anything, &
       'file with the table: two columns, time [s] and torque [N m]', 'table'), &
     key_rule_t('excitation', 'interpolation',   a_word,         1, '',            linear,      interpolations, &
-      'between the points: straight lines, or the monotone cubic of Fritsch and Carlson', 'table'), &
+      'between the points: straight lines, or the monotone cubic of Fritsch and Butland', 'table'), &
     key_rule_t('excitation', 'time',            a_number,       1, 's',           required,    anything, &
       'when it begins', 'step ramp pulse'), &
     key_rule_t('excitation', 'duration',        a_number,       1, 's',           required,    positive, &
