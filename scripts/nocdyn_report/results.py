@@ -9,7 +9,8 @@ import f90nml
 import numpy as np
 import pandas as pd
 
-COLUMN = re.compile(r"(?P<quantity>phi|omega|twist|moment|damping|torque|reaction)_(?P<element>.+) \[(?P<unit>[^]]+)\]")
+COLUMN = re.compile(r"(?P<quantity>phi|omega|twist|moment|damping|torque|throttle|current|reaction)_(?P<element>.+) "
+                    r"\[(?P<unit>[^]]+)\]")
 TIME = "t [s]"
 
 

@@ -5,6 +5,7 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
+import numpy as np
 from matplotlib import pyplot
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -18,8 +19,12 @@ TORQUES = {
     "torque": "motors, loads,\nexcitations",
     "moment": "elastic moment\non the first body",
     "damping": "damping moment\non the first body",
-    "reaction": "gear reaction",
+    "throttle": "throttle",
+    "current": "current",
+    "reaction": "reaction of\ngears, joints",
 }
+SMOOTH_ROWS = 12  # of an oscillation, with which its phase plane looks round
+FEWEST_TURNS = 20  # turning points that make an oscillation
 ENERGIES = {
     "kinetic": "kinetic_energy [J]",
     "elastic": "elastic_energy [J]",
@@ -78,6 +83,28 @@ def draw_run(results: Results, folder: Path) -> list[str]:
     return drawn
 
 
+def coarsest(results: Results) -> tuple[str, float]:
+    """The twist with the fewest rows for each of its oscillations, and how many; infinity without oscillations."""
+    rows = [(column.element, _rows_per_oscillation(column.values)) for column in results.columns("twist")]
+    return min(rows, key=lambda pair: pair[1], default=("", np.inf))
+
+
+def _rows_per_oscillation(values: np.ndarray) -> float:
+    steps = np.diff(values)
+    rising = steps[np.abs(steps) > 0.01 * np.ptp(values)] > 0.0
+    turns = np.flatnonzero(rising[1:] != rising[:-1])
+    return 2.0 * np.median(np.diff(turns)) if turns.size >= FEWEST_TURNS else np.inf
+
+
+def _advise(results: Results) -> str:
+    """What draws a run smoothly that has too few rows, '' if it has enough."""
+    name, rows = coarsest(results)
+    if rows >= SMOOTH_ROWS:
+        return ""
+    interval = np.diff(results.time).max() * rows / (2 * SMOOTH_ROWS)
+    return f"about {rows:.0f} rows for an oscillation of '{name}' draw corners; smooth: &output interval = {interval:.1g}"
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(prog="scripts/plot", description=__doc__)
     parser.add_argument("results", type=Path, metavar="RESULTS", help="folder that 'nocdyn run' wrote")
@@ -93,6 +120,8 @@ def main() -> None:
     except ResultsError as error:
         sys.exit(f"{parser.prog}: {error}")
     print(f"{', '.join(names)} (PNG, SVG, PDF) are in {folder}")
+    if advice := _advise(results):
+        print(advice)
 
 
 if __name__ == "__main__":

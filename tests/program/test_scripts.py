@@ -107,6 +107,31 @@ def test_partial_trajectory_of_many_bodies_is_drawn_and_called_partial(tmp_path,
     assert "failed, ends at t = " in (results / "figures" / "motion.svg").read_text(encoding="utf-8")
 
 
+def test_corners_of_a_fast_oscillation_are_told_with_the_interval_that_rounds_them(tmp_path, monkeypatch, capsys):
+    machine = """
+&body name = 'disc' inertia = 1.0 angle = 1.0 /
+&coupling name = 'spring' bodies = 'ground', 'disc' stiffness = 39.478417604357434 /  ! (2 pi)^2: a second an oscillation
+&run t_end = 50.0 /
+"""
+    call(monkeypatch, "run_figures", run_input(tmp_path, machine, "--set", "output.interval=0.15"))
+    advice = capsys.readouterr().out.splitlines()[1]
+    assert advice == "about 6 rows for an oscillation of 'spring' draw corners; smooth: &output interval = 0.04"
+    call(monkeypatch, "run_figures", run_input(tmp_path, machine, "--set", "output.interval=0.04"))
+    assert len(capsys.readouterr().out.splitlines()) == 1
+
+
+def test_throttle_and_current_are_drawn(tmp_path, monkeypatch):
+    results = run_input(tmp_path, """
+&body name = 'rotor' inertia = 1.0 /
+&motor name = 'drive' body = 'rotor' kind = 'dc' voltage = 24.0 resistance = 1.0 flux_constant = 0.5 inductance = 0.1
+       governor_speed = 20.0 governor_gain = 0.1 governor_time = 1.0 /
+&run t_end = 1.0 /
+""")
+    call(monkeypatch, "run_figures", results)
+    text = (results / "figures" / "torques.svg").read_text(encoding="utf-8")
+    assert "throttle [1]" in text and "current [A]" in text
+
+
 def test_numbers_stand_beside_their_closed_forms(paper_results, monkeypatch, capsys):
     call(monkeypatch, "paper_numbers", *paper_results)
     case1, case2 = capsys.readouterr().out.split("\n\n")
