@@ -64,7 +64,7 @@ module nocdyn_schema_torques
     key_rule_t('motor',      'governor_speed',  a_number,       1, 'rad/s',       unset,       anything, &
       'speed that a PI governor keeps by a throttle from 0 to 1 on the torque (dc: on the voltage)'), &
     key_rule_t('motor',      'governor_gain',   a_number,       1, 's/rad',       unset,       not_zero, &
-      'throttle = z + governor_gain (governor_speed - omega); the gain of a backward motor is negative'), &
+      'throttle = z + governor_gain (governor_speed - omega); gain < 0 if the motor turns backwards'), &
     key_rule_t('motor',      'governor_time',   a_number,       1, 's',           unset,       positive, &
       'integral time: z'' = (throttle - z) / governor_time'), &
     key_rule_t('motor',      'governor_start',  a_number,       1, '',            '1',         from_0_to_1, &
