@@ -125,7 +125,7 @@ contains
                              'speeds: any of them is steady, and of those that were found the one nearest to the start is ' // &
                              'kept, ' // speed_text(balance, z, blocks(i)%members))
     end do
-    loose = loose_elements(balance)
+    allocate (loose, source=loose_elements(balance))
     if (size(loose) == 0) return
     names = ''
     do i = 1, min(size(loose), most_names)

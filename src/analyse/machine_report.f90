@@ -196,7 +196,7 @@ contains
     if (found > most_lines) call put_line(report, 'and ' // to_text(found - most_lines) // ' more groups of geared bodies')
     if (redundant == 0) return
     call put_line(report, counted(redundant, 'constraint repeats', 'constraints repeat') // &
-                  ' others; ratios agree where they differ by less than 1e-9 of their size')
+                  ' others; ratios count as equal within 1e-9 of their size')
   end subroutine put_groups
 
   !> The speeds of the bodies that are no coordinates.

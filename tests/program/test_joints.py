@@ -17,7 +17,7 @@ def test_check_tells_what_the_joints_allow(nocdyn):
     assert lines == [
         "  3 degrees of freedom",
         "  geared together: 'sun', 'ring', 'carrier', 'output', 'left', 'right', 'pump' with 3 degrees of freedom",
-        "  2 constraints repeat others; ratios agree where they differ by less than 1e-9 of their size",
+        "  2 constraints repeat others; ratios count as equal within 1e-9 of their size",
         "  coordinates: 'sun', 'right', 'pump'",
         "  speed of 'ring' = -0.2857143 * speed of 'sun' + 0.3214286 * speed of 'pump'",
         "  speed of 'carrier' = 0.25 * speed of 'pump'",
@@ -154,7 +154,7 @@ def test_ratios_that_decimals_round_differently_agree(nocdyn, second):
     gears = f"{FIRST}&gear name = 'h' bodies = 'a', 'b' {second} /\n"
     outcome = nocdyn("check", nocdyn.write("decimals.nml", gears + THREE))
     assert (outcome.returncode, outcome.stderr) == (0, "")
-    assert "  1 constraint repeats others; ratios agree where they differ by less than 1e-9 of their size\n" in outcome.stdout
+    assert "  1 constraint repeats others; ratios count as equal within 1e-9 of their size\n" in outcome.stdout
     assert "  note: gear 'h' repeats what 'g' already fixes; " in outcome.stdout
 
 
