@@ -4,8 +4,8 @@
 !> contiguous index, so that each operation is a loop over lanes; one machine is a block of one lane. A lane
 !> never reads another lane's numbers.
 !>
-!> The last `quadratures` components of a state are pure integrals: nothing depends on them, and they do not take
-!> part in error control (a system of nothing else has none). An integrator solves linear systems only for the first
+!> The last `quadratures` components of a state are pure integrals: nothing depends on them, and error control is lenient
+!> with them: a thousand times, relative to the largest of them. An integrator solves linear systems only for the first
 !> `states` components.
 !>
 !> The Jacobian is a list of values at the positions that `jacobian_pattern` names once, before the integration: all
@@ -31,7 +31,7 @@ module nocdyn_system
   !> An ordinary differential equation y' = f(t, y) on a block of lanes, with its derivatives.
   type, abstract, public :: system_t
     integer :: lanes = 1         !! copies of the system in the block
-    integer :: states = 0        !! components under error control
+    integer :: states = 0        !! components that the equations depend on
     integer :: quadratures = 0   !! components that follow them and only accumulate
     integer :: switches = 0      !! functions whose fall through zero ends a step
   contains

@@ -15,6 +15,7 @@ module nocdyn_step_control
   real(wp), parameter :: end_stretch = 1.01_wp     !! a step is stretched by up to 1 % to end on the final time
   real(wp), parameter :: least_old_error = 1.0e-4_wp
   real(wp), parameter :: coarse_share = 0.01_wp    !! of a coarse error estimate in the combination of Hairer's DOP853
+  real(wp), parameter :: lenience = 1000.0_wp      !! errors of quadratures may be so much larger than those of states
 
   real(wp), parameter :: no_error = 1.0e-30_wp         !! stands for an error of zero under the logarithm
   real(wp), parameter :: largest_ratio = 1.0e100_wp    !! keeps the square of an error ratio finite
@@ -107,7 +108,39 @@ contains
       end do
     end if
     control%mean_square(:) = control%mean_square / max(trial%states, 1)
+    if (trial%components > trial%states) then
+      call heed_quadratures(trial%lanes, trial%states, trial%components, trial%y, trial%y_new, trial%deviation, &
+                            trial%has_coarse_deviation, trial%coarse_deviation, control)
+    end if
   end subroutine weigh_error
+
+  !> Quadratures shorten a step only if the error of one is far out of proportion to the largest of them: where the states
+  !> are followed without error, as polynomials of the time are, nothing else would limit it. A coarse estimate joins in as
+  !> for the states.
+  pure subroutine heed_quadratures(lanes, states, components, y, y_new, deviation, has_coarse, coarse_deviation, control)
+    integer, intent(in) :: lanes, states, components
+    real(wp), intent(in), dimension(lanes, components) :: y, y_new, deviation, coarse_deviation
+    logical, intent(in) :: has_coarse
+    type(step_control_t), intent(inout) :: control
+    real(wp) :: coarse, error, largest
+    integer :: i, lane
+
+    do lane = 1, lanes
+      error = 0.0_wp
+      coarse = 0.0_wp
+      largest = 0.0_wp
+      do i = states + 1, components
+        error = max(error, abs(deviation(lane, i)))
+        if (has_coarse) coarse = max(coarse, abs(coarse_deviation(lane, i)))
+        largest = max(largest, abs(y(lane, i)), abs(y_new(lane, i)))
+      end do
+      error = min(error, largest_ratio)
+      if (error > 0) error = error * (error / hypot(error, sqrt(coarse_share) * coarse))
+      associate (ratio => error / (lenience * (control%atol + control%rtol * largest)))
+        control%mean_square(lane) = max(control%mean_square(lane), min(ratio, largest_ratio)**2)
+      end associate
+    end do
+  end subroutine heed_quadratures
 
   pure subroutine square_ratios(n, control, y, y_new, deviation)
     integer, intent(in) :: n   !! lanes * states

@@ -140,3 +140,21 @@ def test_the_energy_that_a_projected_start_loses_is_no_part_of_the_run(nocdyn):
     start = 0.5 * (2 + 3 * 0.5**2) * speed**2
     assert f"kinetic energy lost: {0.5 * 2 * 20**2 - start:.4f} J" in outcome.stdout + outcome.stderr
     assert nocdyn.summary("results/machine")["energy_account"]["kinetic_J"][0] == pytest.approx(start, rel=1e-12)
+
+
+@pytest.mark.parametrize("method", ["rk45", "auto", "rodas4", "rodas5p"])
+@pytest.mark.parametrize("torque", [
+    "kind = 'ramp'  amplitude = 10.0  time = 0.5  duration = 3.0",
+    "kind = 'table'  table_time = 0.3, 0.8, 1.1, 1.9  table_torque = 1.0, -2.0, 5.0, 3.0  interpolation = 'cubic'",
+])
+def test_works_are_right_where_nothing_else_limits_the_steps(nocdyn, tmp_path, method, torque):
+    # the speed is a polynomial of the time, which a method may follow without any error; its power is not
+    tmp_path.joinpath("lone.nml").write_text(f"""
+&body name = 'rotor' inertia = 2.0 speed = 1.0 /
+&excitation name = 'drive' body = 'rotor' {torque} /
+&run t_end = 4.0 method = '{method}' rtol = 1.0e-10 atol = 1.0e-10 /
+""")
+    assert nocdyn("run", tmp_path / "lone.nml", "--out", "lone").returncode == 0
+    header, rows = nocdyn.table("lone")
+    residual, work = header.index("energy_residual [J]"), header.index("work_in [J]")
+    assert max(abs(row[residual]) for row in rows) < 1e-6 * max(abs(row[work]) for row in rows)
