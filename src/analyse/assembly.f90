@@ -11,7 +11,7 @@ module nocdyn_assembly
   use nocdyn_formulation, only: formulation_t
   use nocdyn_input, only: group_t, input_t
   use nocdyn_machine, only: machine_t
-  use nocdyn_motor_assembly, only: add_motors
+  use nocdyn_motor_assembly, only: add_motors, check_motors
   use nocdyn_multiplier, only: new_multiplier
   use nocdyn_paper, only: new_paper
   use nocdyn_reduced, only: new_reduced
@@ -41,6 +41,7 @@ contains
     directory = new_directory(machine%names)
     call assemble_constraints(input, directory, machine%constraints, error)
     if (.not. allocated(error)) call check_couplings(input, error)
+    if (.not. allocated(error)) call check_motors(input, error)
     if (allocated(error)) return
     allocate (machine%banks(0))
     call add_couplings(input, directory, machine%banks)

@@ -5,21 +5,43 @@ module nocdyn_motor_assembly
   use nocdyn_curve_motors, only: new_curve_motors
   use nocdyn_dc_motors, only: new_dc_motors
   use nocdyn_element_numbers, only: curves_of, ends_of, names_of, numbers_of
+  use nocdyn_errors, only: error_t, exit_input, raise
   use nocdyn_governed_motors, only: new_governed_motors
   use nocdyn_governors, only: governor_t
   use nocdyn_input, only: group_t, input_t
   use nocdyn_kinds, only: wp
   use nocdyn_motors, only: new_motors
-  use nocdyn_text, only: string_t
+  use nocdyn_text, only: string_t, to_text
   use nocdyn_torque_curves, only: induction_curve_t, quadratic_curve_t, table_curve_t, torque_curve_t
   implicit none (type, external)
   private
 
-  public :: add_motors
+  public :: add_motors, check_motors
 
   integer, parameter :: quadratic = 1, induction = 2, table = 3, inductive = 4   ! forms
 
 contains
+
+  !> Refuses induction motors that would drive away from their synchronous speed.
+  subroutine check_motors(input, error)
+    type(input_t), intent(in) :: input
+    type(error_t), allocatable, intent(out) :: error
+    integer, allocatable :: indices(:)
+    integer :: i
+
+    allocate (indices, source=input%groups_named('motor'))
+    do i = 1, size(indices)
+      associate (group => input%groups(indices(i)))
+        if (form_of(group) /= induction) cycle
+        associate (torque => group%number('breakdown_torque'), speed => group%number('synchronous_speed'))
+          if (torque * speed > 0) cycle
+          call raise(error, exit_input, input%place(indices(i), 'breakdown_torque') // ': breakdown_torque = ' // &
+                     to_text(torque) // ' must have the sign of synchronous_speed = ' // to_text(speed))
+          return
+        end associate
+      end associate
+    end do
+  end subroutine check_motors
 
   !> A motor with constant torque is a quadratic one, and so is a dc motor without inductance.
   pure integer function form_of(group)

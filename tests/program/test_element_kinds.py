@@ -107,3 +107,16 @@ def test_edges_and_limits_without_stiffness_are_refused(nocdyn, law, complaint):
     outcome = nocdyn("check", "machine.nml")
     assert outcome.returncode == 2
     assert outcome.stderr == f"nocdyn: machine.nml:2: &coupling 'teeth': {complaint}\n"
+
+
+def test_an_induction_motor_against_its_own_sense_is_refused(nocdyn):
+    (nocdyn.folder / "machine.nml").write_text("""&body name = 'rotor' inertia = 2.0 /
+&motor name = 'mains' body = 'rotor' kind = 'induction'
+  breakdown_torque = -100.0 breakdown_slip = 0.2 synchronous_speed = 157.0 /
+&run t_end = 1.0 /
+""")
+    outcome = nocdyn("check", "machine.nml")
+    assert outcome.returncode == 2
+    assert outcome.stderr == (
+        "nocdyn: machine.nml:3: &motor 'mains': breakdown_torque = -100 must have the sign of synchronous_speed = 157\n"
+    )
