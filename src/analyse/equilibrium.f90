@@ -9,7 +9,7 @@ module nocdyn_equilibrium
   use nocdyn_machine, only: machine_t
   use nocdyn_reduced, only: new_reduced
   use nocdyn_static_twists, only: find_twists, loose_elements
-  use nocdyn_text, only: append, joined, quoted, rounded_text, selected, string_t, to_text
+  use nocdyn_text, only: append, joined, quoted, rounded_text, selected, string_t
   use nocdyn_torque_balance, only: new_torque_balance, torque_balance_t
   implicit none (type, external)
   private
@@ -116,7 +116,7 @@ contains
     real(wp), intent(in) :: z(:)
     type(string_t), allocatable, intent(inout) :: notes(:)
     integer, allocatable :: loose(:)
-    character(len=:), allocatable :: names
+    type(string_t), allocatable :: names(:)
     integer :: i
 
     do i = 1, size(blocks)
@@ -127,14 +127,12 @@ contains
     end do
     allocate (loose, source=loose_elements(balance))
     if (size(loose) == 0) return
-    names = ''
-    do i = 1, min(size(loose), most_names)
-      if (i > 1) names = names // ', '
-      names = names // quoted(balance%formulation%machine%element_name(loose(i)))
+    allocate (names(0))
+    do i = 1, size(loose)
+      call append(names, balance%formulation%machine%element_name(loose(i)))
     end do
-    if (size(loose) > most_names) names = names // ' and ' // to_text(size(loose) - most_names) // ' more'
-    call append_new(notes, 'inside an open gap, or where a law is level, any twist is steady: of ' // names // &
-                           ' one near the start is kept')
+    call append_new(notes, 'inside an open gap, or where a law is level, any twist is steady: of ' // &
+                           joined(names, ', ', most_names) // ' one near the start is kept')
   end subroutine note_ranges
 
   !> Appends a note that is not there yet.
@@ -307,9 +305,8 @@ contains
     end do
     bodies = pack([(b, b=1, size(moves))], moves)
     associate (names => balance%formulation%machine%names)
-      text = joined(selected(names, bodies(:min(size(bodies), most_names))), ', ')
+      text = joined(selected(names, bodies), ', ', most_names)
     end associate
-    if (size(bodies) > most_names) text = text // ' and ' // to_text(size(bodies) - most_names) // ' more'
   end function moving_bodies
 
   !> "12.5 rad/s of 'motor'".

@@ -95,10 +95,7 @@ contains
                                          numbers_of(input, indices, 'b') + drags(input, indices), &
                                          numbers_of(input, indices, 'c')))
     case (inductive)
-      call append_bank(banks, new_dc_motors(names, body, numbers_of(input, indices, 'voltage'), &
-                                            numbers_of(input, indices, 'resistance'), &
-                                            numbers_of(input, indices, 'flux_constant'), &
-                                            numbers_of(input, indices, 'inductance')))
+      call add_inductive(input, indices, names, body, banks)
     case default
       call make_curve(input, indices, form, curve)
       call append_bank(banks, new_curve_motors(names, body, 1, curve))
@@ -123,15 +120,26 @@ contains
     allocate (governor%time, source=numbers_of(input, indices, 'governor_time'))
     allocate (governor%start, source=numbers_of(input, indices, 'governor_start'))
     if (form == inductive) then
-      call append_bank(banks, new_dc_motors(names, body, numbers_of(input, indices, 'voltage'), &
-                                            numbers_of(input, indices, 'resistance'), &
-                                            numbers_of(input, indices, 'flux_constant'), &
-                                            numbers_of(input, indices, 'inductance'), governor))
+      call add_inductive(input, indices, names, body, banks, governor)
     else
       call make_curve(input, indices, form, curve)
       call append_bank(banks, new_governed_motors(names, body, curve, governor, drags(input, indices)))
     end if
   end subroutine add_governed
+
+  subroutine add_inductive(input, indices, names, body, banks, governor)
+    type(input_t), intent(in) :: input
+    integer, intent(in) :: indices(:)
+    type(string_t), intent(in) :: names(:)
+    integer, intent(in) :: body(:)
+    type(bank_slot_t), allocatable, intent(inout) :: banks(:)
+    type(governor_t), intent(in), optional :: governor   !! absent: no motor has one
+
+    call append_bank(banks, new_dc_motors(names, body, numbers_of(input, indices, 'voltage'), &
+                                          numbers_of(input, indices, 'resistance'), &
+                                          numbers_of(input, indices, 'flux_constant'), &
+                                          numbers_of(input, indices, 'inductance'), governor))
+  end subroutine add_inductive
 
   subroutine make_curve(input, indices, form, curve)
     type(input_t), intent(in) :: input

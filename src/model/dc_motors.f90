@@ -87,7 +87,7 @@ contains
         if (allocated(self%governor)) then
           associate (integral => current + self%lanes)
             throttle = self%governor%throttle(l, e, self%branch(l, e), inner(integral), speed(i))
-            rate(integral) = (throttle - inner(integral)) / self%governor%time(l, e)
+            rate(integral) = self%governor%rate(l, e, throttle, inner(integral))
           end associate
         end if
         working(i) = working(i) + self%flux_constant(l, e) * inner(current)
@@ -111,14 +111,12 @@ contains
           inner%rate_speed(l, s) = -self%flux_constant(l, e) / inductance
           inner%rate_inner(l, 1, s) = -self%resistance(l, e) / inductance
           if (.not. allocated(self%governor)) cycle
-          by_integral = self%governor%throttle_integral(self%branch(l, e))
-          by_speed = -self%governor%gain(l, e) * by_integral
+          call self%governor%slopes(l, e, self%branch(l, e), by_integral, by_speed, inner%rate_inner(l, 2, s + 1), &
+                                    inner%rate_speed(l, s + 1))
           inner%rate_speed(l, s) = inner%rate_speed(l, s) + by_speed * self%voltage(l, e) / inductance
           inner%rate_inner(l, 2, s) = by_integral * self%voltage(l, e) / inductance
           inner%working(l, s + 1) = 0.0_wp
-          inner%rate_speed(l, s + 1) = by_speed / self%governor%time(l, e)
           inner%rate_inner(l, 1, s + 1) = 0.0_wp
-          inner%rate_inner(l, 2, s + 1) = (by_integral - 1.0_wp) / self%governor%time(l, e)
         end associate
       end do
     end do

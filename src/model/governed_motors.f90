@@ -104,7 +104,7 @@ contains
         i = i + 1
         throttle = self%governor%throttle(l, e, self%branch(l, self%first_governor() + e), inner(i), speed(i))
         working(i) = working(i) + throttle * self%curve%torque(l, e, self%segment(l, e), speed(i))
-        rate(i) = (throttle - inner(i)) / self%governor%time(l, e)
+        rate(i) = self%governor%rate(l, e, throttle, inner(i))
       end do
     end do
   end subroutine evaluate_inner
@@ -121,14 +121,12 @@ contains
       do l = 1, self%lanes
         branch = self%branch(l, self%first_governor() + e)
         throttle = self%governor%throttle(l, e, branch, elements%inner%value(l, s), elements%speed(l, i))
-        by_integral = self%governor%throttle_integral(branch)
-        by_speed = -self%governor%gain(l, e) * by_integral
+        call self%governor%slopes(l, e, branch, by_integral, by_speed, elements%inner%rate_inner(l, 1, s), &
+                                  elements%inner%rate_speed(l, s))
         torque = self%curve%torque(l, e, self%segment(l, e), elements%speed(l, i))
         slope = self%curve%slope(l, e, self%segment(l, e), elements%speed(l, i))
         elements%working_speed(l, i) = elements%working_speed(l, i) + (throttle * slope + by_speed * torque)
         elements%inner%working(l, s) = by_integral * torque
-        elements%inner%rate_speed(l, s) = by_speed / self%governor%time(l, e)
-        elements%inner%rate_inner(l, 1, s) = (by_integral - 1.0_wp) / self%governor%time(l, e)
       end do
     end do
   end subroutine differentiate

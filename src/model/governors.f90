@@ -18,7 +18,8 @@ module nocdyn_governors
   contains
     procedure :: start_integral
     procedure :: throttle
-    procedure :: throttle_integral
+    procedure :: rate
+    procedure :: slopes
     procedure :: branch
     procedure :: margin
   end type governor_t
@@ -53,14 +54,28 @@ contains
     end select
   end function throttle
 
-  !> Derivative of the throttle by z; that by the speed is -gain times as large.
-  pure function throttle_integral(self, branch) result(slope)
+  !> z'.
+  pure function rate(self, lane, motor, throttle, z)
     class(governor_t), intent(in) :: self
-    integer, intent(in) :: branch
-    real(wp) :: slope
+    integer, intent(in) :: lane, motor
+    real(wp), intent(in) :: throttle, z
+    real(wp) :: rate
 
-    slope = merge(1.0_wp, 0.0_wp, branch == governing)
-  end function throttle_integral
+    rate = (throttle - z) / self%time(lane, motor)
+  end function rate
+
+  !> Derivatives of the throttle and of z' by z and by the speed.
+  pure subroutine slopes(self, lane, motor, branch, by_integral, by_speed, rate_by_integral, rate_by_speed)
+    class(governor_t), intent(in) :: self
+    integer, intent(in) :: lane, motor, branch
+    real(wp), intent(out) :: by_integral, by_speed             !! of the throttle
+    real(wp), intent(out) :: rate_by_integral, rate_by_speed   !! of z'
+
+    by_integral = merge(1.0_wp, 0.0_wp, branch == governing)
+    by_speed = -self%gain(lane, motor) * by_integral
+    rate_by_integral = (by_integral - 1.0_wp) / self%time(lane, motor)
+    rate_by_speed = by_speed / self%time(lane, motor)
+  end subroutine slopes
 
   !> The branch in which the throttle is.
   pure integer function branch(self, lane, motor, z, speed)
