@@ -1,5 +1,7 @@
 # One set of compiler settings for every Fortran target: target_link_libraries(... PRIVATE nocdyn_settings).
 add_library(nocdyn_settings INTERFACE)
+# OpenMP everywhere: it also keeps local variables off static memory, so that every procedure may run in a thread.
+target_link_libraries(nocdyn_settings INTERFACE OpenMP::OpenMP_Fortran)
 
 if(CMAKE_Fortran_COMPILER_ID STREQUAL GNU)
   target_compile_options(nocdyn_settings INTERFACE

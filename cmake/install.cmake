@@ -1,8 +1,14 @@
-# Program, library, module files, and a CMake package: find_package(nocdyn) and the target nocdyn::nocdyn.
+# Programs, library, module files, and a CMake package: find_package(nocdyn) and the target nocdyn::nocdyn.
 include(CMakePackageConfigHelpers)
 set(package_dir ${CMAKE_INSTALL_LIBDIR}/cmake/nocdyn)
 
 install(TARGETS nocdyn_program RUNTIME)
+if(TARGET nocdyn_sweep_program)
+  install(TARGETS nocdyn_sweep_program RUNTIME)
+endif()
+if(TARGET nocdyn_mpi_program)
+  install(TARGETS nocdyn_mpi_program RUNTIME)
+endif()
 install(TARGETS nocdyn EXPORT nocdyn_targets ARCHIVE)
 install(DIRECTORY ${PROJECT_BINARY_DIR}/modules/ DESTINATION ${CMAKE_INSTALL_LIBDIR}/nocdyn/modules
   FILES_MATCHING PATTERN *.mod)

@@ -229,10 +229,12 @@ def test_refusals_leave_with_exit_code_1_and_one_line(tmp_path):
 
 
 class BareMachine:
-    """A PATH with the plain tools and stand-ins: apt-get notes its arguments and 'installs' a compiler."""
+    """A PATH with the plain tools and stand-ins: apt-get notes its arguments and 'installs' the compilers and mpirun."""
 
     TOOLS = ("bash", "cat", "chmod", "dirname", "env", "mktemp", "rm", "tail", "cmake", "ninja", "g++", "python3")
+    COMPILERS = ("gfortran", "mpifort", "mpirun")
     COMPILER = '#!/usr/bin/env bash\necho "/lib/${1#*=}"\n'
+    PACKAGES = "gfortran liblapack-dev libblas-dev libnetcdff-dev libopenmpi-dev openmpi-bin"
 
     def __init__(self, folder: Path):
         self.folder = folder
@@ -257,13 +259,18 @@ def bare_machine(tmp_path) -> BareMachine:
     machine.stand_in("id", "#!/usr/bin/env bash\necho 1000\n")
     machine.stand_in("apt-get", f'''#!/usr/bin/env bash
 echo "$@" >> '{machine.calls}'
-[[ $1 != install ]] || {{ printf '%s\\n' '{machine.COMPILER}' > '{tmp_path}/gfortran'; chmod +x '{tmp_path}/gfortran'; }}
+[[ $1 == install ]] || exit 0
+for name in {" ".join(machine.COMPILERS)}; do
+  printf '%s\\n' '{machine.COMPILER}' > '{tmp_path}'/$name
+  chmod +x '{tmp_path}'/$name
+done
 ''')
     return machine
 
 
 def test_setup_is_silent_when_nothing_is_missing(bare_machine):
-    bare_machine.stand_in("gfortran", bare_machine.COMPILER)
+    for name in bare_machine.COMPILERS:
+        bare_machine.stand_in(name, bare_machine.COMPILER)
     result = bare_machine.setup("build")
     assert (result.returncode, result.stdout, result.stderr) == (0, "", "")
     assert not bare_machine.calls.exists()
@@ -272,7 +279,7 @@ def test_setup_is_silent_when_nothing_is_missing(bare_machine):
 def test_setup_without_root_and_sudo_says_what_to_run(bare_machine):
     result = bare_machine.setup("build")
     assert result.returncode == 3
-    assert "apt-get update && apt-get install --no-install-recommends gfortran liblapack-dev libblas-dev\n" in result.stderr
+    assert f"apt-get update && apt-get install --no-install-recommends {bare_machine.PACKAGES}\n" in result.stderr
     assert not bare_machine.calls.exists()
 
 
@@ -281,7 +288,7 @@ def test_setup_installs_what_is_missing_by_sudo(bare_machine):
     result = bare_machine.setup("build")
     assert (result.returncode, result.stderr) == (0, "")
     assert bare_machine.calls.read_text(encoding="utf-8").splitlines() == [
-        "update", "install --yes --no-install-recommends gfortran liblapack-dev libblas-dev"]
+        "update", f"install --yes --no-install-recommends {bare_machine.PACKAGES}"]
 
 
 def test_setup_says_when_an_installation_did_not_help(bare_machine):
@@ -289,14 +296,14 @@ def test_setup_says_when_an_installation_did_not_help(bare_machine):
     bare_machine.stand_in("apt-get", "#!/usr/bin/env bash\n")
     result = bare_machine.setup("build")
     assert result.returncode == 3
-    assert "still not found or too old: gfortran liblapack-dev libblas-dev" in result.stderr
+    assert f"still not found or too old: {bare_machine.PACKAGES}" in result.stderr
 
 
 def test_setup_on_another_system_says_what_is_needed(bare_machine):
     (bare_machine.folder / "apt-get").unlink()
     result = bare_machine.setup("build")
     assert result.returncode == 3
-    assert "must be installed first: gfortran liblapack-dev libblas-dev" in result.stderr
+    assert f"must be installed first: {bare_machine.PACKAGES}" in result.stderr
 
 
 def test_setup_refuses_an_unknown_part(bare_machine):
