@@ -8,7 +8,7 @@ module nocdyn_posix
 
   public :: make_folders, rename_file, remove_file, process_id, is_terminal, watch_interrupts, is_interrupted, &
     survive_size_limit
-  public :: create_file, write_bytes, close_file, last_failure
+  public :: create_file, write_bytes, close_file, last_failure, is_interrupted_call
 
   integer, parameter, public :: standard_output = 1, standard_error = 2   !! file descriptors
 
@@ -16,7 +16,7 @@ module nocdyn_posix
   integer(c_int), parameter :: hang_up_signal = 1, interrupt_signal = 2, termination_signal = 15, file_size_signal = 25
   integer(c_long), parameter :: echo = 1   ! seconds in which a second signal is the first one again, sent to the whole group
   integer(c_intptr_t), parameter :: ignored = 1   ! SIG_IGN
-  integer(c_int), parameter :: exists_already = 17   ! EEXIST
+  integer(c_int), parameter :: interrupted_call = 4, exists_already = 17   ! EINTR, EEXIST
 
   integer(c_int), volatile :: received_signal = 0
   integer(c_long), volatile :: received_time = 0
@@ -149,6 +149,9 @@ contains
     next = 1
     do while (next <= len(bytes))
       written = c_write(int(descriptor, c_int), bytes(next:), int(len(bytes) - next + 1, c_size_t))
+      if (written < 0) then
+        if (is_interrupted_call()) cycle
+      end if
       if (written < 1) exit
       next = next + int(written)
     end do
@@ -177,6 +180,11 @@ contains
       reason(i:i) = characters(i)
     end do
   end function last_failure
+
+  !> Whether the call before this one did nothing because a signal came.
+  logical function is_interrupted_call()
+    is_interrupted_call = c_errno() == interrupted_call
+  end function is_interrupted_call
 
   !> Number of this process, for names that no other process uses.
   integer function process_id()

@@ -1,0 +1,72 @@
+!> CRC-32C (Castagnoli), the checksum of iSCSI, ext4 and LevelDB: it finds every damage within 32 neighbouring bits, and
+!> others but for one in 4e9. Eight bytes at a time by eight tables (Kounavis and Berry, ISCC 2005), about one cycle per byte.
+module nocdyn_checksums
+  use, intrinsic :: iso_fortran_env, only: int32
+  implicit none (type, external)
+  private
+
+  public :: make_checksum_table
+
+  integer(int32), parameter :: polynomial = int(z'82F63B78', int32)   ! bits reflected
+  integer, parameter :: slices = 8
+
+  type, public :: checksum_table_t
+    integer(int32), private :: entries(0:255, slices) = 0
+  contains
+    procedure :: checksum
+  end type checksum_table_t
+
+contains
+
+  !> The tables, in some microseconds.
+  pure subroutine make_checksum_table(table)
+    type(checksum_table_t), intent(out) :: table
+    integer(int32) :: value
+    integer :: bit, byte, slice
+
+    do byte = 0, 255
+      value = int(byte, int32)
+      do bit = 1, 8
+        value = ieor(shiftr(value, 1), merge(polynomial, 0_int32, btest(value, 0)))
+      end do
+      table%entries(byte, 1) = value
+    end do
+    do slice = 2, slices
+      do byte = 0, 255
+        value = table%entries(byte, slice - 1)
+        table%entries(byte, slice) = ieor(shiftr(value, 8), table%entries(iand(value, 255_int32), 1))
+      end do
+    end do
+  end subroutine make_checksum_table
+
+  !> CRC-32C of the bytes; 'E3069283' for '123456789' (RFC 3720, B.4, has more).
+  pure integer(int32) function checksum(self, bytes)
+    class(checksum_table_t), intent(in) :: self
+    character(len=*), intent(in) :: bytes
+    integer(int32) :: value
+    integer :: i, last
+
+    last = len(bytes) - modulo(len(bytes), slices)
+    value = not(0_int32)
+    do i = 1, last, slices
+      value = ieor(value, int(ior(ior(code(bytes(i:i)), shiftl(code(bytes(i + 1:i + 1)), 8)), &
+                                  ior(shiftl(code(bytes(i + 2:i + 2)), 16), shiftl(code(bytes(i + 3:i + 3)), 24))), int32))
+      value = ieor(ieor(ieor(self%entries(iand(value, 255_int32), 8), self%entries(iand(shiftr(value, 8), 255_int32), 7)), &
+                        ieor(self%entries(iand(shiftr(value, 16), 255_int32), 6), self%entries(shiftr(value, 24), 5))), &
+                   ieor(ieor(self%entries(code(bytes(i + 4:i + 4)), 4), self%entries(code(bytes(i + 5:i + 5)), 3)), &
+                        ieor(self%entries(code(bytes(i + 6:i + 6)), 2), self%entries(code(bytes(i + 7:i + 7)), 1))))
+    end do
+    do i = last + 1, len(bytes)
+      value = ieor(shiftr(value, 8), self%entries(iand(ieor(value, code(bytes(i:i))), 255_int32), 1))
+    end do
+    checksum = not(value)
+  end function checksum
+
+  !> 0 to 255.
+  elemental integer(int32) function code(byte)
+    character(len=1), intent(in) :: byte
+
+    code = ichar(byte, int32)
+  end function code
+
+end module nocdyn_checksums

@@ -1,0 +1,169 @@
+!> Files that are read at any place and grow at their end, as descriptors of the operating system.
+module nocdyn_posix_files
+  use, intrinsic :: iso_c_binding, only: c_char, c_int, c_int64_t, c_intptr_t, c_null_char, c_size_t
+  use, intrinsic :: iso_fortran_env, only: int64
+  use nocdyn_posix, only: is_interrupted_call
+  implicit none (type, external)
+  private
+
+  public :: open_new, open_existing, file_size, read_at, seek_end, truncate_file, sync_file, sync_path, lock_file
+
+  integer, parameter, public :: lock_taken = 0, lock_of_another = 1
+
+  integer(c_int), parameter :: from_start = 0, from_end = 2      ! SEEK_SET, SEEK_END
+  integer(c_int), parameter :: exclusive = 2, without_waiting = 4   ! LOCK_EX, LOCK_NB
+  integer(c_int), parameter :: would_block = 11   ! EWOULDBLOCK
+
+  interface
+    integer(c_int) function c_open_new(path) bind(c, name='nocdyn_open_new')
+      import :: c_char, c_int
+      character(kind=c_char), intent(in) :: path(*)
+    end function c_open_new
+
+    integer(c_int) function c_open_existing(path, is_to_change) bind(c, name='nocdyn_open_existing')
+      import :: c_char, c_int
+      character(kind=c_char), intent(in) :: path(*)
+      integer(c_int), value, intent(in) :: is_to_change
+    end function c_open_existing
+
+    integer(c_intptr_t) function c_pread(descriptor, bytes, length, offset) bind(c, name='pread')
+      import :: c_char, c_int, c_int64_t, c_intptr_t, c_size_t
+      integer(c_int), value, intent(in) :: descriptor
+      character(kind=c_char), intent(inout) :: bytes(*)
+      integer(c_size_t), value, intent(in) :: length
+      integer(c_int64_t), value, intent(in) :: offset
+    end function c_pread
+
+    integer(c_int64_t) function c_lseek(descriptor, offset, from) bind(c, name='lseek')
+      import :: c_int, c_int64_t
+      integer(c_int), value, intent(in) :: descriptor
+      integer(c_int64_t), value, intent(in) :: offset
+      integer(c_int), value, intent(in) :: from
+    end function c_lseek
+
+    integer(c_int) function c_ftruncate(descriptor, length) bind(c, name='ftruncate')
+      import :: c_int, c_int64_t
+      integer(c_int), value, intent(in) :: descriptor
+      integer(c_int64_t), value, intent(in) :: length
+    end function c_ftruncate
+
+    integer(c_int) function c_fdatasync(descriptor) bind(c, name='fdatasync')
+      import :: c_int
+      integer(c_int), value, intent(in) :: descriptor
+    end function c_fdatasync
+
+    integer(c_int) function c_fsync(descriptor) bind(c, name='fsync')
+      import :: c_int
+      integer(c_int), value, intent(in) :: descriptor
+    end function c_fsync
+
+    integer(c_int) function c_flock(descriptor, operation) bind(c, name='flock')
+      import :: c_int
+      integer(c_int), value, intent(in) :: descriptor, operation
+    end function c_flock
+
+    integer(c_int) function c_close(descriptor) bind(c, name='close')
+      import :: c_int
+      integer(c_int), value, intent(in) :: descriptor
+    end function c_close
+
+    integer(c_int) function c_errno() bind(c, name='nocdyn_errno')
+      import :: c_int
+    end function c_errno
+  end interface
+
+contains
+
+  !> Makes a file to read and write; its descriptor, negative on failure or if there is a file of that name.
+  integer function open_new(path)
+    character(len=*), intent(in) :: path
+
+    open_new = int(c_open_new(path // c_null_char))
+  end function open_new
+
+  !> Opens a file that is there; its descriptor, negative on failure.
+  integer function open_existing(path, is_to_change)
+    character(len=*), intent(in) :: path
+    logical, intent(in) :: is_to_change   !! else it is read only
+
+    open_existing = int(c_open_existing(path // c_null_char, merge(1_c_int, 0_c_int, is_to_change)))
+  end function open_existing
+
+  !> Bytes in the file, negative on failure.
+  integer(int64) function file_size(descriptor)
+    integer, intent(in) :: descriptor
+
+    file_size = c_lseek(int(descriptor, c_int), 0_c_int64_t, from_end)
+  end function file_size
+
+  !> Fills `bytes` from the file, `offset` bytes behind its start; not done: a failure or the end of the file.
+  subroutine read_at(descriptor, offset, bytes, is_done)
+    integer, intent(in) :: descriptor
+    integer(int64), intent(in) :: offset
+    character(len=*), intent(inout) :: bytes
+    logical, intent(out) :: is_done
+    integer(c_intptr_t) :: found
+    integer :: next
+
+    next = 1
+    do while (next <= len(bytes))
+      found = c_pread(int(descriptor, c_int), bytes(next:), int(len(bytes) - next + 1, c_size_t), offset + next - 1)
+      if (found < 0) then
+        if (is_interrupted_call()) cycle
+      end if
+      if (found < 1) exit
+      next = next + int(found)
+    end do
+    is_done = next > len(bytes)
+  end subroutine read_at
+
+  !> The next byte is written at `offset`.
+  subroutine seek_end(descriptor, offset, is_done)
+    integer, intent(in) :: descriptor
+    integer(int64), intent(in) :: offset
+    logical, intent(out) :: is_done
+
+    is_done = c_lseek(int(descriptor, c_int), offset, from_start) == offset
+  end subroutine seek_end
+
+  !> Cuts the file off behind `length` bytes, where writing goes on.
+  subroutine truncate_file(descriptor, length, is_done)
+    integer, intent(in) :: descriptor
+    integer(int64), intent(in) :: length
+    logical, intent(out) :: is_done
+
+    is_done = c_ftruncate(int(descriptor, c_int), length) == 0
+    if (is_done) call seek_end(descriptor, length, is_done)
+  end subroutine truncate_file
+
+  !> What was written is on the disk when this returns.
+  subroutine sync_file(descriptor, is_done)
+    integer, intent(in) :: descriptor
+    logical, intent(out) :: is_done
+
+    is_done = c_fdatasync(int(descriptor, c_int)) == 0
+  end subroutine sync_file
+
+  !> The same for a file or folder that others have written.
+  subroutine sync_path(path, is_done)
+    character(len=*), intent(in) :: path
+    logical, intent(out) :: is_done
+    integer(c_int) :: descriptor, status
+
+    descriptor = c_open_existing(path // c_null_char, 0_c_int)
+    is_done = descriptor >= 0
+    if (.not. is_done) return
+    is_done = c_fsync(descriptor) == 0
+    status = c_close(descriptor)
+  end subroutine sync_path
+
+  !> Takes the file for this process, until it is closed. A file system without locks locks nothing, and that is no failure.
+  integer function lock_file(descriptor)
+    integer, intent(in) :: descriptor
+
+    lock_file = lock_taken
+    if (c_flock(int(descriptor, c_int), ior(exclusive, without_waiting)) == 0) return
+    if (c_errno() == would_block) lock_file = lock_of_another
+  end function lock_file
+
+end module nocdyn_posix_files

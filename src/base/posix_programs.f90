@@ -1,0 +1,66 @@
+!> The programs of this installation: where they are, and one becoming another.
+module nocdyn_posix_programs
+  use, intrinsic :: iso_c_binding, only: c_char, c_int, c_intptr_t, c_loc, c_null_char, c_null_ptr, c_ptr, c_size_t
+  use nocdyn_posix, only: last_failure
+  use nocdyn_text, only: string_t
+  implicit none (type, external)
+  private
+
+  public :: program_folder, replace_process
+
+  integer, parameter :: longest_path = 4096   ! PATH_MAX
+
+  interface
+    integer(c_intptr_t) function c_readlink(path, target, capacity) bind(c, name='readlink')
+      import :: c_char, c_intptr_t, c_size_t
+      character(kind=c_char), intent(in) :: path(*)
+      character(kind=c_char), intent(out) :: target(*)
+      integer(c_size_t), value, intent(in) :: capacity
+    end function c_readlink
+
+    integer(c_int) function c_execv(path, arguments) bind(c, name='execv')
+      import :: c_char, c_int, c_ptr
+      character(kind=c_char), intent(in) :: path(*)
+      type(c_ptr), intent(in) :: arguments(*)
+    end function c_execv
+  end interface
+
+contains
+
+  !> The folder of the running program's file, with its last slash; empty if the system does not tell.
+  function program_folder() result(folder)
+    character(len=:), allocatable :: folder
+    character(len=longest_path) :: path
+    integer :: length
+
+    path = ''
+    length = int(c_readlink('/proc/self/exe' // c_null_char, path, int(longest_path, c_size_t)))
+    folder = path(:index(path(:max(length, 0)), '/', back=.true.))
+  end function program_folder
+
+  !> Another program takes the place of this one; returns only if that failed.
+  subroutine replace_process(program, words, failure)
+    character(len=*), intent(in) :: program                  !! path of its file
+    type(string_t), intent(in) :: words(:)                   !! its arguments
+    character(len=:), allocatable, intent(out) :: failure    !! why it could not be done
+    type(c_ptr), allocatable :: addresses(:)
+    character(len=:), allocatable, target :: texts
+    integer(c_int) :: status
+    integer :: begins(size(words) + 1), i
+
+    texts = program // c_null_char
+    begins(1) = 1
+    do i = 1, size(words)
+      begins(i + 1) = len(texts) + 1
+      texts = texts // words(i)%text // c_null_char
+    end do
+    allocate (addresses(size(words) + 2))
+    do i = 1, size(begins)
+      addresses(i) = c_loc(texts(begins(i):begins(i)))
+    end do
+    addresses(size(addresses)) = c_null_ptr
+    status = c_execv(program // c_null_char, addresses)
+    failure = last_failure()
+  end subroutine replace_process
+
+end module nocdyn_posix_programs

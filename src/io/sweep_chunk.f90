@@ -1,0 +1,138 @@
+!> The results of some consecutive variants of a sweep.
+module nocdyn_sweep_chunk
+  use, intrinsic :: iso_fortran_env, only: int64
+  use nocdyn_bytes, only: byte_reader_t, integer_bytes, put_integers, put_reals, put_text, real_bytes
+  use nocdyn_kinds, only: wp
+  use nocdyn_text, only: string_t
+  implicit none (type, external)
+  private
+
+  public :: allocate_chunk, pack_chunk, unpack_chunk, read_summary
+
+  integer, parameter, public :: status_done = 0      !! all results are there
+  integer, parameter, public :: status_refused = 1   !! a value out of range, or a machine that cannot be
+  integer, parameter, public :: status_failed = 2    !! the integration failed
+  character(len=7), parameter, public :: status_words(0:2) = ['done   ', 'refused', 'failed ']
+
+  type, public :: chunk_t
+    integer :: first = 1                        !! number of the first variant
+    integer :: count = 0                        !! of variants
+    real(wp), allocatable :: parameters(:, :)   !! [varied, count]
+    real(wp), allocatable :: results(:, :)      !! [statistics, count], NaN unless the variant is done
+    integer, allocatable :: status(:)           !! status_...; [count]
+    integer, allocatable :: steps(:)            !! of the integration; [count]
+    type(string_t), allocatable :: reasons(:)   !! one sentence, unless the variant is done; [count]
+  end type chunk_t
+
+  !> What a chunk holds, at the head of its bytes.
+  type, public :: chunk_summary_t
+    integer :: first = 0, count = 0, varied = 0, statistics = 0
+    integer :: refused = 0, failed = 0
+    integer :: longest_reason = 0   !! [characters]
+  end type chunk_summary_t
+
+  integer, parameter :: summary_numbers = 7
+
+contains
+
+  subroutine allocate_chunk(chunk, first, count, varied, statistics)
+    type(chunk_t), intent(out) :: chunk
+    integer, intent(in) :: first, count
+    integer, intent(in) :: varied, statistics   !! values of a variant
+
+    chunk%first = first
+    chunk%count = count
+    allocate (chunk%parameters(varied, count), chunk%results(statistics, count), source=0.0_wp)
+    allocate (chunk%status(count), source=status_done)
+    allocate (chunk%steps(count), source=0)
+    allocate (chunk%reasons(count))
+  end subroutine allocate_chunk
+
+  !> The chunk as bytes, which `unpack_chunk` takes back.
+  subroutine pack_chunk(chunk, bytes)
+    type(chunk_t), intent(in) :: chunk
+    character(len=:), allocatable, intent(out) :: bytes
+    integer :: i, length, longest, used
+
+    length = integer_bytes * (summary_numbers + 2 * chunk%count) + &
+             real_bytes * (size(chunk%parameters) + size(chunk%results))
+    longest = 0
+    do i = 1, chunk%count
+      if (chunk%status(i) == status_done) cycle
+      length = length + integer_bytes + len(chunk%reasons(i)%text)
+      longest = max(longest, len(chunk%reasons(i)%text))
+    end do
+    allocate (character(len=length) :: bytes)
+    used = 0
+    call put_integers(bytes, used, [chunk%first, chunk%count, size(chunk%parameters, 1), size(chunk%results, 1), &
+                                    count(chunk%status == status_refused), count(chunk%status == status_failed), longest])
+    call put_reals(bytes, used, chunk%parameters)
+    call put_reals(bytes, used, chunk%results)
+    call put_integers(bytes, used, chunk%status)
+    call put_integers(bytes, used, chunk%steps)
+    do i = 1, chunk%count
+      if (chunk%status(i) /= status_done) call put_text(bytes, used, chunk%reasons(i)%text)
+    end do
+  end subroutine pack_chunk
+
+  !> Bytes that are none of a chunk are the fault of the program: checksums have been compared before.
+  subroutine unpack_chunk(bytes, chunk)
+    character(len=*), intent(in) :: bytes
+    type(chunk_t), intent(inout) :: chunk        !! its arrays are used again if they fit
+    type(chunk_summary_t) :: summary
+    type(byte_reader_t) :: reader
+    logical :: is_whole
+    integer :: i
+
+    call read_summary(bytes, summary, is_whole)
+    if (.not. is_whole) error stop 'nocdyn_sweep_chunk: unpack_chunk needs the bytes of a chunk'
+    call prepare(chunk, summary)
+    reader%next = summary_numbers * integer_bytes + 1
+    call reader%take_reals(bytes, chunk%parameters)
+    call reader%take_reals(bytes, chunk%results)
+    call reader%take_integers(bytes, chunk%status)
+    call reader%take_integers(bytes, chunk%steps)
+    do i = 1, chunk%count
+      if (chunk%status(i) /= status_done) then
+        call reader%take_text(bytes, chunk%reasons(i)%text)
+      else if (allocated(chunk%reasons(i)%text)) then
+        deallocate (chunk%reasons(i)%text)
+      end if
+    end do
+    if (reader%is_short) error stop 'nocdyn_sweep_chunk: unpack_chunk needs all bytes of a chunk'
+  end subroutine unpack_chunk
+
+  subroutine prepare(chunk, summary)
+    type(chunk_t), intent(inout) :: chunk
+    type(chunk_summary_t), intent(in) :: summary
+    logical :: fits
+
+    fits = allocated(chunk%status)
+    if (fits) fits = size(chunk%parameters, 1) == summary%varied .and. size(chunk%results, 1) == summary%statistics .and. &
+                     size(chunk%status) == summary%count
+    if (fits) then
+      chunk%first = summary%first
+    else
+      call allocate_chunk(chunk, summary%first, summary%count, summary%varied, summary%statistics)
+    end if
+  end subroutine prepare
+
+  !> The head of a chunk's bytes.
+  subroutine read_summary(bytes, summary, is_whole)
+    character(len=*), intent(in) :: bytes
+    type(chunk_summary_t), intent(out) :: summary
+    logical, intent(out) :: is_whole               !! else there are too few bytes for what the head says
+    type(byte_reader_t) :: reader
+    integer :: numbers(summary_numbers)
+    integer(int64) :: needed
+
+    call reader%take_integers(bytes, numbers)
+    summary = chunk_summary_t(numbers(1), numbers(2), numbers(3), numbers(4), numbers(5), numbers(6), numbers(7))
+    is_whole = .not. reader%is_short .and. minval(numbers) >= 0 .and. summary%first > 0 .and. summary%count > 0
+    if (.not. is_whole) return
+    needed = summary_numbers * integer_bytes + &
+             summary%count * (real_bytes * (int(summary%varied, int64) + summary%statistics) + 2 * integer_bytes)
+    is_whole = needed <= len(bytes)
+  end subroutine read_summary
+
+end module nocdyn_sweep_chunk

@@ -1,0 +1,134 @@
+!> What the files of a sweep say about it: what was asked for, by which program, and the names of what comes out.
+module nocdyn_sweep_header
+  use nocdyn_bytes, only: byte_reader_t, integer_bytes, put_integers, put_text
+  implicit none (type, external)
+  private
+
+  public :: pack_header, unpack_header, differing_part
+
+  !> One varied number or one result.
+  type, public :: quantity_t
+    character(len=:), allocatable :: label       !! 'load.work.viscous', 'omega_motor_final'
+    character(len=:), allocatable :: unit        !! '' for numbers without
+    character(len=:), allocatable :: long_name
+  end type quantity_t
+
+  type, public :: sweep_header_t
+    character(len=:), allocatable :: title
+    character(len=:), allocatable :: source             !! program, version, compiler
+    character(len=:), allocatable :: design             !! 'random'
+    character(len=:), allocatable :: input_text         !! the whole canonical input
+    character(len=:), allocatable :: list_fingerprint   !! of the file of a list, '' without one
+    integer :: seed = 0
+    integer :: variants = 0                             !! of the whole sweep
+    integer :: first = 1, last = 0                      !! of this shard
+    type(quantity_t), allocatable :: parameters(:)
+    type(quantity_t), allocatable :: results(:)
+  end type sweep_header_t
+
+contains
+
+  !> The header as bytes, which `unpack_header` takes back.
+  subroutine pack_header(header, bytes)
+    type(sweep_header_t), intent(in) :: header
+    character(len=:), allocatable, intent(out) :: bytes
+    integer :: used
+
+    allocate (character(len=packed_length(header)) :: bytes)
+    used = 0
+    associate (parameters => header%parameters, results => header%results)
+      call put_integers(bytes, used, [header%seed, header%variants, header%first, header%last, size(parameters), size(results)])
+      call put_text(bytes, used, header%title)
+      call put_text(bytes, used, header%source)
+      call put_text(bytes, used, header%design)
+      call put_text(bytes, used, header%input_text)
+      call put_text(bytes, used, header%list_fingerprint)
+      call put_quantities(bytes, used, parameters)
+      call put_quantities(bytes, used, results)
+    end associate
+  end subroutine pack_header
+
+  pure integer function packed_length(header) result(length)
+    type(sweep_header_t), intent(in) :: header
+
+    length = 11 * integer_bytes + len(header%title) + len(header%source) + len(header%design) + len(header%input_text) + &
+             len(header%list_fingerprint) + quantities_length(header%parameters) + quantities_length(header%results)
+  end function packed_length
+
+  pure integer function quantities_length(quantities) result(length)
+    type(quantity_t), intent(in) :: quantities(:)
+    integer :: i
+
+    length = 0
+    do i = 1, size(quantities)
+      length = length + 3 * integer_bytes + len(quantities(i)%label) + len(quantities(i)%unit) + len(quantities(i)%long_name)
+    end do
+  end function quantities_length
+
+  subroutine put_quantities(bytes, used, quantities)
+    character(len=:), allocatable, intent(inout) :: bytes
+    integer, intent(inout) :: used
+    type(quantity_t), intent(in) :: quantities(:)
+    integer :: i
+
+    do i = 1, size(quantities)
+      call put_text(bytes, used, quantities(i)%label)
+      call put_text(bytes, used, quantities(i)%unit)
+      call put_text(bytes, used, quantities(i)%long_name)
+    end do
+  end subroutine put_quantities
+
+  subroutine unpack_header(bytes, header, is_whole)
+    character(len=*), intent(in) :: bytes
+    type(sweep_header_t), intent(out) :: header
+    logical, intent(out) :: is_whole              !! else the bytes are not those of a header
+    type(byte_reader_t) :: reader
+    integer :: numbers(6)
+
+    call reader%take_integers(bytes, numbers)
+    header%seed = numbers(1)
+    header%variants = numbers(2)
+    header%first = numbers(3)
+    header%last = numbers(4)
+    call reader%take_text(bytes, header%title)
+    call reader%take_text(bytes, header%source)
+    call reader%take_text(bytes, header%design)
+    call reader%take_text(bytes, header%input_text)
+    call reader%take_text(bytes, header%list_fingerprint)
+    call take_quantities(reader, bytes, numbers(5), header%parameters)
+    call take_quantities(reader, bytes, numbers(6), header%results)
+    is_whole = .not. reader%is_short .and. reader%next == len(bytes) + 1
+  end subroutine unpack_header
+
+  subroutine take_quantities(reader, bytes, count, quantities)
+    type(byte_reader_t), intent(inout) :: reader
+    character(len=*), intent(in) :: bytes
+    integer, intent(in) :: count
+    type(quantity_t), allocatable, intent(out) :: quantities(:)
+    integer :: i
+
+    ! no more than the bytes can hold, whatever they say
+    allocate (quantities(max(0, min(count, len(bytes) / (3 * integer_bytes)))))
+    do i = 1, size(quantities)
+      call reader%take_text(bytes, quantities(i)%label)
+      call reader%take_text(bytes, quantities(i)%unit)
+      call reader%take_text(bytes, quantities(i)%long_name)
+    end do
+  end subroutine take_quantities
+
+  !> In which the headers of two sweeps differ, shards aside: 'source', 'list', 'input', or '' if they are of one sweep.
+  pure function differing_part(a, b) result(part)
+    type(sweep_header_t), intent(in) :: a, b
+    character(len=:), allocatable :: part
+
+    part = ''
+    if (a%source /= b%source) then
+      part = 'source'
+    else if (a%list_fingerprint /= b%list_fingerprint) then
+      part = 'list'
+    else if (a%input_text /= b%input_text .or. a%variants /= b%variants) then
+      part = 'input'
+    end if
+  end function differing_part
+
+end module nocdyn_sweep_header

@@ -1,0 +1,236 @@
+!> The journal of a sweep, or of a shard of one: its header, then one record per chunk in any order.
+module nocdyn_sweep_journal
+  use, intrinsic :: iso_fortran_env, only: int32, int64
+  use nocdyn_errors, only: error_t, exit_file, exit_input, raise
+  use nocdyn_number_ranges, only: gaps, range_t
+  use nocdyn_record_file, only: frame_bytes, record_file_t
+  use nocdyn_sweep_chunk, only: chunk_summary_t, chunk_t, pack_chunk, read_summary, unpack_chunk
+  use nocdyn_sweep_header, only: pack_header, sweep_header_t, unpack_header
+  use nocdyn_text, only: to_text
+  implicit none (type, external)
+  private
+
+  public :: journal_name, create_journal, open_journal
+
+  integer(int32), parameter :: header_mark = int(z'64616568', int32), chunk_mark = int(z'6B6E6863', int32)   ! 'head', 'chnk'
+
+  !> Where a chunk stands.
+  type :: record_t
+    integer(int64) :: offset = 0   !! of its frame
+    integer :: first = 1, count = 0
+  end type record_t
+
+  type, public :: sweep_journal_t
+    type(sweep_header_t) :: header
+    integer :: done = 0, refused = 0, failed = 0   !! variants in it
+    integer :: records = 0                         !! chunks in it
+    integer :: longest_reason = 0                  !! [characters]
+    integer(int64) :: damaged_bytes = 0            !! left out by `open_journal`
+    type(record_file_t), private :: file
+    type(record_t), allocatable, private :: index(:)
+  contains
+    procedure :: path
+    procedure :: append
+    procedure :: append_packed
+    procedure :: ranges
+    procedure :: missing
+    procedure :: read_record
+    procedure :: close => close_journal
+    procedure :: remove => remove_journal
+    procedure, private :: note_record
+    procedure, private :: read_chunks
+  end type sweep_journal_t
+
+contains
+
+  !> Name of the file.
+  function journal_name(shard, shards) result(name)
+    integer, intent(in) :: shard, shards   !! 1, 1: the whole sweep
+    character(len=:), allocatable :: name
+
+    name = 'sweep.journal'
+    if (shards > 1) name = 'sweep.' // to_text(shard) // '-of-' // to_text(shards) // '.journal'
+  end function journal_name
+
+  !> Begins a journal in `folder`, which is made if need be; a file of that name must not be there.
+  subroutine create_journal(folder, name, header, journal, error)
+    character(len=*), intent(in) :: folder, name
+    type(sweep_header_t), intent(in) :: header
+    type(sweep_journal_t), intent(out) :: journal
+    type(error_t), allocatable, intent(out) :: error
+    character(len=:), allocatable :: bytes
+
+    journal%header = header
+    allocate (journal%index(1))
+    call journal%file%create(folder, name, error)
+    if (allocated(error)) return
+    call pack_header(header, bytes)
+    call journal%file%write(header_mark, bytes, error)
+    if (allocated(error)) call journal%remove()
+  end subroutine create_journal
+
+  !> Opens a journal that is there, to go on with it or to read it. A record that was not written whole is cut off.
+  subroutine open_journal(folder, name, journal, error)
+    character(len=*), intent(in) :: folder, name
+    type(sweep_journal_t), intent(out) :: journal
+    type(error_t), allocatable, intent(out) :: error   !! exit_file: cannot be opened; exit_input: no journal, or in use
+    integer :: length
+    logical :: is_good, is_there
+
+    allocate (journal%index(1))
+    call journal%file%open(folder, name, error)
+    if (allocated(error)) return
+    call journal%file%read(journal%file%end, header_mark, length, is_there, is_good)
+    if (is_good) call unpack_header(journal%file%buffer(frame_bytes + 1:frame_bytes + length), journal%header, is_good)
+    if (is_good) then
+      journal%file%end = journal%file%end + frame_bytes + length
+      call journal%read_chunks()
+      call journal%file%cut(error)
+    else
+      call raise(error, exit_input, journal%path() // ': the head of this journal is damaged; nothing can be made of the rest')
+    end if
+    if (allocated(error)) call journal%close()
+  end subroutine open_journal
+
+  !> Finds the records. One that is damaged is left out, and what is no record any more ends the journal.
+  subroutine read_chunks(self)
+    class(sweep_journal_t), intent(inout) :: self
+    type(chunk_summary_t) :: summary
+    integer(int64) :: offset
+    integer :: length
+    logical :: is_good, is_there
+
+    offset = self%file%end
+    do
+      call self%file%read(offset, chunk_mark, length, is_there, is_good)
+      if (.not. is_there) exit
+      if (is_good) call read_summary(self%file%buffer(frame_bytes + 1:frame_bytes + length), summary, is_good)
+      if (is_good) is_good = belongs(summary, self%header)
+      if (is_good) then
+        self%damaged_bytes = self%damaged_bytes + offset - self%file%end
+        call self%note_record(offset, summary)
+        self%file%end = offset + frame_bytes + length
+      end if
+      offset = offset + frame_bytes + length
+    end do
+    self%damaged_bytes = self%damaged_bytes + self%file%size() - self%file%end
+  end subroutine read_chunks
+
+  pure logical function belongs(summary, header)
+    type(chunk_summary_t), intent(in) :: summary
+    type(sweep_header_t), intent(in) :: header
+
+    belongs = summary%varied == size(header%parameters) .and. summary%statistics == size(header%results) .and. &
+              summary%first >= header%first .and. summary%count <= header%last - summary%first + 1
+  end function belongs
+
+  subroutine note_record(self, offset, summary)
+    class(sweep_journal_t), intent(inout) :: self
+    integer(int64), intent(in) :: offset
+    type(chunk_summary_t), intent(in) :: summary
+    type(record_t), allocatable :: longer(:)
+
+    if (self%records == size(self%index)) then
+      allocate (longer(2 * self%records))
+      longer(:self%records) = self%index
+      call move_alloc(longer, self%index)
+    end if
+    self%records = self%records + 1
+    self%index(self%records) = record_t(offset, summary%first, summary%count)
+    self%refused = self%refused + summary%refused
+    self%failed = self%failed + summary%failed
+    self%done = self%done + summary%count - summary%refused - summary%failed
+    self%longest_reason = max(self%longest_reason, summary%longest_reason)
+  end subroutine note_record
+
+  !> Adds a chunk. After an error the journal is as it was before, if the disk lets it be.
+  subroutine append(self, chunk, error)
+    class(sweep_journal_t), intent(inout) :: self
+    type(chunk_t), intent(in) :: chunk
+    type(error_t), allocatable, intent(out) :: error
+    character(len=:), allocatable :: bytes
+
+    call pack_chunk(chunk, bytes)
+    call self%append_packed(bytes, error)
+  end subroutine append
+
+  !> The same with the bytes of a chunk by `pack_chunk`.
+  subroutine append_packed(self, bytes, error)
+    class(sweep_journal_t), intent(inout) :: self
+    character(len=*), intent(in) :: bytes
+    type(error_t), allocatable, intent(out) :: error
+    type(chunk_summary_t) :: summary
+    integer(int64) :: offset
+    logical :: is_whole
+
+    call read_summary(bytes, summary, is_whole)
+    if (is_whole) is_whole = belongs(summary, self%header)
+    if (.not. is_whole) error stop 'nocdyn_sweep_journal: append_packed needs a chunk of this sweep'
+    offset = self%file%end
+    call self%file%write(chunk_mark, bytes, error)
+    if (.not. allocated(error)) call self%note_record(offset, summary)
+  end subroutine append_packed
+
+  pure function path(self)
+    class(sweep_journal_t), intent(in) :: self
+    character(len=:), allocatable :: path
+
+    path = self%file%path
+  end function path
+
+  !> The variants of each record.
+  pure function ranges(self)
+    class(sweep_journal_t), intent(in) :: self
+    type(range_t), allocatable :: ranges(:)
+    integer :: i
+
+    allocate (ranges(self%records))
+    do i = 1, self%records
+      ranges(i) = range_t(self%index(i)%first, self%index(i)%first + self%index(i)%count - 1)
+    end do
+  end function ranges
+
+  !> The variants from `header%first` to `header%last` that the journal does not hold, in ascending ranges.
+  pure subroutine missing(self, first, count)
+    class(sweep_journal_t), intent(in) :: self
+    integer, allocatable, intent(out) :: first(:), count(:)   !! of each range
+    type(range_t), allocatable :: open_ranges(:)
+
+    call gaps(self%ranges(), range_t(self%header%first, self%header%last), open_ranges)
+    allocate (first(size(open_ranges)), count(size(open_ranges)))
+    first = open_ranges%first
+    count = open_ranges%last - open_ranges%first + 1
+  end subroutine missing
+
+  !> The chunk of record `number`, 1 to `records`.
+  subroutine read_record(self, number, chunk, error)
+    class(sweep_journal_t), intent(inout) :: self
+    integer, intent(in) :: number
+    type(chunk_t), intent(inout) :: chunk
+    type(error_t), allocatable, intent(out) :: error
+    integer :: length
+    logical :: is_good, is_there
+
+    call self%file%read(self%index(number)%offset, chunk_mark, length, is_there, is_good)
+    if (is_good) then
+      call unpack_chunk(self%file%buffer(frame_bytes + 1:frame_bytes + length), chunk)
+    else
+      call raise(error, exit_file, self%path() // ': cannot be read: it is not as it was when it was opened')
+    end if
+  end subroutine read_record
+
+  !> Ends the work on the journal, which stays.
+  subroutine close_journal(self)
+    class(sweep_journal_t), intent(inout) :: self
+
+    call self%file%close()
+  end subroutine close_journal
+
+  !> Ends the work and removes the file.
+  subroutine remove_journal(self)
+    class(sweep_journal_t), intent(inout) :: self
+
+    call self%file%remove()
+  end subroutine remove_journal
+
+end module nocdyn_sweep_journal

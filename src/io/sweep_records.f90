@@ -1,0 +1,155 @@
+!> The chunks of one or several journals in the order of their variants, one at a time.
+module nocdyn_sweep_records
+  use nocdyn_errors, only: error_t, exit_input, raise
+  use nocdyn_number_ranges, only: ascending_order, gaps, range_t
+  use nocdyn_sweep_chunk, only: chunk_t
+  use nocdyn_sweep_header, only: differing_part
+  use nocdyn_sweep_journal, only: sweep_journal_t
+  use nocdyn_text, only: to_text
+  implicit none (type, external)
+  private
+
+  public :: check_sweep
+
+  !> Where the next chunk is; to begin again, begin again.
+  type, public :: sweep_records_t
+    integer, allocatable, private :: journal(:), record(:)   !! in the order of the variants
+    integer, private :: next = 1
+  contains
+    procedure :: begin
+    procedure :: take
+  end type sweep_records_t
+
+contains
+
+  subroutine begin(self, journals)
+    class(sweep_records_t), intent(inout) :: self
+    type(sweep_journal_t), intent(in) :: journals(:)
+    type(range_t), allocatable :: ranges(:)
+    integer, allocatable :: order(:), journal(:), record(:)
+    integer :: i
+
+    call list_records(journals, ranges, journal, record)
+    call ascending_order(ranges, order)
+    self%journal = [(journal(order(i)), i=1, size(order))]
+    self%record = [(record(order(i)), i=1, size(order))]
+    self%next = 1
+  end subroutine begin
+
+  pure subroutine list_records(journals, ranges, journal, record)
+    type(sweep_journal_t), intent(in) :: journals(:)
+    type(range_t), allocatable, intent(out) :: ranges(:)
+    integer, allocatable, intent(out) :: journal(:), record(:)   !! where each is from
+    integer :: i, last, k
+
+    allocate (ranges(sum(journals%records)), journal(sum(journals%records)), record(sum(journals%records)))
+    last = 0
+    do k = 1, size(journals)
+      ranges(last + 1:last + journals(k)%records) = journals(k)%ranges()
+      do i = 1, journals(k)%records
+        journal(last + i) = k
+        record(last + i) = i
+      end do
+      last = last + journals(k)%records
+    end do
+  end subroutine list_records
+
+  !> The next chunk, as long as there is one.
+  subroutine take(self, journals, chunk, is_there, error)
+    class(sweep_records_t), intent(inout) :: self
+    type(sweep_journal_t), intent(inout) :: journals(:)   !! those of `begin`
+    type(chunk_t), intent(inout) :: chunk
+    logical, intent(out) :: is_there
+    type(error_t), allocatable, intent(out) :: error
+
+    is_there = self%next <= size(self%record)
+    if (.not. is_there) return
+    call journals(self%journal(self%next))%read_record(self%record(self%next), chunk, error)
+    self%next = self%next + 1
+  end subroutine take
+
+  !> Whether the journals are of one sweep and hold every variant of it once.
+  subroutine check_sweep(journals, error)
+    type(sweep_journal_t), intent(in) :: journals(:)     !! one at least
+    type(error_t), allocatable, intent(out) :: error
+    type(range_t), allocatable :: ranges(:), open_ranges(:)
+    integer, allocatable :: journal(:), record(:), order(:)
+    integer :: i
+
+    call check_headers(journals, error)
+    if (.not. allocated(error)) call check_wholeness(journals, error)
+    if (allocated(error)) return
+    call list_records(journals, ranges, journal, record)
+    call ascending_order(ranges, order)
+    do i = 2, size(order)
+      if (ranges(order(i))%first > ranges(order(i - 1))%last) cycle
+      call raise(error, exit_input, 'variant ' // to_text(ranges(order(i))%first) // ' is held twice: by ' // &
+                 journals(journal(order(i - 1)))%path() // ' and ' // journals(journal(order(i)))%path())
+      return
+    end do
+    call gaps(ranges, range_t(1, journals(1)%header%variants), open_ranges)
+    if (size(open_ranges) > 0) call raise(error, exit_input, 'no journal holds ' // said(open_ranges) // ' of ' // &
+                                          to_text(journals(1)%header%variants))
+  end subroutine check_sweep
+
+  subroutine check_headers(journals, error)
+    type(sweep_journal_t), intent(in) :: journals(:)
+    type(error_t), allocatable, intent(out) :: error
+    character(len=:), allocatable :: part
+    integer :: i
+
+    do i = 2, size(journals)
+      part = differing_part(journals(1)%header, journals(i)%header)
+      select case (part)
+      case ('')
+        cycle
+      case ('source')
+        part = 'they were written by ' // journals(1)%header%source // ' and ' // journals(i)%header%source
+      case ('list')
+        part = 'the files with their variants differ'
+      case default
+        part = 'their inputs differ'
+      end select
+      call raise(error, exit_input, journals(1)%path() // ' and ' // journals(i)%path() // ' are not of one sweep: ' // part)
+      return
+    end do
+  end subroutine check_headers
+
+  !> Names every journal that lacks variants of its own shard.
+  subroutine check_wholeness(journals, error)
+    type(sweep_journal_t), intent(in) :: journals(:)
+    type(error_t), allocatable, intent(out) :: error
+    type(range_t), allocatable :: open_ranges(:)
+    character(len=:), allocatable :: message
+    integer :: i
+
+    message = ''
+    do i = 1, size(journals)
+      associate (header => journals(i)%header)
+        call gaps(journals(i)%ranges(), range_t(header%first, header%last), open_ranges)
+        if (size(open_ranges) == 0) cycle
+        if (message /= '') message = message // new_line('a')
+        message = message // journals(i)%path() // ': unfinished: ' // said(open_ranges) // ' of ' // to_text(header%first) // &
+                  ' to ' // to_text(header%last) // ' are missing; --resume goes on with it'
+      end associate
+    end do
+    if (message /= '') call raise(error, exit_input, message)
+  end subroutine check_wholeness
+
+  !> 'variants 3 to 5, 8 and 2 more ranges'.
+  pure function said(ranges) result(text)
+    type(range_t), intent(in) :: ranges(:)
+    character(len=:), allocatable :: text
+    integer, parameter :: most = 3
+    integer :: i
+
+    text = 'variants '
+    do i = 1, min(size(ranges), most)
+      if (i > 1) text = text // ', '
+      text = text // to_text(ranges(i)%first)
+      if (ranges(i)%last > ranges(i)%first) text = text // ' to ' // to_text(ranges(i)%last)
+    end do
+    if (size(ranges) > most) text = text // ' and ' // to_text(size(ranges) - most) // ' more ranges'
+  end function said
+
+end module nocdyn_sweep_records
