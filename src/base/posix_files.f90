@@ -2,17 +2,19 @@
 module nocdyn_posix_files
   use, intrinsic :: iso_c_binding, only: c_char, c_int, c_int64_t, c_intptr_t, c_null_char, c_size_t
   use, intrinsic :: iso_fortran_env, only: int64
-  use nocdyn_posix, only: is_interrupted_call
+  use nocdyn_posix, only: is_interrupted_call, last_failure
   implicit none (type, external)
   private
 
-  public :: open_new, open_existing, file_size, read_at, seek_end, truncate_file, sync_file, sync_path, lock_file
+  public :: open_new, open_existing, file_size, read_at, seek_end, truncate_file, sync_file, sync_path, lock_file, &
+    disk_failure
 
   integer, parameter, public :: lock_taken = 0, lock_of_another = 1
 
   integer(c_int), parameter :: from_start = 0, from_end = 2      ! SEEK_SET, SEEK_END
   integer(c_int), parameter :: exclusive = 2, without_waiting = 4   ! LOCK_EX, LOCK_NB
   integer(c_int), parameter :: would_block = 11   ! EWOULDBLOCK
+  integer(c_int), parameter :: disk_troubles(4) = [5, 27, 28, 122]   ! EIO, EFBIG, ENOSPC, EDQUOT
 
   interface
     integer(c_int) function c_open_new(path) bind(c, name='nocdyn_open_new')
@@ -165,5 +167,13 @@ contains
     if (c_flock(int(descriptor, c_int), ior(exclusive, without_waiting)) == 0) return
     if (c_errno() == would_block) lock_file = lock_of_another
   end function lock_file
+
+  !> What the disk has against it, if that is why a library's call before this one failed; else empty.
+  function disk_failure() result(reason)
+    character(len=:), allocatable :: reason
+
+    reason = ''
+    if (any(disk_troubles == c_errno())) reason = last_failure()
+  end function disk_failure
 
 end module nocdyn_posix_files

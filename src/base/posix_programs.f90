@@ -1,12 +1,12 @@
-!> The programs of this installation: where they are, and one becoming another.
+!> The programs of this installation, where they are and one becoming another; and what their libraries hold.
 module nocdyn_posix_programs
-  use, intrinsic :: iso_c_binding, only: c_char, c_int, c_intptr_t, c_loc, c_null_char, c_null_ptr, c_ptr, c_size_t
+  use, intrinsic :: iso_c_binding, only: c_char, c_funptr, c_int, c_intptr_t, c_loc, c_null_char, c_null_ptr, c_ptr, c_size_t
   use nocdyn_posix, only: last_failure
   use nocdyn_text, only: string_t
   implicit none (type, external)
   private
 
-  public :: program_folder, replace_process
+  public :: program_folder, replace_process, procedure_of_libraries
 
   integer, parameter :: longest_path = 4096   ! PATH_MAX
 
@@ -23,6 +23,12 @@ module nocdyn_posix_programs
       character(kind=c_char), intent(in) :: path(*)
       type(c_ptr), intent(in) :: arguments(*)
     end function c_execv
+
+    type(c_funptr) function c_dlsym(library, name) bind(c, name='dlsym')
+      import :: c_char, c_funptr, c_ptr
+      type(c_ptr), value, intent(in) :: library
+      character(kind=c_char), intent(in) :: name(*)
+    end function c_dlsym
   end interface
 
 contains
@@ -62,5 +68,12 @@ contains
     status = c_execv(program // c_null_char, addresses)
     failure = last_failure()
   end subroutine replace_process
+
+  !> A procedure of the shared libraries that this program has loaded, null if none has it.
+  type(c_funptr) function procedure_of_libraries(name)
+    character(len=*), intent(in) :: name
+
+    procedure_of_libraries = c_dlsym(c_null_ptr, name // c_null_char)
+  end function procedure_of_libraries
 
 end module nocdyn_posix_programs

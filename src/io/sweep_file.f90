@@ -1,0 +1,346 @@
+!> sweep.nc: the results of a sweep as NetCDF-4, made of its journals chunk by chunk.
+!>
+!> The file depends on the results alone, byte for byte: no time, no host, and NetCDF keeps HDF5 from noting when an object
+!> was made. Numbers are not compressed: the last digits of what was computed are noise.
+module nocdyn_sweep_file
+  use, intrinsic :: iso_c_binding, only: c_associated, c_f_procpointer, c_funptr, c_int
+  use, intrinsic :: iso_fortran_env, only: int8
+  use netcdf, only: nf90_byte, nf90_char, nf90_chunked, nf90_clobber, nf90_close, nf90_create, nf90_def_dim, nf90_def_var, &
+    nf90_def_var_chunking, nf90_def_var_deflate, nf90_def_var_fill, nf90_double, nf90_ebadname, nf90_ehdferr, nf90_enddef, &
+    nf90_global, nf90_int, nf90_netcdf4, nf90_noerr, nf90_put_att, nf90_put_var, nf90_strerror, nf90_unlimited
+  use nocdyn_errors, only: error_t, exit_file, raise
+  use nocdyn_kinds, only: wp
+  use nocdyn_posix, only: last_failure, make_folders, process_id, remove_file, rename_file
+  use nocdyn_posix_files, only: disk_failure, sync_path
+  use nocdyn_posix_programs, only: procedure_of_libraries
+  use nocdyn_sweep_chunk, only: chunk_t, status_done
+  use nocdyn_sweep_header, only: quantity_t, sweep_header_t
+  use nocdyn_sweep_journal, only: sweep_journal_t
+  use nocdyn_sweep_records, only: check_sweep, sweep_records_t
+  use nocdyn_text, only: append, quoted, string_t, to_text
+  implicit none (type, external)
+  private
+
+  public :: write_sweep_file
+
+  character(len=*), parameter, public :: sweep_file_name = 'sweep.nc'
+
+  integer, parameter :: block_variants = 16384   !! written at once, so that a variable is touched rarely
+  integer, parameter :: chunk_failures = 4096
+
+  !> The file on its way. After the first failure nothing more is done.
+  type :: sweep_file_t
+    integer :: id = -1
+    integer :: variant_dimension = 0, failure_dimension = 0, reason_dimension = 0
+    integer :: variant = 0, status = 0, steps = 0, failed_variant = 0, reason = 0   ! variables
+    integer, allocatable :: parameters(:), results(:)
+    type(string_t), allocatable :: names(:)                                          ! of the variables, so far
+    character(len=:), allocatable :: failure
+    integer :: written = 0, failures = 0                                             ! rows
+  end type sweep_file_t
+
+  !> Rows that wait to be written.
+  type :: rows_t
+    integer :: count = 0
+    real(wp), allocatable :: parameters(:, :), results(:, :)   ! [rows, columns]
+    integer, allocatable :: steps(:), status(:)
+  end type rows_t
+
+  interface
+    !> H5dont_atexit of HDF5.
+    integer(c_int) function setting_interface() bind(c)
+      import :: c_int
+    end function setting_interface
+  end interface
+
+contains
+
+  !> Writes sweep.nc of a whole sweep into `folder`, all of it or nothing.
+  subroutine write_sweep_file(folder, journals, error)
+    character(len=*), intent(in) :: folder
+    type(sweep_journal_t), intent(inout) :: journals(:)   !! of all shards
+    type(error_t), allocatable, intent(out) :: error
+    type(sweep_file_t) :: file
+    character(len=:), allocatable :: aside, failure, path
+    logical :: is_done
+
+    call check_sweep(journals, error)
+    if (allocated(error)) return
+    path = sweep_file_name
+    if (folder /= '.') path = folder // '/' // path
+    aside = path(:len(path) - len(sweep_file_name)) // '.' // sweep_file_name // '.' // to_text(process_id())
+    call make_folders(folder, failure)
+    if (allocated(failure)) then
+      call raise(error, exit_file, 'cannot write ' // quoted(path) // ': the folder cannot be made: ' // failure)
+      return
+    end if
+    call begin(file, aside, journals)
+    call write_rows(file, journals, error)
+    call finish(file)
+    if (.not. (allocated(file%failure) .or. allocated(error))) then
+      call sync_path(aside, is_done)
+      if (is_done) call rename_file(aside, path, is_done)
+      if (.not. is_done) file%failure = last_failure()
+    end if
+    if (allocated(file%failure) .or. allocated(error)) call remove_file(aside)
+    if (allocated(file%failure)) call raise(error, exit_file, 'cannot write ' // quoted(path) // ': ' // file%failure)
+  end subroutine write_sweep_file
+
+  !> Keeps the reason of the first failure; that of the disk is clearer than the library's.
+  subroutine note(file, status)
+    type(sweep_file_t), intent(inout) :: file
+    integer, intent(in) :: status               !! that the library answered
+
+    if (status == nf90_noerr .or. allocated(file%failure)) return
+    if (status == nf90_ehdferr .or. status > 0) file%failure = disk_failure()
+    if (allocated(file%failure)) then
+      if (file%failure /= '') return
+    end if
+    file%failure = trim(nf90_strerror(status))
+  end subroutine note
+
+  !> HDF5 1.10 crashes at the end of a program one of whose files the disk had no room for: let it do nothing there.
+  subroutine keep_library_from_crashing()
+    procedure(setting_interface), pointer :: keep_silent
+    type(c_funptr) :: address
+    integer(c_int) :: status
+
+    address = procedure_of_libraries('H5dont_atexit')
+    if (.not. c_associated(address)) return
+    call c_f_procpointer(address, keep_silent)
+    status = keep_silent()
+  end subroutine keep_library_from_crashing
+
+  !> Makes the file with its dimensions, variables and attributes.
+  subroutine begin(file, path, journals)
+    type(sweep_file_t), intent(inout) :: file
+    character(len=*), intent(in) :: path
+    type(sweep_journal_t), intent(in) :: journals(:)
+    integer :: longest
+
+    allocate (file%names(0))
+    call keep_library_from_crashing()
+    call note(file, nf90_create(path, ior(nf90_clobber, nf90_netcdf4), file%id))
+    if (allocated(file%failure)) return
+    longest = max(1, maxval(journals%longest_reason))
+    associate (header => journals(1)%header)
+      call put_attributes(file, header)
+      call note(file, nf90_def_dim(file%id, 'variant', header%variants, file%variant_dimension))
+      call note(file, nf90_def_dim(file%id, 'failure', nf90_unlimited, file%failure_dimension))
+      call note(file, nf90_def_dim(file%id, 'reason_length', longest, file%reason_dimension))
+      call define(file, 'variant', nf90_int, file%variant_dimension, 'number of the variant', file%variant)
+      call define_quantities(file, header%parameters, 'parameter', file%parameters)
+      call define_quantities(file, header%results, 'result', file%results)
+    end associate
+    call define_outcome(file, longest)
+    if (.not. allocated(file%failure)) call note(file, nf90_enddef(file%id))
+  end subroutine begin
+
+  !> What the header says of the sweep as a whole.
+  subroutine put_attributes(file, header)
+    type(sweep_file_t), intent(inout) :: file
+    type(sweep_header_t), intent(in) :: header
+
+    call put_text(file, nf90_global, 'Conventions', 'CF-1.8')
+    call put_text(file, nf90_global, 'title', header%title)
+    call put_text(file, nf90_global, 'source', header%source)
+    call put_text(file, nf90_global, 'design', header%design)
+    call note(file, nf90_put_att(file%id, nf90_global, 'seed', header%seed))
+    call put_text(file, nf90_global, 'input', header%input_text)
+  end subroutine put_attributes
+
+  subroutine put_text(file, variable, name, text)
+    type(sweep_file_t), intent(inout) :: file
+    integer, intent(in) :: variable
+    character(len=*), intent(in) :: name, text
+
+    call note(file, nf90_put_att(file%id, variable, name, text))
+  end subroutine put_text
+
+  !> A variable over one dimension.
+  subroutine define(file, name, kind, dimension, long_name, variable)
+    type(sweep_file_t), intent(inout) :: file
+    character(len=*), intent(in) :: name, long_name
+    integer, intent(in) :: kind, dimension
+    integer, intent(inout) :: variable
+    integer :: status
+
+    status = nf90_def_var(file%id, name, kind, [dimension], variable)
+    ! Latin-1, say: names must be UTF-8
+    if (status == nf90_ebadname) status = nf90_def_var(file%id, ascii(name), kind, [dimension], variable)
+    call note(file, status)
+    ! every variant is written: filling before that would be the same work again
+    if (dimension == file%variant_dimension) call note(file, nf90_def_var_fill(file%id, variable, 1, 0))
+    call put_text(file, variable, 'long_name', long_name)
+  end subroutine define
+
+  pure function ascii(text)
+    character(len=*), intent(in) :: text
+    character(len=len(text)) :: ascii
+    integer :: i
+
+    ascii = text
+    do i = 1, len(text)
+      if (ichar(text(i:i)) < 32 .or. ichar(text(i:i)) > 126) ascii(i:i) = '_'
+    end do
+  end function ascii
+
+  !> One variable per quantity, named by its label as far as NetCDF lets it; the attribute `label` has it as it is.
+  subroutine define_quantities(file, quantities, role, variables)
+    type(sweep_file_t), intent(inout) :: file
+    type(quantity_t), intent(in) :: quantities(:)
+    character(len=*), intent(in) :: role
+    integer, allocatable, intent(out) :: variables(:)
+    character(len=:), allocatable :: name
+    integer :: i
+
+    allocate (variables(size(quantities)))
+    do i = 1, size(quantities)
+      name = new_name(file, quantities(i)%label)
+      call define(file, name, nf90_double, file%variant_dimension, quantities(i)%long_name, variables(i))
+      if (quantities(i)%unit /= '') call put_text(file, variables(i), 'units', quantities(i)%unit)
+      call put_text(file, variables(i), 'label', quantities(i)%label)
+      call put_text(file, variables(i), 'role', role)
+    end do
+  end subroutine define_quantities
+
+  !> The label without slashes, which NetCDF has for groups, and not yet in use.
+  function new_name(file, label) result(name)
+    type(sweep_file_t), intent(inout) :: file
+    character(len=*), intent(in) :: label
+    character(len=:), allocatable :: name
+    integer :: i
+
+    name = label
+    do i = 1, len(name)
+      if (name(i:i) == '/') name(i:i) = '_'
+    end do
+    do while (any([(file%names(i)%text == name, i=1, size(file%names))]))
+      name = name // '_'
+    end do
+    call append(file%names, name)
+  end function new_name
+
+  !> How the variants ended, and why some did not.
+  subroutine define_outcome(file, longest)
+    type(sweep_file_t), intent(inout) :: file
+    integer, intent(in) :: longest   !! reason [characters]
+
+    call define(file, 'status', nf90_byte, file%variant_dimension, 'how the variant ended', file%status)
+    call note(file, nf90_put_att(file%id, file%status, 'flag_values', [integer(int8) :: 0, 1, 2]))
+    call put_text(file, file%status, 'flag_meanings', 'done refused failed')
+    call define(file, 'steps', nf90_int, file%variant_dimension, 'steps of the integration', file%steps)
+    call define(file, 'failed_variant', nf90_int, file%failure_dimension, 'number of a variant that is not done', &
+                file%failed_variant)
+    call note(file, nf90_def_var(file%id, 'reason', nf90_char, [file%reason_dimension, file%failure_dimension], file%reason))
+    call put_text(file, file%reason, 'long_name', 'why that variant is not done')
+    call put_text(file, file%reason, '_Encoding', 'utf-8')
+    call note(file, nf90_def_var_chunking(file%id, file%failed_variant, nf90_chunked, [chunk_failures]))
+    call note(file, nf90_def_var_chunking(file%id, file%reason, nf90_chunked, [longest, chunk_failures]))
+    call note(file, nf90_def_var_deflate(file%id, file%reason, 0, 1, 1))
+  end subroutine define_outcome
+
+  !> Copies the journals into the file.
+  subroutine write_rows(file, journals, error)
+    type(sweep_file_t), intent(inout) :: file
+    type(sweep_journal_t), intent(inout) :: journals(:)
+    type(error_t), allocatable, intent(out) :: error
+    type(sweep_records_t) :: records
+    type(chunk_t) :: chunk
+    type(rows_t) :: rows
+    logical :: is_there
+
+    allocate (rows%parameters(block_variants, size(file%parameters)), rows%results(block_variants, size(file%results)))
+    allocate (rows%steps(block_variants), rows%status(block_variants))
+    call records%begin(journals)
+    do
+      call records%take(journals, chunk, is_there, error)
+      if (allocated(error) .or. allocated(file%failure) .or. .not. is_there) exit
+      call add_chunk(file, rows, chunk)
+      call write_failures(file, chunk)
+    end do
+    call write_block(file, rows)
+  end subroutine write_rows
+
+  subroutine add_chunk(file, rows, chunk)
+    type(sweep_file_t), intent(inout) :: file
+    type(rows_t), intent(inout) :: rows
+    type(chunk_t), intent(in) :: chunk
+    integer :: done, part
+
+    done = 0
+    do while (done < chunk%count)
+      part = min(chunk%count - done, block_variants - rows%count)
+      associate (to => rows%count)
+        rows%parameters(to + 1:to + part, :) = transpose(chunk%parameters(:, done + 1:done + part))
+        rows%results(to + 1:to + part, :) = transpose(chunk%results(:, done + 1:done + part))
+        rows%steps(to + 1:to + part) = chunk%steps(done + 1:done + part)
+        rows%status(to + 1:to + part) = chunk%status(done + 1:done + part)
+      end associate
+      rows%count = rows%count + part
+      done = done + part
+      if (rows%count == block_variants) call write_block(file, rows)
+    end do
+  end subroutine add_chunk
+
+  subroutine write_block(file, rows)
+    type(sweep_file_t), intent(inout) :: file
+    type(rows_t), intent(inout) :: rows
+    integer :: first(1), i
+
+    if (allocated(file%failure) .or. rows%count == 0) return
+    first = file%written + 1
+    call note(file, nf90_put_var(file%id, file%variant, [(file%written + i, i=1, rows%count)], first))
+    do i = 1, size(file%parameters)
+      call note(file, nf90_put_var(file%id, file%parameters(i), rows%parameters(:rows%count, i), first))
+    end do
+    do i = 1, size(file%results)
+      call note(file, nf90_put_var(file%id, file%results(i), rows%results(:rows%count, i), first))
+    end do
+    call note(file, nf90_put_var(file%id, file%status, int(rows%status(:rows%count), int8), first))
+    call note(file, nf90_put_var(file%id, file%steps, rows%steps(:rows%count), first))
+    file%written = file%written + rows%count
+    rows%count = 0
+  end subroutine write_block
+
+  subroutine write_failures(file, chunk)
+    type(sweep_file_t), intent(inout) :: file
+    type(chunk_t), intent(in) :: chunk
+    integer, allocatable :: places(:)   ! in the chunk
+    integer :: i
+
+    allocate (places(count(chunk%status /= status_done)))
+    if (size(places) == 0 .or. allocated(file%failure)) return
+    places(:) = pack([(i, i=1, chunk%count)], chunk%status /= status_done)
+    call note(file, nf90_put_var(file%id, file%failed_variant, chunk%first - 1 + places, [file%failures + 1]))
+    call write_reasons(file, chunk, places, maxval([(len(chunk%reasons(places(i))%text), i=1, size(places))]))
+    file%failures = file%failures + size(places)
+  end subroutine write_failures
+
+  subroutine write_reasons(file, chunk, places, longest)
+    type(sweep_file_t), intent(inout) :: file
+    type(chunk_t), intent(in) :: chunk
+    integer, intent(in) :: places(:)
+    integer, intent(in) :: longest               !! [characters]
+    character(len=longest) :: reasons(size(places))
+    integer :: i
+
+    do i = 1, size(places)
+      associate (text => chunk%reasons(places(i))%text)
+        reasons(i) = text // repeat(achar(0), longest - len(text))
+      end associate
+    end do
+    call note(file, nf90_put_var(file%id, file%reason, reasons, [1, file%failures + 1], [longest, size(places)]))
+  end subroutine write_reasons
+
+  !> What the library still holds goes to the disk here.
+  subroutine finish(file)
+    type(sweep_file_t), intent(inout) :: file
+    integer :: status
+
+    if (file%id < 0) return
+    status = nf90_close(file%id)
+    call note(file, status)
+  end subroutine finish
+
+end module nocdyn_sweep_file
