@@ -16,7 +16,7 @@ module nocdyn_sweep_file
   use nocdyn_sweep_chunk, only: chunk_t, status_done
   use nocdyn_sweep_header, only: quantity_t, sweep_header_t
   use nocdyn_sweep_journal, only: sweep_journal_t
-  use nocdyn_sweep_records, only: check_sweep, sweep_records_t
+  use nocdyn_journal_chunks, only: check_sweep, sweep_records_t
   use nocdyn_text, only: append, quoted, string_t, to_text
   implicit none (type, external)
   private

@@ -1,5 +1,5 @@
 !> The chunks of one or several journals in the order of their variants, one at a time.
-module nocdyn_sweep_records
+module nocdyn_journal_chunks
   use nocdyn_errors, only: error_t, exit_input, raise
   use nocdyn_number_ranges, only: ascending_order, gaps, range_t
   use nocdyn_sweep_chunk, only: chunk_t
@@ -152,4 +152,4 @@ contains
     if (size(ranges) > most) text = text // ' and ' // to_text(size(ranges) - most) // ' more ranges'
   end function said
 
-end module nocdyn_sweep_records
+end module nocdyn_journal_chunks
