@@ -9,6 +9,7 @@ module nocdyn_sweep_file
     nf90_def_var_chunking, nf90_def_var_deflate, nf90_def_var_fill, nf90_double, nf90_ebadname, nf90_ehdferr, nf90_enddef, &
     nf90_global, nf90_int, nf90_netcdf4, nf90_noerr, nf90_put_att, nf90_put_var, nf90_strerror, nf90_unlimited
   use nocdyn_errors, only: error_t, exit_file, raise
+  use nocdyn_journal_chunks, only: check_sweep, sweep_records_t
   use nocdyn_kinds, only: wp
   use nocdyn_posix, only: last_failure, make_folders, process_id, remove_file, rename_file
   use nocdyn_posix_files, only: disk_failure, sync_path
@@ -16,7 +17,6 @@ module nocdyn_sweep_file
   use nocdyn_sweep_chunk, only: chunk_t, status_done
   use nocdyn_sweep_header, only: quantity_t, sweep_header_t
   use nocdyn_sweep_journal, only: sweep_journal_t
-  use nocdyn_journal_chunks, only: check_sweep, sweep_records_t
   use nocdyn_text, only: append, quoted, string_t, to_text
   implicit none (type, external)
   private

@@ -2,12 +2,12 @@
 module nocdyn_sweep_table
   use nocdyn_csv, only: write_header
   use nocdyn_errors, only: error_t
+  use nocdyn_journal_chunks, only: check_sweep, sweep_records_t
   use nocdyn_kinds, only: wp
   use nocdyn_output_file, only: output_file_t
   use nocdyn_sweep_chunk, only: chunk_t, status_done, status_words
   use nocdyn_sweep_header, only: quantity_t, sweep_header_t
   use nocdyn_sweep_journal, only: sweep_journal_t
-  use nocdyn_journal_chunks, only: check_sweep, sweep_records_t
   use nocdyn_text, only: append, number_width, string_t, to_text, write_number
   implicit none (type, external)
   private
