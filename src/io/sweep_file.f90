@@ -75,7 +75,7 @@ contains
       return
     end if
     call begin(file, aside, journals)
-    call write_rows(file, journals, error)
+    if (.not. allocated(file%failure)) call write_rows(file, journals, error)
     call finish(file)
     if (.not. (allocated(file%failure) .or. allocated(error))) then
       call sync_path(aside, is_done)
