@@ -7,7 +7,7 @@ module nocdyn_sweep_file
   use, intrinsic :: iso_fortran_env, only: int8
   use netcdf, only: nf90_byte, nf90_char, nf90_chunked, nf90_clobber, nf90_close, nf90_create, nf90_def_dim, nf90_def_var, &
     nf90_def_var_chunking, nf90_def_var_deflate, nf90_def_var_fill, nf90_double, nf90_ebadname, nf90_ehdferr, nf90_enddef, &
-    nf90_global, nf90_int, nf90_netcdf4, nf90_noerr, nf90_put_att, nf90_put_var, nf90_strerror, nf90_unlimited
+    nf90_global, nf90_int, nf90_max_name, nf90_netcdf4, nf90_noerr, nf90_put_att, nf90_put_var, nf90_strerror, nf90_unlimited
   use nocdyn_errors, only: error_t, exit_file, raise
   use nocdyn_journal_chunks, only: check_sweep, sweep_records_t
   use nocdyn_kinds, only: wp
@@ -17,7 +17,7 @@ module nocdyn_sweep_file
   use nocdyn_sweep_chunk, only: chunk_t, status_done
   use nocdyn_sweep_header, only: quantity_t, sweep_header_t
   use nocdyn_sweep_journal, only: sweep_journal_t
-  use nocdyn_text, only: append, quoted, string_t, to_text
+  use nocdyn_text, only: append, quoted, string_t, strings, to_text
   implicit none (type, external)
   private
 
@@ -118,7 +118,7 @@ contains
     type(sweep_journal_t), intent(in) :: journals(:)
     integer :: longest
 
-    allocate (file%names(0))
+    allocate (file%names, source=strings(['variant       ', 'status        ', 'steps         ', 'failed_variant', 'reason        ']))
     call keep_library_from_crashing()
     call note(file, nf90_create(path, ior(nf90_clobber, nf90_netcdf4), file%id))
     if (allocated(file%failure)) return
@@ -204,14 +204,14 @@ contains
     end do
   end subroutine define_quantities
 
-  !> The label without slashes, which NetCDF has for groups, and not yet in use.
+  !> The label without slashes, which NetCDF has for groups, not too long and not yet in use.
   function new_name(file, label) result(name)
     type(sweep_file_t), intent(inout) :: file
     character(len=*), intent(in) :: label
     character(len=:), allocatable :: name
     integer :: i
 
-    name = label
+    name = label(:min(len(label), nf90_max_name / 2))
     do i = 1, len(name)
       if (name(i:i) == '/') name(i:i) = '_'
     end do
