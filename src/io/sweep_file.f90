@@ -25,6 +25,8 @@ module nocdyn_sweep_file
 
   character(len=*), parameter, public :: sweep_file_name = 'sweep.nc'
 
+  character(len=14), parameter :: own_names(5) = &
+    [character(len=14) :: 'variant', 'status', 'steps', 'failed_variant', 'reason']
   integer, parameter :: block_variants = 16384   !! written at once, so that a variable is touched rarely
   integer, parameter :: chunk_failures = 4096
 
@@ -118,7 +120,7 @@ contains
     type(sweep_journal_t), intent(in) :: journals(:)
     integer :: longest
 
-    allocate (file%names, source=strings(['variant       ', 'status        ', 'steps         ', 'failed_variant', 'reason        ']))
+    allocate (file%names, source=strings(own_names))
     call keep_library_from_crashing()
     call note(file, nf90_create(path, ior(nf90_clobber, nf90_netcdf4), file%id))
     if (allocated(file%failure)) return
