@@ -1,0 +1,264 @@
+!> Designs of a sweep: which values the varied numbers have in each variant.
+!>
+!> Everything about a variant follows from its number: variants can be asked for in any order, by any thread, again and again.
+!> Only a list holds anything as long as the number of variants.
+module nocdyn_designs
+  use, intrinsic :: iso_fortran_env, only: int64
+  use nocdyn_distributions, only: distribution_t, lognormal_distribution, normal_distribution, uniform_distribution
+  use nocdyn_kinds, only: wp
+  use nocdyn_permutations, only: permutation_t, random_permutation
+  use nocdyn_random_numbers, only: random_number_at, stream_offsets, stream_values
+  use nocdyn_sobol_points, only: sobol_points, sobol_points_t
+  implicit none (type, external)
+  private
+
+  public :: grid_design, random_design, latin_design, sobol_design, list_design
+  public :: grid_size, probability_between
+
+  integer, parameter, public :: most_variants = 2000000000
+
+  real(wp), parameter :: last_offset = 1.0_wp - 2.0_wp**(-20)   ! so that no rounding moves a value into the next stratum
+
+  !> One varied number.
+  type, public :: factor_t
+    character(len=10) :: distribution = 'uniform'           !! 'uniform', 'normal', 'lognormal'
+    real(wp) :: low = -huge(1.0_wp), high = huge(1.0_wp)   !! a uniform factor needs both, the others are truncated by them
+    real(wp) :: mean = 0.0_wp, deviation = 1.0_wp          !! normal; the deviation is above 0
+    real(wp) :: median = 1.0_wp, log_deviation = 1.0_wp    !! lognormal, both above 0: deviation of the natural logarithm
+    integer :: count = 1                                   !! grid only, at least 1
+  end type factor_t
+
+  type, abstract, public :: design_t
+    integer :: variants   !! numbered from 1
+    integer :: varied     !! numbers
+  contains
+    procedure(values_interface), deferred :: values
+  end type design_t
+
+  abstract interface
+    !> The varied numbers of one variant.
+    pure subroutine values_interface(self, variant, x)
+      import :: design_t, wp
+      class(design_t), intent(in) :: self
+      integer, intent(in) :: variant   !! 1 to variants
+      real(wp), intent(out) :: x(:)    !! [varied]
+    end subroutine values_interface
+  end interface
+
+  type, abstract, extends(design_t) :: sampled_design_t
+    private
+    type(distribution_t), allocatable :: distributions(:)   !! [varied]
+    integer :: seed
+  end type sampled_design_t
+
+  type, extends(design_t), public :: grid_design_t
+    private
+    type(factor_t), allocatable :: factors(:)
+  contains
+    procedure :: values => grid_values
+  end type grid_design_t
+
+  type, extends(sampled_design_t), public :: random_design_t
+  contains
+    procedure :: values => random_values
+  end type random_design_t
+
+  type, extends(sampled_design_t), public :: latin_design_t
+    private
+    type(permutation_t), allocatable :: strata(:)
+  contains
+    procedure :: values => latin_values
+  end type latin_design_t
+
+  type, extends(sampled_design_t), public :: sobol_design_t
+    private
+    type(sobol_points_t) :: points
+  contains
+    procedure :: values => sobol_values
+  end type sobol_design_t
+
+  type, extends(design_t), public :: list_design_t
+    private
+    real(wp), allocatable :: list(:, :)   !! [varied, variants]
+  contains
+    procedure :: values => list_values
+  end type list_design_t
+
+contains
+
+  !> Every combination of `count` equally spaced values from `low` to `high` each (`low` alone if there is one); the last
+  !> factor runs fastest. The distributions do not matter.
+  function grid_design(factors) result(design)
+    type(factor_t), intent(in) :: factors(:)   !! `grid_size` at most `most_variants`
+    type(grid_design_t) :: design
+
+    if (grid_size(factors) > most_variants) error stop 'nocdyn_designs: the grid has too many variants'
+    design%variants = int(grid_size(factors))
+    design%varied = size(factors)
+    allocate (design%factors, source=factors)
+  end function grid_design
+
+  !> Points of a grid; more than `most_variants` are `most_variants` + 1.
+  pure integer(int64) function grid_size(factors)
+    type(factor_t), intent(in) :: factors(:)
+    integer :: i
+
+    grid_size = 1
+    do i = 1, size(factors)
+      grid_size = min(grid_size * factors(i)%count, most_variants + 1_int64)
+    end do
+  end function grid_size
+
+  pure subroutine grid_values(self, variant, x)
+    class(grid_design_t), intent(in) :: self
+    integer, intent(in) :: variant
+    real(wp), intent(out) :: x(:)
+    integer :: i, rest, step
+
+    rest = variant - 1
+    do i = self%varied, 1, -1
+      associate (factor => self%factors(i))
+        step = modulo(rest, factor%count)
+        rest = rest / factor%count
+        if (step == 0) then
+          x(i) = factor%low
+        else if (step == factor%count - 1) then
+          x(i) = factor%high
+        else
+          x(i) = factor%low + (factor%high - factor%low) * (real(step, wp) / real(factor%count - 1, wp))
+        end if
+      end associate
+    end do
+  end subroutine grid_values
+
+  !> Independent random values.
+  function random_design(factors, samples, seed) result(design)
+    type(factor_t), intent(in) :: factors(:)
+    integer, intent(in) :: samples   !! at least 1
+    integer, intent(in) :: seed      !! at least 0
+    type(random_design_t) :: design
+
+    call start(design, factors, samples, seed)
+  end function random_design
+
+  pure subroutine random_values(self, variant, x)
+    class(random_design_t), intent(in) :: self
+    integer, intent(in) :: variant
+    real(wp), intent(out) :: x(:)
+    integer :: i
+
+    do i = 1, self%varied
+      x(i) = self%distributions(i)%quantile(random_number_at(self%seed, stream_values, i, variant))
+    end do
+  end subroutine random_values
+
+  !> Latin hypercube (M. D. McKay, R. J. Beckman, W. J. Conover, Technometrics 21 (1979) 239-245): the range of each factor
+  !> falls into as many equally probable strata as there are samples, and each stratum has one value, anywhere inside it.
+  function latin_design(factors, samples, seed) result(design)
+    type(factor_t), intent(in) :: factors(:)
+    integer, intent(in) :: samples   !! at least 1
+    integer, intent(in) :: seed      !! at least 0
+    type(latin_design_t) :: design
+    integer :: i
+
+    call start(design, factors, samples, seed)
+    allocate (design%strata(size(factors)))
+    do i = 1, size(factors)
+      design%strata(i) = random_permutation(samples, seed, i)
+    end do
+  end function latin_design
+
+  pure subroutine latin_values(self, variant, x)
+    class(latin_design_t), intent(in) :: self
+    integer, intent(in) :: variant
+    real(wp), intent(out) :: x(:)
+    real(wp) :: offset
+    integer :: i
+
+    do i = 1, self%varied
+      offset = min(random_number_at(self%seed, stream_offsets, i, variant), last_offset)
+      x(i) = self%distributions(i)%quantile((self%strata(i)%image(variant - 1) + offset) / self%variants)
+    end do
+  end subroutine latin_values
+
+  !> Sobol points, the first of them for variant 1; a seed other than 0 shifts them all.
+  function sobol_design(factors, samples, seed) result(design)
+    type(factor_t), intent(in) :: factors(:)   !! at most `most_dimensions`
+    integer, intent(in) :: samples             !! at least 1
+    integer, intent(in) :: seed                !! at least 0
+    type(sobol_design_t) :: design
+
+    call start(design, factors, samples, seed)
+    design%points = sobol_points(size(factors), seed)
+  end function sobol_design
+
+  pure subroutine sobol_values(self, variant, x)
+    class(sobol_design_t), intent(in) :: self
+    integer, intent(in) :: variant
+    real(wp), intent(out) :: x(:)
+    integer :: i
+
+    do i = 1, self%varied
+      x(i) = self%distributions(i)%quantile(self%points%coordinate(variant - 1, i))
+    end do
+  end subroutine sobol_values
+
+  !> The given values.
+  function list_design(values) result(design)
+    real(wp), intent(in) :: values(:, :)   !! [varied, variants]
+    type(list_design_t) :: design
+
+    design%varied = size(values, 1)
+    design%variants = size(values, 2)
+    allocate (design%list, source=values)
+  end function list_design
+
+  pure subroutine list_values(self, variant, x)
+    class(list_design_t), intent(in) :: self
+    integer, intent(in) :: variant
+    real(wp), intent(out) :: x(:)
+
+    x = self%list(:, variant)
+  end subroutine list_values
+
+  subroutine start(design, factors, samples, seed)
+    class(sampled_design_t), intent(inout) :: design
+    type(factor_t), intent(in) :: factors(:)
+    integer, intent(in) :: samples, seed
+    integer :: i
+
+    design%variants = samples
+    design%varied = size(factors)
+    design%seed = seed
+    allocate (design%distributions(size(factors)))
+    do i = 1, size(factors)
+      design%distributions(i) = distribution_of(factors(i))
+    end do
+  end subroutine start
+
+  !> How probable `low` to `high` is if nothing is truncated. Nothing can be drawn from a range of probability 0.
+  pure real(wp) function probability_between(factor)
+    type(factor_t), intent(in) :: factor
+    type(distribution_t) :: distribution
+
+    distribution = distribution_of(factor)
+    probability_between = distribution%probability
+  end function probability_between
+
+  pure function distribution_of(factor) result(distribution)
+    type(factor_t), intent(in) :: factor
+    type(distribution_t) :: distribution
+
+    select case (factor%distribution)
+    case ('uniform')
+      distribution = uniform_distribution(factor%low, factor%high)
+    case ('normal')
+      distribution = normal_distribution(factor%mean, factor%deviation, factor%low, factor%high)
+    case ('lognormal')
+      distribution = lognormal_distribution(factor%median, factor%log_deviation, factor%low, factor%high)
+    case default
+      error stop 'nocdyn_designs: there is no such distribution'
+    end select
+  end function distribution_of
+
+end module nocdyn_designs

@@ -1,0 +1,80 @@
+!> Pseudo-random permutations of 0 .. n - 1, of which one place can be evaluated without the others.
+!>
+!> A Feistel network on pairs of digits (J. Black, P. Rogaway, Ciphers with arbitrary finite domains, CT-RSA 2002): a number
+!> below s^2 >= n is left s + right, and a round makes (right, left + f(right) modulo s) of it, which can be undone whatever f
+!> is. A result that is not below n goes through the network again until it is; as s^2 is hardly more than n, that is rare.
+module nocdyn_permutations
+  use, intrinsic :: iso_fortran_env, only: int64
+  use nocdyn_random_numbers, only: largest_word, random_words, stream_permutations, word_bits
+  implicit none (type, external)
+  private
+
+  public :: random_permutation
+
+  ! Four are enough if f is random (M. Luby, C. Rackoff, SIAM J. Comput. 17 (1988) 373-386); this f is not quite.
+  integer, parameter :: rounds = 8
+  integer(int64), parameter :: multiplier = int(z'045D9F3B', int64)
+
+  type, public :: permutation_t
+    private
+    integer :: length
+    integer(int64) :: side          !! s: the least whole number with s^2 >= length
+    integer(int64) :: keys(rounds)
+  contains
+    procedure :: image
+  end type permutation_t
+
+contains
+
+  !> Permutations of different seeds or items have nothing in common.
+  pure function random_permutation(length, seed, item) result(permutation)
+    integer, intent(in) :: length   !! at least 1
+    integer, intent(in) :: seed     !! at least 0
+    integer, intent(in) :: item     !! at least 0
+    type(permutation_t) :: permutation
+    integer :: i
+
+    permutation%length = length
+    permutation%side = int(sqrt(real(length)), int64)
+    do while (permutation%side**2 > length)
+      permutation%side = permutation%side - 1
+    end do
+    do while (permutation%side**2 < length)
+      permutation%side = permutation%side + 1
+    end do
+    do i = 1, rounds / 4
+      permutation%keys(4 * i - 3:4 * i) = random_words(seed, stream_permutations, item, i)
+    end do
+  end function random_permutation
+
+  !> Where the permutation puts a place.
+  pure integer function image(self, place)
+    class(permutation_t), intent(in) :: self
+    integer, intent(in) :: place   !! 0 to length - 1
+    integer(int64) :: left, right, sum
+    integer :: i
+
+    image = place
+    do
+      left = image / self%side
+      right = image - left * self%side
+      do i = 1, rounds
+        sum = left + shiftr(mixed(ieor(right, self%keys(i))) * self%side, word_bits)
+        left = right
+        right = sum - merge(self%side, 0_int64, sum >= self%side)
+      end do
+      image = int(left * self%side + right)
+      if (image < self%length) return
+    end do
+  end function image
+
+  !> A word each of whose bits depends on every bit of another one.
+  pure integer(int64) function mixed(word)
+    integer(int64), intent(in) :: word
+
+    mixed = iand(ieor(word, shiftr(word, 16)) * multiplier, largest_word)
+    mixed = iand(ieor(mixed, shiftr(mixed, 16)) * multiplier, largest_word)
+    mixed = ieor(mixed, shiftr(mixed, 16))
+  end function mixed
+
+end module nocdyn_permutations
