@@ -1,8 +1,8 @@
 !> Sobol points: they fill the unit cube far more evenly than random ones do.
 !>
 !> The direction numbers are those of S. Joe, F. Y. Kuo, Constructing Sobol sequences with better two-dimensional
-!> projections, SIAM J. Sci. Comput. 30 (2008) 2635-2654: the first dimensions of their file new-joe-kuo-6.21201 (copyright
-!> 2008 F. Y. Kuo and S. Joe, free under a BSD licence).
+!> projections, SIAM J. Sci. Comput. 30 (2008) 2635-2654: the first dimensions of their file new-joe-kuo-6.21201
+!> (LICENSE-sobol-points).
 !>
 !> The points stand in the order of the Gray code (I. A. Antonov, V. M. Saleev, USSR Comput. Math. Math. Phys. 19 (1979)
 !> 252-256), as the authors' program and SciPy's unscrambled `qmc.Sobol` give them, so that they can be compared one by one.
