@@ -1,0 +1,144 @@
+"""The results of `nocdyn sweep`, read from their folder."""
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+import f90nml
+import h5netcdf
+import numpy as np
+import pandas as pd
+
+from .results import ResultsError
+
+DONE, REFUSED, FAILED = 0, 1, 2
+STATUS_WORDS = {"done": DONE, "refused": REFUSED, "failed": FAILED}
+LABEL = re.compile(r"(?P<name>.+?)(?: \[(?P<unit>[^]]*)\])?")
+
+
+@dataclass(frozen=True)
+class Variable:
+    """A varied number or a result, with its value in each variant."""
+
+    name: str
+    unit: str
+    long_name: str
+    values: np.ndarray
+
+    @property
+    def label(self) -> str:
+        return f"{self.name} [{self.unit}]" if self.unit not in ("", "1") else self.name
+
+    @property
+    def key(self) -> str:
+        """Of a varied number: the last part of its path, without the place in a list."""
+        return self.name.rsplit(".", 1)[-1].split("(")[0]
+
+
+@dataclass(frozen=True)
+class Sweep:
+    title: str
+    design: str
+    varied: list[Variable]
+    results: list[Variable]
+    status: np.ndarray
+
+    @property
+    def done(self) -> np.ndarray:
+        return np.flatnonzero(self.status == DONE)
+
+    @property
+    def not_done(self) -> np.ndarray:
+        return np.flatnonzero(self.status != DONE)
+
+    @property
+    def is_grid(self) -> bool:
+        return self.design == "grid"
+
+    @property
+    def remark(self) -> str:
+        """What the sweep was, in a line."""
+        counts = [f"{np.count_nonzero(self.status == status)} {word}" for word, status in STATUS_WORDS.items()
+                  if status != DONE and (self.status == status).any()]
+        variants = f"{self.status.size:,} variants".replace(",", " ")
+        return ", ".join([f"{self.design} design", variants, *counts])
+
+
+def read_sweep(folder: Path) -> Sweep:
+    if not folder.is_dir():
+        raise ResultsError(f"{folder}: there is no such results folder")
+    if (folder / "sweep.nc").is_file():
+        sweep = _read_netcdf(folder / "sweep.nc")
+    elif (folder / "sweep.csv").is_file():
+        sweep = _read_table(folder / "sweep.csv")
+    elif any(folder.glob("sweep*.journal")):
+        raise ResultsError(f"{folder}: the sweep is not finished; 'nocdyn sweep --resume' goes on with it, "
+                           "'nocdyn merge' joins the shards of one")
+    else:
+        raise ResultsError(f"{folder}: no sweep.nc or sweep.csv here; is this the results folder of a 'nocdyn sweep'?")
+    if not sweep.varied or not sweep.results:
+        raise ResultsError(f"{folder}: nothing to draw: the sweep has {len(sweep.varied)} varied numbers and "
+                           f"{len(sweep.results)} results")
+    if sweep.done.size == 0:
+        raise ResultsError(f"{folder}: nothing to draw: none of the {sweep.status.size} variants was done")
+    return sweep
+
+
+def _read_netcdf(file: Path) -> Sweep:
+    try:
+        with h5netcdf.File(file, "r") as content:
+            status = content.variables["status"][...].astype(int)
+            return Sweep(
+                title=_text(content.attrs.get("title", "")) or file.resolve().parent.name,
+                design=_text(content.attrs["design"]),
+                varied=_variables(content, "varied"),
+                results=_variables(content, "result"),
+                status=status,
+            )
+    except KeyError as error:
+        raise ResultsError(f"{file}: this is no sweep.nc of nocdyn: {error.args[0]} is missing") from None
+    except (OSError, ValueError) as error:
+        raise ResultsError(f"{file}: cannot be read: {' '.join(str(error).split())}") from None
+
+
+def _variables(content: h5netcdf.File, role: str) -> list[Variable]:
+    return [
+        Variable(name, _text(variable.attrs.get("units", "")), _text(variable.attrs.get("long_name", name)),
+                 np.asarray(variable[...], dtype=float))
+        for name, variable in content.variables.items()
+        if _text(variable.attrs.get("role", "")) == role
+    ]
+
+
+def _text(value: object) -> str:
+    return value.decode() if isinstance(value, bytes) else str(value)
+
+
+def _read_table(file: Path) -> Sweep:
+    """sweep.csv: variant, what varies, status, steps, the results, reason."""
+    try:
+        table = pd.read_csv(file, index_col=False)
+        labels = list(table)
+        begin, end = labels.index("status"), labels.index("steps")
+        last = labels.index("reason") if "reason" in labels else len(labels)
+        status = table["status"].replace(STATUS_WORDS).to_numpy(dtype=int)
+        varied = [_column(table, label) for label in labels[1:begin]]
+        results = [_column(table, label) for label in labels[end + 1:last]]
+    except (ValueError, OSError) as error:  # pandas' own parser errors are ValueErrors
+        raise ResultsError(f"{file}: not the table of a sweep: {' '.join(str(error).split())}") from None
+    title, design = _described(file.with_name("input.nml"))
+    return Sweep(title or file.resolve().parent.name, design, varied, results, status)
+
+
+def _column(table: pd.DataFrame, label: str) -> Variable:
+    match = LABEL.fullmatch(label)
+    return Variable(match["name"], match["unit"] or "", match["name"], table[label].to_numpy(dtype=float))
+
+
+def _described(file: Path) -> tuple[str, str]:
+    """Title and design of the input."""
+    try:
+        content = f90nml.read(file)
+        return content.get("case", {}).get("title", ""), content["sweep"]["design"]
+    except (OSError, KeyError) as error:
+        raise ResultsError(f"{file}: the figures of a table need the input of the sweep beside it: {error}") from None
