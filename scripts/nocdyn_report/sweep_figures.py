@@ -3,6 +3,7 @@
 import argparse
 import sys
 from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -11,12 +12,14 @@ from matplotlib.figure import Figure
 
 from .results import ResultsError
 from .style import WIDTH, add_title, plain, save
-from .sweep_panels import draw_curve, draw_histogram, draw_map, draw_parallel, draw_scatter, rank_correlation, wrapped
+from .sweep_panels import (MOST_POINTS, TURN, draw_curve, draw_histogram, draw_map, draw_parallel, draw_scatter,
+                           explain_not_done, rank_correlation, wrapped)
 from .sweep_results import Sweep, Variable, read_sweep
 
 ROWS = 4  # of panels in a figure
 COLUMNS = 4
-TURN = 2.0 * np.pi
+AXES = 10  # of parallel axes, but that of the result
+TICK = {"marker": "|", "linestyle": "", "markersize": 8}
 
 
 def draw_histograms(sweep: Sweep, results: Sequence[Variable]) -> Figure:
@@ -29,13 +32,16 @@ def draw_histograms(sweep: Sweep, results: Sequence[Variable]) -> Figure:
 def draw_scatters(sweep: Sweep, results: Sequence[Variable], keys: Sequence[Variable]) -> Figure:
     """A row for each result, a column for each varied number."""
     figure, grid = pyplot.subplots(len(results), len(keys), squeeze=False, sharex="col", sharey="row",
-                                   figsize=(max(WIDTH * 0.7, 2.9 * len(keys) + 1.0), 2.5 * len(results) + 1.2))
+                                   figsize=(max(0.85 * WIDTH, 2.9 * len(keys) + 1.0), 2.5 * len(results) + 1.2))
     for row, result in zip(grid, results):
         row[0].set_ylabel(wrapped(result.label))
         for axes, key in zip(row, keys):
             draw_scatter(axes, sweep, key, result)
     for axes, key in zip(grid[-1], keys):
         axes.set_xlabel(wrapped(key.label))
+    if sweep.done.size > MOST_POINTS:
+        figure.supxlabel("darker: more variants, by the logarithm of their number", fontsize=8, x=0.01, ha="left")
+    explain_not_done(figure, sweep, **TICK)
     return figure
 
 
@@ -50,6 +56,7 @@ def draw_curves(sweep: Sweep, results: Sequence[Variable]) -> Figure:
     if is_frequency:
         top = panels[0].secondary_xaxis("top", functions=(lambda omega: omega / TURN, lambda hertz: hertz * TURN))
         top.set_xlabel("frequency [Hz]")
+    explain_not_done(figure, sweep, **TICK)
     return figure
 
 
@@ -59,15 +66,15 @@ def draw_maps(sweep: Sweep, results: Sequence[Variable]) -> Figure:
         draw_map(axes, sweep, result)
         axes.set_ylabel(wrapped(sweep.varied[1].label))
     panels[-1].set_xlabel(plain(sweep.varied[0].label))
-    if sweep.not_done.size:
-        figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower right")
+    explain_not_done(figure, sweep, marker="x", linestyle="", markersize=5)
     return figure
 
 
-def draw_parallels(sweep: Sweep, results: Sequence[Variable]) -> Figure:
-    figure, panels = _stack(len(results), 3.2, width=max(WIDTH, 1.4 * len(sweep.varied) + 3.0))
+def draw_parallels(sweep: Sweep, results: Sequence[Variable], keys: Sequence[Variable]) -> Figure:
+    figure, panels = _stack(len(results), 3.2, width=max(WIDTH, 1.4 * len(keys) + 3.0))
     for axes, result in zip(panels, results):
-        draw_parallel(axes, sweep, result)
+        draw_parallel(axes, sweep, keys, result)
+    explain_not_done(figure, sweep, linestyle=(0, (3, 2)), linewidth=0.9)
     return figure
 
 
@@ -89,11 +96,11 @@ def figures_of(sweep: Sweep) -> Iterator[tuple[str, Figure]]:
     keys = sorted(sweep.varied, key=lambda key: -strongest(sweep, key)) if len(sweep.varied) > COLUMNS else sweep.varied
     for first in range(0, len(keys), COLUMNS):
         name = "scatter" if first == 0 else f"scatter_keys{first + 1}"
-        yield from _paged(name, sweep, lambda sweep, results: draw_scatters(sweep, results, keys[first:first + COLUMNS]))
+        yield from _paged(name, sweep, partial(draw_scatters, keys=keys[first:first + COLUMNS]))
     if len(sweep.varied) == 2:
         yield from _paged("map", sweep, draw_maps)
     else:
-        yield from _paged("parallel", sweep, draw_parallels)
+        yield from _paged("parallel", sweep, partial(draw_parallels, keys=keys[:AXES]))
 
 
 def _paged(name: str, sweep: Sweep, draw: Callable[[Sweep, Sequence[Variable]], Figure]) -> Iterator[tuple[str, Figure]]:

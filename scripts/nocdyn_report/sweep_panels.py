@@ -1,32 +1,47 @@
 """The panels of the figures of a sweep: a result over what was varied, or by itself."""
 
+import re
+from collections.abc import Sequence
+
 import numpy as np
 import pandas as pd
+from matplotlib import colormaps
 from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
 from matplotlib.collections import LineCollection
-from matplotlib.colors import LogNorm
+from matplotlib.colors import LinearSegmentedColormap, LogNorm
+from matplotlib.contour import ContourSet
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 from matplotlib.tri import Triangulation
 
 from .style import COLOURS, REFERENCE, plain
-from .sweep_results import Sweep, Variable
+from .sweep_results import DONE, Sweep, Variable
 
 MOST_POINTS = 20_000  # that are drawn one by one
 DENSE = 2_000  # points from which contours show more than dots
+FEW = 100  # points of a curve that are marked
 RASTER = 1_000  # points from which dots are pixels in SVG and PDF too
 BINS = (12, 100)  # fewest and most of a histogram
+CONTOURS = 20
 CELLS = 80  # along each side of a density
 LABEL_LENGTH = 26  # characters that fit under a panel
-WIDE = 1_000.0  # largest over smallest value from which an axis is logarithmic
-STEEP = 50.0  # the same of a resonance curve
-LINES = 1_000  # of parallel axes
-FAILED = COLOURS[1]
+WIDE = 50.0  # 95 % over 5 % value from which an axis is logarithmic; of evenly distributed numbers it is at most 19
+STEEP = 50.0  # largest over smallest value from which the axis of a resonance curve is
+TURN = 2.0 * np.pi  # [rad]
+REACH = 3.0  # distances from 5 % to 95 % beyond which a value is an outlier
+LINES = 500  # of parallel axes
+MOST_MARKS = 100  # of variants that were not done
+WEAK = 0.2  # a correlation whose title is grey
+NOT_DONE = COLOURS[1]
 COLOUR_MAP = "viridis"
+SHADES = LinearSegmentedColormap.from_list("shades", colormaps["Blues"](np.linspace(0.25, 1.0, 64)))
 
 
 def wrapped(label: str, length: int = LABEL_LENGTH) -> str:
-    """A label on several lines if it is long, broken after dots and before brackets."""
+    """A label on several lines if it is long, broken after dots and underscores and before the unit."""
     lines = [""]
-    for piece in label.replace(".", ".\0").replace(" [", "\0 [").split("\0"):
+    for piece in re.split(r"(?<=[._])|(?= \[)", label):
         if lines[-1] and len(lines[-1]) + len(piece) > length:
             lines.append(piece.strip())
         else:
@@ -34,8 +49,20 @@ def wrapped(label: str, length: int = LABEL_LENGTH) -> str:
     return plain("\n".join(lines))
 
 
-def is_wide(values: np.ndarray, ratio: float = WIDE) -> bool:
-    return values.min() > 0.0 and values.max() > ratio * values.min()
+def is_wide(values: np.ndarray) -> bool:
+    low, high = np.quantile(values, (0.05, 0.95))
+    return values.min() > 0.0 and high > WIDE * low
+
+
+def without_outliers(values: np.ndarray) -> np.ndarray:
+    low, high = np.quantile(values, (0.05, 0.95))
+    reach = REACH * (high - low) if high > low else np.inf
+    return values[(values >= low - reach) & (values <= high + reach)]
+
+
+def thinned(places: np.ndarray, most: int) -> np.ndarray:
+    """At most so many, evenly taken."""
+    return places[::max(1, -(-places.size // most))]
 
 
 def is_constant(values: np.ndarray) -> bool:
@@ -54,10 +81,11 @@ def draw_histogram(axes: Axes, result: Variable, done: np.ndarray) -> None:
     """With the 5 %, 50 % and 95 % values; what lies very far outside is counted, not drawn."""
     values = result.values[done]
     low, median, high = np.quantile(values, (0.05, 0.5, 0.95), method="inverted_cdf")
-    reach = 3.0 * (high - low) if high > low else np.inf
-    inside = values[(values >= low - reach) & (values <= high + reach)]
+    inside = without_outliers(values)
     if is_constant(values):
-        axes.hist(values, bins=1, range=(median - 0.5, median + 0.5), color=COLOURS[0], alpha=0.5, rwidth=0.1)
+        room = 0.1 * abs(median) or 1.0
+        axes.bar(median, len(values), width=0.1 * room, color=COLOURS[0], alpha=0.5)
+        axes.set_xlim(median - room, median + room)
     else:
         axes.hist(inside, bins=_bins(inside, high - low), color=COLOURS[0], alpha=0.5)
     for value, name, style in ((low, "5 %", (0, (2, 2))), (median, "median", "-"), (high, "95 %", (0, (5, 3)))):
@@ -82,7 +110,7 @@ def _farthest(values: np.ndarray, median: float) -> float:
 
 
 def draw_scatter(axes: Axes, sweep: Sweep, key: Variable, result: Variable) -> None:
-    """Each variant a dot, or how many there are at each place; ticks on the lower edge are variants that were not done."""
+    """Each variant a dot; of very many, a shade for how many are in a cell."""
     x, y = key.values[sweep.done], result.values[sweep.done]
     if is_wide(x):
         axes.set_xscale("log")
@@ -92,41 +120,54 @@ def draw_scatter(axes: Axes, sweep: Sweep, key: Variable, result: Variable) -> N
         size = np.clip(6000.0 / len(x), 1.5, 16.0)
         axes.scatter(x, y, s=size, color=COLOURS[0], alpha=0.9 if len(x) < 200 else 0.45, linewidths=0,
                      rasterized=len(x) > RASTER)
-    mark_not_done(axes, key.values[sweep.not_done])
+    mark_not_done(axes, sweep, key)
     correlation = rank_correlation(x, y)
-    axes.set_title("no correlation: constant" if np.isnan(correlation) else f"rank correlation {correlation:+.2f}")
+    axes.set_title("constant" if np.isnan(correlation) else f"rank correlation {round(correlation, 2) + 0.0:+.2f}",
+                   color="black" if abs(correlation) >= WEAK else "0.5")
 
 
 def _draw_density(axes: Axes, x: np.ndarray, y: np.ndarray) -> None:
     edges = np.geomspace(x.min(), x.max(), CELLS + 1) if is_wide(x) else CELLS
     counts, x_edges, y_edges = np.histogram2d(x, y, bins=(edges, CELLS))
-    shown = np.ma.masked_equal(counts.T, 0)
-    axes.pcolormesh(x_edges, y_edges, shown, norm=LogNorm(), cmap="Blues", rasterized=True)
+    axes.pcolormesh(x_edges, y_edges, np.ma.masked_equal(counts.T, 0), norm=LogNorm(), cmap=SHADES, rasterized=True)
 
 
-def mark_not_done(axes: Axes, places: np.ndarray) -> None:
-    if places.size:
-        axes.plot(places, np.zeros(places.size), "|", color=FAILED, markersize=9, markeredgewidth=1.2, clip_on=False,
-                  transform=axes.get_xaxis_transform(), label="not done", rasterized=places.size > RASTER)
+def mark_not_done(axes: Axes, sweep: Sweep, key: Variable) -> None:
+    """Ticks on the lower edge."""
+    if sweep.not_done.size == 0:  # an empty line that is not clipped would spoil the layout
+        return
+    places = thinned(key.values[sweep.not_done], MOST_MARKS)
+    axes.plot(places, np.zeros(places.size), "|", color=NOT_DONE, markersize=8, markeredgewidth=1.0, clip_on=False,
+              transform=axes.get_xaxis_transform())
+
+
+def explain_not_done(figure: Figure, sweep: Sweep, **style: object) -> None:
+    """A legend below the figure, if there is something to explain."""
+    count = sweep.not_done.size
+    if count == 0:
+        return
+    share = -(-count // MOST_MARKS)
+    label = sweep.not_done_words + (f" (one in {share} is shown)" if share > 1 else "")
+    figure.legend([Line2D([], [], color=NOT_DONE, **style)], [label], loc="outside lower right")
 
 
 def draw_curve(axes: Axes, sweep: Sweep, key: Variable, result: Variable, mark_peak: bool) -> None:
     """A result over the only number that varies."""
-    done = sweep.done[np.argsort(key.values[sweep.done], kind="stable")]
-    x, y = key.values[done], result.values[done]
-    axes.plot(x, y, color=COLOURS[0], marker="o" if len(x) <= 200 else None, markersize=2.5)
+    order = np.argsort(key.values, kind="stable")
+    x, y = key.values[order], np.where(sweep.status == DONE, result.values, np.nan)[order]  # NaN breaks the line
+    axes.plot(x, y, color=COLOURS[0], marker="o" if len(x) <= FEW else None, markersize=3)
     if is_wide(x):
         axes.set_xscale("log")
-    if mark_peak and is_wide(y, STEEP):
-        axes.set_yscale("log")
-    if mark_peak and not is_constant(y):
-        peak = np.argmax(y)
+    values = result.values[sweep.done]
+    if mark_peak and not is_constant(values):
+        if 0.0 < STEEP * values.min() < values.max():
+            axes.set_yscale("log")
+        peak = np.nanargmax(y)
         axes.axvline(x[peak], **REFERENCE)
-        axes.plot(x[peak], y[peak], "o", color=COLOURS[1], markersize=6,
-                  label=f"largest: {y[peak]:.5g} {result.unit}\nat {x[peak]:.5g} {key.unit}".replace(" 1\n", "\n"))
-    mark_not_done(axes, key.values[sweep.not_done])
-    if axes.get_legend_handles_labels()[0]:
+        axes.plot(x[peak], y[peak], "o", color="black", markersize=5,
+                  label=f"largest: {y[peak]:.5g} {result.unit}\nat {x[peak]:.5g} {key.unit} = {x[peak] / TURN:.4g} Hz")
         axes.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
+    mark_not_done(axes, sweep, key)
     axes.set_title(plain(result.long_name), loc="left")
     axes.set_ylabel(wrapped(result.label))
 
@@ -135,34 +176,37 @@ def draw_map(axes: Axes, sweep: Sweep, result: Variable) -> None:
     """A result over both numbers that vary: cells of a grid, contours or dots; crosses are variants that were not done."""
     first, second = sweep.varied
     x, y, colour = (variable.values[sweep.done] for variable in (first, second, result))
+    limits = without_outliers(colour)
+    scale = {"cmap": COLOUR_MAP, "vmin": limits.min(), "vmax": limits.max()}
     if sweep.is_grid:
-        drawn = _draw_cells(axes, sweep, result)
-    elif DENSE < len(x) and not (is_wide(x) or is_wide(y)):
-        drawn = _draw_contours(axes, x, y, colour)
+        drawn = axes.pcolormesh(*grid_cells(sweep, result), rasterized=True, **scale)
+    elif DENSE < len(x) and not is_wide(x) and not is_wide(y) and not is_constant(limits) and fill_a_plane(x, y):
+        drawn = _draw_contours(axes, x, y, colour, scale)
     else:
-        chosen = slice(None, None, -(-len(x) // MOST_POINTS))
-        drawn = axes.scatter(x[chosen], y[chosen], c=colour[chosen], s=np.clip(8000.0 / len(x), 2.0, 24.0), cmap=COLOUR_MAP,
-                             linewidths=0, rasterized=len(x) > RASTER)
+        chosen = thinned(np.arange(len(x)), MOST_POINTS)
+        drawn = axes.scatter(x[chosen], y[chosen], c=colour[chosen], s=np.clip(8000.0 / len(x), 2.0, 24.0),
+                             linewidths=0, rasterized=len(x) > RASTER, **scale)
     if not sweep.is_grid and is_wide(x):
         axes.set_xscale("log")
     if not sweep.is_grid and is_wide(y):
         axes.set_yscale("log")
-    axes.plot(first.values[sweep.not_done], second.values[sweep.not_done], "x", color=FAILED, markersize=5, markeredgewidth=1.2,
-              label="not done" if sweep.not_done.size else None, rasterized=sweep.not_done.size > RASTER)
-    bar = axes.figure.colorbar(drawn, ax=axes)
-    bar.set_label(wrapped(result.label, 40))
+    marks = thinned(sweep.not_done, MOST_MARKS)
+    axes.plot(first.values[marks], second.values[marks], "x", color=NOT_DONE, markersize=5, markeredgewidth=1.2)
+    extend = ("neither", "min", "max", "both")[(colour.min() < limits.min()) + 2 * (colour.max() > limits.max())]
+    bar = axes.figure.colorbar(drawn if sweep.is_grid else ScalarMappable(drawn.norm, drawn.cmap), ax=axes, extend=extend)
+    bar.set_label(wrapped(result.label))
     axes.set_title(plain(result.long_name), loc="left")
     axes.grid(visible=False)
 
 
-def _draw_cells(axes: Axes, sweep: Sweep, result: Variable):
-    """The cells of a grid, their centres at its points."""
+def grid_cells(sweep: Sweep, result: Variable) -> tuple[np.ndarray, np.ndarray, np.ma.MaskedArray]:
+    """Edges and values of the cells of a grid, their centres at its points."""
     first, second = sweep.varied
     x, columns = np.unique(first.values, return_inverse=True)
     y, rows = np.unique(second.values, return_inverse=True)
     cells = np.ma.masked_all((y.size, x.size))
     cells[rows[sweep.done], columns[sweep.done]] = result.values[sweep.done]
-    return axes.pcolormesh(_edges(x), _edges(y), cells, cmap=COLOUR_MAP, rasterized=True)
+    return _edges(x), _edges(y), cells
 
 
 def _edges(centres: np.ndarray) -> np.ndarray:
@@ -172,43 +216,57 @@ def _edges(centres: np.ndarray) -> np.ndarray:
     return np.concatenate(([2 * centres[0] - middles[0]], middles, [2 * centres[-1] - middles[-1]]))
 
 
-def _draw_contours(axes: Axes, x: np.ndarray, y: np.ndarray, colour: np.ndarray):
-    chosen = slice(None, None, -(-len(x) // MOST_POINTS))
+def fill_a_plane(x: np.ndarray, y: np.ndarray) -> bool:
+    """Whether the points do not lie on a line, which no triangles cover."""
+    return not is_constant(x) and not is_constant(y) and abs(np.corrcoef(x, y)[0, 1]) < 1.0 - 1e-6
+
+
+def _draw_contours(axes: Axes, x: np.ndarray, y: np.ndarray, colour: np.ndarray, scale: dict) -> ContourSet:
+    chosen = thinned(np.arange(len(x)), MOST_POINTS)
     # between 0 and 1 the triangles do not depend on the units
     triangles = Triangulation((x[chosen] - x.min()) / np.ptp(x), (y[chosen] - y.min()) / np.ptp(y)).triangles
-    levels = 20 if not is_constant(colour) else [colour[0] - 0.5, colour[0] + 0.5]
-    return axes.tricontourf(Triangulation(x[chosen], y[chosen], triangles), colour[chosen], levels=levels, cmap=COLOUR_MAP)
+    levels = np.linspace(scale["vmin"], scale["vmax"], CONTOURS + 1)
+    contours = axes.tricontourf(Triangulation(x[chosen], y[chosen], triangles), colour[chosen], levels=levels, extend="both",
+                                **scale)
+    contours.set_rasterized(True)
+    return contours
 
 
-def draw_parallel(axes: Axes, sweep: Sweep, result: Variable) -> None:
+def draw_parallel(axes: Axes, sweep: Sweep, keys: Sequence[Variable], result: Variable) -> None:
     """An axis for each varied number and one for the result; a line for each variant, coloured by the result."""
-    chosen = sweep.done[::-(-sweep.done.size // LINES)]
-    chosen = chosen[np.argsort(np.abs(_share(result.values[chosen]) - 0.5), kind="stable")]  # the extremes on top
-    variables = [*sweep.varied, result]
-    ranges = [(variable.values[sweep.done].min(), variable.values[sweep.done].max()) for variable in variables]
-    shares = np.column_stack([_share(variable.values, *ends) for variable, ends in zip(variables, ranges)])
+    chosen = thinned(sweep.done, LINES)
+    variables = [*keys, result]
+    shares = np.full((sweep.status.size, len(variables)), np.nan)
     places = np.arange(len(variables))
+    for place, variable in zip(places, variables):
+        known = sweep.done if variable is result else slice(None)
+        shares[known, place] = _draw_parallel_axis(axes, place, variable, variable.values[known])
+    middle_first = np.argsort(np.abs(shares[chosen, -1] - 0.5), kind="stable")
+    chosen = chosen[middle_first]
     lines = LineCollection([np.column_stack((places, row)) for row in shares[chosen]], array=result.values[chosen],
-                           cmap=COLOUR_MAP, linewidths=0.8, alpha=0.6, rasterized=True)
+                           cmap=COLOUR_MAP, linewidths=0.7, alpha=0.5, rasterized=True)
     axes.add_collection(lines)
-    for row in shares[sweep.not_done[::-(-max(1, sweep.not_done.size) // LINES)], :-1]:
-        axes.plot(places[:-1], row, color=FAILED, linewidth=0.9, linestyle=(0, (3, 2)))
-    for place, (low, high) in zip(places, ranges):
-        axes.axvline(place, color="0.2", linewidth=0.9)
-        axes.text(place, 1.02, f"{high:.4g}", ha="center", va="bottom", fontsize=8)
-        axes.text(place, -0.02, f"{low:.4g}", ha="center", va="top", fontsize=8)
+    axes.plot(places[:-1], shares[thinned(sweep.not_done, MOST_MARKS), :-1].T, color=NOT_DONE, linewidth=0.9,
+              linestyle=(0, (3, 2)))
     axes.set_xlim(-0.3, len(variables) - 0.7)
-    axes.set_ylim(-0.1, 1.1)
+    axes.set_ylim(-0.12, 1.12)
     axes.set_yticks([])
     axes.set_xticks(places, [wrapped(variable.label, 18) for variable in variables], fontsize=8)
     axes.tick_params(length=0)
     axes.spines[["left", "bottom"]].set_visible(False)
     axes.grid(visible=False)
-    axes.set_title(plain(result.long_name), loc="left", pad=10)
-    axes.figure.colorbar(lines, ax=axes, alpha=1.0).set_label(wrapped(result.label, 40))
+    axes.set_title(plain(result.long_name), loc="left")
+    axes.figure.colorbar(ScalarMappable(lines.norm, lines.cmap), ax=axes).set_label(wrapped(result.label))
 
 
-def _share(values: np.ndarray, low: float | None = None, high: float | None = None) -> np.ndarray:
-    """Where values are between their ends: 0 to 1; 1/2 if these are equal."""
-    low, high = (values.min(), values.max()) if low is None else (low, high)
-    return (values - low) / (high - low) if high > low else np.full(values.shape, 0.5)
+def _draw_parallel_axis(axes: Axes, place: int, variable: Variable, values: np.ndarray) -> np.ndarray:
+    """Draws one axis and gives the places of the values on it, 0 to 1; of wide ranges by their logarithms."""
+    low, high = values.min(), values.max()
+    axes.plot([place, place], [0.0, 1.0], color="0.2", linewidth=0.9, zorder=3)
+    for share, value, alignment in ((1.02, high, "bottom"), (-0.02, low, "top")):
+        axes.text(place, share, f"{value:.4g}", ha="center", va=alignment, fontsize=8)
+    if is_constant(values):
+        return np.full(values.shape, 0.5)
+    if is_wide(values):
+        return np.log(values / low) / np.log(high / low)
+    return (values - low) / (high - low)

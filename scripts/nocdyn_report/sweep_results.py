@@ -13,6 +13,7 @@ from .results import ResultsError
 
 DONE, REFUSED, FAILED = 0, 1, 2
 STATUS_WORDS = {"done": DONE, "refused": REFUSED, "failed": FAILED}
+DESIGN_NAMES = {"latin": "Latin", "sobol": "Sobol"}  # names of people and of squares
 LABEL = re.compile(r"(?P<name>.+?)(?: \[(?P<unit>[^]]*)\])?")
 
 
@@ -61,7 +62,12 @@ class Sweep:
         counts = [f"{np.count_nonzero(self.status == status)} {word}" for word, status in STATUS_WORDS.items()
                   if status != DONE and (self.status == status).any()]
         variants = f"{self.status.size:,} variants".replace(",", " ")
-        return ", ".join([f"{self.design} design", variants, *counts])
+        return ", ".join([f"{DESIGN_NAMES.get(self.design, self.design)} design", variants, *counts])
+
+    @property
+    def not_done_words(self) -> str:
+        """What became of the variants that were not done."""
+        return " or ".join(word for word, status in STATUS_WORDS.items() if status != DONE and (self.status == status).any())
 
 
 def read_sweep(folder: Path) -> Sweep:

@@ -1,0 +1,222 @@
+"""scripts/plot_sweep: figures of sweeps of every kind, and what it says of folders that it cannot draw."""
+
+import importlib
+import importlib.util
+import os
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+SOURCE = Path(os.environ["NOCDYN_SOURCE"])
+SIGNATURES = {"png": b"\x89PNG", "svg": b"<?xml", "pdf": b"%PDF"}
+
+pytestmark = pytest.mark.filterwarnings("error::UserWarning")  # as Matplotlib's of a layout that does not fit
+DONE, REFUSED, FAILED = 0, 1, 2
+UNITS = {"viscous": "N m s/rad", "cubic_stiffness": "N m/rad3", "stiffness": "N m/rad", "frequency": "rad/s", "inertia": "kg m2"}
+
+LOAD, CUBIC = "load.work.viscous", "coupling.coupling.cubic_stiffness"
+MOMENT, SPEED = "moment_coupling_max_abs", "omega_motor_final"
+
+
+@pytest.fixture(scope="session", autouse=True)
+def python_packages() -> None:
+    for package in ("f90nml", "h5netcdf", "h5py", "matplotlib", "numpy", "pandas"):
+        if importlib.util.find_spec(package) is None:
+            pytest.fail(f"{package} is not installed for {sys.executable}: run scripts/setup figures test", pytrace=False)
+    sys.path.insert(0, str(SOURCE / "scripts"))
+
+
+def unit_of(name: str) -> str:
+    return UNITS[name.rsplit(".", 1)[-1].split("(")[0]] if "." in name else "N m" if name.startswith("moment") else "rad/s"
+
+
+def write_sweep(folder: Path, design: str, varied: dict, results: dict, status=None, title: str = "Costs $5") -> Path:
+    """A sweep.nc as 'nocdyn sweep' writes it, without what the figures do not need."""
+    import h5netcdf
+
+    variants = len(next(iter(varied.values())))
+    status = np.zeros(variants, dtype=np.int8) if status is None else np.asarray(status, dtype=np.int8)
+    folder.mkdir(exist_ok=True)
+    with h5netcdf.File(folder / "sweep.nc", "w") as file:
+        file.attrs.update(title=title, design=design)
+        file.dimensions = {"variant": variants}
+        for role, values_of in (("varied", varied), ("result", results)):
+            for name, values in values_of.items():
+                known = status == DONE if role == "result" else True
+                variable = file.create_variable(name, ("variant",), data=np.where(known, values, np.nan))
+                variable.attrs.update(units=unit_of(name), role=role, long_name=name)
+        file.create_variable("status", ("variant",), data=status)
+    return folder
+
+
+def draw(monkeypatch, capsys, folder: Path, formats: tuple[str, ...] = ("svg",)) -> list[str]:
+    """The names of the figures, each of which has been seen in these formats."""
+    main = importlib.import_module("nocdyn_report.sweep_figures").main
+    monkeypatch.setattr("nocdyn_report.style.FORMATS", formats)
+    monkeypatch.setattr(sys, "argv", ["plot_sweep", str(folder)])
+    main()
+    names = capsys.readouterr().out.split(" (PNG, SVG, PDF)")[0].split(", ")
+    for name in names:
+        for kind in formats:
+            content = (folder / "figures" / f"{name}.{kind}").read_bytes()
+            assert content.startswith(SIGNATURES[kind]) and len(content) > 1000, f"{name}.{kind}"
+    assert len(list((folder / "figures").iterdir())) == len(names) * len(formats)
+    return names
+
+
+def text_of(folder: Path, figure: str) -> str:
+    return (folder / "figures" / f"{figure}.svg").read_text(encoding="utf-8").replace("\\$", "$")
+
+
+def random_numbers(variants: int, count: int) -> np.ndarray:
+    return np.random.default_rng(1).random((count, variants))
+
+
+def test_random_sweep_of_two_numbers_with_failures_is_drawn(tmp_path, monkeypatch, capsys):
+    load, cubic = random_numbers(200, 2)
+    status = np.full(200, DONE)
+    status[:4], status[4] = FAILED, REFUSED
+    folder = write_sweep(tmp_path, "random", {LOAD: load, CUBIC: cubic}, {MOMENT: load - cubic, SPEED: -load}, status)
+    assert draw(monkeypatch, capsys, folder, ("png", "svg", "pdf")) == ["histograms", "scatter", "map"]
+    text = text_of(folder, "scatter")
+    assert "Costs $5" in text and "random design, 200 variants, 1 refused, 4 failed" in text
+    assert "rank correlation -1.00" in text and "refused or failed" in text
+    assert "load.work.viscous" in text and "[N m s/rad]" in text
+    assert "moment_coupling_max_abs [N m]" in text_of(folder, "histograms")
+    assert "refused or failed" in text_of(folder, "map")
+
+
+def test_percentiles_are_values_of_variants(tmp_path, monkeypatch, capsys):
+    order = np.random.default_rng(1).permutation(100)
+    folder = write_sweep(tmp_path, "random", {LOAD: order}, {MOMENT: order + 1.0})
+    draw(monkeypatch, capsys, folder)
+    text = text_of(folder, "histograms")
+    assert "5 %: 5<" in text and "median: 50<" in text and "95 %: 95<" in text
+
+
+def test_outliers_are_counted_beside_the_histogram(tmp_path, monkeypatch, capsys):
+    values = np.linspace(0.0, 1.0, 100)
+    values[7] = 1e9
+    folder = write_sweep(tmp_path, "random", {LOAD: np.arange(100.0)}, {MOMENT: values})
+    draw(monkeypatch, capsys, folder)
+    text = text_of(folder, "histograms")
+    assert "1 further out," in text and "up to 1e+09" in text
+
+
+def test_grid_of_two_numbers_is_a_heat_map(tmp_path, monkeypatch, capsys):
+    load, cubic = (axis.ravel() for axis in np.meshgrid(np.linspace(50, 150, 5), [0.0, 10.0, 20.0], indexing="ij"))
+    status = np.where(load + cubic > 160.0, REFUSED, DONE)
+    folder = write_sweep(tmp_path, "grid", {LOAD: load, CUBIC: cubic}, {MOMENT: load * cubic}, status)
+    assert draw(monkeypatch, capsys, folder) == ["histograms", "scatter", "map"]
+    panels = importlib.import_module("nocdyn_report.sweep_panels")
+    results = importlib.import_module("nocdyn_report.sweep_results")
+    sweep = results.read_sweep(folder)
+    x, y, cells = panels.grid_cells(sweep, sweep.results[0])
+    assert x == pytest.approx([37.5, 62.5, 87.5, 112.5, 137.5, 162.5]) and y == pytest.approx([-5.0, 5.0, 15.0, 25.0])
+    assert cells[1, 2] == 100.0 * 10.0 and cells.mask.sum() == 1 and cells.mask[2, 4]
+
+
+def test_many_scattered_variants_become_shades_and_contours(tmp_path, monkeypatch, capsys):
+    load, cubic = random_numbers(25_000, 2)
+    status = np.where(load > 0.99, FAILED, DONE)
+    folder = write_sweep(tmp_path, "sobol", {LOAD: load, CUBIC: cubic}, {MOMENT: load + cubic**2}, status)
+    assert draw(monkeypatch, capsys, folder, ("svg", "pdf")) == ["histograms", "scatter", "map"]
+    assert "Sobol design, 25 000 variants" in text_of(folder, "map")
+    assert "darker: more variants" in text_of(folder, "scatter")
+    assert "failed (one in 3 is shown)" in text_of(folder, "scatter")
+    assert (folder / "figures" / "scatter.pdf").stat().st_size < 200_000
+
+
+def test_frequency_alone_gives_a_resonance_curve_with_its_peak(tmp_path, monkeypatch, capsys):
+    frequency = np.random.default_rng(1).permutation(np.linspace(0.5, 12.0, 116))
+    moment = 1.0 / np.abs(6.4 + 0.1j - frequency)
+    folder = write_sweep(tmp_path, "grid", {"excitation.shaker.frequency": frequency}, {MOMENT: moment},
+                         np.where(frequency > 11.0, FAILED, DONE))
+    assert draw(monkeypatch, capsys, folder) == ["histograms", "resonance"]
+    text = text_of(folder, "resonance")
+    assert "largest: 10 N m" in text and "at 6.4 rad/s = 1.019 Hz" in text and "frequency [Hz]" in text
+    assert "excitation.shaker.frequency [rad/s]" in text
+
+
+def test_another_number_alone_gives_curves(tmp_path, monkeypatch, capsys):
+    folder = write_sweep(tmp_path, "latin", {LOAD: np.geomspace(1.0, 1e6, 40)}, {MOMENT: np.linspace(0.0, 1.0, 40)})
+    assert draw(monkeypatch, capsys, folder) == ["histograms", "curves"]
+    assert "Latin design" in text_of(folder, "curves") and "largest" not in text_of(folder, "curves")
+
+
+def test_many_numbers_and_results_go_on_in_further_figures(tmp_path, monkeypatch, capsys):
+    numbers = random_numbers(150, 6)
+    varied = {f"body.rotor{i}.inertia": row for i, row in enumerate(numbers)}
+    results = {f"omega_rotor{i}_final": numbers[5 - i] + 0.01 * numbers[0] for i in range(5)}
+    folder = write_sweep(tmp_path, "latin", varied, results, np.arange(150) % 50 == 0)
+    assert draw(monkeypatch, capsys, folder) == [
+        "histograms", "histograms_2", "scatter", "scatter_2", "scatter_keys5", "scatter_keys5_2", "parallel", "parallel_2"]
+    assert "body.rotor5.inertia" in text_of(folder, "scatter"), "the strongest correlations come first"
+    assert "body.rotor0.inertia" in text_of(folder, "scatter_keys5")
+
+
+@pytest.mark.parametrize(("load", "cubic"), [
+    (np.ones(1), np.zeros(1)),
+    (np.ones(3000), np.arange(3000.0)),
+    (np.arange(3000.0), np.arange(3000.0)),
+    (np.geomspace(1e-3, 1e3, 3000), np.random.default_rng(1).random(3000)),
+])
+def test_awkward_lists_are_drawn(load, cubic, tmp_path, monkeypatch, capsys):
+    folder = write_sweep(tmp_path, "list", {LOAD: load, CUBIC: cubic}, {MOMENT: cubic, SPEED: 0.0 * load})
+    assert draw(monkeypatch, capsys, folder) == ["histograms", "scatter", "map"]
+    assert "constant" in text_of(folder, "scatter")
+
+
+def test_table_is_drawn_where_there_is_no_netcdf_file(tmp_path, monkeypatch, capsys):
+    (tmp_path / "input.nml").write_text("&case title = 'From a table' /\n&sweep design = 'latin' samples = 3 /\n")
+    (tmp_path / "sweep.csv").write_text(
+        f"variant,{LOAD} [N m s/rad],body.rotor.teeth,status,steps,{MOMENT} [N m],{SPEED} [rad/s],reason\n"
+        "1,50.0,20,0,100,3.5,1.0,\n2,60.0,21,2,90,NaN,NaN,\"too, many steps\"\n3,70.0,22,0,95,4.5,2.0,\n")
+    assert draw(monkeypatch, capsys, tmp_path) == ["histograms", "scatter", "map"]
+    text = text_of(tmp_path, "scatter")
+    assert "From a table" in text and "Latin design, 3 variants, 1 failed" in text and "body.rotor.teeth<" in text
+
+
+@pytest.mark.parametrize(("files", "message"), [
+    (None, "there is no such results folder"),
+    ({}, "no sweep.nc or sweep.csv here"),
+    ({"sweep.journal": ""}, "the sweep is not finished; 'nocdyn sweep --resume' goes on with it"),
+    ({"sweep.nc": "no NetCDF"}, "sweep.nc: cannot be read: "),
+    ({"sweep.csv": ""}, "sweep.csv: not the table of a sweep: "),
+    ({"sweep.csv": "t [s],phi_a [rad]\n0,1\n"}, "sweep.csv: not the table of a sweep: "),
+    ({"sweep.csv": "variant,a.b.c,status,steps,d\n1,1,0,5,one\n"}, "sweep.csv: not the table of a sweep: "),
+    ({"sweep.csv": "variant,a.b.c,status,steps,d\n1,1,0,5,1\n"}, "input.nml: the figures of a table need the input"),
+    ({"sweep.csv": "variant,a.b.c,status,steps,d\n1,1,0,5,1\n", "input.nml": "&run t_end = 1.0 /\n"}, "input.nml: "),
+    ({"sweep.csv": "variant,a.b.c,status,steps,d\n1,1,2,5,\n", "input.nml": "&sweep design = 'random' /\n"},
+     "nothing to draw: none of the 1 variants was done"),
+    ({"sweep.csv": "variant,a.b.c,status,steps\n1,1,0,5\n", "input.nml": "&sweep design = 'random' /\n"},
+     "nothing to draw: the sweep has 1 varied numbers and 0 results"),
+])
+def test_unusable_results_are_one_clear_line(files, message, tmp_path, monkeypatch):
+    folder = tmp_path / "results"
+    for name, text in (files or {}).items():
+        folder.mkdir(exist_ok=True)
+        (folder / name).write_text(text, encoding="utf-8")
+    if files == {}:
+        folder.mkdir()
+    main = importlib.import_module("nocdyn_report.sweep_figures").main
+    monkeypatch.setattr(sys, "argv", ["plot_sweep", str(folder)])
+    with pytest.raises(SystemExit) as leaving:
+        main()
+    said = leaving.value.code  # a text: exit code 1
+    assert said.startswith("scripts/plot_sweep: ") and message in said and str(folder) in said and "\n" not in said
+
+
+def test_netcdf_file_of_something_else_is_refused(tmp_path, monkeypatch):
+    import h5netcdf
+
+    with h5netcdf.File(tmp_path / "sweep.nc", "w") as file:
+        file.dimensions = {"time": 2}
+        file.create_variable("pressure", ("time",), data=np.zeros(2))
+    main = importlib.import_module("nocdyn_report.sweep_figures").main
+    monkeypatch.setattr(sys, "argv", ["plot_sweep", str(tmp_path)])
+    with pytest.raises(SystemExit) as leaving:
+        main()
+    assert "this is no sweep.nc of nocdyn: status is missing" in leaving.value.code
