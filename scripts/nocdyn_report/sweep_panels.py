@@ -9,7 +9,7 @@ from matplotlib import colormaps
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.collections import LineCollection
-from matplotlib.colors import LinearSegmentedColormap, LogNorm
+from matplotlib.colors import LinearSegmentedColormap, PowerNorm
 from matplotlib.contour import ContourSet
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
@@ -32,6 +32,7 @@ TURN = 2.0 * np.pi  # [rad]
 REACH = 3.0  # distances from 5 % to 95 % beyond which a value is an outlier
 LINES = 500  # of parallel axes
 MOST_MARKS = 100  # of variants that were not done
+NOT_DONE_LINES = 20  # of them on parallel axes
 WEAK = 0.2  # a correlation whose title is grey
 NOT_DONE = COLOURS[1]
 COLOUR_MAP = "viridis"
@@ -58,6 +59,12 @@ def without_outliers(values: np.ndarray) -> np.ndarray:
     low, high = np.quantile(values, (0.05, 0.95))
     reach = REACH * (high - low) if high > low else np.inf
     return values[(values >= low - reach) & (values <= high + reach)]
+
+
+def add_note(figure: Figure, *remarks: str) -> None:
+    """Small print below the figure; empty remarks do not count."""
+    if any(remarks):
+        figure.supxlabel("; ".join(filter(None, remarks)), fontsize=8, x=0.01, ha="left")
 
 
 def thinned(places: np.ndarray, most: int) -> np.ndarray:
@@ -129,7 +136,7 @@ def draw_scatter(axes: Axes, sweep: Sweep, key: Variable, result: Variable) -> N
 def _draw_density(axes: Axes, x: np.ndarray, y: np.ndarray) -> None:
     edges = np.geomspace(x.min(), x.max(), CELLS + 1) if is_wide(x) else CELLS
     counts, x_edges, y_edges = np.histogram2d(x, y, bins=(edges, CELLS))
-    axes.pcolormesh(x_edges, y_edges, np.ma.masked_equal(counts.T, 0), norm=LogNorm(), cmap=SHADES, rasterized=True)
+    axes.pcolormesh(x_edges, y_edges, np.ma.masked_equal(counts.T, 0), norm=PowerNorm(0.5), cmap=SHADES, rasterized=True)
 
 
 def mark_not_done(axes: Axes, sweep: Sweep, key: Variable) -> None:
@@ -141,12 +148,12 @@ def mark_not_done(axes: Axes, sweep: Sweep, key: Variable) -> None:
               transform=axes.get_xaxis_transform())
 
 
-def explain_not_done(figure: Figure, sweep: Sweep, **style: object) -> None:
+def explain_not_done(figure: Figure, sweep: Sweep, most: int = MOST_MARKS, **style: object) -> None:
     """A legend below the figure, if there is something to explain."""
     count = sweep.not_done.size
     if count == 0:
         return
-    share = -(-count // MOST_MARKS)
+    share = -(-count // most)
     label = sweep.not_done_words + (f" (one in {share} is shown)" if share > 1 else "")
     figure.legend([Line2D([], [], color=NOT_DONE, **style)], [label], loc="outside lower right")
 
@@ -246,7 +253,7 @@ def draw_parallel(axes: Axes, sweep: Sweep, keys: Sequence[Variable], result: Va
     lines = LineCollection([np.column_stack((places, row)) for row in shares[chosen]], array=result.values[chosen],
                            cmap=COLOUR_MAP, linewidths=0.7, alpha=0.5, rasterized=True)
     axes.add_collection(lines)
-    axes.plot(places[:-1], shares[thinned(sweep.not_done, MOST_MARKS), :-1].T, color=NOT_DONE, linewidth=0.9,
+    axes.plot(places[:-1], shares[thinned(sweep.not_done, NOT_DONE_LINES), :-1].T, color=NOT_DONE, linewidth=0.9,
               linestyle=(0, (3, 2)))
     axes.set_xlim(-0.3, len(variables) - 0.7)
     axes.set_ylim(-0.12, 1.12)

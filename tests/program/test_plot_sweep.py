@@ -147,14 +147,27 @@ def test_another_number_alone_gives_curves(tmp_path, monkeypatch, capsys):
 
 
 def test_many_numbers_and_results_go_on_in_further_figures(tmp_path, monkeypatch, capsys):
-    numbers = random_numbers(150, 6)
+    monkeypatch.setattr("nocdyn_report.sweep_figures.ROWS", 2)
+    monkeypatch.setattr("nocdyn_report.sweep_figures.COLUMNS", 2)
+    numbers = random_numbers(150, 3)
     varied = {f"body.rotor{i}.inertia": row for i, row in enumerate(numbers)}
-    results = {f"omega_rotor{i}_final": numbers[5 - i] + 0.01 * numbers[0] for i in range(5)}
+    results = {f"omega_rotor{i}_final": numbers[2 - i % 2] + 0.01 * numbers[0] for i in range(3)}
     folder = write_sweep(tmp_path, "latin", varied, results, np.arange(150) % 50 == 0)
     assert draw(monkeypatch, capsys, folder) == [
-        "histograms", "histograms_2", "scatter", "scatter_2", "scatter_keys5", "scatter_keys5_2", "parallel", "parallel_2"]
-    assert "body.rotor5.inertia" in text_of(folder, "scatter"), "the strongest correlations come first"
-    assert "body.rotor0.inertia" in text_of(folder, "scatter_keys5")
+        "histograms", "histograms_2", "scatter", "scatter_2", "scatter_keys3", "scatter_keys3_2", "parallel", "parallel_2"]
+    assert "body.rotor0.inertia" not in text_of(folder, "scatter"), "the strongest correlations come first"
+    assert "body.rotor0.inertia" in text_of(folder, "scatter_keys3")
+
+
+def test_parallel_axes_say_what_they_leave_out(tmp_path, monkeypatch, capsys):
+    numbers = random_numbers(1000, 12)
+    varied = {f"body.rotor{i}.inertia": row for i, row in enumerate(numbers)}
+    folder = write_sweep(tmp_path, "latin", varied, {SPEED: numbers[11]}, np.where(numbers[0] < 0.05, FAILED, DONE))
+    assert draw(monkeypatch, capsys, folder)[-1] == "parallel"
+    text = text_of(folder, "parallel")
+    assert "of the variants are drawn; 10 of 12 varied numbers, the most correlated first" in text
+    assert "body.rotor11." in text
+    assert "failed (one in 3 is shown)" in text
 
 
 @pytest.mark.parametrize(("load", "cubic"), [
