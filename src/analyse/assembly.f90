@@ -24,30 +24,33 @@ module nocdyn_assembly
 
 contains
 
-  !> Builds the machine of a checked input; constraints that lock or that the start speeds violate are errors.
-  subroutine assemble_machine(input, machine, error)
+  !> Builds the machine of a checked input, the same in every lane; constraints that lock or that the start speeds violate are
+  !> errors.
+  subroutine assemble_machine(input, machine, error, lanes)
     type(input_t), intent(in) :: input
     type(machine_t), intent(out) :: machine
     type(error_t), allocatable, intent(out) :: error
+    integer, intent(in), optional :: lanes   !! absent: 1
     type(directory_t) :: directory
 
+    if (present(lanes)) machine%lanes = lanes
     associate (bodies => input%groups_named('body'))
       machine%names = names_of(input, bodies)
       machine%bodies = size(bodies)
-      machine%inertia = numbers_of(input, bodies, 'inertia')
-      machine%start_angle = numbers_of(input, bodies, 'angle')
-      machine%start_speed = numbers_of(input, bodies, 'speed')
+      machine%inertia = numbers_of(input, bodies, machine%lanes, 'inertia')
+      machine%start_angle = numbers_of(input, bodies, machine%lanes, 'angle')
+      machine%start_speed = numbers_of(input, bodies, machine%lanes, 'speed')
     end associate
     directory = new_directory(machine%names)
-    call assemble_constraints(input, directory, machine%constraints, error)
+    call assemble_constraints(input, directory, machine%lanes, machine%constraints, error)
     if (.not. allocated(error)) call check_couplings(input, error)
     if (.not. allocated(error)) call check_motors(input, error)
     if (allocated(error)) return
     allocate (machine%banks(0))
-    call add_couplings(input, directory, machine%banks)
-    call add_motors(input, directory, machine%banks)
-    call add_loads(input, directory, machine%banks)
-    call add_excitations(input, directory, machine%banks)
+    call add_couplings(input, directory, machine%lanes, machine%banks)
+    call add_motors(input, directory, machine%lanes, machine%banks)
+    call add_loads(input, directory, machine%lanes, machine%banks)
+    call add_excitations(input, directory, machine%lanes, machine%banks)
     call machine%number_elements()
     call constrain(input, directory, machine, error)
   end subroutine assemble_machine

@@ -33,9 +33,10 @@ contains
   end function constraint_groups
 
   !> All rows; two columns of the results with one name are an error.
-  subroutine assemble_constraints(input, directory, constraints, error)
+  subroutine assemble_constraints(input, directory, lanes, constraints, error)
     type(input_t), intent(in) :: input
     type(directory_t), intent(in) :: directory
+    integer, intent(in) :: lanes
     type(constraints_t), intent(out) :: constraints
     type(error_t), allocatable, intent(out) :: error
     type(joint_t), allocatable :: joints(:)
@@ -47,7 +48,7 @@ contains
     do i = 1, size(indices)
       call read_joint(input%groups(indices(i)), directory, joints(i))
     end do
-    call form_rows(input, indices, joints, size(directory%names), constraints)
+    call form_rows(input, indices, joints, size(directory%names), lanes, constraints)
     call refuse_equal_columns(input, indices, constraints, error)
   end subroutine assemble_constraints
 
@@ -111,11 +112,11 @@ contains
   end subroutine read_planetary
 
   !> Rows without the ground, which has no speed; its torque may still have a column.
-  subroutine form_rows(input, indices, joints, bodies, constraints)
+  subroutine form_rows(input, indices, joints, bodies, lanes, constraints)
     type(input_t), intent(in) :: input
     integer, intent(in) :: indices(:)   !! groups of the rows
     type(joint_t), intent(in) :: joints(:)
-    integer, intent(in) :: bodies
+    integer, intent(in) :: bodies, lanes
     type(constraints_t), intent(out) :: constraints
     type(string_t), allocatable :: kinds(:), names(:), units(:)
     type(member_torques_t) :: members
@@ -125,8 +126,8 @@ contains
 
     associate (entries => sum([(count(joints(i)%bodies > 0), i=1, size(joints))]), &
                columns => sum([(count(joints(i)%members /= ''), i=1, size(joints))]))
-      allocate (body(entries), coefficient(1, entries), first(size(joints) + 1))
-      allocate (members%names(columns), members%row(columns), members%factor(1, columns))
+      allocate (body(entries), coefficient(lanes, entries), first(size(joints) + 1))
+      allocate (members%names(columns), members%row(columns), members%factor(lanes, columns))
     end associate
     allocate (kinds(size(joints)), names(size(joints)), units(size(joints)))
     m = 0
@@ -141,11 +142,11 @@ contains
           m = m + 1
           members%names(m)%text = trim(joints(i)%members(k))
           members%row(m) = i
-          members%factor(1, m) = joints(i)%coefficients(k)
+          members%factor(:, m) = joints(i)%coefficients(k)
         end if
         if (joints(i)%bodies(k) == 0) cycle
         body(next) = joints(i)%bodies(k)
-        coefficient(1, next) = joints(i)%coefficients(k)
+        coefficient(:, next) = joints(i)%coefficients(k)
         next = next + 1
       end do
     end do

@@ -82,9 +82,10 @@ contains
   end function coefficients_of
 
   !> A bank of cubic couplings in any case, the others where there are such couplings.
-  subroutine add_couplings(input, directory, banks)
+  subroutine add_couplings(input, directory, lanes, banks)
     type(input_t), intent(in) :: input
     type(directory_t), intent(in) :: directory
+    integer, intent(in) :: lanes
     type(bank_slot_t), allocatable, intent(inout) :: banks(:)
     integer, allocatable :: indices(:), some(:)
     integer :: form, i
@@ -92,73 +93,75 @@ contains
     allocate (indices, source=input%groups_named('coupling'))
     do form = cubic, table
       some = pack(indices, [(form_of(input%groups(indices(i))) == form, i=1, size(indices))])
-      if (form == cubic .or. size(some) > 0) call add_form(input, some, form, directory, banks)
+      if (form == cubic .or. size(some) > 0) call add_form(input, some, lanes, form, directory, banks)
     end do
   end subroutine add_couplings
 
   !> A bank of the couplings of one form.
-  subroutine add_form(input, indices, form, directory, banks)
+  subroutine add_form(input, indices, lanes, form, directory, banks)
     type(input_t), intent(in) :: input
     integer, intent(in) :: indices(:)
-    integer, intent(in) :: form
+    integer, intent(in) :: lanes, form
     type(directory_t), intent(in) :: directory
     type(bank_slot_t), allocatable, intent(inout) :: banks(:)
     type(ends_t) :: at
 
-    at = all_ends(input, indices, directory)
+    at = all_ends(input, indices, lanes, directory)
     select case (form)
     case (cubic, slipping)
-      call append_bank(banks, new_couplings(at%names, at%from, at%to, numbers_of(input, indices, 'stiffness'), &
-                                            numbers_of(input, indices, 'cubic_stiffness'), at%damping, at%rest_twist, &
+      call append_bank(banks, new_couplings(at%names, at%from, at%to, numbers_of(input, indices, lanes, 'stiffness'), &
+                                            numbers_of(input, indices, lanes, 'cubic_stiffness'), at%damping, at%rest_twist, &
                                             at%friction, at%friction_speed))
     case (polynomial)
-      call append_bank(banks, new_polynomial_couplings(at%names, at%from, at%to, all_coefficients(input, indices), &
+      call append_bank(banks, new_polynomial_couplings(at%names, at%from, at%to, all_coefficients(input, indices, lanes), &
                                                        at%damping, at%rest_twist, at%friction, at%friction_speed))
     case (gap)
-      call append_bank(banks, new_gap_couplings(at%names, at%from, at%to, all_coefficients(input, indices), at%damping, &
-                                                at%rest_twist, numbers_of(input, indices, 'gap'), &
+      call append_bank(banks, new_gap_couplings(at%names, at%from, at%to, all_coefficients(input, indices, lanes), at%damping, &
+                                                at%rest_twist, numbers_of(input, indices, lanes, 'gap'), &
                                                 at%friction, at%friction_speed))
     case (saturated)
-      call append_bank(banks, new_saturated_couplings(at%names, at%from, at%to, numbers_of(input, indices, 'stiffness'), &
-                                                      numbers_of(input, indices, 'saturation'), at%damping, at%rest_twist, &
-                                                      at%friction, at%friction_speed))
+      call append_bank(banks, new_saturated_couplings(at%names, at%from, at%to, numbers_of(input, indices, lanes, 'stiffness'), &
+                                                      numbers_of(input, indices, lanes, 'saturation'), at%damping, &
+                                                      at%rest_twist, at%friction, at%friction_speed))
     case default
       call append_bank(banks, new_table_couplings(at%names, at%from, at%to, &
-                                                  curves_of(input, indices, 'table_twist', 'table_moment'), at%damping, &
+                                                  curves_of(input, indices, lanes, 'table_twist', 'table_moment'), at%damping, &
                                                   at%rest_twist, at%friction, at%friction_speed))
     end select
   end subroutine add_form
 
-  function all_ends(input, indices, directory) result(at)
+  function all_ends(input, indices, lanes, directory) result(at)
     type(input_t), intent(in) :: input
     integer, intent(in) :: indices(:)
+    integer, intent(in) :: lanes
     type(directory_t), intent(in) :: directory
     type(ends_t) :: at
-    real(wp) :: friction(1, size(indices))
+    real(wp) :: friction(lanes, size(indices))
 
     allocate (at%names, source=names_of(input, indices))
     allocate (at%from, source=ends_of(input, indices, 'bodies', 1, directory))
     allocate (at%to, source=ends_of(input, indices, 'bodies', 2, directory))
-    allocate (at%damping, source=numbers_of(input, indices, 'damping'))
-    allocate (at%rest_twist, source=numbers_of(input, indices, 'rest_twist'))
-    friction = numbers_of(input, indices, 'friction')
+    allocate (at%damping, source=numbers_of(input, indices, lanes, 'damping'))
+    allocate (at%rest_twist, source=numbers_of(input, indices, lanes, 'rest_twist'))
+    friction = numbers_of(input, indices, lanes, 'friction')
     if (.not. any(friction > 0)) return
     allocate (at%friction, source=friction)
-    allocate (at%friction_speed, source=numbers_of(input, indices, 'friction_speed', absent=1.0_wp))
+    allocate (at%friction_speed, source=numbers_of(input, indices, lanes, 'friction_speed', absent=1.0_wp))
   end function all_ends
 
-  !> p_1, p_2, ... of all couplings, [order, 1, couplings].
-  function all_coefficients(input, indices) result(coefficients)
+  !> p_1, p_2, ... of all couplings, [order, lanes, couplings].
+  function all_coefficients(input, indices, lanes) result(coefficients)
     type(input_t), intent(in) :: input
     integer, intent(in) :: indices(:)
+    integer, intent(in) :: lanes
     real(wp), allocatable :: coefficients(:, :, :)
-    integer :: i
+    integer :: i, order
 
-    allocate (coefficients(maxval([(size(coefficients_of(input%groups(indices(i)))), i=1, size(indices))]), 1, size(indices)), &
-              source=0.0_wp)
+    order = maxval([(size(coefficients_of(input%groups(indices(i)))), i=1, size(indices))])
+    allocate (coefficients(order, lanes, size(indices)), source=0.0_wp)
     do i = 1, size(indices)
       associate (one => coefficients_of(input%groups(indices(i))))
-        coefficients(:size(one), 1, i) = one
+        coefficients(:size(one), :, i) = spread(one, 2, lanes)
       end associate
     end do
   end function all_coefficients

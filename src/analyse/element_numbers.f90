@@ -1,4 +1,4 @@
-!> Some groups of one kind of an input as the arguments of a bank's constructor, for a single lane.
+!> Some groups of one kind of an input as the arguments of a bank's constructor, the same in every lane.
 module nocdyn_element_numbers
   use nocdyn_body_directory, only: bodies_of, directory_t
   use nocdyn_curves, only: curve_t, extrapolation_constant, extrapolation_linear, interpolation_cubic, interpolation_linear, &
@@ -42,31 +42,34 @@ contains
     end do
   end function ends_of
 
-  !> One number of each group, [1, groups].
-  function numbers_of(input, indices, key, absent) result(values)
+  !> One number of each group, [lanes, groups].
+  function numbers_of(input, indices, lanes, key, absent) result(values)
     type(input_t), intent(in) :: input
     integer, intent(in) :: indices(:)
+    integer, intent(in) :: lanes
     character(len=*), intent(in) :: key
     real(wp), intent(in), optional :: absent   !! where it is unset; absent: 0
-    real(wp) :: values(1, size(indices))
+    real(wp) :: values(lanes, size(indices))
+    real(wp) :: otherwise
     integer :: i
 
-    values = 0.0_wp
-    if (present(absent)) values = absent
+    otherwise = 0.0_wp
+    if (present(absent)) otherwise = absent
     do i = 1, size(indices)
-      values(1, i) = input%groups(indices(i))%number(key, absent=values(1, i))
+      values(:, i) = input%groups(indices(i))%number(key, absent=otherwise)
     end do
   end function numbers_of
 
-  !> The table of each group, [1, groups].
-  function curves_of(input, indices, x, y, extrapolation) result(curves)
+  !> The table of each group, [lanes, groups].
+  function curves_of(input, indices, lanes, x, y, extrapolation) result(curves)
     type(input_t), intent(in) :: input
     integer, intent(in) :: indices(:)
+    integer, intent(in) :: lanes
     character(len=*), intent(in) :: x, y                    !! keys of the lists
     character(len=*), intent(in), optional :: extrapolation   !! absent: that of the group
-    type(curve_t) :: curves(1, size(indices))
+    type(curve_t) :: curves(lanes, size(indices))
     character(len=:), allocatable :: beyond
-    integer :: i, inside, outside
+    integer :: i, inside, lane, outside
 
     do i = 1, size(indices)
       associate (group => input%groups(indices(i)))
@@ -78,6 +81,9 @@ contains
         inside = merge(interpolation_cubic, interpolation_linear, group%text('interpolation') == 'cubic')
         outside = merge(extrapolation_constant, extrapolation_linear, beyond == 'constant')
         curves(1, i) = new_curve(group%numbers(x), group%numbers(y), inside, outside)
+        do lane = 2, lanes
+          curves(lane, i) = curves(1, i)
+        end do
       end associate
     end do
   end function curves_of

@@ -60,9 +60,10 @@ contains
   end function form_of
 
   !> A bank of quadratic motors without governors in any case, the others where there are such motors.
-  subroutine add_motors(input, directory, banks)
+  subroutine add_motors(input, directory, lanes, banks)
     type(input_t), intent(in) :: input
     type(directory_t), intent(in) :: directory
+    integer, intent(in) :: lanes
     type(bank_slot_t), allocatable, intent(inout) :: banks(:)
     integer, allocatable :: free(:), governed(:), indices(:), some(:)
     integer :: form, i
@@ -72,15 +73,15 @@ contains
       some = pack(indices, [(form_of(input%groups(indices(i))) == form, i=1, size(indices))])
       free = pack(some, [(.not. input%groups(some(i))%has_value('governor_speed'), i=1, size(some))])
       governed = pack(some, [(input%groups(some(i))%has_value('governor_speed'), i=1, size(some))])
-      if (form == quadratic .or. size(free) > 0) call add_free(input, free, form, directory, banks)
-      if (size(governed) > 0) call add_governed(input, governed, form, directory, banks)
+      if (form == quadratic .or. size(free) > 0) call add_free(input, free, lanes, form, directory, banks)
+      if (size(governed) > 0) call add_governed(input, governed, lanes, form, directory, banks)
     end do
   end subroutine add_motors
 
-  subroutine add_free(input, indices, form, directory, banks)
+  subroutine add_free(input, indices, lanes, form, directory, banks)
     type(input_t), intent(in) :: input
     integer, intent(in) :: indices(:)
-    integer, intent(in) :: form
+    integer, intent(in) :: lanes, form
     type(directory_t), intent(in) :: directory
     type(bank_slot_t), allocatable, intent(inout) :: banks(:)
     type(string_t), allocatable :: names(:)
@@ -91,21 +92,21 @@ contains
     body = ends_of(input, indices, 'body', 1, directory)
     select case (form)
     case (quadratic)
-      call append_bank(banks, new_motors(names, body, standstill_torques(input, indices), &
-                                         numbers_of(input, indices, 'b') + drags(input, indices), &
-                                         numbers_of(input, indices, 'c')))
+      call append_bank(banks, new_motors(names, body, standstill_torques(input, indices, lanes), &
+                                         numbers_of(input, indices, lanes, 'b') + drags(input, indices, lanes), &
+                                         numbers_of(input, indices, lanes, 'c')))
     case (inductive)
-      call add_inductive(input, indices, names, body, banks)
+      call add_inductive(input, indices, lanes, names, body, banks)
     case default
-      call make_curve(input, indices, form, curve)
-      call append_bank(banks, new_curve_motors(names, body, 1, curve))
+      call make_curve(input, indices, lanes, form, curve)
+      call append_bank(banks, new_curve_motors(names, body, lanes, curve))
     end select
   end subroutine add_free
 
-  subroutine add_governed(input, indices, form, directory, banks)
+  subroutine add_governed(input, indices, lanes, form, directory, banks)
     type(input_t), intent(in) :: input
     integer, intent(in) :: indices(:)
-    integer, intent(in) :: form
+    integer, intent(in) :: lanes, form
     type(directory_t), intent(in) :: directory
     type(bank_slot_t), allocatable, intent(inout) :: banks(:)
     type(string_t), allocatable :: names(:)
@@ -115,36 +116,37 @@ contains
 
     allocate (names, source=names_of(input, indices))
     body = ends_of(input, indices, 'body', 1, directory)
-    allocate (governor%set_speed, source=numbers_of(input, indices, 'governor_speed'))
-    allocate (governor%gain, source=numbers_of(input, indices, 'governor_gain'))
-    allocate (governor%time, source=numbers_of(input, indices, 'governor_time'))
-    allocate (governor%start, source=numbers_of(input, indices, 'governor_start'))
+    allocate (governor%set_speed, source=numbers_of(input, indices, lanes, 'governor_speed'))
+    allocate (governor%gain, source=numbers_of(input, indices, lanes, 'governor_gain'))
+    allocate (governor%time, source=numbers_of(input, indices, lanes, 'governor_time'))
+    allocate (governor%start, source=numbers_of(input, indices, lanes, 'governor_start'))
     if (form == inductive) then
-      call add_inductive(input, indices, names, body, banks, governor)
+      call add_inductive(input, indices, lanes, names, body, banks, governor)
     else
-      call make_curve(input, indices, form, curve)
-      call append_bank(banks, new_governed_motors(names, body, curve, governor, drags(input, indices)))
+      call make_curve(input, indices, lanes, form, curve)
+      call append_bank(banks, new_governed_motors(names, body, curve, governor, drags(input, indices, lanes)))
     end if
   end subroutine add_governed
 
-  subroutine add_inductive(input, indices, names, body, banks, governor)
+  subroutine add_inductive(input, indices, lanes, names, body, banks, governor)
     type(input_t), intent(in) :: input
     integer, intent(in) :: indices(:)
+    integer, intent(in) :: lanes
     type(string_t), intent(in) :: names(:)
     integer, intent(in) :: body(:)
     type(bank_slot_t), allocatable, intent(inout) :: banks(:)
     type(governor_t), intent(in), optional :: governor   !! absent: no motor has one
 
-    call append_bank(banks, new_dc_motors(names, body, numbers_of(input, indices, 'voltage'), &
-                                          numbers_of(input, indices, 'resistance'), &
-                                          numbers_of(input, indices, 'flux_constant'), &
-                                          numbers_of(input, indices, 'inductance'), governor))
+    call append_bank(banks, new_dc_motors(names, body, numbers_of(input, indices, lanes, 'voltage'), &
+                                          numbers_of(input, indices, lanes, 'resistance'), &
+                                          numbers_of(input, indices, lanes, 'flux_constant'), &
+                                          numbers_of(input, indices, lanes, 'inductance'), governor))
   end subroutine add_inductive
 
-  subroutine make_curve(input, indices, form, curve)
+  subroutine make_curve(input, indices, lanes, form, curve)
     type(input_t), intent(in) :: input
     integer, intent(in) :: indices(:)
-    integer, intent(in) :: form
+    integer, intent(in) :: lanes, form
     class(torque_curve_t), allocatable, intent(out) :: curve
     type(induction_curve_t) :: kloss
     type(quadratic_curve_t) :: parabola
@@ -152,39 +154,41 @@ contains
 
     select case (form)
     case (quadratic)
-      allocate (parabola%a, source=standstill_torques(input, indices))
-      allocate (parabola%b, source=numbers_of(input, indices, 'b'))
-      allocate (parabola%c, source=numbers_of(input, indices, 'c'))
+      allocate (parabola%a, source=standstill_torques(input, indices, lanes))
+      allocate (parabola%b, source=numbers_of(input, indices, lanes, 'b'))
+      allocate (parabola%c, source=numbers_of(input, indices, lanes, 'c'))
       allocate (curve, source=parabola)
     case (induction)
-      allocate (kloss%breakdown_torque, source=numbers_of(input, indices, 'breakdown_torque'))
-      allocate (kloss%breakdown_slip, source=numbers_of(input, indices, 'breakdown_slip'))
-      allocate (kloss%synchronous_speed, source=numbers_of(input, indices, 'synchronous_speed'))
+      allocate (kloss%breakdown_torque, source=numbers_of(input, indices, lanes, 'breakdown_torque'))
+      allocate (kloss%breakdown_slip, source=numbers_of(input, indices, lanes, 'breakdown_slip'))
+      allocate (kloss%synchronous_speed, source=numbers_of(input, indices, lanes, 'synchronous_speed'))
       allocate (curve, source=kloss)
     case default
-      allocate (points%curve, source=curves_of(input, indices, 'table_speed', 'table_torque'))
+      allocate (points%curve, source=curves_of(input, indices, lanes, 'table_speed', 'table_torque'))
       allocate (curve, source=points)
     end select
   end subroutine make_curve
 
   !> a of quadratic motors, the torque of constant ones, k voltage / resistance of dc motors without inductance.
-  function standstill_torques(input, indices) result(torques)
+  function standstill_torques(input, indices, lanes) result(torques)
     type(input_t), intent(in) :: input
     integer, intent(in) :: indices(:)
-    real(wp) :: torques(1, size(indices))
+    integer, intent(in) :: lanes
+    real(wp) :: torques(lanes, size(indices))
 
-    torques = numbers_of(input, indices, 'a') + numbers_of(input, indices, 'torque') &
-              + numbers_of(input, indices, 'flux_constant') * numbers_of(input, indices, 'voltage') &
-              / numbers_of(input, indices, 'resistance', absent=1.0_wp)
+    torques = numbers_of(input, indices, lanes, 'a') + numbers_of(input, indices, lanes, 'torque') &
+              + numbers_of(input, indices, lanes, 'flux_constant') * numbers_of(input, indices, lanes, 'voltage') &
+              / numbers_of(input, indices, lanes, 'resistance', absent=1.0_wp)
   end function standstill_torques
 
   !> k^2 / resistance of dc motors without inductance, which no throttle changes [N m s/rad].
-  function drags(input, indices)
+  function drags(input, indices, lanes)
     type(input_t), intent(in) :: input
     integer, intent(in) :: indices(:)
-    real(wp) :: drags(1, size(indices))
+    integer, intent(in) :: lanes
+    real(wp) :: drags(lanes, size(indices))
 
-    drags = numbers_of(input, indices, 'flux_constant')**2 / numbers_of(input, indices, 'resistance', absent=1.0_wp)
+    drags = numbers_of(input, indices, lanes, 'flux_constant')**2 / numbers_of(input, indices, lanes, 'resistance', absent=1.0_wp)
   end function drags
 
 end module nocdyn_motor_assembly

@@ -90,7 +90,7 @@ contains
     machine%shock%row = pack([(row, row=1, size(lambda))], abs(lambda) > least_impulse * maxval(abs(lambda)))
     machine%shock%impulse = lambda(machine%shock%row)
     machine%shock%energy_lost = 0.5_wp * sum(machine%inertia(1, :) * change**2)
-    machine%start_speed(1, :) = nearest
+    machine%start_speed(:, :) = spread(nearest, 1, machine%lanes)
   end subroutine project_start
 
   !> "the start speeds violate this gear: 2 * 1 rad/s ('pinion') + ... = 2, which must be 0; nearest speeds that ...".

@@ -32,9 +32,10 @@ contains
   end function load_form
 
   !> A bank of viscous loads in any case, the others where there are such loads.
-  subroutine add_loads(input, directory, banks)
+  subroutine add_loads(input, directory, lanes, banks)
     type(input_t), intent(in) :: input
     type(directory_t), intent(in) :: directory
+    integer, intent(in) :: lanes
     type(bank_slot_t), allocatable, intent(inout) :: banks(:)
     integer, allocatable :: indices(:), some(:)
     integer :: form, i
@@ -42,26 +43,26 @@ contains
     allocate (indices, source=input%groups_named('load'))
     do form = viscous, table
       some = pack(indices, [(load_form(input%groups(indices(i))) == form, i=1, size(indices))])
-      if (form == viscous .or. size(some) > 0) call add_load_form(input, some, form, directory, banks)
+      if (form == viscous .or. size(some) > 0) call add_load_form(input, some, lanes, form, directory, banks)
     end do
   end subroutine add_loads
 
-  subroutine add_load_form(input, indices, form, directory, banks)
+  subroutine add_load_form(input, indices, lanes, form, directory, banks)
     type(input_t), intent(in) :: input
     integer, intent(in) :: indices(:)
-    integer, intent(in) :: form
+    integer, intent(in) :: lanes, form
     type(directory_t), intent(in) :: directory
     type(bank_slot_t), allocatable, intent(inout) :: banks(:)
     type(string_t), allocatable :: names(:)
     integer :: body(size(indices))
-    real(wp), dimension(1, size(indices)) :: constant, constant_speed, quadratic, slope
+    real(wp), dimension(lanes, size(indices)) :: constant, constant_speed, quadratic, slope
 
     allocate (names, source=names_of(input, indices))
     body = ends_of(input, indices, 'body', 1, directory)
-    slope = numbers_of(input, indices, 'viscous')
-    quadratic = numbers_of(input, indices, 'quadratic')
-    constant = numbers_of(input, indices, 'constant')
-    constant_speed = numbers_of(input, indices, 'constant_speed', absent=1.0_wp)
+    slope = numbers_of(input, indices, lanes, 'viscous')
+    quadratic = numbers_of(input, indices, lanes, 'quadratic')
+    constant = numbers_of(input, indices, lanes, 'constant')
+    constant_speed = numbers_of(input, indices, lanes, 'constant_speed', absent=1.0_wp)
     select case (form)
     case (viscous)
       call append_bank(banks, new_loads(names, body, slope))
@@ -69,7 +70,7 @@ contains
       call append_bank(banks, new_nonlinear_loads(names, body, slope, quadratic, constant, constant_speed))
     case default
       call append_bank(banks, new_table_loads(names, body, slope, quadratic, constant, constant_speed, &
-                                              curves_of(input, indices, 'table_speed', 'table_torque')))
+                                              curves_of(input, indices, lanes, 'table_speed', 'table_torque')))
     end select
   end subroutine add_load_form
 
@@ -89,9 +90,10 @@ contains
   end function excitation_form
 
   !> A bank of harmonic excitations in any case, the others where there are such excitations.
-  subroutine add_excitations(input, directory, banks)
+  subroutine add_excitations(input, directory, lanes, banks)
     type(input_t), intent(in) :: input
     type(directory_t), intent(in) :: directory
+    integer, intent(in) :: lanes
     type(bank_slot_t), allocatable, intent(inout) :: banks(:)
     integer, allocatable :: indices(:), some(:)
     integer :: form, i
@@ -99,14 +101,14 @@ contains
     allocate (indices, source=input%groups_named('excitation'))
     do form = harmonic, timed
       some = pack(indices, [(excitation_form(input%groups(indices(i))) == form, i=1, size(indices))])
-      if (form == harmonic .or. size(some) > 0) call add_excitation_form(input, some, form, directory, banks)
+      if (form == harmonic .or. size(some) > 0) call add_excitation_form(input, some, lanes, form, directory, banks)
     end do
   end subroutine add_excitations
 
-  subroutine add_excitation_form(input, indices, form, directory, banks)
+  subroutine add_excitation_form(input, indices, lanes, form, directory, banks)
     type(input_t), intent(in) :: input
     integer, intent(in) :: indices(:)
-    integer, intent(in) :: form
+    integer, intent(in) :: lanes, form
     type(directory_t), intent(in) :: directory
     type(bank_slot_t), allocatable, intent(inout) :: banks(:)
     type(string_t), allocatable :: names(:)
@@ -116,17 +118,19 @@ contains
     body = ends_of(input, indices, 'body', 1, directory)
     select case (form)
     case (harmonic)
-      call append_bank(banks, new_excitations(names, body, numbers_of(input, indices, 'amplitude'), &
-                                              numbers_of(input, indices, 'frequency'), numbers_of(input, indices, 'phase')))
+      call append_bank(banks, new_excitations(names, body, numbers_of(input, indices, lanes, 'amplitude'), &
+                                              numbers_of(input, indices, lanes, 'frequency'), &
+                                              numbers_of(input, indices, lanes, 'phase')))
     case (waves)
-      call add_waves(input, indices, names, body, banks)
+      call add_waves(input, indices, lanes, names, body, banks)
     case (table)
-      call append_bank(banks, new_table_excitations(names, body, curves_of(input, indices, 'table_time', 'table_torque', &
+      call append_bank(banks, new_table_excitations(names, body, curves_of(input, indices, lanes, 'table_time', 'table_torque', &
                                                                            extrapolation='constant')))
     case default
       call append_bank(banks, new_timed_excitations(names, body, [(shape_of(input%groups(indices(i))), i=1, size(indices))], &
-                                                    numbers_of(input, indices, 'amplitude'), numbers_of(input, indices, 'time'), &
-                                                    numbers_of(input, indices, 'duration', absent=1.0_wp)))
+                                                    numbers_of(input, indices, lanes, 'amplitude'), &
+                                                    numbers_of(input, indices, lanes, 'time'), &
+                                                    numbers_of(input, indices, lanes, 'duration', absent=1.0_wp)))
     end select
   end subroutine add_excitation_form
 
@@ -144,9 +148,10 @@ contains
   end function shape_of
 
   !> Every order is a term; so is amplitude sin(2 (frequency t - pole_pairs phi) + phase).
-  subroutine add_waves(input, indices, names, body, banks)
+  subroutine add_waves(input, indices, lanes, names, body, banks)
     type(input_t), intent(in) :: input
     integer, intent(in) :: indices(:)
+    integer, intent(in) :: lanes
     type(string_t), intent(in) :: names(:)
     integer, intent(in) :: body(:)
     type(bank_slot_t), allocatable, intent(inout) :: banks(:)
@@ -172,15 +177,9 @@ contains
         owner = [owner, spread(i, 1, size(order) - size(owner))]
       end associate
     end do
-    call append_bank(banks, new_wave_excitations(names, body, owner, as_lane(amplitude), as_lane(frequency), as_lane(order), &
-                                                 as_lane(phase)))
+    call append_bank(banks, new_wave_excitations(names, body, owner, spread(amplitude, 1, lanes), &
+                                                 spread(frequency, 1, lanes), spread(order, 1, lanes), &
+                                                 spread(phase, 1, lanes)))
   end subroutine add_waves
-
-  pure function as_lane(values)
-    real(wp), intent(in) :: values(:)
-    real(wp) :: as_lane(1, size(values))
-
-    as_lane(1, :) = values
-  end function as_lane
 
 end module nocdyn_torque_assembly

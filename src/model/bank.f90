@@ -16,6 +16,7 @@ module nocdyn_bank
   use nocdyn_elements, only: elements_t
   use nocdyn_text, only: string_t
   use nocdyn_kinds, only: wp
+  use nocdyn_lane_numbers, only: lane_numbers_t
   use nocdyn_polynomial_laws, only: polynomial_laws_t
   implicit none (type, external)
   private
@@ -75,6 +76,8 @@ module nocdyn_bank
     procedure :: switch_name
     procedure :: connect
     procedure :: let_switch
+    procedure :: list_layout
+    procedure :: list_numbers
     procedure :: last
     procedure :: is_source
     procedure :: quantities
@@ -142,6 +145,26 @@ contains
     if (allocated(self%branch)) deallocate (self%branch)
     allocate (self%branch(self%lanes, size(elements)), source=0)
   end subroutine let_switch
+
+  !> Notes which elements the bank has, and what they do.
+  subroutine list_layout(self, numbers)
+    class(bank_t), intent(in) :: self
+    type(lane_numbers_t), intent(inout) :: numbers
+
+    call numbers%remark([self%role, self%first, self%inner])
+    call numbers%remark(self%is_polynomial)
+    call numbers%remark(self%names)
+    call numbers%remark(self%from)
+    call numbers%remark(self%to)
+    call numbers%remark(self%accounted)
+    call numbers%remark(self%switching)
+  end subroutine list_layout
+
+  !> Lists the parameters of its elements: those that stand in the input as they are by the name that they have there.
+  subroutine list_numbers(self, numbers)
+    class(bank_t), target, intent(inout) :: self
+    type(lane_numbers_t), intent(inout) :: numbers
+  end subroutine list_numbers
 
   !> Number of its last element in the machine.
   pure integer function last(self)

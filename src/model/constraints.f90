@@ -1,6 +1,7 @@
 !> The rigid part of a machine: rows of L_lambda, eqs. (8), (23), each a linear relation between body speeds.
 module nocdyn_constraints
   use nocdyn_kinds, only: wp
+  use nocdyn_lane_numbers, only: lane_numbers_t
   use nocdyn_sparse_map, only: transposed_order
   use nocdyn_text, only: string_t, strings
   implicit none (type, external)
@@ -32,6 +33,7 @@ module nocdyn_constraints
     procedure :: list_rows
     procedure :: block
     procedure :: residual
+    procedure :: list_numbers
   end type constraints_t
 
 contains
@@ -152,5 +154,15 @@ contains
       scale = scale + abs(self%coefficient(lane, entry) * omega(self%body(entry)))
     end do
   end subroutine residual
+
+  subroutine list_numbers(self, numbers)
+    class(constraints_t), target, intent(inout) :: self
+    type(lane_numbers_t), intent(inout) :: numbers
+
+    call numbers%remark(self%first)
+    call numbers%remark(self%body)
+    call numbers%add('constraints: coefficient', self%coefficient)
+    call numbers%add('constraints: factor', self%members%factor)
+  end subroutine list_numbers
 
 end module nocdyn_constraints

@@ -9,6 +9,7 @@ module nocdyn_coordinates
   use nocdyn_errors, only: error_t, exit_input, raise
   use nocdyn_geared_groups, only: geared_group_t
   use nocdyn_kinds, only: wp
+  use nocdyn_lane_numbers, only: lane_numbers_t
   use nocdyn_lapack, only: solve_positive_definite
   use nocdyn_reaction_sweep, only: new_reaction_sweep, reaction_sweep_t
   use nocdyn_rigid_trains, only: rigid_trains_t
@@ -40,6 +41,7 @@ module nocdyn_coordinates
     procedure :: project
     procedure :: reactions_of_torques
     procedure :: reactions_of_imbalances
+    procedure :: list_numbers
   end type coordinates_t
 
 contains
@@ -304,5 +306,19 @@ contains
     self%imbalance(:) = imbalance
     call self%sweep%find_reactions(lane, self%imbalance, lambda)
   end subroutine reactions_of_imbalances
+
+  subroutine list_numbers(self, numbers)
+    class(coordinates_t), target, intent(inout) :: self
+    type(lane_numbers_t), intent(inout) :: numbers
+
+    call numbers%remark(self%body)
+    call numbers%remark(self%first)
+    call numbers%remark(self%coordinate)
+    call numbers%remark(self%geared)
+    call numbers%add('coordinates: ratio', self%ratio)
+    call numbers%add('coordinates: response', self%response)
+    call numbers%add('coordinates: inertia', self%inertia)
+    call self%sweep%list_numbers(numbers)
+  end subroutine list_numbers
 
 end module nocdyn_coordinates

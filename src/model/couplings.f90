@@ -5,6 +5,7 @@ module nocdyn_couplings
   use nocdyn_bank, only: bank_t, quantity_t, role_coupling
   use nocdyn_elements, only: elements_t
   use nocdyn_kinds, only: wp
+  use nocdyn_lane_numbers, only: lane_numbers_t
   use nocdyn_polynomial_laws, only: polynomial_laws_t
   use nocdyn_text, only: string_t
   use nocdyn_vector_functions, only: tanh_of
@@ -22,6 +23,7 @@ module nocdyn_couplings
     real(wp), allocatable :: friction(:, :)          !! [N m]; not allocated: none
     real(wp), allocatable :: friction_speed(:, :)    !! [rad/s]
   contains
+    procedure :: list_numbers
     procedure :: polynomials
     procedure :: evaluate
     procedure :: differentiate
@@ -140,5 +142,19 @@ contains
       values = -elements%working(lane, self%first:self%last())
     end select
   end subroutine observe
+
+  subroutine list_numbers(self, numbers)
+    class(couplings_t), target, intent(inout) :: self
+    type(lane_numbers_t), intent(inout) :: numbers
+
+    call numbers%add('stiffness', self%stiffness)
+    call numbers%add('cubic_stiffness', self%cubic_stiffness)
+    call numbers%add('damping', self%damping)
+    call numbers%add('rest_twist', self%rest_twist)
+    call numbers%remark(allocated(self%friction))
+    if (.not. allocated(self%friction)) return
+    call numbers%add('friction', self%friction)
+    call numbers%add('friction_speed', self%friction_speed)
+  end subroutine list_numbers
 
 end module nocdyn_couplings

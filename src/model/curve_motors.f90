@@ -3,6 +3,7 @@ module nocdyn_curve_motors
   use nocdyn_bank, only: bank_t, role_motor
   use nocdyn_elements, only: elements_t
   use nocdyn_kinds, only: wp
+  use nocdyn_lane_numbers, only: lane_numbers_t
   use nocdyn_text, only: string_t
   use nocdyn_torque_curves, only: torque_curve_t
   implicit none (type, external)
@@ -14,6 +15,7 @@ module nocdyn_curve_motors
   type, extends(bank_t), public :: curve_motors_t
     class(torque_curve_t), allocatable :: curve
   contains
+    procedure :: list_numbers
     procedure :: evaluate
     procedure :: differentiate
     procedure :: choose
@@ -104,5 +106,12 @@ contains
 
     name = 'point in the table'
   end function switch_name
+
+  subroutine list_numbers(self, numbers)
+    class(curve_motors_t), target, intent(inout) :: self
+    type(lane_numbers_t), intent(inout) :: numbers
+
+    call self%curve%list_numbers(numbers)
+  end subroutine list_numbers
 
 end module nocdyn_curve_motors

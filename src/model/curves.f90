@@ -22,6 +22,7 @@ module nocdyn_curves
     real(wp), allocatable, private :: coefficient(:, :)  !! of the powers of x - origin, [0:3, 0:points]
     real(wp), allocatable, private :: area(:)            !! integral from the first point to the origin, [0:points]
   contains
+    procedure :: points
     procedure :: segment
     procedure :: margin
     procedure :: room_above
@@ -107,6 +108,12 @@ contains
 
     have_same_sign = (a > 0 .and. b > 0) .or. (a < 0 .and. b < 0)
   end function have_same_sign
+
+  pure integer function points(self)
+    class(curve_t), intent(in) :: self
+
+    points = size(self%knot)
+  end function points
 
   !> The segment in which x lies.
   pure integer function segment(self, x)

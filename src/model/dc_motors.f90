@@ -4,6 +4,7 @@ module nocdyn_dc_motors
   use nocdyn_elements, only: elements_t
   use nocdyn_governors, only: governor_t
   use nocdyn_kinds, only: wp
+  use nocdyn_lane_numbers, only: lane_numbers_t
   use nocdyn_text, only: string_t
   implicit none (type, external)
   private
@@ -18,6 +19,7 @@ module nocdyn_dc_motors
     real(wp), allocatable :: inductance(:, :)      !! [H], positive
     type(governor_t), allocatable :: governor
   contains
+    procedure :: list_numbers
     procedure :: start_inner
     procedure :: evaluate_inner
     procedure :: differentiate
@@ -192,5 +194,16 @@ contains
       end associate
     end do
   end subroutine observe
+
+  subroutine list_numbers(self, numbers)
+    class(dc_motors_t), target, intent(inout) :: self
+    type(lane_numbers_t), intent(inout) :: numbers
+
+    call numbers%add('voltage', self%voltage)
+    call numbers%add('resistance', self%resistance)
+    call numbers%add('flux_constant', self%flux_constant)
+    call numbers%add('inductance', self%inductance)
+    if (allocated(self%governor)) call self%governor%list_numbers(numbers)
+  end subroutine list_numbers
 
 end module nocdyn_dc_motors

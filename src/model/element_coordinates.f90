@@ -3,6 +3,7 @@ module nocdyn_element_coordinates
   use nocdyn_coordinates, only: coordinates_t
   use nocdyn_elements, only: elements_t
   use nocdyn_kinds, only: wp
+  use nocdyn_lane_numbers, only: lane_numbers_t
   implicit none (type, external)
   private
 
@@ -18,6 +19,7 @@ module nocdyn_element_coordinates
   contains
     procedure :: selected
     procedure :: has_ratio
+    procedure :: list_numbers
   end type element_coordinates_t
 
 contains
@@ -133,5 +135,15 @@ contains
       self%response(:, [k, least]) = self%response(:, [least, k])
     end do
   end subroutine sort_entries
+
+  subroutine list_numbers(self, numbers)
+    class(element_coordinates_t), target, intent(inout) :: self
+    type(lane_numbers_t), intent(inout) :: numbers
+
+    call numbers%remark(self%first)
+    call numbers%remark(self%coordinate)
+    call numbers%add('elements: ratio', self%ratio)
+    call numbers%add('elements: response', self%response)
+  end subroutine list_numbers
 
 end module nocdyn_element_coordinates

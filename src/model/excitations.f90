@@ -3,6 +3,7 @@ module nocdyn_excitations
   use nocdyn_bank, only: bank_t, role_excitation
   use nocdyn_elements, only: elements_t
   use nocdyn_kinds, only: wp
+  use nocdyn_lane_numbers, only: lane_numbers_t
   use nocdyn_text, only: string_t
   use nocdyn_vector_functions, only: cosines, sine_of, sines
   implicit none (type, external)
@@ -15,6 +16,7 @@ module nocdyn_excitations
     real(wp), allocatable :: frequency(:, :)   !! omega_p [rad/s]
     real(wp), allocatable :: phase(:, :)       !! [rad]
   contains
+    procedure :: list_numbers
     procedure :: evaluate
     procedure :: differentiate
     procedure :: has_series
@@ -151,5 +153,14 @@ contains
     where (abs(self%frequency) > 0.0_wp) self%amplitude = 0.0_wp
     self%frequency = 0.0_wp
   end subroutine settle
+
+  subroutine list_numbers(self, numbers)
+    class(excitations_t), target, intent(inout) :: self
+    type(lane_numbers_t), intent(inout) :: numbers
+
+    call numbers%add('amplitude', self%amplitude)
+    call numbers%add('frequency', self%frequency)
+    call numbers%add('phase', self%phase)
+  end subroutine list_numbers
 
 end module nocdyn_excitations

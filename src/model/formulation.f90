@@ -25,6 +25,7 @@ module nocdyn_formulation
     procedure :: place_inner
     procedure :: choose_branches
     procedure :: observe
+    procedure :: receive
     procedure :: enter
     procedure :: switch_values
     procedure :: cross
@@ -118,6 +119,12 @@ contains
     call self%machine%evaluate(t, self%phi, self%omega, self%torque)
   end subroutine observe
 
+  !> A lane may have other numbers than before.
+  subroutine receive(self, lane)
+    class(formulation_t), intent(inout) :: self
+    integer, intent(in) :: lane
+  end subroutine receive
+
   subroutine enter(self, lane, t, y)
     class(formulation_t), intent(inout) :: self
     integer, intent(in) :: lane
@@ -125,6 +132,7 @@ contains
     real(wp), contiguous, intent(in) :: y(:)
     integer :: switch
 
+    call self%receive(lane)
     do switch = 1, self%switches
       call self%cross(lane, switch, t, y)
     end do

@@ -8,6 +8,7 @@ module nocdyn_gap_couplings
   use nocdyn_bank, only: border_width
   use nocdyn_elements, only: elements_t
   use nocdyn_kinds, only: wp
+  use nocdyn_lane_numbers, only: lane_numbers_t
   use nocdyn_polynomial_couplings, only: elastic_curvature, elastic_energy, elastic_moment, elastic_slope, &
                                          new_polynomial_couplings, polynomial_couplings_t
   use nocdyn_polynomial_laws, only: polynomial_laws_t
@@ -22,6 +23,7 @@ module nocdyn_gap_couplings
     real(wp), allocatable :: border(:, :)   !! by which borders are moved, as moment [N m]
     real(wp), allocatable :: scale(:, :)    !! stiffness that makes a moment of a penetration [N m/rad]
   contains
+    procedure :: list_numbers
     procedure :: polynomials
     procedure :: evaluate
     procedure :: differentiate
@@ -245,5 +247,15 @@ contains
 
     name = 'edge of the gap'
   end function switch_name
+
+  subroutine list_numbers(self, numbers)
+    class(gap_couplings_t), target, intent(inout) :: self
+    type(lane_numbers_t), intent(inout) :: numbers
+
+    call self%polynomial_couplings_t%list_numbers(numbers)
+    call numbers%add('gap', self%gap)
+    call numbers%add('border', self%border)
+    call numbers%add('scale', self%scale)
+  end subroutine list_numbers
 
 end module nocdyn_gap_couplings

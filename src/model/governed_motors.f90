@@ -5,6 +5,7 @@ module nocdyn_governed_motors
   use nocdyn_elements, only: elements_t
   use nocdyn_governors, only: governor_t
   use nocdyn_kinds, only: wp
+  use nocdyn_lane_numbers, only: lane_numbers_t
   use nocdyn_polynomial_laws, only: polynomial_laws_t
   use nocdyn_text, only: string_t
   use nocdyn_torque_curves, only: torque_curve_t
@@ -19,6 +20,7 @@ module nocdyn_governed_motors
     type(governor_t) :: governor
     real(wp), allocatable :: drag(:, :)   !! what no throttle changes [N m s/rad], shape [lanes, motors]
   contains
+    procedure :: list_numbers
     procedure :: polynomials
     procedure :: evaluate
     procedure :: differentiate
@@ -208,5 +210,14 @@ contains
       end do
     end if
   end subroutine observe
+
+  subroutine list_numbers(self, numbers)
+    class(governed_motors_t), target, intent(inout) :: self
+    type(lane_numbers_t), intent(inout) :: numbers
+
+    call self%curve_motors_t%list_numbers(numbers)
+    call self%governor%list_numbers(numbers)
+    call numbers%add('drag', self%drag)
+  end subroutine list_numbers
 
 end module nocdyn_governed_motors

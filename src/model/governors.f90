@@ -6,6 +6,7 @@
 module nocdyn_governors
   use nocdyn_bank, only: border_width
   use nocdyn_kinds, only: wp
+  use nocdyn_lane_numbers, only: lane_numbers_t
   implicit none (type, external)
   private
 
@@ -16,6 +17,7 @@ module nocdyn_governors
     real(wp), allocatable :: time(:, :)        !! integral time [s], positive
     real(wp), allocatable :: start(:, :)       !! throttle at the start, 0 to 1
   contains
+    procedure :: list_numbers
     procedure :: start_integral
     procedure :: throttle
     procedure :: rate
@@ -109,5 +111,15 @@ contains
     end associate
     margin = margin + border_width
   end function margin
+
+  subroutine list_numbers(self, numbers)
+    class(governor_t), target, intent(inout) :: self
+    type(lane_numbers_t), intent(inout) :: numbers
+
+    call numbers%add('governor_speed', self%set_speed)
+    call numbers%add('governor_gain', self%gain)
+    call numbers%add('governor_time', self%time)
+    call numbers%add('governor_start', self%start)
+  end subroutine list_numbers
 
 end module nocdyn_governors

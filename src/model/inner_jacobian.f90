@@ -7,6 +7,7 @@ module nocdyn_inner_jacobian
   use nocdyn_elements, only: elements_t
   use nocdyn_inner_states, only: inner_states_t
   use nocdyn_kinds, only: wp
+  use nocdyn_lane_numbers, only: lane_numbers_t
   use nocdyn_system, only: pattern_t
   implicit none (type, external)
   private
@@ -22,6 +23,7 @@ module nocdyn_inner_jacobian
     logical, allocatable, private :: is_accounted(:)        !! [inner states]
   contains
     procedure :: fill
+    procedure :: list_numbers
   end type inner_jacobian_t
 
 contains
@@ -96,5 +98,14 @@ contains
       end do
     end associate
   end subroutine fill
+
+  subroutine list_numbers(self, numbers)
+    class(inner_jacobian_t), target, intent(inout) :: self
+    type(lane_numbers_t), intent(inout) :: numbers
+
+    call numbers%remark(self%pattern%row)
+    call numbers%remark(self%pattern%column)
+    call self%incidence%list_numbers(numbers)
+  end subroutine list_numbers
 
 end module nocdyn_inner_jacobian

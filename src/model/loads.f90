@@ -2,6 +2,7 @@
 module nocdyn_loads
   use nocdyn_bank, only: bank_t, role_load
   use nocdyn_kinds, only: wp
+  use nocdyn_lane_numbers, only: lane_numbers_t
   use nocdyn_polynomial_laws, only: polynomial_laws_t
   use nocdyn_text, only: string_t
   implicit none (type, external)
@@ -12,6 +13,7 @@ module nocdyn_loads
   type, extends(bank_t), public :: loads_t
     real(wp), allocatable :: viscous(:, :)   !! c [N m s/rad], shape [lanes, loads]
   contains
+    procedure :: list_numbers
     procedure :: polynomials
   end type loads_t
 
@@ -37,5 +39,12 @@ contains
     laws%by_speed(:, self%first:self%last()) = -self%viscous
     laws%damping(:, self%first:self%last()) = self%viscous
   end subroutine polynomials
+
+  subroutine list_numbers(self, numbers)
+    class(loads_t), target, intent(inout) :: self
+    type(lane_numbers_t), intent(inout) :: numbers
+
+    call numbers%add('viscous', self%viscous)
+  end subroutine list_numbers
 
 end module nocdyn_loads

@@ -6,6 +6,7 @@ module nocdyn_machine
   use nocdyn_elements, only: elements_t, new_elements
   use nocdyn_geared_groups, only: geared_group_t
   use nocdyn_kinds, only: wp
+  use nocdyn_lane_numbers, only: lane_numbers_t
   use nocdyn_polynomial_laws, only: new_polynomial_laws, polynomial_laws_t
   use nocdyn_rigid_trains, only: rigid_trains_t
   use nocdyn_switches, only: new_switches, switches_t
@@ -41,6 +42,7 @@ module nocdyn_machine
     type(coordinates_t) :: coordinates
   contains
     procedure :: number_elements
+    procedure :: list_numbers
     procedure :: settle
     procedure :: elastic
     procedure :: element_name
@@ -93,6 +95,25 @@ contains
     self%accounted = [(self%banks(i)%bank%first - 1 + self%banks(i)%bank%accounted, i=1, size(self%banks))]
     self%switches = new_switches(self%banks)
   end subroutine number_elements
+
+  !> Lists what may differ from variant to variant.
+  subroutine list_numbers(self, numbers)
+    class(machine_t), target, intent(inout) :: self
+    type(lane_numbers_t), intent(inout) :: numbers
+    integer :: i
+
+    call numbers%remark(self%bodies)
+    call numbers%add('machine: inertia', self%inertia)
+    call numbers%add('machine: start_angle', self%start_angle)
+    call numbers%add('machine: start_speed', self%start_speed)
+    do i = 1, size(self%banks)
+      call self%banks(i)%bank%list_layout(numbers)
+      call self%banks(i)%bank%list_numbers(numbers)
+    end do
+    call self%laws%list_numbers(numbers)
+    call self%constraints%list_numbers(numbers)
+    call self%coordinates%list_numbers(numbers)
+  end subroutine list_numbers
 
   !> Leaves the mean torques of a machine that has run for long; to be evaluated at a late time.
   subroutine settle(self)

@@ -2,6 +2,7 @@
 module nocdyn_motors
   use nocdyn_bank, only: bank_t, role_motor
   use nocdyn_kinds, only: wp
+  use nocdyn_lane_numbers, only: lane_numbers_t
   use nocdyn_polynomial_laws, only: polynomial_laws_t
   use nocdyn_text, only: string_t
   implicit none (type, external)
@@ -14,6 +15,7 @@ module nocdyn_motors
     real(wp), allocatable :: b(:, :)   !! B [N m s/rad]
     real(wp), allocatable :: c(:, :)   !! C [N m s2/rad2]
   contains
+    procedure :: list_numbers
     procedure :: polynomials
   end type motors_t
 
@@ -43,5 +45,14 @@ contains
       laws%by_speed_squared(:, first:last) = -self%c
     end associate
   end subroutine polynomials
+
+  subroutine list_numbers(self, numbers)
+    class(motors_t), target, intent(inout) :: self
+    type(lane_numbers_t), intent(inout) :: numbers
+
+    call numbers%add('a', self%a)
+    call numbers%add('b', self%b)
+    call numbers%add('c', self%c)
+  end subroutine list_numbers
 
 end module nocdyn_motors

@@ -3,6 +3,7 @@
 module nocdyn_nonlinear_loads
   use nocdyn_elements, only: elements_t
   use nocdyn_kinds, only: wp
+  use nocdyn_lane_numbers, only: lane_numbers_t
   use nocdyn_loads, only: loads_t, new_loads
   use nocdyn_text, only: string_t
   use nocdyn_vector_functions, only: tanh_of
@@ -16,6 +17,7 @@ module nocdyn_nonlinear_loads
     real(wp), allocatable :: constant(:, :)         !! [N m]
     real(wp), allocatable :: constant_speed(:, :)   !! [rad/s], positive
   contains
+    procedure :: list_numbers
     procedure :: evaluate
     procedure :: differentiate
   end type nonlinear_loads_t
@@ -71,5 +73,15 @@ contains
       end do
     end do
   end subroutine differentiate
+
+  subroutine list_numbers(self, numbers)
+    class(nonlinear_loads_t), target, intent(inout) :: self
+    type(lane_numbers_t), intent(inout) :: numbers
+
+    call self%loads_t%list_numbers(numbers)
+    call numbers%add('quadratic', self%quadratic)
+    call numbers%add('constant', self%constant)
+    call numbers%add('constant_speed', self%constant_speed)
+  end subroutine list_numbers
 
 end module nocdyn_nonlinear_loads

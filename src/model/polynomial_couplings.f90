@@ -3,6 +3,7 @@ module nocdyn_polynomial_couplings
   use nocdyn_couplings, only: couplings_t, new_couplings
   use nocdyn_elements, only: elements_t
   use nocdyn_kinds, only: wp
+  use nocdyn_lane_numbers, only: lane_numbers_t
   use nocdyn_text, only: string_t
   implicit none (type, external)
   private
@@ -15,6 +16,7 @@ module nocdyn_polynomial_couplings
     integer :: order = 1
     real(wp), allocatable :: coefficient(:, :, :)   !! p_k [N m/rad^k], shape [order, lanes, couplings]
   contains
+    procedure :: list_numbers
     procedure :: evaluate
     procedure :: differentiate
     procedure :: assess
@@ -156,5 +158,13 @@ contains
     end do
     energy = energy * w
   end function elastic_energy
+
+  subroutine list_numbers(self, numbers)
+    class(polynomial_couplings_t), target, intent(inout) :: self
+    type(lane_numbers_t), intent(inout) :: numbers
+
+    call self%couplings_t%list_numbers(numbers)
+    call numbers%add('coefficient', self%coefficient)
+  end subroutine list_numbers
 
 end module nocdyn_polynomial_couplings

@@ -7,6 +7,7 @@
 module nocdyn_polynomial_laws
   use nocdyn_elements, only: elements_t
   use nocdyn_kinds, only: wp
+  use nocdyn_lane_numbers, only: lane_numbers_t
   implicit none (type, external)
   private
 
@@ -28,6 +29,8 @@ module nocdyn_polynomial_laws
     logical, allocatable, private :: is_bare(:)       !! of each part: whether all its elements are
   contains
     procedure :: divide
+    procedure :: admit
+    procedure :: list_numbers
     procedure :: evaluate
     procedure :: differentiate
     procedure :: assess
@@ -80,15 +83,55 @@ contains
 
   end subroutine divide
 
+  !> Divides anew if an element of a bare run is not bare any more in a lane that has new numbers.
+  subroutine admit(self, lane)
+    class(polynomial_laws_t), intent(inout) :: self
+    integer, intent(in) :: lane
+    integer :: e, part
+
+    if (.not. self%is_divided) return
+    do part = 1, self%parts
+      if (.not. self%is_bare(part)) cycle
+      do e = self%first(part), self%first(part + 1) - 1
+        if (is_bare_in(self, lane, e)) cycle
+        call self%divide()
+        return
+      end do
+    end do
+  end subroutine admit
+
+  pure logical function is_bare_in(self, lane, element)
+    type(polynomial_laws_t), intent(in) :: self
+    integer, intent(in) :: lane, element
+
+    is_bare_in = .not. (abs(self%rest(lane, element)) > 0 .or. abs(self%constant(lane, element)) > 0 .or. &
+                        abs(self%by_speed_squared(lane, element)) > 0)
+  end function is_bare_in
+
+  subroutine list_numbers(self, numbers)
+    class(polynomial_laws_t), target, intent(inout) :: self
+    type(lane_numbers_t), intent(inout) :: numbers
+
+    call numbers%add('laws: rest', self%rest)
+    call numbers%add('laws: linear', self%linear)
+    call numbers%add('laws: cubic', self%cubic)
+    call numbers%add('laws: constant', self%constant)
+    call numbers%add('laws: by_speed', self%by_speed)
+    call numbers%add('laws: by_speed_squared', self%by_speed_squared)
+    call numbers%add('laws: damping', self%damping)
+  end subroutine list_numbers
+
   !> How many elements from `first` on are bare in all lanes.
   pure integer function bare_run(self, first)
     type(polynomial_laws_t), intent(in) :: self
     integer, intent(in) :: first
-    integer :: e
+    integer :: e, l
 
     bare_run = 0
     do e = first, size(self%rest, 2)
-      if (any(abs(self%rest(:, e)) + abs(self%constant(:, e)) + abs(self%by_speed_squared(:, e)) > 0)) return
+      do l = 1, size(self%rest, 1)
+        if (.not. is_bare_in(self, l, e)) return
+      end do
       bare_run = bare_run + 1
     end do
   end function bare_run

@@ -9,6 +9,7 @@ module nocdyn_reaction_sweep
   use nocdyn_constraints, only: constraints_t
   use nocdyn_geared_groups, only: geared_group_t
   use nocdyn_kinds, only: wp
+  use nocdyn_lane_numbers, only: lane_numbers_t
   use nocdyn_rigid_trains, only: rigid_trains_t
   use nocdyn_shared_loads, only: new_shared_loads, shared_loads_t
   use nocdyn_train_motion, only: elimination_t, find_loads
@@ -46,6 +47,7 @@ module nocdyn_reaction_sweep
     procedure :: share_out
     procedure :: share
     procedure :: find_reactions
+    procedure :: list_numbers
     procedure, private :: sweep
     procedure, private :: sweep_relations
   end type reaction_sweep_t
@@ -252,5 +254,31 @@ contains
       end do
     end do
   end subroutine sweep_relations
+
+  subroutine list_numbers(self, numbers)
+    class(reaction_sweep_t), target, intent(inout) :: self
+    type(lane_numbers_t), intent(inout) :: numbers
+    integer :: g
+
+    call numbers%remark(self%train)
+    call numbers%remark(self%relations%row)
+    call numbers%remark(self%first)
+    call numbers%remark(self%body)
+    call numbers%remark(self%place)
+    call numbers%remark(self%child)
+    call numbers%remark(self%parent)
+    call numbers%remark(self%row)
+    call self%relations%between%list_numbers(numbers)
+    call numbers%add('sweep: ratio', self%ratio)
+    call numbers%add('sweep: coefficient', self%coefficient)
+    call numbers%add('sweep: own', self%own)
+    call numbers%add('sweep: other', self%other)
+    do g = 1, size(self%groups)
+      call numbers%remark(self%groups(g)%bodies)
+      call self%groups(g)%elimination%list_layout(numbers)
+      call numbers%add_blocks('sweep: dual', self%groups(g)%dual)
+    end do
+    call self%shares%list_numbers(numbers)
+  end subroutine list_numbers
 
 end module nocdyn_reaction_sweep

@@ -9,6 +9,7 @@ module nocdyn_reduced
   use nocdyn_formulation, only: formulation_t
   use nocdyn_inner_jacobian, only: inner_jacobian_t, new_inner_jacobian
   use nocdyn_kinds, only: wp
+  use nocdyn_lane_numbers, only: lane_numbers_t
   use nocdyn_machine, only: machine_t
   use nocdyn_reduced_jacobian, only: new_reduced_jacobian, reduced_jacobian_t
   use nocdyn_reduced_series, only: new_reduced_series, reduced_series_t
@@ -31,6 +32,8 @@ module nocdyn_reduced
     type(element_coordinates_t), private :: switching          !! of the switching elements
     real(wp), allocatable, private :: none(:, :)               !! zeros, [lanes, elements]
   contains
+    procedure :: list_numbers
+    procedure :: receive
     procedure :: derivative
     procedure :: jacobian
     procedure :: jacobian_pattern
@@ -47,16 +50,20 @@ module nocdyn_reduced
 contains
 
   !> The formulation of a machine whose coordinates are known.
-  function new_reduced(machine, audited) result(self)
+  function new_reduced(machine, audited, as_block) result(self)
     type(machine_t), intent(in) :: machine
     logical, intent(in) :: audited   !! whether the works of the accounted elements are integrated
+    logical, intent(in), optional :: as_block   !! whether a single lane is laid out as those of a block: .false.
     type(reduced_t) :: self
     type(element_coordinates_t) :: incidence
     real(wp), allocatable :: angle(:, :)
+    logical :: is_loose
 
+    is_loose = .false.
+    if (present(as_block)) is_loose = as_block
     call self%attach(machine, 2 * machine%coordinates%freedoms, audited)
     incidence = new_element_coordinates(machine%elements, machine%coordinates)
-    self%accelerations = response_map(incidence, machine%coordinates%freedoms)
+    self%accelerations = response_map(incidence, machine%coordinates%freedoms, is_loose)
     self%sums = new_reduced_jacobian(machine%coordinates%freedoms, incidence, machine%accounted(:self%quadratures), self%inner)
     self%inner_rows = new_inner_jacobian(machine%coordinates%freedoms, incidence, machine%accounted(:self%quadratures), &
                                          machine%elements%inner, size(self%sums%pattern%row))
@@ -64,14 +71,15 @@ contains
     allocate (angle(machine%lanes, 0:machine%bodies), source=0.0_wp)
     angle(:, 1:) = machine%start_angle
     self%start_twist = angle(:, machine%elements%to) - angle(:, machine%elements%from)
-    self%twists = twist_map(incidence, without_offset=.not. any(abs(self%start_twist) > 0))
+    self%twists = twist_map(incidence, without_offset=.not. any(abs(self%start_twist) > 0), is_loose=is_loose)
     allocate (self%none, source=0.0_wp * self%start_twist)
   end function new_reduced
 
   !> U, whose rows are the elements.
-  function twist_map(incidence, without_offset) result(map)
+  function twist_map(incidence, without_offset, is_loose) result(map)
     type(element_coordinates_t), intent(in) :: incidence
     logical, intent(in) :: without_offset   !! whether the start twists are zero
+    logical, intent(in) :: is_loose         !! whether the map has no stretches
     type(sparse_map_t) :: map
     integer :: kept(size(incidence%coordinate)), first(size(incidence%first))
     integer :: e, entry, next
@@ -86,13 +94,15 @@ contains
       end do
     end do
     first(size(first)) = next
-    map = new_sparse_map(first, incidence%coordinate(kept(:next - 1)), incidence%ratio(:, kept(:next - 1)), without_offset)
+    map = new_sparse_map(first, incidence%coordinate(kept(:next - 1)), incidence%ratio(:, kept(:next - 1)), without_offset, &
+                         is_loose)
   end function twist_map
 
   !> R, whose rows are the coordinates.
-  function response_map(incidence, freedoms) result(map)
+  function response_map(incidence, freedoms, is_loose) result(map)
     type(element_coordinates_t), intent(in) :: incidence
     integer, intent(in) :: freedoms
+    logical, intent(in) :: is_loose
     type(sparse_map_t) :: map
     integer :: element_of(size(incidence%coordinate)), order(size(incidence%coordinate)), first(freedoms + 1)
     integer :: e
@@ -101,8 +111,34 @@ contains
       element_of(incidence%first(e):incidence%first(e + 1) - 1) = e
     end do
     call transposed_order(incidence%coordinate, freedoms, order, first)
-    map = new_sparse_map(first, element_of(order), incidence%response(:, order))
+    map = new_sparse_map(first, element_of(order), incidence%response(:, order), is_loose=is_loose)
   end function response_map
+
+  !> Lists what may differ from variant to variant, but for what the series takes when a lane is entered; of a block, or
+  !> laid out as one.
+  subroutine list_numbers(self, numbers)
+    class(reduced_t), target, intent(inout) :: self
+    type(lane_numbers_t), intent(inout) :: numbers
+
+    call numbers%clear()
+    call numbers%remark([self%states, self%quadratures, self%switches])
+    call self%machine%list_numbers(numbers)
+    call numbers%add('start_twist', self%start_twist)
+    call self%twists%list_numbers(numbers)
+    call self%accelerations%list_numbers(numbers)
+    call self%sums%list_numbers(numbers)
+    call self%inner_rows%list_numbers(numbers)
+    call self%switching%list_numbers(numbers)
+  end subroutine list_numbers
+
+  !> What saves work or is a copy follows the numbers.
+  subroutine receive(self, lane)
+    class(reduced_t), intent(inout) :: self
+    integer, intent(in) :: lane
+
+    call self%machine%laws%admit(lane)
+    call self%motion%take_lane(lane, self%machine%laws, self%twists, self%accelerations)
+  end subroutine receive
 
   function start(self) result(y)
     class(reduced_t), intent(in) :: self

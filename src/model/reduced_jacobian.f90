@@ -7,6 +7,7 @@ module nocdyn_reduced_jacobian
   use nocdyn_element_coordinates, only: element_coordinates_t
   use nocdyn_elements, only: elements_t
   use nocdyn_kinds, only: wp
+  use nocdyn_lane_numbers, only: lane_numbers_t
   use nocdyn_sparse_map, only: transposed_order
   use nocdyn_system, only: pattern_t
   implicit none (type, external)
@@ -27,6 +28,7 @@ module nocdyn_reduced_jacobian
     real(wp), allocatable, private :: ratio(:, :)      !! of that entry, [lanes, work's entries]
   contains
     procedure :: fill
+    procedure :: list_numbers
   end type reduced_jacobian_t
 
 contains
@@ -168,5 +170,18 @@ contains
       at = at + 2
     end do
   end subroutine fill
+
+  subroutine list_numbers(self, numbers)
+    class(reduced_jacobian_t), target, intent(inout) :: self
+    type(lane_numbers_t), intent(inout) :: numbers
+
+    call numbers%remark(self%element)
+    call numbers%remark(self%place)
+    call numbers%remark(self%worker)
+    call numbers%remark(self%pattern%row)
+    call numbers%remark(self%pattern%column)
+    call numbers%add('jacobian: product', self%product)
+    call numbers%add('jacobian: ratio', self%ratio)
+  end subroutine list_numbers
 
 end module nocdyn_reduced_jacobian

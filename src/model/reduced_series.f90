@@ -46,9 +46,12 @@ module nocdyn_reduced_series
     integer, allocatable :: inner_banks(:)     !! whose laws are more than polynomials and external torques
     integer, allocatable :: cubed(:)           !! first values of the vectors with terms by (u - rest)^3
     integer, allocatable :: squared(:)         !! first values of the vectors with terms by u'^2
+    logical, allocatable :: is_cubed(:)        !! of each vector
+    logical, allocatable :: is_squared(:)
     real(wp), allocatable :: square(:, :)      !! (u - rest)^2 in those of `cubed`
   contains
     procedure :: expand
+    procedure :: take_lane
   end type reduced_series_t
 
 contains
@@ -74,45 +77,101 @@ contains
     self%inverse(:) = [(1.0_wp / k, k=1, order)]
     self%inner_banks = pack(machine%other_banks, [(.not. machine%banks(machine%other_banks(b))%bank%is_external, &
                                                    b=1, size(machine%other_banks))])
-    call take_laws(self, machine%laws, size(machine%laws%rest))
+    call allocate_laws(self)
+    do k = 1, self%lanes
+      call copy_laws(self, k, machine%laws)
+    end do
+    call find_strips(self)
     call multiply_out(self, twists, accelerations, machine%coordinates%freedoms, size(machine%elements%to))
   end function new_reduced_series
 
-  !> The coefficients of the laws, and which vectors have terms of higher degree.
-  subroutine take_laws(self, laws, values)
+  subroutine allocate_laws(self)
     type(reduced_series_t), intent(inout) :: self
-    type(polynomial_laws_t), intent(in) :: laws
-    integer, intent(in) :: values   !! lanes * elements
 
     allocate (self%rest(self%stride), source=0.0_wp)
     allocate (self%linear, self%cubic, self%by_speed, self%by_speed_squared, self%moment, source=self%rest)
-    self%rest(:values) = reshape(laws%rest, [values])
-    self%linear(:values) = reshape(laws%linear, [values])
-    self%cubic(:values) = reshape(laws%cubic, [values])
-    self%by_speed(:values) = reshape(laws%by_speed, [values])
-    self%by_speed_squared(:values) = reshape(laws%by_speed_squared, [values])
-    self%external(:values, 0) = reshape(laws%constant, [values])
-    self%cubed = vectors_of(self%cubic)
-    self%squared = vectors_of(self%by_speed_squared)
-  end subroutine take_laws
+  end subroutine allocate_laws
+
+  !> Takes the numbers that a lane has now.
+  subroutine take_lane(self, lane, laws, twists, accelerations)
+    class(reduced_series_t), intent(inout) :: self
+    integer, intent(in) :: lane
+    type(polynomial_laws_t), intent(in) :: laws
+    type(sparse_map_t), intent(in) :: twists, accelerations
+
+    if (self%order == 0) return
+    call copy_laws(self, lane, laws)
+    if (needs_other_strips(self, lane)) call find_strips(self)
+    if (self%is_dense) call form_matrices(self, twists, accelerations)
+  end subroutine take_lane
+
+  !> Whether a lane has terms of higher degree in vectors that had none.
+  pure logical function needs_other_strips(self, lane)
+    type(reduced_series_t), intent(in) :: self
+    integer, intent(in) :: lane
+    integer :: i, v
+
+    needs_other_strips = .true.
+    do i = lane, size(self%is_cubed) * width, self%lanes
+      v = (i - 1) / width + 1
+      if (abs(self%cubic(i)) > 0 .and. .not. self%is_cubed(v)) return
+      if (abs(self%by_speed_squared(i)) > 0 .and. .not. self%is_squared(v)) return
+    end do
+    needs_other_strips = .false.
+  end function needs_other_strips
+
+  !> Finds the vectors with terms of higher degree.
+  subroutine find_strips(self)
+    type(reduced_series_t), intent(inout) :: self
+    integer :: i
+
+    self%is_cubed = [(any(abs(self%cubic(i:i + width - 1)) > 0), i=1, self%stride, width)]
+    self%is_squared = [(any(abs(self%by_speed_squared(i:i + width - 1)) > 0), i=1, self%stride, width)]
+    self%cubed = pack([(i, i=1, self%stride, width)], self%is_cubed)
+    self%squared = pack([(i, i=1, self%stride, width)], self%is_squared)
+  end subroutine find_strips
+
+  subroutine copy_laws(self, lane, laws)
+    type(reduced_series_t), intent(inout) :: self
+    integer, intent(in) :: lane
+    type(polynomial_laws_t), intent(in) :: laws
+    integer :: e, i
+
+    do e = 1, size(laws%rest, 2)
+      i = self%lanes * (e - 1) + lane
+      self%rest(i) = laws%rest(lane, e)
+      self%linear(i) = laws%linear(lane, e)
+      self%cubic(i) = laws%cubic(lane, e)
+      self%by_speed(i) = laws%by_speed(lane, e)
+      self%by_speed_squared(i) = laws%by_speed_squared(lane, e)
+      self%external(i, 0) = laws%constant(lane, e)
+    end do
+  end subroutine copy_laws
 
   !> The matrices of the maps, if they are small.
   subroutine multiply_out(self, twists, accelerations, freedoms, elements)
     type(reduced_series_t), intent(inout) :: self
     type(sparse_map_t), intent(in) :: twists, accelerations
     integer, intent(in) :: freedoms, elements
-    integer :: i
 
     self%is_dense = self%lanes == 1 .and. max(self%stride * freedoms, size(self%acceleration) * elements) <= most_dense
     if (.not. self%is_dense) return
     allocate (self%twists(self%stride, freedoms), self%responses(size(self%acceleration), elements), source=0.0_wp)
-    do i = 1, freedoms
-      call twists%map_one(unit(freedoms, i), self%twists(:, i))
-    end do
-    do i = 1, elements
-      call accelerations%map_one(unit(elements, i), self%responses(:, i))
-    end do
+    call form_matrices(self, twists, accelerations)
   end subroutine multiply_out
+
+  subroutine form_matrices(self, twists, accelerations)
+    type(reduced_series_t), intent(inout) :: self
+    type(sparse_map_t), intent(in) :: twists, accelerations
+    integer :: i
+
+    do i = 1, size(self%twists, 2)
+      call twists%map_one(unit(size(self%twists, 2), i), self%twists(:, i))
+    end do
+    do i = 1, size(self%responses, 2)
+      call accelerations%map_one(unit(size(self%responses, 2), i), self%responses(:, i))
+    end do
+  end subroutine form_matrices
 
   !> The length of so many numbers in whole vectors.
   pure integer function whole_vectors(numbers)
@@ -128,15 +187,6 @@ contains
     vector = 0.0_wp
     vector(i) = 1.0_wp
   end function unit
-
-  !> The first values of the vectors that are not all zero.
-  pure function vectors_of(x) result(firsts)
-    real(wp), intent(in) :: x(:)   !! in whole vectors
-    integer, allocatable :: firsts(:)
-    integer :: i
-
-    firsts = pack([(i, i=1, size(x), width)], [(any(abs(x(i:i + width - 1)) > 0), i=1, size(x), width)])
-  end function vectors_of
 
   !> The coefficients number 1 to order of q', q and the works of the accounted elements, which follow each other in y.
   subroutine expand(self, machine, twists, accelerations, start_twist, n, length, t, y)

@@ -3,6 +3,7 @@ module nocdyn_saturated_couplings
   use nocdyn_couplings, only: couplings_t, new_couplings
   use nocdyn_elements, only: elements_t
   use nocdyn_kinds, only: wp
+  use nocdyn_lane_numbers, only: lane_numbers_t
   use nocdyn_text, only: string_t
   use nocdyn_vector_functions, only: tanh_of
   implicit none (type, external)
@@ -14,6 +15,7 @@ module nocdyn_saturated_couplings
     real(wp), allocatable :: initial_stiffness(:, :)   !! K1 [N m/rad], positive, shape [lanes, couplings] as all parameters
     real(wp), allocatable :: saturation(:, :)          !! S [N m], positive
   contains
+    procedure :: list_numbers
     procedure :: evaluate
     procedure :: differentiate
     procedure :: assess
@@ -114,5 +116,14 @@ contains
       log_cosh = x + log(0.5_wp * (1.0_wp + exp(-2.0_wp * x)))
     end if
   end function log_cosh
+
+  subroutine list_numbers(self, numbers)
+    class(saturated_couplings_t), target, intent(inout) :: self
+    type(lane_numbers_t), intent(inout) :: numbers
+
+    call self%couplings_t%list_numbers(numbers)
+    call numbers%add('stiffness', self%initial_stiffness)
+    call numbers%add('saturation', self%saturation)
+  end subroutine list_numbers
 
 end module nocdyn_saturated_couplings

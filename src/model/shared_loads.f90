@@ -7,6 +7,7 @@
 module nocdyn_shared_loads
   use nocdyn_geared_groups, only: geared_group_t, redundancy_t
   use nocdyn_kinds, only: wp
+  use nocdyn_lane_numbers, only: lane_numbers_t
   use nocdyn_rigid_trains, only: find_root
   use nocdyn_sparse_map, only: transposed_order
   implicit none (type, external)
@@ -27,6 +28,7 @@ module nocdyn_shared_loads
     type(share_block_t), allocatable :: blocks(:)
   contains
     procedure :: relieve
+    procedure :: list_numbers
   end type shared_loads_t
 
 contains
@@ -151,5 +153,16 @@ contains
       end associate
     end do
   end subroutine relieve
+
+  subroutine list_numbers(self, numbers)
+    class(shared_loads_t), target, intent(inout) :: self
+    type(lane_numbers_t), intent(inout) :: numbers
+    integer :: b
+
+    do b = 1, size(self%blocks)
+      call numbers%remark(self%blocks(b)%rows)
+      call numbers%add_blocks('shares: idle', self%blocks(b)%idle)
+    end do
+  end subroutine list_numbers
 
 end module nocdyn_shared_loads

@@ -4,6 +4,7 @@
 !> that a lane's result is the same to the last bit in a block of any size.
 module nocdyn_sparse_map
   use nocdyn_kinds, only: wp
+  use nocdyn_lane_numbers, only: lane_numbers_t
   use nocdyn_map_products, only: multiply_lanes, multiply_rows
   use nocdyn_stretches, only: multiply_even_stretch, multiply_stretch, pair_of_even_stretch, pair_of_stretch, &
     sum_of_even_stretch, sum_of_stretch
@@ -37,6 +38,7 @@ module nocdyn_sparse_map
     procedure :: map_one
     procedure :: map_pair
     procedure :: map_sum
+    procedure :: list_numbers
   end type sparse_map_t
 
   integer, parameter :: short = 16   !! fewer rows are not worth a vector loop
@@ -44,18 +46,22 @@ module nocdyn_sparse_map
 contains
 
   !> A map from its rows: row r has the entries first(r) to first(r + 1) - 1.
-  function new_sparse_map(first, column, coefficient, without_offset) result(self)
+  function new_sparse_map(first, column, coefficient, without_offset, is_loose) result(self)
     integer, intent(in) :: first(:)               !! [rows + 1]
     integer, intent(in) :: column(:)              !! [entries]
     real(wp), intent(in) :: coefficient(:, :)     !! [lanes, entries]
     logical, intent(in), optional :: without_offset   !! whether all offsets handed to `map_pair` will be zero: .false.
+    logical, intent(in), optional :: is_loose         !! whether there are to be no stretches: .false.
     type(sparse_map_t) :: self
+    logical :: has_stretches
     integer :: order(size(column)), straight(size(first) - 1)
     integer :: begin, entries, rows, width
 
     rows = size(first) - 1
     self%lanes = size(coefficient, 1)
     if (present(without_offset)) self%without_offset = without_offset
+    has_stretches = self%lanes == 1
+    if (present(is_loose)) has_stretches = has_stretches .and. .not. is_loose
     self%all_rows = rows
     self%columns = maxval([0, column])
     allocate (self%row(rows), self%first(rows + 1))
@@ -66,7 +72,7 @@ contains
     begin = 1
     do while (begin <= rows)
       width = first(begin + 1) - first(begin)
-      if (self%lanes == 1 .and. width > 0 .and. straight(begin) >= short) then
+      if (has_stretches .and. width > 0 .and. straight(begin) >= short) then
         self%stretches = self%stretches + 1
         self%first_row(self%stretches) = begin
         self%rows(self%stretches) = straight(begin)
@@ -343,5 +349,16 @@ contains
       end do
     end do
   end subroutine sum_on_lanes
+
+  !> A map of many lanes, or one without stretches.
+  subroutine list_numbers(self, numbers)
+    class(sparse_map_t), target, intent(inout) :: self
+    type(lane_numbers_t), intent(inout) :: numbers
+
+    if (self%stretches > 0) error stop 'nocdyn_sparse_map: the numbers in stretches are not those of lanes'
+    call numbers%remark(self%first(:self%loose_rows + 1))
+    call numbers%remark(self%column)
+    call numbers%add('map: coefficient', self%coefficient)
+  end subroutine list_numbers
 
 end module nocdyn_sparse_map

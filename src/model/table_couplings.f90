@@ -5,6 +5,7 @@ module nocdyn_table_couplings
   use nocdyn_curves, only: curve_t
   use nocdyn_elements, only: elements_t
   use nocdyn_kinds, only: wp
+  use nocdyn_lane_numbers, only: lane_numbers_t
   use nocdyn_text, only: string_t
   implicit none (type, external)
   private
@@ -15,6 +16,7 @@ module nocdyn_table_couplings
   type, extends(couplings_t), public :: table_couplings_t
     type(curve_t), allocatable :: curve(:, :)   !! [N m] over [rad], shape [lanes, couplings]
   contains
+    procedure :: list_numbers
     procedure :: evaluate
     procedure :: differentiate
     procedure :: assess
@@ -126,5 +128,13 @@ contains
 
     name = 'point in the table'
   end function switch_name
+
+  subroutine list_numbers(self, numbers)
+    class(table_couplings_t), target, intent(inout) :: self
+    type(lane_numbers_t), intent(inout) :: numbers
+
+    call self%couplings_t%list_numbers(numbers)
+    call numbers%add_curves(self%curve)
+  end subroutine list_numbers
 
 end module nocdyn_table_couplings

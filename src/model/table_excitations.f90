@@ -4,6 +4,7 @@ module nocdyn_table_excitations
   use nocdyn_curves, only: curve_t
   use nocdyn_elements, only: elements_t
   use nocdyn_kinds, only: wp
+  use nocdyn_lane_numbers, only: lane_numbers_t
   use nocdyn_text, only: string_t
   implicit none (type, external)
   private
@@ -14,6 +15,7 @@ module nocdyn_table_excitations
   type, extends(bank_t), public :: table_excitations_t
     type(curve_t), allocatable :: curve(:, :)   !! [N m] over [s], shape [lanes, excitations]
   contains
+    procedure :: list_numbers
     procedure :: evaluate
     procedure :: differentiate
     procedure :: choose
@@ -94,5 +96,12 @@ contains
 
     name = 'point in the table'
   end function switch_name
+
+  subroutine list_numbers(self, numbers)
+    class(table_excitations_t), target, intent(inout) :: self
+    type(lane_numbers_t), intent(inout) :: numbers
+
+    call numbers%add_curves(self%curve)
+  end subroutine list_numbers
 
 end module nocdyn_table_excitations

@@ -4,6 +4,7 @@ module nocdyn_table_loads
   use nocdyn_curves, only: curve_t
   use nocdyn_elements, only: elements_t
   use nocdyn_kinds, only: wp
+  use nocdyn_lane_numbers, only: lane_numbers_t
   use nocdyn_nonlinear_loads, only: new_nonlinear_loads, nonlinear_loads_t
   use nocdyn_text, only: string_t
   implicit none (type, external)
@@ -15,6 +16,7 @@ module nocdyn_table_loads
   type, extends(nonlinear_loads_t), public :: table_loads_t
     type(curve_t), allocatable :: curve(:, :)   !! resisting torque [N m] over speed [rad/s], shape [lanes, loads]
   contains
+    procedure :: list_numbers
     procedure :: evaluate
     procedure :: differentiate
     procedure :: choose
@@ -95,5 +97,13 @@ contains
 
     name = 'point in the table'
   end function switch_name
+
+  subroutine list_numbers(self, numbers)
+    class(table_loads_t), target, intent(inout) :: self
+    type(lane_numbers_t), intent(inout) :: numbers
+
+    call self%nonlinear_loads_t%list_numbers(numbers)
+    call numbers%add_curves(self%curve)
+  end subroutine list_numbers
 
 end module nocdyn_table_loads

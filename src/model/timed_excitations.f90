@@ -3,6 +3,7 @@ module nocdyn_timed_excitations
   use nocdyn_bank, only: bank_t, role_excitation, time_reached
   use nocdyn_elements, only: elements_t
   use nocdyn_kinds, only: wp
+  use nocdyn_lane_numbers, only: lane_numbers_t
   use nocdyn_text, only: string_t
   use nocdyn_vector_functions, only: cosines, sine_of
   implicit none (type, external)
@@ -20,6 +21,7 @@ module nocdyn_timed_excitations
     real(wp), allocatable :: begin(:, :)       !! [s]
     real(wp), allocatable :: duration(:, :)    !! [s], positive; of no meaning for steps
   contains
+    procedure :: list_numbers
     procedure :: evaluate
     procedure :: differentiate
     procedure :: choose
@@ -162,5 +164,15 @@ contains
       name = 'end of the pulse'
     end select
   end function switch_name
+
+  subroutine list_numbers(self, numbers)
+    class(timed_excitations_t), target, intent(inout) :: self
+    type(lane_numbers_t), intent(inout) :: numbers
+
+    call numbers%remark(self%shape)
+    call numbers%add('amplitude', self%amplitude)
+    call numbers%add('time', self%begin)
+    call numbers%add('duration', self%duration)
+  end subroutine list_numbers
 
 end module nocdyn_timed_excitations

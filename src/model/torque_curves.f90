@@ -3,6 +3,7 @@ module nocdyn_torque_curves
   use nocdyn_bank, only: border_width
   use nocdyn_curves, only: curve_t
   use nocdyn_kinds, only: wp
+  use nocdyn_lane_numbers, only: lane_numbers_t
   implicit none (type, external)
   private
 
@@ -11,6 +12,7 @@ module nocdyn_torque_curves
   contains
     procedure(torque_interface), deferred :: torque   !! [N m]
     procedure(torque_interface), deferred :: slope    !! by the speed [N m s/rad]
+    procedure(list_interface), deferred :: list_numbers
     procedure :: has_segments
     procedure :: segment
     procedure :: margin
@@ -25,6 +27,12 @@ module nocdyn_torque_curves
       real(wp), intent(in) :: speed    !! [rad/s]
       real(wp) :: value
     end function torque_interface
+
+    subroutine list_interface(self, numbers)
+      import :: lane_numbers_t, torque_curve_t
+      class(torque_curve_t), target, intent(inout) :: self
+      type(lane_numbers_t), intent(inout) :: numbers
+    end subroutine list_interface
   end interface
 
   !> Eq. (20): A - B omega - C omega^2.
@@ -33,6 +41,7 @@ module nocdyn_torque_curves
   contains
     procedure :: torque => quadratic_torque
     procedure :: slope => quadratic_slope
+    procedure :: list_numbers => list_quadratic
   end type quadratic_curve_t
 
   !> Kloss: 2 T_k / (s / s_k + s_k / s) with the slip s = 1 - omega / synchronous_speed, as 2 T_k s s_k / (s^2 + s_k^2).
@@ -43,6 +52,7 @@ module nocdyn_torque_curves
   contains
     procedure :: torque => induction_torque
     procedure :: slope => induction_slope
+    procedure :: list_numbers => list_induction
   end type induction_curve_t
 
   type, extends(torque_curve_t), public :: table_curve_t
@@ -50,6 +60,7 @@ module nocdyn_torque_curves
   contains
     procedure :: torque => table_torque
     procedure :: slope => table_slope
+    procedure :: list_numbers => list_table
     procedure :: has_segments => table_has_segments
     procedure :: segment => table_segment
     procedure :: margin => table_margin
@@ -166,5 +177,30 @@ contains
 
     margin = self%curve(lane, motor)%margin(segment, speed, border_width)
   end function table_margin
+
+  subroutine list_quadratic(self, numbers)
+    class(quadratic_curve_t), target, intent(inout) :: self
+    type(lane_numbers_t), intent(inout) :: numbers
+
+    call numbers%add('a', self%a)
+    call numbers%add('b', self%b)
+    call numbers%add('c', self%c)
+  end subroutine list_quadratic
+
+  subroutine list_induction(self, numbers)
+    class(induction_curve_t), target, intent(inout) :: self
+    type(lane_numbers_t), intent(inout) :: numbers
+
+    call numbers%add('breakdown_torque', self%breakdown_torque)
+    call numbers%add('breakdown_slip', self%breakdown_slip)
+    call numbers%add('synchronous_speed', self%synchronous_speed)
+  end subroutine list_induction
+
+  subroutine list_table(self, numbers)
+    class(table_curve_t), target, intent(inout) :: self
+    type(lane_numbers_t), intent(inout) :: numbers
+
+    call numbers%add_curves(self%curve)
+  end subroutine list_table
 
 end module nocdyn_torque_curves

@@ -5,6 +5,7 @@
 module nocdyn_train_motion
   use nocdyn_complement, only: natural_complement
   use nocdyn_kinds, only: wp
+  use nocdyn_lane_numbers, only: lane_numbers_t
   use nocdyn_train_relations, only: train_relations_t
   implicit none (type, external)
   private
@@ -18,6 +19,8 @@ module nocdyn_train_motion
     integer, allocatable :: train(:)         !! that train
     integer, allocatable :: core(:)          !! relations that are solved together
     integer, allocatable :: core_trains(:)   !! all trains in them
+  contains
+    procedure :: list_layout
   end type elimination_t
 
   !> The motion of the trains of a group in one lane.
@@ -106,5 +109,16 @@ contains
       end do
     end do
   end subroutine find_loads
+
+  subroutine list_layout(self, numbers)
+    class(elimination_t), intent(in) :: self
+    type(lane_numbers_t), intent(inout) :: numbers
+
+    call numbers%remark(self%free)
+    call numbers%remark(self%relation)
+    call numbers%remark(self%train)
+    call numbers%remark(self%core)
+    call numbers%remark(self%core_trains)
+  end subroutine list_layout
 
 end module nocdyn_train_motion

@@ -6,6 +6,7 @@ module nocdyn_wave_excitations
   use nocdyn_bank, only: bank_t, role_excitation
   use nocdyn_elements, only: elements_t
   use nocdyn_kinds, only: wp
+  use nocdyn_lane_numbers, only: lane_numbers_t
   use nocdyn_text, only: string_t
   use nocdyn_vector_functions, only: cosines, sine_of
   implicit none (type, external)
@@ -20,6 +21,7 @@ module nocdyn_wave_excitations
     real(wp), allocatable :: order(:, :)
     real(wp), allocatable :: phase(:, :)       !! [rad]
   contains
+    procedure :: list_numbers
     procedure :: evaluate
     procedure :: differentiate
     procedure :: settle
@@ -86,5 +88,16 @@ contains
     self%amplitude = 0.0_wp
     self%frequency = 0.0_wp
   end subroutine settle
+
+  subroutine list_numbers(self, numbers)
+    class(wave_excitations_t), target, intent(inout) :: self
+    type(lane_numbers_t), intent(inout) :: numbers
+
+    call numbers%remark(self%owner)
+    call numbers%add('amplitude', self%amplitude)
+    call numbers%add('frequency', self%frequency)
+    call numbers%add('order', self%order)
+    call numbers%add('phase', self%phase)
+  end subroutine list_numbers
 
 end module nocdyn_wave_excitations
