@@ -1,0 +1,67 @@
+!> What a sweep keeps of a column of trajectory.csv: the words for it, and the labels of the results.
+module nocdyn_statistics
+  use nocdyn_kinds, only: wp
+  use nocdyn_text, only: string_t, to_text
+  implicit none (type, external)
+  private
+
+  public :: new_statistic
+
+  integer, parameter, public :: statistic_final = 1           !! at the end
+  integer, parameter, public :: statistic_max = 2             !! in continuous time, as all of them are
+  integer, parameter, public :: statistic_min = 3
+  integer, parameter, public :: statistic_max_abs = 4
+  integer, parameter, public :: statistic_mean = 5            !! integral over the time, divided by its length
+  integer, parameter, public :: statistic_rms = 6             !! root of the mean square
+  integer, parameter, public :: statistic_time_of_max = 7     !! when the largest value is reached first
+  integer, parameter, public :: statistic_settling_time = 8   !! until the last exit from the band, counted from `from`
+
+  character(len=*), parameter, public :: statistic_names(8) = [character(len=13) :: 'final', 'max', 'min', 'max_abs', 'mean', &
+    'rms', 'time_of_max', 'settling_time']
+  real(wp), parameter, public :: default_band = 0.02_wp
+
+  character(len=*), parameter :: descriptions(8) = [character(len=30) :: 'at the end', 'largest value', 'smallest value', &
+    'largest absolute value', 'mean over time', 'root mean square over time', 'time of the largest value', 'settling time']
+
+  !> One result of each variant. The column x counts from the time `from` on; it has settled once
+  !> |x - x_end| <= band |x(from) - x_end| for good.
+  type, public :: statistic_t
+    integer :: column = 1                            !! of the trajectory table
+    integer :: kind = statistic_final                !! statistic_...
+    real(wp) :: from = 0.0_wp                        !! [s]
+    real(wp) :: band = default_band                  !! for settling_time only
+    character(len=:), allocatable :: label           !! e.g. 'moment_shaft_max_abs_from_2'
+    character(len=:), allocatable :: unit            !! e.g. 'N m'
+    character(len=:), allocatable :: long_name       !! for people
+  end type statistic_t
+
+contains
+
+  !> The statistic of a column with a label such as 'moment_shaft [N m]'.
+  function new_statistic(labels, column, kind, t_start, from, band) result(self)
+    type(string_t), intent(in) :: labels(:)     !! of the trajectory table
+    integer, intent(in) :: column, kind
+    real(wp), intent(in) :: t_start             !! [s]
+    real(wp), intent(in), optional :: from      !! [s]; absent: t_start
+    real(wp), intent(in), optional :: band
+    type(statistic_t) :: self
+    integer :: bracket
+
+    self%column = column
+    self%kind = kind
+    self%from = t_start
+    if (present(band)) self%band = band
+    associate (text => labels(column)%text)
+      bracket = index(text, ' [', back=.true.)
+      self%label = text(:bracket - 1) // '_' // trim(statistic_names(kind))
+      self%unit = text(bracket + 2:len(text) - 1)
+      self%long_name = text(:bracket - 1) // ', ' // trim(descriptions(kind))
+    end associate
+    if (kind == statistic_time_of_max .or. kind == statistic_settling_time) self%unit = 's'
+    if (.not. present(from)) return
+    self%from = from
+    self%label = self%label // '_from_' // to_text(from)
+    self%long_name = self%long_name // ' from ' // to_text(from) // ' s'
+  end function new_statistic
+
+end module nocdyn_statistics
