@@ -1,4 +1,4 @@
-!> The columns of trajectory.csv: labels, and the values of a machine at a time and state.
+!> The rows of trajectory.csv: the values of all columns of a machine at a time and state.
 module nocdyn_trajectory_table
   use nocdyn_bank, only: quantity_t
   use nocdyn_constraints, only: constraints_t
@@ -6,7 +6,8 @@ module nocdyn_trajectory_table
   use nocdyn_formulation, only: formulation_t
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
-  use nocdyn_text, only: string_t, strings
+  use nocdyn_text, only: string_t
+  use nocdyn_trajectory_columns, only: column_t, list_columns
   implicit none (type, external)
   private
 
@@ -42,6 +43,7 @@ contains
     class(formulation_t), intent(in) :: formulation   !! of one lane, audited
     real(wp), intent(in) :: t_start
     type(trajectory_table_t) :: table
+    type(column_t), allocatable :: columns(:)
     integer :: i
 
     if (.not. formulation%is_audited) error stop 'nocdyn_trajectory_table: the works are among the columns'
@@ -55,85 +57,13 @@ contains
       table%is_source = [(spread(banks(i)%bank%is_source(), 1, size(banks(i)%bank%accounted)), i=1, size(banks))]
     end associate
     allocate (table%lambda(formulation%machine%constraints%rows()))
-    table%labels = column_labels(formulation%machine, table%columns)
+    call list_columns(formulation%machine, columns, table%labels)
     table%y = formulation%start()
     call table%formulation%observe([t_start], table%y)
     table%start_kinetic = kinetic_energy(table%formulation)
     table%start_energy = table%start_kinetic + table%formulation%machine%stored_energy(1)
     allocate (table%start_stored, source=stored_energies(table%formulation%machine))
   end function new_trajectory_table
-
-  !> Labels in the order in which `fill` gives the values.
-  function column_labels(machine, columns) result(labels)
-    type(machine_t), intent(in) :: machine
-    type(bank_columns_t), intent(in) :: columns(:)
-    type(string_t), allocatable :: labels(:)
-    integer :: i, next
-
-    allocate (labels(column_count(machine, columns)))
-    labels(1)%text = 't [s]'
-    do i = 1, machine%bodies
-      labels(1 + i)%text = 'phi_' // machine%names(i)%text // ' [rad]'
-      labels(1 + machine%bodies + i)%text = 'omega_' // machine%names(i)%text // ' [rad/s]'
-    end do
-    next = 2 + 2 * machine%bodies
-    do i = 1, size(columns)
-      call label_bank(machine%banks(i)%bank%names, columns(i)%quantities, labels, next)
-    end do
-    call label_reactions(machine%constraints, labels, next)
-    labels(next:) = strings([character(len=19) :: 'kinetic_energy [J]', 'elastic_energy [J]', 'work_in [J]', &
-                             'work_out [J]', 'energy_residual [J]'])
-  end function column_labels
-
-  subroutine label_bank(names, quantities, labels, next)
-    type(string_t), intent(in) :: names(:)
-    type(quantity_t), intent(in) :: quantities(:)
-    type(string_t), intent(inout) :: labels(:)
-    integer, intent(inout) :: next
-    integer :: e, q
-
-    do q = 1, size(quantities)
-      do e = 1, size(quantities(q)%elements)
-        labels(next)%text = trim(quantities(q)%name) // '_' // names(quantities(q)%elements(e))%text // &
-                            ' [' // trim(quantities(q)%unit) // ']'
-        next = next + 1
-      end do
-    end do
-  end subroutine label_bank
-
-  !> Each row's multiplier, then the torques on those of its members that have a column.
-  subroutine label_reactions(constraints, labels, next)
-    type(constraints_t), intent(in) :: constraints
-    type(string_t), intent(inout) :: labels(:)
-    integer, intent(inout) :: next
-    integer :: member, row
-
-    member = 1
-    do row = 1, constraints%rows()
-      labels(next)%text = 'reaction_' // constraints%names(row)%text // ' [' // constraints%units(row)%text // ']'
-      next = next + 1
-      do while (member <= size(constraints%members%row))
-        if (constraints%members%row(member) /= row) exit
-        labels(next)%text = 'reaction_' // constraints%names(row)%text // '_' // &
-                            constraints%members%names(member)%text // ' [N m]'
-        next = next + 1
-        member = member + 1
-      end do
-    end do
-  end subroutine label_reactions
-
-  pure integer function column_count(machine, columns)
-    type(machine_t), intent(in) :: machine
-    type(bank_columns_t), intent(in) :: columns(:)
-    integer :: i, q
-
-    column_count = 1 + 2 * machine%bodies + machine%constraints%rows() + size(machine%constraints%members%row) + 5
-    do i = 1, size(columns)
-      do q = 1, size(columns(i)%quantities)
-        column_count = column_count + size(columns(i)%quantities(q)%elements)
-      end do
-    end do
-  end function column_count
 
   !> The row of the table at time t and state y.
   subroutine fill(self, t, y, row)
@@ -172,7 +102,7 @@ contains
     end associate
   end subroutine fill
 
-  !> Multipliers and torques on members, in the order of `label_reactions`.
+  !> Multipliers, each followed by the torques on its members.
   pure subroutine fill_reactions(constraints, lambda, values)
     type(constraints_t), intent(in) :: constraints
     real(wp), intent(in) :: lambda(:)

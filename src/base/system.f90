@@ -55,11 +55,12 @@ module nocdyn_system
   !> Receives the solution at the requested times, is told of events and extremes, and may stop the integration.
   !>
   !> An event is a root of a function of time and state, found on the solution inside the steps. The tracked functions
-  !> are followed between the steps too: `take_ranges` receives their extremes in continuous time. By default an observer
-  !> wants to know nothing.
+  !> are followed between the steps too: `take_ranges` receives their extremes in continuous time. An observer that
+  !> `follows_steps` is handed the solution inside every step of the whole block. By default an observer wants to know nothing.
   type, public :: observer_t
     integer, allocatable :: directions(:)   !! event_... of each event function; not allocated: there are none
     integer :: tracked = 0                  !! number of tracked functions
+    logical :: follows_steps = .false.      !! whether `follow_steps` is called
   contains
     procedure :: record
     procedure :: stops
@@ -67,7 +68,18 @@ module nocdyn_system
     procedure :: happen
     procedure :: tracked_values
     procedure :: take_ranges
+    procedure :: follow_steps
   end type observer_t
+
+  !> The steps that the lanes of a block have taken at the same time; [lanes].
+  type, public :: steps_t
+    logical, allocatable :: taken(:)     !! whether the lane has moved: the solution inside the step is given then
+    logical, allocatable :: crosses(:)   !! whether the step ends where the system changes its branch
+    real(wp), allocatable :: t(:)        !! start
+    real(wp), allocatable :: h(:)        !! theta = (time - t) / h is the place in the step
+    real(wp), allocatable :: until(:)    !! end as a place: 1, or less where the step was cut
+    real(wp), allocatable :: t_new(:)    !! end as a time
+  end type steps_t
 
   !> Smallest and largest values of the tracked functions so far, with their times; [functions].
   type, public :: ranges_t
@@ -255,5 +267,16 @@ contains
 
     error stop 'nocdyn_system: an observer with tracked functions overrides take_ranges'
   end subroutine take_ranges
+
+  !> The last steps of the lanes, after their records and events: y + sum over p of c(:, :, p) theta^p.
+  subroutine follow_steps(self, steps, y, y_new, c)
+    class(observer_t), intent(inout) :: self
+    type(steps_t), intent(in) :: steps
+    real(wp), contiguous, intent(in) :: y(:, :)       !! at the starts, [lanes, padded columns]
+    real(wp), contiguous, intent(in) :: y_new(:, :)   !! at the ends
+    real(wp), contiguous, intent(in) :: c(:, :, :)    !! [lanes, padded columns, degree]
+
+    error stop 'nocdyn_system: an observer that follows the steps overrides follow_steps'
+  end subroutine follow_steps
 
 end module nocdyn_system

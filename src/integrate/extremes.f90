@@ -2,9 +2,9 @@
 !>
 !> In every step each function is replaced by the polynomial through its values at a few places of the solution inside the
 !> step (Chebyshev-Lobatto places, as many as that solution has coefficients: a linear function of the state is met
-!> exactly). Its critical points are found to machine precision wherever they can exceed the extremes so far. The polynomials
-!> are sums of Chebyshev polynomials, which are well-conditioned at any degree.
+!> exactly). Its critical points are found to machine precision wherever they can exceed the extremes so far.
 module nocdyn_extremes
+  use nocdyn_chebyshev, only: find_peak, lay_places, most_places
   use nocdyn_dense_output, only: dense_output_t, sample
   use nocdyn_kinds, only: wp
   use nocdyn_system, only: observer_t, ranges_t
@@ -13,11 +13,10 @@ module nocdyn_extremes
   private
 
   public :: allocate_extremes, start_extremes, resume_extremes, follow_extremes
+  public :: allocate_ranges, begin_ranges, widen
 
   real(wp), parameter :: overshoot = 0.25_wp   !! of the spread of the values: no polynomial is expected to pass them by more
-  real(wp), parameter :: right_before = 64.0_wp   !! spacings of the times: more than an observer may allow for their rounding
-  integer, parameter :: most_places = 40       !! in a step
-  integer, parameter :: most_newton_steps = 60   !! bisection alone would need as many
+  real(wp), parameter, public :: right_before = 64.0_wp   !! spacings of the times: an observer may allow for fewer of them
 
   type, public :: extremes_t
     type(ranges_t), allocatable :: ranges(:)               !! [lanes]
@@ -36,35 +35,25 @@ contains
     integer, intent(in) :: functions
     integer, intent(in) :: degree
     type(trial_t), intent(in) :: trial
-    real(wp), parameter :: pi = acos(-1.0_wp)
-    integer :: i, k, lane
+    integer :: lane
 
-    if (degree >= most_places) error stop 'nocdyn_extremes: the solution inside the step has too many coefficients'
     allocate (extremes%places(degree + 1), extremes%to_series(degree + 1, degree + 1))
-    do i = 0, degree
-      extremes%places(i + 1) = -cos(pi * i / degree)
-      do k = 0, degree
-        extremes%to_series(k + 1, i + 1) = 2 * end_weight(i, degree) * end_weight(k, degree) / degree &
-                                           * cos(pi * k * (degree - i) / degree)
-      end do
-    end do
+    call lay_places(degree, extremes%places, extremes%to_series)
     allocate (extremes%ranges(trial%lanes))
     do lane = 1, trial%lanes
-      associate (ranges => extremes%ranges(lane))
-        allocate (ranges%lowest(functions), ranges%lowest_time(functions), ranges%highest(functions), &
-                  ranges%highest_time(functions), source=0.0_wp)
-      end associate
+      call allocate_ranges(extremes%ranges(lane), functions)
     end do
     allocate (extremes%last(functions, trial%lanes), extremes%values(functions, degree + 1), extremes%y(trial%components), &
               source=0.0_wp)
   end subroutine allocate_extremes
 
-  !> 1/2 for the first and the last term of the sums that interpolate at Chebyshev-Lobatto places.
-  pure real(wp) function end_weight(i, last)
-    integer, intent(in) :: i, last
+  pure subroutine allocate_ranges(ranges, functions)
+    type(ranges_t), intent(out) :: ranges
+    integer, intent(in) :: functions
 
-    end_weight = merge(0.5_wp, 1.0_wp, i == 0 .or. i == last)
-  end function end_weight
+    allocate (ranges%lowest(functions), ranges%lowest_time(functions), ranges%highest(functions), &
+              ranges%highest_time(functions), source=0.0_wp)
+  end subroutine allocate_ranges
 
   !> The ranges of a lane at its start.
   subroutine start_extremes(extremes, observer, trial, lane)
@@ -74,13 +63,20 @@ contains
     integer, intent(in) :: lane
 
     call resume_extremes(extremes, observer, trial, lane)
-    associate (ranges => extremes%ranges(lane))
-      ranges%lowest(:) = extremes%last(:, lane)
-      ranges%highest(:) = extremes%last(:, lane)
-      ranges%lowest_time(:) = trial%t(lane)
-      ranges%highest_time(:) = trial%t(lane)
-    end associate
+    call begin_ranges(extremes%ranges(lane), extremes%last(:, lane), trial%t(lane))
   end subroutine start_extremes
+
+  !> Ranges that hold the values of a single time.
+  pure subroutine begin_ranges(ranges, values, t)
+    type(ranges_t), intent(inout) :: ranges
+    real(wp), contiguous, intent(in) :: values(:)   !! [functions]
+    real(wp), intent(in) :: t
+
+    ranges%lowest(:) = values
+    ranges%highest(:) = values
+    ranges%lowest_time(:) = t
+    ranges%highest_time(:) = t
+  end subroutine begin_ranges
 
   !> Takes the tracked functions anew where a lane is: they may have jumped.
   subroutine resume_extremes(extremes, observer, trial, lane)
@@ -160,79 +156,5 @@ contains
     time = t_start + 0.5_wp * (1 + place) * (t_end - t_start)
     if (place >= 1) time = t_end
   end subroutine raise
-
-  !> The largest value of the polynomial through `values` and its place, by Newton's method on the derivative with
-  !> bisection as safeguard, between the neighbours of the largest of the values.
-  pure subroutine find_peak(n, places, to_series, values, place, peak)
-    integer, intent(in) :: n
-    real(wp), intent(in) :: places(n), to_series(n, n), values(n)
-    real(wp), intent(out) :: place, peak
-    real(wp), dimension(most_places) :: c, slopes, curvatures   ! coefficients of the polynomial and of its derivatives
-    real(wp) :: below, above, candidate, slope, curvature
-    integer :: i, step
-
-    i = maxloc(values, dim=1)
-    place = places(i)
-    peak = values(i)
-    c(:n) = 0.0_wp
-    do step = 1, n
-      c(:n) = c(:n) + to_series(:, step) * values(step)
-    end do
-    call differentiate(n, c, slopes)
-    below = places(max(i - 1, 1))
-    above = places(min(i + 1, n))
-    if (series_value(n, slopes, below) <= 0 .or. series_value(n, slopes, above) >= 0) return
-    call differentiate(n, slopes, curvatures)
-    candidate = place
-    do step = 1, most_newton_steps
-      slope = series_value(n, slopes, candidate)
-      curvature = series_value(n, curvatures, candidate)
-      if (slope > 0) then
-        below = candidate
-      else
-        above = candidate
-      end if
-      candidate = 0.5_wp * (below + above)
-      if (curvature < 0) then
-        if (abs(slope) < -curvature * (above - below)) candidate = min(above, max(below, place - slope / curvature))
-      end if
-      if (abs(candidate - place) <= epsilon(place)) exit
-      place = candidate
-    end do
-    peak = max(peak, series_value(n, c, place))
-  end subroutine find_peak
-
-  !> The coefficients of the derivative of a sum of Chebyshev polynomials: d_(k-1) = d_(k+1) + 2 k c_k, the first halved.
-  pure subroutine differentiate(n, c, d)
-    integer, intent(in) :: n
-    real(wp), intent(in) :: c(n)   !! of T_0 to T_(n-1)
-    real(wp), intent(inout) :: d(n)
-    real(wp) :: after(most_places + 2)
-    integer :: k
-
-    after(:n + 2) = 0.0_wp
-    do k = n - 1, 1, -1
-      after(k) = after(k + 2) + 2 * k * c(k + 1)
-    end do
-    d = after(:n)
-    d(1) = 0.5_wp * d(1)
-  end subroutine differentiate
-
-  !> The sum of Chebyshev polynomials at x, by Clenshaw's recurrence.
-  pure real(wp) function series_value(n, c, x)
-    integer, intent(in) :: n
-    real(wp), intent(in) :: c(n), x
-    real(wp) :: last, last_but_one, next
-    integer :: k
-
-    last = 0.0_wp
-    last_but_one = 0.0_wp
-    do k = n, 2, -1
-      next = c(k) + 2 * x * last - last_but_one
-      last_but_one = last
-      last = next
-    end do
-    series_value = c(1) + x * last - last_but_one
-  end function series_value
 
 end module nocdyn_extremes

@@ -24,23 +24,31 @@ contains
     real(wp), contiguous, intent(in) :: times(:)
     class(observer_t), intent(inout) :: observer
     type(outcome_t), intent(inout) :: outcome
-    real(wp) :: until   ! place in the step
-    logical :: crosses
     integer :: lane
 
-    do lane = 1, march%trial%lanes
-      if (.not. march%accepted(lane)) cycle
-      if (march%wanted(lane)) call take_lane(march%dense, march%trial, march%coefficients, lane)
-      until = 1.0_wp
-      crosses = .false.
-      if (march%has_switches) then
-        call end_at_crossing(march, system, observer, lane, outcome, until)
-        crosses = march%switching%due(lane) > 0
-      end if
-      if (march%has_events) call pass_events(march, system, lane, until, times, observer, outcome)
-      call record_until(march, lane, march%t_new(lane), times, observer)
-      if (march%has_extremes) call follow_extremes(march%extremes, observer, march%dense, march%t_new(lane), crosses)
-    end do
+    associate (steps => march%steps)
+      do lane = 1, march%trial%lanes
+        if (.not. march%accepted(lane)) cycle
+        if (march%inspected(lane)) call take_lane(march%dense, march%trial, march%coefficients, lane)
+        steps%until(lane) = 1.0_wp
+        steps%crosses(lane) = .false.
+        if (march%has_switches) then
+          call end_at_crossing(march, system, observer, lane, outcome, steps%until(lane))
+          steps%crosses(lane) = march%switching%due(lane) > 0
+        end if
+        if (march%has_events) call pass_events(march, system, lane, steps%until(lane), times, observer, outcome)
+        call record_until(march, lane, march%t_new(lane), times, observer)
+        if (march%has_extremes) then
+          call follow_extremes(march%extremes, observer, march%dense, march%t_new(lane), steps%crosses(lane))
+        end if
+      end do
+      if (.not. observer%follows_steps) return
+      steps%taken(:) = march%accepted
+      steps%t(:) = march%trial%t
+      steps%h(:) = march%trial%h
+      steps%t_new(:) = march%t_new
+      call observer%follow_steps(steps, march%trial%y, march%trial%y_new, march%coefficients)
+    end associate
   end subroutine follow_lanes
 
   !> Cuts the step of a lane where a branch of the system ends.
@@ -72,7 +80,7 @@ contains
     type(march_t), intent(inout) :: march
     class(system_t), intent(inout) :: system
     integer, intent(in) :: lane
-    real(wp), intent(in) :: until   !! end of the step, 1 if it has not been cut
+    real(wp), intent(inout) :: until   !! end of the step, 1 if it has not been cut
     real(wp), contiguous, intent(in) :: times(:)
     class(observer_t), intent(inout) :: observer
     type(outcome_t), intent(inout) :: outcome
@@ -88,6 +96,7 @@ contains
       call observer%happen(lane, march%events%which(i), t, march%sample, is_terminal)
       if (.not. is_terminal) cycle
       outcome%status(lane) = integration_stopped
+      until = march%events%theta(i)
       march%t_new(lane) = t
       march%trial%y_new(lane, :march%trial%components) = march%sample
       exit

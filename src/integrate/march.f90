@@ -13,7 +13,7 @@ module nocdyn_march
     step_control_t, weigh_error
   use nocdyn_stepper, only: stepper_t
   use nocdyn_switching, only: allocate_switching, start_switching, switching_t
-  use nocdyn_system, only: observer_t, system_t
+  use nocdyn_system, only: observer_t, steps_t, system_t
   use nocdyn_trial, only: allocate_trial, evaluate_start, set_out, trial_fine, trial_give_up, trial_not_finite, trial_t
   implicit none (type, external)
   private
@@ -32,11 +32,14 @@ module nocdyn_march
     logical :: has_events = .false.
     logical :: has_extremes = .false.
     logical :: has_switches = .false.
+    logical :: is_followed = .false.                 !! whether the observer is handed the solution inside all steps
     logical :: is_exhausted = .false.                !! the queue has no variant left
     logical, allocatable :: occupied(:)              !! lanes that hold a variant
     logical, allocatable :: starting(:)              !! lanes that have just been given one, or go on from branch to branch
     logical, allocatable :: accepted(:)              !! lanes whose last attempt was accepted
     logical, allocatable :: wanted(:)                !! lanes whose solution inside the last step is wanted
+    logical, allocatable :: inspected(:)             !! lanes whose solution there is looked at on its own
+    type(steps_t) :: steps                           !! as the observer is told of them
     real(wp), allocatable :: t_new(:)                !! end of the last attempt of each lane
     integer, allocatable :: next(:)                  !! number of the first requested time of each lane that is not recorded yet
     real(wp), allocatable :: sample(:)               !! one lane's state at a requested time
@@ -64,13 +67,16 @@ contains
     march%first_step = settings%first_step
     march%max_steps = settings%max_steps
     associate (lanes => system%lanes, components => system%states + system%quadratures)
-      allocate (march%occupied(lanes), march%starting(lanes), march%accepted(lanes), march%wanted(lanes), source=.false.)
+      allocate (march%occupied(lanes), march%starting(lanes), march%accepted(lanes), march%wanted(lanes), &
+                march%inspected(lanes), march%steps%taken(lanes), march%steps%crosses(lanes), source=.false.)
       allocate (march%t_new(lanes), source=times(1))
+      allocate (march%steps%t(lanes), march%steps%h(lanes), march%steps%until(lanes), march%steps%t_new(lanes), source=0.0_wp)
       allocate (march%next(lanes), source=2)
       allocate (march%sample(components), source=0.0_wp)
       allocate (march%coefficients(lanes, size(march%trial%y, 2), stepper%degree), source=0.0_wp)
     end associate
     call allocate_dense_output(march%dense, march%trial%components, stepper%degree)
+    march%is_followed = observer%follows_steps
     march%has_switches = system%switches > 0
     if (march%has_switches) then
       call allocate_switching(march%switching, system, stepper%degree, march%trial, times(size(times)) - times(1))
@@ -248,9 +254,10 @@ contains
     if (.not. stepper%plans_steps) call weigh_error(march%control, march%trial)
     do lane = 1, march%trial%lanes
       march%accepted(lane) = march%trial%working(lane) .and. is_within(march%control%mean_square(lane))
-      march%wanted(lane) = march%accepted(lane) &
-                           .and. (march%has_events .or. march%has_extremes .or. march%has_switches &
-                                  .or. next_time(march, lane, times) < march%t_new(lane))
+      march%inspected(lane) = march%accepted(lane) &
+                              .and. (march%has_events .or. march%has_extremes .or. march%has_switches &
+                                     .or. next_time(march, lane, times) < march%t_new(lane))
+      march%wanted(lane) = march%inspected(lane) .or. (march%accepted(lane) .and. march%is_followed)
     end do
     if (any(march%wanted)) call stepper%interpolate(system, march%trial, march%wanted, march%coefficients)
     do lane = 1, march%trial%lanes

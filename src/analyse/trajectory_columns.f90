@@ -1,0 +1,133 @@
+!> The columns of trajectory.csv: what each of them is, and its label.
+module nocdyn_trajectory_columns
+  use nocdyn_bank, only: quantity_t
+  use nocdyn_constraints, only: constraints_t
+  use nocdyn_machine, only: machine_t
+  use nocdyn_text, only: string_t
+  implicit none (type, external)
+  private
+
+  public :: list_columns
+
+  integer, parameter, public :: column_time = 1
+  integer, parameter, public :: column_angle = 2        !! of a body
+  integer, parameter, public :: column_speed = 3
+  integer, parameter, public :: column_element = 4      !! a quantity of an element of a bank
+  integer, parameter, public :: column_reaction = 5     !! multiplier of a constraint row
+  integer, parameter, public :: column_member = 6       !! torque of a row on one of its members
+  integer, parameter, public :: column_kinetic = 7      !! energies and works of the machine
+  integer, parameter, public :: column_elastic = 8
+  integer, parameter, public :: column_work_in = 9
+  integer, parameter, public :: column_work_out = 10
+  integer, parameter, public :: column_residual = 11
+
+  character(len=*), parameter :: energy_labels(column_kinetic:column_residual) = &
+    [character(len=19) :: 'kinetic_energy [J]', 'elastic_energy [J]', 'work_in [J]', 'work_out [J]', 'energy_residual [J]']
+
+  type, public :: column_t
+    integer :: kind = column_time   !! column_...
+    integer :: bank = 0             !! of an element
+    integer :: quantity = 0         !! number of it in `quantities` of the bank
+    integer :: place = 0            !! body, element within its bank, row, or member
+  end type column_t
+
+contains
+
+  !> All columns of a machine, in the order of the table.
+  subroutine list_columns(machine, columns, labels)
+    type(machine_t), intent(in) :: machine
+    type(column_t), allocatable, intent(out) :: columns(:)
+    type(string_t), allocatable, intent(out) :: labels(:)
+    type(quantity_t), allocatable :: quantities(:)
+    integer :: b, count, i, kind
+
+    count = column_count(machine)
+    allocate (columns(count), labels(count))
+    count = 0
+    call add_column(columns, labels, count, column_t(column_time), 't [s]')
+    do b = 1, machine%bodies
+      call add_column(columns, labels, count, column_t(column_angle, place=b), 'phi_' // machine%names(b)%text // ' [rad]')
+    end do
+    do b = 1, machine%bodies
+      call add_column(columns, labels, count, column_t(column_speed, place=b), 'omega_' // machine%names(b)%text // ' [rad/s]')
+    end do
+    do i = 1, size(machine%banks)
+      quantities = machine%banks(i)%bank%quantities()
+      call add_bank(machine%banks(i)%bank%names, i, quantities, columns, labels, count)
+    end do
+    call add_reactions(machine%constraints, columns, labels, count)
+    do kind = column_kinetic, column_residual
+      call add_column(columns, labels, count, column_t(kind), trim(energy_labels(kind)))
+    end do
+  end subroutine list_columns
+
+  pure subroutine add_column(columns, labels, count, column, label)
+    type(column_t), intent(inout) :: columns(:)
+    type(string_t), intent(inout) :: labels(:)
+    integer, intent(inout) :: count
+    type(column_t), intent(in) :: column
+    character(len=*), intent(in) :: label
+
+    count = count + 1
+    columns(count) = column
+    labels(count)%text = label
+  end subroutine add_column
+
+  subroutine add_bank(names, bank, quantities, columns, labels, count)
+    type(string_t), intent(in) :: names(:)
+    integer, intent(in) :: bank
+    type(quantity_t), intent(in) :: quantities(:)
+    type(column_t), intent(inout) :: columns(:)
+    type(string_t), intent(inout) :: labels(:)
+    integer, intent(inout) :: count
+    integer :: e, q
+
+    do q = 1, size(quantities)
+      do e = 1, size(quantities(q)%elements)
+        associate (element => quantities(q)%elements(e))
+          call add_column(columns, labels, count, column_t(column_element, bank, q, element), &
+                          trim(quantities(q)%name) // '_' // names(element)%text // ' [' // trim(quantities(q)%unit) // ']')
+        end associate
+      end do
+    end do
+  end subroutine add_bank
+
+  !> Each row's multiplier, then the torques on those of its members that have a column.
+  subroutine add_reactions(constraints, columns, labels, count)
+    type(constraints_t), intent(in) :: constraints
+    type(column_t), intent(inout) :: columns(:)
+    type(string_t), intent(inout) :: labels(:)
+    integer, intent(inout) :: count
+    character(len=:), allocatable :: name
+    integer :: member, row
+
+    member = 1
+    do row = 1, constraints%rows()
+      name = 'reaction_' // constraints%names(row)%text
+      call add_column(columns, labels, count, column_t(column_reaction, place=row), &
+                      name // ' [' // constraints%units(row)%text // ']')
+      do while (member <= size(constraints%members%row))
+        if (constraints%members%row(member) /= row) exit
+        call add_column(columns, labels, count, column_t(column_member, place=member), &
+                        name // '_' // constraints%members%names(member)%text // ' [N m]')
+        member = member + 1
+      end do
+    end do
+  end subroutine add_reactions
+
+  integer function column_count(machine)
+    type(machine_t), intent(in) :: machine
+    type(quantity_t), allocatable :: quantities(:)
+    integer :: i, q
+
+    column_count = 1 + 2 * machine%bodies + machine%constraints%rows() + size(machine%constraints%members%row) &
+                   + size(energy_labels)
+    do i = 1, size(machine%banks)
+      quantities = machine%banks(i)%bank%quantities()
+      do q = 1, size(quantities)
+        column_count = column_count + size(quantities(q)%elements)
+      end do
+    end do
+  end function column_count
+
+end module nocdyn_trajectory_columns

@@ -1,0 +1,113 @@
+!> Polynomials on [-1, 1] as sums of Chebyshev polynomials c_1 T_0 + c_2 T_1 + ..., which are well-conditioned at any degree,
+!> and through their values at the Chebyshev-Lobatto places.
+module nocdyn_chebyshev
+  use nocdyn_kinds, only: wp
+  implicit none (type, external)
+  private
+
+  public :: lay_places, find_peak, differentiate, series_value
+
+  integer, parameter, public :: most_places = 40   !! and coefficients
+  integer, parameter :: most_newton_steps = 60     !! bisection alone would need as many
+
+contains
+
+  !> The places -cos(pi i / degree), and the matrix that makes coefficients of the values there.
+  pure subroutine lay_places(degree, places, to_series)
+    integer, intent(in) :: degree
+    real(wp), intent(out) :: places(0:degree)
+    real(wp), intent(out) :: to_series(0:degree, 0:degree)   !! [coefficients, places]
+    real(wp), parameter :: pi = acos(-1.0_wp)
+    integer :: i, k
+
+    if (degree >= most_places) error stop 'nocdyn_chebyshev: a polynomial has too many coefficients'
+    do i = 0, degree
+      places(i) = -cos(pi * i / degree)
+      do k = 0, degree
+        to_series(k, i) = 2 * end_weight(i, degree) * end_weight(k, degree) / degree * cos(pi * k * (degree - i) / degree)
+      end do
+    end do
+  end subroutine lay_places
+
+  !> 1/2 for the first and the last term of the sums that interpolate at Chebyshev-Lobatto places.
+  pure real(wp) function end_weight(i, last)
+    integer, intent(in) :: i, last
+
+    end_weight = merge(0.5_wp, 1.0_wp, i == 0 .or. i == last)
+  end function end_weight
+
+  !> The largest value of the polynomial through `values` and its place, by Newton's method on the derivative with
+  !> bisection as safeguard, between the neighbours of the largest of the values.
+  pure subroutine find_peak(n, places, to_series, values, place, peak)
+    integer, intent(in) :: n
+    real(wp), intent(in) :: places(n), to_series(n, n), values(n)
+    real(wp), intent(out) :: place, peak
+    real(wp), dimension(most_places) :: c, slopes, curvatures   ! coefficients of the polynomial and of its derivatives
+    real(wp) :: below, above, candidate, slope, curvature
+    integer :: i, step
+
+    i = maxloc(values, dim=1)
+    place = places(i)
+    peak = values(i)
+    c(:n) = 0.0_wp
+    do step = 1, n
+      c(:n) = c(:n) + to_series(:, step) * values(step)
+    end do
+    call differentiate(n, c, slopes)
+    below = places(max(i - 1, 1))
+    above = places(min(i + 1, n))
+    if (series_value(n, slopes, below) <= 0 .or. series_value(n, slopes, above) >= 0) return
+    call differentiate(n, slopes, curvatures)
+    candidate = place
+    do step = 1, most_newton_steps
+      slope = series_value(n, slopes, candidate)
+      curvature = series_value(n, curvatures, candidate)
+      if (slope > 0) then
+        below = candidate
+      else
+        above = candidate
+      end if
+      candidate = 0.5_wp * (below + above)
+      if (curvature < 0) then
+        if (abs(slope) < -curvature * (above - below)) candidate = min(above, max(below, place - slope / curvature))
+      end if
+      if (abs(candidate - place) <= epsilon(place)) exit
+      place = candidate
+    end do
+    peak = max(peak, series_value(n, c, place))
+  end subroutine find_peak
+
+  !> The coefficients of the derivative of a sum of Chebyshev polynomials: d_(k-1) = d_(k+1) + 2 k c_k, the first halved.
+  pure subroutine differentiate(n, c, d)
+    integer, intent(in) :: n
+    real(wp), intent(in) :: c(n)   !! of T_0 to T_(n-1)
+    real(wp), intent(inout) :: d(n)
+    real(wp) :: after(most_places + 2)
+    integer :: k
+
+    after(:n + 2) = 0.0_wp
+    do k = n - 1, 1, -1
+      after(k) = after(k + 2) + 2 * k * c(k + 1)
+    end do
+    d = after(:n)
+    d(1) = 0.5_wp * d(1)
+  end subroutine differentiate
+
+  !> The sum of Chebyshev polynomials at x, by Clenshaw's recurrence.
+  pure real(wp) function series_value(n, c, x)
+    integer, intent(in) :: n
+    real(wp), intent(in) :: c(n), x
+    real(wp) :: last, last_but_one, next
+    integer :: k
+
+    last = 0.0_wp
+    last_but_one = 0.0_wp
+    do k = n, 2, -1
+      next = c(k) + 2 * x * last - last_but_one
+      last_but_one = last
+      last = next
+    end do
+    series_value = c(1) + x * last - last_but_one
+  end function series_value
+
+end module nocdyn_chebyshev
