@@ -1,0 +1,163 @@
+!> Some columns of the trajectory table, for all lanes of a block.
+module nocdyn_recorded_columns
+  use nocdyn_formulation, only: formulation_t
+  use nocdyn_kinds, only: wp
+  use nocdyn_trajectory_columns, only: column_angle, column_elastic, column_element, column_kinetic, column_member, &
+    column_reaction, column_residual, column_speed, column_t, column_time, column_work_in, column_work_out
+  implicit none (type, external)
+  private
+
+  public :: new_recorded_columns
+
+  !> Keeps a formulation of its own, so that a running integration is not disturbed.
+  type, public :: recorded_columns_t
+    class(formulation_t), allocatable :: formulation
+    type(column_t), allocatable, private :: columns(:)
+    logical, private :: have_reactions = .false., have_energies = .false.
+    real(wp), allocatable, private :: values(:)          !! of one quantity of a bank, work space
+    real(wp), allocatable, private :: lambda(:)          !! multipliers, work space
+    logical, allocatable, private :: is_source(:)        !! whether a work counts as put in, [quadratures]
+    real(wp), allocatable, private :: start_energy(:)    !! [J], [lanes]
+  contains
+    procedure :: begin
+    procedure :: observe
+    procedure :: take_values
+  end type recorded_columns_t
+
+contains
+
+  function new_recorded_columns(formulation, columns) result(self)
+    class(formulation_t), intent(in) :: formulation   !! audited if there are works among the columns
+    type(column_t), intent(in) :: columns(:)
+    type(recorded_columns_t) :: self
+    integer :: i
+
+    if (any(columns%kind >= column_work_in) .and. .not. formulation%is_audited) then
+      error stop 'nocdyn_recorded_columns: works need a formulation that is audited'
+    end if
+    allocate (self%formulation, source=formulation)
+    allocate (self%columns, source=columns)
+    self%have_reactions = any(columns%kind == column_reaction .or. columns%kind == column_member)
+    self%have_energies = any(columns%kind == column_elastic .or. columns%kind == column_residual)
+    associate (banks => formulation%machine%banks)
+      allocate (self%values(maxval([(size(banks(i)%bank%to), i=1, size(banks))])), source=0.0_wp)
+      allocate (self%is_source, source=[(spread(banks(i)%bank%is_source(), 1, size(banks(i)%bank%accounted)), i=1, size(banks))])
+    end associate
+    allocate (self%lambda(formulation%machine%constraints%rows()), source=0.0_wp)
+    allocate (self%start_energy(formulation%lanes), source=0.0_wp)
+  end function new_recorded_columns
+
+  !> Takes the energy of a lane at its start, after `observe`.
+  subroutine begin(self, lane)
+    class(recorded_columns_t), intent(inout) :: self
+    integer, intent(in) :: lane
+
+    if (self%have_energies) self%start_energy(lane) = kinetic_energy(self, lane) + elastic_energy(self, lane)
+  end subroutine begin
+
+  !> Brings all lanes to a time and state.
+  subroutine observe(self, t, y)
+    class(recorded_columns_t), intent(inout) :: self
+    real(wp), contiguous, intent(in) :: t(:)
+    real(wp), contiguous, intent(in) :: y(:, :)   !! [lanes, states + quadratures]
+
+    call self%formulation%observe(t, y)
+    if (self%have_energies) call self%formulation%machine%assess()
+  end subroutine observe
+
+  !> The values of a lane's columns, after `observe` at (t, y).
+  subroutine take_values(self, lane, t, y, row)
+    class(recorded_columns_t), intent(inout) :: self
+    integer, intent(in) :: lane
+    real(wp), contiguous, intent(in) :: t(:)
+    real(wp), contiguous, intent(in) :: y(:, :)
+    real(wp), intent(inout) :: row(:)   !! [columns]
+    integer :: bank, i, quantity
+
+    if (self%have_reactions) call self%formulation%reactions(lane, self%lambda)
+    bank = 0
+    quantity = 0
+    associate (machine => self%formulation%machine)
+      do i = 1, size(self%columns)
+        associate (column => self%columns(i))
+          select case (column%kind)
+          case (column_time)
+            row(i) = t(lane)
+          case (column_angle)
+            row(i) = self%formulation%phi(lane, column%place)
+          case (column_speed)
+            row(i) = self%formulation%omega(lane, column%place)
+          case (column_element)
+            if (column%bank /= bank .or. column%quantity /= quantity) then
+              bank = column%bank
+              quantity = column%quantity
+              call machine%banks(bank)%bank%observe(machine%elements, quantity, lane, &
+                                                    self%values(:size(machine%banks(bank)%bank%to)))
+            end if
+            row(i) = self%values(column%place)
+          case (column_reaction)
+            row(i) = self%lambda(column%place)
+          case (column_member)
+            row(i) = machine%constraints%members%factor(lane, column%place) &
+                     * self%lambda(machine%constraints%members%row(column%place))
+          case default
+            row(i) = energy(self, lane, column%kind, y)
+          end select
+        end associate
+      end do
+    end associate
+  end subroutine take_values
+
+  !> Of a column of the whole machine [J].
+  real(wp) function energy(self, lane, kind, y)
+    type(recorded_columns_t), intent(in) :: self
+    integer, intent(in) :: lane, kind
+    real(wp), contiguous, intent(in) :: y(:, :)
+
+    energy = 0.0_wp
+    select case (kind)
+    case (column_kinetic)
+      energy = kinetic_energy(self, lane)
+    case (column_elastic)
+      energy = elastic_energy(self, lane)
+    case (column_work_in)
+      energy = work(self, lane, .true., y)
+    case (column_work_out)
+      energy = -work(self, lane, .false., y)
+    case (column_residual)
+      energy = (kinetic_energy(self, lane) + elastic_energy(self, lane) - self%start_energy(lane)) &
+               - (work(self, lane, .true., y) + work(self, lane, .false., y))
+    case default
+      error stop 'nocdyn_recorded_columns: there is no such column'
+    end select
+  end function energy
+
+  real(wp) function kinetic_energy(self, lane)
+    type(recorded_columns_t), intent(in) :: self
+    integer, intent(in) :: lane
+
+    kinetic_energy = self%formulation%machine%kinetic_energy(lane, self%formulation%omega(lane, 1:))
+  end function kinetic_energy
+
+  real(wp) function elastic_energy(self, lane)
+    type(recorded_columns_t), intent(in) :: self
+    integer, intent(in) :: lane
+
+    elastic_energy = sum(self%formulation%machine%elements%stored(lane, :))
+  end function elastic_energy
+
+  !> Of the sources or of the others, positive into the machine.
+  real(wp) function work(self, lane, of_sources, y)
+    type(recorded_columns_t), intent(in) :: self
+    integer, intent(in) :: lane
+    logical, intent(in) :: of_sources
+    real(wp), contiguous, intent(in) :: y(:, :)
+    integer :: i
+
+    work = 0.0_wp
+    do i = 1, size(self%is_source)
+      if (self%is_source(i) .eqv. of_sources) work = work + y(lane, self%formulation%states + i)
+    end do
+  end function work
+
+end module nocdyn_recorded_columns
