@@ -1,0 +1,165 @@
+!> Statistics of machines: as a block takes them, and from the rows of a dense trajectory.
+module nocdyn_test_sweep_blocks
+  use nocdyn_assembly, only: new_formulation
+  use nocdyn_errors, only: error_t
+  use nocdyn_formulation, only: formulation_t
+  use nocdyn_integration, only: integrate
+  use nocdyn_integration_settings, only: integration_settings_t
+  use nocdyn_kinds, only: wp
+  use nocdyn_machine, only: machine_t
+  use nocdyn_outcome, only: outcome_t
+  use nocdyn_recorder, only: recorder, recorder_t
+  use nocdyn_statistics, only: new_statistic, statistic_final, statistic_max, statistic_max_abs, statistic_mean, statistic_min, &
+    statistic_names, statistic_rms, statistic_settling_time, statistic_t, statistic_time_of_max
+  use nocdyn_statistics_observer, only: new_statistics_observer, statistics_observer_t
+  use nocdyn_trajectory_table, only: new_trajectory_table, trajectory_table_t
+  implicit none (type, external)
+  private
+
+  public :: all_statistics, run_block, run_densely, sampled_statistic, column_named
+
+contains
+
+  !> Every statistic of every column but the time, from the start and from a later time.
+  function all_statistics(machine, from, band) result(statistics)
+    type(machine_t), intent(in) :: machine
+    real(wp), intent(in) :: from   !! [s]
+    real(wp), intent(in) :: band
+    type(statistic_t), allocatable :: statistics(:)
+    type(trajectory_table_t) :: table
+    integer :: column, kind, next
+
+    table = table_of(machine)
+    allocate (statistics(2 * (size(table%labels) - 1) * size(statistic_names)))
+    next = 0
+    do column = 2, size(table%labels)
+      do kind = 1, size(statistic_names)
+        statistics(next + 1) = new_statistic(table%labels, column, kind, 0.0_wp, band=band)
+        statistics(next + 2) = new_statistic(table%labels, column, kind, 0.0_wp, from, band)
+        next = next + 2
+      end do
+    end do
+  end function all_statistics
+
+  function table_of(machine) result(table)
+    type(machine_t), intent(in) :: machine
+    type(trajectory_table_t) :: table
+    class(formulation_t), allocatable :: formulation
+
+    call new_formulation('reduced', machine, formulation)
+    table = new_trajectory_table(formulation, 0.0_wp)
+  end function table_of
+
+  !> Number of the column whose label begins with a name, 0 if there is none.
+  integer function column_named(machine, name)
+    type(machine_t), intent(in) :: machine
+    character(len=*), intent(in) :: name
+    type(trajectory_table_t) :: table
+
+    table = table_of(machine)
+    do column_named = size(table%labels), 1, -1
+      if (index(table%labels(column_named)%text, name // ' [') == 1) return
+    end do
+  end function column_named
+
+  pure type(integration_settings_t) function settings_of(method, tolerance) result(settings)
+    character(len=*), intent(in) :: method
+    real(wp), intent(in) :: tolerance
+
+    settings%method = method
+    settings%rtol = tolerance
+    settings%atol = 0.01_wp * tolerance
+  end function settings_of
+
+  !> The statistics of all lanes of a machine, each of which is one variant, from 0 to `t_end`.
+  subroutine run_block(machine, method, tolerance, t_end, statistics, values, outcome)
+    type(machine_t), intent(in) :: machine
+    character(len=*), intent(in) :: method
+    real(wp), intent(in) :: tolerance, t_end
+    type(statistic_t), intent(in) :: statistics(:)
+    real(wp), allocatable, intent(out) :: values(:, :)   !! [statistics, lanes]
+    type(outcome_t), intent(out) :: outcome
+    class(formulation_t), allocatable :: formulation
+    type(statistics_observer_t) :: observer
+    type(error_t), allocatable :: error
+    real(wp), allocatable :: y(:, :)
+    integer :: lane
+
+    call new_formulation('reduced', machine, formulation)
+    observer = new_statistics_observer(formulation, statistics, 0.0_wp, t_end)
+    y = formulation%start()
+    do lane = 1, machine%lanes
+      call observer%begin(lane, y(lane, :))
+    end do
+    call integrate(formulation, settings_of(method, tolerance), [0.0_wp, t_end], y, observer, outcome, error)
+    if (allocated(error)) error stop 'nocdyn_test_sweep_blocks: ' // error%message
+    allocate (values(size(statistics), machine%lanes))
+    do lane = 1, machine%lanes
+      call observer%results(lane, values(:, lane))
+    end do
+  end subroutine run_block
+
+  !> The rows of the trajectory at many times, of a machine of one lane.
+  subroutine run_densely(machine, method, tolerance, times, rows)
+    type(machine_t), intent(in) :: machine
+    character(len=*), intent(in) :: method
+    real(wp), intent(in) :: tolerance
+    real(wp), contiguous, intent(in) :: times(:)
+    real(wp), allocatable, intent(out) :: rows(:, :)   !! [columns, times]
+    class(formulation_t), allocatable :: formulation
+    type(trajectory_table_t) :: table
+    type(recorder_t) :: records
+    type(outcome_t) :: outcome
+    type(error_t), allocatable :: error
+    real(wp), allocatable :: y(:, :), state(:)
+    integer :: i
+
+    call new_formulation('reduced', machine, formulation)
+    table = new_trajectory_table(formulation, times(1))
+    records = recorder(formulation, size(times))
+    y = formulation%start()
+    call integrate(formulation, settings_of(method, tolerance), times, y, records, outcome, error)
+    if (allocated(error)) error stop 'nocdyn_test_sweep_blocks: ' // error%message
+    allocate (rows(size(table%labels), size(times)))
+    do i = 1, size(times)
+      state = records%y(1, i, :)
+      call table%fill(times(i), state, rows(:, i))
+    end do
+  end subroutine run_densely
+
+  !> The same from equidistant samples: extremes among them, integrals by the trapezoidal rule, the last sample out of the band.
+  pure real(wp) function sampled_statistic(statistic, times, x) result(value)
+    type(statistic_t), intent(in) :: statistic
+    real(wp), intent(in) :: times(:), x(:)
+    integer :: first, i, last
+
+    first = count(times < statistic%from - 1.0e-9_wp) + 1
+    last = size(times)
+    select case (statistic%kind)
+    case (statistic_final)
+      value = x(last)
+    case (statistic_max)
+      value = maxval(x(first:))
+    case (statistic_min)
+      value = minval(x(first:))
+    case (statistic_max_abs)
+      value = maxval(abs(x(first:)))
+    case (statistic_mean)
+      value = (sum(x(first:)) - 0.5_wp * (x(first) + x(last))) / (last - first)
+    case (statistic_rms)
+      value = sqrt((sum(x(first:)**2) - 0.5_wp * (x(first)**2 + x(last)**2)) / (last - first))
+    case (statistic_time_of_max)
+      value = times(first - 1 + maxloc(x(first:), dim=1))
+    case (statistic_settling_time)
+      value = 0.0_wp
+      do i = last, first, -1
+        if (abs(x(i) - x(last)) <= statistic%band * abs(x(first) - x(last))) cycle
+        value = times(i) - times(first)
+        exit
+      end do
+    case default
+      error stop 'nocdyn_test_sweep_blocks: there is no such statistic'
+    end select
+  end function sampled_statistic
+
+end module nocdyn_test_sweep_blocks
