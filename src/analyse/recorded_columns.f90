@@ -2,6 +2,8 @@
 module nocdyn_recorded_columns
   use nocdyn_formulation, only: formulation_t
   use nocdyn_kinds, only: wp
+  use nocdyn_lane_numbers, only: lane_numbers_t
+  use nocdyn_reduced, only: reduced_t
   use nocdyn_trajectory_columns, only: column_angle, column_elastic, column_element, column_kinetic, column_member, &
     column_reaction, column_residual, column_speed, column_t, column_time, column_work_in, column_work_out
   implicit none (type, external)
@@ -9,16 +11,19 @@ module nocdyn_recorded_columns
 
   public :: new_recorded_columns
 
-  !> Keeps a formulation of its own, so that a running integration is not disturbed.
+  !> Keeps a formulation of its own, so that a running integration is not disturbed. Once a lane has been copied into it, it
+  !> must stay where it is.
   type, public :: recorded_columns_t
     class(formulation_t), allocatable :: formulation
     type(column_t), allocatable, private :: columns(:)
+    type(lane_numbers_t), private :: numbers             !! of `formulation`, once a lane has been copied
     logical, private :: have_reactions = .false., have_energies = .false.
     real(wp), allocatable, private :: values(:)          !! of one quantity of a bank, work space
     real(wp), allocatable, private :: lambda(:)          !! multipliers, work space
     logical, allocatable, private :: is_source(:)        !! whether a work counts as put in, [quadratures]
     real(wp), allocatable, private :: start_energy(:)    !! [J], [lanes]
   contains
+    procedure :: copy_lane
     procedure :: begin
     procedure :: observe
     procedure :: take_values
@@ -46,6 +51,20 @@ contains
     allocate (self%lambda(formulation%machine%constraints%rows()), source=0.0_wp)
     allocate (self%start_energy(formulation%lanes), source=0.0_wp)
   end function new_recorded_columns
+
+  !> Gives a lane the numbers that it has in the formulation which is integrated.
+  subroutine copy_lane(self, lane, numbers)
+    class(recorded_columns_t), target, intent(inout) :: self
+    integer, intent(in) :: lane
+    type(lane_numbers_t), intent(in) :: numbers
+
+    select type (formulation => self%formulation)
+    class is (reduced_t)
+      if (self%numbers%slabs == 0) call formulation%list_numbers(self%numbers)
+    end select
+    call self%numbers%copy_lane(lane, numbers, lane)
+    call self%formulation%receive(lane)
+  end subroutine copy_lane
 
   !> Takes the energy of a lane at its start, after `observe`.
   subroutine begin(self, lane)

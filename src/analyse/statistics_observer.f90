@@ -3,6 +3,8 @@ module nocdyn_statistics_observer
   use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
   use nocdyn_formulation, only: formulation_t
   use nocdyn_kinds, only: wp
+  use nocdyn_lane_numbers, only: lane_numbers_t
+  use nocdyn_reduced, only: reduced_t
   use nocdyn_sampled_statistics, only: new_sampled_statistics, sampled_statistics_t
   use nocdyn_statistics, only: statistic_t
   use nocdyn_system, only: observer_t, steps_t
@@ -13,10 +15,12 @@ module nocdyn_statistics_observer
 
   public :: new_statistics_observer, needs_works
 
-  !> The times that are requested must be, or contain, the start and the end of the variants.
+  !> The times that are requested must be, or contain, the start and the end of the variants. After the first `begin` it must
+  !> stay where it is.
   type, extends(observer_t), public :: statistics_observer_t
     real(wp), private :: t_start = 0.0_wp, t_end = 0.0_wp   !! [s]
     integer, private :: statistics = 0
+    type(lane_numbers_t), private :: numbers                !! of the block; none if its lanes keep the numbers that they have
     type(sampled_statistics_t), private :: sampled
     logical, allocatable, private :: is_complete(:)         !! whether a lane has reached the end, [lanes]
   contains
@@ -39,10 +43,11 @@ contains
     needs_works = any(columns(statistics%column)%kind >= column_work_in)
   end function needs_works
 
-  function new_statistics_observer(formulation, statistics, t_start, t_end) result(self)
-    class(formulation_t), intent(in) :: formulation   !! of the block; audited if `needs_works`
-    type(statistic_t), intent(in) :: statistics(:)    !! each with t_start <= from < t_end
-    real(wp), intent(in) :: t_start, t_end            !! of every variant [s]
+  !> An observer of a block, which stays where it is. Only the reduced formulation may change the numbers of its lanes.
+  function new_statistics_observer(block, statistics, t_start, t_end) result(self)
+    class(formulation_t), target, intent(inout) :: block   !! audited if `needs_works`
+    type(statistic_t), intent(in) :: statistics(:)         !! each with t_start <= from < t_end
+    real(wp), intent(in) :: t_start, t_end                 !! of every variant [s]
     type(statistics_observer_t) :: self
     type(column_t), allocatable :: columns(:)
     type(string_t), allocatable :: labels(:)
@@ -51,9 +56,13 @@ contains
     self%t_end = t_end
     self%statistics = size(statistics)
     self%follows_steps = .true.
-    call list_columns(formulation%machine, columns, labels)
-    self%sampled = new_sampled_statistics(formulation, columns, statistics, t_end)
-    allocate (self%is_complete(formulation%lanes), source=.false.)
+    call list_columns(block%machine, columns, labels)
+    self%sampled = new_sampled_statistics(block, columns, statistics, t_end)
+    allocate (self%is_complete(block%lanes), source=.false.)
+    select type (block)
+    class is (reduced_t)
+      call block%list_numbers(self%numbers)
+    end select
   end function new_statistics_observer
 
   !> A lane of the block has been given a variant that starts at y.
@@ -63,6 +72,7 @@ contains
     real(wp), contiguous, intent(in) :: y(:)   !! [states + quadratures]
 
     self%is_complete(lane) = .false.
+    if (self%numbers%slabs > 0) call self%sampled%recorded%copy_lane(lane, self%numbers)
     call self%sampled%begin(lane, self%t_start, y)
   end subroutine begin
 

@@ -79,8 +79,8 @@ contains
     type(statistic_t), intent(in) :: statistics(:)
     real(wp), allocatable, intent(out) :: values(:, :)   !! [statistics, lanes]
     type(outcome_t), intent(out) :: outcome
-    class(formulation_t), allocatable :: formulation
-    type(statistics_observer_t) :: observer
+    class(formulation_t), allocatable, target :: formulation
+    type(statistics_observer_t), target :: observer
     type(error_t), allocatable :: error
     real(wp), allocatable :: y(:, :)
     integer :: lane
