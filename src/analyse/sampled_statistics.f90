@@ -200,9 +200,10 @@ contains
   end subroutine conclude
 
   !> The steps of a block.
-  subroutine follow(self, steps, y, c)
+  subroutine follow(self, steps, chosen, y, c)
     class(sampled_statistics_t), intent(inout) :: self
     type(steps_t), intent(in) :: steps
+    logical, intent(in) :: chosen(:)                 !! lanes that are wanted
     real(wp), contiguous, intent(in) :: y(:, :)      !! [lanes, padded columns]
     real(wp), contiguous, intent(in) :: c(:, :, :)   !! [lanes, padded columns, degree]
     integer :: i, lane
@@ -212,7 +213,7 @@ contains
     self%sampled_start(:) = huge(0.0_wp)
     do i = 1, size(self%spans)
       associate (span => self%spans(i))
-        self%active(:) = steps%taken .and. steps%t_new > span%from
+        self%active(:) = steps%taken .and. chosen .and. steps%t_new > span%from
         if (.not. any(self%active)) cycle
         self%start(:) = merge(max(steps%t, span%from), huge(0.0_wp), self%active)
         if (any(abs(self%start - self%sampled_start) > 0)) call sample_parts(self, steps, y, c)

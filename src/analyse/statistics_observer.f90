@@ -4,9 +4,12 @@ module nocdyn_statistics_observer
   use nocdyn_formulation, only: formulation_t
   use nocdyn_kinds, only: wp
   use nocdyn_lane_numbers, only: lane_numbers_t
+  use nocdyn_linear_columns, only: has_law, is_linear
+  use nocdyn_linear_statistics, only: linear_statistics_t, new_linear_statistics
   use nocdyn_reduced, only: reduced_t
   use nocdyn_sampled_statistics, only: new_sampled_statistics, sampled_statistics_t
-  use nocdyn_statistics, only: statistic_t
+  use nocdyn_statistics, only: statistic_max, statistic_max_abs, statistic_min, statistic_settling_time, statistic_t, &
+    statistic_time_of_max
   use nocdyn_system, only: observer_t, steps_t
   use nocdyn_text, only: string_t
   use nocdyn_trajectory_columns, only: column_t, column_work_in, list_columns
@@ -17,12 +20,19 @@ module nocdyn_statistics_observer
 
   !> The times that are requested must be, or contain, the start and the end of the variants. After the first `begin` it must
   !> stay where it is.
+  !>
+  !> A statistic is taken by `linear` if its column allows, else by `sampled`. That of an extremum of an elastic moment is taken
+  !> by `spare` in the lanes where the moment does not rise with the twist.
   type, extends(observer_t), public :: statistics_observer_t
-    real(wp), private :: t_start = 0.0_wp, t_end = 0.0_wp   !! [s]
-    integer, private :: statistics = 0
-    type(lane_numbers_t), private :: numbers                !! of the block; none if its lanes keep the numbers that they have
-    type(sampled_statistics_t), private :: sampled
-    logical, allocatable, private :: is_complete(:)         !! whether a lane has reached the end, [lanes]
+    class(formulation_t), pointer, private :: block => null()
+    real(wp), private :: t_start = 0.0_wp, t_end = 0.0_wp     !! [s]
+    type(lane_numbers_t), private :: numbers                  !! of the block; none if its lanes keep the numbers that they have
+    type(linear_statistics_t), private :: linear
+    type(sampled_statistics_t), private :: sampled, spare
+    integer, allocatable, private :: in_linear(:), in_sampled(:), in_spare(:)   !! places of the statistics there, or 0
+    logical, allocatable, private :: all_lanes(:)             !! true
+    logical, allocatable, private :: is_spared(:)             !! lanes in which `spare` is used
+    logical, allocatable, private :: is_complete(:)           !! lanes that have reached the end
   contains
     procedure :: begin
     procedure :: results
@@ -49,32 +59,77 @@ contains
     type(statistic_t), intent(in) :: statistics(:)         !! each with t_start <= from < t_end
     real(wp), intent(in) :: t_start, t_end                 !! of every variant [s]
     type(statistics_observer_t) :: self
+    logical, dimension(size(statistics)) :: has_extremum, linear
     type(column_t), allocatable :: columns(:)
     type(string_t), allocatable :: labels(:)
+    integer :: i
 
+    self%block => block
     self%t_start = t_start
     self%t_end = t_end
-    self%statistics = size(statistics)
     self%follows_steps = .true.
     call list_columns(block%machine, columns, labels)
-    self%sampled = new_sampled_statistics(block, columns, statistics, t_end)
-    allocate (self%is_complete(block%lanes), source=.false.)
+    has_extremum = .false.
+    do i = 1, size(statistics)
+      associate (column => columns(statistics(i)%column), kind => statistics(i)%kind)
+        linear(i) = is_linear(block, column)
+        if (kind == statistic_settling_time) linear(i) = .false.
+        if (.not. linear(i)) cycle
+        if (any(kind == [statistic_max, statistic_min, statistic_max_abs, statistic_time_of_max])) then
+          has_extremum(i) = has_law(block%machine, column)
+        end if
+      end associate
+    end do
+    allocate (self%in_linear, source=places_of(linear))
+    allocate (self%in_sampled, source=places_of(.not. linear))
+    allocate (self%in_spare, source=places_of(has_extremum))
+    self%linear = new_linear_statistics(block, columns, pack(statistics, linear), t_end)
+    self%sampled = new_sampled_statistics(block, columns, pack(statistics, .not. linear), t_end)
+    self%spare = new_sampled_statistics(block, columns, pack(statistics, has_extremum), t_end)
+    allocate (self%all_lanes(block%lanes), source=.true.)
+    allocate (self%is_spared(block%lanes), self%is_complete(block%lanes), source=.false.)
     select type (block)
     class is (reduced_t)
       call block%list_numbers(self%numbers)
     end select
   end function new_statistics_observer
 
+  !> The numbers of the true ones among themselves, 0 for the others.
+  pure function places_of(mask) result(places)
+    logical, intent(in) :: mask(:)
+    integer :: places(size(mask))
+    integer :: i
+
+    places = [(merge(count(mask(:i)), 0, mask(i)), i=1, size(mask))]
+  end function places_of
+
   !> A lane of the block has been given a variant that starts at y.
   subroutine begin(self, lane, y)
     class(statistics_observer_t), intent(inout) :: self
     integer, intent(in) :: lane
     real(wp), contiguous, intent(in) :: y(:)   !! [states + quadratures]
+    integer :: i
 
     self%is_complete(lane) = .false.
-    if (self%numbers%slabs > 0) call self%sampled%recorded%copy_lane(lane, self%numbers)
-    call self%sampled%begin(lane, self%t_start, y)
+    self%is_spared(lane) = .false.
+    call self%linear%begin(self%block, lane)
+    do i = 1, size(self%in_spare)
+      if (self%in_spare(i) == 0) cycle
+      if (.not. self%linear%is_rising(self%in_linear(i), lane)) self%is_spared(lane) = .true.
+    end do
+    if (any(self%in_sampled > 0)) call begin_sampled(self, self%sampled, lane, y)
+    if (self%is_spared(lane)) call begin_sampled(self, self%spare, lane, y)
   end subroutine begin
+
+  subroutine begin_sampled(self, sampled, lane, y)
+    type(statistics_observer_t), intent(in) :: self
+    type(sampled_statistics_t), target, intent(inout) :: sampled
+    integer, intent(in) :: lane
+    real(wp), contiguous, intent(in) :: y(:)
+
+    if (self%numbers%slabs > 0) call sampled%recorded%copy_lane(lane, self%numbers)
+    call sampled%begin(lane, self%t_start, y)
+  end subroutine begin_sampled
 
   !> The statistics of the last variant in a lane; NaN if it has not reached its end.
   subroutine results(self, lane, values)
@@ -85,11 +140,18 @@ contains
 
     values(:) = ieee_value(1.0_wp, ieee_quiet_nan)
     if (.not. self%is_complete(lane)) return
-    do i = 1, self%statistics
-      values(i) = self%sampled%value(i, lane)
+    do i = 1, size(values)
+      if (self%in_sampled(i) > 0) then
+        values(i) = self%sampled%value(self%in_sampled(i), lane)
+        cycle
+      end if
+      values(i) = self%linear%value(self%in_linear(i), lane)
+      if (self%in_spare(i) == 0) cycle
+      if (.not. self%linear%is_rising(self%in_linear(i), lane)) values(i) = self%spare%value(self%in_spare(i), lane)
     end do
   end subroutine results
 
+  !> Only the end is of interest.
   subroutine record(self, lane, t, y)
     class(statistics_observer_t), intent(inout) :: self
     integer, intent(in) :: lane
@@ -98,7 +160,8 @@ contains
 
     if (t < self%t_end) return
     self%is_complete(lane) = .true.
-    call self%sampled%conclude(lane, t, y)
+    call self%linear%conclude(lane, y)
+    if (any(self%in_sampled > 0)) call self%sampled%conclude(lane, t, y)
   end subroutine record
 
   subroutine follow_steps(self, steps, y, y_new, c)
@@ -106,7 +169,9 @@ contains
     type(steps_t), intent(in) :: steps
     real(wp), contiguous, intent(in) :: y(:, :), y_new(:, :), c(:, :, :)
 
-    call self%sampled%follow(steps, y, c)
+    call self%linear%follow(steps, y, y_new, c)
+    call self%sampled%follow(steps, self%all_lanes, y, c)
+    if (any(self%is_spared)) call self%spare%follow(steps, self%is_spared, y, c)
   end subroutine follow_steps
 
 end module nocdyn_statistics_observer

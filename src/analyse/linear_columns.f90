@@ -1,0 +1,206 @@
+!> Columns of the trajectory table that are linear functions of the state of the reduced formulation, or the elastic moments of
+!> couplings that are polynomials of one; for all lanes of a block.
+!>
+!> x = offset + sum of factor * y(component). An angle or a speed of a body is x, a twist is x, and the elastic moment of a
+!> coupling is (linear + cubic x^2) x, where x is counted from the twist at rest.
+module nocdyn_linear_columns
+  use nocdyn_bank, only: bank_t
+  use nocdyn_couplings, only: couplings_t
+  use nocdyn_coordinates, only: coordinates_t
+  use nocdyn_formulation, only: formulation_t
+  use nocdyn_kinds, only: wp
+  use nocdyn_machine, only: machine_t
+  use nocdyn_reduced, only: reduced_t
+  use nocdyn_trajectory_columns, only: column_angle, column_element, column_speed, column_t
+  implicit none (type, external)
+  private
+
+  public :: is_linear, has_law, new_linear_columns
+
+  integer, parameter, public :: width = 8   !! lanes that are looked at together
+
+  type, public :: linear_columns_t
+    integer :: count = 0
+    integer, allocatable :: first(:)          !! of the entries of each column, [count + 1]
+    integer, allocatable :: component(:)      !! of the state, [entries]
+    real(wp), allocatable :: factor(:, :)     !! [lanes and padding, entries]
+    real(wp), allocatable :: offset(:, :)     !! [lanes and padding, columns], as the next two
+    real(wp), allocatable :: linear(:, :)     !! 1 of a column that is x itself
+    real(wp), allocatable :: cubic(:, :)
+    integer, allocatable, private :: ratio(:)       !! of the coordinates, [entries]
+    logical, allocatable, private :: is_minus(:)    !! whether the factor is its negative, [entries]
+    logical, allocatable, private :: is_speed(:)    !! [columns]
+    integer, allocatable, private :: element(:)     !! that has the law, 0 if none has
+    integer, allocatable, private :: from(:), to(:) !! bodies, 0 is the ground
+  contains
+    procedure :: take_lane
+    procedure :: is_rising
+    procedure :: argument
+    procedure :: law
+  end type linear_columns_t
+
+contains
+
+  !> Whether a column is of this kind.
+  logical function is_linear(block, column)
+    class(formulation_t), intent(in) :: block
+    type(column_t), intent(in) :: column
+
+    is_linear = column%kind == column_angle .or. column%kind == column_speed
+    if (.not. is_linear) is_linear = is_twist(block%machine, column)
+    if (.not. is_linear) is_linear = has_law(block%machine, column)
+    select type (block)
+    class is (reduced_t)
+      return
+    class default
+      is_linear = .false.
+    end select
+  end function is_linear
+
+  logical function is_twist(machine, column)
+    type(machine_t), intent(in) :: machine
+    type(column_t), intent(in) :: column
+
+    is_twist = .false.
+    if (column%kind == column_element) is_twist = is_quantity(machine%banks(column%bank)%bank, column%quantity, 'twist')
+  end function is_twist
+
+  !> Whether a column is the elastic moment of a coupling whose law is that of eq. (3).
+  logical function has_law(machine, column)
+    type(machine_t), intent(in) :: machine
+    type(column_t), intent(in) :: column
+
+    has_law = .false.
+    if (column%kind /= column_element) return
+    select type (bank => machine%banks(column%bank)%bank)
+    type is (couplings_t)
+      has_law = is_quantity(bank, column%quantity, 'moment')
+    end select
+  end function has_law
+
+  logical function is_quantity(bank, quantity, name)
+    class(bank_t), intent(in) :: bank
+    integer, intent(in) :: quantity
+    character(len=*), intent(in) :: name
+
+    associate (quantities => bank%quantities())
+      is_quantity = quantities(quantity)%name == name
+    end associate
+  end function is_quantity
+
+  !> The given columns, each `is_linear`; the numbers of the lanes come by `take_lane`.
+  function new_linear_columns(block, columns) result(self)
+    class(formulation_t), intent(in) :: block
+    type(column_t), intent(in) :: columns(:)
+    type(linear_columns_t) :: self
+    integer :: i, lanes
+
+    self%count = size(columns)
+    lanes = width * ((block%lanes + width - 1) / width)
+    allocate (self%first(self%count + 1), source=1)
+    allocate (self%component(0), self%ratio(0), self%is_minus(0))
+    allocate (self%is_speed, source=columns%kind == column_speed)
+    allocate (self%element(self%count), self%from(self%count), self%to(self%count), source=0)
+    do i = 1, self%count
+      call place_column(self, i, block%machine, columns(i))
+      call add_entries(self, i, block%machine%coordinates)
+    end do
+    allocate (self%factor(lanes, size(self%component)), self%offset(lanes, self%count), self%cubic(lanes, self%count), &
+              source=0.0_wp)
+    allocate (self%linear(lanes, self%count), source=1.0_wp)
+  end function new_linear_columns
+
+  subroutine place_column(self, number, machine, column)
+    type(linear_columns_t), intent(inout) :: self
+    integer, intent(in) :: number
+    type(machine_t), intent(in) :: machine
+    type(column_t), intent(in) :: column
+    integer :: element
+
+    self%to(number) = column%place
+    if (column%kind /= column_element) return
+    element = machine%banks(column%bank)%bank%first - 1 + column%place
+    self%to(number) = machine%elements%to(element)
+    self%from(number) = machine%elements%from(element)
+    if (has_law(machine, column)) self%element(number) = element
+  end subroutine place_column
+
+  subroutine add_entries(self, number, coordinates)
+    type(linear_columns_t), intent(inout) :: self
+    integer, intent(in) :: number
+    type(coordinates_t), intent(in) :: coordinates
+    integer :: bodies(2), i, k
+
+    bodies = [self%to(number), self%from(number)]
+    do i = 1, 2
+      if (bodies(i) == 0) cycle
+      do k = coordinates%first(bodies(i)), coordinates%first(bodies(i) + 1) - 1
+        self%ratio = [self%ratio, k]
+        self%is_minus = [self%is_minus, i == 2]
+        self%component = [self%component, coordinates%coordinate(k) + merge(0, coordinates%freedoms, self%is_speed(number))]
+      end do
+    end do
+    self%first(number + 1) = size(self%ratio) + 1
+  end subroutine add_entries
+
+  !> Takes over the numbers of a lane.
+  pure subroutine take_lane(self, block, lane)
+    class(linear_columns_t), intent(inout) :: self
+    class(formulation_t), intent(in) :: block
+    integer, intent(in) :: lane
+    integer :: i, k
+
+    associate (machine => block%machine)
+      do k = 1, size(self%ratio)
+        associate (ratio => machine%coordinates%ratio(lane, self%ratio(k)))
+          self%factor(lane, k) = merge(-ratio, ratio, self%is_minus(k))
+        end associate
+      end do
+      do i = 1, self%count
+        if (self%is_speed(i)) cycle
+        self%offset(lane, i) = 0.0_wp
+        if (self%to(i) > 0) self%offset(lane, i) = machine%start_angle(lane, self%to(i))
+        if (self%from(i) > 0) self%offset(lane, i) = self%offset(lane, i) - machine%start_angle(lane, self%from(i))
+        if (self%element(i) == 0) cycle
+        associate (laws => machine%laws, e => self%element(i))
+          self%offset(lane, i) = self%offset(lane, i) - laws%rest(lane, e)
+          self%linear(lane, i) = laws%linear(lane, e)
+          self%cubic(lane, i) = laws%cubic(lane, e)
+        end associate
+      end do
+    end associate
+  end subroutine take_lane
+
+  !> Whether a column rises with x.
+  pure logical function is_rising(self, number, lane)
+    class(linear_columns_t), intent(in) :: self
+    integer, intent(in) :: number, lane
+
+    associate (linear => self%linear(lane, number), cubic => self%cubic(lane, number))
+      is_rising = min(linear, cubic) >= 0 .and. max(linear, cubic) > 0
+    end associate
+  end function is_rising
+
+  !> x of a state of a lane.
+  pure real(wp) function argument(self, number, lane, y) result(x)
+    class(linear_columns_t), intent(in) :: self
+    integer, intent(in) :: number, lane
+    real(wp), contiguous, intent(in) :: y(:)
+    integer :: k
+
+    x = self%offset(lane, number)
+    do k = self%first(number), self%first(number + 1) - 1
+      x = x + self%factor(lane, k) * y(self%component(k))
+    end do
+  end function argument
+
+  !> The column at x.
+  pure real(wp) function law(self, number, lane, x)
+    class(linear_columns_t), intent(in) :: self
+    integer, intent(in) :: number, lane
+    real(wp), intent(in) :: x
+
+    law = (self%linear(lane, number) + self%cubic(lane, number) * x * x) * x
+  end function law
+
+end module nocdyn_linear_columns
