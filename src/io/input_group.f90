@@ -10,7 +10,7 @@ module nocdyn_input_group
   use nocdyn_namelist, only: assignment_t, namelist_group_t, namelist_t
   use nocdyn_schema, only: group_rules, key_rule_index, key_rules, orders
   use nocdyn_schema_relations, only: relations_t
-  use nocdyn_schema_rules, only: a_name, key_rule_t, required, unset
+  use nocdyn_schema_rules, only: a_name, key_rule_t, unset
   use nocdyn_schema_text, only: allowed_text, key_names, suggestion
   use nocdyn_text, only: lower_case, nearest_word, to_text
   implicit none (type, external)
@@ -148,11 +148,12 @@ contains
       value%is_given = said > 0
       value%line = draft%line
       value%override = draft%override
-      if (draft%is_damaged .or. (said == 0 .and. (work%may_miss(i) .or. work%is_out(i) .or. rule%default == unset))) return
+      if (draft%is_damaged .or. (said == 0 .and. (work%may_miss(i) .or. work%is_out(i)))) return
+      if (said == 0 .and. rule%default == unset .and. .not. work%is_needed(i)) return
 
       call draft%fill_default(rule, work%length(i))
       known = draft%values_said()
-      if (known == 0 .and. rule%default /= required) return
+      if (known == 0 .and. .not. work%is_needed(i)) return
       if (known == 0) then
         complaint = trim(merge(' has no value', ' is missing  ', draft%is_written)) // '; needed: ' // allowed_text(rule)
       else if (known < size(draft%slots)) then

@@ -9,9 +9,9 @@ module nocdyn_input_reader
   use nocdyn_mistakes, only: mistake_t, mistakes_t, no_line
   use nocdyn_namelist, only: namelist_group_t, namelist_t
   use nocdyn_namelist_scanner, only: scan_namelist
-  use nocdyn_schema, only: group_rule_index, group_rules, is_single
+  use nocdyn_schema, only: first_key, group_rule_index, group_rules, is_single, key_rules, last_key
   use nocdyn_schema_relations, only: relations_of, relations_t
-  use nocdyn_schema_rules, only: at_least_once, exactly_once
+  use nocdyn_schema_rules, only: at_least_once, exactly_once, required
   use nocdyn_schema_text, only: group_names, occurrence_text, suggestion
   use nocdyn_text, only: nearest_word, quoted, string_t, to_text
   use nocdyn_text_buffer, only: text_buffer_t
@@ -123,10 +123,17 @@ contains
         is_there = is_there .or. namelist%groups(g)%name == group_rules(rule)%name
       end do
       if (is_there .or. .not. is_single(rule)) cycle
-      if (group_rules(rule)%occurrence == exactly_once .and. all(overrides%group_rule /= rule)) cycle
+      if (has_required_key(rule) .and. all(overrides%group_rule /= rule)) cycle
       rules = [rules, rule]
     end do
   end subroutine find_absent_groups
+
+  !> Whether a group cannot be made of defaults.
+  pure logical function has_required_key(group_rule)
+    integer, intent(in) :: group_rule
+
+    has_required_key = any(key_rules(first_key(group_rule):last_key(group_rule))%default == required)
+  end function has_required_key
 
   !> Groups that must be there, and groups that may be there only once.
   subroutine check_occurrences(groups, mistakes)

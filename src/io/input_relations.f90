@@ -7,9 +7,9 @@ module nocdyn_input_relations
   use nocdyn_mistakes, only: mistakes_t
   use nocdyn_schema, only: has_word, words_of
   use nocdyn_schema_relations, only: relations_t
-  use nocdyn_schema_rules, only: any_number, key_rule_t, unset
+  use nocdyn_schema_rules, only: any_number, key_rule_t, required, unset
   use nocdyn_schema_text, only: kinds_text, listed
-  use nocdyn_text, only: lower_case, quoted, string_t
+  use nocdyn_text, only: append, joined, lower_case, string_t
   implicit none (type, external)
   private
 
@@ -40,65 +40,87 @@ contains
 
   subroutine keep_keys_of_kind(work, key, mistakes)
     type(work_t), intent(inout) :: work
-    integer, intent(in) :: key   !! position of `kind`
+    integer, intent(in) :: key   !! position of the key of the kind `a_kind`
     type(mistakes_t), intent(inout) :: mistakes
-    character(len=:), allocatable :: kind
+    type(string_t), allocatable :: kinds(:)
     type(key_rule_t) :: rule
+    logical :: is_known
     integer :: i
 
-    call find_kind(work, key, kind)
+    call find_kinds(work, key, kinds, is_known)
     do i = 1, size(work%drafts)
       rule = work%key(i)
-      if (rule%kinds == '') cycle
-      if (kind == '') then
-        work%may_miss(i) = .true.
-      else if (.not. has_word(rule%kinds, kind)) then
-        if (work%drafts(i)%is_said()) call refuse_foreign_key(work, i, key, kind, mistakes)
-        call work%rule_out(i)
+      if (rule%kinds /= '') then
+        if (.not. is_known) then
+          work%may_miss(i) = .true.
+        else if (.not. has_any_word(rule%kinds, kinds)) then
+          if (work%drafts(i)%is_said()) call refuse_foreign_key(work, i, key, kinds, mistakes)
+          call work%rule_out(i)
+        end if
       end if
+      work%is_needed(i) = work%is_needed(i) .or. has_any_word(rule%needed_by, kinds)
     end do
   end subroutine keep_keys_of_kind
 
-  !> The word of the key `kind`; '' if it is not one of the schema, which is reported with its value.
-  subroutine find_kind(work, key, kind)
+  !> The words of the key that says the kind; those that are not of the schema are reported with its value.
+  subroutine find_kinds(work, key, kinds, is_known)
     type(work_t), intent(in) :: work
     integer, intent(in) :: key
-    character(len=:), allocatable, intent(out) :: kind
+    type(string_t), allocatable, intent(out) :: kinds(:)   !! in lower case; empty if none is given, nor a default
+    logical, intent(out) :: is_known                       !! false if one is missing or is none of the schema
     type(key_rule_t) :: rule
     type(string_t), allocatable :: words(:)
-    integer :: i
+    integer :: i, j
 
     rule = work%key(key)
-    kind = ''
-    if (work%drafts(key)%is_damaged) return
+    allocate (kinds(0))
+    is_known = .not. work%drafts(key)%is_damaged
+    if (.not. is_known) return
     if (.not. work%drafts(key)%is_said()) then
-      kind = rule%default(2:len_trim(rule%default) - 1)
+      is_known = rule%default /= required
+      if (rule%default(1:1) == "'") call append(kinds, rule%default(2:len_trim(rule%default) - 1))
       return
     end if
     allocate (words, source=words_of(rule))
-    do i = 1, size(words)
-      if (lower_case(work%drafts(key)%slots(1)%text) == words(i)%text) kind = words(i)%text
+    do i = 1, size(work%drafts(key)%slots)
+      if (.not. allocated(work%drafts(key)%slots(i)%text)) cycle
+      call append(kinds, lower_case(work%drafts(key)%slots(i)%text))
+      is_known = is_known .and. any([(words(j)%text == kinds(size(kinds))%text, j=1, size(words))])
     end do
-  end subroutine find_kind
+  end subroutine find_kinds
+
+  pure logical function has_any_word(list, words)
+    character(len=*), intent(in) :: list   !! separated by blanks
+    type(string_t), intent(in) :: words(:)
+    integer :: i
+
+    has_any_word = any([(has_word(list, words(i)%text), i=1, size(words))])
+  end function has_any_word
 
   !> With the kind left to its default it was probably forgotten: then the keys of the default kind are not missed in addition.
-  subroutine refuse_foreign_key(work, position, kind_position, kind, mistakes)
+  subroutine refuse_foreign_key(work, position, kind_position, kinds, mistakes)
     type(work_t), intent(inout) :: work
     integer, intent(in) :: position, kind_position
-    character(len=*), intent(in) :: kind
+    type(string_t), intent(in) :: kinds(:)
     type(mistakes_t), intent(inout) :: mistakes
-    character(len=:), allocatable :: text
+    character(len=:), allocatable :: text, kind_name
     type(key_rule_t) :: rule
     integer :: i
 
     if (work%is_overridden(kind_position) .and. .not. work%is_overridden(position)) return
     rule = work%key(position)
-    text = trim(rule%name) // ' belongs to kind = ' // kinds_text(rule) // '; here kind = ' // quoted(kind)
-    if (.not. work%drafts(kind_position)%is_said()) then
+    kind_name = name_of(work, kind_position)
+    text = trim(rule%name) // ' belongs to ' // kind_name // ' = ' // kinds_text(rule) // '; here '
+    if (size(kinds) == 0) then
+      text = text // 'is no ' // kind_name
+    else
+      text = text // kind_name // ' = ' // joined(kinds, ', ')
+    end if
+    if (size(kinds) > 0 .and. .not. work%drafts(kind_position)%is_said()) then
       text = text // ', the default'
       do i = 1, size(work%drafts)
         rule = work%key(i)
-        if (has_word(rule%kinds, kind)) work%may_miss(i) = .true.
+        if (has_any_word(rule%kinds, kinds) .or. has_any_word(rule%needed_by, kinds)) work%may_miss(i) = .true.
       end do
     end if
     call mistakes%add(work%drafts(position)%line, work%index, text, work%drafts(position)%override)

@@ -2,7 +2,7 @@
 module nocdyn_input_work
   use nocdyn_input_draft, only: draft_t
   use nocdyn_schema, only: first_key, key_rules, last_key
-  use nocdyn_schema_rules, only: key_rule_t, unset
+  use nocdyn_schema_rules, only: key_rule_t, required, unset
   implicit none (type, external)
   private
 
@@ -17,6 +17,7 @@ module nocdyn_input_work
     type(draft_t), allocatable :: drafts(:)
     logical, allocatable :: may_miss(:)         !! perhaps part of what was not understood, which was reported
     logical, allocatable :: is_out(:)           !! has no value here, nor a default
+    logical, allocatable :: is_needed(:)        !! must be given
     logical, allocatable :: is_displaced(:)     !! was in the file; an override put something else in its place
     integer, allocatable :: length(:)           !! how many values a default has
   contains
@@ -44,6 +45,7 @@ contains
     allocate (work%drafts(keys))
     allocate (work%may_miss(keys), source=is_damaged)
     allocate (work%is_out(keys), work%is_displaced(keys), source=.false.)
+    allocate (work%is_needed(keys), source=key_rules(work%first:work%first + keys - 1)%default == required)
     allocate (work%length(keys), source=key_rules(work%first:work%first + keys - 1)%count)
   end function new_work
 

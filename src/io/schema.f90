@@ -9,13 +9,15 @@ module nocdyn_schema
   use nocdyn_schema_rules, only: a_body, a_flag, a_kind, a_file, a_name, a_number, a_text, a_word, allowed_t, alternative_t, &
     an_integer, any_number, any_times, anything, at_least_once, at_most_once, body_or_ground, columns_t, exactly_once, &
     example_t, from_1, from_2, group_rule_t, key_rule_t, kind_rule_t, need_t, order_t, positive, required, unset
+  use nocdyn_schema_sweep, only: sweep_examples, sweep_groups, sweep_keys, sweep_kinds, sweep_needs, sweep_orders
   use nocdyn_schema_torques, only: excitation_keys, load_keys, motor_keys, torque_alternatives, torque_columns, &
     torque_examples, torque_kinds, torque_needs
   use nocdyn_text, only: append, string_t
   implicit none (type, external)
   private
 
-  public :: group_rule_index, key_rule_index, first_key, last_key, is_single, holds_texts, has_word, words_in, words_of
+  public :: group_rule_index, key_rule_index, kind_rule_index, kind_name, first_key, last_key, is_single, &
+    holds_texts, has_word, words_in, words_of
 
   type(allowed_t), parameter :: steps = allowed_t(low=1.0_wp, high=1.0e8_wp)
   type(allowed_t), parameter :: tolerance = allowed_t(low=1.0e-14_wp, high=0.1_wp)
@@ -34,7 +36,8 @@ module nocdyn_schema
     group_rule_t('load',       any_times,     'torque',   'A resisting torque on a body: the sum of the terms that are given.'), &
     group_rule_t('excitation', any_times,     'torque',   'A torque on a body, by a law of time or of its angle.'), &
     group_rule_t('run',        exactly_once,  '',         'What is computed, and how.'), &
-    group_rule_t('output',     at_most_once,  '',         'Which times are written, and where.')]
+    group_rule_t('output',     at_most_once,  '',         'Which times are written, and where.'), &
+    sweep_groups]
 
   type(key_rule_t), parameter :: frame_keys(*) = [ &
     key_rule_t('case',       'title',           a_text,         1, '',            "''",        anything, &
@@ -74,21 +77,22 @@ module nocdyn_schema
     key_rule_t('output',     'directory',       a_text,         1, '',            "''",        anything, &
       "where results go; '' means results/ and the name of the input file")]
 
-  type(kind_rule_t), parameter, public :: kind_rules(*) = torque_kinds
+  type(kind_rule_t), parameter, public :: kind_rules(*) = [torque_kinds, sweep_kinds]
 
   type(key_rule_t), parameter, public :: key_rules(*) = &
-    [frame_keys, coupling_keys, constraint_keys, motor_keys, load_keys, excitation_keys]
+    [frame_keys, coupling_keys, constraint_keys, motor_keys, load_keys, excitation_keys, sweep_keys]
 
   type(alternative_t), parameter, public :: alternatives(*) = [ &
     alternative_t('output', 'interval', 'points'), &
     coupling_alternatives, constraint_alternatives, torque_alternatives]
 
-  type(need_t), parameter, public :: needs(*) = [coupling_needs, torque_needs]
+  type(need_t), parameter, public :: needs(*) = [coupling_needs, torque_needs, sweep_needs]
 
   type(columns_t), parameter, public :: columns(*) = [coupling_columns, torque_columns]
 
   type(order_t), parameter, public :: orders(*) = [ &
-    order_t('run', 't_start', 't_end')]
+    order_t('run', 't_start', 't_end'), &
+    sweep_orders]
 
   type(example_t), parameter, public :: examples(*) = [ &
     example_t('case',       "title = 'Paper, case 2: harmonic torque on the motor'"), &
@@ -97,7 +101,7 @@ module nocdyn_schema
     example_t('body',       "name = 'machine'  inertia = 5.0"), &
     example_t('run',        "t_end = 10.0  method = 'rk45'  rtol = 1.0e-9  atol = 1.0e-9"), &
     example_t('output',     'interval = 0.01'), &
-    coupling_examples, constraint_examples, torque_examples]
+    coupling_examples, constraint_examples, torque_examples, sweep_examples]
 
 contains
 
@@ -138,6 +142,24 @@ contains
     end do
     key = 0
   end function key_rule_index
+
+  !> Row of `key_rules` of the key that says which other keys a group has, 0 if it has none.
+  pure integer function kind_rule_index(group_rule) result(key)
+    integer, intent(in) :: group_rule
+
+    do key = first_key(group_rule), last_key(group_rule)
+      if (key_rules(key)%kind == a_kind) return
+    end do
+    key = 0
+  end function kind_rule_index
+
+  !> The name of that key: "kind", "design" ...
+  pure function kind_name(group_rule) result(name)
+    integer, intent(in) :: group_rule   !! of a group that has one
+    character(len=:), allocatable :: name
+
+    name = trim(key_rules(kind_rule_index(group_rule))%name)
+  end function kind_name
 
   !> Whether a group occurs at most once, so that its kind alone identifies it.
   pure logical function is_single(group_rule)

@@ -1,7 +1,8 @@
 !> The schema as people read it on the terminal: help, and an annotated example file.
 module nocdyn_schema_help
   use nocdyn_errors, only: error_t, exit_input, raise
-  use nocdyn_schema, only: examples, first_key, group_rule_index, group_rules, has_word, key_rules, kind_rules, last_key
+  use nocdyn_schema, only: examples, first_key, group_rule_index, group_rules, has_word, key_rules, kind_name, kind_rule_index, &
+    kind_rules, last_key
   use nocdyn_schema_rules, only: a_flag, a_kind, a_number, a_word, an_integer, body_or_ground, example_t, key_rule_t
   use nocdyn_schema_sentences, only: default_text, sentences_on
   use nocdyn_schema_text, only: allowed_text, group_names, kind_text, listed, occurrence_text, suggestion
@@ -89,17 +90,17 @@ contains
     call buffer%append_line(margin // '&' // trim(group_rules(rule)%name) // ', ' // &
                             occurrence_text(group_rules(rule)%occurrence))
     call buffer%append_line(margin // '  ' // trim(group_rules(rule)%help))
-    kind_key = last_key(rule)
-    do key = first_key(rule), last_key(rule)
-      if (key_rules(key)%kind == a_kind) kind_key = key
-    end do
+    kind_key = kind_rule_index(rule)
+    if (kind_key == 0) kind_key = last_key(rule)
     do key = first_key(rule), kind_key
       call append_key(buffer, key_rules(key), margin)
     end do
     do k = 1, size(kind_rules)
       if (kind_rules(k)%group == group_rules(rule)%name) call append_kind(buffer, k, rule, margin)
     end do
-    if (any(key_rules(kind_key + 1:last_key(rule))%kinds == '')) call buffer%append_line(margin // '  of every kind')
+    if (any(key_rules(kind_key + 1:last_key(rule))%kinds == '')) then
+      call buffer%append_line(margin // '  of every ' // kind_name(rule))
+    end if
     do key = kind_key + 1, last_key(rule)
       if (key_rules(key)%kinds == '') call append_key(buffer, key_rules(key), margin)
     end do
@@ -114,7 +115,8 @@ contains
     type(string_t), allocatable :: known(:)
     integer :: key
 
-    call buffer%append_line(margin // '  kind = ' // quoted(trim(kind_rules(kind)%word)) // ': ' // trim(kind_rules(kind)%help))
+    call buffer%append_line(margin // '  ' // kind_name(rule) // ' = ' // quoted(trim(kind_rules(kind)%word)) // ': ' // &
+                            trim(kind_rules(kind)%help))
     allocate (known(0))
     do key = first_key(rule), last_key(rule)
       if (.not. has_word(key_rules(key)%kinds, kind_rules(kind)%word)) cycle
@@ -148,7 +150,7 @@ contains
     case (a_word, a_flag)
       text = allowed_text(rule)
     case (a_kind)
-      text = 'one of those below'
+      text = trim(merge('one of those below        ', 'one or more of those below', rule%count == 1))
     case (body_or_ground)
       text = kind_text(rule) // " or 'ground'"
     case default

@@ -1,6 +1,6 @@
 !> The schema as a page of the documentation.
 module nocdyn_schema_reference
-  use nocdyn_schema, only: first_key, group_rules, has_word, key_rules, kind_rules, last_key
+  use nocdyn_schema, only: first_key, group_rules, has_word, key_rules, kind_name, kind_rules, last_key
   use nocdyn_schema_help, only: append_examples
   use nocdyn_schema_rules, only: key_rule_t
   use nocdyn_schema_sentences, only: default_text, sentences_on
@@ -59,7 +59,8 @@ contains
     integer :: key
 
     call buffer%append_line('')
-    call buffer%append_line('`kind = ' // quoted(trim(kind_rules(kind)%word)) // '`: ' // trim(kind_rules(kind)%help) // '.')
+    call buffer%append_line('`' // kind_name(rule) // ' = ' // quoted(trim(kind_rules(kind)%word)) // '`: ' // &
+                            trim(kind_rules(kind)%help) // '.')
     call append_head(buffer)
     do key = first_key(rule), last_key(rule)
       if (has_word(key_rules(key)%kinds, kind_rules(kind)%word)) call append_key(buffer, key_rules(key))

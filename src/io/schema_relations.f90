@@ -1,7 +1,6 @@
 !> How the keys of a group go together, as positions of keys: found once for all groups of one name.
 module nocdyn_schema_relations
-  use nocdyn_schema, only: alternatives, columns, first_key, group_rules, key_rule_index, key_rules, last_key, needs, words_in
-  use nocdyn_schema_rules, only: a_kind
+  use nocdyn_schema, only: alternatives, columns, first_key, group_rules, key_rule_index, kind_rule_index, needs, words_in
   use nocdyn_text, only: string_t
   implicit none (type, external)
   private
@@ -15,7 +14,7 @@ module nocdyn_schema_relations
   end type key_sets_t
 
   type, public :: relations_t
-    integer :: kind = 0                                !! position of the key `kind`, 0 if there is none
+    integer :: kind = 0                                !! position of the key of the kind `a_kind`, 0 if there is none
     type(key_sets_t), allocatable :: alternatives(:)   !! one of two sets
     type(key_sets_t), allocatable :: needs(:)          !! keys, and what each of them needs one of
     type(key_sets_t), allocatable :: columns(:)        !! lists, and the key of the file that may hold them, if any
@@ -29,9 +28,7 @@ contains
     type(relations_t) :: relations
     integer :: i, n
 
-    do i = first_key(group_rule), last_key(group_rule)
-      if (key_rules(i)%kind == a_kind) relations%kind = i - first_key(group_rule) + 1
-    end do
+    relations%kind = max(0, kind_rule_index(group_rule) - first_key(group_rule) + 1)
 
     allocate (relations%alternatives(count(alternatives%group == group_rules(group_rule)%name)))
     n = 0

@@ -9,7 +9,7 @@ module nocdyn_schema_rules
   integer, parameter, public :: a_text = 1, a_name = 2   !! a name: of an element, unique in its name space
   integer, parameter, public :: a_body = 3, body_or_ground = 4   !! name of a &body
   integer, parameter, public :: a_word = 5, a_number = 6, an_integer = 7, a_flag = 8
-  integer, parameter, public :: a_kind = 9   !! a word of `kind_rules` of the group
+  integer, parameter, public :: a_kind = 9   !! a word of `kind_rules`, which says what keys the group has; one in a group
   integer, parameter, public :: a_file = 10  !! path of a table file, relative to the folder of the input
 
   integer, parameter, public :: any_number = 0   !! as `count`: a list of any length, possibly empty
@@ -34,10 +34,10 @@ module nocdyn_schema_rules
     character(len=96) :: help
   end type group_rule_t
 
-  !> One word of a group's key `kind`.
+  !> One word of a group's key of the kind `a_kind`.
   type, public :: kind_rule_t
     character(len=12) :: group
-    character(len=12) :: word
+    character(len=16) :: word
     character(len=80) :: help
   end type kind_rule_t
 
@@ -51,8 +51,9 @@ module nocdyn_schema_rules
     character(len=12) :: default   !! of each value, as written in a file, or `required`, or `unset`
     type(allowed_t) :: allowed
     character(len=96) :: help
-    character(len=48) :: kinds = ''   !! words of `kind` that have this key, separated by blanks; '': all
+    character(len=48) :: kinds = ''   !! words of `kind_rules` that have this key, separated by blanks; '': all
     integer :: least = 0              !! fewest values of a list that is given
+    character(len=12) :: needed_by = ''   !! the word of `kind_rules` with which this key must be given
   end type key_rule_t
 
   !> Two sets of keys, separated by blanks, of which a group has one: keys of both given are a mistake; the defaults of a

@@ -3,7 +3,7 @@ module nocdyn_schema_sentences
   use nocdyn_schema, only: alternatives, columns, group_rules, has_word, key_rule_index, key_rules, needs, words_in
   use nocdyn_schema_rules, only: alternative_t, columns_t, key_rule_t, required, unset
   use nocdyn_schema_text, only: listed
-  use nocdyn_text, only: append, string_t, to_text
+  use nocdyn_text, only: append, quoted, string_t, to_text
   implicit none (type, external)
   private
 
@@ -11,7 +11,7 @@ module nocdyn_schema_sentences
 
 contains
 
-  !> "required", "default 0", "optional", "this or teeth".
+  !> "required", "default 0", "optional", "required by 'uniform'", "this or teeth".
   pure function default_text(rule) result(text)
     type(key_rule_t), intent(in) :: rule
     character(len=:), allocatable :: text
@@ -25,6 +25,7 @@ contains
     else
       text = 'optional'
     end if
+    if (rule%needed_by /= '') text = 'required by ' // quoted(trim(rule%needed_by))
     do i = 1, size(alternatives)
       if (alternatives(i)%group /= rule%group .or. .not. alternatives(i)%is_needed) cycle
       if (has_word(alternatives(i)%first, rule%name)) then

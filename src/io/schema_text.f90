@@ -95,7 +95,7 @@ contains
     end select
   end function noun
 
-  !> The words of `kind` that have a key: "'ramp' or 'pulse'".
+  !> The words of a kind that have a key: "'ramp' or 'pulse'".
   pure function kinds_text(rule) result(text)
     type(key_rule_t), intent(in) :: rule
     character(len=:), allocatable :: text
@@ -172,7 +172,7 @@ contains
     character(len=*), intent(in) :: word
     type(string_t), intent(in) :: candidates(:)
     character(len=:), allocatable :: text
-    integer, parameter :: few = 12
+    integer, parameter :: few = 16
     integer :: nearest
 
     nearest = nearest_word(word, candidates)

@@ -1,0 +1,90 @@
+!> Where a number or a text of the input stands: GROUP.KEY for groups that occur once, GROUP.NAME.KEY for named ones, with a
+!> subscript behind the key where it is a list.
+module nocdyn_input_path
+  use nocdyn_namelist, only: assignment_t
+  use nocdyn_namelist_values, only: read_subscript
+  use nocdyn_schema, only: group_rule_index, group_rules, is_single, key_rule_index
+  use nocdyn_schema_text, only: group_names, key_names, suggestion
+  use nocdyn_text, only: lower_case
+  implicit none (type, external)
+  private
+
+  public :: read_path
+
+  type, public :: path_t
+    integer :: group_rule = 0
+    integer :: key_rule = 0
+    character(len=:), allocatable :: name       !! of the element, '' for single groups
+    type(assignment_t) :: place                 !! key and subscript
+  end type path_t
+
+contains
+
+  !> Takes a path apart. The first dot ends the group and the last one begins the key, so that names may hold dots.
+  subroutine read_path(text, ending, path, complaint)
+    character(len=*), intent(in) :: text
+    character(len=*), intent(in) :: ending   !! what follows a path here, for messages: '=VALUE' or ''
+    type(path_t), intent(out) :: path
+    character(len=:), allocatable, intent(out) :: complaint   !! '' if all is well
+    character(len=:), allocatable :: group, key
+    integer :: first_dot, last_dot
+
+    path%name = ''
+    first_dot = index(text, '.')
+    last_dot = index(text, '.', back=.true.)
+    if (first_dot == 0) then
+      complaint = 'there is no dot in ' // text // '; write GROUP.KEY' // ending // ' or GROUP.NAME.KEY' // ending
+      return
+    end if
+    group = lower_case(text(:first_dot - 1))
+    path%group_rule = group_rule_index(group)
+    if (path%group_rule == 0) then
+      complaint = "there is no group '" // group // "'" // suggestion(group, group_names())
+      return
+    end if
+    if (last_dot > first_dot) path%name = text(first_dot + 1:last_dot - 1)
+    call read_key(text(last_dot + 1:), path, key, complaint)
+    if (complaint == '') call check_form(path%group_rule, key // ending, last_dot > first_dot, complaint)
+  end subroutine read_path
+
+  subroutine read_key(text, path, key, complaint)
+    character(len=*), intent(in) :: text   !! KEY or KEY(SUBSCRIPT)
+    type(path_t), intent(inout) :: path
+    character(len=:), allocatable, intent(out) :: key
+    character(len=:), allocatable, intent(out) :: complaint
+    integer :: open
+
+    open = index(text // '(', '(')
+    key = lower_case(trim(text(:open - 1)))
+    path%place%key = key
+    path%key_rule = key_rule_index(path%group_rule, key)
+    complaint = ''
+    if (path%key_rule == 0) then
+      complaint = key // ' is not a key of &' // trim(group_rules(path%group_rule)%name) &
+        // suggestion(key, key_names(path%group_rule))
+    else if (open <= len(text)) then
+      call read_subscript(text(open + 1:max(open, len(text) - 1)), path%place)
+      if (path%place%is_damaged .or. text(len(text):) /= ')') complaint = text(open:) &
+        // ' is neither a place such as (3) nor a section such as (1:3)'
+    end if
+  end subroutine read_key
+
+  !> Single groups are addressed by kind and key, named ones by kind, name and key, others not at all.
+  subroutine check_form(group_rule, ending, has_name, complaint)
+    integer, intent(in) :: group_rule
+    character(len=*), intent(in) :: ending   !! of the path, for the message
+    logical, intent(in) :: has_name
+    character(len=:), allocatable, intent(inout) :: complaint
+    character(len=:), allocatable :: group
+
+    group = trim(group_rules(group_rule)%name)
+    if (is_single(group_rule)) then
+      if (has_name) complaint = '&' // group // ' has no name; write ' // group // '.' // ending
+    else if (group_rules(group_rule)%name_space == '') then
+      complaint = '&' // group // ' has no name by which one of several could be told; change it in the file'
+    else if (.not. has_name) then
+      complaint = '&' // group // ' may occur several times; write ' // group // '.NAME.' // ending
+    end if
+  end subroutine check_form
+
+end module nocdyn_input_path
