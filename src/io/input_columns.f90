@@ -1,6 +1,7 @@
 !> Lists that belong together: as many values in each, the first of a table ascending, tables from files.
 module nocdyn_input_columns
   use nocdyn_input, only: group_t, value_t
+  use nocdyn_input_orders, only: ascent_complaint
   use nocdyn_input_work, only: work_t
   use nocdyn_kinds, only: wp
   use nocdyn_mistakes, only: mistakes_t
@@ -8,6 +9,7 @@ module nocdyn_input_columns
   use nocdyn_schema_rules, only: key_rule_t, unset
   use nocdyn_table_file, only: read_table_file
   use nocdyn_text, only: string_t, to_text
+  use nocdyn_text_file, only: path_in
   implicit none (type, external)
   private
 
@@ -66,49 +68,30 @@ contains
     do i = 1, size(lists)
       group%values(lists(i)) = value_t(source%is_given, source%line, source%override)
     end do
-    call read_table_file(path_of(folder, source%texts(1)%text), group%values(lists(1))%numbers, &
+    call read_table_file(path_in(folder, source%texts(1)%text), group%values(lists(1))%numbers, &
                          group%values(lists(2))%numbers, complaints, code)
     do i = 1, size(complaints)
       call mistakes%add(source%line, work%index, trim(rule%name) // ': ' // complaints(i)%text, source%override, code)
     end do
   end subroutine read_columns
 
-  !> A relative path begins in the folder.
-  pure function path_of(folder, path)
-    character(len=*), intent(in) :: folder, path
-    character(len=:), allocatable :: path_of
-
-    path_of = folder // path
-    if (path(1:1) == '/') path_of = path
-  end function path_of
-
   subroutine check_ascent(work, value, position, mistakes)
     type(work_t), intent(in) :: work
     type(value_t), intent(in) :: value
     integer, intent(in) :: position
     type(mistakes_t), intent(inout) :: mistakes
+    character(len=:), allocatable :: complaint
     type(key_rule_t) :: rule
     integer :: i
 
     if (.not. allocated(value%numbers)) return
     rule = work%key(position)
     do i = 2, size(value%numbers)
-      if (value%numbers(i) > value%numbers(i - 1)) cycle
-      call mistakes%add(max(value%line, work%drafts(position)%slots(i)%line), work%index, &
-                        element(rule, i, value) // ' is not above ' // element(rule, i - 1, value) // &
-                        '; needed: ascending values', value%override)
+      complaint = ascent_complaint(trim(rule%name), value%numbers, i)
+      if (complaint /= '') call mistakes%add(max(value%line, work%drafts(position)%slots(i)%line), work%index, complaint, &
+                                             value%override)
     end do
   end subroutine check_ascent
-
-  !> "table_speed(3) = 12".
-  function element(rule, i, value) result(text)
-    type(key_rule_t), intent(in) :: rule
-    integer, intent(in) :: i
-    type(value_t), intent(in) :: value
-    character(len=:), allocatable :: text
-
-    text = trim(rule%name) // '(' // to_text(i) // ') = ' // to_text(value%numbers(i))
-  end function element
 
   !> Every list has as many values as the first one that is given.
   subroutine check_lengths(work, group, lists, mistakes)

@@ -1,6 +1,7 @@
 !> Checks of the rigid joints that need several of their keys: members that are different, numbers that fit.
 module nocdyn_input_constraints
   use nocdyn_input, only: group_t
+  use nocdyn_input_orders, only: teeth_complaint
   use nocdyn_mistakes, only: mistakes_t
   use nocdyn_schema, only: first_key, key_rules
   use nocdyn_schema_rules, only: body_or_ground
@@ -84,14 +85,12 @@ contains
     type(group_t), intent(in) :: group
     integer, intent(in) :: index
     type(mistakes_t), intent(inout) :: mistakes
+    character(len=:), allocatable :: complaint
 
+    complaint = teeth_complaint(group)
+    if (complaint == '') return
     associate (value => group%values(group%key_position('teeth')))
-      if (.not. allocated(value%whole_numbers)) return
-      if (size(value%whole_numbers) /= 2) return
-      if (value%whole_numbers(2) > value%whole_numbers(1)) return
-      call mistakes%add(value%line, index, 'teeth = ' // to_text(value%whole_numbers(1)) // ', ' // &
-                        to_text(value%whole_numbers(2)) // ' leave no room for planets; allowed: sun, ring with ring > sun', &
-                        value%override)
+      call mistakes%add(value%line, index, complaint, value%override)
     end associate
   end subroutine check_teeth
 

@@ -2,6 +2,7 @@
 module nocdyn_input_group
   use nocdyn_input, only: group_t, value_t
   use nocdyn_input_columns, only: complete_columns
+  use nocdyn_input_orders, only: applies, find_order_keys, order_complaint
   use nocdyn_input_overrides, only: override_t
   use nocdyn_input_relations, only: relate_keys
   use nocdyn_input_values, only: convert
@@ -179,18 +180,16 @@ contains
     type(group_t), intent(in) :: group
     integer, intent(in) :: index
     type(mistakes_t), intent(inout) :: mistakes
+    character(len=:), allocatable :: complaint
     integer :: o, lower, upper
 
     do o = 1, size(orders)
-      if (orders(o)%group /= group_rules(group%rule)%name) cycle
-      lower = group%key_position(trim(orders(o)%lower))
-      upper = group%key_position(trim(orders(o)%upper))
+      if (.not. applies(o, group)) cycle
+      complaint = order_complaint(o, group)
+      if (complaint == '') cycle
+      call find_order_keys(o, group, lower, upper)
       associate (low => group%values(lower), high => group%values(upper))
-        if (.not. (allocated(low%numbers) .and. allocated(high%numbers))) cycle
-        if (high%numbers(1) > low%numbers(1)) cycle
-        call mistakes%add(max(low%line, high%line), index, trim(orders(o)%upper) // ' = ' // to_text(high%numbers(1)) &
-          // ' is out of range; allowed: > ' // trim(orders(o)%lower) // ' = ' // to_text(low%numbers(1)), &
-          max(low%override, high%override))
+        call mistakes%add(max(low%line, high%line), index, complaint, max(low%override, high%override))
       end associate
     end do
   end subroutine check_orders

@@ -6,7 +6,8 @@ module nocdyn_input_reader
   use nocdyn_input_group, only: read_group
   use nocdyn_input_names, only: check_doubled_names, check_references, collect_names
   use nocdyn_input_overrides, only: override_t, read_overrides
-  use nocdyn_mistakes, only: mistake_t, mistakes_t, no_line
+  use nocdyn_mistakes, only: mistakes_t, no_line
+  use nocdyn_mistakes_report, only: mistakes_report
   use nocdyn_namelist, only: namelist_group_t, namelist_t
   use nocdyn_namelist_scanner, only: scan_namelist
   use nocdyn_schema, only: first_key, group_rule_index, group_rules, is_single, key_rules, last_key
@@ -14,7 +15,6 @@ module nocdyn_input_reader
   use nocdyn_schema_rules, only: at_least_once, exactly_once, required
   use nocdyn_schema_text, only: group_names, occurrence_text, suggestion
   use nocdyn_text, only: nearest_word, quoted, string_t, to_text
-  use nocdyn_text_buffer, only: text_buffer_t
   use nocdyn_text_file, only: read_text_file
   implicit none (type, external)
   private
@@ -66,7 +66,7 @@ contains
     call check_doubled_names(input%groups, mistakes)
     call check_references(input%groups, bodies_are_known(input%groups), mistakes)
     call check_constraints(input%groups, mistakes)
-    if (mistakes%count > 0) call raise(error, mistakes%worst_code(), report(input, mistakes))
+    if (mistakes%count > 0) call raise(error, mistakes%worst_code(), mistakes_report(input, mistakes))
   end subroutine read_input_text
 
   !> All groups of the file, then the single groups that it lacks.
@@ -196,37 +196,5 @@ contains
       end if
     end do
   end function bodies_are_known
-
-  !> One line for each mistake.
-  function report(input, mistakes) result(text)
-    type(input_t), intent(in) :: input
-    type(mistakes_t), intent(in) :: mistakes
-    character(len=:), allocatable :: text
-    type(text_buffer_t) :: buffer
-    integer, allocatable :: order(:)
-    integer :: i
-
-    call mistakes%find_order_by_line(order)
-    do i = 1, size(order)
-      if (i > 1) call buffer%append(new_line('a'))
-      call buffer%append(sentence(input, mistakes%list(order(i))))
-    end do
-    text = buffer%text()
-  end function report
-
-  function sentence(input, mistake) result(text)
-    type(input_t), intent(in) :: input
-    type(mistake_t), intent(in) :: mistake
-    character(len=:), allocatable :: text
-
-    if (mistake%override > 0) then
-      text = '--set ' // input%overrides(mistake%override)%text
-    else
-      text = input%file
-      if (mistake%line > 0 .and. mistake%line < no_line) text = text // ':' // to_text(mistake%line)
-      if (mistake%group > 0) text = text // ': ' // input%label(mistake%group)
-    end if
-    text = text // ': ' // mistake%text
-  end function sentence
 
 end module nocdyn_input_reader

@@ -5,8 +5,8 @@ module nocdyn_input_values
   use nocdyn_kinds, only: wp
   use nocdyn_literals, only: literal_fine, literal_not_finite, literal_too_large, read_integer, read_logical, read_real
   use nocdyn_schema, only: holds_texts, words_of
-  use nocdyn_schema_rules, only: a_body, a_file, a_flag, a_kind, a_name, a_number, a_word, allowed_t, an_integer, &
-    ground, key_rule_t, longest_name
+  use nocdyn_schema_rules, only: a_body, a_file, a_flag, a_kind, a_name, a_number, a_word, an_integer, &
+    ground, is_outside, key_rule_t, longest_name
   use nocdyn_schema_text, only: allowed_text
   use nocdyn_mistakes, only: mistakes_t
   use nocdyn_text, only: joined, lower_case, nearest_word, string_t, to_text
@@ -140,15 +140,6 @@ contains
     call read_logical(text, value, status)
     if (status /= literal_fine) complaint = ' is neither true nor false; allowed: .true., .false.'
   end subroutine convert_flag
-
-  pure logical function is_outside(value, allowed)
-    real(wp), intent(in) :: value
-    type(allowed_t), intent(in) :: allowed
-
-    is_outside = value < allowed%low .or. value > allowed%high
-    if (allowed%excludes_low) is_outside = is_outside .or. .not. value > allowed%low
-    if (allowed%excludes_zero) is_outside = is_outside .or. abs(value) <= 0.0_wp
-  end function is_outside
 
   subroutine check_text(rule, value, complaint)
     type(key_rule_t), intent(in) :: rule

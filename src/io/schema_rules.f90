@@ -4,6 +4,8 @@ module nocdyn_schema_rules
   implicit none (type, external)
   private
 
+  public :: is_outside
+
   integer, parameter, public :: exactly_once = 1, at_most_once = 2, at_least_once = 3, any_times = 4
 
   integer, parameter, public :: a_text = 1, a_name = 2   !! a name: of an element, unique in its name space
@@ -100,5 +102,17 @@ module nocdyn_schema_rules
   type(allowed_t), parameter, public :: from_0_to_1 = allowed_t(low=0.0_wp, high=1.0_wp)
   type(allowed_t), parameter, public :: interpolations = allowed_t(words='linear cubic')
   type(allowed_t), parameter, public :: extrapolations = allowed_t(words='linear constant')
+
+contains
+
+  !> Whether a number is none that a key accepts.
+  pure logical function is_outside(value, allowed)
+    real(wp), intent(in) :: value
+    type(allowed_t), intent(in) :: allowed
+
+    is_outside = value < allowed%low .or. value > allowed%high
+    if (allowed%excludes_low) is_outside = is_outside .or. .not. value > allowed%low
+    if (allowed%excludes_zero) is_outside = is_outside .or. abs(value) <= 0.0_wp
+  end function is_outside
 
 end module nocdyn_schema_rules

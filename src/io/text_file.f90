@@ -6,11 +6,21 @@ module nocdyn_text_file
   implicit none (type, external)
   private
 
-  public :: read_text_file
+  public :: path_in, read_text_file
 
   integer, parameter :: reason_length = 256
 
 contains
+
+  !> A relative path begins in the folder.
+  pure function path_in(folder, path) result(whole)
+    character(len=*), intent(in) :: folder   !! with a slash at its end, or ''
+    character(len=*), intent(in) :: path     !! not ''
+    character(len=:), allocatable :: whole
+
+    whole = folder // path
+    if (path(1:1) == '/') whole = path
+  end function path_in
 
   !> All bytes of a file; pipes work too.
   subroutine read_text_file(file, text, error)

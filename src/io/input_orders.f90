@@ -1,0 +1,86 @@
+!> Numbers of one group that stand in an order, and the sentences on those that do not.
+module nocdyn_input_orders
+  use nocdyn_input, only: group_t
+  use nocdyn_kinds, only: wp
+  use nocdyn_schema, only: group_rules, orders
+  use nocdyn_text, only: to_text
+  implicit none (type, external)
+  private
+
+  public :: applies, find_order_keys, order_complaint, ascent_complaint, teeth_complaint
+
+contains
+
+  !> Whether row `o` of `orders` is about the keys of a group.
+  pure logical function applies(o, group)
+    integer, intent(in) :: o
+    type(group_t), intent(in) :: group
+
+    applies = orders(o)%group == group_rules(group%rule)%name
+  end function applies
+
+  !> The two keys of a row of `orders`, as indices of the group's values.
+  pure subroutine find_order_keys(o, group, lower, upper)
+    integer, intent(in) :: o
+    type(group_t), intent(in) :: group
+    integer, intent(out) :: lower, upper
+
+    lower = group%key_position(trim(orders(o)%lower))
+    upper = group%key_position(trim(orders(o)%upper))
+  end subroutine find_order_keys
+
+  !> What is wrong with two keys by row `o` of `orders`, '' if nothing is.
+  function order_complaint(o, group) result(complaint)
+    integer, intent(in) :: o
+    type(group_t), intent(in) :: group
+    character(len=:), allocatable :: complaint
+    integer :: lower, upper
+
+    complaint = ''
+    call find_order_keys(o, group, lower, upper)
+    associate (low => group%values(lower), high => group%values(upper))
+      if (.not. (allocated(low%numbers) .and. allocated(high%numbers))) return
+      if (high%numbers(1) > low%numbers(1)) return
+      complaint = trim(orders(o)%upper) // ' = ' // to_text(high%numbers(1)) // ' is out of range; allowed: > ' // &
+                  trim(orders(o)%lower) // ' = ' // to_text(low%numbers(1))
+    end associate
+  end function order_complaint
+
+  !> What is wrong with number `i` of an ascending list if it is not above the one before it, else ''.
+  function ascent_complaint(key, numbers, i) result(complaint)
+    character(len=*), intent(in) :: key
+    real(wp), intent(in) :: numbers(:)
+    integer, intent(in) :: i   !! 2 to size(numbers)
+    character(len=:), allocatable :: complaint
+
+    complaint = ''
+    if (numbers(i) > numbers(i - 1)) return
+    complaint = element(key, numbers, i) // ' is not above ' // element(key, numbers, i - 1) // '; needed: ascending values'
+  end function ascent_complaint
+
+  !> "table_speed(3) = 12".
+  function element(key, numbers, i) result(text)
+    character(len=*), intent(in) :: key
+    real(wp), intent(in) :: numbers(:)
+    integer, intent(in) :: i
+    character(len=:), allocatable :: text
+
+    text = key // '(' // to_text(i) // ') = ' // to_text(numbers(i))
+  end function element
+
+  !> What is wrong with the teeth of a &planetary, '' if nothing is.
+  pure function teeth_complaint(group) result(complaint)
+    type(group_t), intent(in) :: group
+    character(len=:), allocatable :: complaint
+
+    complaint = ''
+    associate (value => group%values(group%key_position('teeth')))
+      if (.not. allocated(value%whole_numbers)) return
+      if (size(value%whole_numbers) /= 2) return
+      if (value%whole_numbers(2) > value%whole_numbers(1)) return
+      complaint = 'teeth = ' // to_text(value%whole_numbers(1)) // ', ' // to_text(value%whole_numbers(2)) // &
+                  ' leave no room for planets; allowed: sun, ring with ring > sun'
+    end associate
+  end function teeth_complaint
+
+end module nocdyn_input_orders

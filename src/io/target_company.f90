@@ -1,0 +1,84 @@
+!> What a number that varies asks of the other keys of its group: whether they are given, be it as numbers that vary too.
+module nocdyn_target_company
+  use nocdyn_input, only: input_t
+  use nocdyn_schema, only: first_key, key_rules
+  use nocdyn_schema_relations, only: relations_of, relations_t
+  use nocdyn_schema_text, only: listed
+  use nocdyn_targets, only: target_t
+  use nocdyn_text, only: append, string_t
+  implicit none (type, external)
+  private
+
+  public :: check_company
+
+contains
+
+  !> Whether no alternative of a target's key is given, and one of the keys that it needs is.
+  subroutine check_company(input, targets, which, complaint)
+    type(input_t), intent(in) :: input
+    type(target_t), intent(in) :: targets(:)   !! all that vary; those with group 0 were not found
+    integer, intent(in) :: which               !! the target to check, which was found
+    character(len=:), allocatable, intent(out) :: complaint   !! '' if fine
+    type(relations_t) :: relations
+    logical, allocatable :: is_given(:)   !! [keys of the group]
+    integer :: i
+
+    complaint = ''
+    call find_given(input, targets, targets(which)%group, is_given)
+    relations = relations_of(input%groups(targets(which)%group)%rule)
+    associate (key => targets(which)%key, first => first_key(input%groups(targets(which)%group)%rule) - 1)
+      do i = 1, size(relations%alternatives)
+        associate (sets => relations%alternatives(i))
+          if (any(sets%first == key)) call refuse_beside(first, key, pack(sets%second, is_given(sets%second)), complaint)
+          if (any(sets%second == key)) call refuse_beside(first, key, pack(sets%first, is_given(sets%first)), complaint)
+        end associate
+      end do
+      do i = 1, size(relations%needs)
+        associate (need => relations%needs(i))
+          if (all(need%first /= key) .or. any(is_given(need%second)) .or. complaint /= '') cycle
+          complaint = trim(key_rules(first + key)%name) // ' needs ' // names_of(first, need%second)
+        end associate
+      end do
+    end associate
+  end subroutine check_company
+
+  subroutine find_given(input, targets, group, is_given)
+    type(input_t), intent(in) :: input
+    type(target_t), intent(in) :: targets(:)
+    integer, intent(in) :: group
+    logical, allocatable, intent(out) :: is_given(:)
+    integer :: t
+
+    allocate (is_given(size(input%groups(group)%values)))
+    is_given = input%groups(group)%values%is_given
+    do t = 1, size(targets)
+      if (targets(t)%group == group) is_given(targets(t)%key) = .true.
+    end do
+  end subroutine find_given
+
+  subroutine refuse_beside(first, key, others, complaint)
+    integer, intent(in) :: first       !! row of `key_rules` before the group's
+    integer, intent(in) :: key
+    integer, intent(in) :: others(:)   !! keys of the other alternative that are given
+    character(len=:), allocatable, intent(inout) :: complaint
+
+    if (size(others) == 0 .or. complaint /= '') return
+    complaint = trim(key_rules(first + key)%name) // ' and ' // trim(key_rules(first + others(1))%name) // &
+                ' are both given; allowed: one of them'
+  end subroutine refuse_beside
+
+  !> "a, b or c".
+  pure function names_of(first, keys) result(text)
+    integer, intent(in) :: first, keys(:)
+    character(len=:), allocatable :: text
+    type(string_t), allocatable :: names(:)
+    integer :: i
+
+    allocate (names(0))
+    do i = 1, size(keys)
+      call append(names, trim(key_rules(first + keys(i))%name))
+    end do
+    text = listed(names, ' or ')
+  end function names_of
+
+end module nocdyn_target_company
