@@ -22,6 +22,7 @@ module nocdyn_formulation
     procedure(reactions_interface), deferred :: reactions
     procedure(motion_interface), deferred :: switch_motion
     procedure :: attach
+    procedure :: make_room
     procedure :: place_inner
     procedure :: choose_branches
     procedure :: observe
@@ -77,16 +78,28 @@ contains
     logical, intent(in) :: audited
 
     self%machine = machine
-    self%mechanical = mechanical
-    self%inner = machine%elements%inner%count
-    self%states = self%mechanical + self%inner
-    self%switches = machine%switches%count
-    self%lanes = machine%lanes
-    self%is_audited = audited
-    self%quadratures = merge(machine%accounts(), 0, audited)
-    allocate (self%phi(machine%lanes, 0:machine%bodies), source=0.0_wp)
-    allocate (self%omega, self%torque, source=self%phi)
+    call self%make_room(mechanical, audited)
   end subroutine attach
+
+  !> Counts the states of the machine that is there, and allocates what every formulation needs.
+  subroutine make_room(self, mechanical, audited)
+    class(formulation_t), intent(inout) :: self
+    integer, intent(in) :: mechanical
+    logical, intent(in) :: audited
+
+    associate (machine => self%machine)
+      self%mechanical = mechanical
+      self%inner = machine%elements%inner%count
+      self%states = self%mechanical + self%inner
+      self%switches = machine%switches%count
+      self%lanes = machine%lanes
+      self%is_audited = audited
+      self%quadratures = merge(machine%accounts(), 0, audited)
+      if (allocated(self%phi)) deallocate (self%phi, self%omega, self%torque)
+      allocate (self%phi(machine%lanes, 0:machine%bodies), source=0.0_wp)
+      allocate (self%omega, self%torque, source=self%phi)
+    end associate
+  end subroutine make_room
 
   !> Hands the elements their inner states, [lanes, inner states].
   subroutine place_inner(self, inner)

@@ -32,6 +32,7 @@ module nocdyn_reduced
     type(element_coordinates_t), private :: switching          !! of the switching elements
     real(wp), allocatable, private :: none(:, :)               !! zeros, [lanes, elements]
   contains
+    procedure :: formulate
     procedure :: list_numbers
     procedure :: receive
     procedure :: derivative
@@ -52,28 +53,46 @@ contains
   !> The formulation of a machine whose coordinates are known.
   function new_reduced(machine, audited, as_block) result(self)
     type(machine_t), intent(in) :: machine
-    logical, intent(in) :: audited   !! whether the works of the accounted elements are integrated
+    logical, intent(in) :: audited              !! whether the works of the accounted elements are integrated
     logical, intent(in), optional :: as_block   !! whether a single lane is laid out as those of a block: .false.
     type(reduced_t) :: self
-    type(element_coordinates_t) :: incidence
-    real(wp), allocatable :: angle(:, :)
-    logical :: is_loose
+    logical :: is_block
 
-    is_loose = .false.
-    if (present(as_block)) is_loose = as_block
-    call self%attach(machine, 2 * machine%coordinates%freedoms, audited)
-    incidence = new_element_coordinates(machine%elements, machine%coordinates)
-    self%accelerations = response_map(incidence, machine%coordinates%freedoms, is_loose)
-    self%sums = new_reduced_jacobian(machine%coordinates%freedoms, incidence, machine%accounted(:self%quadratures), self%inner)
-    self%inner_rows = new_inner_jacobian(machine%coordinates%freedoms, incidence, machine%accounted(:self%quadratures), &
-                                         machine%elements%inner, size(self%sums%pattern%row))
-    self%switching = incidence%selected(machine%switches%element, turning=.true.)
-    allocate (angle(machine%lanes, 0:machine%bodies), source=0.0_wp)
-    angle(:, 1:) = machine%start_angle
-    self%start_twist = angle(:, machine%elements%to) - angle(:, machine%elements%from)
-    self%twists = twist_map(incidence, without_offset=.not. any(abs(self%start_twist) > 0), is_loose=is_loose)
-    allocate (self%none, source=0.0_wp * self%start_twist)
+    is_block = .false.
+    if (present(as_block)) is_block = as_block
+    self%machine = machine
+    call self%formulate(audited, is_block)
   end function new_reduced
+
+  !> Forms the equations of the machine that is there.
+  subroutine formulate(self, audited, as_block)
+    class(reduced_t), intent(inout) :: self
+    logical, intent(in) :: audited
+    logical, intent(in) :: as_block
+    type(element_coordinates_t) :: incidence
+
+    call self%make_room(2 * self%machine%coordinates%freedoms, audited)
+    associate (machine => self%machine, freedoms => self%machine%coordinates%freedoms)
+      incidence = new_element_coordinates(machine%elements, machine%coordinates)
+      self%accelerations = response_map(incidence, freedoms, as_block)
+      self%sums = new_reduced_jacobian(freedoms, incidence, machine%accounted(:self%quadratures), self%inner)
+      self%inner_rows = new_inner_jacobian(freedoms, incidence, machine%accounted(:self%quadratures), &
+                                           machine%elements%inner, size(self%sums%pattern%row))
+      self%switching = incidence%selected(machine%switches%element, turning=.true.)
+      call find_start_twists(self)
+      self%twists = twist_map(incidence, without_offset=.not. any(abs(self%start_twist) > 0), is_loose=as_block)
+      self%none = 0.0_wp * self%start_twist
+    end associate
+  end subroutine formulate
+
+  subroutine find_start_twists(self)
+    type(reduced_t), intent(inout) :: self
+    real(wp) :: angle(self%lanes, 0:self%machine%bodies)
+
+    angle(:, 0) = 0.0_wp
+    angle(:, 1:) = self%machine%start_angle
+    self%start_twist = angle(:, self%machine%elements%to) - angle(:, self%machine%elements%from)
+  end subroutine find_start_twists
 
   !> U, whose rows are the elements.
   function twist_map(incidence, without_offset, is_loose) result(map)
