@@ -23,6 +23,7 @@ module nocdyn_curves
     real(wp), allocatable, private :: area(:)            !! integral from the first point to the origin, [0:points]
   contains
     procedure :: points
+    procedure :: is_same
     procedure :: segment
     procedure :: margin
     procedure :: room_above
@@ -114,6 +115,14 @@ contains
 
     points = size(self%knot)
   end function points
+
+  !> Whether two curves of as many points are the same: no number of one is above that of the other.
+  pure logical function is_same(self, other)
+    class(curve_t), intent(in) :: self
+    type(curve_t), intent(in) :: other
+
+    is_same = .not. (any(abs(self%knot - other%knot) > 0) .or. any(abs(self%coefficient - other%coefficient) > 0))
+  end function is_same
 
   !> The segment in which x lies.
   pure integer function segment(self, x)

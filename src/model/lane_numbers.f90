@@ -4,6 +4,7 @@
 !> what its layout depends on: which elements are in which bank, which entries the maps have. Where two lists have the same
 !> layout, a lane of one is made that of the other by copying numbers.
 module nocdyn_lane_numbers
+  use, intrinsic :: iso_fortran_env, only: int64
   use nocdyn_curves, only: curve_t
   use nocdyn_kinds, only: wp
   use nocdyn_text, only: string_t
@@ -17,6 +18,11 @@ module nocdyn_lane_numbers
     character(len=longest) :: name
     real(wp), pointer, contiguous :: value(:, :, :) => null()   !! [numbers, lanes, numbers]
   end type slab_t
+
+  !> Where a number is in a list.
+  type, public :: place_t
+    integer :: slab, row, column
+  end type place_t
 
   !> The curves of some elements.
   type :: curve_slab_t
@@ -39,6 +45,11 @@ module nocdyn_lane_numbers
     generic :: remark => remark_integer, remark_integers, remark_flag, remark_names
     procedure :: is_congruent
     procedure :: copy_lane
+    procedure :: differences
+    procedure :: has_curves_of
+    procedure :: number
+    procedure :: set_number
+    procedure :: name_at
     procedure, private :: add_numbers, add_stacks
     procedure, private :: remark_integer, remark_integers, remark_flag, remark_names
     procedure, private :: next_slab
@@ -204,5 +215,80 @@ contains
       end associate
     end do
   end subroutine copy_lane
+
+  !> Where a lane differs from that of another list, which is congruent, in a single bit; curves are left out.
+  pure function differences(self, lane, other, other_lane) result(places)
+    class(lane_numbers_t), intent(in) :: self
+    integer, intent(in) :: lane
+    type(lane_numbers_t), intent(in) :: other
+    integer, intent(in) :: other_lane
+    type(place_t), allocatable :: places(:)
+    type(place_t) :: place
+    integer :: found, i, k, pass, s
+
+    do pass = 1, 2   ! to count, and to write down
+      found = 0
+      do s = 1, self%slabs
+        do k = 1, size(self%slab(s)%value, 3)
+          do i = 1, size(self%slab(s)%value, 1)
+            place = place_t(s, i, k)
+            if (have_same_bits(self%number(place, lane), other%number(place, other_lane))) cycle
+            found = found + 1
+            if (pass == 2) places(found) = place
+          end do
+        end do
+      end do
+      if (pass == 1) allocate (places(found))
+    end do
+  end function differences
+
+  pure logical function have_same_bits(a, b)
+    real(wp), intent(in) :: a, b
+
+    have_same_bits = transfer(a, 0_int64) == transfer(b, 0_int64)
+  end function have_same_bits
+
+  !> Whether a lane has the curves of another list, which is congruent.
+  pure logical function has_curves_of(self, lane, other, other_lane)
+    class(lane_numbers_t), intent(in) :: self
+    integer, intent(in) :: lane
+    type(lane_numbers_t), intent(in) :: other
+    integer, intent(in) :: other_lane
+    integer :: e, s
+
+    has_curves_of = .false.
+    do s = 1, self%curve_slabs
+      do e = 1, size(self%curve_slab(s)%curve, 2)
+        if (.not. self%curve_slab(s)%curve(lane, e)%is_same(other%curve_slab(s)%curve(other_lane, e))) return
+      end do
+    end do
+    has_curves_of = .true.
+  end function has_curves_of
+
+  pure real(wp) function number(self, place, lane)
+    class(lane_numbers_t), intent(in) :: self
+    type(place_t), intent(in) :: place
+    integer, intent(in) :: lane
+
+    number = self%slab(place%slab)%value(place%row, lane, place%column)
+  end function number
+
+  subroutine set_number(self, place, lane, number)
+    class(lane_numbers_t), intent(inout) :: self
+    type(place_t), intent(in) :: place
+    integer, intent(in) :: lane
+    real(wp), intent(in) :: number
+
+    self%slab(place%slab)%value(place%row, lane, place%column) = number
+  end subroutine set_number
+
+  !> Under which name the array of a number is listed.
+  pure function name_at(self, place) result(name)
+    class(lane_numbers_t), intent(in) :: self
+    type(place_t), intent(in) :: place
+    character(len=longest) :: name
+
+    name = self%slab(place%slab)%name
+  end function name_at
 
 end module nocdyn_lane_numbers
