@@ -7,6 +7,9 @@
 !>
 !> Where all targets are plain (`plain_targets_t`), a variant whose values are allowed is what assembly would make of it if they
 !> are written over those of another one; the machine is not assembled then.
+!>
+!> What makes texts is done by one thread at a time, in critical sections named `texts`: gfortran 12 keeps the lengths of
+!> temporary texts in static memory, with -frecursive as without it.
 module nocdyn_variant_machines
   use nocdyn_assembly, only: assemble_machine, new_formulation
   use nocdyn_errors, only: error_t
@@ -39,7 +42,7 @@ module nocdyn_variant_machines
     logical, allocatable, private :: is_of_run(:)           !! of each target, whether it is a number of &run
     real(wp), allocatable, private :: base(:)               !! values of those in the input
     type(lane_numbers_t), private :: numbers                !! of the block
-    type(reduced_t), pointer, private :: single => null()   !! the machine of that variant, and its formulation, laid out as the block
+    type(reduced_t), pointer, private :: single => null()   !! that variant, laid out as the block
     type(lane_numbers_t), private :: single_numbers
     logical, private :: has_learnt = .false.                !! whether the targets have been tried
     logical, private :: began_at_zero = .false.             !! with a target whose value was 0
@@ -73,6 +76,7 @@ contains
     allocate (self%targets, source=targets)
     self%is_audited = audited
     call look_at_run(self)
+    !$omp critical (texts)
     allocate (block, self%single, self%origin)
     complaint = ''
     if (present(typical)) then
@@ -84,6 +88,7 @@ contains
       call assemble_machine(self%input, block%machine, error, lanes)
     end if
     if (.not. allocated(error)) call lay_out(self, block)
+    !$omp end critical (texts)
   end subroutine new_variant_machines
 
   !> Which targets are numbers of &run, and what they are for the block.
@@ -185,7 +190,9 @@ contains
 
     verdict = variant_refused
     if (.not. self%plain%have_seen(values)) then
+      !$omp critical (texts)
       call set_targets(self%input, self%targets, values, reason)
+      !$omp end critical (texts)
       if (reason /= '') return
       call self%plain%see(values)
     end if
@@ -290,14 +297,17 @@ contains
     type(error_t), allocatable :: error
 
     verdict = variant_refused
+    !$omp critical (texts)
     call set_targets(self%input, self%targets, values, reason)
-    if (reason /= '') return
-    call assemble_machine(self%input, self%single%machine, error)
-    if (allocated(error)) then
-      call move_alloc(error%message, reason)
-    else
-      verdict = variant_alone
+    if (reason == '') then
+      call assemble_machine(self%input, self%single%machine, error)
+      if (allocated(error)) then
+        call move_alloc(error%message, reason)
+      else
+        verdict = variant_alone
+      end if
     end if
+    !$omp end critical (texts)
   end subroutine assemble
 
   !> The formulation, of one lane, of the variant that is to run alone, after `put`.
@@ -305,7 +315,9 @@ contains
     class(variant_machines_t), intent(in) :: self
     class(formulation_t), allocatable, intent(out) :: formulation
 
+    !$omp critical (texts)
     call new_formulation(formulation_word(self%input), self%single%machine, formulation, self%is_audited)
+    !$omp end critical (texts)
   end subroutine alone_formulation
 
   !> Gives up the block.

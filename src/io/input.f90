@@ -182,6 +182,7 @@ contains
 
     first = first_key(self%rule) - 1
     do key_position = 1, size(self%values)
+      if (key_rules(first + key_position)%name(1:1) /= key(1:1)) cycle   ! quicker than to compare the names
       if (key_rules(first + key_position)%name == key) return
     end do
     error stop 'nocdyn_input: a key was asked for that the schema does not have'

@@ -103,6 +103,10 @@ module nocdyn_schema
     example_t('output',     'interval = 0.01'), &
     coupling_examples, constraint_examples, torque_examples, sweep_examples]
 
+  integer :: rule   ! of the list below alone
+  integer, parameter :: first_keys(size(group_rules)) = &
+    [(findloc(key_rules%group, group_rules(rule)%name, dim=1), rule=1, size(group_rules))]
+
 contains
 
   !> Row of `group_rules`, 0 if there is no such group.
@@ -118,9 +122,7 @@ contains
   pure integer function first_key(group_rule) result(key)
     integer, intent(in) :: group_rule
 
-    do key = 1, size(key_rules)
-      if (key_rules(key)%group == group_rules(group_rule)%name) return
-    end do
+    key = first_keys(group_rule)
   end function first_key
 
   !> Last row of `key_rules` of a group.
