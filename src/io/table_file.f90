@@ -1,4 +1,5 @@
-!> Tables in files: two columns of numbers, separated by blanks, tabs or a comma; # and ! begin comments.
+!> Tables in files: columns of numbers, separated by blanks, tabs or a comma; # and ! begin comments. The table of an element
+!> has two columns, of which the first ascends; a list has a first line with the names of its columns, separated by commas.
 module nocdyn_table_file
   use nocdyn_errors, only: error_t, exit_file, exit_input
   use nocdyn_kinds, only: wp
@@ -8,16 +9,18 @@ module nocdyn_table_file
   implicit none (type, external)
   private
 
-  public :: read_table_file, read_table_text
+  public :: read_table_file, read_table_text, read_list_text
 
   integer, parameter :: most_complaints = 5   !! a file of another form has as many mistakes as lines
   character(len=*), parameter :: line_end = achar(10), tab = achar(9), carriage_return = achar(13)
   character(len=*), parameter :: byte_order_mark = char(239) // char(187) // char(191)
-  character(len=*), parameter :: blanks = ' ' // tab, comments = '#!'
+  character(len=*), parameter :: blanks = ' ' // tab, comments = '#!', quotes = '"' // "'"
 
   !> What is known while the lines of a table go by.
   type :: reading_t
     character(len=:), allocatable :: file
+    integer :: columns = 2
+    logical :: is_list = .false.        !! a list, else the table of an element
     integer :: line = 0
     integer :: last_good = 0            !! line of the last row
     integer :: wrong = 0                !! lines with a mistake
@@ -54,26 +57,110 @@ contains
     type(string_t), allocatable, intent(out) :: complaints(:)
     type(reading_t) :: reading
     real(wp), allocatable :: values(:, :)
-    integer :: last, rows, start
+    integer :: rows
 
-    allocate (values(2, lines_of(text)))
     allocate (reading%complaints(0))
     reading%file = file
-    rows = 0
-    start = 1
-    if (index(text, byte_order_mark) == 1) start = 1 + len(byte_order_mark)
-    do while (start <= len(text))
-      last = start - 2 + index(text(start:), line_end)
-      if (last < start - 1) last = len(text)
-      reading%line = reading%line + 1
-      call read_line(text(start:content_end(text, start, last)), reading, values, rows)
-      start = last + 2
-    end do
-    call conclude(reading, rows, index(text, achar(0)) > 0)
+    call read_rows(text, first_position(text), reading, values, rows)
+    call conclude(reading, rows, least=2, is_binary=index(text, achar(0)) > 0)
     first = values(1, :rows)
     second = values(2, :rows)
     call move_alloc(reading%complaints, complaints)
   end subroutine read_table_text
+
+  !> A list: the names of the columns in the first line that is no comment, then rows of as many numbers, one at least.
+  subroutine read_list_text(text, file, names, line, values, complaints)
+    character(len=*), intent(in) :: text
+    character(len=*), intent(in) :: file   !! what complaints call it
+    type(string_t), allocatable, intent(out) :: names(:)
+    integer, intent(out) :: line                                !! of the names
+    real(wp), allocatable, intent(out) :: values(:, :)          !! [names, rows]
+    type(string_t), allocatable, intent(out) :: complaints(:)   !! sentences that begin with file and line; empty: all is well
+    type(reading_t) :: reading
+    real(wp), allocatable :: lines(:, :)
+    integer :: rows, start
+
+    allocate (reading%complaints(0))
+    reading%file = file
+    reading%is_list = .true.
+    start = first_position(text)
+    call read_names(text, start, reading, names)
+    reading%columns = size(names)
+    line = reading%line
+    call read_rows(text, start, reading, lines, rows)
+    call conclude(reading, rows, least=1, is_binary=index(text, achar(0)) > 0)
+    allocate (values(size(names), rows))
+    values = lines(:, :rows)
+    call move_alloc(reading%complaints, complaints)
+  end subroutine read_list_text
+
+  !> Behind the byte order mark, if there is one.
+  pure integer function first_position(text)
+    character(len=*), intent(in) :: text
+
+    first_position = 1
+    if (index(text, byte_order_mark) == 1) first_position = 1 + len(byte_order_mark)
+  end function first_position
+
+  !> Last position of the line that begins at `start`.
+  pure integer function line_last(text, start)
+    character(len=*), intent(in) :: text
+    integer, intent(in) :: start
+
+    line_last = start - 2 + index(text(start:), line_end)
+    if (line_last < start - 1) line_last = len(text)
+  end function line_last
+
+  !> The names of the columns of a list, with or without quotes; none if there is no line but comments.
+  subroutine read_names(text, start, reading, names)
+    character(len=*), intent(in) :: text
+    integer, intent(inout) :: start   !! of the first line; at the end, of the line behind that with the names
+    type(reading_t), intent(inout) :: reading
+    type(string_t), allocatable, intent(out) :: names(:)
+    character(len=:), allocatable :: rest
+    integer :: comma, last
+
+    allocate (names(0))
+    do while (start <= len(text) .and. size(names) == 0)
+      last = line_last(text, start)
+      reading%line = reading%line + 1
+      rest = ''
+      if (content_end(text, start, last) >= start) rest = text(start:last)
+      start = last + 2
+      do while (rest /= '')
+        comma = index(rest // ',', ',')
+        call append(names, without_quotes(rest(:comma - 1)))
+        rest = rest(min(comma, len(rest)) + 1:)
+      end do
+    end do
+  end subroutine read_names
+
+  pure function without_quotes(text) result(name)
+    character(len=*), intent(in) :: text
+    character(len=:), allocatable :: name
+
+    name = text(verify(text // '.', blanks // quotes):verify(text, blanks // quotes // carriage_return, back=.true.))
+  end function without_quotes
+
+  !> The rows of all lines from position `first` on.
+  subroutine read_rows(text, first, reading, values, rows)
+    character(len=*), intent(in) :: text
+    integer, intent(in) :: first
+    type(reading_t), intent(inout) :: reading
+    real(wp), allocatable, intent(out) :: values(:, :)   !! [columns, lines], the first `rows` are in use
+    integer, intent(out) :: rows
+    integer :: last, start
+
+    allocate (values(reading%columns, lines_of(text)))
+    rows = 0
+    start = first
+    do while (start <= len(text))
+      last = line_last(text, start)
+      reading%line = reading%line + 1
+      call read_line(text(start:content_end(text, start, last)), reading, values, rows)
+      start = last + 2
+    end do
+  end subroutine read_rows
 
   pure integer function lines_of(text) result(lines)
     character(len=*), intent(in) :: text
@@ -101,22 +188,26 @@ contains
   subroutine read_line(content, reading, values, rows)
     character(len=*), intent(in) :: content
     type(reading_t), intent(inout) :: reading
-    real(wp), intent(inout) :: values(:, :)   !! [2, lines]
+    real(wp), intent(inout) :: values(:, :)   !! [columns, lines]
     integer, intent(inout) :: rows
-    integer :: begins(2), ends(2), found
+    integer :: begins(reading%columns), ends(reading%columns), column, found
     character(len=:), allocatable :: complaint
 
     if (content == '') return
     call split(content, begins, ends, found)
-    if (found /= 2) then
+    if (found /= reading%columns) then
       complaint = to_text(found) // trim(merge(' column ', ' columns', found == 1)) // ' in ' // excerpt(content) // &
-                  '; needed: 2, separated by blanks or a comma'
+                  '; needed: ' // to_text(reading%columns) // ', separated by blanks or a comma'
     else
-      call read_column(content(begins(1):ends(1)), 1, values(1, rows + 1), complaint)
-      if (complaint == '') call read_column(content(begins(2):ends(2)), 2, values(2, rows + 1), complaint)
+      complaint = ''
+      do column = 1, found
+        if (complaint == '') call read_column(content(begins(column):ends(column)), column, values(column, rows + 1), complaint)
+      end do
     end if
-    if (complaint /= '' .and. rows == 0 .and. reading%wrong == 0) complaint = complaint // header_hint(content)
-    if (complaint == '' .and. rows > 0) call check_ascent(values(1, rows), values(1, rows + 1), reading%last_good, complaint)
+    if (.not. reading%is_list) then
+      if (complaint /= '' .and. rows == 0 .and. reading%wrong == 0) complaint = complaint // header_hint(content)
+      if (complaint == '' .and. rows > 0) call check_ascent(values(1, rows), values(1, rows + 1), reading%last_good, complaint)
+    end if
     if (complaint /= '') then
       call complain(reading, ':' // to_text(reading%line) // ': ' // complaint)
     else
@@ -125,10 +216,10 @@ contains
     end if
   end subroutine read_line
 
-  !> Where the first two columns stand, and how many there are; a comma without a value before it counts as a column.
+  !> Where the columns stand, and how many there are; a comma without a value before it counts as a column.
   pure subroutine split(content, begins, ends, found)
     character(len=*), intent(in) :: content   !! without blanks at its end
-    integer, intent(out) :: begins(2), ends(2)
+    integer, intent(out) :: begins(:), ends(:)
     integer, intent(out) :: found
     integer :: first, last
 
@@ -139,7 +230,7 @@ contains
     do while (first <= len(content))
       last = first - 2 + scan(content(first:) // ',', blanks // ',')
       found = found + 1
-      if (found <= 2) then
+      if (found <= size(begins)) then
         begins(found) = first
         ends(found) = last
       end if
@@ -209,9 +300,10 @@ contains
   end subroutine complain
 
   !> Complaints about the file as a whole.
-  subroutine conclude(reading, rows, is_binary)
+  subroutine conclude(reading, rows, least, is_binary)
     type(reading_t), intent(inout) :: reading
     integer, intent(in) :: rows
+    integer, intent(in) :: least   !! rows
     logical, intent(in) :: is_binary
 
     if (is_binary) then
@@ -221,8 +313,9 @@ contains
     else if (reading%wrong > most_complaints) then
       call append(reading%complaints, reading%file // ': ' // to_text(reading%wrong - most_complaints) // &
                   ' more lines are wrong')
-    else if (reading%wrong == 0 .and. rows < 2) then
-      call complain(reading, ': ' // to_text(rows) // trim(merge(' row ', ' rows', rows == 1)) // '; needed: at least 2')
+    else if (reading%wrong == 0 .and. rows < least) then
+      call complain(reading, ': ' // to_text(rows) // trim(merge(' row ', ' rows', rows == 1)) // '; needed: at least ' // &
+                    to_text(least))
     end if
   end subroutine conclude
 
