@@ -1,17 +1,48 @@
-!> What a number that varies asks of the other keys of its group: whether they are given, be it as numbers that vary too.
+!> Several numbers that vary together: each once, none beside an alternative of its key, none without the keys that it needs.
 module nocdyn_target_company
   use nocdyn_input, only: input_t
   use nocdyn_schema, only: first_key, key_rules
   use nocdyn_schema_relations, only: relations_of, relations_t
   use nocdyn_schema_text, only: listed
-  use nocdyn_targets, only: target_t
-  use nocdyn_text, only: append, string_t
+  use nocdyn_targets, only: find_target, target_t
+  use nocdyn_text, only: append, string_t, to_text
   implicit none (type, external)
   private
 
-  public :: check_company
+  public :: find_targets, check_company
 
 contains
+
+  !> The targets of several paths, and what is wrong with each of them.
+  subroutine find_targets(input, paths, targets, complaints)
+    type(input_t), intent(in) :: input
+    type(string_t), intent(in) :: paths(:)
+    type(target_t), allocatable, intent(out) :: targets(:)        !! [paths]; those with a complaint are of no use
+    type(string_t), allocatable, intent(out) :: complaints(:)     !! [paths], '' if fine
+    integer :: earlier, i
+
+    allocate (targets(size(paths)), complaints(size(paths)))
+    do i = 1, size(paths)
+      call find_target(input, paths(i)%text, targets(i), complaints(i)%text)
+    end do
+    do i = 1, size(paths)
+      if (targets(i)%group == 0) cycle
+      call check_company(input, targets, i, complaints(i)%text)
+      earlier = same_target(targets(:i - 1), targets(i))
+      if (earlier > 0) complaints(i)%text = 'varies already, as number ' // to_text(earlier) // '; allowed: once'
+    end do
+  end subroutine find_targets
+
+  !> The first of the targets that is the same number as `target`, 0 if none is.
+  pure integer function same_target(targets, target) result(same)
+    type(target_t), intent(in) :: targets(:), target
+
+    do same = 1, size(targets)
+      if (targets(same)%group == target%group .and. targets(same)%key == target%key .and. &
+          targets(same)%place == target%place) return
+    end do
+    same = 0
+  end function same_target
 
   !> Whether no alternative of a target's key is given, and one of the keys that it needs is.
   subroutine check_company(input, targets, which, complaint)

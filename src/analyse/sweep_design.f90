@@ -1,0 +1,188 @@
+!> What a sweep varies, and the values of each variant: &sweep and &vary, or the file of a list.
+module nocdyn_sweep_design
+  use nocdyn_designs, only: design_t, factor_t, grid_design, grid_size, latin_design, list_design, most_variants, &
+    probability_between, random_design, sobol_design
+  use nocdyn_errors, only: error_t, exit_file
+  use nocdyn_fingerprints, only: fingerprint
+  use nocdyn_input, only: group_t, input_t
+  use nocdyn_kinds, only: wp
+  use nocdyn_mistakes, only: mistakes_t
+  use nocdyn_sobol_points, only: most_dimensions
+  use nocdyn_sweep_mistakes, only: add_mistake
+  use nocdyn_table_file, only: read_list_text
+  use nocdyn_target_company, only: find_targets
+  use nocdyn_targets, only: target_t
+  use nocdyn_text, only: quoted, string_t, to_text
+  use nocdyn_text_file, only: path_in, read_text_file
+  implicit none (type, external)
+  private
+
+  public :: read_design
+
+contains
+
+  !> Targets and design; the design is allocated if there is no mistake.
+  subroutine read_design(input, sweep, targets, design, list_fingerprint, mistakes)
+    type(input_t), intent(in) :: input
+    integer, intent(in) :: sweep   !! index of &sweep
+    type(target_t), allocatable, intent(out) :: targets(:)
+    class(design_t), allocatable, intent(out) :: design
+    character(len=:), allocatable, intent(out) :: list_fingerprint   !! of the file's bytes; '' without a list
+    type(mistakes_t), intent(inout) :: mistakes
+    type(factor_t), allocatable :: factors(:)
+    real(wp), allocatable :: values(:, :)
+    integer :: before, samples, seed
+
+    before = mistakes%count
+    associate (group => input%groups(sweep), varied => input%groups_named('vary'))
+      list_fingerprint = ''
+      if (group%text('design') == 'list') then
+        call read_list(input, sweep, targets, values, list_fingerprint, mistakes)
+        call refuse_varied(input, varied, mistakes)
+      else
+        call read_varied(input, sweep, varied, targets, factors, mistakes)
+      end if
+      if (mistakes%count > before) return
+      samples = 0
+      seed = 0
+      if (group%has_value('samples')) samples = group%whole_number('samples')
+      if (group%has_value('seed')) seed = group%whole_number('seed')
+      select case (group%text('design'))
+      case ('grid')
+        allocate (design, source=grid_design(factors))
+      case ('random')
+        allocate (design, source=random_design(factors, samples, seed))
+      case ('latin')
+        allocate (design, source=latin_design(factors, samples, seed))
+      case ('sobol')
+        allocate (design, source=sobol_design(factors, samples, seed))
+      case ('list')
+        allocate (design, source=list_design(values))
+      case default
+        error stop 'nocdyn_sweep_design: the schema allows a design that is not there'
+      end select
+    end associate
+  end subroutine read_design
+
+  !> The targets in the first line of a file, and the values in the others.
+  subroutine read_list(input, sweep, targets, values, list_fingerprint, mistakes)
+    type(input_t), intent(in) :: input
+    integer, intent(in) :: sweep
+    type(target_t), allocatable, intent(out) :: targets(:)
+    real(wp), allocatable, intent(out) :: values(:, :)   !! [targets, variants]
+    character(len=:), allocatable, intent(inout) :: list_fingerprint
+    type(mistakes_t), intent(inout) :: mistakes
+    type(error_t), allocatable :: error
+    type(string_t), allocatable :: complaints(:), paths(:)
+    character(len=:), allocatable :: file, text
+    integer :: i, line
+
+    allocate (targets(0))
+    file = path_in(input%file(:index(input%file, '/', back=.true.)), input%groups(sweep)%text('file'))
+    call read_text_file(file, text, error)
+    if (allocated(error)) then
+      call add_mistake(input, sweep, 'file', 'file: ' // error%message, mistakes, exit_file)
+      return
+    end if
+    list_fingerprint = fingerprint(text)
+    call read_list_text(text, file, paths, line, values, complaints)
+    do i = 1, size(complaints)
+      call add_mistake(input, sweep, 'file', 'file: ' // complaints(i)%text, mistakes)
+    end do
+    call find_targets(input, paths, targets, complaints)
+    do i = 1, size(paths)
+      if (complaints(i)%text == '') cycle
+      call add_mistake(input, sweep, 'file', 'file: ' // file // ':' // to_text(line) // ': column ' // to_text(i) // ', ' // &
+                       quoted(paths(i)%text) // ': ' // complaints(i)%text, mistakes)
+    end do
+  end subroutine read_list
+
+  subroutine refuse_varied(input, varied, mistakes)
+    type(input_t), intent(in) :: input
+    integer, intent(in) :: varied(:)
+    type(mistakes_t), intent(inout) :: mistakes
+    integer :: i
+
+    do i = 1, size(varied)
+      call mistakes%add(input%groups(varied(i))%line, varied(i), &
+                        "design = 'list' takes targets and values from its file; allowed: no &vary")
+    end do
+  end subroutine refuse_varied
+
+  !> The targets and factors of all &vary.
+  subroutine read_varied(input, sweep, varied, targets, factors, mistakes)
+    type(input_t), intent(in) :: input
+    integer, intent(in) :: sweep, varied(:)
+    type(target_t), allocatable, intent(out) :: targets(:)
+    type(factor_t), allocatable, intent(out) :: factors(:)
+    type(mistakes_t), intent(inout) :: mistakes
+    type(string_t), allocatable :: complaints(:), paths(:)
+    character(len=:), allocatable :: design
+    integer :: i
+
+    design = input%groups(sweep)%text('design')
+    allocate (factors(size(varied)), paths(size(varied)))
+    do i = 1, size(varied)
+      paths(i)%text = input%groups(varied(i))%text('target')
+    end do
+    call find_targets(input, paths, targets, complaints)
+    do i = 1, size(varied)
+      if (complaints(i)%text /= '') then
+        call add_mistake(input, varied(i), 'target', 'target = ' // quoted(paths(i)%text) // ': ' // complaints(i)%text, mistakes)
+      end if
+      factors(i) = factor_of(input%groups(varied(i)))
+      call check_factor(input, varied(i), design, factors(i), mistakes)
+    end do
+    if (size(varied) == 0) then
+      call add_mistake(input, sweep, 'design', 'design = ' // quoted(design) // ' has nothing to vary; needed: a &vary', mistakes)
+    else if (design == 'sobol' .and. size(varied) > most_dimensions) then
+      call add_mistake(input, sweep, 'design', "design = 'sobol' varies at most " // to_text(most_dimensions) // &
+                       ' numbers; here vary ' // to_text(size(varied)), mistakes)
+    else if (design == 'grid' .and. grid_size(factors) > most_variants) then
+      call add_mistake(input, sweep, 'design', 'the grid has too many variants; allowed: at most ' // to_text(most_variants) // &
+                       ' by the product of all count', mistakes)
+    end if
+  end subroutine read_varied
+
+  function factor_of(group) result(factor)
+    type(group_t), intent(in) :: group
+    type(factor_t) :: factor
+
+    factor%distribution = group%text('distribution')
+    factor%low = group%number('low', factor%low)
+    factor%high = group%number('high', factor%high)
+    factor%mean = group%number('mean', factor%mean)
+    factor%deviation = group%number('deviation', factor%deviation)
+    factor%median = group%number('median', factor%median)
+    factor%log_deviation = group%number('log_deviation', factor%log_deviation)
+    if (group%has_value('count')) factor%count = group%whole_number('count')
+  end function factor_of
+
+  !> What the design asks of a factor, and the distribution of its ends.
+  subroutine check_factor(input, varied, design, factor, mistakes)
+    type(input_t), intent(in) :: input
+    integer, intent(in) :: varied   !! index of the &vary
+    character(len=*), intent(in) :: design
+    type(factor_t), intent(in) :: factor
+    type(mistakes_t), intent(inout) :: mistakes
+    logical :: has_count
+
+    has_count = input%groups(varied)%has_value('count')
+    if (design /= 'grid') then
+      if (has_count) then
+        call add_mistake(input, varied, 'count', "count belongs to design = 'grid'; here design = " // quoted(design), mistakes)
+      end if
+      if (probability_between(factor) <= 0.0_wp) then
+        call add_mistake(input, varied, 'distribution', 'the distribution has nothing from low to high; allowed: ends ' // &
+                         'nearer to its middle', mistakes)
+      end if
+      return
+    end if
+    if (.not. has_count) call add_mistake(input, varied, 'count', "count is missing; design = 'grid' needs it", mistakes)
+    if (factor%distribution /= 'uniform') then
+      call add_mistake(input, varied, 'distribution', 'distribution = ' // quoted(trim(factor%distribution)) // &
+                       " has no grid; allowed with design = 'grid': 'uniform'", mistakes)
+    end if
+  end subroutine check_factor
+
+end module nocdyn_sweep_design

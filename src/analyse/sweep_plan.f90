@@ -1,0 +1,130 @@
+!> A sweep as its input describes it: what varies, how, and what is kept, with every mistake of its groups in one error.
+module nocdyn_sweep_plan
+  use nocdyn_assembly, only: assemble_machine
+  use nocdyn_designs, only: design_t
+  use nocdyn_errors, only: error_t, exit_input, raise
+  use nocdyn_input, only: group_t, input_t
+  use nocdyn_kinds, only: wp
+  use nocdyn_machine, only: machine_t
+  use nocdyn_mistakes, only: mistakes_t
+  use nocdyn_mistakes_report, only: mistakes_report
+  use nocdyn_output_times, only: check_output_times
+  use nocdyn_schema, only: has_word
+  use nocdyn_size_limits, only: check_size
+  use nocdyn_statistics, only: statistic_t
+  use nocdyn_sweep_design, only: read_design
+  use nocdyn_sweep_mistakes, only: add_mistake
+  use nocdyn_sweep_records, only: read_records, time_span_t
+  use nocdyn_targets, only: target_t
+  use nocdyn_text, only: string_t
+  use nocdyn_trajectory_columns, only: column_t, list_columns
+  implicit none (type, external)
+  private
+
+  public :: make_plan, without_sweep
+
+  type, public :: sweep_plan_t
+    type(input_t) :: input                            !! of the base machine, with the groups of the sweep
+    class(design_t), allocatable :: design
+    type(target_t), allocatable :: targets(:)         !! as many as the design varies
+    type(statistic_t), allocatable :: statistics(:)
+    integer, allocatable :: trajectories(:)           !! variants that are written like runs, ascending
+    character(len=:), allocatable :: list_fingerprint   !! of the file of a list, '' without one
+  end type sweep_plan_t
+
+contains
+
+  !> Reads the groups of the sweep; the base machine must be one that `nocdyn run` accepts.
+  subroutine make_plan(input, plan, error)
+    type(input_t), intent(in) :: input   !! read without mistakes
+    type(sweep_plan_t), intent(out) :: plan
+    type(error_t), allocatable, intent(out) :: error
+    type(mistakes_t) :: mistakes
+    type(error_t), allocatable :: failure
+    type(string_t), allocatable :: labels(:)
+    integer, allocatable :: sweeps(:)
+    integer :: variants
+
+    allocate (sweeps, source=input%groups_named('sweep'))
+    if (size(sweeps) == 0) then
+      call raise(error, exit_input, input%file // ": there is no &sweep; 'nocdyn help input sweep' shows one")
+      return
+    end if
+    plan%input = input
+    call read_design(input, sweeps(1), plan%targets, plan%design, plan%list_fingerprint, mistakes)
+    variants = huge(variants)
+    if (allocated(plan%design)) variants = plan%design%variants
+    call label_columns(input, labels, failure)
+    if (.not. allocated(failure)) then
+      call read_records(input, labels, fixed_span(input, plan%targets), variants, plan%statistics, plan%trajectories, mistakes)
+      if (size(plan%statistics) == 0 .and. mistakes%count == 0) call add_mistake(input, sweeps(1), 'design', &
+        'no number of the variants is kept; needed: a &record with quantity and statistic', mistakes)
+      if (size(plan%trajectories) > 0) call check_output_times(input, failure)
+    end if
+    call conclude(input, mistakes, failure, error)
+  end subroutine make_plan
+
+  !> Labels of the columns of trajectory.csv of the base machine.
+  subroutine label_columns(input, labels, error)
+    type(input_t), intent(in) :: input
+    type(string_t), allocatable, intent(out) :: labels(:)
+    type(error_t), allocatable, intent(out) :: error
+    type(column_t), allocatable :: columns(:)
+    type(machine_t) :: machine
+
+    call assemble_machine(input, machine, error)
+    if (.not. allocated(error)) call check_size(input, machine, error)
+    if (.not. allocated(error)) call list_columns(machine, columns, labels)
+  end subroutine label_columns
+
+  !> Start and end of the base machine, as far as they do not vary.
+  pure function fixed_span(input, targets) result(span)
+    type(input_t), intent(in) :: input
+    type(target_t), intent(in) :: targets(:)
+    type(time_span_t) :: span
+    type(group_t) :: run
+    integer, allocatable :: runs(:)
+
+    allocate (runs, source=input%groups_named('run'))
+    run = input%groups(runs(1))
+    if (.not. any(targets%group == runs(1) .and. targets%key == run%key_position('t_start'))) span%t_start = run%number('t_start')
+    if (.not. any(targets%group == runs(1) .and. targets%key == run%key_position('t_end'))) span%t_end = run%number('t_end')
+  end function fixed_span
+
+  !> One error of the mistakes in the sweep and of what is wrong with the base machine.
+  subroutine conclude(input, mistakes, failure, error)
+    type(input_t), intent(in) :: input
+    type(mistakes_t), intent(in) :: mistakes
+    type(error_t), allocatable, intent(in) :: failure
+    type(error_t), allocatable, intent(out) :: error
+
+    if (mistakes%count > 0 .and. allocated(failure)) then
+      call raise(error, max(failure%code, mistakes%worst_code()), mistakes_report(input, mistakes) // new_line('a') // &
+                 failure%message)
+    else if (mistakes%count > 0) then
+      call raise(error, mistakes%worst_code(), mistakes_report(input, mistakes))
+    else if (allocated(failure)) then
+      error = failure
+    end if
+  end subroutine conclude
+
+  !> The input of a machine alone, e.g. of one variant.
+  pure function without_sweep(input) result(machine_input)
+    type(input_t), intent(in) :: input
+    type(input_t) :: machine_input
+    logical :: is_kept(size(input%groups))
+    integer :: i, kept
+
+    is_kept = [(.not. has_word('sweep vary record', input%groups(i)%kind), i=1, size(input%groups))]
+    machine_input%file = input%file
+    allocate (machine_input%overrides, source=input%overrides)
+    allocate (machine_input%groups(count(is_kept)))
+    kept = 0
+    do i = 1, size(input%groups)
+      if (.not. is_kept(i)) cycle
+      kept = kept + 1
+      machine_input%groups(kept) = input%groups(i)
+    end do
+  end function without_sweep
+
+end module nocdyn_sweep_plan

@@ -1,0 +1,171 @@
+!> What a sweep keeps of each variant: &record, resolved against the columns of trajectory.csv.
+module nocdyn_sweep_records
+  use nocdyn_input, only: group_t, input_t
+  use nocdyn_kinds, only: wp
+  use nocdyn_mistakes, only: mistakes_t
+  use nocdyn_schema_text, only: suggestion
+  use nocdyn_statistics, only: default_band, new_statistic, statistic_names, statistic_t
+  use nocdyn_sweep_mistakes, only: add_mistake
+  use nocdyn_text, only: quoted, string_t, to_text
+  implicit none (type, external)
+  private
+
+  public :: read_records
+
+  !> The time in which statistics can be taken; an end that varies is not known.
+  type, public :: time_span_t
+    real(wp) :: t_start = -huge(1.0_wp), t_end = huge(1.0_wp)   !! [s]
+  end type time_span_t
+
+contains
+
+  !> Statistics in the order of the file, and the variants of which trajectories are wanted.
+  subroutine read_records(input, labels, span, variants, statistics, trajectories, mistakes)
+    type(input_t), intent(in) :: input
+    type(string_t), intent(in) :: labels(:)   !! of the columns
+    type(time_span_t), intent(in) :: span
+    integer, intent(in) :: variants           !! huge if that is not known
+    type(statistic_t), allocatable, intent(out) :: statistics(:)
+    integer, allocatable, intent(out) :: trajectories(:)   !! ascending, each once
+    type(mistakes_t), intent(inout) :: mistakes
+    type(string_t), allocatable :: names(:)
+    integer :: i
+
+    allocate (statistics(0), trajectories(0))
+    call take_units_off(labels, names)
+    associate (records => input%groups_named('record'))
+      do i = 1, size(records)
+        associate (group => input%groups(records(i)))
+          if (group%has_value('quantity')) then
+            call add_statistics(input, records(i), labels, names, span, statistics, mistakes)
+          else if (.not. group%has_value('trajectories')) then
+            call mistakes%add(group%line, records(i), 'there is nothing to record; needed: quantity or trajectories')
+          end if
+          if (group%has_value('trajectories')) call add_trajectories(input, records(i), variants, trajectories, mistakes)
+        end associate
+      end do
+    end associate
+  end subroutine read_records
+
+  subroutine take_units_off(labels, names)
+    type(string_t), intent(in) :: labels(:)
+    type(string_t), allocatable, intent(out) :: names(:)
+    integer :: i
+
+    allocate (names(size(labels)))
+    do i = 1, size(labels)
+      names(i)%text = labels(i)%text(:index(labels(i)%text, ' [', back=.true.) - 1)
+    end do
+  end subroutine take_units_off
+
+  subroutine add_statistics(input, record, labels, names, span, statistics, mistakes)
+    type(input_t), intent(in) :: input
+    integer, intent(in) :: record   !! index of the group
+    type(string_t), intent(in) :: labels(:), names(:)   !! with and without units
+    type(time_span_t), intent(in) :: span
+    type(statistic_t), allocatable, intent(inout) :: statistics(:)
+    type(mistakes_t), intent(inout) :: mistakes
+    type(statistic_t) :: statistic
+    type(string_t), allocatable :: words(:)
+    real(wp) :: band
+    integer :: column, i, kind
+
+    call find_column(input, record, labels, names, column, mistakes)
+    call check_from(input, record, span, mistakes)
+    if (column == 0) return
+    associate (group => input%groups(record))
+      words = group%texts('statistic')
+      band = group%number('band', default_band)
+      do i = 1, size(words)
+        kind = findloc(statistic_names, words(i)%text, dim=1)
+        if (kind == 0) error stop 'nocdyn_sweep_records: the schema allows a statistic that is not there'
+        if (group%has_value('from')) then
+          statistic = new_statistic(labels, column, kind, span%t_start, group%number('from'), band)
+        else
+          statistic = new_statistic(labels, column, kind, span%t_start, band=band)
+        end if
+        if (any_has_label(statistics, statistic%label)) then
+          call add_mistake(input, record, 'statistic', quoted(statistic%label) // ' is recorded already; allowed: once', mistakes)
+        else
+          call append_statistic(statistics, statistic)
+        end if
+      end do
+    end associate
+  end subroutine add_statistics
+
+  !> The column of a quantity, which is written with its unit or without; 0 if there is none.
+  subroutine find_column(input, record, labels, names, column, mistakes)
+    type(input_t), intent(in) :: input
+    integer, intent(in) :: record
+    type(string_t), intent(in) :: labels(:), names(:)
+    integer, intent(out) :: column
+    type(mistakes_t), intent(inout) :: mistakes
+    character(len=:), allocatable :: quantity
+
+    quantity = trim(adjustl(input%groups(record)%text('quantity')))
+    do column = 1, size(labels)
+      if (quantity == labels(column)%text .or. quantity == names(column)%text) return
+    end do
+    column = 0
+    call add_mistake(input, record, 'quantity', 'quantity = ' // quoted(quantity) // ' is no column of trajectory.csv' // &
+                     suggestion(quantity, names), mistakes)
+  end subroutine find_column
+
+  subroutine check_from(input, record, span, mistakes)
+    type(input_t), intent(in) :: input
+    integer, intent(in) :: record
+    type(time_span_t), intent(in) :: span
+    type(mistakes_t), intent(inout) :: mistakes
+    real(wp) :: from
+
+    if (.not. input%groups(record)%has_value('from')) return
+    from = input%groups(record)%number('from')
+    if (from < span%t_start) then
+      call add_mistake(input, record, 'from', 'from = ' // to_text(from) // ' is out of range; allowed: >= t_start = ' // &
+                       to_text(span%t_start), mistakes)
+    else if (from >= span%t_end) then
+      call add_mistake(input, record, 'from', 'from = ' // to_text(from) // ' is out of range; allowed: < t_end = ' // &
+                       to_text(span%t_end), mistakes)
+    end if
+  end subroutine check_from
+
+  pure logical function any_has_label(statistics, label)
+    type(statistic_t), intent(in) :: statistics(:)
+    character(len=*), intent(in) :: label
+    integer :: i
+
+    any_has_label = any([(statistics(i)%label == label, i=1, size(statistics))])
+  end function any_has_label
+
+  subroutine append_statistic(statistics, statistic)
+    type(statistic_t), allocatable, intent(inout) :: statistics(:)
+    type(statistic_t), intent(in) :: statistic
+    type(statistic_t), allocatable :: longer(:)
+
+    allocate (longer(size(statistics) + 1))
+    longer(:size(statistics)) = statistics
+    longer(size(longer)) = statistic
+    call move_alloc(longer, statistics)
+  end subroutine append_statistic
+
+  subroutine add_trajectories(input, record, variants, trajectories, mistakes)
+    type(input_t), intent(in) :: input
+    integer, intent(in) :: record
+    integer, intent(in) :: variants
+    integer, allocatable, intent(inout) :: trajectories(:)
+    type(mistakes_t), intent(inout) :: mistakes
+    integer, allocatable :: wanted(:)
+    integer :: i
+
+    wanted = input%groups(record)%whole_numbers('trajectories')
+    do i = 1, size(wanted)
+      if (wanted(i) > variants) then
+        call add_mistake(input, record, 'trajectories', 'trajectories(' // to_text(i) // ') = ' // to_text(wanted(i)) // &
+                         ' is out of range; allowed: 1 to ' // to_text(variants) // ', the number of variants', mistakes)
+      else if (all(trajectories /= wanted(i))) then
+        trajectories = [pack(trajectories, trajectories < wanted(i)), wanted(i), pack(trajectories, trajectories > wanted(i))]
+      end if
+    end do
+  end subroutine add_trajectories
+
+end module nocdyn_sweep_records
