@@ -77,8 +77,7 @@ contains
       words = group%texts('statistic')
       band = group%number('band', default_band)
       do i = 1, size(words)
-        kind = findloc(statistic_names, words(i)%text, dim=1)
-        if (kind == 0) error stop 'nocdyn_sweep_records: the schema allows a statistic that is not there'
+        kind = kind_of(words(i)%text)
         if (group%has_value('from')) then
           statistic = new_statistic(labels, column, kind, span%t_start, group%number('from'), band)
         else
@@ -93,6 +92,15 @@ contains
     end associate
   end subroutine add_statistics
 
+  pure integer function kind_of(word) result(kind)
+    character(len=*), intent(in) :: word
+
+    do kind = 1, size(statistic_names)
+      if (statistic_names(kind) == word) return
+    end do
+    error stop 'nocdyn_sweep_records: the schema allows a statistic that is not there'
+  end function kind_of
+
   !> The column of a quantity, which is written with its unit or without; 0 if there is none.
   subroutine find_column(input, record, labels, names, column, mistakes)
     type(input_t), intent(in) :: input
@@ -100,15 +108,20 @@ contains
     type(string_t), intent(in) :: labels(:), names(:)
     integer, intent(out) :: column
     type(mistakes_t), intent(inout) :: mistakes
-    character(len=:), allocatable :: quantity
+    character(len=:), allocatable :: hint, quantity
 
     quantity = trim(adjustl(input%groups(record)%text('quantity')))
     do column = 1, size(labels)
       if (quantity == labels(column)%text .or. quantity == names(column)%text) return
     end do
     column = 0
-    call add_mistake(input, record, 'quantity', 'quantity = ' // quoted(quantity) // ' is no column of trajectory.csv' // &
-                     suggestion(quantity, names), mistakes)
+    if (index(quantity, '[') > 0) then
+      hint = suggestion(quantity, labels)
+    else
+      hint = suggestion(quantity, names)
+    end if
+    call add_mistake(input, record, 'quantity', 'quantity = ' // quoted(quantity) // ' is no column of trajectory.csv' // hint, &
+                     mistakes)
   end subroutine find_column
 
   subroutine check_from(input, record, span, mistakes)

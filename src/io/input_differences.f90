@@ -1,0 +1,208 @@
+!> What is different between two inputs, in sentences. Both are texts of `input_text`, in which every key has its value.
+!>
+!> The title and the directory of the results change no number and do not count. The order of named groups counts: sums are
+!> formed in it, so that their last bits depend on it.
+module nocdyn_input_differences
+  use nocdyn_mistakes, only: mistakes_t
+  use nocdyn_namelist, only: assignment_t, namelist_t
+  use nocdyn_namelist_scanner, only: scan_namelist
+  use nocdyn_schema, only: group_rule_index, group_rules, is_single
+  use nocdyn_text, only: append, quoted, string_t, to_text
+  use nocdyn_text_order, only: find_order, first_position
+  implicit none (type, external)
+  private
+
+  public :: find_differences
+
+  integer, parameter :: longest_shown = 5   !! values of a list that are written out
+
+  !> An input taken apart.
+  type :: parts_t
+    type(namelist_t) :: namelist
+    type(string_t), allocatable :: labels(:)   !! of the groups: "&load 'work'", "&run", "&vary 2"
+    integer, allocatable :: order(:)           !! of the labels, sorted
+    integer, allocatable :: name_space(:)      !! the first row of `group_rules` with the same, 0 for groups without names
+  end type parts_t
+
+contains
+
+  !> One sentence for each difference, in the order of the old input; none if both describe the same sweep.
+  subroutine find_differences(old, new, sentences)
+    character(len=*), intent(in) :: old, new
+    type(string_t), allocatable, intent(out) :: sentences(:)
+    type(parts_t) :: before, after
+    integer, allocatable :: partner(:)   ! in the new input, 0: none
+    integer :: g
+
+    allocate (sentences(0))
+    call take_apart(old, before)
+    call take_apart(new, after)
+    allocate (partner(before%namelist%group_count))
+    do g = 1, size(partner)
+      partner(g) = first_position(before%labels(g)%text, after%labels, after%order)
+      if (partner(g) > 0) then
+        call compare_groups(before, g, after, partner(g), sentences)
+      else
+        call append(sentences, 'the new input has no ' // before%labels(g)%text)
+      end if
+    end do
+    do g = 1, after%namelist%group_count
+      if (any(partner == g)) cycle
+      call append(sentences, 'the new input has ' // after%labels(g)%text)
+    end do
+    call compare_order(before, partner, sentences)
+  end subroutine find_differences
+
+  subroutine take_apart(text, parts)
+    character(len=*), intent(in) :: text
+    type(parts_t), intent(out) :: parts
+    type(mistakes_t) :: mistakes
+    integer :: count(size(group_rules))
+    integer :: g, rule
+
+    call scan_namelist(text, parts%namelist, mistakes)
+    if (mistakes%count > 0) error stop 'nocdyn_input_differences: only texts of nocdyn_input_text are compared'
+    allocate (parts%labels(parts%namelist%group_count), parts%name_space(parts%namelist%group_count))
+    count = 0
+    do g = 1, parts%namelist%group_count
+      rule = group_rule_index(parts%namelist%groups(g)%name)
+      if (rule == 0) error stop 'nocdyn_input_differences: there is a group that the schema does not have'
+      count(rule) = count(rule) + 1
+      parts%labels(g)%text = label_of(parts%namelist, g, rule, count(rule))
+      parts%name_space(g) = 0
+      if (group_rules(rule)%name_space /= '') then
+        parts%name_space(g) = findloc(group_rules%name_space == group_rules(rule)%name_space, .true., dim=1)
+      end if
+    end do
+    call find_order(parts%labels, parts%order)
+  end subroutine take_apart
+
+  !> What a group is called in both inputs.
+  pure function label_of(namelist, g, rule, number) result(label)
+    type(namelist_t), intent(in) :: namelist
+    integer, intent(in) :: g, rule
+    integer, intent(in) :: number   !! among the groups of its kind
+    character(len=:), allocatable :: label
+    integer :: name
+
+    label = '&' // trim(group_rules(rule)%name)
+    if (group_rules(rule)%name_space /= '') then
+      name = key_place(namelist, g, 'name')
+      label = label // ' ' // quoted(namelist%item_text(namelist%items(namelist%assignments(name)%first_item)))
+    else if (.not. is_single(rule)) then
+      label = label // ' ' // to_text(number)
+    end if
+  end function label_of
+
+  !> The assignment to a key of a group, 0 if there is none.
+  pure integer function key_place(namelist, g, key) result(place)
+    type(namelist_t), intent(in) :: namelist
+    integer, intent(in) :: g
+    character(len=*), intent(in) :: key
+
+    do place = namelist%groups(g)%first_assignment, namelist%groups(g)%last_assignment
+      if (namelist%assignments(place)%key == key) return
+    end do
+    place = 0
+  end function key_place
+
+  !> Keys that one of two groups has alone, and keys of both with other values.
+  subroutine compare_groups(before, old, after, new, sentences)
+    type(parts_t), intent(in) :: before, after
+    integer, intent(in) :: old, new   !! the groups
+    type(string_t), allocatable, intent(inout) :: sentences(:)
+    character(len=:), allocatable :: start   ! of the sentences
+    integer :: a, other
+
+    start = before%labels(old)%text // ': '
+    associate (left => before%namelist, right => after%namelist)
+      do a = left%groups(old)%first_assignment, left%groups(old)%last_assignment
+        if (is_unimportant(before%labels(old)%text, left%assignments(a)%key)) cycle
+        other = key_place(right, new, left%assignments(a)%key)
+        if (other == 0) then
+          call append(sentences, start // left%assignments(a)%key // ' was ' // values_of(left, left%assignments(a)) // &
+                      ', is not there')
+        else
+          call compare_values(start // left%assignments(a)%key, left, left%assignments(a), right, right%assignments(other), &
+                              sentences)
+        end if
+      end do
+      do a = right%groups(new)%first_assignment, right%groups(new)%last_assignment
+        if (key_place(left, old, right%assignments(a)%key) > 0) cycle
+        call append(sentences, start // right%assignments(a)%key // ' was not there, is ' // &
+                    values_of(right, right%assignments(a)))
+      end do
+    end associate
+  end subroutine compare_groups
+
+  pure logical function is_unimportant(label, key)
+    character(len=*), intent(in) :: label, key
+
+    is_unimportant = (label == '&case' .and. key == 'title') .or. (label == '&output' .and. key == 'directory')
+  end function is_unimportant
+
+  !> Of lists of equal length the first place that differs is told, of others their values or lengths.
+  subroutine compare_values(start, left, old, right, new, sentences)
+    character(len=*), intent(in) :: start   !! of the sentence: group and key
+    type(namelist_t), intent(in) :: left, right
+    type(assignment_t), intent(in) :: old, new
+    type(string_t), allocatable, intent(inout) :: sentences(:)
+    character(len=:), allocatable :: is, place, was
+    integer :: count, i
+
+    count = old%last_item - old%first_item + 1
+    if (count /= new%last_item - new%first_item + 1) then
+      call append(sentences, start // ' was ' // values_of(left, old) // ', is ' // values_of(right, new))
+      return
+    end if
+    do i = 1, count
+      was = left%as_written(left%items(old%first_item + i - 1))
+      is = right%as_written(right%items(new%first_item + i - 1))
+      if (was == is) cycle
+      place = ''
+      if (count > 1) place = '(' // to_text(i) // ')'
+      call append(sentences, start // place // ' was ' // was // ', is ' // is)
+      return
+    end do
+  end subroutine compare_values
+
+  !> The values of a key as they are written; of long lists only how many they are.
+  pure function values_of(namelist, assignment) result(text)
+    type(namelist_t), intent(in) :: namelist
+    type(assignment_t), intent(in) :: assignment
+    character(len=:), allocatable :: text
+    integer :: i
+
+    if (assignment%last_item - assignment%first_item >= longest_shown) then
+      text = to_text(assignment%last_item - assignment%first_item + 1) // ' values'
+      return
+    end if
+    text = ''
+    do i = assignment%first_item, assignment%last_item
+      if (i > assignment%first_item) text = text // ', '
+      text = text // namelist%as_written(namelist%items(i))
+    end do
+  end function values_of
+
+  !> Groups of one name space that have changed places.
+  subroutine compare_order(before, partner, sentences)
+    type(parts_t), intent(in) :: before
+    integer, intent(in) :: partner(:)   !! of each old group in the new input
+    type(string_t), allocatable, intent(inout) :: sentences(:)
+    integer :: last(size(group_rules))   ! old group seen last in each name space
+    integer :: g
+
+    last = 0
+    do g = 1, size(partner)
+      if (partner(g) == 0 .or. before%name_space(g) == 0) cycle
+      associate (earlier => last(before%name_space(g)))
+        if (earlier > 0) then
+          if (partner(earlier) > partner(g)) call append(sentences, before%labels(g)%text // ' was behind ' // &
+                                                         before%labels(earlier)%text // ', is before it')
+        end if
+        earlier = g
+      end associate
+    end do
+  end subroutine compare_order
+
+end module nocdyn_input_differences
