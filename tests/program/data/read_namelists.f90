@@ -24,6 +24,9 @@ program read_namelists
   call read_excitations()
   call read_run()
   call read_output()
+  call read_sweep()
+  call read_varies()
+  call read_records()
 
 contains
 
@@ -286,5 +289,64 @@ contains
     if (points == 0 .and. interval < 0) points = 1001
     print '(*(g0, 1x))', 'output', interval, points, trim(directory)
   end subroutine read_output
+
+  subroutine read_sweep()
+    character(len=64) :: design
+    integer :: samples, seed, status
+    namelist /sweep/ design, samples, seed
+
+    design = ''
+    samples = 0
+    seed = 0
+    rewind (unit)
+    read (unit, nml=sweep, iostat=status)
+    if (status > 0) error stop 'sweep'
+    print '(*(g0, 1x))', 'sweep', trim(design), samples, seed
+  end subroutine read_sweep
+
+  subroutine read_varies()
+    character(len=256) :: target
+    character(len=64) :: distribution
+    real(wp) :: low, high, mean, deviation, median, log_deviation
+    integer :: count, status
+    namelist /vary/ target, distribution, low, high, mean, deviation, median, log_deviation, count
+
+    rewind (unit)
+    do
+      distribution = 'uniform'
+      low = not_given
+      high = not_given
+      mean = not_given
+      deviation = not_given
+      median = not_given
+      log_deviation = not_given
+      count = 0
+      read (unit, nml=vary, iostat=status)
+      if (is_iostat_end(status)) exit
+      if (status /= 0) error stop 'vary'
+      print '(*(g0, 1x))', 'vary', trim(target), trim(distribution), low, high, mean, deviation, median, log_deviation, count
+    end do
+  end subroutine read_varies
+
+  subroutine read_records()
+    character(len=256) :: quantity
+    character(len=64) :: statistic(8)
+    real(wp) :: from, band
+    integer :: trajectories(most_numbers), status
+    namelist /record/ quantity, statistic, from, band, trajectories
+
+    rewind (unit)
+    do
+      quantity = ''
+      statistic = ''
+      from = not_given
+      band = not_given
+      trajectories = 0
+      read (unit, nml=record, iostat=status)
+      if (is_iostat_end(status)) exit
+      if (status /= 0) error stop 'record'
+      print '(*(g0, 1x))', 'record', trim(quantity), statistic, from, band, trajectories
+    end do
+  end subroutine read_records
 
 end program read_namelists
