@@ -27,6 +27,7 @@ module nocdyn_targets
     integer :: key = 0                      !! index in the group's values
     integer :: place = 1                    !! in the list of the key
     character(len=:), allocatable :: unit   !! '' if it has none
+    character(len=:), allocatable :: long_name   !! for people: "viscous of &load 'work': torque per speed"
     logical :: is_whole = .false.           !! values are rounded to the nearest whole number
     integer, private :: rule = 0            !! row of `key_rules`
     integer, private :: relation = nothing_else
@@ -45,6 +46,7 @@ contains
 
     target%path = trim(adjustl(path))
     target%unit = ''
+    target%long_name = ''
     call search_target(input, target%path, found, complaint)
     if (complaint /= '') return
     target%group = found%group
@@ -52,6 +54,8 @@ contains
     target%place = found%place
     target%rule = found%rule
     target%unit = trim(key_rules(found%rule)%unit)
+    target%long_name = trim(key_rules(found%rule)%name) // ' of ' // input%label(found%group) // ': ' // &
+                       trim(key_rules(found%rule)%help)
     target%is_whole = key_rules(found%rule)%kind == an_integer
     target%allowed = key_rules(found%rule)%allowed
     if (target%is_whole) target%allowed%high = min(target%allowed%high, real(huge(0), wp))
