@@ -10,11 +10,13 @@ module nocdyn_sweep_records
   implicit none (type, external)
   private
 
-  public :: read_records
+  public :: read_records, fit_statistics
+
+  real(wp), parameter :: unknown_start = -huge(1.0_wp)   !! in place of `from` where t_start varies and `from` is not given
 
   !> The time in which statistics can be taken; an end that varies is not known.
   type, public :: time_span_t
-    real(wp) :: t_start = -huge(1.0_wp), t_end = huge(1.0_wp)   !! [s]
+    real(wp) :: t_start = unknown_start, t_end = huge(1.0_wp)   !! [s]
   end type time_span_t
 
 contains
@@ -46,6 +48,26 @@ contains
       end do
     end associate
   end subroutine read_records
+
+  !> The statistics of a variant that runs from `t_start` to `t_end` [s]. If they have no time left in it, a complaint says so,
+  !> and they begin at `t_start`.
+  subroutine fit_statistics(statistics, t_start, t_end, fitted, complaint)
+    type(statistic_t), intent(in) :: statistics(:)   !! of the plan
+    real(wp), intent(in) :: t_start, t_end
+    type(statistic_t), allocatable, intent(out) :: fitted(:)
+    character(len=:), allocatable, intent(out) :: complaint   !! '' if all is well
+    integer :: i
+
+    complaint = ''
+    allocate (fitted, source=statistics)
+    do i = 1, size(fitted)
+      if (fitted(i)%from >= t_start .and. fitted(i)%from < t_end) cycle
+      if (fitted(i)%from > unknown_start .and. complaint == '') complaint = fitted(i)%label // ': from = ' // &
+        to_text(fitted(i)%from) // ' is out of range; allowed: from t_start = ' // to_text(t_start) // ' to t_end = ' // &
+        to_text(t_end)
+      fitted(i)%from = t_start
+    end do
+  end subroutine fit_statistics
 
   subroutine take_units_off(labels, names)
     type(string_t), intent(in) :: labels(:)
