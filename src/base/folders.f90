@@ -1,0 +1,47 @@
+!> What is in a folder.
+module nocdyn_folders
+  use, intrinsic :: iso_c_binding, only: c_char, c_null_char, c_size_t
+  use nocdyn_text, only: append, string_t
+  implicit none (type, external)
+  private
+
+  public :: folder_names
+
+  interface
+    !> Names with a null character after each (folder_names.cpp); returns the length of all.
+    function c_folder_names(path, names, capacity) result(length) bind(c, name='nocdyn_folder_names')
+      import :: c_char, c_size_t
+      character(kind=c_char), intent(in) :: path(*)
+      character(kind=c_char), intent(out) :: names(*)
+      integer(c_size_t), value, intent(in) :: capacity
+      integer(c_size_t) :: length
+    end function c_folder_names
+  end interface
+
+contains
+
+  !> The names of files and folders in a folder, in no order; none if it cannot be read.
+  function folder_names(folder) result(names)
+    character(len=*), intent(in) :: folder
+    type(string_t), allocatable :: names(:)
+    character(len=:), allocatable :: bytes
+    integer(c_size_t) :: length
+    integer :: first, last
+
+    length = 0
+    do   ! a file may have come since it was asked how long the list is
+      allocate (character(len=length) :: bytes)
+      length = c_folder_names(folder // c_null_char, bytes, int(len(bytes), c_size_t))
+      if (length <= len(bytes)) exit
+      deallocate (bytes)
+    end do
+    allocate (names(0))
+    first = 1
+    do while (first <= length)
+      last = first + index(bytes(first:), c_null_char) - 2
+      call append(names, bytes(first:last))
+      first = last + 2
+    end do
+  end function folder_names
+
+end module nocdyn_folders
