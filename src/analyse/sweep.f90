@@ -1,0 +1,74 @@
+!> What do many variants of a machine do: threads that take chunks of variants until none are left.
+module nocdyn_sweep
+  use, intrinsic :: iso_fortran_env, only: int64
+  use nocdyn_dispatcher, only: dispatcher_t
+  use nocdyn_errors, only: error_t
+  use nocdyn_kinds, only: wp
+  use nocdyn_sweep_block, only: new_sweep_block, sweep_block_t
+  use nocdyn_sweep_chunk, only: chunk_t
+  use nocdyn_sweep_plan, only: sweep_plan_t
+  use nocdyn_sweep_setup, only: sweep_setup_t
+  implicit none (type, external)
+  private
+
+  public :: compute_variants
+
+contains
+
+  !> Computes what `dispatcher` hands out with so many threads, each with a block of its own.
+  subroutine compute_variants(plan, setup, threads, dispatcher)
+    type(sweep_plan_t), intent(in) :: plan
+    type(sweep_setup_t), intent(in) :: setup   !! of the plan
+    integer, intent(in) :: threads
+    class(dispatcher_t), intent(inout) :: dispatcher
+
+    call dispatcher%open()
+    !$omp parallel num_threads(threads) default(shared)
+    call compute_chunks(plan, setup, dispatcher)
+    !$omp end parallel
+    call dispatcher%conclude()
+    call dispatcher%close()
+  end subroutine compute_variants
+
+  !> One thread's work.
+  subroutine compute_chunks(plan, setup, dispatcher)
+    type(sweep_plan_t), intent(in) :: plan
+    type(sweep_setup_t), intent(in) :: setup
+    class(dispatcher_t), intent(inout) :: dispatcher
+    type(sweep_block_t), allocatable :: block
+    type(chunk_t) :: chunk
+    type(error_t), allocatable :: error
+    real(wp) :: seconds
+    integer :: count, first
+    logical :: is_complete
+
+    allocate (block)
+    call dispatcher%enter()
+    call new_sweep_block(plan, setup, dispatcher, block, error)
+    call dispatcher%leave()
+    if (allocated(error)) error stop 'nocdyn_sweep: the base machine has been assembled before'
+    do
+      call dispatcher%enter()
+      call dispatcher%hand_out(first, count)
+      call dispatcher%leave()
+      if (count == 0) exit
+      seconds = time_now()
+      call block%compute(first, count, chunk, is_complete)
+      seconds = time_now() - seconds
+      if (.not. is_complete) exit
+      call dispatcher%enter()
+      call dispatcher%take(chunk, seconds)
+      call dispatcher%leave()
+    end do
+  end subroutine compute_chunks
+
+  !> Of a clock that only runs forward [s].
+  function time_now() result(seconds)
+    real(wp) :: seconds
+    integer(int64) :: count, rate
+
+    call system_clock(count, rate)
+    seconds = real(count, wp) / real(rate, wp)
+  end function time_now
+
+end module nocdyn_sweep

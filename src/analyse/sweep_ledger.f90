@@ -1,0 +1,181 @@
+!> The books of a sweep: which variants are missing, how many are handed out at once, what has become of them.
+module nocdyn_sweep_ledger
+  use nocdyn_dispatcher, only: dispatcher_t
+  use nocdyn_errors, only: error_t
+  use nocdyn_kinds, only: wp
+  use nocdyn_posix, only: is_interrupted
+  use nocdyn_sweep_chunk, only: chunk_t
+  use nocdyn_sweep_journal, only: sweep_journal_t
+  implicit none (type, external)
+  private
+
+  public :: open_ledger, chunk_size
+
+  real(wp), parameter :: chunk_seconds = 0.2_wp   !! aimed at: long beside a message, short beside a person's patience
+  integer, parameter :: most_at_once = 8192       !! keeps chunks small enough to be held by the dozen
+  integer, parameter :: growth = 8                !! of a chunk over the one before, at most
+
+  !> Numbers of variants.
+  type, public :: sweep_counts_t
+    integer :: total = 0
+    integer :: done = 0      !! without failures
+    integer :: refused = 0
+    integer :: failed = 0
+    integer :: new = 0       !! computed by this process and those that report to it, failures included
+  end type sweep_counts_t
+
+  !> Told how far a sweep has come, often.
+  type, abstract, public :: sweep_progress_t
+  contains
+    procedure(update_interface), deferred :: update
+  end type sweep_progress_t
+
+  abstract interface
+    subroutine update_interface(self, counts)
+      import :: sweep_counts_t, sweep_progress_t
+      class(sweep_progress_t), intent(inout) :: self
+      type(sweep_counts_t), intent(in) :: counts
+    end subroutine update_interface
+  end interface
+
+  !> Hands out the missing variants in their order and writes the results to the journal.
+  type, extends(dispatcher_t), public :: sweep_ledger_t
+    type(sweep_journal_t), pointer :: journal => null()
+    class(sweep_progress_t), pointer :: progress => null()
+    type(sweep_counts_t) :: counts
+    integer :: workers = 1                       !! threads of all processes
+    integer :: lanes = 1                         !! of a worker
+    type(error_t), allocatable :: error          !! of the journal; nothing is handed out then
+    integer, allocatable, private :: first(:)    !! missing variants: ranges ...
+    integer, allocatable, private :: count(:)    !! ... and their lengths
+    integer, private :: range = 1                !! from which is handed out
+    integer, private :: left = 0                 !! variants not handed out
+    integer, private :: last_size = 0            !! of the chunk last handed out
+    real(wp), private :: pace = 0.0_wp           !! seconds that a worker needs for a variant, 0: not known yet
+    logical, private :: is_broken = .false.      !! `error` as other threads see it
+  contains
+    procedure :: hand_out
+    procedure :: take
+    procedure :: attend
+    procedure :: conclude
+    procedure :: book
+    procedure :: is_over
+    procedure :: is_complete
+  end type sweep_ledger_t
+
+contains
+
+  !> The books of the variants that the journal does not hold.
+  subroutine open_ledger(ledger, journal, progress, workers, lanes)
+    class(sweep_ledger_t), intent(inout) :: ledger
+    type(sweep_journal_t), target, intent(inout) :: journal
+    class(sweep_progress_t), target, intent(inout) :: progress
+    integer, intent(in) :: workers, lanes
+
+    ledger%journal => journal
+    ledger%progress => progress
+    ledger%workers = workers
+    ledger%lanes = lanes
+    call journal%missing(ledger%first, ledger%count)
+    ledger%left = sum(ledger%count)
+    ledger%counts%total = journal%header%last - journal%header%first + 1
+    ledger%counts%done = journal%done
+    ledger%counts%refused = journal%refused
+    ledger%counts%failed = journal%failed
+  end subroutine open_ledger
+
+  subroutine hand_out(self, first, count)
+    class(sweep_ledger_t), intent(inout) :: self
+    integer, intent(out) :: first, count
+
+    first = 0
+    count = 0
+    if (self%left == 0) return
+    if (self%is_over()) return
+    associate (r => self%range)
+      count = min(self%count(r), chunk_size(self%left, self%workers, self%lanes, self%pace, self%last_size))
+      first = self%first(r)
+      self%first(r) = first + count
+      self%count(r) = self%count(r) - count
+      if (self%count(r) == 0) r = r + 1
+    end associate
+    self%left = self%left - count
+    self%last_size = count
+  end subroutine hand_out
+
+  !> Variants to hand out at once: one for each lane at first, then what takes `chunk_seconds`; at the end, when `left`
+  !> variants are shared by all workers, less, so that they come to their ends together.
+  pure integer function chunk_size(left, workers, lanes, pace, last_size)
+    integer, intent(in) :: left        !! at least 1
+    integer, intent(in) :: workers, lanes
+    real(wp), intent(in) :: pace       !! seconds for a variant, 0 if it is not known
+    integer, intent(in) :: last_size   !! of the chunk before, 0 if there was none
+    integer :: share
+
+    chunk_size = lanes
+    if (pace > 0) chunk_size = int(min(chunk_seconds / pace, real(most_at_once, wp)))
+    chunk_size = max(lanes, min(chunk_size, growth * max(last_size, lanes)))
+    share = (left - 1) / workers + 1
+    chunk_size = max(1, min(chunk_size, max((share + 1) / 2, min(share, lanes))))
+  end function chunk_size
+
+  subroutine take(self, chunk, seconds)
+    class(sweep_ledger_t), intent(inout) :: self
+    type(chunk_t), intent(in) :: chunk
+    real(wp), intent(in) :: seconds
+
+    call self%book(chunk, seconds)
+    call self%attend()
+  end subroutine take
+
+  !> Writes the results to the journal.
+  subroutine book(self, chunk, seconds)
+    class(sweep_ledger_t), intent(inout) :: self
+    type(chunk_t), intent(in) :: chunk
+    real(wp), intent(in) :: seconds
+
+    if (allocated(self%error)) return
+    call self%journal%append(chunk, self%error)
+    if (allocated(self%error)) then
+      !$omp atomic write
+      self%is_broken = .true.
+      return
+    end if
+    self%pace = seconds / chunk%count
+    self%counts%done = self%journal%done
+    self%counts%refused = self%journal%refused
+    self%counts%failed = self%journal%failed
+    self%counts%new = self%counts%new + chunk%count
+  end subroutine book
+
+  subroutine attend(self)
+    class(sweep_ledger_t), intent(inout) :: self
+
+    call self%progress%update(self%counts)
+  end subroutine attend
+
+  !> All variants have been computed here.
+  subroutine conclude(self)
+    class(sweep_ledger_t), intent(inout) :: self
+  end subroutine conclude
+
+  !> After Ctrl-C, and when the journal cannot be written.
+  function is_over(self)
+    class(sweep_ledger_t), intent(in) :: self
+    logical :: is_over
+
+    !$omp atomic read
+    is_over = self%is_broken
+    is_over = is_over .or. is_interrupted()
+  end function is_over
+
+  !> Whether the journal holds every variant.
+  pure logical function is_complete(self)
+    class(sweep_ledger_t), intent(in) :: self
+
+    associate (counts => self%counts)
+      is_complete = counts%done + counts%refused + counts%failed == counts%total
+    end associate
+  end function is_complete
+
+end module nocdyn_sweep_ledger

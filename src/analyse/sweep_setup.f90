@@ -1,0 +1,69 @@
+!> What the blocks of a sweep have in common, and whether its base machine can be run at all.
+module nocdyn_sweep_setup
+  use nocdyn_assembly, only: assemble_machine, new_formulation
+  use nocdyn_errors, only: error_t
+  use nocdyn_formulation, only: formulation_t
+  use nocdyn_input, only: group_t, input_t
+  use nocdyn_integration_settings, only: integration_settings_t
+  use nocdyn_kinds, only: wp
+  use nocdyn_machine, only: machine_t
+  use nocdyn_size_limits, only: check_size, choose_method
+  use nocdyn_statistics_observer, only: needs_works
+  use nocdyn_sweep_plan, only: sweep_plan_t
+  use nocdyn_text, only: string_t
+  implicit none (type, external)
+  private
+
+  public :: prepare_sweep, take_settings
+
+  type, public :: sweep_setup_t
+    integer :: lanes = 1               !! of a block
+    logical :: is_audited = .false.    !! whether a recorded column needs the works
+  end type sweep_setup_t
+
+contains
+
+  !> Refuses a base machine that `nocdyn run` would refuse.
+  subroutine prepare_sweep(plan, setup, error)
+    type(sweep_plan_t), intent(in) :: plan
+    type(sweep_setup_t), intent(out) :: setup
+    type(error_t), allocatable, intent(out) :: error
+    type(machine_t) :: machine
+    class(formulation_t), allocatable :: formulation
+    type(integration_settings_t) :: settings
+    type(group_t) :: run
+    real(wp) :: times(2)
+
+    call assemble_machine(plan%input, machine, error)
+    if (.not. allocated(error)) call check_size(plan%input, machine, error)
+    if (allocated(error)) return
+    run = plan%input%single('run')
+    call new_formulation(run%text('formulation'), machine, formulation)
+    call take_settings(plan%input, formulation, settings, times, error)
+    if (allocated(error)) return
+    setup%is_audited = needs_works(formulation, plan%statistics)
+    setup%lanes = 16
+  end subroutine prepare_sweep
+
+  !> What &run says of the integration.
+  subroutine take_settings(input, formulation, settings, times, error)
+    type(input_t), intent(in) :: input
+    class(formulation_t), intent(in) :: formulation
+    type(integration_settings_t), intent(out) :: settings
+    real(wp), intent(out) :: times(2)                   !! start and end [s]
+    type(error_t), allocatable, intent(out) :: error
+    type(group_t) :: run
+    type(string_t), allocatable :: notes(:)
+    character(len=:), allocatable :: method
+
+    call choose_method(input, formulation, method, notes, error)
+    if (allocated(error)) return
+    run = input%single('run')
+    settings%method = method
+    settings%rtol = run%number('rtol')
+    settings%atol = run%number('atol')
+    settings%max_steps = run%whole_number('max_steps')
+    times = [run%number('t_start'), run%number('t_end')]
+  end subroutine take_settings
+
+end module nocdyn_sweep_setup

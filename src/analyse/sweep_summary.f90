@@ -1,0 +1,194 @@
+!> The summary of a sweep: what summary.json and the printed table tell.
+module nocdyn_sweep_summary
+  use nocdyn_input, only: group_t, input_t
+  use nocdyn_json, only: json_t
+  use nocdyn_kinds, only: wp
+  use nocdyn_sweep_header, only: sweep_header_t
+  use nocdyn_order_statistics, only: order_statistics_t
+  use nocdyn_table_text, only: cell, padded, right
+  use nocdyn_text, only: rounded_text, to_text
+  use nocdyn_version, only: compiler_text, version
+  implicit none (type, external)
+  private
+
+  public :: sweep_json, sweep_line, sweep_table
+
+  integer, parameter :: most_rows = 60    ! a longer table is in summary.json only
+
+  !> What it took, this time.
+  type, public :: sweep_effort_t
+    integer :: variants = 0              !! computed; those of a journal that was gone on with do not count
+    integer :: threads = 1               !! of each process
+    integer :: ranks = 1                 !! processes
+    integer :: lanes = 1                 !! of a block
+    real(wp) :: wall_time = 0.0_wp       !! of computing and of writing the journal [s]
+  end type sweep_effort_t
+
+  type, public :: sweep_summary_t
+    integer :: done = 0, refused = 0, failed = 0   !! variants
+    type(order_statistics_t), allocatable :: statistics(:)   !! of each result, over the variants that are done
+    type(sweep_effort_t), allocatable :: effort              !! not allocated after a merge
+  end type sweep_summary_t
+
+contains
+
+  !> The text of summary.json.
+  function sweep_json(input, header, summary) result(text)
+    type(input_t), intent(in) :: input
+    type(sweep_header_t), intent(in) :: header
+    type(sweep_summary_t), intent(in) :: summary
+    character(len=:), allocatable :: text
+    type(json_t) :: json
+
+    call json%open()
+    call json%put('program', 'nocdyn')
+    call json%put('version', version)
+    call json%put('compiler', compiler_text())
+    call json%put('status', trim(merge('done  ', 'failed', summary%done > 0)))
+    call json%put('input', input%file)
+    call json%put('title', header%title)
+    call put_settings(json, input%single('run'))
+    call put_design(json, header)
+    call json%open('counts')
+    call json%put('variants', header%variants)
+    call json%put('done', summary%done)
+    call json%put('refused', summary%refused)
+    call json%put('failed', summary%failed)
+    call json%close()
+    if (allocated(summary%effort)) call put_effort(json, summary%effort)
+    call put_statistics(json, header, summary)
+    call json%close()
+    text = json%text()
+  end function sweep_json
+
+  subroutine put_settings(json, run)
+    type(json_t), intent(inout) :: json
+    type(group_t), intent(in) :: run
+
+    call json%open('settings')
+    call json%put('t_start', run%number('t_start'))
+    call json%put('t_end', run%number('t_end'))
+    call json%put('method', run%text('method'))
+    call json%put('rtol', run%number('rtol'))
+    call json%put('atol', run%number('atol'))
+    call json%put('formulation', run%text('formulation'))
+    call json%put('max_steps', run%whole_number('max_steps'))
+    call json%close()
+  end subroutine put_settings
+
+  subroutine put_design(json, header)
+    type(json_t), intent(inout) :: json
+    type(sweep_header_t), intent(in) :: header
+    integer :: i
+
+    call json%open('design')
+    call json%put('design', header%design)
+    call json%put('seed', header%seed)
+    call json%open('varied')
+    do i = 1, size(header%parameters)
+      call json%put(header%parameters(i)%label, header%parameters(i)%unit)
+    end do
+    call json%close()
+    call json%close()
+  end subroutine put_design
+
+  subroutine put_effort(json, effort)
+    type(json_t), intent(inout) :: json
+    type(sweep_effort_t), intent(in) :: effort
+
+    call json%put('wall_time_s', effort%wall_time)
+    call json%put('variants_computed', effort%variants)
+    call json%put('variants_per_second', rate(effort))
+    call json%put('threads', effort%threads)
+    call json%put('ranks', effort%ranks)
+    call json%put('lanes', effort%lanes)
+  end subroutine put_effort
+
+  pure real(wp) function rate(effort)
+    type(sweep_effort_t), intent(in) :: effort
+
+    rate = 0.0_wp
+    if (effort%wall_time > 0) rate = effort%variants / effort%wall_time
+  end function rate
+
+  !> Of every result; without a variant that is done there are none.
+  subroutine put_statistics(json, header, summary)
+    type(json_t), intent(inout) :: json
+    type(sweep_header_t), intent(in) :: header
+    type(sweep_summary_t), intent(in) :: summary
+    integer :: i
+
+    call json%open('statistics')
+    do i = 1, merge(size(summary%statistics), 0, summary%done > 0)
+      associate (found => summary%statistics(i))
+        call json%open(header%results(i)%label)
+        call json%put('unit', header%results(i)%unit)
+        call json%put('min', found%minimum)
+        call json%put('variant_of_min', found%variant_of_minimum)
+        call json%put('p5', found%low)
+        call json%put('median', found%median)
+        call json%put('p95', found%high)
+        call json%put('max', found%maximum)
+        call json%put('variant_of_max', found%variant_of_maximum)
+        call json%close()
+      end associate
+    end do
+    call json%close()
+  end subroutine put_statistics
+
+  !> Title, and how the results are distributed over the variants that are done.
+  function sweep_table(header, summary) result(text)
+    type(sweep_header_t), intent(in) :: header
+    type(sweep_summary_t), intent(in) :: summary
+    character(len=:), allocatable :: text
+    character(len=:), allocatable :: heading
+    integer :: i, label_width, rows
+
+    text = header%title
+    if (len(text) > 0) text = text // new_line('a')
+    heading = 'of ' // to_text(summary%done) // ' variants:'
+    rows = min(size(header%results), most_rows)
+    label_width = max(len(heading), maxval([(len(label(header, i)), i=1, rows)]))
+    text = text // padded(heading, label_width) // right('min') // right('5 %') // right('median') // right('95 %') // &
+           right('max') // right('variant of min') // right('variant of max')
+    do i = 1, rows
+      associate (found => summary%statistics(i))
+        text = text // new_line('a') // padded(label(header, i), label_width) // cell(found%minimum) // cell(found%low) // &
+               cell(found%median) // cell(found%high) // cell(found%maximum) // right(to_text(found%variant_of_minimum)) // &
+               right(to_text(found%variant_of_maximum))
+      end associate
+    end do
+    if (rows < size(header%results)) text = text // new_line('a') // '(' // to_text(size(header%results) - rows) // &
+                                            ' more results in summary.json)'
+  end function sweep_table
+
+  !> "moment_shaft_max_abs [N m]"
+  pure function label(header, result_number) result(text)
+    type(sweep_header_t), intent(in) :: header
+    integer, intent(in) :: result_number
+    character(len=:), allocatable :: text
+
+    associate (named => header%results(result_number))
+      text = named%label
+      if (named%unit /= '') text = text // ' [' // named%unit // ']'
+    end associate
+  end function label
+
+  !> One line: what was done, and where the results are.
+  function sweep_line(input, summary, folder) result(text)
+    type(input_t), intent(in) :: input
+    type(sweep_summary_t), intent(in) :: summary
+    character(len=*), intent(in) :: folder
+    character(len=:), allocatable :: text
+
+    text = input%file // ': ' // to_text(summary%done) // ' variants done'
+    if (summary%refused > 0) text = text // ', ' // to_text(summary%refused) // ' refused'
+    if (summary%failed > 0) text = text // ', ' // to_text(summary%failed) // ' failed'
+    if (allocated(summary%effort)) then
+      text = text // ', ' // rounded_text(summary%effort%wall_time, 3) // ' s'
+      if (summary%effort%variants > 0) text = text // ' (' // rounded_text(rate(summary%effort), 3) // ' per second)'
+    end if
+    text = text // '; results in ' // folder
+  end function sweep_line
+
+end module nocdyn_sweep_summary
