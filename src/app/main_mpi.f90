@@ -1,0 +1,43 @@
+!> nocdyn-mpi: sweeps on all ranks of an MPI job.
+program nocdyn_mpi_program
+  use mpi_f08, only: mpi_comm_rank, mpi_comm_world, mpi_finalize, mpi_init_thread, mpi_thread_serialized
+  use nocdyn_arguments, only: arguments_t, command_line, parse_arguments
+  use nocdyn_console, only: complain, output_is_lost
+  use nocdyn_errors, only: error_t, exit_file, exit_input, raise
+  use nocdyn_mpi_command, only: mpi_command
+  use nocdyn_mpi_messages, only: root
+  use nocdyn_posix, only: survive_size_limit
+  implicit none (type, external)
+
+  type(arguments_t) :: arguments
+  type(error_t), allocatable :: error
+  integer :: code, provided, rank
+
+  call mpi_init_thread(mpi_thread_serialized, provided)
+  call mpi_comm_rank(mpi_comm_world, rank)
+  call survive_size_limit()
+  call parse_arguments(command_line(), arguments, error)
+  if (.not. allocated(error)) then
+    if (arguments%command /= 'sweep') then
+      call raise(error, exit_input, "nocdyn-mpi knows the command 'sweep' only; everything else is asked of nocdyn")
+    else if (arguments%shards > 0) then
+      call raise(error, exit_input, '--shard is an option of nocdyn sweep; nocdyn-mpi hands out the variants itself')
+    else if (arguments%threads > 1 .and. provided < mpi_thread_serialized) then
+      call raise(error, exit_input, '--threads above 1 needs an MPI that threads may call in turn')
+    end if
+  end if
+  code = 0
+  if (.not. allocated(error)) then
+    call mpi_command(arguments, code)
+  else if (rank == root) then
+    call complain(error)
+    code = error%code
+  end if
+  if (output_is_lost) then
+    call raise(error, exit_file, 'standard output cannot be written')
+    call complain(error)
+    code = max(code, error%code)
+  end if
+  call mpi_finalize()
+  stop code, quiet=.true.
+end program nocdyn_mpi_program

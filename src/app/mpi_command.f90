@@ -1,0 +1,97 @@
+!> nocdyn-mpi sweep: the variants of a machine on all ranks of an MPI job.
+module nocdyn_mpi_command
+  use mpi_f08, only: mpi_comm_rank, mpi_comm_size, mpi_comm_world
+  use nocdyn_arguments, only: arguments_t
+  use nocdyn_console, only: complain
+  use nocdyn_errors, only: error_t, exit_done
+  use nocdyn_input, only: input_t
+  use nocdyn_input_reader, only: read_input_text
+  use nocdyn_input_text, only: input_text
+  use nocdyn_mpi_messages, only: root, share_number, share_text
+  use nocdyn_mpi_root, only: mpi_root_t
+  use nocdyn_mpi_worker, only: mpi_worker_t
+  use nocdyn_posix, only: watch_interrupts
+  use nocdyn_sweep, only: compute_variants
+  use nocdyn_sweep_job, only: begin_job, finish_job, sweep_job_t
+  use nocdyn_sweep_ledger, only: open_ledger
+  use nocdyn_sweep_plan, only: make_plan, sweep_plan_t
+  use nocdyn_sweep_setup, only: prepare_sweep, sweep_setup_t
+  use nocdyn_text, only: strings
+  implicit none (type, external)
+  private
+
+  public :: mpi_command
+
+contains
+
+  !> Called by all ranks; only rank 0 reads, writes and prints.
+  subroutine mpi_command(arguments, code)
+    type(arguments_t), intent(in) :: arguments
+    integer, intent(out) :: code
+    integer :: rank
+
+    call watch_interrupts()
+    call mpi_comm_rank(mpi_comm_world, rank)
+    if (rank == root) then
+      call lead(arguments, max(1, arguments%threads), code)
+    else
+      call follow(max(1, arguments%threads), code)
+    end if
+  end subroutine mpi_command
+
+  !> Rank 0's part.
+  subroutine lead(arguments, threads, code)
+    type(arguments_t), intent(in) :: arguments
+    integer, intent(in) :: threads   !! of each rank
+    integer, intent(out) :: code
+    type(sweep_job_t), target :: job
+    type(mpi_root_t) :: ledger
+    type(error_t), allocatable :: error
+    character(len=:), allocatable :: file, text
+    integer :: ranks
+
+    code = exit_done
+    call begin_job(arguments, job, error)
+    text = ''
+    if (.not. allocated(error) .and. .not. job%is_done) text = input_text(job%plan%input)
+    call share_text(text)
+    if (allocated(error)) then
+      call complain(error)
+      code = error%code
+    end if
+    if (text == '') return
+    file = job%plan%input%file
+    call share_text(file)
+    call mpi_comm_size(mpi_comm_world, ranks)
+    ledger%others = ranks - 1
+    call open_ledger(ledger, job%journals(1), job%progress, ranks * threads, job%setup%lanes)
+    call compute_variants(job%plan, job%setup, threads, ledger)
+    call finish_job(job, ledger, threads, ranks, code)
+  end subroutine lead
+
+  !> The part of the other ranks: their input is the text that rank 0 has read.
+  subroutine follow(threads, code)
+    integer, intent(in) :: threads
+    integer, intent(out) :: code
+    type(input_t) :: input
+    type(sweep_plan_t) :: plan
+    type(sweep_setup_t) :: setup
+    type(mpi_worker_t) :: worker
+    type(error_t), allocatable :: error
+    character(len=:), allocatable :: file, text
+
+    code = exit_done
+    call share_text(text)
+    if (text == '') return
+    call share_text(file)
+    call read_input_text(text, file, strings([character(len=1) ::]), input, error)
+    if (.not. allocated(error)) call make_plan(input, plan, error)
+    if (.not. allocated(error)) call prepare_sweep(plan, setup, error)
+    if (allocated(error)) then
+      call complain(error)
+      error stop 'nocdyn_mpi_command: an input that rank 0 has read is refused by another rank'
+    end if
+    call compute_variants(plan, setup, threads, worker)
+  end subroutine follow
+
+end module nocdyn_mpi_command
