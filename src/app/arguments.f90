@@ -1,11 +1,14 @@
 !> The command line: command, files and options.
 module nocdyn_arguments
   use nocdyn_errors, only: error_t, exit_input, raise
-  use nocdyn_text, only: append, joined, nearest_word, quoted, string_t, strings
+  use nocdyn_options, only: option_index, option_names, option_t, options, takers_text, takes_option
+  use nocdyn_text, only: append, joined, nearest_word, quoted, string_t, strings, to_text
   implicit none (type, external)
   private
 
   public :: command_line, parse_arguments, command_names
+
+  integer, parameter :: most_threads = 4096, most_shards = 1000000
 
   type, public :: arguments_t
     character(len=:), allocatable :: command
@@ -13,6 +16,10 @@ module nocdyn_arguments
     character(len=:), allocatable :: out          !! --out, not allocated if absent
     type(string_t), allocatable :: overrides(:)   !! PATH=VALUE of every --set
     character(len=:), allocatable :: at           !! --at, not allocated if absent
+    integer :: threads = 0                        !! --threads, 0 if absent
+    integer :: shard = 0, shards = 0              !! --shard, 0 if absent
+    logical :: resumes = .false.                  !! --resume
+    logical :: wants_csv = .false.                !! --csv
     logical :: is_quiet = .false.
   end type arguments_t
 
@@ -35,8 +42,8 @@ contains
   function command_names() result(names)
     type(string_t), allocatable :: names(:)
 
-    allocate (names, source=strings([character(len=11) :: 'run', 'check', 'equilibrium', 'modes', 'matrices', 'new', &
-                                                          'help']))
+    allocate (names, source=strings([character(len=11) :: 'run', 'check', 'equilibrium', 'modes', 'matrices', &
+                                                          'sweep', 'merge', 'new', 'help']))
   end function command_names
 
   !> Takes the words apart; wrong usage is an error with exit code 2.
@@ -100,15 +107,17 @@ contains
     type(arguments_t), intent(inout) :: arguments
     type(error_t), allocatable, intent(out) :: error
     character(len=:), allocatable :: name, value
-    integer :: equals
+    integer :: equals, number
 
     equals = index(words(i)%text // '=', '=')
     name = words(i)%text(:equals - 1)
-    select case (name)
-    case ('--quiet', '-q')
-      arguments%is_quiet = .true.
-      if (equals <= len(words(i)%text)) call raise(error, exit_input, '--quiet takes no value')
-    case ('--out', '--set', '--at')
+    number = option_index(name)
+    if (number == 0) then
+      call raise(error, exit_input, unknown_word(name, 'an option', option_names()))
+    else if (options(number)%value == '') then
+      call take_flag(trim(options(number)%name), arguments)
+      if (equals <= len(words(i)%text)) call raise(error, exit_input, trim(options(number)%name) // ' takes no value')
+    else
       if (equals <= len(words(i)%text)) then
         value = words(i)%text(equals + 1:)
       else if (i < size(words)) then
@@ -117,50 +126,102 @@ contains
       else
         value = ''
       end if
-      call take_value(name, value, arguments, error)
-    case ('--help', '-h')
+      call take_value(options(number), value, arguments, error)
+    end if
+  end subroutine take_option
+
+  subroutine take_flag(name, arguments)
+    character(len=*), intent(in) :: name
+    type(arguments_t), intent(inout) :: arguments
+
+    select case (name)
+    case ('--quiet')
+      arguments%is_quiet = .true.
+    case ('--resume')
+      arguments%resumes = .true.
+    case ('--csv')
+      arguments%wants_csv = .true.
+    case ('--help')
       deallocate (arguments%operands)
       allocate (arguments%operands(1))   ! gfortran 12 loses the text in an array constructor here
       call move_alloc(arguments%command, arguments%operands(1)%text)
       arguments%command = 'help'
     case default
-      call raise(error, exit_input, unknown_word(name, 'an option', &
-                                                 strings([character(len=7) :: '--out', '--set', '--at', '--quiet', '--help'])))
+      error stop 'nocdyn_arguments: an option without a value that nothing is made of'
     end select
-  end subroutine take_option
+  end subroutine take_flag
 
-  subroutine take_value(name, value, arguments, error)
-    character(len=*), intent(in) :: name, value
+  subroutine take_value(option, value, arguments, error)
+    type(option_t), intent(in) :: option
+    character(len=*), intent(in) :: value
     type(arguments_t), intent(inout) :: arguments
     type(error_t), allocatable, intent(out) :: error
 
     if (value == '') then
-      call raise(error, exit_input, name // ' needs a value: ' // option_form(name))
-    else if (name == '--set') then
+      call raise(error, exit_input, trim(option%name) // ' needs a value: ' // trim(option%value))
+      return
+    end if
+    select case (option%name)
+    case ('--set')
       call append(arguments%overrides, value)
-    else if (name == '--out') then
+    case ('--out')
       if (allocated(arguments%out)) call raise(error, exit_input, '--out is given twice')
       arguments%out = value
-    else
+    case ('--at')
       if (allocated(arguments%at)) call raise(error, exit_input, '--at is given twice')
       arguments%at = value
-    end if
+    case ('--threads')
+      if (arguments%threads > 0) call raise(error, exit_input, '--threads is given twice')
+      if (.not. allocated(error)) call take_threads(value, arguments%threads, error)
+    case ('--shard')
+      if (arguments%shards > 0) call raise(error, exit_input, '--shard is given twice')
+      if (.not. allocated(error)) call take_shard(value, arguments%shard, arguments%shards, error)
+    case default
+      error stop 'nocdyn_arguments: an option with a value that nothing is made of'
+    end select
   end subroutine take_value
 
-  !> How an option is written.
-  pure function option_form(name) result(form)
-    character(len=*), intent(in) :: name
-    character(len=:), allocatable :: form
+  subroutine take_threads(value, threads, error)
+    character(len=*), intent(in) :: value
+    integer, intent(inout) :: threads
+    type(error_t), allocatable, intent(out) :: error
 
-    select case (name)
-    case ('--out')
-      form = '--out DIR'
-    case ('--set')
-      form = '--set PATH=VALUE'
-    case default
-      form = '--at equilibrium, --at rest or --at TIME'
-    end select
-  end function option_form
+    if (counting_number(value) < 1 .or. counting_number(value) > most_threads) then
+      call raise(error, exit_input, '--threads ' // value // ': allowed: a number from 1 to ' // to_text(most_threads))
+    else
+      threads = counting_number(value)
+    end if
+  end subroutine take_threads
+
+  !> K/N: part K of N equal parts.
+  subroutine take_shard(value, shard, shards, error)
+    character(len=*), intent(in) :: value
+    integer, intent(inout) :: shard, shards
+    type(error_t), allocatable, intent(out) :: error
+    integer :: part, parts, slash
+
+    slash = index(value, '/')
+    part = counting_number(value(:slash - 1))
+    parts = counting_number(value(slash + 1:))
+    if (slash == 0 .or. part < 1 .or. parts < 1 .or. part > parts .or. parts > most_shards) then
+      call raise(error, exit_input, '--shard ' // value // ': allowed: K/N, the part K of N, with K from 1 to N and N at most ' // &
+                 to_text(most_shards))
+    else
+      shard = part
+      shards = parts
+    end if
+  end subroutine take_shard
+
+  !> The value of a text of digits, -1 if it is none or too long.
+  pure integer function counting_number(text)
+    character(len=*), intent(in) :: text
+    integer, parameter :: most_digits = 9
+    integer :: status
+
+    counting_number = -1
+    if (len(text) == 0 .or. len(text) > most_digits .or. verify(text, '0123456789') > 0) return
+    read (text, *, iostat=status) counting_number
+  end function counting_number
 
   !> "'rnu' is not a command; did you mean 'run'? allowed: 'run', ..."
   function unknown_word(word, what, known) result(message)
@@ -179,33 +240,47 @@ contains
   subroutine check_usage(arguments, error)
     type(arguments_t), intent(in) :: arguments
     type(error_t), allocatable, intent(out) :: error
-    integer :: operands
+    logical :: is_given
+    integer :: i, operands
 
+    do i = 1, size(options)
+      select case (options(i)%name)
+      case ('--out')
+        is_given = allocated(arguments%out)
+      case ('--set')
+        is_given = size(arguments%overrides) > 0
+      case ('--at')
+        is_given = allocated(arguments%at)
+      case ('--threads')
+        is_given = arguments%threads > 0
+      case ('--shard')
+        is_given = arguments%shards > 0
+      case ('--resume')
+        is_given = arguments%resumes
+      case ('--csv')
+        is_given = arguments%wants_csv
+      case ('--quiet')
+        is_given = arguments%is_quiet
+      case default
+        is_given = .false.
+      end select
+      if (.not. is_given .or. takes_option(arguments%command, options(i))) cycle
+      call raise(error, exit_input, takers_text(options(i)))
+      return
+    end do
     operands = size(arguments%operands)
-    if (allocated(arguments%out) .and. .not. is_one_of('run equilibrium modes')) then
-      call raise(error, exit_input, '--out is an option of nocdyn run, equilibrium and modes')
-    else if (arguments%is_quiet .and. .not. is_one_of('run')) then
-      call raise(error, exit_input, '--quiet is an option of nocdyn run')
-    else if (allocated(arguments%at) .and. .not. is_one_of('modes')) then
-      call raise(error, exit_input, '--at is an option of nocdyn modes')
-    else if (size(arguments%overrides) > 0 .and. .not. is_one_of('run check equilibrium modes matrices')) then
-      call raise(error, exit_input, '--set is an option of nocdyn run, check, equilibrium, modes and matrices')
-    else if (is_one_of('run check equilibrium modes') .and. operands == 0) then
-      call raise(error, exit_input, 'an input file is missing: nocdyn ' // arguments%command // ' FILE...')
-    else if (is_one_of('matrices new') .and. operands /= 1) then
-      call raise(error, exit_input, 'exactly one file is needed: nocdyn ' // arguments%command // ' FILE')
-    else if (is_one_of('version') .and. operands > 0) then
-      call raise(error, exit_input, '--version takes no arguments')
-    end if
-
-  contains
-
-    pure logical function is_one_of(commands)
-      character(len=*), intent(in) :: commands   !! separated by blanks
-
-      is_one_of = index(' ' // commands // ' ', ' ' // arguments%command // ' ') > 0
-    end function is_one_of
-
+    select case (arguments%command)
+    case ('run', 'check', 'equilibrium', 'modes')
+      if (operands == 0) call raise(error, exit_input, 'an input file is missing: nocdyn ' // arguments%command // ' FILE...')
+    case ('matrices', 'new', 'sweep')
+      if (operands /= 1) call raise(error, exit_input, 'exactly one file is needed: nocdyn ' // arguments%command // ' FILE')
+    case ('merge')
+      if (operands /= 1) call raise(error, exit_input, 'exactly one folder is needed: nocdyn merge DIR')
+    case ('version')
+      if (operands > 0) call raise(error, exit_input, '--version takes no arguments')
+    case default
+      ! help takes what there is
+    end select
   end subroutine check_usage
 
 end module nocdyn_arguments

@@ -9,7 +9,7 @@ module nocdyn_console
   implicit none (type, external)
   private
 
-  public :: say, complain, new_console_progress
+  public :: say, complain, new_console_progress, new_status_line
 
   logical, protected, public :: output_is_lost = .false.   !! some of standard output could not be written
 
@@ -17,11 +17,21 @@ module nocdyn_console
   real(wp), parameter :: refresh = 0.2_wp     ! time between two updates of the line [s]
 
   !> One line on the terminal, rewritten in place.
-  type, extends(progress_t), public :: console_progress_t
-    character(len=:), allocatable, private :: title
+  type, public :: status_line_t
     logical, private :: is_wanted = .false.
     logical, private :: is_shown = .false.
     integer(int64), private :: began = 0, next = 0, rate = 1
+  contains
+    procedure :: is_due
+    procedure :: elapsed
+    procedure :: show
+    procedure :: clear => clear_line
+  end type status_line_t
+
+  !> How far a run has come.
+  type, extends(progress_t), public :: console_progress_t
+    character(len=:), allocatable, private :: title
+    type(status_line_t), private :: line
   contains
     procedure :: update
     procedure :: clear
@@ -56,41 +66,78 @@ contains
   end subroutine complain
 
   !> A line that shows after a second of work, if standard error is a terminal.
+  function new_status_line(is_quiet) result(line)
+    logical, intent(in) :: is_quiet
+    type(status_line_t) :: line
+
+    line%is_wanted = is_terminal(standard_error) .and. .not. is_quiet
+    call system_clock(line%began, line%rate)
+    line%next = line%began + int(patience * real(line%rate, wp), int64)
+  end function new_status_line
+
+  !> Whether it is time to show how things stand.
+  logical function is_due(self)
+    class(status_line_t), intent(inout) :: self
+    integer(int64) :: now
+
+    is_due = self%is_wanted
+    if (.not. is_due) return
+    call system_clock(now)
+    is_due = now >= self%next
+    if (is_due) self%next = now + int(refresh * real(self%rate, wp), int64)
+  end function is_due
+
+  !> Time since the work began [s].
+  function elapsed(self)
+    class(status_line_t), intent(in) :: self
+    real(wp) :: elapsed
+    integer(int64) :: now
+
+    call system_clock(now)
+    elapsed = real(now - self%began, wp) / real(self%rate, wp)
+  end function elapsed
+
+  subroutine show(self, text)
+    class(status_line_t), intent(inout) :: self
+    character(len=*), intent(in) :: text
+
+    self%is_shown = .true.
+    write (error_unit, '(a)', advance='no') achar(13) // text // achar(27) // '[K'
+    flush (error_unit)
+  end subroutine show
+
+  !> Takes the line away.
+  subroutine clear_line(self)
+    class(status_line_t), intent(inout) :: self
+
+    if (self%is_shown) write (error_unit, '(a)', advance='no') achar(13) // achar(27) // '[K'
+    self%is_shown = .false.
+  end subroutine clear_line
+
   function new_console_progress(title, is_quiet) result(progress)
     character(len=*), intent(in) :: title
     logical, intent(in) :: is_quiet
     type(console_progress_t) :: progress
 
     progress%title = title
-    progress%is_wanted = is_terminal(standard_error) .and. .not. is_quiet
-    call system_clock(progress%began, progress%rate)
-    progress%next = progress%began + int(patience * real(progress%rate, wp), int64)
+    progress%line = new_status_line(is_quiet)
   end function new_console_progress
 
   subroutine update(self, fraction)
     class(console_progress_t), intent(inout) :: self
     real(wp), intent(in) :: fraction
-    integer(int64) :: now
-    real(wp) :: elapsed, left
+    real(wp) :: left
 
-    if (.not. self%is_wanted) return
-    call system_clock(now)
-    if (now < self%next) return
-    self%next = now + int(refresh * real(self%rate, wp), int64)
-    self%is_shown = .true.
-    elapsed = real(now - self%began, wp) / real(self%rate, wp)
-    left = elapsed * (1.0_wp - fraction) / max(fraction, epsilon(fraction))
-    write (error_unit, '(a)', advance='no') achar(13) // self%title // ': ' // to_text(int(100.0_wp * fraction)) // ' %, ' // &
-      to_text(int(min(left, 1.0e8_wp)) + 1) // ' s left' // achar(27) // '[K'
-    flush (error_unit)
+    if (.not. self%line%is_due()) return
+    left = self%line%elapsed() * (1.0_wp - fraction) / max(fraction, epsilon(fraction))
+    call self%line%show(self%title // ': ' // to_text(int(100.0_wp * fraction)) // ' %, ' // &
+                        to_text(int(min(left, 1.0e8_wp)) + 1) // ' s left')
   end subroutine update
 
-  !> Takes the line away.
   subroutine clear(self)
     class(console_progress_t), intent(inout) :: self
 
-    if (self%is_shown) write (error_unit, '(a)', advance='no') achar(13) // achar(27) // '[K'
-    self%is_shown = .false.
+    call self%line%clear()
   end subroutine clear
 
 end module nocdyn_console

@@ -45,6 +45,14 @@ contains
              '  --at rest          at the start angles, with all speeds zero and mean torques' // nl // &
              '  --at TIME          at a time of the run [s], which is integrated up to there' // nl // &
              '  --out DIR          write modes.csv and modes.json to DIR, with several files to DIR/<name of the file>'
+    case ('sweep')
+      text = sweep_help()
+    case ('merge')
+      text = 'nocdyn merge DIR [--csv] [--quiet]' // nl // nl // &
+             'Makes sweep.nc and summary.json of the journals that the shards of a sweep have left in DIR.' // nl // nl // &
+             '  --csv              write sweep.csv too' // nl // &
+             '  --quiet            print nothing but errors' // nl // nl // &
+             'Exit code 2: the journals do not belong together, or variants are missing.'
     case ('matrices')
       text = 'nocdyn matrices FILE [--set PATH=VALUE]...' // nl // nl // &
              'Prints every matrix and vector of the method for the machine at its start, with the number of' // nl // &
@@ -58,6 +66,25 @@ contains
     end select
   end function command_help
 
+  pure function sweep_help() result(text)
+    character(len=:), allocatable :: text
+
+    text = 'nocdyn sweep FILE [--out DIR] [--set PATH=VALUE]... [--threads NUMBER] [--shard K/N] [--resume] [--csv]' // nl // &
+           '             [--quiet]' // nl // nl // &
+           'Runs all variants of a machine that &sweep and &vary of the file describe, and writes what &record asks for' // nl // &
+           'to sweep.nc, with summary.json and input.nml. A variant that fails is recorded with its reason.' // nl // nl // &
+           '  --out DIR          write to DIR; without it &output directory counts, else results/<name of the file>' // nl // &
+           '  --set PATH=VALUE   override a key: sweep.samples=1000, run.rtol=1e-9, load.work.viscous=80' // nl // &
+           '  --threads NUMBER   without it OMP_NUM_THREADS counts, else the cores that the process may use' // nl // &
+           "  --shard K/N        compute part K of N only, for 'nocdyn merge'" // nl // &
+           '  --resume           go on where an interrupted sweep has stopped' // nl // &
+           '  --csv              write sweep.csv too' // nl // &
+           '  --quiet            print nothing but errors' // nl // nl // &
+           'Results are the same to the last bit for any number of threads, shards or interruptions. On many machines:' // nl // &
+           'mpirun -n N nocdyn-mpi sweep FILE, with the same options but --shard.' // nl // nl // &
+           'Exit code 1: interrupted, or every variant failed.'
+  end function sweep_help
+
   pure function overview() result(text)
     character(len=:), allocatable :: text
 
@@ -66,6 +93,8 @@ contains
            '  nocdyn check FILE...       read and analyse, integrate nothing' // nl // &
            '  nocdyn equilibrium FILE... steady running: speeds, torques, twists, powers, stability' // nl // &
            '  nocdyn modes FILE...       natural frequencies, damping, shapes and energies of the modes' // nl // &
+           '  nocdyn sweep FILE          run many variants of a machine' // nl // &
+           '  nocdyn merge DIR           put the parts of a sweep together' // nl // &
            '  nocdyn matrices FILE       print the matrices of the method for a machine' // nl // &
            '  nocdyn new FILE            write a commented input to start from' // nl // &
            '  nocdyn help [COMMAND]      help on a command' // nl // &

@@ -7,6 +7,7 @@ program nocdyn
   use nocdyn_errors, only: error_t, exit_file, raise
   use nocdyn_posix, only: survive_size_limit
   use nocdyn_run_command, only: run_command
+  use nocdyn_sibling_programs, only: become_sibling
   implicit none (type, external)
 
   type(arguments_t) :: arguments
@@ -28,6 +29,10 @@ program nocdyn
     call equilibrium_command(arguments, code)
   case ('modes')
     call modes_command(arguments, code)
+  case ('sweep', 'merge')
+    call become_sibling('nocdyn-sweep', error)
+    call complain(error)
+    code = error%code
   case ('matrices')
     call matrices_command(arguments, code)
   case ('new')

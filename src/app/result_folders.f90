@@ -1,11 +1,12 @@
 !> The folders that results go to.
 module nocdyn_result_folders
   use nocdyn_errors, only: error_t, exit_input, raise
+  use nocdyn_input, only: group_t, input_t
   use nocdyn_text, only: quoted, string_t
   implicit none (type, external)
   private
 
-  public :: plain_path, stem, refuse_shared_folders
+  public :: plain_path, result_folder, stem, refuse_shared_folders
 
 contains
 
@@ -25,6 +26,21 @@ contains
     if (index(path, '/') /= 1) plain = plain(2:)
     if (plain == '') plain = merge('/', '.', index(path, '/') == 1)
   end function plain_path
+
+  !> Where the results of a file go if there is no --out: to what the input says, else to results/<its name>.
+  function result_folder(input) result(folder)
+    type(input_t), intent(in) :: input
+    character(len=:), allocatable :: folder
+    type(group_t) :: output
+
+    output = input%single('output')
+    folder = output%text('directory')
+    if (folder == '') then
+      folder = 'results/' // stem(input%file)
+    else
+      folder = plain_path(folder)
+    end if
+  end function result_folder
 
   !> The file's name without its folders and its last ending.
   pure function stem(path)

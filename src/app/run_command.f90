@@ -3,10 +3,10 @@ module nocdyn_run_command
   use nocdyn_arguments, only: arguments_t
   use nocdyn_console, only: complain, console_progress_t, new_console_progress, say
   use nocdyn_errors, only: error_t, exit_done, exit_failed, raise
-  use nocdyn_input, only: group_t, input_t
+  use nocdyn_input, only: input_t
   use nocdyn_input_reader, only: read_input
   use nocdyn_posix, only: is_interrupted, watch_interrupts
-  use nocdyn_result_folders, only: plain_path, refuse_shared_folders, stem
+  use nocdyn_result_folders, only: plain_path, refuse_shared_folders, result_folder, stem
   use nocdyn_run_summary, only: run_summary_t
   use nocdyn_summary_table, only: method_line, summary_line, summary_table
   use nocdyn_text, only: string_t, to_text
@@ -34,7 +34,7 @@ contains
       call read_input(arguments%operands(i)%text, arguments%overrides, inputs(i), error)
       is_good(i) = .not. allocated(error)
       folders(i)%text = ''
-      if (is_good(i)) folders(i)%text = result_folder(arguments, inputs(i))
+      if (is_good(i)) folders(i)%text = folder_of(arguments, inputs(i))
       if (.not. is_good(i)) call count_failure(error, code)
     end do
     call refuse_shared_folders(arguments%operands, folders, is_good, error)
@@ -88,23 +88,18 @@ contains
     end if
   end subroutine run_file
 
-  !> --out, in which each of several files gets a folder of its own; else what the input says; else results/<its name>.
-  function result_folder(arguments, input) result(folder)
+  !> --out, in which each of several files gets a folder of its own; else that of the file.
+  function folder_of(arguments, input) result(folder)
     type(arguments_t), intent(in) :: arguments
     type(input_t), intent(in) :: input
     character(len=:), allocatable :: folder
-    type(group_t) :: output
 
-    output = input%single('output')
-    folder = output%text('directory')
-    if (allocated(arguments%out)) then
+    if (.not. allocated(arguments%out)) then
+      folder = result_folder(input)
+    else
       folder = plain_path(arguments%out)
       if (size(arguments%operands) > 1) folder = folder // '/' // stem(input%file)
-    else if (folder == '') then
-      folder = 'results/' // stem(input%file)
-    else
-      folder = plain_path(folder)
     end if
-  end function result_folder
+  end function folder_of
 
 end module nocdyn_run_command

@@ -1,0 +1,96 @@
+!> nocdyn merge: one result of the parts of a sweep.
+module nocdyn_merge_command
+  use nocdyn_arguments, only: arguments_t
+  use nocdyn_console, only: complain
+  use nocdyn_errors, only: error_t, exit_done, exit_input, raise
+  use nocdyn_folders, only: folder_names
+  use nocdyn_input, only: input_t
+  use nocdyn_input_reader, only: read_input_text
+  use nocdyn_journal_chunks, only: check_sweep
+  use nocdyn_posix, only: watch_interrupts
+  use nocdyn_result_folders, only: plain_path
+  use nocdyn_sweep_journal, only: open_journal, sweep_journal_t
+  use nocdyn_sweep_plan, only: make_plan, sweep_plan_t
+  use nocdyn_sweep_results, only: results_options_t, write_results
+  use nocdyn_sweep_summary, only: sweep_effort_t
+  use nocdyn_text, only: append, string_t, strings
+  implicit none (type, external)
+  private
+
+  public :: merge_command
+
+contains
+
+  subroutine merge_command(arguments, code)
+    type(arguments_t), intent(in) :: arguments
+    integer, intent(out) :: code
+    type(error_t), allocatable :: error
+
+    code = exit_done
+    call watch_interrupts()
+    call merge_folder(plain_path(arguments%operands(1)%text), results_options_t(arguments%wants_csv, arguments%is_quiet), &
+                      code, error)
+    if (.not. allocated(error)) return
+    call complain(error)
+    code = max(code, error%code)
+  end subroutine merge_command
+
+  subroutine merge_folder(folder, options, code, error)
+    character(len=*), intent(in) :: folder
+    type(results_options_t), intent(in) :: options
+    integer, intent(inout) :: code
+    type(error_t), allocatable, intent(out) :: error
+    type(sweep_journal_t), allocatable :: journals(:)
+    type(input_t) :: input
+    type(sweep_plan_t) :: plan
+    type(sweep_effort_t), allocatable :: effort
+
+    call open_journals(folder, journals, error)
+    if (.not. allocated(error)) call check_sweep(journals, error)
+    if (allocated(error)) return
+    associate (header => journals(1)%header)
+      call read_input_text(header%input_text, folder, strings([character(len=1) ::]), input, error)
+      if (.not. allocated(error)) call make_plan(input, plan, error)
+    end associate
+    if (.not. allocated(error)) call write_results(plan, folder, journals, effort, options, code, error)
+  end subroutine merge_folder
+
+  !> All journals of a folder.
+  subroutine open_journals(folder, journals, error)
+    character(len=*), intent(in) :: folder
+    type(sweep_journal_t), allocatable, intent(out) :: journals(:)
+    type(error_t), allocatable, intent(out) :: error
+    type(string_t), allocatable :: names(:)
+    integer :: i
+
+    allocate (names, source=journal_names(folder))
+    if (size(names) == 0) then
+      call raise(error, exit_input, folder // ': no journal of a sweep is there; nocdyn sweep FILE --shard K/N leaves them')
+      return
+    end if
+    allocate (journals(size(names)))
+    do i = 1, size(names)
+      call open_journal(folder, names(i)%text, journals(i), error)
+      if (allocated(error)) return
+    end do
+  end subroutine open_journals
+
+  !> sweep.journal, sweep.K-of-N.journal
+  function journal_names(folder) result(names)
+    character(len=*), intent(in) :: folder
+    type(string_t), allocatable :: names(:)
+    character(len=*), parameter :: beginning = 'sweep.', ending = 'journal'
+    type(string_t), allocatable :: all_names(:)
+    integer :: i
+
+    allocate (all_names, source=folder_names(folder))
+    allocate (names(0))
+    do i = 1, size(all_names)
+      associate (name => all_names(i)%text)
+        if (index(name, beginning) /= 1 .or. len(name) < len(beginning) + len(ending)) cycle
+        if (name(len(name) - len(ending) + 1:) == ending) call append(names, name)
+      end associate
+    end do
+  end function journal_names
+
+end module nocdyn_merge_command

@@ -1,0 +1,31 @@
+!> Programs that stand beside this one.
+module nocdyn_sibling_programs
+  use nocdyn_arguments, only: command_line
+  use nocdyn_errors, only: error_t, exit_file, raise
+  use nocdyn_posix_programs, only: program_folder, replace_process
+  use nocdyn_text, only: quoted
+  implicit none (type, external)
+  private
+
+  public :: become_sibling
+
+contains
+
+  !> Goes on as another program with the same words on its command line. Returns only if that cannot be done.
+  subroutine become_sibling(name, error)
+    character(len=*), intent(in) :: name
+    type(error_t), allocatable, intent(out) :: error
+    character(len=:), allocatable :: failure, path
+    logical :: is_there
+
+    path = program_folder() // name
+    inquire (file=path, exist=is_there)
+    if (is_there) then
+      call replace_process(path, command_line(), failure)
+      call raise(error, exit_file, quoted(path) // ' cannot be started: ' // failure)
+    else
+      call raise(error, exit_file, quoted(path) // ' is not there: sweeps need NetCDF, and nocdyn was built without it')
+    end if
+  end subroutine become_sibling
+
+end module nocdyn_sibling_programs

@@ -1,0 +1,49 @@
+!> nocdyn sweep: all variants of a machine, on one computer.
+module nocdyn_sweep_command
+  use nocdyn_arguments, only: arguments_t
+  use nocdyn_console, only: complain
+  use nocdyn_errors, only: error_t, exit_done
+  use nocdyn_posix, only: watch_interrupts
+  use nocdyn_sweep, only: compute_variants
+  use nocdyn_sweep_job, only: begin_job, finish_job, sweep_job_t
+  use nocdyn_sweep_ledger, only: open_ledger, sweep_ledger_t
+  use omp_lib, only: omp_get_max_threads
+  implicit none (type, external)
+  private
+
+  public :: sweep_command
+
+contains
+
+  subroutine sweep_command(arguments, code)
+    type(arguments_t), intent(in) :: arguments
+    integer, intent(out) :: code
+    type(sweep_job_t), target :: job
+    type(sweep_ledger_t) :: ledger
+    type(error_t), allocatable :: error
+    integer :: threads
+
+    code = exit_done
+    call watch_interrupts()
+    call begin_job(arguments, job, error)
+    if (allocated(error)) then
+      call complain(error)
+      code = error%code
+      return
+    end if
+    if (job%is_done) return
+    threads = thread_count(arguments)
+    call open_ledger(ledger, job%journals(1), job%progress, threads, job%setup%lanes)
+    call compute_variants(job%plan, job%setup, threads, ledger)
+    call finish_job(job, ledger, threads, 1, code)
+  end subroutine sweep_command
+
+  !> --threads, else what OMP_NUM_THREADS says, else the cores that the process may use.
+  integer function thread_count(arguments)
+    type(arguments_t), intent(in) :: arguments
+
+    thread_count = arguments%threads
+    if (thread_count == 0) thread_count = omp_get_max_threads()
+  end function thread_count
+
+end module nocdyn_sweep_command

@@ -1,0 +1,145 @@
+!> A sweep from its command line to its results: what is the same on one machine and on many.
+module nocdyn_sweep_job
+  use nocdyn_arguments, only: arguments_t
+  use nocdyn_console, only: complain, new_status_line, say
+  use nocdyn_errors, only: error_t, exit_done, exit_failed, exit_input, raise
+  use nocdyn_input, only: input_t
+  use nocdyn_input_reader, only: read_input
+  use nocdyn_result_folders, only: plain_path, result_folder
+  use nocdyn_sweep_file, only: sweep_file_name
+  use nocdyn_sweep_header, only: sweep_header_t
+  use nocdyn_sweep_headers, only: new_sweep_header
+  use nocdyn_sweep_journal, only: create_journal, journal_name, open_journal, sweep_journal_t
+  use nocdyn_sweep_ledger, only: sweep_ledger_t
+  use nocdyn_sweep_plan, only: make_plan, sweep_plan_t
+  use nocdyn_sweep_progress, only: console_sweep_progress_t
+  use nocdyn_sweep_resumption, only: judge_journal, judge_results
+  use nocdyn_sweep_results, only: input_file, results_options_t, write_results
+  use nocdyn_sweep_setup, only: prepare_sweep, sweep_setup_t
+  use nocdyn_sweep_summary, only: sweep_effort_t
+  use nocdyn_text, only: to_text
+  implicit none (type, external)
+  private
+
+  public :: begin_job, finish_job
+
+  type, public :: sweep_job_t
+    type(arguments_t) :: arguments
+    type(sweep_plan_t) :: plan
+    character(len=:), allocatable :: folder
+    type(sweep_setup_t) :: setup
+    type(sweep_journal_t) :: journals(1)
+    type(console_sweep_progress_t) :: progress
+    logical :: is_done = .false.   !! nothing is to be computed or written
+  end type sweep_job_t
+
+contains
+
+  !> Reads the input, and makes the journal or opens the one to go on with.
+  subroutine begin_job(arguments, job, error)
+    type(arguments_t), intent(in) :: arguments
+    type(sweep_job_t), intent(out) :: job
+    type(error_t), allocatable, intent(out) :: error
+    type(input_t) :: input
+    type(sweep_header_t) :: header
+    character(len=:), allocatable :: name
+    logical :: is_there
+
+    job%arguments = arguments
+    call read_input(arguments%operands(1)%text, arguments%overrides, input, error)
+    if (.not. allocated(error)) call make_plan(input, job%plan, error)
+    if (.not. allocated(error)) call prepare_sweep(job%plan, job%setup, error)
+    if (allocated(error)) return
+    if (allocated(arguments%out)) then
+      job%folder = plain_path(arguments%out)
+    else
+      job%folder = result_folder(input)
+    end if
+    if (arguments%shards > job%plan%design%variants) then
+      call raise(error, exit_input, '--shard ' // to_text(arguments%shard) // '/' // to_text(arguments%shards) // &
+                 ': the sweep has ' // to_text(job%plan%design%variants) // ' variants; allowed: at most as many parts')
+      return
+    end if
+    header = new_sweep_header(job%plan, max(1, arguments%shard), max(1, arguments%shards))
+    name = journal_name(max(1, arguments%shard), max(1, arguments%shards))
+    inquire (file=job%folder // '/' // name, exist=is_there)
+    if (is_there) then
+      call open_journal(job%folder, name, job%journals(1), error)
+      if (.not. allocated(error)) call judge_journal(job%journals(1), header, arguments%resumes, error)
+    else
+      if (arguments%resumes) call look_for_results(job, header, error)
+      if (allocated(error) .or. job%is_done) return
+      call create_journal(job%folder, name, header, job%journals(1), error)
+    end if
+    job%progress%title = job%plan%input%file
+    job%progress%line = new_status_line(arguments%is_quiet)
+  end subroutine begin_job
+
+  !> There is no journal to go on with: all is done already, or the sweep starts from its beginning.
+  subroutine look_for_results(job, header, error)
+    type(sweep_job_t), intent(inout) :: job
+    type(sweep_header_t), intent(in) :: header
+    type(error_t), allocatable, intent(out) :: error
+    character(len=:), allocatable :: news
+
+    inquire (file=job%folder // '/' // sweep_file_name, exist=job%is_done)
+    job%is_done = job%is_done .and. job%arguments%shards <= 1
+    if (job%is_done) then
+      call judge_results(job%folder, input_file, header, error)
+      news = 'all ' // to_text(header%variants) // ' variants are done already; results in ' // job%folder
+    else
+      news = 'there is nothing to go on with in ' // job%folder // '; the sweep starts from its beginning'
+    end if
+    if (.not. (allocated(error) .or. job%arguments%is_quiet)) call say(job%plan%input%file // ': ' // news)
+  end subroutine look_for_results
+
+  !> Writes what has come out, and tells it.
+  subroutine finish_job(job, ledger, threads, ranks, code)
+    type(sweep_job_t), intent(inout) :: job
+    class(sweep_ledger_t), intent(in) :: ledger
+    integer, intent(in) :: threads, ranks
+    integer, intent(out) :: code
+    type(sweep_effort_t), allocatable :: effort
+    type(error_t), allocatable :: error
+
+    code = exit_done
+    effort = sweep_effort_t(ledger%counts%new, threads, ranks, job%setup%lanes, job%progress%line%elapsed())
+    call job%progress%line%clear()
+    if (allocated(ledger%error)) then
+      allocate (error, source=ledger%error)
+    else if (.not. ledger%is_complete()) then
+      call raise(error, exit_failed, interruption_text(job, ledger))
+    else if (job%arguments%shards > 1) then
+      if (.not. job%arguments%is_quiet) call say(part_text(job, ledger))
+    else
+      call write_results(job%plan, job%folder, job%journals, effort, &
+                         results_options_t(job%arguments%wants_csv, job%arguments%is_quiet), code, error)
+      if (.not. allocated(error)) call job%journals(1)%remove()
+    end if
+    call job%journals(1)%close()
+    if (.not. allocated(error)) return
+    call complain(error)
+    code = max(code, error%code)
+  end subroutine finish_job
+
+  function interruption_text(job, ledger) result(text)
+    type(sweep_job_t), intent(in) :: job
+    class(sweep_ledger_t), intent(in) :: ledger
+    character(len=:), allocatable :: text
+
+    associate (counts => ledger%counts)
+      text = job%plan%input%file // ': interrupted with ' // to_text(counts%done + counts%refused + counts%failed) // ' of ' // &
+             to_text(counts%total) // ' variants done; the same command with --resume goes on from there'
+    end associate
+  end function interruption_text
+
+  function part_text(job, ledger) result(text)
+    type(sweep_job_t), intent(in) :: job
+    class(sweep_ledger_t), intent(in) :: ledger
+    character(len=:), allocatable :: text
+
+    text = job%plan%input%file // ': part ' // to_text(job%arguments%shard) // ' of ' // to_text(job%arguments%shards) // &
+           ' done, ' // to_text(ledger%counts%total) // ' variants; once all parts are there: nocdyn merge ' // job%folder
+  end function part_text
+
+end module nocdyn_sweep_job

@@ -1,0 +1,112 @@
+!> The files that a finished sweep leaves, and what is printed of it.
+module nocdyn_sweep_results
+  use nocdyn_console, only: console_progress_t, new_console_progress, say
+  use nocdyn_errors, only: error_t, exit_done, exit_failed, raise
+  use nocdyn_input, only: input_t
+  use nocdyn_input_text, only: input_text
+  use nocdyn_kinds, only: wp
+  use nocdyn_output_file, only: write_whole
+  use nocdyn_posix, only: is_interrupted
+  use nocdyn_run_summary, only: run_summary_t
+  use nocdyn_sweep_file, only: sweep_file_name, write_sweep_file
+  use nocdyn_sweep_journal, only: sweep_journal_t
+  use nocdyn_order_statistics, only: find_order_statistics
+  use nocdyn_sweep_plan, only: sweep_plan_t, without_sweep
+  use nocdyn_sweep_summary, only: sweep_effort_t, sweep_json, sweep_line, sweep_summary_t, sweep_table
+  use nocdyn_sweep_table, only: write_sweep_table
+  use nocdyn_targets, only: set_targets
+  use nocdyn_text, only: to_text
+  use nocdyn_transient, only: run_transient
+  implicit none (type, external)
+  private
+
+  public :: write_results
+
+  character(len=*), parameter, public :: summary_file = 'summary.json', input_file = 'input.nml'
+
+  !> What is to be done besides sweep.nc.
+  type, public :: results_options_t
+    logical :: wants_csv = .false.
+    logical :: is_quiet = .false.
+  end type results_options_t
+
+contains
+
+  !> Writes everything of a sweep whose variants are all in the journals, and prints its summary.
+  subroutine write_results(plan, folder, journals, effort, options, code, error)
+    type(sweep_plan_t), intent(in) :: plan
+    character(len=*), intent(in) :: folder
+    type(sweep_journal_t), intent(inout) :: journals(:)
+    type(sweep_effort_t), allocatable, intent(in) :: effort   !! not allocated after a merge
+    type(results_options_t), intent(in) :: options
+    integer, intent(out) :: code   !! 1 if every variant failed
+    type(error_t), allocatable, intent(out) :: error
+    type(sweep_summary_t) :: summary
+
+    code = exit_done
+    summary%done = sum(journals%done)
+    summary%refused = sum(journals%refused)
+    summary%failed = sum(journals%failed)
+    if (allocated(effort)) allocate (summary%effort, source=effort)
+    call find_order_statistics(journals, summary%statistics, error)
+    if (.not. allocated(error)) call write_sweep_file(folder, journals, error)
+    if (.not. allocated(error) .and. options%wants_csv) call write_sweep_table(folder, journals, error)
+    if (.not. allocated(error)) call write_trajectories(plan, folder, options, error)
+    if (.not. allocated(error)) call write_whole(folder, input_file, input_text(plan%input), error)
+    if (.not. allocated(error)) then
+      call write_whole(folder, summary_file, sweep_json(plan%input, journals(1)%header, summary), error)
+    end if
+    if (allocated(error)) return
+    if (.not. options%is_quiet) then
+      if (summary%done > 0) call say(sweep_table(journals(1)%header, summary))
+      call say(sweep_line(plan%input, summary, folder))
+    end if
+    if (summary%done == 0) then
+      code = exit_failed
+      call raise(error, code, plan%input%file // ': every variant failed; the reasons are in ' // folder // '/' // sweep_file_name)
+    end if
+  end subroutine write_results
+
+  !> The chosen variants run once more, as `nocdyn run` would do it. One that fails leaves what it has.
+  subroutine write_trajectories(plan, folder, options, error)
+    type(sweep_plan_t), intent(in) :: plan
+    character(len=*), intent(in) :: folder
+    type(results_options_t), intent(in) :: options
+    type(error_t), allocatable, intent(out) :: error
+    type(input_t) :: input
+    type(run_summary_t) :: summary
+    real(wp) :: values(plan%design%varied)
+    character(len=:), allocatable :: complaint
+    integer :: i
+
+    do i = 1, size(plan%trajectories)
+      associate (variant => plan%trajectories(i))
+        input = plan%input
+        call plan%design%values(variant, values)
+        call set_targets(input, plan%targets, values, complaint)
+        if (complaint /= '') cycle
+        call run_variant(without_sweep(input), folder // '/variant-' // to_text(variant), options, summary, error)
+      end associate
+      if (is_interrupted()) then
+        call raise(error, exit_failed, plan%input%file // ': interrupted while trajectories were written; --resume goes on')
+      else if (allocated(error)) then
+        if (error%code == exit_failed) deallocate (error)   ! its reason is in sweep.nc
+      end if
+      if (allocated(error)) return
+    end do
+  end subroutine write_trajectories
+
+  subroutine run_variant(input, folder, options, summary, error)
+    type(input_t), intent(in) :: input
+    character(len=*), intent(in) :: folder
+    type(results_options_t), intent(in) :: options
+    type(run_summary_t), intent(out) :: summary
+    type(error_t), allocatable, intent(out) :: error
+    type(console_progress_t), target :: progress
+
+    progress = new_console_progress(folder, options%is_quiet)
+    call run_transient(input, folder, progress, summary, error)
+    call progress%clear()
+  end subroutine run_variant
+
+end module nocdyn_sweep_results

@@ -1,0 +1,88 @@
+!> Whether a sweep may go on with what is in its folder.
+module nocdyn_sweep_resumption
+  use nocdyn_errors, only: error_t, exit_input, raise
+  use nocdyn_input_differences, only: find_differences
+  use nocdyn_sweep_header, only: sweep_header_t
+  use nocdyn_sweep_journal, only: sweep_journal_t
+  use nocdyn_text, only: string_t, to_text
+  use nocdyn_text_file, only: read_text_file
+  implicit none (type, external)
+  private
+
+  public :: judge_journal, judge_results
+
+  integer, parameter :: most_told = 5   ! differences
+
+contains
+
+  !> A journal is gone on with if that is asked for and it is one of this very sweep.
+  subroutine judge_journal(journal, header, resumes, error)
+    type(sweep_journal_t), intent(in) :: journal
+    type(sweep_header_t), intent(in) :: header            !! of the sweep that is asked for
+    logical, intent(in) :: resumes
+    type(error_t), allocatable, intent(out) :: error
+    character(len=:), allocatable :: difference
+
+    if (.not. resumes) then
+      call raise(error, exit_input, journal%path() // ' holds ' // to_text(journal%done + journal%refused + journal%failed) // &
+                 ' of ' // to_text(journal%header%last - journal%header%first + 1) // &
+                 ' variants of a sweep that was not finished; go on with it by --resume, or remove it')
+      return
+    end if
+    difference = header_difference(journal%header, header)
+    if (difference /= '') call raise(error, exit_input, journal%path() // ' cannot be gone on with: ' // difference)
+  end subroutine judge_journal
+
+  !> What tells the sweep of a journal from the one that is asked for; empty if nothing does.
+  function header_difference(old, new) result(text)
+    type(sweep_header_t), intent(in) :: old, new
+    character(len=:), allocatable :: text
+
+    text = ''
+    if (old%source /= new%source) then
+      text = 'it was begun by ' // old%source // ', this is ' // new%source
+      return
+    end if
+    text = input_difference(old%input_text, new%input_text)
+    if (text /= '') return
+    if (old%list_fingerprint /= new%list_fingerprint) then
+      text = 'the file of &sweep with the variants has changed'
+    else if (old%first /= new%first .or. old%last /= new%last) then
+      text = 'it is for the variants ' // to_text(old%first) // ' to ' // to_text(old%last) // ', not ' // &
+             to_text(new%first) // ' to ' // to_text(new%last)
+    end if
+  end function header_difference
+
+  !> What has changed in an input; empty if nothing that counts.
+  function input_difference(old, new) result(text)
+    character(len=*), intent(in) :: old, new   !! of `input_text`
+    character(len=:), allocatable :: text
+    type(string_t), allocatable :: sentences(:)
+    integer :: i
+
+    call find_differences(old, new, sentences)
+    text = ''
+    do i = 1, min(size(sentences), most_told)
+      if (i > 1) text = text // '; '
+      text = text // sentences(i)%text
+    end do
+    if (size(sentences) > most_told) text = text // '; and ' // to_text(size(sentences) - most_told) // ' more'
+    if (text /= '') text = 'the input has changed: ' // text
+  end function input_difference
+
+  !> Results that are there already must be of this sweep.
+  subroutine judge_results(folder, input_file, header, error)
+    character(len=*), intent(in) :: folder
+    character(len=*), intent(in) :: input_file            !! its name in the folder
+    type(sweep_header_t), intent(in) :: header
+    type(error_t), allocatable, intent(out) :: error
+    character(len=:), allocatable :: difference, text
+
+    call read_text_file(folder // '/' // input_file, text, error)
+    if (allocated(error)) return
+    difference = input_difference(text, header%input_text)
+    if (difference /= '') call raise(error, exit_input, folder // ' holds the results of another sweep: ' // difference // &
+                                     '; without --resume they are replaced')
+  end subroutine judge_results
+
+end module nocdyn_sweep_resumption
