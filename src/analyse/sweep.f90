@@ -35,7 +35,7 @@ contains
     type(sweep_plan_t), intent(in) :: plan
     type(sweep_setup_t), intent(in) :: setup
     class(dispatcher_t), intent(inout) :: dispatcher
-    type(sweep_block_t), allocatable :: block
+    type(sweep_block_t), allocatable, target :: block
     type(chunk_t) :: chunk
     type(error_t), allocatable :: error
     real(wp) :: seconds
@@ -43,9 +43,7 @@ contains
     logical :: is_complete
 
     allocate (block)
-    call dispatcher%enter()
     call new_sweep_block(plan, setup, dispatcher, block, error)
-    call dispatcher%leave()
     if (allocated(error)) error stop 'nocdyn_sweep: the base machine has been assembled before'
     do
       call dispatcher%enter()
@@ -60,6 +58,7 @@ contains
       call dispatcher%take(chunk, seconds)
       call dispatcher%leave()
     end do
+    call block%release()
   end subroutine compute_chunks
 
   !> Of a clock that only runs forward [s].

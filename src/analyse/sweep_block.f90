@@ -2,16 +2,20 @@
 module nocdyn_sweep_block
   use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
   use nocdyn_dispatcher, only: dispatcher_t
-  use nocdyn_errors, only: error_t
+  use nocdyn_errors, only: error_t, exit_input, raise
   use nocdyn_formulation, only: formulation_t
-  use nocdyn_integration, only: integrate, integrate_queue
-  use nocdyn_integration_settings, only: integration_settings_t
+  use nocdyn_integration, only: integrate_with
+  use nocdyn_integration_settings, only: check_settings, integration_settings_t
   use nocdyn_kinds, only: wp
+  use nocdyn_methods, only: select_method
   use nocdyn_outcome, only: failure_sentence, integration_done, integration_interrupted, outcome_t
-  use nocdyn_queue, only: queue_t
+  use nocdyn_queue, only: one_each, one_each_t, queue_t
+  use nocdyn_statistics, only: statistic_t
   use nocdyn_statistics_observer, only: new_statistics_observer, statistics_observer_t
+  use nocdyn_stepper, only: stepper_t
   use nocdyn_sweep_chunk, only: allocate_chunk, chunk_t, status_done, status_failed, status_refused
   use nocdyn_sweep_plan, only: sweep_plan_t
+  use nocdyn_sweep_records, only: fit_statistics
   use nocdyn_sweep_setup, only: sweep_setup_t, take_settings
   use nocdyn_system, only: system_t
   use nocdyn_variant_machines, only: new_variant_machines, variant_alone, variant_machines_t, variant_refused
@@ -43,26 +47,30 @@ module nocdyn_sweep_block
     procedure :: finish
   end type chunk_queue_t
 
+  !> gfortran 12 keeps the lengths of texts that functions return in static memory, of all threads: texts are made by one thread
+  !> at a time, in the critical section `texts`.
   type, public :: sweep_block_t
     type(sweep_plan_t), pointer :: plan => null()
     class(dispatcher_t), pointer :: dispatcher => null()
     type(variant_machines_t) :: machines
     type(block_observer_t) :: observer
+    class(stepper_t), allocatable :: stepper   !! as it is before an integration
     type(integration_settings_t) :: settings
-    real(wp) :: times(2) = 0.0_wp            !! start and end [s]
+    real(wp) :: times(2) = 0.0_wp              !! start and end [s]
   contains
     procedure :: compute
+    procedure :: release
     procedure, private :: compute_alone
   end type sweep_block_t
 
 contains
 
-  !> A block of lanes of the base machine.
+  !> A block of lanes of the base machine, which stays where it is. To be given up by `release`.
   subroutine new_sweep_block(plan, setup, dispatcher, block, error)
     type(sweep_plan_t), target, intent(in) :: plan
     type(sweep_setup_t), intent(in) :: setup
     class(dispatcher_t), target, intent(inout) :: dispatcher
-    type(sweep_block_t), intent(out) :: block
+    type(sweep_block_t), target, intent(out) :: block
     type(error_t), allocatable, intent(out) :: error
     real(wp) :: typical(plan%design%varied)
 
@@ -71,20 +79,36 @@ contains
     call plan%design%values(1, typical)
     call new_variant_machines(plan%input, plan%targets, setup%lanes, setup%is_audited, block%machines, error, typical)
     if (allocated(error)) return
+    !$omp critical (texts)
     call take_settings(plan%input, block%machines%formulation, block%settings, block%times, error)
-    if (allocated(error)) return
-    call new_block_observer(block%machines%formulation, plan, block%times, dispatcher, block%observer)
+    if (.not. allocated(error)) call select_method(block%settings, block%stepper, error)
+    if (.not. allocated(error)) then
+      call new_block_observer(block%machines%formulation, plan, block%times, dispatcher, block%observer, error)
+    end if
+    !$omp end critical (texts)
   end subroutine new_sweep_block
 
-  subroutine new_block_observer(formulation, plan, times, dispatcher, observer)
+  subroutine release(self)
+    class(sweep_block_t), intent(inout) :: self
+
+    call self%machines%release()
+  end subroutine release
+
+  !> The statistics of variants that run through these times; if some begin outside of them, that is an error.
+  subroutine new_block_observer(formulation, plan, times, dispatcher, observer, error)
     class(formulation_t), target, intent(inout) :: formulation   !! stays where it is, as the observer does
     type(sweep_plan_t), intent(in) :: plan
     real(wp), intent(in) :: times(2)
     class(dispatcher_t), target, intent(inout) :: dispatcher
     type(block_observer_t), intent(out) :: observer
+    type(error_t), allocatable, intent(out) :: error
+    type(statistic_t), allocatable :: statistics(:)
+    character(len=:), allocatable :: complaint
 
-    observer%statistics_observer_t = new_statistics_observer(formulation, plan%statistics, times(1), times(2))
+    call fit_statistics(plan%statistics, times(1), times(2), statistics, complaint)
+    observer%statistics_observer_t = new_statistics_observer(formulation, statistics, times(1), times(2))
     observer%dispatcher => dispatcher
+    if (complaint /= '') call raise(error, exit_input, complaint)
   end subroutine new_block_observer
 
   !> The variants `first`, `first` + 1, ... Those that are interrupted do not count: `is_complete` is false then.
@@ -94,8 +118,8 @@ contains
     type(chunk_t), target, intent(out) :: chunk
     logical, intent(out) :: is_complete
     type(chunk_queue_t) :: queue
+    class(stepper_t), allocatable :: stepper
     type(outcome_t) :: outcome
-    type(error_t), allocatable :: error
     integer :: i
 
     call allocate_chunk(chunk, first, count, self%plan%design%varied, size(self%plan%statistics))
@@ -105,8 +129,8 @@ contains
     queue%chunk => chunk
     allocate (queue%place(self%machines%formulation%lanes), source=0)
     allocate (queue%is_alone(count), source=.false.)
-    call integrate_queue(self%machines%formulation, self%settings, self%times, queue, self%observer, outcome, error)
-    if (allocated(error)) error stop 'nocdyn_sweep_block: the settings of the base machine have been checked'
+    allocate (stepper, source=self%stepper)
+    call integrate_with(stepper, self%machines%formulation, self%settings, self%times, queue, self%observer, outcome)
     do i = 1, count
       if (.not. queue%is_alone(i)) cycle
       if (self%dispatcher%is_over()) exit
@@ -181,7 +205,9 @@ contains
       call observer%results(lane, chunk%results(:, place))
     else
       chunk%status(place) = status_failed
+      !$omp critical (texts)
       chunk%reasons(place)%text = failure_sentence(outcome, lane, formulation, settings%rtol, settings%atol)
+      !$omp end critical (texts)
     end if
   end subroutine conclude
 
@@ -192,33 +218,43 @@ contains
     integer, intent(in) :: place
     class(formulation_t), allocatable, target :: formulation
     type(block_observer_t), target :: observer
+    class(stepper_t), allocatable :: stepper
     type(integration_settings_t) :: settings
+    type(one_each_t) :: queue
     type(outcome_t) :: outcome
     type(error_t), allocatable :: error
-    real(wp), allocatable :: start(:), y(:, :)
-    character(len=:), allocatable :: reason
     real(wp) :: times(2)
+
+    call make_alone(self, chunk%parameters(:, place), formulation)
+    !$omp critical (texts)
+    call take_settings(self%machines%input, formulation, settings, times, error)
+    if (.not. allocated(error)) call check_settings(settings, error)
+    if (.not. allocated(error)) call select_method(settings, stepper, error)
+    if (.not. allocated(error)) call new_block_observer(formulation, self%plan, times, self%dispatcher, observer, error)
+    if (allocated(error)) call refuse(chunk, place, error%message)
+    !$omp end critical (texts)
+    if (allocated(error)) return
+    queue = one_each(formulation%start())
+    call observer%begin(1, queue%y(1, :))
+    call integrate_with(stepper, formulation, settings, times, queue, observer, outcome)
+    call conclude(chunk, place, 1, outcome, formulation, settings, observer)
+  end subroutine compute_alone
+
+  subroutine make_alone(block, values, formulation)
+    class(sweep_block_t), intent(inout) :: block
+    real(wp), contiguous, intent(in) :: values(:)
+    class(formulation_t), allocatable, intent(out) :: formulation
+    real(wp), allocatable :: start(:)
+    character(len=:), allocatable :: reason
     integer :: verdict
 
-    associate (block => self%machines%formulation)
-      allocate (start(block%states + block%quadratures))
+    associate (system => block%machines%formulation)
+      allocate (start(system%states + system%quadratures))
     end associate
-    call self%machines%put(chunk%parameters(:, place), 1, start, verdict, reason)
+    call block%machines%put(values, 1, start, verdict, reason)
     if (verdict /= variant_alone) error stop 'nocdyn_sweep_block: a variant is alone always or never'
-    call self%machines%alone_formulation(formulation)
-    call take_settings(self%machines%input, formulation, settings, times, error)
-    if (.not. allocated(error)) then
-      call new_block_observer(formulation, self%plan, times, self%dispatcher, observer)
-      allocate (y, source=formulation%start())
-      call observer%begin(1, y(1, :))
-      call integrate(formulation, settings, times, y, observer, outcome, error)
-    end if
-    if (allocated(error)) then
-      call refuse(chunk, place, error%message)
-    else
-      call conclude(chunk, place, 1, outcome, formulation, settings, observer)
-    end if
-  end subroutine compute_alone
+    call block%machines%alone_formulation(formulation)
+  end subroutine make_alone
 
   !> Looks after the dispatcher now and then, unless another thread does.
   function stops(self, t)

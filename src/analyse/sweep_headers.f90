@@ -49,7 +49,7 @@ contains
     do i = 1, size(plan%targets)
       header%parameters(i)%label = plan%targets(i)%path
       header%parameters(i)%unit = plan%targets(i)%unit
-      header%parameters(i)%long_name = plan%targets(i)%path
+      header%parameters(i)%long_name = plan%targets(i)%long_name
     end do
     do i = 1, size(plan%statistics)
       header%results(i)%label = plan%statistics(i)%label

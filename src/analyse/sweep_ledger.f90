@@ -135,7 +135,9 @@ contains
     real(wp), intent(in) :: seconds
 
     if (allocated(self%error)) return
+    !$omp critical (texts)
     call self%journal%append(chunk, self%error)
+    !$omp end critical (texts)
     if (allocated(self%error)) then
       !$omp atomic write
       self%is_broken = .true.
@@ -151,7 +153,9 @@ contains
   subroutine attend(self)
     class(sweep_ledger_t), intent(inout) :: self
 
+    !$omp critical (texts)
     call self%progress%update(self%counts)
+    !$omp end critical (texts)
   end subroutine attend
 
   !> All variants have been computed here.

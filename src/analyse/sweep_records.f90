@@ -192,7 +192,7 @@ contains
     integer, allocatable :: wanted(:)
     integer :: i
 
-    wanted = input%groups(record)%whole_numbers('trajectories')
+    allocate (wanted, source=input%groups(record)%whole_numbers('trajectories'))
     do i = 1, size(wanted)
       if (wanted(i) > variants) then
         call add_mistake(input, record, 'trajectories', 'trajectories(' // to_text(i) // ') = ' // to_text(wanted(i)) // &
