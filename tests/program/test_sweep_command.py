@@ -1,0 +1,215 @@
+"""nocdyn sweep and nocdyn merge: what they print, write and refuse."""
+
+import csv
+import os
+import shutil
+import subprocess
+
+import pytest
+from sweep_inputs import MIXED, SWEEP, SWEEP_PROGRAM, TWO_DISCS, needs_sweeps
+
+pytestmark = needs_sweeps
+
+# A single run at this tolerance is the truth for one at the tolerance of the sweep.
+TRUTH = ("--set", "run.rtol=1e-12", "--set", "run.atol=1e-12")
+# largest relative error of the results of a sweep at tolerance 1e-8
+ERROR = 1e-6
+
+
+@pytest.fixture
+def discs(nocdyn):
+    return nocdyn.write("discs.nml", TWO_DISCS + SWEEP)
+
+
+def table(nocdyn, folder):
+    """The rows of sweep.csv."""
+    with open(nocdyn.folder / folder / "sweep.csv", newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def test_a_sweep_leaves_its_files_and_no_journal(nocdyn, discs):
+    outcome = nocdyn("sweep", discs, "--out", "out", "--csv", "--threads", 2)
+    assert (outcome.returncode, outcome.stderr) == (0, "")
+    assert nocdyn.files("out") == ["input.nml", "summary.json", "sweep.csv", "sweep.nc"]
+    title, header, *rows, end = outcome.stdout.splitlines()
+    assert title == "Two discs"
+    assert header.split() == "of 60 variants: min 5 % median 95 % max variant of min variant of max".split()
+    assert [row.split()[0] for row in rows] == [
+        "omega_wheel_final",
+        "omega_wheel_max",
+        "omega_wheel_time_of_max",
+        "moment_shaft_max_abs_from_0.5",
+        "moment_shaft_rms_from_0.5",
+    ]
+    assert end.startswith(f"{discs}: 60 variants done, ") and end.endswith(" per second); results in out")
+
+
+def test_a_quiet_sweep_prints_nothing(nocdyn, discs):
+    outcome = nocdyn("sweep", discs, "--out", "out", "-q")
+    assert (outcome.returncode, outcome.stdout, outcome.stderr) == (0, "", "")
+
+
+def test_the_summary_tells_counts_speed_and_the_distribution_of_results(nocdyn, discs):
+    nocdyn("sweep", discs, "--out", "out", "--csv", "--threads", 2)
+    summary = nocdyn.summary("out")
+    assert (summary["status"], summary["title"], summary["threads"], summary["ranks"]) == ("done", "Two discs", 2, 1)
+    assert summary["counts"] == {"variants": 60, "done": 60, "refused": 0, "failed": 0}
+    assert summary["design"]["design"] == "random" and summary["design"]["seed"] == 3
+    assert summary["variants_per_second"] == pytest.approx(60 / summary["wall_time_s"])
+    found = summary["statistics"]["omega_wheel_max"]
+    values = {int(row["variant"]): float(row["omega_wheel_max [rad/s]"]) for row in table(nocdyn, "out")}
+    assert found["unit"] == "rad/s"
+    assert (found["min"], found["max"]) == (min(values.values()), max(values.values()))
+    assert (values[found["variant_of_min"]], values[found["variant_of_max"]]) == (found["min"], found["max"])
+    assert found["min"] < found["p5"] < found["median"] < found["p95"] < found["max"]
+
+
+def test_the_results_are_those_of_single_runs(nocdyn, discs):
+    nocdyn("sweep", discs, "--out", "out", "--csv")
+    for row in table(nocdyn, "out")[::7]:
+        stiffness = row["coupling.shaft.stiffness [N m/rad]"]
+        viscous = row["load.drag.viscous [N m s/rad]"]
+        numbers = ("--set", f"coupling.shaft.stiffness={stiffness}", "--set", f"load.drag.viscous={viscous}")
+        nocdyn("run", discs, "--out", "single", *numbers, *TRUTH)
+        wheel = nocdyn.summary("single")["columns"]["omega_wheel [rad/s]"]
+        assert float(row["omega_wheel_final [rad/s]"]) == pytest.approx(wheel["last"], rel=ERROR)
+        assert float(row["omega_wheel_max [rad/s]"]) == pytest.approx(wheel["max"], rel=ERROR)
+        # an error e of a parabola moves its top by e / (slope of its slope x distance): the root of the tolerance
+        assert float(row["omega_wheel_time_of_max [s]"]) == pytest.approx(wheel["time_of_max"], rel=1e-4)
+
+
+def test_variants_that_cannot_be_or_fail_are_recorded_with_their_reasons(nocdyn):
+    nocdyn.write("mixed.nml", MIXED)
+    outcome = nocdyn("sweep", "mixed.nml", "--out", "out", "--csv")
+    assert (outcome.returncode, outcome.stderr) == (0, "")
+    rows = table(nocdyn, "out")
+    assert [row["variant"] for row in rows] == [str(i) for i in range(1, 51)]
+    refused = [row for row in rows if row["status"] == "refused"]
+    assert {row["body.disc.inertia [kg m2]"] for row in refused} == {"-0.5", "0"} and len(refused) == 20
+    assert all("body.disc.inertia = " in row["reason"] and "allowed: > 0" in row["reason"] for row in refused)
+    failed = [row for row in rows if row["status"] == "failed"]
+    assert failed and all("the step size became too small at t = " in row["reason"] for row in failed)
+    assert all(row["omega_disc_final [rad/s]"] == "" for row in refused + failed)
+    done = [row for row in rows if row["status"] == "done"]
+    assert all(row["reason"] == "" and row["omega_disc_final [rad/s]"] != "" for row in done)
+    counts = {"variants": 50, "done": len(done), "refused": 20, "failed": len(failed)}
+    assert nocdyn.summary("out")["counts"] == counts
+    assert f"{len(done)} variants done, 20 refused, {len(failed)} failed, " in outcome.stdout
+
+
+def test_numbers_of_run_can_vary(nocdyn):
+    nocdyn.write("mixed.nml", MIXED)
+    nocdyn("sweep", "mixed.nml", "--out", "out", "--csv")
+    rows = [row for row in table(nocdyn, "out") if row["status"] == "done"]
+    for row in rows[:: len(rows) // 4]:
+        names = {"run.t_end [s]", "body.disc.inertia [kg m2]", "coupling.shaft.cubic_stiffness [N m/rad3]"}
+        numbers = [word for name in names for word in ("--set", f"{name.split()[0]}={row[name]}")]
+        nocdyn("run", "mixed.nml", "--out", "single", *numbers, *TRUTH)
+        speed = nocdyn.summary("single")["columns"]["omega_disc [rad/s]"]
+        assert float(row["omega_disc_final [rad/s]"]) == pytest.approx(speed["last"], rel=ERROR)
+
+
+def test_a_sweep_without_a_variant_that_is_done_fails(nocdyn, discs):
+    outcome = nocdyn("sweep", discs, "--out", "out", "--set", "run.max_steps=5")
+    assert outcome.returncode == 1
+    assert outcome.stderr == f"nocdyn: {discs}: every variant failed; the reasons are in out/sweep.nc\n"
+    assert nocdyn.summary("out")["status"] == "failed"
+
+
+def test_trajectories_of_chosen_variants_are_those_of_runs(nocdyn, discs):
+    nocdyn.write("discs.nml", TWO_DISCS + SWEEP + "&record trajectories = 2, 17 /\n")
+    nocdyn("sweep", "discs.nml", "--out", "out", "--csv")
+    assert nocdyn.files("out") == ["input.nml", "summary.json", "sweep.csv", "sweep.nc", "variant-17", "variant-2"]
+    assert nocdyn.files("out/variant-17") == ["input.nml", "summary.json", "trajectory.csv"]
+    row = table(nocdyn, "out")[16]
+    header, rows = nocdyn.table("out/variant-17")
+    speed = rows[-1][header.index("omega_wheel [rad/s]")]
+    assert speed == pytest.approx(float(row["omega_wheel_final [rad/s]"]), rel=ERROR)
+    assert "&sweep" not in (nocdyn.folder / "out/variant-17/input.nml").read_text()
+    nocdyn("run", "out/variant-17/input.nml", "--out", "again")
+    assert (nocdyn.folder / "again/trajectory.csv").read_bytes() == (nocdyn.folder / "out/variant-17/trajectory.csv").read_bytes()
+
+
+def test_input_nml_repeats_the_sweep(nocdyn, discs):
+    nocdyn("sweep", discs, "--out", "out", "--set", "run.rtol=1e-7")
+    nocdyn("sweep", "out/input.nml", "--out", "again")
+    assert (nocdyn.folder / "again/sweep.nc").read_bytes() == (nocdyn.folder / "out/sweep.nc").read_bytes()
+
+
+def test_run_takes_no_notice_of_the_groups_of_a_sweep(nocdyn, discs):
+    nocdyn.write("plain.nml", TWO_DISCS)
+    assert nocdyn("run", discs, "--out", "sweep", "-q").returncode == 0
+    nocdyn("run", "plain.nml", "--out", "plain", "-q")
+    assert (nocdyn.folder / "sweep/trajectory.csv").read_bytes() == (nocdyn.folder / "plain/trajectory.csv").read_bytes()
+
+
+def test_shards_are_merged(nocdyn, discs):
+    for part in (1, 2, 3):
+        outcome = nocdyn("sweep", discs, "--out", "out", "--shard", f"{part}/3")
+        assert outcome.stdout == f"{discs}: part {part} of 3 done, 20 variants; once all parts are there: nocdyn merge out\n"
+    assert nocdyn.files("out") == [f"sweep.{part}-of-3.journal" for part in (1, 2, 3)]
+    outcome = nocdyn("merge", "out", "--csv")
+    assert (outcome.returncode, outcome.stderr) == (0, "")
+    assert outcome.stdout.startswith("Two discs\n") and outcome.stdout.endswith("out: 60 variants done; results in out\n")
+    assert "variants_per_second" not in nocdyn.summary("out")
+    nocdyn("sweep", discs, "--out", "whole", "--csv")
+    for name in ("sweep.nc", "sweep.csv"):
+        assert (nocdyn.folder / "out" / name).read_bytes() == (nocdyn.folder / "whole" / name).read_bytes()
+
+
+def test_a_merge_without_all_parts_is_refused_by_their_variants(nocdyn, discs):
+    for part in (1, 3):
+        nocdyn("sweep", discs, "--out", "out", "--shard", f"{part}/3", "-q")
+    outcome = nocdyn("merge", "out")
+    assert (outcome.returncode, outcome.stdout) == (2, "")
+    assert outcome.stderr == "nocdyn: no journal holds variants 21 to 40 of 60\n"
+    assert nocdyn.files("out") == ["sweep.1-of-3.journal", "sweep.3-of-3.journal"]
+
+
+def test_parts_of_different_sweeps_are_not_merged(nocdyn, discs):
+    nocdyn("sweep", discs, "--out", "out", "--shard", "1/2", "-q")
+    nocdyn("sweep", discs, "--out", "out", "--shard", "2/2", "-q", "--set", "run.rtol=1e-7")
+    outcome = nocdyn("merge", "out")
+    assert (outcome.returncode, outcome.stdout) == (2, "")
+    assert "are not of one sweep: their inputs differ" in outcome.stderr
+
+
+@pytest.mark.parametrize(
+    ("words", "complaint"),
+    [
+        (["sweep"], "exactly one file is needed: nocdyn sweep FILE"),
+        (["merge"], "exactly one folder is needed: nocdyn merge DIR"),
+        (["merge", "."], ".: no journal of a sweep is there; nocdyn sweep FILE --shard K/N leaves them"),
+        (["sweep", "discs.nml", "--threads", "0"], "--threads 0: allowed: a number from 1 to 4096"),
+        (["sweep", "discs.nml", "--threads=2", "--threads=2"], "--threads is given twice"),
+        (["sweep", "discs.nml", "--shard", "3/2"], "--shard 3/2: allowed: K/N, the part K of N, with K from 1 to N"),
+        (["sweep", "discs.nml", "--shard", "2"], "--shard 2: allowed: K/N, the part K of N, with K from 1 to N"),
+        (["sweep", "discs.nml", "--shard"], "--shard needs a value: --shard K/N"),
+        (["sweep", "discs.nml", "--shard", "5/61"], "--shard 5/61: the sweep has 60 variants; allowed: at most as many parts"),
+        (["sweep", "discs.nml", "--csv=yes"], "--csv takes no value"),
+        (["run", "discs.nml", "--resume"], "--resume is an option of nocdyn sweep"),
+        (["run", "discs.nml", "--csv"], "--csv is an option of nocdyn sweep and merge"),
+        (["sweep", "plain.nml"], "plain.nml: there is no &sweep; 'nocdyn help input sweep' shows one"),
+        (["sweep", "discs.nml", "--set", "run.formulation=cubist"], "run.formulation"),
+    ],
+)
+def test_wrong_usage_is_refused_with_code_2(nocdyn, discs, words, complaint):
+    nocdyn.write("plain.nml", TWO_DISCS)
+    outcome = nocdyn(*words)
+    assert (outcome.returncode, outcome.stdout) == (2, "")
+    assert outcome.stderr.startswith("nocdyn: ") and complaint in outcome.stderr and outcome.stderr.count("\n") == 1
+    assert sorted(path.name for path in nocdyn.folder.iterdir()) == ["discs.nml", "plain.nml"]
+
+
+def test_the_program_for_sweeps_says_what_it_is_for(nocdyn):
+    outcome = subprocess.run([SWEEP_PROGRAM, "check", "x.nml"], check=False, capture_output=True, text=True)
+    assert (outcome.returncode, outcome.stdout) == (2, "")
+    assert outcome.stderr == "nocdyn: nocdyn-sweep knows 'sweep' and 'merge' only; everything else is asked of nocdyn\n"
+
+
+def test_without_the_program_for_sweeps_a_sweep_says_why_it_cannot_be(nocdyn, discs):
+    nocdyn.executable = shutil.copy(os.environ["NOCDYN"], nocdyn.folder / "alone")
+    outcome = nocdyn("sweep", discs)
+    assert (outcome.returncode, outcome.stdout) == (3, "")
+    missing = nocdyn.folder / "nocdyn-sweep"
+    assert outcome.stderr == f"nocdyn: '{missing}' is not there: sweeps need NetCDF, and nocdyn was built without it\n"

@@ -1,0 +1,58 @@
+"""The results of a sweep are the same to the last bit, whatever ran it."""
+
+import subprocess
+
+import pytest
+from sweep_inputs import MIXED, MPI_ENVIRONMENT, SWEEP, TWO_DISCS, mpirun, needs_mpi, needs_sweeps
+
+pytestmark = needs_sweeps
+
+# enough for several chunks for each of three workers
+MANY = ("--set", "sweep.samples=400")
+
+
+@pytest.fixture(scope="module")
+def whole(shared_nocdyn):
+    """sweep.nc of one thread, and the function that compares with it."""
+    shared_nocdyn.write("discs.nml", TWO_DISCS + SWEEP)
+    shared_nocdyn.write("mixed.nml", MIXED)
+    assert shared_nocdyn("sweep", "discs.nml", "--out", "discs", "--threads", 1, *MANY).returncode == 0
+    assert shared_nocdyn("sweep", "mixed.nml", "--out", "mixed", "--threads", 1).returncode == 0
+    return shared_nocdyn
+
+
+def bytes_of(nocdyn, folder):
+    return (nocdyn.folder / folder / "sweep.nc").read_bytes()
+
+
+@pytest.mark.parametrize("threads", [2, 3])
+def test_threads_do_not_show(whole, threads):
+    whole("sweep", "discs.nml", "--out", f"threads-{threads}", "--threads", threads, *MANY)
+    whole("sweep", "mixed.nml", "--out", f"mixed-{threads}", "--threads", threads)
+    assert bytes_of(whole, f"threads-{threads}") == bytes_of(whole, "discs")
+    assert bytes_of(whole, f"mixed-{threads}") == bytes_of(whole, "mixed")
+
+
+@needs_mpi
+@pytest.mark.parametrize(("ranks", "threads"), [(1, 1), (2, 1), (3, 1), (2, 2)])
+def test_ranks_do_not_show(whole, ranks, threads):
+    for name, words in (("discs", MANY), ("mixed", ())):
+        folder = f"{name}-{ranks}-ranks-{threads}"
+        command = [*mpirun(ranks), "sweep", f"{name}.nml", "--out", folder, "--threads", str(threads), *words]
+        outcome = subprocess.run(
+            command, cwd=whole.folder, env=MPI_ENVIRONMENT, check=False, capture_output=True, text=True, timeout=120
+        )
+        assert (outcome.returncode, outcome.stderr) == (0, "")
+        assert f"{folder}\n" in outcome.stdout
+        assert whole.summary(folder)["ranks"] == ranks and whole.summary(folder)["threads"] == threads
+        assert bytes_of(whole, folder) == bytes_of(whole, name)
+
+
+@pytest.mark.parametrize("shards", [2, 3])
+def test_shards_do_not_show(whole, shards):
+    for name, words in (("discs", MANY), ("mixed", ())):
+        folder = f"{name}-{shards}-shards"
+        for part in range(1, shards + 1):
+            assert whole("sweep", f"{name}.nml", "--out", folder, "--shard", f"{part}/{shards}", *words).returncode == 0
+        assert whole("merge", folder).returncode == 0
+        assert bytes_of(whole, folder) == bytes_of(whole, name)

@@ -1,0 +1,234 @@
+"""Sweeps that are killed, interrupted, or cannot write: nothing that was done is lost, and the end is the same."""
+
+import random
+import re
+import resource
+import signal
+import subprocess
+import time
+
+import pytest
+from conftest import TRAPS_EXCEPTIONS, wait_for
+from sweep_inputs import MPI_ENVIRONMENT, SWEEP, TWO_DISCS, mpirun, needs_mpi, needs_sweeps
+
+pytestmark = needs_sweeps
+
+# variants that take this sweep about two seconds of one thread
+SAMPLES = 1500 if TRAPS_EXCEPTIONS else 15000
+LONG = ("--set", f"sweep.samples={SAMPLES}", "--set", "run.t_end=20")
+ENDLESS = ("--set", "sweep.samples=100000000", "--set", "run.t_end=20")
+INTERRUPTED = r"nocdyn: .*discs\.nml: interrupted with (\d+) of 100000000 variants done; the same command with --resume goes on from there\n"
+
+
+@pytest.fixture
+def discs(nocdyn):
+    return nocdyn.write("discs.nml", TWO_DISCS + SWEEP)
+
+
+def journal(nocdyn, folder="out"):
+    return nocdyn.folder / folder / "sweep.journal"
+
+
+def start(nocdyn, *words, ranks=0, **options):
+    """A sweep that has begun to compute; with ranks, on as many."""
+    if ranks:
+        options |= {"env": MPI_ENVIRONMENT}
+        command = [*mpirun(ranks), *map(str, words)]
+        pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+        process = subprocess.Popen(command, cwd=nocdyn.folder, **(pipes | options))
+    else:
+        process = nocdyn.start(*words, **options)
+    wait_for(lambda: journal(nocdyn).exists() and journal(nocdyn).stat().st_size > 8000)
+    return process
+
+
+def test_a_sweep_that_is_killed_twenty_times_ends_as_one_that_is_not(nocdyn, discs):
+    nocdyn("sweep", discs, "--out", "whole", "--threads", 1, *LONG)
+    moments = random.Random(20261121)
+    kills = 0
+    while kills < 20:
+        process = nocdyn.start("sweep", discs, "--out", "out", "--threads", 1 + kills % 2, "--resume", *LONG)
+        time.sleep(moments.uniform(0.0, 0.12))
+        process.kill()
+        process.communicate()
+        kills += 1
+    outcome = nocdyn("sweep", discs, "--out", "out", "--resume", *LONG)
+    assert (outcome.returncode, outcome.stderr) == (0, "")
+    assert nocdyn.files("out") == ["input.nml", "summary.json", "sweep.nc"]
+    assert (nocdyn.folder / "out/sweep.nc").read_bytes() == (nocdyn.folder / "whole/sweep.nc").read_bytes()
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_an_interrupted_sweep_keeps_its_journal(nocdyn, discs, number):
+    process = start(nocdyn, "sweep", discs, "--out", "out", *ENDLESS)
+    process.send_signal(number)
+    output, complaint = process.communicate(timeout=30)
+    assert (process.returncode, output) == (1, "")
+    found = re.fullmatch(INTERRUPTED, complaint)
+    assert found
+    assert nocdyn.files("out") == ["sweep.journal"]
+    outcome = nocdyn("sweep", discs, "--out", "out", *ENDLESS)
+    assert (outcome.returncode, outcome.stdout) == (2, "")
+    assert outcome.stderr == (
+        f"nocdyn: out/sweep.journal holds {found[1]} of 100000000 variants of a sweep that was not finished; "
+        "go on with it by --resume, or remove it\n"
+    )
+
+
+def test_what_is_done_is_not_done_again(nocdyn, discs):
+    process = start(nocdyn, "sweep", discs, "--out", "out", *LONG, "--threads", 1)
+    process.send_signal(signal.SIGINT)
+    done = int(re.search(r"interrupted with (\d+) of", process.communicate(timeout=30)[1])[1])
+    assert 0 < done < SAMPLES
+    outcome = nocdyn("sweep", discs, "--out", "out", "--resume", *LONG)
+    assert outcome.returncode == 0
+    assert nocdyn.summary("out")["variants_computed"] == SAMPLES - done
+    assert nocdyn.summary("out")["counts"]["done"] == SAMPLES
+
+
+def interrupt(nocdyn, discs, *words):
+    process = start(nocdyn, "sweep", discs, "--out", "out", *ENDLESS, *words)
+    process.send_signal(signal.SIGINT)
+    process.communicate(timeout=30)
+
+
+@pytest.mark.parametrize(
+    ("words", "difference"),
+    [
+        (("--set", "run.rtol=1e-7"), "the input has changed: &run: rtol was 1e-08, is 1e-07"),
+        (("--set", "load.drag.viscous=0.6"), "the input has changed: &load 'drag': viscous was 0.5, is 0.6"),
+        (("--set", "sweep.seed=4"), "the input has changed: &sweep: seed was 3, is 4"),
+    ],
+)
+def test_a_sweep_with_another_input_is_not_gone_on_with(nocdyn, discs, words, difference):
+    interrupt(nocdyn, discs)
+    before = journal(nocdyn).read_bytes()
+    outcome = nocdyn("sweep", discs, "--out", "out", "--resume", *ENDLESS, *words)
+    assert (outcome.returncode, outcome.stdout) == (2, "")
+    assert outcome.stderr == f"nocdyn: out/sweep.journal cannot be gone on with: {difference}\n"
+    assert journal(nocdyn).read_bytes() == before
+
+
+def test_a_group_that_has_gone_is_named(nocdyn, discs):
+    interrupt(nocdyn, discs)
+    nocdyn.write("discs.nml", (TWO_DISCS + SWEEP).replace("&load     name = 'drag'", "&load     name = 'brake'").replace("drag", "brake"))
+    outcome = nocdyn("sweep", discs, "--out", "out", "--resume", *ENDLESS)
+    assert outcome.returncode == 2
+    assert "the input has changed: the new input has no &load 'drag'" in outcome.stderr
+
+
+def test_a_journal_of_another_version_is_not_gone_on_with(nocdyn, discs):
+    interrupt(nocdyn, discs)
+    content = journal(nocdyn).read_bytes()
+    journal(nocdyn).write_bytes(content.replace(b"nocdyn 0.", b"nocdyn 9.", 1))
+    outcome = nocdyn("sweep", discs, "--out", "out", "--resume", *ENDLESS)
+    assert (outcome.returncode, outcome.stdout) == (2, "")
+    assert outcome.stderr.startswith("nocdyn: out/sweep.journal") or "'out/sweep.journal'" in outcome.stderr
+
+
+def test_nothing_to_go_on_with_is_said(nocdyn, discs):
+    outcome = nocdyn("sweep", discs, "--out", "out", "--resume")
+    assert outcome.returncode == 0
+    assert outcome.stdout.startswith(f"{discs}: there is nothing to go on with in out; the sweep starts from its beginning\n")
+
+
+def test_a_sweep_that_is_done_stays_as_it_is(nocdyn, discs):
+    nocdyn("sweep", discs, "--out", "out")
+    before = {name: (nocdyn.folder / "out" / name).stat().st_mtime_ns for name in nocdyn.files("out")}
+    outcome = nocdyn("sweep", discs, "--out", "out", "--resume")
+    assert (outcome.returncode, outcome.stderr) == (0, "")
+    assert outcome.stdout == f"{discs}: all 60 variants are done already; results in out\n"
+    assert {name: (nocdyn.folder / "out" / name).stat().st_mtime_ns for name in nocdyn.files("out")} == before
+
+
+def test_results_of_another_sweep_are_not_taken_for_its_own(nocdyn, discs):
+    nocdyn("sweep", discs, "--out", "out")
+    outcome = nocdyn("sweep", discs, "--out", "out", "--resume", "--set", "sweep.samples=61")
+    assert (outcome.returncode, outcome.stdout) == (2, "")
+    assert outcome.stderr == (
+        "nocdyn: out holds the results of another sweep: the input has changed: &sweep: samples was 60, is 61; "
+        "without --resume they are replaced\n"
+    )
+
+
+def limited_to(size):
+    """Files of the process cannot grow beyond so many bytes."""
+    return lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (size, size))
+
+
+@pytest.mark.parametrize("size", [0, 3000, 30000])
+@pytest.mark.parametrize("threads", [1, 2])
+def test_a_full_disk_ends_a_sweep_that_can_be_gone_on_with(nocdyn, discs, size, threads):
+    samples = ("--set", "sweep.samples=1000")
+    outcome = nocdyn("sweep", discs, "--out", "out", "--threads", threads, *samples, preexec_fn=limited_to(size))
+    assert (outcome.returncode, outcome.stdout) == (3, "")
+    assert re.fullmatch(r"nocdyn: .*'out/sweep\.journal'.*: File too large\n", outcome.stderr)
+    outcome = nocdyn("sweep", discs, "--out", "out", "--resume", *samples)
+    assert outcome.returncode == 0
+    assert nocdyn.summary("out")["counts"]["done"] == 1000
+
+
+def test_a_disk_without_room_for_the_results_keeps_the_journal(nocdyn, discs):
+    # more than the journal of 60 variants needs, less than sweep.nc does
+    outcome = nocdyn("sweep", discs, "--out", "out", preexec_fn=limited_to(10000))
+    assert (outcome.returncode, outcome.stdout) == (3, "")
+    assert "sweep.nc" in outcome.stderr
+    assert nocdyn.files("out") == ["sweep.journal"]
+    outcome = nocdyn("sweep", discs, "--out", "out", "--resume")
+    assert outcome.returncode == 0
+    assert nocdyn.summary("out")["variants_computed"] == 0
+
+
+@needs_mpi
+@pytest.mark.parametrize("rank", [0, 1])
+def test_a_dead_rank_ends_the_job_and_leaves_the_journal(nocdyn, discs, rank):
+    process = start(nocdyn, "sweep", discs, "--out", "out", *LONG, ranks=2)
+    victims = subprocess.run(["pgrep", "-P", str(process.pid)], check=True, capture_output=True, text=True).stdout.split()
+    assert len(victims) == 2
+    subprocess.run(["kill", "-9", victims[rank]], check=True)
+    process.communicate(timeout=60)
+    assert process.returncode != 0
+    assert nocdyn.files("out") == ["sweep.journal"]
+    assert nocdyn("sweep", discs, "--out", "out", "--resume", *LONG).returncode == 0
+    assert nocdyn.summary("out")["variants_computed"] < SAMPLES
+    assert nocdyn("sweep", discs, "--out", "whole", *LONG).returncode == 0
+    assert (nocdyn.folder / "out/sweep.nc").read_bytes() == (nocdyn.folder / "whole/sweep.nc").read_bytes()
+
+
+@needs_mpi
+def test_an_interrupted_job_keeps_its_journal(nocdyn, discs):
+    process = start(nocdyn, "sweep", discs, "--out", "out", *ENDLESS, ranks=2)
+    process.send_signal(signal.SIGINT)
+    process.communicate(timeout=60)
+    assert process.returncode != 0
+    assert nocdyn.files("out") == ["sweep.journal"]
+
+
+@needs_mpi
+def test_a_full_disk_ends_all_ranks(nocdyn, discs):
+    command = [*mpirun(2), "sweep", str(discs), "--out", "out", *ENDLESS]
+    outcome = subprocess.run(
+        command, cwd=nocdyn.folder, env=MPI_ENVIRONMENT, check=False, capture_output=True, text=True, timeout=60,
+        preexec_fn=limited_to(30000),
+    )  # fmt: skip
+    assert outcome.returncode == 3
+    assert "nocdyn: cannot write 'out/sweep.journal': File too large\n" in outcome.stderr
+    assert nocdyn.files("out") == ["sweep.journal"]
+
+
+@needs_mpi
+@pytest.mark.parametrize(
+    ("words", "complaint"),
+    [
+        (["run", "discs.nml"], "nocdyn-mpi knows the command 'sweep' only; everything else is asked of nocdyn"),
+        (["sweep", "discs.nml", "--shard", "1/2"], "--shard is an option of nocdyn sweep; nocdyn-mpi hands out the variants itself"),
+        (["sweep", "none.nml"], "none.nml: cannot be read: there is no such file"),
+    ],
+)
+def test_only_one_rank_complains(nocdyn, discs, words, complaint):
+    command = [*mpirun(2), *words]
+    outcome = subprocess.run(
+        command, cwd=nocdyn.folder, env=MPI_ENVIRONMENT, check=False, capture_output=True, text=True, timeout=60
+    )
+    assert outcome.returncode in (2, 3) and outcome.stdout.count("nocdyn: ") == 0
+    assert outcome.stderr.count("nocdyn: ") == 1 and f"nocdyn: {complaint}\n" in outcome.stderr
