@@ -1,0 +1,95 @@
+"""Sweeps that cannot be: every mistake of their groups with file, line and what is allowed, in one go."""
+
+import pytest
+from conftest import SPINNER
+
+GROUPS = {
+    "sweep": "&sweep design = 'random' samples = 9 /\n",
+    "vary": "&vary target = 'load.drag.viscous' low = 0.1 high = 0.9 /\n",
+    "record": "&record quantity = 'omega_disc' statistic = 'final' /\n",
+}
+
+
+def refusal(nocdyn, **groups):
+    """What `nocdyn sweep` says of the spinner with some groups replaced; the first of them is on line 5."""
+    path = nocdyn.write("m.nml", SPINNER + "".join((GROUPS | groups).values()))
+    outcome = nocdyn("sweep", path, "--out", "out")
+    assert (outcome.returncode, outcome.stdout) == (2, "")
+    assert not (nocdyn.folder / "out").exists()
+    return outcome.stderr.replace(f"{nocdyn.folder}/", "")
+
+
+@pytest.mark.parametrize(
+    ("groups", "complaint"),
+    [
+        ({"sweep": ""}, "m.nml: there is no &sweep; 'nocdyn help input sweep' shows one"),
+        ({"vary": ""}, "m.nml:5: &sweep: design = 'random' has nothing to vary; needed: a &vary"),
+        ({"record": ""}, "m.nml:5: &sweep: no number of the variants is kept; needed: a &record with quantity and statistic"),
+        ({"record": "&record /"}, "m.nml:7: &record: there is nothing to record; needed: quantity or trajectories"),
+        (
+            {"vary": "&vary target = 'load.drag.viscus' low = 0 high = 1 /\n"},
+            "m.nml:6: &vary: target = 'load.drag.viscus': viscus is not a key of &load; did you mean 'viscous'?",
+        ),
+        (
+            {"vary": "&vary target = 'run.method' low = 0 high = 1 /\n"},
+            "m.nml:6: &vary: target = 'run.method': method is no number (word); allowed: t_start, t_end, rtol, atol, max_steps",
+        ),
+        (
+            {"vary": "&vary target = 'load.drag.constant_speed' low = 1 high = 2 /\n"},
+            "m.nml:6: &vary: target = 'load.drag.constant_speed': constant_speed needs constant",
+        ),
+        (
+            {"record": "&record quantity = 'omega_disk' statistic = 'max' /\n"},
+            "m.nml:7: &record: quantity = 'omega_disk' is no column of trajectory.csv; did you mean 'omega_disc'?",
+        ),
+        (
+            {"record": "&record quantity = 'omega_disc' statistic = 'max' from = 1 /\n"},
+            "m.nml:7: &record: from = 1 is out of range; allowed: < t_end = 1",
+        ),
+        (
+            {"record": GROUPS["record"] + "&record trajectories = 10 /\n"},
+            "m.nml:8: &record: trajectories(1) = 10 is out of range; allowed: 1 to 9, the number of variants",
+        ),
+    ],
+)
+def test_a_sweep_that_cannot_be_is_refused(nocdyn, groups, complaint):
+    assert refusal(nocdyn, **groups) == f"nocdyn: {complaint}\n"
+
+
+def test_all_mistakes_of_a_sweep_are_told_in_one_go(nocdyn):
+    message = refusal(
+        nocdyn,
+        sweep="&sweep design = 'grid' /\n",
+        vary=GROUPS["vary"].replace("drag", "drg"),
+        record="&record quantity = 'omega' statistic = 'rms' from = -1 /\n",
+    )
+    places = ["m.nml:6: &vary: target", "m.nml:6: &vary: count", "m.nml:7: &record: quantity", "m.nml:7: &record: from"]
+    assert [line.split(" = ")[0].removesuffix(" is missing; design") for line in message.splitlines()] == [
+        f"nocdyn: {place}" for place in places
+    ]
+
+
+def test_a_list_is_refused_with_its_own_file_and_line(nocdyn):
+    nocdyn.write("list.csv", "load.drag.viscous, body.disc.name\n0.5, 1\n0.5\n")
+    message = refusal(nocdyn, sweep="&sweep design = 'list' file = 'list.csv' /\n", vary="")
+    assert message == (
+        "nocdyn: m.nml:5: &sweep: file: list.csv:3: 1 column in '0.5'; needed: 2, separated by blanks or a comma\n"
+        "nocdyn: m.nml:5: &sweep: file: list.csv:1: column 2, 'body.disc.name': name is no number (name); "
+        "allowed: inertia, angle, speed\n"
+    )
+
+
+def test_a_list_that_is_not_there_cannot_be_read(nocdyn):
+    path = nocdyn.write("m.nml", SPINNER + "&sweep design = 'list' file = 'none.csv' /\n" + GROUPS["record"])
+    outcome = nocdyn("sweep", path, "--out", "out")
+    assert outcome.returncode == 3
+    assert "m.nml:5: &sweep: file: " in outcome.stderr and "none.csv: cannot be read: there is no such file" in outcome.stderr
+
+
+def test_a_variant_with_a_number_that_is_not_allowed_is_refused_alone(nocdyn):
+    nocdyn.write("list.csv", "load.drag.viscous, run.t_start\n0.5, 0\n-0.5, 0\n0.5, 2\n0.25, 0.5\n")
+    path = nocdyn.write("m.nml", SPINNER + "&sweep design = 'list' file = 'list.csv' /\n" + GROUPS["record"])
+    assert nocdyn("sweep", path, "--out", "out", "--csv").returncode == 0
+    table = (nocdyn.folder / "out/sweep.csv").read_text()
+    assert "load.drag.viscous = -0.5 is out of range; allowed: >= 0 [N m s/rad]" in table
+    assert "run.t_start: t_end = 1 is out of range; allowed: > t_start = 2" in table
