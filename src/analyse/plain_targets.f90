@@ -20,6 +20,7 @@ module nocdyn_plain_targets
 
   type :: plain_target_t
     character(len=:), allocatable :: key
+    logical :: is_exempt = .false.                 !! somebody else sets it
     integer :: passed(-1:1) = 0                    !! trials of each sign
     logical :: may_be(-1:1) = .false.              !! whether values of each sign are plain
     real(wp) :: lowest, highest                    !! allowed values, as far as they are known
@@ -31,9 +32,9 @@ module nocdyn_plain_targets
     logical :: are_plain = .false.                 !! after `conclude`: whether values of some signs are, for every target
     type(plain_target_t), allocatable, private :: target(:)
   contains
+    procedure :: exempt
     procedure :: judge
     procedure :: conclude
-    procedure :: is_as_tried
     procedure :: may_take
     procedure :: have_seen
     procedure :: see
@@ -51,6 +52,18 @@ contains
     self%target%lowest = origin
     self%target%highest = origin
   end function new_plain_targets
+
+  !> Leaves a target, of positive values, to somebody else, who sets other numbers than plain ones.
+  subroutine exempt(self, target)
+    class(plain_targets_t), intent(inout) :: self
+    integer, intent(in) :: target
+
+    associate (one => self%target(target))
+      one%is_exempt = .true.
+      one%may_be = [.false., .false., .true.]
+      allocate (one%place(0), one%is_negative(0))
+    end associate
+  end subroutine exempt
 
   !> The value of trial number 1 to `trials` of a target.
   pure real(wp) function trial_value(origin, number) result(value)
@@ -133,6 +146,7 @@ contains
     self%are_plain = .true.
     do i = 1, size(self%target)
       associate (one => self%target(i))
+        if (one%is_exempt) cycle
         one%may_be = one%passed == trials_of_sign
         self%are_plain = self%are_plain .and. any(one%may_be)
         if (.not. self%are_plain) return
@@ -150,28 +164,6 @@ contains
 
     are_at = a%slab == b%slab .and. a%row == b%row .and. a%column == b%column
   end function are_at
-
-  !> Whether the numbers of a variant, which were assembled, are what `write_values` makes of the origin.
-  logical function is_as_tried(self, values, origin, tried)
-    class(plain_targets_t), intent(in) :: self
-    real(wp), intent(in) :: values(:)
-    type(lane_numbers_t), intent(in) :: origin, tried   !! of one lane
-    integer :: changed, i, k
-
-    changed = 0
-    is_as_tried = tried%has_curves_of(1, origin, 1)
-    do i = 1, size(self%target)
-      associate (one => self%target(i))
-        do k = 1, size(one%place)
-          associate (number => tried%number(one%place(k), 1))
-            is_as_tried = is_as_tried .and. same_bits(number, signed(values(i), one%is_negative(k)))
-            if (.not. same_bits(number, origin%number(one%place(k), 1))) changed = changed + 1
-          end associate
-        end do
-      end associate
-    end do
-    is_as_tried = is_as_tried .and. size(tried%differences(1, origin, 1)) == changed
-  end function is_as_tried
 
   !> Whether values are plain by their signs; the zeros of arithmetic, not its negative ones.
   pure logical function may_take(self, values)

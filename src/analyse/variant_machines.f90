@@ -5,8 +5,10 @@
 !> lane; if not, as where a friction that is zero in the block is not in the variant, or where other numbers of &run are
 !> asked for, the variant is to be run alone.
 !>
-!> Where all targets are plain (`plain_targets_t`), a variant whose values are allowed is what assembly would make of it if they
-!> are written over those of another one; the machine is not assembled then.
+!> Where all targets are plain (`plain_targets_t`) or inertias, a variant whose values are allowed is what assembly would make of
+!> it if they are written over those of another one, the origin; then no machine is assembled. The constraints do not
+!> know of inertias, so that only the responses to moments follow from them. One variant that is set in both ways must have
+!> the same bits before any is set so.
 !>
 !> What makes texts is done by one thread at a time, in critical sections named `texts`: gfortran 12 keeps the lengths of
 !> temporary texts in static memory, with -frecursive as without it.
@@ -36,9 +38,9 @@ module nocdyn_variant_machines
   type, public :: variant_machines_t
     type(input_t) :: input                                  !! with the numbers of the last variant that was assembled
     class(formulation_t), pointer :: formulation => null()  !! the block
+    type(reduced_t), pointer, private :: block => null()    !! the same, if variants may share it
     type(target_t), allocatable, private :: targets(:)
     logical, private :: is_audited = .false.
-    logical, private :: has_lanes = .false.                 !! whether variants may share the block
     logical, allocatable, private :: is_of_run(:)           !! of each target, whether it is a number of &run
     real(wp), allocatable, private :: base(:)               !! values of those in the input
     type(lane_numbers_t), private :: numbers                !! of the block
@@ -51,6 +53,9 @@ module nocdyn_variant_machines
     type(lane_numbers_t), private :: origin_numbers
     real(wp), allocatable, private :: start(:)              !! its start
     logical, allocatable, private :: is_of_origin(:)        !! of each lane
+    integer, allocatable, private :: weighed(:)             !! targets that are inertias
+    integer, allocatable, private :: weighed_bodies(:)      !! of those
+    integer, allocatable, private :: weighed_groups(:)      !! of geared bodies, in which these are
   contains
     procedure :: put
     procedure :: assembles
@@ -119,10 +124,10 @@ contains
     type(reduced_t), pointer, intent(inout) :: block
     class(formulation_t), allocatable :: formulation
 
-    self%has_lanes = formulation_word(self%input) == 'reduced'
-    if (self%has_lanes) then
+    if (formulation_word(self%input) == 'reduced') then
       call block%formulate(self%is_audited, as_block=.true.)
       call block%list_numbers(self%numbers)
+      self%block => block
       self%formulation => block
       allocate (self%is_of_origin(block%lanes), source=.false.)
     else
@@ -150,16 +155,23 @@ contains
     integer, intent(out) :: verdict                 !! variant_...
     character(len=:), allocatable, intent(inout) :: reason   !! why it is refused
 
-    logical :: is_quick
+    logical :: is_set
 
-    is_quick = .false.
-    if (self%plain%are_plain) is_quick = self%plain%may_take(values)
-    if (is_quick) then
-      call put_plain(self, values, lane, y, verdict, reason)
-    else
-      call put_assembled(self, values, lane, y, verdict, reason)
-      if (verdict == variant_set .and. may_teach(self, values)) call learn(self, values)
+    is_set = .false.
+    if (.not. self%assembles(values)) then
+      call check_values(self, values, reason)
+      verdict = variant_refused
+      if (reason /= '') return
+      call put_quickly(self, values, lane, y, is_set)
+      verdict = variant_set
     end if
+    if (is_set) return
+    call form_single(self, values, verdict, reason)
+    if (verdict /= variant_set) return
+    call self%numbers%copy_lane(lane, self%single_numbers, 1)
+    y(:) = reshape(self%single%start(), shape(y))
+    self%is_of_origin(lane) = .false.
+    if (may_teach(self, values)) call learn(self, values, lane)
   end subroutine put
 
   !> The targets are tried with the first variant that is set; once more where that one had a zero, of which no size follows.
@@ -179,45 +191,40 @@ contains
     if (self%plain%are_plain) assembles = .not. self%plain%may_take(values)
   end function assembles
 
-  !> Writes plain values over those of the origin.
-  subroutine put_plain(self, values, lane, y, verdict, reason)
+  !> Whether values that need no assembly are allowed.
+  subroutine check_values(self, values, reason)
+    class(variant_machines_t), intent(inout) :: self
+    real(wp), contiguous, intent(in) :: values(:)
+    character(len=:), allocatable, intent(inout) :: reason   !! '' if they are
+
+    reason = ''
+    if (self%plain%have_seen(values)) return
+    !$omp critical (texts)
+    call set_targets(self%input, self%targets, values, reason)
+    !$omp end critical (texts)
+    if (reason == '') call self%plain%see(values)
+  end subroutine check_values
+
+  !> Writes values over those of the origin.
+  subroutine put_quickly(self, values, lane, y, is_set)
     class(variant_machines_t), intent(inout) :: self
     real(wp), contiguous, intent(in) :: values(:)
     integer, intent(in) :: lane
     real(wp), contiguous, intent(inout) :: y(:)
-    integer, intent(out) :: verdict
-    character(len=:), allocatable, intent(inout) :: reason
+    logical, intent(out) :: is_set   !! rounding may hide inertias
+    logical :: is_indefinite
 
-    verdict = variant_refused
-    if (.not. self%plain%have_seen(values)) then
-      !$omp critical (texts)
-      call set_targets(self%input, self%targets, values, reason)
-      !$omp end critical (texts)
-      if (reason /= '') return
-      call self%plain%see(values)
-    end if
     if (.not. self%is_of_origin(lane)) call self%numbers%copy_lane(lane, self%origin_numbers, 1)
     self%is_of_origin(lane) = .true.
     call self%plain%write_values(values, lane, self%numbers)
     y(:) = self%start
-    verdict = variant_set
-  end subroutine put_plain
-
-  !> Assembles the machine of a variant and copies its numbers.
-  subroutine put_assembled(self, values, lane, y, verdict, reason)
-    class(variant_machines_t), intent(inout) :: self
-    real(wp), contiguous, intent(in) :: values(:)
-    integer, intent(in) :: lane
-    real(wp), contiguous, intent(inout) :: y(:)
-    integer, intent(out) :: verdict
-    character(len=:), allocatable, intent(inout) :: reason
-
-    call form_single(self, values, verdict, reason)
-    if (verdict /= variant_set) return
-    self%is_of_origin(lane) = .false.
-    call self%numbers%copy_lane(lane, self%single_numbers, 1)
-    y(:) = reshape(self%single%start(), shape(y))
-  end subroutine put_assembled
+    is_set = .true.
+    if (size(self%weighed) == 0) return
+    call self%block%weigh(lane, self%weighed_bodies, values(self%weighed), self%weighed_groups, is_indefinite)
+    is_set = .not. is_indefinite
+    self%is_of_origin(lane) = is_set
+    if (is_set) call self%block%start_coordinates(lane, y)
+  end subroutine put_quickly
 
   !> The formulation of a variant, if it has the layout of the block: `variant_set`.
   subroutine form_single(self, values, verdict, reason)
@@ -227,25 +234,46 @@ contains
     character(len=:), allocatable, intent(inout) :: reason
 
     call assemble(self, values, verdict, reason)
-    if (verdict == variant_refused .or. .not. self%has_lanes) return
+    if (verdict == variant_refused .or. .not. associated(self%block)) return
     if (any(self%is_of_run .and. abs(values - self%base) > 0)) return
     call self%single%formulate(self%is_audited, as_block=.true.)
     call self%single%list_numbers(self%single_numbers)
     if (self%numbers%is_congruent(self%single_numbers)) verdict = variant_set
   end subroutine form_single
 
-  !> Tries whether the targets are plain, from a variant that has the layout of the block and has just been assembled: it
-  !> becomes the origin.
-  subroutine learn(self, values)
+  !> Tries whether the targets need assembly, from the variant that has just been put into a lane: it becomes the origin.
+  subroutine learn(self, values, lane)
     class(variant_machines_t), intent(inout) :: self
     real(wp), contiguous, intent(in) :: values(:)
-    type(reduced_t), pointer :: other
-    type(lane_numbers_t) :: other_numbers
-    character(len=:), allocatable :: reason
-    integer :: i, k, verdict
+    integer, intent(in) :: lane
+    integer :: i, k
 
     self%has_learnt = .true.
     self%began_at_zero = .not. all(abs(values) > 0)
+    call take_origin(self)
+    self%plain = new_plain_targets(values)
+    call find_weighed(self)
+    do i = 1, size(values)
+      if (any(self%weighed == i)) then
+        call self%plain%exempt(i)
+        cycle
+      end if
+      do k = 1, trials
+        call try(self, values, i, trial_value(values(i), k))
+      end do
+    end do
+    call self%plain%conclude()
+    if (self%plain%are_plain) self%plain%are_plain = is_set_the_same(self, joint_trial * values, lane)
+    call self%numbers%copy_lane(lane, self%origin_numbers, 1)
+    self%is_of_origin(lane) = .true.
+  end subroutine learn
+
+  !> Makes the variant that has been assembled the origin.
+  subroutine take_origin(self)
+    class(variant_machines_t), intent(inout) :: self
+    type(reduced_t), pointer :: other
+    type(lane_numbers_t) :: other_numbers
+
     self%is_of_origin(:) = .false.
     other => self%origin
     self%origin => self%single
@@ -253,19 +281,60 @@ contains
     other_numbers = self%origin_numbers
     self%origin_numbers = self%single_numbers
     self%single_numbers = other_numbers
-    self%start = reshape(self%origin%start(), [self%formulation%states + self%formulation%quadratures])
-    self%plain = new_plain_targets(values)
-    do i = 1, size(values)
-      do k = 1, trials
-        call try(self, values, i, trial_value(values(i), k))
-      end do
-    end do
-    call self%plain%conclude()
-    if (.not. self%plain%are_plain) return
-    call form_single(self, joint_trial * values, verdict, reason)
+    self%start = reshape(self%origin%start(), [self%block%states + self%block%quadratures])
+  end subroutine take_origin
+
+  !> Finds the targets that are inertias, unless start speeds were projected by them.
+  subroutine find_weighed(self)
+    class(variant_machines_t), intent(inout) :: self
+    integer, allocatable :: bodies(:)
+    integer :: g, i
+
+    self%weighed = pack([(i, i=1, size(self%targets))], [(key_of(self, i) == 'inertia', i=1, size(self%targets))])
+    if (allocated(self%origin%machine%shock)) self%weighed = [integer ::]
+    allocate (bodies, source=self%input%groups_named('body'))
+    self%weighed_bodies = [(findloc(bodies, self%targets(self%weighed(i))%group, dim=1), i=1, size(self%weighed))]
+    associate (groups => self%origin%machine%groups)
+      self%weighed_groups = pack([(g, g=1, size(groups))], [(has_one_of(groups(g)%bodies, self%weighed_bodies), &
+                                                             g=1, size(groups))])
+    end associate
+  end subroutine find_weighed
+
+  pure logical function has_one_of(list, members)
+    integer, intent(in) :: list(:), members(:)
+    integer :: i
+
+    has_one_of = any([(any(list == members(i)), i=1, size(members))])
+  end function has_one_of
+
+  pure function key_of(self, target) result(key)
+    class(variant_machines_t), intent(in) :: self
+    integer, intent(in) :: target
+    character(len=len(key_rules%name)) :: key
+
+    associate (group => self%input%groups(self%targets(target)%group))
+      key = key_rules(first_key(group%rule) + self%targets(target)%key - 1)%name
+    end associate
+  end function key_of
+
+  !> Whether a variant has the same bits with and without assembly.
+  logical function is_set_the_same(self, values, lane) result(is_same)
+    class(variant_machines_t), intent(inout) :: self
+    real(wp), contiguous, intent(in) :: values(:)
+    integer, intent(in) :: lane
+    character(len=:), allocatable :: reason
+    real(wp), dimension(size(self%start)) :: assembled, start
+    integer :: verdict
+
+    is_same = .false.
+    call form_single(self, values, verdict, reason)
     if (verdict /= variant_set) return
-    self%plain%are_plain = self%plain%is_as_tried(joint_trial * values, self%origin_numbers, self%single_numbers)
-  end subroutine learn
+    assembled = reshape(self%single%start(), shape(assembled))
+    call put_quickly(self, values, lane, start, is_same)
+    is_same = is_same .and. size(self%numbers%differences(lane, self%single_numbers, 1)) == 0 .and. &
+              self%numbers%has_curves_of(lane, self%single_numbers, 1) .and. &
+              .not. any(abs(start - assembled) > 0)
+  end function is_set_the_same
 
   !> Tries one value of one target.
   subroutine try(self, origin, target, value)
@@ -282,10 +351,7 @@ contains
     call form_single(self, values, verdict, reason)
     if (verdict /= variant_set) return
     if (any(abs(reshape(self%single%start(), shape(self%start)) - self%start) > 0)) return
-    associate (group => self%input%groups(self%targets(target)%group))
-      call self%plain%judge(target, trim(key_rules(first_key(group%rule) + self%targets(target)%key - 1)%name), value, &
-                            self%origin_numbers, self%single_numbers)
-    end associate
+    call self%plain%judge(target, trim(key_of(self, target)), value, self%origin_numbers, self%single_numbers)
   end subroutine try
 
   !> The machine of a variant, which may be run alone.

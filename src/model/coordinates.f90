@@ -36,6 +36,7 @@ module nocdyn_coordinates
     real(wp), allocatable, private :: imbalance(:)      !! J omega' - T [N m], [bodies], work space
     real(wp), allocatable, private :: acceleration(:)   !! q'', [freedoms], work space
   contains
+    procedure :: weigh
     procedure :: complement
     procedure :: mobility
     procedure :: project
@@ -68,6 +69,7 @@ contains
       place(groups(g)%trains) = [(k, k=1, size(groups(g)%trains))]
     end do
     self%sweep = new_reaction_sweep(constraints, trains, relations, groups)
+    allocate (self%inertia, source=inertia)
     do lane = 1, size(inertia, 1)
       call fill_lane(constraints, trains, relations, groups, place, inertia(lane, :), choice, lane, self, culprit)
       if (culprit > 0) then
@@ -78,7 +80,6 @@ contains
     end do
     call self%sweep%share_out(constraints, groups)
     self%geared = geared_bodies(groups, size(inertia, 2))
-    self%inertia = inertia
     allocate (self%imbalance(size(inertia, 2)), self%acceleration(self%freedoms))
   end subroutine build_coordinates
 
@@ -160,19 +161,20 @@ contains
 
     culprit = 0
     ratio = trains%ratios(constraints, lane)
+    call self%sweep%take_ratios(lane, ratio)
     do g = 1, size(groups)
       call find_motion(relations, groups(g)%elimination, place, size(groups(g)%trains), lane, found)
       factor = complement_factor(choice, found%log_determinant + pair_determinant(constraints, trains, groups(g)%bodies, lane), &
                                  size(groups(g)%kept))
-      call fill_entries(groups(g)%bodies, place(trains%train(groups(g)%bodies)), inertia(groups(g)%bodies), &
-                        ratio(groups(g)%bodies), factor * found%motion, lane, self, is_indefinite)
+      call fill_ratios(groups(g)%bodies, place(trains%train(groups(g)%bodies)), ratio(groups(g)%bodies), &
+                       factor * found%motion, lane, self)
+      call self%weigh(trains, groups(g), inertia, lane, is_indefinite)
       if (is_indefinite) then
         culprit = g
         return
       end if
       call self%sweep%take_core(g, lane, found%dual)
     end do
-    call self%sweep%take_ratios(lane, ratio)
   end subroutine fill_lane
 
   !> What the rows that tie trains add to the logarithm of |L_lambda^ext|: each gives its body by a division.
@@ -191,35 +193,61 @@ contains
     end do
   end function pair_determinant
 
-  !> L_tau of the group, and its response from the mass matrix L_tau^T J L_tau, factored once.
-  subroutine fill_entries(bodies, train, inertia, ratio, motion, lane, self, is_indefinite)
+  !> L_tau of the group.
+  subroutine fill_ratios(bodies, train, ratio, motion, lane, self)
     integer, intent(in) :: bodies(:)
     integer, intent(in) :: train(:)          !! of `bodies`, in the group
-    real(wp), intent(in) :: inertia(:)       !! of `bodies`
     real(wp), intent(in) :: ratio(:)         !! of `bodies` to the leads of their trains
     real(wp), intent(in) :: motion(:, :)     !! L_tau of the leads, [trains, coordinates of the group]
     integer, intent(in) :: lane
     type(coordinates_t), intent(inout) :: self
-    logical, intent(out) :: is_indefinite    !! the mass matrix is, and nothing is filled
-    real(wp), allocatable :: response(:, :)
-    real(wp) :: mass(size(motion, 1)), momentum(size(motion, 1), size(motion, 2))
     integer :: i, k
 
-    mass = 0.0_wp
     do i = 1, size(bodies)
-      mass(train(i)) = mass(train(i)) + inertia(i) * ratio(i)**2
+      k = self%first(bodies(i))
+      self%ratio(lane, k:k + size(motion, 2) - 1) = ratio(i) * motion(train(i), :)
+    end do
+  end subroutine fill_ratios
+
+  !> The response of a group whose ratios are known, from its mass matrix L_tau^T J L_tau, factored once.
+  subroutine weigh(self, trains, group, inertia, lane, is_indefinite)
+    class(coordinates_t), intent(inout) :: self
+    type(rigid_trains_t), intent(in) :: trains
+    type(geared_group_t), intent(in) :: group
+    real(wp), intent(in) :: inertia(:)       !! of all bodies
+    integer, intent(in) :: lane
+    logical, intent(out) :: is_indefinite    !! the mass matrix is, and nothing is filled
+    real(wp), allocatable :: response(:, :)
+    real(wp), dimension(size(group%trains), size(group%independent)) :: momentum, motion
+    real(wp) :: mass(size(group%trains))
+    integer :: i, k, place(size(trains%lead))
+
+    mass = 0.0_wp
+    do i = 1, size(group%trains)
+      place(group%trains(i)) = i
+      k = self%first(trains%lead(group%trains(i)))
+      motion(i, :) = self%ratio(lane, k:k + size(motion, 2) - 1)   ! a lead has the motion of its train
+    end do
+    do i = 1, size(group%bodies)
+      associate (b => group%bodies(i))
+        associate (of_train => mass(place(trains%train(b))))
+          of_train = of_train + inertia(b) * self%sweep%lead_ratio(lane, b)**2
+        end associate
+      end associate
     end do
     do k = 1, size(motion, 2)
       momentum(:, k) = mass * motion(:, k)
     end do
     call solve_positive_definite(matmul(transpose(motion), momentum), transpose(motion), response, is_indefinite)
     if (is_indefinite) return
-    do i = 1, size(bodies)
-      k = self%first(bodies(i))
-      self%ratio(lane, k:k + size(motion, 2) - 1) = ratio(i) * motion(train(i), :)
-      self%response(lane, k:k + size(motion, 2) - 1) = ratio(i) * response(:, train(i))
+    do i = 1, size(group%bodies)
+      associate (b => group%bodies(i))
+        k = self%first(b)
+        self%response(lane, k:k + size(motion, 2) - 1) = self%sweep%lead_ratio(lane, b) * response(:, place(trains%train(b)))
+        self%inertia(lane, b) = inertia(b)
+      end associate
     end do
-  end subroutine fill_entries
+  end subroutine weigh
 
   !> L_tau as a dense matrix [bodies, freedoms], for the paper's matrices and for tests.
   pure function complement(self, lane) result(dense)

@@ -18,6 +18,8 @@ module nocdyn_element_coordinates
     real(wp), allocatable :: response(:, :)    !! the same difference of ((L_tau^T J L_tau)^-1 L_tau^T)^T, [lanes, entries]
   contains
     procedure :: selected
+    procedure :: take_responses
+    procedure :: take_selected
     procedure :: has_ratio
     procedure :: list_numbers
   end type element_coordinates_t
@@ -78,6 +80,59 @@ contains
     some%ratio(:, :) = self%ratio(:, entry(:next - 1))
     some%response(:, :) = self%response(:, entry(:next - 1))
   end function selected
+
+  !> The responses of one lane anew, in the entries that are there.
+  pure subroutine take_responses(self, lane, elements, coordinates)
+    class(element_coordinates_t), intent(inout) :: self
+    integer, intent(in) :: lane
+    type(elements_t), intent(in) :: elements
+    type(coordinates_t), intent(in) :: coordinates
+    integer :: e
+
+    do e = 1, size(elements%to)
+      self%response(lane, self%first(e):self%first(e + 1) - 1) = 0.0_wp
+      call add_response(coordinates, elements%to(e), 1.0_wp, lane, self%first(e), self)
+      call add_response(coordinates, elements%from(e), -1.0_wp, lane, self%first(e), self)
+    end do
+  end subroutine take_responses
+
+  pure subroutine add_response(coordinates, body, sign, lane, begin, self)
+    type(coordinates_t), intent(in) :: coordinates
+    integer, intent(in) :: body     !! 0 = ground, which has none
+    real(wp), intent(in) :: sign
+    integer, intent(in) :: lane
+    integer, intent(in) :: begin    !! first entry of the element
+    type(element_coordinates_t), intent(inout) :: self
+    integer :: k, of_body
+
+    if (body == 0) return
+    do of_body = coordinates%first(body), coordinates%first(body + 1) - 1
+      k = begin
+      do while (self%coordinate(k) /= coordinates%coordinate(of_body))
+        k = k + 1
+      end do
+      self%response(lane, k) = self%response(lane, k) + sign * coordinates%response(lane, of_body)
+    end do
+  end subroutine add_response
+
+  !> The responses of one lane anew, in entries that are those of `selected`.
+  pure subroutine take_selected(self, lane, all, elements, turning)
+    class(element_coordinates_t), intent(inout) :: self
+    integer, intent(in) :: lane
+    type(element_coordinates_t), intent(in) :: all
+    integer, intent(in) :: elements(:)
+    logical, intent(in) :: turning
+    integer :: i, k, next
+
+    next = 0
+    do i = 1, size(elements)
+      do k = all%first(elements(i)), all%first(elements(i) + 1) - 1
+        if (turning .and. .not. abs(all%ratio(lane, k)) > 0) cycle
+        next = next + 1
+        self%response(lane, next) = all%response(lane, k)
+      end do
+    end do
+  end subroutine take_selected
 
   !> Whether an element turns with the coordinate of an entry. In a group of several freedoms it may respond without.
   pure logical function has_ratio(self, entry)

@@ -23,6 +23,7 @@ module nocdyn_inner_jacobian
     logical, allocatable, private :: is_accounted(:)        !! [inner states]
   contains
     procedure :: fill
+    procedure :: take_lane
     procedure :: list_numbers
   end type inner_jacobian_t
 
@@ -98,6 +99,16 @@ contains
       end do
     end associate
   end subroutine fill
+
+  !> The responses of one lane anew.
+  pure subroutine take_lane(self, lane, incidence, inner)
+    class(inner_jacobian_t), intent(inout) :: self
+    integer, intent(in) :: lane
+    type(element_coordinates_t), intent(in) :: incidence
+    type(inner_states_t), intent(in) :: inner
+
+    call self%incidence%take_selected(lane, incidence, inner%element, turning=.false.)
+  end subroutine take_lane
 
   subroutine list_numbers(self, numbers)
     class(inner_jacobian_t), target, intent(inout) :: self

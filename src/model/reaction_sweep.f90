@@ -44,6 +44,7 @@ module nocdyn_reaction_sweep
   contains
     procedure :: take_core
     procedure :: take_ratios
+    procedure :: lead_ratio
     procedure :: share_out
     procedure :: share
     procedure :: find_reactions
@@ -147,6 +148,14 @@ contains
 
     self%ratio(lane, :) = ratio
   end subroutine take_ratios
+
+  !> How fast a body is, measured by the lead of its train.
+  pure real(wp) function lead_ratio(self, lane, body) result(ratio)
+    class(reaction_sweep_t), intent(in) :: self
+    integer, intent(in) :: lane, body
+
+    ratio = self%ratio(lane, body)
+  end function lead_ratio
 
   !> Finds the idle combinations of redundant rows, once the numbers of all lanes are there: a reaction 1 of such a row and
   !> the negative of what the rows that it repeats carry in its place.

@@ -26,6 +26,8 @@ module nocdyn_reduced
     real(wp), allocatable, private :: start_twist(:, :)        !! u_start [rad], [lanes, elements]
     type(sparse_map_t), private :: twists                      !! U
     type(sparse_map_t), private :: accelerations               !! R
+    type(element_coordinates_t), private :: incidence          !! of which both are made
+    integer, allocatable, private :: responding(:)             !! its entry of each entry of R
     type(reduced_jacobian_t), private :: sums                  !! R diag U
     type(reduced_series_t), private :: motion                  !! after `prepare_series`
     type(inner_jacobian_t), private :: inner_rows              !! of the inner states
@@ -33,6 +35,7 @@ module nocdyn_reduced
     real(wp), allocatable, private :: none(:, :)               !! zeros, [lanes, elements]
   contains
     procedure :: formulate
+    procedure :: weigh
     procedure :: list_numbers
     procedure :: receive
     procedure :: derivative
@@ -43,6 +46,7 @@ module nocdyn_reduced
     procedure :: prepare_series
     procedure :: series
     procedure :: start
+    procedure :: start_coordinates
     procedure :: place
     procedure :: reactions
     procedure :: switch_motion
@@ -69,12 +73,11 @@ contains
     class(reduced_t), intent(inout) :: self
     logical, intent(in) :: audited
     logical, intent(in) :: as_block
-    type(element_coordinates_t) :: incidence
 
     call self%make_room(2 * self%machine%coordinates%freedoms, audited)
-    associate (machine => self%machine, freedoms => self%machine%coordinates%freedoms)
-      incidence = new_element_coordinates(machine%elements, machine%coordinates)
-      self%accelerations = response_map(incidence, freedoms, as_block)
+    self%incidence = new_element_coordinates(self%machine%elements, self%machine%coordinates)
+    associate (machine => self%machine, incidence => self%incidence, freedoms => self%machine%coordinates%freedoms)
+      call form_responses(freedoms, as_block, self)
       self%sums = new_reduced_jacobian(freedoms, incidence, machine%accounted(:self%quadratures), self%inner)
       self%inner_rows = new_inner_jacobian(freedoms, incidence, machine%accounted(:self%quadratures), &
                                            machine%elements%inner, size(self%sums%pattern%row))
@@ -118,20 +121,47 @@ contains
   end function twist_map
 
   !> R, whose rows are the coordinates.
-  function response_map(incidence, freedoms, is_loose) result(map)
-    type(element_coordinates_t), intent(in) :: incidence
+  subroutine form_responses(freedoms, is_loose, self)
     integer, intent(in) :: freedoms
     logical, intent(in) :: is_loose
-    type(sparse_map_t) :: map
-    integer :: element_of(size(incidence%coordinate)), order(size(incidence%coordinate)), first(freedoms + 1)
+    type(reduced_t), intent(inout) :: self
+    integer :: element_of(size(self%incidence%coordinate)), first(freedoms + 1)
     integer :: e
 
-    do e = 1, size(incidence%first) - 1
-      element_of(incidence%first(e):incidence%first(e + 1) - 1) = e
+    associate (incidence => self%incidence)
+      do e = 1, size(incidence%first) - 1
+        element_of(incidence%first(e):incidence%first(e + 1) - 1) = e
+      end do
+      if (allocated(self%responding)) deallocate (self%responding)
+      allocate (self%responding(size(incidence%coordinate)))
+      call transposed_order(incidence%coordinate, freedoms, self%responding, first)
+      self%accelerations = new_sparse_map(first, element_of(self%responding), incidence%response(:, self%responding), &
+                                          is_loose=is_loose)
+    end associate
+  end subroutine form_responses
+
+  !> Other inertias in a lane of a block; start speeds that were projected would be others too.
+  subroutine weigh(self, lane, bodies, inertia, groups, is_indefinite)
+    class(reduced_t), intent(inout) :: self
+    integer, intent(in) :: lane
+    integer, intent(in) :: bodies(:)         !! with other inertias
+    real(wp), intent(in) :: inertia(:)       !! of those
+    integer, intent(in) :: groups(:)         !! groups of the machine in which they are
+    logical, intent(out) :: is_indefinite    !! the numbers of the lane are of no use then
+    integer :: g
+
+    self%machine%inertia(lane, bodies) = inertia
+    do g = 1, size(groups)
+      call self%machine%coordinates%weigh(self%machine%trains, self%machine%groups(groups(g)), self%machine%inertia(lane, :), &
+                                          lane, is_indefinite)
+      if (is_indefinite) return
     end do
-    call transposed_order(incidence%coordinate, freedoms, order, first)
-    map = new_sparse_map(first, element_of(order), incidence%response(:, order), is_loose=is_loose)
-  end function response_map
+    call self%incidence%take_responses(lane, self%machine%elements, self%machine%coordinates)
+    call self%accelerations%take_lane(lane, self%incidence%response, self%responding)
+    call self%sums%take_lane(lane, self%incidence)
+    call self%inner_rows%take_lane(lane, self%incidence, self%machine%elements%inner)
+    call self%switching%take_selected(lane, self%incidence, self%machine%switches%element, turning=.true.)
+  end subroutine weigh
 
   !> Lists what may differ from variant to variant, but for what the series takes when a lane is entered; of a block, or
   !> laid out as one.
@@ -143,6 +173,7 @@ contains
     call numbers%remark([self%states, self%quadratures, self%switches])
     call self%machine%list_numbers(numbers)
     call numbers%add('start_twist', self%start_twist)
+    call self%incidence%list_numbers(numbers)
     call self%twists%list_numbers(numbers)
     call self%accelerations%list_numbers(numbers)
     call self%sums%list_numbers(numbers)
@@ -166,11 +197,20 @@ contains
 
     allocate (y(self%lanes, self%states + self%quadratures), source=0.0_wp)
     do l = 1, self%lanes
-      call self%machine%coordinates%project(l, self%machine%inertia(l, :), self%machine%start_speed(l, :), &
-                                            y(l, :self%machine%coordinates%freedoms))
+      call self%start_coordinates(l, y(l, :))
     end do
     y(:, self%mechanical + 1:self%states) = self%machine%start_inner()
   end function start
+
+  !> The speeds of the coordinates in which one lane starts; the rest of the state stays.
+  pure subroutine start_coordinates(self, lane, y)
+    class(reduced_t), intent(in) :: self
+    integer, intent(in) :: lane
+    real(wp), intent(inout) :: y(:)   !! [states + quadratures]
+
+    call self%machine%coordinates%project(lane, self%machine%inertia(lane, :), self%machine%start_speed(lane, :), &
+                                          y(:self%machine%coordinates%freedoms))
+  end subroutine start_coordinates
 
   !> omega = L_tau q', eq. (82) of section 5.
   subroutine place(self, y)

@@ -23,11 +23,14 @@ module nocdyn_reduced_jacobian
     integer, private :: pairs = 0                      !! positions of dq''/dq'
     integer, allocatable, private :: element(:)        !! of each product
     integer, allocatable, private :: place(:)          !! of each product, 1 to pairs
+    integer, allocatable, private :: responding(:)     !! entry of the response of each product
+    integer, allocatable, private :: turning(:)        !! entry of its ratio
     real(wp), allocatable, private :: product(:, :)    !! response * ratio, [lanes, products]
     integer, allocatable, private :: worker(:)         !! accounted element of each work's entry
     real(wp), allocatable, private :: ratio(:, :)      !! of that entry, [lanes, work's entries]
   contains
     procedure :: fill
+    procedure :: take_lane
     procedure :: list_numbers
   end type reduced_jacobian_t
 
@@ -45,7 +48,8 @@ contains
 
     self%freedoms = freedoms
     products = product_count(incidence)
-    allocate (self%element(products), self%place(products), row(products), column(products))
+    allocate (self%element(products), self%place(products), self%responding(products), self%turning(products))
+    allocate (row(products), column(products))
     allocate (self%product(size(incidence%ratio, 1), size(self%element)))
     call form_products(freedoms, incidence, row, column, self)
     row = row(:self%pairs)
@@ -103,6 +107,8 @@ contains
             n = n + 1
             self%element(n) = e
             self%place(n) = at
+            self%responding(n) = a
+            self%turning(n) = b
             self%product(:, n) = incidence%response(:, a) * incidence%ratio(:, b)
           end associate
         end do
@@ -170,6 +176,18 @@ contains
       at = at + 2
     end do
   end subroutine fill
+
+  !> The products of one lane anew.
+  pure subroutine take_lane(self, lane, incidence)
+    class(reduced_jacobian_t), intent(inout) :: self
+    integer, intent(in) :: lane
+    type(element_coordinates_t), intent(in) :: incidence
+    integer :: n
+
+    do n = 1, size(self%element)
+      self%product(lane, n) = incidence%response(lane, self%responding(n)) * incidence%ratio(lane, self%turning(n))
+    end do
+  end subroutine take_lane
 
   subroutine list_numbers(self, numbers)
     class(reduced_jacobian_t), target, intent(inout) :: self

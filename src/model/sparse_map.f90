@@ -38,6 +38,7 @@ module nocdyn_sparse_map
     procedure :: map_one
     procedure :: map_pair
     procedure :: map_sum
+    procedure :: take_lane
     procedure :: list_numbers
   end type sparse_map_t
 
@@ -349,6 +350,19 @@ contains
       end do
     end do
   end subroutine sum_on_lanes
+
+  !> New numbers of one lane of a map without stretches: of entry i that in column order(i).
+  subroutine take_lane(self, lane, coefficient, order)
+    class(sparse_map_t), intent(inout) :: self
+    integer, intent(in) :: lane
+    real(wp), intent(in) :: coefficient(:, :)   !! [lanes, columns]
+    integer, intent(in) :: order(:)
+    integer :: i
+
+    do i = 1, size(self%column)
+      self%coefficient(lane, i) = coefficient(lane, order(i))
+    end do
+  end subroutine take_lane
 
   !> A map of many lanes, or one without stretches.
   subroutine list_numbers(self, numbers)
