@@ -34,7 +34,7 @@ contains
       associate (group => input%groups(indices(i)))
         if (form_of(group) /= induction) cycle
         associate (torque => group%number('breakdown_torque'), speed => group%number('synchronous_speed'))
-          if (torque * speed > 0) cycle
+          if ((torque > 0 .and. speed > 0) .or. (torque < 0 .and. speed < 0)) cycle
           call raise(error, exit_input, input%place(indices(i), 'breakdown_torque') // ': breakdown_torque = ' // &
                      to_text(torque) // ' must have the sign of synchronous_speed = ' // to_text(speed))
           return
