@@ -92,7 +92,11 @@ contains
     if (.not. present(typical) .or. complaint /= '' .or. allocated(error)) then
       call assemble_machine(self%input, block%machine, error, lanes)
     end if
-    if (.not. allocated(error)) call lay_out(self, block)
+    if (allocated(error)) then
+      deallocate (block)
+    else
+      call lay_out(self, block)
+    end if
     !$omp end critical (texts)
   end subroutine new_variant_machines
 
