@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from .results import ResultsError
 from .style import WIDTH, add_title, plain, save
 from .sweep_panels import (LINES, MOST_POINTS, NOT_DONE_LINES, TURN, add_note, draw_curve, draw_histogram, draw_map, draw_parallel,
-                           draw_scatter, explain_not_done, rank_correlation, thinned, wrapped)
+                           draw_scatter, explain_not_done, rank_correlation, wrapped)
 from .sweep_results import Sweep, Variable, read_sweep
 
 ROWS = 4  # of panels in a figure
@@ -25,7 +25,7 @@ TICK = {"marker": "|", "linestyle": "", "markersize": 8}
 def draw_histograms(sweep: Sweep, results: Sequence[Variable]) -> Figure:
     figure, panels = _stack(len(results), 2.2)
     for axes, result in zip(panels, results):
-        draw_histogram(axes, result, sweep.done)
+        draw_histogram(axes, sweep, result)
     return figure
 
 
@@ -39,7 +39,7 @@ def draw_scatters(sweep: Sweep, results: Sequence[Variable], keys: Sequence[Vari
             draw_scatter(axes, sweep, key, result)
     for axes, key in zip(grid[-1], keys):
         axes.set_xlabel(wrapped(key.label))
-    add_note(figure, "darker: more variants" if sweep.done.size > MOST_POINTS else "")
+    add_note(figure, "darker: more variants" if sweep.status.size > MOST_POINTS else "")
     explain_not_done(figure, sweep, **TICK)
     return figure
 
@@ -73,8 +73,7 @@ def draw_parallels(sweep: Sweep, results: Sequence[Variable], keys: Sequence[Var
     figure, panels = _stack(len(results), 3.2, width=max(WIDTH, 1.4 * len(keys) + 3.0))
     for axes, result in zip(panels, results):
         draw_parallel(axes, sweep, keys, result)
-    drawn = thinned(sweep.done, LINES).size
-    add_note(figure, f"{drawn} of the variants are drawn" if drawn < sweep.done.size else "",
+    add_note(figure, f"no more than {LINES} variants are drawn" if sweep.status.size > LINES else "",
              f"{len(keys)} of {len(sweep.varied)} varied numbers, the most correlated first" if len(keys) < len(sweep.varied) else "")
     explain_not_done(figure, sweep, NOT_DONE_LINES, linestyle=(0, (3, 2)), linewidth=0.9)
     return figure
@@ -112,8 +111,8 @@ def _paged(name: str, sweep: Sweep, draw: Callable[[Sweep, Sequence[Variable]], 
 
 def strongest(sweep: Sweep, key: Variable) -> float:
     """The largest rank correlation of a varied number with any result."""
-    return max(np.nan_to_num(abs(rank_correlation(key.values[sweep.done], result.values[sweep.done])))
-               for result in sweep.results)
+    known = ((result.values[rows], key.values[rows]) for result in sweep.results for rows in [sweep.known(result)])
+    return max(np.nan_to_num(abs(rank_correlation(*pair))) for pair in known)
 
 
 def main() -> None:

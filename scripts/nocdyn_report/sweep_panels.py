@@ -16,7 +16,7 @@ from matplotlib.lines import Line2D
 from matplotlib.tri import Triangulation
 
 from .style import COLOURS, REFERENCE, plain
-from .sweep_results import DONE, Sweep, Variable
+from .sweep_results import Sweep, Variable
 
 MOST_POINTS = 20_000  # that are drawn one by one
 DENSE = 2_000  # points from which contours show more than dots
@@ -84,10 +84,10 @@ def rank_correlation(a: np.ndarray, b: np.ndarray) -> float:
     return float(np.corrcoef(pd.Series(a).rank(), pd.Series(b).rank())[0, 1])
 
 
-def draw_histogram(axes: Axes, result: Variable, done: np.ndarray) -> None:
+def draw_histogram(axes: Axes, sweep: Sweep, result: Variable) -> None:
     """With the 5 %, 50 % and 95 % values; what lies very far outside is counted, not drawn."""
-    values = result.values[done]
-    low, median, high = np.quantile(values, (0.05, 0.5, 0.95), method="inverted_cdf")
+    values = result.values[sweep.known(result)]
+    low, median, high = np.quantile(values, (0.05, 0.5, 0.95))
     inside = without_outliers(values)
     if is_constant(values):
         room = 0.1 * abs(median) or 1.0
@@ -118,7 +118,8 @@ def _farthest(values: np.ndarray, median: float) -> float:
 
 def draw_scatter(axes: Axes, sweep: Sweep, key: Variable, result: Variable) -> None:
     """Each variant a dot; of very many, a shade for how many are in a cell."""
-    x, y = key.values[sweep.done], result.values[sweep.done]
+    known = sweep.known(result)
+    x, y = key.values[known], result.values[known]
     if is_wide(x):
         axes.set_xscale("log")
     if len(x) > MOST_POINTS:
@@ -161,11 +162,11 @@ def explain_not_done(figure: Figure, sweep: Sweep, most: int = MOST_MARKS, **sty
 def draw_curve(axes: Axes, sweep: Sweep, key: Variable, result: Variable, mark_peak: bool) -> None:
     """A result over the only number that varies."""
     order = np.argsort(key.values, kind="stable")
-    x, y = key.values[order], np.where(sweep.status == DONE, result.values, np.nan)[order]  # NaN breaks the line
+    x, y = key.values[order], result.values[order]  # NaN breaks the line
     axes.plot(x, y, color=COLOURS[0], marker="o" if len(x) <= FEW else None, markersize=3)
     if is_wide(x):
         axes.set_xscale("log")
-    values = result.values[sweep.done]
+    values = result.values[sweep.known(result)]
     if mark_peak and not is_constant(values):
         if 0.0 < STEEP * values.min() < values.max():
             axes.set_yscale("log")
@@ -182,7 +183,8 @@ def draw_curve(axes: Axes, sweep: Sweep, key: Variable, result: Variable, mark_p
 def draw_map(axes: Axes, sweep: Sweep, result: Variable) -> None:
     """A result over both numbers that vary: cells of a grid, contours or dots; crosses are variants that were not done."""
     first, second = sweep.varied
-    x, y, colour = (variable.values[sweep.done] for variable in (first, second, result))
+    known = sweep.known(result)
+    x, y, colour = (variable.values[known] for variable in (first, second, result))
     limits = without_outliers(colour)
     scale = {"cmap": COLOUR_MAP, "vmin": limits.min(), "vmax": limits.max()}
     if sweep.is_grid:
@@ -191,7 +193,7 @@ def draw_map(axes: Axes, sweep: Sweep, result: Variable) -> None:
         drawn = _draw_contours(axes, x, y, colour, scale)
     else:
         chosen = thinned(np.arange(len(x)), MOST_POINTS)
-        drawn = axes.scatter(x[chosen], y[chosen], c=colour[chosen], s=np.clip(8000.0 / len(x), 2.0, 24.0),
+        drawn = axes.scatter(x[chosen], y[chosen], c=colour[chosen], s=np.clip(16000.0 / len(x), 3.0, 24.0),
                              linewidths=0, rasterized=len(x) > RASTER, **scale)
     if not sweep.is_grid and is_wide(x):
         axes.set_xscale("log")
@@ -212,7 +214,8 @@ def grid_cells(sweep: Sweep, result: Variable) -> tuple[np.ndarray, np.ndarray, 
     x, columns = np.unique(first.values, return_inverse=True)
     y, rows = np.unique(second.values, return_inverse=True)
     cells = np.ma.masked_all((y.size, x.size))
-    cells[rows[sweep.done], columns[sweep.done]] = result.values[sweep.done]
+    known = sweep.known(result)
+    cells[rows[known], columns[known]] = result.values[known]
     return _edges(x), _edges(y), cells
 
 
@@ -241,12 +244,12 @@ def _draw_contours(axes: Axes, x: np.ndarray, y: np.ndarray, colour: np.ndarray,
 
 def draw_parallel(axes: Axes, sweep: Sweep, keys: Sequence[Variable], result: Variable) -> None:
     """An axis for each varied number and one for the result; a line for each variant, coloured by the result."""
-    chosen = thinned(sweep.done, LINES)
+    chosen = thinned(sweep.known(result), LINES)
     variables = [*keys, result]
     shares = np.full((sweep.status.size, len(variables)), np.nan)
     places = np.arange(len(variables))
     for place, variable in zip(places, variables):
-        known = sweep.done if variable is result else slice(None)
+        known = sweep.known(result) if variable is result else slice(None)
         shares[known, place] = _draw_parallel_axis(axes, place, variable, variable.values[known])
     middle_first = np.argsort(np.abs(shares[chosen, -1] - 0.5), kind="stable")
     chosen = chosen[middle_first]

@@ -1,7 +1,7 @@
 """The results of `nocdyn sweep`, read from their folder."""
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import f90nml
@@ -44,9 +44,9 @@ class Sweep:
     results: list[Variable]
     status: np.ndarray
 
-    @property
-    def done(self) -> np.ndarray:
-        return np.flatnonzero(self.status == DONE)
+    def known(self, result: Variable) -> np.ndarray:
+        """The variants that have the result."""
+        return np.flatnonzero((self.status == DONE) & np.isfinite(result.values))
 
     @property
     def not_done(self) -> np.ndarray:
@@ -85,9 +85,12 @@ def read_sweep(folder: Path) -> Sweep:
     if not sweep.varied or not sweep.results:
         raise ResultsError(f"{folder}: nothing to draw: the sweep has {len(sweep.varied)} varied numbers and "
                            f"{len(sweep.results)} results")
-    if sweep.done.size == 0:
+    if not (sweep.status == DONE).any():
         raise ResultsError(f"{folder}: nothing to draw: none of the {sweep.status.size} variants was done")
-    return sweep
+    drawn = [result for result in sweep.results if sweep.known(result).size]
+    if not drawn:
+        raise ResultsError(f"{folder}: nothing to draw: no variant has any of the results")
+    return replace(sweep, results=drawn)
 
 
 def _read_netcdf(file: Path) -> Sweep:
@@ -97,7 +100,7 @@ def _read_netcdf(file: Path) -> Sweep:
             return Sweep(
                 title=_text(content.attrs.get("title", "")) or file.resolve().parent.name,
                 design=_text(content.attrs["design"]),
-                varied=_variables(content, "varied"),
+                varied=_variables(content, "parameter"),
                 results=_variables(content, "result"),
                 status=status,
             )
@@ -109,8 +112,8 @@ def _read_netcdf(file: Path) -> Sweep:
 
 def _variables(content: h5netcdf.File, role: str) -> list[Variable]:
     return [
-        Variable(name, _text(variable.attrs.get("units", "")), _text(variable.attrs.get("long_name", name)),
-                 np.asarray(variable[...], dtype=float))
+        Variable(*(_text(variable.attrs.get(attribute, default)) for attribute, default in
+                   (("label", name), ("units", ""), ("long_name", name))), values=np.asarray(variable[...], dtype=float))
         for name, variable in content.variables.items()
         if _text(variable.attrs.get("role", "")) == role
     ]
@@ -121,19 +124,26 @@ def _text(value: object) -> str:
 
 
 def _read_table(file: Path) -> Sweep:
-    """sweep.csv: variant, what varies, status, steps, the results, reason."""
+    """sweep.csv: variant, what varies, the results, status, steps, reason."""
     try:
         table = pd.read_csv(file, index_col=False)
         labels = list(table)
-        begin, end = labels.index("status"), labels.index("steps")
-        last = labels.index("reason") if "reason" in labels else len(labels)
-        status = table["status"].replace(STATUS_WORDS).to_numpy(dtype=int)
-        varied = [_column(table, label) for label in labels[1:begin]]
-        results = [_column(table, label) for label in labels[end + 1:last]]
+        columns = [_column(table, label) for label in labels[labels.index("variant") + 1:labels.index("status")]]
+        status = np.array([STATUS_WORDS[word] for word in table["status"]], dtype=int)
+    except KeyError as error:
+        raise ResultsError(f"{file}: not the table of a sweep: the status {error.args[0]!r} is none of "
+                           f"{', '.join(STATUS_WORDS)}") from None
     except (ValueError, OSError) as error:  # pandas' own parser errors are ValueErrors
         raise ResultsError(f"{file}: not the table of a sweep: {' '.join(str(error).split())}") from None
-    title, design = _described(file.with_name("input.nml"))
-    return Sweep(title or file.resolve().parent.name, design, varied, results, status)
+    machine = _read_input(file.with_name("input.nml"))
+    varied = [column for column in columns if column.name.split(".")[0] in machine]  # paths begin with a group of the input
+    return Sweep(
+        title=machine.get("case", {}).get("title") or file.resolve().parent.name,
+        design=machine["sweep"]["design"],
+        varied=varied,
+        results=columns[len(varied):],
+        status=status,
+    )
 
 
 def _column(table: pd.DataFrame, label: str) -> Variable:
@@ -141,10 +151,11 @@ def _column(table: pd.DataFrame, label: str) -> Variable:
     return Variable(match["name"], match["unit"] or "", match["name"], table[label].to_numpy(dtype=float))
 
 
-def _described(file: Path) -> tuple[str, str]:
-    """Title and design of the input."""
+def _read_input(file: Path) -> f90nml.Namelist:
     try:
         content = f90nml.read(file)
-        return content.get("case", {}).get("title", ""), content["sweep"]["design"]
-    except (OSError, KeyError) as error:
-        raise ResultsError(f"{file}: the figures of a table need the input of the sweep beside it: {error}") from None
+    except OSError:
+        raise ResultsError(f"{file}: missing; the figures of a table need the input of the sweep beside it") from None
+    if "design" not in content.get("sweep", {}):
+        raise ResultsError(f"{file}: this is not the input of a sweep: there is no &sweep with a design")
+    return content

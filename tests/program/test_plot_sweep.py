@@ -42,11 +42,11 @@ def write_sweep(folder: Path, design: str, varied: dict, results: dict, status=N
     with h5netcdf.File(folder / "sweep.nc", "w") as file:
         file.attrs.update(title=title, design=design)
         file.dimensions = {"variant": variants}
-        for role, values_of in (("varied", varied), ("result", results)):
+        for role, values_of in (("parameter", varied), ("result", results)):
             for name, values in values_of.items():
                 known = status == DONE if role == "result" else True
                 variable = file.create_variable(name, ("variant",), data=np.where(known, values, np.nan))
-                variable.attrs.update(units=unit_of(name), role=role, long_name=name)
+                variable.attrs.update(units=unit_of(name), label=name, role=role, long_name=name)
         file.create_variable("status", ("variant",), data=status)
     return folder
 
@@ -88,12 +88,12 @@ def test_random_sweep_of_two_numbers_with_failures_is_drawn(tmp_path, monkeypatc
     assert "refused or failed" in text_of(folder, "map")
 
 
-def test_percentiles_are_values_of_variants(tmp_path, monkeypatch, capsys):
-    order = np.random.default_rng(1).permutation(100)
+def test_percentiles_are_those_of_the_printed_summary(tmp_path, monkeypatch, capsys):
+    order = np.random.default_rng(1).permutation(101)
     folder = write_sweep(tmp_path, "random", {LOAD: order}, {MOMENT: order + 1.0})
     draw(monkeypatch, capsys, folder)
     text = text_of(folder, "histograms")
-    assert "5 %: 5<" in text and "median: 50<" in text and "95 %: 95<" in text
+    assert "5 %: 6<" in text and "median: 51<" in text and "95 %: 96<" in text
 
 
 def test_outliers_are_counted_beside_the_histogram(tmp_path, monkeypatch, capsys):
@@ -165,7 +165,7 @@ def test_parallel_axes_say_what_they_leave_out(tmp_path, monkeypatch, capsys):
     folder = write_sweep(tmp_path, "latin", varied, {SPEED: numbers[11]}, np.where(numbers[0] < 0.05, FAILED, DONE))
     assert draw(monkeypatch, capsys, folder)[-1] == "parallel"
     text = text_of(folder, "parallel")
-    assert "of the variants are drawn; 10 of 12 varied numbers, the most correlated first" in text
+    assert "no more than 500 variants are drawn; 10 of 12 varied numbers, the most correlated first" in text
     assert "body.rotor11." in text
     assert "failed (one in 3 is shown)" in text
 
@@ -182,14 +182,28 @@ def test_awkward_lists_are_drawn(load, cubic, tmp_path, monkeypatch, capsys):
     assert "constant" in text_of(folder, "scatter")
 
 
+def test_results_that_done_variants_do_not_have_are_left_out(tmp_path, monkeypatch, capsys):
+    load, cubic = random_numbers(100, 2)
+    partly = np.where(load < 0.1, np.nan, load)
+    folder = write_sweep(tmp_path, "random", {LOAD: load, CUBIC: cubic}, {MOMENT: partly, SPEED: np.full(100, np.nan)})
+    assert draw(monkeypatch, capsys, folder) == ["histograms", "scatter", "map"]
+    assert "rank correlation +1.00" in text_of(folder, "scatter")
+    assert SPEED not in text_of(folder, "histograms")
+
+
 def test_table_is_drawn_where_there_is_no_netcdf_file(tmp_path, monkeypatch, capsys):
-    (tmp_path / "input.nml").write_text("&case title = 'From a table' /\n&sweep design = 'latin' samples = 3 /\n")
+    (tmp_path / "input.nml").write_text("""&case title = 'From a table' /
+&body name = 'rotor' inertia = 1.0 /
+&load name = 'work' body = 'rotor' /
+&sweep design = 'list' file = 'list.csv' /
+""")
     (tmp_path / "sweep.csv").write_text(
-        f"variant,{LOAD} [N m s/rad],body.rotor.teeth,status,steps,{MOMENT} [N m],{SPEED} [rad/s],reason\n"
-        "1,50.0,20,0,100,3.5,1.0,\n2,60.0,21,2,90,NaN,NaN,\"too, many steps\"\n3,70.0,22,0,95,4.5,2.0,\n")
+        f"variant,{LOAD} [N m s/rad],body.rotor.teeth,{MOMENT} [N m],omega_a.b_final [rad/s],status,steps,reason\n"
+        "1,50.0,20,3.5,1.0,done,100,\n2,60.0,21,,,failed,90,\"too, many steps\"\n3,70.0,22,4.5,2.0,done,95,\n")
     assert draw(monkeypatch, capsys, tmp_path) == ["histograms", "scatter", "map"]
     text = text_of(tmp_path, "scatter")
-    assert "From a table" in text and "Latin design, 3 variants, 1 failed" in text and "body.rotor.teeth<" in text
+    assert "From a table" in text and "list design, 3 variants, 1 failed" in text and "body.rotor.teeth<" in text
+    assert "omega_a.b_final [rad/s]" in text
 
 
 @pytest.mark.parametrize(("files", "message"), [
@@ -199,12 +213,17 @@ def test_table_is_drawn_where_there_is_no_netcdf_file(tmp_path, monkeypatch, cap
     ({"sweep.nc": "no NetCDF"}, "sweep.nc: cannot be read: "),
     ({"sweep.csv": ""}, "sweep.csv: not the table of a sweep: "),
     ({"sweep.csv": "t [s],phi_a [rad]\n0,1\n"}, "sweep.csv: not the table of a sweep: "),
-    ({"sweep.csv": "variant,a.b.c,status,steps,d\n1,1,0,5,one\n"}, "sweep.csv: not the table of a sweep: "),
-    ({"sweep.csv": "variant,a.b.c,status,steps,d\n1,1,0,5,1\n"}, "input.nml: the figures of a table need the input"),
-    ({"sweep.csv": "variant,a.b.c,status,steps,d\n1,1,0,5,1\n", "input.nml": "&run t_end = 1.0 /\n"}, "input.nml: "),
-    ({"sweep.csv": "variant,a.b.c,status,steps,d\n1,1,2,5,\n", "input.nml": "&sweep design = 'random' /\n"},
+    ({"sweep.csv": "variant,a.b.c,d,status\n1,1,one,done\n"}, "sweep.csv: not the table of a sweep: "),
+    ({"sweep.csv": "variant,a.b.c,d,status\n1,1,1,well\n"},
+     "sweep.csv: not the table of a sweep: the status 'well' is none of done, refused, failed"),
+    ({"sweep.csv": "variant,a.b.c,d,status\n1,1,1,done\n"}, "input.nml: missing; the figures of a table need the input"),
+    ({"sweep.csv": "variant,a.b.c,d,status\n1,1,1,done\n", "input.nml": "&run t_end = 1.0 /\n"},
+     "input.nml: this is not the input of a sweep"),
+    ({"sweep.csv": "variant,a.b.c,d,status\n1,1,,failed\n", "input.nml": "&a b = 1 /\n&sweep design = 'random' /\n"},
      "nothing to draw: none of the 1 variants was done"),
-    ({"sweep.csv": "variant,a.b.c,status,steps\n1,1,0,5\n", "input.nml": "&sweep design = 'random' /\n"},
+    ({"sweep.csv": "variant,a.b.c,d,status\n1,1,,done\n", "input.nml": "&a b = 1 /\n&sweep design = 'random' /\n"},
+     "nothing to draw: no variant has any of the results"),
+    ({"sweep.csv": "variant,a.b.c,status\n1,1,done\n", "input.nml": "&a b = 1 /\n&sweep design = 'random' /\n"},
      "nothing to draw: the sweep has 1 varied numbers and 0 results"),
 ])
 def test_unusable_results_are_one_clear_line(files, message, tmp_path, monkeypatch):
