@@ -12,8 +12,22 @@ from matplotlib.figure import Figure
 
 from .results import ResultsError
 from .style import WIDTH, add_title, plain, save
-from .sweep_panels import (LINES, MOST_POINTS, NOT_DONE_LINES, TURN, add_note, draw_curve, draw_histogram, draw_map, draw_parallel,
-                           draw_scatter, explain_not_done, rank_correlation, wrapped)
+from .sweep_panels import (
+    LINES,
+    MOST_POINTS,
+    NOT_DONE_LINES,
+    TURN,
+    add_note,
+    draw_curve,
+    draw_histogram,
+    draw_map,
+    draw_parallel,
+    draw_scatter,
+    explain_not_done,
+    has_outliers,
+    rank_correlation,
+    wrapped,
+)
 from .sweep_results import Sweep, Variable, read_sweep
 
 ROWS = 4  # of panels in a figure
@@ -39,7 +53,9 @@ def draw_scatters(sweep: Sweep, results: Sequence[Variable], keys: Sequence[Vari
             draw_scatter(axes, sweep, key, result)
     for axes, key in zip(grid[-1], keys):
         axes.set_xlabel(wrapped(key.label))
-    add_note(figure, "darker: more variants" if sweep.status.size > MOST_POINTS else "")
+    far_out = any(has_outliers(result.values[sweep.known(result)]) for result in results)
+    add_note(figure, "darker: more variants" if sweep.status.size > MOST_POINTS else "",
+             "triangles: beyond the axis" if far_out else "")
     explain_not_done(figure, sweep, **TICK)
     return figure
 
@@ -73,8 +89,9 @@ def draw_parallels(sweep: Sweep, results: Sequence[Variable], keys: Sequence[Var
     figure, panels = _stack(len(results), 3.2, width=max(WIDTH, 1.4 * len(keys) + 3.0))
     for axes, result in zip(panels, results):
         draw_parallel(axes, sweep, keys, result)
+    numbers = f"{len(keys)} of {len(sweep.varied)} varied numbers, the most correlated first"
     add_note(figure, f"no more than {LINES} variants are drawn" if sweep.status.size > LINES else "",
-             f"{len(keys)} of {len(sweep.varied)} varied numbers, the most correlated first" if len(keys) < len(sweep.varied) else "")
+             numbers if len(keys) < len(sweep.varied) else "")
     explain_not_done(figure, sweep, NOT_DONE_LINES, linestyle=(0, (3, 2)), linewidth=0.9)
     return figure
 

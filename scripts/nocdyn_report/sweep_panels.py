@@ -9,7 +9,7 @@ from matplotlib import colormaps
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.collections import LineCollection
-from matplotlib.colors import LinearSegmentedColormap, PowerNorm
+from matplotlib.colors import LinearSegmentedColormap, Normalize, PowerNorm
 from matplotlib.contour import ContourSet
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
@@ -72,6 +72,10 @@ def thinned(places: np.ndarray, most: int) -> np.ndarray:
     return places[::max(1, -(-places.size // most))]
 
 
+def has_outliers(values: np.ndarray) -> bool:
+    return without_outliers(values).size < values.size
+
+
 def is_constant(values: np.ndarray) -> bool:
     """Whether all values are the same but for rounding."""
     return np.ptp(values) <= 1e-12 * np.abs(values).max()
@@ -117,17 +121,21 @@ def _farthest(values: np.ndarray, median: float) -> float:
 
 
 def draw_scatter(axes: Axes, sweep: Sweep, key: Variable, result: Variable) -> None:
-    """Each variant a dot; of very many, a shade for how many are in a cell."""
+    """Each variant a dot; of very many, a shade for how many are in a cell; outliers at the edges."""
     known = sweep.known(result)
     x, y = key.values[known], result.values[known]
     if is_wide(x):
         axes.set_xscale("log")
+    inside = without_outliers(y)
+    is_near = (y >= inside.min()) & (y <= inside.max())
     if len(x) > MOST_POINTS:
-        _draw_density(axes, x, y)
+        _draw_density(axes, x[is_near], y[is_near])
     else:
         size = np.clip(6000.0 / len(x), 1.5, 16.0)
-        axes.scatter(x, y, s=size, color=COLOURS[0], alpha=0.9 if len(x) < 200 else 0.45, linewidths=0,
+        axes.scatter(x[is_near], y[is_near], s=size, color=COLOURS[0], alpha=0.9 if len(x) < 200 else 0.45, linewidths=0,
                      rasterized=len(x) > RASTER)
+    _mark_outliers(axes, x[y > inside.max()], "^", 1.0)
+    _mark_outliers(axes, x[y < inside.min()], "v", 0.0)
     mark_not_done(axes, sweep, key)
     correlation = rank_correlation(x, y)
     axes.set_title("constant" if np.isnan(correlation) else f"rank correlation {round(correlation, 2) + 0.0:+.2f}",
@@ -138,6 +146,14 @@ def _draw_density(axes: Axes, x: np.ndarray, y: np.ndarray) -> None:
     edges = np.geomspace(x.min(), x.max(), CELLS + 1) if is_wide(x) else CELLS
     counts, x_edges, y_edges = np.histogram2d(x, y, bins=(edges, CELLS))
     axes.pcolormesh(x_edges, y_edges, np.ma.masked_equal(counts.T, 0), norm=PowerNorm(0.5), cmap=SHADES, rasterized=True)
+
+
+def _mark_outliers(axes: Axes, x: np.ndarray, marker: str, edge: float) -> None:
+    """Triangles at the upper or lower edge, where their result is far beyond."""
+    if x.size:
+        places = thinned(x, MOST_MARKS)
+        axes.plot(places, np.full(places.size, edge), marker, color="0.35", markersize=4, markeredgewidth=0, clip_on=False,
+                  transform=axes.get_xaxis_transform())
 
 
 def mark_not_done(axes: Axes, sweep: Sweep, key: Variable) -> None:
@@ -167,7 +183,7 @@ def draw_curve(axes: Axes, sweep: Sweep, key: Variable, result: Variable, mark_p
     if is_wide(x):
         axes.set_xscale("log")
     values = result.values[sweep.known(result)]
-    if mark_peak and not is_constant(values):
+    if mark_peak and result.unit != "s" and not is_constant(values):  # the latest of times is no peak
         if 0.0 < STEEP * values.min() < values.max():
             axes.set_yscale("log")
         peak = np.nanargmax(y)
@@ -186,7 +202,7 @@ def draw_map(axes: Axes, sweep: Sweep, result: Variable) -> None:
     known = sweep.known(result)
     x, y, colour = (variable.values[known] for variable in (first, second, result))
     limits = without_outliers(colour)
-    scale = {"cmap": COLOUR_MAP, "vmin": limits.min(), "vmax": limits.max()}
+    scale = {"cmap": COLOUR_MAP, "norm": Normalize(limits.min(), limits.max())}
     if sweep.is_grid:
         drawn = axes.pcolormesh(*grid_cells(sweep, result), rasterized=True, **scale)
     elif DENSE < len(x) and not is_wide(x) and not is_wide(y) and not is_constant(limits) and fill_a_plane(x, y):
@@ -201,11 +217,16 @@ def draw_map(axes: Axes, sweep: Sweep, result: Variable) -> None:
         axes.set_yscale("log")
     marks = thinned(sweep.not_done, MOST_MARKS)
     axes.plot(first.values[marks], second.values[marks], "x", color=NOT_DONE, markersize=5, markeredgewidth=1.2)
-    extend = ("neither", "min", "max", "both")[(colour.min() < limits.min()) + 2 * (colour.max() > limits.max())]
-    bar = axes.figure.colorbar(drawn if sweep.is_grid else ScalarMappable(drawn.norm, drawn.cmap), ax=axes, extend=extend)
-    bar.set_label(wrapped(result.label))
+    _add_colour_bar(axes, drawn, result, colour)
     axes.set_title(plain(result.long_name), loc="left")
     axes.grid(visible=False)
+
+
+def _add_colour_bar(axes: Axes, drawn: ScalarMappable, result: Variable, values: np.ndarray) -> None:
+    """Of all colours, opaque; with a tip where values are beyond them."""
+    extend = ("neither", "min", "max", "both")[(values.min() < drawn.norm.vmin) + 2 * (values.max() > drawn.norm.vmax)]
+    bar = axes.figure.colorbar(ScalarMappable(drawn.norm, drawn.cmap), ax=axes, extend=extend)
+    bar.set_label(wrapped(result.label))
 
 
 def grid_cells(sweep: Sweep, result: Variable) -> tuple[np.ndarray, np.ndarray, np.ma.MaskedArray]:
@@ -235,7 +256,7 @@ def _draw_contours(axes: Axes, x: np.ndarray, y: np.ndarray, colour: np.ndarray,
     chosen = thinned(np.arange(len(x)), MOST_POINTS)
     # between 0 and 1 the triangles do not depend on the units
     triangles = Triangulation((x[chosen] - x.min()) / np.ptp(x), (y[chosen] - y.min()) / np.ptp(y)).triangles
-    levels = np.linspace(scale["vmin"], scale["vmax"], CONTOURS + 1)
+    levels = np.linspace(scale["norm"].vmin, scale["norm"].vmax, CONTOURS + 1)
     contours = axes.tricontourf(Triangulation(x[chosen], y[chosen], triangles), colour[chosen], levels=levels, extend="both",
                                 **scale)
     contours.set_rasterized(True)
@@ -253,8 +274,11 @@ def draw_parallel(axes: Axes, sweep: Sweep, keys: Sequence[Variable], result: Va
         shares[known, place] = _draw_parallel_axis(axes, place, variable, variable.values[known])
     middle_first = np.argsort(np.abs(shares[chosen, -1] - 0.5), kind="stable")
     chosen = chosen[middle_first]
+    values = result.values[sweep.known(result)]
+    limits = without_outliers(values)
     lines = LineCollection([np.column_stack((places, row)) for row in shares[chosen]], array=result.values[chosen],
-                           cmap=COLOUR_MAP, linewidths=0.7, alpha=0.5, rasterized=True)
+                           norm=Normalize(limits.min(), limits.max()), cmap=COLOUR_MAP, linewidths=0.7, alpha=0.5,
+                           rasterized=True)
     axes.add_collection(lines)
     axes.plot(places[:-1], shares[thinned(sweep.not_done, NOT_DONE_LINES), :-1].T, color=NOT_DONE, linewidth=0.9,
               linestyle=(0, (3, 2)))
@@ -266,7 +290,7 @@ def draw_parallel(axes: Axes, sweep: Sweep, keys: Sequence[Variable], result: Va
     axes.spines[["left", "bottom"]].set_visible(False)
     axes.grid(visible=False)
     axes.set_title(plain(result.long_name), loc="left")
-    axes.figure.colorbar(ScalarMappable(lines.norm, lines.cmap), ax=axes).set_label(wrapped(result.label))
+    _add_colour_bar(axes, lines, result, values)
 
 
 def _draw_parallel_axis(axes: Axes, place: int, variable: Variable, values: np.ndarray) -> np.ndarray:

@@ -29,7 +29,9 @@ def python_packages() -> None:
 
 
 def unit_of(name: str) -> str:
-    return UNITS[name.rsplit(".", 1)[-1].split("(")[0]] if "." in name else "N m" if name.startswith("moment") else "rad/s"
+    if "." in name:
+        return UNITS[name.rsplit(".", 1)[-1]]
+    return "s" if name.endswith("time_of_max") else "N m" if name.startswith("moment") else "rad/s"
 
 
 def write_sweep(folder: Path, design: str, varied: dict, results: dict, status=None, title: str = "Costs $5") -> Path:
@@ -99,10 +101,11 @@ def test_percentiles_are_those_of_the_printed_summary(tmp_path, monkeypatch, cap
 def test_outliers_are_counted_beside_the_histogram(tmp_path, monkeypatch, capsys):
     values = np.linspace(0.0, 1.0, 100)
     values[7] = 1e9
-    folder = write_sweep(tmp_path, "random", {LOAD: np.arange(100.0)}, {MOMENT: values})
+    folder = write_sweep(tmp_path, "random", {LOAD: np.arange(100.0), CUBIC: np.arange(100.0)}, {MOMENT: values})
     draw(monkeypatch, capsys, folder)
     text = text_of(folder, "histograms")
     assert "1 further out," in text and "up to 1e+09" in text
+    assert "triangles: beyond the axis" in text_of(folder, "scatter")
 
 
 def test_grid_of_two_numbers_is_a_heat_map(tmp_path, monkeypatch, capsys):
@@ -132,12 +135,14 @@ def test_many_scattered_variants_become_shades_and_contours(tmp_path, monkeypatc
 def test_frequency_alone_gives_a_resonance_curve_with_its_peak(tmp_path, monkeypatch, capsys):
     frequency = np.random.default_rng(1).permutation(np.linspace(0.5, 12.0, 116))
     moment = 1.0 / np.abs(6.4 + 0.1j - frequency)
-    folder = write_sweep(tmp_path, "grid", {"excitation.shaker.frequency": frequency}, {MOMENT: moment},
+    folder = write_sweep(tmp_path, "grid", {"excitation.shaker.frequency": frequency},
+                         {MOMENT: moment, "moment_coupling_time_of_max": frequency},
                          np.where(frequency > 11.0, FAILED, DONE))
     assert draw(monkeypatch, capsys, folder) == ["histograms", "resonance"]
     text = text_of(folder, "resonance")
     assert "largest: 10 N m" in text and "at 6.4 rad/s = 1.019 Hz" in text and "frequency [Hz]" in text
     assert "excitation.shaker.frequency [rad/s]" in text
+    assert text.count("largest: ") == 1, "the latest of times is no peak"
 
 
 def test_another_number_alone_gives_curves(tmp_path, monkeypatch, capsys):
