@@ -204,8 +204,8 @@ contains
     part = counting_number(value(:slash - 1))
     parts = counting_number(value(slash + 1:))
     if (slash == 0 .or. part < 1 .or. parts < 1 .or. part > parts .or. parts > most_shards) then
-      call raise(error, exit_input, '--shard ' // value // ': allowed: K/N, the part K of N, with K from 1 to N and N at most ' // &
-                 to_text(most_shards))
+      call raise(error, exit_input, '--shard ' // value // &
+                 ': allowed: K/N, the part K of N, with K from 1 to N and N at most ' // to_text(most_shards))
     else
       shard = part
       shards = parts
@@ -216,11 +216,14 @@ contains
   pure integer function counting_number(text)
     character(len=*), intent(in) :: text
     integer, parameter :: most_digits = 9
-    integer :: status
+    integer :: i
 
     counting_number = -1
     if (len(text) == 0 .or. len(text) > most_digits .or. verify(text, '0123456789') > 0) return
-    read (text, *, iostat=status) counting_number
+    counting_number = 0
+    do i = 1, len(text)
+      counting_number = 10 * counting_number + iachar(text(i:i)) - iachar('0')
+    end do
   end function counting_number
 
   !> "'rnu' is not a command; did you mean 'run'? allowed: 'run', ..."

@@ -71,8 +71,8 @@ contains
 
     text = 'nocdyn sweep FILE [--out DIR] [--set PATH=VALUE]... [--threads NUMBER] [--shard K/N] [--resume] [--csv]' // nl // &
            '             [--quiet]' // nl // nl // &
-           'Runs all variants of a machine that &sweep and &vary of the file describe, and writes what &record asks for' // nl // &
-           'to sweep.nc, with summary.json and input.nml. A variant that fails is recorded with its reason.' // nl // nl // &
+           'Runs all variants of a machine that &sweep and &vary of the file describe, and writes what &record asks' // nl // &
+           'for to sweep.nc, with summary.json and input.nml. A variant that fails is recorded with its reason.' // nl // nl // &
            '  --out DIR          write to DIR; without it &output directory counts, else results/<name of the file>' // nl // &
            '  --set PATH=VALUE   override a key: sweep.samples=1000, run.rtol=1e-9, load.work.viscous=80' // nl // &
            '  --threads NUMBER   without it OMP_NUM_THREADS counts, else the cores that the process may use' // nl // &
