@@ -2,8 +2,8 @@
 module nocdyn_mpi_worker
   use nocdyn_dispatcher, only: dispatcher_t
   use nocdyn_kinds, only: wp
-  use nocdyn_mpi_messages, only: ask, goodbye_word, look, receive_answer, receive_word, root, send_results, send_word, stop_word, &
-    wait_for_message
+  use nocdyn_mpi_messages, only: ask, goodbye_word, look, receive_answer, receive_word, root, send_results, send_word, &
+    stop_word, wait_for_message
   use nocdyn_posix, only: is_interrupted
   use nocdyn_sweep_chunk, only: chunk_t
   implicit none (type, external)

@@ -63,7 +63,8 @@ contains
     end if
     if (summary%done == 0) then
       code = exit_failed
-      call raise(error, code, plan%input%file // ': every variant failed; the reasons are in ' // folder // '/' // sweep_file_name)
+      call raise(error, code, plan%input%file // ': every variant failed; the reasons are in ' // folder // '/' // &
+                 sweep_file_name)
     end if
   end subroutine write_results
 
