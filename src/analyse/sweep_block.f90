@@ -76,7 +76,7 @@ contains
 
     block%plan => plan
     block%dispatcher => dispatcher
-    call plan%design%values(1, typical)
+    call plan%values(1, typical)
     call new_variant_machines(plan%input, plan%targets, setup%lanes, setup%is_audited, block%machines, error, typical)
     if (allocated(error)) return
     !$omp critical (texts)
@@ -155,7 +155,7 @@ contains
       found = i <= self%chunk%count
       if (.not. found) return
       self%next_place = i + 1
-      call self%block%plan%design%values(self%chunk%first + i - 1, self%chunk%parameters(:, i))
+      call self%block%plan%values(self%chunk%first + i - 1, self%chunk%parameters(:, i))
       call self%block%machines%put(self%chunk%parameters(:, i), lane, y, verdict, reason)
       select case (verdict)
       case (variant_refused)

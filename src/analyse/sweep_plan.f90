@@ -30,6 +30,8 @@ module nocdyn_sweep_plan
     type(statistic_t), allocatable :: statistics(:)
     integer, allocatable :: trajectories(:)           !! variants that are written like runs, ascending
     character(len=:), allocatable :: list_fingerprint   !! of the file of a list, '' without one
+  contains
+    procedure :: values
   end type sweep_plan_t
 
 contains
@@ -63,6 +65,16 @@ contains
     end if
     call conclude(input, mistakes, failure, error)
   end subroutine make_plan
+
+  !> The numbers of one variant as they are used: those of the design, whole ones rounded to the nearest.
+  pure subroutine values(self, variant, x)
+    class(sweep_plan_t), intent(in) :: self
+    integer, intent(in) :: variant   !! 1 to `design%variants`
+    real(wp), intent(out) :: x(:)    !! [targets]
+
+    call self%design%values(variant, x)
+    where (self%targets%is_whole) x = anint(x)
+  end subroutine values
 
   !> Labels of the columns of trajectory.csv of the base machine.
   subroutine label_columns(input, labels, error)

@@ -83,7 +83,7 @@ contains
     do i = 1, size(plan%trajectories)
       associate (variant => plan%trajectories(i))
         input = plan%input
-        call plan%design%values(variant, values)
+        call plan%values(variant, values)
         call set_targets(input, plan%targets, values, complaint)
         if (complaint /= '') cycle
         call run_variant(without_sweep(input), folder // '/variant-' // to_text(variant), options, summary, error)
