@@ -6,7 +6,7 @@ module nocdyn_sweep_file
   use, intrinsic :: iso_c_binding, only: c_associated, c_f_procpointer, c_funptr, c_int
   use, intrinsic :: iso_fortran_env, only: int8
   use netcdf, only: nf90_byte, nf90_char, nf90_chunked, nf90_clobber, nf90_close, nf90_create, nf90_def_dim, nf90_def_var, &
-    nf90_def_var_chunking, nf90_def_var_deflate, nf90_def_var_fill, nf90_double, nf90_ebadname, nf90_ehdferr, nf90_enddef, &
+    nf90_def_var_chunking, nf90_def_var_fill, nf90_double, nf90_ebadname, nf90_ehdferr, nf90_enddef, &
     nf90_global, nf90_int, nf90_max_name, nf90_netcdf4, nf90_noerr, nf90_put_att, nf90_put_var, nf90_strerror, nf90_unlimited
   use nocdyn_errors, only: error_t, exit_file, raise
   use nocdyn_journal_chunks, only: check_sweep, sweep_records_t
@@ -29,6 +29,7 @@ module nocdyn_sweep_file
     [character(len=14) :: 'variant', 'status', 'steps', 'failed_variant', 'reason']
   integer, parameter :: block_variants = 16384   !! written at once, so that a variable is touched rarely
   integer, parameter :: chunk_failures = 4096
+  integer, parameter :: megabyte = 2**20      !! the library's unit for caches
 
   !> The file on its way. After the first failure nothing more is done.
   type :: sweep_file_t
@@ -234,12 +235,13 @@ contains
     call define(file, 'steps', nf90_int, file%variant_dimension, 'steps of the integration', file%steps)
     call define(file, 'failed_variant', nf90_int, file%failure_dimension, 'number of a variant that is not done', &
                 file%failed_variant)
-    call note(file, nf90_def_var(file%id, 'reason', nf90_char, [file%reason_dimension, file%failure_dimension], file%reason))
+    ! the cache of the library would keep many chunks that are never looked at again
+    call note(file, nf90_def_var(file%id, 'reason', nf90_char, [file%reason_dimension, file%failure_dimension], file%reason, &
+                                 chunksizes=[longest, chunk_failures], deflate_level=1, &
+                                 cache_size=1 + longest * chunk_failures / megabyte))
     call put_text(file, file%reason, 'long_name', 'why that variant is not done')
     call put_text(file, file%reason, '_Encoding', 'utf-8')
     call note(file, nf90_def_var_chunking(file%id, file%failed_variant, nf90_chunked, [chunk_failures]))
-    call note(file, nf90_def_var_chunking(file%id, file%reason, nf90_chunked, [longest, chunk_failures]))
-    call note(file, nf90_def_var_deflate(file%id, file%reason, 0, 1, 1))
   end subroutine define_outcome
 
   !> Copies the journals into the file.

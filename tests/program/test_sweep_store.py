@@ -193,6 +193,6 @@ def peak_memory(folder, variants):
 
 
 def test_memory_does_not_grow_with_the_variants(tmp_path):
-    small, large = peak_memory(tmp_path / "small", 40_000), peak_memory(tmp_path / "large", 200_000)
-    results = 160_000 * 3 * 8
+    small, large = peak_memory(tmp_path / "small", 100_000), peak_memory(tmp_path / "large", 300_000)
+    results = 200_000 * 3 * 8
     assert large - small < results / 4
