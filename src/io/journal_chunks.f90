@@ -4,12 +4,14 @@ module nocdyn_journal_chunks
   use nocdyn_number_ranges, only: ascending_order, gaps, range_t
   use nocdyn_sweep_chunk, only: chunk_t
   use nocdyn_sweep_header, only: differing_part
-  use nocdyn_sweep_journal, only: sweep_journal_t
+  use nocdyn_sweep_journal, only: journal_name, sweep_journal_t
   use nocdyn_text, only: to_text
   implicit none (type, external)
   private
 
   public :: check_sweep
+
+  integer, parameter :: most_said = 3   !! of equal things in a message
 
   !> Where the next chunk is; to begin again, begin again.
   type, public :: sweep_records_t
@@ -88,9 +90,53 @@ contains
       return
     end do
     call gaps(ranges, range_t(1, journals(1)%header%variants), open_ranges)
-    if (size(open_ranges) > 0) call raise(error, exit_input, 'no journal holds ' // said(open_ranges) // ' of ' // &
-                                          to_text(journals(1)%header%variants))
+    if (size(open_ranges) > 0) call raise(error, exit_input, absent_shards(journals) // 'no journal holds ' // &
+                                          said(open_ranges) // ' of ' // to_text(journals(1)%header%variants))
   end subroutine check_sweep
+
+  !> 'sweep.2-of-5.journal is not there: ', as far as the names of the others tell.
+  function absent_shards(journals) result(text)
+    type(sweep_journal_t), intent(in) :: journals(:)
+    character(len=:), allocatable :: text, name
+    integer :: absent, i, k, shards
+
+    text = ''
+    absent = 0
+    shards = shards_of(journals(1)%path())
+    do k = 1, shards
+      name = journal_name(k, shards)
+      do i = 1, size(journals)
+        if (file_name(journals(i)%path()) == name) exit
+      end do
+      if (i <= size(journals)) cycle
+      absent = absent + 1
+      if (absent > most_said) cycle
+      if (text /= '') text = text // ', '
+      text = text // name
+    end do
+    if (absent > most_said) text = text // ' and ' // to_text(absent - most_said) // ' more'
+    if (absent > 0) text = text // trim(merge(' is ', ' are', absent == 1)) // ' not there: '
+  end function absent_shards
+
+  pure function file_name(path) result(name)
+    character(len=*), intent(in) :: path
+    character(len=:), allocatable :: name
+
+    name = path(index(path, '/', back=.true.) + 1:)
+  end function file_name
+
+  !> 5 for '.../sweep.2-of-5.journal', 0 if the name is another.
+  pure integer function shards_of(path) result(shards)
+    character(len=*), intent(in) :: path
+    integer :: first, last, status
+
+    first = index(path, '-of-', back=.true.) + 4
+    last = index(path, '.journal', back=.true.) - 1
+    shards = 0
+    if (first == 4 .or. last < first) return
+    read (path(first:last), '(i10)', iostat=status) shards
+    if (status /= 0) shards = 0
+  end function shards_of
 
   subroutine check_headers(journals, error)
     type(sweep_journal_t), intent(in) :: journals(:)
@@ -129,8 +175,8 @@ contains
         call gaps(journals(i)%ranges(), range_t(header%first, header%last), open_ranges)
         if (size(open_ranges) == 0) cycle
         if (message /= '') message = message // new_line('a')
-        message = message // journals(i)%path() // ': unfinished: ' // said(open_ranges) // ' of ' // to_text(header%first) // &
-                  ' to ' // to_text(header%last) // ' are missing; --resume goes on with it'
+        message = message // journals(i)%path() // ': unfinished, without ' // said(open_ranges) // ' of ' // &
+                  to_text(header%first) // ' to ' // to_text(header%last) // '; --resume goes on with it'
       end associate
     end do
     if (message /= '') call raise(error, exit_input, message)
@@ -140,16 +186,16 @@ contains
   pure function said(ranges) result(text)
     type(range_t), intent(in) :: ranges(:)
     character(len=:), allocatable :: text
-    integer, parameter :: most = 3
     integer :: i
 
     text = 'variants '
-    do i = 1, min(size(ranges), most)
+    if (size(ranges) == 1) text = trim(merge('variant ', 'variants', ranges(1)%first == ranges(1)%last)) // ' '
+    do i = 1, min(size(ranges), most_said)
       if (i > 1) text = text // ', '
       text = text // to_text(ranges(i)%first)
       if (ranges(i)%last > ranges(i)%first) text = text // ' to ' // to_text(ranges(i)%last)
     end do
-    if (size(ranges) > most) text = text // ' and ' // to_text(size(ranges) - most) // ' more ranges'
+    if (size(ranges) > most_said) text = text // ' and ' // to_text(size(ranges) - most_said) // ' more ranges'
   end function said
 
 end module nocdyn_journal_chunks
