@@ -186,10 +186,10 @@ def draw_curve(axes: Axes, sweep: Sweep, key: Variable, result: Variable, mark_p
     if mark_peak and result.unit != "s" and not is_constant(values):  # the latest of times is no peak
         if 0.0 < STEEP * values.min() < values.max():
             axes.set_yscale("log")
-        peak = np.nanargmax(y)
+        peak, word = (np.nanargmin(y), "smallest") if result.is_minimum else (np.nanargmax(y), "largest")
         axes.axvline(x[peak], **REFERENCE)
         axes.plot(x[peak], y[peak], "o", color="black", markersize=5,
-                  label=f"largest: {y[peak]:.5g} {result.unit}\nat {x[peak]:.5g} {key.unit} = {x[peak] / TURN:.4g} Hz")
+                  label=f"{word}: {y[peak]:.5g} {result.unit}\nat {x[peak]:.5g} {key.unit} = {x[peak] / TURN:.4g} Hz")
         axes.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
     mark_not_done(axes, sweep, key)
     axes.set_title(plain(result.long_name), loc="left")

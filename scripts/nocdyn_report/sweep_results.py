@@ -35,6 +35,11 @@ class Variable:
         """Of a varied number: the last part of its path, without the place in a list."""
         return self.name.rsplit(".", 1)[-1].split("(")[0]
 
+    @property
+    def is_minimum(self) -> bool:
+        """Of a result: whether it is the smallest value of something."""
+        return re.search(r"_min(_from_[^_]+)?$", self.name) is not None
+
 
 @dataclass(frozen=True)
 class Sweep:

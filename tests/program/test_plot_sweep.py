@@ -136,13 +136,14 @@ def test_frequency_alone_gives_a_resonance_curve_with_its_peak(tmp_path, monkeyp
     frequency = np.random.default_rng(1).permutation(np.linspace(0.5, 12.0, 116))
     moment = 1.0 / np.abs(6.4 + 0.1j - frequency)
     folder = write_sweep(tmp_path, "grid", {"excitation.shaker.frequency": frequency},
-                         {MOMENT: moment, "moment_coupling_time_of_max": frequency},
+                         {MOMENT: moment, "moment_coupling_time_of_max": frequency, "moment_coupling_min_from_2": -moment},
                          np.where(frequency > 11.0, FAILED, DONE))
     assert draw(monkeypatch, capsys, folder) == ["histograms", "resonance"]
     text = text_of(folder, "resonance")
     assert "largest: 10 N m" in text and "at 6.4 rad/s = 1.019 Hz" in text and "frequency [Hz]" in text
     assert "excitation.shaker.frequency [rad/s]" in text
     assert text.count("largest: ") == 1, "the latest of times is no peak"
+    assert "smallest: -10 N m" in text and text.count("at 6.4 rad/s = 1.019 Hz") == 2
 
 
 def test_another_number_alone_gives_curves(tmp_path, monkeypatch, capsys):
