@@ -15,19 +15,19 @@ module nocdyn_linear_columns
   implicit none (type, external)
   private
 
-  public :: is_linear, has_law, new_linear_columns
+  public :: is_linear, has_law, new_linear_columns, strip_of, place_of
 
-  integer, parameter, public :: width = 8   !! lanes that are looked at together
+  integer, parameter, public :: width = 8   !! lanes of a strip, which are looked at together
 
   type, public :: linear_columns_t
     integer :: count = 0
-    integer, allocatable :: first(:)          !! of the entries of each column, [count + 1]
+    integer, allocatable :: first(:)          !! of the entries of each column, [count + 1]; they come in pairs
     integer, allocatable :: component(:)      !! of the state, [entries]
-    real(wp), allocatable :: factor(:, :)     !! [lanes and padding, entries]
-    real(wp), allocatable :: offset(:, :)     !! [lanes and padding, columns], as the next two
-    real(wp), allocatable :: linear(:, :)     !! 1 of a column that is x itself
-    real(wp), allocatable :: cubic(:, :)
-    integer, allocatable, private :: ratio(:)       !! of the coordinates, [entries]
+    real(wp), allocatable :: factor(:, :, :)  !! [width, entries, strips of lanes]
+    real(wp), allocatable :: offset(:, :, :)  !! [width, columns, strips], as the next two
+    real(wp), allocatable :: linear(:, :, :)  !! 1 of a column that is x itself
+    real(wp), allocatable :: cubic(:, :, :)
+    integer, allocatable, private :: ratio(:)       !! of the coordinates, [entries], 0 of one that only makes up a pair
     logical, allocatable, private :: is_minus(:)    !! whether the factor is its negative, [entries]
     logical, allocatable, private :: is_speed(:)    !! [columns]
     integer, allocatable, private :: element(:)     !! that has the law, 0 if none has
@@ -93,10 +93,10 @@ contains
     class(formulation_t), intent(in) :: block
     type(column_t), intent(in) :: columns(:)
     type(linear_columns_t) :: self
-    integer :: i, lanes
+    integer :: i, strips
 
     self%count = size(columns)
-    lanes = width * ((block%lanes + width - 1) / width)
+    strips = (block%lanes + width - 1) / width
     allocate (self%first(self%count + 1), source=1)
     allocate (self%component(0), self%ratio(0), self%is_minus(0))
     allocate (self%is_speed, source=columns%kind == column_speed)
@@ -105,9 +105,9 @@ contains
       call place_column(self, i, block%machine, columns(i))
       call add_entries(self, i, block%machine%coordinates)
     end do
-    allocate (self%factor(lanes, size(self%component)), self%offset(lanes, self%count), self%cubic(lanes, self%count), &
-              source=0.0_wp)
-    allocate (self%linear(lanes, self%count), source=1.0_wp)
+    allocate (self%factor(width, size(self%component), strips), self%offset(width, self%count, strips), &
+              self%cubic(width, self%count, strips), source=0.0_wp)
+    allocate (self%linear(width, self%count, strips), source=1.0_wp)
   end function new_linear_columns
 
   subroutine place_column(self, number, machine, column)
@@ -140,6 +140,11 @@ contains
         self%component = [self%component, coordinates%coordinate(k) + merge(0, coordinates%freedoms, self%is_speed(number))]
       end do
     end do
+    if (modulo(size(self%ratio), 2) == 1) then
+      self%ratio = [self%ratio, 0]
+      self%is_minus = [self%is_minus, .false.]
+      self%component = [self%component, self%component(size(self%component))]
+    end if
     self%first(number + 1) = size(self%ratio) + 1
   end subroutine add_entries
 
@@ -150,33 +155,48 @@ contains
     integer, intent(in) :: lane
     integer :: i, k
 
-    associate (machine => block%machine)
+    associate (machine => block%machine, at => place_of(lane), strip => strip_of(lane))
       do k = 1, size(self%ratio)
+        if (self%ratio(k) == 0) cycle
         associate (ratio => machine%coordinates%ratio(lane, self%ratio(k)))
-          self%factor(lane, k) = merge(-ratio, ratio, self%is_minus(k))
+          self%factor(at, k, strip) = merge(-ratio, ratio, self%is_minus(k))
         end associate
       end do
       do i = 1, self%count
         if (self%is_speed(i)) cycle
-        self%offset(lane, i) = 0.0_wp
-        if (self%to(i) > 0) self%offset(lane, i) = machine%start_angle(lane, self%to(i))
-        if (self%from(i) > 0) self%offset(lane, i) = self%offset(lane, i) - machine%start_angle(lane, self%from(i))
-        if (self%element(i) == 0) cycle
-        associate (laws => machine%laws, e => self%element(i))
-          self%offset(lane, i) = self%offset(lane, i) - laws%rest(lane, e)
-          self%linear(lane, i) = laws%linear(lane, e)
-          self%cubic(lane, i) = laws%cubic(lane, e)
+        associate (offset => self%offset(at, i, strip))
+          offset = 0.0_wp
+          if (self%to(i) > 0) offset = machine%start_angle(lane, self%to(i))
+          if (self%from(i) > 0) offset = offset - machine%start_angle(lane, self%from(i))
+          if (self%element(i) == 0) cycle
+          offset = offset - machine%laws%rest(lane, self%element(i))
+          self%linear(at, i, strip) = machine%laws%linear(lane, self%element(i))
+          self%cubic(at, i, strip) = machine%laws%cubic(lane, self%element(i))
         end associate
       end do
     end associate
   end subroutine take_lane
+
+  elemental integer function strip_of(lane)
+    integer, intent(in) :: lane
+
+    strip_of = (lane - 1) / width + 1
+  end function strip_of
+
+  !> Place of a lane in its strip.
+  elemental integer function place_of(lane)
+    integer, intent(in) :: lane
+
+    place_of = modulo(lane - 1, width) + 1
+  end function place_of
 
   !> Whether a column rises with x.
   pure logical function is_rising(self, number, lane)
     class(linear_columns_t), intent(in) :: self
     integer, intent(in) :: number, lane
 
-    associate (linear => self%linear(lane, number), cubic => self%cubic(lane, number))
+    associate (linear => self%linear(place_of(lane), number, strip_of(lane)), &
+               cubic => self%cubic(place_of(lane), number, strip_of(lane)))
       is_rising = min(linear, cubic) >= 0 .and. max(linear, cubic) > 0
     end associate
   end function is_rising
@@ -188,10 +208,12 @@ contains
     real(wp), contiguous, intent(in) :: y(:)
     integer :: k
 
-    x = self%offset(lane, number)
-    do k = self%first(number), self%first(number + 1) - 1
-      x = x + self%factor(lane, k) * y(self%component(k))
-    end do
+    associate (at => place_of(lane), strip => strip_of(lane))
+      x = self%offset(at, number, strip)
+      do k = self%first(number), self%first(number + 1) - 1
+        x = x + self%factor(at, k, strip) * y(self%component(k))
+      end do
+    end associate
   end function argument
 
   !> The column at x.
@@ -200,7 +222,9 @@ contains
     integer, intent(in) :: number, lane
     real(wp), intent(in) :: x
 
-    law = (self%linear(lane, number) + self%cubic(lane, number) * x * x) * x
+    associate (at => place_of(lane), strip => strip_of(lane))
+      law = (self%linear(at, number, strip) + self%cubic(at, number, strip) * x * x) * x
+    end associate
   end function law
 
 end module nocdyn_linear_columns

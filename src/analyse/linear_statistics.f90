@@ -3,10 +3,10 @@
 !> The elastic moment of a coupling that stiffens rises with its twist: its extremes are where those of the twist are. Bounds
 !> from the coefficients of x, in vector loops over the lanes, say in which steps an extremum may pass those before.
 module nocdyn_linear_statistics
-  use nocdyn_bernstein, only: most_degrees, raise_to_maximum, shift_origin
+  use nocdyn_bernstein, only: lay_bernstein_matrix, most_degrees, raise_to_maximum, shift_origin
   use nocdyn_formulation, only: formulation_t
   use nocdyn_kinds, only: wp
-  use nocdyn_linear_columns, only: linear_columns_t, new_linear_columns, width
+  use nocdyn_linear_columns, only: linear_columns_t, new_linear_columns, place_of, strip_of, width
   use nocdyn_quadrature, only: lay_gauss_rule
   use nocdyn_statistics, only: statistic_final, statistic_max, statistic_max_abs, statistic_mean, statistic_min, statistic_rms, &
     statistic_t, statistic_time_of_max
@@ -17,24 +17,31 @@ module nocdyn_linear_statistics
 
   public :: new_linear_statistics
 
-  !> What is kept of one x from a time on.
+  !> What is kept of one x from a time on; [width, strips] of the lanes.
   type :: track_t
     integer :: column = 0                    !! among the linear ones
     real(wp) :: from = 0.0_wp                !! [s]
+    logical :: has_range = .false.           !! whether extremes are wanted:
     logical :: has_max = .false., has_min = .false., has_size = .false.   !! largest, smallest, largest absolute value
     logical :: has_sums = .false.
-    real(wp), allocatable :: highest(:), lowest(:), highest_time(:)       !! of x, [lanes]
-    real(wp), allocatable :: integral(:), square(:)                       !! of the column over time
+    real(wp), allocatable :: highest(:, :), lowest(:, :), highest_time(:, :)   !! of x
+    real(wp), allocatable :: gate(:, :)                                        !! huge before `from`, -huge after it
+    real(wp), allocatable :: integral(:, :), square(:, :)                      !! of the column over time
   end type track_t
 
-  !> The lanes that are looked at together: x in their steps, or in what of them lies after `from`.
-  type :: part_t
+  !> The steps of some lanes that are looked at together, and x in them.
+  type :: strip_t
     integer :: lanes = 0
-    logical :: active(width) = .false.                !! whether anything lies there
-    real(wp) :: t_start(width) = 0.0_wp, t_end(width) = 0.0_wp
-    real(wp) :: x_start(width) = 0.0_wp, x_end(width) = 0.0_wp
-    real(wp) :: c(width, most_degrees) = 0.0_wp       !! of the powers of the place, 0 to 1
-  end type part_t
+    integer :: before = 0                             !! lanes of the strips before it
+    logical :: taken(width) = .false.                 !! x stands still in the other lanes
+    real(wp), dimension(width) :: t_start = 0.0_wp, t_end = 0.0_wp
+    real(wp), dimension(width) :: scale = 0.0_wp, until = 1.0_wp
+    logical :: is_complete = .false.                  !! whether all lanes have taken their steps
+    logical :: is_cut = .false.                       !! whether a step ends before its polynomial does
+    real(wp), dimension(width) :: x_start = 0.0_wp, x_end = 0.0_wp
+    real(wp) :: c(width, most_degrees) = 0.0_wp       !! x = x_start + sum of c_p (scale * place)^p
+    real(wp) :: size(width) = 0.0_wp                  !! sum of |c_p scale^p|
+  end type strip_t
 
   type, public :: linear_statistics_t
     type(linear_columns_t) :: columns
@@ -44,9 +51,11 @@ module nocdyn_linear_statistics
     integer, allocatable, private :: track(:)                 !! of each statistic, 0 for those of the end
     type(track_t), allocatable, private :: tracks(:)          !! in the order of their columns
     real(wp), allocatable, private :: nodes(:), weights(:)    !! of Gauss, 0 to 1
+    real(wp), allocatable, private :: to_bernstein(:, :)
+    real(wp), private :: t_start = 0.0_wp
     real(wp), allocatable, private :: x_end(:, :)             !! [lanes, columns]
-    real(wp), allocatable, private :: y_strip(:, :), y_new_strip(:, :), c_strip(:, :, :)   !! the last lanes, with padding
-    type(part_t), private :: whole, part
+    real(wp), allocatable, private :: y_last(:, :), y_new_last(:, :), c_last(:, :, :)   !! of the last lanes, with padding
+    type(strip_t), private :: strip, cut
   contains
     procedure :: begin
     procedure :: is_rising
@@ -57,15 +66,16 @@ module nocdyn_linear_statistics
 
 contains
 
-  function new_linear_statistics(block, columns, statistics, t_end) result(self)
+  function new_linear_statistics(block, columns, statistics, t_start, t_end) result(self)
     class(formulation_t), intent(in) :: block
     type(column_t), intent(in) :: columns(:)         !! of the trajectory table
     type(statistic_t), intent(in) :: statistics(:)   !! of columns that are linear
-    real(wp), intent(in) :: t_end                    !! [s]
+    real(wp), intent(in) :: t_start, t_end           !! [s]
     type(linear_statistics_t) :: self
     integer, allocatable :: wanted(:)
     integer :: i
 
+    self%t_start = t_start
     self%t_end = t_end
     allocate (self%statistics, source=statistics)
     allocate (wanted, source=pack([(i, i=1, size(columns))], [(any(statistics%column == i), i=1, size(columns))]))
@@ -109,29 +119,47 @@ contains
     end do
     do k = 1, size(self%tracks)
       associate (track => self%tracks(k))
-        allocate (track%highest(lanes), track%lowest(lanes), track%highest_time(lanes), track%integral(lanes), &
-                  track%square(lanes), source=0.0_wp)
+        track%has_range = track%has_max .or. track%has_min .or. track%has_size
+        allocate (track%highest(width, strip_of(lanes)), source=0.0_wp)
+        allocate (track%lowest, track%highest_time, track%integral, track%square, source=track%highest)
+        allocate (track%gate, source=track%highest - huge(0.0_wp))
       end associate
     end do
   end subroutine lay_tracks
 
-  !> A lane of the block starts anew, at a time that no `from` is before.
-  subroutine begin(self, block, lane)
+  !> A lane of the block starts anew at y.
+  subroutine begin(self, block, lane, y)
     class(linear_statistics_t), intent(inout) :: self
     class(formulation_t), intent(in) :: block
     integer, intent(in) :: lane
+    real(wp), contiguous, intent(in) :: y(:)
     integer :: i
 
     call self%columns%take_lane(block, lane)
     do i = 1, size(self%tracks)
-      associate (track => self%tracks(i))
-        track%highest(lane) = -huge(0.0_wp)
-        track%lowest(lane) = huge(0.0_wp)
-        track%integral(lane) = 0.0_wp
-        track%square(lane) = 0.0_wp
+      associate (track => self%tracks(i), at => place_of(lane), strip => strip_of(lane))
+        track%highest(at, strip) = -huge(0.0_wp)
+        track%lowest(at, strip) = huge(0.0_wp)
+        track%gate(at, strip) = huge(0.0_wp)
+        track%integral(at, strip) = 0.0_wp
+        track%square(at, strip) = 0.0_wp
+        if (track%from > self%t_start) cycle
+        call open_gate(track, at, strip, self%columns%argument(track%column, lane, y), self%t_start)
       end associate
     end do
   end subroutine begin
+
+  !> The range of a lane begins with a value.
+  pure subroutine open_gate(track, at, strip, x, t)
+    type(track_t), intent(inout) :: track
+    integer, intent(in) :: at, strip
+    real(wp), intent(in) :: x, t
+
+    track%gate(at, strip) = -huge(0.0_wp)
+    track%highest(at, strip) = x
+    track%lowest(at, strip) = x
+    track%highest_time(at, strip) = t
+  end subroutine open_gate
 
   !> Whether the column of a statistic rises with x in a lane.
   pure logical function is_rising(self, number, lane)
@@ -160,31 +188,19 @@ contains
     type(steps_t), intent(in) :: steps
     real(wp), contiguous, intent(in) :: y(:, :), y_new(:, :)   !! [lanes, padded columns]
     real(wp), contiguous, intent(in) :: c(:, :, :)             !! [lanes, padded columns, degree]
-    integer :: column, first, i, lanes
+    integer :: column, i, number
 
     if (size(self%tracks) == 0) return
     if (.not. allocated(self%nodes)) call lay_out(self, size(c, 2), size(c, 3))
-    lanes = size(c, 1)
-    do first = 1, lanes, width
-      self%whole%lanes = min(width, lanes - first + 1)
-      if (self%whole%lanes < width) then
-        self%y_strip(:self%whole%lanes, :) = y(first:, :)
-        self%y_new_strip(:self%whole%lanes, :) = y_new(first:, :)
-        self%c_strip(:self%whole%lanes, :, :) = c(first:, :, :)
-      end if
+    do number = 1, size(self%tracks(1)%gate, 2)
+      call take_strip(self, number, steps, y, y_new, c)
       column = 0
       do i = 1, size(self%tracks)
         associate (track => self%tracks(i))
-          if (track%column /= column) then
-            column = track%column
-            if (self%whole%lanes < width) then
-              call expand(self%columns, column, first, width, 1, size(c, 2), size(c, 3), self%y_strip, self%y_new_strip, &
-                          self%c_strip, self%whole)
-            else
-              call expand(self%columns, column, first, lanes, first, size(c, 2), size(c, 3), y, y_new, c, self%whole)
-            end if
-          end if
-          call follow_track(self, track, steps, first, size(c, 3))
+          if (track%column /= column) call expand_strip(self, track%column, number, y, y_new, c)
+          column = track%column
+          if (track%has_range) call widen_strip(self, track, number, steps, size(c, 3))
+          if (track%has_sums) call integrate_strip(self, track, number, steps, size(c, 3))
         end associate
       end do
     end do
@@ -199,212 +215,306 @@ contains
     if (degree > most_degrees) error stop 'nocdyn_linear_statistics: the solution inside the step has too many coefficients'
     allocate (self%nodes(degree + 1), self%weights(degree + 1))
     call lay_gauss_rule(degree + 1, self%nodes, self%weights)
-    allocate (self%y_strip(width, columns), self%y_new_strip(width, columns), self%c_strip(width, columns, degree), source=0.0_wp)
+    allocate (self%to_bernstein(degree + 1, degree + 1))
+    call lay_bernstein_matrix(degree, self%to_bernstein)
+    allocate (self%y_last(width, columns), self%y_new_last(width, columns), self%c_last(width, columns, degree), source=0.0_wp)
   end subroutine lay_out
 
-  !> x of a column at the ends of the steps, and its coefficients, in the lanes from `at` on.
-  pure subroutine expand(columns, number, first, lanes, at, states, degree, y, y_new, c, whole)
-    type(linear_columns_t), intent(in) :: columns
+  !> The steps of the lanes of a strip. Those of the last one, if it is not full, are copied to where there is room beside them.
+  subroutine take_strip(self, number, steps, y, y_new, c)
+    type(linear_statistics_t), intent(inout) :: self
     integer, intent(in) :: number
-    integer, intent(in) :: first   !! the lane whose factors are used at `at`
-    integer, intent(in) :: lanes, at, states, degree
-    real(wp), intent(in) :: y(lanes, states), y_new(lanes, states), c(lanes, states, degree)
-    type(part_t), intent(inout) :: whole
-    integer :: j, k, p
+    type(steps_t), intent(in) :: steps
+    real(wp), contiguous, intent(in) :: y(:, :), y_new(:, :), c(:, :, :)
+    integer :: i
 
-    whole%x_start = columns%offset(first:first + width - 1, number)
-    whole%x_end = whole%x_start
-    do p = 1, degree
-      whole%c(:, p) = 0.0_wp
-    end do
-    do k = columns%first(number), columns%first(number + 1) - 1
-      j = columns%component(k)
-      associate (factor => columns%factor(first:first + width - 1, k))
-        whole%x_start = whole%x_start + factor * y(at:at + width - 1, j)
-        whole%x_end = whole%x_end + factor * y_new(at:at + width - 1, j)
-        do p = 1, degree
-          whole%c(:, p) = whole%c(:, p) + factor * c(at:at + width - 1, j, p)
-        end do
+    associate (strip => self%strip)
+      strip%before = width * (number - 1)
+      strip%lanes = min(width, size(c, 1) - strip%before)
+      strip%is_complete = strip%lanes == width
+      strip%is_cut = .false.
+      do i = 1, strip%lanes
+        associate (lane => strip%before + i)
+          strip%taken(i) = steps%taken(lane)
+          strip%t_start(i) = steps%t(lane)
+          strip%t_end(i) = steps%t_new(lane)
+          strip%until(i) = steps%until(lane)
+          strip%scale(i) = 0.0_wp
+          if (steps%taken(lane)) strip%scale(i) = steps%scale(lane)
+          if (steps%taken(lane) .and. steps%until(lane) < 1) strip%is_cut = .true.
+          strip%is_complete = strip%is_complete .and. steps%taken(lane)
+        end associate
+      end do
+      if (strip%lanes == width) return
+      self%y_last(:strip%lanes, :) = y(strip%before + 1:, :)
+      self%y_new_last(:strip%lanes, :) = y_new(strip%before + 1:, :)
+      self%c_last(:strip%lanes, :, :) = c(strip%before + 1:, :, :)
+    end associate
+  end subroutine take_strip
+
+  !> x of a column in the steps of the strip.
+  subroutine expand_strip(self, column, number, y, y_new, c)
+    type(linear_statistics_t), intent(inout) :: self
+    integer, intent(in) :: column, number
+    real(wp), contiguous, intent(in) :: y(:, :), y_new(:, :), c(:, :, :)
+    integer :: i
+
+    associate (columns => self%columns, first => self%columns%first(column))
+      associate (entries => columns%first(column + 1) - first)
+        if (self%strip%lanes < width) then
+          call expand(width, size(c, 2), size(c, 3), 1, entries, columns%component(first), columns%factor(1, first, number), &
+                      columns%offset(1, column, number), self%y_last, self%y_new_last, self%c_last, self%strip)
+        else
+          call expand(size(c, 1), size(c, 2), size(c, 3), self%strip%before + 1, entries, columns%component(first), &
+                      columns%factor(1, first, number), columns%offset(1, column, number), y, y_new, c, self%strip)
+        end if
       end associate
+    end associate
+    if (self%strip%is_complete) return
+    do i = 1, width
+      if (i > self%strip%lanes .or. .not. self%strip%taken(i)) self%strip%x_end(i) = self%strip%x_start(i)
     end do
+  end subroutine expand_strip
+
+  !> x = offset + sum of factor * y, and its coefficients, in the lanes from `at` on.
+  pure subroutine expand(lanes, states, degree, at, entries, component, factor, offset, y, y_new, c, strip)
+    integer, intent(in) :: lanes, states, degree, at
+    integer, intent(in) :: entries   !! an even number
+    integer, intent(in) :: component(entries)
+    real(wp), intent(in) :: factor(width, entries), offset(width)
+    real(wp), intent(in) :: y(lanes, states), y_new(lanes, states), c(lanes, states, degree)
+    type(strip_t), intent(inout) :: strip
+    integer :: k
+
+    strip%x_start = offset
+    strip%x_end = offset
+    do k = 1, entries
+      strip%x_start = strip%x_start + factor(:, k) * y(at:at + width - 1, component(k))
+      strip%x_end = strip%x_end + factor(:, k) * y_new(at:at + width - 1, component(k))
+    end do
+    call take_pair(lanes, states, degree, at, component(1), component(2), factor(:, 1), factor(:, 2), c, strip%c)
+    do k = 3, entries, 2
+      call add_pair(lanes, states, degree, at, component(k), component(k + 1), factor(:, k), factor(:, k + 1), c, strip%c)
+    end do
+    call measure(degree, strip%scale, strip%c, strip%size)
   end subroutine expand
 
-  subroutine follow_track(self, track, steps, first, degree)
-    type(linear_statistics_t), intent(inout) :: self
-    type(track_t), intent(inout) :: track
-    type(steps_t), intent(in) :: steps
-    integer, intent(in) :: first, degree
-    logical :: is_cut
-    integer :: i
-
-    is_cut = .false.
-    do i = 1, self%whole%lanes
-      associate (whole => self%whole, lane => first + i - 1)
-        whole%active(i) = steps%taken(lane) .and. steps%t_new(lane) > track%from
-        whole%t_start(i) = steps%t(lane)
-        whole%t_end(i) = steps%t_new(lane)
-        if (whole%active(i)) is_cut = is_cut .or. steps%t(lane) < track%from .or. steps%until(lane) < 1
-      end associate
-    end do
-    if (is_cut) then
-      self%part = self%whole
-      call cut_part(self%part, steps, first, track%from, degree)
-      call take_part(self, track, self%part, first, degree)
-    else
-      call take_part(self, track, self%whole, first, degree)
-    end if
-  end subroutine follow_track
-
-  !> Leaves of each step what lies after `from` and before its cut.
-  pure subroutine cut_part(part, steps, first, from, degree)
-    type(part_t), intent(inout) :: part
-    type(steps_t), intent(in) :: steps
-    integer, intent(in) :: first
-    real(wp), intent(in) :: from
-    integer, intent(in) :: degree
-    real(wp) :: c(0:most_degrees), place
-    integer :: i
-
-    do i = 1, part%lanes
-      associate (lane => first + i - 1)
-        if (.not. part%active(i)) cycle
-        if (steps%t(lane) >= from .and. steps%until(lane) >= 1) cycle
-        place = max(0.0_wp, (from - steps%t(lane)) / steps%h(lane))
-        part%t_start(i) = max(from, steps%t(lane))
-        c(0) = part%x_start(i)
-        c(1:degree) = part%c(i, :degree)
-        call shift_origin(degree, c(:degree), place, steps%until(lane))
-        part%x_start(i) = c(0)
-        part%c(i, :degree) = c(1:degree)
-      end associate
-    end do
-  end subroutine cut_part
-
-  subroutine take_part(self, track, part, first, degree)
-    type(linear_statistics_t), intent(in) :: self
-    type(track_t), intent(inout) :: track
-    type(part_t), intent(in) :: part
-    integer, intent(in) :: first, degree
-    real(wp), dimension(width) :: above, below, integral, square
-    integer :: i
-
-    if (track%has_max .or. track%has_min .or. track%has_size) then
-      call bound_part(part, degree, above, below)
-      do i = 1, part%lanes
-        if (part%active(i)) call widen(track, part, i, first + i - 1, above(i), below(i), degree)
-      end do
-    end if
-    if (.not. track%has_sums) return
-    call integrate_part(self, track%column, part, first, degree, integral, square)
-    do i = 1, part%lanes
-      if (.not. part%active(i)) cycle
-      associate (lane => first + i - 1, duration => part%t_end(i) - part%t_start(i))
-        track%integral(lane) = track%integral(lane) + duration * integral(i)
-        track%square(lane) = track%square(lane) + duration * square(i)
-      end associate
-    end do
-  end subroutine take_part
-
-  !> What x can rise and fall from its start at most.
-  pure subroutine bound_part(part, degree, above, below)
-    type(part_t), intent(in) :: part
-    integer, intent(in) :: degree
-    real(wp), intent(out) :: above(width), below(width)
+  pure subroutine take_pair(lanes, states, degree, at, j, k, factor_j, factor_k, c, x)
+    integer, intent(in) :: lanes, states, degree, at, j, k
+    real(wp), intent(in) :: factor_j(width), factor_k(width), c(lanes, states, degree)
+    real(wp), intent(inout) :: x(width, degree)
     integer :: p
 
-    above = 0.0_wp
-    below = 0.0_wp
     do p = 1, degree
-      above = above + max(part%c(:, p), 0.0_wp)
-      below = below + min(part%c(:, p), 0.0_wp)
+      x(:, p) = factor_j * c(at:at + width - 1, j, p) + factor_k * c(at:at + width - 1, k, p)
     end do
-  end subroutine bound_part
+  end subroutine take_pair
 
-  !> Widens the range of x in a lane by its step.
-  pure subroutine widen(track, part, i, lane, above, below, degree)
-    type(track_t), intent(inout) :: track
-    type(part_t), intent(in) :: part
-    integer, intent(in) :: i, lane
-    real(wp), intent(in) :: above, below
+  pure subroutine add_pair(lanes, states, degree, at, j, k, factor_j, factor_k, c, x)
+    integer, intent(in) :: lanes, states, degree, at, j, k
+    real(wp), intent(in) :: factor_j(width), factor_k(width), c(lanes, states, degree)
+    real(wp), intent(inout) :: x(width, degree)
+    integer :: p
+
+    do p = 1, degree
+      x(:, p) = x(:, p) + (factor_j * c(at:at + width - 1, j, p) + factor_k * c(at:at + width - 1, k, p))
+    end do
+  end subroutine add_pair
+
+  !> size = sum of |c_p scale^p|.
+  pure subroutine measure(degree, scale, c, size)
     integer, intent(in) :: degree
-    real(wp) :: high_bar, low_bar   ! what x and -x must pass to be of interest
+    real(wp), intent(in) :: scale(width), c(width, degree)
+    real(wp), intent(out) :: size(width)
+    real(wp) :: total(width)
+    integer :: p
 
-    associate (highest => track%highest(lane), lowest => track%lowest(lane))
-      if (highest < lowest) then
-        highest = part%x_start(i)
-        lowest = highest
-        track%highest_time(lane) = part%t_start(i)
-      end if
-      if (part%x_end(i) > highest) then
-        highest = part%x_end(i)
-        track%highest_time(lane) = part%t_end(i)
-      end if
-      lowest = min(lowest, part%x_end(i))
-      high_bar = highest
-      low_bar = -lowest
-      if (.not. track%has_max) high_bar = merge(max(high_bar, low_bar), huge(0.0_wp), track%has_size)
-      if (.not. track%has_min) low_bar = merge(max(highest, low_bar), huge(0.0_wp), track%has_size)
-      if (part%x_start(i) + above > high_bar) call look_above(track, part, i, lane, degree, high_bar)
-      if (-(part%x_start(i) + below) > low_bar) call look_below(track, part, i, lane, degree, low_bar)
-    end associate
-  end subroutine widen
+    total = abs(c(:, degree))
+    do p = degree - 1, 1, -1
+      total = abs(c(:, p)) + scale * total
+    end do
+    size = scale * total
+  end subroutine measure
 
-  pure subroutine look_above(track, part, i, lane, degree, bar)
-    type(track_t), intent(inout) :: track
-    type(part_t), intent(in) :: part
-    integer, intent(in) :: i, lane, degree
-    real(wp), intent(inout) :: bar
-    real(wp) :: c(0:most_degrees), place
-    logical :: found
-
-    c(0) = part%x_start(i)
-    c(1:degree) = part%c(i, :degree)
-    call raise_to_maximum(degree, c(:degree), bar, place, found)
-    if (.not. found) return
-    track%highest(lane) = bar
-    track%highest_time(lane) = part%t_start(i) + place * (part%t_end(i) - part%t_start(i))
-  end subroutine look_above
-
-  pure subroutine look_below(track, part, i, lane, degree, bar)
-    type(track_t), intent(inout) :: track
-    type(part_t), intent(in) :: part
-    integer, intent(in) :: i, lane, degree
-    real(wp), intent(inout) :: bar
-    real(wp) :: c(0:most_degrees), place
-    logical :: found
-
-    c(0) = -part%x_start(i)
-    c(1:degree) = -part%c(i, :degree)
-    call raise_to_maximum(degree, c(:degree), bar, place, found)
-    if (found) track%lowest(lane) = -bar
-  end subroutine look_below
-
-  !> Means over the parts of the column and of its square.
-  pure subroutine integrate_part(self, column, part, first, degree, integral, square)
+  !> Widens the range of x by the steps of the strip. Between its ends x is at most half of what its terms go up and down in all
+  !> beyond their mean.
+  subroutine widen_strip(self, track, number, steps, degree)
     type(linear_statistics_t), intent(in) :: self
-    integer, intent(in) :: column
-    type(part_t), intent(in) :: part
-    integer, intent(in) :: first, degree
-    real(wp), intent(out) :: integral(width), square(width)
-    real(wp) :: x(width)
-    integer :: node, p
+    type(track_t), intent(inout) :: track
+    integer, intent(in) :: number
+    type(steps_t), intent(in) :: steps
+    integer, intent(in) :: degree
+    real(wp) :: rise(width), fall(width)   ! of x beyond what is of interest, at most
+    integer :: i
 
-    integral = 0.0_wp
-    square = 0.0_wp
-    associate (linear => self%columns%linear(first:first + width - 1, column), &
-               cubic => self%columns%cubic(first:first + width - 1, column))
-      do node = 1, degree + 1
-        x = part%c(:, degree)
-        do p = degree - 1, 1, -1
-          x = part%c(:, p) + self%nodes(node) * x
-        end do
-        x = part%x_start + self%nodes(node) * x
-        x = (linear + cubic * x * x) * x
-        integral = integral + self%weights(node) * x
-        square = square + self%weights(node) * (x * x)
+    associate (strip => self%strip)
+      call widen_by_ends(strip, track%gate(1, number), track%highest(1, number), track%lowest(1, number), &
+                         track%highest_time(1, number))
+      call bound_excess(strip, track, track%gate(1, number), track%highest(1, number), track%lowest(1, number), rise, fall)
+      if (.not. (any(max(rise, fall) > 0) .or. strip%is_cut .or. track%from > self%t_start)) return
+      do i = 1, strip%lanes
+        if (.not. strip%taken(i) .or. strip%t_end(i) <= track%from) cycle
+        if (strip%until(i) < 1 .or. track%gate(i, number) > 0) then   ! the bounds do not hold
+          rise(i) = 1.0_wp
+          fall(i) = 1.0_wp
+        end if
+        if (max(rise(i), fall(i)) <= 0) cycle
+        call look_inside(self, track, i, number, steps%h(strip%before + i), degree, rise(i), fall(i))
       end do
     end associate
-  end subroutine integrate_part
+  end subroutine widen_strip
+
+  !> How far x and -x can pass what they must exceed to be of interest.
+  pure subroutine bound_excess(strip, track, gate, highest, lowest, rise, fall)
+    type(strip_t), intent(in) :: strip
+    type(track_t), intent(in) :: track
+    real(wp), intent(in) :: gate(width), highest(width), lowest(width)
+    real(wp), intent(out) :: rise(width), fall(width)
+    integer :: i
+
+    if (track%has_size) then
+      do i = 1, width
+        rise(i) = max(highest(i), -lowest(i))
+      end do
+      fall = rise
+    else
+      rise = huge(0.0_wp)
+      fall = huge(0.0_wp)
+    end if
+    if (track%has_max) rise = highest
+    if (track%has_min) fall = -lowest
+    do i = 1, width
+      rise(i) = 0.5_wp * (strip%size(i) + (strip%x_start(i) + strip%x_end(i))) - max(rise(i), gate(i))
+      fall(i) = 0.5_wp * (strip%size(i) - (strip%x_start(i) + strip%x_end(i))) - max(fall(i), gate(i))
+    end do
+  end subroutine bound_excess
+
+  !> By x at the ends of the steps of the lanes that have passed `from`.
+  pure subroutine widen_by_ends(strip, gate, highest, lowest, highest_time)
+    type(strip_t), intent(in) :: strip
+    real(wp), intent(in) :: gate(width)
+    real(wp), intent(inout) :: highest(width), lowest(width), highest_time(width)
+    integer :: i
+
+    do i = 1, width
+      highest_time(i) = merge(strip%t_end(i), highest_time(i), min(strip%x_end(i), -gate(i)) > highest(i))
+      highest(i) = max(highest(i), min(strip%x_end(i), -gate(i)))
+      lowest(i) = min(lowest(i), max(strip%x_end(i), gate(i)))
+    end do
+  end subroutine widen_by_ends
+
+  !> Widens the range by the extremes of a step, or of what of it lies after `from` and before its cut.
+  pure subroutine look_inside(self, track, i, number, h, degree, rise, fall)
+    type(linear_statistics_t), intent(in) :: self
+    type(track_t), intent(inout) :: track
+    integer, intent(in) :: i, number
+    real(wp), intent(in) :: h
+    integer, intent(in) :: degree
+    real(wp), intent(in) :: rise, fall   !! positive if x, if -x can be of interest
+    real(wp) :: bar, c(0:most_degrees), place, t_start
+    logical :: found
+
+    associate (highest => track%highest(i, number), lowest => track%lowest(i, number), time => track%highest_time(i, number), &
+               x_end => self%strip%x_end(i), t_end => self%strip%t_end(i))
+      call take_part(self%strip, i, track%from, h, degree, c, t_start)
+      if (track%gate(i, number) > 0) then
+        call open_gate(track, i, number, c(0), t_start)
+        if (x_end > highest) time = t_end
+        highest = max(highest, x_end)
+        lowest = min(lowest, x_end)
+      end if
+      if (rise > 0 .and. (track%has_max .or. track%has_size)) then
+        bar = highest
+        if (.not. track%has_max) bar = max(highest, -lowest)
+        call raise_to_maximum(degree, self%to_bernstein, c, bar, place, found)
+        if (found) highest = bar
+        if (found) time = t_start + place * (t_end - t_start)
+      end if
+      if (fall > 0 .and. (track%has_min .or. track%has_size)) then
+        bar = -lowest
+        if (.not. track%has_min) bar = max(highest, -lowest)
+        c(:degree) = -c(:degree)
+        call raise_to_maximum(degree, self%to_bernstein, c, bar, place, found)
+        if (found) lowest = -bar
+      end if
+    end associate
+  end subroutine look_inside
+
+  !> x in what of a step lies after `from` and before its cut, as a polynomial in the place there, 0 to 1.
+  pure subroutine take_part(strip, i, from, h, degree, c, t_start)
+    type(strip_t), intent(in) :: strip
+    integer, intent(in) :: i
+    real(wp), intent(in) :: from, h
+    integer, intent(in) :: degree
+    real(wp), intent(inout) :: c(0:degree)
+    real(wp), intent(out) :: t_start
+    real(wp) :: power
+    integer :: p
+
+    c(0) = strip%x_start(i)
+    power = 1.0_wp
+    do p = 1, degree
+      power = power * strip%scale(i)
+      c(p) = power * strip%c(i, p)
+    end do
+    t_start = max(strip%t_start(i), from)
+    if (t_start <= strip%t_start(i) .and. strip%until(i) >= 1) return
+    call shift_origin(degree, c, (t_start - strip%t_start(i)) / h, strip%until(i))
+  end subroutine take_part
+
+  !> Adds the integrals of a column and of its square over what of the steps lies after `from`.
+  subroutine integrate_strip(self, track, number, steps, degree)
+    type(linear_statistics_t), intent(inout) :: self
+    type(track_t), intent(inout) :: track
+    integer, intent(in) :: number
+    type(steps_t), intent(in) :: steps
+    integer, intent(in) :: degree
+    real(wp) :: c(0:most_degrees), duration(width), t_start
+    integer :: i
+
+    duration = 0.0_wp
+    if (self%strip%is_cut .or. track%from > self%t_start) then
+      self%cut = self%strip
+      do i = 1, self%strip%lanes
+        if (.not. self%strip%taken(i) .or. self%strip%t_end(i) <= track%from) cycle
+        call take_part(self%strip, i, track%from, steps%h(self%strip%before + i), degree, c(:degree), t_start)
+        duration(i) = self%strip%t_end(i) - t_start
+        self%cut%x_start(i) = c(0)
+        self%cut%c(i, :degree) = c(1:degree)
+        self%cut%scale(i) = 1.0_wp
+      end do
+      call add_integrals(self%cut, degree, self%nodes, self%weights, duration, self%columns%linear(1, track%column, number), &
+                         self%columns%cubic(1, track%column, number), track%integral(1, number), track%square(1, number))
+    else
+      do i = 1, self%strip%lanes
+        if (self%strip%taken(i)) duration(i) = self%strip%t_end(i) - self%strip%t_start(i)
+      end do
+      call add_integrals(self%strip, degree, self%nodes, self%weights, duration, self%columns%linear(1, track%column, number), &
+                         self%columns%cubic(1, track%column, number), track%integral(1, number), track%square(1, number))
+    end if
+  end subroutine integrate_strip
+
+  !> By Gauss's rule with as many nodes as x has coefficients: x and its square are integrated exactly.
+  pure subroutine add_integrals(strip, degree, nodes, weights, duration, linear, cubic, integral, square)
+    type(strip_t), intent(in) :: strip
+    integer, intent(in) :: degree
+    real(wp), intent(in) :: nodes(degree + 1), weights(degree + 1), duration(width), linear(width), cubic(width)
+    real(wp), intent(inout) :: integral(width), square(width)
+    real(wp) :: place(width), x(width)
+    integer :: node, p
+
+    do node = 1, degree + 1
+      place = strip%scale * nodes(node)
+      x = strip%c(:, degree)
+      do p = degree - 1, 1, -1
+        x = strip%c(:, p) + place * x
+      end do
+      x = strip%x_start + place * x
+      x = (linear + cubic * x * x) * x
+      integral = integral + duration * weights(node) * x
+      square = square + duration * weights(node) * (x * x)
+    end do
+  end subroutine add_integrals
 
   !> A statistic of a lane that has reached its end. Those of extremes are good where the column rises with x.
   real(wp) function value(self, number, lane)
@@ -417,20 +527,20 @@ contains
         value = columns%law(column, lane, self%x_end(lane, column))
         return
       end if
-      associate (track => self%tracks(self%track(number)))
+      associate (track => self%tracks(self%track(number)), at => place_of(lane), strip => strip_of(lane))
         select case (self%statistics(number)%kind)
         case (statistic_max)
-          value = columns%law(column, lane, track%highest(lane))
+          value = columns%law(column, lane, track%highest(at, strip))
         case (statistic_min)
-          value = columns%law(column, lane, track%lowest(lane))
+          value = columns%law(column, lane, track%lowest(at, strip))
         case (statistic_max_abs)
-          value = columns%law(column, lane, max(track%highest(lane), -track%lowest(lane)))
+          value = columns%law(column, lane, max(track%highest(at, strip), -track%lowest(at, strip)))
         case (statistic_time_of_max)
-          value = track%highest_time(lane)
+          value = track%highest_time(at, strip)
         case (statistic_mean)
-          value = track%integral(lane) / (self%t_end - track%from)
+          value = track%integral(at, strip) / (self%t_end - track%from)
         case (statistic_rms)
-          value = sqrt(track%square(lane) / (self%t_end - track%from))
+          value = sqrt(track%square(at, strip) / (self%t_end - track%from))
         case default
           error stop 'nocdyn_linear_statistics: there is no such statistic'
         end select

@@ -296,7 +296,8 @@ contains
 
     do lane = 1, size(self%active)
       self%theta(lane) = 0.0_wp
-      if (self%active(lane)) self%theta(lane) = min(1.0_wp, (self%t(lane) - steps%t(lane)) / steps%h(lane))
+      if (.not. self%active(lane)) cycle
+      self%theta(lane) = steps%scale(lane) * min(1.0_wp, (self%t(lane) - steps%t(lane)) / steps%h(lane))
     end do
     do component = 1, size(self%y, 2)
       associate (state => self%y(:, component))

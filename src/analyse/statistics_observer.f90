@@ -30,6 +30,7 @@ module nocdyn_statistics_observer
     type(linear_statistics_t), private :: linear
     type(sampled_statistics_t), private :: sampled, spare
     integer, allocatable, private :: in_linear(:), in_sampled(:), in_spare(:)   !! places of the statistics there, or 0
+    logical, private :: has_sampled = .false., has_spared = .false.   !! whether `sampled` is used, whether `spare` is now
     logical, allocatable, private :: all_lanes(:)             !! true
     logical, allocatable, private :: is_spared(:)             !! lanes in which `spare` is used
     logical, allocatable, private :: is_complete(:)           !! lanes that have reached the end
@@ -83,7 +84,8 @@ contains
     allocate (self%in_linear, source=places_of(linear))
     allocate (self%in_sampled, source=places_of(.not. linear))
     allocate (self%in_spare, source=places_of(has_extremum))
-    self%linear = new_linear_statistics(block, columns, pack(statistics, linear), t_end)
+    self%has_sampled = .not. all(linear)
+    self%linear = new_linear_statistics(block, columns, pack(statistics, linear), t_start, t_end)
     self%sampled = new_sampled_statistics(block, columns, pack(statistics, .not. linear), t_end)
     self%spare = new_sampled_statistics(block, columns, pack(statistics, has_extremum), t_end)
     allocate (self%all_lanes(block%lanes), source=.true.)
@@ -112,12 +114,13 @@ contains
 
     self%is_complete(lane) = .false.
     self%is_spared(lane) = .false.
-    call self%linear%begin(self%block, lane)
+    call self%linear%begin(self%block, lane, y)
     do i = 1, size(self%in_spare)
       if (self%in_spare(i) == 0) cycle
       if (.not. self%linear%is_rising(self%in_linear(i), lane)) self%is_spared(lane) = .true.
     end do
-    if (any(self%in_sampled > 0)) call begin_sampled(self, self%sampled, lane, y)
+    self%has_spared = any(self%is_spared)
+    if (self%has_sampled) call begin_sampled(self, self%sampled, lane, y)
     if (self%is_spared(lane)) call begin_sampled(self, self%spare, lane, y)
   end subroutine begin
 
@@ -161,7 +164,7 @@ contains
     if (t < self%t_end) return
     self%is_complete(lane) = .true.
     call self%linear%conclude(lane, y)
-    if (any(self%in_sampled > 0)) call self%sampled%conclude(lane, t, y)
+    if (self%has_sampled) call self%sampled%conclude(lane, t, y)
   end subroutine record
 
   subroutine follow_steps(self, steps, y, y_new, c)
@@ -170,8 +173,8 @@ contains
     real(wp), contiguous, intent(in) :: y(:, :), y_new(:, :), c(:, :, :)
 
     call self%linear%follow(steps, y, y_new, c)
-    call self%sampled%follow(steps, self%all_lanes, y, c)
-    if (any(self%is_spared)) call self%spare%follow(steps, self%is_spared, y, c)
+    if (self%has_sampled) call self%sampled%follow(steps, self%all_lanes, y, c)
+    if (self%has_spared) call self%spare%follow(steps, self%is_spared, y, c)
   end subroutine follow_steps
 
 end module nocdyn_statistics_observer

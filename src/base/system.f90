@@ -77,6 +77,7 @@ module nocdyn_system
     logical, allocatable :: crosses(:)   !! whether the step ends where the system changes its branch
     real(wp), allocatable :: t(:)        !! start
     real(wp), allocatable :: h(:)        !! theta = (time - t) / h is the place in the step
+    real(wp), allocatable :: scale(:)    !! the solution is a polynomial in scale * theta: scale is 1 or h
     real(wp), allocatable :: until(:)    !! end as a place: 1, or less where the step was cut
     real(wp), allocatable :: t_new(:)    !! end as a time
   end type steps_t
@@ -268,7 +269,7 @@ contains
     error stop 'nocdyn_system: an observer with tracked functions overrides take_ranges'
   end subroutine take_ranges
 
-  !> The last steps of the lanes, after their records and events: y + sum over p of c(:, :, p) theta^p.
+  !> The last steps of the lanes, after their records and events: y + sum over p of c(:, :, p) (scale theta)^p.
   subroutine follow_steps(self, steps, y, y_new, c)
     class(observer_t), intent(inout) :: self
     type(steps_t), intent(in) :: steps

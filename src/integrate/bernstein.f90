@@ -8,7 +8,7 @@ module nocdyn_bernstein
   implicit none (type, external)
   private
 
-  public :: raise_to_maximum, shift_origin
+  public :: lay_bernstein_matrix, raise_to_maximum, shift_origin
 
   integer, parameter, public :: most_degrees = 39
   integer, parameter :: most_halvings = 40
@@ -17,9 +17,25 @@ module nocdyn_bernstein
 
 contains
 
+  !> The matrix that makes Bernstein coefficients of those of powers: binomial(i, k) / binomial(n, k), k <= i.
+  pure subroutine lay_bernstein_matrix(n, matrix)
+    integer, intent(in) :: n
+    real(wp), intent(out) :: matrix(0:n, 0:n)   !! [Bernstein coefficients, powers]
+    integer :: i, k
+
+    matrix = 0.0_wp
+    matrix(:, 0) = 1.0_wp
+    do k = 1, n
+      do i = k, n
+        matrix(i, k) = matrix(i, k - 1) * (i - k + 1) / (n - k + 1)
+      end do
+    end do
+  end subroutine lay_bernstein_matrix
+
   !> Raises `highest` to the largest value of c_0 + c_1 s + ... between s = 0 and 1 if that is larger; the ends are not looked at.
-  pure subroutine raise_to_maximum(n, c, highest, place, found)
+  pure subroutine raise_to_maximum(n, matrix, c, highest, place, found)
     integer, intent(in) :: n         !! degree, 1 to `most_degrees`
+    real(wp), intent(in) :: matrix(0:n, 0:n)   !! of `lay_bernstein_matrix`
     real(wp), intent(in) :: c(0:n)
     real(wp), intent(inout) :: highest
     real(wp), intent(out) :: place   !! of the maximum
@@ -31,7 +47,7 @@ contains
     found = .false.
     place = 0.0_wp
     if (does_not_turn(n, c)) return
-    call to_bernstein(n, c, b(:, 1))
+    call multiply(n, matrix, c, b(:, 1))
     left(1) = 0.0_wp
     length(1) = 1.0_wp
     parts = 1
@@ -39,7 +55,7 @@ contains
       turns = 0
       if (can_exceed(n, b(:, parts), highest)) turns = turning_points(n, b(:, parts))
       if (turns == 1 .and. b(1, parts) >= b(0, parts)) then
-        call climb(n, c, left(parts), left(parts) + length(parts), highest, place, found)
+        call climb(n, c, left(parts), length(parts), real(maxloc(b(:n, parts), dim=1) - 1, wp) / n, highest, place, found)
       end if
       if (turns < 2 .or. parts > most_halvings) then
         parts = parts - 1
@@ -90,25 +106,18 @@ contains
     does_not_turn = least > 0 .or. most < 0
   end function does_not_turn
 
-  !> b_i = sum over k <= i of binomial(i, k) / binomial(n, k) c_k.
-  pure subroutine to_bernstein(n, c, b)
+  !> b = matrix * c.
+  pure subroutine multiply(n, matrix, c, b)
     integer, intent(in) :: n
-    real(wp), intent(in) :: c(0:n)
+    real(wp), intent(in) :: matrix(0:n, 0:n), c(0:n)
     real(wp), intent(out) :: b(0:n)
-    real(wp) :: binomial
-    integer :: i, k
+    integer :: k
 
-    binomial = 1.0_wp
-    do k = 0, n
-      b(k) = c(k) / binomial
-      binomial = binomial * (n - k) / (k + 1)
-    end do
+    b = c(0)
     do k = 1, n
-      do i = n, k, -1
-        b(i) = b(i) + b(i - 1)
-      end do
+      b = b + matrix(:, k) * c(k)
     end do
-  end subroutine to_bernstein
+  end subroutine multiply
 
   !> Changes of sign of the differences of the coefficients, which bound the roots of the derivative.
   pure integer function turning_points(n, b)
@@ -142,21 +151,25 @@ contains
     end do
   end subroutine halve
 
-  !> Raises `highest` to the single maximum between two places, by Newton's method on the derivative with bisection as safeguard.
-  pure subroutine climb(n, c, low, high, highest, place, found)
+  !> Raises `highest` to the single maximum in a part, by Newton's method on the derivative with bisection as safeguard.
+  pure subroutine climb(n, c, left, length, guess, highest, place, found)
     integer, intent(in) :: n
     real(wp), intent(in) :: c(0:n)
-    real(wp), intent(in) :: low, high
+    real(wp), intent(in) :: left, length
+    real(wp), intent(in) :: guess        !! of the maximum in the part, 0 to 1
     real(wp), intent(inout) :: highest, place
     logical, intent(inout) :: found
-    real(wp) :: above, below, change, curvature, s, slope, value
-    integer :: step
+    real(wp) :: above, below, change, curvature, d(0:most_degrees), s, slope, value
+    integer :: k, step
 
-    below = low
-    above = high
-    s = 0.5_wp * (low + high)
+    do k = 1, n
+      d(k - 1) = k * c(k)
+    end do
+    below = left
+    above = left + length
+    s = left + guess * length
     do step = 1, most_newton_steps
-      call differentiate(n, c, s, value, slope, curvature)
+      call differentiate(n - 1, d, s, slope, curvature)
       if (slope > 0) then
         below = s
       else
@@ -164,33 +177,34 @@ contains
       end if
       change = 0.5_wp * (below + above) - s
       if (curvature < 0) then
-        if (s - slope / curvature > below .and. s - slope / curvature < above) change = -slope / curvature
+        if (s - slope / curvature >= below .and. s - slope / curvature <= above) change = -slope / curvature
       end if
       s = s + change
       if (abs(change) <= last_change) exit
     end do
-    call differentiate(n, c, s, value, slope, curvature)
+    value = c(n)
+    do k = n - 1, 0, -1
+      value = value * s + c(k)
+    end do
     if (value <= highest) return
     highest = value
     place = s
     found = .true.
   end subroutine climb
 
-  pure subroutine differentiate(n, c, s, value, slope, curvature)
+  !> A polynomial and its derivative.
+  pure subroutine differentiate(n, c, s, value, slope)
     integer, intent(in) :: n
     real(wp), intent(in) :: c(0:n), s
-    real(wp), intent(out) :: value, slope, curvature
+    real(wp), intent(out) :: value, slope
     integer :: k
 
     value = c(n)
     slope = 0.0_wp
-    curvature = 0.0_wp
     do k = n - 1, 0, -1
-      curvature = curvature * s + slope
       slope = slope * s + value
       value = value * s + c(k)
     end do
-    curvature = 2 * curvature
   end subroutine differentiate
 
   !> The polynomial on [start, until] becomes one on [0, 1].

@@ -13,7 +13,7 @@ module nocdyn_following
   implicit none (type, external)
   private
 
-  public :: follow_lanes, cross_lanes
+  public :: follow_lanes, show_steps, cross_lanes
 
 contains
 
@@ -42,14 +42,23 @@ contains
           call follow_extremes(march%extremes, observer, march%dense, march%t_new(lane), steps%crosses(lane))
         end if
       end do
-      if (.not. observer%follows_steps) return
-      steps%taken(:) = march%accepted
-      steps%t(:) = march%trial%t
-      steps%h(:) = march%trial%h
-      steps%t_new(:) = march%t_new
-      call observer%follow_steps(steps, march%trial%y, march%trial%y_new, march%coefficients)
     end associate
   end subroutine follow_lanes
+
+  !> Hands an observer that follows the steps those of the whole block, after `follow_lanes`.
+  subroutine show_steps(march, stepper, observer)
+    type(march_t), intent(inout) :: march
+    class(stepper_t), intent(in) :: stepper
+    class(observer_t), intent(inout) :: observer
+
+    associate (steps => march%steps, trial => march%trial)
+      steps%taken(:) = march%accepted
+      steps%t(:) = trial%t
+      steps%h(:) = trial%h
+      steps%t_new(:) = march%t_new
+      call stepper%show(steps, trial, march%coefficients, observer)
+    end associate
+  end subroutine show_steps
 
   !> Cuts the step of a lane where a branch of the system ends.
   subroutine end_at_crossing(march, system, observer, lane, outcome, until)

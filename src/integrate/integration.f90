@@ -1,7 +1,7 @@
 !> Integration of a block of lanes from the first to the last requested time.
 module nocdyn_integration
   use nocdyn_errors, only: error_t, exit_input, raise
-  use nocdyn_following, only: cross_lanes, follow_lanes
+  use nocdyn_following, only: cross_lanes, follow_lanes, show_steps
   use nocdyn_integration_settings, only: check_settings, integration_settings_t
   use nocdyn_kinds, only: wp
   use nocdyn_march, only: advance_lanes, empty_lanes, fill_lanes, judge_lanes, march_t, prepare, set_out_lanes
@@ -94,6 +94,7 @@ contains
       call judge_lanes(march, stepper, system, times, outcome)
       if (any(march%accepted)) then
         call follow_lanes(march, system, times, observer, outcome)
+        if (march%is_followed) call show_steps(march, stepper, observer)
         call advance_lanes(march)
         call stepper%accept(march%accepted)
         if (march%has_switches) call cross_lanes(march, stepper, system, observer, outcome)

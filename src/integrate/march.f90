@@ -70,7 +70,8 @@ contains
       allocate (march%occupied(lanes), march%starting(lanes), march%accepted(lanes), march%wanted(lanes), &
                 march%inspected(lanes), march%steps%taken(lanes), march%steps%crosses(lanes), source=.false.)
       allocate (march%t_new(lanes), source=times(1))
-      allocate (march%steps%t(lanes), march%steps%h(lanes), march%steps%until(lanes), march%steps%t_new(lanes), source=0.0_wp)
+      allocate (march%steps%t(lanes), march%steps%h(lanes), march%steps%scale(lanes), march%steps%until(lanes), &
+                march%steps%t_new(lanes), source=0.0_wp)
       allocate (march%next(lanes), source=2)
       allocate (march%sample(components), source=0.0_wp)
       allocate (march%coefficients(lanes, size(march%trial%y, 2), stepper%degree), source=0.0_wp)
@@ -257,7 +258,8 @@ contains
       march%inspected(lane) = march%accepted(lane) &
                               .and. (march%has_events .or. march%has_extremes .or. march%has_switches &
                                      .or. next_time(march, lane, times) < march%t_new(lane))
-      march%wanted(lane) = march%inspected(lane) .or. (march%accepted(lane) .and. march%is_followed)
+      march%wanted(lane) = march%inspected(lane) &
+                           .or. (march%accepted(lane) .and. march%is_followed .and. .not. stepper%shows_own)
     end do
     if (any(march%wanted)) call stepper%interpolate(system, march%trial, march%wanted, march%coefficients)
     do lane = 1, march%trial%lanes

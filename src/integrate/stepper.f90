@@ -2,7 +2,7 @@
 module nocdyn_stepper
   use nocdyn_kinds, only: wp
   use nocdyn_step_control, only: step_control_t
-  use nocdyn_system, only: system_t
+  use nocdyn_system, only: observer_t, steps_t, system_t
   use nocdyn_trial, only: trial_t
   implicit none (type, external)
   private
@@ -15,6 +15,7 @@ module nocdyn_stepper
     logical :: has_coarse_error = .false.   !! whether there are two error estimates
     logical :: needs_series = .false.       !! whether the system must have a Taylor series
     logical :: plans_steps = .false.        !! whether `plan` chooses the sizes of the steps, which then have no error estimate
+    logical :: shows_own = .false.          !! whether `show` does without the coefficients of `interpolate`
   contains
     procedure :: plan
     procedure(prepare_interface), deferred :: prepare
@@ -23,6 +24,7 @@ module nocdyn_stepper
     procedure(interpolate_interface), deferred :: interpolate
     procedure(accept_interface), deferred :: accept
     procedure :: resume
+    procedure :: show
   end type stepper_t
 
   abstract interface
@@ -90,5 +92,17 @@ contains
 
     call self%begin(trial, resuming)
   end subroutine resume
+
+  !> Shows an observer the last steps of all lanes.
+  subroutine show(self, steps, trial, coefficients, observer)
+    class(stepper_t), intent(in) :: self
+    type(steps_t), intent(inout) :: steps
+    type(trial_t), intent(in) :: trial
+    real(wp), contiguous, intent(in) :: coefficients(:, :, :)   !! of `interpolate`, unless `shows_own`
+    class(observer_t), intent(inout) :: observer
+
+    steps%scale(:) = 1.0_wp
+    call observer%follow_steps(steps, trial%y, trial%y_new, coefficients)
+  end subroutine show
 
 end module nocdyn_stepper

@@ -11,7 +11,7 @@ module nocdyn_taylor_stepper
   use nocdyn_kinds, only: wp
   use nocdyn_step_control, only: smallest_step, step_control_t
   use nocdyn_stepper, only: stepper_t
-  use nocdyn_system, only: evaluation_fine, system_t
+  use nocdyn_system, only: evaluation_fine, observer_t, steps_t, system_t
   use nocdyn_trial, only: park, park_infinities, trial_fine, trial_not_finite, trial_shorten, trial_t
   implicit none (type, external)
   private
@@ -33,6 +33,7 @@ module nocdyn_taylor_stepper
     procedure :: attempt
     procedure :: interpolate
     procedure :: accept
+    procedure :: show
   end type taylor_stepper_t
 
 contains
@@ -49,6 +50,7 @@ contains
     stepper%degree = stepper%order
     stepper%needs_series = .true.
     stepper%plans_steps = .true.
+    stepper%shows_own = .true.
   end function taylor_stepper
 
   subroutine prepare(self, system)
@@ -225,5 +227,17 @@ contains
 
     self%moved(:) = self%moved .or. accepted
   end subroutine accept
+
+  !> The series as it is, in powers of the time.
+  subroutine show(self, steps, trial, coefficients, observer)
+    class(taylor_stepper_t), intent(in) :: self
+    type(steps_t), intent(inout) :: steps
+    type(trial_t), intent(in) :: trial
+    real(wp), contiguous, intent(in) :: coefficients(:, :, :)
+    class(observer_t), intent(inout) :: observer
+
+    steps%scale(:) = steps%h
+    call observer%follow_steps(steps, trial%y, trial%y_new, self%series(:, :, 1:))
+  end subroutine show
 
 end module nocdyn_taylor_stepper
