@@ -23,6 +23,7 @@ module nocdyn_linear_statistics
     real(wp) :: from = 0.0_wp                !! [s]
     logical :: has_range = .false.           !! whether extremes are wanted:
     logical :: has_max = .false., has_min = .false., has_size = .false.   !! largest, smallest, largest absolute value
+    logical :: has_time = .false.            !! of the largest
     logical :: has_sums = .false.
     real(wp), allocatable :: highest(:, :), lowest(:, :), highest_time(:, :)   !! of x
     real(wp), allocatable :: gate(:, :)                                        !! huge before `from`, -huge after it
@@ -33,11 +34,9 @@ module nocdyn_linear_statistics
   type :: strip_t
     integer :: lanes = 0
     integer :: before = 0                             !! lanes of the strips before it
-    logical :: taken(width) = .false.                 !! x stands still in the other lanes
-    real(wp), dimension(width) :: t_start = 0.0_wp, t_end = 0.0_wp
-    real(wp), dimension(width) :: scale = 0.0_wp, until = 1.0_wp
-    logical :: is_complete = .false.                  !! whether all lanes have taken their steps
-    logical :: is_cut = .false.                       !! whether a step ends before its polynomial does
+    logical :: is_complete = .false.                  !! whether there are `width` lanes, and all have taken a step
+    real(wp), dimension(width) :: t_end = 0.0_wp
+    real(wp), dimension(width) :: scale = 0.0_wp      !! 0 in lanes that have not taken a step: x stands still there
     real(wp), dimension(width) :: x_start = 0.0_wp, x_end = 0.0_wp
     real(wp) :: c(width, most_degrees) = 0.0_wp       !! x = x_start + sum of c_p (scale * place)^p
     real(wp) :: size(width) = 0.0_wp                  !! sum of |c_p scale^p|
@@ -106,6 +105,7 @@ contains
             select case (statistic%kind)
             case (statistic_max, statistic_time_of_max)
               track%has_max = .true.
+              track%has_time = track%has_time .or. statistic%kind == statistic_time_of_max
             case (statistic_min)
               track%has_min = .true.
             case (statistic_max_abs)
@@ -231,19 +231,15 @@ contains
     associate (strip => self%strip)
       strip%before = width * (number - 1)
       strip%lanes = min(width, size(c, 1) - strip%before)
-      strip%is_complete = strip%lanes == width
-      strip%is_cut = .false.
+      strip%is_complete = strip%lanes == width .and. steps%are_all_taken
+      if (strip%is_complete) then
+        strip%t_end = steps%t_new(strip%before + 1:strip%before + width)
+        strip%scale = steps%scale(strip%before + 1:strip%before + width)
+        return
+      end if
       do i = 1, strip%lanes
-        associate (lane => strip%before + i)
-          strip%taken(i) = steps%taken(lane)
-          strip%t_start(i) = steps%t(lane)
-          strip%t_end(i) = steps%t_new(lane)
-          strip%until(i) = steps%until(lane)
-          strip%scale(i) = 0.0_wp
-          if (steps%taken(lane)) strip%scale(i) = steps%scale(lane)
-          if (steps%taken(lane) .and. steps%until(lane) < 1) strip%is_cut = .true.
-          strip%is_complete = strip%is_complete .and. steps%taken(lane)
-        end associate
+        strip%t_end(i) = steps%t_new(strip%before + i)
+        strip%scale(i) = merge(steps%scale(strip%before + i), 0.0_wp, steps%taken(strip%before + i))
       end do
       if (strip%lanes == width) return
       self%y_last(:strip%lanes, :) = y(strip%before + 1:, :)
@@ -272,7 +268,7 @@ contains
     end associate
     if (self%strip%is_complete) return
     do i = 1, width
-      if (i > self%strip%lanes .or. .not. self%strip%taken(i)) self%strip%x_end(i) = self%strip%x_start(i)
+      if (abs(self%strip%scale(i)) <= 0) self%strip%x_end(i) = self%strip%x_start(i)
     end do
   end subroutine expand_strip
 
@@ -336,8 +332,7 @@ contains
     size = scale * total
   end subroutine measure
 
-  !> Widens the range of x by the steps of the strip. Between its ends x is at most half of what its terms go up and down in all
-  !> beyond their mean.
+  !> Widens the range of x by the steps of the strip.
   subroutine widen_strip(self, track, number, steps, degree)
     type(linear_statistics_t), intent(in) :: self
     type(track_t), intent(inout) :: track
@@ -348,67 +343,79 @@ contains
     integer :: i
 
     associate (strip => self%strip)
-      call widen_by_ends(strip, track%gate(1, number), track%highest(1, number), track%lowest(1, number), &
-                         track%highest_time(1, number))
-      call bound_excess(strip, track, track%gate(1, number), track%highest(1, number), track%lowest(1, number), rise, fall)
-      if (.not. (any(max(rise, fall) > 0) .or. strip%is_cut .or. track%from > self%t_start)) return
+      call widen_by_ends(track%has_time, strip%t_end, strip%x_end, track%gate(1, number), track%highest(1, number), &
+                         track%lowest(1, number), track%highest_time(1, number))
+      call bound_excess(track, strip%x_start, strip%x_end, strip%size, track%gate(1, number), track%highest(1, number), &
+                        track%lowest(1, number), rise, fall)
+      if (.not. (steps%may_be_cut .or. track%from > self%t_start)) then
+        if (max(maxval(rise), maxval(fall)) <= 0) return
+      end if
       do i = 1, strip%lanes
-        if (.not. strip%taken(i) .or. strip%t_end(i) <= track%from) cycle
-        if (strip%until(i) < 1 .or. track%gate(i, number) > 0) then   ! the bounds do not hold
-          rise(i) = 1.0_wp
-          fall(i) = 1.0_wp
-        end if
-        if (max(rise(i), fall(i)) <= 0) cycle
-        call look_inside(self, track, i, number, steps%h(strip%before + i), degree, rise(i), fall(i))
+        associate (lane => strip%before + i)
+          if (.not. steps%taken(lane) .or. strip%t_end(i) <= track%from) cycle
+          if (steps%until(lane) < 1 .or. track%gate(i, number) > 0) then   ! the bounds do not hold
+            rise(i) = 1.0_wp
+            fall(i) = 1.0_wp
+          end if
+          if (max(rise(i), fall(i)) <= 0) cycle
+          call look_inside(self, track, i, number, steps%t(lane), steps%h(lane), steps%until(lane), degree, rise(i), fall(i))
+        end associate
       end do
     end associate
   end subroutine widen_strip
 
-  !> How far x and -x can pass what they must exceed to be of interest.
-  pure subroutine bound_excess(strip, track, gate, highest, lowest, rise, fall)
-    type(strip_t), intent(in) :: strip
+  !> By x at the ends of the steps of the lanes that have passed `from`.
+  pure subroutine widen_by_ends(has_time, t_end, x_end, gate, highest, lowest, highest_time)
+    logical, intent(in) :: has_time
+    real(wp), intent(in) :: t_end(width), x_end(width), gate(width)
+    real(wp), intent(inout) :: highest(width), lowest(width), highest_time(width)
+    integer :: i
+
+    if (has_time) then
+      do i = 1, width
+        highest_time(i) = merge(t_end(i), highest_time(i), min(x_end(i), -gate(i)) > highest(i))
+      end do
+    end if
+    do i = 1, width
+      highest(i) = max(highest(i), min(x_end(i), -gate(i)))
+    end do
+    do i = 1, width
+      lowest(i) = min(lowest(i), max(x_end(i), gate(i)))
+    end do
+  end subroutine widen_by_ends
+
+  !> How far x and -x can pass what they must exceed to be of interest. x is at most half as much above the mean of its ends as
+  !> its terms are large.
+  pure subroutine bound_excess(track, x_start, x_end, size, gate, highest, lowest, rise, fall)
     type(track_t), intent(in) :: track
-    real(wp), intent(in) :: gate(width), highest(width), lowest(width)
+    real(wp), intent(in), dimension(width) :: x_start, x_end, size, gate, highest, lowest
     real(wp), intent(out) :: rise(width), fall(width)
     integer :: i
 
+    rise = huge(0.0_wp)
+    fall = huge(0.0_wp)
     if (track%has_size) then
       do i = 1, width
         rise(i) = max(highest(i), -lowest(i))
       end do
       fall = rise
-    else
-      rise = huge(0.0_wp)
-      fall = huge(0.0_wp)
     end if
     if (track%has_max) rise = highest
     if (track%has_min) fall = -lowest
     do i = 1, width
-      rise(i) = 0.5_wp * (strip%size(i) + (strip%x_start(i) + strip%x_end(i))) - max(rise(i), gate(i))
-      fall(i) = 0.5_wp * (strip%size(i) - (strip%x_start(i) + strip%x_end(i))) - max(fall(i), gate(i))
+      rise(i) = 0.5_wp * (size(i) + (x_start(i) + x_end(i))) - max(rise(i), gate(i))
+    end do
+    do i = 1, width
+      fall(i) = 0.5_wp * (size(i) - (x_start(i) + x_end(i))) - max(fall(i), gate(i))
     end do
   end subroutine bound_excess
 
-  !> By x at the ends of the steps of the lanes that have passed `from`.
-  pure subroutine widen_by_ends(strip, gate, highest, lowest, highest_time)
-    type(strip_t), intent(in) :: strip
-    real(wp), intent(in) :: gate(width)
-    real(wp), intent(inout) :: highest(width), lowest(width), highest_time(width)
-    integer :: i
-
-    do i = 1, width
-      highest_time(i) = merge(strip%t_end(i), highest_time(i), min(strip%x_end(i), -gate(i)) > highest(i))
-      highest(i) = max(highest(i), min(strip%x_end(i), -gate(i)))
-      lowest(i) = min(lowest(i), max(strip%x_end(i), gate(i)))
-    end do
-  end subroutine widen_by_ends
-
   !> Widens the range by the extremes of a step, or of what of it lies after `from` and before its cut.
-  pure subroutine look_inside(self, track, i, number, h, degree, rise, fall)
+  pure subroutine look_inside(self, track, i, number, t, h, until, degree, rise, fall)
     type(linear_statistics_t), intent(in) :: self
     type(track_t), intent(inout) :: track
     integer, intent(in) :: i, number
-    real(wp), intent(in) :: h
+    real(wp), intent(in) :: t, h, until   !! the step
     integer, intent(in) :: degree
     real(wp), intent(in) :: rise, fall   !! positive if x, if -x can be of interest
     real(wp) :: bar, c(0:most_degrees), place, t_start
@@ -416,7 +423,7 @@ contains
 
     associate (highest => track%highest(i, number), lowest => track%lowest(i, number), time => track%highest_time(i, number), &
                x_end => self%strip%x_end(i), t_end => self%strip%t_end(i))
-      call take_part(self%strip, i, track%from, h, degree, c, t_start)
+      call take_part(self%strip, i, track%from, t, h, until, degree, c, t_start)
       if (track%gate(i, number) > 0) then
         call open_gate(track, i, number, c(0), t_start)
         if (x_end > highest) time = t_end
@@ -441,10 +448,11 @@ contains
   end subroutine look_inside
 
   !> x in what of a step lies after `from` and before its cut, as a polynomial in the place there, 0 to 1.
-  pure subroutine take_part(strip, i, from, h, degree, c, t_start)
+  pure subroutine take_part(strip, i, from, t, h, until, degree, c, t_start)
     type(strip_t), intent(in) :: strip
     integer, intent(in) :: i
-    real(wp), intent(in) :: from, h
+    real(wp), intent(in) :: from
+    real(wp), intent(in) :: t, h, until   !! the step
     integer, intent(in) :: degree
     real(wp), intent(inout) :: c(0:degree)
     real(wp), intent(out) :: t_start
@@ -457,9 +465,9 @@ contains
       power = power * strip%scale(i)
       c(p) = power * strip%c(i, p)
     end do
-    t_start = max(strip%t_start(i), from)
-    if (t_start <= strip%t_start(i) .and. strip%until(i) >= 1) return
-    call shift_origin(degree, c, (t_start - strip%t_start(i)) / h, strip%until(i))
+    t_start = max(t, from)
+    if (t_start <= t .and. until >= 1) return
+    call shift_origin(degree, c, (t_start - t) / h, until)
   end subroutine take_part
 
   !> Adds the integrals of a column and of its square over what of the steps lies after `from`.
@@ -473,12 +481,14 @@ contains
     integer :: i
 
     duration = 0.0_wp
-    if (self%strip%is_cut .or. track%from > self%t_start) then
+    if (steps%may_be_cut .or. track%from > self%t_start) then
       self%cut = self%strip
       do i = 1, self%strip%lanes
-        if (.not. self%strip%taken(i) .or. self%strip%t_end(i) <= track%from) cycle
-        call take_part(self%strip, i, track%from, steps%h(self%strip%before + i), degree, c(:degree), t_start)
-        duration(i) = self%strip%t_end(i) - t_start
+        associate (lane => self%strip%before + i)
+          if (.not. steps%taken(lane) .or. steps%t_new(lane) <= track%from) cycle
+          call take_part(self%strip, i, track%from, steps%t(lane), steps%h(lane), steps%until(lane), degree, c(:degree), t_start)
+          duration(i) = steps%t_new(lane) - t_start
+        end associate
         self%cut%x_start(i) = c(0)
         self%cut%c(i, :degree) = c(1:degree)
         self%cut%scale(i) = 1.0_wp
@@ -487,7 +497,9 @@ contains
                          self%columns%cubic(1, track%column, number), track%integral(1, number), track%square(1, number))
     else
       do i = 1, self%strip%lanes
-        if (self%strip%taken(i)) duration(i) = self%strip%t_end(i) - self%strip%t_start(i)
+        associate (lane => self%strip%before + i)
+          if (steps%taken(lane)) duration(i) = steps%t_new(lane) - steps%t(lane)
+        end associate
       end do
       call add_integrals(self%strip, degree, self%nodes, self%weights, duration, self%columns%linear(1, track%column, number), &
                          self%columns%cubic(1, track%column, number), track%integral(1, number), track%square(1, number))

@@ -73,6 +73,8 @@ module nocdyn_system
 
   !> The steps that the lanes of a block have taken at the same time; [lanes].
   type, public :: steps_t
+    logical :: are_all_taken = .false.   !! whether all lanes have moved
+    logical :: may_be_cut = .false.      !! whether `until` may be less than 1
     logical, allocatable :: taken(:)     !! whether the lane has moved: the solution inside the step is given then
     logical, allocatable :: crosses(:)   !! whether the step ends where the system changes its branch
     real(wp), allocatable :: t(:)        !! start

@@ -53,6 +53,8 @@ contains
 
     associate (steps => march%steps, trial => march%trial)
       steps%taken(:) = march%accepted
+      steps%are_all_taken = all(march%accepted)
+      steps%may_be_cut = march%has_switches .or. march%has_events
       steps%t(:) = trial%t
       steps%h(:) = trial%h
       steps%t_new(:) = march%t_new
