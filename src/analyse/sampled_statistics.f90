@@ -68,12 +68,13 @@ contains
     type(statistic_t), intent(in) :: statistics(:)
     real(wp), intent(in) :: t_end                    !! [s]
     type(sampled_statistics_t) :: self
-    integer, allocatable :: wanted(:)
+    integer, allocatable :: column_numbers(:), wanted(:)
 
     self%t_end = t_end
     allocate (self%statistics, source=statistics)
-    wanted = distinct(statistics%column)
-    self%column = places_in(wanted, statistics%column)
+    allocate (column_numbers(size(statistics)), source=statistics%column)
+    wanted = distinct(column_numbers)
+    self%column = places_in(wanted, column_numbers)
     self%recorded = new_recorded_columns(formulation, columns(wanted))
     call divide_spans(self, formulation%lanes)
     associate (lanes => formulation%lanes)

@@ -223,6 +223,7 @@ contains
     type(one_each_t) :: queue
     type(outcome_t) :: outcome
     type(error_t), allocatable :: error
+    real(wp), allocatable :: start(:)
     real(wp) :: times(2)
 
     call make_alone(self, chunk%parameters(:, place), formulation)
@@ -235,7 +236,8 @@ contains
     !$omp end critical (texts)
     if (allocated(error)) return
     queue = one_each(formulation%start())
-    call observer%begin(1, queue%y(1, :))
+    allocate (start, source=queue%y(1, :))
+    call observer%begin(1, start)
     call integrate_with(stepper, formulation, settings, times, queue, observer, outcome)
     call conclude(chunk, place, 1, outcome, formulation, settings, observer)
   end subroutine compute_alone

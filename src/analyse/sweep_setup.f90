@@ -16,6 +16,8 @@ module nocdyn_sweep_setup
 
   public :: prepare_sweep, take_settings
 
+  integer, parameter :: most_lanes = 16   ! whole vectors of any processor
+
   type, public :: sweep_setup_t
     integer :: lanes = 1               !! of a block
     logical :: is_audited = .false.    !! whether a recorded column needs the works
@@ -42,7 +44,7 @@ contains
     call take_settings(plan%input, formulation, settings, times, error)
     if (allocated(error)) return
     setup%is_audited = needs_works(formulation, plan%statistics)
-    setup%lanes = 16
+    setup%lanes = most_lanes
   end subroutine prepare_sweep
 
   !> What &run says of the integration.

@@ -162,7 +162,7 @@ def test_a_merge_without_all_parts_is_refused_by_their_variants(nocdyn, discs):
         nocdyn("sweep", discs, "--out", "out", "--shard", f"{part}/3", "-q")
     outcome = nocdyn("merge", "out")
     assert (outcome.returncode, outcome.stdout) == (2, "")
-    assert outcome.stderr == "nocdyn: no journal holds variants 21 to 40 of 60\n"
+    assert outcome.stderr == "nocdyn: sweep.2-of-3.journal is not there: no journal holds variants 21 to 40 of 60\n"
     assert nocdyn.files("out") == ["sweep.1-of-3.journal", "sweep.3-of-3.journal"]
 
 
