@@ -50,10 +50,27 @@ contains
     if (allocated(error)) return
     associate (header => journals(1)%header)
       call read_input_text(header%input_text, folder, strings([character(len=1) ::]), input, error)
-      if (.not. allocated(error)) call make_plan(input, plan, error)
+      if (.not. allocated(error)) call plan_trajectories(input, plan, error)
     end associate
     if (.not. allocated(error)) call write_results(plan, folder, journals, effort, options, code, error)
   end subroutine merge_folder
+
+  !> What is still to be run. A plan of no trajectories needs no more than the input: the file of a list may be elsewhere.
+  subroutine plan_trajectories(input, plan, error)
+    type(input_t), intent(in) :: input
+    type(sweep_plan_t), intent(out) :: plan
+    type(error_t), allocatable, intent(out) :: error
+    integer :: g
+
+    do g = 1, size(input%groups)
+      if (input%groups(g)%kind /= 'record') cycle
+      if (.not. input%groups(g)%has_value('trajectories')) cycle
+      call make_plan(input, plan, error)
+      return
+    end do
+    plan%input = input
+    allocate (plan%trajectories(0))
+  end subroutine plan_trajectories
 
   !> All journals of a folder.
   subroutine open_journals(folder, journals, error)

@@ -76,10 +76,12 @@ contains
     type(error_t), allocatable, intent(out) :: error
     type(input_t) :: input
     type(run_summary_t) :: summary
-    real(wp) :: values(plan%design%varied)
+    real(wp), allocatable :: values(:)
     character(len=:), allocatable :: complaint
     integer :: i
 
+    if (size(plan%trajectories) == 0) return
+    allocate (values(plan%design%varied))
     do i = 1, size(plan%trajectories)
       associate (variant => plan%trajectories(i))
         input = plan%input

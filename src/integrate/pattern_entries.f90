@@ -7,6 +7,9 @@ module nocdyn_pattern_entries
 
   public :: pattern_fault, state_entries, quadrature_entries
 
+  !> Of a text that is not allocatable: gfortran 12 keeps the lengths of those that functions return where all threads write.
+  integer, parameter, public :: fault_length = 50
+
   !> Some entries of a pattern.
   type, public :: entries_t
     integer, allocatable :: position(:)   !! where the pattern has them
@@ -20,7 +23,7 @@ contains
   pure function pattern_fault(pattern, states, quadratures) result(fault)
     type(pattern_t), intent(in) :: pattern
     integer, intent(in) :: states, quadratures
-    character(len=:), allocatable :: fault
+    character(len=fault_length) :: fault
 
     fault = ''
     if (size(pattern%row) /= size(pattern%column)) then

@@ -2,7 +2,7 @@
 module nocdyn_stage_systems
   use nocdyn_finite, only: all_finite, is_finite
   use nocdyn_kinds, only: wp
-  use nocdyn_pattern_entries, only: entries_t, pattern_fault, quadrature_entries, state_entries
+  use nocdyn_pattern_entries, only: entries_t, fault_length, pattern_fault, quadrature_entries, state_entries
   use nocdyn_stage_matrix, only: stage_matrix_t
   use nocdyn_stage_solver, only: choose_stage_matrix
   use nocdyn_system, only: evaluation_fine, pattern_t, system_t
@@ -28,11 +28,11 @@ contains
     type(stage_system_t), intent(out) :: stage_system
     class(system_t), intent(in) :: system
     type(pattern_t) :: pattern
-    character(len=:), allocatable :: fault
+    character(len=fault_length) :: fault
 
     pattern = system%jacobian_pattern()
     fault = pattern_fault(pattern, system%states, system%quadratures)
-    if (len(fault) > 0) error stop 'nocdyn_stage_systems: ' // fault
+    if (fault /= '') error stop 'nocdyn_stage_systems: ' // fault
     associate (lanes => system%lanes, states => system%states, components => system%states + system%quadratures)
       allocate (stage_system%dfdy(lanes, size(pattern%row)), source=0.0_wp)
       allocate (stage_system%dfdt(lanes, components), source=0.0_wp)

@@ -8,13 +8,17 @@ import signal
 import time
 
 from conftest import CASE_2
+from sweep_inputs import SWEEP, TWO_DISCS, needs_sweeps
 
 PROGRESS = re.compile(r"\r[^\r]*case2\.nml: \d+ %, \d+ s left\x1b\[K")
 ERASED = "\r\x1b[K"
 
 
-def read_available(terminal, seconds):
-    """What is written to the terminal until it closes or the time is over."""
+SWEEP_PROGRESS = re.compile(r"\rdiscs\.nml: \d+ of 100000000 variants, [\d.e+]+ per second, \d+ s left\x1b\[K")
+
+
+def read_available(terminal, seconds, awaited=b"%"):
+    """What is written to the terminal until it closes, `awaited` has come or the time is over."""
     text, end = b"", time.monotonic() + seconds
     while time.monotonic() < end:
         ready, _, _ = select.select([terminal], [], [], 0.05)
@@ -27,7 +31,7 @@ def read_available(terminal, seconds):
         if not piece:
             break
         text += piece
-        if b"%" in text:
+        if awaited in text:
             break
     return text.decode()
 
@@ -44,6 +48,22 @@ def test_a_long_run_shows_progress_on_a_terminal_after_a_second(nocdyn):
     process.communicate(timeout=30)
     rest = os.read(terminal, 4096).decode()
     os.close(terminal)
+    assert ERASED + "nocdyn: " in rest
+
+
+@needs_sweeps
+def test_a_long_sweep_shows_how_many_variants_are_done(nocdyn):
+    nocdyn.write("discs.nml", TWO_DISCS + SWEEP)
+    endless = ("--set", "sweep.samples=100000000", "--set", "run.t_end=20")
+    terminal, end = pty.openpty()
+    process = nocdyn.start("sweep", "discs.nml", "--out", "out", *endless, stderr=end)
+    os.close(end)
+    shown = read_available(terminal, 3, b"left")
+    process.send_signal(signal.SIGINT)
+    process.communicate(timeout=30)
+    rest = os.read(terminal, 4096).decode()
+    os.close(terminal)
+    assert SWEEP_PROGRESS.search(shown)
     assert ERASED + "nocdyn: " in rest
 
 

@@ -56,3 +56,20 @@ def test_shards_do_not_show(whole, shards):
             assert whole("sweep", f"{name}.nml", "--out", folder, "--shard", f"{part}/{shards}", *words).returncode == 0
         assert whole("merge", folder).returncode == 0
         assert bytes_of(whole, folder) == bytes_of(whole, name)
+
+
+@needs_mpi
+def test_a_list_of_variants_is_the_same_on_threads_ranks_and_shards(nocdyn):
+    groups = [line for line in SWEEP.splitlines() if "&vary" not in line and "&sweep" not in line]
+    nocdyn.write("in/list.nml", TWO_DISCS + "&sweep design = 'list' file = 'variants.csv' /\n" + "\n".join(groups))
+    rows = [f"{20 + 0.5 * i},{0.1 + 0.02 * (i * 7 % 40)}" for i in range(40)]
+    nocdyn.write("in/variants.csv", "coupling.shaft.stiffness,load.drag.viscous\n" + "\n".join(rows) + "\n")
+    assert nocdyn("sweep", "in/list.nml", "--out", "whole", "--threads", 1).returncode == 0
+    command = [*mpirun(2), "sweep", "in/list.nml", "--out", "ranks"]
+    assert subprocess.run(command, cwd=nocdyn.folder, env=MPI_ENVIRONMENT, check=False, capture_output=True).returncode == 0
+    for part in (1, 2):
+        nocdyn("sweep", "in/list.nml", "--out", "shards", "--shard", f"{part}/2")
+    outcome = nocdyn("merge", "shards")
+    assert (outcome.returncode, outcome.stderr) == (0, "")
+    assert bytes_of(nocdyn, "ranks") == bytes_of(nocdyn, "whole")
+    assert bytes_of(nocdyn, "shards") == bytes_of(nocdyn, "whole")

@@ -126,6 +126,21 @@ def test_a_journal_of_another_version_is_not_gone_on_with(nocdyn, discs):
     assert outcome.stderr.startswith("nocdyn: out/sweep.journal") or "'out/sweep.journal'" in outcome.stderr
 
 
+def test_a_list_that_has_changed_is_not_gone_on_with(nocdyn):
+    groups = [line for line in SWEEP.splitlines() if "&vary" not in line and "&sweep" not in line]
+    nocdyn.write("discs.nml", TWO_DISCS + "&sweep design = 'list' file = 'variants.csv' /\n" + "\n".join(groups))
+    rows = [f"{20 + 1e-4 * i}" for i in range(2 * SAMPLES)]
+    nocdyn.write("variants.csv", "coupling.shaft.stiffness\n" + "\n".join(rows) + "\n")
+    process = start(nocdyn, "sweep", "discs.nml", "--out", "out", "--set", "run.t_end=20")
+    process.send_signal(signal.SIGINT)
+    process.communicate(timeout=30)
+    nocdyn.write("variants.csv", "coupling.shaft.stiffness\n" + "\n".join(["21", *rows[1:]]) + "\n")
+    outcome = nocdyn("sweep", "discs.nml", "--out", "out", "--set", "run.t_end=20", "--resume")
+    assert (outcome.returncode, outcome.stdout) == (2, "")
+    complaint = "the file of &sweep with the variants has changed"
+    assert outcome.stderr == f"nocdyn: out/sweep.journal cannot be gone on with: {complaint}\n"
+
+
 def test_nothing_to_go_on_with_is_said(nocdyn, discs):
     outcome = nocdyn("sweep", discs, "--out", "out", "--resume")
     assert outcome.returncode == 0
