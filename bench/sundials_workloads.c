@@ -3,10 +3,13 @@
  *
  *   sundials_workloads SOLVER RTOL ATOL REPETITIONS STATES_FILE case2 STIFFNESS CUBIC_STIFFNESS INERTIA_3
  *   sundials_workloads SOLVER RTOL ATOL REPETITIONS STATES_FILE chain STIFFNESS CUBIC_STIFFNESS BODIES T_END
+ *   sundials_workloads SOLVER RTOL ATOL REPETITIONS RESULTS_FILE sweep PARAMETERS_FILE
  *
  * SOLVER: adams (CVODE, fixed-point iteration), bdf, bdf2 (CVODE with Newton's method, order at most 5, 2), erk5, erk8
  * (ARKODE with Dormand-Prince 5(4), Fehlberg 8(7)). Prints one JSON object with the seconds of every repetition and the
- * counts; omega and phi of all bodies at the output times go to STATES_FILE, omega_1, omega_2, phi_1, phi_2 for case2. */
+ * counts; omega and phi of all bodies at the output times go to STATES_FILE, omega_1, omega_2, phi_1, phi_2 for case2.
+ * PARAMETERS_FILE holds c and k1 of variants of case2 as native doubles, RESULTS_FILE gets the states at the end and the
+ * largest |elastic moment| of each, whose times are the solvers' roots of the twist's rate. */
 #include <arkode/arkode_erkstep.h>
 #include <cvode/cvode.h>
 #include <math.h>
@@ -22,7 +25,7 @@
 #include <time.h>
 
 typedef struct {
-  double stiffness, cubic_stiffness, inertia_3;
+  double stiffness, cubic_stiffness, inertia_3, viscous;
   int bodies;
 } machine_t;
 
@@ -66,7 +69,7 @@ static int case2_derivative(double t, N_Vector state, N_Vector rate, void *data)
   double *f = N_VGetArrayPointer(rate);
   const double elastic = moment(m, y[3] - y[2]);
   f[0] = (200.0 - (10.0 + y[0]) * y[0] + 20.0 * sin(5.0 * t) + elastic) / 10.0;
-  f[1] = -(elastic + ratio * ratio * 100.0 * y[1]) / (5.0 + ratio * ratio * m->inertia_3);
+  f[1] = -(elastic + ratio * ratio * m->viscous * y[1]) / (5.0 + ratio * ratio * m->inertia_3);
   f[2] = y[0];
   f[3] = y[1];
   return 0;
@@ -82,11 +85,19 @@ static int case2_jacobian(double t, N_Vector state, N_Vector rate, SUNMatrix jac
   SM_ELEMENT_D(jacobian, 0, 0) = -(10.0 + 2.0 * y[0]) / 10.0;
   SM_ELEMENT_D(jacobian, 0, 2) = -stiffness / 10.0;
   SM_ELEMENT_D(jacobian, 0, 3) = stiffness / 10.0;
-  SM_ELEMENT_D(jacobian, 1, 1) = -ratio * ratio * 100.0 / inertia_23;
+  SM_ELEMENT_D(jacobian, 1, 1) = -ratio * ratio * m->viscous / inertia_23;
   SM_ELEMENT_D(jacobian, 1, 2) = stiffness / inertia_23;
   SM_ELEMENT_D(jacobian, 1, 3) = -stiffness / inertia_23;
   SM_ELEMENT_D(jacobian, 2, 0) = 1.0;
   SM_ELEMENT_D(jacobian, 3, 1) = 1.0;
+  return 0;
+}
+
+static int twist_rate(double t, N_Vector state, double *rate, void *data)
+{
+  const double *y = N_VGetArrayPointer(state);
+  (void)t, (void)data;
+  *rate = y[1] - y[0];
   return 0;
 }
 
@@ -213,10 +224,16 @@ static solver_t new_cvode(const char *name, workload_t *w, N_Vector y, double rt
 static workload_t workload_of(char **words)
 {
   workload_t w = {0};
+  if (strcmp(words[0], "sweep") == 0) {
+    w.machine = (machine_t){.stiffness = 100.0, .inertia_3 = 5.0};
+    w.derivative = case2_derivative, w.jacobian = case2_jacobian;
+    w.states = 4, w.t_end = 10.0;
+    return w;
+  }
   w.machine.stiffness = atof(words[1]);
   w.machine.cubic_stiffness = atof(words[2]);
   if (strcmp(words[0], "case2") == 0) {
-    w.machine.inertia_3 = atof(words[3]);
+    w.machine.inertia_3 = atof(words[3]), w.machine.viscous = 100.0;
     w.derivative = case2_derivative, w.jacobian = case2_jacobian;
     w.states = 4, w.outputs = 1001, w.t_end = 10.0;
   } else {
@@ -243,6 +260,48 @@ static void integrate(const solver_t *s, const workload_t *w, N_Vector y, N_Vect
   }
 }
 
+/* From rest to the end; results: the state there and the largest |moment|. */
+static void integrate_variant(const solver_t *s, const workload_t *w, N_Vector y, double *results)
+{
+  const double *state = N_VGetArrayPointer(y);
+  double t = 0.0, peak = 0.0;
+  N_VConst(0.0, y);
+  check(restart(s, w, y), "start");
+  while (t < w->t_end) {
+    check(s->is_arkode ? ERKStepEvolve(s->memory, w->t_end, y, &t, ARK_NORMAL) : CVode(s->memory, w->t_end, y, &t, CV_NORMAL),
+          "step");
+    peak = fmax(peak, fabs(moment(&w->machine, state[3] - state[2])));
+  }
+  memcpy(results, state, w->states * sizeof *results);
+  results[w->states] = peak;
+}
+
+/* All variants of a file of c and k1; results[variant]. */
+static double *sweep(const solver_t *s, workload_t *w, N_Vector y, const char *file_name, long *variants, double *seconds,
+                     long *steps, long *evaluations)
+{
+  FILE *file = fopen(file_name, "rb");
+  if (!file || fseek(file, 0, SEEK_END) != 0) give_up("the parameters cannot be read");
+  *variants = ftell(file) / (2 * (long)sizeof(double));
+  double (*parameters)[2] = malloc(*variants * sizeof *parameters);
+  double *results = malloc(*variants * (w->states + 1) * sizeof *results);
+  rewind(file);
+  if (fread(parameters, sizeof *parameters, *variants, file) != (size_t)*variants) give_up("the parameters cannot be read");
+  fclose(file);
+  check(s->is_arkode ? ERKStepRootInit(s->memory, 1, twist_rate) : CVodeRootInit(s->memory, 1, twist_rate), "roots");
+  *seconds = seconds_now();
+  for (long i = 0; i < *variants; i++) {
+    long these_steps, these_evaluations;
+    w->machine.viscous = parameters[i][0], w->machine.cubic_stiffness = parameters[i][1];
+    integrate_variant(s, w, y, results + i * (w->states + 1));
+    count(s, &these_steps, &these_evaluations);
+    *steps += these_steps, *evaluations += these_evaluations;
+  }
+  *seconds = seconds_now() - *seconds;
+  free(parameters);
+  return results;
+}
+
 /* The chain's states by kind: omega of all bodies, then phi. */
 static void sort_chain(const workload_t *w, double *states)
 {
@@ -258,12 +317,26 @@ static void sort_chain(const workload_t *w, double *states)
   free(sorted);
 }
 
+static void write_and_report(const char *file_name, const double *numbers, size_t count, long steps, long evaluations,
+                             const double *seconds, int repetitions)
+{
+  FILE *file = fopen(file_name, "wb");
+  if (!file || fwrite(numbers, sizeof *numbers, count, file) != count || fclose(file) != 0) {
+    give_up("the results cannot be written");
+  }
+  printf("{\"steps\": %ld, \"evaluations\": %ld, \"seconds\": [", steps, evaluations);
+  for (int i = 0; i < repetitions; i++) printf("%s%.6e", i > 0 ? ", " : "", seconds[i]);
+  printf("]}\n");
+}
+
 int main(int arguments, char **words)
 {
-  if (arguments < 10 || arguments != (strcmp(words[6], "chain") == 0 ? 11 : 10)) give_up("wrong number of arguments");
+  if (arguments < 8) give_up("wrong number of arguments");
+  const int is_sweep = strcmp(words[6], "sweep") == 0, is_chain = strcmp(words[6], "chain") == 0;
+  if (arguments != (is_sweep ? 8 : is_chain ? 11 : 10)) give_up("wrong number of arguments");
   const char *name = words[1];
   const double rtol = atof(words[2]), atol = atof(words[3]);
-  const int repetitions = atoi(words[4]);
+  const int repetitions = is_sweep ? 1 : atoi(words[4]);
   workload_t w = workload_of(words + 6);
   SUNContext context;
   check(SUNContext_Create(NULL, &context), "context");
@@ -271,9 +344,15 @@ int main(int arguments, char **words)
   N_VConst(0.0, y);
   const solver_t s = strncmp(name, "erk", 3) == 0 ? new_erk(name, &w, y, rtol, atol, context)
                                                    : new_cvode(name, &w, y, rtol, atol, context);
-  double *states = malloc((size_t)w.outputs * w.states * sizeof *states);
   long steps = 0, evaluations = 0;
   double *seconds = malloc(repetitions * sizeof *seconds);
+  if (is_sweep) {
+    long variants;
+    double *results = sweep(&s, &w, y, words[7], &variants, seconds, &steps, &evaluations);
+    write_and_report(words[5], results, (size_t)variants * (w.states + 1), steps, evaluations, seconds, repetitions);
+    return 0;
+  }
+  double *states = malloc((size_t)w.outputs * w.states * sizeof *states);
   for (int i = 0; i < repetitions; i++) {
     seconds[i] = seconds_now();
     integrate(&s, &w, y, point, states);
@@ -281,12 +360,6 @@ int main(int arguments, char **words)
   }
   count(&s, &steps, &evaluations);
   if (w.is_banded) sort_chain(&w, states);
-  FILE *file = fopen(words[5], "wb");
-  if (!file || fwrite(states, w.states * sizeof *states, w.outputs, file) != (size_t)w.outputs || fclose(file) != 0) {
-    give_up("the states cannot be written");
-  }
-  printf("{\"steps\": %ld, \"evaluations\": %ld, \"seconds\": [", steps, evaluations);
-  for (int i = 0; i < repetitions; i++) printf("%s%.6e", i > 0 ? ", " : "", seconds[i]);
-  printf("]}\n");
+  write_and_report(words[5], states, (size_t)w.outputs * w.states, steps, evaluations, seconds, repetitions);
   return 0;
 }

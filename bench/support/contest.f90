@@ -9,7 +9,7 @@ module contest
   implicit none (type, external)
   private
 
-  public :: text_argument, number_argument, whole_argument, seconds_now, write_states, print_report
+  public :: text_argument, number_argument, whole_argument, seconds_now, numbers_of_file, write_states, print_report
 
 contains
 
@@ -50,6 +50,20 @@ contains
     call system_clock(ticks, rate)
     seconds = real(ticks, wp) / real(rate, wp)
   end function seconds_now
+
+  !> All of a file of native doubles, `rows` to a column.
+  function numbers_of_file(file, rows) result(numbers)
+    character(len=*), intent(in) :: file
+    integer, intent(in) :: rows
+    real(wp), allocatable :: numbers(:, :)
+    integer :: unit, bytes
+
+    open (newunit=unit, file=file, access='stream', form='unformatted', status='old', action='read')
+    inquire (unit=unit, size=bytes)
+    allocate (numbers(rows, bytes / (rows * storage_size(1.0_wp) / 8)))
+    read (unit) numbers
+    close (unit)
+  end function numbers_of_file
 
   subroutine write_states(file, states)
     character(len=*), intent(in) :: file

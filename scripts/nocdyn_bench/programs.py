@@ -1,6 +1,7 @@
 """Contestants that are compiled programs: nocdyn, the loop written by hand, SUNDIALS. See bench/."""
 
 import json
+import os
 import subprocess
 from pathlib import Path
 
@@ -8,6 +9,7 @@ import numpy as np
 
 from .contestant import Contestant, ContestantError, Run, Solve
 from .problems import Case2, Problem
+from .variants import Found, SolveAll, SweepContestant
 
 MOST_WORDS = 25  # of the message of a program that fails
 
@@ -54,6 +56,33 @@ class Programs:
         return [Contestant(*notes[solver],
                            self._solve(problem, ["sundials_workloads", solver], problem.words, selects=False))
                 for solver in solvers]
+
+    def handwritten_sweep(self) -> SweepContestant:
+        return SweepContestant("hand-written loop", "Dormand-Prince 5(4) for this machine alone, one variant after the other, peaks from "
+                               "its dense output, bench/handwritten_sweep.f90", self._solve_all(["handwritten_sweep"], [], []))
+
+    def sundials_sweep(self, solvers: list[str]) -> list[SweepContestant]:
+        notes = {"adams": ("CVODE Adams", "fixed-point iteration, peaks by CVodeRootInit"),
+                 "erk5": ("ARKODE ERK 5(4)", "Dormand-Prince, peaks by ERKStepRootInit")}
+        if not self.has("sundials_workloads"):
+            return []
+        return [SweepContestant(*notes[solver], self._solve_all(["sundials_workloads", solver], ["1"], ["sweep"]), share=0.02) for solver in solvers]
+
+    def _solve_all(self, head: list, before: list[str], after: list[str]) -> SolveAll:
+        """`before` and `after` the name of the file with the results; that with the parameters comes last."""
+        parameters_file, results_file = self.scratch / "parameters.bin", self.scratch / "results.bin"
+
+        def solve(tolerance: float, parameters: np.ndarray) -> Found:
+            parameters.tofile(parameters_file)
+            command = [self.folder / head[0], *head[1:], repr(tolerance), repr(tolerance), *before, results_file, *after,
+                       parameters_file]
+            done = subprocess.run(command, capture_output=True, text=True, stdin=subprocess.DEVNULL,
+                                  env={**os.environ, "OMP_NUM_THREADS": "1"})
+            if done.returncode != 0:
+                raise ContestantError(" ".join(done.stderr.split()[:MOST_WORDS]))
+            return Found(json.loads(done.stdout)["seconds"][0], np.fromfile(results_file).reshape(-1, 5))
+
+        return solve
 
     def _solve(self, problem: Problem, head: list, tail: list[str], selects: bool = True) -> Solve:
         states = self.scratch / "states.bin"

@@ -11,24 +11,30 @@ from pathlib import Path
 from . import targets
 from .chains import Scaling
 from .rounds import Point
+from .throughput import SAMPLE, SLOW_SAMPLE, Rate, Throughput
 from .whole_process import Workload, largest_error
 from .work_precision import WorkPrecision
 
 PEERS = ("heyoka", "numbalsoda", "numba", "scipy", "numpy")
-VERDICTS = {"W1": targets.case2_verdicts, "W4": targets.stiff_case2_verdicts,
+VERDICTS = {"W1": targets.case2_verdicts, "W2": targets.throughput_verdicts, "W4": targets.stiff_case2_verdicts,
             "W3": targets.chain_verdicts, "W3_stiff": targets.stiff_chain_verdicts}
 
 
-def verdicts(workload: Workload | WorkPrecision | Scaling) -> list[targets.Verdict]:
+Measured = Workload | WorkPrecision | Scaling | Throughput
+
+
+def verdicts(workload: Measured) -> list[targets.Verdict]:
     return VERDICTS[workload.name](workload) if workload.name in VERDICTS else []
 
 
-def markdown(workload: Workload | WorkPrecision | Scaling) -> str:
+def markdown(workload: Measured) -> str:
     """One section."""
     if isinstance(workload, WorkPrecision):
         lines = _work_precision(workload)
     elif isinstance(workload, Scaling):
         lines = _scaling(workload)
+    elif isinstance(workload, Throughput):
+        lines = _throughput(workload)
     else:
         lines = _whole_process(workload)
     return "\n".join([f"## {workload.title}", "", *lines, *(f"\n{verdict}." for verdict in verdicts(workload))])
@@ -125,6 +131,9 @@ def ratio_table(measured: list) -> str:
             for chain in workload.chains:
                 columns[f"{workload.name}, N = {chain.bodies}"] = {
                     point.contestant.label: point.seconds for point in workload.points[chain]}
+        elif isinstance(workload, Throughput):
+            columns[f"{workload.name}, error {workload.error_wanted:.0e}"] = {
+                rate.contestant.label: 1.0 / rate.best for rate in workload.rates if rate.contestant.has_peak}
     labels = list(dict.fromkeys(label for column in columns.values() for label in column))
     rows = [[label] for label in labels]
     for column in columns.values():
@@ -181,6 +190,39 @@ def _scaling(workload: Scaling) -> list[str]:
             *_notes(list(contestants.values()), workload.failures)]
 
 
+def _throughput(workload: Throughput) -> list[str]:
+    rivals = [workload.rate(label) for label in ("hand-written loop", "heyoka with the peak")]
+    rows = []
+    for rate in workload.rates:
+        whole = workload.whole_rate(rate)
+        rows.append([rate.contestant.label, _rounded(rate.best), *(f"{rate.best / rival.best:.3g}" if rival else "-" for rival in rivals),
+                     _rounded(whole) if whole else "-", f"{rate.tolerance:.1e}", f"{rate.errors.state:.0e}",
+                     f"{rate.errors.peak:.0e}" if rate.contestant.has_peak else "-", _rounded(rate.variants)])
+    head = ["", "variants per second", "hand-written loop = 1", "heyoka with the peak = 1", "whole process", "tolerance", "error of the state",
+            "error of the peak", "variants"]
+    return [*_table(head, rows), "",
+            f"Each contestant has the loosest tolerance, in tenths of a decade, with which its errors are below {workload.error_wanted:.0e}: the "
+            "largest absolute one of the four states at the end [rad, rad/s], and the largest relative one of the peak, of the first "
+            f"{SAMPLE} variants, {SLOW_SAMPLE} of those that integrate a part of the {_rounded(workload.count)} variants. One thread where nothing else is said. "
+            "Whole process: from its start until the files are written.", "",
+            f"Reference: heyoka with 80-bit numbers at tolerance 1e-18; SciPy DOP853 at 1e-13 differs by {workload.distance.state:.1e} and "
+            f"{workload.distance.peak:.1e}.", "",
+            *_notes([rate.contestant for rate in workload.rates], workload.failures)]
+
+
+def _rounded(number: float) -> str:
+    """Three digits, thousands apart."""
+    digits = max(0, math.floor(math.log10(number)) - 2)
+    return f"{round(number, -digits):,.0f}".replace(",", " ")
+
+
+def _rate(workload: Throughput, rate: Rate) -> dict:
+    return {"contestant": rate.contestant.label, "variants_per_second": rate.best, "median_variants_per_second": rate.median,
+            "rounds": len(rate.rounds), "variants": rate.variants, "tolerance": rate.tolerance,
+            "whole_process_variants_per_second": workload.whole_rate(rate),
+            "errors": {"state": rate.errors.state, "peak": rate.errors.peak if math.isfinite(rate.errors.peak) else None}}
+
+
 def _count(point: Point | None) -> str:
     return "-" if point is None or point.steps is None else str(point.steps)
 
@@ -211,11 +253,13 @@ def _error(trajectory: Path | None, reference: Path | None) -> float | None:
     return largest_error(trajectory, reference) if trajectory and reference else None
 
 
-def _content(workload: Workload | WorkPrecision | Scaling) -> dict | list:
+def _content(workload: Measured) -> dict | list:
     if isinstance(workload, WorkPrecision):
         return [_point(point) for point in workload.points]
     if isinstance(workload, Scaling):
         return [{"rotors": chain.bodies, **_point(point)} for chain in workload.chains for point in workload.points[chain]]
+    if isinstance(workload, Throughput):
+        return {"variants": workload.count, "memory_MB": workload.memory, "rates": [_rate(workload, rate) for rate in workload.rates]}
     return {
         contestant.label: {"seconds": contestant.seconds, "largest_error": _error(contestant.trajectory, workload.reference)}
         for contestant in workload.contestants

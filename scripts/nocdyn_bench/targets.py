@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from .chains import Scaling
 from .contestant import Contestant
+from .throughput import Throughput
 from .work_precision import WorkPrecision
 
 GROWTH = 1.1  # largest exponent of N in the time of one step that still counts as linear
@@ -105,3 +106,26 @@ def growth(workload: Scaling, label: str) -> Verdict:
     exponent = (math.log(last.seconds / last.steps) - math.log(first.seconds / first.steps)) / math.log(longer.bodies / shorter.bodies)
     return Verdict(f"{sentence} N^{exponent:.2f} from {shorter.bodies} to {longer.bodies} rotors; "
                    f"wanted linear (at most N^{GROWTH})", exponent <= GROWTH)
+
+
+def throughput_verdicts(workload: Throughput) -> list[Verdict]:
+    rules = [("nocdyn rk45", "hand-written loop", 6.0), ("nocdyn taylor", "hand-written loop", 15.0),
+             ("nocdyn taylor", "heyoka with the peak", 6.0), ("nocdyn taylor, 2 threads", "nocdyn taylor", 1.9)]
+    return [*(faster(workload, *rule) for rule in rules), little_memory(workload)]
+
+
+def faster(workload: Throughput, own: str, rival: str, least: float) -> Verdict:
+    ours, theirs = workload.rate(own), workload.rate(rival)
+    if not (ours and theirs):
+        return Verdict(f"{workload.name}: {own} beside {rival}, wanted {least:g} times as many variants per second", None)
+    factor = ours.best / theirs.best
+    return Verdict(f"{workload.name}: {own} makes {ours.best:.4g} variants per second, {factor:.2f} times as many as {rival} "
+                   f"({theirs.best:.4g}); wanted {least:g} times", factor >= least)
+
+
+def little_memory(workload: Throughput, most: float = 500.0) -> Verdict:
+    largest = max(workload.memory.values(), default=None)
+    if largest is None:
+        return Verdict(f"{workload.name}: memory below {most:g} MB", None)
+    sizes = ", ".join(f"{megabytes:.0f} MB for {count:,} variants".replace(",", " ") for count, megabytes in workload.memory.items())
+    return Verdict(f"{workload.name}: the process needs {sizes}; wanted below {most:g} MB", largest < most)

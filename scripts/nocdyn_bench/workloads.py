@@ -8,9 +8,11 @@ from pathlib import Path
 
 from . import whole_process
 from .chains import Scaling
-from .peers import heyoka, numbalsoda, scipy
+from .nocdyn_sweep import sweepers
+from .peers import heyoka, heyoka_sweep, numbalsoda, numbalsoda_sweep, scipy, scipy_sweep
 from .problems import Case2, Chain
 from .programs import Programs
+from .throughput import Throughput
 from .work_precision import WorkPrecision
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -29,7 +31,7 @@ class Bench:
     is_quick: bool
 
 
-Workload = whole_process.Workload | WorkPrecision | Scaling
+Workload = whole_process.Workload | WorkPrecision | Scaling | Throughput
 
 
 def start_up(bench: Bench) -> whole_process.Workload:
@@ -77,6 +79,18 @@ def w1(bench: Bench) -> WorkPrecision:
     ], errors_wanted=[1e-6, 1e-9, 1e-12])
 
 
+def w2(bench: Bench) -> Throughput:
+    own = sweepers(bench.nocdyn.parent, bench.scratch)
+    return Throughput("W2", "W2: variants of case 2, final state and largest elastic moment", 10_000 if bench.is_quick else 100_000, [
+        *(sweeper.contestant() for sweeper in own),
+        bench.programs.handwritten_sweep(),
+        *heyoka_sweep.contestants(),
+        *numbalsoda_sweep.contestants(),
+        *bench.programs.sundials_sweep(["erk5", "adams"]),
+        *scipy_sweep.contestants(["DOP853"] if bench.is_quick else ["DOP853", "LSODA", "RK45"]),
+    ], error_wanted=1e-6, sweepers=own, counts=[10_000] if bench.is_quick else [100_000, 1_000_000])
+
+
 def w3(bench: Bench) -> Scaling:
     chains = [Chain(bodies) for bodies in (10, 100, 1000, 10000)]
     return Scaling("W3", "W3: chain of N rotors, rtol 1e-6, atol 1e-8", chains, {chain: [
@@ -109,5 +123,5 @@ def w4(bench: Bench) -> WorkPrecision:
 
 
 WORKLOADS: dict[str, Callable[[Bench], Workload]] = {
-    "start_up": start_up, "case2": case2, "W1": w1, "W3": w3, "W3_stiff": w3_stiff, "W4": w4,
+    "start_up": start_up, "case2": case2, "W1": w1, "W2": w2, "W3": w3, "W3_stiff": w3_stiff, "W4": w4,
 }

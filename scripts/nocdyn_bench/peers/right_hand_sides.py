@@ -8,6 +8,8 @@ import numpy as np
 
 from ..problems import Case2, Chain, Problem
 
+CASE2_END = 10.0  # [s]
+
 
 def derivative(problem: Problem, interleaved: bool = False) -> Callable:
     """f(t, y, dydt), compiled. `interleaved`: a chain's states omega_1, phi_1, omega_2 ..., which makes a narrow band."""
@@ -16,20 +18,31 @@ def derivative(problem: Problem, interleaved: bool = False) -> Callable:
     return _interleaved_chain(problem) if interleaved else _chain(problem)
 
 
-def _case2(problem: Case2) -> Callable:
-    stiffness, cubic, ratio2 = problem.stiffness, problem.cubic_stiffness, problem.ratio**2
+def variant_derivative(problem: Case2) -> Callable:
+    """f(t, y, dydt, viscous, cubic_stiffness), compiled."""
+    stiffness, ratio2 = problem.stiffness, problem.ratio**2
     over_1, over_23 = 1.0 / problem.inertia_1, 1.0 / problem.inertia_23
     a, b, c = problem.motor_a, problem.motor_b, problem.motor_c
-    load, amplitude, frequency = ratio2 * problem.viscous, problem.amplitude, problem.frequency
+    amplitude, frequency = problem.amplitude, problem.frequency
 
     @numba.njit
-    def compiled(t, y, dydt):
+    def compiled(t, y, dydt, viscous, cubic):
         twist = y[3] - y[2]
         moment = (stiffness + cubic * twist * twist) * twist
         dydt[0] = (a - (b + c * y[0]) * y[0] + amplitude * sin(frequency * t) + moment) * over_1
-        dydt[1] = -(moment + load * y[1]) * over_23
+        dydt[1] = -(moment + ratio2 * viscous * y[1]) * over_23
         dydt[2] = y[0]
         dydt[3] = y[1]
+
+    return compiled
+
+
+def _case2(problem: Case2) -> Callable:
+    fill, viscous, cubic = variant_derivative(problem), problem.viscous, problem.cubic_stiffness
+
+    @numba.njit
+    def compiled(t, y, dydt):
+        fill(t, y, dydt, viscous, cubic)
 
     return compiled
 

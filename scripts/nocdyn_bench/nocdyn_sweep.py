@@ -1,0 +1,104 @@
+"""nocdyn's own sweeps: `nocdyn sweep` with threads, nocdyn-mpi with ranks."""
+
+import csv
+import json
+import shutil
+import subprocess
+import sys
+import time
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from .contestant import ContestantError
+from .problems import Case2
+from .scale import WITH_MEMORY
+from .variants import RANGES, TARGETS, Found, SweepContestant
+
+RECORDS = {"omega_motor": "final", "omega_pinion": "final", "phi_motor": "final", "phi_pinion": "final",
+           "moment_coupling": "max_abs"}
+MPIRUN = ["mpirun", "--allow-run-as-root", "--oversubscribe", "--bind-to", "none"]
+MOST_WORDS = 40  # of the message of a program that fails
+
+
+@dataclass
+class Sweeper:
+    """One way to run sweeps: a method, threads and ranks."""
+
+    folder: Path  # of the programs
+    scratch: Path
+    method: str
+    threads: int = 1
+    ranks: int = 0  # 0: without MPI
+    whole: list[float] = field(default_factory=list)  # seconds of each whole process, the files written
+
+    @property
+    def label(self) -> str:
+        of = f", {self.ranks} rank{'s' * (self.ranks > 1)}" if self.ranks else f", {self.threads} threads" * (self.threads > 1)
+        return f"{'nocdyn-mpi' if self.ranks else 'nocdyn'} {self.method}{of}"
+
+    def contestant(self) -> SweepContestant:
+        program = "nocdyn-mpi sweep" if self.ranks else "nocdyn sweep"
+        return SweepContestant(self.label, f"{program}, variants_per_second of summary.json", self.solve, timed=self.seconds)
+
+    def solve(self, tolerance: float, parameters: np.ndarray) -> Found:
+        """Of a list of variants, for their errors."""
+        rows = self.scratch / "variants.csv"
+        np.savetxt(rows, parameters, fmt="%.17g", delimiter=",", header=",".join(TARGETS), comments="")
+        out = self._run(tolerance, [f"&sweep design = 'list' file = '{rows}' /"], "--csv")
+        with open(out / "sweep.csv", encoding="utf-8") as file:
+            table = [{name.partition(" [")[0]: text for name, text in row.items()} for row in csv.DictReader(file)]
+        columns = [f"{quantity}_{statistic}" for quantity, statistic in RECORDS.items()]
+        found = np.array([[float(row[column]) for column in columns] for row in table])
+        return Found(len(parameters) / _rate(out), found)
+
+    def seconds(self, tolerance: float, count: int) -> float:
+        """For a random design of so many variants."""
+        began = time.perf_counter()
+        out = self._run(tolerance, random_design(count))
+        self.whole.append(time.perf_counter() - began)
+        return count / _rate(out)
+
+    def memory(self, tolerance: float, count: int) -> float:
+        """Largest one of the process [MB], for a random design of so many variants."""
+        said = self._command(tolerance, random_design(count), before=[sys.executable, "-c", WITH_MEMORY])[1]
+        return int(said.split()[-1]) * 1024 / 1e6
+
+    def _run(self, tolerance: float, design: list[str], *options: str) -> Path:
+        return self._command(tolerance, design, *options)[0]
+
+    def _command(self, tolerance: float, design: list[str], *options: str, before: list[str] = []) -> tuple[Path, str]:
+        file, out = self.scratch / "sweep.nml", self.scratch / "sweep"
+        shutil.rmtree(out, ignore_errors=True)
+        Case2().write_input(file)
+        records = [f"&record quantity = '{quantity}' statistic = '{statistic}' /" for quantity, statistic in RECORDS.items()]
+        file.write_text("\n".join([file.read_text(), *design, *records]) + "\n")
+        program = [*MPIRUN, "-n", str(self.ranks), self.folder / "nocdyn-mpi"] if self.ranks else [self.folder / "nocdyn"]
+        settings = [word for name, value in (("method", self.method), ("rtol", repr(tolerance)), ("atol", repr(tolerance)))
+                    for word in ("--set", f"run.{name}={value}")]
+        done = subprocess.run([*before, *program, "sweep", file, "--out", out, "--threads", str(self.threads), "--quiet", *settings,
+                               *options], capture_output=True, text=True, stdin=subprocess.DEVNULL)
+        if done.returncode != 0:
+            raise ContestantError(" ".join(done.stderr.split()[:MOST_WORDS]))
+        return out, done.stdout
+
+
+def random_design(count: int) -> list[str]:
+    return [f"&sweep design = 'random' samples = {count} seed = 1 /",
+            *(f"&vary target = '{target}' low = {low} high = {high} /" for target, (low, high) in zip(TARGETS, RANGES))]
+
+
+def _rate(out: Path) -> float:
+    return json.loads((out / "summary.json").read_text(encoding="utf-8"))["variants_per_second"]
+
+
+def sweepers(folder: Path, scratch: Path) -> list[Sweeper]:
+    """All ways that there are programs for."""
+    methods = ("taylor", "rk45")
+    found = []
+    if (folder / "nocdyn-sweep").exists():
+        found += [Sweeper(folder, scratch, method, threads) for threads in (1, 2) for method in methods]
+    if (folder / "nocdyn-mpi").exists():
+        found += [Sweeper(folder, scratch, method, ranks=ranks) for ranks in (1, 2) for method in methods]
+    return found

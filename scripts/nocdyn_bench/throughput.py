@@ -1,0 +1,96 @@
+"""Variants in a second, every contestant at the loosest tolerance with which its errors are below the wanted one."""
+
+from dataclasses import dataclass, field
+from statistics import median
+
+import numpy as np
+
+from .contestant import ContestantError
+from .nocdyn_sweep import Sweeper
+from .peers import heyoka_sweep, scipy_sweep
+from .variants import Errors, SweepContestant, errors_of, variants
+
+TOLERANCES = 10.0 ** -np.arange(4.0, 12.01, 0.1)
+SAMPLE, SLOW_SAMPLE = 1000, 100  # variants whose errors are looked at; of contestants that do not integrate all
+SECOND_SAMPLE = 10  # of the reference, computed a second time
+
+
+@dataclass
+class Rate:
+    """One contestant at its tolerance."""
+
+    contestant: SweepContestant
+    tolerance: float
+    errors: Errors
+    variants: int  # integrated in one round
+    rounds: list[float] = field(default_factory=list)  # variants per second
+
+    @property
+    def best(self) -> float:
+        return max(self.rounds)
+
+    @property
+    def median(self) -> float:
+        return median(self.rounds)
+
+
+@dataclass
+class Throughput:
+    """A workload of variants of case 2."""
+
+    name: str
+    title: str
+    count: int  # of variants
+    contestants: list[SweepContestant]
+    error_wanted: float
+    sweepers: list[Sweeper]  # nocdyn's, all of whom are contestants too
+    counts: list[int]  # of variants for which the memory is looked at
+    memory: dict[int, float] = field(default_factory=dict)  # of the first sweeper [MB]
+    rates: list[Rate] = field(default_factory=list)
+    failures: list[str] = field(default_factory=list)
+    distance: Errors | None = None  # of the reference from a second one
+
+    def measure(self, rounds: int) -> None:
+        parameters = variants(self.count)
+        exact = heyoka_sweep.accurate_results(parameters[:SAMPLE])
+        other = scipy_sweep.contestants(["DOP853"])[0].solve(1e-13, parameters[:SECOND_SAMPLE]).results
+        self.distance = errors_of(other, exact[:SECOND_SAMPLE])
+        for contestant in self.contestants:
+            try:
+                self.rates.append(self._chosen(contestant, parameters, exact))
+            except ContestantError as error:
+                self.failures.append(f"{contestant.label} fails: {error}")
+        for sweeper in self.sweepers[:1]:
+            for count in self.counts:
+                self.memory[count] = sweeper.memory(self.rate(sweeper.label).tolerance, count)
+        for _ in range(rounds):
+            for rate in self.rates:
+                seconds = rate.contestant.time(rate.tolerance, parameters[:rate.variants])
+                rate.rounds.append(rate.variants / seconds)
+
+    def _chosen(self, contestant: SweepContestant, parameters: np.ndarray, exact: np.ndarray) -> Rate:
+        count = round(contestant.share * self.count)
+        sample = min(count, SAMPLE if contestant.share == 1.0 else SLOW_SAMPLE, len(parameters))
+
+        def errors_at(tolerance: float) -> Errors:
+            return errors_of(contestant.solve(tolerance, parameters[:sample]).results, exact[:sample])
+
+        loose, tight = 0, len(TOLERANCES)  # bisection: tight enough is from `tight` on
+        while loose < tight:
+            middle = (loose + tight) // 2
+            if errors_at(float(TOLERANCES[middle])).are_below(self.error_wanted):
+                tight = middle
+            else:
+                loose = middle + 1
+        if tight == len(TOLERANCES):
+            raise ContestantError(f"its errors are not below {self.error_wanted:.0e} at any tolerance")
+        tolerance = float(TOLERANCES[tight])
+        return Rate(contestant, tolerance, errors_at(tolerance), count)
+
+    def whole_rate(self, rate: Rate) -> float | None:
+        """Variants per second of the whole process, the files written."""
+        sweeper = next((sweeper for sweeper in self.sweepers if sweeper.label == rate.contestant.label), None)
+        return rate.variants / min(sweeper.whole) if sweeper and sweeper.whole else None
+
+    def rate(self, label: str) -> Rate | None:
+        return next((rate for rate in self.rates if rate.contestant.label == label), None)
