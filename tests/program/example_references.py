@@ -394,8 +394,8 @@ def torque_split():
         {f"reaction_{side}_{stage} [N]": force[stage] for side in ("left", "right") for stage in force}
 
 
-def rolling_mill():
-    m = example("rolling_mill")
+def rolling_mill_motion(m):
+    """Angles and speeds of motor, stand and roll; the moments of shaft and spindle as functions of (t, y, mode)."""
     motor, stand, roll = m.inertia()
     shaft, drive = m.coupling["shaft"], m.motor["drive"]
     billet = Curve(m.table(m.excitation["billet"]), constant=True)
@@ -409,11 +409,16 @@ def rolling_mill():
 
     start = np.concatenate([m.start(key, "motor", "stand", "roll") for key in ("angle", "speed")])
     motion = motion_of(rate, start, m.end(), (0, Gap.FREE), gap.borders, billet.x)
+    return motion, lambda t, y, mode: shaft["stiffness"] * (y[1] - y[0]), lambda t, y, mode: gap.elastic(mode, y)
+
+
+def rolling_mill():
+    m = example("rolling_mill")
+    motion, shaft, spindle = rolling_mill_motion(m)
     y = motion.at(m.end())
     return {"phi_motor [rad]": y[0], "phi_roll [rad]": y[2], "omega_motor [rad/s]": y[3], "omega_stand [rad/s]": y[4],
-            "omega_roll [rad/s]": y[5],
-            "min moment_shaft [N m]": motion.largest(lambda t, y, mode: shaft["stiffness"] * (y[1] - y[0]), sign=-1),
-            "min moment_spindle [N m]": motion.largest(lambda t, y, mode: gap.elastic(mode, y), sign=-1)}
+            "omega_roll [rad/s]": y[5], "min moment_shaft [N m]": motion.largest(shaft, sign=-1),
+            "min moment_spindle [N m]": motion.largest(spindle, sign=-1)}
 
 
 def engine():
