@@ -71,9 +71,7 @@ class Sweeper:
     def _command(self, tolerance: float, design: list[str], *options: str, before: list[str] = []) -> tuple[Path, str]:
         file, out = self.scratch / "sweep.nml", self.scratch / "sweep"
         shutil.rmtree(out, ignore_errors=True)
-        Case2().write_input(file)
-        records = [f"&record quantity = '{quantity}' statistic = '{statistic}' /" for quantity, statistic in RECORDS.items()]
-        file.write_text("\n".join([file.read_text(), *design, *records]) + "\n")
+        write_input(file, design)
         program = [*MPIRUN, "-n", str(self.ranks), self.folder / "nocdyn-mpi"] if self.ranks else [self.folder / "nocdyn"]
         settings = [word for name, value in (("method", self.method), ("rtol", repr(tolerance)), ("atol", repr(tolerance)))
                     for word in ("--set", f"run.{name}={value}")]
@@ -87,6 +85,18 @@ class Sweeper:
 def random_design(count: int) -> list[str]:
     return [f"&sweep design = 'random' samples = {count} seed = 1 /",
             *(f"&vary target = '{target}' low = {low} high = {high} /" for target, (low, high) in zip(TARGETS, RANGES))]
+
+
+def write_input(file: Path, design: list[str], settings: str = "") -> None:
+    """Of a sweep of case 2; `settings` goes to &run."""
+    Case2().write_input(file)
+    records = [f"&record quantity = '{quantity}' statistic = '{statistic}' /" for quantity, statistic in RECORDS.items()]
+    file.write_text("\n".join([file.read_text().replace("&run ", f"&run {settings} "), *design, *records]) + "\n")
+
+
+def write_sweep(file: Path, count: int, settings: str) -> None:
+    """Of so many random variants."""
+    write_input(file, random_design(count), settings)
 
 
 def _rate(out: Path) -> float:

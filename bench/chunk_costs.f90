@@ -1,0 +1,164 @@
+!> What a chunk of a sweep costs besides the integration of its variants.
+!>
+!> chunk_costs INPUT VARIANTS CHUNK LANES FOLDER
+!>
+!> Computes VARIANTS of the sweep in INPUT in chunks of CHUNK with one thread, writes them to a journal in FOLDER, and prints one
+!> JSON object: seconds of the computation, of the journal and of the hand-out, bytes of a chunk, and the steps of all variants.
+module counting_dispatcher
+  use nocdyn_kinds, only: wp
+  use nocdyn_dispatcher, only: dispatcher_t
+  use nocdyn_sweep_chunk, only: chunk_t
+  implicit none (type, external)
+  private
+
+  !> Hands out chunks of one size and forgets the results.
+  type, extends(dispatcher_t), public :: counting_dispatcher_t
+    integer :: size = 1    !! of a chunk
+    integer :: left = 0    !! variants
+    integer :: first = 1   !! of the next chunk
+  contains
+    procedure :: hand_out
+    procedure :: take
+    procedure :: attend
+    procedure :: conclude
+    procedure :: is_over
+  end type counting_dispatcher_t
+
+contains
+
+  subroutine hand_out(self, first, count)
+    class(counting_dispatcher_t), intent(inout) :: self
+    integer, intent(out) :: first, count
+
+    first = self%first
+    count = min(self%size, self%left)
+    self%first = first + count
+    self%left = self%left - count
+  end subroutine hand_out
+
+  subroutine take(self, chunk, seconds)
+    class(counting_dispatcher_t), intent(inout) :: self
+    type(chunk_t), intent(in) :: chunk
+    real(wp), intent(in) :: seconds
+
+    if (chunk%count > self%size .or. seconds < 0) error stop 'counting_dispatcher: a chunk that was not handed out'
+  end subroutine take
+
+  subroutine attend(self)
+    class(counting_dispatcher_t), intent(inout) :: self
+
+    if (self%left < 0) error stop 'counting_dispatcher: more was handed out than there is'
+  end subroutine attend
+
+  subroutine conclude(self)
+    class(counting_dispatcher_t), intent(inout) :: self
+
+    if (self%left > 0) error stop 'counting_dispatcher: something is left'
+  end subroutine conclude
+
+  logical function is_over(self)
+    class(counting_dispatcher_t), intent(in) :: self
+
+    is_over = self%size < 1
+  end function is_over
+
+end module counting_dispatcher
+
+program chunk_costs
+  use, intrinsic :: iso_fortran_env, only: error_unit
+  use contest, only: seconds_now, text_argument, whole_argument
+  use counting_dispatcher, only: counting_dispatcher_t
+  use nocdyn_errors, only: error_t
+  use nocdyn_input, only: input_t
+  use nocdyn_input_reader, only: read_input
+  use nocdyn_kinds, only: wp
+  use nocdyn_sweep_block, only: new_sweep_block, sweep_block_t
+  use nocdyn_sweep_chunk, only: chunk_t, pack_chunk
+  use nocdyn_sweep_headers, only: new_sweep_header
+  use nocdyn_sweep_journal, only: create_journal, sweep_journal_t
+  use nocdyn_sweep_plan, only: make_plan, sweep_plan_t
+  use nocdyn_sweep_setup, only: prepare_sweep, sweep_setup_t
+  use nocdyn_text, only: string_t
+  implicit none (type, external)
+
+  type(sweep_plan_t), target :: plan
+  type(sweep_setup_t) :: setup
+  type(sweep_block_t), allocatable, target :: block
+  type(sweep_journal_t) :: journal
+  type(counting_dispatcher_t), target :: dispatcher
+  type(chunk_t) :: chunk
+  real(wp) :: computing, writing, handing
+  integer :: bytes, steps
+
+  call set_up()
+  call measure()
+  print '(a, 3(es13.6, a), i0, a, i0, a)', '{"compute": ', computing, ', "journal": ', writing, ', "hand_out": ', handing, &
+    ', "bytes": ', bytes, ', "steps": ', steps, '}'
+
+contains
+
+  subroutine set_up()
+    type(input_t) :: input
+    type(error_t), allocatable :: error
+    type(string_t) :: overrides(0)
+
+    call read_input(text_argument(1), overrides, input, error)
+    if (.not. allocated(error)) call make_plan(input, plan, error)
+    if (.not. allocated(error)) call prepare_sweep(plan, setup, error)
+    if (allocated(error)) call give_up(error%message)
+    setup%lanes = whole_argument(4)
+    dispatcher%left = whole_argument(2)
+    dispatcher%size = whole_argument(3)
+    call dispatcher%open()
+    allocate (block)
+    call new_sweep_block(plan, setup, dispatcher, block, error)
+    if (.not. allocated(error)) then
+      call create_journal(text_argument(5), 'sweep.journal', new_sweep_header(plan, 1, 1), journal, error)
+    end if
+    if (allocated(error)) call give_up(error%message)
+  end subroutine set_up
+
+  subroutine measure()
+    type(error_t), allocatable :: error
+    character(len=:), allocatable :: packed
+    real(wp) :: began
+    integer :: first, count
+    logical :: is_complete
+
+    computing = 0.0_wp
+    writing = 0.0_wp
+    handing = 0.0_wp
+    bytes = 0
+    steps = 0
+    do
+      began = seconds_now()
+      call dispatcher%enter()
+      call dispatcher%hand_out(first, count)
+      call dispatcher%leave()
+      handing = handing + seconds_now() - began
+      if (count == 0) exit
+      began = seconds_now()
+      call block%compute(first, count, chunk, is_complete)
+      computing = computing + seconds_now() - began
+      began = seconds_now()
+      call journal%append(chunk, error)
+      writing = writing + seconds_now() - began
+      if (allocated(error)) call give_up(error%message)
+      steps = steps + sum(chunk%steps)
+      if (bytes > 0) cycle
+      call pack_chunk(chunk, packed)
+      bytes = len(packed)
+    end do
+    call journal%remove()
+    call dispatcher%conclude()
+    call dispatcher%close()
+  end subroutine measure
+
+  subroutine give_up(message)
+    character(len=*), intent(in) :: message
+
+    write (error_unit, '(a)') 'chunk_costs: ' // message
+    error stop 1
+  end subroutine give_up
+
+end program chunk_costs
