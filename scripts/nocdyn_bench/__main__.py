@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from .chains import Scaling
+from .costs import Costs
 from .figures import draw_scaling, draw_work_precision
 from .programs import Programs
 from .report import markdown, write_report
@@ -19,7 +20,7 @@ from .workloads import ROOT, WORKLOADS, Bench, Workload
 
 FULL = np.arange(3.0, 13.1, 0.5)  # decades of the tolerances
 QUICK = np.arange(3.0, 13.1, 1.0)
-MOST_SWEEPS = 5  # rounds of W2, whose contestants take seconds each
+MOST_SWEEPS = 5  # rounds where a contestant takes seconds
 
 
 def main() -> None:
@@ -29,6 +30,8 @@ def main() -> None:
     parser.add_argument("--quick", action="store_true", help="fewer rounds, tolerances and slow peers")
     parser.add_argument("--build", type=Path, default=ROOT / "build" / "release", metavar="DIR",
                         help="where the programs were built (%(default)s)")
+    parser.add_argument("--plain", type=Path, default=ROOT / "build" / "plain" / "bench", metavar="DIR",
+                        help="programs for processors with AVX2, whose instructions are counted (%(default)s)")
     parser.add_argument("--out", type=Path, default=ROOT / "results" / "bench", metavar="DIR",
                         help="where bench.md, bench.json and the figures go (%(default)s)")
     arguments = parser.parse_args()
@@ -43,7 +46,8 @@ def main() -> None:
     measured = []
     with tempfile.TemporaryDirectory() as folder:
         scratch = Path(folder)
-        bench = Bench(arguments.build / "bin" / "nocdyn", Programs(arguments.build / "bench", scratch), scratch, arguments.quick)
+        bench = Bench(arguments.build / "bin" / "nocdyn", Programs(arguments.build / "bench", scratch), arguments.plain, scratch,
+                      arguments.quick)
         try:
             for name in names:
                 measured.append(WORKLOADS[name](bench))
@@ -62,7 +66,7 @@ def _measure(workload: Workload, rounds: int, is_quick: bool, out: Path) -> None
     elif isinstance(workload, Scaling):
         workload.measure(rounds)
         draw_scaling(workload, out)
-    elif isinstance(workload, Throughput):
+    elif isinstance(workload, Throughput | Costs):
         workload.measure(min(rounds, MOST_SWEEPS))
     else:
         measure(workload, rounds)

@@ -10,6 +10,7 @@ from pathlib import Path
 
 from . import targets
 from .chains import Scaling
+from .costs import Costs
 from .rounds import Point
 from .throughput import SAMPLE, SLOW_SAMPLE, Rate, Throughput
 from .whole_process import Workload, largest_error
@@ -20,7 +21,7 @@ VERDICTS = {"W1": targets.case2_verdicts, "W2": targets.throughput_verdicts, "W4
             "W3": targets.chain_verdicts, "W3_stiff": targets.stiff_chain_verdicts}
 
 
-Measured = Workload | WorkPrecision | Scaling | Throughput
+Measured = Workload | WorkPrecision | Scaling | Throughput | Costs
 
 
 def verdicts(workload: Measured) -> list[targets.Verdict]:
@@ -35,6 +36,8 @@ def markdown(workload: Measured) -> str:
         lines = _scaling(workload)
     elif isinstance(workload, Throughput):
         lines = _throughput(workload)
+    elif isinstance(workload, Costs):
+        lines = workload.lines
     else:
         lines = _whole_process(workload)
     return "\n".join([f"## {workload.title}", "", *lines, *(f"\n{verdict}." for verdict in verdicts(workload))])
@@ -258,6 +261,8 @@ def _content(workload: Measured) -> dict | list:
         return [_point(point) for point in workload.points]
     if isinstance(workload, Scaling):
         return [{"rotors": chain.bodies, **_point(point)} for chain in workload.chains for point in workload.points[chain]]
+    if isinstance(workload, Costs):
+        return workload.lines
     if isinstance(workload, Throughput):
         return {"variants": workload.count, "memory_MB": workload.memory, "rates": [_rate(workload, rate) for rate in workload.rates]}
     return {

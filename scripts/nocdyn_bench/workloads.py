@@ -8,6 +8,7 @@ from pathlib import Path
 
 from . import whole_process
 from .chains import Scaling
+from .costs import Costs, Sweeping, chunk_costs, step_costs
 from .nocdyn_sweep import sweepers
 from .peers import heyoka, heyoka_sweep, numbalsoda, numbalsoda_sweep, scipy, scipy_sweep
 from .problems import Case2, Chain
@@ -21,17 +22,22 @@ CASE2 = ROOT / "input" / "paper" / "case2.nml"
 REFERENCE_TOLERANCES = ("--set", "run.rtol=1e-13", "--set", "run.atol=1e-13")
 
 
+LANES = 16  # of the blocks of nocdyn sweep, for case 2
+SWEEP_SETTINGS = {"taylor": (1.0e-6, LANES), "rk45": (8.0e-8, LANES)}  # tolerance with which W2 has errors below 1e-6, and lanes
+
+
 @dataclass(frozen=True)
 class Bench:
     """What all workloads get to know."""
 
     nocdyn: Path  # the command
     programs: Programs  # those of bench/
+    plain: Path  # those for processors with AVX2
     scratch: Path
     is_quick: bool
 
 
-Workload = whole_process.Workload | WorkPrecision | Scaling | Throughput
+Workload = whole_process.Workload | WorkPrecision | Scaling | Throughput | Costs
 
 
 def start_up(bench: Bench) -> whole_process.Workload:
@@ -91,6 +97,17 @@ def w2(bench: Bench) -> Throughput:
     ], error_wanted=1e-6, sweepers=own, counts=[10_000] if bench.is_quick else [100_000, 1_000_000])
 
 
+def steps(bench: Bench) -> Costs:
+    sweeping = Sweeping(bench.programs.folder, bench.scratch)
+    return Costs("step_costs", "Step costs in sweeps of case 2", lambda rounds: step_costs(sweeping, bench.plain, SWEEP_SETTINGS, rounds))
+
+
+def chunks(bench: Bench) -> Costs:
+    sweeping, has_mpi = Sweeping(bench.programs.folder, bench.scratch), bench.programs.has("mpi_message_costs")
+    return Costs("chunk_costs", "Chunk costs in sweeps of case 2", lambda rounds: chunk_costs(
+        sweeping, "taylor", *SWEEP_SETTINGS["taylor"], has_mpi, rounds))
+
+
 def w3(bench: Bench) -> Scaling:
     chains = [Chain(bodies) for bodies in (10, 100, 1000, 10000)]
     return Scaling("W3", "W3: chain of N rotors, rtol 1e-6, atol 1e-8", chains, {chain: [
@@ -123,5 +140,5 @@ def w4(bench: Bench) -> WorkPrecision:
 
 
 WORKLOADS: dict[str, Callable[[Bench], Workload]] = {
-    "start_up": start_up, "case2": case2, "W1": w1, "W2": w2, "W3": w3, "W3_stiff": w3_stiff, "W4": w4,
+    "start_up": start_up, "case2": case2, "W1": w1, "W2": w2, "W3": w3, "W3_stiff": w3_stiff, "W4": w4, "step_costs": steps, "chunk_costs": chunks,
 }
