@@ -36,8 +36,8 @@ def case2_motion(m):
 
     def rate(t, y, *_):
         torque = drive["a"] - drive["b"] * y[0] - drive["c"] * y[0]**2 + shake["amplitude"] * np.sin(shake["frequency"] * t)
-        return [(torque + moment(t, y)) / motor, -(moment(t, y) + RATIO**2 * load["viscous"] * y[1]) / (pinion + RATIO**2 * machine),
-                y[0], y[1]]
+        resistance = moment(t, y) + RATIO**2 * load["viscous"] * y[1]
+        return [(torque + moment(t, y)) / motor, -resistance / (pinion + RATIO**2 * machine), y[0], y[1]]
 
     return motion_of(rate, np.zeros(4), m.end()), moment
 
