@@ -11,7 +11,7 @@ from .peers import heyoka_sweep, scipy_sweep
 from .variants import Errors, SweepContestant, errors_of, variants
 
 TOLERANCES = 10.0 ** -np.arange(4.0, 12.01, 0.1)
-SAMPLE, SLOW_SAMPLE = 1000, 100  # variants whose errors are looked at; of contestants that do not integrate all
+SAMPLE, SLOW_SAMPLE = 5000, 100  # variants whose errors are looked at; of contestants that do not integrate all
 SECOND_SAMPLE = 10  # of the reference, computed a second time
 
 
