@@ -78,7 +78,7 @@ class Throughput:
         loose, tight = 0, len(TOLERANCES)  # bisection: tight enough is from `tight` on
         while loose < tight:
             middle = (loose + tight) // 2
-            if errors_at(float(TOLERANCES[middle])).are_below(self.error_wanted):
+            if errors_at(float(TOLERANCES[middle])).are_below(self.error_wanted, contestant.has_peak):
                 tight = middle
             else:
                 loose = middle + 1

@@ -44,8 +44,8 @@ class Errors:
     state: float  # largest absolute one at the end, of all variants and states [rad, rad/s]
     peak: float  # largest relative one, nan if no peak is asked for
 
-    def are_below(self, most: float) -> bool:
-        return self.state < most and not self.peak >= most
+    def are_below(self, most: float, has_peak: bool = True) -> bool:
+        return self.state < most and (self.peak < most or not has_peak)
 
 
 def errors_of(results: np.ndarray, exact: np.ndarray) -> Errors:
