@@ -6,16 +6,17 @@ import shutil
 import subprocess
 from collections import Counter
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from .nocdyn_sweep import MPIRUN, write_sweep
+from .tables import table
 
 VARIANTS = 16384  # integrated for one number
 FEW, MORE = 64, 192  # variants that are integrated while instructions are counted; the difference counts
 CHUNKS = (1, 4, 16, 64, 256, 1024, 4096)
 MESSAGES = 2000
-CHUNK_SECONDS = 0.2  # what nocdyn aims at
+CHUNK_SECONDS, MOST_AT_ONCE = 0.2, 8192  # what nocdyn aims at, src/analyse/sweep_ledger.f90
 
 
 @dataclass
@@ -32,23 +33,55 @@ class Costs:
 
 
 @dataclass(frozen=True)
-class Sweeping:
-    """The program chunk_costs on variants of W2."""
+class Case:
+    """How variants of W2 are integrated."""
 
-    folder: Path  # of the programs of bench/
+    method: str
+    tolerance: float
+    lanes: int
+
+
+@dataclass(frozen=True)
+class Cost:
+    """Of so many variants in chunks; seconds of all of them."""
+
+    variants: int
+    chunk: int
+    compute: float
+    hand_out: float
+    journal: float
+    bytes: int  # of a chunk
+    steps: int
+
+    @property
+    def chunks(self) -> float:
+        return self.variants / self.chunk
+
+    @property
+    def rate(self) -> float:
+        return self.variants / self.compute
+
+
+@dataclass(frozen=True)
+class Sweeping:
+    """The programs of bench/ that measure costs."""
+
+    folder: Path
     scratch: Path
 
-    def run(self, method: str, tolerance: float, variants: int, chunk: int, lanes: int, before: tuple = (), folder: Path | None = None) -> dict:
+    def run(self, case: Case, variants: int, chunk: int, before: tuple = (), folder: Path | None = None) -> Cost:
+        """`before`: a command that runs the program; `folder`: of another build."""
         file, out = self.scratch / "costs.nml", self.scratch / "costs"
         shutil.rmtree(out, ignore_errors=True)
-        write_sweep(file, variants, f"method = '{method}' rtol = {tolerance} atol = {tolerance}")
-        command = [*before, (folder or self.folder) / "chunk_costs", file, variants, chunk, lanes, out]
-        return json.loads(subprocess.run(list(map(str, command)), check=True, capture_output=True, text=True).stdout)
+        write_sweep(file, variants, f"method = '{case.method}' rtol = {case.tolerance} atol = {case.tolerance}")
+        program = (folder or self.folder) / "chunk_costs"
+        return Cost(variants, chunk, **_report([*before, program, file, variants, chunk, case.lanes, out]))
 
-    def best(self, rounds: int, *arguments) -> dict:
+    def best(self, rounds: int, case: Case, variants: int, chunk: int) -> Cost:
         """The shortest time of each kind."""
-        found = [self.run(*arguments) for _ in range(rounds)]
-        return {key: min(one[key] for one in found) for key in found[0]}
+        found = [self.run(case, variants, chunk) for _ in range(rounds)]
+        shortest = {key: min(getattr(cost, key) for cost in found) for key in ("compute", "hand_out", "journal")}
+        return replace(found[0], **shortest)
 
     def peak(self, rounds: int) -> float:
         """Unfused additions and multiplications in a second, of a loop that does nothing else."""
@@ -60,58 +93,60 @@ class Sweeping:
 
 
 def _report(command: list) -> dict:
+    """What a program prints."""
     return json.loads(subprocess.run(list(map(str, command)), check=True, capture_output=True, text=True).stdout)
 
 
-def step_costs(sweeping: Sweeping, plain: Path, settings: dict[str, tuple[float, int]], rounds: int) -> list[str]:
-    """`plain`: programs for processors with AVX2, which valgrind knows; settings: tolerance and lanes of each method."""
+def step_costs(sweeping: Sweeping, plain: Path, cases: list[Case], rounds: int) -> list[str]:
+    """`plain`: programs for processors with AVX2, which valgrind knows."""
     peak = sweeping.peak(rounds)
     rows = []
-    for method, (tolerance, lanes) in settings.items():
-        fast = sweeping.best(rounds, method, tolerance, VARIANTS, 2048, lanes)
-        few, more = (count_instructions(sweeping, plain, method, tolerance, lanes, variants) for variants in (FEW, MORE))
-        steps = more.steps - few.steps
-        rate = VARIANTS / fast["compute"]
-        flops = (more.flops - few.flops) / (MORE - FEW)
-        rows.append([f"`{method}`", f"{tolerance:.1e}", f"{fast['steps'] / VARIANTS:.1f}", f"{(more.flops - few.flops) / steps:.0f}",
-                     f"{(more.instructions - few.instructions) / steps:.0f}", f"{1e9 * fast['compute'] / fast['steps']:.0f}",
-                     f"{1e-9 * flops * rate:.1f}", f"{flops * rate / peak:.0%}"])
+    for case in cases:
+        fast = sweeping.best(rounds, case, VARIANTS, 2048)
+        few, more = (count_instructions(sweeping, plain, case, variants) for variants in (FEW, MORE))
+        steps, flops = more.steps - few.steps, (more.flops - few.flops) / (MORE - FEW)
+        rows.append([f"`{case.method}`", f"{case.tolerance:.1e}", f"{fast.steps / VARIANTS:.1f}",
+                     f"{(more.flops - few.flops) / steps:.0f}", f"{(more.instructions - few.instructions) / steps:.0f}", f"{1e9 * fast.compute / fast.steps:.0f}",
+                     f"{1e-9 * flops * fast.rate:.1f}", f"{flops * fast.rate / peak:.0%}"])
     head = ["method", "tolerance", "steps of a variant", "operations in a step", "instructions in a step", "ns for a step", "Gflop/s",
             "share of the peak"]
-    return [*_table(head, rows), "",
-            "A step is that of one lane. Operations are additions, subtractions, multiplications, divisions and square roots of doubles, counted by valgrind from "
-            f"the instructions that {MORE - FEW} variants execute, in a program for AVX2 (four doubles in a register); times are those of the program for this "
-            "processor. The peak is that of a loop of unfused additions and multiplications in registers, "
-            f"measured here: {1e-9 * peak:.0f} Gflop/s."]
+    return [*table(head, rows), "",
+            "A step is that of one lane, its share of starting variants and following statistics included. Operations are additions, "
+            "subtractions, multiplications, divisions and square roots of doubles, counted by valgrind from the instructions that "
+            f"{MORE - FEW} variants execute, in a program for AVX2 (four doubles in a register); times are those of the program for "
+            "this processor. The peak is that of a loop of unfused additions and multiplications in registers, measured here: "
+            f"{1e-9 * peak:.0f} Gflop/s."]
 
 
-def chunk_costs(sweeping: Sweeping, method: str, tolerance: float, lanes: int, has_mpi: bool, rounds: int) -> list[str]:
-    found = {chunk: sweeping.best(rounds, method, tolerance, min(VARIANTS, 512 * chunk), chunk, lanes) for chunk in CHUNKS}
-    fastest = min(one["compute"] / min(VARIANTS, 512 * chunk) for chunk, one in found.items())
+def chunk_costs(sweeping: Sweeping, case: Case, has_mpi: bool, rounds: int) -> list[str]:
+    costs = [sweeping.best(rounds, case, min(VARIANTS, 512 * chunk), chunk) for chunk in CHUNKS]
+    messages = [sweeping.message(cost.bytes) if has_mpi else None for cost in costs]
+    fastest = max(cost.rate for cost in costs)
     rows = []
-    for chunk, one in found.items():
-        variants = min(VARIANTS, 512 * chunk)
-        chunks = variants / chunk
-        own = 1e6 * (one["compute"] - fastest * variants) / chunks
-        rows.append([str(chunk), f"{variants / one['compute']:.3g}", f"{fastest * variants / one['compute']:.0%}", f"{max(own, 0.0):.0f}",
-                     f"{1e6 * one['hand_out'] / chunks:.2f}", f"{1e6 * one['journal'] / chunks:.1f}", str(one["bytes"]),
-                     f"{1e6 * sweeping.message(one['bytes']):.1f}" if has_mpi else "-"])
+    for cost, message in zip(costs, messages):
+        own = 1e6 * (cost.compute - cost.variants / fastest) / cost.chunks
+        rows.append([str(cost.chunk), f"{cost.rate:.3g}", f"{cost.rate / fastest:.0%}", f"{own:.0f}",
+                     f"{1e6 * cost.hand_out / cost.chunks:.2f}", f"{1e6 * cost.journal / cost.chunks:.1f}", str(cost.bytes),
+                     f"{1e6 * message:.1f}" if has_mpi else "-"])
     head = ["variants in a chunk", "variants per second", "efficiency", "start and end, us", "hand-out, us", "journal, us", "bytes",
             "messages, us"]
-    size = round(CHUNK_SECONDS / fastest)
-    largest = found[CHUNKS[-1]]
-    journal = largest["journal"] / (min(VARIANTS, 512 * CHUNKS[-1]) / CHUNKS[-1]) / CHUNKS[-1]
-    lines = [*_table(head, rows), "",
-             f"`{method}`, {lanes} lanes, one thread. Start and end: what the lanes that begin together and run empty together cost, beside the fastest "
-             "chunk. Hand-out: lock and books. Journal: packing, checksum, one write. Messages: request, answer, results and time between two ranks on this machine.", "",
-             f"A chunk is made to take {CHUNK_SECONDS} s, {size} variants here but at most 8192. In the journal a variant takes "
-             f"{1e6 * journal:.3g} us, a {fastest / journal:.0f}th of what its integration takes"]
-    if has_mpi:
-        message = sweeping.message(largest["bytes"]) / CHUNKS[-1]
-        lines[-1] += (f", and {1e6 * message:.3g} us in messages: rank 0, which does both, would be busy with nothing else at about "
-                      f"{fastest / (journal + message):.0f} ranks of this workload")
-    lines[-1] += ". Variants that take longer move that limit out in proportion."
-    return lines
+    return [*table(head, rows), "",
+            f"`{case.method}`, {case.lanes} lanes, one thread. Start and end: what the lanes that begin together and run empty one by "
+            "one cost, beside the fastest chunk. Hand-out: lock and books. Journal: packing, checksum, one write. Messages: request, "
+            "answer, results and time between two ranks on this machine, without the work of either.", "",
+            scaling_out(costs[-1], messages[-1], fastest)]
+
+
+def scaling_out(cost: Cost, message: float | None, rate: float) -> str:
+    """What the largest chunk says of many workers."""
+    journal = cost.journal / cost.variants
+    text = (f"A chunk is made to take {CHUNK_SECONDS} s, which are {CHUNK_SECONDS * rate:.0f} variants here, but has at most {MOST_AT_ONCE}. "
+            f"In the journal a variant takes {1e6 * journal:.2g} us, beside {1e6 / rate:.3g} us for its integration")
+    if message is not None:
+        both = journal + message / cost.chunk
+        text += (f", and {1e6 * message / cost.chunk:.2g} us in messages. Rank 0, which does both for all others, has nothing but that to do "
+                 f"at about {1 / (rate * both):.0f} ranks of one thread")
+    return text + ". Variants that take longer move that limit out in proportion."
 
 
 @dataclass(frozen=True)
@@ -121,15 +156,15 @@ class Executed:
     steps: int
 
 
-def count_instructions(sweeping: Sweeping, plain: Path, method: str, tolerance: float, lanes: int, variants: int) -> Executed:
+def count_instructions(sweeping: Sweeping, plain: Path, case: Case, variants: int) -> Executed:
     profile = sweeping.scratch / "callgrind.out"
     valgrind = ("valgrind", "--tool=callgrind", "--dump-instr=yes", "--compress-pos=no", "--compress-strings=no",
                 f"--callgrind-out-file={profile}")
-    steps = sweeping.run(method, tolerance, variants, variants, lanes, valgrind, plain)["steps"]
+    steps = sweeping.run(case, variants, variants, valgrind, plain).steps
     program = plain / "chunk_costs"
     counts = executions(profile.read_text(encoding="utf-8"), program.name)
-    weights = operations(subprocess.run(["objdump", "--disassemble", "--no-show-raw-insn", program], check=True, capture_output=True,
-                                        text=True).stdout)
+    disassembly = subprocess.run(["objdump", "--disassemble", "--no-show-raw-insn", program], check=True, capture_output=True, text=True)
+    weights = operations(disassembly.stdout)
     return Executed(sum(count * weights[address] for address, count in counts.items()), sum(counts.values()), steps)
 
 
@@ -157,7 +192,3 @@ def operations(disassembly: str) -> Counter:
         width = 1 if name.endswith("sd") else 8 if "zmm" in operands else 4 if "ymm" in operands else 2
         weights[int(address, 16)] = width * (2 if "fm" in name or "fnm" in name else 1)
     return weights
-
-
-def _table(head: list[str], rows: list[list[str]]) -> list[str]:
-    return [f"| {' | '.join(cells)} |" for cells in (head, ["---"] + ["---:"] * (len(head) - 1), *rows)]

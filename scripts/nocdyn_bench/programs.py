@@ -58,15 +58,16 @@ class Programs:
                 for solver in solvers]
 
     def handwritten_sweep(self) -> SweepContestant:
-        return SweepContestant("hand-written loop", "Dormand-Prince 5(4) for this machine alone, one variant after the other, peaks from "
-                               "its dense output, bench/handwritten_sweep.f90", self._solve_all(["handwritten_sweep"], [], []))
+        return SweepContestant("hand-written loop", "Dormand-Prince 5(4) for this machine alone, one variant after the other, peaks "
+                               "from its dense output, bench/handwritten_sweep.f90", self._solve_all(["handwritten_sweep"], [], []))
 
     def sundials_sweep(self, solvers: list[str]) -> list[SweepContestant]:
         notes = {"adams": ("CVODE Adams", "fixed-point iteration, peaks by CVodeRootInit"),
                  "erk5": ("ARKODE ERK 5(4)", "Dormand-Prince, peaks by ERKStepRootInit")}
         if not self.has("sundials_workloads"):
             return []
-        return [SweepContestant(*notes[solver], self._solve_all(["sundials_workloads", solver], ["1"], ["sweep"]), share=0.02) for solver in solvers]
+        return [SweepContestant(*notes[solver], self._solve_all(["sundials_workloads", solver], ["1"], ["sweep"]), share=0.02)
+                for solver in solvers]
 
     def _solve_all(self, head: list, before: list[str], after: list[str]) -> SolveAll:
         """`before` and `after` the name of the file with the results; that with the parameters comes last."""

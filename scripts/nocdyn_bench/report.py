@@ -12,6 +12,7 @@ from . import targets
 from .chains import Scaling
 from .costs import Costs
 from .rounds import Point
+from .tables import table
 from .throughput import SAMPLE, SLOW_SAMPLE, Rate, Throughput
 from .whole_process import Workload, largest_error
 from .work_precision import WorkPrecision
@@ -144,11 +145,7 @@ def ratio_table(measured: list) -> str:
         for row in rows:
             seconds = column.get(row[0])
             row.append(f"{seconds / own:.3g}" if own and seconds else "-")
-    return "\n".join(_table(["", *columns], rows)) if columns else ""
-
-
-def _table(head: list[str], rows: list[list[str]]) -> list[str]:
-    return [f"| {' | '.join(cells)} |" for cells in (head, ["---"] + ["---:"] * (len(head) - 1), *rows)]
+    return "\n".join(table(["", *columns], rows)) if columns else ""
 
 
 def _milliseconds(seconds: float | None) -> str:
@@ -168,7 +165,7 @@ def _work_precision(workload: WorkPrecision) -> list[str]:
             point = workload.point_at(contestant, tolerance)
             row.append(f"{_milliseconds(point.seconds)} ({point.errors['states']:.0e})" if point else "-")
         rows.append(row)
-    return [*_table(head, rows), "", "Errors are the largest absolute ones, of all states [rad, rad/s] or of the elastic moment [N m], "
+    return [*table(head, rows), "", "Errors are the largest absolute ones, of all states [rad, rad/s] or of the elastic moment [N m], "
             "over all outputs; times between two tolerances are interpolated, linear in the logarithms; - : not reached before the sweep ends, at the "
             "first run slower than 2 s (SciPy Radau: 8 s) or the tightest tolerance. rtol = atol.", "",
             f"Reference: {workload.reference.note}; they differ by {workload.reference.distance:.1e}.", "",
@@ -188,7 +185,7 @@ def _scaling(workload: Scaling) -> list[str]:
             *(f"{text}, error" for text in lengths), *(f"{text}, steps" for text in lengths)]
     references = [f"{chain.bodies}: {reference.distance:.0e}" for chain, reference in workload.references.items()]
     contestants = {contestant.label: contestant for chain in workload.chains for contestant in workload.contestants[chain]}
-    return [*_table(head, rows), "", "Errors are the largest absolute ones of the states at the end [rad, rad/s].", "",
+    return [*table(head, rows), "", "Errors are the largest absolute ones of the states at the end [rad, rad/s].", "",
             f"Reference: {next(iter(workload.references.values())).note}; they differ by, at N = {', '.join(references)}.", "",
             *_notes(list(contestants.values()), workload.failures)]
 
@@ -198,19 +195,27 @@ def _throughput(workload: Throughput) -> list[str]:
     rows = []
     for rate in workload.rates:
         whole = workload.whole_rate(rate)
-        rows.append([rate.contestant.label, _rounded(rate.best), *(f"{rate.best / rival.best:.3g}" if rival else "-" for rival in rivals),
+        rows.append([rate.contestant.label, _rounded(rate.best),
+                     *(f"{rate.best / rival.best:.3g}" if rival else "-" for rival in rivals),
                      _rounded(whole) if whole else "-", f"{rate.tolerance:.1e}", f"{rate.errors.state:.0e}",
                      f"{rate.errors.peak:.0e}" if rate.contestant.has_peak else "-", _rounded(rate.variants)])
-    head = ["", "variants per second", "hand-written loop = 1", "heyoka with the peak = 1", "whole process", "tolerance", "error of the state",
-            "error of the peak", "variants"]
-    return [*_table(head, rows), "",
-            f"Each contestant has the loosest tolerance, in tenths of a decade, with which its errors are below {workload.error_wanted:.0e}: the "
-            "largest absolute one of the four states at the end [rad, rad/s], and the largest relative one of the peak, of the first "
-            f"{SAMPLE} variants, {SLOW_SAMPLE} of those that integrate a part of the {_rounded(workload.count)} variants. One thread where nothing else is said. "
-            "Whole process: from its start until the files are written.", "",
-            f"Reference: heyoka with 80-bit numbers at tolerance 1e-18; SciPy DOP853 at 1e-13 differs by {workload.distance.state:.1e} and "
-            f"{workload.distance.peak:.1e}.", "",
+    head = ["", "variants per second", "hand-written loop = 1", "heyoka with the peak = 1", "whole process", "tolerance",
+            "error of the state", "error of the peak", "variants"]
+    return [*table(head, rows), "",
+            "Each contestant has the loosest tolerance, in tenths of a decade, with which its errors are below "
+            f"{workload.error_wanted:.0e}: the largest absolute one of the four states at the end [rad, rad/s], and the largest "
+            f"relative one of the peak, of the first {_rounded(SAMPLE)} variants, {SLOW_SAMPLE} of those that integrate a part of the "
+            f"{_rounded(workload.count)} variants. One thread where nothing else is said. Whole process: from its start until the "
+            "files are written.", "",
+            f"Reference: heyoka with 80-bit numbers at tolerance 1e-18; SciPy DOP853 at 1e-13 differs by "
+            f"{workload.distance.state:.1e} and {workload.distance.peak:.1e}.", "",
+            *_memory_lines(workload),
             *_notes([rate.contestant for rate in workload.rates], workload.failures)]
+
+
+def _memory_lines(workload: Throughput) -> list[str]:
+    sizes = "; ".join(f"{_rounded(count)} variants {megabytes:.0f} MB" for count, megabytes in workload.memory.items())
+    return [f"Largest memory of the process: {sizes}.", ""] if sizes else []
 
 
 def _rounded(number: float) -> str:
@@ -264,7 +269,8 @@ def _content(workload: Measured) -> dict | list:
     if isinstance(workload, Costs):
         return workload.lines
     if isinstance(workload, Throughput):
-        return {"variants": workload.count, "memory_MB": workload.memory, "rates": [_rate(workload, rate) for rate in workload.rates]}
+        return {"variants": workload.count, "memory_MB": workload.memory,
+                "rates": [_rate(workload, rate) for rate in workload.rates]}
     return {
         contestant.label: {"seconds": contestant.seconds, "largest_error": _error(contestant.trajectory, workload.reference)}
         for contestant in workload.contestants

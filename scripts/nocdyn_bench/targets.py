@@ -127,5 +127,5 @@ def little_memory(workload: Throughput, most: float = 500.0) -> Verdict:
     largest = max(workload.memory.values(), default=None)
     if largest is None:
         return Verdict(f"{workload.name}: memory below {most:g} MB", None)
-    sizes = ", ".join(f"{megabytes:.0f} MB for {count:,} variants".replace(",", " ") for count, megabytes in workload.memory.items())
+    sizes = ", ".join(f"{megabytes:.0f} MB for {count} variants" for count, megabytes in workload.memory.items())
     return Verdict(f"{workload.name}: the process needs {sizes}; wanted below {most:g} MB", largest < most)
