@@ -1,9 +1,10 @@
 !> What a chunk of a sweep costs besides the integration of its variants.
 !>
-!> chunk_costs INPUT VARIANTS CHUNK LANES FOLDER
+!> chunk_costs INPUT VARIANTS CHUNK FOLDER
 !>
 !> Computes VARIANTS of the sweep in INPUT in chunks of CHUNK with one thread, writes them to a journal in FOLDER, and prints one
-!> JSON object: seconds of the computation, of the journal and of the hand-out, bytes of a chunk, and the steps of all variants.
+!> JSON object: seconds of the computation, of the journal and of the hand-out, bytes of a chunk, steps of all variants, and the
+!> lanes of the block.
 module counting_dispatcher
   use nocdyn_kinds, only: wp
   use nocdyn_dispatcher, only: dispatcher_t
@@ -92,8 +93,8 @@ program chunk_costs
 
   call set_up()
   call measure()
-  print '(a, 3(es13.6, a), i0, a, i0, a)', '{"compute": ', computing, ', "journal": ', writing, ', "hand_out": ', handing, &
-    ', "bytes": ', bytes, ', "steps": ', steps, '}'
+  print '(a, 3(es13.6, a), 3(i0, a))', '{"compute": ', computing, ', "journal": ', writing, ', "hand_out": ', handing, &
+    ', "bytes": ', bytes, ', "steps": ', steps, ', "lanes": ', setup%lanes, '}'
 
 contains
 
@@ -106,14 +107,13 @@ contains
     if (.not. allocated(error)) call make_plan(input, plan, error)
     if (.not. allocated(error)) call prepare_sweep(plan, setup, error)
     if (allocated(error)) call give_up(error%message)
-    setup%lanes = whole_argument(4)
     dispatcher%left = whole_argument(2)
     dispatcher%size = whole_argument(3)
     call dispatcher%open()
     allocate (block)
     call new_sweep_block(plan, setup, dispatcher, block, error)
     if (.not. allocated(error)) then
-      call create_journal(text_argument(5), 'sweep.journal', new_sweep_header(plan, 1, 1), journal, error)
+      call create_journal(text_argument(4), 'sweep.journal', new_sweep_header(plan, 1, 1), journal, error)
     end if
     if (allocated(error)) call give_up(error%message)
   end subroutine set_up

@@ -15,7 +15,7 @@ from .tables import table
 VARIANTS = 16384  # integrated for one number
 FEW, MORE = 64, 192  # variants that are integrated while instructions are counted; the difference counts
 CHUNKS = (1, 4, 16, 64, 256, 1024, 4096)
-MESSAGES = 2000
+MESSAGES = 300
 CHUNK_SECONDS, MOST_AT_ONCE = 0.2, 8192  # what nocdyn aims at, src/analyse/sweep_ledger.f90
 
 
@@ -38,7 +38,6 @@ class Case:
 
     method: str
     tolerance: float
-    lanes: int
 
 
 @dataclass(frozen=True)
@@ -52,6 +51,7 @@ class Cost:
     journal: float
     bytes: int  # of a chunk
     steps: int
+    lanes: int
 
     @property
     def chunks(self) -> float:
@@ -75,7 +75,7 @@ class Sweeping:
         shutil.rmtree(out, ignore_errors=True)
         write_sweep(file, variants, f"method = '{case.method}' rtol = {case.tolerance} atol = {case.tolerance}")
         program = (folder or self.folder) / "chunk_costs"
-        return Cost(variants, chunk, **_report([*before, program, file, variants, chunk, case.lanes, out]))
+        return Cost(variants, chunk, **_report([*before, program, file, variants, chunk, out]))
 
     def best(self, rounds: int, case: Case, variants: int, chunk: int) -> Cost:
         """The shortest time of each kind."""
@@ -87,9 +87,10 @@ class Sweeping:
         """Unfused additions and multiplications in a second, of a loop that does nothing else."""
         return max(_report([self.folder / "peak_flops"])["flops"] for _ in range(rounds))
 
-    def message(self, size: int) -> float:
+    def message(self, rounds: int, size: int) -> float:
         """Seconds for the messages about one chunk whose results have so many bytes."""
-        return _report([*MPIRUN, "-n", 2, self.folder / "mpi_message_costs", size, MESSAGES])["seconds"]
+        command = [*MPIRUN, "-n", 2, self.folder / "mpi_message_costs", size, MESSAGES]
+        return min(_report(command)["seconds"] for _ in range(rounds))
 
 
 def _report(command: list) -> dict:
@@ -105,11 +106,11 @@ def step_costs(sweeping: Sweeping, plain: Path, cases: list[Case], rounds: int) 
         fast = sweeping.best(rounds, case, VARIANTS, 2048)
         few, more = (count_instructions(sweeping, plain, case, variants) for variants in (FEW, MORE))
         steps, flops = more.steps - few.steps, (more.flops - few.flops) / (MORE - FEW)
-        rows.append([f"`{case.method}`", f"{case.tolerance:.1e}", f"{fast.steps / VARIANTS:.1f}",
-                     f"{(more.flops - few.flops) / steps:.0f}", f"{(more.instructions - few.instructions) / steps:.0f}", f"{1e9 * fast.compute / fast.steps:.0f}",
-                     f"{1e-9 * flops * fast.rate:.1f}", f"{flops * fast.rate / peak:.0%}"])
-    head = ["method", "tolerance", "steps of a variant", "operations in a step", "instructions in a step", "ns for a step", "Gflop/s",
-            "share of the peak"]
+        rows.append([f"`{case.method}`", f"{case.tolerance:.1e}", str(fast.lanes), f"{fast.steps / VARIANTS:.1f}",
+                     f"{(more.flops - few.flops) / steps:.0f}", f"{(more.instructions - few.instructions) / steps:.0f}",
+                     f"{1e9 * fast.compute / fast.steps:.0f}", f"{1e-9 * flops * fast.rate:.1f}", f"{flops * fast.rate / peak:.0%}"])
+    head = ["method", "tolerance", "lanes", "steps of a variant", "operations in a step", "instructions in a step", "ns for a step",
+            "Gflop/s", "share of the peak"]
     return [*table(head, rows), "",
             "A step is that of one lane, its share of starting variants and following statistics included. Operations are additions, "
             "subtractions, multiplications, divisions and square roots of doubles, counted by valgrind from the instructions that "
@@ -120,7 +121,7 @@ def step_costs(sweeping: Sweeping, plain: Path, cases: list[Case], rounds: int) 
 
 def chunk_costs(sweeping: Sweeping, case: Case, has_mpi: bool, rounds: int) -> list[str]:
     costs = [sweeping.best(rounds, case, min(VARIANTS, 512 * chunk), chunk) for chunk in CHUNKS]
-    messages = [sweeping.message(cost.bytes) if has_mpi else None for cost in costs]
+    messages = [sweeping.message(rounds, cost.bytes) if has_mpi else None for cost in costs]
     fastest = max(cost.rate for cost in costs)
     rows = []
     for cost, message in zip(costs, messages):
@@ -131,7 +132,7 @@ def chunk_costs(sweeping: Sweeping, case: Case, has_mpi: bool, rounds: int) -> l
     head = ["variants in a chunk", "variants per second", "efficiency", "start and end, us", "hand-out, us", "journal, us", "bytes",
             "messages, us"]
     return [*table(head, rows), "",
-            f"`{case.method}`, {case.lanes} lanes, one thread. Start and end: what the lanes that begin together and run empty one by "
+            f"`{case.method}`, {costs[0].lanes} lanes, one thread. Start and end: what the lanes that begin together and run empty one by "
             "one cost, beside the fastest chunk. Hand-out: lock and books. Journal: packing, checksum, one write. Messages: request, "
             "answer, results and time between two ranks on this machine, without the work of either.", "",
             scaling_out(costs[-1], messages[-1], fastest)]
@@ -140,12 +141,12 @@ def chunk_costs(sweeping: Sweeping, case: Case, has_mpi: bool, rounds: int) -> l
 def scaling_out(cost: Cost, message: float | None, rate: float) -> str:
     """What the largest chunk says of many workers."""
     journal = cost.journal / cost.variants
-    text = (f"A chunk is made to take {CHUNK_SECONDS} s, which are {CHUNK_SECONDS * rate:.0f} variants here, but has at most {MOST_AT_ONCE}. "
-            f"In the journal a variant takes {1e6 * journal:.2g} us, beside {1e6 / rate:.3g} us for its integration")
+    text = (f"A chunk is made to take {CHUNK_SECONDS} s, which are {CHUNK_SECONDS * rate:.0f} variants here, but has at most "
+            f"{MOST_AT_ONCE}. In the journal a variant takes {1e6 * journal:.2g} us, beside {1e6 / rate:.3g} us for its integration")
     if message is not None:
         both = journal + message / cost.chunk
-        text += (f", and {1e6 * message / cost.chunk:.2g} us in messages. Rank 0, which does both for all others, has nothing but that to do "
-                 f"at about {1 / (rate * both):.0f} ranks of one thread")
+        text += (f", and {1e6 * message / cost.chunk:.2g} us in messages. Rank 0, which does both for all others, has nothing but "
+                 f"that to do at about {1 / (rate * both):.0f} ranks of one thread")
     return text + ". Variants that take longer move that limit out in proportion."
 
 
@@ -163,8 +164,8 @@ def count_instructions(sweeping: Sweeping, plain: Path, case: Case, variants: in
     steps = sweeping.run(case, variants, variants, valgrind, plain).steps
     program = plain / "chunk_costs"
     counts = executions(profile.read_text(encoding="utf-8"), program.name)
-    disassembly = subprocess.run(["objdump", "--disassemble", "--no-show-raw-insn", program], check=True, capture_output=True, text=True)
-    weights = operations(disassembly.stdout)
+    disassemble = ["objdump", "--disassemble", "--no-show-raw-insn", program]
+    weights = operations(subprocess.run(disassemble, check=True, capture_output=True, text=True).stdout)
     return Executed(sum(count * weights[address] for address, count in counts.items()), sum(counts.values()), steps)
 
 
