@@ -83,15 +83,13 @@ contains
     call look_at_run(self)
     !$omp critical (texts)
     allocate (block, self%single, self%origin)
-    complaint = ''
+    complaint = 'there is no typical variant'
     if (present(typical)) then
       call set_targets(self%input, targets, typical, complaint)
       if (complaint == '') call assemble_machine(self%input, block%machine, error, lanes)
       if (complaint /= '' .or. allocated(error)) self%input = input
     end if
-    if (.not. present(typical) .or. complaint /= '' .or. allocated(error)) then
-      call assemble_machine(self%input, block%machine, error, lanes)
-    end if
+    if (complaint /= '' .or. allocated(error)) call assemble_machine(self%input, block%machine, error, lanes)
     if (allocated(error)) then
       deallocate (block)
     else

@@ -11,13 +11,13 @@ module nocdyn_reduced_series
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
   use nocdyn_polynomial_laws, only: polynomial_laws_t
+  use nocdyn_series_laws, only: new_series_laws, series_laws_t, width
   use nocdyn_sparse_map, only: sparse_map_t
   implicit none (type, external)
   private
 
   public :: new_reduced_series
 
-  integer, parameter :: width = 4          ! of a vector
   integer, parameter :: most_dense = 256   ! numbers in the matrix of a map that is worth its zeros
 
   !> Column k of an array holds the coefficients number k, the k-th derivatives over k factorial.
@@ -36,19 +36,11 @@ module nocdyn_reduced_series
     real(wp), allocatable :: moment(:)         !! present coefficients of the whole moments, [stride]
     real(wp), allocatable :: acceleration(:)   !! present coefficients of q'', [lanes * freedoms in whole vectors]
     real(wp), allocatable :: inverse(:)        !! 1 / k, [order]
-    real(wp), allocatable :: rest(:)           !! as in `polynomial_laws_t`, [stride]
-    real(wp), allocatable :: linear(:)
-    real(wp), allocatable :: cubic(:)
-    real(wp), allocatable :: by_speed(:)
-    real(wp), allocatable :: by_speed_squared(:)
+    type(series_laws_t) :: laws
     real(wp), allocatable :: twists(:, :)      !! U, [stride, freedoms], if it is dense
     real(wp), allocatable :: responses(:, :)   !! R, [freedoms in whole vectors, elements], if it is dense
     integer, allocatable :: inner_banks(:)     !! whose laws are more than polynomials and external torques
-    integer, allocatable :: cubed(:)           !! first values of the vectors with terms by (u - rest)^3
-    integer, allocatable :: squared(:)         !! first values of the vectors with terms by u'^2
-    logical, allocatable :: is_cubed(:)        !! of each vector
-    logical, allocatable :: is_squared(:)
-    real(wp), allocatable :: square(:, :)      !! (u - rest)^2 in those of `cubed`
+    real(wp), allocatable :: square(:, :)      !! (u - rest)^2 in the vectors that are `cubed`
   contains
     procedure :: expand
     procedure :: take_lane
@@ -77,20 +69,11 @@ contains
     self%inverse(:) = [(1.0_wp / k, k=1, order)]
     self%inner_banks = pack(machine%other_banks, [(.not. machine%banks(machine%other_banks(b))%bank%is_external, &
                                                    b=1, size(machine%other_banks))])
-    call allocate_laws(self)
-    do k = 1, self%lanes
-      call copy_laws(self, k, machine%laws)
-    end do
-    call find_strips(self)
+    self%laws = new_series_laws(self%stride, machine%laws)
+    allocate (self%moment(self%stride), source=0.0_wp)
+    self%external(:, 0) = self%laws%constant
     call multiply_out(self, twists, accelerations, machine%coordinates%freedoms, size(machine%elements%to))
   end function new_reduced_series
-
-  subroutine allocate_laws(self)
-    type(reduced_series_t), intent(inout) :: self
-
-    allocate (self%rest(self%stride), source=0.0_wp)
-    allocate (self%linear, self%cubic, self%by_speed, self%by_speed_squared, self%moment, source=self%rest)
-  end subroutine allocate_laws
 
   !> Takes the numbers that a lane has now.
   subroutine take_lane(self, lane, laws, twists, accelerations)
@@ -100,53 +83,10 @@ contains
     type(sparse_map_t), intent(in) :: twists, accelerations
 
     if (self%order == 0) return
-    call copy_laws(self, lane, laws)
-    if (needs_other_strips(self, lane)) call find_strips(self)
+    call self%laws%take_lane(lane, laws)
+    self%external(:, 0) = self%laws%constant
     if (self%is_dense) call form_matrices(self, twists, accelerations)
   end subroutine take_lane
-
-  !> Whether a lane has terms of higher degree in vectors that had none.
-  pure logical function needs_other_strips(self, lane)
-    type(reduced_series_t), intent(in) :: self
-    integer, intent(in) :: lane
-    integer :: i, v
-
-    needs_other_strips = .true.
-    do i = lane, size(self%is_cubed) * width, self%lanes
-      v = (i - 1) / width + 1
-      if (abs(self%cubic(i)) > 0 .and. .not. self%is_cubed(v)) return
-      if (abs(self%by_speed_squared(i)) > 0 .and. .not. self%is_squared(v)) return
-    end do
-    needs_other_strips = .false.
-  end function needs_other_strips
-
-  !> Finds the vectors with terms of higher degree.
-  subroutine find_strips(self)
-    type(reduced_series_t), intent(inout) :: self
-    integer :: i
-
-    self%is_cubed = [(any(abs(self%cubic(i:i + width - 1)) > 0), i=1, self%stride, width)]
-    self%is_squared = [(any(abs(self%by_speed_squared(i:i + width - 1)) > 0), i=1, self%stride, width)]
-    self%cubed = pack([(i, i=1, self%stride, width)], self%is_cubed)
-    self%squared = pack([(i, i=1, self%stride, width)], self%is_squared)
-  end subroutine find_strips
-
-  subroutine copy_laws(self, lane, laws)
-    type(reduced_series_t), intent(inout) :: self
-    integer, intent(in) :: lane
-    type(polynomial_laws_t), intent(in) :: laws
-    integer :: e, i
-
-    do e = 1, size(laws%rest, 2)
-      i = self%lanes * (e - 1) + lane
-      self%rest(i) = laws%rest(lane, e)
-      self%linear(i) = laws%linear(lane, e)
-      self%cubic(i) = laws%cubic(lane, e)
-      self%by_speed(i) = laws%by_speed(lane, e)
-      self%by_speed_squared(i) = laws%by_speed_squared(lane, e)
-      self%external(i, 0) = laws%constant(lane, e)
-    end do
-  end subroutine copy_laws
 
   !> The matrices of the maps, if they are small.
   subroutine multiply_out(self, twists, accelerations, freedoms, elements)
@@ -248,17 +188,17 @@ contains
     real(wp), intent(in) :: t(self%lanes)
 
     if (k == 0) then
-      call begin_moments(self%stride, self%rest, self%linear, self%by_speed, self%external, self%angle, self%speed, &
-                         self%restoring, self%working)
+      call begin_moments(self%stride, self%laws%rest, self%laws%linear, self%laws%by_speed, self%external, self%angle, &
+                         self%speed, self%restoring, self%working)
     else
-      call continue_moments(self%stride, k, self%inverse(k), self%linear, self%by_speed, self%external, self%speed, &
+      call continue_moments(self%stride, k, self%inverse(k), self%laws%linear, self%laws%by_speed, self%external, self%speed, &
                             self%angle, self%restoring, self%working)
     end if
-    if (size(self%cubed) > 0) then
-      call add_cubes(self%stride, k, self%cubed, self%cubic, self%angle, self%square, self%restoring)
+    if (size(self%laws%cubed) > 0) then
+      call add_cubes(self%stride, k, self%laws%cubed, self%laws%cubic, self%angle, self%square, self%restoring)
     end if
-    if (size(self%squared) > 0) then
-      call add_squares(self%stride, k, self%squared, self%by_speed_squared, self%speed, self%working)
+    if (size(self%laws%squared) > 0) then
+      call add_squares(self%stride, k, self%laws%squared, self%laws%by_speed_squared, self%speed, self%working)
     end if
     if (size(self%inner_banks) > 0) call add_banks(self, machine, k, t)
     call add(self%stride, self%restoring(1, k), self%working(1, k), self%moment)
