@@ -215,7 +215,7 @@ contains
     if (degree > most_degrees) error stop 'nocdyn_linear_statistics: the solution inside the step has too many coefficients'
     allocate (self%nodes(degree + 1), self%weights(degree + 1))
     call lay_gauss_rule(degree + 1, self%nodes, self%weights)
-    allocate (self%to_bernstein(degree + 1, degree + 1))
+    allocate (self%to_bernstein(0:most_degrees, 0:degree))
     call lay_bernstein_matrix(degree, self%to_bernstein)
     allocate (self%y_last(width, columns), self%y_new_last(width, columns), self%c_last(width, columns, degree), source=0.0_wp)
   end subroutine lay_out
@@ -352,12 +352,12 @@ contains
       end if
       do i = 1, strip%lanes
         associate (lane => strip%before + i)
-          if (.not. steps%taken(lane) .or. strip%t_end(i) <= track%from) cycle
           if (steps%until(lane) < 1 .or. track%gate(i, number) > 0) then   ! the bounds do not hold
             rise(i) = 1.0_wp
             fall(i) = 1.0_wp
           end if
           if (max(rise(i), fall(i)) <= 0) cycle
+          if (.not. steps%taken(lane) .or. strip%t_end(i) <= track%from) cycle
           call look_inside(self, track, i, number, steps%t(lane), steps%h(lane), steps%until(lane), degree, rise(i), fall(i))
         end associate
       end do

@@ -11,6 +11,7 @@ module nocdyn_bernstein
   public :: lay_bernstein_matrix, raise_to_maximum, shift_origin
 
   integer, parameter, public :: most_degrees = 39
+  integer, parameter :: rows = 4                    !! of the matrix that are multiplied together; they divide 1 + most_degrees
   integer, parameter :: most_halvings = 40
   integer, parameter :: most_newton_steps = 60      !! bisection alone would need as many
   real(wp), parameter :: last_change = 1.0e-8_wp    !! of a place by Newton's method, which then leaves its square
@@ -20,11 +21,11 @@ contains
   !> The matrix that makes Bernstein coefficients of those of powers: binomial(i, k) / binomial(n, k), k <= i.
   pure subroutine lay_bernstein_matrix(n, matrix)
     integer, intent(in) :: n
-    real(wp), intent(out) :: matrix(0:n, 0:n)   !! [Bernstein coefficients, powers]
+    real(wp), intent(out) :: matrix(0:most_degrees, 0:n)   !! [Bernstein coefficients and padding, powers]
     integer :: i, k
 
     matrix = 0.0_wp
-    matrix(:, 0) = 1.0_wp
+    matrix(:n, 0) = 1.0_wp
     do k = 1, n
       do i = k, n
         matrix(i, k) = matrix(i, k - 1) * (i - k + 1) / (n - k + 1)
@@ -35,7 +36,7 @@ contains
   !> Raises `highest` to the largest value of c_0 + c_1 s + ... between s = 0 and 1 if that is larger; the ends are not looked at.
   pure subroutine raise_to_maximum(n, matrix, c, highest, place, found)
     integer, intent(in) :: n         !! degree, 1 to `most_degrees`
-    real(wp), intent(in) :: matrix(0:n, 0:n)   !! of `lay_bernstein_matrix`
+    real(wp), intent(in) :: matrix(0:most_degrees, 0:n)   !! of `lay_bernstein_matrix`
     real(wp), intent(in) :: c(0:n)
     real(wp), intent(inout) :: highest
     real(wp), intent(out) :: place   !! of the maximum
@@ -106,16 +107,20 @@ contains
     does_not_turn = least > 0 .or. most < 0
   end function does_not_turn
 
-  !> b = matrix * c.
+  !> b = matrix * c, a few rows at a time; what is above the diagonal is zero.
   pure subroutine multiply(n, matrix, c, b)
     integer, intent(in) :: n
-    real(wp), intent(in) :: matrix(0:n, 0:n), c(0:n)
-    real(wp), intent(out) :: b(0:n)
-    integer :: k
+    real(wp), intent(in) :: matrix(0:most_degrees, 0:n), c(0:n)
+    real(wp), intent(out) :: b(0:most_degrees)
+    real(wp) :: sum(rows)
+    integer :: i, k
 
-    b = c(0)
-    do k = 1, n
-      b = b + matrix(:, k) * c(k)
+    do i = 0, n, rows
+      sum = 0.0_wp
+      do k = 0, min(n, i + rows - 1)
+        sum = sum + matrix(i:i + rows - 1, k) * c(k)
+      end do
+      b(i:i + rows - 1) = sum
     end do
   end subroutine multiply
 

@@ -3,22 +3,93 @@ module nocdyn_test_sweep_blocks
   use nocdyn_assembly, only: new_formulation
   use nocdyn_errors, only: error_t
   use nocdyn_formulation, only: formulation_t
-  use nocdyn_integration, only: integrate
+  use nocdyn_integration, only: integrate, integrate_queue
   use nocdyn_integration_settings, only: integration_settings_t
   use nocdyn_kinds, only: wp
+  use nocdyn_lane_numbers, only: lane_numbers_t
   use nocdyn_machine, only: machine_t
   use nocdyn_outcome, only: outcome_t
+  use nocdyn_queue, only: queue_t
   use nocdyn_recorder, only: recorder, recorder_t
+  use nocdyn_reduced, only: new_reduced, reduced_t
   use nocdyn_statistics, only: new_statistic, statistic_final, statistic_max, statistic_max_abs, statistic_mean, statistic_min, &
     statistic_names, statistic_rms, statistic_settling_time, statistic_t, statistic_time_of_max
   use nocdyn_statistics_observer, only: new_statistics_observer, statistics_observer_t
+  use nocdyn_system, only: system_t
   use nocdyn_trajectory_table, only: new_trajectory_table, trajectory_table_t
   implicit none (type, external)
   private
 
-  public :: all_statistics, run_block, run_densely, sampled_statistic, column_named
+  public :: all_statistics, run_block, run_copied_variants, run_densely, sampled_statistic, column_named
+
+  !> Copies the lanes of a source into whatever lane is free, and takes their statistics.
+  type, extends(queue_t) :: measured_copies_t
+    type(lane_numbers_t) :: block, source
+    type(statistics_observer_t), pointer :: observer => null()
+    real(wp), allocatable :: y(:, :)        !! starts, [variants, components]
+    real(wp), allocatable :: values(:, :)   !! [statistics, variants]
+    integer, allocatable :: variant(:)      !! in each lane
+    integer :: begun = 0
+  contains
+    procedure :: next
+    procedure :: finish
+  end type measured_copies_t
 
 contains
+
+  !> The statistics of the lanes of one machine, copied one after the other into the lanes of another.
+  subroutine run_copied_variants(variants, lanes, method, tolerance, t_end, statistics, values)
+    type(machine_t), intent(in) :: variants, lanes
+    character(len=*), intent(in) :: method
+    real(wp), intent(in) :: tolerance, t_end
+    type(statistic_t), intent(in) :: statistics(:)
+    real(wp), allocatable, intent(out) :: values(:, :)   !! [statistics, variants]; not allocated: the layouts differ
+    type(reduced_t), target :: block, source
+    type(statistics_observer_t), target :: observer
+    type(measured_copies_t) :: queue
+    type(outcome_t) :: outcome
+    type(error_t), allocatable :: error
+
+    source = new_reduced(variants, .true., as_block=.true.)
+    block = new_reduced(lanes, .true., as_block=.true.)
+    call source%list_numbers(queue%source)
+    call block%list_numbers(queue%block)
+    if (.not. queue%block%is_congruent(queue%source)) return
+    observer = new_statistics_observer(block, statistics, 0.0_wp, t_end)
+    queue%observer => observer
+    allocate (queue%y, source=source%start())
+    allocate (queue%values(size(statistics), variants%lanes), source=0.0_wp)
+    allocate (queue%variant(lanes%lanes), source=0)
+    call integrate_queue(block, settings_of(method, tolerance), [0.0_wp, t_end], queue, observer, outcome, error)
+    if (allocated(error)) error stop 'nocdyn_test_sweep_blocks: a setting was refused'
+    call move_alloc(queue%values, values)
+  end subroutine run_copied_variants
+
+  subroutine next(self, system, lane, t, y, found)
+    class(measured_copies_t), intent(inout) :: self
+    class(system_t), intent(inout) :: system
+    integer, intent(in) :: lane
+    real(wp), intent(inout) :: t
+    real(wp), contiguous, intent(inout) :: y(:)
+    logical, intent(out) :: found
+
+    found = self%begun < size(self%y, 1)
+    if (.not. found) return
+    self%begun = self%begun + 1
+    self%variant(lane) = self%begun
+    call self%block%copy_lane(lane, self%source, self%begun)
+    y(:) = self%y(self%begun, :)
+    call self%observer%begin(lane, y)
+  end subroutine next
+
+  subroutine finish(self, lane, y, outcome)
+    class(measured_copies_t), intent(inout) :: self
+    integer, intent(in) :: lane
+    real(wp), contiguous, intent(in) :: y(:)
+    type(outcome_t), intent(in) :: outcome
+
+    call self%observer%results(lane, self%values(:, self%variant(lane)))
+  end subroutine finish
 
   !> Every statistic of every column but the time, from the start and from a later time.
   function all_statistics(machine, from, band) result(statistics)
