@@ -16,6 +16,8 @@ module nocdyn_test_sweep_blocks
     statistic_names, statistic_rms, statistic_settling_time, statistic_t, statistic_time_of_max
   use nocdyn_statistics_observer, only: new_statistics_observer, statistics_observer_t
   use nocdyn_system, only: system_t
+  use nocdyn_text, only: string_t
+  use nocdyn_trajectory_columns, only: column_t, list_columns
   use nocdyn_trajectory_table, only: new_trajectory_table, trajectory_table_t
   implicit none (type, external)
   private
@@ -97,39 +99,32 @@ contains
     real(wp), intent(in) :: from   !! [s]
     real(wp), intent(in) :: band
     type(statistic_t), allocatable :: statistics(:)
-    type(trajectory_table_t) :: table
+    type(column_t), allocatable :: columns(:)
+    type(string_t), allocatable :: labels(:)
     integer :: column, kind, next
 
-    table = table_of(machine)
-    allocate (statistics(2 * (size(table%labels) - 1) * size(statistic_names)))
+    call list_columns(machine, columns, labels)
+    allocate (statistics(2 * (size(labels) - 1) * size(statistic_names)))
     next = 0
-    do column = 2, size(table%labels)
+    do column = 2, size(labels)
       do kind = 1, size(statistic_names)
-        statistics(next + 1) = new_statistic(table%labels, column, kind, 0.0_wp, band=band)
-        statistics(next + 2) = new_statistic(table%labels, column, kind, 0.0_wp, from, band)
+        statistics(next + 1) = new_statistic(labels, column, kind, 0.0_wp, band=band)
+        statistics(next + 2) = new_statistic(labels, column, kind, 0.0_wp, from, band)
         next = next + 2
       end do
     end do
   end function all_statistics
 
-  function table_of(machine) result(table)
-    type(machine_t), intent(in) :: machine
-    type(trajectory_table_t) :: table
-    class(formulation_t), allocatable :: formulation
-
-    call new_formulation('reduced', machine, formulation)
-    table = new_trajectory_table(formulation, 0.0_wp)
-  end function table_of
-
   !> Number of the column whose label begins with a name, 0 if there is none.
   integer function column_named(machine, name)
     type(machine_t), intent(in) :: machine
     character(len=*), intent(in) :: name
-    type(trajectory_table_t) :: table
+    type(column_t), allocatable :: columns(:)
+    type(string_t), allocatable :: labels(:)
 
-    table = table_of(machine)
-    do column_named = size(table%labels), 1, -1
-      if (index(table%labels(column_named)%text, name // ' [') == 1) return
+    call list_columns(machine, columns, labels)
+    do column_named = size(labels), 1, -1
+      if (index(labels(column_named)%text, name // ' [') == 1) return
     end do
   end function column_named
 
@@ -153,14 +148,15 @@ contains
     class(formulation_t), allocatable, target :: formulation
     type(statistics_observer_t), target :: observer
     type(error_t), allocatable :: error
-    real(wp), allocatable :: y(:, :)
+    real(wp), allocatable :: start(:), y(:, :)
     integer :: lane
 
     call new_formulation('reduced', machine, formulation)
     observer = new_statistics_observer(formulation, statistics, 0.0_wp, t_end)
     y = formulation%start()
     do lane = 1, machine%lanes
-      call observer%begin(lane, y(lane, :))
+      start = y(lane, :)
+      call observer%begin(lane, start)
     end do
     call integrate(formulation, settings_of(method, tolerance), [0.0_wp, t_end], y, observer, outcome, error)
     if (allocated(error)) error stop 'nocdyn_test_sweep_blocks: ' // error%message
