@@ -10,6 +10,7 @@ module nocdyn_reduced
   use nocdyn_inner_jacobian, only: inner_jacobian_t, new_inner_jacobian
   use nocdyn_kinds, only: wp
   use nocdyn_lane_numbers, only: lane_numbers_t
+  use nocdyn_lane_series, only: lane_series_t, new_lane_series, suits_lane_series
   use nocdyn_machine, only: machine_t
   use nocdyn_reduced_jacobian, only: new_reduced_jacobian, reduced_jacobian_t
   use nocdyn_reduced_series, only: new_reduced_series, reduced_series_t
@@ -30,6 +31,7 @@ module nocdyn_reduced
     integer, allocatable, private :: responding(:)             !! its entry of each entry of R
     type(reduced_jacobian_t), private :: sums                  !! R diag U
     type(reduced_series_t), private :: motion                  !! after `prepare_series`
+    type(lane_series_t), allocatable, private :: motion_of_lanes   !! the same, of many lanes
     type(inner_jacobian_t), private :: inner_rows              !! of the inner states
     type(element_coordinates_t), private :: switching          !! of the switching elements
     real(wp), allocatable, private :: none(:, :)               !! zeros, [lanes, elements]
@@ -188,6 +190,7 @@ contains
 
     call self%machine%laws%admit(lane)
     call self%motion%take_lane(lane, self%machine%laws, self%twists, self%accelerations)
+    if (allocated(self%motion_of_lanes)) call self%motion_of_lanes%note_lane(self%machine, lane)
   end subroutine receive
 
   function start(self) result(y)
@@ -288,7 +291,12 @@ contains
     class(reduced_t), intent(inout) :: self
     integer, intent(in) :: order
 
-    self%motion = new_reduced_series(self%machine, self%twists, self%accelerations, self%is_audited, order)
+    if (allocated(self%motion_of_lanes)) deallocate (self%motion_of_lanes)
+    if (self%lanes > 1 .and. self%quadratures == 0 .and. suits_lane_series(self%machine)) then
+      allocate (self%motion_of_lanes, source=new_lane_series(self%machine, order))
+    else
+      self%motion = new_reduced_series(self%machine, self%twists, self%accelerations, self%is_audited, order)
+    end if
   end subroutine prepare_series
 
   subroutine series(self, order, columns, t, y, status)
@@ -298,8 +306,12 @@ contains
     real(wp), intent(inout) :: y(self%lanes, columns, 0:order)
     integer, intent(inout) :: status(self%lanes)
 
-    call self%motion%expand(self%machine, self%twists, self%accelerations, self%start_twist, &
-                            self%lanes * self%machine%coordinates%freedoms, self%lanes * columns, t, y)
+    if (allocated(self%motion_of_lanes)) then
+      call self%motion_of_lanes%expand(self%machine, self%twists, self%accelerations, self%start_twist, columns, t, y)
+    else
+      call self%motion%expand(self%machine, self%twists, self%accelerations, self%start_twist, &
+                              self%lanes * self%machine%coordinates%freedoms, self%lanes * columns, t, y)
+    end if
   end subroutine series
 
   pure subroutine copy(n, x, y)

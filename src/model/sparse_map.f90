@@ -26,14 +26,14 @@ module nocdyn_sparse_map
     integer, private :: stretches = 0
     logical, private :: without_offset = .false.         !! in even stretches offsets need not be read
     integer, allocatable, private :: row(:)              !! each loose row
-    integer, allocatable, private :: first(:)            !! its first entry, [loose_rows + 1]
+    integer, allocatable :: first(:)            !! its first entry, [loose_rows + 1]
     integer, allocatable, private :: first_row(:)        !! of each stretch
     integer, allocatable, private :: rows(:)             !! of each stretch
     integer, allocatable, private :: width(:)            !! entries of each of its rows, at least 1
     logical, allocatable, private :: is_even(:)          !! of each stretch
     integer, allocatable, private :: first_entry(:)      !! of each stretch
-    integer, allocatable, private :: column(:)           !! [entries]
-    real(wp), allocatable, private :: coefficient(:, :)  !! [lanes, entries]
+    integer, allocatable :: column(:)                    !! [entries]
+    real(wp), allocatable :: coefficient(:, :)           !! [lanes, entries]
   contains
     procedure :: map_one
     procedure :: map_pair
