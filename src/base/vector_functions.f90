@@ -11,13 +11,16 @@
 !> tanh x = E / (E + 2) for x >= 0 with E = exp(2 x) - 1 = 2^k (exp(r) - 1) + (2^k - 1), r = 2 x - k ln 2 in
 !> [-ln 2 / 2, ln 2 / 2]; ln 2 is in two parts, the first of 32 bits, and the Taylor series up to r^14 / 14! leaves less than
 !> 1e-19. The error is below 4 units in the last place too.
+!>
+!> The logarithm and the power to base 2 are for step sizes, which do not need all digits: their errors are below 1e-8.
+!> log2 x = k + 1/2 + 2 / ln 2 artanh s with x = 2^k m, 1 <= m < 2, s = (m - sqrt 2) / (m + sqrt 2), |s| < 0.172.
 module nocdyn_vector_functions
   use, intrinsic :: iso_fortran_env, only: int64
   use nocdyn_kinds, only: wp
   implicit none (type, external)
   private
 
-  public :: sine_of, sines, cosines, tanh_of, tanhs
+  public :: sine_of, sines, cosines, tanh_of, tanhs, log2s, exp2s
 
   real(wp), parameter :: pi_high = 3.1415926535846666_wp         ! 35 bits
   real(wp), parameter :: pi_middle = 5.1266883031679116e-12_wp   ! the next 35 bits
@@ -166,5 +169,63 @@ contains
     e = two_to_k * (r + r2 * series) + (two_to_k - 1.0_wp)
     tanh_of = sign(e / (e + 2.0_wp), x)
   end function tanh_of
+
+  !> Replaces each x, a normal positive number, by log2(x) with an error below 1e-8.
+  pure subroutine log2s(n, x)
+    integer, intent(in) :: n
+    real(wp), intent(inout) :: x(n)
+    integer :: i
+
+    do i = 1, n
+      x(i) = log2_of(x(i))
+    end do
+  end subroutine log2s
+
+  pure real(wp) function log2_of(x)
+    real(wp), intent(in) :: x
+    integer(int64), parameter :: mantissa = shiftl(1_int64, 52) - 1
+    integer(int64), parameter :: exponent_of_one = shiftl(1023_int64, 52), exponent_of_whole = shiftl(1075_int64, 52)
+    real(wp), parameter :: bias = 2.0_wp**52 + 1023.0_wp
+    real(wp), parameter :: root_2 = 1.4142135623730950_wp
+    real(wp), parameter :: c1 = 2.8853900817779268_wp, c3 = c1 / 3.0_wp, c5 = c1 / 5.0_wp, c7 = c1 / 7.0_wp, c9 = c1 / 9.0_wp
+    integer(int64) :: bits
+    real(wp) :: k, m, s, s2, s4
+
+    bits = transfer(x, bits)
+    k = transfer(ior(shiftr(bits, 52), exponent_of_whole), k) - bias
+    m = transfer(ior(iand(bits, mantissa), exponent_of_one), m)
+    s = (m - root_2) / (m + root_2)
+    s2 = s * s
+    s4 = s2 * s2
+    log2_of = (k + 0.5_wp) + s * ((c1 + c3 * s2) + ((c5 + c7 * s2) + c9 * s4) * s4)
+  end function log2_of
+
+  !> Replaces each x by 2^x with a relative error below 1e-8; beyond 1000 and -1000 it is taken for these.
+  pure subroutine exp2s(n, x)
+    integer, intent(in) :: n
+    real(wp), intent(inout) :: x(n)
+    integer :: i
+
+    do i = 1, n
+      x(i) = exp2_of(x(i))
+    end do
+  end subroutine exp2s
+
+  pure real(wp) function exp2_of(x)
+    real(wp), intent(in) :: x
+    real(wp), parameter :: largest_exponent = 1000.0_wp
+    real(wp), parameter :: to_exponent = to_whole + 1023.0_wp   ! leaves the bits of the exponent at the end
+    real(wp), parameter :: b1 = 0.69314718055994531_wp, b2 = b1**2 / 2.0_wp, b3 = b1**3 / 6.0_wp, b4 = b1**4 / 24.0_wp
+    real(wp), parameter :: b5 = b1**5 / 120.0_wp, b6 = b1**6 / 720.0_wp, b7 = b1**7 / 5040.0_wp
+    real(wp) :: moderate, r, r2, r4, shifted, two_to_k
+
+    moderate = max(-largest_exponent, min(x, largest_exponent))
+    shifted = moderate + to_exponent
+    r = moderate - (shifted - to_exponent)
+    r2 = r * r
+    r4 = r2 * r2
+    two_to_k = transfer(shiftl(transfer(shifted, 1_int64), 52), two_to_k)
+    exp2_of = (((1.0_wp + b1 * r) + (b2 + b3 * r) * r2) + ((b4 + b5 * r) + (b6 + b7 * r) * r2) * r4) * two_to_k
+  end function exp2_of
 
 end module nocdyn_vector_functions

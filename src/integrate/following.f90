@@ -28,10 +28,10 @@ contains
 
     associate (steps => march%steps)
       do lane = 1, march%trial%lanes
-        if (.not. march%accepted(lane)) cycle
-        if (march%inspected(lane)) call take_lane(march%dense, march%trial, march%coefficients, lane)
         steps%until(lane) = 1.0_wp
         steps%crosses(lane) = .false.
+        if (.not. (march%is_due .and. march%accepted(lane))) cycle
+        if (march%inspected(lane)) call take_lane(march%dense, march%trial, march%coefficients, lane)
         if (march%has_switches) then
           call end_at_crossing(march, system, observer, lane, outcome, steps%until(lane))
           steps%crosses(lane) = march%switching%due(lane) > 0

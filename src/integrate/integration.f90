@@ -88,20 +88,20 @@ contains
     call prepare(march, stepper, system, settings, times, observer)
     do
       call fill_lanes(march, stepper, system, queue, times, observer, outcome)
-      if (.not. any(march%occupied)) exit
+      if (march%free == system%lanes) exit
       call set_out_lanes(march, stepper, system, outcome)
       call stepper%attempt(system, march%trial)
-      call judge_lanes(march, stepper, system, times, outcome)
-      if (any(march%accepted)) then
-        call follow_lanes(march, system, times, observer, outcome)
+      call judge_lanes(march, stepper, system, outcome)
+      if (count(march%accepted) > 0) then
+        if (march%is_due .or. march%is_followed) call follow_lanes(march, system, times, observer, outcome)
         if (march%is_followed) call show_steps(march, stepper, observer)
-        call advance_lanes(march)
+        call advance_lanes(march, times)
         call stepper%accept(march%accepted)
         if (march%has_switches) call cross_lanes(march, stepper, system, observer, outcome)
       end if
       call interrupt_if_asked(march, observer, outcome)
       call empty_lanes(march, queue, observer, outcome)
-      if (any(outcome%status == integration_interrupted)) exit
+      if (count(outcome%status == integration_interrupted) > 0) exit
     end do
   end subroutine integrate_with
 
@@ -115,7 +115,7 @@ contains
 
     slowest = huge(slowest)
     do lane = 1, size(outcome%status)
-      if (outcome%status(lane) == integration_running) slowest = min(slowest, march%trial%t(lane))
+      slowest = min(slowest, merge(march%trial%t(lane), huge(slowest), outcome%status(lane) == integration_running))
     end do
     if (slowest >= huge(slowest)) return
     if (.not. observer%stops(slowest)) return

@@ -7,9 +7,9 @@ module nocdyn_march
   use nocdyn_integration_settings, only: integration_settings_t
   use nocdyn_kinds, only: wp
   use nocdyn_outcome, only: integration_done, integration_gave_up, integration_not_finite, integration_running, &
-    integration_step_too_small, integration_too_many_steps, note_method, outcome_t, reset_outcome
+    integration_step_too_small, integration_too_many_steps, note_methods, outcome_t, reset_outcome
   use nocdyn_queue, only: queue_t
-  use nocdyn_step_control, only: is_within, lengthen, propose, reduce, restart, shorten, smallest_step, step_control, &
+  use nocdyn_step_control, only: adapt, is_within, propose, restart, shorten, smallest_step, step_control, &
     step_control_t, weigh_error
   use nocdyn_stepper, only: stepper_t
   use nocdyn_switching, only: allocate_switching, start_switching, switching_t
@@ -34,13 +34,18 @@ module nocdyn_march
     logical :: has_switches = .false.
     logical :: is_followed = .false.                 !! whether the observer is handed the solution inside all steps
     logical :: is_exhausted = .false.                !! the queue has no variant left
+    integer :: free = 0                              !! lanes that hold no variant
+    logical :: is_due = .false.                      !! whether the accepted steps are looked at lane by lane
     logical, allocatable :: occupied(:)              !! lanes that hold a variant
+    logical, allocatable :: running(:)               !! lanes that took part in the last attempt
+    logical, allocatable :: rejected(:)              !! lanes whose last attempt was finished, but not accepted
     logical, allocatable :: starting(:)              !! lanes that have just been given one, or go on from branch to branch
     logical, allocatable :: accepted(:)              !! lanes whose last attempt was accepted
     logical, allocatable :: wanted(:)                !! lanes whose solution inside the last step is wanted
     logical, allocatable :: inspected(:)             !! lanes whose solution there is looked at on its own
     type(steps_t) :: steps                           !! as the observer is told of them
     real(wp), allocatable :: t_new(:)                !! end of the last attempt of each lane
+    real(wp), allocatable :: next_time(:)            !! first requested time of each lane that is not recorded yet; or never
     integer, allocatable :: next(:)                  !! number of the first requested time of each lane that is not recorded yet
     real(wp), allocatable :: sample(:)               !! one lane's state at a requested time
     real(wp), allocatable :: coefficients(:, :, :)   !! of the solution inside the last step
@@ -67,9 +72,11 @@ contains
     march%first_step = settings%first_step
     march%max_steps = settings%max_steps
     associate (lanes => system%lanes, components => system%states + system%quadratures)
-      allocate (march%occupied(lanes), march%starting(lanes), march%accepted(lanes), march%wanted(lanes), &
-                march%inspected(lanes), march%steps%taken(lanes), march%steps%crosses(lanes), source=.false.)
-      allocate (march%t_new(lanes), source=times(1))
+      march%free = lanes
+      allocate (march%occupied(lanes), march%running(lanes), march%starting(lanes), march%accepted(lanes), &
+                march%rejected(lanes), march%wanted(lanes), march%inspected(lanes), march%steps%taken(lanes), &
+                march%steps%crosses(lanes), source=.false.)
+      allocate (march%t_new(lanes), march%next_time(lanes), source=times(1))
       allocate (march%steps%t(lanes), march%steps%h(lanes), march%steps%scale(lanes), march%steps%until(lanes), &
                 march%steps%t_new(lanes), source=0.0_wp)
       allocate (march%next(lanes), source=2)
@@ -101,7 +108,7 @@ contains
     real(wp) :: t
     integer :: lane
 
-    if (march%is_exhausted .or. all(march%occupied)) return
+    if (march%is_exhausted .or. march%free == 0) return
     do lane = 1, size(march%occupied)
       march%starting(lane) = .false.
       if (march%occupied(lane) .or. march%is_exhausted) cycle
@@ -109,7 +116,9 @@ contains
       call queue%next(system, lane, t, march%sample, march%starting(lane))
       march%occupied(lane) = march%starting(lane)
       march%is_exhausted = .not. march%starting(lane)
-      if (march%starting(lane)) call place_start(march, lane, t, times, outcome)
+      if (.not. march%starting(lane)) cycle
+      march%free = march%free - 1
+      call place_start(march, lane, t, times, outcome)
     end do
     if (any(march%starting)) call start_lanes(march, stepper, system, times, observer, outcome)
   end subroutine fill_lanes
@@ -135,6 +144,7 @@ contains
     do while (times(march%next(lane)) <= t)
       march%next(lane) = march%next(lane) + 1
     end do
+    march%next_time(lane) = times(march%next(lane))
     call restart(march%control, lane)
     call reset_outcome(outcome, lane)
   end subroutine place_start
@@ -208,25 +218,40 @@ contains
     class(stepper_t), intent(inout) :: stepper
     class(system_t), intent(inout) :: system
     type(outcome_t), intent(inout) :: outcome
-    integer :: lane
 
     associate (trial => march%trial)
-      do lane = 1, trial%lanes
-        trial%working(lane) = march%occupied(lane) .and. outcome%status(lane) == integration_running
-      end do
+      call find_running(trial%lanes, march%occupied, outcome%status, march%running)
+      trial%working(:) = march%running
       if (stepper%plans_steps) call plan_steps(march, stepper, system, outcome)
-      do lane = 1, trial%lanes
-        trial%h(lane) = 0.0_wp
-        if (.not. trial%working(lane)) cycle
-        call propose(march%control, lane, trial%t(lane), trial%h(lane))
-        outcome%h(lane) = trial%h(lane)
-        outcome%steps(lane) = outcome%steps(lane) + 1
-        march%t_new(lane) = trial%t(lane) + trial%h(lane)
-        if (march%control%reaches_end(lane)) march%t_new(lane) = march%control%t_end
-      end do
+      call propose(march%control, trial%lanes, trial%t, trial%h, march%t_new)
+      call begin_attempts(trial%lanes, march%running, trial%h, outcome%h, outcome%steps)
       call set_out(trial)
     end associate
   end subroutine set_out_lanes
+
+  pure subroutine find_running(lanes, occupied, status, running)
+    integer, intent(in) :: lanes
+    logical, intent(in) :: occupied(lanes)
+    integer, intent(in) :: status(lanes)
+    logical, intent(inout) :: running(lanes)
+
+    running = occupied .and. status == integration_running
+  end subroutine find_running
+
+  !> Notes and counts the attempts of the running lanes; the others get steps of zero.
+  pure subroutine begin_attempts(lanes, running, h, h_noted, steps)
+    integer, intent(in) :: lanes
+    logical, intent(in) :: running(lanes)
+    real(wp), intent(inout) :: h(lanes), h_noted(lanes)
+    integer, intent(inout) :: steps(lanes)
+    integer :: lane
+
+    do lane = 1, lanes
+      h_noted(lane) = merge(h(lane), h_noted(lane), running(lane))
+      h(lane) = merge(h(lane), 0.0_wp, running(lane))
+      steps(lane) = steps(lane) + merge(1, 0, running(lane))
+    end do
+  end subroutine begin_attempts
 
   !> Lets the stepper choose the steps; the first is not longer than the one that was asked for.
   subroutine plan_steps(march, stepper, system, outcome)
@@ -244,41 +269,86 @@ contains
   end subroutine plan_steps
 
   !> Accepts or rejects the last attempt of each lane, and ends the lanes that cannot go on.
-  subroutine judge_lanes(march, stepper, system, times, outcome)
+  subroutine judge_lanes(march, stepper, system, outcome)
     type(march_t), intent(inout) :: march
     class(stepper_t), intent(inout) :: stepper
     class(system_t), intent(inout) :: system
-    real(wp), contiguous, intent(in) :: times(:)
     type(outcome_t), intent(inout) :: outcome
     integer :: lane
 
-    if (.not. stepper%plans_steps) call weigh_error(march%control, march%trial)
-    do lane = 1, march%trial%lanes
-      march%accepted(lane) = march%trial%working(lane) .and. is_within(march%control%mean_square(lane))
-      march%inspected(lane) = march%accepted(lane) &
-                              .and. (march%has_events .or. march%has_extremes .or. march%has_switches &
-                                     .or. next_time(march, lane, times) < march%t_new(lane))
-      march%wanted(lane) = march%inspected(lane) &
-                           .or. (march%accepted(lane) .and. march%is_followed .and. .not. stepper%shows_own)
-    end do
-    if (any(march%wanted)) call stepper%interpolate(system, march%trial, march%wanted, march%coefficients)
-    do lane = 1, march%trial%lanes
-      if (.not. march%occupied(lane) .or. outcome%status(lane) /= integration_running) cycle
-      march%accepted(lane) = march%accepted(lane) .and. march%trial%verdict(lane) == trial_fine
-      if (march%accepted(lane)) then
-        if (.not. stepper%plans_steps) then
-          call lengthen(march%control, lane, march%trial%error_order(lane), march%trial%most_growth(lane), outcome%h(lane))
-        end if
-        call note_method(outcome, lane, march%trial%t(lane), march%trial%implicit(lane))
-        if (march%control%reaches_end(lane)) outcome%status(lane) = integration_done
-      else
-        call judge_rejection(march, lane, outcome)
+    associate (trial => march%trial, lanes => march%trial%lanes, control => march%control)
+      if (.not. stepper%plans_steps) call weigh_error(control, trial)
+      call find_wanted(lanes, march%has_events .or. march%has_extremes .or. march%has_switches, &
+                       march%is_followed .and. .not. stepper%shows_own, trial%working, control%mean_square, march%next_time, &
+                       march%t_new, march%accepted, march%inspected, march%wanted)
+      if (count(march%wanted) > 0) call stepper%interpolate(system, trial, march%wanted, march%coefficients)
+      call sort_lanes(lanes, march%running, trial%verdict, march%accepted, march%rejected)
+      if (.not. stepper%plans_steps) then
+        call adapt(control, lanes, march%accepted, march%rejected, trial%error_order, trial%most_growth, outcome%h)
       end if
-      if (outcome%status(lane) == integration_running .and. outcome%steps(lane) >= march%max_steps) then
-        outcome%status(lane) = integration_too_many_steps
+      call note_methods(outcome, lanes, march%accepted, trial%t, trial%implicit)
+      if (count(march%running .and. .not. march%accepted) > 0) then
+        do lane = 1, lanes
+          if (march%running(lane) .and. .not. march%accepted(lane)) call judge_rejection(march, lane, outcome)
+        end do
       end if
-    end do
+      call find_ended(lanes, march%max_steps, march%running, march%accepted, control%reaches_end, outcome%steps, outcome%status)
+      call find_due(march)
+    end associate
   end subroutine judge_lanes
+
+  !> The lanes whose error is within the tolerances, and those of them whose solution inside the step is wanted.
+  pure subroutine find_wanted(lanes, are_inspected, are_followed, working, mean_square, next_time, t_new, accepted, inspected, &
+                              wanted)
+    integer, intent(in) :: lanes
+    logical, intent(in) :: are_inspected, are_followed   !! whether the solution in all accepted lanes is
+    logical, intent(in) :: working(lanes)
+    real(wp), intent(in) :: mean_square(lanes), next_time(lanes), t_new(lanes)
+    logical, intent(inout) :: accepted(lanes), inspected(lanes), wanted(lanes)
+    integer :: lane
+
+    do lane = 1, lanes
+      accepted(lane) = working(lane) .and. is_within(mean_square(lane))
+      inspected(lane) = accepted(lane) .and. (are_inspected .or. next_time(lane) < t_new(lane))
+      wanted(lane) = inspected(lane) .or. (accepted(lane) .and. are_followed)
+    end do
+  end subroutine find_wanted
+
+  !> Leaves those accepted whose steps were finished.
+  pure subroutine sort_lanes(lanes, running, verdict, accepted, rejected)
+    integer, intent(in) :: lanes
+    logical, intent(in) :: running(lanes)
+    integer, intent(in) :: verdict(lanes)
+    logical, intent(inout) :: accepted(lanes), rejected(lanes)
+    integer :: lane
+
+    do lane = 1, lanes
+      rejected(lane) = running(lane) .and. verdict(lane) == trial_fine .and. .not. accepted(lane)
+      accepted(lane) = accepted(lane) .and. verdict(lane) == trial_fine
+    end do
+  end subroutine sort_lanes
+
+  pure subroutine find_ended(lanes, max_steps, running, accepted, reaches_end, steps, status)
+    integer, intent(in) :: lanes, max_steps
+    logical, intent(in) :: running(lanes), accepted(lanes), reaches_end(lanes)
+    integer, intent(in) :: steps(lanes)
+    integer, intent(inout) :: status(lanes)
+    integer :: lane
+
+    do lane = 1, lanes
+      status(lane) = merge(integration_done, status(lane), accepted(lane) .and. reaches_end(lane))
+      status(lane) = merge(integration_too_many_steps, status(lane), running(lane) .and. steps(lane) >= max_steps &
+                           .and. status(lane) == integration_running)
+    end do
+  end subroutine find_ended
+
+  !> Whether there is anything in the accepted steps that is looked at lane by lane.
+  pure subroutine find_due(march)
+    type(march_t), intent(inout) :: march
+
+    march%is_due = march%has_events .or. march%has_extremes .or. march%has_switches
+    if (.not. march%is_due) march%is_due = count(march%accepted .and. march%next_time <= march%t_new) > 0
+  end subroutine find_due
 
   !> A lane takes a shorter step, or fails if no shorter step will help or none is possible.
   subroutine judge_rejection(march, lane, outcome)
@@ -288,11 +358,7 @@ contains
 
     outcome%rejected(lane) = outcome%rejected(lane) + 1
     associate (trial => march%trial)
-      if (trial%verdict(lane) == trial_fine) then
-        call reduce(march%control, lane, trial%error_order(lane), outcome%h(lane))
-      else
-        call shorten(march%control, lane, outcome%h(lane))
-      end if
+      if (trial%verdict(lane) /= trial_fine) call shorten(march%control, lane, outcome%h(lane))
       if (trial%verdict(lane) == trial_give_up) then
         outcome%status(lane) = integration_gave_up
       else if (outcome%h(lane) <= smallest_step(trial%t(lane))) then
@@ -311,39 +377,40 @@ contains
     end associate
   end subroutine judge_rejection
 
-  !> First requested time of a lane that is not recorded yet; never, if there is none.
-  pure real(wp) function next_time(march, lane, times)
-    type(march_t), intent(in) :: march
-    integer, intent(in) :: lane
-    real(wp), contiguous, intent(in) :: times(:)
-
-    next_time = huge(next_time)
-    if (march%next(lane) <= size(times)) next_time = times(march%next(lane))
-  end function next_time
-
   !> The accepted lanes move to the end of their step.
-  subroutine advance_lanes(march)
+  subroutine advance_lanes(march, times)
     type(march_t), intent(inout) :: march
+    real(wp), contiguous, intent(in) :: times(:)
     real(wp), allocatable :: spare(:, :)
-    integer :: lane, component
+    integer :: component, lane
 
     associate (trial => march%trial, accepted => march%accepted)
-      do lane = 1, trial%lanes
-        if (accepted(lane)) trial%t(lane) = march%t_new(lane)
-      end do
-      if (all(accepted)) then   ! the arrays change their names: nothing asks for y_new any more
+      call take_accepted(trial%lanes, accepted, march%t_new, trial%t)
+      if (count(accepted) == trial%lanes) then   ! the arrays change their names: nothing asks for y_new any more
         call move_alloc(trial%y, spare)
         call move_alloc(trial%y_new, trial%y)
         call move_alloc(spare, trial%y_new)
       else
         do component = 1, trial%components
-          do lane = 1, trial%lanes
-            if (accepted(lane)) trial%y(lane, component) = trial%y_new(lane, component)
-          end do
+          call take_accepted(trial%lanes, accepted, trial%y_new(1, component), trial%y(1, component))
         end do
       end if
+      if (.not. march%is_due) return
+      do lane = 1, trial%lanes
+        march%next_time(lane) = huge(march%next_time)
+        if (march%next(lane) <= size(times)) march%next_time(lane) = times(march%next(lane))
+      end do
     end associate
   end subroutine advance_lanes
+
+  pure subroutine take_accepted(lanes, accepted, new, old)
+    integer, intent(in) :: lanes
+    logical, intent(in) :: accepted(lanes)
+    real(wp), intent(in) :: new(lanes)
+    real(wp), intent(inout) :: old(lanes)
+
+    old = merge(new, old, accepted)
+  end subroutine take_accepted
 
   !> Hands the lanes that have ended to the queue and frees them.
   subroutine empty_lanes(march, queue, observer, outcome)
@@ -353,9 +420,11 @@ contains
     type(outcome_t), intent(inout) :: outcome
     integer :: lane
 
+    if (count(march%occupied .and. outcome%status /= integration_running) == 0) return
     do lane = 1, size(march%occupied)
       if (.not. march%occupied(lane) .or. outcome%status(lane) == integration_running) cycle
       march%occupied(lane) = .false.
+      march%free = march%free + 1
       outcome%t(lane) = march%trial%t(lane)
       outcome%evaluations(lane) = march%trial%evaluations(lane)
       outcome%jacobians(lane) = march%trial%jacobians(lane)

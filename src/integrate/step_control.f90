@@ -2,10 +2,11 @@
 module nocdyn_step_control
   use nocdyn_kinds, only: wp
   use nocdyn_trial, only: trial_t
+  use nocdyn_vector_functions, only: exp2s, log2s
   implicit none (type, external)
   private
 
-  public :: step_control, restart, resume, weigh_error, is_within, lengthen, reduce, shorten, propose, smallest_step
+  public :: step_control, restart, resume, weigh_error, is_within, adapt, shorten, propose, smallest_step
 
   ! The constants of Hairer's DOPRI5, for any order of the error estimate.
   real(wp), parameter :: beta = 0.04_wp            !! weight of the last error in the PI controller
@@ -13,7 +14,7 @@ module nocdyn_step_control
   real(wp), parameter :: safety = 0.9_wp
   real(wp), parameter :: least_change = 0.2_wp
   real(wp), parameter :: end_stretch = 1.01_wp     !! a step is stretched by up to 1 % to end on the final time
-  real(wp), parameter :: least_old_error = 1.0e-4_wp
+  real(wp), parameter :: least_log_error = -13.287712379549449_wp   !! log2 of 1e-4
   real(wp), parameter :: coarse_share = 0.01_wp    !! of a coarse error estimate in the combination of Hairer's DOP853
   real(wp), parameter :: lenience = 1000.0_wp      !! errors of quadratures may be so much larger than those of states
 
@@ -25,10 +26,11 @@ module nocdyn_step_control
     real(wp) :: t_end
     real(wp) :: longest
     real(wp), allocatable :: h(:)                      !! next step size of each lane
-    real(wp), allocatable :: log_error(:)              !! logarithm of the error of the last accepted step
+    real(wp), allocatable :: log_error(:)              !! logarithm to base 2 of the error of the last accepted step
     logical, allocatable :: was_rejected(:)
     logical, allocatable :: reaches_end(:)             !! the present step ends on t_end
     real(wp), allocatable :: mean_square(:)            !! mean squared error ratio of the present step, 1 at the tolerance
+    real(wp), allocatable :: log_ratio(:), change(:)   !! work space
   end type step_control_t
 
 contains
@@ -45,8 +47,8 @@ contains
     control%atol = atol
     control%t_end = t_end
     control%longest = longest
-    allocate (control%h(lanes), control%mean_square(lanes), source=0.0_wp)
-    allocate (control%log_error(lanes), source=log(least_old_error))
+    allocate (control%h(lanes), control%mean_square(lanes), control%log_ratio(lanes), control%change(lanes), source=0.0_wp)
+    allocate (control%log_error(lanes), source=least_log_error)
     allocate (control%was_rejected(lanes), control%reaches_end(lanes), source=.false.)
   end function step_control
 
@@ -55,7 +57,7 @@ contains
     type(step_control_t), intent(inout) :: control
     integer, intent(in) :: lane
 
-    control%log_error(lane) = log(least_old_error)
+    control%log_error(lane) = least_log_error
     control%was_rejected(lane) = .false.
   end subroutine restart
 
@@ -77,17 +79,32 @@ contains
     smallest_step = 10 * max(epsilon(t) * abs(t), tiny(t))
   end function smallest_step
 
-  !> Sets the size of the next attempt of a lane, so that no sliver is left before the final time.
-  pure subroutine propose(control, lane, t, h)
+  !> Sets the sizes of the next attempts and where they end, so that no sliver is left before the final time.
+  pure subroutine propose(control, lanes, t, h, t_new)
     type(step_control_t), intent(inout) :: control
-    integer, intent(in) :: lane
-    real(wp), intent(in) :: t
-    real(wp), intent(out) :: h
+    integer, intent(in) :: lanes
+    real(wp), intent(in) :: t(lanes)
+    real(wp), intent(inout) :: h(lanes), t_new(lanes)
 
-    h = max(min(control%h(lane), control%longest), smallest_step(t))
-    control%reaches_end(lane) = t + end_stretch * h >= control%t_end .and. control%t_end - t <= control%longest
-    if (control%reaches_end(lane)) h = control%t_end - t
+    call propose_lanes(lanes, control%longest, control%t_end, t, control%h, h, t_new, control%reaches_end)
   end subroutine propose
+
+  pure subroutine propose_lanes(lanes, longest, t_end, t, wish, h, t_new, reaches_end)
+    integer, intent(in) :: lanes
+    real(wp), intent(in) :: longest, t_end, t(lanes), wish(lanes)
+    real(wp), intent(inout) :: h(lanes), t_new(lanes)
+    logical, intent(inout) :: reaches_end(lanes)
+    real(wp) :: rest
+    integer :: lane
+
+    do lane = 1, lanes
+      rest = t_end - t(lane)
+      h(lane) = max(min(wish(lane), longest), 10 * max(epsilon(t) * abs(t(lane)), tiny(t)))
+      reaches_end(lane) = t(lane) + end_stretch * h(lane) >= t_end .and. rest <= longest
+      h(lane) = merge(rest, h(lane), reaches_end(lane))
+      t_new(lane) = merge(t_end, t(lane) + h(lane), reaches_end(lane))
+    end do
+  end subroutine propose_lanes
 
   !> The mean over the states of (deviation / (atol + rtol max(|y|, |y_new|)))^2; leaves each term in `deviation`.
   !> A coarse estimate joins in as in DOP853: E5^2 / (E5 + 0.01 E3), sums of squares of the two estimates.
@@ -166,13 +183,21 @@ contains
     integer :: lane, state, whole
 
     whole = states - modulo(states, 4)
-    do lane = 1, lanes
-      part = 0.0_wp
-      do state = 1, whole, 4
-        part = part + squares(lane, state:state + 3)
+    if (lanes > 1 .and. whole == 4) then
+      do lane = 1, lanes
+        total(lane) = (squares(lane, 1) + squares(lane, 2)) + (squares(lane, 3) + squares(lane, 4))
       end do
-      total(lane) = (part(1) + part(2)) + (part(3) + part(4))
-      do state = whole + 1, states
+    else
+      do lane = 1, lanes
+        part = 0.0_wp
+        do state = 1, whole, 4
+          part = part + squares(lane, state:state + 3)
+        end do
+        total(lane) = (part(1) + part(2)) + (part(3) + part(4))
+      end do
+    end if
+    do state = whole + 1, states
+      do lane = 1, lanes
         total(lane) = total(lane) + squares(lane, state)
       end do
     end do
@@ -185,42 +210,60 @@ contains
     is_within = mean_square <= 1
   end function is_within
 
-  !> PI control after an accepted step of size h.
-  pure subroutine lengthen(control, lane, error_order, most_growth, h)
+  !> The next steps of lanes after attempts of size h: PI control where these were accepted, shorter ones where the error was
+  !> too large. Both logarithms are to base 2.
+  pure subroutine adapt(control, lanes, accepted, rejected, error_order, most_growth, h)
     type(step_control_t), intent(inout) :: control
-    integer, intent(in) :: lane
-    integer, intent(in) :: error_order   !! the error falls as h^(error_order + 1)
-    real(wp), intent(in) :: most_growth
-    real(wp), intent(in) :: h
-    real(wp) :: log_error, change
+    integer, intent(in) :: lanes
+    logical, intent(in) :: accepted(lanes), rejected(lanes)
+    integer, intent(in) :: error_order(lanes)    !! the error falls as h^(error_order + 1)
+    real(wp), intent(in) :: most_growth(lanes)
+    real(wp), intent(in) :: h(lanes)
 
-    log_error = 0.5_wp * log(max(control%mean_square(lane), no_error))
-    change = safety * exp(beta * control%log_error(lane) - present_exponent(error_order) * log_error)
-    change = max(least_change, min(change, most_growth))
-    if (control%was_rejected(lane)) change = min(change, 1.0_wp)
-    control%log_error(lane) = max(log_error, log(least_old_error))
-    control%was_rejected(lane) = .false.
-    control%h(lane) = change * h
-  end subroutine lengthen
+    call find_changes(lanes, accepted, error_order, control%mean_square, control%log_error, control%log_ratio, control%change)
+    call apply_changes(lanes, accepted, rejected, most_growth, h, control%log_ratio, control%change, control%h, &
+                       control%log_error, control%was_rejected)
+  end subroutine adapt
 
-  !> After an attempt of size h whose error is too large.
-  pure subroutine reduce(control, lane, error_order, h)
-    type(step_control_t), intent(inout) :: control
-    integer, intent(in) :: lane
-    integer, intent(in) :: error_order
-    real(wp), intent(in) :: h
+  !> The logarithms of the errors and what the steps are to be multiplied by, within no limits.
+  pure subroutine find_changes(lanes, accepted, error_order, mean_square, log_error, log_ratio, change)
+    integer, intent(in) :: lanes
+    logical, intent(in) :: accepted(lanes)
+    integer, intent(in) :: error_order(lanes)
+    real(wp), intent(in) :: mean_square(lanes), log_error(lanes)
+    real(wp), intent(inout) :: log_ratio(lanes), change(lanes)
+    real(wp) :: present_exponent
+    integer :: lane
 
-    control%was_rejected(lane) = .true.
-    control%h(lane) = h * max(least_change, &
-                              safety * exp(-0.5_wp * present_exponent(error_order) * log(control%mean_square(lane))))
-  end subroutine reduce
+    do lane = 1, lanes
+      log_ratio(lane) = max(mean_square(lane), no_error)
+    end do
+    call log2s(lanes, log_ratio)
+    do lane = 1, lanes
+      present_exponent = 1.0_wp / (error_order(lane) + 1) - integral_loss * beta
+      log_ratio(lane) = 0.5_wp * log_ratio(lane)
+      change(lane) = merge(beta, 0.0_wp, accepted(lane)) * log_error(lane) - present_exponent * log_ratio(lane)
+    end do
+    call exp2s(lanes, change)
+  end subroutine find_changes
 
-  !> Exponent of the present error in the PI controller.
-  elemental real(wp) function present_exponent(error_order)
-    integer, intent(in) :: error_order
+  pure subroutine apply_changes(lanes, accepted, rejected, most_growth, h, log_ratio, change, next_h, log_error, was_rejected)
+    integer, intent(in) :: lanes
+    logical, intent(in) :: accepted(lanes), rejected(lanes)
+    real(wp), intent(in) :: most_growth(lanes), h(lanes), log_ratio(lanes), change(lanes)
+    real(wp), intent(inout) :: next_h(lanes), log_error(lanes)
+    logical, intent(inout) :: was_rejected(lanes)
+    real(wp) :: most, new_h
+    integer :: lane
 
-    present_exponent = 1.0_wp / (error_order + 1) - integral_loss * beta
-  end function present_exponent
+    do lane = 1, lanes
+      most = merge(min(most_growth(lane), 1.0_wp), most_growth(lane), was_rejected(lane))
+      new_h = max(least_change, min(safety * change(lane), most)) * h(lane)
+      next_h(lane) = merge(new_h, next_h(lane), accepted(lane) .or. rejected(lane))
+      log_error(lane) = merge(max(log_ratio(lane), least_log_error), log_error(lane), accepted(lane))
+      was_rejected(lane) = rejected(lane) .or. (was_rejected(lane) .and. .not. accepted(lane))
+    end do
+  end subroutine apply_changes
 
   !> After an attempt of size h that could not be completed.
   pure subroutine shorten(control, lane, h)

@@ -13,6 +13,7 @@ module nocdyn_taylor_stepper
   use nocdyn_stepper, only: stepper_t
   use nocdyn_system, only: evaluation_fine, observer_t, steps_t, system_t
   use nocdyn_trial, only: park, park_infinities, trial_fine, trial_not_finite, trial_shorten, trial_t
+  use nocdyn_vector_functions, only: exp2s, log2s
   implicit none (type, external)
   private
 
@@ -23,6 +24,8 @@ module nocdyn_taylor_stepper
   type, extends(stepper_t), public :: taylor_stepper_t
     private
     real(wp), allocatable :: series(:, :, :)   !! y_0, y_1, ... of each lane, [lanes, padded columns, 0:order]
+    real(wp), allocatable :: last(:)           !! norms of the last coefficients and then their steps, [lanes]
+    real(wp), allocatable :: last_but_one(:)
     logical, allocatable :: moved(:)           !! lanes that have moved since they were expanded
     integer, allocatable :: verdict(:)         !! trial_... on the series of each lane
     integer, allocatable :: culprit(:)         !! component that the verdict is due to, 0 if there is none
@@ -57,9 +60,10 @@ contains
     class(taylor_stepper_t), intent(inout) :: self
     class(system_t), intent(in) :: system
 
-    if (allocated(self%series)) deallocate (self%series, self%moved, self%verdict, self%culprit)
+    if (allocated(self%series)) deallocate (self%series, self%last, self%last_but_one, self%moved, self%verdict, self%culprit)
     associate (lanes => system%lanes)
       allocate (self%series(lanes, padded_columns(lanes, system%states + system%quadratures), 0:self%order), source=0.0_wp)
+      allocate (self%last(lanes), self%last_but_one(lanes), source=0.0_wp)
       allocate (self%moved(lanes), source=.true.)
       allocate (self%verdict(lanes), source=trial_fine)
       allocate (self%culprit(lanes), source=0)
@@ -83,18 +87,26 @@ contains
     logical :: are_finite
     integer :: lane
 
-    if (.not. any(self%moved .and. trial%working)) return
+    if (count(self%moved .and. trial%working) == 0) return
     self%series(:, :, 0) = trial%y
     call system%series(self%order, size(self%series, 2), trial%t, self%series, trial%status)
-    are_finite = all_finite(size(self%series), self%series)
+    call measure(trial%lanes, trial%states, size(self%series, 2), control%rtol, control%atol, self%series, &
+                 self%series(1, 1, self%order - 1), self%last, self%last_but_one)
+    ! an infinity between these shows up in y_new
+    are_finite = all_finite(2 * trial%length, self%series) .and. all_finite(2 * trial%length, self%series(1, 1, self%order - 1))
+    call find_steps(trial%lanes, self%order, self%last, self%last_but_one)
     do lane = 1, trial%lanes
       if (.not. (self%moved(lane) .and. trial%working(lane))) cycle
       self%moved(lane) = .false.
       trial%evaluations(lane) = trial%evaluations(lane) + 1
       self%verdict(lane) = trial%status(lane)
       self%culprit(lane) = 0
+      control%h(lane) = self%last(lane)
       if (.not. are_finite) call find_infinity(self, lane)
-      if (self%verdict(lane) == trial_fine) call set_step(self, trial, control, lane)
+      if (self%verdict(lane) == trial_fine .and. control%h(lane) <= smallest_step(trial%t(lane))) then
+        self%verdict(lane) = trial_shorten
+        self%culprit(lane) = maxloc(abs(self%series(lane, :trial%states, self%order)), dim=1)
+      end if
       if (self%verdict(lane) == trial_fine) cycle
       control%h(lane) = 0.0_wp
       self%series(lane, :, 1:) = 0.0_wp
@@ -115,46 +127,44 @@ contains
     end do
   end subroutine find_infinity
 
-  !> The step that the last two coefficients of a lane allow; a verdict if it is too short for the time.
-  subroutine set_step(self, trial, control, lane)
-    type(taylor_stepper_t), intent(inout) :: self
-    type(trial_t), intent(in) :: trial
-    type(step_control_t), intent(inout) :: control
-    integer, intent(in) :: lane
-    real(wp) :: last, last_but_one, log_h
-
-    associate (p => self%order, y => self%series)
-      last = norm(trial%lanes, trial%states, lane, control, y(:, :, 0), y(:, :, p))
-      last_but_one = norm(trial%lanes, trial%states, lane, control, y(:, :, 0), y(:, :, p - 1))
-      log_h = min(log_of_step(last, p), log_of_step(last_but_one, p - 1))
-      control%h(lane) = exp(log_h)
-      if (control%h(lane) > smallest_step(trial%t(lane))) return
-      self%verdict(lane) = trial_shorten
-      self%culprit(lane) = maxloc(abs(y(lane, :trial%states, p)), dim=1)
-    end associate
-  end subroutine set_step
-
-  !> Logarithm of size^(-1/j); large, but no infinity, for a coefficient of zero.
-  pure real(wp) function log_of_step(size, j)
-    real(wp), intent(in) :: size
-    integer, intent(in) :: j
+  !> Largest |y_j| / (atol + rtol |y|) of the states of each lane, for the last two coefficients; no less than a number whose
+  !> logarithm is finite.
+  pure subroutine measure(lanes, states, columns, rtol, atol, y, y_j, last, last_but_one)
+    integer, intent(in) :: lanes, states, columns
+    real(wp), intent(in) :: rtol, atol
+    real(wp), intent(in) :: y(lanes, states), y_j(lanes, columns, 2)   !! y_j of the orders p - 1 and p
+    real(wp), intent(inout) :: last(lanes), last_but_one(lanes)
     real(wp), parameter :: smallest = 1.0e-300_wp
+    real(wp) :: weight
+    integer :: i, lane
 
-    log_of_step = -log(max(size, smallest)) / j
-  end function log_of_step
-
-  !> Largest |y_j| / (atol + rtol |y|) of the states of a lane.
-  pure real(wp) function norm(lanes, states, lane, control, y, y_j)
-    integer, intent(in) :: lanes, states, lane
-    type(step_control_t), intent(in) :: control
-    real(wp), intent(in) :: y(lanes, states), y_j(lanes, states)
-    integer :: i
-
-    norm = 0.0_wp
+    last = smallest
+    last_but_one = smallest
     do i = 1, states
-      norm = max(norm, abs(y_j(lane, i)) / (control%atol + control%rtol * abs(y(lane, i))))
+      do lane = 1, lanes
+        weight = 1.0_wp / (atol + rtol * abs(y(lane, i)))
+        last_but_one(lane) = max(last_but_one(lane), weight * abs(y_j(lane, i, 1)))
+        last(lane) = max(last(lane), weight * abs(y_j(lane, i, 2)))
+      end do
     end do
-  end function norm
+  end subroutine measure
+
+  !> Replaces the norms of the last coefficients by the steps that both pairs allow.
+  pure subroutine find_steps(lanes, order, last, last_but_one)
+    integer, intent(in) :: lanes, order
+    real(wp), intent(inout) :: last(lanes), last_but_one(lanes)
+    real(wp) :: per_order, per_lower_order
+    integer :: lane
+
+    per_order = -1.0_wp / order
+    per_lower_order = -1.0_wp / (order - 1)
+    call log2s(lanes, last)
+    call log2s(lanes, last_but_one)
+    do lane = 1, lanes
+      last(lane) = min(per_order * last(lane), per_lower_order * last_but_one(lane))
+    end do
+    call exp2s(lanes, last)
+  end subroutine find_steps
 
   !> The sum of the series at the end of the step.
   subroutine attempt(self, system, trial)
@@ -163,9 +173,11 @@ contains
     type(trial_t), intent(inout) :: trial
     integer :: lane
 
-    do lane = 1, trial%lanes
-      if (self%verdict(lane) /= trial_fine) call park(trial, lane, self%verdict(lane), self%culprit(lane))
-    end do
+    if (count(self%verdict /= trial_fine) > 0) then
+      do lane = 1, trial%lanes
+        if (self%verdict(lane) /= trial_fine) call park(trial, lane, self%verdict(lane), self%culprit(lane))
+      end do
+    end if
     call sum_series(trial%length, self%order, self%series, trial%h_length, trial%h_spread, trial%y_new)
     if (.not. all_finite(trial%length, trial%y_new)) call park_infinities(trial, trial%y_new)
   end subroutine attempt

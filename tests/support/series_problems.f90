@@ -187,7 +187,7 @@ contains
     end do
     where (y(:, 1, 0) > self%limit .and. t >= 0)
       status = max(evaluation_fine, self%answer)
-      y(:, 1, 2) = merge(quiet_nan(), y(:, 1, 2), self%answer == answer_nan)
+      y(:, 1, order) = merge(quiet_nan(), y(:, 1, order), self%answer == answer_nan)
     end where
   end subroutine burst_series
 
