@@ -9,7 +9,7 @@ module nocdyn_march
   use nocdyn_outcome, only: integration_done, integration_gave_up, integration_not_finite, integration_running, &
     integration_step_too_small, integration_too_many_steps, note_methods, outcome_t, reset_outcome
   use nocdyn_queue, only: queue_t
-  use nocdyn_step_control, only: adapt, is_within, propose, restart, shorten, smallest_step, step_control, &
+  use nocdyn_step_control, only: adapt, propose, restart, shorten, smallest_step, step_control, &
     step_control_t, weigh_error
   use nocdyn_stepper, only: stepper_t
   use nocdyn_switching, only: allocate_switching, start_switching, switching_t
@@ -308,7 +308,7 @@ contains
     integer :: lane
 
     do lane = 1, lanes
-      accepted(lane) = working(lane) .and. is_within(mean_square(lane))
+      accepted(lane) = working(lane) .and. mean_square(lane) <= 1
       inspected(lane) = accepted(lane) .and. (are_inspected .or. next_time(lane) < t_new(lane))
       wanted(lane) = inspected(lane) .or. (accepted(lane) .and. are_followed)
     end do

@@ -94,16 +94,17 @@ contains
     real(wp), intent(in) :: longest, t_end, t(lanes), wish(lanes)
     real(wp), intent(inout) :: h(lanes), t_new(lanes)
     logical, intent(inout) :: reaches_end(lanes)
-    real(wp) :: rest
+    real(wp) :: overshoot, rest, step
     integer :: lane
 
     do lane = 1, lanes
       rest = t_end - t(lane)
-      h(lane) = max(min(wish(lane), longest), 10 * max(epsilon(t) * abs(t(lane)), tiny(t)))
-      reaches_end(lane) = t(lane) + end_stretch * h(lane) >= t_end .and. rest <= longest
-      h(lane) = merge(rest, h(lane), reaches_end(lane))
-      t_new(lane) = merge(t_end, t(lane) + h(lane), reaches_end(lane))
+      step = max(min(wish(lane), longest), 10 * max(epsilon(t) * abs(t(lane)), tiny(t)))
+      overshoot = min((t(lane) + end_stretch * step) - t_end, longest - rest)
+      h(lane) = merge(rest, step, overshoot >= 0)
+      t_new(lane) = merge(t_end, t(lane) + step, overshoot >= 0)
     end do
+    reaches_end = t_new >= t_end
   end subroutine propose_lanes
 
   !> The mean over the states of (deviation / (atol + rtol max(|y|, |y_new|)))^2; leaves each term in `deviation`.

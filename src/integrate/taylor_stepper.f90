@@ -84,25 +84,20 @@ contains
     class(system_t), intent(inout) :: system
     type(trial_t), intent(inout) :: trial
     type(step_control_t), intent(inout) :: control
-    logical :: are_finite
     integer :: lane
 
     if (count(self%moved .and. trial%working) == 0) return
     self%series(:, :, 0) = trial%y
     call system%series(self%order, size(self%series, 2), trial%t, self%series, trial%status)
+    call take_answers(self, trial)
     call measure(trial%lanes, trial%states, size(self%series, 2), control%rtol, control%atol, self%series, &
                  self%series(1, 1, self%order - 1), self%last, self%last_but_one)
-    ! an infinity between these shows up in y_new
-    are_finite = all_finite(2 * trial%length, self%series) .and. all_finite(2 * trial%length, self%series(1, 1, self%order - 1))
     call find_steps(trial%lanes, self%order, self%last, self%last_but_one)
     do lane = 1, trial%lanes
       if (.not. (self%moved(lane) .and. trial%working(lane))) cycle
       self%moved(lane) = .false.
       trial%evaluations(lane) = trial%evaluations(lane) + 1
-      self%verdict(lane) = trial%status(lane)
-      self%culprit(lane) = 0
       control%h(lane) = self%last(lane)
-      if (.not. are_finite) call find_infinity(self, lane)
       if (self%verdict(lane) == trial_fine .and. control%h(lane) <= smallest_step(trial%t(lane))) then
         self%verdict(lane) = trial_shorten
         self%culprit(lane) = maxloc(abs(self%series(lane, :trial%states, self%order)), dim=1)
@@ -114,13 +109,34 @@ contains
     trial%status(:) = evaluation_fine
   end subroutine plan
 
-  subroutine find_infinity(self, lane)
+  !> The verdicts on the lanes that have moved. Series that are not finite are cleared.
+  subroutine take_answers(self, trial)
+    type(taylor_stepper_t), intent(inout) :: self
+    type(trial_t), intent(in) :: trial
+    integer :: lane
+
+    do lane = 1, trial%lanes
+      if (.not. (self%moved(lane) .and. trial%working(lane))) cycle
+      self%verdict(lane) = trial%status(lane)
+      self%culprit(lane) = 0
+    end do
+    ! what is infinite between these coefficients alone shows up in y_new
+    if (all_finite(2 * trial%length, self%series) .and. all_finite(2 * trial%length, self%series(1, 1, self%order - 1))) return
+    do lane = 1, trial%lanes
+      call find_infinity(self, lane, is_judged=self%moved(lane) .and. trial%working(lane))
+    end do
+  end subroutine take_answers
+
+  subroutine find_infinity(self, lane, is_judged)
     type(taylor_stepper_t), intent(inout) :: self
     integer, intent(in) :: lane
+    logical, intent(in) :: is_judged
     integer :: component
 
     do component = 1, size(self%series, 2)
       if (all(is_finite(self%series(lane, component, :)))) cycle
+      self%series(lane, :, 1:) = 0.0_wp
+      if (.not. is_judged) return
       self%verdict(lane) = trial_not_finite
       self%culprit(lane) = component
       return

@@ -4,13 +4,14 @@
 !> What no lane has had so far is left out: a term of zero changes no bit.
 module nocdyn_lane_series
   use nocdyn_kinds, only: wp
+  use nocdyn_lane_terms, only: lane_terms_t
   use nocdyn_machine, only: machine_t
-  use nocdyn_series_products, only: accelerate_row, add_cubic, add_linear, add_square, begin_speeds, continue_speeds, strip
+  use nocdyn_series_products, only: accelerate_row, add_cubic, add_linear, add_square, begin_speeds, continue_speeds
   use nocdyn_sparse_map, only: sparse_map_t
   implicit none (type, external)
   private
 
-  public :: suits_lane_series, new_lane_series
+  public :: new_lane_series
 
   !> Coefficients of the elements.
   type, public :: lane_series_t
@@ -24,42 +25,18 @@ module nocdyn_lane_series
     real(wp), allocatable :: moment(:, :)        !! present coefficients, [lanes, elements]
     real(wp), allocatable :: start(:, :)         !! u at the start of the step, [lanes, elements]
     real(wp), allocatable :: inverse(:)          !! 1 / k, [order]
-    logical, allocatable :: is_external(:)       !! elements whose moments depend on the time alone
-    logical, allocatable :: has_angle(:)         !! elements with a restoring moment
-    logical, allocatable :: has_cubic(:)
-    logical, allocatable :: has_square(:)
   contains
-    procedure :: note_lane
     procedure :: expand
   end type lane_series_t
 
 contains
-
-  !> Whether all moments are polynomials or depend on the time alone, and the lanes fill registers.
-  pure logical function suits_lane_series(machine)
-    type(machine_t), intent(in) :: machine
-    integer :: i
-
-    suits_lane_series = .false.
-    if (modulo(machine%lanes, strip) /= 0 .or. machine%elements%inner%count > 0) return
-    do i = 1, size(machine%other_banks)
-      associate (bank => machine%banks(machine%other_banks(i))%bank)
-        if (.not. bank%is_external) return
-        associate (first => bank%first, last => bank%last(), laws => machine%laws)
-          if (any(abs(laws%linear(:, first:last)) + abs(laws%cubic(:, first:last)) > 0)) return
-          if (any(abs(laws%by_speed(:, first:last)) + abs(laws%by_speed_squared(:, first:last)) > 0)) return
-        end associate
-      end associate
-    end do
-    suits_lane_series = .true.
-  end function suits_lane_series
 
   !> Room for series up to an order.
   function new_lane_series(machine, order) result(self)
     type(machine_t), intent(in) :: machine
     integer, intent(in) :: order
     type(lane_series_t) :: self
-    integer :: i, k, lane
+    integer :: k
 
     self%order = order
     self%elements = size(machine%elements%to)
@@ -69,41 +46,16 @@ contains
       allocate (self%angle(lanes, 0:order, elements), source=0.0_wp)
       allocate (self%square, source=self%angle)
       allocate (self%moment(lanes, elements), self%start(lanes, elements), source=0.0_wp)
-      allocate (self%is_external(elements), self%has_angle(elements), self%has_cubic(elements), self%has_square(elements), &
-                source=.false.)
     end associate
     allocate (self%inverse(order))
     self%inverse(:) = [(1.0_wp / k, k=1, order)]
-    do i = 1, size(machine%other_banks)
-      associate (bank => machine%banks(machine%other_banks(i))%bank)
-        self%is_external(bank%first:bank%last()) = .true.
-      end associate
-    end do
-    do lane = 1, machine%lanes
-      call self%note_lane(machine, lane)
-    end do
   end function new_lane_series
 
-  !> Takes notice of the terms in the laws of a lane.
-  pure subroutine note_lane(self, machine, lane)
-    class(lane_series_t), intent(inout) :: self
-    type(machine_t), intent(in) :: machine
-    integer, intent(in) :: lane
-    integer :: e
-
-    associate (laws => machine%laws)
-      do e = 1, self%elements
-        self%has_cubic(e) = self%has_cubic(e) .or. abs(laws%cubic(lane, e)) > 0
-        self%has_angle(e) = self%has_angle(e) .or. self%has_cubic(e) .or. abs(laws%linear(lane, e)) > 0
-        self%has_square(e) = self%has_square(e) .or. abs(laws%by_speed_squared(lane, e)) > 0
-      end do
-    end associate
-  end subroutine note_lane
-
   !> The coefficients number 1 to order of q' and q, which follow each other in y.
-  subroutine expand(self, machine, twists, accelerations, start_twist, columns, t, y)
+  subroutine expand(self, machine, terms, twists, accelerations, start_twist, columns, t, y)
     class(lane_series_t), intent(inout) :: self
     type(machine_t), intent(in) :: machine
+    type(lane_terms_t), intent(in) :: terms
     type(sparse_map_t), intent(in) :: twists          !! U
     type(sparse_map_t), intent(in) :: accelerations   !! R
     real(wp), contiguous, intent(in) :: start_twist(:, :)   !! [lanes, elements]
@@ -117,10 +69,10 @@ contains
       call twists%map_pair(start_twist, y(1, f + 1, 0), y, self%start, self%speed)
       self%angle(:, 0, :) = self%start - machine%laws%rest
       do k = 0, self%order - 1
-        call find_moments(self, machine, twists, k, lanes, f, y(1, 1, k))
+        call find_moments(self, machine, terms, twists, k, lanes, f, y(1, 1, k))
         do i = 1, f
-          call accelerate_row(lanes, f, columns, self%elements, first(i + 1) - first(i), accelerations%column(first(i):), &
-                              accelerations%coefficient(1, first(i)), self%inverse(k + 1), self%moment, y(1, i, k))
+          call accelerate_row(lanes, f, columns, self%elements, size(accelerations%column), first(i), first(i + 1) - 1, &
+                              accelerations%column, accelerations%coefficient, self%inverse(k + 1), self%moment, y(1, i, k))
         end do
       end do
     end associate
@@ -141,9 +93,10 @@ contains
   end subroutine drive
 
   !> The moments number k.
-  pure subroutine find_moments(self, machine, twists, k, lanes, freedoms, q)
+  pure subroutine find_moments(self, machine, terms, twists, k, lanes, freedoms, q)
     type(lane_series_t), intent(inout) :: self
     type(machine_t), intent(in) :: machine
+    type(lane_terms_t), intent(in) :: terms
     type(sparse_map_t), intent(in) :: twists
     integer, intent(in) :: k, lanes, freedoms
     real(wp), intent(in) :: q(lanes, freedoms)   !! coefficients number k of q'
@@ -154,23 +107,23 @@ contains
     inverse = self%inverse(max(k, 1))
     associate (laws => machine%laws, first => twists%first, n => self%elements)
       do e = 1, n
-        if (self%is_external(e)) then
+        if (terms%is_external(e)) then
           self%moment(:, e) = self%external(:, e, k)
           cycle
         end if
         if (k == 0) then
           call begin_speeds(lanes, laws%constant(1, e), laws%by_speed(1, e), self%speed(1, e, 0), self%moment(1, e))
         else
-          call continue_speeds(lanes, freedoms, first(e + 1) - first(e), twists%column(first(e):), &
-                               twists%coefficient(1, first(e)), q, laws%by_speed(1, e), self%speed(1, e, k), self%moment(1, e))
+          call continue_speeds(lanes, freedoms, size(twists%column), first(e), first(e + 1) - 1, twists%column, &
+                               twists%coefficient, q, laws%by_speed(1, e), self%speed(1, e, k), self%moment(1, e))
         end if
-        if (self%has_square(e)) then
+        if (terms%has_square(e)) then
           call add_square(lanes, n, k, laws%by_speed_squared(1, e), self%speed(1, e, 0), self%moment(1, e))
         end if
-        if (self%has_cubic(e)) then
+        if (terms%has_cubic(e)) then
           call add_cubic(lanes, k, inverse, laws%linear(1, e), laws%cubic(1, e), self%speed(1, e, before), self%angle(1, 0, e), &
                          self%square(1, 0, e), self%moment(1, e))
-        else if (self%has_angle(e)) then
+        else if (terms%has_angle(e)) then
           call add_linear(lanes, k, inverse, laws%linear(1, e), self%speed(1, e, before), self%angle(1, k, e), self%moment(1, e))
         end if
       end do

@@ -10,10 +10,13 @@ module nocdyn_reduced
   use nocdyn_inner_jacobian, only: inner_jacobian_t, new_inner_jacobian
   use nocdyn_kinds, only: wp
   use nocdyn_lane_numbers, only: lane_numbers_t
-  use nocdyn_lane_series, only: lane_series_t, new_lane_series, suits_lane_series
+  use nocdyn_lane_motion, only: lane_motion_t, new_lane_motion
+  use nocdyn_lane_series, only: lane_series_t, new_lane_series
+  use nocdyn_lane_terms, only: is_plain, lane_terms_t, new_lane_terms
   use nocdyn_machine, only: machine_t
   use nocdyn_reduced_jacobian, only: new_reduced_jacobian, reduced_jacobian_t
   use nocdyn_reduced_series, only: new_reduced_series, reduced_series_t
+  use nocdyn_series_products, only: strip
   use nocdyn_sparse_map, only: new_sparse_map, sparse_map_t, transposed_order
   use nocdyn_system, only: pattern_t
   use nocdyn_text, only: quoted
@@ -31,7 +34,9 @@ module nocdyn_reduced
     integer, allocatable, private :: responding(:)             !! its entry of each entry of R
     type(reduced_jacobian_t), private :: sums                  !! R diag U
     type(reduced_series_t), private :: motion                  !! after `prepare_series`
-    type(lane_series_t), allocatable, private :: motion_of_lanes   !! the same, of many lanes
+    type(lane_terms_t), allocatable, private :: terms          !! of many lanes of a plain machine without works
+    type(lane_motion_t), private :: lane_motion                !! if there are `terms`
+    type(lane_series_t), allocatable, private :: lane_series   !! instead of `motion`, after `prepare_series`
     type(inner_jacobian_t), private :: inner_rows              !! of the inner states
     type(element_coordinates_t), private :: switching          !! of the switching elements
     real(wp), allocatable, private :: none(:, :)               !! zeros, [lanes, elements]
@@ -87,6 +92,11 @@ contains
       call find_start_twists(self)
       self%twists = twist_map(incidence, without_offset=.not. any(abs(self%start_twist) > 0), is_loose=as_block)
       self%none = 0.0_wp * self%start_twist
+      if (allocated(self%terms)) deallocate (self%terms)
+      if (machine%lanes > 1 .and. self%quadratures == 0 .and. is_plain(machine)) then
+        allocate (self%terms, source=new_lane_terms(machine))
+        self%lane_motion = new_lane_motion(machine%lanes, size(machine%elements%to))
+      end if
     end associate
   end subroutine formulate
 
@@ -190,7 +200,7 @@ contains
 
     call self%machine%laws%admit(lane)
     call self%motion%take_lane(lane, self%machine%laws, self%twists, self%accelerations)
-    if (allocated(self%motion_of_lanes)) call self%motion_of_lanes%note_lane(self%machine, lane)
+    if (allocated(self%terms)) call self%terms%note_lane(self%machine, lane)
   end subroutine receive
 
   function start(self) result(y)
@@ -258,8 +268,13 @@ contains
     real(wp), intent(inout) :: dydt(2 * n + inner + self%lanes * quadratures)
     integer :: i
 
-    call turn(self, n, inner, t, y)
-    call self%accelerations%map_sum(self%machine%elements%restoring, self%machine%elements%working, dydt)
+    if (allocated(self%terms)) then
+      call self%lane_motion%accelerate(self%machine, self%terms, self%twists, self%accelerations, self%start_twist, t, y, &
+                                       y(n + 1), dydt)
+    else
+      call turn(self, n, inner, t, y)
+      call self%accelerations%map_sum(self%machine%elements%restoring, self%machine%elements%working, dydt)
+    end if
     do i = 1, n
       dydt(n + i) = y(i)
     end do
@@ -291,9 +306,9 @@ contains
     class(reduced_t), intent(inout) :: self
     integer, intent(in) :: order
 
-    if (allocated(self%motion_of_lanes)) deallocate (self%motion_of_lanes)
-    if (self%lanes > 1 .and. self%quadratures == 0 .and. suits_lane_series(self%machine)) then
-      allocate (self%motion_of_lanes, source=new_lane_series(self%machine, order))
+    if (allocated(self%lane_series)) deallocate (self%lane_series)
+    if (allocated(self%terms) .and. modulo(self%lanes, strip) == 0) then
+      allocate (self%lane_series, source=new_lane_series(self%machine, order))
     else
       self%motion = new_reduced_series(self%machine, self%twists, self%accelerations, self%is_audited, order)
     end if
@@ -306,8 +321,8 @@ contains
     real(wp), intent(inout) :: y(self%lanes, columns, 0:order)
     integer, intent(inout) :: status(self%lanes)
 
-    if (allocated(self%motion_of_lanes)) then
-      call self%motion_of_lanes%expand(self%machine, self%twists, self%accelerations, self%start_twist, columns, t, y)
+    if (allocated(self%lane_series)) then
+      call self%lane_series%expand(self%machine, self%terms, self%twists, self%accelerations, self%start_twist, columns, t, y)
     else
       call self%motion%expand(self%machine, self%twists, self%accelerations, self%start_twist, &
                               self%lanes * self%machine%coordinates%freedoms, self%lanes * columns, t, y)

@@ -26,9 +26,9 @@ contains
     end do
   end subroutine begin_speeds
 
-  !> The speeds of an element, from the entries of its row in U, and the moments that depend on them, number k > 0.
-  pure subroutine continue_speeds(lanes, freedoms, entries, column, ratio, q, by_speed, speed, moment)
-    integer, intent(in) :: lanes, freedoms, entries
+  !> The speeds of an element, from the entries `first` to `last` of U, and the moments that depend on them, number k > 0.
+  pure subroutine continue_speeds(lanes, freedoms, entries, first, last, column, ratio, q, by_speed, speed, moment)
+    integer, intent(in) :: lanes, freedoms, entries, first, last
     integer, intent(in) :: column(entries)
     real(wp), intent(in) :: ratio(lanes, entries)
     real(wp), intent(in) :: q(lanes, freedoms)   !! coefficients of q'
@@ -36,27 +36,23 @@ contains
     real(wp), intent(inout) :: speed(lanes), moment(lanes)
     integer :: c, d, k, l
 
-    select case (entries)
+    select case (last - first)
     case (0)
-      speed = 0.0_wp
-      moment = 0.0_wp
-    case (1)
-      c = column(1)
+      c = column(first)
       do l = 1, lanes
-        speed(l) = ratio(l, 1) * q(l, c)
+        speed(l) = ratio(l, first) * q(l, c)
         moment(l) = by_speed(l) * speed(l)
       end do
-    case (2)
-      c = column(1)
-      d = column(2)
+    case (1)
+      c = column(first)
+      d = column(last)
       do l = 1, lanes
-        speed(l) = ratio(l, 1) * q(l, c) + ratio(l, 2) * q(l, d)
+        speed(l) = ratio(l, first) * q(l, c) + ratio(l, last) * q(l, d)
         moment(l) = by_speed(l) * speed(l)
       end do
     case default
-      c = column(1)
-      speed = ratio(:, 1) * q(:, c)
-      do k = 2, entries
+      speed = 0.0_wp
+      do k = first, last
         c = column(k)
         speed = speed + ratio(:, k) * q(:, c)
       end do
@@ -127,9 +123,10 @@ contains
     end do
   end subroutine add_square
 
-  !> The next coefficients of a coordinate, from the entries of its row in R and the moments number k, and from its speed.
-  pure subroutine accelerate_row(lanes, freedoms, columns, elements, entries, element, response, inverse, moment, y)
-    integer, intent(in) :: lanes, freedoms, columns, elements, entries
+  !> The next coefficients of a coordinate, from the entries `first` to `last` of R and the moments number k, and from its
+  !> speed.
+  pure subroutine accelerate_row(lanes, freedoms, columns, elements, entries, first, last, element, response, inverse, moment, y)
+    integer, intent(in) :: lanes, freedoms, columns, elements, entries, first, last
     integer, intent(in) :: element(entries)
     real(wp), intent(in) :: response(lanes, entries)
     real(wp), intent(in) :: inverse   !! 1 / (k + 1)
@@ -137,39 +134,32 @@ contains
     real(wp), intent(inout) :: y(lanes, columns, 2)   !! coefficients number k and k + 1, of which this is the first column
     integer :: a, b, c, k, l
 
-    select case (entries)
-    case (0)
-      y(:, 1, 2) = 0.0_wp
+    select case (last - first)
     case (1)
-      a = element(1)
-      y(:, 1, 2) = inverse * (response(:, 1) * moment(:, a))
+      a = element(first)
+      b = element(last)
+      do l = 1, lanes
+        y(l, 1, 2) = inverse * (response(l, first) * moment(l, a) + response(l, last) * moment(l, b))
+        y(l, 1 + freedoms, 2) = inverse * y(l, 1, 1)
+      end do
     case (2)
-      a = element(1)
-      b = element(2)
+      a = element(first)
+      b = element(first + 1)
+      c = element(last)
       do l = 1, lanes
-        y(l, 1, 2) = inverse * (response(l, 1) * moment(l, a) + response(l, 2) * moment(l, b))
+        y(l, 1, 2) = inverse * (response(l, first) * moment(l, a) + response(l, first + 1) * moment(l, b) &
+                                + response(l, last) * moment(l, c))
         y(l, 1 + freedoms, 2) = inverse * y(l, 1, 1)
       end do
-      return
-    case (3)
-      a = element(1)
-      b = element(2)
-      c = element(3)
-      do l = 1, lanes
-        y(l, 1, 2) = inverse * (response(l, 1) * moment(l, a) + response(l, 2) * moment(l, b) + response(l, 3) * moment(l, c))
-        y(l, 1 + freedoms, 2) = inverse * y(l, 1, 1)
-      end do
-      return
     case default
-      a = element(1)
-      y(:, 1, 2) = response(:, 1) * moment(:, a)
-      do k = 2, entries
+      y(:, 1, 2) = 0.0_wp
+      do k = first, last
         a = element(k)
         y(:, 1, 2) = y(:, 1, 2) + response(:, k) * moment(:, a)
       end do
       y(:, 1, 2) = inverse * y(:, 1, 2)
+      y(:, 1 + freedoms, 2) = inverse * y(:, 1, 1)
     end select
-    y(:, 1 + freedoms, 2) = inverse * y(:, 1, 1)
   end subroutine accelerate_row
 
 end module nocdyn_series_products

@@ -1,0 +1,22 @@
+!> How many lanes a block of variants has.
+module nocdyn_block_sizes
+  use nocdyn_series_products, only: strip
+  implicit none (type, external)
+  private
+
+  public :: lanes_for
+
+  ! By measurement: chains of 10 rotors are fastest with 32 lanes, those of 100 with 8 to 32, those of 1000 with 4 to 8.
+  integer, parameter :: most_states = 250   !! whose numbers, of `strip` lanes, stay in the second cache
+  integer, parameter :: few = 8             !! whole vectors of any processor
+
+contains
+
+  !> The lanes with which machines of so many states are fastest. No result depends on it.
+  pure integer function lanes_for(states)
+    integer, intent(in) :: states
+
+    lanes_for = merge(strip, few, states <= most_states)
+  end function lanes_for
+
+end module nocdyn_block_sizes

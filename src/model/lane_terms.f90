@@ -1,0 +1,79 @@
+!> Which terms the laws of elements have in a block of many lanes, so that those that no lane has are left out.
+!>
+!> A term that any lane has had once is kept: one of zero changes no bit of the others.
+module nocdyn_lane_terms
+  use nocdyn_kinds, only: wp
+  use nocdyn_machine, only: machine_t
+  implicit none (type, external)
+  private
+
+  public :: is_plain, new_lane_terms
+
+  !> Every array has one value per element.
+  type, public :: lane_terms_t
+    logical, allocatable :: is_external(:)   !! whether the moment depends on the time alone
+    logical, allocatable :: has_angle(:)     !! whether there is a restoring moment
+    logical, allocatable :: has_cubic(:)
+    logical, allocatable :: has_speed(:)     !! whether the other moment depends on the speed
+    logical, allocatable :: has_square(:)
+  contains
+    procedure :: note_lane
+  end type lane_terms_t
+
+contains
+
+  !> Whether all moments are polynomials or depend on the time alone.
+  pure logical function is_plain(machine)
+    type(machine_t), intent(in) :: machine
+    integer :: i
+
+    is_plain = .false.
+    if (machine%elements%inner%count > 0) return
+    do i = 1, size(machine%other_banks)
+      associate (bank => machine%banks(machine%other_banks(i))%bank)
+        if (.not. bank%is_external) return
+        associate (first => bank%first, last => bank%last(), laws => machine%laws)
+          if (any(abs(laws%linear(:, first:last)) + abs(laws%cubic(:, first:last)) > 0)) return
+          if (any(abs(laws%by_speed(:, first:last)) + abs(laws%by_speed_squared(:, first:last)) > 0)) return
+        end associate
+      end associate
+    end do
+    is_plain = .true.
+  end function is_plain
+
+  !> The terms of a plain machine.
+  function new_lane_terms(machine) result(self)
+    type(machine_t), intent(in) :: machine
+    type(lane_terms_t) :: self
+    integer :: i, lane
+
+    allocate (self%is_external(size(machine%elements%to)), source=.false.)
+    allocate (self%has_angle, self%has_cubic, self%has_speed, self%has_square, source=self%is_external)
+    do i = 1, size(machine%other_banks)
+      associate (bank => machine%banks(machine%other_banks(i))%bank)
+        self%is_external(bank%first:bank%last()) = .true.
+      end associate
+    end do
+    do lane = 1, machine%lanes
+      call self%note_lane(machine, lane)
+    end do
+  end function new_lane_terms
+
+  !> Takes notice of the terms in the laws of a lane, which may have other numbers than before.
+  pure subroutine note_lane(self, machine, lane)
+    class(lane_terms_t), intent(inout) :: self
+    type(machine_t), intent(in) :: machine
+    integer, intent(in) :: lane
+    integer :: e
+
+    associate (laws => machine%laws)
+      do e = 1, size(self%is_external)
+        if (abs(laws%cubic(lane, e)) > 0) self%has_cubic(e) = .true.
+        if (abs(laws%linear(lane, e)) > 0 .or. self%has_cubic(e)) self%has_angle(e) = .true.
+        if (abs(laws%by_speed_squared(lane, e)) > 0) self%has_square(e) = .true.
+        if (abs(laws%by_speed(lane, e)) > 0 .or. self%has_square(e)) self%has_speed(e) = .true.
+      end do
+    end associate
+  end subroutine note_lane
+
+end module nocdyn_lane_terms
