@@ -80,6 +80,7 @@ contains
     class(observer_t), intent(inout) :: observer
     type(outcome_t), intent(out) :: outcome
     type(march_t) :: march
+    logical :: is_interrupted
 
     if (size(times) < 2) error stop 'nocdyn_integration: times needs a start and an end'
     if (.not. all(times(2:) > times(:size(times) - 1))) error stop 'nocdyn_integration: times must ascend'
@@ -92,33 +93,36 @@ contains
       call set_out_lanes(march, stepper, system, outcome)
       call stepper%attempt(system, march%trial)
       call judge_lanes(march, stepper, system, outcome)
-      if (count(march%accepted) > 0) then
+      if (any(march%accepted)) then
         if (march%is_due .or. march%is_followed) call follow_lanes(march, system, times, observer, outcome)
         if (march%is_followed) call show_steps(march, stepper, observer)
         call advance_lanes(march, times)
         call stepper%accept(march%accepted)
         if (march%has_switches) call cross_lanes(march, stepper, system, observer, outcome)
       end if
-      call interrupt_if_asked(march, observer, outcome)
+      call interrupt_if_asked(march, observer, outcome, is_interrupted)
       call empty_lanes(march, queue, observer, outcome)
-      if (count(outcome%status == integration_interrupted) > 0) exit
+      if (is_interrupted) exit
     end do
   end subroutine integrate_with
 
-  subroutine interrupt_if_asked(march, observer, outcome)
+  !> Ends the lanes that are running if the observer wants to stop at the time of the slowest.
+  subroutine interrupt_if_asked(march, observer, outcome, is_interrupted)
     type(march_t), intent(in) :: march
     class(observer_t), intent(inout) :: observer
     type(outcome_t), intent(inout) :: outcome
-
+    logical, intent(out) :: is_interrupted
     real(wp) :: slowest
     integer :: lane
 
+    is_interrupted = .false.
     slowest = huge(slowest)
     do lane = 1, size(outcome%status)
-      slowest = min(slowest, merge(march%trial%t(lane), huge(slowest), outcome%status(lane) == integration_running))
+      if (outcome%status(lane) == integration_running) slowest = min(slowest, march%trial%t(lane))
     end do
     if (slowest >= huge(slowest)) return
-    if (.not. observer%stops(slowest)) return
+    is_interrupted = observer%stops(slowest)
+    if (.not. is_interrupted) return
     do lane = 1, size(outcome%status)
       if (outcome%status(lane) == integration_running) outcome%status(lane) = integration_interrupted
     end do

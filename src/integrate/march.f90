@@ -7,7 +7,7 @@ module nocdyn_march
   use nocdyn_integration_settings, only: integration_settings_t
   use nocdyn_kinds, only: wp
   use nocdyn_outcome, only: integration_done, integration_gave_up, integration_not_finite, integration_running, &
-    integration_step_too_small, integration_too_many_steps, note_methods, outcome_t, reset_outcome
+    integration_step_too_small, integration_too_many_steps, note_method, outcome_t, reset_outcome
   use nocdyn_queue, only: queue_t
   use nocdyn_step_control, only: adapt, propose, restart, shorten, smallest_step, step_control, &
     step_control_t, weigh_error
@@ -274,81 +274,63 @@ contains
     class(stepper_t), intent(inout) :: stepper
     class(system_t), intent(inout) :: system
     type(outcome_t), intent(inout) :: outcome
-    integer :: lane
+    integer :: failed, lane, wanted
 
-    associate (trial => march%trial, lanes => march%trial%lanes, control => march%control)
-      if (.not. stepper%plans_steps) call weigh_error(control, trial)
-      call find_wanted(lanes, march%has_events .or. march%has_extremes .or. march%has_switches, &
-                       march%is_followed .and. .not. stepper%shows_own, trial%working, control%mean_square, march%next_time, &
-                       march%t_new, march%accepted, march%inspected, march%wanted)
-      if (count(march%wanted) > 0) call stepper%interpolate(system, trial, march%wanted, march%coefficients)
-      call sort_lanes(lanes, march%running, trial%verdict, march%accepted, march%rejected)
-      if (.not. stepper%plans_steps) then
-        call adapt(control, lanes, march%accepted, march%rejected, trial%error_order, trial%most_growth, outcome%h)
-      end if
-      call note_methods(outcome, lanes, march%accepted, trial%t, trial%implicit)
-      if (count(march%running .and. .not. march%accepted) > 0) then
-        do lane = 1, lanes
-          if (march%running(lane) .and. .not. march%accepted(lane)) call judge_rejection(march, lane, outcome)
-        end do
-      end if
-      call find_ended(lanes, march%max_steps, march%running, march%accepted, control%reaches_end, outcome%steps, outcome%status)
-      call find_due(march)
-    end associate
+    if (.not. stepper%plans_steps) call weigh_error(march%control, march%trial)
+    call find_wanted(march, wanted)
+    if (wanted > 0) call stepper%interpolate(system, march%trial, march%wanted, march%coefficients)
+    call settle_lanes(march, outcome, failed)
+    if (.not. stepper%plans_steps) then
+      call adapt(march%control, march%trial%lanes, march%accepted, march%rejected, march%trial%error_order, &
+                 march%trial%most_growth, outcome%h)
+    end if
+    if (failed == 0) return
+    do lane = 1, march%trial%lanes
+      if (march%running(lane) .and. .not. march%accepted(lane)) call judge_rejection(march, lane, outcome)
+    end do
   end subroutine judge_lanes
 
   !> The lanes whose error is within the tolerances, and those of them whose solution inside the step is wanted.
-  pure subroutine find_wanted(lanes, are_inspected, are_followed, working, mean_square, next_time, t_new, accepted, inspected, &
-                              wanted)
-    integer, intent(in) :: lanes
-    logical, intent(in) :: are_inspected, are_followed   !! whether the solution in all accepted lanes is
-    logical, intent(in) :: working(lanes)
-    real(wp), intent(in) :: mean_square(lanes), next_time(lanes), t_new(lanes)
-    logical, intent(inout) :: accepted(lanes), inspected(lanes), wanted(lanes)
+  pure subroutine find_wanted(march, wanted)
+    type(march_t), intent(inout) :: march
+    integer, intent(out) :: wanted   !! how many
     integer :: lane
 
-    do lane = 1, lanes
-      accepted(lane) = working(lane) .and. mean_square(lane) <= 1
-      inspected(lane) = accepted(lane) .and. (are_inspected .or. next_time(lane) < t_new(lane))
-      wanted(lane) = inspected(lane) .or. (accepted(lane) .and. are_followed)
+    march%is_due = march%has_events .or. march%has_extremes .or. march%has_switches
+    wanted = 0
+    do lane = 1, march%trial%lanes
+      march%accepted(lane) = march%trial%working(lane) .and. march%control%mean_square(lane) <= 1
+      march%inspected(lane) = march%accepted(lane) .and. (march%is_due .or. march%next_time(lane) < march%t_new(lane))
+      march%wanted(lane) = march%inspected(lane) .or. (march%accepted(lane) .and. march%is_followed)
+      if (march%wanted(lane)) wanted = wanted + 1
     end do
   end subroutine find_wanted
 
-  !> Leaves those accepted whose steps were finished.
-  pure subroutine sort_lanes(lanes, running, verdict, accepted, rejected)
-    integer, intent(in) :: lanes
-    logical, intent(in) :: running(lanes)
-    integer, intent(in) :: verdict(lanes)
-    logical, intent(inout) :: accepted(lanes), rejected(lanes)
-    integer :: lane
-
-    do lane = 1, lanes
-      rejected(lane) = running(lane) .and. verdict(lane) == trial_fine .and. .not. accepted(lane)
-      accepted(lane) = accepted(lane) .and. verdict(lane) == trial_fine
-    end do
-  end subroutine sort_lanes
-
-  pure subroutine find_ended(lanes, max_steps, running, accepted, reaches_end, steps, status)
-    integer, intent(in) :: lanes, max_steps
-    logical, intent(in) :: running(lanes), accepted(lanes), reaches_end(lanes)
-    integer, intent(in) :: steps(lanes)
-    integer, intent(inout) :: status(lanes)
-    integer :: lane
-
-    do lane = 1, lanes
-      status(lane) = merge(integration_done, status(lane), accepted(lane) .and. reaches_end(lane))
-      status(lane) = merge(integration_too_many_steps, status(lane), running(lane) .and. steps(lane) >= max_steps &
-                           .and. status(lane) == integration_running)
-    end do
-  end subroutine find_ended
-
-  !> Whether there is anything in the accepted steps that is looked at lane by lane.
-  pure subroutine find_due(march)
+  !> Counts the accepted steps and ends the lanes that have reached the final time or may take no more steps.
+  pure subroutine settle_lanes(march, outcome, failed)
     type(march_t), intent(inout) :: march
+    type(outcome_t), intent(inout) :: outcome
+    integer, intent(out) :: failed   !! attempts that were not accepted
+    logical :: is_fine
+    integer :: lane
 
-    march%is_due = march%has_events .or. march%has_extremes .or. march%has_switches
-    if (.not. march%is_due) march%is_due = count(march%accepted .and. march%next_time <= march%t_new) > 0
-  end subroutine find_due
+    failed = 0
+    do lane = 1, march%trial%lanes
+      march%rejected(lane) = .false.
+      if (.not. march%running(lane)) cycle
+      if (outcome%steps(lane) >= march%max_steps) outcome%status(lane) = integration_too_many_steps
+      is_fine = march%trial%verdict(lane) == trial_fine
+      march%rejected(lane) = is_fine .and. .not. march%accepted(lane)
+      march%accepted(lane) = is_fine .and. march%accepted(lane)
+      if (march%accepted(lane)) then
+        call note_method(outcome, lane, march%trial%t(lane), march%trial%implicit(lane))
+        if (march%control%reaches_end(lane)) outcome%status(lane) = integration_done
+        if (march%next_time(lane) <= march%t_new(lane)) march%is_due = .true.
+      else
+        failed = failed + 1
+      end if
+    end do
+  end subroutine settle_lanes
 
   !> A lane takes a shorter step, or fails if no shorter step will help or none is possible.
   subroutine judge_rejection(march, lane, outcome)
@@ -385,8 +367,10 @@ contains
     integer :: component, lane
 
     associate (trial => march%trial, accepted => march%accepted)
-      call take_accepted(trial%lanes, accepted, march%t_new, trial%t)
-      if (count(accepted) == trial%lanes) then   ! the arrays change their names: nothing asks for y_new any more
+      do lane = 1, trial%lanes
+        if (accepted(lane)) trial%t(lane) = march%t_new(lane)
+      end do
+      if (all(accepted)) then   ! the arrays change their names: nothing asks for y_new any more
         call move_alloc(trial%y, spare)
         call move_alloc(trial%y_new, trial%y)
         call move_alloc(spare, trial%y_new)
@@ -420,7 +404,6 @@ contains
     type(outcome_t), intent(inout) :: outcome
     integer :: lane
 
-    if (count(march%occupied .and. outcome%status /= integration_running) == 0) return
     do lane = 1, size(march%occupied)
       if (.not. march%occupied(lane) .or. outcome%status(lane) == integration_running) cycle
       march%occupied(lane) = .false.

@@ -6,7 +6,7 @@ module nocdyn_outcome
   implicit none (type, external)
   private
 
-  public :: allocate_outcome, reset_outcome, note_methods, note_crossing, failure_sentence
+  public :: allocate_outcome, reset_outcome, note_method, note_crossing, failure_sentence
 
   integer, parameter, public :: integration_running = -1
   integer, parameter, public :: integration_done = 0
@@ -80,36 +80,21 @@ contains
     outcome%last_crossed(lane) = 0
   end subroutine reset_outcome
 
-  !> Counts the accepted steps, and a switch where the method is of the other kind than that of the lane's step before.
-  pure subroutine note_methods(outcome, lanes, accepted, t, implicit)
-    type(outcome_t), intent(inout) :: outcome
-    integer, intent(in) :: lanes
-    logical, intent(in) :: accepted(lanes)
-    real(wp), intent(in) :: t(lanes)        !! starts of the steps
-    logical, intent(in) :: implicit(lanes)
-    integer :: lane
-
-    if (count(accepted .and. (implicit .neqv. outcome%implicit)) > 0) then
-      do lane = 1, lanes
-        if (accepted(lane)) call note_switch(outcome, lane, t(lane), implicit(lane))
-      end do
-    end if
-    outcome%accepted(:) = outcome%accepted + merge(1, 0, accepted)
-    outcome%implicit_steps(:) = outcome%implicit_steps + merge(1, 0, accepted .and. implicit)
-  end subroutine note_methods
-
-  pure subroutine note_switch(outcome, lane, t, implicit)
+  !> Counts an accepted step, and a switch if its method is of the other kind than that of the step before.
+  pure subroutine note_method(outcome, lane, t, implicit)
     type(outcome_t), intent(inout) :: outcome
     integer, intent(in) :: lane
-    real(wp), intent(in) :: t
+    real(wp), intent(in) :: t        !! start of the step
     logical, intent(in) :: implicit
 
-    if (outcome%accepted(lane) > 0 .and. (implicit .neqv. outcome%implicit(lane))) then
+    outcome%accepted(lane) = outcome%accepted(lane) + 1
+    if (implicit) outcome%implicit_steps(lane) = outcome%implicit_steps(lane) + 1
+    if (outcome%accepted(lane) > 1 .and. (implicit .neqv. outcome%implicit(lane))) then
       outcome%switches(lane) = outcome%switches(lane) + 1
       if (outcome%switches(lane) <= most_switches) outcome%switch_times(outcome%switches(lane), lane) = t
     end if
     outcome%implicit(lane) = implicit
-  end subroutine note_switch
+  end subroutine note_method
 
   !> Counts a change of a branch.
   pure subroutine note_crossing(outcome, lane, which)

@@ -86,26 +86,32 @@ contains
     real(wp), intent(in) :: t(lanes)
     real(wp), intent(inout) :: h(lanes), t_new(lanes)
 
-    call propose_lanes(lanes, control%longest, control%t_end, t, control%h, h, t_new, control%reaches_end)
-  end subroutine propose
-
-  pure subroutine propose_lanes(lanes, longest, t_end, t, wish, h, t_new, reaches_end)
-    integer, intent(in) :: lanes
-    real(wp), intent(in) :: longest, t_end, t(lanes), wish(lanes)
-    real(wp), intent(inout) :: h(lanes), t_new(lanes)
-    logical, intent(inout) :: reaches_end(lanes)
-    real(wp) :: overshoot, rest, step
     integer :: lane
 
-    do lane = 1, lanes
-      rest = t_end - t(lane)
-      step = max(min(wish(lane), longest), 10 * max(epsilon(t) * abs(t(lane)), tiny(t)))
-      overshoot = min((t(lane) + end_stretch * step) - t_end, longest - rest)
-      h(lane) = merge(rest, step, overshoot >= 0)
-      t_new(lane) = merge(t_end, t(lane) + step, overshoot >= 0)
-    end do
-    reaches_end = t_new >= t_end
-  end subroutine propose_lanes
+    if (lanes == 1) then
+      call propose_one(control%longest, control%t_end, t(1), control%h(1), h(1), t_new(1))
+      control%reaches_end(1) = t_new(1) >= control%t_end
+    else
+      associate (longest => control%longest, t_end => control%t_end, wish => control%h)
+        do lane = 1, lanes
+          call propose_one(longest, t_end, t(lane), wish(lane), h(lane), t_new(lane))
+        end do
+        control%reaches_end(:) = t_new >= t_end
+      end associate
+    end if
+  end subroutine propose
+
+  pure subroutine propose_one(longest, t_end, t, wish, h, t_new)
+    real(wp), intent(in) :: longest, t_end, t, wish
+    real(wp), intent(out) :: h, t_new
+    real(wp) :: overshoot, rest, step
+
+    rest = t_end - t
+    step = max(min(wish, longest), 10 * max(epsilon(t) * abs(t), tiny(t)))
+    overshoot = min((t + end_stretch * step) - t_end, longest - rest)
+    h = merge(rest, step, overshoot >= 0)
+    t_new = merge(t_end, t + step, overshoot >= 0)
+  end subroutine propose_one
 
   !> The mean over the states of (deviation / (atol + rtol max(|y|, |y_new|)))^2; leaves each term in `deviation`.
   !> A coarse estimate joins in as in DOP853: E5^2 / (E5 + 0.01 E3), sums of squares of the two estimates.
@@ -221,50 +227,30 @@ contains
     real(wp), intent(in) :: most_growth(lanes)
     real(wp), intent(in) :: h(lanes)
 
-    call find_changes(lanes, accepted, error_order, control%mean_square, control%log_error, control%log_ratio, control%change)
-    call apply_changes(lanes, accepted, rejected, most_growth, h, control%log_ratio, control%change, control%h, &
-                       control%log_error, control%was_rejected)
-  end subroutine adapt
-
-  !> The logarithms of the errors and what the steps are to be multiplied by, within no limits.
-  pure subroutine find_changes(lanes, accepted, error_order, mean_square, log_error, log_ratio, change)
-    integer, intent(in) :: lanes
-    logical, intent(in) :: accepted(lanes)
-    integer, intent(in) :: error_order(lanes)
-    real(wp), intent(in) :: mean_square(lanes), log_error(lanes)
-    real(wp), intent(inout) :: log_ratio(lanes), change(lanes)
-    real(wp) :: present_exponent
+    real(wp) :: most, present_exponent
     integer :: lane
 
+    !GCC$ novector
     do lane = 1, lanes
-      log_ratio(lane) = max(mean_square(lane), no_error)
+      control%log_ratio(lane) = max(control%mean_square(lane), no_error)
     end do
-    call log2s(lanes, log_ratio)
+    call log2s(lanes, control%log_ratio)
     do lane = 1, lanes
       present_exponent = 1.0_wp / (error_order(lane) + 1) - integral_loss * beta
-      log_ratio(lane) = 0.5_wp * log_ratio(lane)
-      change(lane) = merge(beta, 0.0_wp, accepted(lane)) * log_error(lane) - present_exponent * log_ratio(lane)
+      control%log_ratio(lane) = 0.5_wp * control%log_ratio(lane)
+      control%change(lane) = merge(beta, 0.0_wp, accepted(lane)) * control%log_error(lane) &
+                             - present_exponent * control%log_ratio(lane)
     end do
-    call exp2s(lanes, change)
-  end subroutine find_changes
-
-  pure subroutine apply_changes(lanes, accepted, rejected, most_growth, h, log_ratio, change, next_h, log_error, was_rejected)
-    integer, intent(in) :: lanes
-    logical, intent(in) :: accepted(lanes), rejected(lanes)
-    real(wp), intent(in) :: most_growth(lanes), h(lanes), log_ratio(lanes), change(lanes)
-    real(wp), intent(inout) :: next_h(lanes), log_error(lanes)
-    logical, intent(inout) :: was_rejected(lanes)
-    real(wp) :: most, new_h
-    integer :: lane
-
+    call exp2s(lanes, control%change)
     do lane = 1, lanes
-      most = merge(min(most_growth(lane), 1.0_wp), most_growth(lane), was_rejected(lane))
-      new_h = max(least_change, min(safety * change(lane), most)) * h(lane)
-      next_h(lane) = merge(new_h, next_h(lane), accepted(lane) .or. rejected(lane))
-      log_error(lane) = merge(max(log_ratio(lane), least_log_error), log_error(lane), accepted(lane))
-      was_rejected(lane) = rejected(lane) .or. (was_rejected(lane) .and. .not. accepted(lane))
+      if (.not. (accepted(lane) .or. rejected(lane))) cycle
+      most = most_growth(lane)
+      if (control%was_rejected(lane)) most = min(most, 1.0_wp)
+      control%h(lane) = max(least_change, min(safety * control%change(lane), most)) * h(lane)
+      control%was_rejected(lane) = rejected(lane)
+      if (accepted(lane)) control%log_error(lane) = max(control%log_ratio(lane), least_log_error)
     end do
-  end subroutine apply_changes
+  end subroutine adapt
 
   !> After an attempt of size h that could not be completed.
   pure subroutine shorten(control, lane, h)

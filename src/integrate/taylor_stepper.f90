@@ -86,7 +86,7 @@ contains
     type(step_control_t), intent(inout) :: control
     integer :: lane
 
-    if (count(self%moved .and. trial%working) == 0) return
+    if (.not. any(self%moved .and. trial%working)) return
     self%series(:, :, 0) = trial%y
     call system%series(self%order, size(self%series, 2), trial%t, self%series, trial%status)
     call take_answers(self, trial)
@@ -156,13 +156,21 @@ contains
 
     last = smallest
     last_but_one = smallest
-    do i = 1, states
-      do lane = 1, lanes
-        weight = 1.0_wp / (atol + rtol * abs(y(lane, i)))
-        last_but_one(lane) = max(last_but_one(lane), weight * abs(y_j(lane, i, 1)))
-        last(lane) = max(last(lane), weight * abs(y_j(lane, i, 2)))
+    if (lanes == 1) then
+      do i = 1, states
+        weight = 1.0_wp / (atol + rtol * abs(y(1, i)))
+        last_but_one(1) = max(last_but_one(1), weight * abs(y_j(1, i, 1)))
+        last(1) = max(last(1), weight * abs(y_j(1, i, 2)))
       end do
-    end do
+    else
+      do i = 1, states
+        do lane = 1, lanes
+          weight = 1.0_wp / (atol + rtol * abs(y(lane, i)))
+          last_but_one(lane) = max(last_but_one(lane), weight * abs(y_j(lane, i, 1)))
+          last(lane) = max(last(lane), weight * abs(y_j(lane, i, 2)))
+        end do
+      end do
+    end if
   end subroutine measure
 
   !> Replaces the norms of the last coefficients by the steps that both pairs allow.
