@@ -3,8 +3,9 @@ module nocdyn_integration
   use nocdyn_errors, only: error_t, exit_input, raise
   use nocdyn_following, only: cross_lanes, follow_lanes, show_steps
   use nocdyn_integration_settings, only: check_settings, integration_settings_t
+  use nocdyn_judging, only: judge_lanes
   use nocdyn_kinds, only: wp
-  use nocdyn_march, only: advance_lanes, empty_lanes, fill_lanes, judge_lanes, march_t, prepare, set_out_lanes
+  use nocdyn_march, only: advance_lanes, empty_lanes, fill_lanes, march_t, prepare, set_out_lanes
   use nocdyn_methods, only: select_method
   use nocdyn_outcome, only: allocate_outcome, integration_interrupted, integration_running, outcome_t
   use nocdyn_queue, only: one_each, one_each_t, queue_t

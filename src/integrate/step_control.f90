@@ -6,7 +6,7 @@ module nocdyn_step_control
   implicit none (type, external)
   private
 
-  public :: step_control, restart, resume, weigh_error, is_within, adapt, shorten, propose, smallest_step
+  public :: step_control, restart, resume, weigh_error, adapt, shorten, propose, smallest_step
 
   ! The constants of Hairer's DOPRI5, for any order of the error estimate.
   real(wp), parameter :: beta = 0.04_wp            !! weight of the last error in the PI controller
@@ -210,13 +210,6 @@ contains
     end do
   end subroutine add_up
 
-  !> Whether the error of the last attempt is within the tolerances.
-  elemental logical function is_within(mean_square)
-    real(wp), intent(in) :: mean_square   !! of `step_control_t`
-
-    is_within = mean_square <= 1
-  end function is_within
-
   !> The next steps of lanes after attempts of size h: PI control where these were accepted, shorter ones where the error was
   !> too large. Both logarithms are to base 2.
   pure subroutine adapt(control, lanes, accepted, rejected, error_order, most_growth, h)
@@ -227,7 +220,6 @@ contains
     real(wp), intent(in) :: most_growth(lanes)
     real(wp), intent(in) :: h(lanes)
 
-    real(wp) :: most, present_exponent
     integer :: lane
 
     !GCC$ novector
@@ -235,22 +227,44 @@ contains
       control%log_ratio(lane) = max(control%mean_square(lane), no_error)
     end do
     call log2s(lanes, control%log_ratio)
-    do lane = 1, lanes
-      present_exponent = 1.0_wp / (error_order(lane) + 1) - integral_loss * beta
-      control%log_ratio(lane) = 0.5_wp * control%log_ratio(lane)
-      control%change(lane) = merge(beta, 0.0_wp, accepted(lane)) * control%log_error(lane) &
-                             - present_exponent * control%log_ratio(lane)
-    end do
+    call find_changes(lanes, accepted, error_order, control%log_error, control%log_ratio, control%change)
     call exp2s(lanes, control%change)
     do lane = 1, lanes
-      if (.not. (accepted(lane) .or. rejected(lane))) cycle
-      most = most_growth(lane)
-      if (control%was_rejected(lane)) most = min(most, 1.0_wp)
-      control%h(lane) = max(least_change, min(safety * control%change(lane), most)) * h(lane)
-      control%was_rejected(lane) = rejected(lane)
-      if (accepted(lane)) control%log_error(lane) = max(control%log_ratio(lane), least_log_error)
+      if (accepted(lane) .or. rejected(lane)) call change_step(control, lane, accepted(lane), most_growth(lane), h(lane))
     end do
   end subroutine adapt
+
+  !> The logarithms of the errors, and of what the steps are to be multiplied by.
+  pure subroutine find_changes(lanes, accepted, error_order, log_error, log_ratio, change)
+    integer, intent(in) :: lanes
+    logical, intent(in) :: accepted(lanes)
+    integer, intent(in) :: error_order(lanes)
+    real(wp), intent(in) :: log_error(lanes)
+    real(wp), intent(inout) :: log_ratio(lanes), change(lanes)
+    real(wp) :: present_exponent
+    integer :: lane
+
+    !GCC$ novector
+    do lane = 1, lanes
+      present_exponent = 1.0_wp / (error_order(lane) + 1) - integral_loss * beta
+      log_ratio(lane) = 0.5_wp * log_ratio(lane)
+      change(lane) = merge(beta, 0.0_wp, accepted(lane)) * log_error(lane) - present_exponent * log_ratio(lane)
+    end do
+  end subroutine find_changes
+
+  pure subroutine change_step(control, lane, is_accepted, most_growth, h)
+    type(step_control_t), intent(inout) :: control
+    integer, intent(in) :: lane
+    logical, intent(in) :: is_accepted
+    real(wp), intent(in) :: most_growth, h
+    real(wp) :: most
+
+    most = most_growth
+    if (control%was_rejected(lane)) most = min(most, 1.0_wp)
+    control%h(lane) = max(least_change, min(safety * control%change(lane), most)) * h
+    control%was_rejected(lane) = .not. is_accepted
+    if (is_accepted) control%log_error(lane) = max(control%log_ratio(lane), least_log_error)
+  end subroutine change_step
 
   !> After an attempt of size h that could not be completed.
   pure subroutine shorten(control, lane, h)

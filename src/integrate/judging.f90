@@ -1,0 +1,108 @@
+!> What becomes of the attempts of the lanes: steps, shorter attempts, or ends.
+module nocdyn_judging
+  use nocdyn_march, only: march_t
+  use nocdyn_outcome, only: integration_done, integration_gave_up, integration_not_finite, integration_step_too_small, &
+    integration_too_many_steps, note_method, outcome_t
+  use nocdyn_step_control, only: adapt, shorten, smallest_step, weigh_error
+  use nocdyn_stepper, only: stepper_t
+  use nocdyn_system, only: system_t
+  use nocdyn_trial, only: trial_fine, trial_give_up, trial_not_finite
+  implicit none (type, external)
+  private
+
+  public :: judge_lanes
+
+contains
+
+  !> Accepts or rejects the last attempt of each lane, and ends the lanes that cannot go on.
+  subroutine judge_lanes(march, stepper, system, outcome)
+    type(march_t), intent(inout) :: march
+    class(stepper_t), intent(inout) :: stepper
+    class(system_t), intent(inout) :: system
+    type(outcome_t), intent(inout) :: outcome
+    integer :: failed, lane, wanted
+
+    if (.not. stepper%plans_steps) call weigh_error(march%control, march%trial)
+    call find_wanted(march, wanted)
+    if (wanted > 0) call stepper%interpolate(system, march%trial, march%wanted, march%coefficients)
+    call settle_lanes(march, outcome, failed)
+    if (.not. stepper%plans_steps) then
+      call adapt(march%control, march%trial%lanes, march%accepted, march%rejected, march%trial%error_order, &
+                 march%trial%most_growth, outcome%h)
+    end if
+    if (failed == 0) return
+    do lane = 1, march%trial%lanes
+      if (march%running(lane) .and. .not. march%accepted(lane)) call judge_rejection(march, lane, outcome)
+    end do
+  end subroutine judge_lanes
+
+  !> The lanes whose error is within the tolerances, and those of them whose solution inside the step is wanted.
+  pure subroutine find_wanted(march, wanted)
+    type(march_t), intent(inout) :: march
+    integer, intent(out) :: wanted   !! how many
+    integer :: lane
+
+    march%is_due = march%has_events .or. march%has_extremes .or. march%has_switches
+    wanted = 0
+    do lane = 1, march%trial%lanes
+      march%accepted(lane) = march%trial%working(lane) .and. march%control%mean_square(lane) <= 1
+      march%inspected(lane) = march%accepted(lane) .and. (march%is_due .or. march%next_time(lane) < march%t_new(lane))
+      march%wanted(lane) = march%inspected(lane) .or. (march%accepted(lane) .and. march%is_followed)
+      if (march%wanted(lane)) wanted = wanted + 1
+    end do
+  end subroutine find_wanted
+
+  !> Counts the accepted steps and ends the lanes that have reached the final time or may take no more steps.
+  pure subroutine settle_lanes(march, outcome, failed)
+    type(march_t), intent(inout) :: march
+    type(outcome_t), intent(inout) :: outcome
+    integer, intent(out) :: failed   !! attempts that were not accepted
+    logical :: is_fine
+    integer :: lane
+
+    failed = 0
+    do lane = 1, march%trial%lanes
+      march%rejected(lane) = .false.
+      if (.not. march%running(lane)) cycle
+      if (outcome%steps(lane) >= march%max_steps) outcome%status(lane) = integration_too_many_steps
+      is_fine = march%trial%verdict(lane) == trial_fine
+      march%rejected(lane) = is_fine .and. .not. march%accepted(lane)
+      march%accepted(lane) = is_fine .and. march%accepted(lane)
+      if (march%accepted(lane)) then
+        call note_method(outcome, lane, march%trial%t(lane), march%trial%implicit(lane))
+        if (march%control%reaches_end(lane)) outcome%status(lane) = integration_done
+        if (march%next_time(lane) <= march%t_new(lane)) march%is_due = .true.
+      else
+        failed = failed + 1
+      end if
+    end do
+  end subroutine settle_lanes
+
+  !> A lane takes a shorter step, or fails if no shorter step will help or none is possible.
+  subroutine judge_rejection(march, lane, outcome)
+    type(march_t), intent(inout) :: march
+    integer, intent(in) :: lane
+    type(outcome_t), intent(inout) :: outcome
+
+    outcome%rejected(lane) = outcome%rejected(lane) + 1
+    associate (trial => march%trial)
+      if (trial%verdict(lane) /= trial_fine) call shorten(march%control, lane, outcome%h(lane))
+      if (trial%verdict(lane) == trial_give_up) then
+        outcome%status(lane) = integration_gave_up
+      else if (outcome%h(lane) <= smallest_step(trial%t(lane))) then
+        select case (trial%verdict(lane))
+        case (trial_fine)
+          outcome%status(lane) = integration_step_too_small
+          outcome%component(lane) = maxloc(trial%deviation(lane, :trial%states), dim=1)
+        case (trial_not_finite)
+          outcome%status(lane) = integration_not_finite
+          outcome%component(lane) = trial%culprit(lane)
+        case default
+          outcome%status(lane) = integration_step_too_small
+          outcome%component(lane) = trial%culprit(lane)
+        end select
+      end if
+    end associate
+  end subroutine judge_rejection
+
+end module nocdyn_judging
