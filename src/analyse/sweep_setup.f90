@@ -1,6 +1,7 @@
 !> What the blocks of a sweep have in common, and whether its base machine can be run at all.
 module nocdyn_sweep_setup
   use nocdyn_assembly, only: assemble_machine, new_formulation
+  use nocdyn_block_sizes, only: lanes_for
   use nocdyn_errors, only: error_t
   use nocdyn_formulation, only: formulation_t
   use nocdyn_input, only: group_t, input_t
@@ -15,8 +16,6 @@ module nocdyn_sweep_setup
   private
 
   public :: prepare_sweep, take_settings
-
-  integer, parameter :: most_lanes = 16   ! whole vectors of any processor
 
   type, public :: sweep_setup_t
     integer :: lanes = 1               !! of a block
@@ -44,7 +43,7 @@ contains
     call take_settings(plan%input, formulation, settings, times, error)
     if (allocated(error)) return
     setup%is_audited = needs_works(formulation, plan%statistics)
-    setup%lanes = most_lanes
+    setup%lanes = lanes_for(formulation%states)
   end subroutine prepare_sweep
 
   !> What &run says of the integration.
