@@ -47,7 +47,7 @@ contains
     do lane = 1, march%trial%lanes
       march%accepted(lane) = march%trial%working(lane) .and. march%control%mean_square(lane) <= 1
       march%inspected(lane) = march%accepted(lane) .and. (march%is_due .or. march%next_time(lane) < march%t_new(lane))
-      march%wanted(lane) = march%inspected(lane) .or. (march%accepted(lane) .and. march%is_followed)
+      march%wanted(lane) = march%inspected(lane) .or. (march%accepted(lane) .and. march%wants_all)
       if (march%wanted(lane)) wanted = wanted + 1
     end do
   end subroutine find_wanted

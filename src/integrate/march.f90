@@ -31,6 +31,7 @@ module nocdyn_march
     logical :: has_extremes = .false.
     logical :: has_switches = .false.
     logical :: is_followed = .false.                 !! whether the observer is handed the solution inside all steps
+    logical :: wants_all = .false.                   !! whether it is that of `interpolate`
     logical :: is_exhausted = .false.                !! the queue has no variant left
     integer :: free = 0                              !! lanes that hold no variant
     logical :: is_due = .false.                      !! whether the accepted steps are looked at lane by lane
@@ -83,6 +84,7 @@ contains
     end associate
     call allocate_dense_output(march%dense, march%trial%components, stepper%degree)
     march%is_followed = observer%follows_steps
+    march%wants_all = march%is_followed .and. .not. stepper%shows_own
     march%has_switches = system%switches > 0
     if (march%has_switches) then
       call allocate_switching(march%switching, system, stepper%degree, march%trial, times(size(times)) - times(1))
