@@ -1,6 +1,6 @@
 !> How many lanes a block of variants has.
 module nocdyn_block_sizes
-  use nocdyn_series_products, only: strip
+  use nocdyn_series_strips, only: strip
   implicit none (type, external)
   private
 

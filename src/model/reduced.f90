@@ -16,7 +16,7 @@ module nocdyn_reduced
   use nocdyn_machine, only: machine_t
   use nocdyn_reduced_jacobian, only: new_reduced_jacobian, reduced_jacobian_t
   use nocdyn_reduced_series, only: new_reduced_series, reduced_series_t
-  use nocdyn_series_products, only: strip
+  use nocdyn_series_strips, only: strip
   use nocdyn_sparse_map, only: new_sparse_map, sparse_map_t, transposed_order
   use nocdyn_system, only: pattern_t
   use nocdyn_text, only: quoted
@@ -308,7 +308,7 @@ contains
 
     if (allocated(self%lane_series)) deallocate (self%lane_series)
     if (allocated(self%terms) .and. modulo(self%lanes, strip) == 0) then
-      allocate (self%lane_series, source=new_lane_series(self%machine, order))
+      allocate (self%lane_series, source=new_lane_series(self%machine, self%twists, self%accelerations, order))
     else
       self%motion = new_reduced_series(self%machine, self%twists, self%accelerations, self%is_audited, order)
     end if

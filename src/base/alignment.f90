@@ -1,0 +1,24 @@
+!> Where arrays lie in memory: vectors that cross from one line of the cache to the next take twice as long.
+module nocdyn_alignment
+  use, intrinsic :: iso_c_binding, only: c_intptr_t, c_loc
+  use nocdyn_kinds, only: wp
+  implicit none (type, external)
+  private
+
+  public :: numbers_to_line
+
+  integer, parameter, public :: line = 8   !! numbers of a line of the cache, and of the longest vectors
+
+contains
+
+  !> Numbers before the first one of an array that begins a line.
+  integer function numbers_to_line(array) result(numbers)
+    real(wp), target, contiguous, intent(in) :: array(:)
+    integer(c_intptr_t) :: bytes, number
+
+    number = storage_size(array) / 8
+    bytes = transfer(c_loc(array), bytes)
+    numbers = int(modulo(-bytes, line * number) / number)
+  end function numbers_to_line
+
+end module nocdyn_alignment
