@@ -12,6 +12,8 @@ module nocdyn_finite
   integer, parameter :: exponent_bits = 11
   integer(int64), parameter :: exponent_ones = 2_int64**exponent_bits - 1
 
+  integer, parameter :: several = 32
+
 contains
 
   !> Whether no element is infinite or NaN: the sum of their sizes is then neither, unless it overflows.
@@ -19,11 +21,22 @@ contains
     integer, intent(in) :: n
     real(wp), intent(in) :: x(n)
     logical :: all_finite
-    real(wp) :: total(4)   ! four sums, as a vector
-    integer :: i
+    real(wp) :: total(4)          ! four sums, as a vector
+    real(wp) :: totals(several)   ! sums that need not wait for each other
+    integer :: i, whole
 
     total = 0.0_wp
-    do i = 1, n - 3, 4
+    whole = n - modulo(n, several)
+    if (whole > 0) then
+      totals = abs(x(:several))
+      do i = several + 1, whole, several
+        totals = totals + abs(x(i:i + several - 1))
+      end do
+      do i = 1, several, 4
+        total = total + totals(i:i + 3)
+      end do
+    end if
+    do i = whole + 1, n - 3, 4
       total = total + abs(x(i:i + 3))
     end do
     do i = n - modulo(n, 4) + 1, n

@@ -112,13 +112,15 @@ contains
           cycle
         end if
         if (k == 0) then
-          call begin_moments(law(1, constant, e), law(1, by_speed, e), speed(1, 0, e), moment(1, e))
+          call begin_moments(law(1, constant, e), law(1, by_speed, e), speed(1, 0, e), restoring(1, e), moment(1, e))
         else
-          call find_speeds(freedoms, entries, first(e), first(e + 1) - 1, column, ratio, q(1, 1, k), law(1, by_speed, e), &
-                           speed(1, k, e), moment(1, e))
+          call find_moments(freedoms, entries, first(e), first(e + 1) - 1, column, ratio, q(1, 1, k), law(1, by_speed, e), &
+                            restoring(1, e), speed(1, k, e), moment(1, e))
         end if
-        if (has_square(e)) call add_square(k, law(1, by_speed_squared, e), speed(1, 0, e), moment(1, e))
-        if (has_angle(e)) call add(restoring(1, e), moment(1, e))
+        if (has_square(e)) then
+          call find_moments_of_squares(k, law(1, constant, e), law(1, by_speed, e), law(1, by_speed_squared, e), speed(1, 0, e), &
+                                       restoring(1, e), moment(1, e))
+        end if
       end do
       inverse = 1.0_wp / (k + 1)
       do i = 1, freedoms
@@ -135,28 +137,22 @@ contains
     y = x
   end subroutine copy
 
-  pure subroutine add(x, y)
-    real(wp), intent(in) :: x(strip)
-    real(wp), intent(inout) :: y(strip)
-
-    y = x + y
-  end subroutine add
-
-  !> The moments that depend on the speed, number 0.
-  pure subroutine begin_moments(constant, by_speed, speed, moment)
-    real(wp), intent(in) :: constant(strip), by_speed(strip), speed(strip)
+  !> The moments number 0, but for those by the square of the speed.
+  pure subroutine begin_moments(constant, by_speed, speed, restoring, moment)
+    real(wp), intent(in), dimension(strip) :: constant, by_speed, speed, restoring
     real(wp), intent(inout) :: moment(strip)
 
-    moment = constant + by_speed * speed
+    moment = restoring + (constant + by_speed * speed)
   end subroutine begin_moments
 
-  !> The speeds of an element, from the entries `begin` to `end` of U, and the moments that depend on them, number k > 0.
-  pure subroutine find_speeds(freedoms, entries, begin, end, column, ratio, q, by_speed, speed, moment)
+  !> The speeds of an element, from the entries `begin` to `end` of U, and its moments, but for those by the square of the speed,
+  !> number k > 0.
+  pure subroutine find_moments(freedoms, entries, begin, end, column, ratio, q, by_speed, restoring, speed, moment)
     integer, intent(in) :: freedoms, entries, begin, end
     integer, intent(in) :: column(entries)
     real(wp), intent(in) :: ratio(strip, entries)
     real(wp), intent(in) :: q(strip, freedoms)   !! coefficients of q'
-    real(wp), intent(in) :: by_speed(strip)
+    real(wp), intent(in) :: by_speed(strip), restoring(strip)
     real(wp), intent(inout) :: speed(strip), moment(strip)
     real(wp) :: v
     integer :: c, d, i, k
@@ -167,14 +163,14 @@ contains
       do i = 1, strip
         v = ratio(i, begin) * q(i, c)
         speed(i) = v
-        moment(i) = by_speed(i) * v
+        moment(i) = restoring(i) + by_speed(i) * v
       end do
     case (1)
       d = column(end)
       do i = 1, strip
         v = ratio(i, begin) * q(i, c) + ratio(i, end) * q(i, d)
         speed(i) = v
-        moment(i) = by_speed(i) * v
+        moment(i) = restoring(i) + by_speed(i) * v
       end do
     case default
       do i = 1, strip
@@ -187,10 +183,10 @@ contains
         end do
       end do
       do i = 1, strip
-        moment(i) = by_speed(i) * speed(i)
+        moment(i) = restoring(i) + by_speed(i) * speed(i)
       end do
     end select
-  end subroutine find_speeds
+  end subroutine find_moments
 
   !> Coefficient k of w, for k > 0 from coefficient k - 1 of the speed, and of -linear w.
   pure subroutine find_linear(k, inverse, linear, speed, w, restoring)
@@ -236,33 +232,37 @@ contains
       end do
       sum = sum + w(:, 0) * w(:, k)
     end if
-    sum = sum + sum
-    if (modulo(k, 2) == 0) sum = sum + w(:, k / 2) * w(:, k / 2)
-    w2(:, k) = sum
-    sum_of_cubes = sum_of_cubes + (w(:, 0) * sum + w(:, k) * w2(:, 0))
-    restoring = -linear * w(:, k) - cubic * sum_of_cubes
+    if (modulo(k, 2) == 0) then
+      w2(:, k) = (sum + sum) + w(:, k / 2) * w(:, k / 2)
+    else
+      w2(:, k) = sum + sum
+    end if
+    restoring = -linear * w(:, k) - cubic * (sum_of_cubes + (w(:, 0) * w2(:, k) + w(:, k) * w2(:, 0)))
   end subroutine find_cubic
 
-  !> Adds by_speed_squared times coefficient k of v^2.
-  pure subroutine add_square(k, by_speed_squared, v, moment)
+  !> The moments of an element with a term by the square of the speed v, number k.
+  pure subroutine find_moments_of_squares(k, constant, by_speed, by_speed_squared, v, restoring, moment)
     integer, intent(in) :: k
-    real(wp), intent(in) :: by_speed_squared(strip), v(strip, 0:k)
+    real(wp), intent(in), dimension(strip) :: constant, by_speed, by_speed_squared, restoring
+    real(wp), intent(in) :: v(strip, 0:k)
     real(wp), intent(inout) :: moment(strip)
     real(wp) :: sum(strip)
     integer :: j
 
     if (k == 0) then
-      moment = moment + by_speed_squared * (0.0_wp + v(:, 0) * v(:, 0))
+      moment = restoring + ((constant + by_speed * v(:, 0)) + by_speed_squared * (0.0_wp + v(:, 0) * v(:, 0)))
       return
     end if
     sum = 0.0_wp + v(:, (k - 1) / 2) * v(:, k - (k - 1) / 2)
     do j = (k - 1) / 2 - 1, 0, -1
       sum = sum + v(:, j) * v(:, k - j)
     end do
-    sum = sum + sum
-    if (modulo(k, 2) == 0) sum = sum + v(:, k / 2) * v(:, k / 2)
-    moment = moment + by_speed_squared * sum
-  end subroutine add_square
+    if (modulo(k, 2) == 0) then
+      moment = restoring + (by_speed * v(:, k) + by_speed_squared * ((sum + sum) + v(:, k / 2) * v(:, k / 2)))
+    else
+      moment = restoring + (by_speed * v(:, k) + by_speed_squared * (sum + sum))
+    end if
+  end subroutine find_moments_of_squares
 
   !> The next coefficients of a coordinate, from the entries `begin` to `end` of R and the moments number k, and from those of
   !> its speed.
