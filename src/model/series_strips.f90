@@ -11,7 +11,7 @@ module nocdyn_series_strips
 
   public :: gather, gather_laws, begin_strip, expand_strip
 
-  integer, parameter, public :: strip = 32   !! lanes that go through the recurrence together; those of a block are multiples of it
+  integer, parameter, public :: strip = 32   !! lanes that go through the recurrence together; those of a block are a multiple
 
   integer, parameter, public :: constant = 1, by_speed = 2, by_speed_squared = 3, linear = 4, cubic = 5   !! numbers of a law
 
@@ -89,7 +89,7 @@ contains
     real(wp), intent(in) :: law(strip, 5, elements)
     real(wp), intent(in) :: external(lanes, elements, 0:order)   !! moments of the external elements
     real(wp), intent(inout), dimension(strip, 0:order, elements) :: speed, angle, square   !! u', w and w^2
-    real(wp), intent(inout), dimension(strip, elements) :: restoring, moment   !! present coefficients
+    real(wp), intent(inout), dimension(strip, elements) :: restoring, moment   !! present coefficients; zero to begin with
     real(wp), intent(inout) :: q(strip, freedoms, 0:order)   !! q'
     integer, intent(in) :: columns
     real(wp), intent(inout) :: y(lanes, columns, 0:order)
@@ -157,15 +157,16 @@ contains
     real(wp) :: v
     integer :: c, d, i, k
 
-    c = column(begin)
     select case (end - begin)
     case (0)
+      c = column(begin)
       do i = 1, strip
         v = ratio(i, begin) * q(i, c)
         speed(i) = v
         moment(i) = restoring(i) + by_speed(i) * v
       end do
     case (1)
+      c = column(begin)
       d = column(end)
       do i = 1, strip
         v = ratio(i, begin) * q(i, c) + ratio(i, end) * q(i, d)
@@ -174,9 +175,9 @@ contains
       end do
     case default
       do i = 1, strip
-        speed(i) = ratio(i, begin) * q(i, c)
+        speed(i) = 0.0_wp
       end do
-      do k = begin + 1, end
+      do k = begin, end
         c = column(k)
         do i = 1, strip
           speed(i) = speed(i) + ratio(i, k) * q(i, c)
@@ -292,7 +293,8 @@ contains
       b = element(begin + 1)
       c = element(end)
       do i = 1, strip
-        v = inverse * (response(i, begin) * moment(i, a) + response(i, begin + 1) * moment(i, b) + response(i, end) * moment(i, c))
+        v = inverse * (response(i, begin) * moment(i, a) + response(i, begin + 1) * moment(i, b) &
+                       + response(i, end) * moment(i, c))
         next_speed(i) = v
         y_speed(i) = v
         y_angle(i) = inverse * speed(i)
