@@ -9,7 +9,7 @@ module nocdyn_machine_report
   implicit none (type, external)
   private
 
-  public :: coordinate_names, machine_report, machine_notes, number_of
+  public :: coordinate_names, counted, machine_report, machine_notes, number_of
 
   integer, parameter :: most_names = 12    ! in a line
   integer, parameter :: most_lines = 40    ! of one sort in a report

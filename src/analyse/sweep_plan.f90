@@ -6,6 +6,7 @@ module nocdyn_sweep_plan
   use nocdyn_input, only: group_t, input_t
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
+  use nocdyn_machine_report, only: counted
   use nocdyn_mistakes, only: mistakes_t
   use nocdyn_mistakes_report, only: mistakes_report
   use nocdyn_output_times, only: check_output_times
@@ -21,7 +22,9 @@ module nocdyn_sweep_plan
   implicit none (type, external)
   private
 
-  public :: make_plan, without_sweep
+  public :: make_plan, has_sweep, without_sweep
+
+  character(len=*), parameter :: kinds = 'sweep vary record'   !! of the groups of a sweep
 
   type, public :: sweep_plan_t
     type(input_t) :: input                            !! of the base machine, with the groups of the sweep
@@ -32,6 +35,7 @@ module nocdyn_sweep_plan
     character(len=:), allocatable :: list_fingerprint   !! of the file of a list, '' without one
   contains
     procedure :: values
+    procedure :: summary
   end type sweep_plan_t
 
 contains
@@ -75,6 +79,18 @@ contains
     call self%design%values(variant, x)
     where (self%targets%is_whole) x = anint(x)
   end subroutine values
+
+  !> 'random, 100000 variants of 2 numbers, 7 results'
+  function summary(self) result(text)
+    class(sweep_plan_t), intent(in) :: self
+    character(len=:), allocatable :: text
+    type(group_t) :: group
+
+    group = self%input%single('sweep')
+    text = group%text('design') // ', ' // counted(self%design%variants, 'variant', 'variants') // ' of ' // &
+           counted(self%design%varied, 'number', 'numbers') // ', ' // counted(size(self%statistics), 'result', 'results')
+    if (size(self%trajectories) > 0) text = text // ', ' // counted(size(self%trajectories), 'trajectory', 'trajectories')
+  end function summary
 
   !> Labels of the columns of trajectory.csv of the base machine.
   subroutine label_columns(input, labels, error)
@@ -120,6 +136,14 @@ contains
     end if
   end subroutine conclude
 
+  !> Whether an input has groups of a sweep.
+  pure logical function has_sweep(input)
+    type(input_t), intent(in) :: input
+    integer :: i
+
+    has_sweep = any([(has_word(kinds, input%groups(i)%kind), i=1, size(input%groups))])
+  end function has_sweep
+
   !> The input of a machine alone, e.g. of one variant.
   pure function without_sweep(input) result(machine_input)
     type(input_t), intent(in) :: input
@@ -127,7 +151,7 @@ contains
     logical :: is_kept(size(input%groups))
     integer :: i, kept
 
-    is_kept = [(.not. has_word('sweep vary record', input%groups(i)%kind), i=1, size(input%groups))]
+    is_kept = [(.not. has_word(kinds, input%groups(i)%kind), i=1, size(input%groups))]
     machine_input%file = input%file
     allocate (machine_input%overrides, source=input%overrides)
     allocate (machine_input%groups(count(is_kept)))

@@ -14,6 +14,7 @@ module nocdyn_commands
   use nocdyn_output_times, only: check_output_times
   use nocdyn_schema, only: group_rule_index
   use nocdyn_schema_help, only: group_help, input_help, input_template
+  use nocdyn_sweep_plan, only: has_sweep, make_plan, sweep_plan_t
   use nocdyn_text, only: joined, lower_case, quoted
   use nocdyn_version, only: compiler_text, version
   implicit none (type, external)
@@ -30,19 +31,34 @@ contains
     type(input_t) :: input
     type(machine_t) :: machine
     type(error_t), allocatable :: error
+    character(len=:), allocatable :: sweep
     integer :: i
 
     code = exit_done
     do i = 1, size(arguments%operands)
       call read_machine(arguments, i, input, machine, error)
+      if (.not. allocated(error)) call check_sweep(input, sweep, error)
       if (allocated(error)) then
         call complain(error)
         code = max(code, error%code)
       else
-        call say(machine_report(input%file, machine))
+        call say(machine_report(input%file, machine) // sweep)
       end if
     end do
   end subroutine check_command
+
+  !> The line of a report about the sweep of the machine.
+  subroutine check_sweep(input, text, error)
+    type(input_t), intent(in) :: input
+    character(len=:), allocatable, intent(out) :: text   !! '' if there are no groups of a sweep
+    type(error_t), allocatable, intent(out) :: error
+    type(sweep_plan_t) :: plan
+
+    text = ''
+    if (.not. has_sweep(input)) return
+    call make_plan(input, plan, error)
+    if (.not. allocated(error)) text = new_line('a') // '  sweep: ' // plan%summary()
+  end subroutine check_sweep
 
   subroutine read_machine(arguments, number, input, machine, error)
     type(arguments_t), intent(in) :: arguments

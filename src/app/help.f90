@@ -29,7 +29,7 @@ contains
     case ('check')
       text = 'nocdyn check FILE... [--set PATH=VALUE]...' // nl // nl // &
              'Reads the files and analyses the machines: every mistake with its line, degrees of freedom,' // nl // &
-             'independent coordinates, ratios between geared bodies, redundant gears.'
+             'independent coordinates, ratios between geared bodies, redundant gears; and the sweep, if there is one.'
     case ('equilibrium')
       text = 'nocdyn equilibrium FILE... [--set PATH=VALUE]... [--out DIR]' // nl // nl // &
              'Finds the steady states of the machines: constant speeds at which the mean torques balance, and the' // nl // &

@@ -14,7 +14,7 @@ module nocdyn_sweep_job
   use nocdyn_sweep_plan, only: make_plan, sweep_plan_t
   use nocdyn_sweep_progress, only: console_sweep_progress_t
   use nocdyn_sweep_resumption, only: judge_journal, judge_results
-  use nocdyn_sweep_results, only: input_file, results_options_t, write_results
+  use nocdyn_sweep_results, only: results_options_t, write_results
   use nocdyn_sweep_setup, only: prepare_sweep, sweep_setup_t
   use nocdyn_sweep_summary, only: sweep_effort_t
   use nocdyn_text, only: to_text
@@ -85,7 +85,7 @@ contains
     inquire (file=job%folder // '/' // sweep_file_name, exist=job%is_done)
     job%is_done = job%is_done .and. job%arguments%shards <= 1
     if (job%is_done) then
-      call judge_results(job%folder, input_file, header, error)
+      call judge_results(job%folder, header, error)
       news = 'all ' // to_text(header%variants) // ' variants are done already; results in ' // job%folder
     else
       news = 'there is nothing to go on with in ' // job%folder // '; the sweep starts from its beginning'

@@ -2,10 +2,10 @@
 module nocdyn_sweep_resumption
   use nocdyn_errors, only: error_t, exit_input, raise
   use nocdyn_input_differences, only: find_differences
+  use nocdyn_sweep_file, only: read_origin
   use nocdyn_sweep_header, only: sweep_header_t
   use nocdyn_sweep_journal, only: sweep_journal_t
   use nocdyn_text, only: string_t, to_text
-  use nocdyn_text_file, only: read_text_file
   implicit none (type, external)
   private
 
@@ -33,7 +33,7 @@ contains
     if (difference /= '') call raise(error, exit_input, journal%path() // ' cannot be gone on with: ' // difference)
   end subroutine judge_journal
 
-  !> What tells the sweep of a journal from the one that is asked for; empty if nothing does.
+  !> What tells a sweep that was begun from the one that is asked for; empty if nothing does.
   function header_difference(old, new) result(text)
     type(sweep_header_t), intent(in) :: old, new
     character(len=:), allocatable :: text
@@ -71,16 +71,18 @@ contains
   end function input_difference
 
   !> Results that are there already must be of this sweep.
-  subroutine judge_results(folder, input_file, header, error)
+  subroutine judge_results(folder, header, error)
     character(len=*), intent(in) :: folder
-    character(len=*), intent(in) :: input_file            !! its name in the folder
-    type(sweep_header_t), intent(in) :: header
+    type(sweep_header_t), intent(in) :: header            !! of the sweep that is asked for
     type(error_t), allocatable, intent(out) :: error
-    character(len=:), allocatable :: difference, text
+    type(sweep_header_t) :: old
+    character(len=:), allocatable :: difference
 
-    call read_text_file(folder // '/' // input_file, text, error)
+    call read_origin(folder, old, error)
     if (allocated(error)) return
-    difference = input_difference(text, header%input_text)
+    old%first = header%first
+    old%last = header%last
+    difference = header_difference(old, header)
     if (difference /= '') call raise(error, exit_input, folder // ' holds the results of another sweep: ' // difference // &
                                      '; without --resume they are replaced')
   end subroutine judge_results

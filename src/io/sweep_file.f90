@@ -6,8 +6,9 @@ module nocdyn_sweep_file
   use, intrinsic :: iso_c_binding, only: c_associated, c_f_procpointer, c_funptr, c_int
   use, intrinsic :: iso_fortran_env, only: int8
   use netcdf, only: nf90_byte, nf90_char, nf90_chunked, nf90_clobber, nf90_close, nf90_create, nf90_def_dim, nf90_def_var, &
-    nf90_def_var_chunking, nf90_def_var_fill, nf90_double, nf90_ebadname, nf90_ehdferr, nf90_enddef, &
-    nf90_global, nf90_int, nf90_max_name, nf90_netcdf4, nf90_noerr, nf90_put_att, nf90_put_var, nf90_strerror, nf90_unlimited
+    nf90_def_var_chunking, nf90_def_var_fill, nf90_double, nf90_ebadname, nf90_ehdferr, nf90_enddef, nf90_enotatt, &
+    nf90_get_att, nf90_global, nf90_inquire_attribute, nf90_int, nf90_max_name, nf90_netcdf4, nf90_noerr, nf90_nowrite, &
+    nf90_open, nf90_put_att, nf90_put_var, nf90_strerror, nf90_unlimited
   use nocdyn_errors, only: error_t, exit_file, raise
   use nocdyn_journal_chunks, only: check_sweep, sweep_records_t
   use nocdyn_kinds, only: wp
@@ -21,7 +22,7 @@ module nocdyn_sweep_file
   implicit none (type, external)
   private
 
-  public :: write_sweep_file
+  public :: write_sweep_file, read_origin
 
   character(len=*), parameter, public :: sweep_file_name = 'sweep.nc'
 
@@ -150,7 +151,41 @@ contains
     call put_text(file, nf90_global, 'design', header%design)
     call note(file, nf90_put_att(file%id, nf90_global, 'seed', header%seed))
     call put_text(file, nf90_global, 'input', header%input_text)
+    if (header%list_fingerprint /= '') call put_text(file, nf90_global, 'list_fingerprint', header%list_fingerprint)
   end subroutine put_attributes
+
+  !> Of which sweep the results in `folder` are: source, input and the fingerprint of a list, nothing else of a header.
+  subroutine read_origin(folder, header, error)
+    character(len=*), intent(in) :: folder
+    type(sweep_header_t), intent(out) :: header
+    type(error_t), allocatable, intent(out) :: error
+    integer :: id, status
+
+    status = nf90_open(folder // '/' // sweep_file_name, nf90_nowrite, id)
+    if (status == nf90_noerr) then
+      call read_text(id, 'source', header%source, status)
+      if (status == nf90_noerr) call read_text(id, 'input', header%input_text, status)
+      if (status == nf90_noerr) call read_text(id, 'list_fingerprint', header%list_fingerprint, status)
+      if (nf90_close(id) /= nf90_noerr) status = nf90_ehdferr
+    end if
+    if (status /= nf90_noerr) call raise(error, exit_file, quoted(folder // '/' // sweep_file_name) // ' cannot be read: ' // &
+                                         trim(nf90_strerror(status)))
+  end subroutine read_origin
+
+  !> A text of the file as a whole; '' if it does not have it.
+  subroutine read_text(id, name, text, status)
+    integer, intent(in) :: id                              !! of the file
+    character(len=*), intent(in) :: name
+    character(len=:), allocatable, intent(out) :: text
+    integer, intent(out) :: status                         !! that the library answered
+    integer :: length
+
+    length = 0
+    status = nf90_inquire_attribute(id, nf90_global, name, len=length)
+    allocate (character(len=length) :: text)
+    if (status == nf90_noerr .and. length > 0) status = nf90_get_att(id, nf90_global, name, text)
+    if (status == nf90_enotatt) status = nf90_noerr
+  end subroutine read_text
 
   subroutine put_text(file, variable, name, text)
     type(sweep_file_t), intent(inout) :: file

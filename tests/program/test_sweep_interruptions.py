@@ -1,5 +1,6 @@
 """Sweeps that are killed, interrupted, or cannot write: nothing that was done is lost, and the end is the same."""
 
+import os
 import random
 import re
 import resource
@@ -7,6 +8,7 @@ import signal
 import subprocess
 import time
 
+import h5py
 import pytest
 from conftest import TRAPS_EXCEPTIONS, wait_for
 from sweep_inputs import MPI_ENVIRONMENT, MPI_PROGRAM, SWEEP, TWO_DISCS, mpirun, needs_mpi, needs_sweeps
@@ -40,6 +42,11 @@ def start(nocdyn, *words, ranks=0, **options):
         process = nocdyn.start(*words, **options)
     wait_for(lambda: journal(nocdyn).exists() and journal(nocdyn).stat().st_size > 8000)
     return process
+
+
+def limited_to(size):
+    """Files of the process cannot grow beyond so many bytes."""
+    return lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (size, size))
 
 
 def test_a_sweep_that_is_killed_twenty_times_ends_as_one_that_is_not(nocdyn, discs):
@@ -118,27 +125,66 @@ def test_a_group_that_has_gone_is_named(nocdyn, discs):
 
 
 def test_a_journal_of_another_version_is_not_gone_on_with(nocdyn, discs):
-    interrupt(nocdyn, discs)
-    content = journal(nocdyn).read_bytes()
-    journal(nocdyn).write_bytes(content.replace(b"nocdyn 0.", b"nocdyn 9.", 1))
-    outcome = nocdyn("sweep", discs, "--out", "out", "--resume", *ENDLESS)
+    # the program of the tests writes as version 9; without room for sweep.nc it leaves its journal
+    command = [os.environ["NOCDYN_SWEEP_STORE"], "out", "60", "20"]
+    subprocess.run(command, cwd=nocdyn.folder, check=False, capture_output=True, preexec_fn=limited_to(10000))
+    before = journal(nocdyn).read_bytes()
+    outcome = nocdyn("sweep", discs, "--out", "out", "--resume")
     assert (outcome.returncode, outcome.stdout) == (2, "")
-    assert outcome.stderr.startswith("nocdyn: out/sweep.journal") or "'out/sweep.journal'" in outcome.stderr
+    this = re.escape(nocdyn("--version").stdout.strip())
+    complaint = f"nocdyn: out/sweep\\.journal cannot be gone on with: it was begun by nocdyn 9, this is {this}\n"
+    assert re.fullmatch(complaint, outcome.stderr)
+    assert journal(nocdyn).read_bytes() == before
+
+
+def write_list(nocdyn, rows):
+    """A sweep over a list of stiffnesses."""
+    groups = [line for line in SWEEP.splitlines() if "&vary" not in line and "&sweep" not in line]
+    nocdyn.write("variants.csv", "\n".join(["coupling.shaft.stiffness", *rows]) + "\n")
+    return nocdyn.write("discs.nml", TWO_DISCS + "&sweep design = 'list' file = 'variants.csv' /\n" + "\n".join(groups))
 
 
 def test_a_list_that_has_changed_is_not_gone_on_with(nocdyn):
-    groups = [line for line in SWEEP.splitlines() if "&vary" not in line and "&sweep" not in line]
-    nocdyn.write("discs.nml", TWO_DISCS + "&sweep design = 'list' file = 'variants.csv' /\n" + "\n".join(groups))
     rows = [f"{20 + 1e-4 * i}" for i in range(2 * SAMPLES)]
-    nocdyn.write("variants.csv", "coupling.shaft.stiffness\n" + "\n".join(rows) + "\n")
-    process = start(nocdyn, "sweep", "discs.nml", "--out", "out", "--set", "run.t_end=20")
+    discs = write_list(nocdyn, rows)
+    process = start(nocdyn, "sweep", discs, "--out", "out", "--set", "run.t_end=20")
     process.send_signal(signal.SIGINT)
     process.communicate(timeout=30)
-    nocdyn.write("variants.csv", "coupling.shaft.stiffness\n" + "\n".join(["21", *rows[1:]]) + "\n")
-    outcome = nocdyn("sweep", "discs.nml", "--out", "out", "--set", "run.t_end=20", "--resume")
+    write_list(nocdyn, ["21", *rows[1:]])
+    outcome = nocdyn("sweep", discs, "--out", "out", "--set", "run.t_end=20", "--resume")
     assert (outcome.returncode, outcome.stdout) == (2, "")
     complaint = "the file of &sweep with the variants has changed"
     assert outcome.stderr == f"nocdyn: out/sweep.journal cannot be gone on with: {complaint}\n"
+
+
+def test_results_of_a_list_that_has_changed_are_not_taken_for_those_of_the_new_one(nocdyn):
+    discs = write_list(nocdyn, ["20", "30", "40"])
+    nocdyn("sweep", discs, "--out", "out")
+    outcome = nocdyn("sweep", discs, "--out", "out", "--resume")
+    assert (outcome.returncode, outcome.stdout) == (0, f"{discs}: all 3 variants are done already; results in out\n")
+    write_list(nocdyn, ["20", "31", "40"])
+    before = (nocdyn.folder / "out/sweep.nc").read_bytes()
+    outcome = nocdyn("sweep", discs, "--out", "out", "--resume")
+    assert (outcome.returncode, outcome.stdout) == (2, "")
+    complaint = "the file of &sweep with the variants has changed; without --resume they are replaced"
+    assert outcome.stderr == f"nocdyn: out holds the results of another sweep: {complaint}\n"
+    assert (nocdyn.folder / "out/sweep.nc").read_bytes() == before
+
+
+def test_results_of_another_version_are_not_taken_for_those_of_this_one(nocdyn, discs):
+    nocdyn("sweep", discs, "--out", "out")
+    with h5py.File(nocdyn.folder / "out/sweep.nc", "r+") as file:
+        file.attrs["source"] = "nocdyn 9"
+    outcome = nocdyn("sweep", discs, "--out", "out", "--resume")
+    assert (outcome.returncode, outcome.stdout) == (2, "")
+    assert outcome.stderr.startswith("nocdyn: out holds the results of another sweep: it was begun by nocdyn 9, this is nocdyn 0.")
+
+
+def test_results_that_cannot_be_read_are_not_taken_for_finished(nocdyn, discs):
+    nocdyn.write("out/sweep.nc", "not of NetCDF")
+    outcome = nocdyn("sweep", discs, "--out", "out", "--resume")
+    assert (outcome.returncode, outcome.stdout) == (3, "")
+    assert outcome.stderr == "nocdyn: 'out/sweep.nc' cannot be read: NetCDF: Unknown file format\n"
 
 
 def test_nothing_to_go_on_with_is_said(nocdyn, discs):
@@ -164,11 +210,6 @@ def test_results_of_another_sweep_are_not_taken_for_its_own(nocdyn, discs):
         "nocdyn: out holds the results of another sweep: the input has changed: &sweep: samples was 60, is 61; "
         "without --resume they are replaced\n"
     )
-
-
-def limited_to(size):
-    """Files of the process cannot grow beyond so many bytes."""
-    return lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (size, size))
 
 
 @pytest.mark.parametrize("size", [0, 3000, 30000])

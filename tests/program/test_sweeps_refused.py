@@ -93,3 +93,20 @@ def test_a_variant_with_a_number_that_is_not_allowed_is_refused_alone(nocdyn):
     table = (nocdyn.folder / "out/sweep.csv").read_text()
     assert "load.drag.viscous = -0.5 is out of range; allowed: >= 0 [N m s/rad]" in table
     assert "run.t_start: t_end = 1 is out of range; allowed: > t_start = 2" in table
+
+
+def test_check_looks_at_the_sweep_too(nocdyn):
+    path = nocdyn.write("m.nml", SPINNER + "".join(GROUPS.values()) + "&record trajectories = 1, 2 /\n")
+    outcome = nocdyn("check", path, "--set", "sweep.samples=100000")
+    assert (outcome.returncode, outcome.stderr) == (0, "")
+    assert outcome.stdout.endswith("\n  sweep: random, 100000 variants of 1 number, 1 result, 2 trajectories\n")
+    outcome = nocdyn("check", path, "--set", "sweep.samples=1")
+    assert (outcome.returncode, outcome.stdout) == (2, "")
+    assert outcome.stderr.endswith("m.nml:8: &record: trajectories(2) = 2 is out of range; allowed: 1, the number of variants\n")
+
+
+def test_check_wants_a_sweep_where_something_varies(nocdyn):
+    path = nocdyn.write("m.nml", SPINNER + GROUPS["vary"])
+    outcome = nocdyn("check", path)
+    assert (outcome.returncode, outcome.stdout) == (2, "")
+    assert outcome.stderr == f"nocdyn: {path}: there is no &sweep; 'nocdyn help input sweep' shows one\n"
