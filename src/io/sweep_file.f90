@@ -180,8 +180,8 @@ contains
     integer, intent(out) :: status                         !! that the library answered
     integer :: length
 
-    length = 0
     status = nf90_inquire_attribute(id, nf90_global, name, len=length)
+    if (status /= nf90_noerr) length = 0
     allocate (character(len=length) :: text)
     if (status == nf90_noerr .and. length > 0) status = nf90_get_att(id, nf90_global, name, text)
     if (status == nf90_enotatt) status = nf90_noerr

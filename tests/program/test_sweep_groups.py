@@ -27,7 +27,7 @@ def test_the_input_of_the_results_can_be_run_again(nocdyn):
     assert [first.count(f"\n&{group}\n") for group in ("sweep", "vary", "record")] == [1, 3, 2]
 
 
-@pytest.mark.parametrize("command", ["check", "matrices", "modes", "equilibrium"])
+@pytest.mark.parametrize("command", ["matrices", "modes", "equilibrium"])
 def test_other_commands_take_the_machine_as_it_is(nocdyn, command):
     outcome = nocdyn(command, VARIED)
     alone = nocdyn(command, nocdyn.write("varied_machine.nml", VARIED.read_text().split("&sweep")[0]))

@@ -102,7 +102,7 @@ def test_check_looks_at_the_sweep_too(nocdyn):
     assert outcome.stdout.endswith("\n  sweep: random, 100000 variants of 1 number, 1 result, 2 trajectories\n")
     outcome = nocdyn("check", path, "--set", "sweep.samples=1")
     assert (outcome.returncode, outcome.stdout) == (2, "")
-    assert outcome.stderr.endswith("m.nml:8: &record: trajectories(2) = 2 is out of range; allowed: 1, the number of variants\n")
+    assert outcome.stderr.endswith("m.nml:8: &record: trajectories(2) = 2 is out of range; allowed: 1 to 1, the number of variants\n")
 
 
 def test_check_wants_a_sweep_where_something_varies(nocdyn):
