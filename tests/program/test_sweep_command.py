@@ -15,6 +15,17 @@ TRUTH = ("--set", "run.rtol=1e-12", "--set", "run.atol=1e-12")
 # largest relative error of the results of a sweep at tolerance 1e-8
 ERROR = 1e-6
 
+PURE_POWERS = """\
+&body     name = 'disc'   inertia = 1.0  speed = 1.0 /
+&coupling name = 'spring' bodies = 'ground', 'disc' stiffness = 0.0 cubic_stiffness = 4.0 /
+&motor    name = 'drive'  body = 'disc' a = 0.3 b = 0.0 c = 0.2 /
+&run      t_end = 2.0 rtol = 1e-8 atol = 1e-8 /
+&output   points = 11 /
+&sweep    design = 'grid' /
+&vary     target = 'coupling.spring.cubic_stiffness' low = 2.0 high = 6.0 count = 4 /
+&record   quantity = 'omega_disc' statistic = 'final' /
+"""
+
 
 @pytest.fixture
 def discs(nocdyn):
@@ -107,6 +118,31 @@ def test_numbers_of_run_can_vary(nocdyn):
         nocdyn("run", "mixed.nml", "--out", "single", *numbers, *TRUTH)
         speed = nocdyn.summary("single")["columns"]["omega_disc [rad/s]"]
         assert float(row["omega_disc_final [rad/s]"]) == pytest.approx(speed["last"], rel=ERROR)
+
+
+@pytest.mark.parametrize("method", ["rk45", "taylor"])
+def test_laws_without_their_linear_terms_are_computed(nocdyn, method):
+    nocdyn.write("spring.nml", PURE_POWERS)
+    assert nocdyn("sweep", "spring.nml", "--out", "out", "--csv", "--set", f"run.method={method}").returncode == 0
+    for row in table(nocdyn, "out"):
+        cubic = row["coupling.spring.cubic_stiffness [N m/rad3]"]
+        nocdyn("run", "spring.nml", "--out", "single", "--set", f"coupling.spring.cubic_stiffness={cubic}", *TRUTH)
+        speed = nocdyn.summary("single")["columns"]["omega_disc [rad/s]"]
+        assert float(row["omega_disc_final [rad/s]"]) == pytest.approx(speed["last"], rel=ERROR)
+
+
+@pytest.mark.parametrize("method", ["rk45", "taylor"])
+def test_variants_of_other_tolerances_have_the_bits_of_a_sweep_of_these(nocdyn, method):
+    groups = [line for line in SWEEP.splitlines() if "&vary" not in line and "&sweep" not in line]
+    groups += ["&sweep design = 'grid' /", "&vary target = 'run.rtol' low = 1e-12 high = 1e-4 count = 2 /"]
+    groups += ["&vary target = 'load.drag.viscous' low = 0.3 high = 0.6 count = 2 /"]
+    nocdyn.write("discs.nml", TWO_DISCS + "\n".join(groups) + "\n")
+    words = ("--csv", "--set", f"run.method={method}")
+    for folder, rtol in (("alone", 1e-8), ("fine", 1e-12), ("coarse", 1e-4)):
+        assert nocdyn("sweep", "discs.nml", "--out", folder, *words, "--set", f"run.rtol={rtol}").returncode == 0
+    alone, fine, coarse = (table(nocdyn, folder) for folder in ("alone", "fine", "coarse"))
+    assert alone == fine == coarse
+    assert alone[0]["steps"] != alone[2]["steps"]
 
 
 def test_a_sweep_without_a_variant_that_is_done_fails(nocdyn, discs):
