@@ -4,12 +4,12 @@ module nocdyn_statistics_observer
   use nocdyn_formulation, only: formulation_t
   use nocdyn_kinds, only: wp
   use nocdyn_lane_numbers, only: lane_numbers_t
-  use nocdyn_linear_columns, only: has_law, is_linear
+  use nocdyn_linear_columns, only: has_law, is_linear, linear_columns_t, new_linear_columns
   use nocdyn_linear_statistics, only: linear_statistics_t, new_linear_statistics
   use nocdyn_reduced, only: reduced_t
   use nocdyn_sampled_statistics, only: new_sampled_statistics, sampled_statistics_t
-  use nocdyn_statistics, only: statistic_max, statistic_max_abs, statistic_min, statistic_settling_time, statistic_t, &
-    statistic_time_of_max
+  use nocdyn_statistics, only: statistic_final, statistic_max, statistic_max_abs, statistic_min, statistic_settling_time, &
+    statistic_t, statistic_time_of_max
   use nocdyn_system, only: observer_t, steps_t
   use nocdyn_text, only: string_t
   use nocdyn_trajectory_columns, only: column_t, column_work_in, list_columns
@@ -31,6 +31,7 @@ module nocdyn_statistics_observer
     type(sampled_statistics_t), private :: sampled, spare
     integer, allocatable, private :: in_linear(:), in_sampled(:), in_spare(:)   !! places of the statistics there, or 0
     logical, private :: has_sampled = .false., has_spared = .false.   !! whether `sampled` is used, whether `spare` is now
+    integer, private :: first_component = 1, last_component = huge(1)   !! of the state, that `linear` follows inside steps
     logical, allocatable, private :: all_lanes(:)             !! true
     logical, allocatable, private :: is_spared(:)             !! lanes in which `spare` is used
     logical, allocatable, private :: is_complete(:)           !! lanes that have reached the end
@@ -85,6 +86,7 @@ contains
     allocate (self%in_sampled, source=places_of(.not. linear))
     allocate (self%in_spare, source=places_of(has_extremum))
     self%has_sampled = .not. all(linear)
+    call find_components(self, block, columns(pack(statistics%column, linear .and. statistics%kind /= statistic_final)))
     self%linear = new_linear_statistics(block, columns, pack(statistics, linear), t_start, t_end)
     self%sampled = new_sampled_statistics(block, columns, pack(statistics, .not. linear), t_end)
     self%spare = new_sampled_statistics(block, columns, pack(statistics, has_extremum), t_end)
@@ -95,6 +97,19 @@ contains
       call block%list_numbers(self%numbers)
     end select
   end function new_statistics_observer
+
+  !> The components of the state whose course inside the steps matters to linear columns.
+  subroutine find_components(self, block, columns)
+    type(statistics_observer_t), intent(inout) :: self
+    class(formulation_t), intent(in) :: block
+    type(column_t), intent(in) :: columns(:)
+    type(linear_columns_t) :: followed
+
+    followed = new_linear_columns(block, columns)
+    if (size(followed%component) == 0) return
+    self%first_component = minval(followed%component)
+    self%last_component = maxval(followed%component)
+  end subroutine find_components
 
   !> The numbers of the true ones among themselves, 0 for the others.
   pure function places_of(mask) result(places)
@@ -120,6 +135,12 @@ contains
       if (.not. self%linear%is_rising(self%in_linear(i), lane)) self%is_spared(lane) = .true.
     end do
     self%has_spared = any(self%is_spared)
+    self%first_followed = 1
+    self%last_followed = huge(1)
+    if (.not. (self%has_sampled .or. self%has_spared)) then
+      self%first_followed = self%first_component
+      self%last_followed = self%last_component
+    end if
     if (self%has_sampled) call begin_sampled(self, self%sampled, lane, y)
     if (self%is_spared(lane)) call begin_sampled(self, self%spare, lane, y)
   end subroutine begin

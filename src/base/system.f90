@@ -61,6 +61,8 @@ module nocdyn_system
     integer, allocatable :: directions(:)   !! event_... of each event function; not allocated: there are none
     integer :: tracked = 0                  !! number of tracked functions
     logical :: follows_steps = .false.      !! whether `follow_steps` is called
+    integer :: first_followed = 1           !! components whose polynomials it reads
+    integer :: last_followed = huge(0)
   contains
     procedure :: record
     procedure :: stops

@@ -1,6 +1,7 @@
 !> Linear combinations of stages: the inner loops of every one-step method.
 module nocdyn_combinations
   use, intrinsic :: iso_fortran_env, only: int64
+  use nocdyn_finite, only: are_finite => all_finite
   use nocdyn_kinds, only: wp
   implicit none (type, external)
   private
@@ -10,6 +11,7 @@ module nocdyn_combinations
   integer, parameter :: most_terms = 12     !! of a row of any table
   integer(int64), parameter :: exponent_mask = shiftl(2047_int64, 52)   ! all ones in a number that is not finite
   integer, parameter, public :: width = 4   !! all arrays here consist of whole vectors of this length
+  integer, parameter :: few = 16            !! numbers in which infinities are soonest found one vector after the other
   integer, parameter, public :: strip = 256 !! numbers of each stage that are combined at a time
 
   !> The non-zero weights of a row of a method's table and where the stages are that they belong to.
@@ -77,7 +79,7 @@ contains
     integer, intent(in) :: x_length, h_length        !! the length of a stage, or `strip` if that is less
     real(wp), intent(in) :: x(x_length), h(h_length)
     real(wp), intent(inout) :: y(combination%length)
-    logical, intent(out) :: all_finite               !! whether no element of y is infinite or NaN
+    logical, intent(out), optional :: all_finite     !! whether no element of y is infinite or NaN
     real(wp) :: total(width)   ! of the sizes, finite if they all are
     integer :: i
 
@@ -95,6 +97,11 @@ contains
         call combine_many(n, m, terms, w, o, k, x, h, y)
       end if
     end associate
+    if (.not. present(all_finite)) return
+    if (combination%length > few) then
+      all_finite = are_finite(combination%length, y)
+      return
+    end if
     total = 0.0_wp
     do i = 1, combination%length, width
       total = total + abs(y(i:i + 3))
@@ -109,19 +116,19 @@ contains
     integer, intent(in) :: x_length, h_length
     real(wp), intent(in) :: x(x_length), h(h_length)
     real(wp), intent(inout) :: y(combination%length)
-    logical, intent(out) :: all_finite
+    logical, intent(out), optional :: all_finite
     type(combination_t) :: part
     logical :: is_finite
     integer :: before
 
     part = combination
-    all_finite = .true.
+    if (present(all_finite)) all_finite = .true.
     do before = 0, combination%length - 1, strip
       part%length = min(strip, combination%length - before)
       part%extent = combination%extent - before
       call combine(part, k(before + 1), part%length, x(merge(before, 0, x_length > strip) + 1), &
                    part%length, h(merge(before, 0, h_length > strip) + 1), y(before + 1), is_finite)
-      all_finite = all_finite .and. is_finite
+      if (present(all_finite)) all_finite = all_finite .and. is_finite
     end do
   end subroutine combine_strips
 

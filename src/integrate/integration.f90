@@ -93,7 +93,7 @@ contains
       if (march%free == system%lanes) exit
       call set_out_lanes(march, stepper, system, outcome)
       call stepper%attempt(system, march%trial)
-      call judge_lanes(march, stepper, system, outcome)
+      call judge_lanes(march, stepper, system, observer, outcome)
       if (any(march%accepted)) then
         if (march%is_due .or. march%is_followed) call follow_lanes(march, system, times, observer, outcome)
         if (march%is_followed) call show_steps(march, stepper, observer)

@@ -1,11 +1,12 @@
 !> What becomes of the attempts of the lanes: steps, shorter attempts, or ends.
 module nocdyn_judging
+  use nocdyn_combinations, only: width
   use nocdyn_march, only: march_t
   use nocdyn_outcome, only: integration_done, integration_gave_up, integration_not_finite, integration_step_too_small, &
     integration_too_many_steps, note_method, outcome_t
   use nocdyn_step_control, only: adapt, shorten, smallest_step, weigh_error
   use nocdyn_stepper, only: stepper_t
-  use nocdyn_system, only: system_t
+  use nocdyn_system, only: observer_t, system_t
   use nocdyn_trial, only: trial_fine, trial_give_up, trial_not_finite
   implicit none (type, external)
   private
@@ -15,15 +16,17 @@ module nocdyn_judging
 contains
 
   !> Accepts or rejects the last attempt of each lane, and ends the lanes that cannot go on.
-  subroutine judge_lanes(march, stepper, system, outcome)
+  subroutine judge_lanes(march, stepper, system, observer, outcome)
     type(march_t), intent(inout) :: march
     class(stepper_t), intent(inout) :: stepper
     class(system_t), intent(inout) :: system
+    class(observer_t), intent(in) :: observer
     type(outcome_t), intent(inout) :: outcome
     integer :: failed, lane, wanted
 
     if (.not. stepper%plans_steps) call weigh_error(march%control, march%trial)
     call find_wanted(march, wanted)
+    if (wanted > 0) call choose_columns(march, observer)
     if (wanted > 0) call stepper%interpolate(system, march%trial, march%wanted, march%coefficients)
     call settle_lanes(march, outcome, failed)
     if (.not. stepper%plans_steps) then
@@ -51,6 +54,21 @@ contains
       if (march%wanted(lane)) wanted = wanted + 1
     end do
   end subroutine find_wanted
+
+  !> The columns of the state whose course is of interest: those that the observer follows, or all for the lanes that are
+  !> looked at on their own.
+  pure subroutine choose_columns(march, observer)
+    type(march_t), intent(inout) :: march
+    class(observer_t), intent(in) :: observer
+
+    associate (trial => march%trial)
+      trial%first_inside = 1
+      trial%last_inside = size(trial%y, 2)
+      if (modulo(trial%lanes, width) /= 0 .or. any(march%inspected)) return
+      trial%first_inside = observer%first_followed
+      trial%last_inside = min(observer%last_followed, trial%last_inside)
+    end associate
+  end subroutine choose_columns
 
   !> Counts the accepted steps and ends the lanes that have reached the final time or may take no more steps.
   pure subroutine settle_lanes(march, outcome, failed)

@@ -195,7 +195,7 @@ contains
     type(stages_t), intent(in) :: self
     type(trial_t), intent(in) :: trial
     real(wp), intent(inout) :: y(trial%length)
-    logical, intent(out) :: all_finite
+    logical, intent(out), optional :: all_finite
 
     call combine(combination, self%k, size(self%zero), self%zero, trial%h_length, trial%h_spread, y, all_finite)
   end subroutine weigh
@@ -214,16 +214,27 @@ contains
     if (.not. all_finite) call park_infinities(trial, trial%coarse_deviation)
   end subroutine estimate_error
 
-  !> The solution inside the last step: y + sum over p of coefficients(:, :, p) theta^p.
+  !> The solution inside the last step: y + sum over p of coefficients(:, :, p) theta^p, in the columns that are of interest.
   pure subroutine expand(self, trial, coefficients)
     type(stages_t), intent(in) :: self
     type(trial_t), intent(in) :: trial
     real(wp), intent(inout) :: coefficients(trial%length, size(self%dense))   !! [lanes * padded columns, degree]
-    logical :: all_finite
-    integer :: power
+    type(combination_t) :: part
+    integer :: before, power
 
+    if (trial%last_inside - trial%first_inside + 1 == size(trial%y, 2)) then
+      do power = 1, size(self%dense)
+        call weigh(self%dense(power), self, trial, coefficients(:, power))
+      end do
+      return
+    end if
+    before = trial%lanes * (trial%first_inside - 1)
     do power = 1, size(self%dense)
-      call weigh(self%dense(power), self, trial, coefficients(:, power), all_finite)
+      part = self%dense(power)
+      part%length = trial%lanes * (trial%last_inside - trial%first_inside + 1)
+      part%extent = part%extent - before
+      call combine(part, self%k(1, trial%first_inside, 1), min(part%length, size(self%zero)), self%zero, &
+                   min(part%length, trial%h_length), trial%h_spread, coefficients(before + 1, power))
     end do
   end subroutine expand
 

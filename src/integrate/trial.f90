@@ -30,6 +30,7 @@ module nocdyn_trial
     real(wp), allocatable :: deviation(:, :)       !! y_new minus the embedded solution
     real(wp), allocatable :: coarse_deviation(:, :)   !! the same of a coarser one, for methods with two estimates
     real(wp), allocatable :: slope(:, :)           !! f(t, y) when a lane was last started
+    integer :: first_inside, last_inside           !! columns of the state whose course inside the step is of interest
     logical, allocatable :: working(:)             !! lanes that take part and have not failed
     logical :: has_coarse_deviation = .false.
     real(wp), allocatable :: scratch(:)            !! work space, shape [lanes]
@@ -59,6 +60,8 @@ contains
       trial%states = system%states
       trial%components = components
       trial%length = lanes * columns
+      trial%first_inside = 1
+      trial%last_inside = columns
       allocate (trial%t(lanes), trial%h(lanes), trial%scratch(lanes), trial%most_growth(lanes), source=0.0_wp)
       trial%h_length = merge(min(columns, strip), lanes * columns, lanes == 1)
       allocate (trial%h_spread(lanes, trial%h_length / lanes), source=0.0_wp)
