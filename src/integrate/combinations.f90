@@ -12,6 +12,7 @@ module nocdyn_combinations
   integer(int64), parameter :: exponent_mask = shiftl(2047_int64, 52)   ! all ones in a number that is not finite
   integer, parameter, public :: width = 4   !! all arrays here consist of whole vectors of this length
   integer, parameter :: few = 16            !! numbers in which infinities are soonest found one vector after the other
+  integer, parameter :: piece = 32          !! of many numbers, that is combined at once
   integer, parameter, public :: strip = 256 !! numbers of each stage that are combined at a time
 
   !> The non-zero weights of a row of a method's table and where the stages are that they belong to.
@@ -89,7 +90,9 @@ contains
     end if
     associate (n => combination%length, m => combination%extent, terms => combination%terms, w => combination%weights, &
                o => combination%offsets)
-      if (terms <= 4) then
+      if (modulo(n, piece) == 0) then
+        call combine_pieces(n, m, terms, w, o, k, x, h, y)
+      else if (terms <= 4) then
         call combine_few(n, m, terms, w, o, k, x, h, y)
       else if (terms <= 8) then
         call combine_several(n, m, terms, w, o, k, x, h, y)
@@ -131,6 +134,97 @@ contains
       if (present(all_finite)) all_finite = all_finite .and. is_finite
     end do
   end subroutine combine_strips
+
+  !> Sums of any number of terms, of many numbers: the loops over the numbers of a piece have no end to be guessed.
+  pure subroutine combine_pieces(n, m, terms, w, o, k, x, h, y)
+    integer, intent(in) :: n, m, terms
+    real(wp), intent(in) :: w(most_terms)
+    integer, intent(in) :: o(most_terms)
+    real(wp), intent(in) :: k(m), x(n), h(n)
+    real(wp), intent(inout) :: y(n)
+    real(wp) :: total(piece)
+    integer :: before, i, term
+
+    if (terms == 0) y = x
+    if (terms == 0) return
+    do before = 0, n - 1, piece
+      call begin_sum(m, min(terms, 4), w, o, before, k, total)
+      do term = 5, terms, 4
+        call continue_sum(m, min(terms - term + 1, 4), w(term), o(term), before, k, total)
+      end do
+      do i = 1, piece
+        y(before + i) = x(before + i) + h(before + i) * total(i)
+      end do
+    end do
+  end subroutine combine_pieces
+
+  !> The first one to four terms of a sum.
+  pure subroutine begin_sum(m, terms, w, o, before, k, total)
+    integer, intent(in) :: m, terms
+    real(wp), intent(in) :: w(4)
+    integer, intent(in) :: o(4)
+    integer, intent(in) :: before
+    real(wp), intent(in) :: k(m)
+    real(wp), intent(inout) :: total(piece)
+    integer :: a, b, c, d, i
+
+    a = before + o(1)
+    b = before + o(2)
+    c = before + o(3)
+    d = before + o(4)
+    select case (terms)
+    case (1)
+      do i = 1, piece
+        total(i) = w(1) * k(a + i)
+      end do
+    case (2)
+      do i = 1, piece
+        total(i) = w(1) * k(a + i) + w(2) * k(b + i)
+      end do
+    case (3)
+      do i = 1, piece
+        total(i) = w(1) * k(a + i) + w(2) * k(b + i) + w(3) * k(c + i)
+      end do
+    case default
+      do i = 1, piece
+        total(i) = w(1) * k(a + i) + w(2) * k(b + i) + w(3) * k(c + i) + w(4) * k(d + i)
+      end do
+    end select
+  end subroutine begin_sum
+
+  !> The next one to four terms of a sum, in the same order as in the sums of fewer numbers.
+  pure subroutine continue_sum(m, terms, w, o, before, k, total)
+    integer, intent(in) :: m, terms
+    real(wp), intent(in) :: w(4)
+    integer, intent(in) :: o(4)
+    integer, intent(in) :: before
+    real(wp), intent(in) :: k(m)
+    real(wp), intent(inout) :: total(piece)
+    integer :: a, b, c, d, i
+
+    a = before + o(1)
+    b = before + o(2)
+    c = before + o(3)
+    d = before + o(4)
+    select case (terms)
+    case (1)
+      do i = 1, piece
+        total(i) = total(i) + w(1) * k(a + i)
+      end do
+    case (2)
+      do i = 1, piece
+        total(i) = total(i) + w(1) * k(a + i) + w(2) * k(b + i)
+      end do
+    case (3)
+      do i = 1, piece
+        total(i) = total(i) + w(1) * k(a + i) + w(2) * k(b + i) + w(3) * k(c + i)
+      end do
+    case default
+      do i = 1, piece
+        total(i) = total(i) + w(1) * k(a + i) + w(2) * k(b + i) + w(3) * k(c + i) + w(4) * k(d + i)
+      end do
+    end select
+  end subroutine continue_sum
 
   !> Sums of up to four terms.
   pure subroutine combine_few(n, m, terms, w, o, k, x, h, y)

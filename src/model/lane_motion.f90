@@ -1,5 +1,7 @@
 !> The accelerations of many lanes of a machine whose moments are polynomials or depend on the time alone: the same as those
 !> of `sparse_map_t` and `polynomial_laws_t`, to the last bit, without what no lane has.
+!>
+!> Torques that depend on the time alone are kept while the times stay, as in the last two stages of a Runge-Kutta step.
 module nocdyn_lane_motion
   use nocdyn_kinds, only: wp
   use nocdyn_lane_terms, only: lane_terms_t
@@ -10,14 +12,21 @@ module nocdyn_lane_motion
 
   public :: new_lane_motion
 
+  integer, parameter, public :: motion_strip = 32   !! lanes that are moved at a time; their number is a multiple of it
+  integer, parameter :: strip = motion_strip
+
   type, public :: lane_motion_t
     private
-    real(wp), allocatable :: angle(:), speed(:)   !! u - rest, u' of one element, [lanes]
-    real(wp), allocatable :: moment(:, :)         !! [lanes, elements]
-    real(wp), allocatable :: none(:, :)           !! for the restoring moments that external banks do not have
+    real(wp), allocatable :: angle(:), speed(:)   !! u - rest, u' of one element, [strip]
+    real(wp), allocatable :: moment(:, :)   !! [lanes, elements]; those of external elements hold at `time`
+    real(wp), allocatable :: time(:)        !! [lanes]
+    real(wp), allocatable :: none(:, :)     !! for the restoring moments that external banks do not have
   contains
+    procedure :: forget
     procedure :: accelerate
   end type lane_motion_t
+
+  real(wp), parameter :: never = -huge(1.0_wp)
 
 contains
 
@@ -25,8 +34,18 @@ contains
     integer, intent(in) :: lanes, elements
     type(lane_motion_t) :: self
 
-    allocate (self%angle(lanes), self%speed(lanes), self%moment(lanes, elements), self%none(lanes, elements), source=0.0_wp)
+    allocate (self%moment(lanes, elements), self%none(lanes, elements), self%angle(strip), self%speed(strip), &
+              source=0.0_wp)
+    allocate (self%time(lanes), source=never)
   end function new_lane_motion
+
+  !> A lane may have other numbers than before.
+  pure subroutine forget(self, lane)
+    class(lane_motion_t), intent(inout) :: self
+    integer, intent(in) :: lane
+
+    self%time(lane) = never
+  end subroutine forget
 
   !> q'' = R M.
   subroutine accelerate(self, machine, terms, twists, accelerations, start_twist, t, speed, angle, acceleration)
@@ -39,45 +58,79 @@ contains
     real(wp), intent(in) :: t(machine%lanes)
     real(wp), intent(in), dimension(machine%lanes, machine%coordinates%freedoms) :: speed, angle   !! q', q
     real(wp), intent(inout) :: acceleration(machine%lanes, machine%coordinates%freedoms)
-    integer :: e, i
+    integer :: at
 
-    associate (lanes => machine%lanes, freedoms => machine%coordinates%freedoms, laws => machine%laws)
-      do e = 1, size(terms%is_external)
-        if (terms%is_external(e)) then
-          self%moment(:, e) = laws%constant(:, e)
-          cycle
-        end if
-        associate (entries => size(twists%column), first => twists%first(e), last => twists%first(e + 1) - 1)
-          if (terms%has_speed(e)) then
-            call sum_speeds(lanes, freedoms, entries, first, last, twists%column, twists%coefficient, speed, self%speed)
-          end if
-          if (terms%has_angle(e)) then
-            call sum_angles(lanes, freedoms, entries, first, last, twists%column, twists%coefficient, angle, &
-                            start_twist(1, e), laws%rest(1, e), self%angle)
-          end if
-        end associate
-        call find_working(lanes, terms%has_speed(e), terms%has_square(e), laws%constant(1, e), laws%by_speed(1, e), &
-                          laws%by_speed_squared(1, e), self%speed, self%moment(1, e))
-        if (terms%has_angle(e)) then
-          call add_restoring(lanes, terms%has_cubic(e), laws%linear(1, e), laws%cubic(1, e), self%angle, self%moment(1, e))
-        end if
-      end do
-      call add_external(self, machine, t)
-      do i = 1, freedoms
-        call sum_moments(lanes, size(terms%is_external), size(accelerations%column), accelerations%first(i), &
-                         accelerations%first(i + 1) - 1, accelerations%column, accelerations%coefficient, self%moment, &
-                         acceleration(1, i))
-      end do
-    end associate
+    if (have_passed(machine%lanes, t, self%time)) call take_external(self, machine, terms, t)
+    do at = 1, machine%lanes, strip
+      call find_moments(self, machine, terms, twists, start_twist, at, machine%lanes, machine%coordinates%freedoms, speed, angle)
+      call sum_moments(machine%lanes, at, size(terms%is_external), machine%coordinates%freedoms, size(accelerations%column), &
+                       accelerations%first, accelerations%column, accelerations%coefficient, self%moment, acceleration)
+    end do
   end subroutine accelerate
 
-  !> The torques that depend on the time alone.
-  subroutine add_external(self, machine, t)
+  !> The moments of the elements that are not external, in the lanes from `at` on.
+  pure subroutine find_moments(self, machine, terms, twists, start_twist, at, lanes, freedoms, speed, angle)
     type(lane_motion_t), intent(inout) :: self
     type(machine_t), intent(in) :: machine
-    real(wp), intent(in) :: t(machine%lanes)
-    integer :: i
+    type(lane_terms_t), intent(in) :: terms
+    type(sparse_map_t), intent(in) :: twists
+    integer, intent(in) :: at, lanes, freedoms
+    real(wp), intent(in) :: start_twist(lanes, size(terms%is_external))
+    real(wp), intent(in), dimension(lanes, freedoms) :: speed, angle
+    integer :: e
 
+    associate (laws => machine%laws, entries => size(twists%column), column => twists%column, ratio => twists%coefficient)
+      do e = 1, size(terms%is_external)
+        if (terms%is_external(e)) cycle
+        associate (first => twists%first(e), last => twists%first(e + 1) - 1)
+          if (terms%has_speed(e)) then
+            call sum_speeds(lanes, at, freedoms, entries, first, last, column, ratio, speed, self%speed)
+            call find_working(terms%has_square(e), laws%constant(at, e), laws%by_speed(at, e), laws%by_speed_squared(at, e), &
+                              self%speed, self%moment(at, e))
+          else
+            self%moment(at:at + strip - 1, e) = laws%constant(at:at + strip - 1, e)
+          end if
+          if (terms%has_angle(e)) then
+            call sum_angles(lanes, at, freedoms, entries, first, last, column, ratio, angle, start_twist(at, e), &
+                            laws%rest(at, e), self%angle)
+            call add_restoring(terms%has_cubic(e), laws%linear(at, e), laws%cubic(at, e), self%angle, self%moment(at, e))
+          end if
+        end associate
+      end do
+    end associate
+  end subroutine find_moments
+
+  !> Whether any of the times is another one.
+  pure logical function have_passed(lanes, t, time)
+    integer, intent(in) :: lanes
+    real(wp), intent(in) :: t(lanes), time(lanes)
+    real(wp) :: largest(strip), part(strip / 4)
+    integer :: before, l
+
+    largest = 0.0_wp
+    do before = 0, lanes - 1, strip
+      do l = 1, strip
+        largest(l) = max(largest(l), abs(t(before + l) - time(before + l)))
+      end do
+    end do
+    do l = 1, strip / 4
+      part(l) = max(max(largest(l), largest(l + 8)), max(largest(l + 16), largest(l + 24)))
+    end do
+    have_passed = max(max(max(part(1), part(2)), max(part(3), part(4))), max(max(part(5), part(6)), max(part(7), part(8)))) > 0
+  end function have_passed
+
+  !> The torques that depend on the time alone.
+  subroutine take_external(self, machine, terms, t)
+    type(lane_motion_t), intent(inout) :: self
+    type(machine_t), intent(in) :: machine
+    type(lane_terms_t), intent(in) :: terms
+    real(wp), intent(in) :: t(machine%lanes)
+    integer :: e, i
+
+    self%time(:) = t
+    do e = 1, size(terms%is_external)
+      if (terms%is_external(e)) self%moment(:, e) = machine%laws%constant(:, e)
+    end do
     do i = 1, size(machine%other_banks)
       associate (bank => machine%banks(machine%other_banks(i))%bank)
         associate (first => bank%first)
@@ -86,79 +139,77 @@ contains
         end associate
       end associate
     end do
-  end subroutine add_external
+  end subroutine take_external
 
   !> u' of an element, from the entries `first` to `last` of U.
-  pure subroutine sum_speeds(lanes, freedoms, entries, first, last, column, ratio, q, v)
-    integer, intent(in) :: lanes, freedoms, entries, first, last
+  pure subroutine sum_speeds(lanes, at, freedoms, entries, first, last, column, ratio, q, v)
+    integer, intent(in) :: lanes, at, freedoms, entries, first, last
     integer, intent(in) :: column(entries)
     real(wp), intent(in) :: ratio(lanes, entries), q(lanes, freedoms)
-    real(wp), intent(inout) :: v(lanes)
-    integer :: c, d, k
+    real(wp), intent(inout) :: v(strip)
+    integer :: b, c, d, k
 
+    b = at + strip - 1
     select case (last - first)
     case (0)
       c = column(first)
-      v = ratio(:, first) * q(:, c)
+      v = ratio(at:b, first) * q(at:b, c)
     case (1)
       c = column(first)
       d = column(last)
-      v = ratio(:, first) * q(:, c) + ratio(:, last) * q(:, d)
+      v = ratio(at:b, first) * q(at:b, c) + ratio(at:b, last) * q(at:b, d)
     case default
       v = 0.0_wp
       do k = first, last
         c = column(k)
-        v = v + ratio(:, k) * q(:, c)
+        v = v + ratio(at:b, k) * q(at:b, c)
       end do
     end select
   end subroutine sum_speeds
 
   !> u - rest of an element.
-  pure subroutine sum_angles(lanes, freedoms, entries, first, last, column, ratio, q, start, rest, w)
-    integer, intent(in) :: lanes, freedoms, entries, first, last
+  pure subroutine sum_angles(lanes, at, freedoms, entries, first, last, column, ratio, q, start, rest, w)
+    integer, intent(in) :: lanes, at, freedoms, entries, first, last
     integer, intent(in) :: column(entries)
-    real(wp), intent(in) :: ratio(lanes, entries), q(lanes, freedoms), start(lanes), rest(lanes)
-    real(wp), intent(inout) :: w(lanes)
-    integer :: c, d, k
+    real(wp), intent(in) :: ratio(lanes, entries), q(lanes, freedoms), start(strip), rest(strip)
+    real(wp), intent(inout) :: w(strip)
+    integer :: b, c, d, k
 
+    b = at + strip - 1
     select case (last - first)
     case (0)
       c = column(first)
-      w = (start + ratio(:, first) * q(:, c)) - rest
+      w = (start + ratio(at:b, first) * q(at:b, c)) - rest
     case (1)
       c = column(first)
       d = column(last)
-      w = ((start + ratio(:, first) * q(:, c)) + ratio(:, last) * q(:, d)) - rest
+      w = ((start + ratio(at:b, first) * q(at:b, c)) + ratio(at:b, last) * q(at:b, d)) - rest
     case default
       w = start
       do k = first, last
         c = column(k)
-        w = w + ratio(:, k) * q(:, c)
+        w = w + ratio(at:b, k) * q(at:b, c)
       end do
       w = w - rest
     end select
   end subroutine sum_angles
 
-  pure subroutine find_working(lanes, has_speed, has_square, constant, by_speed, by_speed_squared, v, moment)
-    integer, intent(in) :: lanes
-    logical, intent(in) :: has_speed, has_square
-    real(wp), intent(in), dimension(lanes) :: constant, by_speed, by_speed_squared, v
-    real(wp), intent(inout) :: moment(lanes)
+  pure subroutine find_working(has_square, constant, by_speed, by_speed_squared, v, moment)
+    logical, intent(in) :: has_square
+    real(wp), intent(in), dimension(strip) :: constant, by_speed, by_speed_squared, v
+    real(wp), intent(inout) :: moment(strip)
 
     if (has_square) then
       moment = constant + (by_speed + by_speed_squared * v) * v
-    else if (has_speed) then
-      moment = constant + by_speed * v
     else
-      moment = constant
+      moment = constant + by_speed * v
     end if
   end subroutine find_working
 
-  pure subroutine add_restoring(lanes, has_cubic, linear, cubic, w, moment)
-    integer, intent(in) :: lanes
+  pure subroutine add_restoring(has_cubic, linear, cubic, w, moment)
     logical, intent(in) :: has_cubic
-    real(wp), intent(in), dimension(lanes) :: linear, cubic, w
-    real(wp), intent(inout) :: moment(lanes)
+    real(wp), intent(in), dimension(strip) :: linear, cubic, w
+    real(wp), intent(inout) :: moment(strip)
 
     if (has_cubic) then
       moment = moment - (linear + cubic * w * w) * w
@@ -167,31 +218,36 @@ contains
     end if
   end subroutine add_restoring
 
-  !> A row of R M, from the entries `first` to `last` of R.
-  pure subroutine sum_moments(lanes, elements, entries, first, last, element, response, moment, acceleration)
-    integer, intent(in) :: lanes, elements, entries, first, last
-    integer, intent(in) :: element(entries)
+  !> R M, in the lanes from `at` on.
+  pure subroutine sum_moments(lanes, at, elements, freedoms, entries, first, element, response, moment, acceleration)
+    integer, intent(in) :: lanes, at, elements, freedoms, entries
+    integer, intent(in) :: first(freedoms + 1), element(entries)
     real(wp), intent(in) :: response(lanes, entries), moment(lanes, elements)
-    real(wp), intent(inout) :: acceleration(lanes)
-    integer :: a, b, c, k
+    real(wp), intent(inout) :: acceleration(lanes, freedoms)
+    integer :: a, b, i, k, l, m, n
 
-    select case (last - first)
-    case (1)
-      a = element(first)
-      b = element(last)
-      acceleration = response(:, first) * moment(:, a) + response(:, last) * moment(:, b)
-    case (2)
-      a = element(first)
-      b = element(first + 1)
-      c = element(last)
-      acceleration = response(:, first) * moment(:, a) + response(:, first + 1) * moment(:, b) + response(:, last) * moment(:, c)
-    case default
-      acceleration = 0.0_wp
-      do k = first, last
-        a = element(k)
-        acceleration = acceleration + response(:, k) * moment(:, a)
-      end do
-    end select
+    b = at + strip - 1
+    do i = 1, freedoms
+      k = first(i)
+      select case (first(i + 1) - k)
+      case (2)
+        l = element(k)
+        m = element(k + 1)
+        acceleration(at:b, i) = response(at:b, k) * moment(at:b, l) + response(at:b, k + 1) * moment(at:b, m)
+      case (3)
+        l = element(k)
+        m = element(k + 1)
+        n = element(k + 2)
+        acceleration(at:b, i) = response(at:b, k) * moment(at:b, l) + response(at:b, k + 1) * moment(at:b, m) &
+                                + response(at:b, k + 2) * moment(at:b, n)
+      case default
+        acceleration(at:b, i) = 0.0_wp
+        do a = k, first(i + 1) - 1
+          l = element(a)
+          acceleration(at:b, i) = acceleration(at:b, i) + response(at:b, a) * moment(at:b, l)
+        end do
+      end select
+    end do
   end subroutine sum_moments
 
 end module nocdyn_lane_motion

@@ -10,7 +10,7 @@ module nocdyn_reduced
   use nocdyn_inner_jacobian, only: inner_jacobian_t, new_inner_jacobian
   use nocdyn_kinds, only: wp
   use nocdyn_lane_numbers, only: lane_numbers_t
-  use nocdyn_lane_motion, only: lane_motion_t, new_lane_motion
+  use nocdyn_lane_motion, only: lane_motion_t, motion_strip, new_lane_motion
   use nocdyn_lane_series, only: lane_series_t, new_lane_series
   use nocdyn_lane_terms, only: is_plain, lane_terms_t, new_lane_terms
   use nocdyn_machine, only: machine_t
@@ -35,7 +35,7 @@ module nocdyn_reduced
     type(reduced_jacobian_t), private :: sums                  !! R diag U
     type(reduced_series_t), private :: motion                  !! after `prepare_series`
     type(lane_terms_t), allocatable, private :: terms          !! of many lanes of a plain machine without works
-    type(lane_motion_t), private :: lane_motion                !! if there are `terms`
+    type(lane_motion_t), allocatable, private :: lane_motion   !! if there are `terms` and whole strips of lanes
     type(lane_series_t), allocatable, private :: lane_series   !! instead of `motion`, after `prepare_series`
     type(inner_jacobian_t), private :: inner_rows              !! of the inner states
     type(element_coordinates_t), private :: switching          !! of the switching elements
@@ -93,9 +93,12 @@ contains
       self%twists = twist_map(incidence, without_offset=.not. any(abs(self%start_twist) > 0), is_loose=as_block)
       self%none = 0.0_wp * self%start_twist
       if (allocated(self%terms)) deallocate (self%terms)
+      if (allocated(self%lane_motion)) deallocate (self%lane_motion)
       if (machine%lanes > 1 .and. self%quadratures == 0 .and. is_plain(machine)) then
         allocate (self%terms, source=new_lane_terms(machine))
-        self%lane_motion = new_lane_motion(machine%lanes, size(machine%elements%to))
+        if (modulo(machine%lanes, motion_strip) == 0) then
+          allocate (self%lane_motion, source=new_lane_motion(machine%lanes, size(machine%elements%to)))
+        end if
       end if
     end associate
   end subroutine formulate
@@ -200,7 +203,9 @@ contains
 
     call self%machine%laws%admit(lane)
     call self%motion%take_lane(lane, self%machine%laws, self%twists, self%accelerations)
-    if (allocated(self%terms)) call self%terms%note_lane(self%machine, lane)
+    if (.not. allocated(self%terms)) return
+    call self%terms%note_lane(self%machine, lane)
+    if (allocated(self%lane_motion)) call self%lane_motion%forget(lane)
   end subroutine receive
 
   function start(self) result(y)
@@ -268,7 +273,7 @@ contains
     real(wp), intent(inout) :: dydt(2 * n + inner + self%lanes * quadratures)
     integer :: i
 
-    if (allocated(self%terms)) then
+    if (allocated(self%lane_motion)) then
       call self%lane_motion%accelerate(self%machine, self%terms, self%twists, self%accelerations, self%start_twist, t, y, &
                                        y(n + 1), dydt)
     else
