@@ -3,6 +3,7 @@ module nocdyn_explicit_stepper
   use nocdyn_combinations, only: combination
   use nocdyn_explicit_tables, only: explicit_table_t
   use nocdyn_kinds, only: wp
+  use nocdyn_masks, only: all_true, any_true
   use nocdyn_stages, only: allocate_stages, estimate_error, expand, inner_state, set_weights, share_places, stages_t, &
     update_state
   use nocdyn_stepper, only: stepper_t
@@ -81,7 +82,9 @@ contains
     integer :: begin, last, stage
 
     begin = self%stages%begin
-    if (any(self%moved .and. trial%working)) call renew_first_stage(self, system, trial)
+    if (any_true(trial%lanes, self%moved)) then
+      if (any(self%moved .and. trial%working)) call renew_first_stage(self, system, trial)
+    end if
     last = merge(self%stages%step - 1, self%stages%step, self%first_same_as_last)
     do stage = 2, last
       if (.not. any(trial%working)) exit
@@ -153,7 +156,7 @@ contains
       return
     end if
     associate (k => self%stages%k, last => self%stages%place(self%stages%step))
-      if (all(accepted)) then
+      if (all_true(size(accepted), accepted)) then
         k(:, :, 1) = k(:, :, last)
       else
         do component = 1, size(k, 2)

@@ -4,6 +4,7 @@ module nocdyn_following
   use nocdyn_events, only: find_events
   use nocdyn_extremes, only: follow_extremes, resume_extremes
   use nocdyn_kinds, only: wp
+  use nocdyn_masks, only: all_true
   use nocdyn_march, only: march_t, start_slopes
   use nocdyn_outcome, only: integration_done, integration_running, integration_stopped, integration_too_many_steps, outcome_t
   use nocdyn_step_control, only: resume
@@ -27,10 +28,11 @@ contains
     integer :: lane
 
     associate (steps => march%steps)
+      steps%until(:) = 1.0_wp
+      steps%crosses(:) = .false.
+      if (.not. march%is_due) return
       do lane = 1, march%trial%lanes
-        steps%until(lane) = 1.0_wp
-        steps%crosses(lane) = .false.
-        if (.not. (march%is_due .and. march%accepted(lane))) cycle
+        if (.not. march%accepted(lane)) cycle
         if (march%inspected(lane)) call take_lane(march%dense, march%trial, march%coefficients, lane)
         if (march%has_switches) then
           call end_at_crossing(march, system, observer, lane, outcome, steps%until(lane))
@@ -53,7 +55,7 @@ contains
 
     associate (steps => march%steps, trial => march%trial)
       steps%taken(:) = march%accepted
-      steps%are_all_taken = all(march%accepted)
+      steps%are_all_taken = all_true(size(march%accepted), march%accepted)
       steps%may_be_cut = march%has_switches .or. march%has_events
       steps%t(:) = trial%t
       steps%h(:) = trial%h

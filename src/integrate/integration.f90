@@ -5,6 +5,7 @@ module nocdyn_integration
   use nocdyn_integration_settings, only: check_settings, integration_settings_t
   use nocdyn_judging, only: judge_lanes
   use nocdyn_kinds, only: wp
+  use nocdyn_masks, only: any_other, any_true
   use nocdyn_march, only: advance_lanes, empty_lanes, fill_lanes, march_t, prepare, set_out_lanes
   use nocdyn_methods, only: select_method
   use nocdyn_outcome, only: allocate_outcome, integration_interrupted, integration_running, outcome_t
@@ -94,7 +95,7 @@ contains
       call set_out_lanes(march, stepper, system, outcome)
       call stepper%attempt(system, march%trial)
       call judge_lanes(march, stepper, system, observer, outcome)
-      if (any(march%accepted)) then
+      if (any_true(system%lanes, march%accepted)) then
         if (march%is_due .or. march%is_followed) call follow_lanes(march, system, times, observer, outcome)
         if (march%is_followed) call show_steps(march, stepper, observer)
         call advance_lanes(march, times)
@@ -118,9 +119,15 @@ contains
 
     is_interrupted = .false.
     slowest = huge(slowest)
-    do lane = 1, size(outcome%status)
-      if (outcome%status(lane) == integration_running) slowest = min(slowest, march%trial%t(lane))
-    end do
+    if (any_other(size(outcome%status), outcome%status, integration_running)) then
+      do lane = 1, size(outcome%status)
+        if (outcome%status(lane) == integration_running) slowest = min(slowest, march%trial%t(lane))
+      end do
+    else
+      do lane = 1, size(outcome%status)
+        slowest = min(slowest, march%trial%t(lane))
+      end do
+    end if
     if (slowest >= huge(slowest)) return
     is_interrupted = observer%stops(slowest)
     if (.not. is_interrupted) return

@@ -1,7 +1,9 @@
 !> What becomes of the attempts of the lanes: steps, shorter attempts, or ends.
 module nocdyn_judging
   use nocdyn_combinations, only: width
+  use nocdyn_kinds, only: wp
   use nocdyn_march, only: march_t
+  use nocdyn_masks, only: all_true, any_true
   use nocdyn_outcome, only: integration_done, integration_gave_up, integration_not_finite, integration_step_too_small, &
     integration_too_many_steps, note_method, outcome_t
   use nocdyn_step_control, only: adapt, shorten, smallest_step, weigh_error
@@ -23,12 +25,27 @@ contains
     class(observer_t), intent(in) :: observer
     type(outcome_t), intent(inout) :: outcome
     integer :: failed, lane, wanted
+    logical :: usual   ! whether all lanes have taken steps that have only to be counted
 
     if (.not. stepper%plans_steps) call weigh_error(march%control, march%trial)
-    call find_wanted(march, wanted)
-    if (wanted > 0) call choose_columns(march, observer)
-    if (wanted > 0) call stepper%interpolate(system, march%trial, march%wanted, march%coefficients)
-    call settle_lanes(march, outcome, failed)
+    march%is_due = march%has_events .or. march%has_extremes .or. march%has_switches
+    usual = is_usual(march, outcome)
+    if (usual) then
+      call accept_all(march, wanted)
+    else
+      call find_wanted(march, wanted)
+    end if
+    if (wanted > 0) then
+      call choose_columns(march, observer)
+      call stepper%interpolate(system, march%trial, march%wanted, march%coefficients)
+      usual = usual .and. all_true(march%trial%lanes, march%trial%working)
+    end if
+    if (usual) then
+      failed = 0
+      outcome%accepted(:) = outcome%accepted + 1
+    else
+      call settle_lanes(march, outcome, failed)
+    end if
     if (.not. stepper%plans_steps) then
       call adapt(march%control, march%trial%lanes, march%accepted, march%rejected, march%trial%error_order, &
                  march%trial%most_growth, outcome%h)
@@ -39,13 +56,47 @@ contains
     end do
   end subroutine judge_lanes
 
+  !> Whether all lanes have taken explicit steps within the tolerances in which no requested time lies.
+  pure logical function is_usual(march, outcome)
+    type(march_t), intent(in) :: march
+    type(outcome_t), intent(in) :: outcome
+    real(wp) :: errors(width), passed(width)
+    integer :: i
+
+    is_usual = .false.
+    associate (trial => march%trial)
+      if (modulo(trial%lanes, width) /= 0 .or. march%is_due) return
+      errors = 0.0_wp
+      passed = -huge(passed)
+      do i = 1, trial%lanes, width
+        errors = max(errors, march%control%mean_square(i:i + width - 1))
+        passed = max(passed, march%t_new(i:i + width - 1) - march%next_time(i:i + width - 1))
+      end do
+      if (maxval(errors) > 1 .or. maxval(passed) >= 0) return
+      if (maxval(outcome%steps) >= march%max_steps) return
+      if (any_true(trial%lanes, trial%implicit) .or. any_true(trial%lanes, outcome%implicit)) return
+      is_usual = all_true(trial%lanes, trial%working)
+    end associate
+  end function is_usual
+
+  !> Accepts the steps of all lanes.
+  pure subroutine accept_all(march, wanted)
+    type(march_t), intent(inout) :: march
+    integer, intent(out) :: wanted
+
+    march%accepted(:) = .true.
+    march%rejected(:) = .false.
+    march%inspected(:) = .false.
+    march%wanted(:) = march%wants_all
+    wanted = merge(march%trial%lanes, 0, march%wants_all)
+  end subroutine accept_all
+
   !> The lanes whose error is within the tolerances, and those of them whose solution inside the step is wanted.
   pure subroutine find_wanted(march, wanted)
     type(march_t), intent(inout) :: march
     integer, intent(out) :: wanted   !! how many
     integer :: lane
 
-    march%is_due = march%has_events .or. march%has_extremes .or. march%has_switches
     wanted = 0
     do lane = 1, march%trial%lanes
       march%accepted(lane) = march%trial%working(lane) .and. march%control%mean_square(lane) <= 1

@@ -6,6 +6,7 @@ module nocdyn_march
   use nocdyn_first_step, only: guess_first_steps
   use nocdyn_integration_settings, only: integration_settings_t
   use nocdyn_kinds, only: wp
+  use nocdyn_masks, only: all_true, any_other
   use nocdyn_outcome, only: integration_gave_up, integration_not_finite, integration_running, outcome_t, reset_outcome
   use nocdyn_queue, only: queue_t
   use nocdyn_step_control, only: propose, restart, step_control, step_control_t
@@ -276,14 +277,15 @@ contains
     integer :: component, lane
 
     associate (trial => march%trial, accepted => march%accepted)
-      do lane = 1, trial%lanes
-        if (accepted(lane)) trial%t(lane) = march%t_new(lane)
-      end do
-      if (all(accepted)) then   ! the arrays change their names: nothing asks for y_new any more
+      if (all_true(trial%lanes, accepted)) then   ! the arrays change their names: nothing asks for y_new any more
+        trial%t(:) = march%t_new
         call move_alloc(trial%y, spare)
         call move_alloc(trial%y_new, trial%y)
         call move_alloc(spare, trial%y_new)
       else
+        do lane = 1, trial%lanes
+          if (accepted(lane)) trial%t(lane) = march%t_new(lane)
+        end do
         do component = 1, trial%components
           call take_accepted(trial%lanes, accepted, trial%y_new(1, component), trial%y(1, component))
         end do
@@ -313,6 +315,7 @@ contains
     type(outcome_t), intent(inout) :: outcome
     integer :: lane
 
+    if (.not. any_other(size(outcome%status), outcome%status, integration_running)) return
     do lane = 1, size(march%occupied)
       if (.not. march%occupied(lane) .or. outcome%status(lane) == integration_running) cycle
       march%occupied(lane) = .false.

@@ -1,6 +1,7 @@
 !> How long the next step of each lane is.
 module nocdyn_step_control
   use nocdyn_kinds, only: wp
+  use nocdyn_masks, only: all_true, any_true
   use nocdyn_trial, only: trial_t
   use nocdyn_vector_functions, only: exp2s, log2s
   implicit none (type, external)
@@ -222,6 +223,13 @@ contains
 
     integer :: lane
 
+    if (lanes > 1) then
+      if (all_true(lanes, accepted) .and. .not. any_true(lanes, control%was_rejected)) then
+        call lengthen(lanes, error_order, most_growth, h, control%mean_square, control%log_error, control%log_ratio, &
+                      control%change, control%h)
+        return
+      end if
+    end if
     !GCC$ novector
     do lane = 1, lanes
       control%log_ratio(lane) = max(control%mean_square(lane), no_error)
@@ -233,6 +241,30 @@ contains
       if (accepted(lane) .or. rejected(lane)) call change_step(control, lane, accepted(lane), most_growth(lane), h(lane))
     end do
   end subroutine adapt
+
+  !> The next steps of lanes that have been accepted twice: the same without a question about any lane.
+  pure subroutine lengthen(lanes, error_order, most_growth, h, mean_square, log_error, log_ratio, change, next)
+    integer, intent(in) :: lanes
+    integer, intent(in) :: error_order(lanes)
+    real(wp), intent(in) :: most_growth(lanes), h(lanes), mean_square(lanes)
+    real(wp), intent(inout) :: log_error(lanes), log_ratio(lanes), change(lanes)
+    real(wp), intent(inout) :: next(lanes)   !! sizes of the steps
+    integer :: lane
+
+    do lane = 1, lanes
+      log_ratio(lane) = max(mean_square(lane), no_error)
+    end do
+    call log2s(lanes, log_ratio)
+    do lane = 1, lanes
+      log_ratio(lane) = 0.5_wp * log_ratio(lane)
+      change(lane) = beta * log_error(lane) - (1.0_wp / (error_order(lane) + 1) - integral_loss * beta) * log_ratio(lane)
+    end do
+    call exp2s(lanes, change)
+    do lane = 1, lanes
+      next(lane) = max(least_change, min(safety * change(lane), most_growth(lane))) * h(lane)
+      log_error(lane) = max(log_ratio(lane), least_log_error)
+    end do
+  end subroutine lengthen
 
   !> The logarithms of the errors, and of what the steps are to be multiplied by.
   pure subroutine find_changes(lanes, accepted, error_order, log_error, log_ratio, change)

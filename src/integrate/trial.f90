@@ -3,6 +3,7 @@ module nocdyn_trial
   use nocdyn_combinations, only: padded_columns, strip
   use nocdyn_finite, only: all_finite, is_finite
   use nocdyn_kinds, only: wp
+  use nocdyn_masks, only: all_true, any_other
   use nocdyn_system, only: evaluation_fine, evaluation_give_up, evaluation_shorten, system_t
   implicit none (type, external)
   private
@@ -103,14 +104,10 @@ contains
     real(wp), intent(in) :: t(trial%lanes)
     real(wp), intent(in) :: y(trial%length)
     real(wp), intent(inout) :: dydt(trial%length)
-    integer :: lane
 
     trial%made = trial%made + 1
     call system%derivative(t, y, dydt, trial%status)
-    do lane = 1, trial%lanes
-      if (trial%status(lane) /= evaluation_fine) exit
-    end do
-    if (lane <= trial%lanes) call park_failures(trial, dydt)
+    if (any_other(trial%lanes, trial%status, evaluation_fine)) call park_failures(trial, dydt)
   end subroutine evaluate
 
   !> The same, and lanes whose values are not finite are parked too.
@@ -146,9 +143,13 @@ contains
     type(trial_t), intent(inout) :: trial
     integer :: lane
 
-    do lane = 1, trial%lanes
-      if (trial%working(lane)) trial%evaluations(lane) = trial%evaluations(lane) + trial%made
-    end do
+    if (all_true(trial%lanes, trial%working)) then
+      trial%evaluations(:) = trial%evaluations + trial%made
+    else
+      do lane = 1, trial%lanes
+        if (trial%working(lane)) trial%evaluations(lane) = trial%evaluations(lane) + trial%made
+      end do
+    end if
     trial%made = 0
   end subroutine count_evaluations
 

@@ -107,6 +107,8 @@ contains
     real(wp) :: largest(strip), part(strip / 4)
     integer :: before, l
 
+    have_passed = abs(t(1) - time(1)) > 0
+    if (have_passed) return
     largest = 0.0_wp
     do before = 0, lanes - 1, strip
       do l = 1, strip
