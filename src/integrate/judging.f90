@@ -29,7 +29,8 @@ contains
 
     if (.not. stepper%plans_steps) call weigh_error(march%control, march%trial)
     march%is_due = march%has_events .or. march%has_extremes .or. march%has_switches
-    usual = is_usual(march, outcome)
+    usual = .false.
+    if (march%trial%lanes > 1) usual = is_usual(march, outcome)
     if (usual) then
       call accept_all(march, wanted)
     else
@@ -56,7 +57,8 @@ contains
     end do
   end subroutine judge_lanes
 
-  !> Whether all lanes have taken explicit steps within the tolerances in which no requested time lies.
+  !> Whether all lanes have taken explicit steps within the tolerances in which no requested time lies: nothing has to be
+  !> decided for one of them then. The answer is no too if they do not make whole vectors.
   pure logical function is_usual(march, outcome)
     type(march_t), intent(in) :: march
     type(outcome_t), intent(in) :: outcome

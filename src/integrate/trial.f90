@@ -107,7 +107,11 @@ contains
 
     trial%made = trial%made + 1
     call system%derivative(t, y, dydt, trial%status)
-    if (any_other(trial%lanes, trial%status, evaluation_fine)) call park_failures(trial, dydt)
+    if (trial%lanes == 1) then
+      if (trial%status(1) /= evaluation_fine) call park_failures(trial, dydt)
+    else if (any_other(trial%lanes, trial%status, evaluation_fine)) then
+      call park_failures(trial, dydt)
+    end if
   end subroutine evaluate
 
   !> The same, and lanes whose values are not finite are parked too.
@@ -143,7 +147,9 @@ contains
     type(trial_t), intent(inout) :: trial
     integer :: lane
 
-    if (all_true(trial%lanes, trial%working)) then
+    if (trial%lanes == 1) then
+      if (trial%working(1)) trial%evaluations(1) = trial%evaluations(1) + trial%made
+    else if (all_true(trial%lanes, trial%working)) then
       trial%evaluations(:) = trial%evaluations + trial%made
     else
       do lane = 1, trial%lanes
