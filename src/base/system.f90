@@ -61,7 +61,7 @@ module nocdyn_system
     integer, allocatable :: directions(:)   !! event_... of each event function; not allocated: there are none
     integer :: tracked = 0                  !! number of tracked functions
     logical :: follows_steps = .false.      !! whether `follow_steps` is called
-    integer :: first_followed = 1           !! components whose polynomials it reads
+    integer :: first_followed = 1           !! components whose polynomials it reads; may change from variant to variant
     integer :: last_followed = huge(0)
   contains
     procedure :: record
@@ -279,7 +279,7 @@ contains
     type(steps_t), intent(in) :: steps
     real(wp), contiguous, intent(in) :: y(:, :)       !! at the starts, [lanes, padded columns]
     real(wp), contiguous, intent(in) :: y_new(:, :)   !! at the ends
-    real(wp), contiguous, intent(in) :: c(:, :, :)    !! [lanes, padded columns, degree]
+    real(wp), contiguous, intent(in) :: c(:, :, :)    !! [lanes, padded columns, degree]; only of the components followed
 
     error stop 'nocdyn_system: an observer that follows the steps overrides follow_steps'
   end subroutine follow_steps
