@@ -9,6 +9,7 @@ module nocdyn_operating_point
   use nocdyn_literals, only: literal_fine, read_real
   use nocdyn_machine, only: machine_t
   use nocdyn_reduced, only: new_reduced
+  use nocdyn_run_settings, only: settings_of
   use nocdyn_size_limits, only: choose_method
   use nocdyn_solve, only: solve
   use nocdyn_text, only: append, string_t, to_text
@@ -105,17 +106,12 @@ contains
     type(error_t), allocatable, intent(out) :: error
     type(integration_settings_t) :: settings
     character(len=:), allocatable :: method
-    type(group_t) :: run
     real(wp), allocatable :: states(:, :)
 
     allocate (point%formulation, source=new_reduced(machine, .false.))
     call choose_method(input, point%formulation, method, point%notes, error)
     if (allocated(error)) return
-    run = input%single('run')
-    settings%method = method
-    settings%rtol = run%number('rtol')
-    settings%atol = run%number('atol')
-    settings%max_steps = run%whole_number('max_steps')
+    settings = settings_of(input, method)
     point%y = point%formulation%start()
     if (time > point%t) then
       allocate (states(size(point%y, 2), 2), source=0.0_wp)

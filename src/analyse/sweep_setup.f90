@@ -8,6 +8,7 @@ module nocdyn_sweep_setup
   use nocdyn_integration_settings, only: integration_settings_t
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
+  use nocdyn_run_settings, only: settings_of
   use nocdyn_size_limits, only: check_size, choose_method
   use nocdyn_statistics_observer, only: needs_works
   use nocdyn_sweep_plan, only: sweep_plan_t
@@ -60,10 +61,7 @@ contains
     call choose_method(input, formulation, method, notes, error)
     if (allocated(error)) return
     run = input%single('run')
-    settings%method = method
-    settings%rtol = run%number('rtol')
-    settings%atol = run%number('atol')
-    settings%max_steps = run%whole_number('max_steps')
+    settings = settings_of(input, method)
     times = [run%number('t_start'), run%number('t_end')]
   end subroutine take_settings
 

@@ -16,6 +16,7 @@ module nocdyn_transient
   use nocdyn_output_file, only: output_file_t
   use nocdyn_output_times, only: check_output_times, output_times
   use nocdyn_posix, only: is_interrupted, remove_file
+  use nocdyn_run_settings, only: settings_of
   use nocdyn_run_summary, only: audit_energy, run_summary_t, start_extremes, summary_json, update_extremes, widen_extremes
   use nocdyn_size_limits, only: check_size, choose_method
   use nocdyn_system, only: observer_t, ranges_t
@@ -93,7 +94,7 @@ contains
     call start_recorder(recorder, formulation, times, folder, progress)
     recorder%summary%method = method
     recorder%summary%notes = [recorder%summary%notes, notes]
-    call solve(formulation, run, times, recorder, outcome, error)
+    call solve(formulation, settings_of(input, method), times, recorder, outcome, error)
     if (.not. allocated(outcome%status)) then   ! a setting was refused
       call recorder%file%discard()
       return
@@ -126,21 +127,16 @@ contains
   end subroutine start_recorder
 
   !> Integrates; an integration that does not reach the end is an error that says why.
-  subroutine solve(formulation, run, times, recorder, outcome, error)
+  subroutine solve(formulation, settings, times, recorder, outcome, error)
     class(formulation_t), intent(inout) :: formulation
-    type(group_t), intent(in) :: run
+    type(integration_settings_t), intent(in) :: settings
     real(wp), contiguous, intent(in) :: times(:)
     type(recorder_t), intent(inout) :: recorder
     type(outcome_t), intent(out) :: outcome
     type(error_t), allocatable, intent(out) :: error
-    type(integration_settings_t) :: settings
     real(wp), allocatable :: y(:, :)
     integer(int64) :: began, ended, rate
 
-    settings%method = recorder%summary%method
-    settings%rtol = run%number('rtol')
-    settings%atol = run%number('atol')
-    settings%max_steps = run%whole_number('max_steps')
     y = formulation%start()
     call system_clock(began, rate)
     call integrate(formulation, settings, times, y, recorder, outcome, error)
