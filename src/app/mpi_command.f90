@@ -7,7 +7,7 @@ module nocdyn_mpi_command
   use nocdyn_input, only: input_t
   use nocdyn_input_reader, only: read_input_text
   use nocdyn_input_text, only: input_text
-  use nocdyn_mpi_messages, only: root, share_number, share_text
+  use nocdyn_mpi_messages, only: root, share_text
   use nocdyn_mpi_root, only: mpi_root_t
   use nocdyn_mpi_worker, only: mpi_worker_t
   use nocdyn_posix, only: watch_interrupts

@@ -8,14 +8,14 @@ module nocdyn_mpi_messages
   private
 
   public :: ask, answer, receive_answer, send_results, receive_results, send_word, receive_word, look, wait_for_message
-  public :: share_text, share_number
+  public :: share_text
 
   integer, parameter, public :: root = 0
 
   integer, parameter, public :: request_word = 1    !! to rank 0: which variants next?
-  integer, parameter, public :: answer_word = 2     !! from rank 0: these
+  integer, parameter :: answer_word = 2     !! from rank 0: these
   integer, parameter, public :: results_word = 3    !! to rank 0: a chunk that has been computed
-  integer, parameter, public :: seconds_word = 4    !! to rank 0: the time that it took
+  integer, parameter :: seconds_word = 4    !! to rank 0: the time that it took
   integer, parameter, public :: stop_word = 5       !! from rank 0: leave off
   integer, parameter, public :: goodbye_word = 6    !! to rank 0: nothing more comes; from rank 0: the same
 
@@ -111,16 +111,9 @@ contains
 
     length = 0
     if (allocated(text)) length = len(text)
-    call share_number(length)
+    call mpi_bcast(length, 1, mpi_integer, root, mpi_comm_world)
     if (.not. allocated(text)) allocate (character(len=length) :: text)
     call mpi_bcast(text, length, mpi_character, root, mpi_comm_world)
   end subroutine share_text
-
-  !> All ranks have rank 0's number then.
-  subroutine share_number(number)
-    integer, intent(inout) :: number
-
-    call mpi_bcast(number, 1, mpi_integer, root, mpi_comm_world)
-  end subroutine share_number
 
 end module nocdyn_mpi_messages

@@ -6,10 +6,8 @@ module nocdyn_posix_files
   implicit none (type, external)
   private
 
-  public :: open_new, open_existing, file_size, read_at, seek_end, truncate_file, sync_file, sync_path, lock_file, &
+  public :: open_new, open_existing, file_size, read_at, truncate_file, sync_file, sync_path, lock_file, &
     disk_failure
-
-  integer, parameter, public :: lock_taken = 0, lock_of_another = 1
 
   integer(c_int), parameter :: from_start = 0, from_end = 2      ! SEEK_SET, SEEK_END
   integer(c_int), parameter :: exclusive = 2, without_waiting = 4   ! LOCK_EX, LOCK_NB
@@ -119,15 +117,6 @@ contains
     is_done = next > len(bytes)
   end subroutine read_at
 
-  !> The next byte is written at `offset`.
-  subroutine seek_end(descriptor, offset, is_done)
-    integer, intent(in) :: descriptor
-    integer(int64), intent(in) :: offset
-    logical, intent(out) :: is_done
-
-    is_done = c_lseek(int(descriptor, c_int), offset, from_start) == offset
-  end subroutine seek_end
-
   !> Cuts the file off behind `length` bytes, where writing goes on.
   subroutine truncate_file(descriptor, length, is_done)
     integer, intent(in) :: descriptor
@@ -135,7 +124,7 @@ contains
     logical, intent(out) :: is_done
 
     is_done = c_ftruncate(int(descriptor, c_int), length) == 0
-    if (is_done) call seek_end(descriptor, length, is_done)
+    if (is_done) is_done = c_lseek(int(descriptor, c_int), length, from_start) == length
   end subroutine truncate_file
 
   !> What was written is on the disk when this returns.
@@ -159,14 +148,15 @@ contains
     status = c_close(descriptor)
   end subroutine sync_path
 
-  !> Takes the file for this process, until it is closed. A file system without locks locks nothing, and that is no failure.
-  integer function lock_file(descriptor)
+  !> Takes the file for this process, until it is closed; not done: another process has it. A file system without locks locks
+  !> nothing, and that is no failure.
+  subroutine lock_file(descriptor, is_done)
     integer, intent(in) :: descriptor
+    logical, intent(out) :: is_done
 
-    lock_file = lock_taken
-    if (c_flock(int(descriptor, c_int), ior(exclusive, without_waiting)) == 0) return
-    if (c_errno() == would_block) lock_file = lock_of_another
-  end function lock_file
+    is_done = c_flock(int(descriptor, c_int), ior(exclusive, without_waiting)) == 0
+    if (.not. is_done) is_done = c_errno() /= would_block
+  end subroutine lock_file
 
   !> What the disk has against it, if that is why a library's call before this one failed; else empty.
   function disk_failure() result(reason)

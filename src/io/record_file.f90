@@ -10,7 +10,7 @@ module nocdyn_record_file
   use nocdyn_checksums, only: checksum_table_t, make_checksum_table
   use nocdyn_errors, only: error_t, exit_file, exit_input, raise
   use nocdyn_posix, only: close_file, last_failure, make_folders, remove_file, write_bytes
-  use nocdyn_posix_files, only: file_size, lock_file, lock_taken, open_existing, open_new, read_at, sync_file, truncate_file
+  use nocdyn_posix_files, only: file_size, lock_file, open_existing, open_new, read_at, sync_file, truncate_file
   use nocdyn_text, only: quoted, to_text
   implicit none (type, external)
   private
@@ -49,7 +49,8 @@ module nocdyn_record_file
 
 contains
 
-  !> Begins a file in `folder`, which is made if need be; a file of that name must not be there.
+  !> Begins a file in `folder`, which is made if need be; a file of that name must not be there, unless it is empty: a process
+  !> was killed before its first record.
   subroutine create(self, folder, name, error)
     class(record_file_t), intent(inout) :: self
     character(len=*), intent(in) :: folder, name
@@ -65,9 +66,11 @@ contains
     self%descriptor = open_new(self%path)
     if (self%descriptor < 0) then
       call self%raise_failure(last_failure(), error)
-    else
-      call self%lock(error)
+      self%descriptor = open_existing(self%path, .true.)
+      if (self%size() == 0) deallocate (error)
     end if
+    if (.not. allocated(error)) call self%lock(error)
+    if (allocated(error)) call self%close()
   end subroutine create
 
   !> Opens a file that is there, to read it and to write on once `end` is set.
@@ -101,9 +104,10 @@ contains
   subroutine lock(self, error)
     class(record_file_t), intent(in) :: self
     type(error_t), allocatable, intent(out) :: error
+    logical :: is_done
 
-    if (lock_file(self%descriptor) == lock_taken) return
-    call raise(error, exit_input, self%path // ': another process is at work on this sweep')
+    call lock_file(self%descriptor, is_done)
+    if (.not. is_done) call raise(error, exit_input, self%path // ': another process is at work on this sweep')
   end subroutine lock
 
   !> What stands before the records.
