@@ -1,6 +1,6 @@
 !> What a sweep keeps of each variant: &record, resolved against the columns of trajectory.csv.
 module nocdyn_sweep_records
-  use nocdyn_input, only: group_t, input_t
+  use nocdyn_input, only: input_t
   use nocdyn_kinds, only: wp
   use nocdyn_mistakes, only: mistakes_t
   use nocdyn_schema_text, only: suggestion
@@ -10,7 +10,7 @@ module nocdyn_sweep_records
   implicit none (type, external)
   private
 
-  public :: read_records, fit_statistics
+  public :: read_records, fit_statistics, wanted_trajectories
 
   real(wp), parameter :: unknown_start = -huge(1.0_wp)   !! in place of `from` where t_start varies and `from` is not given
 
@@ -21,19 +21,18 @@ module nocdyn_sweep_records
 
 contains
 
-  !> Statistics in the order of the file, and the variants of which trajectories are wanted.
-  subroutine read_records(input, labels, span, variants, statistics, trajectories, mistakes)
+  !> Statistics in the order of the file.
+  subroutine read_records(input, labels, span, variants, statistics, mistakes)
     type(input_t), intent(in) :: input
     type(string_t), intent(in) :: labels(:)   !! of the columns
     type(time_span_t), intent(in) :: span
     integer, intent(in) :: variants           !! huge if that is not known
     type(statistic_t), allocatable, intent(out) :: statistics(:)
-    integer, allocatable, intent(out) :: trajectories(:)   !! ascending, each once
     type(mistakes_t), intent(inout) :: mistakes
     type(string_t), allocatable :: names(:)
     integer :: i
 
-    allocate (statistics(0), trajectories(0))
+    allocate (statistics(0))
     call take_units_off(labels, names)
     associate (records => input%groups_named('record'))
       do i = 1, size(records)
@@ -43,7 +42,7 @@ contains
           else if (.not. group%has_value('trajectories')) then
             call mistakes%add(group%line, records(i), 'there is nothing to record; needed: quantity or trajectories')
           end if
-          if (group%has_value('trajectories')) call add_trajectories(input, records(i), variants, trajectories, mistakes)
+          if (group%has_value('trajectories')) call check_trajectories(input, records(i), variants, mistakes)
         end associate
       end do
     end associate
@@ -183,24 +182,38 @@ contains
     call move_alloc(longer, statistics)
   end subroutine append_statistic
 
-  subroutine add_trajectories(input, record, variants, trajectories, mistakes)
+  !> The variants of which trajectories are wanted, ascending, each once.
+  pure function wanted_trajectories(input) result(wanted)
+    type(input_t), intent(in) :: input
+    integer, allocatable :: wanted(:)
+    integer, allocatable :: numbers(:), records(:)
+    integer :: i, k
+
+    allocate (wanted(0))
+    allocate (records, source=input%groups_named('record'))
+    do i = 1, size(records)
+      if (.not. input%groups(records(i))%has_value('trajectories')) cycle
+      numbers = input%groups(records(i))%whole_numbers('trajectories')
+      do k = 1, size(numbers)
+        if (all(wanted /= numbers(k))) wanted = [pack(wanted, wanted < numbers(k)), numbers(k), pack(wanted, wanted > numbers(k))]
+      end do
+    end do
+  end function wanted_trajectories
+
+  subroutine check_trajectories(input, record, variants, mistakes)
     type(input_t), intent(in) :: input
     integer, intent(in) :: record
     integer, intent(in) :: variants
-    integer, allocatable, intent(inout) :: trajectories(:)
     type(mistakes_t), intent(inout) :: mistakes
     integer, allocatable :: wanted(:)
     integer :: i
 
     allocate (wanted, source=input%groups(record)%whole_numbers('trajectories'))
     do i = 1, size(wanted)
-      if (wanted(i) > variants) then
-        call add_mistake(input, record, 'trajectories', 'trajectories(' // to_text(i) // ') = ' // to_text(wanted(i)) // &
-                         ' is out of range; allowed: 1 to ' // to_text(variants) // ', the number of variants', mistakes)
-      else if (all(trajectories /= wanted(i))) then
-        trajectories = [pack(trajectories, trajectories < wanted(i)), wanted(i), pack(trajectories, trajectories > wanted(i))]
-      end if
+      if (wanted(i) <= variants) cycle
+      call add_mistake(input, record, 'trajectories', 'trajectories(' // to_text(i) // ') = ' // to_text(wanted(i)) // &
+                       ' is out of range; allowed: 1 to ' // to_text(variants) // ', the number of variants', mistakes)
     end do
-  end subroutine add_trajectories
+  end subroutine check_trajectories
 
 end module nocdyn_sweep_records

@@ -4,15 +4,17 @@ module nocdyn_merge_command
   use nocdyn_console, only: complain
   use nocdyn_errors, only: error_t, exit_done, exit_input, raise
   use nocdyn_folders, only: folder_names
-  use nocdyn_input, only: input_t
   use nocdyn_input_reader, only: read_input_text
   use nocdyn_journal_chunks, only: check_sweep
   use nocdyn_posix, only: watch_interrupts
   use nocdyn_result_folders, only: plain_path
+  use nocdyn_sweep_header, only: quantity_t
   use nocdyn_sweep_journal, only: open_journal, sweep_journal_t
-  use nocdyn_sweep_plan, only: make_plan, sweep_plan_t
+  use nocdyn_sweep_plan, only: sweep_plan_t
+  use nocdyn_sweep_records, only: wanted_trajectories
   use nocdyn_sweep_results, only: results_options_t, write_results
   use nocdyn_sweep_summary, only: sweep_effort_t
+  use nocdyn_target_company, only: find_targets
   use nocdyn_text, only: append, string_t, strings
   implicit none (type, external)
   private
@@ -41,36 +43,32 @@ contains
     integer, intent(inout) :: code
     type(error_t), allocatable, intent(out) :: error
     type(sweep_journal_t), allocatable :: journals(:)
-    type(input_t) :: input
-    type(sweep_plan_t) :: plan
+    type(sweep_plan_t) :: plan   ! as far as results need it; a design has served
+    type(string_t), allocatable :: complaints(:)
     type(sweep_effort_t), allocatable :: effort
 
     call open_journals(folder, journals, error)
     if (.not. allocated(error)) call check_sweep(journals, error)
     if (allocated(error)) return
     associate (header => journals(1)%header)
-      call read_input_text(header%input_text, folder, strings([character(len=1) ::]), input, error)
-      if (.not. allocated(error)) call plan_trajectories(input, plan, error)
+      call read_input_text(header%input_text, folder, strings([character(len=1) ::]), plan%input, error)
+      if (allocated(error)) return
+      call find_targets(plan%input, labels_of(header%parameters), plan%targets, complaints)
     end associate
-    if (.not. allocated(error)) call write_results(plan, folder, journals, effort, options, code, error)
+    allocate (plan%trajectories, source=wanted_trajectories(plan%input))
+    call write_results(plan, folder, journals, effort, options, code, error)
   end subroutine merge_folder
 
-  !> What is still to be run. A plan of no trajectories needs no more than the input: the file of a list may be elsewhere.
-  subroutine plan_trajectories(input, plan, error)
-    type(input_t), intent(in) :: input
-    type(sweep_plan_t), intent(out) :: plan
-    type(error_t), allocatable, intent(out) :: error
-    integer :: g
+  pure function labels_of(quantities) result(labels)
+    type(quantity_t), intent(in) :: quantities(:)
+    type(string_t), allocatable :: labels(:)
+    integer :: i
 
-    do g = 1, size(input%groups)
-      if (input%groups(g)%kind /= 'record') cycle
-      if (.not. input%groups(g)%has_value('trajectories')) cycle
-      call make_plan(input, plan, error)
-      return
+    allocate (labels(0))
+    do i = 1, size(quantities)
+      call append(labels, quantities(i)%label)
     end do
-    plan%input = input
-    allocate (plan%trajectories(0))
-  end subroutine plan_trajectories
+  end function labels_of
 
   !> All journals of a folder.
   subroutine open_journals(folder, journals, error)

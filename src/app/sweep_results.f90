@@ -1,16 +1,18 @@
 !> The files that a finished sweep leaves, and what is printed of it.
 module nocdyn_sweep_results
-  use nocdyn_console, only: console_progress_t, new_console_progress, say
+  use nocdyn_console, only: complain, console_progress_t, new_console_progress, say
   use nocdyn_errors, only: error_t, exit_done, exit_failed, raise
   use nocdyn_input, only: input_t
   use nocdyn_input_text, only: input_text
+  use nocdyn_journal_chunks, only: sweep_records_t
   use nocdyn_kinds, only: wp
+  use nocdyn_order_statistics, only: find_order_statistics
   use nocdyn_output_file, only: write_whole
   use nocdyn_posix, only: is_interrupted
   use nocdyn_run_summary, only: run_summary_t
+  use nocdyn_sweep_chunk, only: chunk_t
   use nocdyn_sweep_file, only: sweep_file_name, write_sweep_file
   use nocdyn_sweep_journal, only: sweep_journal_t
-  use nocdyn_order_statistics, only: find_order_statistics
   use nocdyn_sweep_plan, only: sweep_plan_t, without_sweep
   use nocdyn_sweep_summary, only: sweep_effort_t, sweep_json, sweep_line, sweep_summary_t, sweep_table
   use nocdyn_sweep_table, only: write_sweep_table
@@ -22,7 +24,7 @@ module nocdyn_sweep_results
 
   public :: write_results
 
-  character(len=*), parameter, public :: summary_file = 'summary.json', input_file = 'input.nml'
+  character(len=*), parameter :: summary_file = 'summary.json', input_file = 'input.nml'
 
   !> What is to be done besides sweep.nc.
   type, public :: results_options_t
@@ -39,9 +41,10 @@ contains
     type(sweep_journal_t), intent(inout) :: journals(:)
     type(sweep_effort_t), allocatable, intent(in) :: effort   !! not allocated after a merge
     type(results_options_t), intent(in) :: options
-    integer, intent(out) :: code   !! 1 if every variant failed
+    integer, intent(out) :: code   !! 1 if every variant failed; everything is written then too
     type(error_t), allocatable, intent(out) :: error
     type(sweep_summary_t) :: summary
+    character(len=:), allocatable :: reason
 
     code = exit_done
     summary%done = sum(journals%done)
@@ -51,7 +54,7 @@ contains
     call find_order_statistics(journals, summary%statistics, error)
     if (.not. allocated(error)) call write_sweep_file(folder, journals, error)
     if (.not. allocated(error) .and. options%wants_csv) call write_sweep_table(folder, journals, error)
-    if (.not. allocated(error)) call write_trajectories(plan, folder, options, error)
+    if (.not. allocated(error)) call write_trajectories(plan, folder, journals, options, error)
     if (.not. allocated(error)) call write_whole(folder, input_file, input_text(plan%input), error)
     if (.not. allocated(error)) then
       call write_whole(folder, summary_file, sweep_json(plan%input, journals(1)%header, summary), error)
@@ -61,17 +64,36 @@ contains
       if (summary%done > 0) call say(sweep_table(journals(1)%header, summary))
       call say(sweep_line(plan%input, summary, folder))
     end if
-    if (summary%done == 0) then
-      code = exit_failed
-      call raise(error, code, plan%input%file // ': every variant failed; the reasons are in ' // folder // '/' // &
-                 sweep_file_name)
-    end if
+    if (summary%done > 0) return
+    code = exit_failed
+    call find_first_reason(journals, reason, error)
+    if (allocated(error)) return
+    call raise(error, code, plan%input%file // ': every variant failed, the first one because: ' // reason // &
+               '; all reasons are in ' // folder // '/' // sweep_file_name)
+    call complain(error)
+    deallocate (error)
   end subroutine write_results
 
-  !> The chosen variants run once more, as `nocdyn run` would do it. One that fails leaves what it has.
-  subroutine write_trajectories(plan, folder, options, error)
+  !> Why the first variant of a sweep is not done.
+  subroutine find_first_reason(journals, reason, error)
+    type(sweep_journal_t), intent(inout) :: journals(:)
+    character(len=:), allocatable, intent(out) :: reason
+    type(error_t), allocatable, intent(out) :: error
+    type(sweep_records_t) :: records
+    type(chunk_t) :: chunk
+    logical :: is_there
+
+    call records%begin(journals)
+    call records%take(journals, chunk, is_there, error)
+    if (.not. allocated(error)) reason = chunk%reasons(1)%text
+  end subroutine find_first_reason
+
+  !> The chosen variants run once more with the numbers that the journals have of them, as `nocdyn run` would do it. One that
+  !> fails leaves what it has.
+  subroutine write_trajectories(plan, folder, journals, options, error)
     type(sweep_plan_t), intent(in) :: plan
     character(len=*), intent(in) :: folder
+    type(sweep_journal_t), intent(inout) :: journals(:)
     type(results_options_t), intent(in) :: options
     type(error_t), allocatable, intent(out) :: error
     type(input_t) :: input
@@ -80,12 +102,11 @@ contains
     character(len=:), allocatable :: complaint
     integer :: i
 
-    if (size(plan%trajectories) == 0) return
-    allocate (values(plan%design%varied))
     do i = 1, size(plan%trajectories)
       associate (variant => plan%trajectories(i))
         input = plan%input
-        call plan%values(variant, values)
+        call find_values(journals, variant, values, error)
+        if (allocated(error)) return
         call set_targets(input, plan%targets, values, complaint)
         if (complaint /= '') cycle
         call run_variant(without_sweep(input), folder // '/variant-' // to_text(variant), options, summary, error)
@@ -98,6 +119,25 @@ contains
       if (allocated(error)) return
     end do
   end subroutine write_trajectories
+
+  !> What the varied numbers of one variant are.
+  subroutine find_values(journals, variant, values, error)
+    type(sweep_journal_t), intent(inout) :: journals(:)   !! one of which holds it
+    integer, intent(in) :: variant
+    real(wp), allocatable, intent(out) :: values(:)
+    type(error_t), allocatable, intent(out) :: error
+    type(chunk_t) :: chunk
+    integer :: i, k
+
+    do k = 1, size(journals)
+      i = journals(k)%record_of(variant)
+      if (i == 0) cycle
+      call journals(k)%read_record(i, chunk, error)
+      if (.not. allocated(error)) values = chunk%parameters(:, variant - chunk%first + 1)
+      return
+    end do
+    error stop 'nocdyn_sweep_results: the trajectory of a variant is asked for that no journal holds'
+  end subroutine find_values
 
   subroutine run_variant(input, folder, options, summary, error)
     type(input_t), intent(in) :: input

@@ -34,6 +34,7 @@ module nocdyn_sweep_journal
     procedure :: append_packed
     procedure :: ranges
     procedure :: missing
+    procedure :: record_of
     procedure :: read_record
     procedure :: close => close_journal
     procedure :: remove => remove_journal
@@ -201,6 +202,16 @@ contains
     first = open_ranges%first
     count = open_ranges%last - open_ranges%first + 1
   end subroutine missing
+
+  !> The number of the record that holds a variant, 0 if none does.
+  pure integer function record_of(self, variant) result(number)
+    class(sweep_journal_t), intent(in) :: self
+    integer, intent(in) :: variant
+
+    do number = self%records, 1, -1
+      if (variant >= self%index(number)%first .and. variant - self%index(number)%first < self%index(number)%count) return
+    end do
+  end function record_of
 
   !> The chunk of record `number`, 1 to `records`.
   subroutine read_record(self, number, chunk, error)
