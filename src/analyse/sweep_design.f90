@@ -1,9 +1,9 @@
 !> What a sweep varies, and the values of each variant: &sweep and &vary, or the file of a list.
 module nocdyn_sweep_design
+  use nocdyn_checksums, only: checksum_digits
   use nocdyn_designs, only: design_t, factor_t, grid_design, grid_size, latin_design, list_design, most_variants, &
     probability_between, random_design, sobol_design
   use nocdyn_errors, only: error_t, exit_file
-  use nocdyn_fingerprints, only: fingerprint
   use nocdyn_input, only: group_t, input_t
   use nocdyn_kinds, only: wp
   use nocdyn_mistakes, only: mistakes_t
@@ -22,12 +22,12 @@ module nocdyn_sweep_design
 contains
 
   !> Targets and design; the design is allocated if there is no mistake.
-  subroutine read_design(input, sweep, targets, design, list_fingerprint, mistakes)
+  subroutine read_design(input, sweep, targets, design, list_checksum, mistakes)
     type(input_t), intent(in) :: input
     integer, intent(in) :: sweep   !! index of &sweep
     type(target_t), allocatable, intent(out) :: targets(:)
     class(design_t), allocatable, intent(out) :: design
-    character(len=:), allocatable, intent(out) :: list_fingerprint   !! of the file's bytes; '' without a list
+    character(len=:), allocatable, intent(out) :: list_checksum   !! of the file's bytes; '' without a list
     type(mistakes_t), intent(inout) :: mistakes
     type(factor_t), allocatable :: factors(:)
     real(wp), allocatable :: values(:, :)
@@ -35,9 +35,9 @@ contains
 
     before = mistakes%count
     associate (group => input%groups(sweep), varied => input%groups_named('vary'))
-      list_fingerprint = ''
+      list_checksum = ''
       if (group%text('design') == 'list') then
-        call read_list(input, sweep, targets, values, list_fingerprint, mistakes)
+        call read_list(input, sweep, targets, values, list_checksum, mistakes)
         call refuse_varied(input, varied, mistakes)
       else
         call read_varied(input, sweep, varied, targets, factors, mistakes)
@@ -65,12 +65,12 @@ contains
   end subroutine read_design
 
   !> The targets in the first line of a file, and the values in the others.
-  subroutine read_list(input, sweep, targets, values, list_fingerprint, mistakes)
+  subroutine read_list(input, sweep, targets, values, list_checksum, mistakes)
     type(input_t), intent(in) :: input
     integer, intent(in) :: sweep
     type(target_t), allocatable, intent(out) :: targets(:)
     real(wp), allocatable, intent(out) :: values(:, :)   !! [targets, variants]
-    character(len=:), allocatable, intent(inout) :: list_fingerprint
+    character(len=:), allocatable, intent(inout) :: list_checksum
     type(mistakes_t), intent(inout) :: mistakes
     type(error_t), allocatable :: error
     type(string_t), allocatable :: complaints(:), paths(:)
@@ -84,7 +84,7 @@ contains
       call add_mistake(input, sweep, 'file', 'file: ' // error%message, mistakes, exit_file)
       return
     end if
-    list_fingerprint = fingerprint(text)
+    list_checksum = checksum_digits(text)
     call read_list_text(text, file, paths, line, values, complaints)
     do i = 1, size(complaints)
       call add_mistake(input, sweep, 'file', 'file: ' // complaints(i)%text, mistakes)

@@ -26,7 +26,7 @@ contains
     header%design = group%text('design')
     if (group%has_value('seed')) header%seed = group%whole_number('seed')
     header%input_text = input_text(plan%input)
-    header%list_fingerprint = plan%list_fingerprint
+    header%list_checksum = plan%list_checksum
     header%variants = plan%design%variants
     header%first = first_of_shard(header%variants, shard, shards)
     header%last = first_of_shard(header%variants, shard + 1, shards) - 1

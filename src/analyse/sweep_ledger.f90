@@ -4,7 +4,7 @@ module nocdyn_sweep_ledger
   use nocdyn_errors, only: error_t
   use nocdyn_kinds, only: wp
   use nocdyn_posix, only: is_interrupted
-  use nocdyn_sweep_chunk, only: chunk_t
+  use nocdyn_sweep_chunk, only: chunk_t, status_refused
   use nocdyn_sweep_journal, only: sweep_journal_t
   implicit none (type, external)
   private
@@ -143,7 +143,7 @@ contains
       self%is_broken = .true.
       return
     end if
-    self%pace = seconds / chunk%count
+    if (any(chunk%status /= status_refused)) self%pace = seconds / count(chunk%status /= status_refused)
     self%counts%done = self%journal%done
     self%counts%refused = self%journal%refused
     self%counts%failed = self%journal%failed

@@ -15,7 +15,7 @@ module nocdyn_sweep_plan
   use nocdyn_statistics, only: statistic_t
   use nocdyn_sweep_design, only: read_design
   use nocdyn_sweep_mistakes, only: add_mistake
-  use nocdyn_sweep_records, only: read_records, time_span_t
+  use nocdyn_sweep_records, only: read_records, time_span_t, wanted_trajectories
   use nocdyn_targets, only: target_t
   use nocdyn_text, only: string_t
   use nocdyn_trajectory_columns, only: column_t, list_columns
@@ -32,7 +32,7 @@ module nocdyn_sweep_plan
     type(target_t), allocatable :: targets(:)         !! as many as the design varies
     type(statistic_t), allocatable :: statistics(:)
     integer, allocatable :: trajectories(:)           !! variants that are written like runs, ascending
-    character(len=:), allocatable :: list_fingerprint   !! of the file of a list, '' without one
+    character(len=:), allocatable :: list_checksum   !! of the file of a list, '' without one
   contains
     procedure :: values
     procedure :: summary
@@ -57,12 +57,13 @@ contains
       return
     end if
     plan%input = input
-    call read_design(input, sweeps(1), plan%targets, plan%design, plan%list_fingerprint, mistakes)
+    call read_design(input, sweeps(1), plan%targets, plan%design, plan%list_checksum, mistakes)
     variants = huge(variants)
     if (allocated(plan%design)) variants = plan%design%variants
     call label_columns(input, labels, failure)
     if (.not. allocated(failure)) then
-      call read_records(input, labels, fixed_span(input, plan%targets), variants, plan%statistics, plan%trajectories, mistakes)
+      call read_records(input, labels, fixed_span(input, plan%targets), variants, plan%statistics, mistakes)
+      allocate (plan%trajectories, source=wanted_trajectories(input))
       if (size(plan%statistics) == 0 .and. mistakes%count == 0) call add_mistake(input, sweeps(1), 'design', &
         'no number of the variants is kept; needed: a &record with quantity and statistic', mistakes)
       if (size(plan%trajectories) > 0) call check_output_times(input, failure)

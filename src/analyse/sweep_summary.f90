@@ -146,7 +146,7 @@ contains
 
     text = header%title
     if (len(text) > 0) text = text // new_line('a')
-    heading = 'of ' // to_text(summary%done) // ' variants:'
+    heading = 'of ' // to_text(summary%done) // trim(merge(' variant: ', ' variants:', summary%done == 1))
     rows = min(size(header%results), most_rows)
     label_width = max(len(heading), maxval([(len(label(header, i)), i=1, rows)]))
     text = text // padded(heading, label_width) // right('min') // right('5 %') // right('median') // right('95 %') // &
@@ -181,7 +181,7 @@ contains
     character(len=*), intent(in) :: folder
     character(len=:), allocatable :: text
 
-    text = input%file // ': ' // to_text(summary%done) // ' variants done'
+    text = input%file // ': ' // to_text(summary%done) // trim(merge(' variant ', ' variants', summary%done == 1)) // ' done'
     if (summary%refused > 0) text = text // ', ' // to_text(summary%refused) // ' refused'
     if (summary%failed > 0) text = text // ', ' // to_text(summary%failed) // ' failed'
     if (allocated(summary%effort)) then

@@ -1,5 +1,6 @@
 !> A sweep from its command line to its results: what is the same on one machine and on many.
 module nocdyn_sweep_job
+  use, intrinsic :: iso_fortran_env, only: int64
   use nocdyn_arguments, only: arguments_t
   use nocdyn_console, only: complain, new_status_line, say
   use nocdyn_errors, only: error_t, exit_done, exit_failed, exit_input, raise
@@ -17,6 +18,7 @@ module nocdyn_sweep_job
   use nocdyn_sweep_results, only: results_options_t, write_results
   use nocdyn_sweep_setup, only: prepare_sweep, sweep_setup_t
   use nocdyn_sweep_summary, only: sweep_effort_t
+  use nocdyn_sweep_table, only: sweep_table_name
   use nocdyn_text, only: to_text
   implicit none (type, external)
   private
@@ -43,6 +45,7 @@ contains
     type(input_t) :: input
     type(sweep_header_t) :: header
     character(len=:), allocatable :: name
+    integer(int64) :: bytes
     logical :: is_there
 
     job%arguments = arguments
@@ -62,8 +65,8 @@ contains
     end if
     header = new_sweep_header(job%plan, max(1, arguments%shard), max(1, arguments%shards))
     name = journal_name(max(1, arguments%shard), max(1, arguments%shards))
-    inquire (file=job%folder // '/' // name, exist=is_there)
-    if (is_there) then
+    inquire (file=job%folder // '/' // name, exist=is_there, size=bytes)
+    if (is_there .and. bytes > 0) then
       call open_journal(job%folder, name, job%journals(1), error)
       if (.not. allocated(error)) call judge_journal(job%journals(1), header, arguments%resumes, error)
     else
@@ -81,12 +84,18 @@ contains
     type(sweep_header_t), intent(in) :: header
     type(error_t), allocatable, intent(out) :: error
     character(len=:), allocatable :: news
+    logical :: has_table
 
     inquire (file=job%folder // '/' // sweep_file_name, exist=job%is_done)
     job%is_done = job%is_done .and. job%arguments%shards <= 1
     if (job%is_done) then
       call judge_results(job%folder, header, error)
       news = 'all ' // to_text(header%variants) // ' variants are done already; results in ' // job%folder
+      inquire (file=job%folder // '/' // sweep_table_name, exist=has_table)
+      if (job%arguments%wants_csv .and. .not. (has_table .or. allocated(error))) then
+        call raise(error, exit_input, job%plan%input%file // ': ' // news // ', without ' // sweep_table_name // &
+                   '; to have it, leave out --resume')
+      end if
     else
       news = 'there is nothing to go on with in ' // job%folder // '; the sweep starts from its beginning'
     end if

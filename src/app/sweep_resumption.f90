@@ -12,6 +12,7 @@ module nocdyn_sweep_resumption
   public :: judge_journal, judge_results
 
   integer, parameter :: most_told = 5   ! differences
+  character(len=*), parameter :: changed_list = 'the file of &sweep with the variants has changed'
 
 contains
 
@@ -24,14 +25,28 @@ contains
     character(len=:), allocatable :: difference
 
     if (.not. resumes) then
-      call raise(error, exit_input, journal%path() // ' holds ' // to_text(journal%done + journal%refused + journal%failed) // &
-                 ' of ' // to_text(journal%header%last - journal%header%first + 1) // &
-                 ' variants of a sweep that was not finished; go on with it by --resume, or remove it')
+      call raise(error, exit_input, journal%path() // ' holds ' // held_text(journal) // &
+                 '; go on with it by --resume, or remove it')
       return
     end if
     difference = header_difference(journal%header, header)
     if (difference /= '') call raise(error, exit_input, journal%path() // ' cannot be gone on with: ' // difference)
   end subroutine judge_journal
+
+  !> '30 of 60 variants of a sweep that was not finished': of a part that waits for the others all are there.
+  function held_text(journal) result(text)
+    type(sweep_journal_t), intent(in) :: journal
+    character(len=:), allocatable :: text
+    integer :: held, wanted
+
+    held = journal%done + journal%refused + journal%failed
+    wanted = journal%header%last - journal%header%first + 1
+    if (held == wanted) then
+      text = 'all ' // to_text(wanted) // ' of its variants already'
+    else
+      text = to_text(held) // ' of ' // to_text(wanted) // ' variants of a sweep that was not finished'
+    end if
+  end function held_text
 
   !> What tells a sweep that was begun from the one that is asked for; empty if nothing does.
   function header_difference(old, new) result(text)
@@ -45,8 +60,8 @@ contains
     end if
     text = input_difference(old%input_text, new%input_text)
     if (text /= '') return
-    if (old%list_fingerprint /= new%list_fingerprint) then
-      text = 'the file of &sweep with the variants has changed'
+    if (old%list_checksum /= new%list_checksum) then
+      text = changed_list
     else if (old%first /= new%first .or. old%last /= new%last) then
       text = 'it is for the variants ' // to_text(old%first) // ' to ' // to_text(old%last) // ', not ' // &
              to_text(new%first) // ' to ' // to_text(new%last)

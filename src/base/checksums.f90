@@ -5,7 +5,7 @@ module nocdyn_checksums
   implicit none (type, external)
   private
 
-  public :: make_checksum_table
+  public :: checksum_digits, make_checksum_table
 
   integer(int32), parameter :: polynomial = int(z'82F63B78', int32)   ! bits reflected
   integer, parameter :: slices = 8
@@ -61,6 +61,16 @@ contains
     end do
     checksum = not(value)
   end function checksum
+
+  !> CRC-32C of one text as eight hexadecimal digits.
+  pure function checksum_digits(text) result(digits)
+    character(len=*), intent(in) :: text
+    character(len=8) :: digits
+    type(checksum_table_t) :: table
+
+    call make_checksum_table(table)
+    write (digits, '(z8.8)') table%checksum(text)
+  end function checksum_digits
 
   !> 0 to 255.
   elemental integer(int32) function code(byte)

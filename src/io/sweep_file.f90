@@ -15,7 +15,7 @@ module nocdyn_sweep_file
   use nocdyn_posix, only: last_failure, make_folders, process_id, remove_file, rename_file
   use nocdyn_posix_files, only: disk_failure, sync_path
   use nocdyn_posix_programs, only: procedure_of_libraries
-  use nocdyn_sweep_chunk, only: chunk_t, status_done
+  use nocdyn_sweep_chunk, only: chunk_t, status_done, status_words
   use nocdyn_sweep_header, only: quantity_t, sweep_header_t
   use nocdyn_sweep_journal, only: sweep_journal_t
   use nocdyn_text, only: append, quoted, string_t, strings, to_text
@@ -151,10 +151,10 @@ contains
     call put_text(file, nf90_global, 'design', header%design)
     call note(file, nf90_put_att(file%id, nf90_global, 'seed', header%seed))
     call put_text(file, nf90_global, 'input', header%input_text)
-    if (header%list_fingerprint /= '') call put_text(file, nf90_global, 'list_fingerprint', header%list_fingerprint)
+    if (header%list_checksum /= '') call put_text(file, nf90_global, 'list_checksum', header%list_checksum)
   end subroutine put_attributes
 
-  !> Of which sweep the results in `folder` are: source, input and the fingerprint of a list, nothing else of a header.
+  !> Of which sweep the results in `folder` are: source, input and the checksum of a list, nothing else of a header.
   subroutine read_origin(folder, header, error)
     character(len=*), intent(in) :: folder
     type(sweep_header_t), intent(out) :: header
@@ -165,7 +165,7 @@ contains
     if (status == nf90_noerr) then
       call read_text(id, 'source', header%source, status)
       if (status == nf90_noerr) call read_text(id, 'input', header%input_text, status)
-      if (status == nf90_noerr) call read_text(id, 'list_fingerprint', header%list_fingerprint, status)
+      if (status == nf90_noerr) call read_text(id, 'list_checksum', header%list_checksum, status)
       if (nf90_close(id) /= nf90_noerr) status = nf90_ehdferr
     end if
     if (status /= nf90_noerr) call raise(error, exit_file, quoted(folder // '/' // sweep_file_name) // ' cannot be read: ' // &
@@ -266,7 +266,8 @@ contains
 
     call define(file, 'status', nf90_byte, file%variant_dimension, 'how the variant ended', file%status)
     call note(file, nf90_put_att(file%id, file%status, 'flag_values', [integer(int8) :: 0, 1, 2]))
-    call put_text(file, file%status, 'flag_meanings', 'done refused failed')
+    call put_text(file, file%status, 'flag_meanings', &
+                  trim(status_words(0)) // ' ' // trim(status_words(1)) // ' ' // trim(status_words(2)))
     call define(file, 'steps', nf90_int, file%variant_dimension, 'steps of the integration', file%steps)
     call define(file, 'failed_variant', nf90_int, file%failure_dimension, 'number of a variant that is not done', &
                 file%failed_variant)

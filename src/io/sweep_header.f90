@@ -18,7 +18,7 @@ module nocdyn_sweep_header
     character(len=:), allocatable :: source             !! program, version, compiler
     character(len=:), allocatable :: design             !! 'random'
     character(len=:), allocatable :: input_text         !! the whole canonical input
-    character(len=:), allocatable :: list_fingerprint   !! of the file of a list, '' without one
+    character(len=:), allocatable :: list_checksum   !! of the file of a list, '' without one
     integer :: seed = 0
     integer :: variants = 0                             !! of the whole sweep
     integer :: first = 1, last = 0                      !! of this shard
@@ -42,7 +42,7 @@ contains
       call put_text(bytes, used, header%source)
       call put_text(bytes, used, header%design)
       call put_text(bytes, used, header%input_text)
-      call put_text(bytes, used, header%list_fingerprint)
+      call put_text(bytes, used, header%list_checksum)
       call put_quantities(bytes, used, parameters)
       call put_quantities(bytes, used, results)
     end associate
@@ -52,7 +52,7 @@ contains
     type(sweep_header_t), intent(in) :: header
 
     length = 11 * integer_bytes + len(header%title) + len(header%source) + len(header%design) + len(header%input_text) + &
-             len(header%list_fingerprint) + quantities_length(header%parameters) + quantities_length(header%results)
+             len(header%list_checksum) + quantities_length(header%parameters) + quantities_length(header%results)
   end function packed_length
 
   pure integer function quantities_length(quantities) result(length)
@@ -94,7 +94,7 @@ contains
     call reader%take_text(bytes, header%source)
     call reader%take_text(bytes, header%design)
     call reader%take_text(bytes, header%input_text)
-    call reader%take_text(bytes, header%list_fingerprint)
+    call reader%take_text(bytes, header%list_checksum)
     call take_quantities(reader, bytes, numbers(5), header%parameters)
     call take_quantities(reader, bytes, numbers(6), header%results)
     is_whole = .not. reader%is_short .and. reader%next == len(bytes) + 1
@@ -124,7 +124,7 @@ contains
     part = ''
     if (a%source /= b%source) then
       part = 'source'
-    else if (a%list_fingerprint /= b%list_fingerprint) then
+    else if (a%list_checksum /= b%list_checksum) then
       part = 'list'
     else if (a%input_text /= b%input_text .or. a%variants /= b%variants) then
       part = 'input'

@@ -5,6 +5,7 @@ import os
 import shutil
 import subprocess
 
+import h5netcdf
 import pytest
 from sweep_inputs import MIXED, SWEEP, SWEEP_PROGRAM, TWO_DISCS, needs_sweeps
 
@@ -148,8 +149,12 @@ def test_variants_of_other_tolerances_have_the_bits_of_a_sweep_of_these(nocdyn, 
 def test_a_sweep_without_a_variant_that_is_done_fails(nocdyn, discs):
     outcome = nocdyn("sweep", discs, "--out", "out", "--set", "run.max_steps=5")
     assert outcome.returncode == 1
-    assert outcome.stderr == f"nocdyn: {discs}: every variant failed; the reasons are in out/sweep.nc\n"
+    with h5netcdf.File(nocdyn.folder / "out/sweep.nc") as content:
+        reason = content.variables["reason"][0].tobytes().rstrip(b"\0").decode()
+    assert "the most that max_steps allows" in reason
+    assert outcome.stderr == f"nocdyn: {discs}: every variant failed, the first one because: {reason}; all reasons are in out/sweep.nc\n"
     assert nocdyn.summary("out")["status"] == "failed"
+    assert nocdyn.files("out") == ["input.nml", "summary.json", "sweep.nc"]
 
 
 def test_trajectories_of_chosen_variants_are_those_of_runs(nocdyn, discs):
@@ -190,6 +195,20 @@ def test_shards_are_merged(nocdyn, discs):
     assert "variants_per_second" not in nocdyn.summary("out")
     nocdyn("sweep", discs, "--out", "whole", "--csv")
     for name in ("sweep.nc", "sweep.csv"):
+        assert (nocdyn.folder / "out" / name).read_bytes() == (nocdyn.folder / "whole" / name).read_bytes()
+
+
+def test_parts_of_a_list_are_merged_without_its_file(nocdyn):
+    sweep = "&sweep design = 'list' file = 'list.csv' /\n&record quantity = 'omega_wheel' statistic = 'final' trajectories = 2 /\n"
+    nocdyn.write("discs.nml", TWO_DISCS + sweep)
+    nocdyn.write("list.csv", "load.drag.viscous\n0.2\n0.3\n0.4\n")
+    nocdyn("sweep", "discs.nml", "--out", "whole")
+    for part in (1, 2):
+        nocdyn("sweep", "discs.nml", "--out", "out", "--shard", f"{part}/2")
+    (nocdyn.folder / "list.csv").unlink()
+    outcome = nocdyn("merge", "out", "-q")
+    assert (outcome.returncode, outcome.stdout, outcome.stderr) == (0, "", "")
+    for name in ("sweep.nc", "variant-2/trajectory.csv"):
         assert (nocdyn.folder / "out" / name).read_bytes() == (nocdyn.folder / "whole" / name).read_bytes()
 
 

@@ -213,6 +213,51 @@ def test_results_of_another_sweep_are_not_taken_for_its_own(nocdyn, discs):
     )
 
 
+LIST = "&sweep design = 'list' file = 'list.csv' /\n&record quantity = 'omega_wheel' statistic = 'final' /\n"
+
+
+def test_results_of_another_list_are_not_taken_for_its_own(nocdyn):
+    nocdyn.write("discs.nml", TWO_DISCS + LIST)
+    nocdyn.write("list.csv", "load.drag.viscous\n0.2\n")
+    nocdyn("sweep", "discs.nml", "--out", "out")
+    nocdyn.write("list.csv", "load.drag.viscous\n0.3\n")
+    outcome = nocdyn("sweep", "discs.nml", "--out", "out", "--resume")
+    assert (outcome.returncode, outcome.stdout) == (2, "")
+    assert outcome.stderr == (
+        "nocdyn: out holds the results of another sweep: the file of &sweep with the variants has changed; "
+        "without --resume they are replaced\n"
+    )
+
+
+def test_a_table_of_results_that_are_done_already_is_refused(nocdyn, discs):
+    nocdyn("sweep", discs, "--out", "out")
+    outcome = nocdyn("sweep", discs, "--out", "out", "--resume", "--csv")
+    assert (outcome.returncode, outcome.stdout) == (2, "")
+    assert outcome.stderr == (
+        f"nocdyn: {discs}: all 60 variants are done already; results in out, without sweep.csv; "
+        "to have it, leave out --resume\n"
+    )
+    nocdyn("sweep", discs, "--out", "out", "--csv")
+    assert nocdyn("sweep", discs, "--out", "out", "--resume", "--csv").returncode == 0
+
+
+@pytest.mark.parametrize("words", [[], ["--resume"]])
+def test_a_journal_without_a_byte_holds_nothing_up(nocdyn, discs, words):
+    nocdyn.write("out/sweep.journal", "")
+    outcome = nocdyn("sweep", discs, "--out", "out", *words)
+    assert (outcome.returncode, outcome.stderr) == (0, "")
+    assert nocdyn.files("out") == ["input.nml", "summary.json", "sweep.nc"]
+
+
+def test_a_part_that_waits_for_the_others_is_not_called_unfinished(nocdyn, discs):
+    nocdyn("sweep", discs, "--out", "out", "--shard", "1/2")
+    outcome = nocdyn("sweep", discs, "--out", "out", "--shard", "1/2")
+    assert (outcome.returncode, outcome.stdout) == (2, "")
+    assert outcome.stderr == (
+        "nocdyn: out/sweep.1-of-2.journal holds all 30 of its variants already; go on with it by --resume, or remove it\n"
+    )
+
+
 @pytest.mark.parametrize("size", [0, 3000, 30000])
 @pytest.mark.parametrize("threads", [1, 2])
 def test_a_full_disk_ends_a_sweep_that_can_be_gone_on_with(nocdyn, discs, size, threads):

@@ -24,7 +24,7 @@ contains
     header%design = 'random'
     header%seed = 42
     header%input_text = '&body name = ''a'' /' // new_line('a') // '&sweep design = ''random'' /' // new_line('a')
-    header%list_fingerprint = ''
+    header%list_checksum = ''
     header%variants = variants
     header%first = first
     header%last = last
