@@ -28,6 +28,7 @@ module nocdyn_sweep_summary
     integer :: done = 0, refused = 0, failed = 0   !! variants
     type(order_statistics_t), allocatable :: statistics(:)   !! of each result, over the variants that are done
     type(sweep_effort_t), allocatable :: effort              !! not allocated after a merge
+    character(len=:), allocatable :: first_reason            !! why the first variant is not done; if none is
   end type sweep_summary_t
 
 contains

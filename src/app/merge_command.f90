@@ -12,8 +12,8 @@ module nocdyn_merge_command
   use nocdyn_sweep_journal, only: open_journal, sweep_journal_t
   use nocdyn_sweep_plan, only: sweep_plan_t
   use nocdyn_sweep_records, only: wanted_trajectories
-  use nocdyn_sweep_results, only: results_options_t, write_results
-  use nocdyn_sweep_summary, only: sweep_effort_t
+  use nocdyn_sweep_results, only: results_options_t, tell_results, write_results
+  use nocdyn_sweep_summary, only: sweep_summary_t
   use nocdyn_target_company, only: find_targets
   use nocdyn_text, only: append, string_t, strings
   implicit none (type, external)
@@ -45,7 +45,7 @@ contains
     type(sweep_journal_t), allocatable :: journals(:)
     type(sweep_plan_t) :: plan   ! as far as results need it; a design has served
     type(string_t), allocatable :: complaints(:)
-    type(sweep_effort_t), allocatable :: effort
+    type(sweep_summary_t) :: summary
 
     call open_journals(folder, journals, error)
     if (.not. allocated(error)) call check_sweep(journals, error)
@@ -56,7 +56,8 @@ contains
       call find_targets(plan%input, labels_of(header%parameters), plan%targets, complaints)
     end associate
     allocate (plan%trajectories, source=wanted_trajectories(plan%input))
-    call write_results(plan, folder, journals, effort, options, code, error)
+    call write_results(plan, folder, journals, options, summary, error)
+    if (.not. allocated(error)) call tell_results(plan, folder, journals(1)%header, options, summary, code)
   end subroutine merge_folder
 
   pure function labels_of(quantities) result(labels)

@@ -15,9 +15,9 @@ module nocdyn_sweep_job
   use nocdyn_sweep_plan, only: make_plan, sweep_plan_t
   use nocdyn_sweep_progress, only: console_sweep_progress_t
   use nocdyn_sweep_resumption, only: judge_journal, judge_results
-  use nocdyn_sweep_results, only: results_options_t, write_results
+  use nocdyn_sweep_results, only: results_options_t, tell_results, write_results
   use nocdyn_sweep_setup, only: prepare_sweep, sweep_setup_t
-  use nocdyn_sweep_summary, only: sweep_effort_t
+  use nocdyn_sweep_summary, only: sweep_effort_t, sweep_summary_t
   use nocdyn_sweep_table, only: sweep_table_name
   use nocdyn_text, only: to_text
   implicit none (type, external)
@@ -108,11 +108,12 @@ contains
     class(sweep_ledger_t), intent(in) :: ledger
     integer, intent(in) :: threads, ranks
     integer, intent(out) :: code
-    type(sweep_effort_t), allocatable :: effort
+    type(sweep_summary_t) :: summary
+    type(results_options_t) :: options
     type(error_t), allocatable :: error
 
     code = exit_done
-    effort = sweep_effort_t(ledger%counts%new, threads, ranks, job%setup%lanes, job%progress%line%elapsed())
+    summary%effort = sweep_effort_t(ledger%counts%new, threads, ranks, job%setup%lanes, job%progress%line%elapsed())
     call job%progress%line%clear()
     if (allocated(ledger%error)) then
       allocate (error, source=ledger%error)
@@ -121,9 +122,12 @@ contains
     else if (job%arguments%shards > 1) then
       if (.not. job%arguments%is_quiet) call say(part_text(job, ledger))
     else
-      call write_results(job%plan, job%folder, job%journals, effort, &
-                         results_options_t(job%arguments%wants_csv, job%arguments%is_quiet), code, error)
-      if (.not. allocated(error)) call job%journals(1)%remove()
+      options = results_options_t(job%arguments%wants_csv, job%arguments%is_quiet)
+      call write_results(job%plan, job%folder, job%journals, options, summary, error)
+      if (.not. allocated(error)) then
+        call job%journals(1)%remove()   ! first: a reader of the output who is gone ends the program
+        call tell_results(job%plan, job%folder, job%journals(1)%header, options, summary, code)
+      end if
     end if
     call job%journals(1)%close()
     if (.not. allocated(error)) return

@@ -12,9 +12,10 @@ module nocdyn_sweep_results
   use nocdyn_run_summary, only: run_summary_t
   use nocdyn_sweep_chunk, only: chunk_t
   use nocdyn_sweep_file, only: sweep_file_name, write_sweep_file
+  use nocdyn_sweep_header, only: sweep_header_t
   use nocdyn_sweep_journal, only: sweep_journal_t
   use nocdyn_sweep_plan, only: sweep_plan_t, without_sweep
-  use nocdyn_sweep_summary, only: sweep_effort_t, sweep_json, sweep_line, sweep_summary_t, sweep_table
+  use nocdyn_sweep_summary, only: sweep_json, sweep_line, sweep_summary_t, sweep_table
   use nocdyn_sweep_table, only: write_sweep_table
   use nocdyn_targets, only: set_targets
   use nocdyn_text, only: to_text
@@ -22,7 +23,7 @@ module nocdyn_sweep_results
   implicit none (type, external)
   private
 
-  public :: write_results
+  public :: write_results, tell_results
 
   character(len=*), parameter :: summary_file = 'summary.json', input_file = 'input.nml'
 
@@ -34,23 +35,18 @@ module nocdyn_sweep_results
 
 contains
 
-  !> Writes everything of a sweep whose variants are all in the journals, and prints its summary.
-  subroutine write_results(plan, folder, journals, effort, options, code, error)
+  !> Writes everything of a sweep whose variants are all in the journals.
+  subroutine write_results(plan, folder, journals, options, summary, error)
     type(sweep_plan_t), intent(in) :: plan
     character(len=*), intent(in) :: folder
     type(sweep_journal_t), intent(inout) :: journals(:)
-    type(sweep_effort_t), allocatable, intent(in) :: effort   !! not allocated after a merge
     type(results_options_t), intent(in) :: options
-    integer, intent(out) :: code   !! 1 if every variant failed; everything is written then too
+    type(sweep_summary_t), intent(inout) :: summary   !! with the effort, if there was one
     type(error_t), allocatable, intent(out) :: error
-    type(sweep_summary_t) :: summary
-    character(len=:), allocatable :: reason
 
-    code = exit_done
     summary%done = sum(journals%done)
     summary%refused = sum(journals%refused)
     summary%failed = sum(journals%failed)
-    if (allocated(effort)) allocate (summary%effort, source=effort)
     call find_order_statistics(journals, summary%statistics, error)
     if (.not. allocated(error)) call write_sweep_file(folder, journals, error)
     if (.not. allocated(error) .and. options%wants_csv) call write_sweep_table(folder, journals, error)
@@ -59,20 +55,30 @@ contains
     if (.not. allocated(error)) then
       call write_whole(folder, summary_file, sweep_json(plan%input, journals(1)%header, summary), error)
     end if
-    if (allocated(error)) return
+    if (summary%done == 0 .and. .not. allocated(error)) call find_first_reason(journals, summary%first_reason, error)
+  end subroutine write_results
+
+  !> Prints what has come out.
+  subroutine tell_results(plan, folder, header, options, summary, code)
+    type(sweep_plan_t), intent(in) :: plan
+    character(len=*), intent(in) :: folder
+    type(sweep_header_t), intent(in) :: header
+    type(results_options_t), intent(in) :: options
+    type(sweep_summary_t), intent(in) :: summary   !! of `write_results`
+    integer, intent(out) :: code                   !! 1 if every variant failed
+    type(error_t), allocatable :: error
+
+    code = exit_done
     if (.not. options%is_quiet) then
-      if (summary%done > 0) call say(sweep_table(journals(1)%header, summary))
+      if (summary%done > 0) call say(sweep_table(header, summary))
       call say(sweep_line(plan%input, summary, folder))
     end if
     if (summary%done > 0) return
     code = exit_failed
-    call find_first_reason(journals, reason, error)
-    if (allocated(error)) return
-    call raise(error, code, plan%input%file // ': every variant failed, the first one because: ' // reason // &
+    call raise(error, code, plan%input%file // ': every variant failed, the first one because: ' // summary%first_reason // &
                '; all reasons are in ' // folder // '/' // sweep_file_name)
     call complain(error)
-    deallocate (error)
-  end subroutine write_results
+  end subroutine tell_results
 
   !> Why the first variant of a sweep is not done.
   subroutine find_first_reason(journals, reason, error)

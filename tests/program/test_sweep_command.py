@@ -157,6 +157,14 @@ def test_a_sweep_without_a_variant_that_is_done_fails(nocdyn, discs):
     assert nocdyn.files("out") == ["input.nml", "summary.json", "sweep.nc"]
 
 
+def test_a_reader_of_the_output_who_is_gone_costs_no_results(nocdyn, discs):
+    reading, writing = os.pipe()
+    os.close(reading)
+    nocdyn.start("sweep", discs, "--out", "out", stdout=writing).wait(timeout=60)
+    os.close(writing)
+    assert nocdyn.files("out") == ["input.nml", "summary.json", "sweep.nc"]
+
+
 def test_trajectories_of_chosen_variants_are_those_of_runs(nocdyn, discs):
     nocdyn.write("discs.nml", TWO_DISCS + SWEEP + "&record trajectories = 2, 17 /\n")
     nocdyn("sweep", "discs.nml", "--out", "out", "--csv")
