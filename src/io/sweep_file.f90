@@ -5,10 +5,10 @@
 module nocdyn_sweep_file
   use, intrinsic :: iso_c_binding, only: c_associated, c_f_procpointer, c_funptr, c_int
   use, intrinsic :: iso_fortran_env, only: int8
-  use netcdf, only: nf90_byte, nf90_char, nf90_chunked, nf90_clobber, nf90_close, nf90_create, nf90_def_dim, nf90_def_var, &
-    nf90_def_var_chunking, nf90_def_var_fill, nf90_double, nf90_ebadname, nf90_ehdferr, nf90_enddef, nf90_enotatt, &
-    nf90_get_att, nf90_global, nf90_inquire_attribute, nf90_int, nf90_max_name, nf90_netcdf4, nf90_noerr, nf90_nowrite, &
-    nf90_open, nf90_put_att, nf90_put_var, nf90_strerror, nf90_unlimited
+  use netcdf, only: nf90_byte, nf90_char, nf90_chunked, nf90_clobber, nf90_close, nf90_create, nf90_def_dim, &
+    nf90_def_var, nf90_def_var_chunking, nf90_def_var_fill, nf90_double, nf90_ebadname, nf90_ehdferr, nf90_enameinuse, &
+    nf90_enddef, nf90_enotatt, nf90_get_att, nf90_global, nf90_inquire_attribute, nf90_int, nf90_max_name, &
+    nf90_netcdf4, nf90_noerr, nf90_nowrite, nf90_open, nf90_put_att, nf90_put_var, nf90_strerror, nf90_unlimited
   use nocdyn_errors, only: error_t, exit_file, raise
   use nocdyn_journal_chunks, only: check_sweep, sweep_records_t
   use nocdyn_kinds, only: wp
@@ -201,11 +201,19 @@ contains
     character(len=*), intent(in) :: name, long_name
     integer, intent(in) :: kind, dimension
     integer, intent(inout) :: variable
+    character(len=:), allocatable :: possible
     integer :: status
 
-    status = nf90_def_var(file%id, name, kind, [dimension], variable)
-    ! Latin-1, say: names must be UTF-8
-    if (status == nf90_ebadname) status = nf90_def_var(file%id, ascii(name), kind, [dimension], variable)
+    possible = name
+    status = nf90_def_var(file%id, possible, kind, [dimension], variable)
+    if (status == nf90_ebadname) then   ! Latin-1, say: names must be UTF-8
+      possible = ascii(name)
+      status = nf90_def_var(file%id, possible, kind, [dimension], variable)
+    end if
+    do while (status == nf90_enameinuse)   ! two names in which only such letters differ
+      possible = possible // '_'
+      status = nf90_def_var(file%id, possible, kind, [dimension], variable)
+    end do
     call note(file, status)
     ! every variant is written: filling before that would be the same work again
     if (dimension == file%variant_dimension) call note(file, nf90_def_var_fill(file%id, variable, 1, 0))
