@@ -8,7 +8,7 @@ module nocdyn_sweep_results
   use nocdyn_kinds, only: wp
   use nocdyn_order_statistics, only: find_order_statistics
   use nocdyn_output_file, only: write_whole
-  use nocdyn_posix, only: is_interrupted
+  use nocdyn_posix, only: is_interrupted, remove_file
   use nocdyn_run_summary, only: run_summary_t
   use nocdyn_sweep_chunk, only: chunk_t
   use nocdyn_sweep_file, only: sweep_file_name, write_sweep_file
@@ -16,7 +16,7 @@ module nocdyn_sweep_results
   use nocdyn_sweep_journal, only: sweep_journal_t
   use nocdyn_sweep_plan, only: sweep_plan_t, without_sweep
   use nocdyn_sweep_summary, only: sweep_json, sweep_line, sweep_summary_t, sweep_table
-  use nocdyn_sweep_table, only: write_sweep_table
+  use nocdyn_sweep_table, only: sweep_table_name, write_sweep_table
   use nocdyn_targets, only: set_targets
   use nocdyn_text, only: to_text
   use nocdyn_transient, only: run_transient
@@ -35,7 +35,8 @@ module nocdyn_sweep_results
 
 contains
 
-  !> Writes everything of a sweep whose variants are all in the journals.
+  !> Writes everything of a sweep whose variants are all in the journals. A table that it does not write is one of an earlier
+  !> sweep, and removed.
   subroutine write_results(plan, folder, journals, options, summary, error)
     type(sweep_plan_t), intent(in) :: plan
     character(len=*), intent(in) :: folder
@@ -49,6 +50,7 @@ contains
     summary%failed = sum(journals%failed)
     call find_order_statistics(journals, summary%statistics, error)
     if (.not. allocated(error)) call write_sweep_file(folder, journals, error)
+    if (.not. (allocated(error) .or. options%wants_csv)) call remove_file(folder // '/' // sweep_table_name)
     if (.not. allocated(error) .and. options%wants_csv) call write_sweep_table(folder, journals, error)
     if (.not. allocated(error)) call write_trajectories(plan, folder, journals, options, error)
     if (.not. allocated(error)) call write_whole(folder, input_file, input_text(plan%input), error)

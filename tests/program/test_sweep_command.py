@@ -157,6 +157,13 @@ def test_a_sweep_without_a_variant_that_is_done_fails(nocdyn, discs):
     assert nocdyn.files("out") == ["input.nml", "summary.json", "sweep.nc"]
 
 
+def test_a_table_of_an_earlier_sweep_does_not_stay_beside_new_results(nocdyn, discs):
+    nocdyn("sweep", discs, "--out", "out", "--csv")
+    assert "sweep.csv" in nocdyn.files("out")
+    nocdyn("sweep", discs, "--out", "out", "--set", "sweep.seed=4")
+    assert nocdyn.files("out") == ["input.nml", "summary.json", "sweep.nc"]
+
+
 def test_a_reader_of_the_output_who_is_gone_costs_no_results(nocdyn, discs):
     reading, writing = os.pipe()
     os.close(reading)
