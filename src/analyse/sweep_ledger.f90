@@ -12,7 +12,8 @@ module nocdyn_sweep_ledger
   public :: open_ledger, chunk_size
 
   real(wp), parameter :: chunk_seconds = 0.2_wp   !! aimed at: long beside a message, short beside a person's patience
-  integer, parameter :: most_at_once = 8192       !! keeps chunks small enough to be held by the dozen
+  integer, parameter :: most_at_once = 8192       !! variants, and ...
+  integer, parameter :: most_numbers = 2**22      !! ... numbers: keep chunks small enough to be held by the dozen
   integer, parameter :: growth = 8                !! of a chunk over the one before, at most
 
   !> Numbers of variants.
@@ -50,6 +51,7 @@ module nocdyn_sweep_ledger
     integer, allocatable, private :: count(:)    !! ... and their lengths
     integer, private :: range = 1                !! from which is handed out
     integer, private :: left = 0                 !! variants not handed out
+    integer, private :: most = 1                 !! variants to hand out at once
     integer, private :: last_size = 0            !! of the chunk last handed out
     real(wp), private :: pace = 0.0_wp           !! seconds that a worker needs for a variant, 0: not known yet
     logical, private :: is_broken = .false.      !! `error` as other threads see it
@@ -78,6 +80,7 @@ contains
     ledger%lanes = lanes
     call journal%missing(ledger%first, ledger%count)
     ledger%left = sum(ledger%count)
+    ledger%most = max(1, most_numbers / (size(journal%header%parameters) + size(journal%header%results)))
     ledger%counts%total = journal%header%last - journal%header%first + 1
     ledger%counts%done = journal%done
     ledger%counts%refused = journal%refused
@@ -93,7 +96,7 @@ contains
     if (self%left == 0) return
     if (self%is_over()) return
     associate (r => self%range)
-      count = min(self%count(r), chunk_size(self%left, self%workers, self%lanes, self%pace, self%last_size))
+      count = min(self%count(r), self%most, chunk_size(self%left, self%workers, self%lanes, self%pace, self%last_size))
       first = self%first(r)
       self%first(r) = first + count
       self%count(r) = self%count(r) - count
