@@ -37,7 +37,9 @@ echo "$job;cluster"
 """
 SRUN = """\
 #!/usr/bin/env bash
-exec mpirun -n "$SLURM_NTASKS" "$@"
+set -euo pipefail
+[[ $1 == --kill-on-bad-exit=1 ]]
+exec mpirun -n "$SLURM_NTASKS" "${@:2}"
 """
 
 
