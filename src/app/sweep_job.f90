@@ -69,6 +69,7 @@ contains
     if (is_there .and. bytes > 0) then
       call open_journal(job%folder, name, job%journals(1), error)
       if (.not. allocated(error)) call judge_journal(job%journals(1), header, arguments%resumes, error)
+      if (.not. allocated(error)) call tell_damage(job)
     else
       if (arguments%resumes) call look_for_results(job, header, error)
       if (allocated(error) .or. job%is_done) return
@@ -101,6 +102,15 @@ contains
     end if
     if (.not. (allocated(error) .or. job%arguments%is_quiet)) call say(job%plan%input%file // ': ' // news)
   end subroutine look_for_results
+
+  !> A record that a kill has cut short, or a disk has spoilt, costs the variants in it.
+  subroutine tell_damage(job)
+    type(sweep_job_t), intent(in) :: job
+
+    if (job%journals(1)%damaged_bytes == 0 .or. job%arguments%is_quiet) return
+    call say(job%plan%input%file // ': note: ' // job%journals(1)%path() // ' has damaged records; ' // &
+             'their variants are computed again')
+  end subroutine tell_damage
 
   !> Writes what has come out, and tells it.
   subroutine finish_job(job, ledger, threads, ranks, code)

@@ -213,6 +213,19 @@ def test_results_of_another_sweep_are_not_taken_for_its_own(nocdyn, discs):
     )
 
 
+def test_a_damaged_journal_is_told_and_made_good(nocdyn, discs):
+    process = start(nocdyn, "sweep", discs, "--out", "out", *LONG, "--threads", 1)
+    process.send_signal(signal.SIGINT)
+    process.communicate(timeout=30)
+    content = journal(nocdyn).read_bytes()
+    journal(nocdyn).write_bytes(content[:-10])
+    outcome = nocdyn("sweep", discs, "--out", "out", "--resume", *LONG)
+    assert (outcome.returncode, outcome.stderr) == (0, "")
+    note = "note: out/sweep.journal has damaged records; their variants are computed again"
+    assert outcome.stdout.startswith(f"{discs}: {note}\n")
+    assert nocdyn.summary("out")["counts"]["done"] == SAMPLES
+
+
 LIST = "&sweep design = 'list' file = 'list.csv' /\n&record quantity = 'omega_wheel' statistic = 'final' /\n"
 
 
