@@ -243,31 +243,10 @@ contains
   subroutine check_usage(arguments, error)
     type(arguments_t), intent(in) :: arguments
     type(error_t), allocatable, intent(out) :: error
-    logical :: is_given
     integer :: i, operands
 
     do i = 1, size(options)
-      select case (options(i)%name)
-      case ('--out')
-        is_given = allocated(arguments%out)
-      case ('--set')
-        is_given = size(arguments%overrides) > 0
-      case ('--at')
-        is_given = allocated(arguments%at)
-      case ('--threads')
-        is_given = arguments%threads > 0
-      case ('--shard')
-        is_given = arguments%shards > 0
-      case ('--resume')
-        is_given = arguments%resumes
-      case ('--csv')
-        is_given = arguments%wants_csv
-      case ('--quiet')
-        is_given = arguments%is_quiet
-      case default
-        is_given = .false.
-      end select
-      if (.not. is_given .or. takes_option(arguments%command, options(i))) cycle
+      if (.not. is_given(arguments, options(i)%name) .or. takes_option(arguments%command, options(i))) cycle
       call raise(error, exit_input, takers_text(options(i)))
       return
     end do
@@ -285,5 +264,32 @@ contains
       ! help takes what there is
     end select
   end subroutine check_usage
+
+  !> Whether an option is on the command line. Of --help a command has been made.
+  pure logical function is_given(arguments, name)
+    type(arguments_t), intent(in) :: arguments
+    character(len=*), intent(in) :: name
+
+    select case (name)
+    case ('--out')
+      is_given = allocated(arguments%out)
+    case ('--set')
+      is_given = size(arguments%overrides) > 0
+    case ('--at')
+      is_given = allocated(arguments%at)
+    case ('--threads')
+      is_given = arguments%threads > 0
+    case ('--shard')
+      is_given = arguments%shards > 0
+    case ('--resume')
+      is_given = arguments%resumes
+    case ('--csv')
+      is_given = arguments%wants_csv
+    case ('--quiet')
+      is_given = arguments%is_quiet
+    case default
+      is_given = .false.
+    end select
+  end function is_given
 
 end module nocdyn_arguments
