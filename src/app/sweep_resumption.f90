@@ -12,7 +12,6 @@ module nocdyn_sweep_resumption
   public :: judge_journal, judge_results
 
   integer, parameter :: most_told = 5   ! differences
-  character(len=*), parameter :: changed_list = 'the file of &sweep with the variants has changed'
 
 contains
 
@@ -61,7 +60,7 @@ contains
     text = input_difference(old%input_text, new%input_text)
     if (text /= '') return
     if (old%list_checksum /= new%list_checksum) then
-      text = changed_list
+      text = 'the file of &sweep with the variants has changed'
     else if (old%first /= new%first .or. old%last /= new%last) then
       text = 'it is for the variants ' // to_text(old%first) // ' to ' // to_text(old%last) // ', not ' // &
              to_text(new%first) // ' to ' // to_text(new%last)
