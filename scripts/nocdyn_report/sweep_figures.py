@@ -11,21 +11,20 @@ from matplotlib import pyplot
 from matplotlib.figure import Figure
 
 from .results import ResultsError
-from .style import WIDTH, add_title, plain, save
+from .style import FORMATS, WIDTH, add_title, plain, save
+from .sweep_curves import Family, add_hertz, draw_family, explain_marks, family_of
+from .sweep_influence import MOST_BARS, Influence, draw_influence
 from .sweep_panels import (
     LINES,
     MOST_POINTS,
     NOT_DONE_LINES,
-    TURN,
     add_note,
-    draw_curve,
     draw_histogram,
     draw_map,
     draw_parallel,
     draw_scatter,
     explain_not_done,
     has_outliers,
-    rank_correlation,
     wrapped,
 )
 from .sweep_results import Sweep, Variable, read_sweep
@@ -43,35 +42,48 @@ def draw_histograms(sweep: Sweep, results: Sequence[Variable]) -> Figure:
     return figure
 
 
-def draw_scatters(sweep: Sweep, results: Sequence[Variable], keys: Sequence[Variable]) -> Figure:
-    """A row for each result, a column for each varied number."""
-    figure, grid = pyplot.subplots(len(results), len(keys), squeeze=False, sharex="col", sharey="row",
-                                   figsize=(max(0.85 * WIDTH, 2.9 * len(keys) + 1.0), 2.5 * len(results) + 1.2))
+def draw_scatters(sweep: Sweep, results: Sequence[Variable], influence: Influence) -> Figure:
+    """A row for each result; a column for each varied number, or for those with the most influence on the result."""
+    columns = min(COLUMNS, len(sweep.varied))
+    are_all = columns == len(sweep.varied)
+    figure, grid = pyplot.subplots(len(results), columns, squeeze=False, sharex="col" if are_all else "none", sharey="row",
+                                   figsize=(max(0.85 * WIDTH, 2.9 * columns + 1.0),
+                                            (2.5 if are_all else 2.9) * len(results) + 1.2))
     for row, result in zip(grid, results):
         row[0].set_ylabel(wrapped(result.label))
-        for axes, key in zip(row, keys):
+        for axes, key in zip(row, sweep.varied if are_all else influence.strongest_first(result)):
             draw_scatter(axes, sweep, key, result)
-    for axes, key in zip(grid[-1], keys):
-        axes.set_xlabel(wrapped(key.label))
-    far_out = any(has_outliers(result.values[sweep.known(result)]) for result in results)
-    add_note(figure, "darker: more variants" if sweep.status.size > MOST_POINTS else "",
+            if not are_all or result is results[-1]:
+                axes.set_xlabel(wrapped(key.label))
+    far_out = any(has_outliers(sweep, result.values[sweep.known(result)]) for result in results)
+    add_note(figure, "" if are_all else f"of {len(sweep.varied)} varied numbers the {columns} most correlated with the result",
+             "darker: more variants" if sweep.status.size > MOST_POINTS else "",
              "triangles: beyond the axis" if far_out else "")
     explain_not_done(figure, sweep, **TICK)
     return figure
 
 
-def draw_curves(sweep: Sweep, results: Sequence[Variable]) -> Figure:
-    """Each result over the only number that varies; with the largest value marked, and in Hz too, if that is a frequency."""
-    key = sweep.varied[0]
-    is_frequency = is_resonance(sweep)
-    figure, panels = _stack(len(results), 2.6, sharex=True)
+def draw_curves(sweep: Sweep, results: Sequence[Variable], family: Family) -> Figure:
+    """Each result over one number; in Hz too, if that is a frequency."""
+    figure, panels = _stack(len(results), 2.6, width=WIDTH if family.parameter is None else 1.2 * WIDTH, sharex=True)
     for axes, result in zip(panels, results):
-        draw_curve(axes, sweep, key, result, mark_peak=is_frequency)
-    panels[-1].set_xlabel(plain(key.label))
-    if is_frequency:
-        top = panels[0].secondary_xaxis("top", functions=(lambda omega: omega / TURN, lambda hertz: hertz * TURN))
-        top.set_xlabel("frequency [Hz]")
+        draw_family(axes, sweep, family, result)
+    panels[-1].set_xlabel(plain(family.key.label))
+    if family.is_resonance:
+        add_hertz(panels[0])
+    add_note(figure, explain_marks(family))
     explain_not_done(figure, sweep, **TICK)
+    return figure
+
+
+def draw_influences(sweep: Sweep, results: Sequence[Variable], influence: Influence) -> Figure:
+    bars = min(MOST_BARS, len(sweep.varied))
+    figure, panels = _stack(len(results), 0.6 + 0.24 * bars, sharex=True)
+    for axes, result in zip(panels, results):
+        draw_influence(axes, sweep, influence, result)
+    panels[-1].set_xlabel("rank correlation with the result")
+    add_note(figure, "grey: what chance alone gives, 95 % of the time",
+             f"{bars} of {len(sweep.varied)} varied numbers" if bars < len(sweep.varied) else "")
     return figure
 
 
@@ -101,24 +113,28 @@ def _stack(rows: int, height: float, width: float = WIDTH, sharex: bool = False)
     return figure, grid[:, 0]
 
 
-def is_resonance(sweep: Sweep) -> bool:
-    return len(sweep.varied) == 1 and sweep.varied[0].key == "frequency" and sweep.varied[0].unit == "rad/s"
-
-
 def figures_of(sweep: Sweep) -> Iterator[tuple[str, Figure]]:
     """Names and figures; those of many results go on in NAME_2 ..."""
-    yield from _paged("histograms", sweep, draw_histograms)
-    if len(sweep.varied) == 1:
-        yield from _paged("resonance" if is_resonance(sweep) else "curves", sweep, draw_curves)
-        return
-    keys = sorted(sweep.varied, key=lambda key: -strongest(sweep, key)) if len(sweep.varied) > COLUMNS else sweep.varied
-    for first in range(0, len(keys), COLUMNS):
-        name = "scatter" if first == 0 else f"scatter_keys{first + 1}"
-        yield from _paged(name, sweep, partial(draw_scatters, keys=keys[first:first + COLUMNS]))
+    family = family_of(sweep)
+    if family is None or not sweep.is_grid:  # how often a value comes along a curve says nothing
+        yield from _paged("histograms", sweep, draw_histograms)
+    if family is not None:
+        yield from _paged("resonance" if family.is_resonance else "curves", sweep, partial(draw_curves, family=family))
+    else:
+        yield from _clouds(sweep)
     if len(sweep.varied) == 2:
         yield from _paged("map", sweep, draw_maps)
-    else:
-        yield from _paged("parallel", sweep, partial(draw_parallels, keys=keys[:AXES]))
+
+
+def _clouds(sweep: Sweep) -> Iterator[tuple[str, Figure]]:
+    """The figures of variants that do not lie on curves."""
+    influence = Influence(sweep)
+    if not sweep.is_grid:
+        yield from _paged("influence", sweep, partial(draw_influences, influence=influence))
+    yield from _paged("scatter", sweep, partial(draw_scatters, influence=influence))
+    if len(sweep.varied) > 2:
+        keys = influence.strongest_first()[:AXES] if len(sweep.varied) > COLUMNS else sweep.varied
+        yield from _paged("parallel", sweep, partial(draw_parallels, keys=keys))
 
 
 def _paged(name: str, sweep: Sweep, draw: Callable[[Sweep, Sequence[Variable]], Figure]) -> Iterator[tuple[str, Figure]]:
@@ -126,17 +142,22 @@ def _paged(name: str, sweep: Sweep, draw: Callable[[Sweep, Sequence[Variable]], 
         yield name if page == 1 else f"{name}_{page}", draw(sweep, sweep.results[first:first + ROWS])
 
 
-def strongest(sweep: Sweep, key: Variable) -> float:
-    """The largest rank correlation of a varied number with any result."""
-    known = ((result.values[rows], key.values[rows]) for result in sweep.results for rows in [sweep.known(result)])
-    return max(np.nan_to_num(abs(rank_correlation(*pair))) for pair in known)
+def formats(text: str) -> list[str]:
+    """Of the figures, as given after --format."""
+    kinds = text.lower().split(",")
+    for kind in kinds:
+        if kind not in FORMATS:
+            raise argparse.ArgumentTypeError(f"'{kind}' is none of {', '.join(FORMATS)}")
+    return kinds
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(prog="scripts/plot_sweep", description=__doc__)
     parser.add_argument("results", type=Path, metavar="RESULTS", help="folder that 'nocdyn sweep' wrote")
     parser.add_argument("--out", type=Path, metavar="DIR",
-                        help="where the figures go, as PNG, SVG and PDF (RESULTS/figures)")
+                        help="where the figures go (RESULTS/figures)")
+    parser.add_argument("--format", type=formats, default=list(FORMATS), metavar="KINDS",
+                        help=f"of the figures, separated by commas: some of {','.join(FORMATS)} (all)")
     arguments = parser.parse_args()
     folder = arguments.out or arguments.results / "figures"
     try:
@@ -146,9 +167,10 @@ def main() -> None:
     names = []
     for name, figure in figures_of(sweep):
         add_title(figure, sweep.title, sweep.remark)
-        save(figure, folder, name)
+        save(figure, folder, name, arguments.format)
         names.append(name)
-    print(f"{', '.join(names)} (PNG, SVG, PDF) are in {folder}")
+    kinds = ", ".join(kind.upper() for kind in arguments.format)
+    print(f"{', '.join(names)} ({kinds}) are in {folder}")
 
 
 if __name__ == "__main__":

@@ -9,26 +9,25 @@ from matplotlib import colormaps
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.collections import LineCollection
-from matplotlib.colors import LinearSegmentedColormap, Normalize, PowerNorm
+from matplotlib.colors import LinearSegmentedColormap, LogNorm, Normalize, PowerNorm
 from matplotlib.contour import ContourSet
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.tri import Triangulation
 
-from .style import COLOURS, REFERENCE, plain
+from .style import COLOURS, plain
 from .sweep_results import Sweep, Variable
 
 MOST_POINTS = 20_000  # that are drawn one by one
 DENSE = 2_000  # points from which contours show more than dots
-FEW = 100  # points of a curve that are marked
 RASTER = 1_000  # points from which dots are pixels in SVG and PDF too
 BINS = (12, 100)  # fewest and most of a histogram
 CONTOURS = 20
 CELLS = 80  # along each side of a density
 LABEL_LENGTH = 26  # characters that fit under a panel
 WIDE = 50.0  # 95 % over 5 % value from which an axis is logarithmic; of evenly distributed numbers it is at most 19
-STEEP = 50.0  # largest over smallest value from which the axis of a resonance curve is
-TURN = 2.0 * np.pi  # [rad]
+DECADES = 100.0  # largest over smallest value from which the colours of a grid are
+FEWEST_DIGITS = 5
 REACH = 3.0  # distances from 5 % to 95 % beyond which a value is an outlier
 LINES = 500  # of parallel axes
 MOST_MARKS = 100  # of variants that were not done
@@ -55,6 +54,11 @@ def is_wide(values: np.ndarray) -> bool:
     return values.min() > 0.0 and high > WIDE * low
 
 
+def shown(sweep: Sweep, values: np.ndarray) -> np.ndarray:
+    """Those within the axes and colours of a figure. On a grid all are: there, an extreme is what was looked for."""
+    return values if sweep.is_grid else without_outliers(values)
+
+
 def without_outliers(values: np.ndarray) -> np.ndarray:
     low, high = np.quantile(values, (0.05, 0.95))
     reach = REACH * (high - low) if high > low else np.inf
@@ -72,8 +76,8 @@ def thinned(places: np.ndarray, most: int) -> np.ndarray:
     return places[::max(1, -(-places.size // most))]
 
 
-def has_outliers(values: np.ndarray) -> bool:
-    return without_outliers(values).size < values.size
+def has_outliers(sweep: Sweep, values: np.ndarray) -> bool:
+    return shown(sweep, values).size < values.size
 
 
 def is_constant(values: np.ndarray) -> bool:
@@ -92,17 +96,19 @@ def draw_histogram(axes: Axes, sweep: Sweep, result: Variable) -> None:
     """With the 5 %, 50 % and 95 % values; what lies very far outside is counted, not drawn."""
     values = result.values[sweep.known(result)]
     low, median, high = np.quantile(values, (0.05, 0.5, 0.95))
-    inside = without_outliers(values)
+    inside = shown(sweep, values)
     if is_constant(values):
         room = 0.1 * abs(median) or 1.0
         axes.bar(median, len(values), width=0.1 * room, color=COLOURS[0], alpha=0.5)
         axes.set_xlim(median - room, median + room)
     else:
         axes.hist(inside, bins=_bins(inside, high - low), color=COLOURS[0], alpha=0.5)
+    digits = _digits(low, high)
     for value, name, style in ((low, "5 %", (0, (2, 2))), (median, "median", "-"), (high, "95 %", (0, (5, 3)))):
-        axes.axvline(value, color="black", linestyle=style, linewidth=1.1, label=f"{name}: {value:.5g}")
+        axes.axvline(value, color="black", linestyle=style, linewidth=1.1,
+                     label=plain(f"{name}: {value:.{digits}g} {result.shown_unit}".rstrip()))
     if len(inside) < len(values):
-        axes.plot([], [], " ", label=f"{len(values) - len(inside)} further out,\nup to {_farthest(values, median):.5g}")
+        axes.plot([], [], " ", label=plain(f"{len(values) - len(inside)} further out,\n{_far_ends(values, inside, result)}"))
     axes.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
     axes.set_title(plain(result.long_name), loc="left")
     axes.set_xlabel(plain(result.label))
@@ -116,8 +122,17 @@ def _bins(values: np.ndarray, width: float) -> int:
     return int(np.clip(np.ptp(values) / bin_width, *BINS)) if bin_width > 0.0 else BINS[0]
 
 
-def _farthest(values: np.ndarray, median: float) -> float:
-    return values[np.argmax(np.abs(values - median))]
+def _digits(low: float, high: float) -> int:
+    """Significant ones that show three of the difference of two numbers, if it is more than rounding."""
+    if is_constant(np.array([low, high])):
+        return FEWEST_DIGITS
+    return max(FEWEST_DIGITS, 3 + int(np.ceil(np.log10(max(abs(low), abs(high)) / (high - low)))))
+
+
+def _far_ends(values: np.ndarray, inside: np.ndarray, result: Variable) -> str:
+    """How far the outliers go, on the sides on which there are some."""
+    ends = ((values.min(), "down to", values.min() < inside.min()), (values.max(), "up to", values.max() > inside.max()))
+    return ",\n".join(f"{words} {value:.5g} {result.shown_unit}".rstrip() for value, words, is_out in ends if is_out)
 
 
 def draw_scatter(axes: Axes, sweep: Sweep, key: Variable, result: Variable) -> None:
@@ -126,7 +141,7 @@ def draw_scatter(axes: Axes, sweep: Sweep, key: Variable, result: Variable) -> N
     x, y = key.values[known], result.values[known]
     if is_wide(x):
         axes.set_xscale("log")
-    inside = without_outliers(y)
+    inside = shown(sweep, y)
     is_near = (y >= inside.min()) & (y <= inside.max())
     if len(x) > MOST_POINTS:
         _draw_density(axes, x[is_near], y[is_near])
@@ -175,34 +190,14 @@ def explain_not_done(figure: Figure, sweep: Sweep, most: int = MOST_MARKS, **sty
     figure.legend([Line2D([], [], color=NOT_DONE, **style)], [label], loc="outside lower right")
 
 
-def draw_curve(axes: Axes, sweep: Sweep, key: Variable, result: Variable, mark_peak: bool) -> None:
-    """A result over the only number that varies."""
-    order = np.argsort(key.values, kind="stable")
-    x, y = key.values[order], result.values[order]  # NaN breaks the line
-    axes.plot(x, y, color=COLOURS[0], marker="o" if len(x) <= FEW else None, markersize=3)
-    if is_wide(x):
-        axes.set_xscale("log")
-    values = result.values[sweep.known(result)]
-    if mark_peak and result.unit != "s" and not is_constant(values):  # the latest of times is no peak
-        if 0.0 < STEEP * values.min() < values.max():
-            axes.set_yscale("log")
-        peak, word = (np.nanargmin(y), "smallest") if result.is_minimum else (np.nanargmax(y), "largest")
-        axes.axvline(x[peak], **REFERENCE)
-        axes.plot(x[peak], y[peak], "o", color="black", markersize=5,
-                  label=f"{word}: {y[peak]:.5g} {result.unit}\nat {x[peak]:.5g} {key.unit} = {x[peak] / TURN:.4g} Hz")
-        axes.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
-    mark_not_done(axes, sweep, key)
-    axes.set_title(plain(result.long_name), loc="left")
-    axes.set_ylabel(wrapped(result.label))
-
-
 def draw_map(axes: Axes, sweep: Sweep, result: Variable) -> None:
     """A result over both numbers that vary: cells of a grid, contours or dots; crosses are variants that were not done."""
     first, second = sweep.varied
     known = sweep.known(result)
     x, y, colour = (variable.values[known] for variable in (first, second, result))
-    limits = without_outliers(colour)
-    scale = {"cmap": COLOUR_MAP, "norm": Normalize(limits.min(), limits.max())}
+    limits = shown(sweep, colour)
+    is_steep = sweep.is_grid and 0.0 < DECADES * limits.min() < limits.max()
+    scale = {"cmap": COLOUR_MAP, "norm": (LogNorm if is_steep else Normalize)(limits.min(), limits.max())}
     if sweep.is_grid:
         drawn = axes.pcolormesh(*grid_cells(sweep, result), rasterized=True, **scale)
     elif DENSE < len(x) and not is_wide(x) and not is_wide(y) and not is_constant(limits) and fill_a_plane(x, y):
@@ -275,7 +270,7 @@ def draw_parallel(axes: Axes, sweep: Sweep, keys: Sequence[Variable], result: Va
     middle_first = np.argsort(np.abs(shares[chosen, -1] - 0.5), kind="stable")
     chosen = chosen[middle_first]
     values = result.values[sweep.known(result)]
-    limits = without_outliers(values)
+    limits = shown(sweep, values)
     lines = LineCollection([np.column_stack((places, row)) for row in shares[chosen]], array=result.values[chosen],
                            norm=Normalize(limits.min(), limits.max()), cmap=COLOUR_MAP, linewidths=0.7, alpha=0.5,
                            rasterized=True)

@@ -28,7 +28,11 @@ class Variable:
 
     @property
     def label(self) -> str:
-        return f"{self.name} [{self.unit}]" if self.unit not in ("", "1") else self.name
+        return f"{self.name} [{self.shown_unit}]" if self.shown_unit else self.name
+
+    @property
+    def shown_unit(self) -> str:
+        return "" if self.unit == "1" else self.unit
 
     @property
     def key(self) -> str:
@@ -125,7 +129,12 @@ def _variables(content: h5netcdf.File, role: str) -> list[Variable]:
 
 
 def _text(value: object) -> str:
-    return value.decode() if isinstance(value, bytes) else str(value)
+    """The text of an attribute: UTF-8, which the NetCDF library marks as ASCII; what is no UTF-8 is taken for Latin-1."""
+    stored = value if isinstance(value, bytes) else str(value).encode("utf-8", "surrogateescape")
+    try:
+        return stored.decode("utf-8")
+    except UnicodeDecodeError:
+        return stored.decode("latin-1")
 
 
 def _read_table(file: Path) -> Sweep:

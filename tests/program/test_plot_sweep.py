@@ -56,10 +56,9 @@ def write_sweep(folder: Path, design: str, varied: dict, results: dict, status=N
 def draw(monkeypatch, capsys, folder: Path, formats: tuple[str, ...] = ("svg",)) -> list[str]:
     """The names of the figures, each of which has been seen in these formats."""
     main = importlib.import_module("nocdyn_report.sweep_figures").main
-    monkeypatch.setattr("nocdyn_report.style.FORMATS", formats)
-    monkeypatch.setattr(sys, "argv", ["plot_sweep", str(folder)])
+    monkeypatch.setattr(sys, "argv", ["plot_sweep", str(folder), "--format", ",".join(formats)])
     main()
-    names = capsys.readouterr().out.split(" (PNG, SVG, PDF)")[0].split(", ")
+    names = capsys.readouterr().out.split(f" ({', '.join(formats).upper()})")[0].split(", ")
     for name in names:
         for kind in formats:
             content = (folder / "figures" / f"{name}.{kind}").read_bytes()
@@ -81,7 +80,7 @@ def test_random_sweep_of_two_numbers_with_failures_is_drawn(tmp_path, monkeypatc
     status = np.full(200, DONE)
     status[:4], status[4] = FAILED, REFUSED
     folder = write_sweep(tmp_path, "random", {LOAD: load, CUBIC: cubic}, {MOMENT: load - cubic, SPEED: -load}, status)
-    assert draw(monkeypatch, capsys, folder, ("png", "svg", "pdf")) == ["histograms", "scatter", "map"]
+    assert draw(monkeypatch, capsys, folder, ("png", "svg", "pdf")) == ["histograms", "influence", "scatter", "map"]
     text = text_of(folder, "scatter")
     assert "Costs $5" in text and "random design, 200 variants, 1 refused, 4 failed" in text
     assert "rank correlation -1.00" in text and "refused or failed" in text
@@ -95,16 +94,30 @@ def test_percentiles_are_those_of_the_printed_summary(tmp_path, monkeypatch, cap
     folder = write_sweep(tmp_path, "random", {LOAD: order}, {MOMENT: order + 1.0})
     draw(monkeypatch, capsys, folder)
     text = text_of(folder, "histograms")
-    assert "5 %: 6<" in text and "median: 51<" in text and "95 %: 96<" in text
+    assert "5 %: 6 N m<" in text and "median: 51 N m<" in text and "95 %: 96 N m<" in text
 
 
-def test_outliers_are_counted_beside_the_histogram(tmp_path, monkeypatch, capsys):
+def test_percentiles_that_differ_little_are_told_apart(tmp_path, monkeypatch, capsys):
+    order = np.random.default_rng(1).permutation(101)
+    folder = write_sweep(tmp_path, "random", {LOAD: order}, {MOMENT: 1e4 + 1e-5 * order, SPEED: np.full(101, 100.0 / 3.0)})
+    draw(monkeypatch, capsys, folder)
+    text = text_of(folder, "histograms")
+    assert "5 %: 10000.00005 N m<" in text and "median: 10000.0005 N m<" in text and "95 %: 10000.00095 N m<" in text
+    assert "5 %: 33.333 rad/s<" in text and "95 %: 33.333 rad/s<" in text
+
+
+@pytest.mark.parametrize(("extremes", "words"), [
+    ({7: 1e9}, ["1 further out,", "up to 1e+09 N m"]),
+    ({7: -1e9}, ["1 further out,", "down to -1e+09 N m"]),
+    ({7: -1e6, 8: 1e9, 9: -1e7}, ["3 further out,", "down to -1e+07 N m,", "up to 1e+09 N m"]),
+])
+def test_outliers_are_counted_beside_the_histogram(extremes, words, tmp_path, monkeypatch, capsys):
     values = np.linspace(0.0, 1.0, 100)
-    values[7] = 1e9
+    values[list(extremes)] = list(extremes.values())
     folder = write_sweep(tmp_path, "random", {LOAD: np.arange(100.0), CUBIC: np.arange(100.0)}, {MOMENT: values})
     draw(monkeypatch, capsys, folder)
     text = text_of(folder, "histograms")
-    assert "1 further out," in text and "up to 1e+09" in text
+    assert all(f">{word}<" in text for word in words) and text.count(" to ") == len(words) - 1
     assert "triangles: beyond the axis" in text_of(folder, "scatter")
 
 
@@ -121,11 +134,60 @@ def test_grid_of_two_numbers_is_a_heat_map(tmp_path, monkeypatch, capsys):
     assert cells[1, 2] == 100.0 * 10.0 and cells.mask.sum() == 1 and cells.mask[2, 4]
 
 
+def grid_of(*axes) -> list[np.ndarray]:
+    return [axis.ravel() for axis in np.meshgrid(*axes, indexing="ij")]
+
+
+def test_extremes_of_a_grid_are_drawn(tmp_path, monkeypatch, capsys):
+    load, cubic = grid_of(np.linspace(50, 150, 20), np.arange(10.0))
+    moment = np.where((load == 150) & (cubic == 0), 1e6, 100.0 + load)
+    folder = write_sweep(tmp_path, "grid", {LOAD: load, CUBIC: cubic}, {MOMENT: moment, SPEED: -moment})
+    assert draw(monkeypatch, capsys, folder) == ["histograms", "scatter", "map"]
+    assert "further out" not in text_of(folder, "histograms") and "triangles" not in text_of(folder, "scatter")
+    figures = importlib.import_module("nocdyn_report.sweep_figures")
+    sweep = importlib.import_module("nocdyn_report.sweep_results").read_sweep(folder)
+    panels = figures.draw_maps(sweep, sweep.results).axes
+    scales = [(norm.vmin, norm.vmax, type(norm).__name__) for axes in panels[:2] for norm in [axes.collections[0].norm]]
+    assert scales == [(150.0, 1e6, "LogNorm"), (-1e6, -150.0, "Normalize")]
+
+
+def test_resonances_for_few_values_of_a_second_number_are_a_family_of_curves(tmp_path, monkeypatch, capsys):
+    frequency, load = grid_of(np.linspace(0.5, 12.0, 116), [1.0, 2.0, 4.0])
+    moment = 1.0 / np.abs(6.4 + 0.1j * load - frequency)
+    varied = {"excitation.shaker.frequency": frequency, LOAD: load}
+    folder = write_sweep(tmp_path / "few", "grid", varied, {MOMENT: moment, "moment_coupling_time_of_max": frequency})
+    assert draw(monkeypatch, capsys, folder) == ["resonance", "map"]
+    text = text_of(folder, "resonance")
+    assert ">1: largest 10 N m at 6.4 rad/s<" in text and ">4: largest 2.5 N m at 6.4 rad/s<" in text
+    assert text.count("largest 5 N m") == 1 and ">2<" in text, "the latest of times is no peak"
+    assert "load.work.viscous" in text and "dots: the extremes of the curves" in text and "frequency [Hz]" in text
+
+    frequency, load = grid_of(np.linspace(0.5, 12.0, 10), np.arange(9.0))
+    folder = write_sweep(tmp_path / "many", "grid", {LOAD: load, "excitation.shaker.frequency": frequency}, {MOMENT: frequency})
+    assert draw(monkeypatch, capsys, folder) == ["histograms", "scatter", "map"]
+
+
+def test_influence_is_shown_as_bars_the_strongest_first(tmp_path, monkeypatch, capsys):
+    numbers = random_numbers(400, 20)
+    varied = {f"body.rotor{i}.inertia": row for i, row in enumerate(numbers)}
+    folder = write_sweep(tmp_path, "random", varied, {MOMENT: numbers[5] - 3.0 * numbers[11], SPEED: np.ones(400)})
+    draw(monkeypatch, capsys, folder)
+    assert "15 of 20 varied numbers" in text_of(folder, "influence")
+    modules = [importlib.import_module(f"nocdyn_report.sweep_{name}") for name in ("figures", "influence", "results")]
+    sweep = modules[2].read_sweep(folder)
+    figure = modules[0].draw_influences(sweep, sweep.results, modules[1].Influence(sweep))
+    bars = [bar.get_width() for bar in figure.axes[0].patches if bar.get_height() == 0.7]
+    names = [label.get_text() for label in figure.axes[0].get_yticklabels()]
+    assert len(bars) == 15 and names[:2] == ["body.rotor11.inertia", "body.rotor5.inertia"]
+    assert bars[0] < -0.9 and 0.2 < bars[1] < 0.4 and max(map(abs, bars[2:])) < 0.2
+    assert not any(bar.get_width() for bar in figure.axes[1].patches if bar.get_height() == 0.7), "a constant depends on nothing"
+
+
 def test_many_scattered_variants_become_shades_and_contours(tmp_path, monkeypatch, capsys):
     load, cubic = random_numbers(25_000, 2)
     status = np.where(load > 0.99, FAILED, DONE)
     folder = write_sweep(tmp_path, "sobol", {LOAD: load, CUBIC: cubic}, {MOMENT: load + cubic**2}, status)
-    assert draw(monkeypatch, capsys, folder, ("svg", "pdf")) == ["histograms", "scatter", "map"]
+    assert draw(monkeypatch, capsys, folder, ("svg", "pdf")) == ["histograms", "influence", "scatter", "map"]
     assert "Sobol design, 25 000 variants" in text_of(folder, "map")
     assert "darker: more variants" in text_of(folder, "scatter")
     assert "failed (one in 3 is shown)" in text_of(folder, "scatter")
@@ -138,7 +200,7 @@ def test_frequency_alone_gives_a_resonance_curve_with_its_peak(tmp_path, monkeyp
     folder = write_sweep(tmp_path, "grid", {"excitation.shaker.frequency": frequency},
                          {MOMENT: moment, "moment_coupling_time_of_max": frequency, "moment_coupling_min_from_2": -moment},
                          np.where(frequency > 11.0, FAILED, DONE))
-    assert draw(monkeypatch, capsys, folder) == ["histograms", "resonance"]
+    assert draw(monkeypatch, capsys, folder) == ["resonance"]
     text = text_of(folder, "resonance")
     assert "largest: 10 N m" in text and "at 6.4 rad/s = 1.019 Hz" in text and "frequency [Hz]" in text
     assert "excitation.shaker.frequency [rad/s]" in text
@@ -160,9 +222,10 @@ def test_many_numbers_and_results_go_on_in_further_figures(tmp_path, monkeypatch
     results = {f"omega_rotor{i}_final": numbers[2 - i % 2] + 0.01 * numbers[0] for i in range(3)}
     folder = write_sweep(tmp_path, "latin", varied, results, np.arange(150) % 50 == 0)
     assert draw(monkeypatch, capsys, folder) == [
-        "histograms", "histograms_2", "scatter", "scatter_2", "scatter_keys3", "scatter_keys3_2", "parallel", "parallel_2"]
-    assert "body.rotor0.inertia" not in text_of(folder, "scatter"), "the strongest correlations come first"
-    assert "body.rotor0.inertia" in text_of(folder, "scatter_keys3")
+        "histograms", "histograms_2", "influence", "influence_2", "scatter", "scatter_2", "parallel", "parallel_2"]
+    text = text_of(folder, "scatter_2")  # of the third result, which is the third number with some of the first
+    assert "body.rotor2.inertia" in text and "body.rotor0.inertia" in text and "body.rotor1.inertia" not in text
+    assert "of 3 varied numbers the 2 most correlated with the result" in text
 
 
 def test_parallel_axes_say_what_they_leave_out(tmp_path, monkeypatch, capsys):
@@ -184,7 +247,7 @@ def test_parallel_axes_say_what_they_leave_out(tmp_path, monkeypatch, capsys):
 ])
 def test_awkward_lists_are_drawn(load, cubic, tmp_path, monkeypatch, capsys):
     folder = write_sweep(tmp_path, "list", {LOAD: load, CUBIC: cubic}, {MOMENT: cubic, SPEED: 0.0 * load})
-    assert draw(monkeypatch, capsys, folder) == ["histograms", "scatter", "map"]
+    assert draw(monkeypatch, capsys, folder) == ["histograms", "influence", "scatter", "map"]
     assert "constant" in text_of(folder, "scatter")
 
 
@@ -192,7 +255,7 @@ def test_results_that_done_variants_do_not_have_are_left_out(tmp_path, monkeypat
     load, cubic = random_numbers(100, 2)
     partly = np.where(load < 0.1, np.nan, load)
     folder = write_sweep(tmp_path, "random", {LOAD: load, CUBIC: cubic}, {MOMENT: partly, SPEED: np.full(100, np.nan)})
-    assert draw(monkeypatch, capsys, folder) == ["histograms", "scatter", "map"]
+    assert draw(monkeypatch, capsys, folder) == ["histograms", "influence", "scatter", "map"]
     assert "rank correlation +1.00" in text_of(folder, "scatter")
     assert SPEED not in text_of(folder, "histograms")
 
@@ -206,10 +269,44 @@ def test_table_is_drawn_where_there_is_no_netcdf_file(tmp_path, monkeypatch, cap
     (tmp_path / "sweep.csv").write_text(
         f"variant,{LOAD} [N m s/rad],body.rotor.teeth,{MOMENT} [N m],omega_a.b_final [rad/s],status,steps,reason\n"
         "1,50.0,20,3.5,1.0,done,100,\n2,60.0,21,,,failed,90,\"too, many steps\"\n3,70.0,22,4.5,2.0,done,95,\n")
-    assert draw(monkeypatch, capsys, tmp_path) == ["histograms", "scatter", "map"]
+    assert draw(monkeypatch, capsys, tmp_path) == ["histograms", "influence", "scatter", "map"]
     text = text_of(tmp_path, "scatter")
     assert "From a table" in text and "list design, 3 variants, 1 failed" in text and "body.rotor.teeth<" in text
     assert "omega_a.b_final [rad/s]" in text
+
+
+@pytest.mark.parametrize("store", [
+    lambda text: np.bytes_(text.encode()),  # as the NetCDF library does it: UTF-8 that is marked as ASCII
+    lambda text: np.bytes_(text.encode("latin-1")),
+    lambda text: text,
+])
+def test_names_beyond_ascii_are_drawn(store, tmp_path, monkeypatch, capsys):
+    import h5py
+
+    folder = write_sweep(tmp_path, "random", {LOAD: np.arange(9.0), CUBIC: np.arange(9.0)}, {MOMENT: np.arange(9.0)})
+    with h5py.File(folder / "sweep.nc", "r+") as file:
+        file.attrs["title"] = store("Größe")
+        file[MOMENT].attrs["label"] = store("moment_größe_final")
+        file[MOMENT].attrs["long_name"] = store("moment_größe, at the end")
+    draw(monkeypatch, capsys, folder, ("png", "svg", "pdf"))
+    text = text_of(folder, "histograms")
+    assert "Größe" in text and "moment_größe_final [N m]" in text and "moment_größe, at the end" in text
+
+
+def test_only_the_formats_that_are_asked_for_are_written(tmp_path, monkeypatch, capsys):
+    folder = write_sweep(tmp_path, "grid", {LOAD: np.arange(9.0)}, {MOMENT: np.arange(9.0)})
+    main = importlib.import_module("nocdyn_report.sweep_figures").main
+    files = {"png": ["curves.png"], "svg,PDF": ["curves.pdf", "curves.svg"], None: ["curves.pdf", "curves.png", "curves.svg"]}
+    for number, (kinds, names) in enumerate(files.items()):
+        out = tmp_path / str(number)
+        monkeypatch.setattr(sys, "argv", ["plot_sweep", str(folder), "--out", str(out), *(["--format", kinds] if kinds else [])])
+        main()
+        assert sorted(path.name for path in out.iterdir()) == names
+    monkeypatch.setattr(sys, "argv", ["plot_sweep", str(folder), "--format", "png,tiff"])
+    capsys.readouterr()
+    with pytest.raises(SystemExit) as leaving:
+        main()
+    assert leaving.value.code == 2 and "'tiff' is none of png, svg, pdf" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(("files", "message"), [
