@@ -23,6 +23,7 @@ module nocdyn_plain_targets
     logical :: is_exempt = .false.                 !! somebody else sets it
     integer :: passed(-1:1) = 0                    !! trials of each sign
     logical :: may_be(-1:1) = .false.              !! whether values of each sign are plain
+    logical :: is_zero_at_origin = .false.
     real(wp) :: lowest, highest                    !! allowed values, as far as they are known
     type(place_t), allocatable :: place(:)         !! not allocated: no trial has passed
     logical, allocatable :: is_negative(:)         !! whether the number there is the negative of the value
@@ -51,6 +52,7 @@ contains
     allocate (self%target(size(origin)))
     self%target%lowest = origin
     self%target%highest = origin
+    self%target%is_zero_at_origin = .not. abs(origin) > 0
   end function new_plain_targets
 
   !> Leaves a target, of positive values, to somebody else, who sets other numbers than plain ones.
@@ -165,14 +167,18 @@ contains
     are_at = a%slab == b%slab .and. a%row == b%row .and. a%column == b%column
   end function are_at
 
-  !> Whether values are plain by their signs; the zeros of arithmetic, not its negative ones.
+  !> Whether values are plain by their signs; the zeros of arithmetic, not its negative ones. Only single zeros have been tried:
+  !> of two, e.g. the last terms of a law, each may be plain where both are not.
   pure logical function may_take(self, values)
     class(plain_targets_t), intent(in) :: self
     real(wp), contiguous, intent(in) :: values(:)
-    integer :: i
+    integer :: i, zeros
 
     may_take = .false.
+    zeros = 0
     do i = 1, size(self%target)
+      if (.not. abs(values(i)) > 0 .and. .not. self%target(i)%is_zero_at_origin) zeros = zeros + 1
+      if (zeros > 1) return
       if (values(i) > 0) then
         if (.not. self%target(i)%may_be(1)) return
       else if (values(i) < 0) then

@@ -5,7 +5,7 @@ module nocdyn_statistics
   implicit none (type, external)
   private
 
-  public :: new_statistic
+  public :: new_statistic, find_columns, is_torque, value_of_nothing
 
   integer, parameter, public :: statistic_final = 1           !! at the end
   integer, parameter, public :: statistic_max = 2             !! in continuous time, as all of them are
@@ -24,9 +24,10 @@ module nocdyn_statistics
     'largest absolute value', 'mean over time', 'root mean square over time', 'time of the largest value', 'settling time']
 
   !> One result of each variant. The column x counts from the time `from` on; it has settled once
-  !> |x - x_end| <= band |x(from) - x_end| for good.
+  !> |x - x_end| <= band |x(from) - x_end| for good. Variants of another structure have other columns, in another order.
   type, public :: statistic_t
-    integer :: column = 1                            !! of the trajectory table
+    character(len=:), allocatable :: quantity        !! label of the column, e.g. 'moment_shaft [N m]'
+    integer :: column = 0                            !! of one machine's trajectory table; 0: it has none
     integer :: kind = statistic_final                !! statistic_...
     real(wp) :: from = 0.0_wp                        !! [s]
     real(wp) :: band = default_band                  !! for settling_time only
@@ -47,6 +48,7 @@ contains
     type(statistic_t) :: self
     integer :: bracket
 
+    self%quantity = labels(column)%text
     self%column = column
     self%kind = kind
     self%from = t_start
@@ -63,5 +65,39 @@ contains
     self%label = self%label // '_from_' // to_text(from)
     self%long_name = self%long_name // ' from ' // to_text(from) // ' s'
   end function new_statistic
+
+  !> Looks the columns of statistics up among those of a machine.
+  subroutine find_columns(labels, statistics)
+    type(string_t), intent(in) :: labels(:)   !! of the machine's trajectory table
+    type(statistic_t), intent(inout) :: statistics(:)
+    integer :: column, i
+
+    do i = 1, size(statistics)
+      associate (statistic => statistics(i))
+        if (statistic%column >= 1 .and. statistic%column <= size(labels)) then
+          if (labels(statistic%column)%text == statistic%quantity) cycle
+        end if
+        statistic%column = 0
+        do column = 1, size(labels)
+          if (labels(column)%text == statistic%quantity) statistic%column = column
+        end do
+      end associate
+    end do
+  end subroutine find_columns
+
+  !> Whether the column is a torque: 0 in a machine that has no such column, as there is no such torque.
+  pure logical function is_torque(statistic)
+    type(statistic_t), intent(in) :: statistic
+
+    is_torque = index(statistic%quantity, ' [N m]') > 0
+  end function is_torque
+
+  !> The statistic of a column that is 0 all the time.
+  elemental real(wp) function value_of_nothing(statistic) result(value)
+    type(statistic_t), intent(in) :: statistic
+
+    value = 0.0_wp
+    if (statistic%kind == statistic_time_of_max) value = statistic%from
+  end function value_of_nothing
 
 end module nocdyn_statistics

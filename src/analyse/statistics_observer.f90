@@ -8,8 +8,8 @@ module nocdyn_statistics_observer
   use nocdyn_linear_statistics, only: linear_statistics_t, new_linear_statistics
   use nocdyn_reduced, only: reduced_t
   use nocdyn_sampled_statistics, only: new_sampled_statistics, sampled_statistics_t
-  use nocdyn_statistics, only: statistic_final, statistic_max, statistic_max_abs, statistic_min, statistic_settling_time, &
-    statistic_t, statistic_time_of_max
+  use nocdyn_statistics, only: find_columns, is_torque, statistic_final, statistic_max, statistic_max_abs, statistic_min, &
+    statistic_settling_time, statistic_t, statistic_time_of_max, value_of_nothing
   use nocdyn_system, only: observer_t, steps_t
   use nocdyn_text, only: string_t
   use nocdyn_trajectory_columns, only: column_t, column_work_in, list_columns
@@ -22,14 +22,17 @@ module nocdyn_statistics_observer
   !> stay where it is.
   !>
   !> A statistic is taken by `linear` if its column allows, else by `sampled`. That of an extremum of an elastic moment is taken
-  !> by `spare` in the lanes where the moment does not rise with the twist.
+  !> by `spare` in the lanes where the moment does not rise with the twist. That of a torque of which the block has no column is
+  !> that of 0.
   type, extends(observer_t), public :: statistics_observer_t
+    character(len=:), allocatable :: missing                  !! a quantity that the block lacks and that is no torque; '': none
     class(formulation_t), pointer, private :: block => null()
     real(wp), private :: t_start = 0.0_wp, t_end = 0.0_wp     !! [s]
     type(lane_numbers_t), private :: numbers                  !! of the block; none if its lanes keep the numbers that they have
     type(linear_statistics_t), private :: linear
     type(sampled_statistics_t), private :: sampled, spare
     integer, allocatable, private :: in_linear(:), in_sampled(:), in_spare(:)   !! places of the statistics there, or 0
+    real(wp), allocatable, private :: otherwise(:)            !! values of the statistics that are neither there nor there
     logical, private :: has_sampled = .false., has_spared = .false.   !! whether `sampled` is used, whether `spare` is now
     integer, private :: first_component = 1, last_component = huge(1)   !! of the state, that `linear` follows inside steps
     logical, allocatable, private :: all_lanes(:)             !! true
@@ -48,11 +51,18 @@ contains
   logical function needs_works(formulation, statistics)
     class(formulation_t), intent(in) :: formulation
     type(statistic_t), intent(in) :: statistics(:)
+    type(statistic_t), allocatable :: found(:)
     type(column_t), allocatable :: columns(:)
     type(string_t), allocatable :: labels(:)
+    integer :: i
 
     call list_columns(formulation%machine, columns, labels)
-    needs_works = any(columns(statistics%column)%kind >= column_work_in)
+    allocate (found, source=statistics)
+    call find_columns(labels, found)
+    needs_works = .false.
+    do i = 1, size(found)
+      if (found(i)%column > 0) needs_works = needs_works .or. columns(found(i)%column)%kind >= column_work_in
+    end do
   end function needs_works
 
   !> An observer of a block, which stays where it is. Only the reduced formulation may change the numbers of its lanes.
@@ -61,7 +71,8 @@ contains
     type(statistic_t), intent(in) :: statistics(:)         !! each with t_start <= from < t_end
     real(wp), intent(in) :: t_start, t_end                 !! of every variant [s]
     type(statistics_observer_t) :: self
-    logical, dimension(size(statistics)) :: has_extremum, linear
+    logical, dimension(size(statistics)) :: has_extremum, linear, sampled
+    type(statistic_t), allocatable :: found(:)
     type(column_t), allocatable :: columns(:)
     type(string_t), allocatable :: labels(:)
     integer :: i
@@ -71,25 +82,32 @@ contains
     self%t_end = t_end
     self%follows_steps = .true.
     call list_columns(block%machine, columns, labels)
+    allocate (found, source=statistics)
+    call find_columns(labels, found)
+    self%missing = missing_quantity(found)
+    allocate (self%otherwise, source=value_of_nothing(found))
     has_extremum = .false.
-    do i = 1, size(statistics)
-      associate (column => columns(statistics(i)%column), kind => statistics(i)%kind)
-        linear(i) = is_linear(block, column)
-        if (kind == statistic_settling_time) linear(i) = .false.
-        if (.not. linear(i)) cycle
+    linear = .false.
+    sampled = .false.
+    do i = 1, size(found)
+      if (found(i)%column == 0) cycle
+      associate (column => columns(found(i)%column), kind => found(i)%kind)
+        linear(i) = is_linear(block, column) .and. kind /= statistic_settling_time
+        sampled(i) = .not. linear(i)
+        if (sampled(i)) cycle
         if (any(kind == [statistic_max, statistic_min, statistic_max_abs, statistic_time_of_max])) then
           has_extremum(i) = has_law(block%machine, column)
         end if
       end associate
     end do
     allocate (self%in_linear, source=places_of(linear))
-    allocate (self%in_sampled, source=places_of(.not. linear))
+    allocate (self%in_sampled, source=places_of(sampled))
     allocate (self%in_spare, source=places_of(has_extremum))
-    self%has_sampled = .not. all(linear)
-    call find_components(self, block, columns(pack(statistics%column, linear .and. statistics%kind /= statistic_final)))
-    self%linear = new_linear_statistics(block, columns, pack(statistics, linear), t_start, t_end)
-    self%sampled = new_sampled_statistics(block, columns, pack(statistics, .not. linear), t_end)
-    self%spare = new_sampled_statistics(block, columns, pack(statistics, has_extremum), t_end)
+    self%has_sampled = any(sampled)
+    call find_components(self, block, columns(pack(found%column, linear .and. found%kind /= statistic_final)))
+    self%linear = new_linear_statistics(block, columns, pack(found, linear), t_start, t_end)
+    self%sampled = new_sampled_statistics(block, columns, pack(found, sampled), t_end)
+    self%spare = new_sampled_statistics(block, columns, pack(found, has_extremum), t_end)
     allocate (self%all_lanes(block%lanes), source=.true.)
     allocate (self%is_spared(block%lanes), self%is_complete(block%lanes), source=.false.)
     select type (block)
@@ -110,6 +128,18 @@ contains
     self%first_component = minval(followed%component)
     self%last_component = maxval(followed%component)
   end subroutine find_components
+
+  !> The first quantity without a column that is not 0 for want of it; '' if there is none.
+  pure function missing_quantity(found) result(quantity)
+    type(statistic_t), intent(in) :: found(:)
+    character(len=:), allocatable :: quantity
+    integer :: i
+
+    quantity = ''
+    do i = 1, size(found)
+      if (found(i)%column == 0 .and. .not. is_torque(found(i)) .and. quantity == '') quantity = found(i)%quantity
+    end do
+  end function missing_quantity
 
   !> The numbers of the true ones among themselves, 0 for the others.
   pure function places_of(mask) result(places)
@@ -169,6 +199,8 @@ contains
         values(i) = self%sampled%value(self%in_sampled(i), lane)
         cycle
       end if
+      values(i) = self%otherwise(i)
+      if (self%in_linear(i) == 0) cycle
       values(i) = self%linear%value(self%in_linear(i), lane)
       if (self%in_spare(i) == 0) cycle
       if (.not. self%linear%is_rising(self%in_linear(i), lane)) values(i) = self%spare%value(self%in_spare(i), lane)

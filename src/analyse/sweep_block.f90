@@ -57,6 +57,7 @@ module nocdyn_sweep_block
     class(stepper_t), allocatable :: stepper   !! as it is before an integration
     type(integration_settings_t) :: settings
     real(wp) :: times(2) = 0.0_wp              !! start and end [s]
+    character(len=:), allocatable, private :: complaint   !! why the variants that fit the lanes are refused; '': they are not
   contains
     procedure :: compute
     procedure :: release
@@ -85,7 +86,10 @@ contains
     if (.not. allocated(error)) then
       call new_block_observer(block%machines%formulation, plan, block%times, dispatcher, block%observer, error)
     end if
+    block%complaint = ''
+    if (allocated(error)) call move_alloc(error%message, block%complaint)
     !$omp end critical (texts)
+    if (allocated(error)) deallocate (error)
   end subroutine new_sweep_block
 
   subroutine release(self)
@@ -94,7 +98,8 @@ contains
     call self%machines%release()
   end subroutine release
 
-  !> The statistics of variants that run through these times; if some begin outside of them, that is an error.
+  !> The statistics of variants that run through these times; if some begin outside of them, or have nothing to look at, that is
+  !> an error.
   subroutine new_block_observer(formulation, plan, times, dispatcher, observer, error)
     class(formulation_t), target, intent(inout) :: formulation   !! stays where it is, as the observer does
     type(sweep_plan_t), intent(in) :: plan
@@ -108,6 +113,8 @@ contains
     call fit_statistics(plan%statistics, times(1), times(2), statistics, complaint)
     observer%statistics_observer_t = new_statistics_observer(formulation, statistics, times(1), times(2))
     observer%dispatcher => dispatcher
+    if (complaint == '' .and. observer%missing /= '') complaint = observer%missing // ' is recorded, but this machine has no ' // &
+      'such column'
     if (complaint /= '') call raise(error, exit_input, complaint)
   end subroutine new_block_observer
 
@@ -129,8 +136,12 @@ contains
     queue%chunk => chunk
     allocate (queue%place(self%machines%formulation%lanes), source=0)
     allocate (queue%is_alone(count), source=.false.)
-    allocate (stepper, source=self%stepper)
-    call integrate_with(stepper, self%machines%formulation, self%settings, self%times, queue, self%observer, outcome)
+    if (self%complaint == '') then
+      allocate (stepper, source=self%stepper)
+      call integrate_with(stepper, self%machines%formulation, self%settings, self%times, queue, self%observer, outcome)
+    else
+      call refuse_all(self%machines%formulation, queue)
+    end if
     do i = 1, count
       if (.not. queue%is_alone(i)) cycle
       if (self%dispatcher%is_over()) exit
@@ -138,6 +149,20 @@ contains
     end do
     is_complete = all(chunk%status /= not_computed)
   end subroutine compute
+
+  !> Goes through a queue whose variants are refused or left over.
+  subroutine refuse_all(formulation, queue)
+    class(formulation_t), intent(inout) :: formulation
+    type(chunk_queue_t), intent(inout) :: queue
+    real(wp), allocatable :: y(:)
+    real(wp) :: t
+    logical :: found
+
+    allocate (y(formulation%states + formulation%quadratures), source=0.0_wp)
+    t = 0.0_wp
+    call queue%next(formulation, 1, t, y, found)
+    if (found) error stop 'nocdyn_sweep_block: a variant has been put into a lane that does not run'
+  end subroutine refuse_all
 
   !> Puts the numbers of the next variant that a lane can hold into one.
   subroutine next(self, system, lane, t, y, found)
@@ -163,7 +188,8 @@ contains
       case (variant_alone)
         self%is_alone(i) = .true.
       case default
-        exit
+        if (self%block%complaint == '') exit
+        call refuse(self%chunk, i, self%block%complaint)
       end select
     end do
     self%place(lane) = i
@@ -226,7 +252,7 @@ contains
     real(wp), allocatable :: start(:)
     real(wp) :: times(2)
 
-    call make_alone(self, chunk%parameters(:, place), formulation)
+    call self%machines%alone_formulation(chunk%parameters(:, place), formulation)
     !$omp critical (texts)
     call take_settings(self%machines%input, formulation, settings, times, error)
     if (.not. allocated(error)) call check_settings(settings, error)
@@ -241,22 +267,6 @@ contains
     call integrate_with(stepper, formulation, settings, times, queue, observer, outcome)
     call conclude(chunk, place, 1, outcome, formulation, settings, observer)
   end subroutine compute_alone
-
-  subroutine make_alone(block, values, formulation)
-    class(sweep_block_t), intent(inout) :: block
-    real(wp), contiguous, intent(in) :: values(:)
-    class(formulation_t), allocatable, intent(out) :: formulation
-    real(wp), allocatable :: start(:)
-    character(len=:), allocatable :: reason
-    integer :: verdict
-
-    associate (system => block%machines%formulation)
-      allocate (start(system%states + system%quadratures))
-    end associate
-    call block%machines%put(values, 1, start, verdict, reason)
-    if (verdict /= variant_alone) error stop 'nocdyn_sweep_block: a variant is alone always or never'
-    call block%machines%alone_formulation(formulation)
-  end subroutine make_alone
 
   !> Looks after the dispatcher now and then, unless another thread does.
   function stops(self, t)

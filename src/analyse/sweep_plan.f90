@@ -19,6 +19,7 @@ module nocdyn_sweep_plan
   use nocdyn_targets, only: target_t
   use nocdyn_text, only: string_t
   use nocdyn_trajectory_columns, only: column_t, list_columns
+  use nocdyn_variant_columns, only: add_variant_columns
   implicit none (type, external)
   private
 
@@ -62,6 +63,7 @@ contains
     if (allocated(plan%design)) variants = plan%design%variants
     call label_columns(input, labels, failure)
     if (.not. allocated(failure)) then
+      call add_variant_columns(input, plan%targets, labels)
       call read_records(input, labels, fixed_span(input, plan%targets), variants, plan%statistics, mistakes)
       allocate (plan%trajectories, source=wanted_trajectories(input))
       if (size(plan%statistics) == 0 .and. mistakes%count == 0) call add_mistake(input, sweeps(1), 'design', &

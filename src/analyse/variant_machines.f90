@@ -378,11 +378,16 @@ contains
     !$omp end critical (texts)
   end subroutine assemble
 
-  !> The formulation, of one lane, of the variant that is to run alone, after `put`.
-  subroutine alone_formulation(self, formulation)
-    class(variant_machines_t), intent(in) :: self
+  !> The formulation, of one lane, of a variant that is to run alone.
+  subroutine alone_formulation(self, values, formulation)
+    class(variant_machines_t), intent(inout) :: self
+    real(wp), contiguous, intent(in) :: values(:)   !! of the targets
     class(formulation_t), allocatable, intent(out) :: formulation
+    character(len=:), allocatable :: reason
+    integer :: verdict
 
+    call assemble(self, values, verdict, reason)
+    if (verdict == variant_refused) error stop 'nocdyn_variant_machines: a variant is refused always or never'
     !$omp critical (texts)
     call new_formulation(formulation_word(self%input), self%single%machine, formulation, self%is_audited)
     !$omp end critical (texts)

@@ -1,0 +1,97 @@
+!> Columns of trajectory.csv that variants of a machine can have though it has none of them itself.
+!>
+!> The damping moment of a coupling, the current and the throttle of a motor have columns where the numbers that they come
+!> from are given and are not 0.
+module nocdyn_variant_columns
+  use nocdyn_assembly, only: assemble_machine
+  use nocdyn_errors, only: error_t
+  use nocdyn_input, only: input_t
+  use nocdyn_kinds, only: wp
+  use nocdyn_machine, only: machine_t
+  use nocdyn_schema, only: has_word
+  use nocdyn_targets, only: set_target, target_t
+  use nocdyn_text, only: append, string_t
+  use nocdyn_trajectory_columns, only: column_t, list_columns
+  implicit none (type, external)
+  private
+
+  public :: add_variant_columns
+
+  real(wp), parameter :: something = 1.0_wp   ! in place of 0 or nothing
+
+contains
+
+  !> Appends the columns that there are only where varied numbers that are 0 or not given in the input are not 0.
+  subroutine add_variant_columns(input, targets, labels)
+    type(input_t), intent(in) :: input            !! of a machine that can be
+    type(target_t), intent(in) :: targets(:)      !! those with group 0 were not found
+    type(string_t), allocatable, intent(inout) :: labels(:)
+    type(target_t), allocatable :: hidden(:)
+    logical :: can_be
+    integer :: i
+
+    allocate (hidden, source=pack(targets, [(hides_column(input, targets(i)), i=1, size(targets))]))
+    if (size(hidden) == 0) return
+    call add_columns(input, hidden, labels, can_be)
+    if (can_be) return
+    do i = 1, size(hidden)
+      call add_columns(input, hidden(i:i), labels, can_be)
+    end do
+  end subroutine add_variant_columns
+
+  !> Whether a number is 0 or not given, and the columns of its element may depend on that.
+  logical function hides_column(input, target)
+    type(input_t), intent(in) :: input
+    type(target_t), intent(in) :: target
+
+    hides_column = .false.
+    if (target%group == 0) return
+    if (.not. has_word('coupling motor', input%groups(target%group)%kind)) return
+    associate (value => input%groups(target%group)%values(target%key))
+      hides_column = .not. value%has_any()
+      if (allocated(value%numbers)) hides_column = .not. any(abs(value%numbers) > 0)
+    end associate
+  end function hides_column
+
+  !> Appends the columns of the machine in which some numbers are something, as far as that is allowed.
+  subroutine add_columns(input, hidden, labels, can_be)
+    type(input_t), intent(in) :: input
+    type(target_t), intent(in) :: hidden(:)
+    type(string_t), allocatable, intent(inout) :: labels(:)
+    logical, intent(out) :: can_be   !! whether there is such a machine
+    type(input_t) :: changed, before
+    type(machine_t) :: machine
+    type(error_t), allocatable :: error
+    type(column_t), allocatable :: columns(:)
+    type(string_t), allocatable :: others(:)
+    character(len=:), allocatable :: complaint
+    integer :: i
+
+    changed = input
+    do i = 1, size(hidden)
+      before = changed
+      call set_target(changed, hidden(i), something, complaint)
+      if (complaint /= '') changed = before
+    end do
+    call assemble_machine(changed, machine, error)
+    can_be = .not. allocated(error)
+    if (.not. can_be) return
+    call list_columns(machine, columns, others)
+    do i = 1, size(others)
+      if (.not. is_among(others(i)%text, labels)) call append(labels, others(i)%text)
+    end do
+  end subroutine add_columns
+
+  pure logical function is_among(label, labels)
+    character(len=*), intent(in) :: label
+    type(string_t), intent(in) :: labels(:)
+    integer :: i
+
+    is_among = .true.
+    do i = 1, size(labels)
+      if (labels(i)%text == label) return
+    end do
+    is_among = .false.
+  end function is_among
+
+end module nocdyn_variant_columns
