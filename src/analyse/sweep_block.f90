@@ -113,8 +113,9 @@ contains
     call fit_statistics(plan%statistics, times(1), times(2), statistics, complaint)
     observer%statistics_observer_t = new_statistics_observer(formulation, statistics, times(1), times(2))
     observer%dispatcher => dispatcher
-    if (complaint == '' .and. observer%missing /= '') complaint = observer%missing // ' is recorded, but this machine has no ' // &
-      'such column'
+    if (complaint == '' .and. observer%missing /= '') then
+      complaint = observer%missing // ' is recorded, but this machine has no such column'
+    end if
     if (complaint /= '') call raise(error, exit_input, complaint)
   end subroutine new_block_observer
 

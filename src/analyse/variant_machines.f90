@@ -90,11 +90,8 @@ contains
       if (complaint /= '' .or. allocated(error)) self%input = input
     end if
     if (complaint /= '' .or. allocated(error)) call assemble_machine(self%input, block%machine, error, lanes)
-    if (allocated(error)) then
-      deallocate (block)
-    else
-      call lay_out(self, block)
-    end if
+    if (.not. allocated(error)) call lay_out(self, block)
+    if (allocated(error)) deallocate (block)
     !$omp end critical (texts)
   end subroutine new_variant_machines
 
@@ -156,7 +153,6 @@ contains
     real(wp), contiguous, intent(inout) :: y(:)     !! its start, if it has been set
     integer, intent(out) :: verdict                 !! variant_...
     character(len=:), allocatable, intent(inout) :: reason   !! why it is refused
-
     logical :: is_set
 
     is_set = .false.

@@ -4,7 +4,7 @@ import csv
 import functools
 
 import pytest
-from sweep_inputs import needs_sweeps
+from sweep_inputs import TWO_DISCS, needs_sweeps
 
 pytestmark = needs_sweeps
 
@@ -138,3 +138,15 @@ def test_times_that_vary_past_those_of_the_file_leave_statistics_room(nocdyn):
     rows = sweep(nocdyn, ["run.t_end"], [[2.0], [1.0], [3.0]], ["omega_rotor"])
     assert [row["status"] for row in rows] == ["done", "refused", "done"]
     assert "from = 1.5 is out of range" in rows[1]["reason"]
+
+
+def test_numbers_that_change_the_machine_only_together_do_so_wherever_the_work_begins(nocdyn):
+    nocdyn.write("machine.nml", TWO_DISCS.replace("rtol", "method = 'taylor' rtol"))
+    rows = [(0.1, 0.2), (0.2, 0.1), (0, 0), (0, 0), (0.3, 0.3), (0, 0.1)]
+    whole = sweep(nocdyn, ["load.drag.quadratic", "load.drag.constant"], rows, ["torque_drag"])
+    assert [row["status"] for row in whole] == ["refused", "refused", "done", "done", "refused", "refused"]
+    assert "method = 'taylor' cannot be used" in whole[0]["reason"]
+    for part in (1, 2):
+        assert nocdyn("sweep", "sweep.nml", "--out", "shards", "--shard", f"{part}/2").returncode == 0
+    nocdyn("merge", "shards")
+    assert (nocdyn.folder / "shards/sweep.nc").read_bytes() == (nocdyn.folder / "out/sweep.nc").read_bytes()
