@@ -74,12 +74,12 @@ def _add_colour_bar(axes: Axes, names: Sequence[str], palette: np.ndarray) -> No
     bar.ax.invert_yaxis()  # reads as the list of bodies does
 
 
-def save(figure: Figure, folder: Path, name: str, formats: Sequence[str] = FORMATS) -> None:
-    """Writes FOLDER/NAME in each format and frees the figure."""
+def save(figure: Figure, folder: Path, name: str, formats: Sequence[str] | None = None) -> None:
+    """Writes FOLDER/NAME in each format, in all if none is named, and frees the figure."""
     folder.mkdir(parents=True, exist_ok=True)
     figure.draw_without_rendering()
     figure.set_layout_engine("none")  # laid out once, not for each format again
-    for kind in formats:
+    for kind in formats or FORMATS:
         undated = {"png": None, "svg": {"Date": None}, "pdf": {"CreationDate": None}}[kind]
         figure.savefig(folder / f"{name}.{kind}", metadata=undated)
     pyplot.close(figure)

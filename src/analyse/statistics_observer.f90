@@ -104,7 +104,8 @@ contains
     allocate (self%in_sampled, source=places_of(sampled))
     allocate (self%in_spare, source=places_of(has_extremum))
     self%has_sampled = any(sampled)
-    call find_components(self, block, columns(pack(found%column, linear .and. found%kind /= statistic_final)))
+    call find_components(self, block, columns(pack([(found(i)%column, i=1, size(found))], &
+                                                   linear .and. [(found(i)%kind /= statistic_final, i=1, size(found))])))
     self%linear = new_linear_statistics(block, columns, pack(found, linear), t_start, t_end)
     self%sampled = new_sampled_statistics(block, columns, pack(found, sampled), t_end)
     self%spare = new_sampled_statistics(block, columns, pack(found, has_extremum), t_end)
