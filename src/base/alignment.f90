@@ -5,20 +5,21 @@ module nocdyn_alignment
   implicit none (type, external)
   private
 
-  public :: numbers_to_line
+  public :: numbers_to_multiple
 
   integer, parameter, public :: line = 8   !! numbers of a line of the cache, and of the longest vectors
 
 contains
 
-  !> Numbers before the first one of an array that begins a line.
-  integer function numbers_to_line(array) result(numbers)
+  !> Numbers before the first one of an array whose address is a multiple of the length of so many numbers.
+  integer function numbers_to_multiple(array, of) result(numbers)
     real(wp), target, contiguous, intent(in) :: array(:)
+    integer, intent(in) :: of   !! `line`, or the numbers of a vector
     integer(c_intptr_t) :: bytes, number
 
     number = storage_size(array) / 8
     bytes = transfer(c_loc(array), bytes)
-    numbers = int(modulo(-bytes, line * number) / number)
-  end function numbers_to_line
+    numbers = int(modulo(-bytes, of * number) / number)
+  end function numbers_to_multiple
 
 end module nocdyn_alignment

@@ -1,6 +1,6 @@
 !> The stages of a one-step method on a block of lanes, and the sums that are formed of them.
 module nocdyn_stages
-  use, intrinsic :: iso_c_binding, only: c_intptr_t, c_loc
+  use nocdyn_alignment, only: numbers_to_multiple
   use nocdyn_combinations, only: combination, combination_t, combine, padded_columns, set_offsets, strip, width
   use nocdyn_finite, only: is_finite
   use nocdyn_kinds, only: wp
@@ -125,7 +125,7 @@ contains
       spare = merge(width, 0, lanes == 1)
       allocate (self%k(lanes, columns + spare, self%places), self%zero(min(lanes * columns, strip)), source=0.0_wp)
       self%begin = 1
-      if (lanes == 1) self%begin = 1 + numbers_to_vector(self%k)
+      if (lanes == 1) self%begin = 1 + numbers_to_multiple(self%k(:, 1, 1), width)
       self%end = self%begin + columns - 1
       call place_combinations(self, lanes * columns, lanes * (columns + spare), lanes * (self%begin - 1))
     end associate
@@ -141,16 +141,6 @@ contains
     call set_offsets(self%coarse_error, length, self%places, stride, before)
     call set_offsets(self%dense, length, self%places, stride, before)
   end subroutine place_combinations
-
-  !> Numbers before the first one of an array whose address is a multiple of a vector's length.
-  integer function numbers_to_vector(array) result(numbers)
-    real(wp), target, contiguous, intent(in) :: array(:, :, :)
-    integer(c_intptr_t) :: bytes, number
-
-    number = storage_size(array) / 8
-    bytes = modulo(transfer(c_loc(array), bytes), width * number)
-    numbers = int(modulo(width * number - bytes, width * number) / number)
-  end function numbers_to_vector
 
   !> The state that a stage is taken at, from the stages before it; a lane where it overflows is parked.
   pure subroutine inner_state(self, trial, stage, y)

@@ -4,7 +4,7 @@
 !> A strip of lanes goes through all orders before the next one does. What it needs is gathered first, in one array, so that it
 !> stays in the first-level cache and no vector crosses from one line of it to the next.
 module nocdyn_lane_series
-  use nocdyn_alignment, only: line, numbers_to_line
+  use nocdyn_alignment, only: line, numbers_to_multiple
   use nocdyn_kinds, only: wp
   use nocdyn_lane_terms, only: lane_terms_t
   use nocdyn_machine, only: machine_t
@@ -88,7 +88,7 @@ contains
     integer :: begin, l
 
     call drive(self, machine, t)
-    begin = 1 + numbers_to_line(self%room)
+    begin = 1 + numbers_to_multiple(self%room, line)
     associate (room => self%room, at => self%places, lanes => machine%lanes, f => machine%coordinates%freedoms, &
                n => self%elements, laws => machine%laws, entries => size(twists%column), &
                responses => size(accelerations%column))
