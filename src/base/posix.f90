@@ -8,7 +8,7 @@ module nocdyn_posix
 
   public :: make_folders, rename_file, remove_file, process_id, is_terminal, watch_interrupts, is_interrupted, &
     survive_size_limit
-  public :: create_file, write_bytes, close_file, last_failure, is_interrupted_call
+  public :: create_file, write_bytes, close_file, last_failure, failure_number, is_interrupted_call
 
   integer, parameter, public :: standard_output = 1, standard_error = 2   !! file descriptors
 
@@ -158,7 +158,7 @@ contains
     is_done = next > len(bytes)
   end subroutine write_bytes
 
-  !> Closes a descriptor of `create_file`; not done means that what was written may be lost.
+  !> Closes a descriptor; not done means that what was written may be lost.
   subroutine close_file(descriptor, is_done)
     integer, intent(in) :: descriptor
     logical, intent(out) :: is_done
@@ -180,6 +180,11 @@ contains
       reason(i:i) = characters(i)
     end do
   end function last_failure
+
+  !> The same as a number, `errno`.
+  integer function failure_number()
+    failure_number = int(c_errno())
+  end function failure_number
 
   !> Whether the call before this one did nothing because a signal came.
   logical function is_interrupted_call()

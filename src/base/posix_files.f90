@@ -2,7 +2,7 @@
 module nocdyn_posix_files
   use, intrinsic :: iso_c_binding, only: c_char, c_int, c_int64_t, c_intptr_t, c_null_char, c_size_t
   use, intrinsic :: iso_fortran_env, only: int64
-  use nocdyn_posix, only: is_interrupted_call, last_failure
+  use nocdyn_posix, only: close_file, failure_number, is_interrupted_call, last_failure
   implicit none (type, external)
   private
 
@@ -11,8 +11,8 @@ module nocdyn_posix_files
 
   integer(c_int), parameter :: from_start = 0, from_end = 2      ! SEEK_SET, SEEK_END
   integer(c_int), parameter :: exclusive = 2, without_waiting = 4   ! LOCK_EX, LOCK_NB
-  integer(c_int), parameter :: would_block = 11   ! EWOULDBLOCK
-  integer(c_int), parameter :: disk_troubles(4) = [5, 27, 28, 122]   ! EIO, EFBIG, ENOSPC, EDQUOT
+  integer, parameter :: would_block = 11   ! EWOULDBLOCK
+  integer, parameter :: disk_troubles(4) = [5, 27, 28, 122]   ! EIO, EFBIG, ENOSPC, EDQUOT
 
   interface
     integer(c_int) function c_open_new(path) bind(c, name='nocdyn_open_new')
@@ -61,15 +61,6 @@ module nocdyn_posix_files
       import :: c_int
       integer(c_int), value, intent(in) :: descriptor, operation
     end function c_flock
-
-    integer(c_int) function c_close(descriptor) bind(c, name='close')
-      import :: c_int
-      integer(c_int), value, intent(in) :: descriptor
-    end function c_close
-
-    integer(c_int) function c_errno() bind(c, name='nocdyn_errno')
-      import :: c_int
-    end function c_errno
   end interface
 
 contains
@@ -139,13 +130,14 @@ contains
   subroutine sync_path(path, is_done)
     character(len=*), intent(in) :: path
     logical, intent(out) :: is_done
-    integer(c_int) :: descriptor, status
+    integer :: descriptor
+    logical :: is_closed
 
-    descriptor = c_open_existing(path // c_null_char, 0_c_int)
+    descriptor = open_existing(path, is_to_change=.false.)
     is_done = descriptor >= 0
     if (.not. is_done) return
-    is_done = c_fsync(descriptor) == 0
-    status = c_close(descriptor)
+    is_done = c_fsync(int(descriptor, c_int)) == 0
+    call close_file(descriptor, is_closed)
   end subroutine sync_path
 
   !> Takes the file for this process, until it is closed; not done: another process has it. A file system without locks locks
@@ -155,7 +147,7 @@ contains
     logical, intent(out) :: is_done
 
     is_done = c_flock(int(descriptor, c_int), ior(exclusive, without_waiting)) == 0
-    if (.not. is_done) is_done = c_errno() /= would_block
+    if (.not. is_done) is_done = failure_number() /= would_block
   end subroutine lock_file
 
   !> What the disk has against it, if that is why a library's call before this one failed; else empty.
@@ -163,7 +155,7 @@ contains
     character(len=:), allocatable :: reason
 
     reason = ''
-    if (any(disk_troubles == c_errno())) reason = last_failure()
+    if (any(disk_troubles == failure_number())) reason = last_failure()
   end function disk_failure
 
 end module nocdyn_posix_files
