@@ -1,11 +1,12 @@
-!> What &run says of an integration.
+!> What &run says of an integration, for the integrator and for summaries.
 module nocdyn_run_settings
   use nocdyn_input, only: group_t, input_t
   use nocdyn_integration_settings, only: integration_settings_t
+  use nocdyn_json, only: json_t
   implicit none (type, external)
   private
 
-  public :: settings_of
+  public :: settings_of, put_settings
 
 contains
 
@@ -22,5 +23,26 @@ contains
     settings%atol = run%number('atol')
     settings%max_steps = run%whole_number('max_steps')
   end function settings_of
+
+  !> Some keys of &run with their values.
+  subroutine put_settings(json, run, keys)
+    type(json_t), intent(inout) :: json
+    type(group_t), intent(in) :: run
+    character(len=*), intent(in) :: keys(:)   !! each with one number, whole number or text
+    integer :: i, k
+
+    call json%open('settings')
+    do i = 1, size(keys)
+      k = run%key_position(trim(keys(i)))
+      if (allocated(run%values(k)%numbers)) then
+        call json%put(trim(keys(i)), run%values(k)%numbers(1))
+      else if (allocated(run%values(k)%whole_numbers)) then
+        call json%put(trim(keys(i)), run%values(k)%whole_numbers(1))
+      else
+        call json%put(trim(keys(i)), run%values(k)%texts(1)%text)
+      end if
+    end do
+    call json%close()
+  end subroutine put_settings
 
 end module nocdyn_run_settings

@@ -7,6 +7,7 @@ module nocdyn_run_summary
   use nocdyn_machine, only: machine_t
   use nocdyn_machine_report, only: coordinate_names, number_of
   use nocdyn_outcome, only: most_switches, outcome_t
+  use nocdyn_run_settings, only: put_settings
   use nocdyn_system, only: ranges_t
   use nocdyn_text, only: append, rounded_text, string_t
   use nocdyn_version, only: compiler_text, version
@@ -129,7 +130,9 @@ contains
     about = input%single('case')
     call json%put('title', about%text('title'))
     call put_machine(json, machine, summary)
-    call put_settings(json, input%single('run'))
+    call put_settings(json, input%single('run'), &
+                      [character(len=11) :: 't_start', 't_end', 'method', 'rtol', 'atol', 'formulation', 'complement', &
+                                                   'max_steps'])
     call put_counts(json, summary)
     call put_method(json, summary)
     if (allocated(summary%account)) call put_account(json, summary%account)
@@ -152,22 +155,6 @@ contains
     call json%put('notes', summary%notes)
     call json%close()
   end subroutine put_machine
-
-  subroutine put_settings(json, run)
-    type(json_t), intent(inout) :: json
-    type(group_t), intent(in) :: run
-
-    call json%open('settings')
-    call json%put('t_start', run%number('t_start'))
-    call json%put('t_end', run%number('t_end'))
-    call json%put('method', run%text('method'))
-    call json%put('rtol', run%number('rtol'))
-    call json%put('atol', run%number('atol'))
-    call json%put('formulation', run%text('formulation'))
-    call json%put('complement', run%text('complement'))
-    call json%put('max_steps', run%whole_number('max_steps'))
-    call json%close()
-  end subroutine put_settings
 
   subroutine put_counts(json, summary)
     type(json_t), intent(inout) :: json

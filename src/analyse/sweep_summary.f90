@@ -1,10 +1,11 @@
 !> The summary of a sweep: what summary.json and the printed table tell.
 module nocdyn_sweep_summary
-  use nocdyn_input, only: group_t, input_t
+  use nocdyn_input, only: input_t
   use nocdyn_json, only: json_t
   use nocdyn_kinds, only: wp
   use nocdyn_sweep_header, only: sweep_header_t
   use nocdyn_order_statistics, only: order_statistics_t
+  use nocdyn_run_settings, only: put_settings
   use nocdyn_table_text, only: cell, padded, right
   use nocdyn_text, only: rounded_text, to_text
   use nocdyn_version, only: compiler_text, version
@@ -48,7 +49,8 @@ contains
     call json%put('status', trim(merge('done  ', 'failed', summary%done > 0)))
     call json%put('input', input%file)
     call json%put('title', header%title)
-    call put_settings(json, input%single('run'))
+    call put_settings(json, input%single('run'), &
+                      [character(len=11) :: 't_start', 't_end', 'method', 'rtol', 'atol', 'formulation', 'max_steps'])
     call put_design(json, header)
     call json%open('counts')
     call json%put('variants', header%variants)
@@ -61,21 +63,6 @@ contains
     call json%close()
     text = json%text()
   end function sweep_json
-
-  subroutine put_settings(json, run)
-    type(json_t), intent(inout) :: json
-    type(group_t), intent(in) :: run
-
-    call json%open('settings')
-    call json%put('t_start', run%number('t_start'))
-    call json%put('t_end', run%number('t_end'))
-    call json%put('method', run%text('method'))
-    call json%put('rtol', run%number('rtol'))
-    call json%put('atol', run%number('atol'))
-    call json%put('formulation', run%text('formulation'))
-    call json%put('max_steps', run%whole_number('max_steps'))
-    call json%close()
-  end subroutine put_settings
 
   subroutine put_design(json, header)
     type(json_t), intent(inout) :: json
