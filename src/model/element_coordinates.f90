@@ -4,10 +4,11 @@ module nocdyn_element_coordinates
   use nocdyn_elements, only: elements_t
   use nocdyn_kinds, only: wp
   use nocdyn_lane_numbers, only: lane_numbers_t
+  use nocdyn_sparse_map, only: new_sparse_map, sparse_map_t
   implicit none (type, external)
   private
 
-  public :: new_element_coordinates
+  public :: new_element_coordinates, twist_map
 
   !> Element e has the entries first(e) to first(e + 1) - 1, one for each coordinate of its two bodies, in ascending order:
   !> its speed is the sum of ratio * q'(coordinate), and its moment M adds response * M to q''(coordinate).
@@ -200,5 +201,28 @@ contains
     call numbers%add('elements: ratio', self%ratio)
     call numbers%add('elements: response', self%response)
   end subroutine list_numbers
+
+  !> U, whose rows are the elements: their speeds are U q'.
+  function twist_map(incidence, without_offset, is_loose) result(map)
+    type(element_coordinates_t), intent(in) :: incidence
+    logical, intent(in) :: without_offset   !! whether the start twists are zero
+    logical, intent(in) :: is_loose         !! whether the map has no stretches
+    type(sparse_map_t) :: map
+    integer :: kept(size(incidence%coordinate)), first(size(incidence%first))
+    integer :: e, entry, next
+
+    next = 1
+    do e = 1, size(first) - 1
+      first(e) = next
+      do entry = incidence%first(e), incidence%first(e + 1) - 1
+        if (.not. incidence%has_ratio(entry)) cycle
+        kept(next) = entry
+        next = next + 1
+      end do
+    end do
+    first(size(first)) = next
+    map = new_sparse_map(first, incidence%coordinate(kept(:next - 1)), incidence%ratio(:, kept(:next - 1)), without_offset, &
+                         is_loose)
+  end function twist_map
 
 end module nocdyn_element_coordinates

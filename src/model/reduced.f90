@@ -5,7 +5,7 @@
 !> u' = U q', and their moments M give q'' = R M with R = (L_tau^T J L_tau)^-1 L_tau^T B, where the columns of B are
 !> the elements' unit moments on their two bodies and U = B^T L_tau.
 module nocdyn_reduced
-  use nocdyn_element_coordinates, only: element_coordinates_t, new_element_coordinates
+  use nocdyn_element_coordinates, only: element_coordinates_t, new_element_coordinates, twist_map
   use nocdyn_formulation, only: formulation_t
   use nocdyn_inner_jacobian, only: inner_jacobian_t, new_inner_jacobian
   use nocdyn_kinds, only: wp
@@ -111,29 +111,6 @@ contains
     angle(:, 1:) = self%machine%start_angle
     self%start_twist = angle(:, self%machine%elements%to) - angle(:, self%machine%elements%from)
   end subroutine find_start_twists
-
-  !> U, whose rows are the elements.
-  function twist_map(incidence, without_offset, is_loose) result(map)
-    type(element_coordinates_t), intent(in) :: incidence
-    logical, intent(in) :: without_offset   !! whether the start twists are zero
-    logical, intent(in) :: is_loose         !! whether the map has no stretches
-    type(sparse_map_t) :: map
-    integer :: kept(size(incidence%coordinate)), first(size(incidence%first))
-    integer :: e, entry, next
-
-    next = 1
-    do e = 1, size(first) - 1
-      first(e) = next
-      do entry = incidence%first(e), incidence%first(e + 1) - 1
-        if (.not. incidence%has_ratio(entry)) cycle
-        kept(next) = entry
-        next = next + 1
-      end do
-    end do
-    first(size(first)) = next
-    map = new_sparse_map(first, incidence%coordinate(kept(:next - 1)), incidence%ratio(:, kept(:next - 1)), without_offset, &
-                         is_loose)
-  end function twist_map
 
   !> R, whose rows are the coordinates.
   subroutine form_responses(freedoms, is_loose, self)
