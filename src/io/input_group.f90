@@ -9,11 +9,11 @@ module nocdyn_input_group
   use nocdyn_input_work, only: new_work, work_t
   use nocdyn_mistakes, only: mistakes_t, no_line
   use nocdyn_namelist, only: assignment_t, namelist_group_t, namelist_t
-  use nocdyn_schema, only: group_rules, key_rule_index, key_rules, orders
+  use nocdyn_schema, only: group_rules, is_single, key_rule_index, key_rules, orders
   use nocdyn_schema_relations, only: relations_t
   use nocdyn_schema_rules, only: a_name, key_rule_t, unset
-  use nocdyn_schema_text, only: allowed_text, key_names, suggestion
-  use nocdyn_text, only: lower_case, nearest_word, to_text
+  use nocdyn_schema_text, only: allowed_text, key_suggestion, meant_keys
+  use nocdyn_text, only: lower_case, string_t, to_text
   implicit none (type, external)
   private
 
@@ -38,7 +38,7 @@ contains
     allocate (group%values(size(work%drafts)))
     call take_assignments(namelist, source, work, mistakes)
     group%name = name_of(work)
-    call take_overrides(group%name, overrides, work, mistakes)
+    call take_overrides(group%name, number_of(namelist, index, group%rule), overrides, work, mistakes)
     call relate_keys(work, relations, mistakes)
     do i = 1, size(work%drafts)
       call complete(work, i, group%values(i), mistakes)
@@ -74,17 +74,20 @@ contains
     end do
   end subroutine take_assignments
 
-  !> The key that was probably meant is not missed in addition.
+  !> The keys that were probably meant are not missed in addition.
   subroutine refuse_key(assignment, work, mistakes)
     type(assignment_t), intent(in) :: assignment
     type(work_t), intent(inout) :: work
     type(mistakes_t), intent(inout) :: mistakes
-    integer :: nearest
+    type(string_t), allocatable :: meant(:)
+    integer :: i
 
-    nearest = nearest_word(assignment%key, key_names(work%rule))
-    if (nearest > 0) work%may_miss(nearest) = .true.
+    allocate (meant, source=meant_keys(work%rule, assignment%key))
+    do i = 1, size(meant)
+      work%may_miss(key_rule_index(work%rule, meant(i)%text) - work%first + 1) = .true.
+    end do
     call mistakes%add(assignment%line, work%index, assignment%key // ' is not a key of &' &
-      // trim(group_rules(work%rule)%name) // suggestion(assignment%key, key_names(work%rule)))
+      // trim(group_rules(work%rule)%name) // key_suggestion(work%rule, assignment%key))
   end subroutine refuse_key
 
   !> Row of a key that stands among the values, 0 if none does: its equals sign was probably forgotten.
@@ -115,8 +118,26 @@ contains
     end do
   end function name_of
 
-  subroutine take_overrides(name, overrides, work, mistakes)
+  !> The number of a group without name among those of its kind, 0 of other groups.
+  pure integer function number_of(namelist, index, rule) result(number)
+    type(namelist_t), intent(in) :: namelist
+    integer, intent(in) :: index, rule
+
+    number = 0
+    if (is_single(rule) .or. group_rules(rule)%name_space /= '') return
+    number = count(is_of(namelist%groups(:index), trim(group_rules(rule)%name)))
+  end function number_of
+
+  elemental logical function is_of(group, kind)
+    type(namelist_group_t), intent(in) :: group
+    character(len=*), intent(in) :: kind
+
+    is_of = group%name == kind
+  end function is_of
+
+  subroutine take_overrides(name, number, overrides, work, mistakes)
     character(len=*), intent(in) :: name
+    integer, intent(in) :: number   !! among the groups without names
     type(override_t), intent(inout) :: overrides(:)
     type(work_t), intent(inout) :: work
     type(mistakes_t), intent(inout) :: mistakes
@@ -124,7 +145,8 @@ contains
     integer :: i, key
 
     do i = 1, size(overrides)
-      if (.not. overrides(i)%is_fine .or. overrides(i)%group_rule /= work%rule .or. overrides(i)%name /= name) cycle
+      if (.not. overrides(i)%is_fine .or. overrides(i)%group_rule /= work%rule) cycle
+      if (overrides(i)%name /= name .or. overrides(i)%number /= number) cycle
       overrides(i)%is_used = .true.
       key = overrides(i)%key_rule
       call work%drafts(key - work%first + 1)%replace(overrides(i)%namelist, overrides(i)%assignment, key_rules(key), i, &

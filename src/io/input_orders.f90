@@ -41,8 +41,10 @@ contains
     associate (low => group%values(lower), high => group%values(upper))
       if (.not. (allocated(low%numbers) .and. allocated(high%numbers))) return
       if (high%numbers(1) > low%numbers(1)) return
-      complaint = trim(orders(o)%upper) // ' = ' // to_text(high%numbers(1)) // ' is out of range; allowed: > ' // &
-                  trim(orders(o)%lower) // ' = ' // to_text(low%numbers(1))
+      if (orders(o)%may_be_equal .and. high%numbers(1) >= low%numbers(1)) return
+      complaint = trim(orders(o)%upper) // ' = ' // to_text(high%numbers(1)) // ' is out of range; allowed: ' // &
+                  trim(merge('>= ', '>  ', orders(o)%may_be_equal)) // ' ' // trim(orders(o)%lower) // ' = ' // &
+                  to_text(low%numbers(1))
     end associate
   end function order_complaint
 

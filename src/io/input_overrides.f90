@@ -18,7 +18,8 @@ module nocdyn_input_overrides
     logical :: is_used = .false.                !! its group was found
     integer :: group_rule = 0
     integer :: key_rule = 0
-    character(len=:), allocatable :: name       !! of the element, '' for single groups
+    character(len=:), allocatable :: name       !! of the element, '' for groups without names
+    integer :: number = 0                       !! among the groups without names of its kind, 0 for other groups
     type(assignment_t) :: assignment
     type(namelist_t) :: namelist
   end type override_t
@@ -62,6 +63,7 @@ contains
     override%group_rule = path%group_rule
     override%key_rule = path%key_rule
     override%name = path%name
+    override%number = path%number
     override%assignment = path%place
     if (complaint /= '') return
     if (key_rules(path%key_rule)%kind == a_name) complaint = 'a name cannot be overridden: other groups refer to it'

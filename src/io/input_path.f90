@@ -1,10 +1,10 @@
-!> Where a number or a text of the input stands: GROUP.KEY for groups that occur once, GROUP.NAME.KEY for named ones, with a
-!> subscript behind the key where it is a list.
+!> Where a number or a text of the input stands: GROUP.KEY for groups that occur once, GROUP.NAME.KEY for named ones,
+!> GROUP(NUMBER).KEY for others, with a subscript behind the key where it is a list.
 module nocdyn_input_path
   use nocdyn_namelist, only: assignment_t
   use nocdyn_namelist_values, only: read_subscript
   use nocdyn_schema, only: group_rule_index, group_rules, is_single, key_rule_index
-  use nocdyn_schema_text, only: group_names, key_names, suggestion
+  use nocdyn_schema_text, only: group_names, key_suggestion, suggestion
   use nocdyn_text, only: lower_case
   implicit none (type, external)
   private
@@ -14,7 +14,8 @@ module nocdyn_input_path
   type, public :: path_t
     integer :: group_rule = 0
     integer :: key_rule = 0
-    character(len=:), allocatable :: name       !! of the element, '' for single groups
+    character(len=:), allocatable :: name       !! of the element, '' for groups without names
+    integer :: number = 0                       !! among the groups without names of its kind, 0: the path has none
     type(assignment_t) :: place                 !! key and subscript
   end type path_t
 
@@ -26,7 +27,7 @@ contains
     character(len=*), intent(in) :: ending   !! what follows a path here, for messages: '=VALUE' or ''
     type(path_t), intent(out) :: path
     character(len=:), allocatable, intent(out) :: complaint   !! '' if all is well
-    character(len=:), allocatable :: group, key
+    character(len=:), allocatable :: key
     integer :: first_dot, last_dot
 
     path%name = ''
@@ -36,16 +37,34 @@ contains
       complaint = 'there is no dot in ' // text // '; write GROUP.KEY' // ending // ' or GROUP.NAME.KEY' // ending
       return
     end if
-    group = lower_case(text(:first_dot - 1))
-    path%group_rule = group_rule_index(group)
-    if (path%group_rule == 0) then
-      complaint = "there is no group '" // group // "'" // suggestion(group, group_names())
-      return
-    end if
+    call read_group(text(:first_dot - 1), path, complaint)
+    if (complaint /= '') return
     if (last_dot > first_dot) path%name = text(first_dot + 1:last_dot - 1)
     call read_key(text(last_dot + 1:), path, key, complaint)
-    if (complaint == '') call check_form(path%group_rule, key // ending, last_dot > first_dot, complaint)
+    if (complaint == '') call check_form(path, key // ending, last_dot > first_dot, complaint)
   end subroutine read_path
+
+  subroutine read_group(text, path, complaint)
+    character(len=*), intent(in) :: text   !! GROUP or GROUP(NUMBER)
+    type(path_t), intent(inout) :: path
+    character(len=:), allocatable, intent(out) :: complaint
+    character(len=:), allocatable :: group
+    type(assignment_t) :: place
+    integer :: open
+
+    open = index(text // '(', '(')
+    group = lower_case(trim(text(:open - 1)))
+    path%group_rule = group_rule_index(group)
+    complaint = ''
+    if (path%group_rule == 0) then
+      complaint = "there is no group '" // group // "'" // suggestion(group, group_names())
+    else if (open <= len(text)) then
+      call read_subscript(text(open + 1:max(open, len(text) - 1)), place)
+      path%number = place%first
+      if (place%is_damaged .or. place%last /= place%first .or. text(len(text):) /= ')') complaint = text(open:) &
+        // ' is no number of a group such as (3)'
+    end if
+  end subroutine read_group
 
   subroutine read_key(text, path, key, complaint)
     character(len=*), intent(in) :: text   !! KEY or KEY(SUBSCRIPT)
@@ -61,7 +80,7 @@ contains
     complaint = ''
     if (path%key_rule == 0) then
       complaint = key // ' is not a key of &' // trim(group_rules(path%group_rule)%name) &
-        // suggestion(key, key_names(path%group_rule))
+        // key_suggestion(path%group_rule, key)
     else if (open <= len(text)) then
       call read_subscript(text(open + 1:max(open, len(text) - 1)), path%place)
       if (path%place%is_damaged .or. text(len(text):) /= ')') complaint = text(open:) &
@@ -69,19 +88,23 @@ contains
     end if
   end subroutine read_key
 
-  !> Single groups are addressed by kind and key, named ones by kind, name and key, others not at all.
-  subroutine check_form(group_rule, ending, has_name, complaint)
-    integer, intent(in) :: group_rule
+  !> Single groups are addressed by kind and key, named ones by kind, name and key, others by kind, number and key.
+  subroutine check_form(path, ending, has_name, complaint)
+    type(path_t), intent(in) :: path
     character(len=*), intent(in) :: ending   !! of the path, for the message
     logical, intent(in) :: has_name
     character(len=:), allocatable, intent(inout) :: complaint
     character(len=:), allocatable :: group
 
-    group = trim(group_rules(group_rule)%name)
-    if (is_single(group_rule)) then
+    group = trim(group_rules(path%group_rule)%name)
+    if (is_single(path%group_rule)) then
       if (has_name) complaint = '&' // group // ' has no name; write ' // group // '.' // ending
-    else if (group_rules(group_rule)%name_space == '') then
-      complaint = '&' // group // ' has no name by which one of several could be told; change it in the file'
+      if (path%number > 0) complaint = '&' // group // ' occurs once only; write ' // group // '.' // ending
+    else if (group_rules(path%group_rule)%name_space == '') then
+      if (has_name .or. path%number == 0) complaint = '&' // group // ' has no name; write ' // group // '(1).' // ending // &
+        ' for the first one in the file'
+    else if (path%number > 0) then
+      complaint = '&' // group // ' is found by its name; write ' // group // '.NAME.' // ending
     else if (.not. has_name) then
       complaint = '&' // group // ' may occur several times; write ' // group // '.NAME.' // ending
     end if

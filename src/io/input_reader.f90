@@ -175,11 +175,27 @@ contains
 
     do i = 1, size(overrides)
       if (overrides(i)%is_used .or. .not. overrides(i)%is_fine) cycle
+      if (overrides(i)%number > 0) then
+        call refuse_number(groups, overrides(i), i, mistakes)
+        cycle
+      end if
       call collect_names(groups, pack([(g, g=1, size(groups))], groups%rule == overrides(i)%group_rule), names)
       call mistakes%add(no_line, 0, 'there is no &' // trim(group_rules(overrides(i)%group_rule)%name) // ' ' &
         // quoted(overrides(i)%name) // suggestion(overrides(i)%name, names), i)
     end do
   end subroutine refuse_unused
+
+  subroutine refuse_number(groups, override, which, mistakes)
+    type(group_t), intent(in) :: groups(:)
+    type(override_t), intent(in) :: override
+    integer, intent(in) :: which   !! index of the override
+    type(mistakes_t), intent(inout) :: mistakes
+    character(len=:), allocatable :: kind
+
+    kind = trim(group_rules(override%group_rule)%name)
+    call mistakes%add(no_line, 0, 'there is no ' // kind // '(' // to_text(override%number) // '); the file has ' // &
+                      to_text(count(groups%rule == override%group_rule)) // ' &' // kind, which)
+  end subroutine refuse_number
 
   !> False if a &body, perhaps misspelt, is there whose name could not be read.
   pure logical function bodies_are_known(groups)

@@ -8,8 +8,9 @@ module nocdyn_schema
   use nocdyn_schema_couplings, only: coupling_alternatives, coupling_columns, coupling_examples, coupling_keys, coupling_needs
   use nocdyn_schema_rules, only: a_body, a_flag, a_kind, a_file, a_name, a_number, a_text, a_word, allowed_t, alternative_t, &
     an_integer, any_number, any_times, anything, at_least_once, at_most_once, body_or_ground, columns_t, exactly_once, &
-    example_t, from_1, from_2, group_rule_t, key_rule_t, kind_rule_t, need_t, order_t, positive, required, unset
-  use nocdyn_schema_sweep, only: sweep_examples, sweep_groups, sweep_keys, sweep_kinds, sweep_needs, sweep_orders
+    example_t, from_1, from_2, group_rule_t, key_rule_t, kind_rule_t, need_t, order_t, positive, required, synonym_t, unset
+  use nocdyn_schema_sweep, only: sweep_examples, sweep_groups, sweep_keys, sweep_kinds, sweep_needs, sweep_orders, &
+    sweep_synonyms
   use nocdyn_schema_torques, only: excitation_keys, load_keys, motor_keys, torque_alternatives, torque_columns, &
     torque_examples, torque_kinds, torque_needs
   use nocdyn_text, only: append, string_t
@@ -93,6 +94,8 @@ module nocdyn_schema
   type(order_t), parameter, public :: orders(*) = [ &
     order_t('run', 't_start', 't_end'), &
     sweep_orders]
+
+  type(synonym_t), parameter, public :: synonyms(*) = sweep_synonyms
 
   type(example_t), parameter, public :: examples(*) = [ &
     example_t('case',       "title = 'Paper, case 2: harmonic torque on the motor'"), &

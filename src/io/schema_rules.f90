@@ -80,11 +80,18 @@ module nocdyn_schema_rules
     character(len=12) :: file = ''     !! the key of a file that may hold the two lists as columns; the first one ascends then
   end type columns_t
 
-  !> Two keys of a group: `upper` must be greater than `lower`.
+  !> Two keys of a group: `upper` must be greater than `lower`, or not less.
   type, public :: order_t
     character(len=12) :: group
     character(len=18) :: lower, upper
+    logical :: may_be_equal = .false.
   end type order_t
+
+  !> Words that stand for keys in other programs. Both are separated by blanks.
+  type, public :: synonym_t
+    character(len=12) :: group
+    character(len=48) :: words, keys
+  end type synonym_t
 
   !> The inside of a group as an example.
   type, public :: example_t

@@ -3,7 +3,7 @@ module nocdyn_schema_sweep
   use nocdyn_kinds, only: wp
   use nocdyn_schema_rules, only: a_file, a_kind, a_number, a_text, allowed_t, an_integer, any_number, any_times, anything, &
     at_most_once, example_t, from_1, group_rule_t, key_rule_t, kind_rule_t, need_t, not_negative, order_t, positive, required, &
-    unset
+    synonym_t, unset
   implicit none (type, external)
   private
 
@@ -46,9 +46,9 @@ module nocdyn_schema_sweep
     key_rule_t('vary',       'low',             a_number,       1, '',            unset,       anything, &
       'smallest value', needed_by='uniform'), &
     key_rule_t('vary',       'high',            a_number,       1, '',            unset,       anything, &
-      'largest value, above low', needed_by='uniform'), &
+      'largest value, above low; low itself with count = 1', needed_by='uniform'), &
     key_rule_t('vary',       'count',           an_integer,     1, '',            unset,       from_1, &
-      "values from low to high, both included; for design = 'grid', which needs it"), &
+      "how many values from low to high, both included; 1: low alone; design = 'grid' needs it"), &
     key_rule_t('vary',       'distribution',    a_kind,         1, '',            "'uniform'", anything, &
       'how the values are distributed; all numbers in the unit of the target'), &
     key_rule_t('vary',       'mean',            a_number,       1, '',            required,    anything, &
@@ -66,7 +66,7 @@ module nocdyn_schema_sweep
     key_rule_t('record',     'trajectories',    an_integer,     any_number, '',   unset,       from_1, &
       'numbers of variants whose results are written as those of a run', least=1), &
     key_rule_t('record',     'statistic',       a_kind,         any_number, '',   unset,       anything, &
-      'which numbers of it', least=1), &
+      'what is kept of the quantity', least=1), &
     key_rule_t('record',     'band',            a_number,       1, '',            unset,       positive, &
       '0.02 if not given', 'settling_time')]
 
@@ -75,7 +75,18 @@ module nocdyn_schema_sweep
     need_t('record', 'statistic from', 'quantity')]
 
   type(order_t), parameter, public :: sweep_orders(*) = [ &
-    order_t('vary', 'low', 'high')]
+    order_t('vary', 'low', 'high', may_be_equal=.true.)]
+
+  type(synonym_t), parameter, public :: sweep_synonyms(*) = [ &
+    synonym_t('sweep',  'n variants count number',       'samples'), &
+    synonym_t('vary',   'sigma std sd stddev scale',     'deviation log_deviation'), &
+    synonym_t('vary',   'mu average loc',                'mean median'), &
+    synonym_t('vary',   'min minimum from start',        'low'), &
+    synonym_t('vary',   'max maximum to stop',           'high'), &
+    synonym_t('vary',   'n points steps samples', 'count'), &
+    synonym_t('record', 'column variable name',          'quantity'), &
+    synonym_t('record', 'start after t_start',           'from'), &
+    synonym_t('record', 'tolerance',                     'band')]
 
   type(example_t), parameter, public :: sweep_examples(*) = [ &
     example_t('sweep',  "design = 'random' samples = 100000 seed = 1", .false.), &

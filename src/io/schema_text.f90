@@ -1,14 +1,15 @@
 !> Rows of the schema in words, for messages and help.
 module nocdyn_schema_text
   use nocdyn_kinds, only: wp
-  use nocdyn_schema, only: first_key, group_rules, key_rules, last_key, words_in, words_of
+  use nocdyn_schema, only: first_key, group_rules, has_word, key_rules, last_key, synonyms, words_in, words_of
   use nocdyn_schema_rules, only: a_body, a_file, a_flag, a_kind, a_name, a_number, a_text, a_word, allowed_t, &
     an_integer, any_number, at_least_once, at_most_once, body_or_ground, exactly_once, key_rule_t
-  use nocdyn_text, only: joined, nearest_word, quoted, string_t, to_text
+  use nocdyn_text, only: append, joined, nearest_word, quoted, string_t, to_text
   implicit none (type, external)
   private
 
-  public :: allowed_text, kind_text, kinds_text, listed, occurrence_text, group_names, key_names, suggestion
+  public :: allowed_text, kind_text, kinds_text, listed, occurrence_text, group_names, key_names, meant_keys, &
+    key_suggestion, suggestion
 
 contains
 
@@ -166,6 +167,44 @@ contains
       names(i)%text = trim(key_rules(first + i - 1)%name)
     end do
   end function key_names
+
+  !> The keys that a word which is no key of the group may stand for.
+  pure function meant_keys(group_rule, word) result(keys)
+    integer, intent(in) :: group_rule
+    character(len=*), intent(in) :: word   !! in lower case
+    type(string_t), allocatable :: keys(:)
+    type(string_t), allocatable :: names(:)
+    integer :: i, nearest
+
+    allocate (keys(0))
+    do i = 1, size(synonyms)
+      if (synonyms(i)%group /= group_rules(group_rule)%name .or. .not. has_word(synonyms(i)%words, word)) cycle
+      keys = words_in(synonyms(i)%keys)
+      return
+    end do
+    allocate (names, source=key_names(group_rule))
+    nearest = nearest_word(word, names)
+    if (nearest > 0) call append(keys, names(nearest)%text)
+  end function meant_keys
+
+  !> "; did you mean 'low'?", or all keys of the group if none is meant and they are few.
+  pure function key_suggestion(group_rule, word) result(text)
+    integer, intent(in) :: group_rule
+    character(len=*), intent(in) :: word   !! in lower case
+    character(len=:), allocatable :: text
+    type(string_t), allocatable :: keys(:)
+    integer :: i
+
+    allocate (keys, source=meant_keys(group_rule, word))
+    if (size(keys) == 0) then
+      text = suggestion(word, key_names(group_rule))
+      return
+    end if
+    do i = 1, size(keys)
+      keys(i)%text = quoted(keys(i)%text)
+    end do
+    text = '; did you mean ' // listed(keys, ' or ') // '?'
+  end function key_suggestion
 
   !> "; did you mean 'stiffness'?", or all candidates if none is near and they are few.
   pure function suggestion(word, candidates) result(text)

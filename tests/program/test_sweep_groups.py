@@ -72,10 +72,15 @@ def test_help_explains_the_groups(nocdyn, group, parts):
         ("&sweep design = 'grid' / &sweep design = 'grid' /", "&sweep: given twice, first on line 5; allowed: at most once"),
         ("&vary low = 1 high = 2 /", "&vary: target is missing; needed: any text"),
         ("&vary target = 'x' high = 2 /", "&vary: low is missing; needed: any value"),
-        ("&vary target = 'x' low = 2 high = 1 /", "&vary: high = 1 is out of range; allowed: > low = 2"),
+        ("&vary target = 'x' low = 2 high = 1 /", "&vary: high = 1 is out of range; allowed: >= low = 2"),
         ("&vary target = 'x' low = 1 high = 2 count = 0 /", "&vary: count = 0 is out of range; allowed: >= 1"),
         ("&vary target = 'x' low = 1 high = 2 mean = 1 /", "mean belongs to distribution = 'normal'; here distribution = 'uniform', the default"),
         ("&vary target = 'x' distribution = 'normal' mean = 1 /", "&vary: deviation is missing; needed: > 0"),
+        ("&vary target = 'x' distribution = 'normal' mean = 1 sigma = 2 /", "sigma is not a key of &vary; did you mean 'deviation' or 'log_deviation'?"),
+        ("&vary target = 'x' distribution = 'lognormal' mu = 1 log_deviation = 2 /", "mu is not a key of &vary; did you mean 'mean' or 'median'?"),
+        ("&vary target = 'x' min = 1 high = 2 /", "min is not a key of &vary; did you mean 'low'?"),
+        ("&sweep design = 'random' n = 3 /", "&sweep: n is not a key of &sweep; did you mean 'samples'?"),
+        ("&record column = 'x' statistic = 'max' /", "column is not a key of &record; did you mean 'quantity'?"),
         ("&vary target = 'x' distribution = 'gauss' /", "distribution = 'gauss' is not known; allowed: 'uniform', 'normal', 'lognormal'"),
         ("&vary target = 'x' distribution = 'lognormal' median = 0 log_deviation = 1 /", "median = 0 is out of range; allowed: > 0"),
         ("&record quantity = 'x' /", "&record: quantity needs statistic"),
@@ -115,13 +120,18 @@ def test_another_design_on_the_command_line_displaces_the_keys_of_the_old_one(no
 
 
 @pytest.mark.parametrize("override", ["vary.low=1", "vary.x.low=1", "record.from=1"])
-def test_groups_without_names_cannot_be_reached_by_a_path(nocdyn, override):
+def test_groups_without_names_are_not_reached_without_their_number(nocdyn, override):
     outcome = nocdyn("check", VARIED, "--set", override)
     assert outcome.returncode == 2
-    group = override.split(".")[0]
-    assert outcome.stderr == (
-        f"nocdyn: --set {override}: &{group} has no name by which one of several could be told; change it in the file\n"
-    )
+    group, key = override.split(".")[0], override.split(".")[-1][:-2]
+    assert outcome.stderr == f"nocdyn: --set {override}: &{group} has no name; write {group}(1).{key}=VALUE for the first one in the file\n"
+
+
+def test_groups_without_names_are_reached_by_their_number(nocdyn):
+    words = ("--set", "vary(2).mean=2", "--set", "record(1).statistic=max", "--set", "sweep.samples=7", "--set", "record(2).trajectories=5")
+    assert nocdyn("run", VARIED, "--out", "out", "-q", *words).returncode == 0
+    text = (nocdyn.folder / "out/input.nml").read_text()
+    assert all(line in text for line in ("  mean = 2\n", "  statistic = 'max'\n", "  samples = 7\n", "  trajectories = 5\n"))
 
 
 def test_an_override_of_a_sweep_that_is_not_there_tells_what_is_missing(nocdyn):
