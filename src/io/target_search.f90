@@ -6,7 +6,7 @@ module nocdyn_target_search
   use nocdyn_schema, only: first_key, group_rules, has_word, key_rules, kind_name, kind_rule_index, last_key
   use nocdyn_schema_rules, only: a_number, an_integer, key_rule_t
   use nocdyn_schema_text, only: kind_text, kinds_text, listed, suggestion
-  use nocdyn_text, only: append, quoted, string_t, to_text
+  use nocdyn_text, only: append, lower_case, nearest_word, quoted, string_t, to_text
   implicit none (type, external)
   private
 
@@ -31,6 +31,7 @@ contains
     type(path_t) :: path
 
     call read_path(text, '', path, complaint)
+    if (path%key_rule == 0) call suggest_path(input, text, path%group_rule > 0, complaint)
     if (path%group_rule > 0) then
       if (has_word(fixed_groups, group_rules(path%group_rule)%name)) complaint = 'the keys of &' // &
         trim(group_rules(path%group_rule)%name) // ' cannot vary; allowed: bodies, couplings, joints, torques and &run'
@@ -39,9 +40,65 @@ contains
     if (complaint /= '') return
     found%rule = path%key_rule
     call find_group(input, path, found%group, complaint)
+    if (complaint /= '') call suggest_path(input, text, .true., complaint)
     if (complaint == '') call check_law(input%groups(found%group), key_rules(found%rule), complaint)
     if (complaint == '') call find_place(input%groups(found%group), text, path, found%place, complaint)
   end subroutine search_target
+
+  !> Puts a path of the input in place of what a complaint suggests, if the text is one whose group is missing or another one.
+  subroutine suggest_path(input, text, has_group, complaint)
+    type(input_t), intent(in) :: input
+    character(len=*), intent(in) :: text     !! the path
+    logical, intent(in) :: has_group         !! there are groups of its kind; then the rest must be right
+    character(len=:), allocatable, intent(inout) :: complaint
+    type(string_t), allocatable :: tails(:)
+    integer, allocatable :: owners(:)
+    character(len=:), allocatable :: tail
+    integer :: near, place
+
+    if (index(complaint, '; did you mean') > 0) return   ! of the group or the key
+    call list_tails(input, tails, owners)
+    place = index(text // '(', '(')
+    tail = lower_case(text(:place - 1))
+    if (has_group) tail = tail(index(tail, '.') + 1:)
+    near = nearest_word(tail, tails)
+    if (near == 0) return
+    if (has_group .and. tail /= lower_case(tails(near)%text)) return
+    complaint = complaint(:index(complaint // ';', ';') - 1) // "; did you mean '" // input%groups(owners(near))%kind // '.' // &
+                tails(near)%text // text(place:) // "'?"
+  end subroutine suggest_path
+
+  !> The paths without their groups of all keys that can vary.
+  subroutine list_tails(input, tails, owners)
+    type(input_t), intent(in) :: input
+    type(string_t), allocatable, intent(out) :: tails(:)
+    integer, allocatable, intent(out) :: owners(:)   !! indices of the groups, [tails]
+    integer :: found, g, key
+
+    found = 0
+    do g = 1, size(input%groups)
+      if (can_vary(input%groups(g))) found = found + &
+        count(is_numeric(key_rules(first_key(input%groups(g)%rule):last_key(input%groups(g)%rule))))
+    end do
+    allocate (tails(found), owners(found))
+    found = 0
+    do g = 1, size(input%groups)
+      if (.not. can_vary(input%groups(g))) cycle
+      do key = first_key(input%groups(g)%rule), last_key(input%groups(g)%rule)
+        if (.not. is_numeric(key_rules(key))) cycle
+        found = found + 1
+        owners(found) = g
+        tails(found)%text = trim(key_rules(key)%name)
+        if (input%groups(g)%name /= '') tails(found)%text = input%groups(g)%name // '.' // tails(found)%text
+      end do
+    end do
+  end subroutine list_tails
+
+  pure logical function can_vary(group)
+    type(group_t), intent(in) :: group
+
+    can_vary = .not. has_word(fixed_groups, group%kind)
+  end function can_vary
 
   !> Only numbers vary.
   subroutine check_kind_of_key(path, complaint)
@@ -59,7 +116,7 @@ contains
     if (size(names) > 0) complaint = complaint // '; allowed: ' // listed(names, ', ')
   end subroutine check_kind_of_key
 
-  pure logical function is_numeric(rule)
+  elemental logical function is_numeric(rule)
     type(key_rule_t), intent(in) :: rule
 
     is_numeric = rule%kind == a_number .or. rule%kind == an_integer
