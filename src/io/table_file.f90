@@ -24,6 +24,7 @@ module nocdyn_table_file
     integer :: line = 0
     integer :: last_good = 0            !! line of the last row
     integer :: wrong = 0                !! lines with a mistake
+    logical :: is_other = .false.       !! the file has another form altogether, which was reported
     type(string_t), allocatable :: complaints(:)
   end type reading_t
 
@@ -85,8 +86,9 @@ contains
     reading%is_list = .true.
     start = first_position(text)
     call read_names(text, start, reading, names)
-    reading%columns = size(names)
     line = reading%line
+    call judge_names(reading, names)
+    reading%columns = size(names)
     call read_rows(text, start, reading, lines, rows)
     call conclude(reading, rows, least=1, is_binary=index(text, achar(0)) > 0)
     allocate (values(size(names), rows))
@@ -135,6 +137,34 @@ contains
     end do
   end subroutine read_names
 
+  !> Drops names that a file of another form has.
+  subroutine judge_names(reading, names)
+    type(reading_t), intent(inout) :: reading
+    type(string_t), allocatable, intent(inout) :: names(:)
+    character(len=:), allocatable :: complaint
+    integer :: i
+
+    complaint = ''
+    do i = 1, size(names)
+      if (index(names(i)%text, ';') > 0) then
+        complaint = 'the columns are separated by semicolons; needed: commas, and points in numbers'
+      else if (index(names(i)%text, tab) > 0) then
+        complaint = 'the names of the columns are separated by tabs; needed: commas'
+      else if (names(i)%text == 'variant') then
+        complaint = "'variant' is a column of a sweep.csv; needed: the columns of the numbers that vary alone"
+      else if (names(i)%text == '') then
+        complaint = 'column ' // to_text(i) // ' has no name; needed: the path of a number'
+        if (i == 1) complaint = complaint // ', and no numbers of rows (pandas: to_csv(FILE, index=False))'
+      end if
+      if (complaint /= '') exit
+    end do
+    if (complaint == '') return
+    reading%is_other = .true.
+    call complain(reading, ':' // to_text(reading%line) // ': ' // complaint)
+    deallocate (names)
+    allocate (names(0))
+  end subroutine judge_names
+
   pure function without_quotes(text) result(name)
     character(len=*), intent(in) :: text
     character(len=:), allocatable :: name
@@ -154,7 +184,7 @@ contains
     allocate (values(reading%columns, lines_of(text)))
     rows = 0
     start = first
-    do while (start <= len(text))
+    do while (start <= len(text) .and. .not. reading%is_other)
       last = line_last(text, start)
       reading%line = reading%line + 1
       call read_line(text(start:content_end(text, start, last)), reading, values, rows)
@@ -194,6 +224,11 @@ contains
     character(len=:), allocatable :: complaint
 
     if (content == '') return
+    if (reading%is_list .and. scan(content, quotes) > 0) then
+      reading%is_other = .true.
+      call complain(reading, ':' // to_text(reading%line) // ': quotes in ' // excerpt(content) // '; needed: plain numbers')
+      return
+    end if
     call split(content, begins, ends, found)
     if (found /= reading%columns) then
       complaint = to_text(found) // trim(merge(' column ', ' columns', found == 1)) // ' in ' // excerpt(content) // &
