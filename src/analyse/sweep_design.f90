@@ -6,11 +6,11 @@ module nocdyn_sweep_design
   use nocdyn_errors, only: error_t, exit_file
   use nocdyn_input, only: group_t, input_t
   use nocdyn_kinds, only: wp
-  use nocdyn_mistakes, only: mistakes_t
+  use nocdyn_mistakes, only: mistakes_t, no_line
   use nocdyn_sobol_points, only: most_dimensions
   use nocdyn_sweep_mistakes, only: add_mistake
   use nocdyn_table_file, only: read_list_text
-  use nocdyn_target_company, only: find_targets
+  use nocdyn_target_company, only: find_targets, target_at
   use nocdyn_targets, only: target_t
   use nocdyn_text, only: quoted, string_t, to_text
   use nocdyn_text_file, only: path_in, read_text_file
@@ -42,6 +42,7 @@ contains
       else
         call read_varied(input, sweep, varied, targets, factors, mistakes)
       end if
+      call refuse_overrides(input, varied, targets, mistakes)
       if (mistakes%count > before) return
       samples = 0
       seed = 0
@@ -73,7 +74,7 @@ contains
     character(len=:), allocatable, intent(inout) :: list_checksum
     type(mistakes_t), intent(inout) :: mistakes
     type(error_t), allocatable :: error
-    type(string_t), allocatable :: complaints(:), paths(:)
+    type(string_t), allocatable :: complaints(:), names(:), paths(:), units(:)
     character(len=:), allocatable :: file, text
     integer :: i, line
 
@@ -85,17 +86,39 @@ contains
       return
     end if
     list_checksum = checksum_digits(text)
-    call read_list_text(text, file, paths, line, values, complaints)
+    call read_list_text(text, file, names, line, values, complaints)
     do i = 1, size(complaints)
       call add_mistake(input, sweep, 'file', 'file: ' // complaints(i)%text, mistakes)
     end do
+    call take_units_off(names, paths, units)
     call find_targets(input, paths, targets, complaints)
     do i = 1, size(paths)
+      if (complaints(i)%text == '' .and. units(i)%text /= '' .and. units(i)%text /= targets(i)%unit) then
+        complaints(i)%text = 'another unit; needed: ' // paths(i)%text
+        if (targets(i)%unit /= '') complaints(i)%text = complaints(i)%text // ' [' // targets(i)%unit // ']'
+      end if
       if (complaints(i)%text == '') cycle
       call add_mistake(input, sweep, 'file', 'file: ' // file // ':' // to_text(line) // ': column ' // to_text(i) // ', ' // &
-                       quoted(paths(i)%text) // ': ' // complaints(i)%text, mistakes)
+                       quoted(names(i)%text) // ': ' // complaints(i)%text, mistakes)
     end do
   end subroutine read_list
+
+  !> "load.work.viscous [N m s/rad]", as sweep.csv has it.
+  subroutine take_units_off(names, paths, units)
+    type(string_t), intent(in) :: names(:)
+    type(string_t), allocatable, intent(out) :: paths(:), units(:)   !! '' where there is no unit
+    integer :: bracket, i
+
+    allocate (paths(size(names)), units(size(names)))
+    do i = 1, size(names)
+      associate (name => names(i)%text)
+        bracket = index(name, '[', back=.true.)
+        if (bracket == 0 .or. name(len(name):) /= ']') bracket = len(name) + 1
+        paths(i)%text = trim(name(:bracket - 1))
+        units(i)%text = name(bracket + 1:len(name) - 1)
+      end associate
+    end do
+  end subroutine take_units_off
 
   subroutine refuse_varied(input, varied, mistakes)
     type(input_t), intent(in) :: input
@@ -108,6 +131,30 @@ contains
                         "design = 'list' takes targets and values from its file; allowed: no &vary")
     end do
   end subroutine refuse_varied
+
+  !> An override of a number that varies would be without effect.
+  subroutine refuse_overrides(input, varied, targets, mistakes)
+    type(input_t), intent(in) :: input
+    integer, intent(in) :: varied(:)   !! the &vary of the targets; none if they are those of a list
+    type(target_t), intent(in) :: targets(:)
+    type(mistakes_t), intent(inout) :: mistakes
+    character(len=:), allocatable :: source
+    integer :: i, t
+
+    do i = 1, size(input%overrides)
+      associate (text => input%overrides(i)%text)
+        t = target_at(input, targets, text(:index(text, '=') - 1))
+      end associate
+      if (t == 0) cycle
+      if (size(varied) == 0) then
+        source = 'column ' // to_text(t) // ' of the list gives this number its values'
+      else
+        source = 'the &vary on line ' // to_text(input%groups(varied(t))%line) // ' gives this number its values; to ' // &
+                 'change those, write vary(' // to_text(t) // ').KEY=VALUE'
+      end if
+      call mistakes%add(no_line, 0, 'has no effect on a sweep: ' // source, i)
+    end do
+  end subroutine refuse_overrides
 
   !> The targets and factors of all &vary.
   subroutine read_varied(input, sweep, varied, targets, factors, mistakes)
@@ -132,6 +179,7 @@ contains
       end if
       factors(i) = factor_of(input%groups(varied(i)))
       call check_factor(input, varied(i), design, factors(i), mistakes)
+      if (design == 'grid' .and. targets(i)%is_whole) call check_whole_grid(input, varied(i), targets(i), factors(i), mistakes)
     end do
     if (size(varied) == 0) then
       call add_mistake(input, sweep, 'design', 'design = ' // quoted(design) // ' has nothing to vary; needed: a &vary', mistakes)
@@ -172,17 +220,43 @@ contains
       if (has_count) then
         call add_mistake(input, varied, 'count', "count belongs to design = 'grid'; here design = " // quoted(design), mistakes)
       end if
-      if (probability_between(factor) <= 0.0_wp) then
+      if (factor%distribution == 'uniform' .and. factor%high <= factor%low) then
+        call add_mistake(input, varied, 'high', 'high = ' // to_text(factor%high) // ' is out of range; allowed: > low = ' // &
+                         to_text(factor%low), mistakes)
+      else if (probability_between(factor) <= 0.0_wp) then
         call add_mistake(input, varied, 'distribution', 'the distribution has nothing from low to high; allowed: ends ' // &
                          'nearer to its middle', mistakes)
       end if
       return
     end if
-    if (.not. has_count) call add_mistake(input, varied, 'count', "count is missing; design = 'grid' needs it", mistakes)
+    if (.not. has_count) then
+      call add_mistake(input, varied, 'count', "count is missing; design = 'grid' needs it", mistakes)
+    else if (factor%count > 1 .and. factor%high <= factor%low) then
+      call add_mistake(input, varied, 'count', 'count = ' // to_text(factor%count) // ' values from low = ' // &
+                       to_text(factor%low) // ' to high = ' // to_text(factor%high) // ' are all the same; allowed: count = 1', &
+                       mistakes)
+    end if
     if (factor%distribution /= 'uniform') then
       call add_mistake(input, varied, 'distribution', 'distribution = ' // quoted(trim(factor%distribution)) // &
                        " has no grid; allowed with design = 'grid': 'uniform'", mistakes)
     end if
   end subroutine check_factor
+
+  !> Values of a whole number must not round to the same one.
+  subroutine check_whole_grid(input, varied, target, factor, mistakes)
+    type(input_t), intent(in) :: input
+    integer, intent(in) :: varied   !! index of the &vary
+    type(target_t), intent(in) :: target
+    type(factor_t), intent(in) :: factor
+    type(mistakes_t), intent(inout) :: mistakes
+    real(wp) :: room
+
+    if (factor%distribution /= 'uniform' .or. factor%high <= factor%low) return
+    room = anint(factor%high) - anint(factor%low) + 1.0_wp
+    if (factor%count <= room) return
+    call add_mistake(input, varied, 'count', 'count = ' // to_text(factor%count) // ' has repeats: ' // target%path // &
+                     ' is a whole number, of which low = ' // to_text(factor%low) // ' to high = ' // to_text(factor%high) // &
+                     ' holds ' // to_text(nint(room)) // '; allowed: 1 to ' // to_text(nint(room)), mistakes)
+  end subroutine check_whole_grid
 
 end module nocdyn_sweep_design

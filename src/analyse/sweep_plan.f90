@@ -83,14 +83,14 @@ contains
     where (self%targets%is_whole) x = anint(x)
   end subroutine values
 
-  !> 'random, 100000 variants of 2 numbers, 7 results'
+  !> 'random, 100000 variants that differ in 2 numbers, 7 results'
   function summary(self) result(text)
     class(sweep_plan_t), intent(in) :: self
     character(len=:), allocatable :: text
     type(group_t) :: group
 
     group = self%input%single('sweep')
-    text = group%text('design') // ', ' // counted(self%design%variants, 'variant', 'variants') // ' of ' // &
+    text = group%text('design') // ', ' // counted(self%design%variants, 'variant', 'variants') // ' that differ in ' // &
            counted(self%design%varied, 'number', 'numbers') // ', ' // counted(size(self%statistics), 'result', 'results')
     if (size(self%trajectories) > 0) text = text // ', ' // counted(size(self%trajectories), 'trajectory', 'trajectories')
   end function summary

@@ -3,10 +3,9 @@ module nocdyn_sweep_records
   use nocdyn_input, only: input_t
   use nocdyn_kinds, only: wp
   use nocdyn_mistakes, only: mistakes_t
-  use nocdyn_schema_text, only: suggestion
-  use nocdyn_statistics, only: default_band, new_statistic, statistic_names, statistic_t
+  use nocdyn_statistics, only: default_band, new_statistic, statistic_names, statistic_settling_time, statistic_t
   use nocdyn_sweep_mistakes, only: add_mistake
-  use nocdyn_text, only: quoted, string_t, to_text
+  use nocdyn_text, only: append, joined, nearest_word, quoted, string_t, to_text
   implicit none (type, external)
   private
 
@@ -104,6 +103,7 @@ contains
         else
           statistic = new_statistic(labels, column, kind, span%t_start, band=band)
         end if
+        if (kind == statistic_settling_time .and. group%has_value('band')) call name_band(statistic)
         if (any_has_label(statistics, statistic%label)) then
           call add_mistake(input, record, 'statistic', quoted(statistic%label) // ' is recorded already; allowed: once', mistakes)
         else
@@ -112,6 +112,13 @@ contains
       end do
     end associate
   end subroutine add_statistics
+
+  subroutine name_band(statistic)
+    type(statistic_t), intent(inout) :: statistic
+
+    statistic%label = statistic%label // '_band_' // to_text(statistic%band)
+    statistic%long_name = statistic%long_name // ' in a band of ' // to_text(statistic%band)
+  end subroutine name_band
 
   pure integer function kind_of(word) result(kind)
     character(len=*), intent(in) :: word
@@ -137,13 +144,50 @@ contains
     end do
     column = 0
     if (index(quantity, '[') > 0) then
-      hint = suggestion(quantity, labels)
+      hint = near_match(quantity, labels)
     else
-      hint = suggestion(quantity, names)
+      hint = near_match(quantity, names)
     end if
+    if (hint == '') hint = ', which has ' // related_names(quantity, names)
     call add_mistake(input, record, 'quantity', 'quantity = ' // quoted(quantity) // ' is no column of trajectory.csv' // hint, &
                      mistakes)
   end subroutine find_column
+
+  !> "; did you mean 'omega_motor'?", '' if nothing is near.
+  pure function near_match(quantity, candidates) result(text)
+    character(len=*), intent(in) :: quantity
+    type(string_t), intent(in) :: candidates(:)
+    character(len=:), allocatable :: text
+    integer :: nearest
+
+    text = ''
+    nearest = nearest_word(quantity, candidates)
+    if (nearest > 0) text = '; did you mean ' // quoted(candidates(nearest)%text) // '?'
+  end function near_match
+
+  !> The columns of the element that a quantity seems to name; the first of all columns if there are none.
+  pure function related_names(quantity, names) result(text)
+    character(len=*), intent(in) :: quantity
+    type(string_t), intent(in) :: names(:)   !! without units
+    character(len=:), allocatable :: text
+    integer, parameter :: most = 16
+    type(string_t), allocatable :: related(:)
+    character(len=:), allocatable :: ending
+    integer :: i
+
+    ending = quantity(:index(quantity // ' [', ' [') - 1)
+    ending = '_' // ending(index(ending, '_') + 1:) // '|'
+    allocate (related(0))
+    do i = 1, size(names)
+      if (index(names(i)%text // '|', ending) > 0) call append(related, names(i)%text)
+    end do
+    if (size(related) > 0) then
+      text = joined(related, ', ')
+    else
+      text = joined(names, ', ', most)
+      if (size(names) > most) text = text // ' in its first line'
+    end if
+  end function related_names
 
   subroutine check_from(input, record, span, mistakes)
     type(input_t), intent(in) :: input

@@ -9,7 +9,7 @@ module nocdyn_target_company
   implicit none (type, external)
   private
 
-  public :: find_targets, check_company
+  public :: find_targets, target_at, check_company
 
 contains
 
@@ -32,6 +32,19 @@ contains
       if (earlier > 0) complaints(i)%text = 'varies already, as number ' // to_text(earlier) // '; allowed: once'
     end do
   end subroutine find_targets
+
+  !> Which of several targets a path leads to, 0 if none.
+  integer function target_at(input, targets, path)
+    type(input_t), intent(in) :: input
+    type(target_t), intent(in) :: targets(:)
+    character(len=*), intent(in) :: path
+    type(target_t) :: target
+    character(len=:), allocatable :: complaint
+
+    call find_target(input, path, target, complaint)
+    target_at = 0
+    if (complaint == '') target_at = same_target(targets, target)
+  end function target_at
 
   !> The first of the targets that is the same number as `target`, 0 if none is.
   pure integer function same_target(targets, target) result(same)

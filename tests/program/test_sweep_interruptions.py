@@ -104,7 +104,7 @@ def interrupt(nocdyn, discs, *words):
     ("words", "difference"),
     [
         (("--set", "run.rtol=1e-7"), "the input has changed: &run: rtol was 1e-08, is 1e-07"),
-        (("--set", "load.drag.viscous=0.6"), "the input has changed: &load 'drag': viscous was 0.5, is 0.6"),
+        (("--set", "body.wheel.inertia=1.5"), "the input has changed: &body 'wheel': inertia was 1, is 1.5"),
         (("--set", "sweep.seed=4"), "the input has changed: &sweep: seed was 3, is 4"),
     ],
 )

@@ -43,6 +43,14 @@ def refusal(nocdyn, **groups):
             "m.nml:7: &record: quantity = 'omega_disk' is no column of trajectory.csv; did you mean 'omega_disc'?",
         ),
         (
+            {"record": "&record quantity = 'speed_disc' statistic = 'max' /\n"},
+            "m.nml:7: &record: quantity = 'speed_disc' is no column of trajectory.csv, which has 'phi_disc', 'omega_disc'",
+        ),
+        (
+            {"vary": "&vary target = 'drag.viscous' low = 0 high = 1 /\n"},
+            "m.nml:6: &vary: target = 'drag.viscous': there is no group 'drag'; did you mean 'load.drag.viscous'?",
+        ),
+        (
             {"record": "&record quantity = 'omega_disc' statistic = 'max' from = 1 /\n"},
             "m.nml:7: &record: from = 1 is out of range; allowed: < t_end = 1",
         ),
@@ -79,6 +87,36 @@ def test_a_list_is_refused_with_its_own_file_and_line(nocdyn):
     )
 
 
+def test_a_list_of_another_form_is_refused_once(nocdyn):
+    nocdyn.write("list.csv", '"load.drag.viscous";"run.t_end"\n0,5;1\n0,75;2\n')
+    message = refusal(nocdyn, sweep="&sweep design = 'list' file = 'list.csv' /\n", vary="")
+    assert message == (
+        "nocdyn: m.nml:5: &sweep: file: list.csv:1: the columns are separated by semicolons; needed: commas, and points in numbers\n"
+    )
+
+
+def test_columns_of_a_table_of_results_are_a_list(nocdyn):
+    path = nocdyn.write("m.nml", SPINNER + "".join(GROUPS.values()))
+    assert nocdyn("sweep", path, "--out", "out", "--csv").returncode == 0
+    rows = [line.split(",") for line in (nocdyn.folder / "out/sweep.csv").read_text().splitlines()]
+    nocdyn.write("list.csv", "".join(f"{row[1]}\n" for row in rows))
+    again = nocdyn.write("again.nml", SPINNER + "&sweep design = 'list' file = 'list.csv' /\n" + GROUPS["record"])
+    assert nocdyn("sweep", again, "--out", "again", "--csv").returncode == 0
+    assert [line.split(",")[:3] for line in (nocdyn.folder / "again/sweep.csv").read_text().splitlines()] == [row[:3] for row in rows]
+
+
+@pytest.mark.parametrize("command", ["sweep", "check"])
+def test_an_override_of_a_number_that_varies_is_refused(nocdyn, command):
+    path = nocdyn.write("m.nml", SPINNER + "".join(GROUPS.values()))
+    outcome = nocdyn(command, path, "--set", "load.drag.viscous=0.3")
+    assert (outcome.returncode, outcome.stdout) == (2, "")
+    assert outcome.stderr == (
+        "nocdyn: --set load.drag.viscous=0.3: has no effect on a sweep: the &vary on line 6 gives this number its values; "
+        "to change those, write vary(1).KEY=VALUE\n"
+    )
+    assert nocdyn(command, path, "--set", "vary(1).low=0.3").returncode == 0
+
+
 def test_a_list_that_is_not_there_cannot_be_read(nocdyn):
     path = nocdyn.write("m.nml", SPINNER + "&sweep design = 'list' file = 'none.csv' /\n" + GROUPS["record"])
     outcome = nocdyn("sweep", path, "--out", "out")
@@ -99,7 +137,7 @@ def test_check_looks_at_the_sweep_too(nocdyn):
     path = nocdyn.write("m.nml", SPINNER + "".join(GROUPS.values()) + "&record trajectories = 1, 2 /\n")
     outcome = nocdyn("check", path, "--set", "sweep.samples=100000")
     assert (outcome.returncode, outcome.stderr) == (0, "")
-    assert outcome.stdout.endswith("\n  sweep: random, 100000 variants of 1 number, 1 result, 2 trajectories\n")
+    assert outcome.stdout.endswith("\n  sweep: random, 100000 variants that differ in 1 number, 1 result, 2 trajectories\n")
     outcome = nocdyn("check", path, "--set", "sweep.samples=1")
     assert (outcome.returncode, outcome.stdout) == (2, "")
     assert outcome.stderr.endswith("m.nml:8: &record: trajectories(2) = 2 is out of range; allowed: 1 to 1, the number of variants\n")
