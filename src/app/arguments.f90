@@ -250,6 +250,11 @@ contains
       call raise(error, exit_input, takers_text(options(i)))
       return
     end do
+    if (arguments%shards > 1 .and. arguments%wants_csv) then
+      call raise(error, exit_input, '--csv and --shard: a part of a sweep has no table; ' // &
+                 'nocdyn merge DIR --csv writes that of all')
+      return
+    end if
     operands = size(arguments%operands)
     select case (arguments%command)
     case ('run', 'check', 'equilibrium', 'modes')

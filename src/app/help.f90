@@ -74,11 +74,11 @@ contains
            'Runs all variants of a machine that &sweep and &vary of the file describe, and writes what &record asks' // nl // &
            'for to sweep.nc, with summary.json and input.nml. A variant that fails is recorded with its reason.' // nl // nl // &
            '  --out DIR          write to DIR; without it &output directory counts, else results/<name of the file>' // nl // &
-           '  --set PATH=VALUE   override a key: sweep.samples=1000, run.rtol=1e-9, load.work.viscous=80' // nl // &
+           '  --set PATH=VALUE   override a key: sweep.samples=1000, vary(2).high=20, run.rtol=1e-9' // nl // &
            '  --threads NUMBER   without it OMP_NUM_THREADS counts, else the cores that the process may use' // nl // &
            "  --shard K/N        compute part K of N only, for 'nocdyn merge'" // nl // &
            '  --resume           go on where an interrupted sweep has stopped' // nl // &
-           '  --csv              write sweep.csv too' // nl // &
+           "  --csv              write sweep.csv too; of shards, 'nocdyn merge' writes it" // nl // &
            '  --quiet            print nothing but errors' // nl // nl // &
            'Results are the same to the last bit for any number of threads, shards or interruptions. On many machines:' // nl // &
            'mpirun -n N nocdyn-mpi sweep FILE, with the same options but --shard.' // nl // nl // &

@@ -2,11 +2,13 @@
 !> have to load for every other command.
 program nocdyn_sweep_program
   use nocdyn_arguments, only: arguments_t, command_line, parse_arguments
+  use nocdyn_commands, only: help_command, version_command
   use nocdyn_console, only: complain, output_is_lost
   use nocdyn_errors, only: error_t, exit_file, exit_input, raise
   use nocdyn_merge_command, only: merge_command
   use nocdyn_posix, only: survive_size_limit
   use nocdyn_sweep_command, only: sweep_command
+  use nocdyn_text, only: append
   implicit none (type, external)
 
   type(arguments_t) :: arguments
@@ -15,18 +17,25 @@ program nocdyn_sweep_program
 
   call survive_size_limit()
   call parse_arguments(command_line(), arguments, error)
-  if (.not. allocated(error) .and. arguments%command /= 'sweep' .and. arguments%command /= 'merge') then
-    call raise(error, exit_input, "nocdyn-sweep knows 'sweep' and 'merge' only; everything else is asked of nocdyn")
-  end if
   if (allocated(error)) then
     call complain(error)
     stop error%code, quiet=.true.
   end if
-  if (arguments%command == 'sweep') then
+  select case (arguments%command)
+  case ('sweep')
     call sweep_command(arguments, code)
-  else
+  case ('merge')
     call merge_command(arguments, code)
-  end if
+  case ('help')
+    if (size(arguments%operands) == 0) call append(arguments%operands, 'sweep')
+    call help_command(arguments, code)
+  case ('version')
+    call version_command(code)
+  case default
+    call raise(error, exit_input, "nocdyn-sweep knows 'sweep' and 'merge' only; everything else is asked of nocdyn")
+    call complain(error)
+    stop error%code, quiet=.true.
+  end select
   if (output_is_lost) then
     call raise(error, exit_file, 'standard output cannot be written')
     call complain(error)

@@ -2,6 +2,7 @@
 
 import csv
 import os
+import re
 import shutil
 import subprocess
 
@@ -137,10 +138,10 @@ def test_variants_of_other_tolerances_have_the_bits_of_a_sweep_of_these(nocdyn, 
     groups = [line for line in SWEEP.splitlines() if "&vary" not in line and "&sweep" not in line]
     groups += ["&sweep design = 'grid' /", "&vary target = 'run.rtol' low = 1e-12 high = 1e-4 count = 2 /"]
     groups += ["&vary target = 'load.drag.viscous' low = 0.3 high = 0.6 count = 2 /"]
-    nocdyn.write("discs.nml", TWO_DISCS + "\n".join(groups) + "\n")
     words = ("--csv", "--set", f"run.method={method}")
-    for folder, rtol in (("alone", 1e-8), ("fine", 1e-12), ("coarse", 1e-4)):
-        assert nocdyn("sweep", "discs.nml", "--out", folder, *words, "--set", f"run.rtol={rtol}").returncode == 0
+    for folder, rtol in (("alone", "1e-8"), ("fine", "1e-12"), ("coarse", "1e-4")):
+        nocdyn.write("discs.nml", TWO_DISCS.replace("rtol = 1e-8", f"rtol = {rtol}") + "\n".join(groups) + "\n")
+        assert nocdyn("sweep", "discs.nml", "--out", folder, *words).returncode == 0
     alone, fine, coarse = (table(nocdyn, folder) for folder in ("alone", "fine", "coarse"))
     assert alone == fine == coarse
     assert alone[0]["steps"] != alone[2]["steps"]
@@ -257,6 +258,7 @@ def test_parts_of_different_sweeps_are_not_merged(nocdyn, discs):
         (["sweep", "discs.nml", "--shard"], "--shard needs a value: --shard K/N"),
         (["sweep", "discs.nml", "--shard", "5/61"], "--shard 5/61: the sweep has 60 variants; allowed: at most as many parts"),
         (["sweep", "discs.nml", "--csv=yes"], "--csv takes no value"),
+        (["sweep", "discs.nml", "--csv", "--shard", "1/2"], "--csv and --shard: a part of a sweep has no table; nocdyn merge DIR --csv"),
         (["run", "discs.nml", "--resume"], "--resume is an option of nocdyn sweep"),
         (["run", "discs.nml", "--csv"], "--csv is an option of nocdyn sweep and merge"),
         (["sweep", "plain.nml"], "plain.nml: there is no &sweep; 'nocdyn help input sweep' shows one"),
@@ -275,6 +277,27 @@ def test_the_program_for_sweeps_says_what_it_is_for(nocdyn):
     outcome = subprocess.run([SWEEP_PROGRAM, "check", "x.nml"], check=False, capture_output=True, text=True)
     assert (outcome.returncode, outcome.stdout) == (2, "")
     assert outcome.stderr == "nocdyn: nocdyn-sweep knows 'sweep' and 'merge' only; everything else is asked of nocdyn\n"
+
+
+@pytest.mark.parametrize(
+    ("words", "same"),
+    [
+        (["--help"], ["help", "sweep"]),
+        (["-h"], ["help", "sweep"]),
+        (["sweep", "--help"], ["help", "sweep"]),
+        (["merge", "--help"], ["help", "merge"]),
+        (["--version"], ["--version"]),
+    ],
+)
+def test_the_program_for_sweeps_has_help_and_version(nocdyn, words, same):
+    outcome = subprocess.run([SWEEP_PROGRAM, *words], check=False, capture_output=True, text=True)
+    assert (outcome.returncode, outcome.stderr) == (0, "")
+    assert outcome.stdout == nocdyn(*same).stdout
+
+
+def test_help_on_sweep_names_its_options_and_no_others(nocdyn):
+    text = nocdyn("help", "sweep").stdout
+    assert set(re.findall(r"--\w+", text)) == {"--out", "--set", "--threads", "--shard", "--resume", "--csv", "--quiet"}
 
 
 def test_without_the_program_for_sweeps_a_sweep_says_why_it_cannot_be(nocdyn, discs):
