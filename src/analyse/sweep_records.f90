@@ -165,24 +165,25 @@ contains
     if (nearest > 0) text = '; did you mean ' // quoted(candidates(nearest)%text) // '?'
   end function near_match
 
-  !> The columns of the element that a quantity seems to name; the first of all columns if there are none.
+  !> The columns of the element or of the kind that a quantity seems to name; the first of all columns if there are none.
   pure function related_names(quantity, names) result(text)
     character(len=*), intent(in) :: quantity
     type(string_t), intent(in) :: names(:)   !! without units
     character(len=:), allocatable :: text
     integer, parameter :: most = 16
     type(string_t), allocatable :: related(:)
-    character(len=:), allocatable :: ending
+    character(len=:), allocatable :: element, name
     integer :: i
 
-    ending = quantity(:index(quantity // ' [', ' [') - 1)
-    ending = '_' // ending(index(ending, '_') + 1:) // '|'
+    name = quantity(:index(quantity // ' [', ' [') - 1)
+    element = name(index(name, '_') + 1:)
     allocate (related(0))
     do i = 1, size(names)
-      if (index(names(i)%text // '|', ending) > 0) call append(related, names(i)%text)
+      if (index(names(i)%text // '|', '_' // element // '|') == 0 .and. index(names(i)%text, name // '_') /= 1) cycle
+      call append(related, names(i)%text)
     end do
     if (size(related) > 0) then
-      text = joined(related, ', ')
+      text = joined(related, ', ', most)
     else
       text = joined(names, ', ', most)
       if (size(names) > most) text = text // ' in its first line'
