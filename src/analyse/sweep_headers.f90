@@ -25,6 +25,7 @@ contains
     group = plan%input%single('sweep')
     header%design = group%text('design')
     if (group%has_value('seed')) header%seed = group%whole_number('seed')
+    header%input_file = plan%input%file
     header%input_text = input_text(plan%input)
     header%list_checksum = plan%list_checksum
     header%variants = plan%design%variants

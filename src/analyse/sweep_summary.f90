@@ -23,6 +23,7 @@ module nocdyn_sweep_summary
     integer :: ranks = 1                 !! processes
     integer :: lanes = 1                 !! of a block
     real(wp) :: wall_time = 0.0_wp       !! of computing and of writing the journal [s]
+    real(wp) :: writing_time = 0.0_wp    !! of making the other files of it [s]
   end type sweep_effort_t
 
   type, public :: sweep_summary_t
@@ -50,7 +51,8 @@ contains
     call json%put('input', input%file)
     call json%put('title', header%title)
     call put_settings(json, input%single('run'), &
-                      [character(len=11) :: 't_start', 't_end', 'method', 'rtol', 'atol', 'formulation', 'max_steps'])
+                      [character(len=11) :: 't_start', 't_end', 'method', 'rtol', 'atol', 'formulation', &
+                       'complement', 'max_steps'])
     call put_design(json, header)
     call json%open('counts')
     call json%put('variants', header%variants)
@@ -85,6 +87,7 @@ contains
     type(sweep_effort_t), intent(in) :: effort
 
     call json%put('wall_time_s', effort%wall_time)
+    call json%put('writing_time_s', effort%writing_time)
     call json%put('variants_computed', effort%variants)
     call json%put('variants_per_second', rate(effort))
     call json%put('threads', effort%threads)
@@ -173,8 +176,11 @@ contains
     if (summary%refused > 0) text = text // ', ' // to_text(summary%refused) // ' refused'
     if (summary%failed > 0) text = text // ', ' // to_text(summary%failed) // ' failed'
     if (allocated(summary%effort)) then
-      text = text // ', ' // rounded_text(summary%effort%wall_time, 3) // ' s'
-      if (summary%effort%variants > 0) text = text // ' (' // rounded_text(rate(summary%effort), 3) // ' per second)'
+      associate (effort => summary%effort)
+        if (effort%variants > 0) text = text // ', computed in ' // rounded_text(effort%wall_time, 3) // ' s (' // &
+                                        rounded_text(rate(effort), 3) // ' per second)'
+        text = text // ', written in ' // rounded_text(effort%writing_time, 3) // ' s'
+      end associate
     end if
     text = text // '; results in ' // folder
   end function sweep_line

@@ -51,7 +51,7 @@ contains
     if (.not. allocated(error)) call check_sweep(journals, error)
     if (allocated(error)) return
     associate (header => journals(1)%header)
-      call read_input_text(header%input_text, folder, strings([character(len=1) ::]), plan%input, error)
+      call read_input_text(header%input_text, header%input_file, strings([character(len=1) ::]), plan%input, error)
       if (allocated(error)) return
       call find_targets(plan%input, labels_of(header%parameters), plan%targets, complaints)
     end associate

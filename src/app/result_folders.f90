@@ -2,11 +2,12 @@
 module nocdyn_result_folders
   use nocdyn_errors, only: error_t, exit_input, raise
   use nocdyn_input, only: group_t, input_t
+  use nocdyn_sweep_header, only: sweep_file_name
   use nocdyn_text, only: quoted, string_t
   implicit none (type, external)
   private
 
-  public :: plain_path, result_folder, stem, refuse_shared_folders
+  public :: plain_path, result_folder, stem, refuse_shared_folders, refuse_sweep_folder
 
 contains
 
@@ -70,5 +71,16 @@ contains
       end do
     end do
   end subroutine refuse_shared_folders
+
+  !> A run would take the name of a summary.json that belongs to a sweep, which may be the work of many hours.
+  subroutine refuse_sweep_folder(file, folder, error)
+    character(len=*), intent(in) :: file, folder
+    type(error_t), allocatable, intent(out) :: error
+    logical :: is_there
+
+    inquire (file=folder // '/' // sweep_file_name, exist=is_there)
+    if (is_there) call raise(error, exit_input, file // ': ' // folder // ' holds the results of a sweep; choose another ' // &
+                             'folder by --out, or remove ' // sweep_file_name)
+  end subroutine refuse_sweep_folder
 
 end module nocdyn_result_folders

@@ -6,7 +6,7 @@ module nocdyn_run_command
   use nocdyn_input, only: input_t
   use nocdyn_input_reader, only: read_input
   use nocdyn_posix, only: is_interrupted, watch_interrupts
-  use nocdyn_result_folders, only: plain_path, refuse_shared_folders, result_folder, stem
+  use nocdyn_result_folders, only: plain_path, refuse_shared_folders, refuse_sweep_folder, result_folder, stem
   use nocdyn_run_summary, only: run_summary_t
   use nocdyn_summary_table, only: method_line, summary_line, summary_table
   use nocdyn_text, only: string_t, to_text
@@ -34,7 +34,11 @@ contains
       call read_input(arguments%operands(i)%text, arguments%overrides, inputs(i), error)
       is_good(i) = .not. allocated(error)
       folders(i)%text = ''
-      if (is_good(i)) folders(i)%text = folder_of(arguments, inputs(i))
+      if (is_good(i)) then
+        folders(i)%text = folder_of(arguments, inputs(i))
+        call refuse_sweep_folder(inputs(i)%file, folders(i)%text, error)
+        is_good(i) = .not. allocated(error)
+      end if
       if (.not. is_good(i)) call count_failure(error, code)
     end do
     call refuse_shared_folders(arguments%operands, folders, is_good, error)

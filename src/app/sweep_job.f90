@@ -7,8 +7,7 @@ module nocdyn_sweep_job
   use nocdyn_input, only: input_t
   use nocdyn_input_reader, only: read_input
   use nocdyn_result_folders, only: plain_path, result_folder
-  use nocdyn_sweep_file, only: sweep_file_name
-  use nocdyn_sweep_header, only: sweep_header_t
+  use nocdyn_sweep_header, only: sweep_file_name, sweep_header_t
   use nocdyn_sweep_headers, only: new_sweep_header
   use nocdyn_sweep_journal, only: create_journal, journal_name, open_journal, sweep_journal_t
   use nocdyn_sweep_ledger, only: sweep_ledger_t

@@ -1,7 +1,9 @@
 !> The files that a finished sweep leaves, and what is printed of it.
 module nocdyn_sweep_results
+  use, intrinsic :: iso_fortran_env, only: int64
   use nocdyn_console, only: complain, console_progress_t, new_console_progress, say
   use nocdyn_errors, only: error_t, exit_done, exit_failed, raise
+  use nocdyn_folders, only: folder_names, remove_empty_folder
   use nocdyn_input, only: input_t
   use nocdyn_input_text, only: input_text
   use nocdyn_journal_chunks, only: sweep_records_t
@@ -11,21 +13,21 @@ module nocdyn_sweep_results
   use nocdyn_posix, only: is_interrupted, remove_file
   use nocdyn_run_summary, only: run_summary_t
   use nocdyn_sweep_chunk, only: chunk_t
-  use nocdyn_sweep_file, only: sweep_file_name, write_sweep_file
-  use nocdyn_sweep_header, only: sweep_header_t
+  use nocdyn_sweep_file, only: write_sweep_file
+  use nocdyn_sweep_header, only: sweep_file_name, sweep_header_t
   use nocdyn_sweep_journal, only: sweep_journal_t
   use nocdyn_sweep_plan, only: sweep_plan_t, without_sweep
   use nocdyn_sweep_summary, only: sweep_json, sweep_line, sweep_summary_t, sweep_table
   use nocdyn_sweep_table, only: sweep_table_name, write_sweep_table
   use nocdyn_targets, only: set_targets
-  use nocdyn_text, only: to_text
-  use nocdyn_transient, only: run_transient
+  use nocdyn_text, only: string_t, to_text
+  use nocdyn_transient, only: input_file, partial_file, run_transient, summary_file, trajectory_file
   implicit none (type, external)
   private
 
   public :: write_results, tell_results
 
-  character(len=*), parameter :: summary_file = 'summary.json', input_file = 'input.nml'
+  character(len=*), parameter :: variant_folder = 'variant-'
 
   !> What is to be done besides sweep.nc.
   type, public :: results_options_t
@@ -35,8 +37,8 @@ module nocdyn_sweep_results
 
 contains
 
-  !> Writes everything of a sweep whose variants are all in the journals. A table that it does not write is one of an earlier
-  !> sweep, and removed.
+  !> Writes everything of a sweep whose variants are all in the journals. Once its sweep.nc is there, what an earlier sweep or
+  !> run has left in the folder goes.
   subroutine write_results(plan, folder, journals, options, summary, error)
     type(sweep_plan_t), intent(in) :: plan
     character(len=*), intent(in) :: folder
@@ -44,21 +46,54 @@ contains
     type(results_options_t), intent(in) :: options
     type(sweep_summary_t), intent(inout) :: summary   !! with the effort, if there was one
     type(error_t), allocatable, intent(out) :: error
+    integer(int64) :: began, now, rate
 
+    call system_clock(began, rate)
     summary%done = sum(journals%done)
     summary%refused = sum(journals%refused)
     summary%failed = sum(journals%failed)
     call find_order_statistics(journals, summary%statistics, error)
     if (.not. allocated(error)) call write_sweep_file(folder, journals, error)
-    if (.not. (allocated(error) .or. options%wants_csv)) call remove_file(folder // '/' // sweep_table_name)
+    if (.not. allocated(error)) call remove_other_results(folder, keeps_table=options%wants_csv)
     if (.not. allocated(error) .and. options%wants_csv) call write_sweep_table(folder, journals, error)
     if (.not. allocated(error)) call write_trajectories(plan, folder, journals, options, error)
     if (.not. allocated(error)) call write_whole(folder, input_file, input_text(plan%input), error)
+    call system_clock(now)
+    if (allocated(summary%effort)) summary%effort%writing_time = real(now - began, wp) / real(rate, wp)
     if (.not. allocated(error)) then
       call write_whole(folder, summary_file, sweep_json(plan%input, journals(1)%header, summary), error)
     end if
     if (summary%done == 0 .and. .not. allocated(error)) call find_first_reason(journals, summary%first_reason, error)
   end subroutine write_results
+
+  !> Nothing stale is to look finished. Files of the user's own stay, and the folders that they are in.
+  subroutine remove_other_results(folder, keeps_table)
+    character(len=*), intent(in) :: folder
+    logical, intent(in) :: keeps_table   !! sweep.csv is about to be replaced
+    type(string_t), allocatable :: names(:)
+    integer :: i
+
+    call remove_run(folder)
+    if (.not. keeps_table) call remove_file(folder // '/' // sweep_table_name)
+    allocate (names, source=folder_names(folder))
+    do i = 1, size(names)
+      associate (name => names(i)%text)
+        if (index(name, variant_folder) /= 1 .or. verify(name(len(variant_folder) + 1:), '0123456789') > 0) cycle
+        call remove_run(folder // '/' // name)
+        call remove_file(folder // '/' // name // '/' // input_file)
+        call remove_empty_folder(folder // '/' // name)
+      end associate
+    end do
+  end subroutine remove_other_results
+
+  !> What makes the results of a run.
+  subroutine remove_run(folder)
+    character(len=*), intent(in) :: folder
+
+    call remove_file(folder // '/' // summary_file)
+    call remove_file(folder // '/' // trajectory_file)
+    call remove_file(folder // '/' // partial_file)
+  end subroutine remove_run
 
   !> Prints what has come out.
   subroutine tell_results(plan, folder, header, options, summary, code)
@@ -117,7 +152,7 @@ contains
         if (allocated(error)) return
         call set_targets(input, plan%targets, values, complaint)
         if (complaint /= '') cycle
-        call run_variant(without_sweep(input), folder // '/variant-' // to_text(variant), options, summary, error)
+        call run_variant(without_sweep(input), folder // '/' // variant_folder // to_text(variant), options, summary, error)
       end associate
       if (is_interrupted()) then
         call raise(error, exit_failed, plan%input%file // ': interrupted while trajectories were written; --resume goes on')

@@ -1,11 +1,11 @@
-!> What is in a folder.
+!> What is in a folder, and folders with nothing in them.
 module nocdyn_folders
-  use, intrinsic :: iso_c_binding, only: c_char, c_null_char, c_size_t
+  use, intrinsic :: iso_c_binding, only: c_char, c_int, c_null_char, c_size_t
   use nocdyn_text, only: append, string_t
   implicit none (type, external)
   private
 
-  public :: folder_names
+  public :: folder_names, remove_empty_folder
 
   interface
     !> Names with a null character after each (folder_names.cpp); returns the length of all.
@@ -16,6 +16,11 @@ module nocdyn_folders
       integer(c_size_t), value, intent(in) :: capacity
       integer(c_size_t) :: length
     end function c_folder_names
+
+    integer(c_int) function c_rmdir(path) bind(c, name='rmdir')
+      import :: c_char, c_int
+      character(kind=c_char), intent(in) :: path(*)
+    end function c_rmdir
   end interface
 
 contains
@@ -43,5 +48,13 @@ contains
       first = last + 2
     end do
   end function folder_names
+
+  !> Removes a folder if nothing is in it.
+  subroutine remove_empty_folder(path)
+    character(len=*), intent(in) :: path
+    integer(c_int) :: status
+
+    status = c_rmdir(path // c_null_char)
+  end subroutine remove_empty_folder
 
 end module nocdyn_folders

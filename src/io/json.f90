@@ -7,6 +7,8 @@ module nocdyn_json
   implicit none (type, external)
   private
 
+  public :: has_utf_8
+
   !> Nested objects, two blanks per level, in the order of the calls.
   type, public :: json_t
     type(text_buffer_t), private :: buffer
@@ -206,6 +208,22 @@ contains
     end do
     escaped = escaped // '"'
   end function escaped
+
+  !> Whether a text is UTF-8 throughout, with characters beyond ASCII.
+  pure logical function has_utf_8(text)
+    character(len=*), intent(in) :: text
+    integer :: i, length
+
+    has_utf_8 = .false.
+    i = 1
+    do while (i <= len(text))
+      length = utf_8_length(text, i)
+      if (length == 0) exit
+      has_utf_8 = has_utf_8 .or. length > 1
+      i = i + length
+    end do
+    has_utf_8 = has_utf_8 .and. i > len(text)
+  end function has_utf_8
 
   !> Bytes of the UTF-8 character that begins at `first`, 0 if none does.
   pure integer function utf_8_length(text, first) result(length)

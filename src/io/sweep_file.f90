@@ -3,28 +3,29 @@
 !> The file depends on the results alone, byte for byte: no time, no host, and NetCDF keeps HDF5 from noting when an object
 !> was made. Numbers are not compressed: the last digits of what was computed are noise.
 module nocdyn_sweep_file
-  use, intrinsic :: iso_c_binding, only: c_associated, c_f_procpointer, c_funptr, c_int
+  use, intrinsic :: iso_c_binding, only: c_associated, c_char, c_f_procpointer, c_funptr, c_int, c_loc, &
+    c_null_char, c_null_ptr
   use, intrinsic :: iso_fortran_env, only: int8
   use netcdf, only: nf90_byte, nf90_char, nf90_chunked, nf90_clobber, nf90_close, nf90_create, nf90_def_dim, &
     nf90_def_var, nf90_def_var_chunking, nf90_def_var_fill, nf90_double, nf90_ebadname, nf90_ehdferr, nf90_enameinuse, &
     nf90_enddef, nf90_enotatt, nf90_get_att, nf90_global, nf90_inquire_attribute, nf90_int, nf90_max_name, &
-    nf90_netcdf4, nf90_noerr, nf90_nowrite, nf90_open, nf90_put_att, nf90_put_var, nf90_strerror, nf90_unlimited
+    nf90_netcdf4, nf90_noerr, nf90_nowrite, nf90_open, nf90_put_att, nf90_put_att_any, nf90_put_var, nf90_strerror, nf90_string, &
+    nf90_unlimited
   use nocdyn_errors, only: error_t, exit_file, raise
   use nocdyn_journal_chunks, only: check_sweep, sweep_records_t
+  use nocdyn_json, only: has_utf_8
   use nocdyn_kinds, only: wp
   use nocdyn_posix, only: last_failure, make_folders, process_id, remove_file, rename_file
   use nocdyn_posix_files, only: disk_failure, sync_path
   use nocdyn_posix_programs, only: procedure_of_libraries
   use nocdyn_sweep_chunk, only: chunk_t, status_done, status_words
-  use nocdyn_sweep_header, only: quantity_t, sweep_header_t
+  use nocdyn_sweep_header, only: quantity_t, sweep_file_name, sweep_header_t
   use nocdyn_sweep_journal, only: sweep_journal_t
   use nocdyn_text, only: append, quoted, string_t, strings, to_text
   implicit none (type, external)
   private
 
   public :: write_sweep_file, read_origin
-
-  character(len=*), parameter, public :: sweep_file_name = 'sweep.nc'
 
   character(len=14), parameter :: own_names(5) = &
     [character(len=14) :: 'variant', 'status', 'steps', 'failed_variant', 'reason']
@@ -147,10 +148,10 @@ contains
 
     call put_text(file, nf90_global, 'Conventions', 'CF-1.8')
     call put_text(file, nf90_global, 'title', header%title)
-    call put_text(file, nf90_global, 'source', header%source)
+    call note(file, nf90_put_att(file%id, nf90_global, 'source', header%source))   ! characters, for `read_origin`
     call put_text(file, nf90_global, 'design', header%design)
     call note(file, nf90_put_att(file%id, nf90_global, 'seed', header%seed))
-    call put_text(file, nf90_global, 'input', header%input_text)
+    call note(file, nf90_put_att(file%id, nf90_global, 'input', header%input_text))
     if (header%list_checksum /= '') call put_text(file, nf90_global, 'list_checksum', header%list_checksum)
   end subroutine put_attributes
 
@@ -187,12 +188,21 @@ contains
     if (status == nf90_enotatt) status = nf90_noerr
   end subroutine read_text
 
+  !> The library marks characters as ASCII; only strings are UTF-8.
   subroutine put_text(file, variable, name, text)
     type(sweep_file_t), intent(inout) :: file
     integer, intent(in) :: variable
     character(len=*), intent(in) :: name, text
+    character(kind=c_char), allocatable, target :: string(:)
+    character(len=storage_size(c_null_ptr) / storage_size('c')) :: address   ! of the string: what the library copies from
 
-    call note(file, nf90_put_att(file%id, variable, name, text))
+    if (has_utf_8(text)) then
+      allocate (string, source=transfer(text // c_null_char, [c_null_char]))
+      address = transfer(c_loc(string), address)
+      call note(file, nf90_put_att_any(file%id, variable, name, nf90_string, 1, address))
+    else
+      call note(file, nf90_put_att(file%id, variable, name, text))
+    end if
   end subroutine put_text
 
   !> A variable over one dimension.

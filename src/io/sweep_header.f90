@@ -6,6 +6,8 @@ module nocdyn_sweep_header
 
   public :: pack_header, unpack_header, differing_part
 
+  character(len=*), parameter, public :: sweep_file_name = 'sweep.nc'
+
   !> One varied number or one result.
   type, public :: quantity_t
     character(len=:), allocatable :: label       !! 'load.work.viscous', 'omega_motor_final'
@@ -17,8 +19,9 @@ module nocdyn_sweep_header
     character(len=:), allocatable :: title
     character(len=:), allocatable :: source             !! program, version, compiler
     character(len=:), allocatable :: design             !! 'random'
+    character(len=:), allocatable :: input_file         !! as the command line has it
     character(len=:), allocatable :: input_text         !! the whole canonical input
-    character(len=:), allocatable :: list_checksum   !! of the file of a list, '' without one
+    character(len=:), allocatable :: list_checksum      !! of the file of a list, '' without one
     integer :: seed = 0
     integer :: variants = 0                             !! of the whole sweep
     integer :: first = 1, last = 0                      !! of this shard
@@ -41,6 +44,7 @@ contains
       call put_text(bytes, used, header%title)
       call put_text(bytes, used, header%source)
       call put_text(bytes, used, header%design)
+      call put_text(bytes, used, header%input_file)
       call put_text(bytes, used, header%input_text)
       call put_text(bytes, used, header%list_checksum)
       call put_quantities(bytes, used, parameters)
@@ -51,8 +55,9 @@ contains
   pure integer function packed_length(header) result(length)
     type(sweep_header_t), intent(in) :: header
 
-    length = 11 * integer_bytes + len(header%title) + len(header%source) + len(header%design) + len(header%input_text) + &
-             len(header%list_checksum) + quantities_length(header%parameters) + quantities_length(header%results)
+    length = 12 * integer_bytes + len(header%title) + len(header%source) + len(header%design) + len(header%input_file) + &
+             len(header%input_text) + len(header%list_checksum) + quantities_length(header%parameters) + &
+             quantities_length(header%results)
   end function packed_length
 
   pure integer function quantities_length(quantities) result(length)
@@ -93,6 +98,7 @@ contains
     call reader%take_text(bytes, header%title)
     call reader%take_text(bytes, header%source)
     call reader%take_text(bytes, header%design)
+    call reader%take_text(bytes, header%input_file)
     call reader%take_text(bytes, header%input_text)
     call reader%take_text(bytes, header%list_checksum)
     call take_quantities(reader, bytes, numbers(5), header%parameters)

@@ -23,6 +23,7 @@ contains
     header%source = 'nocdyn 9'
     header%design = 'random'
     header%seed = 42
+    header%input_file = 'in/sample.nml'
     header%input_text = '&body name = ''a'' /' // new_line('a') // '&sweep design = ''random'' /' // new_line('a')
     header%list_checksum = ''
     header%variants = variants
