@@ -1,4 +1,4 @@
-!> What the person at the keyboard sees: messages, and progress on a terminal.
+!> What the person at the keyboard sees: messages and progress.
 module nocdyn_console
   use, intrinsic :: iso_fortran_env, only: error_unit, int64
   use nocdyn_errors, only: error_t
@@ -15,10 +15,12 @@ module nocdyn_console
 
   real(wp), parameter :: patience = 1.0_wp    ! a run shorter than this shows no progress [s]
   real(wp), parameter :: refresh = 0.2_wp     ! time between two updates of the line [s]
+  real(wp), parameter :: first_entry = 10.0_wp, most_apart = 600.0_wp   ! of lines in a log [s]
 
-  !> One line on the terminal, rewritten in place.
+  !> How things stand: one line on a terminal, rewritten in place; in a log a new line each time, ever farther apart.
   type, public :: status_line_t
     logical, private :: is_wanted = .false.
+    logical, private :: is_in_place = .false.
     logical, private :: is_shown = .false.
     integer(int64), private :: began = 0, next = 0, rate = 1
   contains
@@ -65,26 +67,30 @@ contains
     end do
   end subroutine complain
 
-  !> A line that shows after a second of work, if standard error is a terminal.
-  function new_status_line(is_quiet) result(line)
-    logical, intent(in) :: is_quiet
+  !> A line that shows after a second of work if standard error is a terminal, after longer if it is a log.
+  function new_status_line(is_quiet, shows_in_logs) result(line)
+    logical, intent(in) :: is_quiet, shows_in_logs
     type(status_line_t) :: line
 
-    line%is_wanted = is_terminal(standard_error) .and. .not. is_quiet
+    line%is_in_place = is_terminal(standard_error)
+    line%is_wanted = (line%is_in_place .or. shows_in_logs) .and. .not. is_quiet
     call system_clock(line%began, line%rate)
-    line%next = line%began + int(patience * real(line%rate, wp), int64)
+    line%next = line%began + int(merge(patience, first_entry, line%is_in_place) * real(line%rate, wp), int64)
   end function new_status_line
 
-  !> Whether it is time to show how things stand.
+  !> Whether it is time to show how things stand. In a log that is when the work has taken twice as long as the last time.
   logical function is_due(self)
     class(status_line_t), intent(inout) :: self
     integer(int64) :: now
+    real(wp) :: interval
 
     is_due = self%is_wanted
     if (.not. is_due) return
     call system_clock(now)
     is_due = now >= self%next
-    if (is_due) self%next = now + int(refresh * real(self%rate, wp), int64)
+    if (.not. is_due) return
+    interval = merge(refresh, min(self%elapsed(), most_apart), self%is_in_place)
+    self%next = now + int(interval * real(self%rate, wp), int64)
   end function is_due
 
   !> Time since the work began [s].
@@ -101,8 +107,12 @@ contains
     class(status_line_t), intent(inout) :: self
     character(len=*), intent(in) :: text
 
-    self%is_shown = .true.
-    write (error_unit, '(a)', advance='no') achar(13) // text // achar(27) // '[K'
+    if (self%is_in_place) then
+      self%is_shown = .true.
+      write (error_unit, '(a)', advance='no') achar(13) // text // achar(27) // '[K'
+    else
+      write (error_unit, '(a)') text
+    end if
     flush (error_unit)
   end subroutine show
 
@@ -120,7 +130,7 @@ contains
     type(console_progress_t) :: progress
 
     progress%title = title
-    progress%line = new_status_line(is_quiet)
+    progress%line = new_status_line(is_quiet, shows_in_logs=.false.)
   end function new_console_progress
 
   subroutine update(self, fraction)

@@ -3,7 +3,7 @@ module nocdyn_sweep_job
   use, intrinsic :: iso_fortran_env, only: int64
   use nocdyn_arguments, only: arguments_t
   use nocdyn_console, only: complain, new_status_line, say
-  use nocdyn_errors, only: error_t, exit_done, exit_failed, exit_input, raise
+  use nocdyn_errors, only: error_t, exit_done, exit_failed, exit_file, exit_input, raise
   use nocdyn_input, only: input_t
   use nocdyn_input_reader, only: read_input
   use nocdyn_result_folders, only: plain_path, result_folder
@@ -68,14 +68,14 @@ contains
     if (is_there .and. bytes > 0) then
       call open_journal(job%folder, name, job%journals(1), error)
       if (.not. allocated(error)) call judge_journal(job%journals(1), header, arguments%resumes, error)
-      if (.not. allocated(error)) call tell_damage(job)
+      if (.not. allocated(error)) call tell_journal(job)
     else
       if (arguments%resumes) call look_for_results(job, header, error)
       if (allocated(error) .or. job%is_done) return
       call create_journal(job%folder, name, header, job%journals(1), error)
     end if
     job%progress%title = job%plan%input%file
-    job%progress%line = new_status_line(arguments%is_quiet)
+    job%progress%line = new_status_line(arguments%is_quiet, shows_in_logs=.true.)
   end subroutine begin_job
 
   !> There is no journal to go on with: all is done already, or the sweep starts from its beginning.
@@ -102,14 +102,19 @@ contains
     if (.not. (allocated(error) .or. job%arguments%is_quiet)) call say(job%plan%input%file // ': ' // news)
   end subroutine look_for_results
 
-  !> A record that a kill has cut short, or a disk has spoilt, costs the variants in it.
-  subroutine tell_damage(job)
+  !> What is in the journal that is gone on with. A record that a kill has cut short, or a disk has spoilt, costs the variants
+  !> in it.
+  subroutine tell_journal(job)
     type(sweep_job_t), intent(in) :: job
 
-    if (job%journals(1)%damaged_bytes == 0 .or. job%arguments%is_quiet) return
-    call say(job%plan%input%file // ': note: ' // job%journals(1)%path() // ' has damaged records; ' // &
-             'their variants are computed again')
-  end subroutine tell_damage
+    if (job%arguments%is_quiet) return
+    associate (file => job%plan%input%file, journal => job%journals(1))
+      if (journal%damaged_bytes > 0) call say(file // ': note: ' // journal%path() // ' has damaged records; ' // &
+                                              'their variants are computed again')
+      call say(file // ': taking over ' // to_text(journal%done + journal%refused + journal%failed) // ' of ' // &
+               to_text(journal%header%last - journal%header%first + 1) // ' variants from ' // journal%path())
+    end associate
+  end subroutine tell_journal
 
   !> Writes what has come out, and tells it.
   subroutine finish_job(job, ledger, threads, ranks, code)
@@ -140,6 +145,8 @@ contains
     end if
     call job%journals(1)%close()
     if (.not. allocated(error)) return
+    if (error%code == exit_file) error%message = error%message // '; once it can be written, the same command with ' // &
+                                                 '--resume goes on from there'
     call complain(error)
     code = max(code, error%code)
   end subroutine finish_job

@@ -15,7 +15,7 @@ module nocdyn_sweep_resumption
 
 contains
 
-  !> A journal is gone on with if that is asked for and it is one of this very sweep.
+  !> A journal is gone on with if it is one of this very sweep and that is asked for.
   subroutine judge_journal(journal, header, resumes, error)
     type(sweep_journal_t), intent(in) :: journal
     type(sweep_header_t), intent(in) :: header            !! of the sweep that is asked for
@@ -23,16 +23,16 @@ contains
     type(error_t), allocatable, intent(out) :: error
     character(len=:), allocatable :: difference
 
-    if (.not. resumes) then
-      call raise(error, exit_input, journal%path() // ' holds ' // held_text(journal) // &
-                 '; go on with it by --resume, or remove it')
-      return
-    end if
     difference = header_difference(journal%header, header)
-    if (difference /= '') call raise(error, exit_input, journal%path() // ' cannot be gone on with: ' // difference)
+    if (difference /= '') then
+      call raise(error, exit_input, journal%path() // ' cannot be gone on with: ' // difference // &
+                 '; remove it, or choose another folder by --out')
+    else if (.not. resumes) then
+      call raise(error, exit_input, journal%path() // ' holds ' // held_text(journal))
+    end if
   end subroutine judge_journal
 
-  !> '30 of 60 variants of a sweep that was not finished': of a part that waits for the others all are there.
+  !> How much of a sweep or of a part is there, and what can be done with it.
   function held_text(journal) result(text)
     type(sweep_journal_t), intent(in) :: journal
     character(len=:), allocatable :: text
@@ -40,10 +40,12 @@ contains
 
     held = journal%done + journal%refused + journal%failed
     wanted = journal%header%last - journal%header%first + 1
-    if (held == wanted) then
-      text = 'all ' // to_text(wanted) // ' of its variants already'
+    if (held == wanted .and. wanted < journal%header%variants) then
+      text = 'all ' // to_text(wanted) // ' variants of this part: nocdyn merge takes them from there; ' // &
+             'to compute them again, remove it'
     else
-      text = to_text(held) // ' of ' // to_text(wanted) // ' variants of a sweep that was not finished'
+      text = to_text(held) // ' of ' // to_text(wanted) // ' variants of a sweep that was not finished; go on with it by ' // &
+             '--resume, or remove it'
     end if
   end function held_text
 

@@ -1,4 +1,4 @@
-"""Progress shows on a terminal only, and only on work that takes longer than a second."""
+"""Progress shows on a terminal only, and only on work that takes longer than a second; that of sweeps in logs too."""
 
 import os
 import pty
@@ -14,6 +14,9 @@ PROGRESS = re.compile(r"\r[^\r]*case2\.nml: \d+ %, \d+ s left\x1b\[K")
 ERASED = "\r\x1b[K"
 
 
+LOGGED = re.compile(
+    r"discs\.nml: \d+ of 100000000 variants, [\d.e+]+ per second, \d+ s left\nnocdyn: discs\.nml: interrupted .*\n"
+)
 SWEEP_PROGRESS = re.compile(r"\rdiscs\.nml: \d+ of 100000000 variants, [\d.e+]+ per second, \d+ s left\x1b\[K")
 
 
@@ -65,6 +68,20 @@ def test_a_long_sweep_shows_how_many_variants_are_done(nocdyn):
     os.close(terminal)
     assert SWEEP_PROGRESS.search(shown)
     assert ERASED + "nocdyn: " in rest
+
+
+@needs_sweeps
+def test_a_long_sweep_tells_a_log_now_and_then_how_many_variants_are_done(nocdyn):
+    nocdyn.write("discs.nml", TWO_DISCS + SWEEP)
+    endless = ("--set", "sweep.samples=100000000", "--set", "run.t_end=20", "--threads", 1)
+    processes = [nocdyn.start("sweep", "discs.nml", "--out", out, *endless, *words) for out, words in (("a", ()), ("b", ("-q",)))]
+    # longer than the ten seconds after which a log gets its first line, shorter than the twenty until the second
+    time.sleep(12)
+    for process in processes:
+        process.send_signal(signal.SIGINT)
+    logged, quiet = (process.communicate(timeout=30)[1] for process in processes)
+    assert LOGGED.fullmatch(logged)
+    assert quiet.startswith("nocdyn: ") and quiet.count("\n") == 1
 
 
 def test_a_short_run_shows_no_progress(nocdyn):
