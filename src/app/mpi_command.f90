@@ -1,9 +1,9 @@
 !> nocdyn-mpi sweep: the variants of a machine on all ranks of an MPI job.
 module nocdyn_mpi_command
-  use mpi_f08, only: mpi_comm_rank, mpi_comm_size, mpi_comm_world
+  use mpi_f08, only: mpi_abort, mpi_comm_rank, mpi_comm_size, mpi_comm_world
   use nocdyn_arguments, only: arguments_t
   use nocdyn_console, only: complain
-  use nocdyn_errors, only: error_t, exit_done
+  use nocdyn_errors, only: error_t, exit_done, exit_input, raise
   use nocdyn_input, only: input_t
   use nocdyn_input_reader, only: read_input_text
   use nocdyn_input_text, only: input_text
@@ -16,6 +16,7 @@ module nocdyn_mpi_command
   use nocdyn_sweep_ledger, only: open_ledger
   use nocdyn_sweep_plan, only: make_plan, sweep_plan_t
   use nocdyn_sweep_setup, only: prepare_sweep, sweep_setup_t
+  use nocdyn_sweep_threads, only: bounded_threads, tell_threads
   use nocdyn_text, only: strings
   implicit none (type, external)
   private
@@ -33,9 +34,9 @@ contains
     call watch_interrupts()
     call mpi_comm_rank(mpi_comm_world, rank)
     if (rank == root) then
-      call lead(arguments, max(1, arguments%threads), code)
+      call lead(arguments, bounded_threads(max(1, arguments%threads)), code)
     else
-      call follow(max(1, arguments%threads), code)
+      call follow(bounded_threads(max(1, arguments%threads)), code)
     end if
   end subroutine mpi_command
 
@@ -61,7 +62,9 @@ contains
     end if
     if (text == '') return
     file = job%plan%input%file
+    if (.not. arguments%is_quiet) call tell_threads(file, max(1, arguments%threads))
     call share_text(file)
+    call share_text(job%plan%list_checksum)
     call mpi_comm_size(mpi_comm_world, ranks)
     ledger%others = ranks - 1
     call open_ledger(ledger, job%journals(1), job%progress, ranks * threads, job%setup%lanes)
@@ -69,7 +72,7 @@ contains
     call finish_job(job, ledger, threads, ranks, code)
   end subroutine lead
 
-  !> The part of the other ranks: their input is the text that rank 0 has read.
+  !> The part of the other ranks: their input is the text that rank 0 has read; the file of a list they read themselves.
   subroutine follow(threads, code)
     integer, intent(in) :: threads
     integer, intent(out) :: code
@@ -78,18 +81,22 @@ contains
     type(sweep_setup_t) :: setup
     type(mpi_worker_t) :: worker
     type(error_t), allocatable :: error
-    character(len=:), allocatable :: file, text
+    character(len=:), allocatable :: checksum, file, text
 
     code = exit_done
     call share_text(text)
     if (text == '') return
     call share_text(file)
+    call share_text(checksum)
     call read_input_text(text, file, strings([character(len=1) ::]), input, error)
     if (.not. allocated(error)) call make_plan(input, plan, error)
     if (.not. allocated(error)) call prepare_sweep(plan, setup, error)
+    if (.not. allocated(error) .and. plan%list_checksum /= checksum) then
+      call raise(error, exit_input, file // ': the file of &sweep with the variants is not that of rank 0')
+    end if
     if (allocated(error)) then
       call complain(error)
-      error stop 'nocdyn_mpi_command: an input that rank 0 has read is refused by another rank'
+      call mpi_abort(mpi_comm_world, error%code)
     end if
     call compute_variants(plan, setup, threads, worker)
   end subroutine follow

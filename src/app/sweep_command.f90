@@ -7,6 +7,7 @@ module nocdyn_sweep_command
   use nocdyn_sweep, only: compute_variants
   use nocdyn_sweep_job, only: begin_job, finish_job, sweep_job_t
   use nocdyn_sweep_ledger, only: open_ledger, sweep_ledger_t
+  use nocdyn_sweep_threads, only: bounded_threads, refuse_ranks, tell_threads
   use omp_lib, only: omp_get_max_threads
   implicit none (type, external)
   private
@@ -25,20 +26,22 @@ contains
 
     code = exit_done
     call watch_interrupts()
-    call begin_job(arguments, job, error)
+    call refuse_ranks(arguments, error)
+    if (.not. allocated(error)) call begin_job(arguments, job, error)
     if (allocated(error)) then
       call complain(error)
       code = error%code
       return
     end if
     if (job%is_done) return
-    threads = thread_count(arguments)
+    threads = bounded_threads(thread_count(arguments))
+    if (.not. arguments%is_quiet) call tell_threads(job%plan%input%file, thread_count(arguments))
     call open_ledger(ledger, job%journals(1), job%progress, threads, job%setup%lanes)
     call compute_variants(job%plan, job%setup, threads, ledger)
     call finish_job(job, ledger, threads, 1, code)
   end subroutine sweep_command
 
-  !> --threads, else what OMP_NUM_THREADS says, else the cores that the process may use.
+  !> That are asked for: --threads, else what OMP_NUM_THREADS says, else the cores that the process may use.
   integer function thread_count(arguments)
     type(arguments_t), intent(in) :: arguments
 

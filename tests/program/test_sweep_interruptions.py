@@ -90,6 +90,7 @@ def test_what_is_done_is_not_done_again(nocdyn, discs):
     assert 0 < done < SAMPLES
     outcome = nocdyn("sweep", discs, "--out", "out", "--resume", *LONG)
     assert outcome.returncode == 0
+    assert outcome.stdout.startswith(f"{discs}: taking over {done} of {SAMPLES} variants from out/sweep.journal\n")
     assert nocdyn.summary("out")["variants_computed"] == SAMPLES - done
     assert nocdyn.summary("out")["counts"]["done"] == SAMPLES
 
@@ -113,7 +114,9 @@ def test_a_sweep_with_another_input_is_not_gone_on_with(nocdyn, discs, words, di
     before = journal(nocdyn).read_bytes()
     outcome = nocdyn("sweep", discs, "--out", "out", "--resume", *ENDLESS, *words)
     assert (outcome.returncode, outcome.stdout) == (2, "")
-    assert outcome.stderr == f"nocdyn: out/sweep.journal cannot be gone on with: {difference}\n"
+    remedy = "remove it, or choose another folder by --out"
+    assert outcome.stderr == f"nocdyn: out/sweep.journal cannot be gone on with: {difference}; {remedy}\n"
+    assert nocdyn("sweep", discs, "--out", "out", *ENDLESS, *words).stderr == outcome.stderr
     assert journal(nocdyn).read_bytes() == before
 
 
@@ -133,7 +136,7 @@ def test_a_journal_of_another_version_is_not_gone_on_with(nocdyn, discs):
     outcome = nocdyn("sweep", discs, "--out", "out", "--resume")
     assert (outcome.returncode, outcome.stdout) == (2, "")
     this = re.escape(nocdyn("--version").stdout.strip())
-    complaint = f"nocdyn: out/sweep\\.journal cannot be gone on with: it was begun by nocdyn 9, this is {this}\n"
+    complaint = f"nocdyn: out/sweep\\.journal cannot be gone on with: it was begun by nocdyn 9, this is {this}; remove it, .*\n"
     assert re.fullmatch(complaint, outcome.stderr)
     assert journal(nocdyn).read_bytes() == before
 
@@ -154,7 +157,7 @@ def test_a_list_that_has_changed_is_not_gone_on_with(nocdyn):
     write_list(nocdyn, ["21", *rows[1:]])
     outcome = nocdyn("sweep", discs, "--out", "out", "--set", "run.t_end=20", "--resume")
     assert (outcome.returncode, outcome.stdout) == (2, "")
-    complaint = "the file of &sweep with the variants has changed"
+    complaint = "the file of &sweep with the variants has changed; remove it, or choose another folder by --out"
     assert outcome.stderr == f"nocdyn: out/sweep.journal cannot be gone on with: {complaint}\n"
 
 
@@ -222,7 +225,7 @@ def test_a_damaged_journal_is_told_and_made_good(nocdyn, discs):
     outcome = nocdyn("sweep", discs, "--out", "out", "--resume", *LONG)
     assert (outcome.returncode, outcome.stderr) == (0, "")
     note = "note: out/sweep.journal has damaged records; their variants are computed again"
-    assert outcome.stdout.startswith(f"{discs}: {note}\n")
+    assert outcome.stdout.startswith(f"{discs}: {note}\n{discs}: taking over ")
     assert nocdyn.summary("out")["counts"]["done"] == SAMPLES
 
 
@@ -267,8 +270,14 @@ def test_a_part_that_waits_for_the_others_is_not_called_unfinished(nocdyn, discs
     outcome = nocdyn("sweep", discs, "--out", "out", "--shard", "1/2")
     assert (outcome.returncode, outcome.stdout) == (2, "")
     assert outcome.stderr == (
-        "nocdyn: out/sweep.1-of-2.journal holds all 30 of its variants already; go on with it by --resume, or remove it\n"
+        "nocdyn: out/sweep.1-of-2.journal holds all 30 variants of this part: nocdyn merge takes them from there; "
+        "to compute them again, remove it\n"
     )
+    outcome = nocdyn("sweep", discs, "--out", "out", "--shard", "1/2", "--resume")
+    assert (outcome.returncode, outcome.stderr) == (0, "")
+    taken, done = outcome.stdout.splitlines()
+    assert taken == f"{discs}: taking over 30 of 30 variants from out/sweep.1-of-2.journal"
+    assert done == f"{discs}: part 1 of 2 done, 30 variants; once all parts are there: nocdyn merge out"
 
 
 @pytest.mark.parametrize("size", [0, 3000, 30000])
@@ -277,7 +286,8 @@ def test_a_full_disk_ends_a_sweep_that_can_be_gone_on_with(nocdyn, discs, size, 
     samples = ("--set", "sweep.samples=1000")
     outcome = nocdyn("sweep", discs, "--out", "out", "--threads", threads, *samples, preexec_fn=limited_to(size))
     assert (outcome.returncode, outcome.stdout) == (3, "")
-    assert re.fullmatch(r"nocdyn: .*'out/sweep\.journal'.*: File too large\n", outcome.stderr)
+    remedy = "" if size == 0 else "; once it can be written, the same command with --resume goes on from there"
+    assert outcome.stderr == f"nocdyn: cannot write 'out/sweep.journal': File too large{remedy}\n"
     outcome = nocdyn("sweep", discs, "--out", "out", "--resume", *samples)
     assert outcome.returncode == 0
     assert nocdyn.summary("out")["counts"]["done"] == 1000
@@ -287,7 +297,7 @@ def test_a_disk_without_room_for_the_results_keeps_the_journal(nocdyn, discs):
     # more than the journal of 60 variants needs, less than sweep.nc does
     outcome = nocdyn("sweep", discs, "--out", "out", preexec_fn=limited_to(10000))
     assert (outcome.returncode, outcome.stdout) == (3, "")
-    assert "sweep.nc" in outcome.stderr
+    assert "sweep.nc" in outcome.stderr and "the same command with --resume goes on from there\n" in outcome.stderr
     assert nocdyn.files("out") == ["sweep.journal"]
     outcome = nocdyn("sweep", discs, "--out", "out", "--resume")
     assert outcome.returncode == 0
@@ -329,8 +339,29 @@ def test_a_full_disk_ends_all_ranks(nocdyn, discs):
         command, cwd=nocdyn.folder, env=environment, check=False, capture_output=True, text=True, timeout=60
     )
     assert outcome.returncode == 3
-    assert "nocdyn: cannot write 'out/sweep.journal': File too large\n" in outcome.stderr
+    assert "nocdyn: cannot write 'out/sweep.journal': File too large; once" in outcome.stderr
     assert nocdyn.files("out") == ["sweep.journal"]
+
+
+@needs_mpi
+@pytest.mark.parametrize(
+    ("rows", "complaint"),
+    [
+        ("0.2\n0.4\n", "discs.nml: the file of &sweep with the variants is not that of rank 0"),
+        (None, "list.csv: cannot be read: there is no such file"),
+    ],
+)
+def test_a_rank_with_another_list_ends_the_job(nocdyn, rows, complaint):
+    nocdyn.write("here/discs.nml", TWO_DISCS + LIST)
+    nocdyn.write("here/list.csv", "load.drag.viscous\n0.2\n0.3\n")
+    (nocdyn.folder / "there").mkdir()
+    if rows:
+        nocdyn.write("there/list.csv", f"load.drag.viscous\n{rows}")
+    ranks = [["-n", "1", "--wdir", nocdyn.folder / name, MPI_PROGRAM, "sweep", "discs.nml", "--out", "out"] for name in ("here", "there")]
+    command = ["mpirun", *ranks[0], ":", *ranks[1]]
+    outcome = subprocess.run(command, env=MPI_ENVIRONMENT, check=False, capture_output=True, text=True, timeout=60)
+    assert outcome.returncode != 0 and f"{complaint}\n" in outcome.stderr
+    assert nocdyn.files("here") == ["discs.nml", "list.csv", "out"] and "sweep.nc" not in nocdyn.files("here/out")
 
 
 @needs_mpi

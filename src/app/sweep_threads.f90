@@ -1,0 +1,54 @@
+!> With how many threads and processes a sweep is computed.
+module nocdyn_sweep_threads
+  use nocdyn_arguments, only: arguments_t
+  use nocdyn_console, only: say
+  use nocdyn_errors, only: error_t, exit_input, raise
+  use nocdyn_text, only: to_text
+  use omp_lib, only: omp_get_num_procs
+  implicit none (type, external)
+  private
+
+  public :: bounded_threads, tell_threads, refuse_ranks
+
+  integer, parameter :: most_per_processor = 8   ! a few share one without harm, hundreds cost the time to begin and memory
+
+contains
+
+  !> As many threads as are wanted and make sense.
+  integer function bounded_threads(wanted)
+    integer, intent(in) :: wanted
+
+    bounded_threads = min(wanted, most_per_processor * omp_get_num_procs())
+  end function bounded_threads
+
+  !> Says so if that is fewer than were wanted.
+  subroutine tell_threads(file, wanted)
+    character(len=*), intent(in) :: file   !! of the input
+    integer, intent(in) :: wanted
+
+    if (bounded_threads(wanted) == wanted) return
+    call say(file // ': note: ' // to_text(bounded_threads(wanted)) // ' threads instead of ' // to_text(wanted) // &
+             ', which is more than ' // to_text(most_per_processor) // ' for each processor that may be used')
+  end subroutine tell_threads
+
+  !> Each process of an MPI job would compute the same sweep, unless it has a shard of its own.
+  subroutine refuse_ranks(arguments, error)
+    type(arguments_t), intent(in) :: arguments
+    type(error_t), allocatable, intent(out) :: error
+    character(len=*), parameter :: names(*) = [character(len=20) :: 'OMPI_COMM_WORLD_SIZE', 'PMI_SIZE']   ! Open MPI, MPICH
+    character(len=12) :: value
+    integer :: i, ranks, status
+
+    if (arguments%shards > 0) return
+    do i = 1, size(names)
+      call get_environment_variable(trim(names(i)), value, status=status)
+      if (status /= 0) cycle
+      read (value, *, iostat=status) ranks
+      if (status /= 0 .or. ranks <= 1) cycle
+      call raise(error, exit_input, 'this is one of ' // to_text(ranks) // ' processes of an MPI job (' // trim(names(i)) // &
+                 '), which would all compute the same sweep; nocdyn-mpi sweep shares it among them')
+      return
+    end do
+  end subroutine refuse_ranks
+
+end module nocdyn_sweep_threads
