@@ -24,7 +24,8 @@ contains
       call replace_process(path, command_line(), failure)
       call raise(error, exit_file, quoted(path) // ' cannot be started: ' // failure)
     else
-      call raise(error, exit_file, quoted(path) // ' is not there: sweeps need NetCDF, and nocdyn was built without it')
+      call raise(error, exit_file, quoted(path) // ' is not there: this program for sweeps is built beside nocdyn by ' // &
+                 'cmake --build --preset release, unless -DNOCDYN_SWEEP=OFF leaves it out')
     end if
   end subroutine become_sibling
 

@@ -8,6 +8,7 @@ import subprocess
 
 import h5netcdf
 import pytest
+import xarray
 from sweep_inputs import MIXED, SWEEP, SWEEP_PROGRAM, TWO_DISCS, needs_sweeps
 
 pytestmark = needs_sweeps
@@ -54,7 +55,8 @@ def test_a_sweep_leaves_its_files_and_no_journal(nocdyn, discs):
         "moment_shaft_max_abs_from_0.5",
         "moment_shaft_rms_from_0.5",
     ]
-    assert end.startswith(f"{discs}: 60 variants done, ") and end.endswith(" per second); results in out")
+    took = r"computed in [\d.e+-]+ s \([\d.e+]+ per second\), written in [\d.e+-]+ s"
+    assert re.fullmatch(f"{re.escape(str(discs))}: 60 variants done, {took}; results in out", end)
 
 
 def test_a_quiet_sweep_prints_nothing(nocdyn, discs):
@@ -69,6 +71,8 @@ def test_the_summary_tells_counts_speed_and_the_distribution_of_results(nocdyn, 
     assert summary["counts"] == {"variants": 60, "done": 60, "refused": 0, "failed": 0}
     assert summary["design"]["design"] == "random" and summary["design"]["seed"] == 3
     assert summary["variants_per_second"] == pytest.approx(60 / summary["wall_time_s"])
+    assert summary["writing_time_s"] > 0
+    assert (summary["settings"]["formulation"], summary["settings"]["complement"]) == ("reduced", "natural")
     found = summary["statistics"]["omega_wheel_max"]
     values = {int(row["variant"]): float(row["omega_wheel_max [rad/s]"]) for row in table(nocdyn, "out")}
     assert found["unit"] == "rad/s"
@@ -165,6 +169,29 @@ def test_a_table_of_an_earlier_sweep_does_not_stay_beside_new_results(nocdyn, di
     assert nocdyn.files("out") == ["input.nml", "summary.json", "sweep.nc"]
 
 
+def test_trajectories_of_an_earlier_sweep_and_a_run_do_not_stay_beside_new_results(nocdyn, discs):
+    nocdyn("run", discs, "--out", "out")
+    for variants in ("1, 2, 3", "2"):
+        nocdyn.write("discs.nml", TWO_DISCS + SWEEP + f"&record trajectories = {variants} /\n")
+        assert nocdyn("sweep", "discs.nml", "--out", "out").returncode == 0
+        nocdyn.write("out/variant-3/own.txt", "of the user")
+    assert nocdyn.files("out") == ["input.nml", "summary.json", "sweep.nc", "variant-2", "variant-3"]
+    assert nocdyn.files("out/variant-3") == ["own.txt"]
+    assert nocdyn.files("out/variant-2") == ["input.nml", "summary.json", "trajectory.csv"]
+
+
+def test_a_run_does_not_go_to_the_folder_of_a_sweep(nocdyn, discs, spinner):
+    nocdyn("sweep", discs, "--out", "out/discs")
+    before = {name: (nocdyn.folder / "out/discs" / name).read_bytes() for name in nocdyn.files("out/discs")}
+    outcome = nocdyn("run", discs, spinner, "--out", "out", "-q")
+    assert (outcome.returncode, outcome.stdout) == (2, "")
+    assert outcome.stderr == (
+        f"nocdyn: {discs}: out/discs holds the results of a sweep; choose another folder by --out, or remove sweep.nc\n"
+    )
+    assert {name: (nocdyn.folder / "out/discs" / name).read_bytes() for name in nocdyn.files("out/discs")} == before
+    assert nocdyn.files("out/spinner") == ["input.nml", "summary.json", "trajectory.csv"]
+
+
 def test_a_reader_of_the_output_who_is_gone_costs_no_results(nocdyn, discs):
     reading, writing = os.pipe()
     os.close(reading)
@@ -207,11 +234,16 @@ def test_shards_are_merged(nocdyn, discs):
     assert nocdyn.files("out") == [f"sweep.{part}-of-3.journal" for part in (1, 2, 3)]
     outcome = nocdyn("merge", "out", "--csv")
     assert (outcome.returncode, outcome.stderr) == (0, "")
-    assert outcome.stdout.startswith("Two discs\n") and outcome.stdout.endswith("out: 60 variants done; results in out\n")
+    assert outcome.stdout.startswith("Two discs\n")
+    assert outcome.stdout.endswith(f"{discs}: 60 variants done; results in out\n")
+    assert nocdyn.summary("out")["input"] == str(discs)
     assert "variants_per_second" not in nocdyn.summary("out")
     nocdyn("sweep", discs, "--out", "whole", "--csv")
     for name in ("sweep.nc", "sweep.csv"):
         assert (nocdyn.folder / "out" / name).read_bytes() == (nocdyn.folder / "whole" / name).read_bytes()
+    assert nocdyn("merge", "out").returncode == 0
+    journals = [f"sweep.{part}-of-3.journal" for part in (1, 2, 3)]
+    assert nocdyn.files("out") == ["input.nml", "summary.json", *journals, "sweep.nc"]
 
 
 def test_parts_of_a_list_are_merged_without_its_file(nocdyn):
@@ -273,6 +305,42 @@ def test_wrong_usage_is_refused_with_code_2(nocdyn, discs, words, complaint):
     assert sorted(path.name for path in nocdyn.folder.iterdir()) == ["discs.nml", "plain.nml"]
 
 
+@pytest.mark.parametrize("words", [("--threads", "4096"), ()])
+def test_threads_beyond_what_processors_can_use_are_not_started(nocdyn, discs, words):
+    environment = os.environ | {"OMP_NUM_THREADS": "4096"}
+    outcome = nocdyn("sweep", discs, "--out", "out", *words, env=environment)
+    most = 8 * len(os.sched_getaffinity(0))
+    assert (outcome.returncode, outcome.stderr) == (0, "")
+    note = f"note: {most} threads instead of 4096, which is more than 8 for each processor that may be used"
+    assert outcome.stdout.startswith(f"{discs}: {note}\n")
+    assert nocdyn.summary("out")["threads"] == most
+
+
+@pytest.mark.parametrize("name", ["OMPI_COMM_WORLD_SIZE", "PMI_SIZE"])
+def test_a_process_of_an_mpi_job_does_not_compute_what_the_others_do(nocdyn, discs, name):
+    environment = os.environ | {name: "2"}
+    outcome = nocdyn("sweep", discs, "--out", "out", env=environment)
+    assert (outcome.returncode, outcome.stdout) == (2, "")
+    assert outcome.stderr == (
+        f"nocdyn: this is one of 2 processes of an MPI job ({name}), which would all compute the same sweep; "
+        "nocdyn-mpi sweep shares it among them\n"
+    )
+    assert not (nocdyn.folder / "out").exists()
+    assert nocdyn("sweep", discs, "--out", "out", "--shard", "1/2", env=environment).returncode == 0
+    assert nocdyn("sweep", discs, "--out", "alone", env=os.environ | {name: "1"}).returncode == 0
+
+
+def test_names_beyond_ascii_are_read_as_they_are(nocdyn):
+    nocdyn.write("discs.nml", (TWO_DISCS + SWEEP).replace("wheel", "räd").replace("Two discs", "Zwei Räder"))
+    assert nocdyn("sweep", "discs.nml", "--out", "out").returncode == 0
+    with xarray.open_dataset(nocdyn.folder / "out/sweep.nc", engine="h5netcdf") as sweep:
+        assert sweep.attrs["title"] == "Zwei Räder"
+        assert sweep["omega_räd_final"].attrs["label"] == "omega_räd_final"
+        assert "'räd'" in sweep.attrs["input"].encode("utf-8", "surrogateescape").decode()
+    outcome = nocdyn("sweep", "discs.nml", "--out", "out", "--resume")
+    assert outcome.stdout == "discs.nml: all 60 variants are done already; results in out\n"
+
+
 def test_the_program_for_sweeps_says_what_it_is_for(nocdyn):
     outcome = subprocess.run([SWEEP_PROGRAM, "check", "x.nml"], check=False, capture_output=True, text=True)
     assert (outcome.returncode, outcome.stdout) == (2, "")
@@ -305,4 +373,7 @@ def test_without_the_program_for_sweeps_a_sweep_says_why_it_cannot_be(nocdyn, di
     outcome = nocdyn("sweep", discs)
     assert (outcome.returncode, outcome.stdout) == (3, "")
     missing = nocdyn.folder / "nocdyn-sweep"
-    assert outcome.stderr == f"nocdyn: '{missing}' is not there: sweeps need NetCDF, and nocdyn was built without it\n"
+    assert outcome.stderr == (
+        f"nocdyn: '{missing}' is not there: this program for sweeps is built beside nocdyn by "
+        "cmake --build --preset release, unless -DNOCDYN_SWEEP=OFF leaves it out\n"
+    )
