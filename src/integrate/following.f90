@@ -39,7 +39,7 @@ contains
           steps%crosses(lane) = march%switching%due(lane) > 0
         end if
         if (march%has_events) call pass_events(march, system, lane, steps%until(lane), times, observer, outcome)
-        call record_until(march, lane, march%t_new(lane), times, observer)
+        if (march%next_time(lane) <= march%t_new(lane)) call record_until(march, lane, march%t_new(lane), times, observer)
         if (march%has_extremes) then
           call follow_extremes(march%extremes, observer, march%dense, march%t_new(lane), steps%crosses(lane))
         end if

@@ -41,9 +41,11 @@ contains
       call stepper%interpolate(system, march%trial, march%wanted, march%coefficients)
       usual = usual .and. all_true(march%trial%lanes, march%trial%working)
     end if
+    failed = 0
     if (usual) then
-      failed = 0
       outcome%accepted(:) = outcome%accepted + 1
+      call end_lanes(march%trial%lanes, march%control%reaches_end, outcome%status)
+      march%is_due = has_passed(march%trial%lanes, march%next_time, march%t_new)
     else
       call settle_lanes(march, outcome, failed)
     end if
@@ -57,29 +59,71 @@ contains
     end do
   end subroutine judge_lanes
 
-  !> Whether all lanes have taken explicit steps within the tolerances in which no requested time lies: nothing has to be
-  !> decided for one of them then. The answer is no too if they do not make whole vectors.
+  !> Whether all lanes have taken explicit steps within the tolerances, in which no requested time lies but at their end: nothing
+  !> has to be decided for one of them then. The answer is no too if they do not make whole vectors.
   pure logical function is_usual(march, outcome)
     type(march_t), intent(in) :: march
     type(outcome_t), intent(in) :: outcome
-    real(wp) :: errors(width), passed(width)
-    integer :: i
 
     is_usual = .false.
     associate (trial => march%trial)
       if (modulo(trial%lanes, width) /= 0 .or. march%is_due) return
-      errors = 0.0_wp
-      passed = -huge(passed)
-      do i = 1, trial%lanes, width
-        errors = max(errors, march%control%mean_square(i:i + width - 1))
-        passed = max(passed, march%t_new(i:i + width - 1) - march%next_time(i:i + width - 1))
-      end do
-      if (maxval(errors) > 1 .or. maxval(passed) >= 0) return
-      if (maxval(outcome%steps) >= march%max_steps) return
+      if (largest_excess(trial%lanes, march%control%mean_square, march%t_new, march%next_time) > 0) return
+      if (largest_count(trial%lanes, outcome%steps) >= march%max_steps) return
       if (any_true(trial%lanes, trial%implicit) .or. any_true(trial%lanes, outcome%implicit)) return
       is_usual = all_true(trial%lanes, trial%working)
     end associate
   end function is_usual
+
+  !> The largest error beyond the tolerances or time beyond the next requested one; whole vectors.
+  pure real(wp) function largest_excess(lanes, mean_square, t_new, next_time) result(excess)
+    integer, intent(in) :: lanes
+    real(wp), intent(in), dimension(lanes) :: mean_square, t_new, next_time
+    real(wp) :: most(width)
+    integer :: i
+
+    most = -1.0_wp
+    do i = 1, lanes, width
+      most = max(most, max(mean_square(i:i + width - 1) - 1.0_wp, t_new(i:i + width - 1) - next_time(i:i + width - 1)))
+    end do
+    excess = max(max(most(1), most(2)), max(most(3), most(4)))
+  end function largest_excess
+
+  pure integer function largest_count(lanes, counts) result(largest)
+    integer, intent(in) :: lanes
+    integer, intent(in) :: counts(lanes)
+    integer :: i
+
+    largest = 0
+    do i = 1, lanes
+      largest = max(largest, counts(i))
+    end do
+  end function largest_count
+
+  !> The lanes whose steps end on the final time are done.
+  pure subroutine end_lanes(lanes, reaches_end, status)
+    integer, intent(in) :: lanes
+    logical, intent(in) :: reaches_end(lanes)
+    integer, intent(inout) :: status(lanes)
+    integer :: i
+
+    do i = 1, lanes
+      status(i) = merge(integration_done, status(i), reaches_end(i))
+    end do
+  end subroutine end_lanes
+
+  !> Whether a lane has passed a time.
+  pure logical function has_passed(lanes, time, t)
+    integer, intent(in) :: lanes
+    real(wp), intent(in) :: time(lanes), t(lanes)
+    integer :: i, passed
+
+    passed = 0
+    do i = 1, lanes
+      passed = passed + merge(1, 0, time(i) <= t(i))
+    end do
+    has_passed = passed > 0
+  end function has_passed
 
   !> Accepts the steps of all lanes.
   pure subroutine accept_all(march, wanted)

@@ -236,7 +236,7 @@ contains
     integer, intent(in) :: status(lanes)
     logical, intent(inout) :: running(lanes)
 
-    running = occupied .and. status == integration_running
+    running = merge(occupied, .false., status == integration_running)
   end subroutine find_running
 
   !> Notes and counts the attempts of the running lanes; the others get steps of zero.

@@ -7,7 +7,7 @@ module nocdyn_step_control
   implicit none (type, external)
   private
 
-  public :: step_control, restart, resume, weigh_error, adapt, shorten, propose, smallest_step
+  public :: step_control, restart, resume, weigh_error, adapt, shorten, propose, smallest_step, any_too_small
 
   ! The constants of Hairer's DOPRI5, for any order of the error estimate.
   real(wp), parameter :: beta = 0.04_wp            !! weight of the last error in the PI controller
@@ -79,6 +79,19 @@ contains
 
     smallest_step = 10 * max(epsilon(t) * abs(t), tiny(t))
   end function smallest_step
+
+  !> Whether the step of a lane is no longer than that.
+  pure logical function any_too_small(lanes, t, h)
+    integer, intent(in) :: lanes
+    real(wp), intent(in) :: t(lanes), h(lanes)
+    integer :: lane, small
+
+    small = 0
+    do lane = 1, lanes
+      small = small + merge(1, 0, h(lane) <= 10 * max(epsilon(t) * abs(t(lane)), tiny(t)))
+    end do
+    any_too_small = small > 0
+  end function any_too_small
 
   !> Sets the sizes of the next attempts and where they end, so that no sliver is left before the final time.
   pure subroutine propose(control, lanes, t, h, t_new)

@@ -9,7 +9,8 @@ module nocdyn_taylor_stepper
   use nocdyn_combinations, only: padded_columns, width
   use nocdyn_finite, only: all_finite, is_finite
   use nocdyn_kinds, only: wp
-  use nocdyn_step_control, only: smallest_step, step_control_t
+  use nocdyn_masks, only: all_true, any_other
+  use nocdyn_step_control, only: any_too_small, smallest_step, step_control_t
   use nocdyn_stepper, only: stepper_t
   use nocdyn_system, only: evaluation_fine, observer_t, steps_t, system_t
   use nocdyn_trial, only: park, park_infinities, trial_fine, trial_not_finite, trial_shorten, trial_t
@@ -31,6 +32,7 @@ module nocdyn_taylor_stepper
     logical, allocatable :: moved(:)           !! lanes that have moved since they were expanded
     integer, allocatable :: verdict(:)         !! trial_... on the series of each lane
     integer, allocatable :: culprit(:)         !! component that the verdict is due to, 0 if there is none
+    integer, allocatable :: infinite(:)        !! first component whose new series is not finite, 0 if all are
   contains
     procedure :: plan
     procedure :: prepare
@@ -62,13 +64,14 @@ contains
     class(taylor_stepper_t), intent(inout) :: self
     class(system_t), intent(in) :: system
 
-    if (allocated(self%series)) deallocate (self%series, self%last, self%last_but_one, self%moved, self%verdict, self%culprit)
+    if (allocated(self%series)) deallocate (self%series, self%last, self%last_but_one, self%moved, self%verdict, self%culprit, &
+                                             self%infinite)
     associate (lanes => system%lanes)
       allocate (self%series(lanes, padded_columns(lanes, system%states + system%quadratures), 0:self%order), source=0.0_wp)
       allocate (self%last(lanes), self%last_but_one(lanes), source=0.0_wp)
       allocate (self%moved(lanes), source=.true.)
       allocate (self%verdict(lanes), source=trial_fine)
-      allocate (self%culprit(lanes), source=0)
+      allocate (self%culprit(lanes), self%infinite(lanes), source=0)
     end associate
   end subroutine prepare
 
@@ -77,7 +80,7 @@ contains
     type(trial_t), intent(inout) :: trial
     logical, intent(in) :: starting(:)
 
-    self%moved(:) = self%moved .or. starting
+    call note_moves(size(starting), starting, self%moved)
   end subroutine begin
 
   !> Expands the lanes that have moved and sets their steps; a lane that cannot be expanded is parked by `attempt`.
@@ -86,18 +89,69 @@ contains
     class(system_t), intent(inout) :: system
     type(trial_t), intent(inout) :: trial
     type(step_control_t), intent(inout) :: control
-    integer :: lane
+    logical :: are_finite, have_all_moved
 
-    if (.not. any(self%moved .and. trial%working)) return
-    self%series(:, :, 0) = trial%y
+    have_all_moved = all_true(trial%lanes, self%moved) .and. all_true(trial%lanes, trial%working)
+    if (.not. have_all_moved) then
+      if (.not. any(self%moved .and. trial%working)) return
+    end if
+    call copy(trial%length, trial%y, self%series)
     call system%series(self%order, size(self%series, 2), trial%t, self%series, trial%status)
-    call take_answers(self, trial)
+    ! what is infinite between these coefficients alone shows up in y_new
+    are_finite = all_finite(2 * trial%length, self%series) .and. all_finite(2 * trial%length, self%series(1, 1, self%order - 1))
+    if (.not. are_finite) call clear_infinities(self)
     call measure(trial%lanes, trial%states, size(self%series, 2), control%rtol, control%atol, self%series, &
                  self%series(1, 1, self%order - 1), self%last, self%last_but_one)
     call find_steps(trial%lanes, self%order, self%last, self%last_but_one)
+    if (have_all_moved .and. are_finite .and. .not. any_other(trial%lanes, trial%status, evaluation_fine)) then
+      if (.not. any_too_small(trial%lanes, trial%t, self%last)) then
+        call take_all_steps(trial%lanes, self%last, self%moved, self%verdict, self%culprit, trial%evaluations, control%h)
+        return
+      end if
+    end if
+    call take_steps(self, trial, control)
+    trial%status(:) = evaluation_fine
+  end subroutine plan
+
+  pure subroutine copy(n, x, y)
+    integer, intent(in) :: n
+    real(wp), intent(in) :: x(n)
+    real(wp), intent(inout) :: y(n)
+
+    y = x
+  end subroutine copy
+
+  !> Where all lanes have moved and have good series.
+  pure subroutine take_all_steps(lanes, steps, moved, verdict, culprit, evaluations, h)
+    integer, intent(in) :: lanes
+    real(wp), intent(in) :: steps(lanes)
+    logical, intent(inout) :: moved(lanes)
+    integer, intent(inout), dimension(lanes) :: verdict, culprit, evaluations
+    real(wp), intent(inout) :: h(lanes)
+
+    moved = .false.
+    verdict = trial_fine
+    culprit = 0
+    evaluations = evaluations + 1
+    h = steps
+  end subroutine take_all_steps
+
+  !> The verdicts on the lanes that have moved, and the steps of those with good series.
+  subroutine take_steps(self, trial, control)
+    class(taylor_stepper_t), intent(inout) :: self
+    type(trial_t), intent(inout) :: trial
+    type(step_control_t), intent(inout) :: control
+    integer :: lane
+
     do lane = 1, trial%lanes
       if (.not. (self%moved(lane) .and. trial%working(lane))) cycle
       self%moved(lane) = .false.
+      self%verdict(lane) = trial%status(lane)
+      self%culprit(lane) = 0
+      if (self%infinite(lane) > 0) then
+        self%verdict(lane) = trial_not_finite
+        self%culprit(lane) = self%infinite(lane)
+      end if
       trial%evaluations(lane) = trial%evaluations(lane) + 1
       control%h(lane) = self%last(lane)
       if (self%verdict(lane) == trial_fine .and. control%h(lane) <= smallest_step(trial%t(lane))) then
@@ -108,42 +162,23 @@ contains
       control%h(lane) = 0.0_wp
       self%series(lane, :, 1:) = 0.0_wp
     end do
-    trial%status(:) = evaluation_fine
-  end subroutine plan
+    self%infinite(:) = 0
+  end subroutine take_steps
 
-  !> The verdicts on the lanes that have moved. Series that are not finite are cleared.
-  subroutine take_answers(self, trial)
-    type(taylor_stepper_t), intent(inout) :: self
-    type(trial_t), intent(in) :: trial
-    integer :: lane
+  !> Clears series that are not finite, and notes the first component that is to blame for it.
+  subroutine clear_infinities(self)
+    class(taylor_stepper_t), intent(inout) :: self
+    integer :: component, lane
 
-    do lane = 1, trial%lanes
-      if (.not. (self%moved(lane) .and. trial%working(lane))) cycle
-      self%verdict(lane) = trial%status(lane)
-      self%culprit(lane) = 0
+    do lane = 1, size(self%infinite)
+      do component = 1, size(self%series, 2)
+        if (all(is_finite(self%series(lane, component, :)))) cycle
+        self%infinite(lane) = component
+        self%series(lane, :, 1:) = 0.0_wp
+        exit
+      end do
     end do
-    ! what is infinite between these coefficients alone shows up in y_new
-    if (all_finite(2 * trial%length, self%series) .and. all_finite(2 * trial%length, self%series(1, 1, self%order - 1))) return
-    do lane = 1, trial%lanes
-      call find_infinity(self, lane, is_judged=self%moved(lane) .and. trial%working(lane))
-    end do
-  end subroutine take_answers
-
-  subroutine find_infinity(self, lane, is_judged)
-    type(taylor_stepper_t), intent(inout) :: self
-    integer, intent(in) :: lane
-    logical, intent(in) :: is_judged
-    integer :: component
-
-    do component = 1, size(self%series, 2)
-      if (all(is_finite(self%series(lane, component, :)))) cycle
-      self%series(lane, :, 1:) = 0.0_wp
-      if (.not. is_judged) return
-      self%verdict(lane) = trial_not_finite
-      self%culprit(lane) = component
-      return
-    end do
-  end subroutine find_infinity
+  end subroutine clear_infinities
 
   !> Largest |y_j| / (atol + rtol |y|) of the states of each lane, for the last two coefficients; no less than a number whose
   !> logarithm is finite.
@@ -199,7 +234,7 @@ contains
     type(trial_t), intent(inout) :: trial
     integer :: lane
 
-    if (count(self%verdict /= trial_fine) > 0) then
+    if (any_other(trial%lanes, self%verdict, trial_fine)) then
       do lane = 1, trial%lanes
         if (self%verdict(lane) /= trial_fine) call park(trial, lane, self%verdict(lane), self%culprit(lane))
       end do
@@ -285,8 +320,16 @@ contains
     class(taylor_stepper_t), intent(inout) :: self
     logical, intent(in) :: accepted(:)
 
-    self%moved(:) = self%moved .or. accepted
+    call note_moves(size(accepted), accepted, self%moved)
   end subroutine accept
+
+  pure subroutine note_moves(lanes, moving, moved)
+    integer, intent(in) :: lanes
+    logical, intent(in) :: moving(lanes)
+    logical, intent(inout) :: moved(lanes)
+
+    moved = merge(.true., moved, moving)
+  end subroutine note_moves
 
   !> The series as it is, in powers of the time.
   subroutine show(self, steps, trial, coefficients, observer)
