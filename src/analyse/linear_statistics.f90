@@ -39,7 +39,7 @@ module nocdyn_linear_statistics
     real(wp), dimension(width) :: scale = 0.0_wp      !! 0 in lanes that have not taken a step: x stands still there
     real(wp), dimension(width) :: x_start = 0.0_wp, x_end = 0.0_wp
     real(wp) :: c(width, most_degrees) = 0.0_wp       !! x = x_start + sum of c_p (scale * place)^p
-    real(wp) :: size(width) = 0.0_wp                  !! sum of |c_p scale^p|
+    real(wp), dimension(width) :: above = 0.0_wp, below = 0.0_wp   !! that x can leave the range of its ends by, at most
   end type strip_t
 
   type, public :: linear_statistics_t
@@ -50,6 +50,7 @@ module nocdyn_linear_statistics
     integer, allocatable, private :: track(:)                 !! of each statistic, 0 for those of the end
     type(track_t), allocatable, private :: tracks(:)          !! in the order of their columns
     real(wp), allocatable, private :: nodes(:), weights(:)    !! of Gauss, 0 to 1
+    real(wp), allocatable, private :: depth(:)                !! largest value of s - s^p between s = 0 and 1, [degree]
     real(wp), allocatable, private :: to_bernstein(:, :)
     real(wp), private :: t_start = 0.0_wp
     real(wp), allocatable, private :: x_end(:, :)             !! [lanes, columns]
@@ -211,10 +212,15 @@ contains
     type(linear_statistics_t), intent(inout) :: self
     integer, intent(in) :: columns   !! of the states
     integer, intent(in) :: degree
+    integer :: p
 
     if (degree > most_degrees) error stop 'nocdyn_linear_statistics: the solution inside the step has too many coefficients'
     allocate (self%nodes(degree + 1), self%weights(degree + 1))
     call lay_gauss_rule(degree + 1, self%nodes, self%weights)
+    allocate (self%depth(degree), source=0.0_wp)
+    do p = 2, degree
+      self%depth(p) = (1.0_wp / p)**(1.0_wp / (p - 1)) * (1.0_wp - 1.0_wp / p)
+    end do
     allocate (self%to_bernstein(0:most_degrees, 0:degree))
     call lay_bernstein_matrix(degree, self%to_bernstein)
     allocate (self%y_last(width, columns), self%y_new_last(width, columns), self%c_last(width, columns, degree), source=0.0_wp)
@@ -258,10 +264,12 @@ contains
     associate (columns => self%columns, first => self%columns%first(column))
       associate (entries => columns%first(column + 1) - first)
         if (self%strip%lanes < width) then
-          call expand(width, size(c, 2), size(c, 3), 1, entries, columns%component(first), columns%factor(1, first, number), &
+          call expand(width, size(c, 2), size(c, 3), 1, self%depth, entries, columns%component(first), &
+                      columns%factor(1, first, number), &
                       columns%offset(1, column, number), self%y_last, self%y_new_last, self%c_last, self%strip)
         else
-          call expand(size(c, 1), size(c, 2), size(c, 3), self%strip%before + 1, entries, columns%component(first), &
+          call expand(size(c, 1), size(c, 2), size(c, 3), self%strip%before + 1, self%depth, entries, &
+                      columns%component(first), &
                       columns%factor(1, first, number), columns%offset(1, column, number), y, y_new, c, self%strip)
         end if
       end associate
@@ -273,8 +281,9 @@ contains
   end subroutine expand_strip
 
   !> x = offset + sum of factor * y, and its coefficients, in the lanes from `at` on.
-  pure subroutine expand(lanes, states, degree, at, entries, component, factor, offset, y, y_new, c, strip)
+  pure subroutine expand(lanes, states, degree, at, depth, entries, component, factor, offset, y, y_new, c, strip)
     integer, intent(in) :: lanes, states, degree, at
+    real(wp), intent(in) :: depth(degree)
     integer, intent(in) :: entries   !! an even number
     integer, intent(in) :: component(entries)
     real(wp), intent(in) :: factor(width, entries), offset(width)
@@ -292,7 +301,7 @@ contains
     do k = 3, entries, 2
       call add_pair(lanes, states, degree, at, component(k), component(k + 1), factor(:, k), factor(:, k + 1), c, strip%c)
     end do
-    call measure(degree, strip%scale, strip%c, strip%size)
+    call bound_bulges(degree, depth, strip%scale, strip%c, strip%above, strip%below)
   end subroutine expand
 
   pure subroutine take_pair(lanes, states, degree, at, j, k, factor_j, factor_k, c, x)
@@ -317,20 +326,30 @@ contains
     end do
   end subroutine add_pair
 
-  !> size = sum of |c_p scale^p|.
-  pure subroutine measure(degree, scale, c, size)
+  !> How far x can leave the range of its ends: x(s) = (1 - s) x(0) + s x(1) - sum of c_p scale^p (s - s^p).
+  pure subroutine bound_bulges(degree, depth, scale, c, above, below)
     integer, intent(in) :: degree
-    real(wp), intent(in) :: scale(width), c(width, degree)
-    real(wp), intent(out) :: size(width)
-    real(wp) :: total(width)
-    integer :: p
+    real(wp), intent(in) :: depth(degree), scale(width), c(width, degree)
+    real(wp), intent(out) :: above(width), below(width)
+    real(wp) :: sizes(width), sum(width), term
+    integer :: i, p
 
-    total = abs(c(:, degree))
-    do p = degree - 1, 1, -1
-      total = abs(c(:, p)) + scale * total
+    sum = 0.0_wp
+    sizes = 0.0_wp
+    do p = degree, 2, -1
+      !GCC$ unroll 1
+      do i = 1, width
+        term = depth(p) * c(i, p)
+        sum(i) = term + scale(i) * sum(i)
+        sizes(i) = abs(term) + scale(i) * sizes(i)
+      end do
     end do
-    size = scale * total
-  end subroutine measure
+    !GCC$ unroll 1
+    do i = 1, width
+      above(i) = 0.5_wp * (scale(i) * scale(i)) * (sizes(i) - sum(i))
+      below(i) = 0.5_wp * (scale(i) * scale(i)) * (sizes(i) + sum(i))
+    end do
+  end subroutine bound_bulges
 
   !> Widens the range of x by the steps of the strip.
   subroutine widen_strip(self, track, number, steps, degree)
@@ -345,10 +364,11 @@ contains
     associate (strip => self%strip)
       call widen_by_ends(track%has_time, strip%t_end, strip%x_end, track%gate(1, number), track%highest(1, number), &
                          track%lowest(1, number), track%highest_time(1, number))
-      call bound_excess(track, strip%x_start, strip%x_end, strip%size, track%gate(1, number), track%highest(1, number), &
-                        track%lowest(1, number), rise, fall)
+      call bound_excess(track, strip%x_start, strip%x_end, strip%above, strip%below, track%gate(1, number), &
+                        track%highest(1, number), track%lowest(1, number), rise, fall)
+      if (any_positive(rise, fall)) call forget_slopes(degree, self%depth, strip%scale, strip%c, rise, fall)
       if (.not. (steps%may_be_cut .or. track%from > self%t_start)) then
-        if (max(maxval(rise), maxval(fall)) <= 0) return
+        if (.not. any_positive(rise, fall)) return
       end if
       do i = 1, strip%lanes
         associate (lane => strip%before + i)
@@ -384,11 +404,10 @@ contains
     end do
   end subroutine widen_by_ends
 
-  !> How far x and -x can pass what they must exceed to be of interest. x is at most half as much above the mean of its ends as
-  !> its terms are large.
-  pure subroutine bound_excess(track, x_start, x_end, size, gate, highest, lowest, rise, fall)
+  !> How far x and -x can pass what they must exceed to be of interest.
+  pure subroutine bound_excess(track, x_start, x_end, above, below, gate, highest, lowest, rise, fall)
     type(track_t), intent(in) :: track
-    real(wp), intent(in), dimension(width) :: x_start, x_end, size, gate, highest, lowest
+    real(wp), intent(in), dimension(width) :: x_start, x_end, above, below, gate, highest, lowest
     real(wp), intent(out) :: rise(width), fall(width)
     integer :: i
 
@@ -403,12 +422,54 @@ contains
     if (track%has_max) rise = highest
     if (track%has_min) fall = -lowest
     do i = 1, width
-      rise(i) = 0.5_wp * (size(i) + (x_start(i) + x_end(i))) - max(rise(i), gate(i))
+      rise(i) = (max(x_start(i), x_end(i)) + above(i)) - max(rise(i), gate(i))
     end do
     do i = 1, width
-      fall(i) = 0.5_wp * (size(i) - (x_start(i) + x_end(i))) - max(fall(i), gate(i))
+      fall(i) = (below(i) - min(x_start(i), x_end(i))) - max(fall(i), gate(i))
     end do
   end subroutine bound_excess
+
+  pure logical function any_positive(x, y)
+    real(wp), intent(in) :: x(width), y(width)
+    integer :: i, positive
+
+    positive = 0
+    do i = 1, width
+      positive = positive + merge(1, 0, max(x(i), y(i)) > 0)
+    end do
+    any_positive = positive > 0
+  end function any_positive
+
+  !> Nothing is of interest inside the steps in which x only rises or only falls:
+  !> x' = (1 - s) x'(0) + s x'(1) - sum of p c_p scale^p (s - s^(p-1)).
+  pure subroutine forget_slopes(degree, depth, scale, c, rise, fall)
+    integer, intent(in) :: degree
+    real(wp), intent(in) :: depth(degree), scale(width), c(width, degree)
+    real(wp), intent(inout) :: rise(width), fall(width)
+    real(wp) :: bulges(width), end_slope(width), least, most, sum(width), term
+    integer :: i, p
+
+    end_slope = 0.0_wp
+    sum = 0.0_wp
+    bulges = 0.0_wp
+    do p = degree, 2, -1
+      !GCC$ unroll 1
+      do i = 1, width
+        term = p * c(i, p)
+        end_slope(i) = (term + end_slope(i)) * scale(i)
+        sum(i) = (depth(p - 1) * term + sum(i)) * scale(i)
+        bulges(i) = (depth(p - 1) * abs(term) + bulges(i)) * scale(i)
+      end do
+    end do
+    !GCC$ unroll 1
+    do i = 1, width
+      end_slope(i) = c(i, 1) + end_slope(i)
+      least = min(c(i, 1), end_slope(i)) - 0.5_wp * (bulges(i) + sum(i))
+      most = max(c(i, 1), end_slope(i)) + 0.5_wp * (bulges(i) - sum(i))
+      rise(i) = merge(rise(i), -1.0_wp, least * most <= 0)
+      fall(i) = merge(fall(i), -1.0_wp, least * most <= 0)
+    end do
+  end subroutine forget_slopes
 
   !> Widens the range by the extremes of a step, or of what of it lies after `from` and before its cut.
   pure subroutine look_inside(self, track, i, number, t, h, until, degree, rise, fall)

@@ -47,7 +47,6 @@ contains
 
     found = .false.
     place = 0.0_wp
-    if (does_not_turn(n, c)) return
     call multiply(n, matrix, c, b(:, 1))
     left(1) = 0.0_wp
     length(1) = 1.0_wp
@@ -90,22 +89,6 @@ contains
     end do
     can_exceed = largest - n * epsilon(size) * size > highest
   end function can_exceed
-
-  !> Whether the bounds of the derivative on [0, 1] have one sign.
-  pure logical function does_not_turn(n, c)
-    integer, intent(in) :: n
-    real(wp), intent(in) :: c(0:n)
-    real(wp) :: least, most
-    integer :: k
-
-    least = c(1)
-    most = c(1)
-    do k = 2, n
-      least = least + min(k * c(k), 0.0_wp)
-      most = most + max(k * c(k), 0.0_wp)
-    end do
-    does_not_turn = least > 0 .or. most < 0
-  end function does_not_turn
 
   !> b = matrix * c, a few rows at a time; what is above the diagonal is zero.
   pure subroutine multiply(n, matrix, c, b)
