@@ -446,16 +446,17 @@ contains
     integer, intent(in) :: degree
     real(wp), intent(in) :: depth(degree), scale(width), c(width, degree)
     real(wp), intent(inout) :: rise(width), fall(width)
-    real(wp) :: bulges(width), end_slope(width), least, most, sum(width), term
+    real(wp) :: bulges(width), end_slope(width), factor, least, most, sum(width), term
     integer :: i, p
 
     end_slope = 0.0_wp
     sum = 0.0_wp
     bulges = 0.0_wp
     do p = degree, 2, -1
+      factor = real(p, wp)
       !GCC$ unroll 1
       do i = 1, width
-        term = p * c(i, p)
+        term = factor * c(i, p)
         end_slope(i) = (term + end_slope(i)) * scale(i)
         sum(i) = (depth(p - 1) * term + sum(i)) * scale(i)
         bulges(i) = (depth(p - 1) * abs(term) + bulges(i)) * scale(i)

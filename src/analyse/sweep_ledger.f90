@@ -107,7 +107,7 @@ contains
   end subroutine hand_out
 
   !> Variants to hand out at once: one for each lane at first, then what takes `chunk_seconds`; at the end, when `left`
-  !> variants are shared by all workers, less, so that they come to their ends together.
+  !> variants are shared by several workers, less, so that these come to their ends together.
   pure integer function chunk_size(left, workers, lanes, pace, last_size)
     integer, intent(in) :: left        !! at least 1
     integer, intent(in) :: workers, lanes
@@ -119,7 +119,8 @@ contains
     if (pace > 0) chunk_size = int(min(chunk_seconds / pace, real(most_at_once, wp)))
     chunk_size = max(lanes, min(chunk_size, growth * max(last_size, lanes)))
     share = (left - 1) / workers + 1
-    chunk_size = max(1, min(chunk_size, max((share + 1) / 2, min(share, lanes))))
+    if (workers > 1) share = max((share + 1) / 2, min(share, lanes))
+    chunk_size = max(1, min(chunk_size, share))
   end function chunk_size
 
   subroutine take(self, chunk, seconds)
