@@ -42,22 +42,15 @@ contains
     end do
   end function combination
 
-  !> Finds the stages in an array [stride, stages].
-  elemental subroutine set_offsets(combination, length, stages, stride, before)
+  !> Finds the stages in an array [length, stages].
+  elemental subroutine set_offsets(combination, length, stages)
     type(combination_t), intent(inout) :: combination
-    integer, intent(in) :: length             !! of a stage, whole vectors
+    integer, intent(in) :: length   !! of a stage, whole vectors
     integer, intent(in) :: stages
-    integer, intent(in), optional :: stride   !! from stage to stage, at least before + length; absent: length
-    integer, intent(in), optional :: before   !! numbers before each stage; absent: 0
-    integer :: first, step
 
-    step = length
-    if (present(stride)) step = stride
-    first = 0
-    if (present(before)) first = before
     combination%length = length
-    combination%extent = step * stages
-    combination%offsets = first + step * (combination%stages - 1)
+    combination%extent = length * stages
+    combination%offsets = length * (combination%stages - 1)
   end subroutine set_offsets
 
   !> Columns, at least one, of an array [lanes, columns] that holds all components and consists of whole vectors.

@@ -70,7 +70,7 @@ contains
 
     do lane = 1, size(starting)
       if (.not. starting(lane)) cycle
-      self%stages%k(lane, self%stages%begin:self%stages%end, 1) = trial%slope(lane, :)
+      self%stages%k(lane, :, 1) = trial%slope(lane, :)
       self%moved(lane) = .false.
     end do
   end subroutine begin
@@ -79,23 +79,22 @@ contains
     class(explicit_stepper_t), intent(inout) :: self
     class(system_t), intent(inout) :: system
     type(trial_t), intent(inout) :: trial
-    integer :: begin, last, stage
+    integer :: last, stage
 
-    begin = self%stages%begin
     if (any_true(trial%lanes, self%moved)) then
       if (any(self%moved .and. trial%working)) call renew_first_stage(self, system, trial)
     end if
     last = merge(self%stages%step - 1, self%stages%step, self%first_same_as_last)
     do stage = 2, last
       if (.not. any(trial%working)) exit
-      call inner_state(self%stages, trial, stage, self%y_stage(1, begin))
+      call inner_state(self%stages, trial, stage, self%y_stage)
       call place_stage(trial%lanes, trial%t, trial%h, self%c(stage), self%t_stage)
-      call evaluate(trial, system, self%t_stage, self%y_stage(1, begin), self%stages%k(1, begin, self%stages%place(stage)))
+      call evaluate(trial, system, self%t_stage, self%y_stage, self%stages%k(1, 1, self%stages%place(stage)))
     end do
     call update_state(self%stages, trial)
     if (self%first_same_as_last) then
       call place_stage(trial%lanes, trial%t, trial%h, 1.0_wp, self%t_stage)
-      call evaluate_finite(trial, system, self%t_stage, trial%y_new, self%stages%k(1, begin, self%stages%place(self%stages%step)))
+      call evaluate_finite(trial, system, self%t_stage, trial%y_new, self%stages%k(1, 1, self%stages%place(self%stages%step)))
     end if
     call estimate_error(self%stages, trial)
     call count_evaluations(trial)
@@ -119,7 +118,7 @@ contains
     class(system_t), intent(inout) :: system
     type(trial_t), intent(inout) :: trial
 
-    call evaluate_start(trial, system, self%moved, self%stages%k(1, self%stages%begin, 1))
+    call evaluate_start(trial, system, self%moved, self%stages%k)
     self%moved(:) = self%moved .and. .not. trial%working
   end subroutine renew_first_stage
 
@@ -130,16 +129,15 @@ contains
     type(trial_t), intent(inout) :: trial
     logical, intent(in) :: wanted(:)
     real(wp), contiguous, intent(inout) :: coefficients(:, :, :)
-    integer :: begin, stage
+    integer :: stage
 
-    begin = self%stages%begin
     if (self%stages%all > self%stages%step) then
       trial%working(:) = wanted
       do stage = self%stages%step + 1, self%stages%all
-        call inner_state(self%stages, trial, stage, self%y_stage(1, begin))
+        call inner_state(self%stages, trial, stage, self%y_stage)
         call place_stage(trial%lanes, trial%t, trial%h, self%c(stage), self%t_stage)
-        call evaluate_finite(trial, system, self%t_stage, self%y_stage(1, begin), &
-                             self%stages%k(1, begin, self%stages%place(stage)))
+        call evaluate_finite(trial, system, self%t_stage, self%y_stage, &
+                             self%stages%k(1, 1, self%stages%place(stage)))
       end do
       call count_evaluations(trial)
     end if
@@ -190,10 +188,10 @@ contains
     slopes = 0.0_wp
     states = 0.0_wp
     associate (k => self%stages%k, last => self%stages%place(self%stages%step), &
-               before => self%stages%place(self%stages%step - 1), start => self%stages%begin - 1)
+               before => self%stages%place(self%stages%step - 1))
       do i = 1, trial%states
-        slopes = slopes + min(abs(k(lane, start + i, last) - k(lane, start + i, before)), largest)**2
-        states = states + min(abs(trial%y_new(lane, i) - self%y_stage(lane, start + i)), largest)**2
+        slopes = slopes + min(abs(k(lane, i, last) - k(lane, i, before)), largest)**2
+        states = states + min(abs(trial%y_new(lane, i) - self%y_stage(lane, i)), largest)**2
       end do
     end associate
     ratio = 0.0_wp

@@ -67,17 +67,14 @@ contains
     class(system_t), intent(in) :: system
 
     call allocate_stages(self%stages, system)
-    associate (lanes => system%lanes, stages => self%stages)
-      call set_offsets(self%coupling, lanes * (stages%end - stages%begin + 1), stages%all, lanes * size(stages%k, 2), &
-                       lanes * (stages%begin - 1))
-    end associate
+    call set_offsets(self%coupling, system%lanes * size(self%stages%k, 2), self%stages%all)
     call allocate_stage_system(self%stage_system, system)
     call allocate_spectra(self%spectra, system)
     if (allocated(self%slope)) deallocate (self%t_stage, self%y_stage, self%f, self%r, self%one, self%slope, &
                                            self%no_slope, self%no_jacobian)
     associate (lanes => system%lanes)
       allocate (self%t_stage(lanes), source=0.0_wp)
-      allocate (self%y_stage, self%f, self%r, self%slope, source=self%stages%k(:, self%stages%begin:self%stages%end, 1))
+      allocate (self%y_stage, self%f, self%r, self%slope, source=self%stages%k(:, :, 1))
       allocate (self%one, source=self%stages%zero + 1)
       allocate (self%no_slope(lanes), self%no_jacobian(lanes), source=.true.)
     end associate
@@ -152,7 +149,7 @@ contains
       call add_time_derivative(trial%lanes, trial%components, self%gamma_sum(stage), trial%h, &
                                self%stage_system%dfdt, self%r)
     end if
-    call solve(self%stage_system, trial, self%gamma, self%r, self%stages%k(:, self%stages%begin:self%stages%end, stage))
+    call solve(self%stage_system, trial, self%gamma, self%r, self%stages%k(:, :, stage))
   end subroutine solve_stage
 
   pure subroutine add_time_derivative(lanes, components, gamma_sum, h, dfdt, r)

@@ -1,7 +1,6 @@
 !> The stages of a one-step method on a block of lanes, and the sums that are formed of them.
 module nocdyn_stages
-  use nocdyn_alignment, only: numbers_to_multiple
-  use nocdyn_combinations, only: combination, combination_t, combine, padded_columns, set_offsets, strip, width
+  use nocdyn_combinations, only: combination, combination_t, combine, padded_columns, set_offsets, strip
   use nocdyn_finite, only: is_finite
   use nocdyn_kinds, only: wp
   use nocdyn_system, only: system_t
@@ -21,9 +20,7 @@ module nocdyn_stages
     type(combination_t), allocatable :: dense(:)       !! weights of each power of theta = (time - t) / h
     integer :: places = 0                              !! for stages in `k`
     integer, allocatable :: place(:)                   !! of each stage in `k`, [all]
-    real(wp), allocatable :: k(:, :, :)                !! the stages, shape [lanes, spare and padded columns, places]
-    integer :: begin = 1                               !! first column of each stage in `k`
-    integer :: end = 1                                 !! last column
+    real(wp), allocatable :: k(:, :, :)                !! the stages, shape [lanes, padded columns, places]
     real(wp), allocatable :: zero(:)                   !! zeros for any strip
   end type stages_t
 
@@ -112,34 +109,29 @@ contains
     end associate
   end subroutine note_reads
 
-  !> Room for the stages of every lane. Large arrays lie where half of the vectors of one lane would cross from one line of
-  !> the cache to the next: its stages begin at the first column from which they do not.
+  !> Room for the stages of every lane.
   subroutine allocate_stages(self, system)
     type(stages_t), intent(inout) :: self
     class(system_t), intent(in) :: system
-    integer :: columns, spare
+    integer :: columns
 
     if (allocated(self%k)) deallocate (self%k, self%zero)
     associate (lanes => system%lanes)
       columns = padded_columns(lanes, system%states + system%quadratures)
-      spare = merge(width, 0, lanes == 1)
-      allocate (self%k(lanes, columns + spare, self%places), self%zero(min(lanes * columns, strip)), source=0.0_wp)
-      self%begin = 1
-      if (lanes == 1) self%begin = 1 + numbers_to_multiple(self%k(:, 1, 1), width)
-      self%end = self%begin + columns - 1
-      call place_combinations(self, lanes * columns, lanes * (columns + spare), lanes * (self%begin - 1))
+      allocate (self%k(lanes, columns, self%places), self%zero(min(lanes * columns, strip)), source=0.0_wp)
+      call place_combinations(self, lanes * columns)
     end associate
   end subroutine allocate_stages
 
-  elemental subroutine place_combinations(self, length, stride, before)
+  elemental subroutine place_combinations(self, length)
     type(stages_t), intent(inout) :: self
-    integer, intent(in) :: length, stride, before   !! as for `set_offsets`
+    integer, intent(in) :: length   !! of a stage
 
-    call set_offsets(self%inner, length, self%places, stride, before)
-    call set_offsets(self%update, length, self%places, stride, before)
-    call set_offsets(self%error, length, self%places, stride, before)
-    call set_offsets(self%coarse_error, length, self%places, stride, before)
-    call set_offsets(self%dense, length, self%places, stride, before)
+    call set_offsets(self%inner, length, self%places)
+    call set_offsets(self%update, length, self%places)
+    call set_offsets(self%error, length, self%places)
+    call set_offsets(self%coarse_error, length, self%places)
+    call set_offsets(self%dense, length, self%places)
   end subroutine place_combinations
 
   !> The state that a stage is taken at, from the stages before it; a lane where it overflows is parked.
