@@ -3,44 +3,21 @@
 !> The elastic moment of a coupling that stiffens rises with its twist: its extremes are where those of the twist are. Bounds
 !> from the coefficients of x, in vector loops over the lanes, say in which steps an extremum may pass those before.
 module nocdyn_linear_statistics
-  use nocdyn_bernstein, only: lay_bernstein_matrix, most_degrees, raise_to_maximum, shift_origin
+  use nocdyn_bernstein, only: lay_bernstein_matrix, most_degrees, raise_to_maximum
   use nocdyn_formulation, only: formulation_t
   use nocdyn_kinds, only: wp
   use nocdyn_linear_columns, only: linear_columns_t, new_linear_columns, place_of, strip_of, width
+  use nocdyn_linear_tracks, only: lay_tracks, open_gate, track_t
   use nocdyn_quadrature, only: lay_gauss_rule
   use nocdyn_statistics, only: statistic_final, statistic_max, statistic_max_abs, statistic_mean, statistic_min, statistic_rms, &
     statistic_t, statistic_time_of_max
+  use nocdyn_step_strips, only: add_integrals, expand, forget_slopes, lay_depths, strip_t, take_part
   use nocdyn_system, only: steps_t
   use nocdyn_trajectory_columns, only: column_t
   implicit none (type, external)
   private
 
   public :: new_linear_statistics
-
-  !> What is kept of one x from a time on; [width, strips] of the lanes.
-  type :: track_t
-    integer :: column = 0                    !! among the linear ones
-    real(wp) :: from = 0.0_wp                !! [s]
-    logical :: has_range = .false.           !! whether extremes are wanted:
-    logical :: has_max = .false., has_min = .false., has_size = .false.   !! largest, smallest, largest absolute value
-    logical :: has_time = .false.            !! of the largest
-    logical :: has_sums = .false.
-    real(wp), allocatable :: highest(:, :), lowest(:, :), highest_time(:, :)   !! of x
-    real(wp), allocatable :: gate(:, :)                                        !! huge before `from`, -huge after it
-    real(wp), allocatable :: integral(:, :), square(:, :)                      !! of the column over time
-  end type track_t
-
-  !> The steps of some lanes that are looked at together, and x in them.
-  type :: strip_t
-    integer :: lanes = 0
-    integer :: before = 0                             !! lanes of the strips before it
-    logical :: is_complete = .false.                  !! whether there are `width` lanes, and all have taken a step
-    real(wp), dimension(width) :: t_end = 0.0_wp
-    real(wp), dimension(width) :: scale = 0.0_wp      !! 0 in lanes that have not taken a step: x stands still there
-    real(wp), dimension(width) :: x_start = 0.0_wp, x_end = 0.0_wp
-    real(wp) :: c(width, most_degrees) = 0.0_wp       !! x = x_start + sum of c_p (scale * place)^p
-    real(wp), dimension(width) :: above = 0.0_wp, below = 0.0_wp   !! that x can leave the range of its ends by, at most
-  end type strip_t
 
   type, public :: linear_statistics_t
     type(linear_columns_t) :: columns
@@ -82,51 +59,8 @@ contains
     allocate (self%column, source=[(findloc(wanted, statistics(i)%column, dim=1), i=1, size(statistics))])
     self%columns = new_linear_columns(block, columns(wanted))
     allocate (self%x_end(block%lanes, size(wanted)), source=0.0_wp)
-    call lay_tracks(self, block%lanes)
+    call lay_tracks(statistics, self%column, block%lanes, self%tracks, self%track)
   end function new_linear_statistics
-
-  !> One track for each column and `from`.
-  subroutine lay_tracks(self, lanes)
-    type(linear_statistics_t), intent(inout) :: self
-    integer, intent(in) :: lanes
-    integer :: column, i, k
-
-    allocate (self%tracks(0))
-    allocate (self%track(size(self%statistics)), source=0)
-    do column = 1, self%columns%count
-      do i = 1, size(self%statistics)
-        associate (statistic => self%statistics(i))
-          if (self%column(i) /= column .or. statistic%kind == statistic_final) cycle
-          do k = 1, size(self%tracks)
-            if (self%tracks(k)%column == column .and. abs(self%tracks(k)%from - statistic%from) <= 0) exit
-          end do
-          if (k > size(self%tracks)) self%tracks = [self%tracks, track_t(column=column, from=statistic%from)]
-          self%track(i) = k
-          associate (track => self%tracks(k))
-            select case (statistic%kind)
-            case (statistic_max, statistic_time_of_max)
-              track%has_max = .true.
-              track%has_time = track%has_time .or. statistic%kind == statistic_time_of_max
-            case (statistic_min)
-              track%has_min = .true.
-            case (statistic_max_abs)
-              track%has_size = .true.
-            case default
-              track%has_sums = .true.
-            end select
-          end associate
-        end associate
-      end do
-    end do
-    do k = 1, size(self%tracks)
-      associate (track => self%tracks(k))
-        track%has_range = track%has_max .or. track%has_min .or. track%has_size
-        allocate (track%highest(width, strip_of(lanes)), source=0.0_wp)
-        allocate (track%lowest, track%highest_time, track%integral, track%square, source=track%highest)
-        allocate (track%gate, source=track%highest - huge(0.0_wp))
-      end associate
-    end do
-  end subroutine lay_tracks
 
   !> A lane of the block starts anew at y.
   subroutine begin(self, block, lane, y)
@@ -149,18 +83,6 @@ contains
       end associate
     end do
   end subroutine begin
-
-  !> The range of a lane begins with a value.
-  pure subroutine open_gate(track, at, strip, x, t)
-    type(track_t), intent(inout) :: track
-    integer, intent(in) :: at, strip
-    real(wp), intent(in) :: x, t
-
-    track%gate(at, strip) = -huge(0.0_wp)
-    track%highest(at, strip) = x
-    track%lowest(at, strip) = x
-    track%highest_time(at, strip) = t
-  end subroutine open_gate
 
   !> Whether the column of a statistic rises with x in a lane.
   pure logical function is_rising(self, number, lane)
@@ -212,15 +134,12 @@ contains
     type(linear_statistics_t), intent(inout) :: self
     integer, intent(in) :: columns   !! of the states
     integer, intent(in) :: degree
-    integer :: p
 
     if (degree > most_degrees) error stop 'nocdyn_linear_statistics: the solution inside the step has too many coefficients'
     allocate (self%nodes(degree + 1), self%weights(degree + 1))
     call lay_gauss_rule(degree + 1, self%nodes, self%weights)
-    allocate (self%depth(degree), source=0.0_wp)
-    do p = 2, degree
-      self%depth(p) = (1.0_wp / p)**(1.0_wp / (p - 1)) * (1.0_wp - 1.0_wp / p)
-    end do
+    allocate (self%depth(degree))
+    call lay_depths(self%depth)
     allocate (self%to_bernstein(0:most_degrees, 0:degree))
     call lay_bernstein_matrix(degree, self%to_bernstein)
     allocate (self%y_last(width, columns), self%y_new_last(width, columns), self%c_last(width, columns, degree), source=0.0_wp)
@@ -279,77 +198,6 @@ contains
       if (abs(self%strip%scale(i)) <= 0) self%strip%x_end(i) = self%strip%x_start(i)
     end do
   end subroutine expand_strip
-
-  !> x = offset + sum of factor * y, and its coefficients, in the lanes from `at` on.
-  pure subroutine expand(lanes, states, degree, at, depth, entries, component, factor, offset, y, y_new, c, strip)
-    integer, intent(in) :: lanes, states, degree, at
-    real(wp), intent(in) :: depth(degree)
-    integer, intent(in) :: entries   !! an even number
-    integer, intent(in) :: component(entries)
-    real(wp), intent(in) :: factor(width, entries), offset(width)
-    real(wp), intent(in) :: y(lanes, states), y_new(lanes, states), c(lanes, states, degree)
-    type(strip_t), intent(inout) :: strip
-    integer :: k
-
-    strip%x_start = offset
-    strip%x_end = offset
-    do k = 1, entries
-      strip%x_start = strip%x_start + factor(:, k) * y(at:at + width - 1, component(k))
-      strip%x_end = strip%x_end + factor(:, k) * y_new(at:at + width - 1, component(k))
-    end do
-    call take_pair(lanes, states, degree, at, component(1), component(2), factor(:, 1), factor(:, 2), c, strip%c)
-    do k = 3, entries, 2
-      call add_pair(lanes, states, degree, at, component(k), component(k + 1), factor(:, k), factor(:, k + 1), c, strip%c)
-    end do
-    call bound_bulges(degree, depth, strip%scale, strip%c, strip%above, strip%below)
-  end subroutine expand
-
-  pure subroutine take_pair(lanes, states, degree, at, j, k, factor_j, factor_k, c, x)
-    integer, intent(in) :: lanes, states, degree, at, j, k
-    real(wp), intent(in) :: factor_j(width), factor_k(width), c(lanes, states, degree)
-    real(wp), intent(inout) :: x(width, degree)
-    integer :: p
-
-    do p = 1, degree
-      x(:, p) = factor_j * c(at:at + width - 1, j, p) + factor_k * c(at:at + width - 1, k, p)
-    end do
-  end subroutine take_pair
-
-  pure subroutine add_pair(lanes, states, degree, at, j, k, factor_j, factor_k, c, x)
-    integer, intent(in) :: lanes, states, degree, at, j, k
-    real(wp), intent(in) :: factor_j(width), factor_k(width), c(lanes, states, degree)
-    real(wp), intent(inout) :: x(width, degree)
-    integer :: p
-
-    do p = 1, degree
-      x(:, p) = x(:, p) + (factor_j * c(at:at + width - 1, j, p) + factor_k * c(at:at + width - 1, k, p))
-    end do
-  end subroutine add_pair
-
-  !> How far x can leave the range of its ends: x(s) = (1 - s) x(0) + s x(1) - sum of c_p scale^p (s - s^p).
-  pure subroutine bound_bulges(degree, depth, scale, c, above, below)
-    integer, intent(in) :: degree
-    real(wp), intent(in) :: depth(degree), scale(width), c(width, degree)
-    real(wp), intent(out) :: above(width), below(width)
-    real(wp) :: sizes(width), sum(width), term
-    integer :: i, p
-
-    sum = 0.0_wp
-    sizes = 0.0_wp
-    do p = degree, 2, -1
-      !GCC$ unroll 1
-      do i = 1, width
-        term = depth(p) * c(i, p)
-        sum(i) = term + scale(i) * sum(i)
-        sizes(i) = abs(term) + scale(i) * sizes(i)
-      end do
-    end do
-    !GCC$ unroll 1
-    do i = 1, width
-      above(i) = 0.5_wp * (scale(i) * scale(i)) * (sizes(i) - sum(i))
-      below(i) = 0.5_wp * (scale(i) * scale(i)) * (sizes(i) + sum(i))
-    end do
-  end subroutine bound_bulges
 
   !> Widens the range of x by the steps of the strip.
   subroutine widen_strip(self, track, number, steps, degree)
@@ -440,38 +288,6 @@ contains
     any_positive = positive > 0
   end function any_positive
 
-  !> Nothing is of interest inside the steps in which x only rises or only falls:
-  !> x' = (1 - s) x'(0) + s x'(1) - sum of p c_p scale^p (s - s^(p-1)).
-  pure subroutine forget_slopes(degree, depth, scale, c, rise, fall)
-    integer, intent(in) :: degree
-    real(wp), intent(in) :: depth(degree), scale(width), c(width, degree)
-    real(wp), intent(inout) :: rise(width), fall(width)
-    real(wp) :: bulges(width), end_slope(width), factor, least, most, sum(width), term
-    integer :: i, p
-
-    end_slope = 0.0_wp
-    sum = 0.0_wp
-    bulges = 0.0_wp
-    do p = degree, 2, -1
-      factor = real(p, wp)
-      !GCC$ unroll 1
-      do i = 1, width
-        term = factor * c(i, p)
-        end_slope(i) = (term + end_slope(i)) * scale(i)
-        sum(i) = (depth(p - 1) * term + sum(i)) * scale(i)
-        bulges(i) = (depth(p - 1) * abs(term) + bulges(i)) * scale(i)
-      end do
-    end do
-    !GCC$ unroll 1
-    do i = 1, width
-      end_slope(i) = c(i, 1) + end_slope(i)
-      least = min(c(i, 1), end_slope(i)) - 0.5_wp * (bulges(i) + sum(i))
-      most = max(c(i, 1), end_slope(i)) + 0.5_wp * (bulges(i) - sum(i))
-      rise(i) = merge(rise(i), -1.0_wp, least * most <= 0)
-      fall(i) = merge(fall(i), -1.0_wp, least * most <= 0)
-    end do
-  end subroutine forget_slopes
-
   !> Widens the range by the extremes of a step, or of what of it lies after `from` and before its cut.
   pure subroutine look_inside(self, track, i, number, t, h, until, degree, rise, fall)
     type(linear_statistics_t), intent(in) :: self
@@ -509,29 +325,6 @@ contains
     end associate
   end subroutine look_inside
 
-  !> x in what of a step lies after `from` and before its cut, as a polynomial in the place there, 0 to 1.
-  pure subroutine take_part(strip, i, from, t, h, until, degree, c, t_start)
-    type(strip_t), intent(in) :: strip
-    integer, intent(in) :: i
-    real(wp), intent(in) :: from
-    real(wp), intent(in) :: t, h, until   !! the step
-    integer, intent(in) :: degree
-    real(wp), intent(inout) :: c(0:degree)
-    real(wp), intent(out) :: t_start
-    real(wp) :: power
-    integer :: p
-
-    c(0) = strip%x_start(i)
-    power = 1.0_wp
-    do p = 1, degree
-      power = power * strip%scale(i)
-      c(p) = power * strip%c(i, p)
-    end do
-    t_start = max(t, from)
-    if (t_start <= t .and. until >= 1) return
-    call shift_origin(degree, c, (t_start - t) / h, until)
-  end subroutine take_part
-
   !> Adds the integrals of a column and of its square over what of the steps lies after `from`.
   subroutine integrate_strip(self, track, number, steps, degree)
     type(linear_statistics_t), intent(inout) :: self
@@ -567,28 +360,6 @@ contains
                          self%columns%cubic(1, track%column, number), track%integral(1, number), track%square(1, number))
     end if
   end subroutine integrate_strip
-
-  !> By Gauss's rule with as many nodes as x has coefficients: x and its square are integrated exactly.
-  pure subroutine add_integrals(strip, degree, nodes, weights, duration, linear, cubic, integral, square)
-    type(strip_t), intent(in) :: strip
-    integer, intent(in) :: degree
-    real(wp), intent(in) :: nodes(degree + 1), weights(degree + 1), duration(width), linear(width), cubic(width)
-    real(wp), intent(inout) :: integral(width), square(width)
-    real(wp) :: place(width), x(width)
-    integer :: node, p
-
-    do node = 1, degree + 1
-      place = strip%scale * nodes(node)
-      x = strip%c(:, degree)
-      do p = degree - 1, 1, -1
-        x = strip%c(:, p) + place * x
-      end do
-      x = strip%x_start + place * x
-      x = (linear + cubic * x * x) * x
-      integral = integral + duration * weights(node) * x
-      square = square + duration * weights(node) * (x * x)
-    end do
-  end subroutine add_integrals
 
   !> A statistic of a lane that has reached its end. Those of extremes are good where the column rises with x.
   real(wp) function value(self, number, lane)
