@@ -82,7 +82,7 @@ contains
            '  --quiet            print nothing but errors' // nl // nl // &
            'Results are the same to the last bit for any number of threads, shards or interruptions. On many machines:' // nl // &
            'mpirun -n N nocdyn-mpi sweep FILE, with the same options but --shard.' // nl // nl // &
-           'Exit code 1: interrupted, or every variant failed.'
+           'Exit code 1: interrupted, or no variant can be computed.'
   end function sweep_help
 
   pure function overview() result(text)

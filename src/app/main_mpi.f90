@@ -2,11 +2,13 @@
 program nocdyn_mpi_program
   use mpi_f08, only: mpi_comm_rank, mpi_comm_world, mpi_finalize, mpi_init_thread, mpi_thread_serialized
   use nocdyn_arguments, only: arguments_t, command_line, parse_arguments
+  use nocdyn_commands, only: help_command, version_command
   use nocdyn_console, only: complain, output_is_lost
   use nocdyn_errors, only: error_t, exit_file, exit_input, raise
   use nocdyn_mpi_command, only: mpi_command
   use nocdyn_mpi_messages, only: root
   use nocdyn_posix, only: survive_size_limit
+  use nocdyn_text, only: append
   implicit none (type, external)
 
   type(arguments_t) :: arguments
@@ -18,7 +20,7 @@ program nocdyn_mpi_program
   call survive_size_limit()
   call parse_arguments(command_line(), arguments, error)
   if (.not. allocated(error)) then
-    if (arguments%command /= 'sweep') then
+    if (.not. any(arguments%command == ['sweep  ', 'help   ', 'version'])) then
       call raise(error, exit_input, "nocdyn-mpi knows the command 'sweep' only; everything else is asked of nocdyn")
     else if (arguments%shards > 0) then
       call raise(error, exit_input, '--shard is an option of nocdyn sweep; nocdyn-mpi hands out the variants itself')
@@ -28,7 +30,15 @@ program nocdyn_mpi_program
   end if
   code = 0
   if (.not. allocated(error)) then
-    call mpi_command(arguments, code)
+    select case (arguments%command)
+    case ('help')
+      if (size(arguments%operands) == 0) call append(arguments%operands, 'sweep')
+      if (rank == root) call help_command(arguments, code)
+    case ('version')
+      if (rank == root) call version_command(code)
+    case default
+      call mpi_command(arguments, code)
+    end select
   else if (rank == root) then
     call complain(error)
     code = error%code

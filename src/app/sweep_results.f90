@@ -102,7 +102,7 @@ contains
     type(sweep_header_t), intent(in) :: header
     type(results_options_t), intent(in) :: options
     type(sweep_summary_t), intent(in) :: summary   !! of `write_results`
-    integer, intent(out) :: code                   !! 1 if every variant failed
+    integer, intent(out) :: code                   !! 1 if no variant is done
     type(error_t), allocatable :: error
 
     code = exit_done
@@ -112,7 +112,7 @@ contains
     end if
     if (summary%done > 0) return
     code = exit_failed
-    call raise(error, code, plan%input%file // ': every variant failed, the first one because: ' // summary%first_reason // &
+    call raise(error, code, plan%input%file // ': no variant can be computed, the first one because: ' // summary%first_reason // &
                '; all reasons are in ' // folder // '/' // sweep_file_name)
     call complain(error)
   end subroutine tell_results

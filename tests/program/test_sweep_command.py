@@ -157,7 +157,7 @@ def test_a_sweep_without_a_variant_that_is_done_fails(nocdyn, discs):
     with h5netcdf.File(nocdyn.folder / "out/sweep.nc") as content:
         reason = content.variables["reason"][0].tobytes().rstrip(b"\0").decode()
     assert "the most that max_steps allows" in reason
-    assert outcome.stderr == f"nocdyn: {discs}: every variant failed, the first one because: {reason}; all reasons are in out/sweep.nc\n"
+    assert outcome.stderr == f"nocdyn: {discs}: no variant can be computed, the first one because: {reason}; all reasons are in out/sweep.nc\n"
     assert nocdyn.summary("out")["status"] == "failed"
     assert nocdyn.files("out") == ["input.nml", "summary.json", "sweep.nc"]
 

@@ -380,3 +380,12 @@ def test_only_one_rank_complains(nocdyn, discs, words, complaint):
     )
     assert outcome.returncode in (2, 3) and outcome.stdout.count("nocdyn: ") == 0
     assert outcome.stderr.count("nocdyn: ") == 1 and f"nocdyn: {complaint}\n" in outcome.stderr
+
+
+@needs_mpi
+@pytest.mark.parametrize(("words", "first"), [(["--help"], "nocdyn sweep FILE"), (["--version"], "nocdyn ")])
+def test_help_and_version_are_said_once(nocdyn, words, first):
+    outcome = subprocess.run([*mpirun(2), *words], env=MPI_ENVIRONMENT, check=False, capture_output=True, text=True, timeout=60)
+    wanted = nocdyn("sweep", "--help") if words == ["--help"] else nocdyn("--version")
+    assert (outcome.returncode, outcome.stdout, outcome.stderr) == (0, wanted.stdout, "")
+    assert first in wanted.stdout
