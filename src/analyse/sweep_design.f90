@@ -31,39 +31,48 @@ contains
     type(mistakes_t), intent(inout) :: mistakes
     type(factor_t), allocatable :: factors(:)
     real(wp), allocatable :: values(:, :)
-    integer :: before, samples, seed
+    integer :: before
 
     before = mistakes%count
+    list_checksum = ''
     associate (group => input%groups(sweep), varied => input%groups_named('vary'))
-      list_checksum = ''
       if (group%text('design') == 'list') then
         call read_list(input, sweep, targets, values, list_checksum, mistakes)
         call refuse_varied(input, varied, mistakes)
+        call refuse_overrides(input, [integer ::], targets, mistakes)
+        if (mistakes%count == before) allocate (design, source=list_design(values))
       else
         call read_varied(input, sweep, varied, targets, factors, mistakes)
+        call refuse_overrides(input, varied, targets, mistakes)
+        if (mistakes%count == before) call make_design(group, factors, design)
       end if
-      call refuse_overrides(input, varied, targets, mistakes)
-      if (mistakes%count > before) return
-      samples = 0
-      seed = 0
-      if (group%has_value('samples')) samples = group%whole_number('samples')
-      if (group%has_value('seed')) seed = group%whole_number('seed')
-      select case (group%text('design'))
-      case ('grid')
-        allocate (design, source=grid_design(factors))
-      case ('random')
-        allocate (design, source=random_design(factors, samples, seed))
-      case ('latin')
-        allocate (design, source=latin_design(factors, samples, seed))
-      case ('sobol')
-        allocate (design, source=sobol_design(factors, samples, seed))
-      case ('list')
-        allocate (design, source=list_design(values))
-      case default
-        error stop 'nocdyn_sweep_design: the schema allows a design that is not there'
-      end select
     end associate
   end subroutine read_design
+
+  !> The design of &vary.
+  subroutine make_design(group, factors, design)
+    type(group_t), intent(in) :: group   !! &sweep
+    type(factor_t), intent(in) :: factors(:)
+    class(design_t), allocatable, intent(out) :: design
+    integer :: samples, seed
+
+    samples = 0
+    seed = 0
+    if (group%has_value('samples')) samples = group%whole_number('samples')
+    if (group%has_value('seed')) seed = group%whole_number('seed')
+    select case (group%text('design'))
+    case ('grid')
+      allocate (design, source=grid_design(factors))
+    case ('random')
+      allocate (design, source=random_design(factors, samples, seed))
+    case ('latin')
+      allocate (design, source=latin_design(factors, samples, seed))
+    case ('sobol')
+      allocate (design, source=sobol_design(factors, samples, seed))
+    case default
+      error stop 'nocdyn_sweep_design: the schema allows a design that is not there'
+    end select
+  end subroutine make_design
 
   !> The targets in the first line of a file, and the values in the others.
   subroutine read_list(input, sweep, targets, values, list_checksum, mistakes)
@@ -135,7 +144,7 @@ contains
   !> An override of a number that varies would be without effect.
   subroutine refuse_overrides(input, varied, targets, mistakes)
     type(input_t), intent(in) :: input
-    integer, intent(in) :: varied(:)   !! the &vary of the targets; none if they are those of a list
+    integer, intent(in) :: varied(:)   !! the &vary of each target; none if these are those of a list
     type(target_t), intent(in) :: targets(:)
     type(mistakes_t), intent(inout) :: mistakes
     character(len=:), allocatable :: source
