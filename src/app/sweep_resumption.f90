@@ -2,9 +2,9 @@
 module nocdyn_sweep_resumption
   use nocdyn_errors, only: error_t, exit_input, raise
   use nocdyn_input_differences, only: find_differences
-  use nocdyn_sweep_file, only: read_origin
   use nocdyn_sweep_header, only: sweep_header_t
   use nocdyn_sweep_journal, only: sweep_journal_t
+  use nocdyn_sweep_origin, only: read_origin
   use nocdyn_text, only: string_t, to_text
   implicit none (type, external)
   private

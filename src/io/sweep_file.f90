@@ -8,9 +8,8 @@ module nocdyn_sweep_file
   use, intrinsic :: iso_fortran_env, only: int8
   use netcdf, only: nf90_byte, nf90_char, nf90_chunked, nf90_clobber, nf90_close, nf90_create, nf90_def_dim, &
     nf90_def_var, nf90_def_var_chunking, nf90_def_var_fill, nf90_double, nf90_ebadname, nf90_ehdferr, nf90_enameinuse, &
-    nf90_enddef, nf90_enotatt, nf90_get_att, nf90_global, nf90_inquire_attribute, nf90_int, nf90_max_name, &
-    nf90_netcdf4, nf90_noerr, nf90_nowrite, nf90_open, nf90_put_att, nf90_put_att_any, nf90_put_var, nf90_strerror, nf90_string, &
-    nf90_unlimited
+    nf90_enddef, nf90_global, nf90_int, nf90_max_name, nf90_netcdf4, nf90_noerr, nf90_put_att, nf90_put_att_any, &
+    nf90_put_var, nf90_strerror, nf90_string, nf90_unlimited
   use nocdyn_errors, only: error_t, exit_file, raise
   use nocdyn_journal_chunks, only: check_sweep, sweep_records_t
   use nocdyn_json, only: has_utf_8
@@ -25,7 +24,7 @@ module nocdyn_sweep_file
   implicit none (type, external)
   private
 
-  public :: write_sweep_file, read_origin
+  public :: write_sweep_file
 
   character(len=14), parameter :: own_names(5) = &
     [character(len=14) :: 'variant', 'status', 'steps', 'failed_variant', 'reason']
@@ -148,45 +147,12 @@ contains
 
     call put_text(file, nf90_global, 'Conventions', 'CF-1.8')
     call put_text(file, nf90_global, 'title', header%title)
-    call note(file, nf90_put_att(file%id, nf90_global, 'source', header%source))   ! characters, for `read_origin`
+    call note(file, nf90_put_att(file%id, nf90_global, 'source', header%source))   ! characters, for `nocdyn_sweep_origin`
     call put_text(file, nf90_global, 'design', header%design)
     call note(file, nf90_put_att(file%id, nf90_global, 'seed', header%seed))
     call note(file, nf90_put_att(file%id, nf90_global, 'input', header%input_text))
     if (header%list_checksum /= '') call put_text(file, nf90_global, 'list_checksum', header%list_checksum)
   end subroutine put_attributes
-
-  !> Of which sweep the results in `folder` are: source, input and the checksum of a list, nothing else of a header.
-  subroutine read_origin(folder, header, error)
-    character(len=*), intent(in) :: folder
-    type(sweep_header_t), intent(out) :: header
-    type(error_t), allocatable, intent(out) :: error
-    integer :: id, status
-
-    status = nf90_open(folder // '/' // sweep_file_name, nf90_nowrite, id)
-    if (status == nf90_noerr) then
-      call read_text(id, 'source', header%source, status)
-      if (status == nf90_noerr) call read_text(id, 'input', header%input_text, status)
-      if (status == nf90_noerr) call read_text(id, 'list_checksum', header%list_checksum, status)
-      if (nf90_close(id) /= nf90_noerr) status = nf90_ehdferr
-    end if
-    if (status /= nf90_noerr) call raise(error, exit_file, quoted(folder // '/' // sweep_file_name) // ' cannot be read: ' // &
-                                         trim(nf90_strerror(status)))
-  end subroutine read_origin
-
-  !> A text of the file as a whole; '' if it does not have it.
-  subroutine read_text(id, name, text, status)
-    integer, intent(in) :: id                              !! of the file
-    character(len=*), intent(in) :: name
-    character(len=:), allocatable, intent(out) :: text
-    integer, intent(out) :: status                         !! that the library answered
-    integer :: length
-
-    status = nf90_inquire_attribute(id, nf90_global, name, len=length)
-    if (status /= nf90_noerr) length = 0
-    allocate (character(len=length) :: text)
-    if (status == nf90_noerr .and. length > 0) status = nf90_get_att(id, nf90_global, name, text)
-    if (status == nf90_enotatt) status = nf90_noerr
-  end subroutine read_text
 
   !> The library marks characters as ASCII; only strings are UTF-8.
   subroutine put_text(file, variable, name, text)
