@@ -24,11 +24,12 @@ contains
     settings%max_steps = run%whole_number('max_steps')
   end function settings_of
 
-  !> Some keys of &run with their values.
-  subroutine put_settings(json, run, keys)
+  !> How the motion is integrated: keys of &run with their values.
+  subroutine put_settings(json, run)
     type(json_t), intent(inout) :: json
     type(group_t), intent(in) :: run
-    character(len=*), intent(in) :: keys(:)   !! each with one number, whole number or text
+    character(len=*), parameter :: keys(*) = &
+      [character(len=11) :: 't_start', 't_end', 'method', 'rtol', 'atol', 'formulation', 'complement', 'max_steps']
     integer :: i, k
 
     call json%open('settings')

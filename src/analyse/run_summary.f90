@@ -130,9 +130,7 @@ contains
     about = input%single('case')
     call json%put('title', about%text('title'))
     call put_machine(json, machine, summary)
-    call put_settings(json, input%single('run'), &
-                      [character(len=11) :: 't_start', 't_end', 'method', 'rtol', 'atol', 'formulation', 'complement', &
-                                                   'max_steps'])
+    call put_settings(json, input%single('run'))
     call put_counts(json, summary)
     call put_method(json, summary)
     if (allocated(summary%account)) call put_account(json, summary%account)

@@ -50,9 +50,7 @@ contains
     call json%put('status', trim(merge('done  ', 'failed', summary%done > 0)))
     call json%put('input', input%file)
     call json%put('title', header%title)
-    call put_settings(json, input%single('run'), &
-                      [character(len=11) :: 't_start', 't_end', 'method', 'rtol', 'atol', 'formulation', &
-                       'complement', 'max_steps'])
+    call put_settings(json, input%single('run'))
     call put_design(json, header)
     call json%open('counts')
     call json%put('variants', header%variants)
