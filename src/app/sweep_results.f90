@@ -112,8 +112,8 @@ contains
     end if
     if (summary%done > 0) return
     code = exit_failed
-    call raise(error, code, plan%input%file // ': no variant can be computed, the first one because: ' // summary%first_reason // &
-               '; all reasons are in ' // folder // '/' // sweep_file_name)
+    call raise(error, code, plan%input%file // ': no variant can be computed, the first one because: ' // &
+               summary%first_reason // '; all reasons are in ' // folder // '/' // sweep_file_name)
     call complain(error)
   end subroutine tell_results
 
