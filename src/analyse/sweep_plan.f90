@@ -90,7 +90,8 @@ contains
     type(group_t) :: group
 
     group = self%input%single('sweep')
-    text = group%text('design') // ', ' // counted(self%design%variants, 'variant', 'variants') // ' that differ in ' // &
+    text = group%text('design') // ', ' // &
+           counted(self%design%variants, 'variant that differs in ', 'variants that differ in ') // &
            counted(self%design%varied, 'number', 'numbers') // ', ' // counted(size(self%statistics), 'result', 'results')
     if (size(self%trajectories) > 0) text = text // ', ' // counted(size(self%trajectories), 'trajectory', 'trajectories')
   end function summary

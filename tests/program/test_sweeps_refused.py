@@ -138,6 +138,8 @@ def test_check_looks_at_the_sweep_too(nocdyn):
     outcome = nocdyn("check", path, "--set", "sweep.samples=100000")
     assert (outcome.returncode, outcome.stderr) == (0, "")
     assert outcome.stdout.endswith("\n  sweep: random, 100000 variants that differ in 1 number, 1 result, 2 trajectories\n")
+    outcome = nocdyn("check", path, "--set", "sweep.samples=1", "--set", "record(2).trajectories=1")
+    assert outcome.stdout.endswith("\n  sweep: random, 1 variant that differs in 1 number, 1 result, 1 trajectory\n")
     outcome = nocdyn("check", path, "--set", "sweep.samples=1")
     assert (outcome.returncode, outcome.stdout) == (2, "")
     assert outcome.stderr.endswith("m.nml:8: &record: trajectories(2) = 2 is out of range; allowed: 1 to 1, the number of variants\n")
