@@ -78,13 +78,21 @@ contains
     allocate (names, source=folder_names(folder))
     do i = 1, size(names)
       associate (name => names(i)%text)
-        if (index(name, variant_folder) /= 1 .or. verify(name(len(variant_folder) + 1:), '0123456789') > 0) cycle
+        if (.not. is_of_variant(name)) cycle
         call remove_run(folder // '/' // name)
         call remove_file(folder // '/' // name // '/' // input_file)
         call remove_empty_folder(folder // '/' // name)
       end associate
     end do
   end subroutine remove_other_results
+
+  !> 'variant-17'
+  pure logical function is_of_variant(name)
+    character(len=*), intent(in) :: name   !! in the folder of a sweep
+
+    is_of_variant = index(name, variant_folder) == 1 .and. len(name) > len(variant_folder)
+    if (is_of_variant) is_of_variant = verify(name(len(variant_folder) + 1:), '0123456789') == 0
+  end function is_of_variant
 
   !> What makes the results of a run.
   subroutine remove_run(folder)

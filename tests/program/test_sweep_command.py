@@ -174,8 +174,10 @@ def test_trajectories_of_an_earlier_sweep_and_a_run_do_not_stay_beside_new_resul
     for variants in ("1, 2, 3", "2"):
         nocdyn.write("discs.nml", TWO_DISCS + SWEEP + f"&record trajectories = {variants} /\n")
         assert nocdyn("sweep", "discs.nml", "--out", "out").returncode == 0
-        nocdyn.write("out/variant-3/own.txt", "of the user")
-    assert nocdyn.files("out") == ["input.nml", "summary.json", "sweep.nc", "variant-2", "variant-3"]
+        for own in ("variant-3/own.txt", "variant-/input.nml", "variant-1a/input.nml"):
+            nocdyn.write(f"out/{own}", "of the user")
+    assert nocdyn.files("out") == ["input.nml", "summary.json", "sweep.nc", "variant-", "variant-1a", "variant-2", "variant-3"]
+    assert nocdyn.files("out/variant-") == nocdyn.files("out/variant-1a") == ["input.nml"]
     assert nocdyn.files("out/variant-3") == ["own.txt"]
     assert nocdyn.files("out/variant-2") == ["input.nml", "summary.json", "trajectory.csv"]
 
