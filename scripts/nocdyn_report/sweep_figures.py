@@ -57,6 +57,7 @@ def draw_scatters(sweep: Sweep, results: Sequence[Variable], influence: Influenc
                 axes.set_xlabel(wrapped(key.label))
     far_out = any(has_outliers(sweep, result.values[sweep.known(result)]) for result in results)
     add_note(figure, "" if are_all else f"of {len(sweep.varied)} varied numbers the {columns} most correlated with the result",
+             "grey: no more than chance alone gives, 95 % of the time",
              "darker: more variants" if sweep.status.size > MOST_POINTS else "",
              "triangles: beyond the axis" if far_out else "")
     explain_not_done(figure, sweep, **TICK)
@@ -102,7 +103,7 @@ def draw_parallels(sweep: Sweep, results: Sequence[Variable], keys: Sequence[Var
     for axes, result in zip(panels, results):
         draw_parallel(axes, sweep, keys, result)
     numbers = f"{len(keys)} of {len(sweep.varied)} varied numbers, the most correlated first"
-    add_note(figure, f"no more than {LINES} variants are drawn" if sweep.status.size > LINES else "",
+    add_note(figure, f"{LINES} of {sweep.status.size} variants are drawn" if sweep.status.size > LINES else "",
              numbers if len(keys) < len(sweep.varied) else "")
     explain_not_done(figure, sweep, NOT_DONE_LINES, linestyle=(0, (3, 2)), linewidth=0.9)
     return figure

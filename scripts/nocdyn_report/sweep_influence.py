@@ -6,11 +6,10 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from .style import COLOURS, plain
-from .sweep_panels import rank_correlation
+from .sweep_panels import chance, rank_correlation
 from .sweep_results import Sweep, Variable
 
 MOST_BARS = 15
-CHANCE = 1.96  # standard deviations, 95 % of what chance alone gives
 RISING, FALLING = COLOURS[0], COLOURS[1]
 
 
@@ -43,8 +42,7 @@ def draw_influence(axes: Axes, sweep: Sweep, influence: Influence, result: Varia
     places = np.arange(len(keys))
     variants = sweep.known(result).size
     if variants > 1:
-        chance = min(1.0, CHANCE / np.sqrt(variants - 1))
-        axes.axvspan(-chance, chance, color="0.9", linewidth=0, zorder=0)
+        axes.axvspan(-chance(variants), chance(variants), color="0.9", linewidth=0, zorder=0)
     axes.barh(places, values, height=0.7, color=np.where(values >= 0.0, RISING, FALLING))
     for place, value in zip(places, values):
         axes.annotate(f"{round(value, 2) + 0.0:+.2f}", (value, place), xytext=(4 if value >= 0.0 else -4, 0),

@@ -32,7 +32,7 @@ REACH = 3.0  # distances from 5 % to 95 % beyond which a value is an outlier
 LINES = 500  # of parallel axes
 MOST_MARKS = 100  # of variants that were not done
 NOT_DONE_LINES = 20  # of them on parallel axes
-WEAK = 0.2  # a correlation whose title is grey
+CHANCE = 1.96  # standard deviations, 95 % of what chance alone gives
 NOT_DONE = COLOURS[1]
 COLOUR_MAP = "viridis"
 SHADES = LinearSegmentedColormap.from_list("shades", colormaps["Blues"](np.linspace(0.25, 1.0, 64)))
@@ -83,6 +83,11 @@ def has_outliers(sweep: Sweep, values: np.ndarray) -> bool:
 def is_constant(values: np.ndarray) -> bool:
     """Whether all values are the same but for rounding."""
     return np.ptp(values) <= 1e-12 * np.abs(values).max()
+
+
+def chance(variants: int) -> float:
+    """The rank correlation that 95 % of so many variants of unrelated numbers do not exceed."""
+    return min(1.0, CHANCE / np.sqrt(max(variants - 1, 1)))
 
 
 def rank_correlation(a: np.ndarray, b: np.ndarray) -> float:
@@ -154,7 +159,7 @@ def draw_scatter(axes: Axes, sweep: Sweep, key: Variable, result: Variable) -> N
     mark_not_done(axes, sweep, key)
     correlation = rank_correlation(x, y)
     axes.set_title("constant" if np.isnan(correlation) else f"rank correlation {round(correlation, 2) + 0.0:+.2f}",
-                   color="black" if abs(correlation) >= WEAK else "0.5")
+                   color="black" if abs(correlation) > chance(len(x)) else "0.5")
 
 
 def _draw_density(axes: Axes, x: np.ndarray, y: np.ndarray) -> None:

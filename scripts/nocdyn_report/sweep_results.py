@@ -80,6 +80,8 @@ class Sweep:
 
 
 def read_sweep(folder: Path) -> Sweep:
+    if folder.is_file():
+        raise ResultsError(f"{folder}: is a file; the folder that it is in is what is drawn")
     if not folder.is_dir():
         raise ResultsError(f"{folder}: there is no such results folder")
     if (folder / "sweep.nc").is_file():

@@ -135,16 +135,16 @@ contains
 
     text = header%title
     if (len(text) > 0) text = text // new_line('a')
-    heading = 'of ' // to_text(summary%done) // trim(merge(' variant: ', ' variants:', summary%done == 1))
+    heading = 'of ' // to_text(summary%done) // trim(merge(' variant ', ' variants', summary%done == 1)) // ' done:'
     rows = min(size(header%results), most_rows)
     label_width = max(len(heading), maxval([(len(label(header, i)), i=1, rows)]))
     text = text // padded(heading, label_width) // right('min') // right('5 %') // right('median') // right('95 %') // &
-           right('max') // right('variant of min') // right('variant of max')
+           right('max') // ' ' // right('variant of min') // ' ' // right('variant of max')
     do i = 1, rows
       associate (found => summary%statistics(i))
         text = text // new_line('a') // padded(label(header, i), label_width) // cell(found%minimum) // cell(found%low) // &
-               cell(found%median) // cell(found%high) // cell(found%maximum) // right(to_text(found%variant_of_minimum)) // &
-               right(to_text(found%variant_of_maximum))
+               cell(found%median) // cell(found%high) // cell(found%maximum) // ' ' // right(to_text(found%variant_of_minimum)) // &
+               ' ' // right(to_text(found%variant_of_maximum))
       end associate
     end do
     if (rows < size(header%results)) text = text // new_line('a') // '(' // to_text(size(header%results) - rows) // &

@@ -228,13 +228,32 @@ def test_many_numbers_and_results_go_on_in_further_figures(tmp_path, monkeypatch
     assert "of 3 varied numbers the 2 most correlated with the result" in text
 
 
+def test_what_chance_gives_is_said_to_be_grey(tmp_path, monkeypatch, capsys):
+    numbers = random_numbers(1000, 2)
+    folder = write_sweep(tmp_path, "random", {"body.a.inertia": numbers[0], "body.b.inertia": numbers[1]}, {SPEED: numbers[0]})
+    assert "scatter" in draw(monkeypatch, capsys, folder)
+    assert "grey: no more than chance alone gives" in text_of(folder, "scatter")
+    panels = importlib.import_module("nocdyn_report.sweep_panels")
+    pairs = np.split(random_numbers(1000, 400), 200)
+    beyond = sum(abs(panels.rank_correlation(*pair)) > panels.chance(1000) for pair in pairs)
+    assert 3 <= beyond <= 20  # 5 % of 200, give or take three deviations
+
+
+def test_a_file_is_not_a_folder(tmp_path, monkeypatch, capsys):
+    numbers = random_numbers(10, 2)
+    folder = write_sweep(tmp_path, "random", {"body.a.inertia": numbers[0]}, {SPEED: numbers[1]})
+    with pytest.raises(SystemExit) as leaving:
+        draw(monkeypatch, capsys, folder / "sweep.nc")
+    assert "is a file; the folder that it is in is what is drawn" in str(leaving.value)
+
+
 def test_parallel_axes_say_what_they_leave_out(tmp_path, monkeypatch, capsys):
     numbers = random_numbers(1000, 12)
     varied = {f"body.rotor{i}.inertia": row for i, row in enumerate(numbers)}
     folder = write_sweep(tmp_path, "latin", varied, {SPEED: numbers[11]}, np.where(numbers[0] < 0.05, FAILED, DONE))
     assert draw(monkeypatch, capsys, folder)[-1] == "parallel"
     text = text_of(folder, "parallel")
-    assert "no more than 500 variants are drawn; 10 of 12 varied numbers, the most correlated first" in text
+    assert "500 of 1000 variants are drawn; 10 of 12 varied numbers, the most correlated first" in text
     assert "body.rotor11." in text
     assert "failed (one in 3 is shown)" in text
 

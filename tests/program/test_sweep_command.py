@@ -47,7 +47,7 @@ def test_a_sweep_leaves_its_files_and_no_journal(nocdyn, discs):
     assert nocdyn.files("out") == ["input.nml", "summary.json", "sweep.csv", "sweep.nc"]
     title, header, *rows, end = outcome.stdout.splitlines()
     assert title == "Two discs"
-    assert header.split() == "of 60 variants: min 5 % median 95 % max variant of min variant of max".split()
+    assert header.split() == "of 60 variants done: min 5 % median 95 % max variant of min variant of max".split()
     assert [row.split()[0] for row in rows] == [
         "omega_wheel_final",
         "omega_wheel_max",
