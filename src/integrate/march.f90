@@ -71,18 +71,7 @@ contains
     march%control = step_control(system%lanes, settings%rtol, settings%atol, times(size(times)), settings%longest_step)
     march%first_step = settings%first_step
     march%max_steps = settings%max_steps
-    associate (lanes => system%lanes, components => system%states + system%quadratures)
-      march%free = lanes
-      allocate (march%occupied(lanes), march%running(lanes), march%starting(lanes), march%accepted(lanes), &
-                march%rejected(lanes), march%wanted(lanes), march%inspected(lanes), march%steps%taken(lanes), &
-                march%steps%crosses(lanes), source=.false.)
-      allocate (march%t_new(lanes), march%next_time(lanes), source=times(1))
-      allocate (march%steps%t(lanes), march%steps%h(lanes), march%steps%scale(lanes), march%steps%until(lanes), &
-                march%steps%t_new(lanes), source=0.0_wp)
-      allocate (march%next(lanes), source=2)
-      allocate (march%sample(components), source=0.0_wp)
-      allocate (march%coefficients(lanes, size(march%trial%y, 2), stepper%degree), source=0.0_wp)
-    end associate
+    call allocate_lanes(march, system%lanes, system%states + system%quadratures, stepper%degree, times(1))
     call allocate_dense_output(march%dense, march%trial%components, stepper%degree)
     march%is_followed = observer%follows_steps
     march%wants_all = march%is_followed .and. .not. stepper%shows_own
@@ -96,6 +85,24 @@ contains
     march%has_events = size(observer%directions) > 0
     if (march%has_events) call allocate_events(march%events, observer, stepper%degree, march%trial)
   end subroutine prepare
+
+  !> What is known of each lane; none holds a variant.
+  pure subroutine allocate_lanes(march, lanes, components, degree, t_start)
+    type(march_t), intent(inout) :: march
+    integer, intent(in) :: lanes, components, degree
+    real(wp), intent(in) :: t_start
+
+    march%free = lanes
+    allocate (march%occupied(lanes), march%running(lanes), march%starting(lanes), march%accepted(lanes), &
+              march%rejected(lanes), march%wanted(lanes), march%inspected(lanes), march%steps%taken(lanes), &
+              march%steps%crosses(lanes), source=.false.)
+    allocate (march%t_new(lanes), march%next_time(lanes), source=t_start)
+    allocate (march%steps%t(lanes), march%steps%h(lanes), march%steps%scale(lanes), march%steps%until(lanes), &
+              march%steps%t_new(lanes), source=0.0_wp)
+    allocate (march%next(lanes), source=2)
+    allocate (march%sample(components), source=0.0_wp)
+    allocate (march%coefficients(lanes, size(march%trial%y, 2), degree), source=0.0_wp)
+  end subroutine allocate_lanes
 
   !> Gives the free lanes their next variants and starts them.
   subroutine fill_lanes(march, stepper, system, queue, times, observer, outcome)
