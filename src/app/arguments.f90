@@ -113,7 +113,8 @@ contains
     name = words(i)%text(:equals - 1)
     number = option_index(name)
     if (number == 0) then
-      call raise(error, exit_input, unknown_word(name, 'an option', option_names()))
+      call raise(error, exit_input, unknown_word(name, 'an option of nocdyn ' // words(1)%text, &
+                                                option_names(words(1)%text)))
     else if (options(number)%value == '') then
       call take_flag(trim(options(number)%name), arguments)
       if (equals <= len(words(i)%text)) call raise(error, exit_input, trim(options(number)%name) // ' takes no value')

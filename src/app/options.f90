@@ -36,14 +36,15 @@ contains
     end do
   end function option_index
 
-  !> All options by their long names.
-  function option_names() result(names)
+  !> The options of a command by their long names; --help is one of each.
+  function option_names(command) result(names)
+    character(len=*), intent(in) :: command
     type(string_t), allocatable :: names(:)
     integer :: i
 
     allocate (names(0))
     do i = 1, size(options)
-      call append(names, trim(options(i)%name))
+      if (options(i)%commands == '' .or. takes_option(command, options(i))) call append(names, trim(options(i)%name))
     end do
   end function option_names
 

@@ -30,6 +30,9 @@ def one_line(text):
         (["new"], "exactly one file is needed: nocdyn new FILE"),
         (["run", CASE_1, "--ouy", "x"], "'--ouy' is not an option"),
         (["run", CASE_1, "--ouy", "x"], "did you mean '--out'?"),
+        (["sweep", CASE_1, "--resum"], "'--resum' is not an option of nocdyn sweep; did you mean '--resume'? "
+         "allowed: '--out', '--set', '--threads', '--shard', '--resume', '--csv', '--quiet', '--help'\n"),
+        (["new", "a.nml", "--force"], "'--force' is not an option of nocdyn new; allowed: '--help'\n"),
         (["run", CASE_1, "--out"], "--out needs a value: --out DIR\n"),
         (["run", CASE_1, "--out="], "--out needs a value: --out DIR\n"),
         (["run", CASE_1, "--set"], "--set needs a value: --set PATH=VALUE\n"),
