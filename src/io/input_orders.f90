@@ -41,12 +41,22 @@ contains
     associate (low => group%values(lower), high => group%values(upper))
       if (.not. (allocated(low%numbers) .and. allocated(high%numbers))) return
       if (high%numbers(1) > low%numbers(1)) return
-      if (orders(o)%may_be_equal .and. high%numbers(1) >= low%numbers(1)) return
+      if (orders(o)%alone /= '' .and. high%numbers(1) >= low%numbers(1)) return
       complaint = trim(orders(o)%upper) // ' = ' // to_text(high%numbers(1)) // ' is out of range; allowed: ' // &
-                  trim(merge('>= ', '>  ', orders(o)%may_be_equal)) // ' ' // trim(orders(o)%lower) // ' = ' // &
+                  trim(merge('>= ', '>  ', is_alone(o, group))) // ' ' // trim(orders(o)%lower) // ' = ' // &
                   to_text(low%numbers(1))
     end associate
   end function order_complaint
+
+  !> Whether a group has one value only where row `o` of `orders` then allows two equal ends.
+  pure logical function is_alone(o, group)
+    integer, intent(in) :: o
+    type(group_t), intent(in) :: group
+
+    is_alone = .false.
+    if (orders(o)%alone == '') return
+    if (group%has_value(trim(orders(o)%alone))) is_alone = group%whole_number(trim(orders(o)%alone)) == 1
+  end function is_alone
 
   !> What is wrong with number `i` of an ascending list if it is not above the one before it, else ''.
   function ascent_complaint(key, numbers, i) result(complaint)

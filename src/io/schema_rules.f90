@@ -80,11 +80,11 @@ module nocdyn_schema_rules
     character(len=12) :: file = ''     !! the key of a file that may hold the two lists as columns; the first one ascends then
   end type columns_t
 
-  !> Two keys of a group: `upper` must be greater than `lower`, or not less.
+  !> Two keys of a group: `upper` must be greater than `lower`.
   type, public :: order_t
     character(len=12) :: group
     character(len=18) :: lower, upper
-    logical :: may_be_equal = .false.
+    character(len=18) :: alone = ''   !! a key with which both may be equal if it is 1; if it is not, the sweep judges that
   end type order_t
 
   !> Words that stand for keys in other programs. Both are separated by blanks.

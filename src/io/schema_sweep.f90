@@ -75,7 +75,7 @@ module nocdyn_schema_sweep
     need_t('record', 'statistic from', 'quantity')]
 
   type(order_t), parameter, public :: sweep_orders(*) = [ &
-    order_t('vary', 'low', 'high', may_be_equal=.true.)]
+    order_t('vary', 'low', 'high', alone='count')]
 
   type(synonym_t), parameter, public :: sweep_synonyms(*) = [ &
     synonym_t('sweep',  'n variants count number',       'samples'), &
