@@ -4,9 +4,10 @@ module nocdyn_input_overrides
   use nocdyn_mistakes, only: mistakes_t, no_line
   use nocdyn_namelist, only: assignment_t, item_t, namelist_t
   use nocdyn_namelist_scanner, only: scan_value
+  use nocdyn_namelist_values, only: longest_list
   use nocdyn_schema, only: holds_texts, key_rules
-  use nocdyn_schema_rules, only: a_name, key_rule_t
-  use nocdyn_text, only: string_t
+  use nocdyn_schema_rules, only: a_name, any_number, key_rule_t
+  use nocdyn_text, only: string_t, to_text
   implicit none (type, external)
   private
 
@@ -66,7 +67,16 @@ contains
     override%number = path%number
     override%assignment = path%place
     if (complaint /= '') return
-    if (key_rules(path%key_rule)%kind == a_name) complaint = 'a name cannot be overridden: other groups refer to it'
+    associate (rule => key_rules(path%key_rule))
+      if (rule%kind == a_name) then
+        complaint = 'a name cannot be overridden: other groups refer to it'
+      else if (path%is_outside .and. rule%count == 1) then
+        complaint = trim(rule%name) // ' is a single value and takes no subscript'
+      else if (path%is_outside) then
+        complaint = 'the subscript of ' // trim(rule%name) // ' is out of range; allowed: 1 to ' // &
+                    to_text(merge(rule%count, longest_list, rule%count /= any_number))
+      end if
+    end associate
   end subroutine find_key
 
   !> A single text is taken as it stands if it has no quotes: the shell has eaten them.

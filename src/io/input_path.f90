@@ -1,6 +1,7 @@
 !> Where a number or a text of the input stands: GROUP.KEY for groups that occur once, GROUP.NAME.KEY for named ones,
 !> GROUP(NUMBER).KEY for others, with a subscript behind the key where it is a list.
 module nocdyn_input_path
+  use nocdyn_literals, only: literal_fine, read_integer
   use nocdyn_namelist, only: assignment_t
   use nocdyn_namelist_values, only: read_subscript
   use nocdyn_schema, only: group_rule_index, group_rules, is_single, key_rule_index
@@ -17,6 +18,7 @@ module nocdyn_input_path
     character(len=:), allocatable :: name       !! of the element, '' for groups without names
     integer :: number = 0                       !! among the groups without names of its kind, 0: the path has none
     type(assignment_t) :: place                 !! key and subscript
+    logical :: is_outside = .false.             !! the subscript is a whole number that no list has as a place
   end type path_t
 
 contains
@@ -83,10 +85,19 @@ contains
         // key_suggestion(path%group_rule, key)
     else if (open <= len(text)) then
       call read_subscript(text(open + 1:max(open, len(text) - 1)), path%place)
-      if (path%place%is_damaged .or. text(len(text):) /= ')') complaint = text(open:) &
+      path%is_outside = path%place%is_damaged .and. is_whole_number(text(open + 1:max(open, len(text) - 1)))
+      if ((path%place%is_damaged .and. .not. path%is_outside) .or. text(len(text):) /= ')') complaint = text(open:) &
         // ' is neither a place such as (3) nor a section such as (1:3)'
     end if
   end subroutine read_key
+
+  logical function is_whole_number(text)
+    character(len=*), intent(in) :: text
+    integer :: number, status
+
+    call read_integer(trim(adjustl(text)), number, status)
+    is_whole_number = status == literal_fine
+  end function is_whole_number
 
   !> Single groups are addressed by kind and key, named ones by kind, name and key, others by kind, number and key.
   subroutine check_form(path, ending, has_name, complaint)

@@ -172,7 +172,7 @@ contains
       else if (path%place%last /= place) then
         complaint = 'several places of ' // trim(rule%name) // '; allowed: one, ' // &
                     places(text(:index(text, '(', back=.true.) - 1), count)
-      else if (place > count) then
+      else if (place < 1 .or. place > count) then
         complaint = 'the subscript of ' // trim(rule%name) // ' is out of range; allowed: 1 to ' // to_text(count)
       end if
     end associate
