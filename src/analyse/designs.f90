@@ -4,7 +4,7 @@
 !> Only a list holds anything as long as the number of variants.
 module nocdyn_designs
   use, intrinsic :: iso_fortran_env, only: int64
-  use nocdyn_distributions, only: distribution_t, lognormal_distribution, normal_distribution, uniform_distribution
+  use nocdyn_distributions, only: distribution_t, farthest, lognormal_distribution, normal_distribution, uniform_distribution
   use nocdyn_kinds, only: wp
   use nocdyn_permutations, only: permutation_t, random_permutation
   use nocdyn_random_numbers, only: random_number_at, stream_offsets, stream_values
@@ -13,7 +13,7 @@ module nocdyn_designs
   private
 
   public :: grid_design, random_design, latin_design, sobol_design, list_design
-  public :: grid_size, probability_between
+  public :: grid_size, leaves_numbers, probability_between
 
   integer, parameter, public :: most_variants = 2000000000
 
@@ -244,6 +244,25 @@ contains
     distribution = distribution_of(factor)
     probability_between = distribution%probability
   end function probability_between
+
+  !> Whether the width of a uniform factor, or a value of another one, can be above the largest number.
+  pure logical function leaves_numbers(factor)
+    type(factor_t), intent(in) :: factor
+    real(wp), parameter :: part = 0.01_wp   ! of each number: sums of such parts do not overflow
+
+    select case (factor%distribution)
+    case ('uniform')
+      leaves_numbers = part * factor%high - part * factor%low > part * huge(part)
+    case ('normal')
+      associate (middle => part * factor%mean, reach => part * farthest * factor%deviation)
+        leaves_numbers = (factor%high >= huge(part) .and. middle + reach > part * huge(part)) .or. &
+                         (factor%low <= -huge(part) .and. middle - reach < -part * huge(part))
+      end associate
+    case default
+      leaves_numbers = factor%high >= huge(part) .and. &
+                       log(factor%median) + farthest * factor%log_deviation > log(huge(part))
+    end select
+  end function leaves_numbers
 
   pure function distribution_of(factor) result(distribution)
     type(factor_t), intent(in) :: factor

@@ -1,8 +1,8 @@
 !> What a sweep varies, and the values of each variant: &sweep and &vary, or the file of a list.
 module nocdyn_sweep_design
   use nocdyn_checksums, only: checksum_digits
-  use nocdyn_designs, only: design_t, factor_t, grid_design, grid_size, latin_design, list_design, most_variants, &
-    probability_between, random_design, sobol_design
+  use nocdyn_designs, only: design_t, factor_t, grid_design, grid_size, latin_design, leaves_numbers, list_design, &
+    most_variants, probability_between, random_design, sobol_design
   use nocdyn_errors, only: error_t, exit_file
   use nocdyn_input, only: group_t, input_t
   use nocdyn_kinds, only: wp
@@ -17,7 +17,7 @@ module nocdyn_sweep_design
   implicit none (type, external)
   private
 
-  public :: read_design
+  public :: read_design, find_varied
 
 contains
 
@@ -172,20 +172,13 @@ contains
     type(target_t), allocatable, intent(out) :: targets(:)
     type(factor_t), allocatable, intent(out) :: factors(:)
     type(mistakes_t), intent(inout) :: mistakes
-    type(string_t), allocatable :: complaints(:), paths(:)
     character(len=:), allocatable :: design
     integer :: i
 
     design = input%groups(sweep)%text('design')
-    allocate (factors(size(varied)), paths(size(varied)))
+    call find_varied(input, varied, targets, mistakes)
+    allocate (factors(size(varied)))
     do i = 1, size(varied)
-      paths(i)%text = input%groups(varied(i))%text('target')
-    end do
-    call find_targets(input, paths, targets, complaints)
-    do i = 1, size(varied)
-      if (complaints(i)%text /= '') then
-        call add_mistake(input, varied(i), 'target', 'target = ' // quoted(paths(i)%text) // ': ' // complaints(i)%text, mistakes)
-      end if
       factors(i) = factor_of(input%groups(varied(i)))
       call check_factor(input, varied(i), design, factors(i), mistakes)
       if (design == 'grid' .and. targets(i)%is_whole) call check_whole_grid(input, varied(i), targets(i), factors(i), mistakes)
@@ -200,6 +193,27 @@ contains
                        ' by the product of all count', mistakes)
     end if
   end subroutine read_varied
+
+  !> The targets of all &vary, as far as they are there.
+  subroutine find_varied(input, varied, targets, mistakes)
+    type(input_t), intent(in) :: input
+    integer, intent(in) :: varied(:)
+    type(target_t), allocatable, intent(out) :: targets(:)
+    type(mistakes_t), intent(inout) :: mistakes
+    type(string_t), allocatable :: complaints(:), paths(:)
+    integer :: i
+
+    allocate (paths(size(varied)))
+    do i = 1, size(varied)
+      paths(i)%text = ''
+      if (input%groups(varied(i))%has_value('target')) paths(i)%text = input%groups(varied(i))%text('target')
+    end do
+    call find_targets(input, paths, targets, complaints)
+    do i = 1, size(varied)
+      if (complaints(i)%text == '' .or. .not. input%groups(varied(i))%has_value('target')) cycle
+      call add_mistake(input, varied(i), 'target', 'target = ' // quoted(paths(i)%text) // ': ' // complaints(i)%text, mistakes)
+    end do
+  end subroutine find_varied
 
   function factor_of(group) result(factor)
     type(group_t), intent(in) :: group
@@ -232,6 +246,8 @@ contains
       if (factor%distribution == 'uniform' .and. factor%high <= factor%low) then
         call add_mistake(input, varied, 'high', 'high = ' // to_text(factor%high) // ' is out of range; allowed: > low = ' // &
                          to_text(factor%low), mistakes)
+      else if (leaves_numbers(factor)) then
+        call refuse_overflow(input, varied, factor, mistakes)
       else if (probability_between(factor) <= 0.0_wp) then
         call add_mistake(input, varied, 'distribution', 'the distribution has nothing from low to high; allowed: ends ' // &
                          'nearer to its middle', mistakes)
@@ -244,12 +260,37 @@ contains
       call add_mistake(input, varied, 'count', 'count = ' // to_text(factor%count) // ' values from low = ' // &
                        to_text(factor%low) // ' to high = ' // to_text(factor%high) // ' are all the same; allowed: count = 1', &
                        mistakes)
+    else if (factor%distribution == 'uniform' .and. factor%count > 1 .and. leaves_numbers(factor)) then
+      call refuse_overflow(input, varied, factor, mistakes)
     end if
     if (factor%distribution /= 'uniform') then
       call add_mistake(input, varied, 'distribution', 'distribution = ' // quoted(trim(factor%distribution)) // &
                        " has no grid; allowed with design = 'grid': 'uniform'", mistakes)
     end if
   end subroutine check_factor
+
+  subroutine refuse_overflow(input, varied, factor, mistakes)
+    type(input_t), intent(in) :: input
+    integer, intent(in) :: varied   !! index of the &vary
+    type(factor_t), intent(in) :: factor
+    type(mistakes_t), intent(inout) :: mistakes
+    character(len=:), allocatable :: most
+
+    most = to_text(huge(factor%high))
+    select case (factor%distribution)
+    case ('uniform')
+      call add_mistake(input, varied, 'high', 'high = ' // to_text(factor%high) // ' is too far from low = ' // &
+                       to_text(factor%low) // '; allowed: high - low at most ' // most, mistakes)
+    case ('normal')
+      call add_mistake(input, varied, 'deviation', 'mean = ' // to_text(factor%mean) // ' and deviation = ' // &
+                       to_text(factor%deviation) // ' reach numbers beyond ' // most // &
+                       '; allowed: smaller ones, or low and high', mistakes)
+    case default
+      call add_mistake(input, varied, 'log_deviation', 'median = ' // to_text(factor%median) // ' and log_deviation = ' // &
+                       to_text(factor%log_deviation) // ' reach numbers beyond ' // most // &
+                       '; allowed: smaller ones, or high', mistakes)
+    end select
+  end subroutine refuse_overflow
 
   !> Values of a whole number must not round to the same one.
   subroutine check_whole_grid(input, varied, target, factor, mistakes)
@@ -260,7 +301,7 @@ contains
     type(mistakes_t), intent(inout) :: mistakes
     real(wp) :: room
 
-    if (factor%distribution /= 'uniform' .or. factor%high <= factor%low) return
+    if (factor%distribution /= 'uniform' .or. factor%high <= factor%low .or. leaves_numbers(factor)) return
     room = anint(factor%high) - anint(factor%low) + 1.0_wp
     if (factor%count <= room) return
     call add_mistake(input, varied, 'count', 'count = ' // to_text(factor%count) // ' has repeats: ' // target%path // &

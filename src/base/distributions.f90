@@ -8,7 +8,8 @@ module nocdyn_distributions
   public :: uniform_distribution, normal_distribution, lognormal_distribution
 
   integer, parameter :: shape_uniform = 1, shape_normal = 2, shape_lognormal = 3
-  real(wp), parameter :: farthest = 40.0_wp   ! deviations from the middle: the probability beyond is 0 in double precision
+  !> Deviations from the middle: the probability beyond is 0 in double precision.
+  real(wp), parameter, public :: farthest = 40.0_wp
 
   type, public :: distribution_t
     private
@@ -28,8 +29,8 @@ contains
     real(wp), intent(in) :: low, high
     type(distribution_t) :: distribution
 
-    distribution = distribution_t(probability=1.0_wp, shape=shape_uniform, low=low, high=high, middle=0.5_wp * (low + high), &
-                                  deviation=0.0_wp, below=0.0_wp, above=0.0_wp)
+    distribution = distribution_t(probability=1.0_wp, shape=shape_uniform, low=low, high=high, &
+                                  middle=0.5_wp * low + 0.5_wp * high, deviation=0.0_wp, below=0.0_wp, above=0.0_wp)
   end function uniform_distribution
 
   pure function normal_distribution(mean, deviation, low, high) result(distribution)
