@@ -13,9 +13,9 @@ module nocdyn_sweep_plan
   use nocdyn_schema, only: has_word
   use nocdyn_size_limits, only: check_size
   use nocdyn_statistics, only: statistic_t
-  use nocdyn_sweep_design, only: read_design
+  use nocdyn_sweep_design, only: find_varied, read_design
   use nocdyn_sweep_mistakes, only: add_mistake
-  use nocdyn_sweep_records, only: read_records, time_span_t, wanted_trajectories
+  use nocdyn_sweep_records, only: check_quantities, read_records, time_span_t, wanted_trajectories
   use nocdyn_targets, only: target_t
   use nocdyn_text, only: string_t
   use nocdyn_trajectory_columns, only: column_t, list_columns
@@ -23,7 +23,7 @@ module nocdyn_sweep_plan
   implicit none (type, external)
   private
 
-  public :: make_plan, has_sweep, without_sweep
+  public :: make_plan, add_plan_mistakes, has_sweep, without_sweep
 
   character(len=*), parameter :: kinds = 'sweep vary record'   !! of the groups of a sweep
 
@@ -72,6 +72,33 @@ contains
     end if
     call conclude(input, mistakes, failure, error)
   end subroutine make_plan
+
+  !> Adds wrong targets and quantities to the error of an input with mistakes, if all of these are in groups of the sweep and
+  !> it is known what varies: columns can depend on that.
+  subroutine add_plan_mistakes(input, mistakes, error)
+    type(input_t), intent(in) :: input
+    type(mistakes_t), intent(inout) :: mistakes   !! of reading the input
+    type(error_t), allocatable, intent(inout) :: error
+    type(error_t), allocatable :: failure
+    type(string_t), allocatable :: labels(:)
+    type(target_t), allocatable :: targets(:)
+    integer, allocatable :: varied(:)
+    integer :: i
+
+    if (mistakes%count == 0) return
+    do i = 1, mistakes%count
+      if (mistakes%list(i)%group == 0) return
+      if (.not. has_word(kinds, input%groups(mistakes%list(i)%group)%kind)) return
+    end do
+    allocate (varied, source=input%groups_named('vary'))
+    call find_varied(input, varied, targets, mistakes)
+    call label_columns(input, labels, failure)
+    if (size(varied) > 0 .and. .not. allocated(failure)) then
+      call add_variant_columns(input, targets, labels)
+      call check_quantities(input, labels, mistakes)
+    end if
+    call conclude(input, mistakes, failure, error)
+  end subroutine add_plan_mistakes
 
   !> The numbers of one variant as they are used: those of the design, whole ones rounded to the nearest.
   pure subroutine values(self, variant, x)

@@ -9,7 +9,7 @@ module nocdyn_sweep_records
   implicit none (type, external)
   private
 
-  public :: read_records, fit_statistics, wanted_trajectories
+  public :: read_records, check_quantities, fit_statistics, wanted_trajectories
 
   real(wp), parameter :: unknown_start = -huge(1.0_wp)   !! in place of `from` where t_start varies and `from` is not given
 
@@ -46,6 +46,23 @@ contains
       end do
     end associate
   end subroutine read_records
+
+  !> The quantities alone, as far as an input with mistakes has them.
+  subroutine check_quantities(input, labels, mistakes)
+    type(input_t), intent(in) :: input
+    type(string_t), intent(in) :: labels(:)   !! of the columns
+    type(mistakes_t), intent(inout) :: mistakes
+    type(string_t), allocatable :: names(:)
+    integer :: column, i
+
+    call take_units_off(labels, names)
+    associate (records => input%groups_named('record'))
+      do i = 1, size(records)
+        if (.not. input%groups(records(i))%has_value('quantity')) cycle
+        call find_column(input, records(i), labels, names, column, mistakes)
+      end do
+    end associate
+  end subroutine check_quantities
 
   !> The statistics of a variant that runs from `t_start` to `t_end` [s]. If they have no time left in it, a complaint says so,
   !> and they begin at `t_start`.

@@ -10,11 +10,12 @@ module nocdyn_commands
   use nocdyn_machine, only: machine_t
   use nocdyn_machine_report, only: machine_report
   use nocdyn_matrix_report, only: matrix_report
+  use nocdyn_mistakes, only: mistakes_t
   use nocdyn_output_file, only: write_whole
   use nocdyn_output_times, only: check_output_times
   use nocdyn_schema, only: group_rule_index
   use nocdyn_schema_help, only: group_help, input_help, input_template
-  use nocdyn_sweep_plan, only: has_sweep, make_plan, sweep_plan_t
+  use nocdyn_sweep_plan, only: add_plan_mistakes, has_sweep, make_plan, sweep_plan_t
   use nocdyn_text, only: joined, lower_case, quoted
   use nocdyn_version, only: compiler_text, version
   implicit none (type, external)
@@ -66,8 +67,10 @@ contains
     type(input_t), intent(out) :: input
     type(machine_t), intent(out) :: machine
     type(error_t), allocatable, intent(out) :: error
+    type(mistakes_t) :: mistakes
 
-    call read_input(arguments%operands(number)%text, arguments%overrides, input, error)
+    call read_input(arguments%operands(number)%text, arguments%overrides, input, error, mistakes)
+    if (allocated(error)) call add_plan_mistakes(input, mistakes, error)
     if (.not. allocated(error)) call check_output_times(input, error)
     if (.not. allocated(error)) call assemble_machine(input, machine, error)
   end subroutine read_machine

@@ -6,12 +6,13 @@ module nocdyn_sweep_job
   use nocdyn_errors, only: error_t, exit_done, exit_failed, exit_file, exit_input, raise
   use nocdyn_input, only: input_t
   use nocdyn_input_reader, only: read_input
+  use nocdyn_mistakes, only: mistakes_t
   use nocdyn_result_folders, only: plain_path, result_folder
   use nocdyn_sweep_header, only: sweep_file_name, sweep_header_t
   use nocdyn_sweep_headers, only: new_sweep_header
   use nocdyn_sweep_journal, only: create_journal, journal_name, open_journal, sweep_journal_t
   use nocdyn_sweep_ledger, only: sweep_ledger_t
-  use nocdyn_sweep_plan, only: make_plan, sweep_plan_t
+  use nocdyn_sweep_plan, only: add_plan_mistakes, make_plan, sweep_plan_t
   use nocdyn_sweep_progress, only: console_sweep_progress_t
   use nocdyn_sweep_resumption, only: judge_journal, judge_results
   use nocdyn_sweep_results, only: results_options_t, tell_results, write_results
@@ -42,13 +43,15 @@ contains
     type(sweep_job_t), intent(out) :: job
     type(error_t), allocatable, intent(out) :: error
     type(input_t) :: input
+    type(mistakes_t) :: mistakes
     type(sweep_header_t) :: header
     character(len=:), allocatable :: name
     integer(int64) :: bytes
     logical :: is_there
 
     job%arguments = arguments
-    call read_input(arguments%operands(1)%text, arguments%overrides, input, error)
+    call read_input(arguments%operands(1)%text, arguments%overrides, input, error, mistakes)
+    if (allocated(error)) call add_plan_mistakes(input, mistakes, error)
     if (.not. allocated(error)) call make_plan(input, job%plan, error)
     if (.not. allocated(error)) call prepare_sweep(job%plan, job%setup, error)
     if (allocated(error)) return

@@ -24,25 +24,27 @@ module nocdyn_input_reader
 contains
 
   !> Reads and checks a file; every mistake is a line of the error's message, in the order of the file.
-  subroutine read_input(file, overrides, input, error)
+  subroutine read_input(file, overrides, input, error, mistakes)
     character(len=*), intent(in) :: file
     type(string_t), intent(in) :: overrides(:)   !! PATH=VALUE
     type(input_t), intent(out) :: input
     type(error_t), allocatable, intent(out) :: error
+    type(mistakes_t), intent(out), optional :: mistakes   !! those of the error
     character(len=:), allocatable :: text
 
     call read_text_file(file, text, error)
     if (allocated(error)) return
-    call read_input_text(text, file, overrides, input, error)
+    call read_input_text(text, file, overrides, input, error, mistakes)
   end subroutine read_input
 
   !> Reads and checks the text of a file.
-  subroutine read_input_text(text, file, overrides, input, error)
+  subroutine read_input_text(text, file, overrides, input, error, all_mistakes)
     character(len=*), intent(in) :: text
     character(len=*), intent(in) :: file         !! what messages call it
     type(string_t), intent(in) :: overrides(:)   !! PATH=VALUE
     type(input_t), intent(out) :: input
     type(error_t), allocatable, intent(out) :: error
+    type(mistakes_t), intent(out), optional :: all_mistakes   !! those of the error
     type(namelist_t) :: namelist
     type(mistakes_t) :: mistakes
     type(override_t), allocatable :: parsed(:)
@@ -67,6 +69,7 @@ contains
     call check_references(input%groups, bodies_are_known(input%groups), mistakes)
     call check_constraints(input%groups, mistakes)
     if (mistakes%count > 0) call raise(error, mistakes%worst_code(), mistakes_report(input, mistakes))
+    if (present(all_mistakes)) all_mistakes = mistakes
   end subroutine read_input_text
 
   !> All groups of the file, then the single groups that it lacks.
