@@ -12,7 +12,7 @@ module nocdyn_sweep_summary
   implicit none (type, external)
   private
 
-  public :: sweep_json, sweep_line, sweep_table
+  public :: sweep_json, sweep_line, sweep_note, sweep_table
 
   integer, parameter :: most_rows = 60    ! a longer table is in summary.json only
 
@@ -31,6 +31,7 @@ module nocdyn_sweep_summary
     type(order_statistics_t), allocatable :: statistics(:)   !! of each result, over the variants that are done
     type(sweep_effort_t), allocatable :: effort              !! not allocated after a merge
     character(len=:), allocatable :: first_reason            !! why the first variant is not done; if none is
+    integer, allocatable :: without_trajectory(:)            !! variants of which one is asked for, but that are refused
   end type sweep_summary_t
 
 contains
@@ -162,6 +163,29 @@ contains
       if (named%unit /= '') text = text // ' [' // named%unit // ']'
     end associate
   end function label
+
+  !> One line on the trajectories that are asked for and cannot be, '' if there are none.
+  function sweep_note(input, summary) result(text)
+    type(input_t), intent(in) :: input
+    type(sweep_summary_t), intent(in) :: summary
+    character(len=:), allocatable :: text
+    integer :: i
+
+    text = ''
+    associate (variants => summary%without_trajectory)
+      if (size(variants) == 0) return
+      text = input%file // ': note: variant ' // to_text(variants(1))
+      if (size(variants) > 1) text = input%file // ': note: variants ' // to_text(variants(1))
+      do i = 2, size(variants)
+        text = text // ', ' // to_text(variants(i))
+      end do
+      if (size(variants) > 1) then
+        text = text // ' were refused; they have no trajectories'
+      else
+        text = text // ' was refused; it has no trajectory'
+      end if
+    end associate
+  end function sweep_note
 
   !> One line: what was done, and where the results are.
   function sweep_line(input, summary, folder) result(text)

@@ -12,12 +12,12 @@ module nocdyn_sweep_results
   use nocdyn_output_file, only: write_whole
   use nocdyn_posix, only: is_interrupted, remove_file
   use nocdyn_run_summary, only: run_summary_t
-  use nocdyn_sweep_chunk, only: chunk_t
+  use nocdyn_sweep_chunk, only: chunk_t, status_refused
   use nocdyn_sweep_file, only: write_sweep_file
   use nocdyn_sweep_header, only: sweep_file_name, sweep_header_t
   use nocdyn_sweep_journal, only: sweep_journal_t
   use nocdyn_sweep_plan, only: sweep_plan_t, without_sweep
-  use nocdyn_sweep_summary, only: sweep_json, sweep_line, sweep_summary_t, sweep_table
+  use nocdyn_sweep_summary, only: sweep_json, sweep_line, sweep_note, sweep_summary_t, sweep_table
   use nocdyn_sweep_table, only: sweep_table_name, write_sweep_table
   use nocdyn_targets, only: set_targets
   use nocdyn_text, only: string_t, to_text
@@ -56,7 +56,8 @@ contains
     if (.not. allocated(error)) call write_sweep_file(folder, journals, error)
     if (.not. allocated(error)) call remove_other_results(folder, keeps_table=options%wants_csv)
     if (.not. allocated(error) .and. options%wants_csv) call write_sweep_table(folder, journals, error)
-    if (.not. allocated(error)) call write_trajectories(plan, folder, journals, options, error)
+    if (.not. allocated(error)) call write_trajectories(plan, folder, journals, options, &
+                                                         summary%without_trajectory, error)
     if (.not. allocated(error)) call write_whole(folder, input_file, input_text(plan%input), error)
     call system_clock(now)
     if (allocated(summary%effort)) summary%effort%writing_time = real(now - began, wp) / real(rate, wp)
@@ -112,10 +113,13 @@ contains
     type(sweep_summary_t), intent(in) :: summary   !! of `write_results`
     integer, intent(out) :: code                   !! 1 if no variant is done
     type(error_t), allocatable :: error
+    character(len=:), allocatable :: note
 
     code = exit_done
     if (.not. options%is_quiet) then
       if (summary%done > 0) call say(sweep_table(header, summary))
+      note = sweep_note(plan%input, summary)
+      if (note /= '') call say(note)
       call say(sweep_line(plan%input, summary, folder))
     end if
     if (summary%done > 0) return
@@ -140,26 +144,31 @@ contains
   end subroutine find_first_reason
 
   !> The chosen variants run once more with the numbers that the journals have of them, as `nocdyn run` would do it. One that
-  !> fails leaves what it has.
-  subroutine write_trajectories(plan, folder, journals, options, error)
+  !> fails leaves what it has, one that is refused has nothing.
+  subroutine write_trajectories(plan, folder, journals, options, refused, error)
     type(sweep_plan_t), intent(in) :: plan
     character(len=*), intent(in) :: folder
     type(sweep_journal_t), intent(inout) :: journals(:)
     type(results_options_t), intent(in) :: options
+    integer, allocatable, intent(out) :: refused(:)   !! variants
     type(error_t), allocatable, intent(out) :: error
     type(input_t) :: input
     type(run_summary_t) :: summary
     real(wp), allocatable :: values(:)
     character(len=:), allocatable :: complaint
-    integer :: i
+    integer :: i, status
 
+    allocate (refused(0))
     do i = 1, size(plan%trajectories)
       associate (variant => plan%trajectories(i))
         input = plan%input
-        call find_values(journals, variant, values, error)
+        call find_values(journals, variant, values, status, error)
         if (allocated(error)) return
         call set_targets(input, plan%targets, values, complaint)
-        if (complaint /= '') cycle
+        if (status == status_refused .or. complaint /= '') then
+          refused = [refused, variant]
+          cycle
+        end if
         call run_variant(without_sweep(input), folder // '/' // variant_folder // to_text(variant), options, summary, error)
       end associate
       if (is_interrupted()) then
@@ -171,20 +180,24 @@ contains
     end do
   end subroutine write_trajectories
 
-  !> What the varied numbers of one variant are.
-  subroutine find_values(journals, variant, values, error)
+  !> What the varied numbers of one variant are, and what has become of it.
+  subroutine find_values(journals, variant, values, status, error)
     type(sweep_journal_t), intent(inout) :: journals(:)   !! one of which holds it
     integer, intent(in) :: variant
     real(wp), allocatable, intent(out) :: values(:)
+    integer, intent(out) :: status   !! status_...
     type(error_t), allocatable, intent(out) :: error
     type(chunk_t) :: chunk
     integer :: i, k
 
+    status = status_refused
     do k = 1, size(journals)
       i = journals(k)%record_of(variant)
       if (i == 0) cycle
       call journals(k)%read_record(i, chunk, error)
-      if (.not. allocated(error)) values = chunk%parameters(:, variant - chunk%first + 1)
+      if (allocated(error)) return
+      values = chunk%parameters(:, variant - chunk%first + 1)
+      status = chunk%status(variant - chunk%first + 1)
       return
     end do
     error stop 'nocdyn_sweep_results: the trajectory of a variant is asked for that no journal holds'

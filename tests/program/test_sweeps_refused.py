@@ -77,6 +77,42 @@ def test_all_mistakes_of_a_sweep_are_told_in_one_go(nocdyn):
     ]
 
 
+def mistaken_keys(message):
+    return [line.removeprefix("nocdyn: ").split(" = ")[0] for line in message.splitlines()]
+
+
+def test_a_wrong_design_does_not_hide_other_mistakes(nocdyn):
+    record = "&record quantity = 'omega_disk' statistic = 'final' /\n&record quantity = 'omega' statistic = 'maxi' /\n"
+    groups = {
+        "sweep": "&sweep design = 'sobal' samples = 9 /\n",
+        "vary": "&vary target = 'load.drag.viscus' low = 2 high = 1 /\n",
+        "record": record,
+    }
+    assert mistaken_keys(refusal(nocdyn, **groups)) == [
+        "m.nml:5: &sweep: design",
+        "m.nml:6: &vary: high",
+        "m.nml:6: &vary: target",
+        "m.nml:7: &record: quantity",
+        "m.nml:8: &record: statistic(1)",
+        "m.nml:8: &record: quantity",
+    ]
+    message = refusal(nocdyn, **groups)
+    assert nocdyn("check", "m.nml").stderr == message
+
+
+def test_quantities_are_not_judged_before_it_is_known_what_varies(nocdyn):
+    damping = "&record quantity = 'omega' statistic = 'final' /\n"
+    assert mistaken_keys(refusal(nocdyn, sweep="&sweep design = 'lst' file = 'list.csv' /\n", vary="", record=damping)) == [
+        "m.nml:5: &sweep: design"
+    ]
+
+
+def test_a_mistake_in_the_machine_is_told_without_those_that_need_the_machine(nocdyn):
+    path = nocdyn.write("m.nml", SPINNER.replace("2.0", "-2.0") + GROUPS["sweep"] + GROUPS["vary"] + GROUPS["record"].replace("disc", "disk"))
+    outcome = nocdyn("sweep", path, "--out", "out")
+    assert mistaken_keys(outcome.stderr.replace(f"{nocdyn.folder}/", "")) == ["m.nml:1: &body 'disc': inertia"]
+
+
 def test_a_list_is_refused_with_its_own_file_and_line(nocdyn):
     nocdyn.write("list.csv", "load.drag.viscous, body.disc.name\n0.5, 1\n0.5\n")
     message = refusal(nocdyn, sweep="&sweep design = 'list' file = 'list.csv' /\n", vary="")
@@ -131,6 +167,28 @@ def test_a_variant_with_a_number_that_is_not_allowed_is_refused_alone(nocdyn):
     table = (nocdyn.folder / "out/sweep.csv").read_text()
     assert "load.drag.viscous = -0.5 is out of range; allowed: >= 0 [N m s/rad]" in table
     assert "run.t_start: t_end = 1 is out of range; allowed: > t_start = 2" in table
+
+
+def test_trajectories_of_refused_variants_are_said_to_be_missing(nocdyn):
+    nocdyn.write("list.csv", "load.drag.viscous, run.t_start\n0.5, 0\n-0.5, 0\n0.5, 2\n")
+    groups = "&sweep design = 'list' file = 'list.csv' /\n" + GROUPS["record"] + "&record trajectories = 1, 2 /\n"
+    path = nocdyn.write("m.nml", SPINNER + groups)
+    outcome = nocdyn("sweep", path, "--out", "out")
+    assert (outcome.returncode, outcome.stderr) == (0, "")
+    assert f"\n{path}: note: variant 2 was refused; it has no trajectory\n" in outcome.stdout
+    outcome = nocdyn("sweep", path, "--out", "out", "--set", "record(2).trajectories=2,1,3")
+    assert f"\n{path}: note: variants 2, 3 were refused; they have no trajectories\n" in outcome.stdout
+    assert nocdyn.files("out") == ["input.nml", "summary.json", "sweep.nc", "variant-1"]
+    assert "note" not in nocdyn("sweep", path, "--out", "out", "--set", "record(2).trajectories=1").stdout
+    assert nocdyn("sweep", path, "--out", "out", "-q").stdout == ""
+
+
+def test_a_trajectory_of_a_machine_that_cannot_be_is_said_to_be_missing(nocdyn):
+    machine = SPINNER.replace("&run", "&body name = 'rim' inertia = 1 speed = -0.5 /\n&gear name = 'mesh' bodies = 'disc', 'rim' radii = 1, 2 /\n&run")
+    nocdyn.write("list.csv", "body.rim.speed\n-0.5\n9\n")
+    groups = "&sweep design = 'list' file = 'list.csv' /\n" + GROUPS["record"] + "&record trajectories = 2 /\n"
+    outcome = nocdyn("sweep", nocdyn.write("m.nml", machine + groups), "--out", "out")
+    assert "note: variant 2 was refused; it has no trajectory\n" in outcome.stdout, outcome
 
 
 def test_check_looks_at_the_sweep_too(nocdyn):
