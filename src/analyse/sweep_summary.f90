@@ -144,8 +144,8 @@ contains
     do i = 1, rows
       associate (found => summary%statistics(i))
         text = text // new_line('a') // padded(label(header, i), label_width) // cell(found%minimum) // cell(found%low) // &
-               cell(found%median) // cell(found%high) // cell(found%maximum) // ' ' // right(to_text(found%variant_of_minimum)) // &
-               ' ' // right(to_text(found%variant_of_maximum))
+               cell(found%median) // cell(found%high) // cell(found%maximum) // &
+               ' ' // right(to_text(found%variant_of_minimum)) // ' ' // right(to_text(found%variant_of_maximum))
       end associate
     end do
     if (rows < size(header%results)) text = text // new_line('a') // '(' // to_text(size(header%results) - rows) // &
