@@ -1,17 +1,15 @@
 !> Whether a sweep may go on with what is in its folder.
 module nocdyn_sweep_resumption
   use nocdyn_errors, only: error_t, exit_input, raise
-  use nocdyn_input_differences, only: find_differences
+  use nocdyn_sweep_differences, only: input_difference
   use nocdyn_sweep_header, only: sweep_header_t
   use nocdyn_sweep_journal, only: sweep_journal_t
   use nocdyn_sweep_origin, only: read_origin
-  use nocdyn_text, only: string_t, to_text
+  use nocdyn_text, only: to_text
   implicit none (type, external)
   private
 
   public :: judge_journal, judge_results
-
-  integer, parameter :: most_told = 5   ! differences
 
 contains
 
@@ -25,7 +23,7 @@ contains
 
     difference = header_difference(journal%header, header)
     if (difference /= '') then
-      call raise(error, exit_input, journal%path() // ' cannot be gone on with: ' // difference // &
+      call raise(error, exit_input, journal%path() // ' is not of this sweep: ' // difference // &
                  '; remove it, or choose another folder by --out')
     else if (.not. resumes) then
       call raise(error, exit_input, journal%path() // ' holds ' // held_text(journal))
@@ -60,31 +58,15 @@ contains
       return
     end if
     text = input_difference(old%input_text, new%input_text)
-    if (text /= '') return
-    if (old%list_checksum /= new%list_checksum) then
+    if (text /= '') then
+      text = 'the input has changed: ' // text
+    else if (old%list_checksum /= new%list_checksum) then
       text = 'the file of &sweep with the variants has changed'
     else if (old%first /= new%first .or. old%last /= new%last) then
       text = 'it is for the variants ' // to_text(old%first) // ' to ' // to_text(old%last) // ', not ' // &
              to_text(new%first) // ' to ' // to_text(new%last)
     end if
   end function header_difference
-
-  !> What has changed in an input; empty if nothing that counts.
-  function input_difference(old, new) result(text)
-    character(len=*), intent(in) :: old, new   !! of `input_text`
-    character(len=:), allocatable :: text
-    type(string_t), allocatable :: sentences(:)
-    integer :: i
-
-    call find_differences(old, new, sentences)
-    text = ''
-    do i = 1, min(size(sentences), most_told)
-      if (i > 1) text = text // '; '
-      text = text // sentences(i)%text
-    end do
-    if (size(sentences) > most_told) text = text // '; and ' // to_text(size(sentences) - most_told) // ' more'
-    if (text /= '') text = 'the input has changed: ' // text
-  end function input_difference
 
   !> Results that are there already must be of this sweep.
   subroutine judge_results(folder, header, error)

@@ -3,7 +3,8 @@ module nocdyn_journal_chunks
   use nocdyn_errors, only: error_t, exit_input, raise
   use nocdyn_number_ranges, only: ascending_order, gaps, range_t
   use nocdyn_sweep_chunk, only: chunk_t
-  use nocdyn_sweep_header, only: differing_part
+  use nocdyn_sweep_differences, only: input_difference
+  use nocdyn_sweep_header, only: sweep_header_t
   use nocdyn_sweep_journal, only: journal_name, sweep_journal_t
   use nocdyn_text, only: to_text
   implicit none (type, external)
@@ -141,25 +142,35 @@ contains
   subroutine check_headers(journals, error)
     type(sweep_journal_t), intent(in) :: journals(:)
     type(error_t), allocatable, intent(out) :: error
-    character(len=:), allocatable :: part
+    character(len=:), allocatable :: difference
     integer :: i
 
     do i = 2, size(journals)
-      part = differing_part(journals(1)%header, journals(i)%header)
-      select case (part)
-      case ('')
-        cycle
-      case ('source')
-        part = 'they were written by ' // journals(1)%header%source // ' and ' // journals(i)%header%source
-      case ('list')
-        part = 'the files with their variants differ'
-      case default
-        part = 'their inputs differ'
-      end select
-      call raise(error, exit_input, journals(1)%path() // ' and ' // journals(i)%path() // ' are not of one sweep: ' // part)
+      difference = header_difference(journals(1)%header, journals(i)%header)
+      if (difference == '') cycle
+      call raise(error, exit_input, journals(1)%path() // ' and ' // journals(i)%path() // ' are not of one sweep: ' // &
+                 difference)
       return
     end do
   end subroutine check_headers
+
+  !> In what the headers of two shards differ; empty if they are of one sweep.
+  function header_difference(first, second) result(text)
+    type(sweep_header_t), intent(in) :: first, second
+    character(len=:), allocatable :: text
+
+    text = ''
+    if (first%source /= second%source) then
+      text = 'they were written by ' // first%source // ' and ' // second%source
+      return
+    end if
+    text = input_difference(first%input_text, second%input_text)
+    if (text /= '') then
+      text = 'their inputs differ, from the first to the second: ' // text
+    else if (first%list_checksum /= second%list_checksum .or. first%variants /= second%variants) then
+      text = 'the files with their variants differ'
+    end if
+  end function header_difference
 
   !> Names every journal that lacks variants of its own shard.
   subroutine check_wholeness(journals, error)

@@ -4,7 +4,7 @@ module nocdyn_sweep_header
   implicit none (type, external)
   private
 
-  public :: pack_header, unpack_header, differing_part
+  public :: pack_header, unpack_header
 
   character(len=*), parameter, public :: sweep_file_name = 'sweep.nc'
 
@@ -121,20 +121,5 @@ contains
       call reader%take_text(bytes, quantities(i)%long_name)
     end do
   end subroutine take_quantities
-
-  !> In which the headers of two sweeps differ, shards aside: 'source', 'list', 'input', or '' if they are of one sweep.
-  pure function differing_part(a, b) result(part)
-    type(sweep_header_t), intent(in) :: a, b
-    character(len=:), allocatable :: part
-
-    part = ''
-    if (a%source /= b%source) then
-      part = 'source'
-    else if (a%list_checksum /= b%list_checksum) then
-      part = 'list'
-    else if (a%input_text /= b%input_text .or. a%variants /= b%variants) then
-      part = 'input'
-    end if
-  end function differing_part
 
 end module nocdyn_sweep_header

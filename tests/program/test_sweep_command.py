@@ -273,10 +273,13 @@ def test_a_merge_without_all_parts_is_refused_by_their_variants(nocdyn, discs):
 
 def test_parts_of_different_sweeps_are_not_merged(nocdyn, discs):
     nocdyn("sweep", discs, "--out", "out", "--shard", "1/2", "-q")
-    nocdyn("sweep", discs, "--out", "out", "--shard", "2/2", "-q", "--set", "run.rtol=1e-7")
+    nocdyn("sweep", discs, "--out", "out", "--shard", "2/2", "-q", "--set", "run.rtol=1e-7", "--set", "case.title=Three")
     outcome = nocdyn("merge", "out")
     assert (outcome.returncode, outcome.stdout) == (2, "")
-    assert "are not of one sweep: their inputs differ" in outcome.stderr
+    assert outcome.stderr == (
+        "nocdyn: out/sweep.1-of-2.journal and out/sweep.2-of-2.journal are not of one sweep: their inputs differ, from the first to "
+        "the second: &case: title was 'Two discs', is 'Three'; &run: rtol was 1e-08, is 1e-07\n"
+    )
 
 
 @pytest.mark.parametrize(

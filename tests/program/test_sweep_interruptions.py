@@ -107,6 +107,8 @@ def interrupt(nocdyn, discs, *words):
         (("--set", "run.rtol=1e-7"), "the input has changed: &run: rtol was 1e-08, is 1e-07"),
         (("--set", "body.wheel.inertia=1.5"), "the input has changed: &body 'wheel': inertia was 1, is 1.5"),
         (("--set", "sweep.seed=4"), "the input has changed: &sweep: seed was 3, is 4"),
+        (("--set", "case.title=Three"), "the input has changed: &case: title was 'Two discs', is 'Three'"),
+        (("--set", "output.points=21"), "the input has changed: &output: points was 11, is 21"),
     ],
 )
 def test_a_sweep_with_another_input_is_not_gone_on_with(nocdyn, discs, words, difference):
@@ -115,7 +117,7 @@ def test_a_sweep_with_another_input_is_not_gone_on_with(nocdyn, discs, words, di
     outcome = nocdyn("sweep", discs, "--out", "out", "--resume", *ENDLESS, *words)
     assert (outcome.returncode, outcome.stdout) == (2, "")
     remedy = "remove it, or choose another folder by --out"
-    assert outcome.stderr == f"nocdyn: out/sweep.journal cannot be gone on with: {difference}; {remedy}\n"
+    assert outcome.stderr == f"nocdyn: out/sweep.journal is not of this sweep: {difference}; {remedy}\n"
     assert nocdyn("sweep", discs, "--out", "out", *ENDLESS, *words).stderr == outcome.stderr
     assert journal(nocdyn).read_bytes() == before
 
@@ -136,7 +138,7 @@ def test_a_journal_of_another_version_is_not_gone_on_with(nocdyn, discs):
     outcome = nocdyn("sweep", discs, "--out", "out", "--resume")
     assert (outcome.returncode, outcome.stdout) == (2, "")
     this = re.escape(nocdyn("--version").stdout.strip())
-    complaint = f"nocdyn: out/sweep\\.journal cannot be gone on with: it was begun by nocdyn 9, this is {this}; remove it, .*\n"
+    complaint = f"nocdyn: out/sweep\\.journal is not of this sweep: it was begun by nocdyn 9, this is {this}; remove it, .*\n"
     assert re.fullmatch(complaint, outcome.stderr)
     assert journal(nocdyn).read_bytes() == before
 
@@ -158,7 +160,7 @@ def test_a_list_that_has_changed_is_not_gone_on_with(nocdyn):
     outcome = nocdyn("sweep", discs, "--out", "out", "--set", "run.t_end=20", "--resume")
     assert (outcome.returncode, outcome.stdout) == (2, "")
     complaint = "the file of &sweep with the variants has changed; remove it, or choose another folder by --out"
-    assert outcome.stderr == f"nocdyn: out/sweep.journal cannot be gone on with: {complaint}\n"
+    assert outcome.stderr == f"nocdyn: out/sweep.journal is not of this sweep: {complaint}\n"
 
 
 def test_results_of_a_list_that_has_changed_are_not_taken_for_those_of_the_new_one(nocdyn):
@@ -214,6 +216,18 @@ def test_results_of_another_sweep_are_not_taken_for_its_own(nocdyn, discs):
         "nocdyn: out holds the results of another sweep: the input has changed: &sweep: samples was 60, is 61; "
         "without --resume they are replaced\n"
     )
+
+
+def test_results_with_another_title_are_not_taken_for_its_own(nocdyn, discs):
+    nocdyn("sweep", discs, "--out", "out")
+    before = (nocdyn.folder / "out/input.nml").read_bytes()
+    outcome = nocdyn("sweep", discs, "--out", "out", "--resume", "--set", "case.title=Three")
+    assert (outcome.returncode, outcome.stdout) == (2, "")
+    assert outcome.stderr == (
+        "nocdyn: out holds the results of another sweep: the input has changed: &case: title was 'Two discs', is 'Three'; "
+        "without --resume they are replaced\n"
+    )
+    assert (nocdyn.folder / "out/input.nml").read_bytes() == before
 
 
 def test_a_damaged_journal_is_told_and_made_good(nocdyn, discs):
