@@ -2,14 +2,13 @@
 module nocdyn_merge_command
   use nocdyn_arguments, only: arguments_t
   use nocdyn_console, only: complain
-  use nocdyn_errors, only: error_t, exit_done, exit_input, raise
-  use nocdyn_folders, only: folder_names
+  use nocdyn_errors, only: error_t, exit_done, exit_file, exit_input, raise
   use nocdyn_input_reader, only: read_input_text
   use nocdyn_journal_chunks, only: check_sweep
   use nocdyn_posix, only: watch_interrupts
   use nocdyn_result_folders, only: plain_path
   use nocdyn_sweep_header, only: quantity_t
-  use nocdyn_sweep_journal, only: open_journal, sweep_journal_t
+  use nocdyn_sweep_journal, only: journal_names, open_journal, sweep_journal_t
   use nocdyn_sweep_plan, only: sweep_plan_t
   use nocdyn_sweep_records, only: wanted_trajectories
   use nocdyn_sweep_results, only: results_options_t, tell_results, write_results
@@ -78,35 +77,24 @@ contains
     type(error_t), allocatable, intent(out) :: error
     type(string_t), allocatable :: names(:)
     integer :: i
+    logical :: is_folder, is_there
 
+    inquire (file=folder, exist=is_there)
+    inquire (file=folder // '/.', exist=is_folder)
     allocate (names, source=journal_names(folder))
-    if (size(names) == 0) then
+    if (.not. is_there) then
+      call raise(error, exit_file, folder // ': there is no such folder')
+    else if (.not. is_folder) then
+      call raise(error, exit_file, folder // ': is no folder; nocdyn merge needs that of the journals')
+    else if (size(names) == 0) then
       call raise(error, exit_input, folder // ': no journal of a sweep is there; nocdyn sweep FILE --shard K/N leaves them')
-      return
     end if
+    if (allocated(error)) return
     allocate (journals(size(names)))
     do i = 1, size(names)
       call open_journal(folder, names(i)%text, journals(i), error)
       if (allocated(error)) return
     end do
   end subroutine open_journals
-
-  !> sweep.journal, sweep.K-of-N.journal
-  function journal_names(folder) result(names)
-    character(len=*), intent(in) :: folder
-    type(string_t), allocatable :: names(:)
-    character(len=*), parameter :: beginning = 'sweep.', ending = 'journal'
-    type(string_t), allocatable :: all_names(:)
-    integer :: i
-
-    allocate (all_names, source=folder_names(folder))
-    allocate (names(0))
-    do i = 1, size(all_names)
-      associate (name => all_names(i)%text)
-        if (index(name, beginning) /= 1 .or. len(name) < len(beginning) + len(ending)) cycle
-        if (name(len(name) - len(ending) + 1:) == ending) call append(names, name)
-      end associate
-    end do
-  end function journal_names
 
 end module nocdyn_merge_command

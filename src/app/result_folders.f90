@@ -3,11 +3,14 @@ module nocdyn_result_folders
   use nocdyn_errors, only: error_t, exit_input, raise
   use nocdyn_input, only: group_t, input_t
   use nocdyn_sweep_header, only: sweep_file_name
-  use nocdyn_text, only: quoted, string_t
+  use nocdyn_sweep_journal, only: journal_names
+  use nocdyn_text, only: joined, quoted, string_t
   implicit none (type, external)
   private
 
   public :: plain_path, result_folder, stem, refuse_shared_folders, refuse_sweep_folder
+
+  integer, parameter :: most_told = 3   ! names
 
 contains
 
@@ -72,15 +75,23 @@ contains
     end do
   end subroutine refuse_shared_folders
 
-  !> A run would take the name of a summary.json that belongs to a sweep, which may be the work of many hours.
+  !> A run would take the name of a summary.json that belongs to a sweep, which may be the work of many hours; a sweep that is
+  !> not finished would remove the results of the run at its end.
   subroutine refuse_sweep_folder(file, folder, error)
     character(len=*), intent(in) :: file, folder
     type(error_t), allocatable, intent(out) :: error
+    type(string_t), allocatable :: names(:)
     logical :: is_there
 
     inquire (file=folder // '/' // sweep_file_name, exist=is_there)
-    if (is_there) call raise(error, exit_input, file // ': ' // folder // ' holds the results of a sweep; choose another ' // &
-                             'folder by --out, or remove ' // sweep_file_name)
+    allocate (names, source=journal_names(folder))
+    if (is_there) then
+      call raise(error, exit_input, file // ': ' // folder // ' holds the results of a sweep; choose another folder by ' // &
+                 '--out, or remove ' // sweep_file_name)
+    else if (size(names) > 0) then
+      call raise(error, exit_input, file // ': ' // folder // ' holds a sweep that is not finished; choose another folder ' // &
+                 'by --out, or remove ' // joined(names, ', ', most_told))
+    end if
   end subroutine refuse_sweep_folder
 
 end module nocdyn_result_folders

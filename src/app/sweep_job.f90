@@ -14,7 +14,7 @@ module nocdyn_sweep_job
   use nocdyn_sweep_ledger, only: sweep_ledger_t
   use nocdyn_sweep_plan, only: add_plan_mistakes, make_plan, sweep_plan_t
   use nocdyn_sweep_progress, only: console_sweep_progress_t
-  use nocdyn_sweep_resumption, only: judge_journal, judge_results
+  use nocdyn_sweep_resumption, only: judge_journal, judge_results, refuse_other_journals
   use nocdyn_sweep_results, only: results_options_t, tell_results, write_results
   use nocdyn_sweep_setup, only: prepare_sweep, sweep_setup_t
   use nocdyn_sweep_summary, only: sweep_effort_t, sweep_summary_t
@@ -45,9 +45,6 @@ contains
     type(input_t) :: input
     type(mistakes_t) :: mistakes
     type(sweep_header_t) :: header
-    character(len=:), allocatable :: name
-    integer(int64) :: bytes
-    logical :: is_there
 
     job%arguments = arguments
     call read_input(arguments%operands(1)%text, arguments%overrides, input, error, mistakes)
@@ -66,22 +63,41 @@ contains
       return
     end if
     header = new_sweep_header(job%plan, max(1, arguments%shard), max(1, arguments%shards))
-    name = journal_name(max(1, arguments%shard), max(1, arguments%shards))
-    inquire (file=job%folder // '/' // name, exist=is_there, size=bytes)
-    if (is_there .and. bytes > 0) then
-      call open_journal(job%folder, name, job%journals(1), error)
-      if (.not. allocated(error)) call judge_journal(job%journals(1), header, arguments%resumes, error)
-      if (.not. allocated(error)) call tell_journal(job)
-    else
-      if (arguments%resumes) call look_for_results(job, header, error)
-      if (allocated(error) .or. job%is_done) return
-      call create_journal(job%folder, name, header, job%journals(1), error)
-    end if
+    call prepare_journal(job, header, error)
+    if (allocated(error) .or. job%is_done) return
     job%progress%title = job%plan%input%file
     job%progress%line = new_status_line(arguments%is_quiet, shows_in_logs=.true.)
   end subroutine begin_job
 
-  !> There is no journal to go on with: all is done already, or the sweep starts from its beginning.
+  !> Opens the journal that is there, or makes one if the sweep is not done already.
+  subroutine prepare_journal(job, header, error)
+    type(sweep_job_t), intent(inout) :: job
+    type(sweep_header_t), intent(in) :: header
+    type(error_t), allocatable, intent(out) :: error
+    character(len=:), allocatable :: name
+    integer(int64) :: bytes
+    logical :: is_there
+
+    name = journal_name(max(1, job%arguments%shard), max(1, job%arguments%shards))
+    inquire (file=job%folder // '/' // name, exist=is_there, size=bytes)
+    if (is_there .and. bytes > 0) then
+      call open_journal(job%folder, name, job%journals(1), error)
+      if (.not. allocated(error)) call judge_journal(job%journals(1), header, job%arguments%resumes, error)
+      if (.not. allocated(error)) call tell_journal(job)
+    else
+      if (job%arguments%resumes) call look_for_results(job, header, error)
+      if (allocated(error) .or. job%is_done) return
+      call refuse_other_journals(job%folder, job%arguments%shards, error)
+      if (allocated(error)) return
+      if (job%arguments%resumes .and. .not. job%arguments%is_quiet) then
+        call say(job%plan%input%file // ': there is nothing to go on with in ' // job%folder // &
+                 '; the sweep starts from its beginning')
+      end if
+      call create_journal(job%folder, name, header, job%journals(1), error)
+    end if
+  end subroutine prepare_journal
+
+  !> There is no journal to go on with, but all may be done already.
   subroutine look_for_results(job, header, error)
     type(sweep_job_t), intent(inout) :: job
     type(sweep_header_t), intent(in) :: header
@@ -91,18 +107,16 @@ contains
 
     inquire (file=job%folder // '/' // sweep_file_name, exist=job%is_done)
     job%is_done = job%is_done .and. job%arguments%shards <= 1
-    if (job%is_done) then
-      call judge_results(job%folder, header, error)
-      news = 'all ' // to_text(header%variants) // ' variants are done already; results in ' // job%folder
-      inquire (file=job%folder // '/' // sweep_table_name, exist=has_table)
-      if (job%arguments%wants_csv .and. .not. (has_table .or. allocated(error))) then
-        call raise(error, exit_input, job%plan%input%file // ': ' // news // ', without ' // sweep_table_name // &
-                   '; to have it, leave out --resume')
-      end if
-    else
-      news = 'there is nothing to go on with in ' // job%folder // '; the sweep starts from its beginning'
+    if (.not. job%is_done) return
+    call judge_results(job%folder, header, error)
+    if (allocated(error)) return
+    news = job%plan%input%file // ': all ' // to_text(header%variants) // ' variants are done already; results in ' // job%folder
+    inquire (file=job%folder // '/' // sweep_table_name, exist=has_table)
+    if (job%arguments%wants_csv .and. .not. has_table) then
+      call raise(error, exit_input, news // ', without ' // sweep_table_name // '; to have it, leave out --resume')
+    else if (.not. job%arguments%is_quiet) then
+      call say(news)
     end if
-    if (.not. (allocated(error) .or. job%arguments%is_quiet)) call say(job%plan%input%file // ': ' // news)
   end subroutine look_for_results
 
   !> What is in the journal that is gone on with. A record that a kill has cut short, or a disk has spoilt, costs the variants

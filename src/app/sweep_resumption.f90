@@ -3,13 +3,15 @@ module nocdyn_sweep_resumption
   use nocdyn_errors, only: error_t, exit_input, raise
   use nocdyn_sweep_differences, only: input_difference
   use nocdyn_sweep_header, only: sweep_header_t
-  use nocdyn_sweep_journal, only: sweep_journal_t
+  use nocdyn_sweep_journal, only: journal_name, journal_names, sweep_journal_t
   use nocdyn_sweep_origin, only: read_origin
-  use nocdyn_text, only: to_text
+  use nocdyn_text, only: joined, string_t, to_text
   implicit none (type, external)
   private
 
-  public :: judge_journal, judge_results
+  public :: judge_journal, judge_results, refuse_other_journals
+
+  integer, parameter :: most_told = 3   ! names
 
 contains
 
@@ -67,6 +69,30 @@ contains
              to_text(new%first) // ' to ' // to_text(new%last)
     end if
   end function header_difference
+
+  !> A sweep as a whole and parts of one do not share a folder: `nocdyn merge` takes all journals that are there.
+  subroutine refuse_other_journals(folder, shards, error)
+    character(len=*), intent(in) :: folder
+    integer, intent(in) :: shards                         !! of the sweep that is asked for, at most 1: the whole sweep
+    type(error_t), allocatable, intent(out) :: error
+    type(string_t), allocatable :: names(:)
+    character(len=:), allocatable :: whole
+    integer :: i
+
+    whole = journal_name(1, 1)
+    allocate (names, source=journal_names(folder))
+    do i = 1, size(names)
+      if (names(i)%text == whole .eqv. shards <= 1) cycle
+      if (shards > 1) then
+        call raise(error, exit_input, folder // ' holds the journal of a whole sweep, ' // whole // '; go on with it by ' // &
+                   '--resume without --shard, remove it, or choose another folder by --out')
+      else
+        call raise(error, exit_input, folder // ' holds journals of parts of a sweep: ' // joined(names, ', ', most_told) // &
+                   '; go on with them by --shard, remove them, or choose another folder by --out')
+      end if
+      return
+    end do
+  end subroutine refuse_other_journals
 
   !> Results that are there already must be of this sweep.
   subroutine judge_results(folder, header, error)

@@ -2,15 +2,17 @@
 module nocdyn_sweep_journal
   use, intrinsic :: iso_fortran_env, only: int32, int64
   use nocdyn_errors, only: error_t, exit_file, exit_input, raise
+  use nocdyn_folders, only: folder_names
   use nocdyn_number_ranges, only: gaps, range_t
   use nocdyn_record_file, only: frame_bytes, record_file_t
   use nocdyn_sweep_chunk, only: chunk_summary_t, chunk_t, pack_chunk, read_summary, unpack_chunk
   use nocdyn_sweep_header, only: pack_header, sweep_header_t, unpack_header
-  use nocdyn_text, only: to_text
+  use nocdyn_text, only: append_text => append, string_t, to_text
+  use nocdyn_text_order, only: find_order
   implicit none (type, external)
   private
 
-  public :: journal_name, create_journal, open_journal
+  public :: journal_name, journal_names, create_journal, open_journal
 
   integer(int32), parameter :: header_mark = int(z'64616568', int32), chunk_mark = int(z'6B6E6863', int32)   ! 'head', 'chnk'
 
@@ -52,6 +54,26 @@ contains
     name = 'sweep.journal'
     if (shards > 1) name = 'sweep.' // to_text(shard) // '-of-' // to_text(shards) // '.journal'
   end function journal_name
+
+  !> The names of all journals in a folder, sorted.
+  function journal_names(folder) result(names)
+    character(len=*), intent(in) :: folder
+    type(string_t), allocatable :: names(:)
+    character(len=*), parameter :: beginning = 'sweep.', ending = 'journal'
+    type(string_t), allocatable :: all_names(:)
+    integer, allocatable :: order(:)
+    integer :: i
+
+    allocate (all_names, source=folder_names(folder))
+    call find_order(all_names, order)
+    allocate (names(0))
+    do i = 1, size(all_names)
+      associate (name => all_names(order(i))%text)
+        if (index(name, beginning) /= 1 .or. len(name) < len(beginning) + len(ending)) cycle
+        if (name(len(name) - len(ending) + 1:) == ending) call append_text(names, name)
+      end associate
+    end do
+  end function journal_names
 
   !> Begins a journal in `folder`, which is made if need be; a file of that name must not be there.
   subroutine create_journal(folder, name, header, journal, error)

@@ -194,6 +194,17 @@ def test_a_run_does_not_go_to_the_folder_of_a_sweep(nocdyn, discs, spinner):
     assert nocdyn.files("out/spinner") == ["input.nml", "summary.json", "trajectory.csv"]
 
 
+@pytest.mark.parametrize("name", ["sweep.journal", "sweep.1-of-2.journal"])
+def test_a_run_does_not_go_to_the_folder_of_a_sweep_that_is_not_finished(nocdyn, discs, name):
+    nocdyn.write(f"out/{name}", "of a sweep")
+    outcome = nocdyn("run", discs, "--out", "out")
+    assert (outcome.returncode, outcome.stdout) == (2, "")
+    assert outcome.stderr == (
+        f"nocdyn: {discs}: out holds a sweep that is not finished; choose another folder by --out, or remove '{name}'\n"
+    )
+    assert nocdyn.files("out") == [name]
+
+
 def test_a_reader_of_the_output_who_is_gone_costs_no_results(nocdyn, discs):
     reading, writing = os.pipe()
     os.close(reading)
@@ -280,6 +291,18 @@ def test_parts_of_different_sweeps_are_not_merged(nocdyn, discs):
         "nocdyn: out/sweep.1-of-2.journal and out/sweep.2-of-2.journal are not of one sweep: their inputs differ, from the first to "
         "the second: &case: title was 'Two discs', is 'Three'; &run: rtol was 1e-08, is 1e-07\n"
     )
+
+
+@pytest.mark.parametrize(
+    ("operand", "complaint"),
+    [
+        ("nope", "nope: there is no such folder"),
+        ("discs.nml", "discs.nml: is no folder; nocdyn merge needs that of the journals"),
+    ],
+)
+def test_a_merge_of_no_folder_is_refused_with_code_3(nocdyn, discs, operand, complaint):
+    outcome = nocdyn("merge", operand)
+    assert (outcome.returncode, outcome.stdout, outcome.stderr) == (3, "", f"nocdyn: {complaint}\n")
 
 
 @pytest.mark.parametrize(

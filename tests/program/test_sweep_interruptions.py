@@ -230,6 +230,40 @@ def test_results_with_another_title_are_not_taken_for_its_own(nocdyn, discs):
     assert (nocdyn.folder / "out/input.nml").read_bytes() == before
 
 
+@pytest.mark.parametrize("words", [[], ["--resume"]])
+def test_a_part_does_not_go_to_the_folder_of_a_whole_sweep(nocdyn, discs, words):
+    interrupt(nocdyn, discs)
+    outcome = nocdyn("sweep", discs, "--out", "out", "--shard", "1/2", *words, *ENDLESS)
+    assert (outcome.returncode, outcome.stdout) == (2, "")
+    assert outcome.stderr == (
+        "nocdyn: out holds the journal of a whole sweep, sweep.journal; go on with it by --resume without --shard, remove it, "
+        "or choose another folder by --out\n"
+    )
+    assert nocdyn.files("out") == ["sweep.journal"]
+
+
+@pytest.mark.parametrize("words", [[], ["--resume"]])
+def test_a_whole_sweep_does_not_go_to_the_folder_of_parts(nocdyn, discs, words):
+    for part in (1, 2):
+        nocdyn("sweep", discs, "--out", "out", "--shard", f"{part}/3")
+    journals = ["sweep.1-of-3.journal", "sweep.2-of-3.journal"]
+    outcome = nocdyn("sweep", discs, "--out", "out", *words)
+    assert (outcome.returncode, outcome.stdout) == (2, "")
+    assert outcome.stderr == (
+        f"nocdyn: out holds journals of parts of a sweep: '{journals[0]}', '{journals[1]}'; go on with them by --shard, remove them, "
+        "or choose another folder by --out\n"
+    )
+    assert nocdyn.files("out") == journals
+
+
+def test_merged_parts_are_done_for_a_whole_sweep_too(nocdyn, discs):
+    for part in (1, 2):
+        nocdyn("sweep", discs, "--out", "out", "--shard", f"{part}/2")
+    nocdyn("merge", "out")
+    outcome = nocdyn("sweep", discs, "--out", "out", "--resume")
+    assert (outcome.returncode, outcome.stdout) == (0, f"{discs}: all 60 variants are done already; results in out\n")
+
+
 def test_a_damaged_journal_is_told_and_made_good(nocdyn, discs):
     process = start(nocdyn, "sweep", discs, "--out", "out", *LONG, "--threads", 1)
     process.send_signal(signal.SIGINT)
