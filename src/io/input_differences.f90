@@ -1,7 +1,7 @@
 !> What is different between two inputs, in sentences. Both are texts of `input_text`, in which every key has its value.
 !>
-!> The title and the directory of the results change no number and do not count. The order of named groups counts: sums are
-!> formed in it, so that their last bits depend on it.
+!> The directory of the results does not count. The title does, though it changes no number: files of a sweep carry it. The order
+!> of named groups counts: sums are formed in it, so that their last bits depend on it.
 module nocdyn_input_differences
   use nocdyn_mistakes, only: mistakes_t
   use nocdyn_namelist, only: assignment_t, namelist_t
@@ -138,7 +138,7 @@ contains
   pure logical function is_unimportant(label, key)
     character(len=*), intent(in) :: label, key
 
-    is_unimportant = (label == '&case' .and. key == 'title') .or. (label == '&output' .and. key == 'directory')
+    is_unimportant = label == '&output' .and. key == 'directory'
   end function is_unimportant
 
   !> Of lists of equal length the first place that differs is told, of others their values or lengths.
