@@ -41,7 +41,7 @@ contains
     real(wp) :: ends(2)
 
     ends = [low, high]
-    where (abs(0.5_wp * ends - 0.5_wp * mean) < 0.5_wp * farthest * deviation)   ! halves of huge numbers do not overflow
+    where (abs(0.5_wp * ends - 0.5_wp * mean) / farthest < 0.5_wp * deviation)   ! halves of huge numbers do not overflow
       ends = (ends - mean) / deviation
     else where
       ends = sign(farthest, 0.5_wp * ends - 0.5_wp * mean)

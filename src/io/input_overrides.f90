@@ -54,6 +54,7 @@ contains
     character(len=*), intent(in) :: text   !! before the equals sign
     type(override_t), intent(inout) :: override
     character(len=:), allocatable, intent(out) :: complaint
+    type(key_rule_t) :: rule
     type(path_t) :: path
 
     if (text == '') then
@@ -67,16 +68,15 @@ contains
     override%number = path%number
     override%assignment = path%place
     if (complaint /= '') return
-    associate (rule => key_rules(path%key_rule))
-      if (rule%kind == a_name) then
-        complaint = 'a name cannot be overridden: other groups refer to it'
-      else if (path%is_outside .and. rule%count == 1) then
-        complaint = trim(rule%name) // ' is a single value and takes no subscript'
-      else if (path%is_outside) then
-        complaint = 'the subscript of ' // trim(rule%name) // ' is out of range; allowed: 1 to ' // &
-                    to_text(merge(rule%count, longest_list, rule%count /= any_number))
-      end if
-    end associate
+    rule = key_rules(path%key_rule)
+    if (rule%kind == a_name) then
+      complaint = 'a name cannot be overridden: other groups refer to it'
+    else if (path%is_outside .and. rule%count == 1) then
+      complaint = trim(rule%name) // ' is a single value and takes no subscript'
+    else if (path%is_outside) then
+      complaint = 'the subscript of ' // trim(rule%name) // ' is out of range; allowed: 1 to ' // &
+                  to_text(merge(rule%count, longest_list, rule%count /= any_number))
+    end if
   end subroutine find_key
 
   !> A single text is taken as it stands if it has no quotes: the shell has eaten them.

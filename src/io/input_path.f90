@@ -85,7 +85,7 @@ contains
         // key_suggestion(path%group_rule, key)
     else if (open <= len(text)) then
       call read_subscript(text(open + 1:max(open, len(text) - 1)), path%place)
-      path%is_outside = path%place%is_damaged .and. is_whole_number(text(open + 1:max(open, len(text) - 1)))
+      if (path%place%is_damaged) path%is_outside = is_whole_number(text(open + 1:max(open, len(text) - 1)))
       if ((path%place%is_damaged .and. .not. path%is_outside) .or. text(len(text):) /= ')') complaint = text(open:) &
         // ' is neither a place such as (3) nor a section such as (1:3)'
     end if

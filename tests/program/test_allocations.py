@@ -1,6 +1,7 @@
 """No memory is allocated per step or per row: the number of allocations does not depend on how many there are."""
 
 import os
+import shutil
 import subprocess
 from itertools import product
 
@@ -24,6 +25,7 @@ def counter(tmp_path_factory):
 
 def allocations(nocdyn, counter, path, *overrides):
     file = nocdyn.folder / "allocations"
+    shutil.rmtree(nocdyn.folder / "out", ignore_errors=True)  # names that are there are read
     words = [word for override in overrides for word in ("--set", override)]
     environment = os.environ | {"LD_PRELOAD": str(counter), "ALLOCATIONS": str(file)}
     assert nocdyn("run", path, "--quiet", "--out", "out", *words, env=environment).returncode == 0
