@@ -7,7 +7,7 @@ extern "C" void *__real_malloc(std::size_t bytes);
 
 extern "C" void *__wrap_malloc(std::size_t bytes)
 {
-    constexpr std::size_t line = 64, smallest_array = 512;
+    constexpr std::size_t line = 64, smallest_array = 1024;
     if (bytes < smallest_array || bytes > std::size_t(-1) - line)
         return __real_malloc(bytes);
     return std::aligned_alloc(line, (bytes + line - 1) / line * line);
