@@ -119,20 +119,13 @@ contains
     associate (lanes => system%lanes)
       columns = padded_columns(lanes, system%states + system%quadratures)
       allocate (self%k(lanes, columns, self%places), self%zero(min(lanes * columns, strip)), source=0.0_wp)
-      call place_combinations(self, lanes * columns)
+      call set_offsets(self%inner, lanes * columns, self%places)
+      call set_offsets(self%update, lanes * columns, self%places)
+      call set_offsets(self%error, lanes * columns, self%places)
+      call set_offsets(self%coarse_error, lanes * columns, self%places)
+      call set_offsets(self%dense, lanes * columns, self%places)
     end associate
   end subroutine allocate_stages
-
-  elemental subroutine place_combinations(self, length)
-    type(stages_t), intent(inout) :: self
-    integer, intent(in) :: length   !! of a stage
-
-    call set_offsets(self%inner, length, self%places)
-    call set_offsets(self%update, length, self%places)
-    call set_offsets(self%error, length, self%places)
-    call set_offsets(self%coarse_error, length, self%places)
-    call set_offsets(self%dense, length, self%places)
-  end subroutine place_combinations
 
   !> The state that a stage is taken at, from the stages before it; a lane where it overflows is parked.
   pure subroutine inner_state(self, trial, stage, y)

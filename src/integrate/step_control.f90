@@ -88,7 +88,7 @@ contains
 
     small = 0
     do lane = 1, lanes
-      small = small + merge(1, 0, h(lane) <= 10 * max(epsilon(t) * abs(t(lane)), tiny(t)))
+      small = small + merge(1, 0, h(lane) <= smallest_step(t(lane)))
     end do
     any_too_small = small > 0
   end function any_too_small
@@ -121,7 +121,7 @@ contains
     real(wp) :: overshoot, rest, step
 
     rest = t_end - t
-    step = max(min(wish, longest), 10 * max(epsilon(t) * abs(t), tiny(t)))
+    step = max(min(wish, longest), smallest_step(t))
     overshoot = min((t + end_stretch * step) - t_end, longest - rest)
     h = merge(rest, step, overshoot >= 0)
     t_new = merge(t_end, t + step, overshoot >= 0)

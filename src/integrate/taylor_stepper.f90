@@ -95,7 +95,7 @@ contains
     if (.not. have_all_moved) then
       if (.not. any(self%moved .and. trial%working)) return
     end if
-    call copy(trial%length, trial%y, self%series)
+    self%series(:, :, 0) = trial%y
     call system%series(self%order, size(self%series, 2), trial%t, self%series, trial%status)
     ! what is infinite between these coefficients alone shows up in y_new
     are_finite = all_finite(2 * trial%length, self%series) .and. all_finite(2 * trial%length, self%series(1, 1, self%order - 1))
@@ -112,14 +112,6 @@ contains
     call take_steps(self, trial, control)
     trial%status(:) = evaluation_fine
   end subroutine plan
-
-  pure subroutine copy(n, x, y)
-    integer, intent(in) :: n
-    real(wp), intent(in) :: x(n)
-    real(wp), intent(inout) :: y(n)
-
-    y = x
-  end subroutine copy
 
   !> Where all lanes have moved and have good series.
   pure subroutine take_all_steps(lanes, steps, moved, verdict, culprit, evaluations, h)
