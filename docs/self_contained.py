@@ -2,8 +2,8 @@
 
 usage: self_contained.py SITE
 
-The copies come from the Debian packages libjs-bootstrap5, libjs-lunr and libjs-mathjax. Exit codes: 0 done, 1 the pages
-load something that this script does not know, 3 a package is missing; then the site is left as it is.
+The copies come from the Debian packages libjs-bootstrap5, libjs-lunr and libjs-mathjax (scripts/setup docs). Exit code 1: the pages load
+something that this script does not know, or a package is missing.
 """
 import os
 import pathlib
@@ -45,19 +45,18 @@ def localised(html, libraries):
 
 
 def main(site):
-    if not all((INSTALLED / part).exists() for part in COPIES):
-        return 3
+    missing = [part for part in COPIES if not (INSTALLED / part).exists()]
+    if missing:
+        sys.exit(f"self_contained.py: {INSTALLED / missing[0]} is missing; scripts/setup docs installs it")
     pages = list(site.rglob("*.html"))
     copy_libraries(site / "lib")
     for page in pages:
         try:
             html = localised(page.read_text(encoding="utf-8"), os.path.relpath(site / "lib", page.parent))
         except KeyError as unknown:
-            print(f"{page}: there is no copy of {unknown}", file=sys.stderr)
-            return 1
+            sys.exit(f"self_contained.py: {page} loads {unknown}, of which there is no copy")
         page.write_text(html, encoding="utf-8")
-    return 0
 
 
 if __name__ == "__main__":
-    sys.exit(main(pathlib.Path(sys.argv[1])))
+    main(pathlib.Path(sys.argv[1]))

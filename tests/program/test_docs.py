@@ -72,12 +72,17 @@ def test_files_that_pages_name_exist(page):
         assert (SOURCE / path).exists(), f"there is no {path}"
 
 
-@pytest.fixture(scope="module")
-def fill_pages():
-    description = importlib.util.spec_from_file_location("fill_pages", SOURCE / "docs" / "fill_pages.py")
+def script_of_docs(name):
+    """docs/NAME.py as a module."""
+    description = importlib.util.spec_from_file_location(name, SOURCE / "docs" / f"{name}.py")
     module = importlib.util.module_from_spec(description)
     description.loader.exec_module(module)
     return module
+
+
+@pytest.fixture(scope="module")
+def fill_pages():
+    return script_of_docs("fill_pages")
 
 
 @pytest.mark.parametrize("page", sorted(PAGES.glob("*.md")), ids=name_of)
@@ -185,3 +190,52 @@ def test_input_reference_has_the_groups_keys_and_defaults_of_the_help(nocdyn, re
         groups[section.split("`")[0]] = {(row[0], row[2].strip()) for row in rows}
     assert groups == keys_of_help(nocdyn("help", "input").stdout)
     assert len(groups) >= 9 and all(groups.values())
+
+
+@pytest.fixture(scope="module")
+def index(reference):
+    """A function that finds words in the guide as the search of the site does."""
+    search_index = script_of_docs("search_index")
+    pages = script_of_docs("stage_pages").staged_pages(reference)
+    documents = [section for name, text in pages.items() for section in search_index.sections_of(name, text)]
+    serialized = search_index.index_of(documents).serialize()
+    return lambda words: [document["url"] for document in search_index.search(serialized, documents, words)]
+
+
+@pytest.mark.parametrize(("words", "first"), [
+    ("planetary", "page/input.html#planetary"), ("planet", "page/input.html#planetary"), ("&gear", "page/input.html#gear"),
+    ("tolerances", "page/choosing-a-method.html#tolerances"), ("natural orthogonal complement", "page/theory.html#the-natural-orthogonal-complement-73-to-82"),
+])
+def test_search_finds_the_section_about_a_word_first(index, words, first):
+    assert index(words)[0] == first
+
+
+def test_search_takes_signs_for_no_operators(index):
+    assert index("planetary~ -gear: +(x^2*)") and index("?!") == []
+
+
+def test_site_gets_search_and_scripts_that_need_no_network(tmp_path):
+    """On a page as FORD writes it; the libraries are empty files here."""
+    search_index, self_contained = script_of_docs("search_index"), script_of_docs("self_contained")
+    self_contained.INSTALLED = tmp_path / "javascript"
+    for part in self_contained.COPIES:
+        (self_contained.INSTALLED / part).parent.mkdir(parents=True, exist_ok=True)
+        (self_contained.INSTALLED / part).write_text("")
+    site, pages = tmp_path / "site", tmp_path / "pages"
+    page = ('<html><link href="https://cdn.test/bootstrap.min.css" rel="stylesheet"\n integrity="sha384-x" crossorigin="anonymous">'
+            '<script src="https://cdn.test/MathJax.js?config=TeX-AMS-MML_HTMLorMML" async></script>'
+            '<div></div><!--/.nav-collapse --><h2 id="gaps">Gaps</h2></body></html>')
+    row = "<tr>\n<td><a href='../proc/find_gap.html'>find_gap</a></td>\n<td>x</td>\n<td><p>Where a <em>gap</em> opens.</p></td>\n</tr>"
+    for name, text in {"page/a.html": page, "search.html": page, "lists/procedures.html": row}.items():
+        (site / name).parent.mkdir(parents=True, exist_ok=True)
+        (site / name).write_text(text)
+    pages.mkdir()
+    (pages / "a.md").write_text("title: A\n\nOne.\n\n## Gaps\n\n```\n## no heading\n```\nTwo.\n")
+    search_index.main(site, pages)
+    self_contained.main(site)
+    linked = (site / "page" / "a.html").read_text()
+    assert "https://" not in linked and 'href="../lib/bootstrap5/css/bootstrap.min.css"' in linked and 'action="../search.html"' in linked
+    for script in re.findall(r'src="([^"?]+)', (site / "search.html").read_text()):
+        assert (site / script).exists(), script
+    data = (site / "search" / "index.js").read_text()
+    assert '"url":"page/a.html#gaps"' in data and "no heading Two." in data and '"text":"Where a gap opens."' in data
