@@ -3,9 +3,10 @@ import importlib.util
 import os
 import re
 import subprocess
+from pathlib import Path
 
 import pytest
-from conftest import SOURCE
+from conftest import SOURCE, TRAPS_EXCEPTIONS
 
 PAGES = SOURCE / "docs" / "pages"
 TOP_PAGES = [SOURCE / name for name in ("README.md", "CONTRIBUTING.md", "CHANGELOG.md")]
@@ -239,3 +240,33 @@ def test_site_gets_search_and_scripts_that_need_no_network(tmp_path):
         assert (site / script).exists(), script
     data = (site / "search" / "index.js").read_text()
     assert '"url":"page/a.html#gaps"' in data and "no heading Two." in data and '"text":"Where a gap opens."' in data
+
+
+@pytest.fixture(scope="module")
+def sessions():
+    return script_of_docs("sessions")
+
+
+@pytest.mark.skipif(TRAPS_EXCEPTIONS, reason="the sweeps take minutes in debug")
+@pytest.mark.skipif(not (Path(os.environ["NOCDYN"]).parent / "nocdyn-sweep").exists(), reason="built without sweeps")
+@pytest.mark.parametrize("page", [PAGES / "tutorial.md"], ids=name_of)
+def test_commands_of_a_page_print_what_it_shows(page, sessions, tmp_path):
+    environment = sessions.make_folder(tmp_path, os.environ["NOCDYN"])
+    commands = sessions.sessions_of(page)
+    assert len(commands) >= 4
+    for command, shown in commands:
+        seen = sessions.output_of(command, tmp_path, environment)
+        assert sessions.is_same(shown, seen), f"$ {command}\n{seen}"
+
+
+def test_outputs_differ_in_words_and_numbers_but_not_in_times_and_rounding(sessions):
+    shown = "pump: done, speed 147.6823 rad/s, rest 2.9e-11 J, 25.6 ms (1660 per second)\n"
+    assert sessions.is_same(shown, "pump: done, speed  147.6824 rad/s, rest -1.1e-12 J, 1.2 ms (9 per second)\n")
+    assert not sessions.is_same(shown, shown.replace("147.6823", "147.7823"))
+    assert not sessions.is_same(shown, shown.replace("done", "failed"))
+
+
+def test_sessions_are_read_with_long_commands_and_outputs(sessions, tmp_path):
+    page = tmp_path / "page.md"
+    page.write_text("```\n$ nocdyn run \\\n  a.nml\none\ntwo\n$ ls\n```\n```\nnocdyn new a.nml\n```\n```text\n$ cat a\nthree\n```\n")
+    assert sessions.sessions_of(page) == [("nocdyn run \\\n  a.nml", "one\ntwo\n"), ("ls", ""), ("cat a", "three\n")]
