@@ -11,7 +11,7 @@ A place lies between <!-- fill: WHAT --> and <!-- filled -->, where WHAT is
   bench             what stands before the sections
   picture NAME      the same folder's picture NAME.svg, copied to docs/media
 
-Without pages: all of docs/pages. Names the pages that it changes. Exit codes: 0 done, 1 something asked for is not there.
+Without pages: README.md and all of docs/pages. Names the pages that it changes. Exit codes: 0 done, 1 something asked for is not there.
 """
 import argparse
 import re
@@ -96,7 +96,7 @@ def main():
         parser.add_argument(option, type=Path)
     parser.add_argument("pages", nargs="*", type=Path)
     arguments = parser.parse_args()
-    for page in arguments.pages or sorted((ROOT / "docs" / "pages").glob("*.md")):
+    for page in arguments.pages or [ROOT / "README.md", *sorted((ROOT / "docs" / "pages").glob("*.md"))]:
         text = page.read_text(encoding="utf-8")
         try:
             new = filled(text, arguments.examples, arguments.tables, arguments.bench)

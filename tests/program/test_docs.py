@@ -86,7 +86,7 @@ def fill_pages():
     return script_of_docs("fill_pages")
 
 
-@pytest.mark.parametrize("page", sorted(PAGES.glob("*.md")), ids=name_of)
+@pytest.mark.parametrize("page", DOCUMENTS, ids=name_of)
 def test_pages_quote_files_as_they_are(page, fill_pages):
     text = page.read_text(encoding="utf-8")
     assert fill_pages.filled(text) == text, "scripts/docs --refresh puts the files into the pages"
@@ -249,7 +249,7 @@ def sessions():
 
 @pytest.mark.skipif(TRAPS_EXCEPTIONS, reason="the sweeps take minutes in debug")
 @pytest.mark.skipif(not (Path(os.environ["NOCDYN"]).parent / "nocdyn-sweep").exists(), reason="built without sweeps")
-@pytest.mark.parametrize("page", [PAGES / "tutorial.md"], ids=name_of)
+@pytest.mark.parametrize("page", [SOURCE / "README.md", PAGES / "tutorial.md"], ids=name_of)
 def test_commands_of_a_page_print_what_it_shows(page, sessions, tmp_path):
     environment = sessions.make_folder(tmp_path, os.environ["NOCDYN"])
     commands = sessions.sessions_of(page)
