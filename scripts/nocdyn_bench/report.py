@@ -104,7 +104,7 @@ def _release_flags(build: Path) -> str:
     if not ninja.exists():
         return "unknown"
     text = ninja.read_text(encoding="utf-8")
-    place = text.find("build src/CMakeFiles/nocdyn.dir/integrate/integration.f90.o:")
+    place = text.find("build src/CMakeFiles/nocdyn.dir/integrate/driver/integration.f90.o:")
     return next((line.partition("=")[2].strip() for line in text[place:].splitlines() if line.startswith("  FLAGS =")), "unknown")
 
 
