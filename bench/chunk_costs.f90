@@ -5,77 +5,77 @@
 !> Computes VARIANTS of the sweep in INPUT in chunks of CHUNK with one thread, writes them to a journal in FOLDER, and prints one
 !> JSON object: seconds of the computation, of the journal and of the hand-out, bytes of a chunk, steps of all variants, and the
 !> lanes of the block.
-module counting_dispatcher
+module counting_scheduler
   use nocdyn_kinds, only: wp
-  use nocdyn_dispatcher, only: dispatcher_t
+  use nocdyn_scheduler, only: scheduler_t
   use nocdyn_sweep_chunk, only: chunk_t
   implicit none (type, external)
   private
 
   !> Hands out chunks of one size and forgets the results.
-  type, extends(dispatcher_t), public :: counting_dispatcher_t
+  type, extends(scheduler_t), public :: counting_scheduler_t
     integer :: size = 1    !! of a chunk
     integer :: left = 0    !! variants
     integer :: first = 1   !! of the next chunk
   contains
-    procedure :: hand_out
-    procedure :: take
-    procedure :: attend
-    procedure :: conclude
-    procedure :: is_over
-  end type counting_dispatcher_t
+    procedure :: next_chunk
+    procedure :: submit
+    procedure :: poll
+    procedure :: finalise
+    procedure :: is_cancelled
+  end type counting_scheduler_t
 
 contains
 
-  subroutine hand_out(self, first, count)
-    class(counting_dispatcher_t), intent(inout) :: self
+  subroutine next_chunk(self, first, count)
+    class(counting_scheduler_t), intent(inout) :: self
     integer, intent(out) :: first, count
 
     first = self%first
     count = min(self%size, self%left)
     self%first = first + count
     self%left = self%left - count
-  end subroutine hand_out
+  end subroutine next_chunk
 
-  subroutine take(self, chunk, seconds)
-    class(counting_dispatcher_t), intent(inout) :: self
+  subroutine submit(self, chunk, seconds)
+    class(counting_scheduler_t), intent(inout) :: self
     type(chunk_t), intent(in) :: chunk
     real(wp), intent(in) :: seconds
 
     if (chunk%count > self%size .or. seconds < 0) error stop 'counting_dispatcher: a chunk that was not handed out'
-  end subroutine take
+  end subroutine submit
 
-  subroutine attend(self)
-    class(counting_dispatcher_t), intent(inout) :: self
+  subroutine poll(self)
+    class(counting_scheduler_t), intent(inout) :: self
 
     if (self%left < 0) error stop 'counting_dispatcher: more was handed out than there is'
-  end subroutine attend
+  end subroutine poll
 
-  subroutine conclude(self)
-    class(counting_dispatcher_t), intent(inout) :: self
+  subroutine finalise(self)
+    class(counting_scheduler_t), intent(inout) :: self
 
     if (self%left > 0) error stop 'counting_dispatcher: something is left'
-  end subroutine conclude
+  end subroutine finalise
 
-  logical function is_over(self)
-    class(counting_dispatcher_t), intent(in) :: self
+  logical function is_cancelled(self)
+    class(counting_scheduler_t), intent(in) :: self
 
-    is_over = self%size < 1
-  end function is_over
+    is_cancelled = self%size < 1
+  end function is_cancelled
 
-end module counting_dispatcher
+end module counting_scheduler
 
 program chunk_costs
   use, intrinsic :: iso_fortran_env, only: error_unit
   use contest, only: seconds_now, text_argument, whole_argument
-  use counting_dispatcher, only: counting_dispatcher_t
+  use counting_scheduler, only: counting_scheduler_t
   use nocdyn_errors, only: error_t
   use nocdyn_input, only: input_t
   use nocdyn_input_reader, only: read_input
   use nocdyn_kinds, only: wp
   use nocdyn_sweep_block, only: new_sweep_block, sweep_block_t
   use nocdyn_sweep_chunk, only: chunk_t, pack_chunk
-  use nocdyn_sweep_headers, only: new_sweep_header
+  use nocdyn_plan_header, only: new_sweep_header
   use nocdyn_sweep_journal, only: create_journal, sweep_journal_t
   use nocdyn_sweep_plan, only: make_plan, sweep_plan_t
   use nocdyn_sweep_setup, only: prepare_sweep, sweep_setup_t
@@ -86,7 +86,7 @@ program chunk_costs
   type(sweep_setup_t) :: setup
   type(sweep_block_t), allocatable, target :: block
   type(sweep_journal_t) :: journal
-  type(counting_dispatcher_t), target :: dispatcher
+  type(counting_scheduler_t), target :: scheduler
   type(chunk_t) :: chunk
   real(wp) :: computing, writing, handing
   integer :: bytes, steps
@@ -107,11 +107,11 @@ contains
     if (.not. allocated(error)) call make_plan(input, plan, error)
     if (.not. allocated(error)) call prepare_sweep(plan, setup, error)
     if (allocated(error)) call give_up(error%message)
-    dispatcher%left = whole_argument(2)
-    dispatcher%size = whole_argument(3)
-    call dispatcher%open()
+    scheduler%left = whole_argument(2)
+    scheduler%size = whole_argument(3)
+    call scheduler%create_lock()
     allocate (block)
-    call new_sweep_block(plan, setup, dispatcher, block, error)
+    call new_sweep_block(plan, setup, scheduler, block, error)
     if (.not. allocated(error)) then
       call create_journal(text_argument(4), 'sweep.journal', new_sweep_header(plan, 1, 1), journal, error)
     end if
@@ -132,9 +132,9 @@ contains
     steps = 0
     do
       began = seconds_now()
-      call dispatcher%enter()
-      call dispatcher%hand_out(first, count)
-      call dispatcher%leave()
+      call scheduler%lock()
+      call scheduler%next_chunk(first, count)
+      call scheduler%unlock()
       handing = handing + seconds_now() - began
       if (count == 0) exit
       began = seconds_now()
@@ -150,8 +150,8 @@ contains
       bytes = len(packed)
     end do
     call journal%remove()
-    call dispatcher%conclude()
-    call dispatcher%close()
+    call scheduler%finalise()
+    call scheduler%destroy_lock()
   end subroutine measure
 
   subroutine give_up(message)

@@ -6,7 +6,7 @@ program classic_digits
   use nocdyn_classic_problems, only: classic_count, make_classic_problem
   use nocdyn_classic_runs, only: classic_methods, solve_classic, suits
   use nocdyn_kinds, only: wp
-  use nocdyn_outcome, only: outcome_t
+  use nocdyn_solver_status, only: solver_status_t
   implicit none (type, external)
 
   integer, parameter :: first = 3, last = 12      ! tolerances are 10**(-first) to 10**(-last)
@@ -33,7 +33,7 @@ contains
     character(len=*), intent(in) :: method_name
     integer, intent(inout) :: rows
     class(classic_problem_t), allocatable :: problem
-    type(outcome_t) :: outcome
+    type(solver_status_t) :: solver_status
     real(wp) :: error
     integer :: i
 
@@ -43,9 +43,9 @@ contains
     digits(rows) = '| ' // problem%name // ' | `' // method_name // '` |'
     prices(rows) = digits(rows)
     do i = first, last
-      call solve_classic(problem, method_name, 10.0_wp**(-i), error, outcome)
+      call solve_classic(problem, method_name, 10.0_wp**(-i), error, solver_status)
       digits(rows) = trim(digits(rows)) // digits_cell(error)
-      if (any(priced == i)) prices(rows) = trim(prices(rows)) // price_cell(outcome)
+      if (any(priced == i)) prices(rows) = trim(prices(rows)) // price_cell(solver_status)
     end do
   end subroutine add_row
 
@@ -60,12 +60,13 @@ contains
     cell = number // ' |'
   end function digits_cell
 
-  pure function price_cell(outcome) result(cell)
-    type(outcome_t), intent(in) :: outcome
+  pure function price_cell(solver_status) result(cell)
+    type(solver_status_t), intent(in) :: solver_status
     character(len=:), allocatable :: cell
     character(len=40) :: numbers
 
-    write (numbers, '(i0, " / ", i0, " / ", i0)') outcome%steps(1), outcome%evaluations(1), outcome%factorisations(1)
+    write (numbers, '(i0, " / ", i0, " / ", i0)') solver_status%steps(1), solver_status%evaluations(1), &
+      solver_status%factorisations(1)
     cell = ' ' // trim(numbers) // ' |'
   end function price_cell
 

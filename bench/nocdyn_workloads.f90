@@ -10,13 +10,13 @@ module kept_states
     real(wp), allocatable :: y(:, :)   !! [components, outputs]
     integer :: outputs = 0
   contains
-    procedure :: record
-    procedure :: stops
+    procedure :: on_output
+    procedure :: wants_stop
   end type keeper_t
 
 contains
 
-  subroutine record(self, lane, t, y)
+  subroutine on_output(self, lane, t, y)
     class(keeper_t), intent(inout) :: self
     integer, intent(in) :: lane
     real(wp), intent(in) :: t
@@ -26,15 +26,15 @@ contains
     self%outputs = self%outputs + 1
     self%t(self%outputs) = t
     self%y(:, self%outputs) = y
-  end subroutine record
+  end subroutine on_output
 
-  function stops(self, t)
+  function wants_stop(self, t)
     class(keeper_t), intent(inout) :: self
     real(wp), intent(in) :: t
-    logical :: stops
+    logical :: wants_stop
 
-    stops = self%outputs == size(self%t) .and. t < self%t(1)
-  end function stops
+    wants_stop = self%outputs == size(self%t) .and. t < self%t(1)
+  end function wants_stop
 
 end module kept_states
 
@@ -56,7 +56,7 @@ program nocdyn_workloads
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
   use nocdyn_methods, only: method_names
-  use nocdyn_outcome, only: failure_sentence, integration_done, outcome_t
+  use nocdyn_solver_status, only: failure_message, integration_done, solver_status_t
   use nocdyn_output_times, only: output_times
   use nocdyn_text, only: string_t
   implicit none (type, external)
@@ -85,7 +85,7 @@ contains
     if (.not. allocated(error)) call assemble_machine(input, machine, error)
     if (allocated(error)) call give_up(error%message)
     run = input%single('run')
-    call new_formulation(run%text('formulation'), machine, formulation, audited=.false.)
+    call new_formulation(run%text('formulation'), machine, formulation, with_energy_balance=.false.)
     times = output_times(input)
     settings%method = text_argument(2)
     settings%rtol = number_argument(3)
@@ -95,7 +95,7 @@ contains
 
   subroutine measure()
     type(keeper_t) :: keeper
-    type(outcome_t) :: outcome
+    type(solver_status_t) :: solver_status
     type(error_t), allocatable :: error
     real(wp), allocatable :: y(:, :), seconds(:)
     integer :: i
@@ -106,15 +106,15 @@ contains
       y = formulation%start()
       keeper%outputs = 0
       seconds(i) = seconds_now()
-      call integrate(formulation, settings, times, y, keeper, outcome, error)
+      call integrate(formulation, settings, times, y, keeper, solver_status, error)
       seconds(i) = seconds_now() - seconds(i)
       if (allocated(error)) call give_up(error%message)
-      if (outcome%status(1) /= integration_done) then
-        call give_up(failure_sentence(outcome, 1, formulation, settings%rtol, settings%atol))
+      if (solver_status%code(1) /= integration_done) then
+        call give_up(failure_message(solver_status, 1, formulation, settings%rtol, settings%atol))
       end if
     end do
     call write_states(text_argument(6), states_of_bodies(keeper))
-    call print_report(seconds, outcome%steps(1), outcome%evaluations(1))
+    call print_report(seconds, solver_status%steps(1), solver_status%evaluations(1))
   end subroutine measure
 
   !> omega and phi of all bodies, [2 bodies, outputs].
@@ -126,7 +126,7 @@ contains
     associate (bodies => formulation%machine%bodies)
       allocate (states(2 * bodies, keeper%outputs))
       do i = 1, keeper%outputs
-        call formulation%place(reshape(keeper%y(:, i), [1, size(keeper%y, 1)]))
+        call formulation%set_state(reshape(keeper%y(:, i), [1, size(keeper%y, 1)]))
         states(:bodies, i) = formulation%omega(1, 1:)
         states(bodies + 1:, i) = formulation%phi(1, 1:)
       end do

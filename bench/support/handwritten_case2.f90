@@ -36,7 +36,7 @@ module handwritten_case2
                          d6 = -1453857185.0_wp / 822651844.0_wp, d7 = 69997945.0_wp / 29380423.0_wp
 
   real(wp), parameter :: safety = 0.9_wp, beta = 0.04_wp, exponent = 0.2_wp - 0.75_wp * beta
-  real(wp), parameter :: least_change = 0.2_wp, most_change = 10.0_wp, least_error = 1.0e-4_wp
+  real(wp), parameter :: min_factor = 0.2_wp, most_change = 10.0_wp, least_error = 1.0e-4_wp
   real(wp), parameter :: near = 1.0e-5_wp   ! of theta: the twist is flat where its rate is zero
 
   type, public :: variant_t
@@ -46,14 +46,14 @@ module handwritten_case2
   end type variant_t
 
   !> A run on its way: the step at work and what the controller remembers.
-  type :: march_t
+  type :: integrator_t
     real(wp) :: t, h, error, old_error
     real(wp), dimension(4) :: y, y_new, k1, k3, k4, k5, k6, k7
     real(wp) :: rtol, atol
     logical :: was_rejected
     integer :: steps         ! attempts
     integer :: evaluations
-  end type march_t
+  end type integrator_t
 
 contains
 
@@ -94,7 +94,7 @@ contains
     real(wp), intent(out) :: states(4, outputs)
     integer, intent(out) :: steps         !! attempts
     integer, intent(out) :: evaluations
-    type(march_t) :: march
+    type(integrator_t) :: march
     integer :: next
 
     call begin(variant, rtol, atol, march)
@@ -118,7 +118,7 @@ contains
     real(wp), intent(out) :: peak         !! [N m]
     integer, intent(out) :: steps         !! attempts
     integer, intent(out) :: evaluations
-    type(march_t) :: march
+    type(integrator_t) :: march
     real(wp) :: twist   ! the largest |twist| so far: the moment grows with it
 
     call begin(variant, rtol, atol, march)
@@ -138,7 +138,7 @@ contains
   pure subroutine begin(variant, rtol, atol, march)
     type(variant_t), intent(in) :: variant
     real(wp), intent(in) :: rtol, atol
-    type(march_t), intent(out) :: march
+    type(integrator_t), intent(out) :: march
 
     march%t = 0.0_wp
     march%y = 0.0_wp
@@ -155,7 +155,7 @@ contains
   !> Until a step is accepted; y and t still are those of its start.
   pure subroutine step(variant, march)
     type(variant_t), intent(in) :: variant
-    type(march_t), intent(inout) :: march
+    type(integrator_t), intent(inout) :: march
     real(wp) :: k2(4), scales(4), error, change
 
     associate (t => march%t, h => march%h, y => march%y, y_new => march%y_new, k1 => march%k1, k3 => march%k3, &
@@ -176,7 +176,7 @@ contains
         error = sqrt(0.25_wp * sum((h * (e1 * k1 + e3 * k3 + e4 * k4 + e5 * k5 + e6 * k6 + e7 * k7) / scales)**2))
         if (error <= 1.0_wp) exit
         change = safety * max(error, 1.0e-30_wp)**(-exponent)
-        h = h * max(least_change, change)
+        h = h * max(min_factor, change)
         march%was_rejected = .true.
       end do
     end associate
@@ -185,12 +185,12 @@ contains
 
   !> To the end of the accepted step, and the size of the next one.
   pure subroutine go_on(march)
-    type(march_t), intent(inout) :: march
+    type(integrator_t), intent(inout) :: march
     real(wp) :: change
 
     march%t = march%t + march%h
     change = safety * max(march%error, 1.0e-30_wp)**(-exponent) * march%old_error**beta
-    change = min(max(least_change, change), most_change)
+    change = min(max(min_factor, change), most_change)
     if (march%was_rejected) change = min(change, 1.0_wp)
     march%h = march%h * change
     march%old_error = max(march%error, least_error)
@@ -201,7 +201,7 @@ contains
 
   !> The states at the outputs within a step, by the polynomial of CONTD5 in powers of theta.
   pure subroutine interpolate(march, next, states)
-    type(march_t), intent(in) :: march
+    type(integrator_t), intent(in) :: march
     integer, intent(inout) :: next   !! output
     real(wp), intent(inout) :: states(4, outputs)
     real(wp) :: p(4, 0:4), theta, over_h
@@ -218,7 +218,7 @@ contains
 
   !> The twist where its rate is zero in a step whose ends have rates of different signs, by bisection and Newton's method.
   pure function extreme_twist(march) result(twist)
-    type(march_t), intent(in) :: march
+    type(integrator_t), intent(in) :: march
     real(wp) :: twist
     real(wp) :: p(4, 0:4), rate(0:4), theta, low, high, value, change
     integer :: i
@@ -246,7 +246,7 @@ contains
 
   !> Coefficients of the dense output in powers of theta, 0 at the start of the step and 1 at its end.
   pure function polynomial(march) result(p)
-    type(march_t), intent(in) :: march
+    type(integrator_t), intent(in) :: march
     real(wp) :: p(4, 0:4)
     real(wp), dimension(4) :: rise, bend
 

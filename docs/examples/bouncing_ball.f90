@@ -11,7 +11,7 @@ module ball
   type, extends(sampler_t), public :: ground_t
   contains
     procedure :: event_values
-    procedure :: happen
+    procedure :: on_event
   end type ground_t
 
 contains
@@ -36,7 +36,7 @@ contains
     g(1) = y(1)
   end subroutine event_values
 
-  subroutine happen(self, lane, event, t, y, is_terminal)
+  subroutine on_event(self, lane, event, t, y, is_terminal)
     class(ground_t), intent(inout) :: self
     integer, intent(in) :: lane
     integer, intent(in) :: event
@@ -45,7 +45,7 @@ contains
     logical, intent(out) :: is_terminal
 
     is_terminal = .true.
-  end subroutine happen
+  end subroutine on_event
 
 end module ball
 
@@ -56,7 +56,7 @@ program bouncing_ball
   use nocdyn_integration, only: integrate
   use nocdyn_integration_settings, only: integration_settings_t
   use nocdyn_kinds, only: wp
-  use nocdyn_outcome, only: failure_sentence, integration_done, integration_stopped, outcome_t
+  use nocdyn_solver_status, only: failure_message, integration_done, integration_stopped, solver_status_t
   use nocdyn_plain_system, only: plain_system, plain_system_t
   use nocdyn_sampler, only: sampler
   use nocdyn_system, only: event_falling
@@ -65,7 +65,7 @@ program bouncing_ball
   type(integration_settings_t), parameter :: settings = integration_settings_t(method='rk853', rtol=1.0e-10_wp, atol=1.0e-10_wp)
   type(plain_system_t) :: system
   type(ground_t) :: ground
-  type(outcome_t) :: outcome
+  type(solver_status_t) :: solver_status
   type(error_t), allocatable :: error
   real(wp) :: t, y(1, 2)
 
@@ -75,11 +75,12 @@ program bouncing_ball
   do
     ground%sampler_t = sampler(1, 2, 2)
     ground%directions = [event_falling]
-    call integrate(system, settings, [t, t_end], y, ground, outcome, error)
+    call integrate(system, settings, [t, t_end], y, ground, solver_status, error)
     if (allocated(error)) error stop error%message
-    t = outcome%t(1)
-    if (outcome%status(1) == integration_done) exit
-    if (outcome%status(1) /= integration_stopped) error stop failure_sentence(outcome, 1, system, settings%rtol, settings%atol)
+    t = solver_status%t(1)
+    if (solver_status%code(1) == integration_done) exit
+    if (solver_status%code(1) /= integration_stopped) error stop failure_message(solver_status, 1, system, settings%rtol, &
+                                                                                 settings%atol)
     print '("ground at t =", f10.7, " s with", f11.7, " m/s")', t, y(1, 2)
     y(1, :) = [0.0_wp, -restitution * y(1, 2)]
   end do

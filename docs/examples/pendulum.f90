@@ -1,7 +1,7 @@
 !> Rods without friction that swing about their ends, one in each lane: phi'' = -omega_0^2 sin(phi).
 module pendulum
   use nocdyn_kinds, only: wp
-  use nocdyn_system, only: evaluation_give_up, pattern_t, system_t
+  use nocdyn_system, only: evaluation_fatal, pattern_t, system_t
   use nocdyn_vector_functions, only: cosines, sines
   implicit none (type, external)
   private
@@ -46,7 +46,7 @@ contains
       dydt(lane, 2) = -self%omega_0(lane)**2 * self%x(lane)
       dydt(lane, 3) = y(lane, 2)**2
     end do
-    where (self%omega_0 <= 0) status = evaluation_give_up
+    where (self%omega_0 <= 0) status = evaluation_fatal
   end subroutine derivative
 
   !> The values at the positions of `jacobian_pattern`, in their order.

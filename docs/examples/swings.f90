@@ -1,8 +1,8 @@
 !> One swing of each pendulum, forth and back: how long it takes and how fast it gets.
 module swings
   use nocdyn_kinds, only: wp
-  use nocdyn_outcome, only: integration_stopped, outcome_t
-  use nocdyn_queue, only: queue_t
+  use nocdyn_solver_status, only: integration_stopped, solver_status_t
+  use nocdyn_ensemble, only: ensemble_t
   use nocdyn_system, only: event_falling, observer_t, ranges_t, system_t
   use pendulum, only: pendulum_t
   implicit none (type, external)
@@ -14,15 +14,15 @@ module swings
   type, extends(observer_t), public :: swing_watcher_t
     type(ranges_t), allocatable :: ranges(:)   !! of the last variant in each lane
   contains
-    procedure :: record
+    procedure :: on_output
     procedure :: event_values
-    procedure :: happen
+    procedure :: on_event
     procedure :: tracked_values
-    procedure :: take_ranges
+    procedure :: on_extremes
   end type swing_watcher_t
 
   !> Variant i starts at rest. What is not found stays 0.
-  type, extends(queue_t), public :: swing_queue_t
+  type, extends(ensemble_t), public :: swing_queue_t
     real(wp), allocatable :: amplitude(:)      !! [rad], [variants]
     real(wp), allocatable :: omega_0(:)
     real(wp), allocatable :: period(:), highest_speed(:), integral(:)
@@ -46,12 +46,12 @@ contains
   end function swing_watcher
 
   !> The states at the requested times are not needed.
-  subroutine record(self, lane, t, y)
+  subroutine on_output(self, lane, t, y)
     class(swing_watcher_t), intent(inout) :: self
     integer, intent(in) :: lane
     real(wp), intent(in) :: t
     real(wp), contiguous, intent(in) :: y(:)
-  end subroutine record
+  end subroutine on_output
 
   subroutine event_values(self, lane, t, y, g)
     class(swing_watcher_t), intent(inout) :: self
@@ -63,7 +63,7 @@ contains
     g(1) = y(2)
   end subroutine event_values
 
-  subroutine happen(self, lane, event, t, y, is_terminal)
+  subroutine on_event(self, lane, event, t, y, is_terminal)
     class(swing_watcher_t), intent(inout) :: self
     integer, intent(in) :: lane
     integer, intent(in) :: event
@@ -72,7 +72,7 @@ contains
     logical, intent(out) :: is_terminal
 
     is_terminal = .true.
-  end subroutine happen
+  end subroutine on_event
 
   subroutine tracked_values(self, lane, t, y, values)
     class(swing_watcher_t), intent(inout) :: self
@@ -84,27 +84,27 @@ contains
     values(1) = y(2)
   end subroutine tracked_values
 
-  subroutine take_ranges(self, lane, ranges)
+  subroutine on_extremes(self, lane, ranges)
     class(swing_watcher_t), intent(inout) :: self
     integer, intent(in) :: lane
     type(ranges_t), intent(in) :: ranges
 
     self%ranges(lane) = ranges
-  end subroutine take_ranges
+  end subroutine on_extremes
 
-  function swing_queue(amplitude, omega_0, lanes, watcher) result(queue)
+  function swing_queue(amplitude, omega_0, lanes, watcher) result(ensemble)
     real(wp), intent(in) :: amplitude(:), omega_0(:)
     integer, intent(in) :: lanes
     type(swing_watcher_t), target, intent(in) :: watcher
-    type(swing_queue_t) :: queue
+    type(swing_queue_t) :: ensemble
 
-    allocate (queue%amplitude, source=amplitude)
-    allocate (queue%omega_0, source=omega_0)
+    allocate (ensemble%amplitude, source=amplitude)
+    allocate (ensemble%omega_0, source=omega_0)
     associate (variants => size(amplitude))
-      allocate (queue%period(variants), queue%highest_speed(variants), queue%integral(variants), source=0.0_wp)
+      allocate (ensemble%period(variants), ensemble%highest_speed(variants), ensemble%integral(variants), source=0.0_wp)
     end associate
-    allocate (queue%variant(lanes), source=0)
-    queue%watcher => watcher
+    allocate (ensemble%variant(lanes), source=0)
+    ensemble%watcher => watcher
   end function swing_queue
 
   subroutine next(self, system, lane, t, y, found)
@@ -128,15 +128,15 @@ contains
     end select
   end subroutine next
 
-  subroutine finish(self, lane, y, outcome)
+  subroutine finish(self, lane, y, solver_status)
     class(swing_queue_t), intent(inout) :: self
     integer, intent(in) :: lane
     real(wp), contiguous, intent(in) :: y(:)
-    type(outcome_t), intent(in) :: outcome
+    type(solver_status_t), intent(in) :: solver_status
 
-    if (outcome%status(lane) /= integration_stopped) return
+    if (solver_status%code(lane) /= integration_stopped) return
     associate (variant => self%variant(lane))
-      self%period(variant) = outcome%t(lane)
+      self%period(variant) = solver_status%t(lane)
       self%highest_speed(variant) = self%watcher%ranges(lane)%highest(1)
       self%integral(variant) = y(3)
     end associate

@@ -16,9 +16,9 @@ module room
   contains
     procedure :: derivative
     procedure :: jacobian
-    procedure :: enter
-    procedure :: switch_values
-    procedure :: cross
+    procedure :: start_lane
+    procedure :: indicator_values
+    procedure :: change_branch
     procedure :: switch_name
   end type room_t
 
@@ -56,16 +56,16 @@ contains
     dfdt(:, :) = 0.0_wp
   end subroutine jacobian
 
-  subroutine enter(self, lane, t, y)
+  subroutine start_lane(self, lane, t, y)
     class(room_t), intent(inout) :: self
     integer, intent(in) :: lane
     real(wp), intent(in) :: t
     real(wp), contiguous, intent(in) :: y(:)
 
     self%is_on(lane) = y(1) < highest
-  end subroutine enter
+  end subroutine start_lane
 
-  subroutine switch_values(self, lane, t, y, g)
+  subroutine indicator_values(self, lane, t, y, g)
     class(room_t), intent(inout) :: self
     integer, intent(in) :: lane
     real(wp), intent(in) :: t
@@ -73,9 +73,9 @@ contains
     real(wp), contiguous, intent(inout) :: g(:)
 
     g(1) = merge(highest - y(1), y(1) - lowest, self%is_on(lane))
-  end subroutine switch_values
+  end subroutine indicator_values
 
-  subroutine cross(self, lane, which, t, y)
+  subroutine change_branch(self, lane, which, t, y)
     class(room_t), intent(inout) :: self
     integer, intent(in) :: lane
     integer, intent(in) :: which
@@ -83,7 +83,7 @@ contains
     real(wp), contiguous, intent(in) :: y(:)
 
     self%is_on(lane) = .not. self%is_on(lane)
-  end subroutine cross
+  end subroutine change_branch
 
   function switch_name(self, which) result(name)
     class(room_t), intent(in) :: self
@@ -101,7 +101,7 @@ program thermostat
   use nocdyn_integration, only: integrate
   use nocdyn_integration_settings, only: integration_settings_t
   use nocdyn_kinds, only: wp
-  use nocdyn_outcome, only: failure_sentence, integration_done, outcome_t
+  use nocdyn_solver_status, only: failure_message, integration_done, solver_status_t
   use nocdyn_system, only: observer_t
   use room, only: heated_room, heating, highest, lowest, outside, room_t, slowness
   implicit none (type, external)
@@ -109,17 +109,18 @@ program thermostat
   type(integration_settings_t), parameter :: settings = integration_settings_t(rtol=1.0e-11_wp, atol=1.0e-11_wp)
   type(room_t) :: system
   type(observer_t) :: nobody
-  type(outcome_t) :: outcome
+  type(solver_status_t) :: solver_status
   type(error_t), allocatable :: error
   real(wp) :: y(1, 1), first, cooling, warming, rest
 
   system = heated_room(1)
   y = start
-  call integrate(system, settings, [0.0_wp, day], y, nobody, outcome, error)
+  call integrate(system, settings, [0.0_wp, day], y, nobody, solver_status, error)
   if (allocated(error)) error stop error%message
-  if (outcome%status(1) /= integration_done) error stop failure_sentence(outcome, 1, system, settings%rtol, settings%atol)
+  if (solver_status%code(1) /= integration_done) error stop failure_message(solver_status, 1, system, settings%rtol, &
+                                                                            settings%atol)
   print '("after a day", f14.9, " C, the heater was switched ", i0, " times in ", i0, " steps")', &
-    y, outcome%crossings(1), outcome%accepted(1)
+    y, solver_status%crossings(1), solver_status%accepted(1)
 
   first = slowness * log((hot - start) / (hot - highest))
   cooling = slowness * log((highest - outside) / (lowest - outside))

@@ -16,7 +16,7 @@ VARIANTS = 16384  # integrated for one number
 FEW, MORE = 64, 192  # variants that are integrated while instructions are counted; the difference counts
 CHUNKS = (1, 4, 16, 64, 256, 1024, 4096)
 MESSAGES = 300
-CHUNK_SECONDS, MOST_AT_ONCE = 0.2, 8192  # what nocdyn aims at, src/analyse/sweep/engine/sweep_ledger.f90
+CHUNK_SECONDS, MOST_AT_ONCE = 0.2, 8192  # what nocdyn aims at, src/analyse/sweep/engine/journal_scheduler.f90
 
 
 @dataclass

@@ -8,28 +8,28 @@ module row_counter
   type, extends(observer_t), public :: row_counter_t
     integer :: rows = 0
   contains
-    procedure :: record
-    procedure :: stops
+    procedure :: on_output
+    procedure :: wants_stop
   end type row_counter_t
 
 contains
 
-  subroutine record(self, lane, t, y)
+  subroutine on_output(self, lane, t, y)
     class(row_counter_t), intent(inout) :: self
     integer, intent(in) :: lane
     real(wp), intent(in) :: t
     real(wp), contiguous, intent(in) :: y(:)
 
     if (lane == 1 .and. t >= 0 .and. size(y) > 0) self%rows = self%rows + 1
-  end subroutine record
+  end subroutine on_output
 
-  function stops(self, t)
+  function wants_stop(self, t)
     class(row_counter_t), intent(inout) :: self
     real(wp), intent(in) :: t
-    logical :: stops
+    logical :: wants_stop
 
-    stops = self%rows < 0 .and. t < 0
-  end function stops
+    wants_stop = self%rows < 0 .and. t < 0
+  end function wants_stop
 
 end module row_counter
 
@@ -44,7 +44,7 @@ program spin_up
   use nocdyn_integration_settings, only: integration_settings_t
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
-  use nocdyn_outcome, only: integration_done, outcome_t
+  use nocdyn_solver_status, only: integration_done, solver_status_t
   use nocdyn_text, only: string_t
   use row_counter, only: row_counter_t
   implicit none (type, external)
@@ -53,7 +53,7 @@ program spin_up
   type(machine_t) :: machine
   class(formulation_t), allocatable :: formulation
   type(row_counter_t) :: counter
-  type(outcome_t) :: outcome
+  type(solver_status_t) :: solver_status
   type(error_t), allocatable :: error
   type(string_t) :: overrides(0)
   real(wp), allocatable :: y(:, :)
@@ -66,9 +66,9 @@ program spin_up
   if (allocated(error)) error stop error%message
   call new_formulation('reduced', machine, formulation)
   y = formulation%start()
-  call integrate(formulation, integration_settings_t(rtol=1.0e-11_wp, atol=1.0e-12_wp), times, y, counter, outcome, error)
+  call integrate(formulation, integration_settings_t(rtol=1.0e-11_wp, atol=1.0e-12_wp), times, y, counter, solver_status, error)
   if (allocated(error)) error stop error%message
-  if (outcome%status(1) /= integration_done) error stop 'spin_up: the integration did not reach its end'
+  if (solver_status%code(1) /= integration_done) error stop 'spin_up: the integration did not reach its end'
   call formulation%observe(times(3:), y)
   print '(i0, *(1x, es23.16))', counter%rows, formulation%omega(1, 1:)
 end program spin_up

@@ -5,10 +5,10 @@ program sweep_store
   use, intrinsic :: iso_fortran_env, only: error_unit, output_unit
   use nocdyn_errors, only: error_t
   use nocdyn_order_statistics, only: find_order_statistics, order_statistics_t
-  use nocdyn_posix, only: survive_size_limit
-  use nocdyn_sweep_file, only: write_sweep_file
+  use nocdyn_posix, only: ignore_file_size_signal
+  use nocdyn_sweep_netcdf, only: write_sweep_netcdf
   use nocdyn_sweep_journal, only: create_journal, journal_name, open_journal, sweep_journal_t
-  use nocdyn_sweep_table, only: write_sweep_table
+  use nocdyn_sweep_csv, only: write_sweep_csv
   use nocdyn_text, only: to_text
   use sample_sweeps, only: header_of, sample_chunk
   implicit none (type, external)
@@ -18,15 +18,15 @@ program sweep_store
   type(error_t), allocatable :: error
   integer :: variants, chunk
 
-  call survive_size_limit()
+  call ignore_file_size_signal()
   call get_command_argument(1, folder)
   variants = number(2)
   chunk = number(3)
   call begin()
   call compute()
-  call write_sweep_file(trim(folder), journals, error)
+  call write_sweep_netcdf(trim(folder), journals, error)
   call stop_on(error)
-  call write_sweep_table(trim(folder), journals, error)
+  call write_sweep_csv(trim(folder), journals, error)
   call stop_on(error)
   call print_statistics()
   call journals(1)%remove()

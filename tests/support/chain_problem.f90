@@ -1,7 +1,7 @@
 !> A stiff chain of rotors, sparse, that can also pretend to be full.
 module nocdyn_chain_problem
   use nocdyn_kinds, only: wp
-  use nocdyn_system, only: evaluation_fine, pattern_t, system_t
+  use nocdyn_system, only: evaluation_ok, pattern_t, system_t
   implicit none (type, external)
   private
 
@@ -47,7 +47,7 @@ contains
     integer, intent(inout) :: status(self%lanes)
     integer :: i, lane
 
-    status = evaluation_fine
+    status = evaluation_ok
     associate (n => self%rotors)
       dydt(:, :n) = 0.0_wp
       dydt(:, n + 1:2 * n) = y(:, :n)
@@ -117,7 +117,7 @@ contains
     integer, intent(inout) :: status(self%lanes)
     integer :: lane, p
 
-    status = evaluation_fine
+    status = evaluation_ok
     do p = 1, size(dfdy, 2)
       do lane = 1, self%lanes
         dfdy(lane, p) = entry_at(self%pattern%row(p), self%pattern%column(p), self%stiffness(lane), &

@@ -8,7 +8,7 @@
 !> with that of 5 stages; the published ones serve as a check.
 module nocdyn_classic_problem
   use nocdyn_kinds, only: wp
-  use nocdyn_system, only: evaluation_shorten, system_t
+  use nocdyn_system, only: evaluation_recoverable, system_t
   implicit none (type, external)
   private
 
@@ -102,7 +102,7 @@ contains
 
     if (self%lanes /= 1) error stop 'nocdyn_classic_problem: a classic problem has one lane'
     if (any(abs(y) > most)) then
-      status = evaluation_shorten
+      status = evaluation_recoverable
     else
       call self%law(y, dydt)
     end if

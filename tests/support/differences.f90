@@ -3,7 +3,7 @@
 !> They are exact for polynomials of degree four, for which a large step is best: only rounding remains.
 module nocdyn_test_differences
   use nocdyn_kinds, only: wp
-  use nocdyn_system, only: evaluation_fine, pattern_t, system_t
+  use nocdyn_system, only: evaluation_ok, pattern_t, system_t
   implicit none (type, external)
   private
 
@@ -31,7 +31,7 @@ contains
     if (present(step)) by = step
     dfdy = 0.0_wp
     dfdt = 0.0_wp
-    status = evaluation_fine
+    status = evaluation_ok
     do k = 1, size(offset)
       call system%derivative(t + offset(k) * time_step, y, slope, status)
       dfdt = dfdt + weight(k) / time_step * slope

@@ -3,11 +3,11 @@ module nocdyn_fixed_steps
   use nocdyn_kinds, only: wp
   use nocdyn_stepper, only: stepper_t
   use nocdyn_system, only: system_t
-  use nocdyn_trial, only: allocate_trial, evaluate_start, set_out, trial_t
+  use nocdyn_step_attempt, only: allocate_step_attempt, evaluate_start, begin_attempt, step_attempt_t
   implicit none (type, external)
   private
 
-  public :: prepare_trial, take_steps, one_step, measured_order
+  public :: prepare_attempt, take_steps, one_step, measured_order
 
 contains
 
@@ -18,19 +18,19 @@ contains
     real(wp), intent(in) :: t_start, t_end
     integer, intent(in) :: steps
     real(wp), intent(inout) :: y(:)
-    type(trial_t) :: trial
+    type(step_attempt_t) :: attempt
     integer :: i
 
-    call prepare_trial(stepper, system, t_start, y, trial)
+    call prepare_attempt(stepper, system, t_start, y, attempt)
     do i = 1, steps
-      trial%t = t_start + (i - 1) * (t_end - t_start) / steps
-      trial%h = (t_end - t_start) / steps
-      call set_out(trial)
-      call stepper%attempt(system, trial)
-      trial%y = trial%y_new
-      call stepper%accept(trial%working)
+      attempt%t = t_start + (i - 1) * (t_end - t_start) / steps
+      attempt%h = (t_end - t_start) / steps
+      call begin_attempt(attempt)
+      call stepper%take_step(system, attempt)
+      attempt%y = attempt%y_new
+      call stepper%accept(attempt%active)
     end do
-    y = trial%y(1, :trial%components)
+    y = attempt%y(1, :attempt%components)
   end subroutine take_steps
 
   !> One step of size h: its result, its deviation from the embedded solution, and the solution inside it at `theta`.
@@ -40,40 +40,40 @@ contains
     real(wp), intent(in) :: t, h
     real(wp), intent(in) :: theta
     real(wp), intent(inout) :: y(:, :)   !! first column: start; on return the columns y_new, deviation, y(t + theta h)
-    type(trial_t) :: trial
+    type(step_attempt_t) :: attempt
     real(wp), allocatable :: coefficients(:, :, :)
     logical, parameter :: wanted(1) = .true.
     integer :: power
 
-    call prepare_trial(stepper, system, t, y(:, 1), trial)
-    trial%h = h
-    call set_out(trial)
-    call stepper%attempt(system, trial)
-    allocate (coefficients(1, size(trial%y, 2), stepper%degree), source=0.0_wp)
-    call stepper%interpolate(system, trial, wanted, coefficients)
-    y(:, 3) = trial%y(1, :size(y, 1))
+    call prepare_attempt(stepper, system, t, y(:, 1), attempt)
+    attempt%h = h
+    call begin_attempt(attempt)
+    call stepper%take_step(system, attempt)
+    allocate (coefficients(1, size(attempt%y, 2), stepper%degree), source=0.0_wp)
+    call stepper%interpolate(system, attempt, wanted, coefficients)
+    y(:, 3) = attempt%y(1, :size(y, 1))
     do power = 1, size(coefficients, 3)
       y(:, 3) = y(:, 3) + theta**power * coefficients(1, :size(y, 1), power)
     end do
-    y(:, 1) = trial%y_new(1, :size(y, 1))
-    y(:, 2) = trial%deviation(1, :size(y, 1))
+    y(:, 1) = attempt%y_new(1, :size(y, 1))
+    y(:, 2) = attempt%error_estimate(1, :size(y, 1))
   end subroutine one_step
 
-  subroutine prepare_trial(stepper, system, t, y, trial)
+  subroutine prepare_attempt(stepper, system, t, y, attempt)
     class(stepper_t), intent(inout) :: stepper
     class(system_t), intent(inout) :: system
     real(wp), intent(in) :: t
     real(wp), intent(in) :: y(:)
-    type(trial_t), intent(out) :: trial
+    type(step_attempt_t), intent(out) :: attempt
 
     call stepper%prepare(system)
-    call allocate_trial(trial, system)
-    trial%has_coarse_deviation = stepper%has_coarse_error
-    trial%t = t
-    trial%y(1, :size(y)) = y
-    call evaluate_start(trial, system, trial%working, trial%slope)
-    call stepper%begin(trial, trial%working)
-  end subroutine prepare_trial
+    call allocate_step_attempt(attempt, system)
+    attempt%has_low_order_estimate = stepper%has_low_order_error
+    attempt%t = t
+    attempt%y(1, :size(y)) = y
+    call evaluate_start(attempt, system, attempt%active, attempt%slope)
+    call stepper%start(attempt, attempt%active)
+  end subroutine prepare_attempt
 
   !> The exponent p of errors that fall as h^p when h is halved.
   elemental function measured_order(error, error_of_half) result(order)

@@ -46,13 +46,13 @@ contains
   end function full_machine
 
   !> The same number for every element, a little different in every lane.
-  pure function numbers(value, variants, count)
+  pure function lane_values(value, variants, count)
     real(wp), intent(in) :: value
     integer, intent(in) :: variants(:), count
-    real(wp) :: numbers(size(variants), count)
+    real(wp) :: lane_values(size(variants), count)
 
-    numbers = spread(value * (1.0_wp + 0.03_wp * variants), 2, count)
-  end function numbers
+    lane_values = spread(value * (1.0_wp + 0.03_wp * variants), 2, count)
+  end function lane_values
 
   !> A curve that is a little different in every lane.
   function curves(x, y, interpolation, extrapolation, variants, count) result(all_curves)
@@ -77,10 +77,10 @@ contains
     integer :: k
 
     do k = 1, 5
-      coefficient(k, :, :) = numbers(50.0_wp / k, variants, 2)
+      coefficient(k, :, :) = lane_values(50.0_wp / k, variants, 2)
     end do
-    associate (one => numbers(1.0_wp, variants, 2), friction => numbers(4.0_wp, variants, 2), &
-               friction_speed => numbers(0.5_wp, variants, 2))
+    associate (one => lane_values(1.0_wp, variants, 2), friction => lane_values(4.0_wp, variants, 2), &
+               friction_speed => lane_values(0.5_wp, variants, 2))
       call append_bank(machine%banks, &
                        new_polynomial_couplings(numbered_names('polynomial', 2), [0, 1], [1, bodies], coefficient, one, &
                                                 0.1_wp * one, friction, friction_speed))
@@ -105,19 +105,19 @@ contains
     type(quadratic_curve_t) :: quadratic
     type(table_curve_t) :: table
 
-    allocate (induction%breakdown_torque, source=numbers(60.0_wp, variants, 1))
-    allocate (induction%breakdown_slip, source=numbers(0.3_wp, variants, 1))
-    allocate (induction%synchronous_speed, source=numbers(10.0_wp, variants, 1))
+    allocate (induction%breakdown_torque, source=lane_values(60.0_wp, variants, 1))
+    allocate (induction%breakdown_slip, source=lane_values(0.3_wp, variants, 1))
+    allocate (induction%synchronous_speed, source=lane_values(10.0_wp, variants, 1))
     allocate (table%curve, source=curves([-4.0_wp, 0.0_wp, 1.0_wp, 4.0_wp], [50.0_wp, 60.0_wp, 40.0_wp, -30.0_wp], &
                                          interpolation_linear, extrapolation_linear, variants, 1))
-    allocate (quadratic%a, source=numbers(30.0_wp, variants, 1))
-    allocate (quadratic%b, source=numbers(3.0_wp, variants, 1))
-    allocate (quadratic%c, source=numbers(0.1_wp, variants, 1))
-    allocate (governor%set_speed, source=numbers(1.0_wp, variants, 1))
-    allocate (governor%gain, source=numbers(0.3_wp, variants, 1))
-    allocate (governor%time, source=numbers(0.4_wp, variants, 1))
-    allocate (governor%start, source=numbers(0.5_wp, variants, 1))
-    associate (one => numbers(1.0_wp, variants, 1))
+    allocate (quadratic%a, source=lane_values(30.0_wp, variants, 1))
+    allocate (quadratic%b, source=lane_values(3.0_wp, variants, 1))
+    allocate (quadratic%c, source=lane_values(0.1_wp, variants, 1))
+    allocate (governor%set_speed, source=lane_values(1.0_wp, variants, 1))
+    allocate (governor%gain, source=lane_values(0.3_wp, variants, 1))
+    allocate (governor%time, source=lane_values(0.4_wp, variants, 1))
+    allocate (governor%start, source=lane_values(0.5_wp, variants, 1))
+    associate (one => lane_values(1.0_wp, variants, 1))
       call append_bank(machine%banks, &
                        new_curve_motors(numbered_names('induction', 1), [1], size(variants), induction))
       call append_bank(machine%banks, &
@@ -139,7 +139,7 @@ contains
     integer, intent(in) :: bodies, variants(:)
     type(machine_t), intent(inout) :: machine
 
-    associate (one => numbers(1.0_wp, variants, 2))
+    associate (one => lane_values(1.0_wp, variants, 2))
       call append_bank(machine%banks, &
                        new_nonlinear_loads(numbered_names('fan', 2), [1, bodies], one, 0.5_wp * one, &
                                            5.0_wp * one, 0.7_wp * one))
@@ -154,7 +154,7 @@ contains
     integer, intent(in) :: bodies, variants(:)
     type(machine_t), intent(inout) :: machine
 
-    associate (one => numbers(1.0_wp, variants, 3))
+    associate (one => lane_values(1.0_wp, variants, 3))
       call append_bank(machine%banks, &
                        new_wave_excitations(numbered_names('gas', 2), [1, bodies], [1, 1, 2], 9.0_wp * one, &
                                             spread([0.0_wp, 0.0_wp, 3.0_wp], 1, size(variants)), &

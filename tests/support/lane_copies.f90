@@ -1,13 +1,13 @@
 !> Runs of variants one after the other in the lanes of a block, whose numbers are copied.
 module nocdyn_test_lane_copies
   use nocdyn_errors, only: error_t
-  use nocdyn_integration, only: integrate_queue
+  use nocdyn_integration, only: integrate_ensemble
   use nocdyn_integration_settings, only: integration_settings_t
   use nocdyn_kinds, only: wp
-  use nocdyn_lane_numbers, only: lane_numbers_t
+  use nocdyn_lane_parameters, only: lane_parameters_t
   use nocdyn_machine, only: machine_t
-  use nocdyn_outcome, only: integration_done, outcome_t
-  use nocdyn_queue, only: queue_t
+  use nocdyn_solver_status, only: integration_done, solver_status_t
+  use nocdyn_ensemble, only: ensemble_t
   use nocdyn_reduced, only: new_reduced, reduced_t
   use nocdyn_system, only: observer_t, system_t
   implicit none (type, external)
@@ -16,8 +16,8 @@ module nocdyn_test_lane_copies
   public :: run_alone, run_copied
 
   !> Copies the lanes of a source, in their order, into whatever lane is free.
-  type, extends(queue_t) :: copies_t
-    type(lane_numbers_t) :: block, source
+  type, extends(ensemble_t) :: copies_t
+    type(lane_parameters_t) :: block, source
     real(wp), allocatable :: y(:, :)     !! [variants, components]: starts, and then ends
     integer, allocatable :: variant(:)   !! in each lane
     integer :: next_variant = 1
@@ -36,18 +36,18 @@ contains
     real(wp), contiguous, intent(in) :: times(:)
     real(wp), allocatable, intent(out) :: y(:, :)   !! [machines, components]
     type(reduced_t), target :: system
-    type(copies_t) :: queue
+    type(copies_t) :: ensemble
     integer :: i
 
     do i = 1, size(machines)
       system = new_reduced(machines(i), .true.)
-      queue = copies_t()
-      allocate (queue%y, source=system%start())
-      allocate (queue%variant(1), source=0)
-      call run(system, method, times, queue)
-      if (.not. allocated(y)) allocate (y(size(machines), size(queue%y, 2)))
-      y(i, :) = queue%y(1, :)
-      deallocate (queue%y, queue%variant)
+      ensemble = copies_t()
+      allocate (ensemble%y, source=system%start())
+      allocate (ensemble%variant(1), source=0)
+      call run(system, method, times, ensemble)
+      if (.not. allocated(y)) allocate (y(size(machines), size(ensemble%y, 2)))
+      y(i, :) = ensemble%y(1, :)
+      deallocate (ensemble%y, ensemble%variant)
     end do
   end subroutine run_alone
 
@@ -57,31 +57,31 @@ contains
     character(len=*), intent(in) :: method
     real(wp), contiguous, intent(in) :: times(:)
     real(wp), allocatable, intent(out) :: y(:, :)   !! [lanes of the source, components]; not allocated: the layouts differ
-    type(copies_t) :: queue
+    type(copies_t) :: ensemble
 
-    call source%list_numbers(queue%source)
-    call block%list_numbers(queue%block)
-    if (.not. queue%block%is_congruent(queue%source)) return
-    allocate (queue%y, source=source%start())
-    allocate (queue%variant(block%lanes), source=0)
-    call run(block, method, times, queue)
-    if (queue%done < source%lanes) error stop 'nocdyn_test_lane_copies: a variant was not run'
-    allocate (y, source=queue%y)
+    call source%list_parameters(ensemble%source)
+    call block%list_parameters(ensemble%block)
+    if (.not. ensemble%block%has_same_structure(ensemble%source)) return
+    allocate (ensemble%y, source=source%start())
+    allocate (ensemble%variant(block%lanes), source=0)
+    call run(block, method, times, ensemble)
+    if (ensemble%done < source%lanes) error stop 'nocdyn_test_lane_copies: a variant was not run'
+    allocate (y, source=ensemble%y)
   end subroutine run_copied
 
-  subroutine run(system, method, times, queue)
+  subroutine run(system, method, times, ensemble)
     type(reduced_t), intent(inout) :: system
     character(len=*), intent(in) :: method
     real(wp), contiguous, intent(in) :: times(:)
-    type(copies_t), intent(inout) :: queue
+    type(copies_t), intent(inout) :: ensemble
     type(integration_settings_t) :: settings
-    type(outcome_t) :: outcome
+    type(solver_status_t) :: solver_status
     type(error_t), allocatable :: error
     type(observer_t) :: nobody
 
     settings%method = method
     settings%rtol = 1.0e-8_wp
-    call integrate_queue(system, settings, times, queue, nobody, outcome, error)
+    call integrate_ensemble(system, settings, times, ensemble, nobody, solver_status, error)
     if (allocated(error)) error stop 'nocdyn_test_lane_copies: a setting was refused'
   end subroutine run
 
@@ -95,20 +95,20 @@ contains
 
     found = self%next_variant <= size(self%y, 1)
     if (.not. found) return
-    if (self%source%slabs > 0) call self%block%copy_lane(lane, self%source, self%next_variant)
+    if (self%source%arrays > 0) call self%block%copy_lane(lane, self%source, self%next_variant)
     y(:) = self%y(self%next_variant, :)
     self%variant(lane) = self%next_variant
     self%next_variant = self%next_variant + 1
   end subroutine next
 
-  subroutine finish(self, lane, y, outcome)
+  subroutine finish(self, lane, y, solver_status)
     class(copies_t), intent(inout) :: self
     integer, intent(in) :: lane
     real(wp), contiguous, intent(in) :: y(:)
-    type(outcome_t), intent(in) :: outcome
+    type(solver_status_t), intent(in) :: solver_status
 
     self%y(self%variant(lane), :) = 0.0_wp   ! of a run that has failed
-    if (outcome%status(lane) == integration_done) self%y(self%variant(lane), :) = y
+    if (solver_status%code(lane) == integration_done) self%y(self%variant(lane), :) = y
     self%done = self%done + 1
   end subroutine finish
 

@@ -3,7 +3,7 @@ module nocdyn_test_law_checks
   use nocdyn_bank, only: bank_t
   use nocdyn_elements, only: elements_t
   use nocdyn_kinds, only: wp
-  use nocdyn_test_law_differences, only: by_angle, by_inner, by_speed, by_time, choose_branches, difference_laws, elements_of, &
+  use nocdyn_test_law_differences, only: by_angle, by_state, by_speed, by_time, choose_branches, difference_laws, elements_of, &
                                          evaluate_all, law_slopes_t
   implicit none (type, external)
   private
@@ -15,11 +15,11 @@ module nocdyn_test_law_checks
 contains
 
   !> The largest difference between a derivative and its finite difference, relative to the largest derivative or 1.
-  function law_error(bank, angle, speed, time, inner) result(error)
+  function law_error(bank, angle, speed, time, internal) result(error)
     class(bank_t), intent(inout) :: bank   !! its branches are chosen
     real(wp), intent(in) :: angle, speed
     real(wp), intent(in), optional :: time
-    real(wp), intent(in), optional :: inner(:)
+    real(wp), intent(in), optional :: internal(:)
     real(wp) :: error
     type(elements_t) :: elements
     type(law_slopes_t) :: slopes
@@ -29,24 +29,24 @@ contains
     elements%angle = angle
     elements%speed = speed
     if (present(time)) elements%time = time
-    if (present(inner)) elements%inner%value(1, :) = inner
+    if (present(internal)) elements%internal%value(1, :) = internal
     call choose_branches(bank, elements)
     call evaluate_all(bank, elements)
     error = 0.0_wp
     slopes = difference_laws(bank, elements, by_angle, step)
-    error = max(error, misfit(slopes%restoring, elements%restoring_angle), misfit(slopes%working, elements%working_angle))
+    error = max(error, misfit(slopes%restoring, elements%restoring_angle), misfit(slopes%applied, elements%applied_angle))
     error = max(error, misfit(slopes%tangent, elements%restoring_curvature), misfit(-slopes%stored, elements%restoring))
     error = max(error, maxval([0.0_wp, abs(slopes%rate)]))
     slopes = difference_laws(bank, elements, by_speed, step)
-    error = max(error, misfit(slopes%working, elements%working_speed), maxval(abs(slopes%restoring)))
-    error = max(error, misfit(slopes%rate, elements%inner%rate_speed))
+    error = max(error, misfit(slopes%applied, elements%applied_speed), maxval(abs(slopes%restoring)))
+    error = max(error, misfit(slopes%rate, elements%internal%rate_speed))
     slopes = difference_laws(bank, elements, by_time, step)
-    error = max(error, misfit(slopes%working, elements%working_time), maxval(abs(slopes%restoring)))
+    error = max(error, misfit(slopes%applied, elements%applied_time), maxval(abs(slopes%restoring)))
     error = max(error, maxval([0.0_wp, abs(slopes%rate)]))
-    do s = 1, bank%inner
-      slopes = difference_laws(bank, elements, by_inner + s, step)
-      error = max(error, misfit(slopes%working, elements%inner%working(:, s:s)), maxval(abs(slopes%restoring)))
-      error = max(error, misfit(slopes%rate, elements%inner%rate_inner(:, s, :)))
+    do s = 1, bank%states
+      slopes = difference_laws(bank, elements, by_state + s, step)
+      error = max(error, misfit(slopes%applied, elements%internal%applied(:, s:s)), maxval(abs(slopes%restoring)))
+      error = max(error, misfit(slopes%rate, elements%internal%rate_internal(:, s, :)))
     end do
   end function law_error
 

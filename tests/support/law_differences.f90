@@ -10,10 +10,10 @@ module nocdyn_test_law_differences
   implicit none (type, external)
   private
 
-  public :: difference_laws, elements_of, evaluate_all, choose_branches, margins_of
+  public :: difference_laws, elements_of, evaluate_all, choose_branches, indicators_of
 
   integer, parameter, public :: by_angle = 1, by_speed = 2, by_time = 3
-  integer, parameter, public :: by_inner = 3   !! + number of the inner state of each element
+  integer, parameter, public :: by_state = 3   !! + number of the inner state of each element
 
   real(wp), parameter :: offset(4) = [-2.0_wp, -1.0_wp, 1.0_wp, 2.0_wp]
   real(wp), parameter :: weight(4) = [1.0_wp, -8.0_wp, 8.0_wp, -1.0_wp] / 12.0_wp
@@ -22,7 +22,7 @@ module nocdyn_test_law_differences
 
   !> Derivatives of what a bank computes, [lanes, elements].
   type, public :: law_slopes_t
-    real(wp), allocatable :: restoring(:, :), working(:, :), stored(:, :)
+    real(wp), allocatable :: restoring(:, :), applied(:, :), stored(:, :)
     real(wp), allocatable :: tangent(:, :)   !! of `restoring_angle`
     real(wp), allocatable :: rate(:, :)      !! of the inner states, [lanes, inner states]
   end type law_slopes_t
@@ -36,7 +36,7 @@ contains
 
     integer :: e
 
-    elements = new_elements(bank%lanes, bank%from, bank%to, [(bank%inner, e=1, size(bank%to))])
+    elements = new_elements(bank%lanes, bank%from, bank%to, [(bank%states, e=1, size(bank%to))])
   end function elements_of
 
   !> All that a bank finds for its elements at their angles, speeds and time.
@@ -49,13 +49,13 @@ contains
     call bank%polynomials(laws)
     call laws%evaluate(elements)
     call laws%differentiate(elements)
-    call laws%assess(elements)
-    call bank%evaluate(elements%time, elements%angle, elements%speed, elements%restoring, elements%working)
-    if (bank%inner > 0) then
-      call bank%evaluate_inner(elements%speed, elements%inner%value, elements%working, elements%inner%rate)
+    call laws%evaluate_energies(elements)
+    call bank%evaluate(elements%time, elements%angle, elements%speed, elements%restoring, elements%applied)
+    if (bank%states > 0) then
+      call bank%evaluate_internal(elements%speed, elements%internal%value, elements%applied, elements%internal%rate)
     end if
     call bank%differentiate(elements)
-    call bank%assess(elements)
+    call bank%evaluate_energies(elements)
   end subroutine evaluate_all
 
   !> Puts every lane of a bank on the branches in which its elements are.
@@ -64,40 +64,40 @@ contains
     type(elements_t), intent(in) :: elements
     integer :: k, l
 
-    do k = 1, size(bank%switching)
-      associate (e => bank%switching(k))
+    do k = 1, size(bank%switch_element)
+      associate (e => bank%switch_element(k))
         do l = 1, bank%lanes
-          call bank%choose(k, l, elements%time(l), elements%angle(l, e), elements%speed(l, e), inner_of(bank, elements, l, e))
+          call bank%choose(k, l, elements%time(l), elements%angle(l, e), elements%speed(l, e), states_of(bank, elements, l, e))
         end do
       end associate
     end do
   end subroutine choose_branches
 
   !> How far the lanes are from the borders of their branches, [lanes, switches].
-  function margins_of(bank, elements) result(margins)
+  function indicators_of(bank, elements) result(indicators)
     class(bank_t), intent(in) :: bank
     type(elements_t), intent(in) :: elements
-    real(wp) :: margins(bank%lanes, size(bank%switching))
+    real(wp) :: indicators(bank%lanes, size(bank%switch_element))
     integer :: k, l
 
-    do k = 1, size(bank%switching)
-      associate (e => bank%switching(k))
+    do k = 1, size(bank%switch_element)
+      associate (e => bank%switch_element(k))
         do l = 1, bank%lanes
-          margins(l, k) = bank%margin(k, l, elements%time(l), elements%angle(l, e), elements%speed(l, e), &
-                                      inner_of(bank, elements, l, e))
+          indicators(l, k) = bank%indicator(k, l, elements%time(l), elements%angle(l, e), elements%speed(l, e), &
+                                      states_of(bank, elements, l, e))
         end do
       end associate
     end do
-  end function margins_of
+  end function indicators_of
 
-  function inner_of(bank, elements, lane, element) result(inner)
+  function states_of(bank, elements, lane, element) result(internal)
     class(bank_t), intent(in) :: bank
     type(elements_t), intent(in) :: elements
     integer, intent(in) :: lane, element
-    real(wp) :: inner(bank%inner)
+    real(wp) :: internal(bank%states)
 
-    inner = elements%inner%value(lane, (element - 1) * bank%inner + 1:element * bank%inner)
-  end function inner_of
+    internal = elements%internal%value(lane, (element - 1) * bank%states + 1:element * bank%states)
+  end function states_of
 
   !> Derivatives of the laws of a bank by its angles, its speeds, the time or an inner state.
   function difference_laws(bank, elements, variable, by) result(slopes)
@@ -110,8 +110,8 @@ contains
     real(wp) :: gain, step
     integer :: k
 
-    allocate (slopes%restoring, slopes%working, slopes%stored, slopes%tangent, source=0.0_wp * elements%angle)
-    allocate (slopes%rate, source=0.0_wp * elements%inner%value)
+    allocate (slopes%restoring, slopes%applied, slopes%stored, slopes%tangent, source=0.0_wp * elements%angle)
+    allocate (slopes%rate, source=0.0_wp * elements%internal%value)
     step = merge(time_step, state_step, variable == by_time)
     if (present(by)) step = by
     do k = 1, size(offset)
@@ -119,17 +119,17 @@ contains
       if (variable == by_angle) moved%angle = elements%angle + offset(k) * step
       if (variable == by_speed) moved%speed = elements%speed + offset(k) * step
       if (variable == by_time) moved%time = elements%time + offset(k) * step
-      if (variable > by_inner) then
-        moved%inner%value(:, variable - by_inner::bank%inner) = elements%inner%value(:, variable - by_inner::bank%inner) &
+      if (variable > by_state) then
+        moved%internal%value(:, variable - by_state::bank%states) = elements%internal%value(:, variable - by_state::bank%states) &
                                                                 + offset(k) * step
       end if
       call evaluate_all(bank, moved)
       gain = weight(k) / step
       slopes%restoring = slopes%restoring + gain * moved%restoring
-      slopes%working = slopes%working + gain * moved%working
+      slopes%applied = slopes%applied + gain * moved%applied
       slopes%stored = slopes%stored + gain * moved%stored
       slopes%tangent = slopes%tangent + gain * moved%restoring_angle
-      slopes%rate = slopes%rate + gain * moved%inner%rate
+      slopes%rate = slopes%rate + gain * moved%internal%rate
     end do
   end function difference_laws
 

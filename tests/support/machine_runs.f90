@@ -6,7 +6,7 @@ module nocdyn_test_machine_runs
   use nocdyn_integration_settings, only: integration_settings_t
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
-  use nocdyn_outcome, only: integration_done, outcome_t
+  use nocdyn_solver_status, only: integration_done, solver_status_t
   use nocdyn_recorder, only: recorder, recorder_t
   use nocdyn_test_states, only: formulate
   implicit none (type, external)
@@ -20,7 +20,7 @@ module nocdyn_test_machine_runs
     real(wp), allocatable :: energy(:)                !! kinetic and stored [J]
     real(wp), allocatable :: work(:)                  !! of all accounted elements [J]
     real(wp) :: effort = 0.0_wp                       !! the largest sum of absolute works [J]
-    type(outcome_t) :: outcome
+    type(solver_status_t) :: solver_status
   end type machine_run_t
 
 contains
@@ -45,9 +45,9 @@ contains
     settings%atol = 0.1_wp * tolerance
     y = formulation%start()
     records = recorder(formulation, size(times))
-    call integrate(formulation, settings, times, y, records, run%outcome, error)
+    call integrate(formulation, settings, times, y, records, run%solver_status, error)
     if (allocated(error)) error stop 'nocdyn_test_machine_runs: a setting was refused'
-    if (run%outcome%status(1) /= integration_done) error stop 'nocdyn_test_machine_runs: a run did not reach its end'
+    if (run%solver_status%code(1) /= integration_done) error stop 'nocdyn_test_machine_runs: a run did not reach its end'
     allocate (run%phi(machine%bodies, size(times)), run%omega(machine%bodies, size(times)))
     allocate (run%energy(size(times)), run%work(size(times)))
     do i = 1, size(times)

@@ -15,7 +15,7 @@ module nocdyn_test_machines
   implicit none (type, external)
   private
 
-  public :: paper_machine, damped_chain, long_chain, branched_train, gear_loop, bare_machine
+  public :: paper_machine, damped_chain, long_chain, branched_train, gear_loop, machine_of_bodies
   public :: install, gear_rows, numbered_names, finish, row
 
 contains
@@ -26,7 +26,7 @@ contains
     integer, intent(in) :: choice       !! complement_...
     type(machine_t) :: machine
 
-    machine = bare_machine(row([10.0_wp, 5.0_wp, 5.0_wp]))
+    machine = machine_of_bodies(row([10.0_wp, 5.0_wp, 5.0_wp]))
     machine%names = strings([character(len=7) :: 'motor', 'pinion', 'machine'])
     call install(machine%banks, new_couplings(strings(['coupling']), [1], [2], row([100.0_wp]), row([10.0_wp]), &
                                               row([0.0_wp]), row([0.0_wp])))
@@ -45,7 +45,7 @@ contains
   function damped_chain() result(machine)
     type(machine_t) :: machine
 
-    machine = bare_machine(row([4.0_wp, 2.0_wp, 1.0_wp, 3.0_wp]))
+    machine = machine_of_bodies(row([4.0_wp, 2.0_wp, 1.0_wp, 3.0_wp]))
     call install(machine%banks, new_couplings(numbered_names('spring', 5), [0, 1, 2, 3, 4], [1, 2, 3, 4, 0], &
                                               row([30.0_wp, 100.0_wp, 80.0_wp, 50.0_wp, 20.0_wp]), &
                                               row([5.0_wp, 10.0_wp, -4.0_wp, 0.0_wp, 0.0_wp]), &
@@ -67,7 +67,7 @@ contains
     type(machine_t) :: machine
     integer :: i
 
-    machine = bare_machine(row([(1.0_wp, i=1, bodies)]))
+    machine = machine_of_bodies(row([(1.0_wp, i=1, bodies)]))
     associate (stiffness => row([(1.0e4_wp, i=1, bodies - 1)]))
       call install(machine%banks, new_couplings(numbered_names('shaft', bodies - 1), [(i, i=1, bodies - 1)], &
                                                 [(i + 1, i=1, bodies - 1)], stiffness, 10.0_wp * stiffness, &
@@ -84,7 +84,7 @@ contains
     integer, intent(in) :: choice   !! complement_...
     type(machine_t) :: machine
 
-    machine = bare_machine(row([4.0_wp, 2.0_wp, 6.0_wp, 1.0_wp, 3.0_wp, 2.5_wp, 8.0_wp]))
+    machine = machine_of_bodies(row([4.0_wp, 2.0_wp, 6.0_wp, 1.0_wp, 3.0_wp, 2.5_wp, 8.0_wp]))
     call install(machine%banks, new_couplings(numbered_names('shaft', 4), [4, 3, 6, 0], [5, 5, 7, 7], &
                                               row([60.0_wp, 40.0_wp, 90.0_wp, 10.0_wp]), &
                                               row([4.0_wp, 0.0_wp, 7.0_wp, 0.0_wp]), &
@@ -102,7 +102,7 @@ contains
   function gear_loop() result(machine)
     type(machine_t) :: machine
 
-    machine = bare_machine(row([4.0_wp, 2.0_wp, 6.0_wp, 1.0_wp, 3.0_wp]))
+    machine = machine_of_bodies(row([4.0_wp, 2.0_wp, 6.0_wp, 1.0_wp, 3.0_wp]))
     call install(machine%banks, new_couplings(numbered_names('shaft', 1), [3], [5], row([60.0_wp]), row([4.0_wp]), &
                                               row([0.5_wp]), row([0.0_wp])))
     call install(machine%banks, new_motors(numbered_names('motor', 1), [1], row([150.0_wp]), row([8.0_wp]), &
@@ -114,7 +114,7 @@ contains
   end function gear_loop
 
   !> Bodies at rest that nothing joins or drives.
-  function bare_machine(inertia) result(machine)
+  function machine_of_bodies(inertia) result(machine)
     real(wp), intent(in) :: inertia(:, :)   !! [lanes, bodies] [kg m2]
     type(machine_t) :: machine
 
@@ -125,7 +125,7 @@ contains
     allocate (machine%start_angle, machine%start_speed, source=0.0_wp * inertia)
     machine%banks = element_banks(machine%lanes)
     machine%constraints = gear_rows(machine%bodies, reshape([integer ::], [2, 0]), inertia(:, :0))
-  end function bare_machine
+  end function machine_of_bodies
 
   !> One bank of every kind in the order of the roles, without elements.
   function element_banks(lanes) result(banks)
@@ -172,10 +172,10 @@ contains
     integer, intent(in) :: wanted(:)   !! bodies that are to be the coordinates, none to have them found
     integer, intent(in) :: choice      !! complement_...
     type(error_t), allocatable :: error
-    integer :: culprit
+    integer :: offending_row
 
     call machine%number_elements()
-    call analyse_constraints(machine%constraints, machine%names, wanted, machine%trains, machine%groups, culprit, error)
+    call analyse_constraints(machine%constraints, machine%names, wanted, machine%trains, machine%groups, offending_row, error)
     if (allocated(error)) error stop 'nocdyn_test_machines: a machine to test with has gears that lock'
     call build_coordinates(machine%constraints, machine%names, machine%trains, machine%groups, machine%inertia, wanted, choice, &
                            machine%coordinates, error)

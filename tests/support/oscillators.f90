@@ -29,11 +29,11 @@ module nocdyn_oscillators
     logical :: in_order = .true.             !! whether records and events came in the order of their times
     type(ranges_t), allocatable :: ranges(:) !! of each lane
   contains
-    procedure :: record
+    procedure :: on_output
     procedure :: event_values
-    procedure :: happen
+    procedure :: on_event
     procedure :: tracked_values
-    procedure :: take_ranges
+    procedure :: on_extremes
   end type watcher_t
 
 contains
@@ -88,7 +88,7 @@ contains
     allocate (watcher%ranges(lanes))
   end function watcher
 
-  subroutine record(self, lane, t, y)
+  subroutine on_output(self, lane, t, y)
     class(watcher_t), intent(inout) :: self
     integer, intent(in) :: lane
     real(wp), intent(in) :: t
@@ -97,7 +97,7 @@ contains
     self%records(lane) = self%records(lane) + 1
     self%in_order = self%in_order .and. t >= self%last_time(lane)
     self%last_time(lane) = t
-  end subroutine record
+  end subroutine on_output
 
   subroutine event_values(self, lane, t, y, g)
     class(watcher_t), intent(inout) :: self
@@ -109,7 +109,7 @@ contains
     g(:) = y(1) - self%level
   end subroutine event_values
 
-  subroutine happen(self, lane, event, t, y, is_terminal)
+  subroutine on_event(self, lane, event, t, y, is_terminal)
     class(watcher_t), intent(inout) :: self
     integer, intent(in) :: lane
     integer, intent(in) :: event
@@ -124,7 +124,7 @@ contains
     self%time(self%count(lane), lane) = t
     self%x(self%count(lane), lane) = y(1)
     is_terminal = event == self%terminal
-  end subroutine happen
+  end subroutine on_event
 
   subroutine tracked_values(self, lane, t, y, values)
     class(watcher_t), intent(inout) :: self
@@ -136,12 +136,12 @@ contains
     values(:) = [y(1), y(2), y(1)**3]
   end subroutine tracked_values
 
-  subroutine take_ranges(self, lane, ranges)
+  subroutine on_extremes(self, lane, ranges)
     class(watcher_t), intent(inout) :: self
     integer, intent(in) :: lane
     type(ranges_t), intent(in) :: ranges
 
     self%ranges(lane) = ranges
-  end subroutine take_ranges
+  end subroutine on_extremes
 
 end module nocdyn_oscillators

@@ -7,7 +7,7 @@ module nocdyn_test_random_machines
   use nocdyn_loads, only: new_loads
   use nocdyn_machine, only: machine_t
   use nocdyn_motors, only: new_motors
-  use nocdyn_test_machines, only: bare_machine, finish, gear_rows, install, numbered_names
+  use nocdyn_test_machines, only: machine_of_bodies, finish, gear_rows, install, numbered_names
   use nocdyn_test_random, only: random_stream, random_stream_t
   implicit none (type, external)
   private
@@ -34,7 +34,7 @@ contains
     do l = 1, size(lanes)
       lanes(l) = random_stream(1000 * seed + variants(l))
     end do
-    machine = bare_machine(drawn(lanes, 0.5_wp, 10.0_wp, bodies))
+    machine = machine_of_bodies(drawn(lanes, 0.5_wp, 10.0_wp, bodies))
     speed = drawn(lanes, 0.4_wp, 2.5_wp, bodies)
     do b = 1, bodies
       if (layout%number(0.0_wp, 1.0_wp) < 0.6_wp) speed(:, b) = -speed(:, b)

@@ -8,7 +8,7 @@ module nocdyn_test_random_trains
   use nocdyn_constraints, only: new_constraints
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
-  use nocdyn_test_machines, only: bare_machine, finish, numbered_names
+  use nocdyn_test_machines, only: machine_of_bodies, finish, numbered_names
   use nocdyn_test_random, only: random_stream, random_stream_t
   use nocdyn_test_random_machines, only: add_couplings, add_torques, drawn
   implicit none (type, external)
@@ -51,7 +51,7 @@ contains
       call close_loop(layout, growth)
       call repeat_rows(layout, growth)
     end do
-    machine = bare_machine(drawn(numbers, 0.5_wp, 10.0_wp, bodies))
+    machine = machine_of_bodies(drawn(numbers, 0.5_wp, 10.0_wp, bodies))
     call take_rows(growth, drawn(numbers, 0.5_wp, 2.0_wp, bodies), drawn(numbers, 0.5_wp, 2.0_wp, growth%rows), machine)
     is_independent = growth%is_independent(:growth%rows)
     call add_couplings(layout, numbers, machine)

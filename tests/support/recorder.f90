@@ -12,10 +12,10 @@ module nocdyn_recorder
     real(wp), allocatable :: t(:, :)         !! [lanes, times]
     real(wp), allocatable :: y(:, :, :)      !! [lanes, times, components]
     real(wp) :: stop_time = huge(1.0_wp)     !! asks to stop once the slowest lane is there
-    integer :: questions = 0                 !! calls of `stops`
+    integer :: questions = 0                 !! calls of `wants_stop`
   contains
-    procedure :: record
-    procedure :: stops
+    procedure :: on_output
+    procedure :: wants_stop
   end type recorder_t
 
 contains
@@ -30,7 +30,7 @@ contains
     allocate (recorder%y(system%lanes, times, system%states + system%quadratures), source=0.0_wp)
   end function recorder
 
-  subroutine record(self, lane, t, y)
+  subroutine on_output(self, lane, t, y)
     class(recorder_t), intent(inout) :: self
     integer, intent(in) :: lane
     real(wp), intent(in) :: t
@@ -39,15 +39,15 @@ contains
     self%count(lane) = self%count(lane) + 1
     self%t(lane, self%count(lane)) = t
     self%y(lane, self%count(lane), :) = y
-  end subroutine record
+  end subroutine on_output
 
-  function stops(self, t)
+  function wants_stop(self, t)
     class(recorder_t), intent(inout) :: self
     real(wp), intent(in) :: t
-    logical :: stops
+    logical :: wants_stop
 
     self%questions = self%questions + 1
-    stops = t >= self%stop_time
-  end function stops
+    wants_stop = t >= self%stop_time
+  end function wants_stop
 
 end module nocdyn_recorder

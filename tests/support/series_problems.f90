@@ -2,7 +2,7 @@
 module nocdyn_series_problems
   use nocdyn_kinds, only: wp
   use nocdyn_oscillators, only: oscillators_t
-  use nocdyn_system, only: evaluation_fine, system_t
+  use nocdyn_system, only: evaluation_ok, system_t
   use nocdyn_test_problems, only: duffing_t
   implicit none (type, external)
   private
@@ -68,7 +68,7 @@ contains
     real(wp) :: cube, force, slope, swap, work
     integer :: j, k, lane
 
-    status = evaluation_fine
+    status = evaluation_ok
     !GCC$ novector
     do lane = 1, self%lanes
       force = 3 * cos(frequency * t(lane))
@@ -112,7 +112,7 @@ contains
     integer, intent(inout) :: status(self%lanes)
     integer :: k
 
-    status = merge(evaluation_fine, status, t >= 0)
+    status = merge(evaluation_ok, status, t >= 0)
     do k = 0, order - 1
       y(:, 1, k + 1) = y(:, 2, k) / (k + 1)
       y(:, 2, k + 1) = -self%omega**2 * y(:, 1, k) / (k + 1)
@@ -138,7 +138,7 @@ contains
     integer, intent(inout) :: status(self%lanes)
 
     dydt(:, 1) = y(:, 1)**2
-    where (y(:, 1) > self%limit .and. t >= 0) status = max(evaluation_fine, self%answer)
+    where (y(:, 1) > self%limit .and. t >= 0) status = max(evaluation_ok, self%answer)
   end subroutine burst_derivative
 
   subroutine burst_jacobian(self, t, y, dfdy, dfdt, status)
@@ -151,7 +151,7 @@ contains
 
     dfdy(:, 1) = 2 * y(:, 1)
     dfdt(:, 1) = 0.0_wp * t
-    where (y(:, 1) > self%limit) status = max(evaluation_fine, self%answer)
+    where (y(:, 1) > self%limit) status = max(evaluation_ok, self%answer)
   end subroutine burst_jacobian
 
   function burst_obstacle(self) result(obstacle)
@@ -186,7 +186,7 @@ contains
       y(:, 1, k + 1) = y(:, 1, k + 1) / (k + 1)
     end do
     where (y(:, 1, 0) > self%limit .and. t >= 0)
-      status = max(evaluation_fine, self%answer)
+      status = max(evaluation_ok, self%answer)
       y(:, 1, order) = merge(quiet_nan(), y(:, 1, order), self%answer == answer_nan)
     end where
   end subroutine burst_series

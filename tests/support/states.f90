@@ -19,15 +19,15 @@ module nocdyn_test_states
 
 contains
 
-  subroutine formulate(machine, which, formulation, audited)
+  subroutine formulate(machine, which, formulation, with_energy_balance)
     type(machine_t), intent(in) :: machine
     integer, intent(in) :: which   !! `reduced`, `paper` or `multiplier`
     class(formulation_t), allocatable, intent(out) :: formulation
-    logical, intent(in), optional :: audited   !! whether the works are integrated; absent: they are
+    logical, intent(in), optional :: with_energy_balance   !! whether the works are integrated; absent: they are
     logical :: has_works
 
     has_works = .true.
-    if (present(audited)) has_works = audited
+    if (present(with_energy_balance)) has_works = with_energy_balance
     select case (which)
     case (reduced)
       formulation = new_reduced(machine, has_works)
@@ -69,7 +69,7 @@ contains
 
     allocate (y(formulation%lanes, formulation%states + formulation%quadratures), source=0.0_wp)
     y(:, formulation%mechanical + 1:formulation%states) = &
-      spread([(0.5_wp + 0.3_wp * sin(real(s, wp)), s=1, formulation%inner)], 1, formulation%lanes)
+      spread([(0.5_wp + 0.3_wp * sin(real(s, wp)), s=1, formulation%internal)], 1, formulation%lanes)
     select type (formulation)
     type is (reduced_t)
       call place_coordinates(formulation%machine, phi, omega, y)
@@ -105,7 +105,7 @@ contains
 
     n = machine%bodies
     copy = machine
-    call copy%choose_all([(0.0_wp, l=1, machine%lanes)], phi, omega)
+    call copy%choose_branches([(0.0_wp, l=1, machine%lanes)], phi, omega)
     call bring_to(copy, [(0.0_wp, l=1, machine%lanes)], phi, omega)
     do l = 1, machine%lanes
       call elastic_moments(copy, l, moments)
@@ -123,7 +123,7 @@ contains
 
     do l = 1, formulation%lanes
       state = y(l, :)
-      call formulation%enter(l, t(l), state)
+      call formulation%start_lane(l, t(l), state)
     end do
   end subroutine enter_all
 
@@ -134,7 +134,7 @@ contains
     real(wp), contiguous, intent(in) :: phi(:, 0:), omega(:, 0:)
 
     call machine%differentiate(t, phi, omega)
-    call machine%assess()
+    call machine%evaluate_energies()
   end subroutine bring_to
 
 end module nocdyn_test_states

@@ -3,13 +3,13 @@ module nocdyn_test_sweep_blocks
   use nocdyn_assembly, only: new_formulation
   use nocdyn_errors, only: error_t
   use nocdyn_formulation, only: formulation_t
-  use nocdyn_integration, only: integrate, integrate_queue
+  use nocdyn_integration, only: integrate, integrate_ensemble
   use nocdyn_integration_settings, only: integration_settings_t
   use nocdyn_kinds, only: wp
-  use nocdyn_lane_numbers, only: lane_numbers_t
+  use nocdyn_lane_parameters, only: lane_parameters_t
   use nocdyn_machine, only: machine_t
-  use nocdyn_outcome, only: outcome_t
-  use nocdyn_queue, only: queue_t
+  use nocdyn_solver_status, only: solver_status_t
+  use nocdyn_ensemble, only: ensemble_t
   use nocdyn_recorder, only: recorder, recorder_t
   use nocdyn_reduced, only: new_reduced, reduced_t
   use nocdyn_statistics, only: new_statistic, statistic_final, statistic_max, statistic_max_abs, statistic_mean, statistic_min, &
@@ -25,8 +25,8 @@ module nocdyn_test_sweep_blocks
   public :: all_statistics, run_block, run_copied_variants, run_densely, sampled_statistic, column_named
 
   !> Copies the lanes of a source into whatever lane is free, and takes their statistics.
-  type, extends(queue_t) :: measured_copies_t
-    type(lane_numbers_t) :: block, source
+  type, extends(ensemble_t) :: measured_copies_t
+    type(lane_parameters_t) :: block, source
     type(statistics_observer_t), pointer :: observer => null()
     real(wp), allocatable :: y(:, :)        !! starts, [variants, components]
     real(wp), allocatable :: values(:, :)   !! [statistics, variants]
@@ -48,23 +48,23 @@ contains
     real(wp), allocatable, intent(out) :: values(:, :)   !! [statistics, variants]; not allocated: the layouts differ
     type(reduced_t), target :: block, source
     type(statistics_observer_t), target :: observer
-    type(measured_copies_t) :: queue
-    type(outcome_t) :: outcome
+    type(measured_copies_t) :: ensemble
+    type(solver_status_t) :: solver_status
     type(error_t), allocatable :: error
 
     source = new_reduced(variants, .true., as_block=.true.)
     block = new_reduced(lanes, .true., as_block=.true.)
-    call source%list_numbers(queue%source)
-    call block%list_numbers(queue%block)
-    if (.not. queue%block%is_congruent(queue%source)) return
+    call source%list_parameters(ensemble%source)
+    call block%list_parameters(ensemble%block)
+    if (.not. ensemble%block%has_same_structure(ensemble%source)) return
     observer = new_statistics_observer(block, statistics, 0.0_wp, t_end)
-    queue%observer => observer
-    allocate (queue%y, source=source%start())
-    allocate (queue%values(size(statistics), variants%lanes), source=0.0_wp)
-    allocate (queue%variant(lanes%lanes), source=0)
-    call integrate_queue(block, settings_of(method, tolerance), [0.0_wp, t_end], queue, observer, outcome, error)
+    ensemble%observer => observer
+    allocate (ensemble%y, source=source%start())
+    allocate (ensemble%values(size(statistics), variants%lanes), source=0.0_wp)
+    allocate (ensemble%variant(lanes%lanes), source=0)
+    call integrate_ensemble(block, settings_of(method, tolerance), [0.0_wp, t_end], ensemble, observer, solver_status, error)
     if (allocated(error)) error stop 'nocdyn_test_sweep_blocks: a setting was refused'
-    call move_alloc(queue%values, values)
+    call move_alloc(ensemble%values, values)
   end subroutine run_copied_variants
 
   subroutine next(self, system, lane, t, y, found)
@@ -81,14 +81,14 @@ contains
     self%variant(lane) = self%begun
     call self%block%copy_lane(lane, self%source, self%begun)
     y(:) = self%y(self%begun, :)
-    call self%observer%begin(lane, y)
+    call self%observer%start_lane(lane, y)
   end subroutine next
 
-  subroutine finish(self, lane, y, outcome)
+  subroutine finish(self, lane, y, solver_status)
     class(measured_copies_t), intent(inout) :: self
     integer, intent(in) :: lane
     real(wp), contiguous, intent(in) :: y(:)
-    type(outcome_t), intent(in) :: outcome
+    type(solver_status_t), intent(in) :: solver_status
 
     call self%observer%results(lane, self%values(:, self%variant(lane)))
   end subroutine finish
@@ -138,13 +138,13 @@ contains
   end function settings_of
 
   !> The statistics of all lanes of a machine, each of which is one variant, from 0 to `t_end`.
-  subroutine run_block(machine, method, tolerance, t_end, statistics, values, outcome)
+  subroutine run_block(machine, method, tolerance, t_end, statistics, values, solver_status)
     type(machine_t), intent(in) :: machine
     character(len=*), intent(in) :: method
     real(wp), intent(in) :: tolerance, t_end
     type(statistic_t), intent(in) :: statistics(:)
     real(wp), allocatable, intent(out) :: values(:, :)   !! [statistics, lanes]
-    type(outcome_t), intent(out) :: outcome
+    type(solver_status_t), intent(out) :: solver_status
     class(formulation_t), allocatable, target :: formulation
     type(statistics_observer_t), target :: observer
     type(error_t), allocatable :: error
@@ -156,9 +156,9 @@ contains
     y = formulation%start()
     do lane = 1, machine%lanes
       start = y(lane, :)
-      call observer%begin(lane, start)
+      call observer%start_lane(lane, start)
     end do
-    call integrate(formulation, settings_of(method, tolerance), [0.0_wp, t_end], y, observer, outcome, error)
+    call integrate(formulation, settings_of(method, tolerance), [0.0_wp, t_end], y, observer, solver_status, error)
     if (allocated(error)) error stop 'nocdyn_test_sweep_blocks: ' // error%message
     allocate (values(size(statistics), machine%lanes))
     do lane = 1, machine%lanes
@@ -176,7 +176,7 @@ contains
     class(formulation_t), allocatable :: formulation
     type(trajectory_table_t) :: table
     type(recorder_t) :: records
-    type(outcome_t) :: outcome
+    type(solver_status_t) :: solver_status
     type(error_t), allocatable :: error
     real(wp), allocatable :: y(:, :), state(:)
     integer :: i
@@ -185,7 +185,7 @@ contains
     table = new_trajectory_table(formulation, times(1))
     records = recorder(formulation, size(times))
     y = formulation%start()
-    call integrate(formulation, settings_of(method, tolerance), times, y, records, outcome, error)
+    call integrate(formulation, settings_of(method, tolerance), times, y, records, solver_status, error)
     if (allocated(error)) error stop 'nocdyn_test_sweep_blocks: ' // error%message
     allocate (rows(size(table%labels), size(times)))
     do i = 1, size(times)

@@ -1,7 +1,7 @@
 !> Systems that change their branches, with solutions in closed form: an oscillator with play, switches at given times, a relay.
 module nocdyn_switching_systems
   use nocdyn_kinds, only: wp
-  use nocdyn_system, only: evaluation_give_up, system_t
+  use nocdyn_system, only: evaluation_fatal, system_t
   use nocdyn_text, only: to_text
   implicit none (type, external)
   private
@@ -16,9 +16,9 @@ module nocdyn_switching_systems
   contains
     procedure :: derivative => play_derivative
     procedure :: jacobian => play_jacobian
-    procedure :: enter => play_enter
-    procedure :: switch_values => play_values
-    procedure :: cross => play_cross
+    procedure :: start_lane => play_enter
+    procedure :: indicator_values => play_values
+    procedure :: change_branch => play_cross
     procedure :: switch_name => play_name
   end type play_t
 
@@ -28,14 +28,14 @@ module nocdyn_switching_systems
     real(wp) :: rate = 0.0_wp
     integer :: refused = huge(1)              !! so many passed times, and the slope cannot be evaluated
     logical, allocatable :: passed(:, :)
-    integer, allocatable :: calls(:)          !! of `cross`, by the switches
-    integer :: looks = 0                      !! calls of `switch_values`
+    integer, allocatable :: calls(:)          !! of `change_branch`, by the switches
+    integer :: looks = 0                      !! calls of `indicator_values`
   contains
     procedure :: derivative => clock_derivative
     procedure :: jacobian => clock_jacobian
-    procedure :: enter => clock_enter
-    procedure :: switch_values => clock_values
-    procedure :: cross => clock_cross
+    procedure :: start_lane => clock_enter
+    procedure :: indicator_values => clock_values
+    procedure :: change_branch => clock_cross
   end type clock_t
 
   !> x' = -1 above zero, 1 below: at zero it has nowhere to go.
@@ -45,9 +45,9 @@ module nocdyn_switching_systems
   contains
     procedure :: derivative => relay_derivative
     procedure :: jacobian => relay_jacobian
-    procedure :: enter => relay_enter
-    procedure :: switch_values => relay_values
-    procedure :: cross => relay_cross
+    procedure :: start_lane => relay_enter
+    procedure :: indicator_values => relay_values
+    procedure :: change_branch => relay_cross
   end type relay_t
 
   real(wp), parameter :: overlap = 1.0e-14_wp   ! of the branches of `play_t`, relative to the edge
@@ -200,7 +200,7 @@ contains
     integer, intent(inout) :: status(self%lanes)
 
     dydt(:, 1) = count(self%passed, dim=1) - self%rate * y(:, 1)
-    where (count(self%passed, dim=1) >= self%refused) status = evaluation_give_up
+    where (count(self%passed, dim=1) >= self%refused) status = evaluation_fatal
   end subroutine clock_derivative
 
   subroutine clock_jacobian(self, t, y, dfdy, dfdt, status)

@@ -4,7 +4,7 @@
 !> functions, so that a lane would depend on its place in the block: loops with such calls are marked `novector`.
 module nocdyn_test_problems
   use nocdyn_kinds, only: wp
-  use nocdyn_system, only: evaluation_fine, evaluation_give_up, evaluation_shorten, pattern_t, system_t
+  use nocdyn_system, only: evaluation_ok, evaluation_fatal, evaluation_recoverable, pattern_t, system_t
   use nocdyn_text, only: to_text
   implicit none (type, external)
   private
@@ -118,7 +118,7 @@ contains
     real(wp) :: u(2)
     integer :: lane
 
-    status = evaluation_fine
+    status = evaluation_ok
     !GCC$ novector
     do lane = 1, self%lanes
       u = smooth_solution(t(lane))
@@ -137,7 +137,7 @@ contains
     real(wp) :: u(2), v(2)
     integer :: lane
 
-    status = evaluation_fine
+    status = evaluation_ok
     !GCC$ novector
     do lane = 1, self%lanes
       u = smooth_solution(t(lane))
@@ -168,7 +168,7 @@ contains
     integer, intent(inout) :: status(self%lanes)
     integer :: lane
 
-    status = evaluation_fine
+    status = evaluation_ok
     !GCC$ novector
     do lane = 1, self%lanes
       dydt(lane, 1) = -self%stiffness(lane) * (y(lane, 1) - cos(t(lane))) - sin(t(lane))
@@ -185,7 +185,7 @@ contains
     integer, intent(inout) :: status(self%lanes)
     integer :: lane
 
-    status = evaluation_fine
+    status = evaluation_ok
     dfdt(:, 2) = 0.0_wp * y(:, 2)
     !GCC$ novector
     do lane = 1, self%lanes
@@ -213,7 +213,7 @@ contains
     integer, intent(inout) :: status(self%lanes)
     integer :: lane
 
-    status = evaluation_fine
+    status = evaluation_ok
     !GCC$ novector
     do lane = 1, self%lanes
       dydt(lane, 1) = y(lane, 2)
@@ -239,7 +239,7 @@ contains
     integer, intent(inout) :: status(self%lanes)
     integer :: lane
 
-    status = evaluation_fine
+    status = evaluation_ok
     dfdy(:, 1) = -self%stiffness - 3 * y(:, 1)**2
     dfdy(:, 2) = 1.0_wp
     dfdy(:, 3) = -0.1_wp
@@ -270,7 +270,7 @@ contains
     integer, intent(inout) :: status(self%lanes)
     integer :: lane
 
-    status = evaluation_fine
+    status = evaluation_ok
     !GCC$ novector
     do lane = 1, self%lanes
       dydt(lane, 1) = 1.0_wp
@@ -280,13 +280,13 @@ contains
       case (wall_not_finite)
         dydt(lane, 2) = quiet_nan()
       case (wall_shorten)
-        status(lane) = evaluation_shorten
+        status(lane) = evaluation_recoverable
       case (wall_give_up)
-        status(lane) = evaluation_give_up
+        status(lane) = evaluation_fatal
       case (wall_jump)
         dydt(lane, 2) = 1.0e30_wp
       case default
-        status(lane) = evaluation_fine
+        status(lane) = evaluation_ok
       end select
     end do
   end subroutine wall_derivative
@@ -300,7 +300,7 @@ contains
     integer, intent(inout) :: status(self%lanes)
     integer :: lane
 
-    status = evaluation_fine
+    status = evaluation_ok
     dfdy(:, :) = 0.0_wp
     dfdt(:, :) = 0.0_wp
     !GCC$ novector
@@ -343,7 +343,7 @@ contains
     real(wp), intent(inout) :: dydt(self%lanes, self%states + self%quadratures)
     integer, intent(inout) :: status(self%lanes)
 
-    status = merge(evaluation_fine, evaluation_give_up, size(t) == self%lanes .and. size(y, 1) == self%lanes)
+    status = merge(evaluation_ok, evaluation_fatal, size(t) == self%lanes .and. size(y, 1) == self%lanes)
     dydt(:, :self%states) = 0.0_wp
     dydt(:, self%states + 1:) = 1.0_wp
   end subroutine rest_derivative
@@ -356,7 +356,7 @@ contains
     real(wp), intent(inout) :: dfdt(self%lanes, self%states + self%quadratures)
     integer, intent(inout) :: status(self%lanes)
 
-    status = merge(evaluation_fine, evaluation_give_up, size(t) == self%lanes .and. size(y, 1) == self%lanes)
+    status = merge(evaluation_ok, evaluation_fatal, size(t) == self%lanes .and. size(y, 1) == self%lanes)
     dfdy(:, :) = 0.0_wp
     dfdt(:, :) = 0.0_wp
   end subroutine rest_jacobian

@@ -1,12 +1,12 @@
 !> From the input to the model: bodies, banks, constraints and coordinates.
 module nocdyn_assembly
-  use nocdyn_body_directory, only: bodies_of, directory_t, new_directory
+  use nocdyn_body_index, only: bodies_of, body_index_t, new_body_index
   use nocdyn_complement, only: complement_natural, complement_negated, complement_scaled
   use nocdyn_constraint_analysis, only: analyse_constraints
   use nocdyn_constraint_assembly, only: assemble_constraints, constraint_groups
   use nocdyn_coordinates, only: build_coordinates
   use nocdyn_coupling_assembly, only: add_couplings, check_couplings
-  use nocdyn_element_numbers, only: names_of, numbers_of
+  use nocdyn_element_parameters, only: names_of, values_of
   use nocdyn_errors, only: error_t
   use nocdyn_formulation, only: formulation_t
   use nocdyn_input, only: group_t, input_t
@@ -31,68 +31,68 @@ contains
     type(machine_t), intent(out) :: machine
     type(error_t), allocatable, intent(out) :: error
     integer, intent(in), optional :: lanes   !! absent: 1
-    type(directory_t) :: directory
+    type(body_index_t) :: body_index
 
     if (present(lanes)) machine%lanes = lanes
     associate (bodies => input%groups_named('body'))
       machine%names = names_of(input, bodies)
       machine%bodies = size(bodies)
-      machine%inertia = numbers_of(input, bodies, machine%lanes, 'inertia')
-      machine%start_angle = numbers_of(input, bodies, machine%lanes, 'angle')
-      machine%start_speed = numbers_of(input, bodies, machine%lanes, 'speed')
+      machine%inertia = values_of(input, bodies, machine%lanes, 'inertia')
+      machine%start_angle = values_of(input, bodies, machine%lanes, 'angle')
+      machine%start_speed = values_of(input, bodies, machine%lanes, 'speed')
     end associate
-    directory = new_directory(machine%names)
-    call assemble_constraints(input, directory, machine%lanes, machine%constraints, error)
+    body_index = new_body_index(machine%names)
+    call assemble_constraints(input, body_index, machine%lanes, machine%constraints, error)
     if (.not. allocated(error)) call check_couplings(input, error)
     if (.not. allocated(error)) call check_motors(input, error)
     if (allocated(error)) return
     allocate (machine%banks(0))
-    call add_couplings(input, directory, machine%lanes, machine%banks)
-    call add_motors(input, directory, machine%lanes, machine%banks)
-    call add_loads(input, directory, machine%lanes, machine%banks)
-    call add_excitations(input, directory, machine%lanes, machine%banks)
+    call add_couplings(input, body_index, machine%lanes, machine%banks)
+    call add_motors(input, body_index, machine%lanes, machine%banks)
+    call add_loads(input, body_index, machine%lanes, machine%banks)
+    call add_excitations(input, body_index, machine%lanes, machine%banks)
     call machine%number_elements()
-    call constrain(input, directory, machine, error)
+    call analyse_machine_constraints(input, body_index, machine, error)
   end subroutine assemble_machine
 
   !> Analyses the constraints, and chooses the coordinates and the speeds of the start.
-  subroutine constrain(input, directory, machine, error)
+  subroutine analyse_machine_constraints(input, body_index, machine, error)
     type(input_t), intent(in) :: input
-    type(directory_t), intent(in) :: directory
+    type(body_index_t), intent(in) :: body_index
     type(machine_t), intent(inout) :: machine
     type(error_t), allocatable, intent(out) :: error
     type(group_t) :: run
     integer, allocatable :: wanted(:)
-    integer :: culprit
+    integer :: offending_row
 
     run = input%single('run')
-    wanted = bodies_of(run, 'independent', directory)
-    call analyse_constraints(machine%constraints, machine%names, wanted, machine%trains, machine%groups, culprit, error)
+    wanted = bodies_of(run, 'independent', body_index)
+    call analyse_constraints(machine%constraints, machine%names, wanted, machine%trains, machine%groups, offending_row, error)
     if (.not. allocated(error)) then
       call build_coordinates(machine%constraints, machine%names, machine%trains, machine%groups, machine%inertia, wanted, &
                              complement_choice(run%text('complement')), machine%coordinates, error)
     end if
-    if (.not. allocated(error)) call fit_start_speeds(machine, run%text('start') == 'projected', culprit, error)
-    if (allocated(error)) call tell_place(input, culprit, error)
-  end subroutine constrain
+    if (.not. allocated(error)) call fit_start_speeds(machine, run%text('start') == 'projected', offending_row, error)
+    if (allocated(error)) call add_location(input, offending_row, error)
+  end subroutine analyse_machine_constraints
 
   !> The system that an integrator solves, by the word of the input.
-  subroutine new_formulation(word, machine, formulation, audited)
+  subroutine new_formulation(word, machine, formulation, with_energy_balance)
     character(len=*), intent(in) :: word
     type(machine_t), intent(in) :: machine
     class(formulation_t), allocatable, intent(out) :: formulation
-    logical, intent(in), optional :: audited   !! whether the works of the elements are integrated; absent: they are
-    logical :: has_works
+    logical, intent(in), optional :: with_energy_balance   !! whether the works of the elements are integrated; absent: they are
+    logical :: has_work_integrals
 
-    has_works = .true.
-    if (present(audited)) has_works = audited
+    has_work_integrals = .true.
+    if (present(with_energy_balance)) has_work_integrals = with_energy_balance
     select case (word)
     case ('reduced')
-      allocate (formulation, source=new_reduced(machine, has_works))
+      allocate (formulation, source=new_reduced(machine, has_work_integrals))
     case ('paper')
-      allocate (formulation, source=new_paper(machine, has_works))
+      allocate (formulation, source=new_paper(machine, has_work_integrals))
     case ('multiplier')
-      allocate (formulation, source=new_multiplier(machine, has_works))
+      allocate (formulation, source=new_multiplier(machine, has_work_integrals))
     case default
       error stop 'nocdyn_assembly: the schema allows a formulation that is not there'
     end select
@@ -113,20 +113,20 @@ contains
     end select
   end function complement_choice
 
-  !> Begins the message with file, line and group: of the constraint number `culprit`, of `independent` if that is 0.
-  subroutine tell_place(input, culprit, error)
+  !> Begins the message with file, line and group: of the constraint number `offending_row`, of `independent` if that is 0.
+  subroutine add_location(input, offending_row, error)
     type(input_t), intent(in) :: input
-    integer, intent(in) :: culprit
+    integer, intent(in) :: offending_row
     type(error_t), intent(inout) :: error
     integer, allocatable :: indices(:)
 
-    if (culprit > 0) then
+    if (offending_row > 0) then
       allocate (indices, source=constraint_groups(input))
-      error%message = input%place(indices(culprit)) // ': ' // error%message
+      error%message = input%location(indices(offending_row)) // ': ' // error%message
     else
       allocate (indices, source=input%groups_named('run'))
-      error%message = input%place(indices(1), 'independent') // ': independent ' // error%message
+      error%message = input%location(indices(1), 'independent') // ': independent ' // error%message
     end if
-  end subroutine tell_place
+  end subroutine add_location
 
 end module nocdyn_assembly

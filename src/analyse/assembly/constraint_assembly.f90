@@ -1,12 +1,12 @@
 !> From the rigid joints of an input to constraint rows, in the order of the file.
 module nocdyn_constraint_assembly
-  use nocdyn_body_directory, only: bodies_of, directory_t
+  use nocdyn_body_index, only: bodies_of, body_index_t
   use nocdyn_constraints, only: constraints_t, member_torques_t, new_constraints
   use nocdyn_errors, only: error_t, exit_input, raise
   use nocdyn_input, only: group_t, input_t
   use nocdyn_kinds, only: wp
   use nocdyn_text, only: string_t
-  use nocdyn_text_order, only: find_order, first_position
+  use nocdyn_text_sort, only: argsort, sorted_position
   implicit none (type, external)
   private
 
@@ -33,9 +33,9 @@ contains
   end function constraint_groups
 
   !> All rows; two columns of the results with one name are an error.
-  subroutine assemble_constraints(input, directory, lanes, constraints, error)
+  subroutine assemble_constraints(input, body_index, lanes, constraints, error)
     type(input_t), intent(in) :: input
-    type(directory_t), intent(in) :: directory
+    type(body_index_t), intent(in) :: body_index
     integer, intent(in) :: lanes
     type(constraints_t), intent(out) :: constraints
     type(error_t), allocatable, intent(out) :: error
@@ -46,28 +46,28 @@ contains
     allocate (indices, source=constraint_groups(input))
     allocate (joints(size(indices)))
     do i = 1, size(indices)
-      call read_joint(input%groups(indices(i)), directory, joints(i))
+      call read_joint(input%groups(indices(i)), body_index, joints(i))
     end do
-    call form_rows(input, indices, joints, size(directory%names), lanes, constraints)
+    call form_rows(input, indices, joints, size(body_index%names), lanes, constraints)
     call refuse_equal_columns(input, indices, constraints, error)
   end subroutine assemble_constraints
 
-  subroutine read_joint(group, directory, joint)
+  subroutine read_joint(group, body_index, joint)
     type(group_t), intent(in) :: group
-    type(directory_t), intent(in) :: directory
+    type(body_index_t), intent(in) :: body_index
     type(joint_t), intent(out) :: joint
 
     select case (group%kind)
     case ('gear')
-      call read_gear(group, directory, joint)
+      call read_gear(group, body_index, joint)
     case ('planetary')
-      call read_planetary(group, directory, joint)
+      call read_planetary(group, body_index, joint)
     case ('differential')
-      joint%bodies = [bodies_of(group, 'sides', directory), bodies_of(group, 'case', directory)]
+      joint%bodies = [bodies_of(group, 'sides', body_index), bodies_of(group, 'case', body_index)]
       joint%coefficients = [1.0_wp, 1.0_wp, -2.0_wp]
       joint%members = [character(len=7) :: '', '', 'case']
     case ('constraint')
-      joint%bodies = bodies_of(group, 'bodies', directory)
+      joint%bodies = bodies_of(group, 'bodies', body_index)
       joint%coefficients = group%numbers('coefficients')
       allocate (joint%members(size(joint%bodies)))
       joint%members(:) = ''
@@ -80,12 +80,12 @@ contains
   !>
   !> With radii the multiplier is the tooth force [N]; with teeth the row is scaled so that it is the torque on the
   !> first body [N m].
-  subroutine read_gear(gear, directory, joint)
+  subroutine read_gear(gear, body_index, joint)
     type(group_t), intent(in) :: gear
-    type(directory_t), intent(in) :: directory
+    type(body_index_t), intent(in) :: body_index
     type(joint_t), intent(inout) :: joint
 
-    joint%bodies = bodies_of(gear, 'bodies', directory)
+    joint%bodies = bodies_of(gear, 'bodies', body_index)
     if (gear%has_value('radii')) then
       joint%coefficients = gear%numbers('radii')
       joint%unit = 'N'
@@ -98,13 +98,13 @@ contains
   end subroutine read_gear
 
   !> Willis: z_s omega_s + z_r omega_r - (z_s + z_r) omega_c = 0, scaled so that the multiplier is the torque on the sun.
-  subroutine read_planetary(planetary, directory, joint)
+  subroutine read_planetary(planetary, body_index, joint)
     type(group_t), intent(in) :: planetary
-    type(directory_t), intent(in) :: directory
+    type(body_index_t), intent(in) :: body_index
     type(joint_t), intent(inout) :: joint
 
-    joint%bodies = [bodies_of(planetary, 'sun', directory), bodies_of(planetary, 'ring', directory), &
-                    bodies_of(planetary, 'carrier', directory)]
+    joint%bodies = [bodies_of(planetary, 'sun', body_index), bodies_of(planetary, 'ring', body_index), &
+                    bodies_of(planetary, 'carrier', body_index)]
     associate (teeth => real(planetary%whole_numbers('teeth'), wp))
       joint%coefficients = [1.0_wp, teeth(2) / teeth(1), -(teeth(1) + teeth(2)) / teeth(1)]
     end associate
@@ -165,12 +165,12 @@ contains
     integer :: m, other
 
     if (size(constraints%members%row) == 0) return
-    call find_order(constraints%names, order)
+    call argsort(constraints%names, order)
     do m = 1, size(constraints%members%row)
       name = constraints%names(constraints%members%row(m))%text // '_' // constraints%members%names(m)%text
-      other = first_position(name, constraints%names, order)
+      other = sorted_position(name, constraints%names, order)
       if (other == 0) cycle
-      call raise(error, exit_input, input%place(indices(constraints%members%row(m))) // ': its column reaction_' // name // &
+      call raise(error, exit_input, input%location(indices(constraints%members%row(m))) // ': its column reaction_' // name // &
                  ' would have the name of that of ' // input%label(indices(other)) // '; allowed: another name')
       return
     end do

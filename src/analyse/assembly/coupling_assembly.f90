@@ -1,9 +1,9 @@
 !> The banks of couplings of an input: one for each form of the elastic moment that it has.
 module nocdyn_coupling_assembly
   use nocdyn_bank, only: append_bank, bank_slot_t
-  use nocdyn_body_directory, only: directory_t
+  use nocdyn_body_index, only: body_index_t
   use nocdyn_couplings, only: new_couplings
-  use nocdyn_element_numbers, only: curves_of, ends_of, names_of, numbers_of
+  use nocdyn_element_parameters, only: curves_of, ends_of, names_of, values_of
   use nocdyn_errors, only: error_t, exit_input, raise
   use nocdyn_gap_couplings, only: new_gap_couplings
   use nocdyn_input, only: group_t, input_t
@@ -42,11 +42,12 @@ contains
         select case (form_of(group))
         case (gap)
           if (any(abs(coefficients_of(group)) > 0)) cycle
-          call raise(error, exit_input, input%place(indices(i), 'gap') // ': gap needs an elastic moment at its edges: ' // &
+          call raise(error, exit_input, input%location(indices(i), 'gap') // ': gap needs an elastic moment at its edges: ' // &
                      'stiffness, cubic_stiffness or polynomial that is not 0')
         case (saturated)
           if (group%number('stiffness') > 0) cycle
-          call raise(error, exit_input, input%place(indices(i), 'saturation') // ': saturation needs a stiffness that is not 0')
+          call raise(error, exit_input, input%location(indices(i), &
+                                                       'saturation') // ': saturation needs a stiffness that is not 0')
         case default
           cycle
         end select
@@ -82,9 +83,9 @@ contains
   end function coefficients_of
 
   !> A bank of cubic couplings in any case, the others where there are such couplings.
-  subroutine add_couplings(input, directory, lanes, banks)
+  subroutine add_couplings(input, body_index, lanes, banks)
     type(input_t), intent(in) :: input
-    type(directory_t), intent(in) :: directory
+    type(body_index_t), intent(in) :: body_index
     integer, intent(in) :: lanes
     type(bank_slot_t), allocatable, intent(inout) :: banks(:)
     integer, allocatable :: indices(:), some(:)
@@ -93,35 +94,35 @@ contains
     allocate (indices, source=input%groups_named('coupling'))
     do form = cubic, table
       some = pack(indices, [(form_of(input%groups(indices(i))) == form, i=1, size(indices))])
-      if (form == cubic .or. size(some) > 0) call add_form(input, some, lanes, form, directory, banks)
+      if (form == cubic .or. size(some) > 0) call add_form(input, some, lanes, form, body_index, banks)
     end do
   end subroutine add_couplings
 
   !> A bank of the couplings of one form.
-  subroutine add_form(input, indices, lanes, form, directory, banks)
+  subroutine add_form(input, indices, lanes, form, body_index, banks)
     type(input_t), intent(in) :: input
     integer, intent(in) :: indices(:)
     integer, intent(in) :: lanes, form
-    type(directory_t), intent(in) :: directory
+    type(body_index_t), intent(in) :: body_index
     type(bank_slot_t), allocatable, intent(inout) :: banks(:)
     type(ends_t) :: at
 
-    at = all_ends(input, indices, lanes, directory)
+    at = all_ends(input, indices, lanes, body_index)
     select case (form)
     case (cubic, slipping)
-      call append_bank(banks, new_couplings(at%names, at%from, at%to, numbers_of(input, indices, lanes, 'stiffness'), &
-                                            numbers_of(input, indices, lanes, 'cubic_stiffness'), at%damping, at%rest_twist, &
+      call append_bank(banks, new_couplings(at%names, at%from, at%to, values_of(input, indices, lanes, 'stiffness'), &
+                                            values_of(input, indices, lanes, 'cubic_stiffness'), at%damping, at%rest_twist, &
                                             at%friction, at%friction_speed))
     case (polynomial)
       call append_bank(banks, new_polynomial_couplings(at%names, at%from, at%to, all_coefficients(input, indices, lanes), &
                                                        at%damping, at%rest_twist, at%friction, at%friction_speed))
     case (gap)
       call append_bank(banks, new_gap_couplings(at%names, at%from, at%to, all_coefficients(input, indices, lanes), at%damping, &
-                                                at%rest_twist, numbers_of(input, indices, lanes, 'gap'), &
+                                                at%rest_twist, values_of(input, indices, lanes, 'gap'), &
                                                 at%friction, at%friction_speed))
     case (saturated)
-      call append_bank(banks, new_saturated_couplings(at%names, at%from, at%to, numbers_of(input, indices, lanes, 'stiffness'), &
-                                                      numbers_of(input, indices, lanes, 'saturation'), at%damping, &
+      call append_bank(banks, new_saturated_couplings(at%names, at%from, at%to, values_of(input, indices, lanes, 'stiffness'), &
+                                                      values_of(input, indices, lanes, 'saturation'), at%damping, &
                                                       at%rest_twist, at%friction, at%friction_speed))
     case default
       call append_bank(banks, new_table_couplings(at%names, at%from, at%to, &
@@ -130,23 +131,23 @@ contains
     end select
   end subroutine add_form
 
-  function all_ends(input, indices, lanes, directory) result(at)
+  function all_ends(input, indices, lanes, body_index) result(at)
     type(input_t), intent(in) :: input
     integer, intent(in) :: indices(:)
     integer, intent(in) :: lanes
-    type(directory_t), intent(in) :: directory
+    type(body_index_t), intent(in) :: body_index
     type(ends_t) :: at
     real(wp) :: friction(lanes, size(indices))
 
     allocate (at%names, source=names_of(input, indices))
-    allocate (at%from, source=ends_of(input, indices, 'bodies', 1, directory))
-    allocate (at%to, source=ends_of(input, indices, 'bodies', 2, directory))
-    allocate (at%damping, source=numbers_of(input, indices, lanes, 'damping'))
-    allocate (at%rest_twist, source=numbers_of(input, indices, lanes, 'rest_twist'))
-    friction = numbers_of(input, indices, lanes, 'friction')
+    allocate (at%from, source=ends_of(input, indices, 'bodies', 1, body_index))
+    allocate (at%to, source=ends_of(input, indices, 'bodies', 2, body_index))
+    allocate (at%damping, source=values_of(input, indices, lanes, 'damping'))
+    allocate (at%rest_twist, source=values_of(input, indices, lanes, 'rest_twist'))
+    friction = values_of(input, indices, lanes, 'friction')
     if (.not. any(friction > 0)) return
     allocate (at%friction, source=friction)
-    allocate (at%friction_speed, source=numbers_of(input, indices, lanes, 'friction_speed', absent=1.0_wp))
+    allocate (at%friction_speed, source=values_of(input, indices, lanes, 'friction_speed', absent=1.0_wp))
   end function all_ends
 
   !> p_1, p_2, ... of all couplings, [order, lanes, couplings].

@@ -1,10 +1,10 @@
 !> The banks of motors of an input: one for each form of their laws that it has.
 module nocdyn_motor_assembly
   use nocdyn_bank, only: append_bank, bank_slot_t
-  use nocdyn_body_directory, only: directory_t
+  use nocdyn_body_index, only: body_index_t
   use nocdyn_curve_motors, only: new_curve_motors
   use nocdyn_dc_motors, only: new_dc_motors
-  use nocdyn_element_numbers, only: curves_of, ends_of, names_of, numbers_of
+  use nocdyn_element_parameters, only: curves_of, ends_of, names_of, values_of
   use nocdyn_errors, only: error_t, exit_input, raise
   use nocdyn_governed_motors, only: new_governed_motors
   use nocdyn_governors, only: governor_t
@@ -35,7 +35,7 @@ contains
         if (form_of(group) /= induction) cycle
         associate (torque => group%number('breakdown_torque'), speed => group%number('synchronous_speed'))
           if ((torque > 0 .and. speed > 0) .or. (torque < 0 .and. speed < 0)) cycle
-          call raise(error, exit_input, input%place(indices(i), 'breakdown_torque') // ': breakdown_torque = ' // &
+          call raise(error, exit_input, input%location(indices(i), 'breakdown_torque') // ': breakdown_torque = ' // &
                      to_text(torque) // ' must have the sign of synchronous_speed = ' // to_text(speed))
           return
         end associate
@@ -60,9 +60,9 @@ contains
   end function form_of
 
   !> A bank of quadratic motors without governors in any case, the others where there are such motors.
-  subroutine add_motors(input, directory, lanes, banks)
+  subroutine add_motors(input, body_index, lanes, banks)
     type(input_t), intent(in) :: input
-    type(directory_t), intent(in) :: directory
+    type(body_index_t), intent(in) :: body_index
     integer, intent(in) :: lanes
     type(bank_slot_t), allocatable, intent(inout) :: banks(:)
     integer, allocatable :: free(:), governed(:), indices(:), some(:)
@@ -73,28 +73,28 @@ contains
       some = pack(indices, [(form_of(input%groups(indices(i))) == form, i=1, size(indices))])
       free = pack(some, [(.not. input%groups(some(i))%has_value('governor_speed'), i=1, size(some))])
       governed = pack(some, [(input%groups(some(i))%has_value('governor_speed'), i=1, size(some))])
-      if (form == quadratic .or. size(free) > 0) call add_free(input, free, lanes, form, directory, banks)
-      if (size(governed) > 0) call add_governed(input, governed, lanes, form, directory, banks)
+      if (form == quadratic .or. size(free) > 0) call add_free(input, free, lanes, form, body_index, banks)
+      if (size(governed) > 0) call add_governed(input, governed, lanes, form, body_index, banks)
     end do
   end subroutine add_motors
 
-  subroutine add_free(input, indices, lanes, form, directory, banks)
+  subroutine add_free(input, indices, lanes, form, body_index, banks)
     type(input_t), intent(in) :: input
     integer, intent(in) :: indices(:)
     integer, intent(in) :: lanes, form
-    type(directory_t), intent(in) :: directory
+    type(body_index_t), intent(in) :: body_index
     type(bank_slot_t), allocatable, intent(inout) :: banks(:)
     type(string_t), allocatable :: names(:)
     class(torque_curve_t), allocatable :: curve
     integer :: body(size(indices))
 
     allocate (names, source=names_of(input, indices))
-    body = ends_of(input, indices, 'body', 1, directory)
+    body = ends_of(input, indices, 'body', 1, body_index)
     select case (form)
     case (quadratic)
       call append_bank(banks, new_motors(names, body, standstill_torques(input, indices, lanes), &
-                                         numbers_of(input, indices, lanes, 'b') + drags(input, indices, lanes), &
-                                         numbers_of(input, indices, lanes, 'c')))
+                                         values_of(input, indices, lanes, 'b') + drags(input, indices, lanes), &
+                                         values_of(input, indices, lanes, 'c')))
     case (inductive)
       call add_inductive(input, indices, lanes, names, body, banks)
     case default
@@ -103,11 +103,11 @@ contains
     end select
   end subroutine add_free
 
-  subroutine add_governed(input, indices, lanes, form, directory, banks)
+  subroutine add_governed(input, indices, lanes, form, body_index, banks)
     type(input_t), intent(in) :: input
     integer, intent(in) :: indices(:)
     integer, intent(in) :: lanes, form
-    type(directory_t), intent(in) :: directory
+    type(body_index_t), intent(in) :: body_index
     type(bank_slot_t), allocatable, intent(inout) :: banks(:)
     type(string_t), allocatable :: names(:)
     class(torque_curve_t), allocatable :: curve
@@ -115,11 +115,11 @@ contains
     integer :: body(size(indices))
 
     allocate (names, source=names_of(input, indices))
-    body = ends_of(input, indices, 'body', 1, directory)
-    allocate (governor%set_speed, source=numbers_of(input, indices, lanes, 'governor_speed'))
-    allocate (governor%gain, source=numbers_of(input, indices, lanes, 'governor_gain'))
-    allocate (governor%time, source=numbers_of(input, indices, lanes, 'governor_time'))
-    allocate (governor%start, source=numbers_of(input, indices, lanes, 'governor_start'))
+    body = ends_of(input, indices, 'body', 1, body_index)
+    allocate (governor%set_speed, source=values_of(input, indices, lanes, 'governor_speed'))
+    allocate (governor%gain, source=values_of(input, indices, lanes, 'governor_gain'))
+    allocate (governor%time, source=values_of(input, indices, lanes, 'governor_time'))
+    allocate (governor%start, source=values_of(input, indices, lanes, 'governor_start'))
     if (form == inductive) then
       call add_inductive(input, indices, lanes, names, body, banks, governor)
     else
@@ -137,10 +137,10 @@ contains
     type(bank_slot_t), allocatable, intent(inout) :: banks(:)
     type(governor_t), intent(in), optional :: governor   !! absent: no motor has one
 
-    call append_bank(banks, new_dc_motors(names, body, numbers_of(input, indices, lanes, 'voltage'), &
-                                          numbers_of(input, indices, lanes, 'resistance'), &
-                                          numbers_of(input, indices, lanes, 'flux_constant'), &
-                                          numbers_of(input, indices, lanes, 'inductance'), governor))
+    call append_bank(banks, new_dc_motors(names, body, values_of(input, indices, lanes, 'voltage'), &
+                                          values_of(input, indices, lanes, 'resistance'), &
+                                          values_of(input, indices, lanes, 'flux_constant'), &
+                                          values_of(input, indices, lanes, 'inductance'), governor))
   end subroutine add_inductive
 
   subroutine make_curve(input, indices, lanes, form, curve)
@@ -155,13 +155,13 @@ contains
     select case (form)
     case (quadratic)
       allocate (parabola%a, source=standstill_torques(input, indices, lanes))
-      allocate (parabola%b, source=numbers_of(input, indices, lanes, 'b'))
-      allocate (parabola%c, source=numbers_of(input, indices, lanes, 'c'))
+      allocate (parabola%b, source=values_of(input, indices, lanes, 'b'))
+      allocate (parabola%c, source=values_of(input, indices, lanes, 'c'))
       allocate (curve, source=parabola)
     case (induction)
-      allocate (kloss%breakdown_torque, source=numbers_of(input, indices, lanes, 'breakdown_torque'))
-      allocate (kloss%breakdown_slip, source=numbers_of(input, indices, lanes, 'breakdown_slip'))
-      allocate (kloss%synchronous_speed, source=numbers_of(input, indices, lanes, 'synchronous_speed'))
+      allocate (kloss%breakdown_torque, source=values_of(input, indices, lanes, 'breakdown_torque'))
+      allocate (kloss%breakdown_slip, source=values_of(input, indices, lanes, 'breakdown_slip'))
+      allocate (kloss%synchronous_speed, source=values_of(input, indices, lanes, 'synchronous_speed'))
       allocate (curve, source=kloss)
     case default
       allocate (points%curve, source=curves_of(input, indices, lanes, 'table_speed', 'table_torque'))
@@ -176,9 +176,9 @@ contains
     integer, intent(in) :: lanes
     real(wp) :: torques(lanes, size(indices))
 
-    torques = numbers_of(input, indices, lanes, 'a') + numbers_of(input, indices, lanes, 'torque') &
-              + numbers_of(input, indices, lanes, 'flux_constant') * numbers_of(input, indices, lanes, 'voltage') &
-              / numbers_of(input, indices, lanes, 'resistance', absent=1.0_wp)
+    torques = values_of(input, indices, lanes, 'a') + values_of(input, indices, lanes, 'torque') &
+              + values_of(input, indices, lanes, 'flux_constant') * values_of(input, indices, lanes, 'voltage') &
+              / values_of(input, indices, lanes, 'resistance', absent=1.0_wp)
   end function standstill_torques
 
   !> k^2 / resistance of dc motors without inductance, which no throttle changes [N m s/rad].
@@ -188,7 +188,7 @@ contains
     integer, intent(in) :: lanes
     real(wp) :: drags(lanes, size(indices))
 
-    drags = numbers_of(input, indices, lanes, 'flux_constant')**2 / numbers_of(input, indices, lanes, 'resistance', absent=1.0_wp)
+    drags = values_of(input, indices, lanes, 'flux_constant')**2 / values_of(input, indices, lanes, 'resistance', absent=1.0_wp)
   end function drags
 
 end module nocdyn_motor_assembly

@@ -19,7 +19,7 @@ contains
     type(error_t), allocatable, intent(out) :: error
     type(group_t) :: output, run
     real(wp) :: rounding, span, step
-    character(len=:), allocatable :: complaint, key
+    character(len=:), allocatable :: message, key
 
     output = input%single('output')
     run = input%single('run')
@@ -28,33 +28,33 @@ contains
     if (output%has_value('interval')) then
       key = 'interval'
       step = output%number(key)
-      complaint = key // ' = ' // to_text(step)
+      message = key // ' = ' // to_text(step)
     else
       key = 'points'
       step = span / (output%whole_number(key) - 1)
-      complaint = key // ' = ' // to_text(output%whole_number(key))
+      message = key // ' = ' // to_text(output%whole_number(key))
     end if
     if (step < span / most_rows) then
-      complaint = complaint // ' asks for too many rows; allowed: at most ' // to_text(most_rows) // &
+      message = message // ' asks for too many rows; allowed: at most ' // to_text(most_rows) // &
                   ', an interval of ' // rounded_text(span / most_rows, 3) // ' s'
     else if (step <= rounding) then
-      complaint = complaint // ' asks for times that rounding makes equal; allowed: an interval above ' // &
+      message = message // ' asks for times that rounding makes equal; allowed: an interval above ' // &
                   rounded_text(rounding, 3) // ' s, the spacing of numbers at t_start and t_end'
     else
       return
     end if
-    call raise(error, exit_input, place_of_output(input, key) // ': ' // complaint)
+    call raise(error, exit_input, output_location(input, key) // ': ' // message)
   end subroutine check_output_times
 
-  function place_of_output(input, key) result(place)
+  function output_location(input, key) result(place)
     type(input_t), intent(in) :: input
     character(len=*), intent(in) :: key
     character(len=:), allocatable :: place
     integer, allocatable :: indices(:)
 
     allocate (indices, source=input%groups_named('output'))
-    place = input%place(indices(1), key)
-  end function place_of_output
+    place = input%location(indices(1), key)
+  end function output_location
 
   !> The requested times: a row at t_start, one every `interval`, and one at t_end; or `points` rows evenly spaced.
   pure function output_times(input) result(times)

@@ -84,7 +84,8 @@ contains
                          ': implicit ones need ' // need)
     else
       allocate (indices, source=input%groups_named('run'))
-      call raise(error, exit_input, input%place(indices(1), 'method') // ': method = ' // quoted(method) // ' needs ' // need // &
+      call raise(error, exit_input, input%location(indices(1), &
+                                                   'method') // ': method = ' // quoted(method) // ' needs ' // need // &
                  '; method = ' // quoted('rk853') // ' needs none')
     end if
   end subroutine choose_method
@@ -100,7 +101,7 @@ contains
     obstacle = formulation%series_obstacle()
     if (len(obstacle) == 0) return
     allocate (indices, source=input%groups_named('run'))
-    call raise(error, exit_input, input%place(indices(1), 'method') // ': method = ' // quoted('taylor') // &
+    call raise(error, exit_input, input%location(indices(1), 'method') // ': method = ' // quoted('taylor') // &
                ' cannot be used: ' // obstacle)
   end subroutine refuse_missing_series
 

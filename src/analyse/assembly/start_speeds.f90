@@ -22,24 +22,24 @@ module nocdyn_start_speeds
 contains
 
   !> Checks the speeds, and projects those of the groups concerned if they may be.
-  subroutine fit_start_speeds(machine, may_project, culprit, error)
+  subroutine fit_start_speeds(machine, may_project, offending_row, error)
     type(machine_t), intent(inout) :: machine
     logical, intent(in) :: may_project
-    integer, intent(out) :: culprit   !! first row that is violated
+    integer, intent(out) :: offending_row   !! first row that is violated
     type(error_t), allocatable, intent(out) :: error
     real(wp) :: nearest(machine%bodies)
     integer, allocatable :: violated(:)
     integer :: row
 
-    culprit = 0
+    offending_row = 0
     violated = pack([(row, row=1, machine%constraints%rows())], [(is_violated(machine, row), row=1, machine%constraints%rows())])
     if (size(violated) == 0) return
     nearest = nearest_speeds(machine, violated)
     if (may_project) then
       call project_start(nearest, machine)
     else
-      culprit = violated(1)
-      call raise(error, exit_input, complaint(machine, violated, nearest))
+      offending_row = violated(1)
+      call raise(error, exit_input, violation_message(machine, violated, nearest))
     end if
   end subroutine fit_start_speeds
 
@@ -86,15 +86,15 @@ contains
 
     change = nearest - machine%start_speed(1, :)
     call machine%coordinates%reactions_of_imbalances(1, machine%inertia(1, :) * change, lambda)
-    allocate (machine%shock)
-    machine%shock%row = pack([(row, row=1, size(lambda))], abs(lambda) > least_impulse * maxval(abs(lambda)))
-    machine%shock%impulse = lambda(machine%shock%row)
-    machine%shock%energy_lost = 0.5_wp * sum(machine%inertia(1, :) * change**2)
+    allocate (machine%start_impulse)
+    machine%start_impulse%row = pack([(row, row=1, size(lambda))], abs(lambda) > least_impulse * maxval(abs(lambda)))
+    machine%start_impulse%impulse = lambda(machine%start_impulse%row)
+    machine%start_impulse%energy_lost = 0.5_wp * sum(machine%inertia(1, :) * change**2)
     machine%start_speed(:, :) = spread(nearest, 1, machine%lanes)
   end subroutine project_start
 
   !> "the start speeds violate this gear: 2 * 1 rad/s ('pinion') + ... = 2, which must be 0; nearest speeds that ...".
-  function complaint(machine, violated, nearest) result(text)
+  function violation_message(machine, violated, nearest) result(text)
     type(machine_t), intent(in) :: machine
     integer, intent(in) :: violated(:)
     real(wp), intent(in) :: nearest(:)
@@ -121,7 +121,7 @@ contains
     end do
     if (others > 0) text = text // ' and ' // to_text(others) // ' more'
     text = text // '; &run start = ' // quoted('projected') // ' takes them'
-  end function complaint
+  end function violation_message
 
   !> The left-hand side of a row with the start speeds in it, e.g. "2 * 1 rad/s ('pinion') + 3 * 0 rad/s ('machine')".
   function row_text(machine, row) result(text)

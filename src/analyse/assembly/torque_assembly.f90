@@ -1,8 +1,8 @@
 !> The banks of loads and excitations of an input: one for each form of their laws that it has.
 module nocdyn_torque_assembly
   use nocdyn_bank, only: append_bank, bank_slot_t
-  use nocdyn_body_directory, only: directory_t
-  use nocdyn_element_numbers, only: curves_of, ends_of, names_of, numbers_of
+  use nocdyn_body_index, only: body_index_t
+  use nocdyn_element_parameters, only: curves_of, ends_of, names_of, values_of
   use nocdyn_excitations, only: new_excitations
   use nocdyn_input, only: group_t, input_t
   use nocdyn_kinds, only: wp
@@ -32,9 +32,9 @@ contains
   end function load_form
 
   !> A bank of viscous loads in any case, the others where there are such loads.
-  subroutine add_loads(input, directory, lanes, banks)
+  subroutine add_loads(input, body_index, lanes, banks)
     type(input_t), intent(in) :: input
-    type(directory_t), intent(in) :: directory
+    type(body_index_t), intent(in) :: body_index
     integer, intent(in) :: lanes
     type(bank_slot_t), allocatable, intent(inout) :: banks(:)
     integer, allocatable :: indices(:), some(:)
@@ -43,26 +43,26 @@ contains
     allocate (indices, source=input%groups_named('load'))
     do form = viscous, table
       some = pack(indices, [(load_form(input%groups(indices(i))) == form, i=1, size(indices))])
-      if (form == viscous .or. size(some) > 0) call add_load_form(input, some, lanes, form, directory, banks)
+      if (form == viscous .or. size(some) > 0) call add_load_form(input, some, lanes, form, body_index, banks)
     end do
   end subroutine add_loads
 
-  subroutine add_load_form(input, indices, lanes, form, directory, banks)
+  subroutine add_load_form(input, indices, lanes, form, body_index, banks)
     type(input_t), intent(in) :: input
     integer, intent(in) :: indices(:)
     integer, intent(in) :: lanes, form
-    type(directory_t), intent(in) :: directory
+    type(body_index_t), intent(in) :: body_index
     type(bank_slot_t), allocatable, intent(inout) :: banks(:)
     type(string_t), allocatable :: names(:)
     integer :: body(size(indices))
     real(wp), dimension(lanes, size(indices)) :: constant, constant_speed, quadratic, slope
 
     allocate (names, source=names_of(input, indices))
-    body = ends_of(input, indices, 'body', 1, directory)
-    slope = numbers_of(input, indices, lanes, 'viscous')
-    quadratic = numbers_of(input, indices, lanes, 'quadratic')
-    constant = numbers_of(input, indices, lanes, 'constant')
-    constant_speed = numbers_of(input, indices, lanes, 'constant_speed', absent=1.0_wp)
+    body = ends_of(input, indices, 'body', 1, body_index)
+    slope = values_of(input, indices, lanes, 'viscous')
+    quadratic = values_of(input, indices, lanes, 'quadratic')
+    constant = values_of(input, indices, lanes, 'constant')
+    constant_speed = values_of(input, indices, lanes, 'constant_speed', absent=1.0_wp)
     select case (form)
     case (viscous)
       call append_bank(banks, new_loads(names, body, slope))
@@ -90,9 +90,9 @@ contains
   end function excitation_form
 
   !> A bank of harmonic excitations in any case, the others where there are such excitations.
-  subroutine add_excitations(input, directory, lanes, banks)
+  subroutine add_excitations(input, body_index, lanes, banks)
     type(input_t), intent(in) :: input
-    type(directory_t), intent(in) :: directory
+    type(body_index_t), intent(in) :: body_index
     integer, intent(in) :: lanes
     type(bank_slot_t), allocatable, intent(inout) :: banks(:)
     integer, allocatable :: indices(:), some(:)
@@ -101,26 +101,26 @@ contains
     allocate (indices, source=input%groups_named('excitation'))
     do form = harmonic, timed
       some = pack(indices, [(excitation_form(input%groups(indices(i))) == form, i=1, size(indices))])
-      if (form == harmonic .or. size(some) > 0) call add_excitation_form(input, some, lanes, form, directory, banks)
+      if (form == harmonic .or. size(some) > 0) call add_excitation_form(input, some, lanes, form, body_index, banks)
     end do
   end subroutine add_excitations
 
-  subroutine add_excitation_form(input, indices, lanes, form, directory, banks)
+  subroutine add_excitation_form(input, indices, lanes, form, body_index, banks)
     type(input_t), intent(in) :: input
     integer, intent(in) :: indices(:)
     integer, intent(in) :: lanes, form
-    type(directory_t), intent(in) :: directory
+    type(body_index_t), intent(in) :: body_index
     type(bank_slot_t), allocatable, intent(inout) :: banks(:)
     type(string_t), allocatable :: names(:)
     integer :: body(size(indices)), i
 
     allocate (names, source=names_of(input, indices))
-    body = ends_of(input, indices, 'body', 1, directory)
+    body = ends_of(input, indices, 'body', 1, body_index)
     select case (form)
     case (harmonic)
-      call append_bank(banks, new_excitations(names, body, numbers_of(input, indices, lanes, 'amplitude'), &
-                                              numbers_of(input, indices, lanes, 'frequency'), &
-                                              numbers_of(input, indices, lanes, 'phase')))
+      call append_bank(banks, new_excitations(names, body, values_of(input, indices, lanes, 'amplitude'), &
+                                              values_of(input, indices, lanes, 'frequency'), &
+                                              values_of(input, indices, lanes, 'phase')))
     case (waves)
       call add_waves(input, indices, lanes, names, body, banks)
     case (table)
@@ -128,9 +128,9 @@ contains
                                                                            extrapolation='constant')))
     case default
       call append_bank(banks, new_timed_excitations(names, body, [(shape_of(input%groups(indices(i))), i=1, size(indices))], &
-                                                    numbers_of(input, indices, lanes, 'amplitude'), &
-                                                    numbers_of(input, indices, lanes, 'time'), &
-                                                    numbers_of(input, indices, lanes, 'duration', absent=1.0_wp)))
+                                                    values_of(input, indices, lanes, 'amplitude'), &
+                                                    values_of(input, indices, lanes, 'time'), &
+                                                    values_of(input, indices, lanes, 'duration', absent=1.0_wp)))
     end select
   end subroutine add_excitation_form
 

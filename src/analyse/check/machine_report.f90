@@ -9,7 +9,7 @@ module nocdyn_machine_report
   implicit none (type, external)
   private
 
-  public :: coordinate_names, counted, machine_report, machine_notes, number_of
+  public :: coordinate_names, counted, machine_report, machine_notes, constraint_count
 
   integer, parameter :: most_names = 12    ! in a line
   integer, parameter :: most_lines = 40    ! of one sort in a report
@@ -31,12 +31,12 @@ contains
     type(string_t), allocatable :: notes(:)
 
     allocate (notes(0))
-    call note_redundancies(machine, notes)
-    if (allocated(machine%shock)) call note_shock(machine, notes)
+    call add_redundancy_notes(machine, notes)
+    if (allocated(machine%start_impulse)) call add_impulse_note(machine, notes)
   end function machine_notes
 
   !> One sentence for every redundant constraint.
-  subroutine note_redundancies(machine, notes)
+  subroutine add_redundancy_notes(machine, notes)
     type(machine_t), intent(in) :: machine
     type(string_t), allocatable, intent(inout) :: notes(:)
     integer :: found, g, r
@@ -55,7 +55,7 @@ contains
       end do
     end do
     if (found > most_notes) call append(notes, to_text(found - most_notes) // ' more constraints repeat others')
-  end subroutine note_redundancies
+  end subroutine add_redundancy_notes
 
   !> What the multiplier of a row is, with its verb.
   function reaction_word(machine, row) result(word)
@@ -74,23 +74,23 @@ contains
     end select
   end function reaction_word
 
-  subroutine note_shock(machine, notes)
+  subroutine add_impulse_note(machine, notes)
     type(machine_t), intent(in) :: machine
     type(string_t), allocatable, intent(inout) :: notes(:)
     character(len=:), allocatable :: text
     integer :: i
 
     text = 'the start speeds were projected onto the constraints: impulse'
-    associate (shock => machine%shock)
-      do i = 1, min(size(shock%row), most_names)
+    associate (impulse => machine%start_impulse)
+      do i = 1, min(size(impulse%row), most_names)
         if (i > 1) text = text // ','
-        text = text // ' ' // rounded_text(shock%impulse(i), 7) // ' ' // machine%constraints%units(shock%row(i))%text // &
-               ' s in ' // label(machine, shock%row(i))
+        text = text // ' ' // rounded_text(impulse%impulse(i), 7) // ' ' // machine%constraints%units(impulse%row(i))%text // &
+               ' s in ' // label(machine, impulse%row(i))
       end do
-      if (size(shock%row) > most_names) text = text // ' and ' // to_text(size(shock%row) - most_names) // ' more'
-      call append(notes, text // '; kinetic energy lost: ' // rounded_text(shock%energy_lost, 7) // ' J')
+      if (size(impulse%row) > most_names) text = text // ' and ' // to_text(size(impulse%row) - most_names) // ' more'
+      call append(notes, text // '; kinetic energy lost: ' // rounded_text(impulse%energy_lost, 7) // ' J')
     end associate
-  end subroutine note_shock
+  end subroutine add_impulse_note
 
   !> "gear 'reducer'".
   function label(machine, row)
@@ -152,17 +152,17 @@ contains
     character(len=:), allocatable :: text
     integer :: number
 
-    text = ', ' // counted(number_of(machine, 'gear'), 'gear', 'gears')
-    number = number_of(machine, 'planetary')
+    text = ', ' // counted(constraint_count(machine, 'gear'), 'gear', 'gears')
+    number = constraint_count(machine, 'planetary')
     if (number > 0) text = text // ', ' // counted(number, 'planetary set', 'planetary sets')
-    number = number_of(machine, 'differential')
+    number = constraint_count(machine, 'differential')
     if (number > 0) text = text // ', ' // counted(number, 'differential', 'differentials')
-    number = number_of(machine, 'constraint')
+    number = constraint_count(machine, 'constraint')
     if (number > 0) text = text // ', ' // counted(number, 'constraint', 'constraints')
   end function counted_constraints
 
   !> Rows of one kind.
-  integer function number_of(machine, kind) result(number)
+  integer function constraint_count(machine, kind) result(number)
     type(machine_t), intent(in) :: machine
     character(len=*), intent(in) :: kind
     integer :: row
@@ -171,7 +171,7 @@ contains
     do row = 1, machine%constraints%rows()
       if (machine%constraints%kinds(row)%text == kind) number = number + 1
     end do
-  end function number_of
+  end function constraint_count
 
   !> Which bodies are geared together.
   subroutine put_groups(report, machine)

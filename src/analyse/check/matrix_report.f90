@@ -44,7 +44,7 @@ contains
 
     equations%machine = machine
     equations%n = machine%bodies
-    call place(equations%machine, t_start)
+    call set_start_state(equations%machine, t_start)
     call equations%report%append_line('Bodies 1 to ' // to_text(machine%bodies) // ': ' // joined(machine%names, ', '))
     call equations%report%append_line('Coordinates: ' // joined(coordinate_names(machine), ', '))
     call equations%report%append_line('At the start: t = ' // rounded_text(t_start, digits) // ' s')
@@ -63,7 +63,7 @@ contains
     type(string_t), allocatable :: names(:)
     integer :: i, role
 
-    if (all([(equations%machine%banks(i)%bank%is_of_paper, i=1, size(equations%machine%banks))])) return
+    if (all([(equations%machine%banks(i)%bank%has_paper_law, i=1, size(equations%machine%banks))])) return
     do role = 1, size(role_names)
       call collect_other_laws(equations%machine, role, names)
       if (size(names) == 0) cycle
@@ -82,7 +82,7 @@ contains
     allocate (names(0))
     do i = 1, size(machine%banks)
       associate (bank => machine%banks(i)%bank)
-        if (bank%is_of_paper .or. bank%role /= role) cycle
+        if (bank%has_paper_law .or. bank%role /= role) cycle
         do e = 1, size(bank%names)
           call append(names, bank%names(e)%text)
         end do
@@ -91,7 +91,7 @@ contains
   end subroutine collect_other_laws
 
   !> Brings all elements of the machine to the start.
-  subroutine place(machine, t_start)
+  subroutine set_start_state(machine, t_start)
     type(machine_t), intent(inout) :: machine
     real(wp), intent(in) :: t_start
     real(wp), dimension(1, 0:machine%bodies) :: phi, omega
@@ -100,11 +100,11 @@ contains
     omega = 0.0_wp
     phi(:, 1:) = machine%start_angle
     omega(:, 1:) = machine%start_speed
-    machine%elements%inner%value = machine%start_inner()
-    call machine%choose_all([t_start], phi, omega)
+    machine%elements%internal%value = machine%start_internal()
+    call machine%choose_branches([t_start], phi, omega)
     call machine%differentiate([t_start], phi, omega)
-    call machine%assess()
-  end subroutine place
+    call machine%evaluate_energies()
+  end subroutine set_start_state
 
   !> The bodies before the constraints: eqs. (13)-(22).
   subroutine report_free_bodies(equations)

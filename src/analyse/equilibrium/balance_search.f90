@@ -23,7 +23,7 @@ module nocdyn_balance_search
     integer, allocatable :: members(:)           !! unknowns
     real(wp), allocatable :: values(:, :)        !! [members, solutions]
     logical, allocatable :: is_range(:)          !! whether a solution stands for a range of others, [solutions]
-    logical :: is_idle = .false.                 !! nothing acts: any speed is steady, and the one of the start is kept
+    logical :: is_unloaded = .false.                 !! nothing acts: any speed is steady, and the one of the start is kept
     real(wp) :: least_torque = huge(1.0_wp)      !! smallest imbalance that was met, with its sign [N m]
     real(wp) :: least_speed = 0.0_wp             !! there [rad/s]
   end type block_solutions_t
@@ -49,7 +49,7 @@ contains
       if (size(blocks(k)%members) == 1 .and. i <= balance%motions%freedoms()) then
         call scan(balance, z, blocks(k))
       else
-        call try_starts(balance, z, blocks(k))
+        call search_from_starts(balance, z, blocks(k))
       end if
     end do
   end subroutine search_balance
@@ -63,7 +63,7 @@ contains
     real(wp) :: torque(lbound(grid, 1):ubound(grid, 1))
     integer :: i
 
-    call lay_out(balance, block%members(1), grid)
+    call fill_speed_grid(balance, block%members(1), grid)
     do i = lbound(grid, 1), ubound(grid, 1)
       torque(i) = imbalance(balance, z, block%members(1), grid(i))
       if (abs(torque(i)) < abs(block%least_torque)) then
@@ -71,18 +71,18 @@ contains
         block%least_speed = grid(i)
       end if
     end do
-    block%is_idle = all(abs(torque) <= 0.0_wp)
-    if (block%is_idle) then
+    block%is_unloaded = all(abs(torque) <= 0.0_wp)
+    if (block%is_unloaded) then
       call add(z(block%members), block)
       return
     end if
     do i = lbound(grid, 1), ubound(grid, 1)
-      call look_around(balance, z, grid, torque, lbound(grid, 1), i, block)
+      call search_interval(balance, z, grid, torque, lbound(grid, 1), i, block)
     end do
   end subroutine scan
 
   !> Speeds that grow geometrically on both sides of zero; `fastest` is the speed of the fastest body per speed of the freedom.
-  subroutine lay_out(balance, freedom, grid)
+  subroutine fill_speed_grid(balance, freedom, grid)
     type(torque_balance_t), intent(in) :: balance
     integer, intent(in) :: freedom
     real(wp), intent(out) :: grid(-2 * decades * points_per_decade - 1:)
@@ -97,10 +97,10 @@ contains
       grid(i) = 10.0_wp**(real(i - 1, wp) / points_per_decade - decades) / fastest
       grid(-i) = -grid(i)
     end do
-  end subroutine lay_out
+  end subroutine fill_speed_grid
 
   !> The solutions between this point of the scan and the next, and in the pair of intervals around it.
-  subroutine look_around(balance, z, grid, torque, lower, i, block)
+  subroutine search_interval(balance, z, grid, torque, lower, i, block)
     type(torque_balance_t), intent(inout) :: balance
     real(wp), intent(in) :: z(:)
     integer, intent(in) :: lower, i
@@ -113,20 +113,20 @@ contains
         call add_range(z(member), grid, torque, lower, i, block)
       else if (i < n) then
         if (torque(i) * torque(i + 1) < 0.0_wp) then
-          call refine(balance, z, grid(i), grid(i + 1), torque(i), block)
+          call solve_bracketed(balance, z, grid(i), grid(i + 1), torque(i), block)
         else if (i > lower) then
-          if (.not. is_dip(torque(i - 1:i + 1))) return
-          call descend(balance, z, member, grid(i - 1), grid(i + 1), middle, top)
+          if (.not. is_local_minimum(torque(i - 1:i + 1))) return
+          call minimise_torque(balance, z, member, grid(i - 1), grid(i + 1), middle, top)
           if (abs(top) <= 0.0_wp) then
             call add([middle], block)
           else if (top * torque(i) < 0.0_wp) then
-            call refine(balance, z, grid(i - 1), middle, torque(i - 1), block)
-            call refine(balance, z, middle, grid(i + 1), top, block)
+            call solve_bracketed(balance, z, grid(i - 1), middle, torque(i - 1), block)
+            call solve_bracketed(balance, z, middle, grid(i + 1), top, block)
           end if
         end if
       end if
     end associate
-  end subroutine look_around
+  end subroutine search_interval
 
   !> A point of the scan where the torques balance, or the speed nearest to `start` of the range that begins there.
   subroutine add_range(start, grid, torque, lower, i, block)
@@ -147,12 +147,12 @@ contains
   end subroutine add_range
 
   !> Whether the middle one of three torques of the same sign is the smallest.
-  pure logical function is_dip(torque)
+  pure logical function is_local_minimum(torque)
     real(wp), intent(in) :: torque(3)
 
-    is_dip = torque(1) * torque(2) > 0.0_wp .and. torque(3) * torque(2) > 0.0_wp .and. &
+    is_local_minimum = torque(1) * torque(2) > 0.0_wp .and. torque(3) * torque(2) > 0.0_wp .and. &
              abs(torque(2)) <= abs(torque(1)) .and. abs(torque(2)) <= abs(torque(3))
-  end function is_dip
+  end function is_local_minimum
 
   !> The torque along a freedom when it has this speed; zero if it is no more than rounding.
   function imbalance(balance, z, member, speed) result(torque)
@@ -167,11 +167,11 @@ contains
     trial(member) = speed
     call balance%evaluate(trial)
     torque = balance%residual(member)
-    if (abs(torque) <= rounding * balance%size(member)) torque = 0.0_wp
+    if (abs(torque) <= rounding * balance%scale(member)) torque = 0.0_wp
   end function imbalance
 
   !> The smallest torque between two speeds, by golden sections until its sign changes or the interval is used up.
-  subroutine descend(balance, z, member, left, right, middle, torque)
+  subroutine minimise_torque(balance, z, member, left, right, middle, torque)
     type(torque_balance_t), intent(inout) :: balance
     real(wp), intent(in) :: z(:)
     integer, intent(in) :: member
@@ -179,35 +179,35 @@ contains
     real(wp), intent(out) :: middle, torque
     real(wp), parameter :: golden = 0.6180339887498949_wp
     integer, parameter :: sections = 40   ! beyond 37 the torque at a minimum changes by rounding alone
-    real(wp) :: a, b, inner(2), value(2), sign_outside
+    real(wp) :: a, b, internal(2), value(2), sign_outside
     integer :: i
 
     a = left
     b = right
     sign_outside = imbalance(balance, z, member, left)
-    inner = [b - golden * (b - a), a + golden * (b - a)]
+    internal = [b - golden * (b - a), a + golden * (b - a)]
     do i = 1, 2
-      value(i) = imbalance(balance, z, member, inner(i))
+      value(i) = imbalance(balance, z, member, internal(i))
     end do
     do i = 1, sections
       if (any(value * sign_outside <= 0.0_wp)) exit
       if (abs(value(1)) < abs(value(2))) then
-        b = inner(2)
-        inner = [b - golden * (b - a), inner(1)]
-        value = [imbalance(balance, z, member, inner(1)), value(1)]
+        b = internal(2)
+        internal = [b - golden * (b - a), internal(1)]
+        value = [imbalance(balance, z, member, internal(1)), value(1)]
       else
-        a = inner(1)
-        inner = [inner(2), a + golden * (b - a)]
-        value = [value(2), imbalance(balance, z, member, inner(2))]
+        a = internal(1)
+        internal = [internal(2), a + golden * (b - a)]
+        value = [value(2), imbalance(balance, z, member, internal(2))]
       end if
     end do
     i = merge(1, 2, value(1) * sign_outside < value(2) * sign_outside)
-    middle = inner(i)
+    middle = internal(i)
     torque = value(i)
-  end subroutine descend
+  end subroutine minimise_torque
 
   !> The root between two speeds with torques of different sign: Newton's method, bisection where it leaves the bracket.
-  subroutine refine(balance, z, left, right, left_torque, block)
+  subroutine solve_bracketed(balance, z, left, right, left_torque, block)
     type(torque_balance_t), intent(inout) :: balance
     real(wp), intent(in) :: z(:)
     real(wp), intent(in) :: left, right, left_torque
@@ -239,7 +239,7 @@ contains
       end do
       call add([speed], block)
     end associate
-  end subroutine refine
+  end subroutine solve_bracketed
 
   !> Keeps a solution unless it is there already.
   subroutine add(values, block)
@@ -257,7 +257,7 @@ contains
   end subroutine add
 
   !> Newton's method from the start of the machine and from speeds of many sizes, alone and together.
-  subroutine try_starts(balance, z, block)
+  subroutine search_from_starts(balance, z, block)
     type(torque_balance_t), intent(inout) :: balance
     real(wp), intent(in) :: z(:)
     type(block_solutions_t), intent(inout) :: block
@@ -278,7 +278,7 @@ contains
         end do
       end do
     end associate
-  end subroutine try_starts
+  end subroutine search_from_starts
 
   !> Newton's method with steps of least norm, halved until the residuals fall; what converges is kept.
   subroutine newton(balance, z, block)
@@ -371,7 +371,7 @@ contains
     type(torque_balance_t), intent(in) :: balance
     integer, intent(in) :: members(:)
 
-    is_balanced = all(abs(balance%residual(members)) <= epsilon(1.0_wp) * balance%size(members))
+    is_balanced = all(abs(balance%residual(members)) <= epsilon(1.0_wp) * balance%scale(members))
   end function is_balanced
 
   !> Whether Newton's method has ended at a root: the residuals are rounding, of torques or of rates.
@@ -385,7 +385,7 @@ contains
     do i = 1, size(members)
       associate (residual => abs(balance%residual(members(i))))
         if (members(i) <= balance%motions%freedoms()) then
-          is_nearly_balanced = is_nearly_balanced .and. residual <= near * balance%size(members(i))
+          is_nearly_balanced = is_nearly_balanced .and. residual <= near * balance%scale(members(i))
         else
           is_nearly_balanced = is_nearly_balanced .and. residual <= near
         end if

@@ -8,15 +8,15 @@ module nocdyn_equilibrium
   use nocdyn_linearisation, only: linearisation_t, linearise
   use nocdyn_machine, only: machine_t
   use nocdyn_reduced, only: new_reduced
-  use nocdyn_static_twists, only: find_twists, loose_elements
+  use nocdyn_static_twists, only: find_twists, undetermined_elements
   use nocdyn_text, only: append, joined, quoted, rounded_text, selected, string_t
   use nocdyn_torque_balance, only: new_torque_balance, torque_balance_t
   implicit none (type, external)
   private
 
-  public :: find_equilibria, judge_equilibria, nearest_equilibrium
+  public :: find_equilibria, find_stability, nearest_equilibrium
 
-  real(wp), parameter, public :: late = 1.0e30_wp   !! when all that changes once has changed [s]
+  real(wp), parameter, public :: t_infinity = 1.0e30_wp   !! when all that changes once has changed [s]
 
   integer, parameter :: most_combinations = 64   !! of the solutions of independent parts of a machine
   integer, parameter :: most_states = 1000       !! whose eigenvalues are found to state the stability, in some seconds
@@ -27,7 +27,7 @@ module nocdyn_equilibrium
     real(wp), allocatable :: y(:, :)          !! state of the reduced formulation without works, [1, states]
     character(len=14) :: stability = 'not determined'   !! stable, unstable, neutral, not determined
     real(wp) :: growth = 0.0_wp               !! largest real part of the eigenvalues but those of idle motions [1/s]
-    integer :: idle = 0                       !! rigid motions that nothing drives or brakes
+    integer :: free_modes = 0                       !! rigid motions that nothing drives or brakes
   end type equilibrium_t
 
 contains
@@ -39,39 +39,39 @@ contains
     type(equilibrium_t), allocatable, intent(out) :: equilibria(:)
     type(string_t), allocatable, intent(out) :: notes(:)
     type(error_t), allocatable, intent(out) :: error               !! if there is none
-    type(machine_t) :: settled
+    type(machine_t) :: mean_machine
     type(torque_balance_t) :: balance
     type(block_solutions_t), allocatable :: blocks(:)
     integer :: i
 
-    settled = machine
-    call settled%settle()
-    allocate (formulation, source=new_reduced(settled, .false.))
-    balance = new_torque_balance(formulation, late)
+    mean_machine = machine
+    call mean_machine%to_mean_torque()
+    allocate (formulation, source=new_reduced(mean_machine, .false.))
+    balance = new_torque_balance(formulation, t_infinity)
     call search_balance(balance, blocks)
     allocate (notes(0))
     do i = 1, size(blocks)
       if (size(blocks(i)%values, 2) > 0) cycle
-      call raise(error, exit_failed, no_balance_sentence(balance, blocks(i)))
+      call raise(error, exit_failed, no_balance_message(balance, blocks(i)))
       return
     end do
     do i = 1, size(blocks)
-      if (blocks(i)%is_idle) call append(notes, 'nothing drives or brakes ' // moving_bodies(balance, blocks(i)%members) // &
+      if (blocks(i)%is_unloaded) call append(notes, 'nothing drives or brakes ' // moving_bodies(balance, blocks(i)%members) // &
                                                 ': any speed is steady, and the one of the start is kept')
     end do
     call combine(balance, blocks, equilibria, notes, error)
   end subroutine find_equilibria
 
   !> States the stability of every steady state.
-  subroutine judge_equilibria(formulation, equilibria)
+  subroutine find_stability(formulation, equilibria)
     class(formulation_t), intent(inout) :: formulation
     type(equilibrium_t), intent(inout) :: equilibria(:)
     integer :: i
 
     do i = 1, size(equilibria)
-      call judge(formulation, equilibria(i))
+      call classify(formulation, equilibria(i))
     end do
-  end subroutine judge_equilibria
+  end subroutine find_stability
 
   !> Every combination of the solutions of the blocks, with its twists.
   subroutine combine(balance, blocks, equilibria, notes, error)
@@ -95,9 +95,9 @@ contains
       call complete(balance, z, found, is_found, error)
       if (allocated(error)) return
       if (is_found) then
-        found%idle = count(blocks%is_idle .or. [(blocks(i)%is_range(choice(i)), i=1, size(blocks))])
+        found%free_modes = count(blocks%is_unloaded .or. [(blocks(i)%is_range(choice(i)), i=1, size(blocks))])
         equilibria = [equilibria, found]
-        call note_ranges(balance, blocks, choice, z, notes)
+        call add_range_notes(balance, blocks, choice, z, notes)
       else
         call append(notes, 'the torques balance at ' // speed_text(balance, z, [(i, i=1, size(z))]) // &
                            ', but no twists of the couplings carry them')
@@ -109,13 +109,13 @@ contains
   end subroutine combine
 
   !> What else is steady beside a solution: other speeds, other twists.
-  subroutine note_ranges(balance, blocks, choice, z, notes)
+  subroutine add_range_notes(balance, blocks, choice, z, notes)
     type(torque_balance_t), intent(in) :: balance      !! at the solution, with its twists
     type(block_solutions_t), intent(in) :: blocks(:)
     integer, intent(in) :: choice(:)
     real(wp), intent(in) :: z(:)
     type(string_t), allocatable, intent(inout) :: notes(:)
-    integer, allocatable :: loose(:)
+    integer, allocatable :: undetermined(:)
     type(string_t), allocatable :: names(:)
     integer :: i
 
@@ -125,15 +125,15 @@ contains
                              'speeds: any of them is steady, and of those that were found the one nearest to the start is ' // &
                              'kept, ' // speed_text(balance, z, blocks(i)%members))
     end do
-    allocate (loose, source=loose_elements(balance))
-    if (size(loose) == 0) return
+    allocate (undetermined, source=undetermined_elements(balance))
+    if (size(undetermined) == 0) return
     allocate (names(0))
-    do i = 1, size(loose)
-      call append(names, balance%formulation%machine%element_name(loose(i)))
+    do i = 1, size(undetermined)
+      call append(names, balance%formulation%machine%element_name(undetermined(i)))
     end do
     call append_new(notes, 'inside an open gap, or where a law is level, any twist is steady: of ' // &
                            joined(names, ', ', most_names) // ' one near the start is kept')
-  end subroutine note_ranges
+  end subroutine add_range_notes
 
   !> Appends a note that is not there yet.
   subroutine append_new(notes, text)
@@ -174,13 +174,13 @@ contains
     q = 0.0_wp
     call balance%evaluate(z)
     call find_twists(balance, q, is_found, error)
-    call balance%place(z)
+    call balance%set_state(z)
     balance%y(1, size(q) + 1:2 * size(q)) = q
     equilibrium%y = balance%y
   end subroutine complete
 
   !> States the stability by the eigenvalues of the linearisation, where there are not too many.
-  subroutine judge(formulation, equilibrium)
+  subroutine classify(formulation, equilibrium)
     class(formulation_t), intent(inout) :: formulation
     type(equilibrium_t), intent(inout) :: equilibrium
     real(wp), parameter :: rounding = 1.0e-10_wp   ! of the largest eigenvalue
@@ -191,12 +191,12 @@ contains
 
     equilibrium%stability = 'not determined'
     if (formulation%states > most_states) return
-    call linearise(formulation, late, equilibrium%y, linear, error)
+    call linearise(formulation, t_infinity, equilibrium%y, linear, error)
     if (allocated(error)) return
     allocate (values(size(linear%matrix, 1)), vectors(size(linear%matrix, 1), size(linear%matrix, 1)))
     call eigenvectors(linear%matrix, values, vectors, has_failed)
     if (has_failed) return
-    equilibrium%growth = growth_rate(values, equilibrium%idle)
+    equilibrium%growth = growth_rate(values, equilibrium%free_modes)
     if (equilibrium%growth < -rounding * maxval(abs(values))) then
       equilibrium%stability = 'stable'
     else if (equilibrium%growth > rounding * maxval(abs(values))) then
@@ -204,17 +204,17 @@ contains
     else
       equilibrium%stability = 'neutral'
     end if
-  end subroutine judge
+  end subroutine classify
 
   !> The largest real part of the eigenvalues, but for the smallest of them, which are those of idle motions.
-  pure real(wp) function growth_rate(values, idle)
+  pure real(wp) function growth_rate(values, free_modes)
     complex(wp), intent(in) :: values(:)
-    integer, intent(in) :: idle   !! how many do not count
+    integer, intent(in) :: free_modes   !! how many do not count
     logical :: counts(size(values))
     integer :: i
 
     counts = .true.
-    do i = 1, idle
+    do i = 1, free_modes
       counts(minloc(abs(values), dim=1, mask=counts)) = .false.
     end do
     growth_rate = 0.0_wp
@@ -231,14 +231,14 @@ contains
     integer :: i
     logical :: has_stable
 
-    call formulation%place(formulation%start())
+    call formulation%set_state(formulation%start())
     start = formulation%omega(1, 1:)
     has_stable = any(equilibria%stability == 'stable')
     least = huge(least)
     nearest = 1
     do i = 1, size(equilibria)
       if (has_stable .and. equilibria(i)%stability /= 'stable') cycle
-      call formulation%place(equilibria(i)%y)
+      call formulation%set_state(equilibria(i)%y)
       distance = formulation%machine%kinetic_energy(1, formulation%omega(1, 1:) - start)
       if (distance >= least) cycle
       least = distance
@@ -247,7 +247,7 @@ contains
   end function nearest_equilibrium
 
   !> Why a block has no solution.
-  function no_balance_sentence(balance, block) result(sentence)
+  function no_balance_message(balance, block) result(sentence)
     type(torque_balance_t), intent(inout) :: balance
     type(block_solutions_t), intent(in) :: block
     character(len=:), allocatable :: sentence
@@ -273,7 +273,7 @@ contains
                    quoted(body_of(balance, member))
       end if
     end associate
-  end function no_balance_sentence
+  end function no_balance_message
 
   !> The body that stands for a rigid motion.
   function body_of(balance, freedom) result(name)

@@ -1,8 +1,8 @@
 !> The steady states of a machine as a person and as a program read them.
 module nocdyn_equilibrium_report
   use nocdyn_bank, only: role_coupling
-  use nocdyn_energy_account, only: worker_names
-  use nocdyn_equilibrium, only: equilibrium_t, late
+  use nocdyn_energy_balance, only: work_element_names
+  use nocdyn_equilibrium, only: equilibrium_t, t_infinity
   use nocdyn_formulation, only: formulation_t
   use nocdyn_input, only: group_t, input_t
   use nocdyn_json, only: json_t
@@ -29,7 +29,7 @@ module nocdyn_equilibrium_report
     type(string_t), allocatable :: notes(:)
     type(string_t), allocatable :: labels(:)       !! as in trajectory.csv: speeds, twists, moments, torques, reactions, energies
     real(wp), allocatable :: values(:, :)          !! [labels, equilibria]
-    type(string_t), allocatable :: workers(:)      !! elements whose power counts, with their kind
+    type(string_t), allocatable :: work_elements(:)      !! elements whose power counts, with their kind
     real(wp), allocatable :: power(:, :)           !! into the machine [W], [workers, equilibria]
     type(string_t), allocatable :: coordinates(:)
   end type equilibrium_report_t
@@ -44,23 +44,23 @@ contains
     type(equilibrium_report_t) :: self
     type(trajectory_table_t) :: table
     real(wp), allocatable :: row(:), watts(:, :), y(:)
-    integer, allocatable :: told(:)                 !! columns
+    integer, allocatable :: reported(:)                 !! columns
     integer :: i, k
 
     allocate (self%equilibria, source=equilibria)
     allocate (self%notes, source=notes)
     allocate (self%coordinates, source=coordinate_names(formulation%machine))
-    table = new_trajectory_table(new_reduced(formulation%machine, .true.), late)
-    told = steady_columns(table, formulation%machine)
-    allocate (self%labels, source=selected(table%labels, told))
-    allocate (self%workers, source=worker_names(formulation%machine))
-    allocate (self%values(size(self%labels), size(equilibria)), self%power(size(self%workers), size(equilibria)))
-    allocate (row(size(table%labels)), watts(1, size(self%workers)))
+    table = new_trajectory_table(new_reduced(formulation%machine, .true.), t_infinity)
+    reported = steady_columns(table, formulation%machine)
+    allocate (self%labels, source=selected(table%labels, reported))
+    allocate (self%work_elements, source=work_element_names(formulation%machine))
+    allocate (self%values(size(self%labels), size(equilibria)), self%power(size(self%work_elements), size(equilibria)))
+    allocate (row(size(table%labels)), watts(1, size(self%work_elements)))
     do k = 1, size(equilibria)
-      y = [equilibria(k)%y(1, :), (0.0_wp, i=1, size(self%workers))]
-      call table%fill(late, y, row)
+      y = [equilibria(k)%y(1, :), (0.0_wp, i=1, size(self%work_elements))]
+      call table%fill(t_infinity, y, row)
       call table%formulation%machine%power(watts)
-      self%values(:, k) = row(told)
+      self%values(:, k) = row(reported)
       self%power(:, k) = watts(1, :)
     end do
   end function new_equilibrium_report
@@ -106,7 +106,7 @@ contains
                                 ', ' // stability_text(self%equilibria(k)))
       end if
       call put_rows(self%labels, self%values(:, k), report)
-      call put_power(self%workers, self%power(:, k), report)
+      call put_power(self%work_elements, self%power(:, k), report)
     end do
     text = report%text()
   end function equilibrium_text
@@ -143,20 +143,22 @@ contains
   end subroutine put_rows
 
   !> Who puts power in, who takes it out, and what does not add up.
-  subroutine put_power(workers, power, report)
-    type(string_t), intent(in) :: workers(:)
+  subroutine put_power(work_elements, power, report)
+    type(string_t), intent(in) :: work_elements(:)
     real(wp), intent(in) :: power(:)
     type(text_buffer_t), intent(inout) :: report
     integer :: i, rows, width
 
-    if (size(workers) == 0) return
-    rows = min(size(workers), most_rows)
-    width = max(len('power into the machine [W]'), maxval([(text_width(workers(i)%text), i=1, rows)]))
+    if (size(work_elements) == 0) return
+    rows = min(size(work_elements), most_rows)
+    width = max(len('power into the machine [W]'), maxval([(text_width(work_elements(i)%text), i=1, rows)]))
     call report%append_line('  power into the machine [W]')
     do i = 1, rows
-      call report%append_line('  ' // padded(workers(i)%text, width) // cell(power(i)))
+      call report%append_line('  ' // padded(work_elements(i)%text, width) // cell(power(i)))
     end do
-    if (rows < size(workers)) call report%append_line('  (' // to_text(size(workers) - rows) // ' more in equilibrium.json)')
+    if (rows < size(work_elements)) then
+      call report%append_line('  (' // to_text(size(work_elements) - rows) // ' more in equilibrium.json)')
+    end if
     call report%append_line('  ' // padded('in all', width) // cell(sum(power)) // ', of ' // &
                             rounded_text(sum(max(power, 0.0_wp)), cell_digits) // ' put in')
   end subroutine put_power
@@ -185,7 +187,7 @@ contains
       call json%put('stability', trim(self%equilibria(k)%stability))
       if (self%equilibria(k)%stability /= 'not determined') call json%put('growth_rate_1_s', self%equilibria(k)%growth)
       call put_members(json, 'values', self%labels, self%values(:, k))
-      call put_members(json, 'power_W', self%workers, self%power(:, k))
+      call put_members(json, 'power_W', self%work_elements, self%power(:, k))
       call json%put('power_put_in_W', sum(max(self%power(:, k), 0.0_wp)))
       call json%put('power_residual_W', sum(self%power(:, k)))
       call json%close()

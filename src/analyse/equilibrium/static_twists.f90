@@ -17,27 +17,27 @@ module nocdyn_static_twists
   implicit none (type, external)
   private
 
-  public :: find_twists, loose_elements
+  public :: find_twists, undetermined_elements
 
   integer, parameter :: largest_matrix = 6000   ! rows and columns of a dense matrix of as many entries as are allowed
   real(wp), parameter :: balanced = 1.0e-13_wp   ! of the torques' terms: what is left is rounding
   real(wp), parameter :: angle_rounding = 16 * epsilon(1.0_wp)   ! of the angles, of which an elastic moment tells a difference
-  real(wp), parameter :: farthest = 1.0e8_wp     ! rad: twists beyond this carry nothing that nearer ones do not
+  real(wp), parameter :: max_twist = 1.0e8_wp     ! rad: twists beyond this carry nothing that nearer ones do not
 
   !> The stiffness matrix of the coordinates that are not free, and what is solved with it.
-  type :: stiffness_t
+  type :: twist_problem_t
     integer, allocatable :: unknown(:)       !! coordinates
-    integer, allocatable :: place(:)         !! of each coordinate in the band, 0 if it is free
+    integer, allocatable :: position(:)         !! of each coordinate in the band, 0 if it is free
     integer :: width = 0                     !! diagonals beside the main one
     real(wp), allocatable :: band(:, :)
-    real(wp), allocatable :: shield(:)       !! what raises the diagonal: its largest elements so far, 1 before, [unknown]
-    real(wp), allocatable :: outer(:)        !! torques of all other elements, [coordinates]
-    real(wp), allocatable :: outer_size(:)   !! sum of their absolute terms
+    real(wp), allocatable :: diagonal_scale(:)       !! what raises the diagonal: its largest elements so far, 1 before, [unknown]
+    real(wp), allocatable :: external_torque(:)        !! torques of all other elements, [coordinates]
+    real(wp), allocatable :: external_scale(:)   !! sum of their absolute terms
     real(wp) :: floor = 0.0_wp               !! rounding of the solution where little acts [N m]
     real(wp), allocatable :: torque(:)       !! residual, [coordinates]
     real(wp), allocatable :: tolerance(:)    !! what may be left of it: rounding of its terms and of the angles
     real(wp) :: energy = 0.0_wp
-  end type stiffness_t
+  end type twist_problem_t
 
 contains
 
@@ -49,8 +49,8 @@ contains
     type(error_t), allocatable, intent(out) :: error   !! if the stiffness matrix is too large
     integer, parameter :: most_steps = 500
     real(wp), parameter :: stalled = 1.0e3_wp   ! what is left and falls no further is rounding that no estimate foresees
-    type(stiffness_t) :: self
-    real(wp) :: lift, trial(size(q)), step(size(q))
+    type(twist_problem_t) :: self
+    real(wp) :: damping, trial(size(q)), step(size(q))
     real(wp) :: energy, excess, last_excess
     integer :: i
     logical :: is_singular
@@ -58,8 +58,8 @@ contains
     is_found = .false.
     call set_up(balance, self, error)
     if (allocated(error)) return
-    call load(balance, q, self)
-    lift = 0.0_wp
+    call evaluate_angles(balance, q, self)
+    damping = 0.0_wp
     last_excess = huge(1.0_wp)
     do i = 1, most_steps
       excess = torque_excess(self)
@@ -67,27 +67,27 @@ contains
       if (is_found) exit
       last_excess = excess
       energy = self%energy
-      call solve(balance, lift, self, step, is_singular)
+      call solve(balance, damping, self, step, is_singular)
       trial = q + step
-      if (.not. is_singular) call load(balance, trial, self)
-      if (.not. is_singular .and. goes_down(self, energy, step)) then
+      if (.not. is_singular) call evaluate_angles(balance, trial, self)
+      if (.not. is_singular .and. lowers_energy(self, energy, step)) then
         q = trial
-        lift = merge(0.0_wp, 0.1_wp * lift, lift < 1.0e-8_wp)
+        damping = merge(0.0_wp, 0.1_wp * damping, damping < 1.0e-8_wp)
         is_found = all(abs(step) <= 4 * spacing(abs(q)))
         if (is_found) exit
       else
-        call load(balance, q, self)
-        lift = max(10.0_wp * lift, 1.0e-6_wp)
+        call evaluate_angles(balance, q, self)
+        damping = max(10.0_wp * damping, 1.0e-6_wp)
       end if
-      if (lift > 1.0e12_wp .or. maxval(abs(q)) > farthest) exit
+      if (damping > 1.0e12_wp .or. maxval(abs(q)) > max_twist) exit
     end do
   end subroutine find_twists
 
   !> Elastic elements whose twists are not determined: where the machine stands, they and all others beside them have no
   !> stiffness.
-  function loose_elements(balance) result(loose)
+  function undetermined_elements(balance) result(undetermined)
     type(torque_balance_t), intent(in) :: balance   !! after `find_twists`
-    integer, allocatable :: loose(:)
+    integer, allocatable :: undetermined(:)
     type(rigid_motions_t) :: motions
     integer, allocatable :: slack(:)
     integer :: i
@@ -97,8 +97,8 @@ contains
       if (size(slack) > 0) motions = new_rigid_motions(balance%coordinates, balance%incidence, &
                                                        pack(balance%elastic, abs(stiffness) > 0.0_wp))
     end associate
-    loose = pack(slack, [(is_twisted(balance, motions, slack(i)), i=1, size(slack))])
-  end function loose_elements
+    undetermined = pack(slack, [(is_twisted(balance, motions, slack(i)), i=1, size(slack))])
+  end function undetermined_elements
 
   !> Whether a rigid motion twists an element.
   pure logical function is_twisted(balance, motions, element)
@@ -126,7 +126,7 @@ contains
 
   !> The largest of the torques that are left over, in units of what may be left.
   pure real(wp) function torque_excess(self)
-    type(stiffness_t), intent(in) :: self
+    type(twist_problem_t), intent(in) :: self
 
     integer :: c, i
 
@@ -138,21 +138,21 @@ contains
   end function torque_excess
 
   !> Whether a step has lowered the energy, or is so small that rounding hides it.
-  pure logical function goes_down(self, energy, step)
-    type(stiffness_t), intent(in) :: self
+  pure logical function lowers_energy(self, energy, step)
+    type(twist_problem_t), intent(in) :: self
     real(wp), intent(in) :: energy
     real(wp), intent(in) :: step(:)
     real(wp), parameter :: rounding = 1.0e-12_wp
     real(wp) :: turned
 
-    turned = abs(energy) + sum(abs(self%outer * step))
-    goes_down = self%energy <= energy + rounding * turned
-  end function goes_down
+    turned = abs(energy) + sum(abs(self%external_torque * step))
+    lowers_energy = self%energy <= energy + rounding * turned
+  end function lowers_energy
 
   !> The order of the coordinates and the torques of the other elements.
   subroutine set_up(balance, self, error)
     type(torque_balance_t), intent(in) :: balance
-    type(stiffness_t), intent(out) :: self
+    type(twist_problem_t), intent(out) :: self
     type(error_t), allocatable, intent(out) :: error
     type(entries_t) :: entries
     integer :: number(balance%coordinates), order(balance%coordinates - balance%motions%freedoms())
@@ -172,13 +172,13 @@ contains
       return
     end if
     self%unknown = self%unknown(order)
-    allocate (self%place(size(number)), source=0)
-    self%place(self%unknown) = [(c, c=1, size(self%unknown))]
-    allocate (self%band(3 * self%width + 1, size(self%unknown)), self%shield(size(self%unknown)), source=0.0_wp)
-    allocate (self%outer(size(number)), self%torque(size(number)), source=0.0_wp)
-    allocate (self%outer_size, self%tolerance, source=self%outer)
-    call find_outer(balance, self)
-    if (size(self%outer) > 0) self%floor = max(0.01_wp * epsilon(1.0_wp) * maxval(self%outer_size), tiny(1.0_wp))
+    allocate (self%position(size(number)), source=0)
+    self%position(self%unknown) = [(c, c=1, size(self%unknown))]
+    allocate (self%band(3 * self%width + 1, size(self%unknown)), self%diagonal_scale(size(self%unknown)), source=0.0_wp)
+    allocate (self%external_torque(size(number)), self%torque(size(number)), source=0.0_wp)
+    allocate (self%external_scale, self%tolerance, source=self%external_torque)
+    call find_external(balance, self)
+    if (size(self%external_torque) > 0) self%floor = max(0.01_wp * epsilon(1.0_wp) * maxval(self%external_scale), tiny(1.0_wp))
   end subroutine set_up
 
   !> Pairs of coordinates that an elastic element joins, each once.
@@ -213,9 +213,9 @@ contains
   end function joined_coordinates
 
   !> The torques of the elements that are not elastic, and of the elastic ones what does not depend on the twist.
-  subroutine find_outer(balance, self)
+  subroutine find_external(balance, self)
     type(torque_balance_t), intent(in) :: balance
-    type(stiffness_t), intent(inout) :: self
+    type(twist_problem_t), intent(inout) :: self
     real(wp) :: moment
     logical :: is_elastic(size(balance%formulation%machine%elements%to))
     integer :: e, k
@@ -224,35 +224,35 @@ contains
     is_elastic(balance%elastic) = .true.
     associate (elements => balance%formulation%machine%elements, incidence => balance%incidence)
       do e = 1, size(is_elastic)
-        moment = elements%working(1, e)
+        moment = elements%applied(1, e)
         if (.not. is_elastic(e)) moment = moment + elements%restoring(1, e)
         do k = incidence%first(e), incidence%first(e + 1) - 1
           associate (c => incidence%coordinate(k))
-            self%outer(c) = self%outer(c) + incidence%ratio(1, k) * moment
-            self%outer_size(c) = self%outer_size(c) + abs(incidence%ratio(1, k) * moment)
+            self%external_torque(c) = self%external_torque(c) + incidence%ratio(1, k) * moment
+            self%external_scale(c) = self%external_scale(c) + abs(incidence%ratio(1, k) * moment)
           end associate
         end do
       end do
     end associate
-  end subroutine find_outer
+  end subroutine find_external
 
   !> The elements at the angles q: residual torques and energy.
-  subroutine load(balance, q, self)
+  subroutine evaluate_angles(balance, q, self)
     type(torque_balance_t), intent(inout) :: balance
     real(wp), intent(in) :: q(:)
-    type(stiffness_t), intent(inout) :: self
+    type(twist_problem_t), intent(inout) :: self
     integer :: c, e, i, k
     real(wp) :: rounding
 
     balance%y(1, size(q) + 1:2 * size(q)) = q
     call balance%evaluate_state()
     call balance%formulation%machine%differentiate_elements(balance%t)
-    call balance%formulation%machine%assess()
-    self%torque = self%outer
-    self%tolerance = self%floor + balanced * self%outer_size
+    call balance%formulation%machine%evaluate_energies()
+    self%torque = self%external_torque
+    self%tolerance = self%floor + balanced * self%external_scale
     associate (elements => balance%formulation%machine%elements, incidence => balance%incidence, &
                phi => balance%formulation%phi)
-      self%energy = sum(elements%stored(1, balance%elastic)) - sum(self%outer * q)
+      self%energy = sum(elements%stored(1, balance%elastic)) - sum(self%external_torque * q)
       do i = 1, size(balance%elastic)
         e = balance%elastic(i)
         rounding = balanced * abs(elements%restoring(1, e)) + angle_rounding * abs(elements%restoring_angle(1, e)) &
@@ -264,13 +264,13 @@ contains
         end do
       end do
     end associate
-  end subroutine load
+  end subroutine evaluate_angles
 
-  !> Solves (K + lift * shield) step = torque at the elements of the last `load`.
-  subroutine solve(balance, lift, self, step, is_singular)
+  !> Solves (K + lift * shield) step = torque at the elements of the last `evaluate_angles`.
+  subroutine solve(balance, damping, self, step, is_singular)
     type(torque_balance_t), intent(in) :: balance
-    real(wp), intent(in) :: lift
-    type(stiffness_t), intent(inout) :: self
+    real(wp), intent(in) :: damping
+    type(twist_problem_t), intent(inout) :: self
     real(wp), intent(out) :: step(:)
     logical, intent(out) :: is_singular
     real(wp) :: x(size(self%unknown))
@@ -286,8 +286,8 @@ contains
         e = balance%elastic(i)
         do k = incidence%first(e), incidence%first(e + 1) - 1
           do l = incidence%first(e), incidence%first(e + 1) - 1
-            row = self%place(incidence%coordinate(k))
-            column = self%place(incidence%coordinate(l))
+            row = self%position(incidence%coordinate(k))
+            column = self%position(incidence%coordinate(l))
             if (min(row, column) == 0) cycle
             associate (entry => self%band(diagonal + row - column, column))
               entry = entry - incidence%ratio(1, k) * incidence%ratio(1, l) * elements%restoring_angle(1, e)
@@ -296,14 +296,14 @@ contains
         end do
       end do
     end associate
-    self%shield = max(self%shield, self%band(diagonal, :))
-    self%band(diagonal, :) = self%band(diagonal, :) + lift * merge(self%shield, 1.0_wp, self%shield > 0.0_wp)
+    self%diagonal_scale = max(self%diagonal_scale, self%band(diagonal, :))
+    self%band(diagonal, :) = self%band(diagonal, :) + damping * merge(self%diagonal_scale, 1.0_wp, self%diagonal_scale > 0.0_wp)
     x = self%torque(self%unknown)
     call band_factor(self%width, self%width, self%band, pivots, is_singular)
     if (is_singular) return
     call band_solve(self%width, self%width, self%band, pivots, x)
     step(self%unknown) = x
-    if (maxval(abs(x)) > farthest) is_singular = .true.
+    if (maxval(abs(x)) > max_twist) is_singular = .true.
   end subroutine solve
 
 end module nocdyn_static_twists

@@ -21,23 +21,23 @@ module nocdyn_torque_balance
     type(rigid_motions_t) :: motions
     integer, allocatable :: elastic(:)            !! elements that hold the rigid motions together
     integer :: coordinates = 0
-    integer :: inner = 0                          !! states after the angles
+    integer :: internal = 0                          !! states after the angles
     real(wp), allocatable :: residual(:)          !! of the equations after `evaluate`: [N m], rates of the inner states
-    real(wp), allocatable :: size(:)              !! sum of the absolute terms of each
+    real(wp), allocatable :: scale(:)              !! sum of the absolute terms of each
     ! the rest is work space
     real(wp) :: t(1) = 0.0_wp
     integer :: status(1) = 0
-    integer, allocatable, private :: acting(:)    !! elements that are not elastic
+    integer, allocatable, private :: inelastic(:)    !! elements that are not elastic
     integer, allocatable :: first(:)              !! [acting + 1]
     integer, allocatable :: freedom(:)            !! [entries]
     real(wp), allocatable, private :: ratio(:)    !! G, [entries]
     type(pattern_t), private :: pattern
-    real(wp), allocatable :: y(:, :)              !! state after `place`, [1, states]
+    real(wp), allocatable :: y(:, :)              !! state after `set_state`, [1, states]
     real(wp), allocatable, private :: rate(:, :), slopes(:, :)
   contains
     procedure :: unknowns
     procedure :: start
-    procedure :: place
+    procedure :: set_state
     procedure :: evaluate
     procedure :: evaluate_state
     procedure :: differentiate
@@ -58,12 +58,12 @@ contains
     allocate (self%formulation, source=formulation)
     associate (machine => formulation%machine)
       self%coordinates = machine%coordinates%freedoms
-      self%inner = formulation%states - 2 * self%coordinates
+      self%internal = formulation%states - 2 * self%coordinates
       self%incidence = new_element_coordinates(machine%elements, machine%coordinates)
       self%elastic = machine%elastic()
       is_elastic = .false.
       is_elastic(self%elastic) = .true.
-      self%acting = pack([(e, e=1, size(is_elastic))], .not. is_elastic)
+      self%inelastic = pack([(e, e=1, size(is_elastic))], .not. is_elastic)
       self%motions = new_rigid_motions(self%coordinates, self%incidence, self%elastic)
     end associate
     self%t = t
@@ -71,7 +71,7 @@ contains
     self%pattern = formulation%jacobian_pattern()
     allocate (self%y(1, formulation%states), self%rate(1, formulation%states), self%slopes(1, size(self%pattern%row)), &
               source=0.0_wp)
-    allocate (self%residual(self%unknowns()), self%size(self%unknowns()), source=0.0_wp)
+    allocate (self%residual(self%unknowns()), self%scale(self%unknowns()), source=0.0_wp)
   end function new_torque_balance
 
   !> G = U N of the acting elements.
@@ -82,14 +82,14 @@ contains
     integer :: i, k, next
 
     associate (incidence => self%incidence, motions => self%motions)
-      allocate (self%first(size(self%acting) + 1))
+      allocate (self%first(size(self%inelastic) + 1))
       self%first(1) = 1
       self%freedom = [integer ::]
       self%ratio = [real(wp) ::]
       row = 0.0_wp
-      do i = 1, size(self%acting)
+      do i = 1, size(self%inelastic)
         touched = [integer ::]
-        do k = incidence%first(self%acting(i)), incidence%first(self%acting(i) + 1) - 1
+        do k = incidence%first(self%inelastic(i)), incidence%first(self%inelastic(i) + 1) - 1
           do next = motions%first(incidence%coordinate(k)), motions%first(incidence%coordinate(k) + 1) - 1
             associate (s => motions%freedom(next))
               if (all(touched /= s)) touched = [touched, s]
@@ -108,7 +108,7 @@ contains
   pure integer function unknowns(self)
     class(torque_balance_t), intent(in) :: self
 
-    unknowns = self%motions%freedoms() + self%inner
+    unknowns = self%motions%freedoms() + self%internal
   end function unknowns
 
   !> The unknowns at the start of the machine: rigid motions with the angular momenta of the start speeds.
@@ -132,13 +132,13 @@ contains
     integer :: i
 
     s = 0.0_wp
-    rest = self%motions%along(inertial_torque(self, q_rate))
+    rest = self%motions%project_torques(inertial_torque(self, q_rate))
     direction = rest
     norm = sum(rest**2)
     scale = norm
     do i = 1, 10 * size(s)
       if (norm <= epsilon(norm)**2 * scale) exit
-      image = self%motions%along(inertial_torque(self, self%motions%speeds(direction)))
+      image = self%motions%project_torques(inertial_torque(self, self%motions%speeds(direction)))
       associate (step => norm / sum(direction * image))
         s = s + step * direction
         rest = rest - step * image
@@ -192,7 +192,7 @@ contains
   end function body_speeds
 
   !> The state y of the unknowns, at the start angles.
-  subroutine place(self, z)
+  subroutine set_state(self, z)
     class(torque_balance_t), intent(inout) :: self
     real(wp), intent(in) :: z(:)
 
@@ -201,7 +201,7 @@ contains
       self%y(1, f + 1:2 * f) = 0.0_wp
       self%y(1, 2 * f + 1:) = z(size(s) + 1:)
     end associate
-  end subroutine place
+  end subroutine set_state
 
   !> Brings the elements to the state y.
   subroutine evaluate_state(self)
@@ -218,23 +218,23 @@ contains
     real(wp) :: term
     integer :: e, i, k
 
-    call self%place(z)
+    call self%set_state(z)
     call self%evaluate_state()
     self%residual = 0.0_wp
-    self%size = 0.0_wp
+    self%scale = 0.0_wp
     associate (elements => self%formulation%machine%elements)
-      do i = 1, size(self%acting)
-        e = self%acting(i)
+      do i = 1, size(self%inelastic)
+        e = self%inelastic(i)
         do k = self%first(i), self%first(i + 1) - 1
-          term = self%ratio(k) * (elements%restoring(1, e) + elements%working(1, e))
+          term = self%ratio(k) * (elements%restoring(1, e) + elements%applied(1, e))
           self%residual(self%freedom(k)) = self%residual(self%freedom(k)) + term
-          self%size(self%freedom(k)) = self%size(self%freedom(k)) + abs(term)
+          self%scale(self%freedom(k)) = self%scale(self%freedom(k)) + abs(term)
         end do
       end do
     end associate
     associate (r => self%motions%freedoms(), f => self%coordinates)
       self%residual(r + 1:) = self%rate(1, 2 * f + 1:)
-      self%size(r + 1:) = abs(self%rate(1, 2 * f + 1:))
+      self%scale(r + 1:) = abs(self%rate(1, 2 * f + 1:))
     end associate
   end subroutine evaluate
 
@@ -248,24 +248,24 @@ contains
     matrix = 0.0_wp
     call self%formulation%jacobian(self%t, self%y, self%slopes, dfdt, self%status)
     associate (elements => self%formulation%machine%elements)
-      do i = 1, size(self%acting)
-        e = self%acting(i)
+      do i = 1, size(self%inelastic)
+        e = self%inelastic(i)
         do k = self%first(i), self%first(i + 1) - 1
           do j = self%first(i), self%first(i + 1) - 1
             matrix(self%freedom(k), self%freedom(j)) = matrix(self%freedom(k), self%freedom(j)) &
-                                                       + self%ratio(k) * self%ratio(j) * elements%working_speed(1, e)
+                                                       + self%ratio(k) * self%ratio(j) * elements%applied_speed(1, e)
           end do
         end do
       end do
     end associate
-    if (self%inner > 0) call differentiate_inner(self, matrix)
+    if (self%internal > 0) call differentiate_internal(self, matrix)
   end subroutine differentiate
 
   !> The rows and columns of the inner states: N^T M dq''/dx, dx'/dq' N and dx'/dx.
-  subroutine differentiate_inner(self, matrix)
+  subroutine differentiate_internal(self, matrix)
     type(torque_balance_t), intent(in) :: self
     real(wp), intent(inout) :: matrix(:, :)
-    real(wp) :: accelerations(self%coordinates, self%inner)
+    real(wp) :: accelerations(self%coordinates, self%internal)
     integer :: c, k, p, r
 
     r = self%motions%freedoms()
@@ -286,10 +286,10 @@ contains
         end associate
       end do
     end associate
-    do k = 1, self%inner
-      matrix(:r, r + k) = self%motions%along(inertial_torque(self, accelerations(:, k)))
+    do k = 1, self%internal
+      matrix(:r, r + k) = self%motions%project_torques(inertial_torque(self, accelerations(:, k)))
     end do
-  end subroutine differentiate_inner
+  end subroutine differentiate_internal
 
   !> Unknowns that no equation joins have different numbers: their blocks can be solved one by one.
   function blocks(self) result(block_of)
@@ -299,7 +299,7 @@ contains
 
     r = self%motions%freedoms()
     block_of = [(i, i=1, size(block_of))]
-    do i = 1, size(self%acting)
+    do i = 1, size(self%inelastic)
       do k = self%first(i) + 1, self%first(i + 1) - 1
         call join(self%freedom(self%first(i)), self%freedom(k), block_of)
       end do

@@ -12,7 +12,7 @@ module nocdyn_linearisation
   use nocdyn_errors, only: error_t, exit_failed, raise
   use nocdyn_formulation, only: formulation_t
   use nocdyn_kinds, only: wp
-  use nocdyn_lapack_eigen, only: cholesky_factor, divide_left, divide_right, singular_vectors, symmetric_eigenvectors
+  use nocdyn_lapack_eigen, only: cholesky_factor, solve_left, solve_right, singular_vectors, symmetric_eigenvectors
   use nocdyn_one_lane, only: choose_branches
   use nocdyn_system, only: pattern_t
   implicit none (type, external)
@@ -55,13 +55,13 @@ contains
     call formulation%jacobian([t], y, slopes, dfdt, status)
     incidence = new_element_coordinates(formulation%machine%elements, formulation%machine%coordinates)
     associate (elements => formulation%machine%elements)
-      self%stiffness = -(elements%restoring_angle(1, :) + elements%working_angle(1, :))
+      self%stiffness = -(elements%restoring_angle(1, :) + elements%applied_angle(1, :))
     end associate
     call find_modes(formulation, incidence, self, error)
     if (allocated(error)) return
     call assemble(formulation, self)
     if (formulation%states > 2 * size(self%natural)) then
-      call add_inner(formulation, pattern, slopes(1, :), self)
+      call add_internal(formulation, pattern, slopes(1, :), self)
     end if
   end subroutine linearise
 
@@ -86,13 +86,13 @@ contains
           flexibility(i, incidence%coordinate(e)) = incidence%ratio(1, e) * sqrt(abs(self%stiffness(elastic(i))))
         end do
       end do
-      if (size(elastic) > 0) call divide_right(factor, flexibility)
+      if (size(elastic) > 0) call solve_right(factor, flexibility)
       call solve_undamped(flexibility, self%stiffness(elastic), self, has_failed)
       if (has_failed) then
         call raise(error, exit_failed, 'the natural frequencies were not found: LAPACK did not converge')
         return
       end if
-      call divide_left(factor, self%shapes)
+      call solve_left(factor, self%shapes)
     end associate
     allocate (self%twists(size(self%stiffness), size(self%natural)), source=0.0_wp)
     do e = 1, size(self%stiffness)
@@ -152,20 +152,20 @@ contains
   subroutine assemble(formulation, self)
     class(formulation_t), intent(in) :: formulation
     type(linearisation_t), intent(inout) :: self
-    integer, allocatable :: working(:)
+    integer, allocatable :: applied(:)
     real(wp), allocatable :: rates(:, :)
     integer :: e, i, n, states
 
     n = size(self%natural)
     states = n + size(self%flexible) + formulation%states - 2 * n
     allocate (self%matrix(states, states), source=0.0_wp)
-    associate (damping => formulation%machine%elements%working_speed(1, :))
-      working = pack([(e, e=1, size(damping))], abs(damping) > 0.0_wp)
-      allocate (rates(size(working), n))
+    associate (damping => formulation%machine%elements%applied_speed(1, :))
+      applied = pack([(e, e=1, size(damping))], abs(damping) > 0.0_wp)
+      allocate (rates(size(applied), n))
       do i = 1, n
-        rates(:, i) = damping(working) * self%twists(working, i)
+        rates(:, i) = damping(applied) * self%twists(applied, i)
       end do
-      self%matrix(:n, :n) = matmul(transpose(self%twists(working, :)), rates)
+      self%matrix(:n, :n) = matmul(transpose(self%twists(applied, :)), rates)
     end associate
     do i = 1, size(self%flexible)
       associate (natural => self%natural(self%flexible(i)))
@@ -176,23 +176,23 @@ contains
   end subroutine assemble
 
   !> The rows and columns of the inner states; no inner state knows of a rigid rotation.
-  subroutine add_inner(formulation, pattern, slopes, self)
+  subroutine add_internal(formulation, pattern, slopes, self)
     class(formulation_t), intent(in) :: formulation
     type(pattern_t), intent(in) :: pattern
     real(wp), intent(in) :: slopes(:)
     type(linearisation_t), intent(inout) :: self
-    real(wp), allocatable :: by_inner(:, :), by_speed(:, :), by_angle(:, :)
+    real(wp), allocatable :: by_state(:, :), by_speed(:, :), by_angle(:, :)
     integer :: i, n, p, before
 
     n = size(self%natural)
     before = n + size(self%flexible)
-    associate (inner => formulation%states - 2 * n)
-      allocate (by_inner(n, inner), by_speed(inner, n), by_angle(inner, n), source=0.0_wp)
+    associate (internal => formulation%states - 2 * n)
+      allocate (by_state(n, internal), by_speed(internal, n), by_angle(internal, n), source=0.0_wp)
     end associate
     do p = 1, size(slopes)
       associate (row => pattern%row(p), column => pattern%column(p))
         if (row <= n .and. column > 2 * n) then
-          by_inner(row, column - 2 * n) = slopes(p)
+          by_state(row, column - 2 * n) = slopes(p)
         else if (row > 2 * n .and. column <= n) then
           by_speed(row - 2 * n, column) = slopes(p)
         else if (row > 2 * n .and. column <= 2 * n) then
@@ -202,13 +202,13 @@ contains
         end if
       end associate
     end do
-    self%matrix(:n, before + 1:) = matmul(transpose(self%shapes), matmul(mass_matrix(formulation), by_inner))
+    self%matrix(:n, before + 1:) = matmul(transpose(self%shapes), matmul(mass_matrix(formulation), by_state))
     self%matrix(before + 1:, :n) = matmul(by_speed, self%shapes)
     do i = 1, size(self%flexible)
       associate (mode => self%flexible(i))
         self%matrix(before + 1:, n + i) = matmul(by_angle, self%shapes(:, mode)) / abs(self%natural(mode))
       end associate
     end do
-  end subroutine add_inner
+  end subroutine add_internal
 
 end module nocdyn_linearisation

@@ -15,7 +15,7 @@ contains
     real(wp), intent(in) :: t
     real(wp), intent(in) :: y(formulation%states)
 
-    call formulation%enter(1, t, y)
+    call formulation%start_lane(1, t, y)
   end subroutine choose_branches
 
 end module nocdyn_one_lane

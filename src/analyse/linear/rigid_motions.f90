@@ -12,10 +12,10 @@ module nocdyn_rigid_motions
   public :: new_rigid_motions
 
   !> Speeds of coordinates that are combinations of others: q'(coordinate) = sum of ratio * q'(of).
-  type :: combination_t
+  type :: linear_combination_t
     integer, allocatable :: of(:)
     real(wp), allocatable :: ratio(:)
-  end type combination_t
+  end type linear_combination_t
 
   !> q'(c) is the sum of ratio * s(freedom) over the entries first(c) to first(c + 1) - 1.
   type, public :: rigid_motions_t
@@ -26,7 +26,7 @@ module nocdyn_rigid_motions
   contains
     procedure :: freedoms
     procedure :: speeds
-    procedure :: along
+    procedure :: project_torques
   end type rigid_motions_t
 
   !> A sparse row in the making.
@@ -34,7 +34,7 @@ module nocdyn_rigid_motions
     integer, allocatable :: active(:)     !! coordinates with an entry, the first `used`
     integer :: used = 0
     real(wp), allocatable :: value(:)     !! [coordinates]
-    real(wp), allocatable :: size(:)      !! sum of the absolute terms of `value`
+    real(wp), allocatable :: scale(:)      !! sum of the absolute terms of `value`
     logical, allocatable :: is_active(:)
   end type row_t
 
@@ -48,11 +48,11 @@ contains
     type(element_coordinates_t), intent(in) :: incidence    !! its first lane counts
     integer, intent(in) :: elastic(:)                       !! elements that may not be twisted further
     type(rigid_motions_t) :: self
-    type(combination_t) :: definition(freedoms)
+    type(linear_combination_t) :: definition(freedoms)
     type(row_t) :: row
     integer :: e, k
 
-    allocate (row%active(freedoms), row%value(freedoms), row%size(freedoms), row%is_active(freedoms))
+    allocate (row%active(freedoms), row%value(freedoms), row%scale(freedoms), row%is_active(freedoms))
     row%is_active = .false.
     do e = 1, size(elastic)
       do k = incidence%first(elastic(e)), incidence%first(elastic(e) + 1) - 1
@@ -60,7 +60,7 @@ contains
       end do
       call eliminate(row, definition)
     end do
-    call resolve(definition, row, self)
+    call express_by_free(definition, row, self)
   end function new_rigid_motions
 
   pure subroutine add(row, coordinate, value, size)
@@ -73,42 +73,42 @@ contains
       row%active(row%used) = coordinate
       row%is_active(coordinate) = .true.
       row%value(coordinate) = 0.0_wp
-      row%size(coordinate) = 0.0_wp
+      row%scale(coordinate) = 0.0_wp
     end if
     row%value(coordinate) = row%value(coordinate) + value
-    row%size(coordinate) = row%size(coordinate) + size
+    row%scale(coordinate) = row%scale(coordinate) + size
   end subroutine add
 
   !> Replaces the defined coordinates of a row until none is left.
   pure subroutine substitute(row, definition)
     type(row_t), intent(inout) :: row
-    type(combination_t), intent(in) :: definition(:)
-    integer :: c, i, place
+    type(linear_combination_t), intent(in) :: definition(:)
+    integer :: c, i, position
     real(wp) :: size, value
 
-    place = 1
-    do while (place <= row%used)
-      c = row%active(place)
+    position = 1
+    do while (position <= row%used)
+      c = row%active(position)
       if (.not. allocated(definition(c)%of)) then
-        place = place + 1
+        position = position + 1
         cycle
       end if
       value = row%value(c)
-      size = row%size(c)
+      size = row%scale(c)
       row%is_active(c) = .false.
-      row%active(place) = row%active(row%used)
+      row%active(position) = row%active(row%used)
       row%used = row%used - 1
       do i = 1, ubound(definition(c)%of, 1)
         call add(row, definition(c)%of(i), definition(c)%ratio(i) * value, abs(definition(c)%ratio(i)) * size)
       end do
-      place = 1
+      position = 1
     end do
   end subroutine substitute
 
   !> Solves the row for its highest coordinate, which is thereby defined; clears the row.
   pure subroutine eliminate(row, definition)
     type(row_t), intent(inout) :: row
-    type(combination_t), intent(inout) :: definition(:)
+    type(linear_combination_t), intent(inout) :: definition(:)
     integer, allocatable :: left(:)
     integer :: c
 
@@ -129,7 +129,7 @@ contains
     integer, allocatable :: coordinates(:)
 
     associate (active => row%active(:row%used))
-      coordinates = pack(active, abs(row%value(active)) > rounding * row%size(active))
+      coordinates = pack(active, abs(row%value(active)) > rounding * row%scale(active))
     end associate
   end function significant
 
@@ -141,8 +141,8 @@ contains
   end subroutine clear
 
   !> Every coordinate by the free ones.
-  pure subroutine resolve(definition, row, self)
-    type(combination_t), intent(inout) :: definition(:)
+  pure subroutine express_by_free(definition, row, self)
+    type(linear_combination_t), intent(inout) :: definition(:)
     type(row_t), intent(inout) :: row
     type(rigid_motions_t), intent(inout) :: self
     integer :: c, i
@@ -172,7 +172,7 @@ contains
       self%freedom(self%first(c):self%first(c + 1) - 1) = freedom_of(definition(c)%of)
       self%ratio(self%first(c):self%first(c + 1) - 1) = definition(c)%ratio
     end do
-  end subroutine resolve
+  end subroutine express_by_free
 
   !> Number of independent rigid motions.
   pure integer function freedoms(self)
@@ -197,7 +197,7 @@ contains
   end function speeds
 
   !> What acts along each freedom of what acts along the coordinates: the transpose of `speeds`.
-  pure function along(self, torque) result(total)
+  pure function project_torques(self, torque) result(total)
     class(rigid_motions_t), intent(in) :: self
     real(wp), intent(in) :: torque(:)   !! [coordinates]
     real(wp) :: total(size(self%free))
@@ -209,6 +209,6 @@ contains
         total(self%freedom(k)) = total(self%freedom(k)) + self%ratio(k) * torque(c)
       end do
     end do
-  end function along
+  end function project_torques
 
 end module nocdyn_rigid_motions

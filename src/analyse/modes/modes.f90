@@ -58,11 +58,11 @@ contains
     end if
     call clear_rounding(values)
     kept = pack([(i, i=1, states)], aimag(values) >= 0.0_wp)
-    call trace(linear, elastic, vectors(:, kept), speeds, twists)
+    call expand_vectors(linear, elastic, vectors(:, kept), speeds, twists)
     allocate (modes(size(kept)))
     do i = 1, size(kept)
       call fill_mode(linear, elastic, values(kept(i)), vectors(:, kept(i)), twists(:, i), modes(i))
-      call place_bodies(formulation, speeds(:, i), modes(i))
+      call fill_bodies(formulation, speeds(:, i), modes(i))
     end do
     modes = modes(order_of(modes))
   end subroutine find_modes
@@ -83,7 +83,7 @@ contains
   end subroutine clear_rounding
 
   !> Speeds of the coordinates and twists of the elastic elements in all modes, from the eigenvectors (p, e, inner states).
-  subroutine trace(linear, elastic, vectors, speeds, twists)
+  subroutine expand_vectors(linear, elastic, vectors, speeds, twists)
     type(linearisation_t), intent(in) :: linear
     integer, intent(in) :: elastic(:)
     complex(wp), intent(in) :: vectors(:, :)
@@ -99,7 +99,7 @@ contains
     end do
     speeds = matmul(cmplx(linear%shapes, kind=wp), vectors(:n, :))
     twists = matmul(cmplx(angles, kind=wp), vectors(n + 1:n + size(linear%flexible), :))
-  end subroutine trace
+  end subroutine expand_vectors
 
   !> What a mode is, and its potential energies.
   subroutine fill_mode(linear, elastic, eigenvalue, vector, twist, mode)
@@ -130,7 +130,7 @@ contains
   end subroutine fill_mode
 
   !> Shape and kinetic energies of the bodies from the speeds of the coordinates.
-  subroutine place_bodies(formulation, speeds, mode)
+  subroutine fill_bodies(formulation, speeds, mode)
     class(formulation_t), intent(in) :: formulation
     complex(wp), intent(in) :: speeds(:)
     type(mode_t), intent(inout) :: mode
@@ -151,7 +151,7 @@ contains
       mode%kinetic = mode%kinetic / total
       mode%shape = mode%shape / largest
     end associate
-  end subroutine place_bodies
+  end subroutine fill_bodies
 
   !> Places of the modes in the order in which they are told.
   function order_of(modes) result(order)

@@ -1,6 +1,6 @@
 !> The modes of a machine as a program reads them: modes.csv and modes.json.
 module nocdyn_modes_files
-  use nocdyn_equilibrium, only: late
+  use nocdyn_equilibrium, only: t_infinity
   use nocdyn_input, only: group_t, input_t
   use nocdyn_json, only: json_t
   use nocdyn_kinds, only: wp
@@ -112,9 +112,9 @@ contains
     about = input%single('case')
     call json%put('title', about%text('title'))
     call json%put('about', self%point)
-    if (self%t < late) call json%put('time_s', self%t)
+    if (self%t < t_infinity) call json%put('time_s', self%t)
     call json%put('notes', self%notes)
-    call put_train(json, self)
+    call put_drivetrain(json, self)
     call json%open_list('modes')
     number = 0
     do i = 1, size(self%modes)
@@ -127,7 +127,7 @@ contains
   end function modes_json
 
   !> What is joined to what: bodies, elastic couplings, and gears with the speed of the second body at 1 of the first.
-  subroutine put_train(json, self)
+  subroutine put_drivetrain(json, self)
     type(json_t), intent(inout) :: json
     type(modes_report_t), intent(in) :: self
     integer :: e, i
@@ -159,7 +159,7 @@ contains
       end do
     end associate
     call json%close_list()
-  end subroutine put_train
+  end subroutine put_drivetrain
 
   subroutine put_mode(json, mode, number, has_shape)
     type(json_t), intent(inout) :: json

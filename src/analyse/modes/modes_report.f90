@@ -48,7 +48,7 @@ contains
     allocate (self%elastic, source=self%machine%elastic())
     call find_modes(point%formulation, linear, self%elastic, self%modes, error)
     if (allocated(error)) return
-    call point%formulation%place(point%y)
+    call point%formulation%set_state(point%y)
     allocate (self%omega, source=point%formulation%omega(1, 1:))
     self%stiffness = linear%stiffness(self%elastic)
     self%t = point%t
@@ -160,13 +160,13 @@ contains
     type(modes_report_t), intent(in) :: self
     type(mode_t), intent(in) :: mode
     character(len=:), allocatable :: text
-    integer :: k, places(most_shares), shares
+    integer :: k, largest(most_shares), shares
 
     text = ''
-    call find_largest(mode%kinetic, places, shares)
+    call find_largest(mode%kinetic, largest, shares)
     do k = 1, shares
       if (k > 1) text = text // ', '
-      text = text // self%machine%names(places(k))%text // ' ' // percent(mode%kinetic(places(k)))
+      text = text // self%machine%names(largest(k))%text // ' ' // percent(mode%kinetic(largest(k)))
     end do
   end function kinetic_text
 
@@ -174,30 +174,30 @@ contains
     type(modes_report_t), intent(in) :: self
     type(mode_t), intent(in) :: mode
     character(len=:), allocatable :: text
-    integer :: k, places(most_shares), shares
+    integer :: k, largest(most_shares), shares
 
     text = ''
-    call find_largest(mode%potential, places, shares)
+    call find_largest(mode%potential, largest, shares)
     do k = 1, shares
       if (k > 1) text = text // ', '
-      text = text // self%machine%element_name(self%elastic(places(k))) // ' ' // percent(mode%potential(places(k)))
+      text = text // self%machine%element_name(self%elastic(largest(k))) // ' ' // percent(mode%potential(largest(k)))
     end do
   end function potential_text
 
   !> Places of the shares that are named, the largest first: one at least, if any is not zero.
-  pure subroutine find_largest(share, places, shares)
+  pure subroutine find_largest(share, largest, shares)
     real(wp), intent(in) :: share(:)
-    integer, intent(out) :: places(most_shares), shares
+    integer, intent(out) :: largest(most_shares), shares
     real(wp) :: left(size(share))
     integer :: k
 
     left = abs(share)
     shares = 0
-    places = 0
+    largest = 0
     do k = 1, min(most_shares, size(share))
       associate (place => maxloc(left, dim=1))
         if (left(place) < merge(least_share, tiny(1.0_wp), k > 1)) return
-        places(k) = place
+        largest(k) = place
         shares = k
         left(place) = 0.0_wp
       end associate

@@ -1,6 +1,6 @@
 !> The state about which a machine is linearised.
 module nocdyn_operating_point
-  use nocdyn_equilibrium, only: equilibrium_t, find_equilibria, judge_equilibria, late, nearest_equilibrium
+  use nocdyn_equilibrium, only: equilibrium_t, find_equilibria, find_stability, t_infinity, nearest_equilibrium
   use nocdyn_errors, only: error_t, exit_input, raise
   use nocdyn_formulation, only: formulation_t
   use nocdyn_input, only: group_t, input_t
@@ -44,9 +44,9 @@ contains
     allocate (point%notes(0))
     select case (at)
     case ('equilibrium')
-      call take_equilibrium(machine, point, error)
+      call use_equilibrium(machine, point, error)
     case ('rest')
-      call take_rest(machine, point)
+      call use_rest(machine, point)
     case default
       call read_real(at, time, status)
       if (status /= literal_fine) then
@@ -55,13 +55,13 @@ contains
         call raise(error, exit_input, input%file // ': --at ' // at // ' is no time of the run; allowed: ' // &
                    to_text(run%number('t_start')) // ' to ' // to_text(run%number('t_end')) // ' s')
       else
-        call take_time(input, machine, time, point, error)
+        call use_time(input, machine, time, point, error)
       end if
     end select
   end subroutine find_operating_point
 
   !> The steady state, of several the one nearest to the start, of the stable ones if there are any.
-  subroutine take_equilibrium(machine, point, error)
+  subroutine use_equilibrium(machine, point, error)
     type(machine_t), intent(in) :: machine
     type(operating_point_t), intent(inout) :: point
     type(error_t), allocatable, intent(out) :: error
@@ -70,9 +70,9 @@ contains
 
     call find_equilibria(machine, point%formulation, equilibria, point%notes, error)
     if (allocated(error)) return
-    if (size(equilibria) > 1) call judge_equilibria(point%formulation, equilibria)
+    if (size(equilibria) > 1) call find_stability(point%formulation, equilibria)
     nearest = nearest_equilibrium(point%formulation, equilibria)
-    point%t = late
+    point%t = t_infinity
     point%y = equilibria(nearest)%y
     point%text = 'the steady state'
     if (size(equilibria) == 1) return
@@ -80,25 +80,25 @@ contains
                              to_text(count(equilibria%stability == 'stable')) // ' of them stable; this is the ' // &
                              trim(merge('stable one', 'one       ', any(equilibria%stability == 'stable'))) // &
                              ' nearest to the start: nocdyn equilibrium shows all')
-  end subroutine take_equilibrium
+  end subroutine use_equilibrium
 
   !> The start angles without speeds; the torques are the mean ones.
-  subroutine take_rest(machine, point)
+  subroutine use_rest(machine, point)
     type(machine_t), intent(in) :: machine
     type(operating_point_t), intent(inout) :: point
-    type(machine_t) :: settled
+    type(machine_t) :: mean_machine
 
-    settled = machine
-    call settled%settle()
-    allocate (point%formulation, source=new_reduced(settled, .false.))
+    mean_machine = machine
+    call mean_machine%to_mean_torque()
+    allocate (point%formulation, source=new_reduced(mean_machine, .false.))
     point%y = point%formulation%start()
-    point%y(1, :settled%coordinates%freedoms) = 0.0_wp
-    point%t = late
+    point%y(1, :mean_machine%coordinates%freedoms) = 0.0_wp
+    point%t = t_infinity
     point%text = 'rest'
-  end subroutine take_rest
+  end subroutine use_rest
 
   !> The state at a time, by the method and tolerances of the run.
-  subroutine take_time(input, machine, time, point, error)
+  subroutine use_time(input, machine, time, point, error)
     type(input_t), intent(in) :: input
     type(machine_t), intent(in) :: machine
     real(wp), intent(in) :: time
@@ -122,6 +122,6 @@ contains
     end if
     point%t = time
     point%text = 't = ' // to_text(time) // ' s'
-  end subroutine take_time
+  end subroutine use_time
 
 end module nocdyn_operating_point

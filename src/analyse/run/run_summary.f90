@@ -1,12 +1,12 @@
 !> The summary of a run: what summary.json and the printed table tell.
 module nocdyn_run_summary
-  use nocdyn_energy_account, only: energy_account_t, put_account
+  use nocdyn_energy_balance, only: energy_balance_t, put_energy_balance
   use nocdyn_input, only: group_t, input_t
   use nocdyn_json, only: json_t
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
-  use nocdyn_machine_report, only: coordinate_names, number_of
-  use nocdyn_outcome, only: most_switches, outcome_t
+  use nocdyn_machine_report, only: coordinate_names, constraint_count
+  use nocdyn_solver_status, only: max_switch_times, solver_status_t
   use nocdyn_run_settings, only: put_settings
   use nocdyn_system, only: ranges_t
   use nocdyn_text, only: append, rounded_text, string_t
@@ -14,10 +14,10 @@ module nocdyn_run_summary
   implicit none (type, external)
   private
 
-  public :: start_extremes, update_extremes, widen_extremes, audit_energy, summary_json
+  public :: start_extremes, update_extremes, widen_extremes, check_energy_balance, summary_json
 
   !> A note is made of an energy residual above this share of the energy turned over: the motion is then not to be trusted.
-  real(wp), parameter :: audit_limit = 0.01_wp
+  real(wp), parameter :: energy_error_limit = 0.01_wp
 
   !> An extreme beyond that of the rows by this share of the largest value or less is rounding: a machine at rest at the
   !> start has its smallest energy there.
@@ -38,8 +38,8 @@ module nocdyn_run_summary
     type(string_t), allocatable :: labels(:)        !! of the columns
     type(extremes_t) :: extremes
     character(len=:), allocatable :: method         !! that integrated
-    type(outcome_t) :: outcome
-    type(energy_account_t), allocatable :: account  !! from the start to the last row; not allocated if there are no rows
+    type(solver_status_t) :: solver_status
+    type(energy_balance_t), allocatable :: energy_balance  !! from the start to the last row; not allocated if there are no rows
     real(wp) :: wall_time = 0.0_wp                  !! of integration and writing of the trajectory [s]
   end type run_summary_t
 
@@ -97,7 +97,7 @@ contains
   end subroutine widen_extremes
 
   !> Adds a note if the energy audit does not close. The last five columns are the energies, the residual last.
-  subroutine audit_energy(extremes, notes)
+  subroutine check_energy_balance(extremes, notes)
     type(extremes_t), intent(in) :: extremes
     type(string_t), allocatable, intent(inout) :: notes(:)
     real(wp) :: residual, turned_over
@@ -106,10 +106,10 @@ contains
     columns = size(extremes%last)
     residual = max(abs(extremes%lowest(columns)), abs(extremes%highest(columns)))
     turned_over = maxval(max(abs(extremes%lowest(columns - 4:columns - 1)), abs(extremes%highest(columns - 4:columns - 1))))
-    if (extremes%rows == 0 .or. residual <= audit_limit * turned_over) return
+    if (extremes%rows == 0 .or. residual <= energy_error_limit * turned_over) return
     call append(notes, 'the energy does not add up: energy_residual reaches ' // rounded_text(residual, 3) // &
                        ' J where at most ' // rounded_text(turned_over, 3) // ' J were turned over; tighten rtol and atol')
-  end subroutine audit_energy
+  end subroutine check_energy_balance
 
   !> The text of summary.json; `input` and `machine` are those of the run.
   function summary_json(input, machine, summary) result(text)
@@ -133,7 +133,7 @@ contains
     call put_settings(json, input%single('run'))
     call put_counts(json, summary)
     call put_method(json, summary)
-    if (allocated(summary%account)) call put_account(json, summary%account)
+    if (allocated(summary%energy_balance)) call put_energy_balance(json, summary%energy_balance)
     call put_columns(json, summary)
     call json%close()
     text = json%text()
@@ -146,7 +146,7 @@ contains
 
     call json%open('machine')
     call json%put('bodies', machine%bodies)
-    call json%put('gears', number_of(machine, 'gear'))
+    call json%put('gears', constraint_count(machine, 'gear'))
     call json%put('constraints', machine%constraints%rows())
     call json%put('degrees_of_freedom', machine%coordinates%freedoms)
     call json%put('independent', coordinate_names(machine))
@@ -158,17 +158,17 @@ contains
     type(json_t), intent(inout) :: json
     type(run_summary_t), intent(in) :: summary
 
-    associate (outcome => summary%outcome)
+    associate (solver_status => summary%solver_status)
       call json%open('counts')
-      call json%put('accepted_steps', outcome%accepted(1))
-      call json%put('rejected_steps', outcome%rejected(1))
-      call json%put('evaluations', outcome%evaluations(1))
-      call json%put('jacobians', outcome%jacobians(1))
-      call json%put('factorisations', outcome%factorisations(1))
-      call json%put('crossings', outcome%crossings(1))
+      call json%put('accepted_steps', solver_status%accepted(1))
+      call json%put('rejected_steps', solver_status%rejected(1))
+      call json%put('evaluations', solver_status%evaluations(1))
+      call json%put('jacobians', solver_status%jacobians(1))
+      call json%put('factorisations', solver_status%factorisations(1))
+      call json%put('crossings', solver_status%crossings(1))
       call json%put('rows', summary%extremes%rows)
       call json%close()
-      call json%put('time_reached', outcome%t(1))
+      call json%put('time_reached', solver_status%t(1))
     end associate
     call json%put('wall_time_s', summary%wall_time)
   end subroutine put_counts
@@ -180,17 +180,17 @@ contains
     integer :: i
     logical :: to_implicit
 
-    associate (outcome => summary%outcome)
+    associate (solver_status => summary%solver_status)
       call json%open('method')
       call json%put('name', summary%method)
-      call json%put('explicit_steps', outcome%accepted(1) - outcome%implicit_steps(1))
-      call json%put('implicit_steps', outcome%implicit_steps(1))
-      call json%put('switches', outcome%switches(1))
+      call json%put('explicit_steps', solver_status%accepted(1) - solver_status%implicit_steps(1))
+      call json%put('implicit_steps', solver_status%implicit_steps(1))
+      call json%put('switches', solver_status%switches(1))
       call json%open_list('first_switches')
-      do i = 1, min(outcome%switches(1), most_switches)
-        to_implicit = outcome%implicit(1) .eqv. mod(outcome%switches(1) - i, 2) == 0   ! switches alternate
+      do i = 1, min(solver_status%switches(1), max_switch_times)
+        to_implicit = solver_status%implicit(1) .eqv. mod(solver_status%switches(1) - i, 2) == 0   ! switches alternate
         call json%open()
-        call json%put('time', outcome%switch_times(i, 1))
+        call json%put('time', solver_status%switch_times(i, 1))
         call json%put('to', trim(merge('implicit', 'explicit', to_implicit)))
         call json%close()
       end do

@@ -1,6 +1,6 @@
 !> The summary of a run as a person reads it.
 module nocdyn_summary_table
-  use nocdyn_energy_account, only: account_text
+  use nocdyn_energy_balance, only: energy_balance_text
   use nocdyn_input, only: group_t, input_t
   use nocdyn_kinds, only: wp
   use nocdyn_run_summary, only: run_summary_t
@@ -22,9 +22,12 @@ contains
     character(len=*), intent(in) :: folder
     character(len=:), allocatable :: text
 
-    text = input%file // ': done at t = ' // to_text(summary%outcome%t(1)) // ' s, ' // &
-           to_text(summary%outcome%accepted(1)) // ' steps (' // to_text(summary%outcome%rejected(1)) // ' rejected), '
-    if (summary%outcome%crossings(1) > 0) text = text // to_text(summary%outcome%crossings(1)) // ' kinks or jumps crossed, '
+    text = input%file // ': done at t = ' // to_text(summary%solver_status%t(1)) // ' s, ' // &
+           to_text(summary%solver_status%accepted(1)) // ' steps (' // &
+           to_text(summary%solver_status%rejected(1)) // ' rejected), '
+    if (summary%solver_status%crossings(1) > 0) then
+      text = text // to_text(summary%solver_status%crossings(1)) // ' kinks or jumps crossed, '
+    end if
     text = text // to_text(summary%extremes%rows) // ' rows, ' // rounded_text(1000.0_wp * summary%wall_time, 3) // &
            ' ms; results in ' // folder
   end function summary_line
@@ -36,11 +39,12 @@ contains
     character(len=:), allocatable :: text
 
     text = ''
-    associate (outcome => summary%outcome)
-      if (outcome%switches(1) == 0) return
-      text = input%file // ': stiff: implicit steps from t = ' // rounded_text(outcome%switch_times(1, 1), cell_digits) // ' s'
-      if (outcome%switches(1) > 1) text = text // ' (' // to_text(outcome%switches(1)) // ' switches in all)'
-      text = text // ', ' // to_text(outcome%implicit_steps(1)) // ' of ' // to_text(outcome%accepted(1)) // ' steps'
+    associate (solver_status => summary%solver_status)
+      if (solver_status%switches(1) == 0) return
+      text = input%file // ': stiff: implicit steps from t = ' // rounded_text(solver_status%switch_times(1, 1), &
+                                                                               cell_digits) // ' s'
+      if (solver_status%switches(1) > 1) text = text // ' (' // to_text(solver_status%switches(1)) // ' switches in all)'
+      text = text // ', ' // to_text(solver_status%implicit_steps(1)) // ' of ' // to_text(solver_status%accepted(1)) // ' steps'
     end associate
   end function method_line
 
@@ -51,7 +55,7 @@ contains
     type(run_summary_t), intent(in) :: summary
     character(len=:), allocatable :: text
     type(group_t) :: about
-    character(len=:), allocatable :: account, heading
+    character(len=:), allocatable :: energy_balance, heading
     integer :: i, label_width, rows
 
     about = input%single('case')
@@ -72,9 +76,9 @@ contains
     end associate
     if (rows < size(summary%labels)) text = text // new_line('a') // '(' // to_text(size(summary%labels) - rows) // &
                                             ' more columns in summary.json)'
-    if (.not. allocated(summary%account)) return
-    account = account_text(summary%account)
-    if (len(account) > 0) text = text // new_line('a') // account
+    if (.not. allocated(summary%energy_balance)) return
+    energy_balance = energy_balance_text(summary%energy_balance)
+    if (len(energy_balance) > 0) text = text // new_line('a') // energy_balance
   end function summary_table
 
 end module nocdyn_summary_table

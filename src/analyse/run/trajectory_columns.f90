@@ -28,7 +28,7 @@ module nocdyn_trajectory_columns
     integer :: kind = column_time   !! column_...
     integer :: bank = 0             !! of an element
     integer :: quantity = 0         !! number of it in `quantities` of the bank
-    integer :: place = 0            !! body, element within its bank, row, or member
+    integer :: index = 0            !! body, element within its bank, row, or member
   end type column_t
 
 contains
@@ -46,10 +46,10 @@ contains
     count = 0
     call add_column(columns, labels, count, column_t(column_time), 't [s]')
     do b = 1, machine%bodies
-      call add_column(columns, labels, count, column_t(column_angle, place=b), 'phi_' // machine%names(b)%text // ' [rad]')
+      call add_column(columns, labels, count, column_t(column_angle, index=b), 'phi_' // machine%names(b)%text // ' [rad]')
     end do
     do b = 1, machine%bodies
-      call add_column(columns, labels, count, column_t(column_speed, place=b), 'omega_' // machine%names(b)%text // ' [rad/s]')
+      call add_column(columns, labels, count, column_t(column_speed, index=b), 'omega_' // machine%names(b)%text // ' [rad/s]')
     end do
     do i = 1, size(machine%banks)
       quantities = machine%banks(i)%bank%quantities()
@@ -104,11 +104,11 @@ contains
     member = 1
     do row = 1, constraints%rows()
       name = 'reaction_' // constraints%names(row)%text
-      call add_column(columns, labels, count, column_t(column_reaction, place=row), &
+      call add_column(columns, labels, count, column_t(column_reaction, index=row), &
                       name // ' [' // constraints%units(row)%text // ']')
       do while (member <= size(constraints%members%row))
         if (constraints%members%row(member) /= row) exit
-        call add_column(columns, labels, count, column_t(column_member, place=member), &
+        call add_column(columns, labels, count, column_t(column_member, index=member), &
                         name // '_' // constraints%members%names(member)%text // ' [N m]')
         member = member + 1
       end do

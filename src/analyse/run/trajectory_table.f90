@@ -2,7 +2,7 @@
 module nocdyn_trajectory_table
   use nocdyn_bank, only: quantity_t
   use nocdyn_constraints, only: constraints_t
-  use nocdyn_energy_account, only: energy_account_t, worker_names
+  use nocdyn_energy_balance, only: energy_balance_t, work_element_names
   use nocdyn_formulation, only: formulation_t
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
@@ -32,8 +32,8 @@ module nocdyn_trajectory_table
     real(wp), allocatable, private :: start_stored(:)   !! of the elastic elements
   contains
     procedure :: fill
-    procedure :: account
-    procedure, private :: audit
+    procedure :: find_energy_balance
+    procedure, private :: fill_energies
   end type trajectory_table_t
 
 contains
@@ -46,7 +46,7 @@ contains
     type(column_t), allocatable :: columns(:)
     integer :: i
 
-    if (.not. formulation%is_audited) error stop 'nocdyn_trajectory_table: the works are among the columns'
+    if (.not. formulation%has_energy_balance) error stop 'nocdyn_trajectory_table: the works are among the columns'
     allocate (table%formulation, source=formulation)
     associate (banks => formulation%machine%banks)
       allocate (table%columns(size(banks)))
@@ -54,7 +54,7 @@ contains
         table%columns(i)%quantities = banks(i)%bank%quantities()
       end do
       allocate (table%values(maxval([(size(banks(i)%bank%to), i=1, size(banks))])))
-      table%is_source = [(spread(banks(i)%bank%is_source(), 1, size(banks(i)%bank%accounted)), i=1, size(banks))]
+      table%is_source = [(spread(banks(i)%bank%is_source(), 1, size(banks(i)%bank%with_work)), i=1, size(banks))]
     end associate
     allocate (table%lambda(formulation%machine%constraints%rows()))
     call list_columns(formulation%machine, columns, table%labels)
@@ -98,7 +98,7 @@ contains
       end do
       call self%formulation%reactions(1, self%lambda)
       call fill_reactions(machine%constraints, self%lambda, row(next:size(row) - 5))
-      call self%audit(row(size(row) - 4:))
+      call self%fill_energies(row(size(row) - 4:))
     end associate
   end subroutine fill
 
@@ -124,7 +124,7 @@ contains
   end subroutine fill_reactions
 
   !> Kinetic and elastic energy, work put in, work taken out, and what does not add up.
-  subroutine audit(self, energies)
+  subroutine fill_energies(self, energies)
     class(trajectory_table_t), intent(inout) :: self
     real(wp), intent(out) :: energies(5)
     real(wp) :: work_in, work_out
@@ -146,31 +146,31 @@ contains
     energies(3) = work_in
     energies(4) = work_out
     energies(5) = (energies(1) + energies(2) - self%start_energy) - (work_in - work_out)
-  end subroutine audit
+  end subroutine fill_energies
 
   !> Works and energies from the start to time t and state y.
-  subroutine account(self, t, y, energies)
+  subroutine find_energy_balance(self, t, y, energies)
     class(trajectory_table_t), intent(inout) :: self
     real(wp), intent(in) :: t
     real(wp), contiguous, intent(in) :: y(:)   !! [states + quadratures]
-    type(energy_account_t), intent(out) :: energies
+    type(energy_balance_t), intent(out) :: energies
     real(wp) :: row(size(self%labels))
     integer :: e
 
     call self%fill(t, y, row)
     associate (machine => self%formulation%machine, elastic => self%formulation%machine%elastic())
-      allocate (energies%workers, source=worker_names(machine))
+      allocate (energies%work_elements, source=work_element_names(machine))
       allocate (energies%work, source=y(self%formulation%states + 1:))
-      allocate (energies%stores(size(elastic)))
+      allocate (energies%elastic_elements(size(elastic)))
       do e = 1, size(elastic)
-        energies%stores(e)%text = machine%element_name(elastic(e))
+        energies%elastic_elements(e)%text = machine%element_name(elastic(e))
       end do
       allocate (energies%stored_start, source=self%start_stored)
       allocate (energies%stored_end, source=stored_energies(machine))
     end associate
     energies%kinetic_start = self%start_kinetic
     energies%kinetic_end = kinetic_energy(self%formulation)
-  end subroutine account
+  end subroutine find_energy_balance
 
   !> Of the elastic elements, after `stored_energy` of the machine [J].
   function stored_energies(machine) result(energies)

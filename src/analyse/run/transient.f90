@@ -12,12 +12,12 @@ module nocdyn_transient
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
   use nocdyn_machine_report, only: machine_notes
-  use nocdyn_outcome, only: failure_sentence, integration_done, integration_interrupted, outcome_t
+  use nocdyn_solver_status, only: failure_message, integration_done, integration_interrupted, solver_status_t
   use nocdyn_output_file, only: output_file_t
   use nocdyn_output_times, only: check_output_times, output_times
   use nocdyn_posix, only: is_interrupted, remove_file
   use nocdyn_run_settings, only: settings_of
-  use nocdyn_run_summary, only: audit_energy, run_summary_t, start_extremes, summary_json, update_extremes, widen_extremes
+  use nocdyn_run_summary, only: check_energy_balance, run_summary_t, start_extremes, summary_json, update_extremes, widen_extremes
   use nocdyn_size_limits, only: check_size, choose_method
   use nocdyn_system, only: observer_t, ranges_t
   use nocdyn_text, only: string_t
@@ -45,7 +45,7 @@ module nocdyn_transient
   end interface
 
   !> Writes the rows and keeps the extremes of their columns.
-  type, extends(observer_t) :: recorder_t
+  type, extends(observer_t) :: run_observer_t
     type(trajectory_table_t) :: table
     type(output_file_t) :: file
     type(run_summary_t) :: summary
@@ -53,14 +53,14 @@ module nocdyn_transient
     real(wp) :: last_time = 0.0_wp         !! of the rows
     real(wp), allocatable :: last_state(:)
     real(wp) :: t_start, t_end
-    logical :: follows = .false.   !! whether the columns have been followed between the rows
+    logical :: has_ranges = .false.   !! whether the columns have been followed between the rows
     class(progress_t), pointer :: progress => null()
   contains
-    procedure :: record
-    procedure :: stops
+    procedure :: on_output
+    procedure :: wants_stop
     procedure :: tracked_values
-    procedure :: take_ranges
-  end type recorder_t
+    procedure :: on_extremes
+  end type run_observer_t
 
 contains
 
@@ -74,9 +74,9 @@ contains
     type(error_t), allocatable, intent(out) :: error
     type(machine_t) :: machine
     class(formulation_t), allocatable :: formulation
-    type(recorder_t) :: recorder
+    type(run_observer_t) :: observer
     type(group_t) :: run
-    type(outcome_t) :: outcome
+    type(solver_status_t) :: solver_status
     type(error_t), allocatable :: write_error
     type(string_t), allocatable :: notes(:)
     character(len=:), allocatable :: method
@@ -91,89 +91,89 @@ contains
     call choose_method(input, formulation, method, notes, error)
     if (allocated(error)) return
     times = output_times(input)
-    call start_recorder(recorder, formulation, times, folder, progress)
-    recorder%summary%method = method
-    recorder%summary%notes = [recorder%summary%notes, notes]
-    call solve(formulation, settings_of(input, method), times, recorder, outcome, error)
-    if (.not. allocated(outcome%status)) then   ! a setting was refused
-      call recorder%file%discard()
+    call start_recorder(observer, formulation, times, folder, progress)
+    observer%summary%method = method
+    observer%summary%notes = [observer%summary%notes, notes]
+    call solve(formulation, settings_of(input, method), times, observer, solver_status, error)
+    if (.not. allocated(solver_status%code)) then   ! a setting was refused
+      call observer%file%discard()
       return
     end if
-    call conclude(outcome, error, recorder)
-    call write_results(input, machine, recorder, folder, write_error)
+    call complete_summary(solver_status, error, observer)
+    call write_results(input, machine, observer, folder, write_error)
     if (allocated(write_error)) call move_alloc(write_error, error)
-    summary = recorder%summary
+    summary = observer%summary
   end subroutine run_transient
 
-  subroutine start_recorder(recorder, formulation, times, folder, progress)
-    type(recorder_t), intent(inout) :: recorder
+  subroutine start_recorder(observer, formulation, times, folder, progress)
+    type(run_observer_t), intent(inout) :: observer
     class(formulation_t), intent(in) :: formulation
     real(wp), intent(in) :: times(:)
     character(len=*), intent(in) :: folder
     class(progress_t), target, intent(inout) :: progress
 
-    recorder%table = new_trajectory_table(formulation, times(1))
-    recorder%t_start = times(1)
-    recorder%t_end = times(size(times))
-    recorder%progress => progress
-    recorder%summary%labels = recorder%table%labels
-    recorder%summary%notes = machine_notes(formulation%machine)
-    allocate (recorder%row(size(recorder%table%labels)))
-    allocate (recorder%last_state(formulation%states + formulation%quadratures), source=0.0_wp)
-    recorder%tracked = size(recorder%row)
-    call start_extremes(recorder%summary%extremes, size(recorder%row))
-    call recorder%file%open(folder, trajectory_file)
-    call write_header(recorder%file, recorder%table%labels)
+    observer%table = new_trajectory_table(formulation, times(1))
+    observer%t_start = times(1)
+    observer%t_end = times(size(times))
+    observer%progress => progress
+    observer%summary%labels = observer%table%labels
+    observer%summary%notes = machine_notes(formulation%machine)
+    allocate (observer%row(size(observer%table%labels)))
+    allocate (observer%last_state(formulation%states + formulation%quadratures), source=0.0_wp)
+    observer%tracked = size(observer%row)
+    call start_extremes(observer%summary%extremes, size(observer%row))
+    call observer%file%open(folder, trajectory_file)
+    call write_header(observer%file, observer%table%labels)
   end subroutine start_recorder
 
   !> Integrates; an integration that does not reach the end is an error that says why.
-  subroutine solve(formulation, settings, times, recorder, outcome, error)
+  subroutine solve(formulation, settings, times, observer, solver_status, error)
     class(formulation_t), intent(inout) :: formulation
     type(integration_settings_t), intent(in) :: settings
     real(wp), contiguous, intent(in) :: times(:)
-    type(recorder_t), intent(inout) :: recorder
-    type(outcome_t), intent(out) :: outcome
+    type(run_observer_t), intent(inout) :: observer
+    type(solver_status_t), intent(out) :: solver_status
     type(error_t), allocatable, intent(out) :: error
     real(wp), allocatable :: y(:, :)
     integer(int64) :: began, ended, rate
 
     y = formulation%start()
     call system_clock(began, rate)
-    call integrate(formulation, settings, times, y, recorder, outcome, error)
+    call integrate(formulation, settings, times, y, observer, solver_status, error)
     call system_clock(ended)
     if (allocated(error)) return
-    recorder%summary%wall_time = real(ended - began, wp) / real(rate, wp)
-    if (outcome%status(1) /= integration_done) then
-      call raise(error, exit_failed, failure_sentence(outcome, 1, formulation, settings%rtol, settings%atol))
+    observer%summary%wall_time = real(ended - began, wp) / real(rate, wp)
+    if (solver_status%code(1) /= integration_done) then
+      call raise(error, exit_failed, failure_message(solver_status, 1, formulation, settings%rtol, settings%atol))
     end if
   end subroutine solve
 
   !> What the summary tells of the whole run.
-  subroutine conclude(outcome, error, recorder)
-    type(outcome_t), intent(in) :: outcome
+  subroutine complete_summary(solver_status, error, observer)
+    type(solver_status_t), intent(in) :: solver_status
     type(error_t), allocatable, intent(in) :: error
-    type(recorder_t), intent(inout) :: recorder
+    type(run_observer_t), intent(inout) :: observer
 
-    associate (summary => recorder%summary)
-      summary%outcome = outcome
-      call audit_energy(summary%extremes, summary%notes)
+    associate (summary => observer%summary)
+      summary%solver_status = solver_status
+      call check_energy_balance(summary%extremes, summary%notes)
       if (summary%extremes%rows > 0) then
-        allocate (summary%account)
-        call recorder%table%account(recorder%last_time, recorder%last_state, summary%account)
+        allocate (summary%energy_balance)
+        call observer%table%find_energy_balance(observer%last_time, observer%last_state, summary%energy_balance)
       end if
       if (.not. allocated(error)) return
       summary%message = error%message
       summary%status = 'failed'
-      if (outcome%status(1) == integration_interrupted) summary%status = 'interrupted'
+      if (solver_status%code(1) == integration_interrupted) summary%status = 'interrupted'
     end associate
-  end subroutine conclude
+  end subroutine complete_summary
 
   !> Gives the three files their names once all are written: a full disk leaves the results of an earlier run alone.
   !> The other trajectory file of an earlier run is removed.
-  subroutine write_results(input, machine, recorder, folder, error)
+  subroutine write_results(input, machine, observer, folder, error)
     type(input_t), intent(in) :: input
     type(machine_t), intent(in) :: machine
-    type(recorder_t), intent(inout) :: recorder
+    type(run_observer_t), intent(inout) :: observer
     character(len=*), intent(in) :: folder
     type(error_t), allocatable, intent(out) :: error
     type(output_file_t) :: input_copy, summary
@@ -181,39 +181,39 @@ contains
     call input_copy%open(folder, input_file)
     call input_copy%put(input_text(input))
     call summary%open(folder, summary_file)
-    call summary%put(summary_json(input, machine, recorder%summary))
-    call recorder%file%complete(trajectory_file, error)
+    call summary%put(summary_json(input, machine, observer%summary))
+    call observer%file%complete(trajectory_file, error)
     if (.not. allocated(error)) call input_copy%complete(input_file, error)
     if (.not. allocated(error)) call summary%complete(summary_file, error)
-    if (.not. allocated(error)) call name_results(recorder, folder, input_copy, summary, error)
+    if (.not. allocated(error)) call name_results(observer, folder, input_copy, summary, error)
     if (.not. allocated(error)) return
-    call recorder%file%discard()
+    call observer%file%discard()
     call input_copy%discard()
     call summary%discard()
   end subroutine write_results
 
   !> Files that have their names stay if a later one cannot take its own; without a summary.json they are no results.
-  subroutine name_results(recorder, folder, input_copy, summary, error)
-    type(recorder_t), intent(inout) :: recorder
+  subroutine name_results(observer, folder, input_copy, summary, error)
+    type(run_observer_t), intent(inout) :: observer
     character(len=*), intent(in) :: folder
     type(output_file_t), intent(inout) :: input_copy, summary
     type(error_t), allocatable, intent(out) :: error
 
     call remove_file(folder // '/' // summary_file)
-    if (recorder%summary%status == 'done') then
+    if (observer%summary%status == 'done') then
       call remove_file(folder // '/' // partial_file)
-      call recorder%file%finish(trajectory_file, error)
+      call observer%file%finish(trajectory_file, error)
     else
       call remove_file(folder // '/' // trajectory_file)
-      call recorder%file%finish(partial_file, error)
+      call observer%file%finish(partial_file, error)
     end if
     if (.not. allocated(error)) call input_copy%finish(input_file, error)
     if (.not. allocated(error)) call summary%finish(summary_file, error)
   end subroutine name_results
 
   !> One requested time: a row of the table.
-  subroutine record(self, lane, t, y)
-    class(recorder_t), intent(inout) :: self
+  subroutine on_output(self, lane, t, y)
+    class(run_observer_t), intent(inout) :: self
     integer, intent(in) :: lane
     real(wp), intent(in) :: t
     real(wp), contiguous, intent(in) :: y(:)
@@ -224,11 +224,11 @@ contains
     call write_row(self%file, self%row)
     self%last_time = t
     self%last_state(:) = y
-  end subroutine record
+  end subroutine on_output
 
   !> The columns of the table between its rows.
   subroutine tracked_values(self, lane, t, y, values)
-    class(recorder_t), intent(inout) :: self
+    class(run_observer_t), intent(inout) :: self
     integer, intent(in) :: lane
     real(wp), intent(in) :: t
     real(wp), contiguous, intent(in) :: y(:)
@@ -236,27 +236,27 @@ contains
 
     if (lane /= 1) error stop 'nocdyn_transient: a run is one lane'
     call self%table%fill(t, y, values)
-    self%follows = .true.
+    self%has_ranges = .true.
   end subroutine tracked_values
 
   !> The extremes of the motion; a run that fails at its start has none.
-  subroutine take_ranges(self, lane, ranges)
-    class(recorder_t), intent(inout) :: self
+  subroutine on_extremes(self, lane, ranges)
+    class(run_observer_t), intent(inout) :: self
     integer, intent(in) :: lane
     type(ranges_t), intent(in) :: ranges
 
     if (lane /= 1) error stop 'nocdyn_transient: a run is one lane'
-    if (self%follows) call widen_extremes(self%summary%extremes, ranges)
-  end subroutine take_ranges
+    if (self%has_ranges) call widen_extremes(self%summary%extremes, ranges)
+  end subroutine on_extremes
 
   !> Stops on Ctrl-C and when the file cannot be written.
-  function stops(self, t)
-    class(recorder_t), intent(inout) :: self
+  function wants_stop(self, t)
+    class(run_observer_t), intent(inout) :: self
     real(wp), intent(in) :: t
-    logical :: stops
+    logical :: wants_stop
 
     call self%progress%update((t - self%t_start) / (self%t_end - self%t_start))
-    stops = is_interrupted() .or. self%file%has_failed
-  end function stops
+    wants_stop = is_interrupted() .or. self%file%has_failed
+  end function wants_stop
 
 end module nocdyn_transient

@@ -1,7 +1,7 @@
 !> The command line: command, files and options.
 module nocdyn_arguments
   use nocdyn_errors, only: error_t, exit_input, raise
-  use nocdyn_options, only: option_index, option_names, option_t, options, takers_text, takes_option
+  use nocdyn_options, only: option_index, option_names, option_t, options, accepted_by_text, accepts_option
   use nocdyn_text, only: append, joined, nearest_word, quoted, string_t, strings, to_text
   implicit none (type, external)
   private
@@ -62,7 +62,7 @@ contains
       if (words(i)%text == '--') then
         takes_options = .false.
       else if (takes_options .and. index(words(i)%text, '-') == 1 .and. len(words(i)%text) > 1) then
-        call take_option(words, i, arguments, error)
+        call parse_option(words, i, arguments, error)
       else
         call append(arguments%operands, words(i)%text)
       end if
@@ -101,7 +101,7 @@ contains
   end subroutine find_command
 
   !> The option at word `i`, with its value in the same word after '=' or in the next one.
-  subroutine take_option(words, i, arguments, error)
+  subroutine parse_option(words, i, arguments, error)
     type(string_t), intent(in) :: words(:)
     integer, intent(inout) :: i
     type(arguments_t), intent(inout) :: arguments
@@ -116,7 +116,7 @@ contains
       call raise(error, exit_input, unknown_word(name, 'an option of nocdyn ' // words(1)%text, &
                                                 option_names(words(1)%text)))
     else if (options(number)%value == '') then
-      call take_flag(trim(options(number)%name), arguments)
+      call set_flag(trim(options(number)%name), arguments)
       if (equals <= len(words(i)%text)) call raise(error, exit_input, trim(options(number)%name) // ' takes no value')
     else
       if (equals <= len(words(i)%text)) then
@@ -127,11 +127,11 @@ contains
       else
         value = ''
       end if
-      call take_value(options(number), value, arguments, error)
+      call set_value(options(number), value, arguments, error)
     end if
-  end subroutine take_option
+  end subroutine parse_option
 
-  subroutine take_flag(name, arguments)
+  subroutine set_flag(name, arguments)
     character(len=*), intent(in) :: name
     type(arguments_t), intent(inout) :: arguments
 
@@ -150,9 +150,9 @@ contains
     case default
       error stop 'nocdyn_arguments: an option without a value that nothing is made of'
     end select
-  end subroutine take_flag
+  end subroutine set_flag
 
-  subroutine take_value(option, value, arguments, error)
+  subroutine set_value(option, value, arguments, error)
     type(option_t), intent(in) :: option
     character(len=*), intent(in) :: value
     type(arguments_t), intent(inout) :: arguments
@@ -173,37 +173,37 @@ contains
       arguments%at = value
     case ('--threads')
       if (arguments%threads > 0) call raise(error, exit_input, '--threads is given twice')
-      if (.not. allocated(error)) call take_threads(value, arguments%threads, error)
+      if (.not. allocated(error)) call parse_threads(value, arguments%threads, error)
     case ('--shard')
       if (arguments%shards > 0) call raise(error, exit_input, '--shard is given twice')
-      if (.not. allocated(error)) call take_shard(value, arguments%shard, arguments%shards, error)
+      if (.not. allocated(error)) call parse_shard(value, arguments%shard, arguments%shards, error)
     case default
       error stop 'nocdyn_arguments: an option with a value that nothing is made of'
     end select
-  end subroutine take_value
+  end subroutine set_value
 
-  subroutine take_threads(value, threads, error)
+  subroutine parse_threads(value, threads, error)
     character(len=*), intent(in) :: value
     integer, intent(inout) :: threads
     type(error_t), allocatable, intent(out) :: error
 
-    if (counting_number(value) < 1 .or. counting_number(value) > most_threads) then
+    if (digits_value(value) < 1 .or. digits_value(value) > most_threads) then
       call raise(error, exit_input, '--threads ' // value // ': allowed: a number from 1 to ' // to_text(most_threads))
     else
-      threads = counting_number(value)
+      threads = digits_value(value)
     end if
-  end subroutine take_threads
+  end subroutine parse_threads
 
   !> K/N: part K of N equal parts.
-  subroutine take_shard(value, shard, shards, error)
+  subroutine parse_shard(value, shard, shards, error)
     character(len=*), intent(in) :: value
     integer, intent(inout) :: shard, shards
     type(error_t), allocatable, intent(out) :: error
     integer :: part, parts, slash
 
     slash = index(value, '/')
-    part = counting_number(value(:slash - 1))
-    parts = counting_number(value(slash + 1:))
+    part = digits_value(value(:slash - 1))
+    parts = digits_value(value(slash + 1:))
     if (slash == 0 .or. part < 1 .or. parts < 1 .or. part > parts .or. parts > most_shards) then
       call raise(error, exit_input, '--shard ' // value // &
                  ': allowed: K/N, the part K of N, with K from 1 to N and N at most ' // to_text(most_shards))
@@ -211,21 +211,21 @@ contains
       shard = part
       shards = parts
     end if
-  end subroutine take_shard
+  end subroutine parse_shard
 
   !> The value of a text of digits, -1 if it is none or too long.
-  pure integer function counting_number(text)
+  pure integer function digits_value(text)
     character(len=*), intent(in) :: text
     integer, parameter :: most_digits = 9
     integer :: i
 
-    counting_number = -1
+    digits_value = -1
     if (len(text) == 0 .or. len(text) > most_digits .or. verify(text, '0123456789') > 0) return
-    counting_number = 0
+    digits_value = 0
     do i = 1, len(text)
-      counting_number = 10 * counting_number + iachar(text(i:i)) - iachar('0')
+      digits_value = 10 * digits_value + iachar(text(i:i)) - iachar('0')
     end do
-  end function counting_number
+  end function digits_value
 
   !> "'rnu' is not a command; did you mean 'run'? allowed: 'run', ..."
   function unknown_word(word, what, known) result(message)
@@ -247,8 +247,8 @@ contains
     integer :: i, operands
 
     do i = 1, size(options)
-      if (.not. is_given(arguments, options(i)%name) .or. takes_option(arguments%command, options(i))) cycle
-      call raise(error, exit_input, takers_text(options(i)))
+      if (.not. is_given(arguments, options(i)%name) .or. accepts_option(arguments%command, options(i))) cycle
+      call raise(error, exit_input, accepted_by_text(options(i)))
       return
     end do
     if (arguments%shards > 1 .and. arguments%wants_csv) then

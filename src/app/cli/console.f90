@@ -9,13 +9,13 @@ module nocdyn_console
   implicit none (type, external)
   private
 
-  public :: say, complain, new_console_progress, new_status_line
+  public :: print_text, report_error, new_console_progress, new_status_line
 
   logical, protected, public :: output_is_lost = .false.   !! some of standard output could not be written
 
-  real(wp), parameter :: patience = 1.0_wp    ! a run shorter than this shows no progress [s]
-  real(wp), parameter :: refresh = 0.2_wp     ! time between two updates of the line [s]
-  real(wp), parameter :: first_entry = 10.0_wp, most_apart = 600.0_wp   ! of lines in a log [s]
+  real(wp), parameter :: first_shown_after = 1.0_wp    ! a run shorter than this shows no progress [s]
+  real(wp), parameter :: refresh_interval = 0.2_wp     ! time between two updates of the line [s]
+  real(wp), parameter :: first_log_interval = 10.0_wp, longest_log_interval = 600.0_wp   ! of lines in a log [s]
 
   !> How things stand: one line on a terminal, rewritten in place; in a log a new line each time, ever farther apart.
   type, public :: status_line_t
@@ -42,7 +42,7 @@ module nocdyn_console
 contains
 
   !> A line, or several, on standard output; the last one may have its end already.
-  subroutine say(text)
+  subroutine print_text(text)
     character(len=*), intent(in) :: text
     logical :: is_done
 
@@ -52,10 +52,10 @@ contains
       call write_bytes(standard_output, text // new_line('a'), is_done)
     end if
     if (.not. is_done) output_is_lost = .true.
-  end subroutine say
+  end subroutine print_text
 
   !> The message of an error on standard error, every line with the program's name before it.
-  subroutine complain(error)
+  subroutine report_error(error)
     type(error_t), intent(in) :: error
     integer :: first, last
 
@@ -65,7 +65,7 @@ contains
       write (error_unit, '(a)') 'nocdyn: ' // error%message(first:last)
       first = last + 2
     end do
-  end subroutine complain
+  end subroutine report_error
 
   !> A line that shows after a second of work if standard error is a terminal, after longer if it is a log.
   function new_status_line(is_quiet, shows_in_logs) result(line)
@@ -75,7 +75,7 @@ contains
     line%is_in_place = is_terminal(standard_error)
     line%is_wanted = (line%is_in_place .or. shows_in_logs) .and. .not. is_quiet
     call system_clock(line%began, line%rate)
-    line%next = line%began + int(merge(patience, first_entry, line%is_in_place) * real(line%rate, wp), int64)
+    line%next = line%began + int(merge(first_shown_after, first_log_interval, line%is_in_place) * real(line%rate, wp), int64)
   end function new_status_line
 
   !> Whether it is time to show how things stand. In a log that is when the work has taken twice as long as the last time.
@@ -89,7 +89,7 @@ contains
     call system_clock(now)
     is_due = now >= self%next
     if (.not. is_due) return
-    interval = merge(refresh, min(self%elapsed(), most_apart), self%is_in_place)
+    interval = merge(refresh_interval, min(self%elapsed(), longest_log_interval), self%is_in_place)
     self%next = now + int(interval * real(self%rate, wp), int64)
   end function is_due
 

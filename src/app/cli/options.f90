@@ -4,7 +4,7 @@ module nocdyn_options
   implicit none (type, external)
   private
 
-  public :: option_index, option_names, takers_text, takes_option
+  public :: option_index, option_names, accepted_by_text, accepts_option
 
   type, public :: option_t
     character(len=9) :: name
@@ -44,19 +44,19 @@ contains
 
     allocate (names(0))
     do i = 1, size(options)
-      if (options(i)%commands == '' .or. takes_option(command, options(i))) call append(names, trim(options(i)%name))
+      if (options(i)%commands == '' .or. accepts_option(command, options(i))) call append(names, trim(options(i)%name))
     end do
   end function option_names
 
-  pure logical function takes_option(command, option)
+  pure logical function accepts_option(command, option)
     character(len=*), intent(in) :: command
     type(option_t), intent(in) :: option
 
-    takes_option = index(' ' // option%commands // ' ', ' ' // command // ' ') > 0
-  end function takes_option
+    accepts_option = index(' ' // option%commands // ' ', ' ' // command // ' ') > 0
+  end function accepts_option
 
   !> "--out is an option of nocdyn run, equilibrium and modes"
-  function takers_text(option) result(text)
+  function accepted_by_text(option) result(text)
     type(option_t), intent(in) :: option
     character(len=:), allocatable :: text
     integer :: first, last
@@ -74,6 +74,6 @@ contains
         text = text // ' and '
       end if
     end do
-  end function takers_text
+  end function accepted_by_text
 
 end module nocdyn_options

@@ -2,8 +2,8 @@
 module nocdyn_analysis_commands
   use nocdyn_arguments, only: arguments_t
   use nocdyn_assembly, only: assemble_machine
-  use nocdyn_console, only: complain, say
-  use nocdyn_equilibrium, only: equilibrium_t, find_equilibria, judge_equilibria
+  use nocdyn_console, only: report_error, print_text
+  use nocdyn_equilibrium, only: equilibrium_t, find_equilibria, find_stability
   use nocdyn_equilibrium_report, only: equilibrium_json, equilibrium_report_t, equilibrium_text, new_equilibrium_report
   use nocdyn_errors, only: error_t, exit_done, exit_failed
   use nocdyn_formulation, only: formulation_t
@@ -13,9 +13,9 @@ module nocdyn_analysis_commands
   use nocdyn_modes_files, only: modes_csv, modes_json
   use nocdyn_modes_report, only: modes_report_t, modes_text, new_modes_report
   use nocdyn_operating_point, only: find_operating_point, operating_point_t
-  use nocdyn_output_file, only: write_whole
+  use nocdyn_output_file, only: write_file
   use nocdyn_output_times, only: check_output_times
-  use nocdyn_result_folders, only: plain_path, refuse_shared_folders, stem
+  use nocdyn_result_folders, only: normalised_path, refuse_shared_folders, stem
   use nocdyn_size_limits, only: check_dense_size
   use nocdyn_text, only: string_t
   implicit none (type, external)
@@ -35,11 +35,11 @@ contains
 
     code = exit_done
     call result_folders(arguments, folders, error)
-    if (allocated(error)) call count_failure(error, code)
+    if (allocated(error)) call report_failure(error, code)
     if (code /= exit_done) return
     do i = 1, size(folders)
       call analyse_equilibrium(arguments, i, folders(i)%text, error)
-      if (allocated(error)) call count_failure(error, code)
+      if (allocated(error)) call report_failure(error, code)
     end do
   end subroutine equilibrium_command
 
@@ -53,21 +53,21 @@ contains
 
     code = exit_done
     call result_folders(arguments, folders, error)
-    if (allocated(error)) call count_failure(error, code)
+    if (allocated(error)) call report_failure(error, code)
     if (code /= exit_done) return
     do i = 1, size(folders)
       call analyse_modes(arguments, i, folders(i)%text, error)
-      if (allocated(error)) call count_failure(error, code)
+      if (allocated(error)) call report_failure(error, code)
     end do
   end subroutine modes_command
 
-  subroutine count_failure(error, code)
+  subroutine report_failure(error, code)
     type(error_t), intent(in) :: error
     integer, intent(inout) :: code
 
-    call complain(error)
+    call report_error(error)
     code = max(code, error%code)
-  end subroutine count_failure
+  end subroutine report_failure
 
   !> --out, in which each of several files gets a folder of its own; empty texts without --out.
   subroutine result_folders(arguments, folders, error)
@@ -80,7 +80,7 @@ contains
     do i = 1, size(folders)
       folders(i)%text = ''
       if (.not. allocated(arguments%out)) cycle
-      folders(i)%text = plain_path(arguments%out)
+      folders(i)%text = normalised_path(arguments%out)
       if (size(folders) > 1) folders(i)%text = folders(i)%text // '/' // stem(arguments%operands(i)%text)
     end do
     if (allocated(arguments%out)) call refuse_shared_folders(arguments%operands, folders, [(.true., i=1, size(folders))], error)
@@ -117,10 +117,10 @@ contains
       error%message = input%file // ': ' // error%message
       return
     end if
-    call judge_equilibria(formulation, equilibria)
+    call find_stability(formulation, equilibria)
     report = new_equilibrium_report(formulation, equilibria, notes)
-    call say(equilibrium_text(input%file, report))
-    if (folder /= '') call write_whole(folder, 'equilibrium.json', equilibrium_json(input, report), error)
+    call print_text(equilibrium_text(input%file, report))
+    if (folder /= '') call write_file(folder, 'equilibrium.json', equilibrium_json(input, report), error)
   end subroutine analyse_equilibrium
 
   subroutine analyse_modes(arguments, number, folder, error)
@@ -146,10 +146,10 @@ contains
       if (error%code == exit_failed) error%message = input%file // ': ' // error%message
       return
     end if
-    call say(modes_text(input%file, report))
+    call print_text(modes_text(input%file, report))
     if (folder == '') return
-    call write_whole(folder, 'modes.csv', modes_csv(report), error)
-    if (.not. allocated(error)) call write_whole(folder, 'modes.json', modes_json(input, report), error)
+    call write_file(folder, 'modes.csv', modes_csv(report), error)
+    if (.not. allocated(error)) call write_file(folder, 'modes.json', modes_json(input, report), error)
   end subroutine analyse_modes
 
 end module nocdyn_analysis_commands

@@ -2,7 +2,7 @@
 module nocdyn_commands
   use nocdyn_arguments, only: arguments_t, command_names
   use nocdyn_assembly, only: assemble_machine
-  use nocdyn_console, only: complain, say
+  use nocdyn_console, only: report_error, print_text
   use nocdyn_errors, only: error_t, exit_done, exit_file, exit_input, raise
   use nocdyn_help, only: command_help
   use nocdyn_input, only: group_t, input_t
@@ -10,12 +10,12 @@ module nocdyn_commands
   use nocdyn_machine, only: machine_t
   use nocdyn_machine_report, only: machine_report
   use nocdyn_matrix_report, only: matrix_report
-  use nocdyn_mistakes, only: mistakes_t
-  use nocdyn_output_file, only: write_whole
+  use nocdyn_diagnostics, only: diagnostics_t
+  use nocdyn_output_file, only: write_file
   use nocdyn_output_times, only: check_output_times
   use nocdyn_schema, only: group_rule_index
   use nocdyn_schema_help, only: group_help, input_help, input_template
-  use nocdyn_sweep_plan, only: add_plan_mistakes, has_sweep, make_plan, sweep_plan_t
+  use nocdyn_sweep_plan, only: add_plan_diagnostics, has_sweep, make_plan, sweep_plan_t
   use nocdyn_text, only: joined, lower_case, quoted
   use nocdyn_version, only: compiler_text, version
   implicit none (type, external)
@@ -40,10 +40,10 @@ contains
       call read_machine(arguments, i, input, machine, error)
       if (.not. allocated(error)) call check_sweep(input, sweep, error)
       if (allocated(error)) then
-        call complain(error)
+        call report_error(error)
         code = max(code, error%code)
       else
-        call say(machine_report(input%file, machine) // sweep)
+        call print_text(machine_report(input%file, machine) // sweep)
       end if
     end do
   end subroutine check_command
@@ -67,10 +67,10 @@ contains
     type(input_t), intent(out) :: input
     type(machine_t), intent(out) :: machine
     type(error_t), allocatable, intent(out) :: error
-    type(mistakes_t) :: mistakes
+    type(diagnostics_t) :: diagnostics
 
-    call read_input(arguments%operands(number)%text, arguments%overrides, input, error, mistakes)
-    if (allocated(error)) call add_plan_mistakes(input, mistakes, error)
+    call read_input(arguments%operands(number)%text, arguments%overrides, input, error, diagnostics)
+    if (allocated(error)) call add_plan_diagnostics(input, diagnostics, error)
     if (.not. allocated(error)) call check_output_times(input, error)
     if (.not. allocated(error)) call assemble_machine(input, machine, error)
   end subroutine read_machine
@@ -87,12 +87,12 @@ contains
     code = exit_done
     call read_machine(arguments, 1, input, machine, error)
     if (allocated(error)) then
-      call complain(error)
+      call report_error(error)
       code = error%code
       return
     end if
     run = input%single('run')
-    call say(matrix_report(machine, run%number('t_start')))
+    call print_text(matrix_report(machine, run%number('t_start')))
   end subroutine matrices_command
 
   !> Writes a commented input to start from; a file that exists is left alone.
@@ -110,15 +110,15 @@ contains
       if (exists) then
         call raise(error, exit_file, quoted(path) // ' exists; it was left as it is')
       else if (slash == 0) then
-        call write_whole('.', path, input_template(), error)
+        call write_file('.', path, input_template(), error)
       else
-        call write_whole(path(:max(1, slash - 1)), path(slash + 1:), input_template(), error)
+        call write_file(path(:max(1, slash - 1)), path(slash + 1:), input_template(), error)
       end if
       if (allocated(error)) then
-        call complain(error)
+        call report_error(error)
         code = error%code
       else
-        call say(path // ': a commented input; try: nocdyn run ' // path)
+        call print_text(path // ': a commented input; try: nocdyn run ' // path)
       end if
     end associate
   end subroutine new_command
@@ -133,13 +133,13 @@ contains
     code = exit_done
     associate (topics => arguments%operands)
       if (size(topics) == 0) then
-        call say(command_help(''))
+        call print_text(command_help(''))
       else if (topics(1)%text == 'input' .and. size(topics) <= 2) then
         if (size(topics) == 1) text = input_help()
         if (size(topics) == 2) call group_help(topics(2)%text, text, error)
-        if (.not. allocated(error)) call say(text)
+        if (.not. allocated(error)) call print_text(text)
       else if (size(topics) == 1 .and. len(command_help(topics(1)%text)) > 0) then
-        call say(command_help(topics(1)%text))
+        call print_text(command_help(topics(1)%text))
       else if (group_rule_index(lower_case(topics(1)%text)) > 0) then
         call raise(error, exit_input, quoted(topics(1)%text) // ' is a group of the input: nocdyn help input ' // topics(1)%text)
       else
@@ -148,7 +148,7 @@ contains
       end if
     end associate
     if (.not. allocated(error)) return
-    call complain(error)
+    call report_error(error)
     code = error%code
   end subroutine help_command
 
@@ -157,7 +157,7 @@ contains
     integer, intent(out) :: code
 
     code = exit_done
-    call say('nocdyn ' // version // ' (' // compiler_text() // ')')
+    call print_text('nocdyn ' // version // ' (' // compiler_text() // ')')
   end subroutine version_command
 
 end module nocdyn_commands

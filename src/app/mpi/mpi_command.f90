@@ -2,21 +2,21 @@
 module nocdyn_mpi_command
   use mpi_f08, only: mpi_abort, mpi_comm_rank, mpi_comm_size, mpi_comm_world
   use nocdyn_arguments, only: arguments_t
-  use nocdyn_console, only: complain
+  use nocdyn_console, only: report_error
   use nocdyn_errors, only: error_t, exit_done, exit_input, raise
   use nocdyn_input, only: input_t
   use nocdyn_input_reader, only: read_input_text
   use nocdyn_input_text, only: input_text
-  use nocdyn_mpi_messages, only: root, share_text
+  use nocdyn_mpi_messages, only: root, broadcast_text
   use nocdyn_mpi_root, only: mpi_root_t
   use nocdyn_mpi_worker, only: mpi_worker_t
-  use nocdyn_posix, only: watch_interrupts
+  use nocdyn_posix, only: catch_interrupts
   use nocdyn_sweep, only: compute_variants
-  use nocdyn_sweep_job, only: begin_job, finish_job, sweep_job_t
-  use nocdyn_sweep_ledger, only: open_ledger
+  use nocdyn_sweep_job, only: start_job, finish_job, sweep_job_t
+  use nocdyn_journal_scheduler, only: initialise_scheduler
   use nocdyn_sweep_plan, only: make_plan, sweep_plan_t
   use nocdyn_sweep_setup, only: prepare_sweep, sweep_setup_t
-  use nocdyn_sweep_threads, only: bounded_threads, tell_threads
+  use nocdyn_sweep_threads, only: usable_threads, print_thread_note
   use nocdyn_text, only: strings
   implicit none (type, external)
   private
@@ -31,49 +31,49 @@ contains
     integer, intent(out) :: code
     integer :: rank
 
-    call watch_interrupts()
+    call catch_interrupts()
     call mpi_comm_rank(mpi_comm_world, rank)
     if (rank == root) then
-      call lead(arguments, bounded_threads(max(1, arguments%threads)), code)
+      call run_root(arguments, usable_threads(max(1, arguments%threads)), code)
     else
-      call follow(bounded_threads(max(1, arguments%threads)), code)
+      call run_worker(usable_threads(max(1, arguments%threads)), code)
     end if
   end subroutine mpi_command
 
   !> Rank 0's part.
-  subroutine lead(arguments, threads, code)
+  subroutine run_root(arguments, threads, code)
     type(arguments_t), intent(in) :: arguments
     integer, intent(in) :: threads   !! of each rank
     integer, intent(out) :: code
     type(sweep_job_t), target :: job
-    type(mpi_root_t) :: ledger
+    type(mpi_root_t) :: scheduler
     type(error_t), allocatable :: error
     character(len=:), allocatable :: file, text
     integer :: ranks
 
     code = exit_done
-    call begin_job(arguments, job, error)
+    call start_job(arguments, job, error)
     text = ''
     if (.not. allocated(error) .and. .not. job%is_done) text = input_text(job%plan%input)
-    call share_text(text)
+    call broadcast_text(text)
     if (allocated(error)) then
-      call complain(error)
+      call report_error(error)
       code = error%code
     end if
     if (text == '') return
     file = job%plan%input%file
-    if (.not. arguments%is_quiet) call tell_threads(file, max(1, arguments%threads))
-    call share_text(file)
-    call share_text(job%plan%list_checksum)
+    if (.not. arguments%is_quiet) call print_thread_note(file, max(1, arguments%threads))
+    call broadcast_text(file)
+    call broadcast_text(job%plan%list_checksum)
     call mpi_comm_size(mpi_comm_world, ranks)
-    ledger%others = ranks - 1
-    call open_ledger(ledger, job%journals(1), job%progress, ranks * threads, job%setup%lanes)
-    call compute_variants(job%plan, job%setup, threads, ledger)
-    call finish_job(job, ledger, threads, ranks, code)
-  end subroutine lead
+    scheduler%other_ranks = ranks - 1
+    call initialise_scheduler(scheduler, job%journals(1), job%progress, ranks * threads, job%setup%lanes)
+    call compute_variants(job%plan, job%setup, threads, scheduler)
+    call finish_job(job, scheduler, threads, ranks, code)
+  end subroutine run_root
 
   !> The part of the other ranks: their input is the text that rank 0 has read; the file of a list they read themselves.
-  subroutine follow(threads, code)
+  subroutine run_worker(threads, code)
     integer, intent(in) :: threads
     integer, intent(out) :: code
     type(input_t) :: input
@@ -84,10 +84,10 @@ contains
     character(len=:), allocatable :: checksum, file, text
 
     code = exit_done
-    call share_text(text)
+    call broadcast_text(text)
     if (text == '') return
-    call share_text(file)
-    call share_text(checksum)
+    call broadcast_text(file)
+    call broadcast_text(checksum)
     call read_input_text(text, file, strings([character(len=1) ::]), input, error)
     if (.not. allocated(error)) call make_plan(input, plan, error)
     if (.not. allocated(error)) call prepare_sweep(plan, setup, error)
@@ -95,10 +95,10 @@ contains
       call raise(error, exit_input, file // ': the file of &sweep with the variants is not that of rank 0')
     end if
     if (allocated(error)) then
-      call complain(error)
+      call report_error(error)
       call mpi_abort(mpi_comm_world, error%code)
     end if
     call compute_variants(plan, setup, threads, worker)
-  end subroutine follow
+  end subroutine run_worker
 
 end module nocdyn_mpi_command

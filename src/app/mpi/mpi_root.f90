@@ -2,14 +2,15 @@
 module nocdyn_mpi_root
   use, intrinsic :: iso_c_binding, only: c_int
   use nocdyn_kinds, only: wp
-  use nocdyn_mpi_messages, only: answer, goodbye_word, look, receive_results, receive_word, request_word, results_word, &
-    send_word, stop_word
+  use nocdyn_mpi_messages, only: send_assignment, tag_done, probe_message, receive_results, receive_tag, tag_request, &
+                                 tag_results, &
+    send_tag, tag_stop
   use nocdyn_sweep_chunk, only: chunk_t
-  use nocdyn_sweep_ledger, only: sweep_ledger_t
+  use nocdyn_journal_scheduler, only: journal_scheduler_t
   implicit none (type, external)
   private
 
-  integer(c_int), parameter :: nap = 200   ! while the others are waited for [microseconds]
+  integer(c_int), parameter :: poll_interval = 200   ! while the others are waited for [microseconds]
 
   interface
     integer(c_int) function c_usleep(microseconds) bind(c, name='usleep')
@@ -18,73 +19,73 @@ module nocdyn_mpi_root
     end function c_usleep
   end interface
 
-  type, extends(sweep_ledger_t), public :: mpi_root_t
-    integer :: others = 0                       !! ranks besides this one
-    integer, private :: farewells = 0           !! of ranks from which nothing more comes
+  type, extends(journal_scheduler_t), public :: mpi_root_t
+    integer :: other_ranks = 0                       !! ranks besides this one
+    integer, private :: finished_ranks = 0           !! of ranks from which nothing more comes
     logical, private :: has_stopped = .false.   !! the others have been told to leave off
   contains
-    procedure :: attend
-    procedure :: conclude
-    procedure, private :: serve
+    procedure :: poll
+    procedure :: finalise
+    procedure, private :: handle_message
   end type mpi_root_t
 
 contains
 
-  subroutine attend(self)
+  subroutine poll(self)
     class(mpi_root_t), intent(inout) :: self
-    integer :: rank, word
+    integer :: rank, tag
 
-    call self%sweep_ledger_t%attend()
+    call self%journal_scheduler_t%poll()
     do
-      call look(rank, word)
-      if (word == 0) exit
-      call self%serve(rank, word)
+      call probe_message(rank, tag)
+      if (tag == 0) exit
+      call self%handle_message(rank, tag)
     end do
     if (self%has_stopped) return
-    if (.not. self%is_over()) return
+    if (.not. self%is_cancelled()) return
     self%has_stopped = .true.
-    do rank = 1, self%others
-      call send_word(rank, stop_word)
+    do rank = 1, self%other_ranks
+      call send_tag(rank, tag_stop)
     end do
-  end subroutine attend
+  end subroutine poll
 
   !> Does what a message asks for.
-  subroutine serve(self, rank, word)
+  subroutine handle_message(self, rank, tag)
     class(mpi_root_t), intent(inout) :: self
-    integer, intent(in) :: rank, word
+    integer, intent(in) :: rank, tag
     type(chunk_t) :: chunk
     real(wp) :: seconds
     integer :: count, first
 
-    select case (word)
-    case (request_word)
-      call receive_word(rank, word)
-      call self%hand_out(first, count)
-      call answer(rank, first, count)
-    case (results_word)
+    select case (tag)
+    case (tag_request)
+      call receive_tag(rank, tag)
+      call self%next_chunk(first, count)
+      call send_assignment(rank, first, count)
+    case (tag_results)
       call receive_results(rank, chunk, seconds)
-      call self%book(chunk, seconds)
-    case (goodbye_word)
-      call receive_word(rank, word)
-      self%farewells = self%farewells + 1
+      call self%commit(chunk, seconds)
+    case (tag_done)
+      call receive_tag(rank, tag)
+      self%finished_ranks = self%finished_ranks + 1
     case default
       error stop 'nocdyn_mpi_root: a message that rank 0 does not know'
     end select
-  end subroutine serve
+  end subroutine handle_message
 
   !> Waits until the others have nothing more to send, and lets them go.
-  subroutine conclude(self)
+  subroutine finalise(self)
     class(mpi_root_t), intent(inout) :: self
     integer(c_int) :: status
     integer :: rank
 
-    do while (self%farewells < self%others)
-      call self%attend()
-      status = c_usleep(nap)
+    do while (self%finished_ranks < self%other_ranks)
+      call self%poll()
+      status = c_usleep(poll_interval)
     end do
-    do rank = 1, self%others
-      call send_word(rank, goodbye_word)
+    do rank = 1, self%other_ranks
+      call send_tag(rank, tag_done)
     end do
-  end subroutine conclude
+  end subroutine finalise
 
 end module nocdyn_mpi_root

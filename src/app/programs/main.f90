@@ -3,21 +3,21 @@ program nocdyn
   use nocdyn_analysis_commands, only: equilibrium_command, modes_command
   use nocdyn_arguments, only: arguments_t, command_line, parse_arguments
   use nocdyn_commands, only: check_command, help_command, matrices_command, new_command, version_command
-  use nocdyn_console, only: complain, output_is_lost
+  use nocdyn_console, only: report_error, output_is_lost
   use nocdyn_errors, only: error_t, exit_file, raise
-  use nocdyn_posix, only: survive_size_limit
+  use nocdyn_posix, only: ignore_file_size_signal
   use nocdyn_run_command, only: run_command
-  use nocdyn_sibling_programs, only: become_sibling
+  use nocdyn_companion_programs, only: exec_companion
   implicit none (type, external)
 
   type(arguments_t) :: arguments
   type(error_t), allocatable :: error
   integer :: code
 
-  call survive_size_limit()
+  call ignore_file_size_signal()
   call parse_arguments(command_line(), arguments, error)
   if (allocated(error)) then
-    call complain(error)
+    call report_error(error)
     stop error%code, quiet=.true.
   end if
   select case (arguments%command)
@@ -30,8 +30,8 @@ program nocdyn
   case ('modes')
     call modes_command(arguments, code)
   case ('sweep', 'merge')
-    call become_sibling('nocdyn-sweep', error)
-    call complain(error)
+    call exec_companion('nocdyn-sweep', error)
+    call report_error(error)
     code = error%code
   case ('matrices')
     call matrices_command(arguments, code)
@@ -44,7 +44,7 @@ program nocdyn
   end select
   if (output_is_lost) then
     call raise(error, exit_file, 'standard output cannot be written')
-    call complain(error)
+    call report_error(error)
     code = max(code, error%code)
   end if
   stop code, quiet=.true.

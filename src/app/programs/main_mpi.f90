@@ -3,11 +3,11 @@ program nocdyn_mpi_program
   use mpi_f08, only: mpi_comm_rank, mpi_comm_world, mpi_finalize, mpi_init_thread, mpi_thread_serialized
   use nocdyn_arguments, only: arguments_t, command_line, parse_arguments
   use nocdyn_commands, only: help_command, version_command
-  use nocdyn_console, only: complain, output_is_lost
+  use nocdyn_console, only: report_error, output_is_lost
   use nocdyn_errors, only: error_t, exit_file, exit_input, raise
   use nocdyn_mpi_command, only: mpi_command
   use nocdyn_mpi_messages, only: root
-  use nocdyn_posix, only: survive_size_limit
+  use nocdyn_posix, only: ignore_file_size_signal
   use nocdyn_text, only: append
   implicit none (type, external)
 
@@ -17,7 +17,7 @@ program nocdyn_mpi_program
 
   call mpi_init_thread(mpi_thread_serialized, provided)
   call mpi_comm_rank(mpi_comm_world, rank)
-  call survive_size_limit()
+  call ignore_file_size_signal()
   call parse_arguments(command_line(), arguments, error)
   if (.not. allocated(error)) then
     if (.not. any(arguments%command == ['sweep  ', 'help   ', 'version'])) then
@@ -40,12 +40,12 @@ program nocdyn_mpi_program
       call mpi_command(arguments, code)
     end select
   else if (rank == root) then
-    call complain(error)
+    call report_error(error)
     code = error%code
   end if
   if (output_is_lost) then
     call raise(error, exit_file, 'standard output cannot be written')
-    call complain(error)
+    call report_error(error)
     code = max(code, error%code)
   end if
   call mpi_finalize()

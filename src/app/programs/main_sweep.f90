@@ -3,10 +3,10 @@
 program nocdyn_sweep_program
   use nocdyn_arguments, only: arguments_t, command_line, parse_arguments
   use nocdyn_commands, only: help_command, version_command
-  use nocdyn_console, only: complain, output_is_lost
+  use nocdyn_console, only: report_error, output_is_lost
   use nocdyn_errors, only: error_t, exit_file, exit_input, raise
   use nocdyn_merge_command, only: merge_command
-  use nocdyn_posix, only: survive_size_limit
+  use nocdyn_posix, only: ignore_file_size_signal
   use nocdyn_sweep_command, only: sweep_command
   use nocdyn_text, only: append
   implicit none (type, external)
@@ -15,10 +15,10 @@ program nocdyn_sweep_program
   type(error_t), allocatable :: error
   integer :: code
 
-  call survive_size_limit()
+  call ignore_file_size_signal()
   call parse_arguments(command_line(), arguments, error)
   if (allocated(error)) then
-    call complain(error)
+    call report_error(error)
     stop error%code, quiet=.true.
   end if
   select case (arguments%command)
@@ -33,12 +33,12 @@ program nocdyn_sweep_program
     call version_command(code)
   case default
     call raise(error, exit_input, "nocdyn-sweep knows 'sweep' and 'merge' only; everything else is asked of nocdyn")
-    call complain(error)
+    call report_error(error)
     stop error%code, quiet=.true.
   end select
   if (output_is_lost) then
     call raise(error, exit_file, 'standard output cannot be written')
-    call complain(error)
+    call report_error(error)
     code = max(code, error%code)
   end if
   stop code, quiet=.true.

@@ -1,19 +1,19 @@
 !> nocdyn merge: one result of the parts of a sweep.
 module nocdyn_merge_command
   use nocdyn_arguments, only: arguments_t
-  use nocdyn_console, only: complain
+  use nocdyn_console, only: report_error
   use nocdyn_errors, only: error_t, exit_done, exit_file, exit_input, raise
   use nocdyn_input_reader, only: read_input_text
   use nocdyn_journal_chunks, only: check_sweep
-  use nocdyn_posix, only: watch_interrupts
-  use nocdyn_result_folders, only: plain_path
+  use nocdyn_posix, only: catch_interrupts
+  use nocdyn_result_folders, only: normalised_path
   use nocdyn_sweep_header, only: quantity_t
   use nocdyn_sweep_journal, only: journal_names, open_journal, sweep_journal_t
   use nocdyn_sweep_plan, only: sweep_plan_t
-  use nocdyn_sweep_records, only: wanted_trajectories
-  use nocdyn_sweep_results, only: results_options_t, tell_results, write_results
+  use nocdyn_recorded_quantities, only: wanted_trajectories
+  use nocdyn_sweep_results, only: results_options_t, print_results, write_results
   use nocdyn_sweep_summary, only: sweep_summary_t
-  use nocdyn_target_company, only: find_targets
+  use nocdyn_target_consistency, only: find_targets
   use nocdyn_text, only: append, string_t, strings
   implicit none (type, external)
   private
@@ -28,11 +28,11 @@ contains
     type(error_t), allocatable :: error
 
     code = exit_done
-    call watch_interrupts()
-    call merge_folder(plain_path(arguments%operands(1)%text), results_options_t(arguments%wants_csv, arguments%is_quiet), &
+    call catch_interrupts()
+    call merge_folder(normalised_path(arguments%operands(1)%text), results_options_t(arguments%wants_csv, arguments%is_quiet), &
                       code, error)
     if (.not. allocated(error)) return
-    call complain(error)
+    call report_error(error)
     code = max(code, error%code)
   end subroutine merge_command
 
@@ -43,7 +43,7 @@ contains
     type(error_t), allocatable, intent(out) :: error
     type(sweep_journal_t), allocatable :: journals(:)
     type(sweep_plan_t) :: plan   ! as far as results need it; a design has served
-    type(string_t), allocatable :: complaints(:)
+    type(string_t), allocatable :: messages(:)
     type(sweep_summary_t) :: summary
 
     call open_journals(folder, journals, error)
@@ -52,11 +52,11 @@ contains
     associate (header => journals(1)%header)
       call read_input_text(header%input_text, header%input_file, strings([character(len=1) ::]), plan%input, error)
       if (allocated(error)) return
-      call find_targets(plan%input, labels_of(header%parameters), plan%targets, complaints)
+      call find_targets(plan%input, labels_of(header%parameters), plan%targets, messages)
     end associate
     allocate (plan%trajectories, source=wanted_trajectories(plan%input))
     call write_results(plan, folder, journals, options, summary, error)
-    if (.not. allocated(error)) call tell_results(plan, folder, journals(1)%header, options, summary, code)
+    if (.not. allocated(error)) call print_results(plan, folder, journals(1)%header, options, summary, code)
   end subroutine merge_folder
 
   pure function labels_of(quantities) result(labels)

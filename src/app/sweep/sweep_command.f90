@@ -1,13 +1,13 @@
 !> nocdyn sweep: all variants of a machine, on one computer.
 module nocdyn_sweep_command
   use nocdyn_arguments, only: arguments_t
-  use nocdyn_console, only: complain
+  use nocdyn_console, only: report_error
   use nocdyn_errors, only: error_t, exit_done
-  use nocdyn_posix, only: watch_interrupts
+  use nocdyn_posix, only: catch_interrupts
   use nocdyn_sweep, only: compute_variants
-  use nocdyn_sweep_job, only: begin_job, finish_job, sweep_job_t
-  use nocdyn_sweep_ledger, only: open_ledger, sweep_ledger_t
-  use nocdyn_sweep_threads, only: bounded_threads, refuse_ranks, tell_threads
+  use nocdyn_sweep_job, only: start_job, finish_job, sweep_job_t
+  use nocdyn_journal_scheduler, only: initialise_scheduler, journal_scheduler_t
+  use nocdyn_sweep_threads, only: usable_threads, refuse_ranks, print_thread_note
   use omp_lib, only: omp_get_max_threads
   implicit none (type, external)
   private
@@ -20,25 +20,25 @@ contains
     type(arguments_t), intent(in) :: arguments
     integer, intent(out) :: code
     type(sweep_job_t), target :: job
-    type(sweep_ledger_t) :: ledger
+    type(journal_scheduler_t) :: scheduler
     type(error_t), allocatable :: error
     integer :: threads
 
     code = exit_done
-    call watch_interrupts()
+    call catch_interrupts()
     call refuse_ranks(arguments, error)
-    if (.not. allocated(error)) call begin_job(arguments, job, error)
+    if (.not. allocated(error)) call start_job(arguments, job, error)
     if (allocated(error)) then
-      call complain(error)
+      call report_error(error)
       code = error%code
       return
     end if
     if (job%is_done) return
-    threads = bounded_threads(thread_count(arguments))
-    if (.not. arguments%is_quiet) call tell_threads(job%plan%input%file, thread_count(arguments))
-    call open_ledger(ledger, job%journals(1), job%progress, threads, job%setup%lanes)
-    call compute_variants(job%plan, job%setup, threads, ledger)
-    call finish_job(job, ledger, threads, 1, code)
+    threads = usable_threads(thread_count(arguments))
+    if (.not. arguments%is_quiet) call print_thread_note(job%plan%input%file, thread_count(arguments))
+    call initialise_scheduler(scheduler, job%journals(1), job%progress, threads, job%setup%lanes)
+    call compute_variants(job%plan, job%setup, threads, scheduler)
+    call finish_job(job, scheduler, threads, 1, code)
   end subroutine sweep_command
 
   !> That are asked for: --threads, else what OMP_NUM_THREADS says, else the cores that the process may use.

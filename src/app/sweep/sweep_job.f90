@@ -2,28 +2,28 @@
 module nocdyn_sweep_job
   use, intrinsic :: iso_fortran_env, only: int64
   use nocdyn_arguments, only: arguments_t
-  use nocdyn_console, only: complain, new_status_line, say
+  use nocdyn_console, only: report_error, new_status_line, print_text
   use nocdyn_errors, only: error_t, exit_done, exit_failed, exit_file, exit_input, raise
   use nocdyn_input, only: input_t
   use nocdyn_input_reader, only: read_input
-  use nocdyn_mistakes, only: mistakes_t
-  use nocdyn_result_folders, only: plain_path, result_folder
-  use nocdyn_sweep_header, only: sweep_file_name, sweep_header_t
-  use nocdyn_sweep_headers, only: new_sweep_header
+  use nocdyn_diagnostics, only: diagnostics_t
+  use nocdyn_result_folders, only: normalised_path, result_folder
+  use nocdyn_sweep_header, only: sweep_netcdf_name, sweep_header_t
+  use nocdyn_plan_header, only: new_sweep_header
   use nocdyn_sweep_journal, only: create_journal, journal_name, open_journal, sweep_journal_t
-  use nocdyn_sweep_ledger, only: sweep_ledger_t
-  use nocdyn_sweep_plan, only: add_plan_mistakes, make_plan, sweep_plan_t
+  use nocdyn_journal_scheduler, only: journal_scheduler_t
+  use nocdyn_sweep_plan, only: add_plan_diagnostics, make_plan, sweep_plan_t
   use nocdyn_sweep_progress, only: console_sweep_progress_t
-  use nocdyn_sweep_resumption, only: judge_journal, judge_results, refuse_other_journals
-  use nocdyn_sweep_results, only: results_options_t, tell_results, write_results
+  use nocdyn_sweep_resumption, only: check_journal, check_results, refuse_other_journals
+  use nocdyn_sweep_results, only: results_options_t, print_results, write_results
   use nocdyn_sweep_setup, only: prepare_sweep, sweep_setup_t
   use nocdyn_sweep_summary, only: sweep_effort_t, sweep_summary_t
-  use nocdyn_sweep_table, only: sweep_table_name
+  use nocdyn_sweep_csv, only: sweep_csv_name
   use nocdyn_text, only: to_text
   implicit none (type, external)
   private
 
-  public :: begin_job, finish_job
+  public :: start_job, finish_job
 
   type, public :: sweep_job_t
     type(arguments_t) :: arguments
@@ -38,22 +38,22 @@ module nocdyn_sweep_job
 contains
 
   !> Reads the input, and makes the journal or opens the one to go on with.
-  subroutine begin_job(arguments, job, error)
+  subroutine start_job(arguments, job, error)
     type(arguments_t), intent(in) :: arguments
     type(sweep_job_t), intent(out) :: job
     type(error_t), allocatable, intent(out) :: error
     type(input_t) :: input
-    type(mistakes_t) :: mistakes
+    type(diagnostics_t) :: diagnostics
     type(sweep_header_t) :: header
 
     job%arguments = arguments
-    call read_input(arguments%operands(1)%text, arguments%overrides, input, error, mistakes)
-    if (allocated(error)) call add_plan_mistakes(input, mistakes, error)
+    call read_input(arguments%operands(1)%text, arguments%overrides, input, error, diagnostics)
+    if (allocated(error)) call add_plan_diagnostics(input, diagnostics, error)
     if (.not. allocated(error)) call make_plan(input, job%plan, error)
     if (.not. allocated(error)) call prepare_sweep(job%plan, job%setup, error)
     if (allocated(error)) return
     if (allocated(arguments%out)) then
-      job%folder = plain_path(arguments%out)
+      job%folder = normalised_path(arguments%out)
     else
       job%folder = result_folder(input)
     end if
@@ -67,7 +67,7 @@ contains
     if (allocated(error) .or. job%is_done) return
     job%progress%title = job%plan%input%file
     job%progress%line = new_status_line(arguments%is_quiet, shows_in_logs=.true.)
-  end subroutine begin_job
+  end subroutine start_job
 
   !> Opens the journal that is there, or makes one if the sweep is not done already.
   subroutine prepare_journal(job, header, error)
@@ -82,15 +82,15 @@ contains
     inquire (file=job%folder // '/' // name, exist=is_there, size=bytes)
     if (is_there .and. bytes > 0) then
       call open_journal(job%folder, name, job%journals(1), error)
-      if (.not. allocated(error)) call judge_journal(job%journals(1), header, job%arguments%resumes, error)
-      if (.not. allocated(error)) call tell_journal(job)
+      if (.not. allocated(error)) call check_journal(job%journals(1), header, job%arguments%resumes, error)
+      if (.not. allocated(error)) call print_journal_state(job)
     else
-      if (job%arguments%resumes) call look_for_results(job, header, error)
+      if (job%arguments%resumes) call check_finished_results(job, header, error)
       if (allocated(error) .or. job%is_done) return
       call refuse_other_journals(job%folder, job%arguments%shards, error)
       if (allocated(error)) return
       if (job%arguments%resumes .and. .not. job%arguments%is_quiet) then
-        call say(job%plan%input%file // ': there is nothing to go on with in ' // job%folder // &
+        call print_text(job%plan%input%file // ': there is nothing to go on with in ' // job%folder // &
                  '; the sweep starts from its beginning')
       end if
       call create_journal(job%folder, name, header, job%journals(1), error)
@@ -98,45 +98,46 @@ contains
   end subroutine prepare_journal
 
   !> There is no journal to go on with, but all may be done already.
-  subroutine look_for_results(job, header, error)
+  subroutine check_finished_results(job, header, error)
     type(sweep_job_t), intent(inout) :: job
     type(sweep_header_t), intent(in) :: header
     type(error_t), allocatable, intent(out) :: error
-    character(len=:), allocatable :: news
+    character(len=:), allocatable :: message
     logical :: has_table
 
-    inquire (file=job%folder // '/' // sweep_file_name, exist=job%is_done)
+    inquire (file=job%folder // '/' // sweep_netcdf_name, exist=job%is_done)
     job%is_done = job%is_done .and. job%arguments%shards <= 1
     if (.not. job%is_done) return
-    call judge_results(job%folder, header, error)
+    call check_results(job%folder, header, error)
     if (allocated(error)) return
-    news = job%plan%input%file // ': all ' // to_text(header%variants) // ' variants are done already; results in ' // job%folder
-    inquire (file=job%folder // '/' // sweep_table_name, exist=has_table)
+    message = job%plan%input%file // ': all ' // to_text(header%variants) // ' variants are done already; results in ' // &
+              job%folder
+    inquire (file=job%folder // '/' // sweep_csv_name, exist=has_table)
     if (job%arguments%wants_csv .and. .not. has_table) then
-      call raise(error, exit_input, news // ', without ' // sweep_table_name // '; to have it, leave out --resume')
+      call raise(error, exit_input, message // ', without ' // sweep_csv_name // '; to have it, leave out --resume')
     else if (.not. job%arguments%is_quiet) then
-      call say(news)
+      call print_text(message)
     end if
-  end subroutine look_for_results
+  end subroutine check_finished_results
 
   !> What is in the journal that is gone on with. A record that a kill has cut short, or a disk has spoilt, costs the variants
   !> in it.
-  subroutine tell_journal(job)
+  subroutine print_journal_state(job)
     type(sweep_job_t), intent(in) :: job
 
     if (job%arguments%is_quiet) return
     associate (file => job%plan%input%file, journal => job%journals(1))
-      if (journal%damaged_bytes > 0) call say(file // ': note: ' // journal%path() // ' has damaged records; ' // &
+      if (journal%damaged_bytes > 0) call print_text(file // ': note: ' // journal%path() // ' has damaged records; ' // &
                                               'their variants are computed again')
-      call say(file // ': taking over ' // to_text(journal%done + journal%refused + journal%failed) // ' of ' // &
+      call print_text(file // ': taking over ' // to_text(journal%done + journal%refused + journal%failed) // ' of ' // &
                to_text(journal%header%last - journal%header%first + 1) // ' variants from ' // journal%path())
     end associate
-  end subroutine tell_journal
+  end subroutine print_journal_state
 
   !> Writes what has come out, and tells it.
-  subroutine finish_job(job, ledger, threads, ranks, code)
+  subroutine finish_job(job, scheduler, threads, ranks, code)
     type(sweep_job_t), intent(inout) :: job
-    class(sweep_ledger_t), intent(in) :: ledger
+    class(journal_scheduler_t), intent(in) :: scheduler
     integer, intent(in) :: threads, ranks
     integer, intent(out) :: code
     type(sweep_summary_t) :: summary
@@ -144,48 +145,48 @@ contains
     type(error_t), allocatable :: error
 
     code = exit_done
-    summary%effort = sweep_effort_t(ledger%counts%new, threads, ranks, job%setup%lanes, job%progress%line%elapsed())
+    summary%effort = sweep_effort_t(scheduler%counts%new, threads, ranks, job%setup%lanes, job%progress%line%elapsed())
     call job%progress%line%clear()
-    if (allocated(ledger%error)) then
-      allocate (error, source=ledger%error)
-    else if (.not. ledger%is_complete()) then
-      call raise(error, exit_failed, interruption_text(job, ledger))
+    if (allocated(scheduler%error)) then
+      allocate (error, source=scheduler%error)
+    else if (.not. scheduler%is_complete()) then
+      call raise(error, exit_failed, interruption_text(job, scheduler))
     else if (job%arguments%shards > 1) then
-      if (.not. job%arguments%is_quiet) call say(part_text(job, ledger))
+      if (.not. job%arguments%is_quiet) call print_text(part_text(job, scheduler))
     else
       options = results_options_t(job%arguments%wants_csv, job%arguments%is_quiet)
       call write_results(job%plan, job%folder, job%journals, options, summary, error)
       if (.not. allocated(error)) then
         call job%journals(1)%remove()   ! first: a reader of the output who is gone ends the program
-        call tell_results(job%plan, job%folder, job%journals(1)%header, options, summary, code)
+        call print_results(job%plan, job%folder, job%journals(1)%header, options, summary, code)
       end if
     end if
     call job%journals(1)%close()
     if (.not. allocated(error)) return
     if (error%code == exit_file) error%message = error%message // '; once it can be written, the same command with ' // &
                                                  '--resume goes on from there'
-    call complain(error)
+    call report_error(error)
     code = max(code, error%code)
   end subroutine finish_job
 
-  function interruption_text(job, ledger) result(text)
+  function interruption_text(job, scheduler) result(text)
     type(sweep_job_t), intent(in) :: job
-    class(sweep_ledger_t), intent(in) :: ledger
+    class(journal_scheduler_t), intent(in) :: scheduler
     character(len=:), allocatable :: text
 
-    associate (counts => ledger%counts)
+    associate (counts => scheduler%counts)
       text = job%plan%input%file // ': interrupted with ' // to_text(counts%done + counts%refused + counts%failed) // ' of ' // &
              to_text(counts%total) // ' variants done; the same command with --resume goes on from there'
     end associate
   end function interruption_text
 
-  function part_text(job, ledger) result(text)
+  function part_text(job, scheduler) result(text)
     type(sweep_job_t), intent(in) :: job
-    class(sweep_ledger_t), intent(in) :: ledger
+    class(journal_scheduler_t), intent(in) :: scheduler
     character(len=:), allocatable :: text
 
     text = job%plan%input%file // ': part ' // to_text(job%arguments%shard) // ' of ' // to_text(job%arguments%shards) // &
-           ' done, ' // to_text(ledger%counts%total) // ' variants; once all parts are there: nocdyn merge ' // job%folder
+           ' done, ' // to_text(scheduler%counts%total) // ' variants; once all parts are there: nocdyn merge ' // job%folder
   end function part_text
 
 end module nocdyn_sweep_job

@@ -1,31 +1,31 @@
 !> The files that a finished sweep leaves, and what is printed of it.
 module nocdyn_sweep_results
   use, intrinsic :: iso_fortran_env, only: int64
-  use nocdyn_console, only: complain, console_progress_t, new_console_progress, say
+  use nocdyn_console, only: report_error, console_progress_t, new_console_progress, print_text
   use nocdyn_errors, only: error_t, exit_done, exit_failed, raise
   use nocdyn_folders, only: folder_names, remove_empty_folder
   use nocdyn_input, only: input_t
   use nocdyn_input_text, only: input_text
-  use nocdyn_journal_chunks, only: sweep_records_t
+  use nocdyn_journal_chunks, only: chunk_cursor_t
   use nocdyn_kinds, only: wp
   use nocdyn_order_statistics, only: find_order_statistics
-  use nocdyn_output_file, only: write_whole
+  use nocdyn_output_file, only: write_file
   use nocdyn_posix, only: is_interrupted, remove_file
   use nocdyn_run_summary, only: run_summary_t
   use nocdyn_sweep_chunk, only: chunk_t, status_refused
-  use nocdyn_sweep_file, only: write_sweep_file
-  use nocdyn_sweep_header, only: sweep_file_name, sweep_header_t
+  use nocdyn_sweep_netcdf, only: write_sweep_netcdf
+  use nocdyn_sweep_header, only: sweep_netcdf_name, sweep_header_t
   use nocdyn_sweep_journal, only: sweep_journal_t
   use nocdyn_sweep_plan, only: sweep_plan_t, without_sweep
   use nocdyn_sweep_summary, only: sweep_json, sweep_line, sweep_note, sweep_summary_t, sweep_table
-  use nocdyn_sweep_table, only: sweep_table_name, write_sweep_table
+  use nocdyn_sweep_csv, only: sweep_csv_name, write_sweep_csv
   use nocdyn_targets, only: set_targets
   use nocdyn_text, only: string_t, to_text
   use nocdyn_transient, only: input_file, partial_file, run_transient, summary_file, trajectory_file
   implicit none (type, external)
   private
 
-  public :: write_results, tell_results
+  public :: write_results, print_results
 
   character(len=*), parameter :: variant_folder = 'variant-'
 
@@ -53,16 +53,16 @@ contains
     summary%refused = sum(journals%refused)
     summary%failed = sum(journals%failed)
     call find_order_statistics(journals, summary%statistics, error)
-    if (.not. allocated(error)) call write_sweep_file(folder, journals, error)
+    if (.not. allocated(error)) call write_sweep_netcdf(folder, journals, error)
     if (.not. allocated(error)) call remove_other_results(folder, keeps_table=options%wants_csv)
-    if (.not. allocated(error) .and. options%wants_csv) call write_sweep_table(folder, journals, error)
+    if (.not. allocated(error) .and. options%wants_csv) call write_sweep_csv(folder, journals, error)
     if (.not. allocated(error)) call write_trajectories(plan, folder, journals, options, &
                                                          summary%without_trajectory, error)
-    if (.not. allocated(error)) call write_whole(folder, input_file, input_text(plan%input), error)
+    if (.not. allocated(error)) call write_file(folder, input_file, input_text(plan%input), error)
     call system_clock(now)
     if (allocated(summary%effort)) summary%effort%writing_time = real(now - began, wp) / real(rate, wp)
     if (.not. allocated(error)) then
-      call write_whole(folder, summary_file, sweep_json(plan%input, journals(1)%header, summary), error)
+      call write_file(folder, summary_file, sweep_json(plan%input, journals(1)%header, summary), error)
     end if
     if (summary%done == 0 .and. .not. allocated(error)) call find_first_reason(journals, summary%first_reason, error)
   end subroutine write_results
@@ -75,7 +75,7 @@ contains
     integer :: i
 
     call remove_run(folder)
-    if (.not. keeps_table) call remove_file(folder // '/' // sweep_table_name)
+    if (.not. keeps_table) call remove_file(folder // '/' // sweep_csv_name)
     allocate (names, source=folder_names(folder))
     do i = 1, size(names)
       associate (name => names(i)%text)
@@ -105,7 +105,7 @@ contains
   end subroutine remove_run
 
   !> Prints what has come out.
-  subroutine tell_results(plan, folder, header, options, summary, code)
+  subroutine print_results(plan, folder, header, options, summary, code)
     type(sweep_plan_t), intent(in) :: plan
     character(len=*), intent(in) :: folder
     type(sweep_header_t), intent(in) :: header
@@ -117,29 +117,29 @@ contains
 
     code = exit_done
     if (.not. options%is_quiet) then
-      if (summary%done > 0) call say(sweep_table(header, summary))
+      if (summary%done > 0) call print_text(sweep_table(header, summary))
       note = sweep_note(plan%input, summary)
-      if (note /= '') call say(note)
-      call say(sweep_line(plan%input, summary, folder))
+      if (note /= '') call print_text(note)
+      call print_text(sweep_line(plan%input, summary, folder))
     end if
     if (summary%done > 0) return
     code = exit_failed
     call raise(error, code, plan%input%file // ': no variant can be computed, the first one because: ' // &
-               summary%first_reason // '; all reasons are in ' // folder // '/' // sweep_file_name)
-    call complain(error)
-  end subroutine tell_results
+               summary%first_reason // '; all reasons are in ' // folder // '/' // sweep_netcdf_name)
+    call report_error(error)
+  end subroutine print_results
 
   !> Why the first variant of a sweep is not done.
   subroutine find_first_reason(journals, reason, error)
     type(sweep_journal_t), intent(inout) :: journals(:)
     character(len=:), allocatable, intent(out) :: reason
     type(error_t), allocatable, intent(out) :: error
-    type(sweep_records_t) :: records
+    type(chunk_cursor_t) :: cursor
     type(chunk_t) :: chunk
     logical :: is_there
 
-    call records%begin(journals)
-    call records%take(journals, chunk, is_there, error)
+    call cursor%rewind_to_start(journals)
+    call cursor%next_chunk(journals, chunk, is_there, error)
     if (.not. allocated(error)) reason = chunk%reasons(1)%text
   end subroutine find_first_reason
 
@@ -155,7 +155,7 @@ contains
     type(input_t) :: input
     type(run_summary_t) :: summary
     real(wp), allocatable :: values(:)
-    character(len=:), allocatable :: complaint
+    character(len=:), allocatable :: message
     integer :: i, status
 
     allocate (refused(0))
@@ -164,8 +164,8 @@ contains
         input = plan%input
         call find_values(journals, variant, values, status, error)
         if (allocated(error)) return
-        call set_targets(input, plan%targets, values, complaint)
-        if (status == status_refused .or. complaint /= '') then
+        call set_targets(input, plan%targets, values, message)
+        if (status == status_refused .or. message /= '') then
           refused = [refused, variant]
           cycle
         end if
@@ -192,9 +192,9 @@ contains
 
     status = status_refused
     do k = 1, size(journals)
-      i = journals(k)%record_of(variant)
+      i = journals(k)%entry_of(variant)
       if (i == 0) cycle
-      call journals(k)%read_record(i, chunk, error)
+      call journals(k)%read_entry(i, chunk, error)
       if (allocated(error)) return
       values = chunk%parameters(:, variant - chunk%first + 1)
       status = chunk%status(variant - chunk%first + 1)

@@ -4,19 +4,19 @@ module nocdyn_sweep_resumption
   use nocdyn_sweep_differences, only: input_difference
   use nocdyn_sweep_header, only: sweep_header_t
   use nocdyn_sweep_journal, only: journal_name, journal_names, sweep_journal_t
-  use nocdyn_sweep_origin, only: read_origin
+  use nocdyn_sweep_provenance, only: read_provenance
   use nocdyn_text, only: joined, string_t, to_text
   implicit none (type, external)
   private
 
-  public :: judge_journal, judge_results, refuse_other_journals
+  public :: check_journal, check_results, refuse_other_journals
 
-  integer, parameter :: most_told = 3   ! names
+  integer, parameter :: max_listed = 3   ! names
 
 contains
 
   !> A journal is gone on with if it is one of this very sweep and that is asked for.
-  subroutine judge_journal(journal, header, resumes, error)
+  subroutine check_journal(journal, header, resumes, error)
     type(sweep_journal_t), intent(in) :: journal
     type(sweep_header_t), intent(in) :: header            !! of the sweep that is asked for
     logical, intent(in) :: resumes
@@ -28,12 +28,12 @@ contains
       call raise(error, exit_input, journal%path() // ' is not of this sweep: ' // difference // &
                  '; remove it, or choose another folder by --out')
     else if (.not. resumes) then
-      call raise(error, exit_input, journal%path() // ' holds ' // held_text(journal))
+      call raise(error, exit_input, journal%path() // ' holds ' // journal_content_text(journal))
     end if
-  end subroutine judge_journal
+  end subroutine check_journal
 
   !> How much of a sweep or of a part is there, and what can be done with it.
-  function held_text(journal) result(text)
+  function journal_content_text(journal) result(text)
     type(sweep_journal_t), intent(in) :: journal
     character(len=:), allocatable :: text
     integer :: held, wanted
@@ -47,7 +47,7 @@ contains
       text = to_text(held) // ' of ' // to_text(wanted) // ' variants of a sweep that was not finished; go on with it by ' // &
              '--resume, or remove it'
     end if
-  end function held_text
+  end function journal_content_text
 
   !> What tells a sweep that was begun from the one that is asked for; empty if nothing does.
   function header_difference(old, new) result(text)
@@ -87,7 +87,7 @@ contains
         call raise(error, exit_input, folder // ' holds the journal of a whole sweep, ' // whole // '; go on with it by ' // &
                    '--resume without --shard, remove it, or choose another folder by --out')
       else
-        call raise(error, exit_input, folder // ' holds journals of parts of a sweep: ' // joined(names, ', ', most_told) // &
+        call raise(error, exit_input, folder // ' holds journals of parts of a sweep: ' // joined(names, ', ', max_listed) // &
                    '; go on with them by --shard, remove them, or choose another folder by --out')
       end if
       return
@@ -95,20 +95,20 @@ contains
   end subroutine refuse_other_journals
 
   !> Results that are there already must be of this sweep.
-  subroutine judge_results(folder, header, error)
+  subroutine check_results(folder, header, error)
     character(len=*), intent(in) :: folder
     type(sweep_header_t), intent(in) :: header            !! of the sweep that is asked for
     type(error_t), allocatable, intent(out) :: error
     type(sweep_header_t) :: old
     character(len=:), allocatable :: difference
 
-    call read_origin(folder, old, error)
+    call read_provenance(folder, old, error)
     if (allocated(error)) return
     old%first = header%first
     old%last = header%last
     difference = header_difference(old, header)
     if (difference /= '') call raise(error, exit_input, folder // ' holds the results of another sweep: ' // difference // &
                                      '; without --resume they are replaced')
-  end subroutine judge_results
+  end subroutine check_results
 
 end module nocdyn_sweep_resumption

@@ -1,35 +1,35 @@
 !> With how many threads and processes a sweep is computed.
 module nocdyn_sweep_threads
   use nocdyn_arguments, only: arguments_t
-  use nocdyn_console, only: say
+  use nocdyn_console, only: print_text
   use nocdyn_errors, only: error_t, exit_input, raise
   use nocdyn_text, only: to_text
   use omp_lib, only: omp_get_num_procs
   implicit none (type, external)
   private
 
-  public :: bounded_threads, tell_threads, refuse_ranks
+  public :: usable_threads, print_thread_note, refuse_ranks
 
   integer, parameter :: most_per_processor = 8   ! a few share one without harm, hundreds cost the time to begin and memory
 
 contains
 
   !> As many threads as are wanted and make sense.
-  integer function bounded_threads(wanted)
+  integer function usable_threads(wanted)
     integer, intent(in) :: wanted
 
-    bounded_threads = min(wanted, most_per_processor * omp_get_num_procs())
-  end function bounded_threads
+    usable_threads = min(wanted, most_per_processor * omp_get_num_procs())
+  end function usable_threads
 
   !> Says so if that is fewer than were wanted.
-  subroutine tell_threads(file, wanted)
+  subroutine print_thread_note(file, wanted)
     character(len=*), intent(in) :: file   !! of the input
     integer, intent(in) :: wanted
 
-    if (bounded_threads(wanted) == wanted) return
-    call say(file // ': note: ' // to_text(bounded_threads(wanted)) // ' threads instead of ' // to_text(wanted) // &
+    if (usable_threads(wanted) == wanted) return
+    call print_text(file // ': note: ' // to_text(usable_threads(wanted)) // ' threads instead of ' // to_text(wanted) // &
              ', which is more than ' // to_text(most_per_processor) // ' for each processor that may be used')
-  end subroutine tell_threads
+  end subroutine print_thread_note
 
   !> Each process of an MPI job would compute the same sweep, unless it has a shard of its own.
   subroutine refuse_ranks(arguments, error)

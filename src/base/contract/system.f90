@@ -18,9 +18,9 @@ module nocdyn_system
   implicit none (type, external)
   private
 
-  integer, parameter, public :: evaluation_fine = 0       !! the values are good
-  integer, parameter, public :: evaluation_shorten = 1    !! not admissible here: take a shorter step
-  integer, parameter, public :: evaluation_give_up = 2    !! no shorter step will help
+  integer, parameter, public :: evaluation_ok = 0       !! the values are good
+  integer, parameter, public :: evaluation_recoverable = 1    !! not admissible here: take a shorter step
+  integer, parameter, public :: evaluation_fatal = 2    !! no shorter step will help
 
   !> Positions of the Jacobian's entries that can differ from zero, each at most once, in the order of their values.
   type, public :: pattern_t
@@ -42,9 +42,9 @@ module nocdyn_system
     procedure :: series_obstacle
     procedure :: prepare_series
     procedure :: series
-    procedure :: enter
-    procedure :: switch_values
-    procedure :: cross
+    procedure :: start_lane
+    procedure :: indicator_values
+    procedure :: change_branch
     procedure :: switch_name
   end type system_t
 
@@ -55,36 +55,36 @@ module nocdyn_system
   !> Receives the solution at the requested times, is told of events and extremes, and may stop the integration.
   !>
   !> An event is a root of a function of time and state, found on the solution inside the steps. The tracked functions
-  !> are followed between the steps too: `take_ranges` receives their extremes in continuous time. An observer that
-  !> `follows_steps` is handed the solution inside every step of the whole block. By default an observer wants to know nothing.
+  !> are followed between the steps too: `on_extremes` receives their extremes in continuous time. An observer that
+  !> `wants_steps` is handed the solution inside every step of the whole block. By default an observer wants to know nothing.
   type, public :: observer_t
     integer, allocatable :: directions(:)   !! event_... of each event function; not allocated: there are none
     integer :: tracked = 0                  !! number of tracked functions
-    logical :: follows_steps = .false.      !! whether `follow_steps` is called
-    integer :: first_followed = 1           !! components whose polynomials it reads; may change from variant to variant
-    integer :: last_followed = huge(0)
+    logical :: wants_steps = .false.      !! whether `on_steps` is called
+    integer :: first_read = 1           !! components whose polynomials it reads; may change from variant to variant
+    integer :: last_read = huge(0)
   contains
-    procedure :: record
-    procedure :: stops
+    procedure :: on_output
+    procedure :: wants_stop
     procedure :: event_values
-    procedure :: happen
+    procedure :: on_event
     procedure :: tracked_values
-    procedure :: take_ranges
-    procedure :: follow_steps
+    procedure :: on_extremes
+    procedure :: on_steps
   end type observer_t
 
   !> The steps that the lanes of a block have taken at the same time; [lanes].
-  type, public :: steps_t
+  type, public :: step_block_t
     logical :: are_all_taken = .false.   !! whether all lanes have moved
-    logical :: may_be_cut = .false.      !! whether `until` may be less than 1
+    logical :: may_be_cut = .false.      !! whether `theta_end` may be less than 1
     logical, allocatable :: taken(:)     !! whether the lane has moved: the solution inside the step is given then
     logical, allocatable :: crosses(:)   !! whether the step ends where the system changes its branch
     real(wp), allocatable :: t(:)        !! start
     real(wp), allocatable :: h(:)        !! theta = (time - t) / h is the place in the step
     real(wp), allocatable :: scale(:)    !! the solution is a polynomial in scale * theta: scale is 1 or h
-    real(wp), allocatable :: until(:)    !! end as a place: 1, or less where the step was cut
+    real(wp), allocatable :: theta_end(:)    !! end as a place: 1, or less where the step was cut
     real(wp), allocatable :: t_new(:)    !! end as a time
-  end type steps_t
+  end type step_block_t
 
   !> Smallest and largest values of the tracked functions so far, with their times; [functions].
   type, public :: ranges_t
@@ -174,15 +174,15 @@ contains
   end subroutine series
 
   !> A lane starts at (t, y): the place to choose its branches.
-  subroutine enter(self, lane, t, y)
+  subroutine start_lane(self, lane, t, y)
     class(system_t), intent(inout) :: self
     integer, intent(in) :: lane
     real(wp), intent(in) :: t
     real(wp), contiguous, intent(in) :: y(:)   !! [states + quadratures]
-  end subroutine enter
+  end subroutine start_lane
 
   !> The functions that are positive while the branches of a lane hold.
-  subroutine switch_values(self, lane, t, y, g)
+  subroutine indicator_values(self, lane, t, y, g)
     class(system_t), intent(inout) :: self
     integer, intent(in) :: lane
     real(wp), intent(in) :: t
@@ -190,11 +190,11 @@ contains
     real(wp), contiguous, intent(inout) :: g(:)   !! [switches]
 
     error stop 'nocdyn_system: a system with switches overrides switch_values'
-  end subroutine switch_values
+  end subroutine indicator_values
 
   !> A lane goes to the branch beyond a function, whose value here must be zero or positive then. A border that is
   !> widened a little, so that it is positive, keeps rounding from crossing back.
-  subroutine cross(self, lane, which, t, y)
+  subroutine change_branch(self, lane, which, t, y)
     class(system_t), intent(inout) :: self
     integer, intent(in) :: lane
     integer, intent(in) :: which               !! number of the function
@@ -202,7 +202,7 @@ contains
     real(wp), contiguous, intent(in) :: y(:)   !! [states + quadratures]
 
     error stop 'nocdyn_system: a system with switches overrides cross'
-  end subroutine cross
+  end subroutine change_branch
 
   !> What function `which` is called in a message, e.g. "gap of 'coupling'".
   function switch_name(self, which) result(name)
@@ -214,21 +214,21 @@ contains
   end function switch_name
 
   !> One requested time of one lane; the calls of a lane come in the order of its times.
-  subroutine record(self, lane, t, y)
+  subroutine on_output(self, lane, t, y)
     class(observer_t), intent(inout) :: self
     integer, intent(in) :: lane
     real(wp), intent(in) :: t
     real(wp), contiguous, intent(in) :: y(:)   !! [states + quadratures]
-  end subroutine record
+  end subroutine on_output
 
   !> Asked after every attempted step while a lane is running: true ends the integration of all lanes.
-  function stops(self, t)
+  function wants_stop(self, t)
     class(observer_t), intent(inout) :: self
     real(wp), intent(in) :: t   !! time reached by the slowest lane
-    logical :: stops
+    logical :: wants_stop
 
-    stops = .false.
-  end function stops
+    wants_stop = .false.
+  end function wants_stop
 
   !> The event functions g(t, y) of one lane, [size(directions)].
   subroutine event_values(self, lane, t, y, g)
@@ -242,7 +242,7 @@ contains
   end subroutine event_values
 
   !> An event of one lane; events and records of a lane come in the order of their times.
-  subroutine happen(self, lane, event, t, y, is_terminal)
+  subroutine on_event(self, lane, event, t, y, is_terminal)
     class(observer_t), intent(inout) :: self
     integer, intent(in) :: lane
     integer, intent(in) :: event                !! number of the event function
@@ -251,7 +251,7 @@ contains
     logical, intent(out) :: is_terminal         !! true ends the integration of this lane here
 
     is_terminal = .false.
-  end subroutine happen
+  end subroutine on_event
 
   !> The tracked functions of one lane, [tracked].
   subroutine tracked_values(self, lane, t, y, values)
@@ -265,23 +265,23 @@ contains
   end subroutine tracked_values
 
   !> The ranges of the tracked functions when a lane has ended.
-  subroutine take_ranges(self, lane, ranges)
+  subroutine on_extremes(self, lane, ranges)
     class(observer_t), intent(inout) :: self
     integer, intent(in) :: lane
     type(ranges_t), intent(in) :: ranges
 
     error stop 'nocdyn_system: an observer with tracked functions overrides take_ranges'
-  end subroutine take_ranges
+  end subroutine on_extremes
 
   !> The last steps of the lanes, after their records and events: y + sum over p of c(:, :, p) (scale theta)^p.
-  subroutine follow_steps(self, steps, y, y_new, c)
+  subroutine on_steps(self, steps, y, y_new, c)
     class(observer_t), intent(inout) :: self
-    type(steps_t), intent(in) :: steps
+    type(step_block_t), intent(in) :: steps
     real(wp), contiguous, intent(in) :: y(:, :)       !! at the starts, [lanes, padded columns]
     real(wp), contiguous, intent(in) :: y_new(:, :)   !! at the ends
     real(wp), contiguous, intent(in) :: c(:, :, :)    !! [lanes, padded columns, degree]; only of the components followed
 
     error stop 'nocdyn_system: an observer that follows the steps overrides follow_steps'
-  end subroutine follow_steps
+  end subroutine on_steps
 
 end module nocdyn_system

@@ -3,7 +3,7 @@ module nocdyn_masks
   implicit none (type, external)
   private
 
-  public :: all_true, any_true, any_other
+  public :: all_true, any_true, any_differs
 
 contains
 
@@ -33,7 +33,7 @@ contains
   end function count_true
 
   !> Whether any number differs from `usual`.
-  pure logical function any_other(n, numbers, usual)
+  pure logical function any_differs(n, numbers, usual)
     integer, intent(in) :: n
     integer, intent(in) :: numbers(n)
     integer, intent(in) :: usual
@@ -43,7 +43,7 @@ contains
     do i = 1, n
       differences = ior(differences, ieor(numbers(i), usual))
     end do
-    any_other = differences /= 0
-  end function any_other
+    any_differs = differences /= 0
+  end function any_differs
 
 end module nocdyn_masks

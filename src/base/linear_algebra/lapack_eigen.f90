@@ -4,7 +4,7 @@ module nocdyn_lapack_eigen
   implicit none (type, external)
   private
 
-  public :: cholesky_factor, divide_left, divide_right, singular_vectors, symmetric_eigenvectors, eigenvectors
+  public :: cholesky_factor, solve_left, solve_right, singular_vectors, symmetric_eigenvectors, eigenvectors
 
   interface
     subroutine dpotrf(uplo, n, a, lda, info)
@@ -64,22 +64,22 @@ contains
   end subroutine cholesky_factor
 
   !> B becomes R^-1 B.
-  subroutine divide_left(factor, matrix)
+  subroutine solve_left(factor, matrix)
     real(wp), contiguous, intent(in) :: factor(:, :)      !! of `cholesky_factor`
     real(wp), contiguous, intent(inout) :: matrix(:, :)
 
     call dtrsm('L', 'U', 'N', 'N', size(matrix, 1), size(matrix, 2), 1.0_wp, factor, max(1, size(factor, 1)), &
                matrix, max(1, size(matrix, 1)))
-  end subroutine divide_left
+  end subroutine solve_left
 
   !> B becomes B R^-1.
-  subroutine divide_right(factor, matrix)
+  subroutine solve_right(factor, matrix)
     real(wp), contiguous, intent(in) :: factor(:, :)      !! of `cholesky_factor`
     real(wp), contiguous, intent(inout) :: matrix(:, :)
 
     call dtrsm('R', 'U', 'N', 'N', size(matrix, 1), size(matrix, 2), 1.0_wp, factor, max(1, size(factor, 1)), &
                matrix, max(1, size(matrix, 1)))
-  end subroutine divide_right
+  end subroutine solve_right
 
   !> Singular values, descending, and all right singular vectors, as columns (DGESVD).
   subroutine singular_vectors(matrix, values, vectors, has_failed)

@@ -8,20 +8,20 @@ module nocdyn_bernstein
   implicit none (type, external)
   private
 
-  public :: lay_bernstein_matrix, raise_to_maximum, shift_origin
+  public :: make_bernstein_matrix, raise_to_maximum, shift_origin
 
-  integer, parameter, public :: most_degrees = 39
+  integer, parameter, public :: max_degree = 39
   integer, parameter :: rows = 4                    !! of the matrix that are multiplied together; they divide 1 + most_degrees
-  integer, parameter :: most_halvings = 40
-  integer, parameter :: most_newton_steps = 60      !! bisection alone would need as many
+  integer, parameter :: max_halvings = 40
+  integer, parameter :: max_newton_steps = 60      !! bisection alone would need as many
   real(wp), parameter :: last_change = 1.0e-8_wp    !! of a place by Newton's method, which then leaves its square
 
 contains
 
   !> The matrix that makes Bernstein coefficients of those of powers: binomial(i, k) / binomial(n, k), k <= i.
-  pure subroutine lay_bernstein_matrix(n, matrix)
+  pure subroutine make_bernstein_matrix(n, matrix)
     integer, intent(in) :: n
-    real(wp), intent(out) :: matrix(0:most_degrees, 0:n)   !! [Bernstein coefficients and padding, powers]
+    real(wp), intent(out) :: matrix(0:max_degree, 0:n)   !! [Bernstein coefficients and padding, powers]
     integer :: i, k
 
     matrix = 0.0_wp
@@ -31,33 +31,34 @@ contains
         matrix(i, k) = matrix(i, k - 1) * (i - k + 1) / (n - k + 1)
       end do
     end do
-  end subroutine lay_bernstein_matrix
+  end subroutine make_bernstein_matrix
 
   !> Raises `highest` to the largest value of c_0 + c_1 s + ... between s = 0 and 1 if that is larger; the ends are not looked at.
-  pure subroutine raise_to_maximum(n, matrix, c, highest, place, found)
-    integer, intent(in) :: n         !! degree, 1 to `most_degrees`
-    real(wp), intent(in) :: matrix(0:most_degrees, 0:n)   !! of `lay_bernstein_matrix`
+  pure subroutine raise_to_maximum(n, matrix, c, highest, position, found)
+    integer, intent(in) :: n         !! degree, 1 to `max_degree`
+    real(wp), intent(in) :: matrix(0:max_degree, 0:n)   !! of `make_bernstein_matrix`
     real(wp), intent(in) :: c(0:n)
     real(wp), intent(inout) :: highest
-    real(wp), intent(out) :: place   !! of the maximum
+    real(wp), intent(out) :: position   !! of the maximum
     logical, intent(out) :: found    !! whether `highest` has been raised by more than rounding
-    real(wp) :: b(0:most_degrees, most_halvings + 2)   ! of the parts that are left; the last of them is next
-    real(wp) :: left(most_halvings + 2), length(most_halvings + 2)
-    integer :: parts, turns
+    real(wp) :: b(0:max_degree, max_halvings + 2)   ! of the parts that are left; the last of them is next
+    real(wp) :: left(max_halvings + 2), length(max_halvings + 2)
+    integer :: parts, changes
 
     found = .false.
-    place = 0.0_wp
+    position = 0.0_wp
     call multiply(n, matrix, c, b(:, 1))
     left(1) = 0.0_wp
     length(1) = 1.0_wp
     parts = 1
     do while (parts > 0)
-      turns = 0
-      if (can_exceed(n, b(:, parts), highest)) turns = turning_points(n, b(:, parts))
-      if (turns == 1 .and. b(1, parts) >= b(0, parts)) then
-        call climb(n, c, left(parts), length(parts), real(maxloc(b(:n, parts), dim=1) - 1, wp) / n, highest, place, found)
+      changes = 0
+      if (can_exceed(n, b(:, parts), highest)) changes = sign_changes(n, b(:, parts))
+      if (changes == 1 .and. b(1, parts) >= b(0, parts)) then
+        call refine_maximum(n, c, left(parts), length(parts), real(maxloc(b(:n, parts), dim=1) - 1, wp) / n, highest, position, &
+                            found)
       end if
-      if (turns < 2 .or. parts > most_halvings) then
+      if (changes < 2 .or. parts > max_halvings) then
         parts = parts - 1
         cycle
       end if
@@ -67,7 +68,7 @@ contains
       call halve(n, b(:, parts), b(:, parts + 1))
       if (b(0, parts) > highest) then
         highest = b(0, parts)
-        place = left(parts)
+        position = left(parts)
         found = .true.
       end if
       parts = parts + 1
@@ -93,8 +94,8 @@ contains
   !> b = matrix * c, a few rows at a time; what is above the diagonal is zero.
   pure subroutine multiply(n, matrix, c, b)
     integer, intent(in) :: n
-    real(wp), intent(in) :: matrix(0:most_degrees, 0:n), c(0:n)
-    real(wp), intent(out) :: b(0:most_degrees)
+    real(wp), intent(in) :: matrix(0:max_degree, 0:n), c(0:n)
+    real(wp), intent(out) :: b(0:max_degree)
     real(wp) :: sum(rows)
     integer :: i, k
 
@@ -108,21 +109,21 @@ contains
   end subroutine multiply
 
   !> Changes of sign of the differences of the coefficients, which bound the roots of the derivative.
-  pure integer function turning_points(n, b)
+  pure integer function sign_changes(n, b)
     integer, intent(in) :: n
     real(wp), intent(in) :: b(0:n)
     real(wp) :: last
     integer :: i
 
-    turning_points = 0
+    sign_changes = 0
     last = 0.0_wp
     do i = 1, n
       associate (difference => b(i) - b(i - 1))
-        if (difference * last < 0) turning_points = turning_points + 1
+        if (difference * last < 0) sign_changes = sign_changes + 1
         if (abs(difference) > 0) last = sign(1.0_wp, difference)
       end associate
     end do
-  end function turning_points
+  end function sign_changes
 
   !> de Casteljau's algorithm: b becomes that of the right half.
   pure subroutine halve(n, b, left)
@@ -140,14 +141,14 @@ contains
   end subroutine halve
 
   !> Raises `highest` to the single maximum in a part, by Newton's method on the derivative with bisection as safeguard.
-  pure subroutine climb(n, c, left, length, guess, highest, place, found)
+  pure subroutine refine_maximum(n, c, left, length, guess, highest, position, found)
     integer, intent(in) :: n
     real(wp), intent(in) :: c(0:n)
     real(wp), intent(in) :: left, length
     real(wp), intent(in) :: guess        !! of the maximum in the part, 0 to 1
-    real(wp), intent(inout) :: highest, place
+    real(wp), intent(inout) :: highest, position
     logical, intent(inout) :: found
-    real(wp) :: above, below, change, curvature, d(0:most_degrees), s, slope, value
+    real(wp) :: above, below, change, curvature, d(0:max_degree), s, slope, value
     integer :: k, step
 
     do k = 1, n
@@ -156,7 +157,7 @@ contains
     below = left
     above = left + length
     s = left + guess * length
-    do step = 1, most_newton_steps
+    do step = 1, max_newton_steps
       call differentiate(n - 1, d, s, slope, curvature)
       if (slope > 0) then
         below = s
@@ -176,9 +177,9 @@ contains
     end do
     if (value <= highest) return
     highest = value
-    place = s
+    position = s
     found = .true.
-  end subroutine climb
+  end subroutine refine_maximum
 
   !> A polynomial and its derivative.
   pure subroutine differentiate(n, c, s, value, slope)

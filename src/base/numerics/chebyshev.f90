@@ -5,29 +5,29 @@ module nocdyn_chebyshev
   implicit none (type, external)
   private
 
-  public :: lay_places, find_peak, differentiate, series_value
+  public :: lobatto_nodes, find_maximum, differentiate, series_value
 
-  integer, parameter, public :: most_places = 40   !! and coefficients
-  integer, parameter :: most_newton_steps = 60     !! bisection alone would need as many
+  integer, parameter, public :: max_nodes = 40   !! and coefficients
+  integer, parameter :: max_newton_steps = 60     !! bisection alone would need as many
 
 contains
 
   !> The places -cos(pi i / degree), and the matrix that makes coefficients of the values there.
-  pure subroutine lay_places(degree, places, to_series)
+  pure subroutine lobatto_nodes(degree, nodes, to_series)
     integer, intent(in) :: degree
-    real(wp), intent(out) :: places(0:degree)
+    real(wp), intent(out) :: nodes(0:degree)
     real(wp), intent(out) :: to_series(0:degree, 0:degree)   !! [coefficients, places]
     real(wp), parameter :: pi = acos(-1.0_wp)
     integer :: i, k
 
-    if (degree >= most_places) error stop 'nocdyn_chebyshev: a polynomial has too many coefficients'
+    if (degree >= max_nodes) error stop 'nocdyn_chebyshev: a polynomial has too many coefficients'
     do i = 0, degree
-      places(i) = -cos(pi * i / degree)
+      nodes(i) = -cos(pi * i / degree)
       do k = 0, degree
         to_series(k, i) = 2 * end_weight(i, degree) * end_weight(k, degree) / degree * cos(pi * k * (degree - i) / degree)
       end do
     end do
-  end subroutine lay_places
+  end subroutine lobatto_nodes
 
   !> 1/2 for the first and the last term of the sums that interpolate at Chebyshev-Lobatto places.
   pure real(wp) function end_weight(i, last)
@@ -38,28 +38,28 @@ contains
 
   !> The largest value of the polynomial through `values` and its place, by Newton's method on the derivative with
   !> bisection as safeguard, between the neighbours of the largest of the values.
-  pure subroutine find_peak(n, places, to_series, values, place, peak)
+  pure subroutine find_maximum(n, nodes, to_series, values, node, peak)
     integer, intent(in) :: n
-    real(wp), intent(in) :: places(n), to_series(n, n), values(n)
-    real(wp), intent(out) :: place, peak
-    real(wp), dimension(most_places) :: c, slopes, curvatures   ! coefficients of the polynomial and of its derivatives
+    real(wp), intent(in) :: nodes(n), to_series(n, n), values(n)
+    real(wp), intent(out) :: node, peak
+    real(wp), dimension(max_nodes) :: c, slopes, curvatures   ! coefficients of the polynomial and of its derivatives
     real(wp) :: below, above, candidate, slope, curvature
     integer :: i, step
 
     i = maxloc(values, dim=1)
-    place = places(i)
+    node = nodes(i)
     peak = values(i)
     c(:n) = 0.0_wp
     do step = 1, n
       c(:n) = c(:n) + to_series(:, step) * values(step)
     end do
     call differentiate(n, c, slopes)
-    below = places(max(i - 1, 1))
-    above = places(min(i + 1, n))
+    below = nodes(max(i - 1, 1))
+    above = nodes(min(i + 1, n))
     if (series_value(n, slopes, below) <= 0 .or. series_value(n, slopes, above) >= 0) return
     call differentiate(n, slopes, curvatures)
-    candidate = place
-    do step = 1, most_newton_steps
+    candidate = node
+    do step = 1, max_newton_steps
       slope = series_value(n, slopes, candidate)
       curvature = series_value(n, curvatures, candidate)
       if (slope > 0) then
@@ -69,20 +69,20 @@ contains
       end if
       candidate = 0.5_wp * (below + above)
       if (curvature < 0) then
-        if (abs(slope) < -curvature * (above - below)) candidate = min(above, max(below, place - slope / curvature))
+        if (abs(slope) < -curvature * (above - below)) candidate = min(above, max(below, node - slope / curvature))
       end if
-      if (abs(candidate - place) <= epsilon(place)) exit
-      place = candidate
+      if (abs(candidate - node) <= epsilon(node)) exit
+      node = candidate
     end do
-    peak = max(peak, series_value(n, c, place))
-  end subroutine find_peak
+    peak = max(peak, series_value(n, c, node))
+  end subroutine find_maximum
 
   !> The coefficients of the derivative of a sum of Chebyshev polynomials: d_(k-1) = d_(k+1) + 2 k c_k, the first halved.
   pure subroutine differentiate(n, c, d)
     integer, intent(in) :: n
     real(wp), intent(in) :: c(n)   !! of T_0 to T_(n-1)
     real(wp), intent(inout) :: d(n)
-    real(wp) :: after(most_places + 2)
+    real(wp) :: after(max_nodes + 2)
     integer :: k
 
     after(:n + 2) = 0.0_wp

@@ -25,8 +25,8 @@ module nocdyn_curves
     procedure :: points
     procedure :: is_same
     procedure :: segment
-    procedure :: margin
-    procedure :: room_above
+    procedure :: inset
+    procedure :: distance_to_end
     procedure :: value
     procedure :: slope
     procedure :: curvature
@@ -143,28 +143,28 @@ contains
   end function segment
 
   !> How far x is inside a segment whose ends are moved outwards, in units of x.
-  pure function margin(self, segment, x, width)
+  pure function inset(self, segment, x, width)
     class(curve_t), intent(in) :: self
     integer, intent(in) :: segment
     real(wp), intent(in) :: x
     real(wp), intent(in) :: width   !! by which the ends are moved, relative to the largest point
-    real(wp) :: margin
+    real(wp) :: inset
 
-    margin = self%room_above(segment, x)
-    if (segment > 0) margin = min(margin, x - self%knot(segment))
-    margin = margin + width * max(abs(self%knot(1)), abs(self%knot(size(self%knot))))
-  end function margin
+    inset = self%distance_to_end(segment, x)
+    if (segment > 0) inset = min(inset, x - self%knot(segment))
+    inset = inset + width * max(abs(self%knot(1)), abs(self%knot(size(self%knot))))
+  end function inset
 
   !> How far x is below the upper end of a segment.
-  pure function room_above(self, segment, x) result(room)
+  pure function distance_to_end(self, segment, x) result(distance)
     class(curve_t), intent(in) :: self
     integer, intent(in) :: segment
     real(wp), intent(in) :: x
-    real(wp) :: room
+    real(wp) :: distance
 
-    room = huge(room)
-    if (segment < size(self%knot)) room = self%knot(segment + 1) - x
-  end function room_above
+    distance = huge(distance)
+    if (segment < size(self%knot)) distance = self%knot(segment + 1) - x
+  end function distance_to_end
 
   pure function value(self, segment, x)
     class(curve_t), intent(in) :: self

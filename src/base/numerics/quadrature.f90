@@ -4,14 +4,14 @@ module nocdyn_quadrature
   implicit none (type, external)
   private
 
-  public :: lay_gauss_rule
+  public :: gauss_legendre_rule
 
-  integer, parameter :: most_newton_steps = 20   ! four or five are needed
+  integer, parameter :: max_newton_steps = 20   ! four or five are needed
 
 contains
 
   !> Nodes and weights on [0, 1] that integrate polynomials of degree 2 n - 1 exactly.
-  pure subroutine lay_gauss_rule(n, nodes, weights)
+  pure subroutine gauss_legendre_rule(n, nodes, weights)
     integer, intent(in) :: n
     real(wp), intent(out) :: nodes(n)     !! ascending
     real(wp), intent(out) :: weights(n)   !! their sum is 1
@@ -21,7 +21,7 @@ contains
 
     do i = 1, n
       x = -cos(pi * (i - 0.25_wp) / (n + 0.5_wp))
-      do step = 1, most_newton_steps
+      do step = 1, max_newton_steps
         call legendre(n, x, value, slope)
         change = value / slope
         x = x - change
@@ -31,7 +31,7 @@ contains
       nodes(i) = 0.5_wp * (1 + x)
       weights(i) = 1 / ((1 - x**2) * slope**2)
     end do
-  end subroutine lay_gauss_rule
+  end subroutine gauss_legendre_rule
 
   !> P_n and its derivative, by Bonnet's recurrence.
   pure subroutine legendre(n, x, value, slope)

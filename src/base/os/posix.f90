@@ -6,8 +6,8 @@ module nocdyn_posix
   implicit none (type, external)
   private
 
-  public :: make_folders, rename_file, remove_file, process_id, is_terminal, watch_interrupts, is_interrupted, &
-    survive_size_limit
+  public :: make_folders, rename_file, remove_file, process_id, is_terminal, catch_interrupts, is_interrupted, &
+    ignore_file_size_signal
   public :: create_file, write_bytes, close_file, last_failure, failure_number, is_interrupted_call
 
   integer, parameter, public :: standard_output = 1, standard_error = 2   !! file descriptors
@@ -205,11 +205,11 @@ contains
 
   !> From here on Ctrl-C, termination and the end of the terminal do not end the program but show in `is_interrupted`;
   !> a second one, more than a second later, ends it.
-  subroutine watch_interrupts()
+  subroutine catch_interrupts()
     call watch(interrupt_signal)
     call watch(termination_signal)
     call watch(hang_up_signal)
-  end subroutine watch_interrupts
+  end subroutine catch_interrupts
 
   !> A signal that is ignored (nohup, a background job of a script) stays ignored.
   subroutine watch(signal)
@@ -221,11 +221,11 @@ contains
   end subroutine watch
 
   !> From here on a file that would grow beyond the limit of the shell is a write that fails, not the end of the program.
-  subroutine survive_size_limit()
+  subroutine ignore_file_size_signal()
     type(c_funptr) :: previous
 
     previous = c_signal(file_size_signal, transfer(ignored, c_null_funptr))
-  end subroutine survive_size_limit
+  end subroutine ignore_file_size_signal
 
   subroutine note_signal(signal) bind(c)
     integer(c_int), value, intent(in) :: signal
@@ -238,7 +238,7 @@ contains
     received_signal = signal
   end subroutine note_signal
 
-  !> The interruption asked for since `watch_interrupts`.
+  !> The interruption asked for since `catch_interrupts`.
   logical function is_interrupted()
     is_interrupted = received_signal /= 0
   end function is_interrupted

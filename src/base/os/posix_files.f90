@@ -12,7 +12,7 @@ module nocdyn_posix_files
   integer(c_int), parameter :: from_start = 0, from_end = 2      ! SEEK_SET, SEEK_END
   integer(c_int), parameter :: exclusive = 2, without_waiting = 4   ! LOCK_EX, LOCK_NB
   integer, parameter :: would_block = 11   ! EWOULDBLOCK
-  integer, parameter :: disk_troubles(4) = [5, 27, 28, 122]   ! EIO, EFBIG, ENOSPC, EDQUOT
+  integer, parameter :: disk_errors(4) = [5, 27, 28, 122]   ! EIO, EFBIG, ENOSPC, EDQUOT
 
   interface
     integer(c_int) function c_open_new(path) bind(c, name='nocdyn_open_new')
@@ -155,7 +155,7 @@ contains
     character(len=:), allocatable :: reason
 
     reason = ''
-    if (any(disk_troubles == failure_number())) reason = last_failure()
+    if (any(disk_errors == failure_number())) reason = last_failure()
   end function disk_failure
 
 end module nocdyn_posix_files

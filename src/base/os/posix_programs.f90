@@ -6,7 +6,7 @@ module nocdyn_posix_programs
   implicit none (type, external)
   private
 
-  public :: program_folder, replace_process, procedure_of_libraries
+  public :: program_folder, exec_program, find_library_procedure
 
   integer, parameter :: longest_path = 4096   ! PATH_MAX
 
@@ -45,7 +45,7 @@ contains
   end function program_folder
 
   !> Another program takes the place of this one; returns only if that failed.
-  subroutine replace_process(program, words, failure)
+  subroutine exec_program(program, words, failure)
     character(len=*), intent(in) :: program                  !! path of its file
     type(string_t), intent(in) :: words(:)                   !! its arguments
     character(len=:), allocatable, intent(out) :: failure    !! why it could not be done
@@ -67,13 +67,13 @@ contains
     addresses(size(addresses)) = c_null_ptr
     status = c_execv(program // c_null_char, addresses)
     failure = last_failure()
-  end subroutine replace_process
+  end subroutine exec_program
 
   !> A procedure of the shared libraries that this program has loaded, null if none has it.
-  type(c_funptr) function procedure_of_libraries(name)
+  type(c_funptr) function find_library_procedure(name)
     character(len=*), intent(in) :: name
 
-    procedure_of_libraries = c_dlsym(c_null_ptr, name // c_null_char)
-  end function procedure_of_libraries
+    find_library_procedure = c_dlsym(c_null_ptr, name // c_null_char)
+  end function find_library_procedure
 
 end module nocdyn_posix_programs

@@ -9,7 +9,7 @@ module nocdyn_distributions
 
   integer, parameter :: shape_uniform = 1, shape_normal = 2, shape_lognormal = 3
   !> Deviations from the middle: the probability beyond is 0 in double precision.
-  real(wp), parameter, public :: farthest = 40.0_wp
+  real(wp), parameter, public :: tail_end = 40.0_wp
 
   type, public :: distribution_t
     private
@@ -41,10 +41,10 @@ contains
     real(wp) :: ends(2)
 
     ends = [low, high]
-    where (abs(0.5_wp * ends - 0.5_wp * mean) / farthest < 0.5_wp * deviation)   ! halves of huge numbers do not overflow
+    where (abs(0.5_wp * ends - 0.5_wp * mean) / tail_end < 0.5_wp * deviation)   ! halves of huge numbers do not overflow
       ends = (ends - mean) / deviation
     else where
-      ends = sign(farthest, 0.5_wp * ends - 0.5_wp * mean)
+      ends = sign(tail_end, 0.5_wp * ends - 0.5_wp * mean)
     end where
     distribution = truncated(shape_normal, mean, deviation, low, high, ends)
   end function normal_distribution
@@ -57,7 +57,7 @@ contains
     real(wp) :: ends(2)
 
     ends = log(max([low, high], tiny(low))) - log(median)
-    ends = max(-farthest, min(ends / log_deviation, farthest))
+    ends = max(-tail_end, min(ends / log_deviation, tail_end))
     distribution = truncated(shape_lognormal, median, log_deviation, low, high, ends)
   end function lognormal_distribution
 

@@ -48,13 +48,13 @@ contains
   end function random_permutation
 
   !> Where the permutation puts a place.
-  pure integer function image(self, place)
+  pure integer function image(self, position)
     class(permutation_t), intent(in) :: self
-    integer, intent(in) :: place   !! 0 to length - 1
+    integer, intent(in) :: position   !! 0 to length - 1
     integer(int64) :: left, right, sum
     integer :: i
 
-    image = place
+    image = position
     do
       left = image / self%side
       right = image - left * self%side

@@ -17,11 +17,11 @@ module nocdyn_sobol_points
 
   public :: sobol_points
 
-  integer, parameter, public :: most_dimensions = 64
+  integer, parameter, public :: max_dimensions = 64
 
   ! From the second dimension on. Bit i of a polynomial is its coefficient of x^i, first and last included: 2^s + 2 a + 1 of
   ! the columns s and a of the file. Each has as many initial numbers m as its degree.
-  integer, parameter :: polynomials(most_dimensions - 1) = [ &
+  integer, parameter :: polynomials(max_dimensions - 1) = [ &
     3, 7, 11, 13, 19, 25, 37, 41, 47, 55, 59, 61, 67, 91, 97, 103, 109, 115, 131, 137, 143, 145, 157, 167, 171, 185, &
     191, 193, 203, 211, 213, 229, 239, 241, 247, 253, 285, 299, 301, 333, 351, 355, 357, 361, 369, 391, 397, 425, &
     451, 463, 487, 501, 529, 539, 545, 557, 563, 601, 607, 617, 623, 631, 637]
@@ -55,13 +55,13 @@ contains
   !> The points as published for seed 0. Another seed shifts all by the exclusive-or with one random word a dimension: what
   !> makes them even stays, and the averages over several seeds tell the error of one.
   pure function sobol_points(dimensions, seed) result(points)
-    integer, intent(in) :: dimensions   !! at most `most_dimensions`
+    integer, intent(in) :: dimensions   !! at most `max_dimensions`
     integer, intent(in) :: seed         !! at least 0
     type(sobol_points_t) :: points
     integer(int64) :: words(4)
     integer :: i, used
 
-    if (dimensions > most_dimensions) error stop 'nocdyn_sobol_points: there are no direction numbers for so many dimensions'
+    if (dimensions > max_dimensions) error stop 'nocdyn_sobol_points: there are no direction numbers for so many dimensions'
     allocate (points%directions(word_bits, dimensions), points%shift(dimensions))
     points%shift = 0
     used = 0

@@ -2,22 +2,23 @@
 module nocdyn_step_control
   use nocdyn_kinds, only: wp
   use nocdyn_masks, only: all_true, any_true
-  use nocdyn_trial, only: trial_t
+  use nocdyn_step_attempt, only: step_attempt_t
   use nocdyn_vector_functions, only: exp2s, log2s
   implicit none (type, external)
   private
 
-  public :: step_control, restart, resume, weigh_error, adapt, shorten, propose, smallest_step, any_too_small
+  public :: step_control, reset_control, resume_control, measure_error, adapt_steps, shorten_step, propose_steps, &
+    smallest_step, any_too_small
 
   ! The constants of Hairer's DOPRI5, for any order of the error estimate.
   real(wp), parameter :: beta = 0.04_wp            !! weight of the last error in the PI controller
-  real(wp), parameter :: integral_loss = 0.75_wp   !! what beta takes from the exponent of the present error
+  real(wp), parameter :: pi_correction = 0.75_wp   !! what beta takes from the exponent of the present error
   real(wp), parameter :: safety = 0.9_wp
-  real(wp), parameter :: least_change = 0.2_wp
-  real(wp), parameter :: end_stretch = 1.01_wp     !! a step is stretched by up to 1 % to end on the final time
-  real(wp), parameter :: least_log_error = -13.287712379549449_wp   !! log2 of 1e-4
-  real(wp), parameter :: coarse_share = 0.01_wp    !! of a coarse error estimate in the combination of Hairer's DOP853
-  real(wp), parameter :: lenience = 1000.0_wp      !! errors of quadratures may be so much larger than those of states
+  real(wp), parameter :: min_factor = 0.2_wp
+  real(wp), parameter :: final_stretch = 1.01_wp     !! a step is stretched by up to 1 % to end on the final time
+  real(wp), parameter :: min_log_error = -13.287712379549449_wp   !! log2 of 1e-4
+  real(wp), parameter :: low_order_share = 0.01_wp    !! of a coarse error estimate in the combination of Hairer's DOP853
+  real(wp), parameter :: quadrature_leniency = 1000.0_wp      !! errors of quadratures may be so much larger than those of states
 
   real(wp), parameter :: no_error = 1.0e-30_wp         !! stands for an error of zero under the logarithm
   real(wp), parameter :: largest_ratio = 1.0e100_wp    !! keeps the square of an error ratio finite
@@ -29,9 +30,9 @@ module nocdyn_step_control
     real(wp), allocatable :: h(:)                      !! next step size of each lane
     real(wp), allocatable :: log_error(:)              !! logarithm to base 2 of the error of the last accepted step
     logical, allocatable :: was_rejected(:)
-    logical, allocatable :: reaches_end(:)             !! the present step ends on t_end
+    logical, allocatable :: ends_at_t_end(:)             !! the present step ends on t_end
     real(wp), allocatable :: mean_square(:)            !! mean squared error ratio of the present step, 1 at the tolerance
-    real(wp), allocatable :: log_ratio(:), change(:)   !! work space
+    real(wp), allocatable :: log_ratio(:), factor(:)   !! work space
   end type step_control_t
 
 contains
@@ -48,29 +49,29 @@ contains
     control%atol = atol
     control%t_end = t_end
     control%longest = longest
-    allocate (control%h(lanes), control%mean_square(lanes), control%log_ratio(lanes), control%change(lanes), source=0.0_wp)
-    allocate (control%log_error(lanes), source=least_log_error)
-    allocate (control%was_rejected(lanes), control%reaches_end(lanes), source=.false.)
+    allocate (control%h(lanes), control%mean_square(lanes), control%log_ratio(lanes), control%factor(lanes), source=0.0_wp)
+    allocate (control%log_error(lanes), source=min_log_error)
+    allocate (control%was_rejected(lanes), control%ends_at_t_end(lanes), source=.false.)
   end function step_control
 
   !> Forgets the past of a lane.
-  pure subroutine restart(control, lane)
+  pure subroutine reset_control(control, lane)
     type(step_control_t), intent(inout) :: control
     integer, intent(in) :: lane
 
-    control%log_error(lane) = least_log_error
+    control%log_error(lane) = min_log_error
     control%was_rejected(lane) = .false.
-  end subroutine restart
+  end subroutine reset_control
 
   !> A lane goes on within a step of size h, with other equations: what is known of the errors is forgotten, the size is not.
-  pure subroutine resume(control, lane, h)
+  pure subroutine resume_control(control, lane, h)
     type(step_control_t), intent(inout) :: control
     integer, intent(in) :: lane
     real(wp), intent(in) :: h
 
-    call restart(control, lane)
+    call reset_control(control, lane)
     control%h(lane) = min(control%h(lane), h)
-  end subroutine resume
+  end subroutine resume_control
 
   !> No step can be shorter: ten times what rounding makes of t.
   elemental function smallest_step(t)
@@ -94,7 +95,7 @@ contains
   end function any_too_small
 
   !> Sets the sizes of the next attempts and where they end, so that no sliver is left before the final time.
-  pure subroutine propose(control, lanes, t, h, t_new)
+  pure subroutine propose_steps(control, lanes, t, h, t_new)
     type(step_control_t), intent(inout) :: control
     integer, intent(in) :: lanes
     real(wp), intent(in) :: t(lanes)
@@ -104,16 +105,16 @@ contains
 
     if (lanes == 1) then
       call propose_one(control%longest, control%t_end, t(1), control%h(1), h(1), t_new(1))
-      control%reaches_end(1) = t_new(1) >= control%t_end
+      control%ends_at_t_end(1) = t_new(1) >= control%t_end
     else
       associate (longest => control%longest, t_end => control%t_end, wish => control%h)
         do lane = 1, lanes
           call propose_one(longest, t_end, t(lane), wish(lane), h(lane), t_new(lane))
         end do
-        control%reaches_end(:) = t_new >= t_end
+        control%ends_at_t_end(:) = t_new >= t_end
       end associate
     end if
-  end subroutine propose
+  end subroutine propose_steps
 
   pure subroutine propose_one(longest, t_end, t, wish, h, t_new)
     real(wp), intent(in) :: longest, t_end, t, wish
@@ -122,81 +123,83 @@ contains
 
     rest = t_end - t
     step = max(min(wish, longest), smallest_step(t))
-    overshoot = min((t + end_stretch * step) - t_end, longest - rest)
+    overshoot = min((t + final_stretch * step) - t_end, longest - rest)
     h = merge(rest, step, overshoot >= 0)
     t_new = merge(t_end, t + step, overshoot >= 0)
   end subroutine propose_one
 
-  !> The mean over the states of (deviation / (atol + rtol max(|y|, |y_new|)))^2; leaves each term in `deviation`.
+  !> The mean over the states of (deviation / (atol + rtol max(|y|, |y_new|)))^2; leaves each term in `error_estimate`.
   !> A coarse estimate joins in as in DOP853: E5^2 / (E5 + 0.01 E3), sums of squares of the two estimates.
-  pure subroutine weigh_error(control, trial)
+  pure subroutine measure_error(control, attempt)
     type(step_control_t), intent(inout) :: control
-    type(trial_t), intent(inout) :: trial
+    type(step_attempt_t), intent(inout) :: attempt
     integer :: lane
 
-    call square_ratios(trial%lanes * trial%states, control, trial%y, trial%y_new, trial%deviation)
-    call add_up(trial%lanes, trial%states, trial%deviation, control%mean_square)
-    if (trial%has_coarse_deviation) then
-      call square_ratios(trial%lanes * trial%states, control, trial%y, trial%y_new, trial%coarse_deviation)
-      call add_up(trial%lanes, trial%states, trial%coarse_deviation, trial%scratch)
-      do lane = 1, trial%lanes
-        associate (fine => control%mean_square(lane), coarse => trial%scratch(lane))
-          if (fine > 0) fine = fine * (fine / (fine + coarse_share * coarse))
+    call square_scaled_errors(attempt%lanes * attempt%states, control, attempt%y, attempt%y_new, attempt%error_estimate)
+    call sum_over_states(attempt%lanes, attempt%states, attempt%error_estimate, control%mean_square)
+    if (attempt%has_low_order_estimate) then
+      call square_scaled_errors(attempt%lanes * attempt%states, control, attempt%y, attempt%y_new, attempt%low_order_estimate)
+      call sum_over_states(attempt%lanes, attempt%states, attempt%low_order_estimate, attempt%scratch)
+      do lane = 1, attempt%lanes
+        associate (error_norm => control%mean_square(lane), low_order => attempt%scratch(lane))
+          if (error_norm > 0) error_norm = error_norm * (error_norm / (error_norm + low_order_share * low_order))
         end associate
       end do
     end if
-    control%mean_square(:) = control%mean_square / max(trial%states, 1)
-    if (trial%components > trial%states) then
-      call heed_quadratures(trial%lanes, trial%states, trial%components, trial%y, trial%y_new, trial%deviation, &
-                            trial%has_coarse_deviation, trial%coarse_deviation, control)
+    control%mean_square(:) = control%mean_square / max(attempt%states, 1)
+    if (attempt%components > attempt%states) then
+      call limit_by_quadratures(attempt%lanes, attempt%states, attempt%components, attempt%y, attempt%y_new, &
+                                attempt%error_estimate, &
+                            attempt%has_low_order_estimate, attempt%low_order_estimate, control)
     end if
-  end subroutine weigh_error
+  end subroutine measure_error
 
   !> Quadratures shorten a step only if the error of one is far out of proportion to the largest of them: where the states
   !> are followed without error, as polynomials of the time are, nothing else would limit it. A coarse estimate joins in as
   !> for the states.
-  pure subroutine heed_quadratures(lanes, states, components, y, y_new, deviation, has_coarse, coarse_deviation, control)
+  pure subroutine limit_by_quadratures(lanes, states, components, y, y_new, error_estimate, has_low_order, low_order_estimate, &
+                                       control)
     integer, intent(in) :: lanes, states, components
-    real(wp), intent(in), dimension(lanes, components) :: y, y_new, deviation, coarse_deviation
-    logical, intent(in) :: has_coarse
+    real(wp), intent(in), dimension(lanes, components) :: y, y_new, error_estimate, low_order_estimate
+    logical, intent(in) :: has_low_order
     type(step_control_t), intent(inout) :: control
-    real(wp) :: coarse, error, largest
+    real(wp) :: low_order, error, largest
     integer :: i, lane
 
     do lane = 1, lanes
       error = 0.0_wp
-      coarse = 0.0_wp
+      low_order = 0.0_wp
       largest = 0.0_wp
       do i = states + 1, components
-        error = max(error, abs(deviation(lane, i)))
-        if (has_coarse) coarse = max(coarse, abs(coarse_deviation(lane, i)))
+        error = max(error, abs(error_estimate(lane, i)))
+        if (has_low_order) low_order = max(low_order, abs(low_order_estimate(lane, i)))
         largest = max(largest, abs(y(lane, i)), abs(y_new(lane, i)))
       end do
       error = min(error, largest_ratio)
-      if (error > 0) error = error * (error / hypot(error, sqrt(coarse_share) * coarse))
-      associate (ratio => error / (lenience * (control%atol + control%rtol * largest)))
+      if (error > 0) error = error * (error / hypot(error, sqrt(low_order_share) * low_order))
+      associate (ratio => error / (quadrature_leniency * (control%atol + control%rtol * largest)))
         control%mean_square(lane) = max(control%mean_square(lane), min(ratio, largest_ratio)**2)
       end associate
     end do
-  end subroutine heed_quadratures
+  end subroutine limit_by_quadratures
 
-  pure subroutine square_ratios(n, control, y, y_new, deviation)
+  pure subroutine square_scaled_errors(n, control, y, y_new, error_estimate)
     integer, intent(in) :: n   !! lanes * states
     type(step_control_t), intent(in) :: control
     real(wp), intent(in) :: y(n), y_new(n)
-    real(wp), intent(inout) :: deviation(n)
+    real(wp), intent(inout) :: error_estimate(n)
     real(wp) :: rtol, atol
     integer :: i
 
     rtol = control%rtol
     atol = control%atol
     do i = 1, n
-      deviation(i) = min(abs(deviation(i)) / (atol + rtol * max(abs(y(i)), abs(y_new(i)))), largest_ratio)**2
+      error_estimate(i) = min(abs(error_estimate(i)) / (atol + rtol * max(abs(y(i)), abs(y_new(i)))), largest_ratio)**2
     end do
-  end subroutine square_ratios
+  end subroutine square_scaled_errors
 
   !> Sums over the states, of every fourth state first: the additions need not wait for one another.
-  pure subroutine add_up(lanes, states, squares, total)
+  pure subroutine sum_over_states(lanes, states, squares, total)
     integer, intent(in) :: lanes, states
     real(wp), intent(in) :: squares(lanes, states)
     real(wp), intent(inout) :: total(lanes)
@@ -222,24 +225,24 @@ contains
         total(lane) = total(lane) + squares(lane, state)
       end do
     end do
-  end subroutine add_up
+  end subroutine sum_over_states
 
   !> The next steps of lanes after attempts of size h: PI control where these were accepted, shorter ones where the error was
   !> too large. Both logarithms are to base 2.
-  pure subroutine adapt(control, lanes, accepted, rejected, error_order, most_growth, h)
+  pure subroutine adapt_steps(control, lanes, accepted, rejected, error_order, max_growth, h)
     type(step_control_t), intent(inout) :: control
     integer, intent(in) :: lanes
     logical, intent(in) :: accepted(lanes), rejected(lanes)
     integer, intent(in) :: error_order(lanes)    !! the error falls as h^(error_order + 1)
-    real(wp), intent(in) :: most_growth(lanes)
+    real(wp), intent(in) :: max_growth(lanes)
     real(wp), intent(in) :: h(lanes)
 
     integer :: lane
 
     if (lanes > 1) then
       if (all_true(lanes, accepted) .and. .not. any_true(lanes, control%was_rejected)) then
-        call lengthen(lanes, error_order, most_growth, h, control%mean_square, control%log_error, control%log_ratio, &
-                      control%change, control%h)
+        call adapt_accepted_steps(lanes, error_order, max_growth, h, control%mean_square, control%log_error, control%log_ratio, &
+                      control%factor, control%h)
         return
       end if
     end if
@@ -248,19 +251,19 @@ contains
       control%log_ratio(lane) = max(control%mean_square(lane), no_error)
     end do
     call log2s(lanes, control%log_ratio)
-    call find_changes(lanes, accepted, error_order, control%log_error, control%log_ratio, control%change)
-    call exp2s(lanes, control%change)
+    call find_step_factors(lanes, accepted, error_order, control%log_error, control%log_ratio, control%factor)
+    call exp2s(lanes, control%factor)
     do lane = 1, lanes
-      if (accepted(lane) .or. rejected(lane)) call change_step(control, lane, accepted(lane), most_growth(lane), h(lane))
+      if (accepted(lane) .or. rejected(lane)) call set_next_step(control, lane, accepted(lane), max_growth(lane), h(lane))
     end do
-  end subroutine adapt
+  end subroutine adapt_steps
 
   !> The next steps of lanes that have been accepted twice: the same without a question about any lane.
-  pure subroutine lengthen(lanes, error_order, most_growth, h, mean_square, log_error, log_ratio, change, next)
+  pure subroutine adapt_accepted_steps(lanes, error_order, max_growth, h, mean_square, log_error, log_ratio, factor, next)
     integer, intent(in) :: lanes
     integer, intent(in) :: error_order(lanes)
-    real(wp), intent(in) :: most_growth(lanes), h(lanes), mean_square(lanes)
-    real(wp), intent(inout) :: log_error(lanes), log_ratio(lanes), change(lanes)
+    real(wp), intent(in) :: max_growth(lanes), h(lanes), mean_square(lanes)
+    real(wp), intent(inout) :: log_error(lanes), log_ratio(lanes), factor(lanes)
     real(wp), intent(inout) :: next(lanes)   !! sizes of the steps
     integer :: lane
 
@@ -270,55 +273,55 @@ contains
     call log2s(lanes, log_ratio)
     do lane = 1, lanes
       log_ratio(lane) = 0.5_wp * log_ratio(lane)
-      change(lane) = beta * log_error(lane) - (1.0_wp / (error_order(lane) + 1) - integral_loss * beta) * log_ratio(lane)
+      factor(lane) = beta * log_error(lane) - (1.0_wp / (error_order(lane) + 1) - pi_correction * beta) * log_ratio(lane)
     end do
-    call exp2s(lanes, change)
+    call exp2s(lanes, factor)
     do lane = 1, lanes
-      next(lane) = max(least_change, min(safety * change(lane), most_growth(lane))) * h(lane)
-      log_error(lane) = max(log_ratio(lane), least_log_error)
+      next(lane) = max(min_factor, min(safety * factor(lane), max_growth(lane))) * h(lane)
+      log_error(lane) = max(log_ratio(lane), min_log_error)
     end do
-  end subroutine lengthen
+  end subroutine adapt_accepted_steps
 
   !> The logarithms of the errors, and of what the steps are to be multiplied by.
-  pure subroutine find_changes(lanes, accepted, error_order, log_error, log_ratio, change)
+  pure subroutine find_step_factors(lanes, accepted, error_order, log_error, log_ratio, factor)
     integer, intent(in) :: lanes
     logical, intent(in) :: accepted(lanes)
     integer, intent(in) :: error_order(lanes)
     real(wp), intent(in) :: log_error(lanes)
-    real(wp), intent(inout) :: log_ratio(lanes), change(lanes)
+    real(wp), intent(inout) :: log_ratio(lanes), factor(lanes)
     real(wp) :: present_exponent
     integer :: lane
 
     !GCC$ novector
     do lane = 1, lanes
-      present_exponent = 1.0_wp / (error_order(lane) + 1) - integral_loss * beta
+      present_exponent = 1.0_wp / (error_order(lane) + 1) - pi_correction * beta
       log_ratio(lane) = 0.5_wp * log_ratio(lane)
-      change(lane) = merge(beta, 0.0_wp, accepted(lane)) * log_error(lane) - present_exponent * log_ratio(lane)
+      factor(lane) = merge(beta, 0.0_wp, accepted(lane)) * log_error(lane) - present_exponent * log_ratio(lane)
     end do
-  end subroutine find_changes
+  end subroutine find_step_factors
 
-  pure subroutine change_step(control, lane, is_accepted, most_growth, h)
+  pure subroutine set_next_step(control, lane, is_accepted, max_growth, h)
     type(step_control_t), intent(inout) :: control
     integer, intent(in) :: lane
     logical, intent(in) :: is_accepted
-    real(wp), intent(in) :: most_growth, h
+    real(wp), intent(in) :: max_growth, h
     real(wp) :: most
 
-    most = most_growth
+    most = max_growth
     if (control%was_rejected(lane)) most = min(most, 1.0_wp)
-    control%h(lane) = max(least_change, min(safety * control%change(lane), most)) * h
+    control%h(lane) = max(min_factor, min(safety * control%factor(lane), most)) * h
     control%was_rejected(lane) = .not. is_accepted
-    if (is_accepted) control%log_error(lane) = max(control%log_ratio(lane), least_log_error)
-  end subroutine change_step
+    if (is_accepted) control%log_error(lane) = max(control%log_ratio(lane), min_log_error)
+  end subroutine set_next_step
 
   !> After an attempt of size h that could not be completed.
-  pure subroutine shorten(control, lane, h)
+  pure subroutine shorten_step(control, lane, h)
     type(step_control_t), intent(inout) :: control
     integer, intent(in) :: lane
     real(wp), intent(in) :: h
 
     control%was_rejected(lane) = .true.
-    control%h(lane) = least_change * h
-  end subroutine shorten
+    control%h(lane) = min_factor * h
+  end subroutine shorten_step
 
 end module nocdyn_step_control

@@ -2,29 +2,30 @@
 module nocdyn_stepper
   use nocdyn_kinds, only: wp
   use nocdyn_step_control, only: step_control_t
-  use nocdyn_system, only: observer_t, steps_t, system_t
-  use nocdyn_trial, only: trial_t
+  use nocdyn_system, only: observer_t, step_block_t, system_t
+  use nocdyn_step_attempt, only: step_attempt_t
   implicit none (type, external)
   private
 
   type, abstract, public :: stepper_t
     integer :: order = 0         !! of y_new
     integer :: error_order = 0   !! the error estimate falls as h^(error_order + 1)
-    real(wp) :: most_growth = 6.0_wp   !! of the step size from one step to the next
+    real(wp) :: max_growth = 6.0_wp   !! of the step size from one step to the next
     integer :: degree = 0        !! of the polynomials inside a step
-    logical :: has_coarse_error = .false.   !! whether there are two error estimates
+    logical :: has_low_order_error = .false.   !! whether there are two error estimates
     logical :: needs_series = .false.       !! whether the system must have a Taylor series
-    logical :: plans_steps = .false.        !! whether `plan` chooses the sizes of the steps, which then have no error estimate
-    logical :: shows_own = .false.          !! whether `show` does without the coefficients of `interpolate`
+    logical :: chooses_steps = .false.        !! whether `choose_steps` chooses the sizes of the steps, which then have no error
+                                              !! estimate
+    logical :: passes_series = .false.          !! whether `pass_steps` does without the coefficients of `interpolate`
   contains
-    procedure :: plan
+    procedure :: choose_steps
     procedure(prepare_interface), deferred :: prepare
-    procedure(begin_interface), deferred :: begin
-    procedure(attempt_interface), deferred :: attempt
+    procedure(start_interface), deferred :: start
+    procedure(take_step_interface), deferred :: take_step
     procedure(interpolate_interface), deferred :: interpolate
     procedure(accept_interface), deferred :: accept
     procedure :: resume
-    procedure :: show
+    procedure :: pass_steps
   end type stepper_t
 
   abstract interface
@@ -37,28 +38,28 @@ module nocdyn_stepper
     end subroutine prepare_interface
 
     !> Takes over trial%slope = f(t, y) of lanes that start.
-    subroutine begin_interface(self, trial, starting)
-      import :: stepper_t, trial_t
+    subroutine start_interface(self, attempt, starting)
+      import :: stepper_t, step_attempt_t
       class(stepper_t), intent(inout) :: self
-      type(trial_t), intent(inout) :: trial
+      type(step_attempt_t), intent(inout) :: attempt
       logical, intent(in) :: starting(:)
-    end subroutine begin_interface
+    end subroutine start_interface
 
     !> One step of size h from (t, y): y_new and the deviations, or a verdict on the lanes that failed.
-    subroutine attempt_interface(self, system, trial)
-      import :: stepper_t, system_t, trial_t
+    subroutine take_step_interface(self, system, attempt)
+      import :: stepper_t, system_t, step_attempt_t
       class(stepper_t), intent(inout) :: self
       class(system_t), intent(inout) :: system
-      type(trial_t), intent(inout) :: trial
-    end subroutine attempt_interface
+      type(step_attempt_t), intent(inout) :: attempt
+    end subroutine take_step_interface
 
     !> The solution inside the last step, y + sum over p of coefficients(:, :, p) theta^p with theta = (time - t) / h,
     !> of the lanes in `wanted`, or a verdict on those where it could not be had.
-    subroutine interpolate_interface(self, system, trial, wanted, coefficients)
-      import :: stepper_t, system_t, trial_t, wp
+    subroutine interpolate_interface(self, system, attempt, wanted, coefficients)
+      import :: stepper_t, system_t, step_attempt_t, wp
       class(stepper_t), intent(inout) :: self
       class(system_t), intent(inout) :: system
-      type(trial_t), intent(inout) :: trial
+      type(step_attempt_t), intent(inout) :: attempt
       logical, intent(in) :: wanted(:)
       real(wp), contiguous, intent(inout) :: coefficients(:, :, :)   !! shape [lanes, padded columns, degree]
     end subroutine interpolate_interface
@@ -75,34 +76,34 @@ module nocdyn_stepper
 contains
 
   !> Sets control%h of the lanes that are working and have moved since the last call.
-  subroutine plan(self, system, trial, control)
+  subroutine choose_steps(self, system, attempt, control)
     class(stepper_t), intent(inout) :: self
     class(system_t), intent(inout) :: system
-    type(trial_t), intent(inout) :: trial
+    type(step_attempt_t), intent(inout) :: attempt
     type(step_control_t), intent(inout) :: control
 
     error stop 'nocdyn_stepper: a stepper that plans its steps overrides plan'
-  end subroutine plan
+  end subroutine choose_steps
 
   !> Takes over trial%slope = f(t, y) of lanes whose equations have changed where they are, after `accept`.
-  subroutine resume(self, trial, resuming)
+  subroutine resume(self, attempt, resuming)
     class(stepper_t), intent(inout) :: self
-    type(trial_t), intent(inout) :: trial
+    type(step_attempt_t), intent(inout) :: attempt
     logical, intent(in) :: resuming(:)
 
-    call self%begin(trial, resuming)
+    call self%start(attempt, resuming)
   end subroutine resume
 
   !> Shows an observer the last steps of all lanes.
-  subroutine show(self, steps, trial, coefficients, observer)
+  subroutine pass_steps(self, steps, attempt, coefficients, observer)
     class(stepper_t), intent(in) :: self
-    type(steps_t), intent(inout) :: steps
-    type(trial_t), intent(in) :: trial
-    real(wp), contiguous, intent(in) :: coefficients(:, :, :)   !! of `interpolate`, unless `shows_own`
+    type(step_block_t), intent(inout) :: steps
+    type(step_attempt_t), intent(in) :: attempt
+    real(wp), contiguous, intent(in) :: coefficients(:, :, :)   !! of `interpolate`, unless `passes_series`
     class(observer_t), intent(inout) :: observer
 
     steps%scale(:) = 1.0_wp
-    call observer%follow_steps(steps, trial%y, trial%y_new, coefficients)
-  end subroutine show
+    call observer%on_steps(steps, attempt%y, attempt%y_new, coefficients)
+  end subroutine pass_steps
 
 end module nocdyn_stepper

@@ -1,8 +1,8 @@
 !> The solution of one lane inside its last step: polynomials in theta = (time - t) / h.
 module nocdyn_dense_output
-  use nocdyn_combinations, only: width
+  use nocdyn_stage_sums, only: width
   use nocdyn_kinds, only: wp
-  use nocdyn_trial, only: trial_t
+  use nocdyn_step_attempt, only: step_attempt_t
   implicit none (type, external)
   private
 
@@ -33,18 +33,18 @@ contains
   end subroutine allocate_dense_output
 
   !> Takes over the polynomials of one lane of a block.
-  pure subroutine take_lane(dense, trial, coefficients, lane)
+  pure subroutine take_lane(dense, attempt, coefficients, lane)
     type(dense_output_t), intent(inout) :: dense
-    type(trial_t), intent(in) :: trial
+    type(step_attempt_t), intent(in) :: attempt
     real(wp), contiguous, intent(in) :: coefficients(:, :, :)   !! of the powers 1 to degree, [lanes, padded columns, degree]
     integer, intent(in) :: lane
     integer :: power
 
     dense%lane = lane
-    dense%t = trial%t(lane)
-    dense%h = trial%h(lane)
-    associate (n => trial%components)
-      dense%c(:n, 0) = trial%y(lane, :n)
+    dense%t = attempt%t(lane)
+    dense%h = attempt%h(lane)
+    associate (n => attempt%components)
+      dense%c(:n, 0) = attempt%y(lane, :n)
       do power = 1, size(coefficients, 3)
         dense%c(:n, power) = coefficients(lane, :n, power)
       end do

@@ -7,9 +7,9 @@ module nocdyn_events
   use nocdyn_finite, only: is_finite
   use nocdyn_kinds, only: wp
   use nocdyn_system, only: event_falling, event_rising, observer_t, system_t
-  use nocdyn_trial, only: trial_t
-  use nocdyn_watched_functions, only: allocate_watched, find_root, part_of_step, scan_step, sign_of, start_watched, &
-    watched_t
+  use nocdyn_step_attempt, only: step_attempt_t
+  use nocdyn_root_functions, only: allocate_root_functions, find_root, part_bracket, scan_step, sign_of, start_root_functions, &
+    root_functions_t
   implicit none (type, external)
   private
 
@@ -20,56 +20,56 @@ module nocdyn_events
     integer, allocatable :: which(:)        !! event functions, in the order of their times
     real(wp), allocatable :: theta(:)       !! places in the step
     integer, allocatable, private :: directions(:)
-    type(watched_t), private :: watched
+    type(root_functions_t), private :: roots
   end type events_t
 
 contains
 
   !> Room for the event functions of an observer.
-  subroutine allocate_events(events, observer, degree, trial)
+  subroutine allocate_events(events, observer, degree, attempt)
     type(events_t), intent(out) :: events
     class(observer_t), intent(in) :: observer   !! with `directions`
     integer, intent(in) :: degree               !! of the solution inside the step
-    type(trial_t), intent(in) :: trial
+    type(step_attempt_t), intent(in) :: attempt
 
     allocate (events%directions, source=observer%directions)
     associate (functions => size(observer%directions))
-      call allocate_watched(events%watched, functions, .false., degree, trial)
-      allocate (events%which(events%watched%parts * functions), source=0)
-      allocate (events%theta(events%watched%parts * functions), source=0.0_wp)
+      call allocate_root_functions(events%roots, functions, .false., degree, attempt)
+      allocate (events%which(events%roots%parts * functions), source=0)
+      allocate (events%theta(events%roots%parts * functions), source=0.0_wp)
     end associate
   end subroutine allocate_events
 
   !> Takes the signs at the start of a lane.
-  subroutine start_events(events, system, observer, trial, lane)
+  subroutine start_events(events, system, observer, attempt, lane)
     type(events_t), intent(inout) :: events
     class(system_t), intent(inout) :: system
     class(observer_t), intent(inout) :: observer
-    type(trial_t), intent(in) :: trial
+    type(step_attempt_t), intent(in) :: attempt
     integer, intent(in) :: lane
 
-    call start_watched(events%watched, system, observer, trial, lane)
+    call start_root_functions(events%roots, system, observer, attempt, lane)
   end subroutine start_events
 
   !> Finds the events of a lane in its last step and puts them into order.
-  subroutine find_events(events, system, observer, dense, until)
+  subroutine find_events(events, system, observer, dense, theta_end)
     type(events_t), intent(inout) :: events
     class(system_t), intent(inout) :: system
     class(observer_t), intent(inout) :: observer
     type(dense_output_t), intent(inout) :: dense   !! of the lane
-    real(wp), intent(in) :: until                  !! end of the step, 1 if it has not been cut
+    real(wp), intent(in) :: theta_end                  !! end of the step, 1 if it has not been cut
     real(wp) :: root
     integer :: function, part
 
     events%found = 0
-    call scan_step(events%watched, system, observer, dense, until)
-    do part = 1, events%watched%parts
+    call scan_step(events%roots, system, observer, dense, theta_end)
+    do part = 1, events%roots%parts
       do function = 1, size(events%directions)
-        associate (side => events%watched%side(dense%lane, function), g => events%watched%values(function, part))
+        associate (side => events%roots%side(dense%lane, function), g => events%roots%values(function, part))
           if (.not. is_finite(g)) cycle
           if (is_event(side, g, events%directions(function))) then
-            call find_root(events%watched, system, observer, dense, &
-                           part_of_step(events%watched, function, part, until), root)
+            call find_root(events%roots, system, observer, dense, &
+                           part_bracket(events%roots, function, part, theta_end), root)
             call insert(events, function, root)
           end if
           side = sign_of(g)

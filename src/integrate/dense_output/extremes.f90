@@ -4,24 +4,24 @@
 !> step (Chebyshev-Lobatto places, as many as that solution has coefficients: a linear function of the state is met
 !> exactly). Its critical points are found to machine precision wherever they can exceed the extremes so far.
 module nocdyn_extremes
-  use nocdyn_chebyshev, only: find_peak, lay_places, most_places
+  use nocdyn_chebyshev, only: find_maximum, lobatto_nodes, max_nodes
   use nocdyn_dense_output, only: dense_output_t, sample
   use nocdyn_kinds, only: wp
   use nocdyn_system, only: observer_t, ranges_t
-  use nocdyn_trial, only: trial_t
+  use nocdyn_step_attempt, only: step_attempt_t
   implicit none (type, external)
   private
 
-  public :: allocate_extremes, start_extremes, resume_extremes, follow_extremes
-  public :: allocate_ranges, begin_ranges, widen
+  public :: allocate_extremes, start_extremes, restart_extremes, update_extremes
+  public :: allocate_ranges, start_ranges, widen_ranges
 
   real(wp), parameter :: overshoot = 0.25_wp   !! of the spread of the values: no polynomial is expected to pass them by more
-  real(wp), parameter, public :: right_before = 64.0_wp   !! spacings of the times: an observer may allow for fewer of them
+  real(wp), parameter, public :: before_jump = 64.0_wp   !! spacings of the times: an observer may allow for fewer of them
 
   type, public :: extremes_t
     type(ranges_t), allocatable :: ranges(:)               !! [lanes]
     real(wp), allocatable, private :: last(:, :)           !! values at the end of the last step, [functions, lanes]
-    real(wp), allocatable, private :: places(:)            !! in the step, -1 to 1, [places]
+    real(wp), allocatable, private :: nodes(:)            !! in the step, -1 to 1, [places]
     real(wp), allocatable, private :: to_series(:, :)      !! from values to the coefficients of T_0, T_1, ...
     real(wp), allocatable, private :: values(:, :)         !! [functions, places]
     real(wp), allocatable, private :: y(:)                 !! [components]
@@ -30,20 +30,20 @@ module nocdyn_extremes
 contains
 
   !> Room for the tracked functions of an observer, on solutions of a degree inside the step.
-  subroutine allocate_extremes(extremes, functions, degree, trial)
+  subroutine allocate_extremes(extremes, functions, degree, attempt)
     type(extremes_t), intent(out) :: extremes
     integer, intent(in) :: functions
     integer, intent(in) :: degree
-    type(trial_t), intent(in) :: trial
+    type(step_attempt_t), intent(in) :: attempt
     integer :: lane
 
-    allocate (extremes%places(degree + 1), extremes%to_series(degree + 1, degree + 1))
-    call lay_places(degree, extremes%places, extremes%to_series)
-    allocate (extremes%ranges(trial%lanes))
-    do lane = 1, trial%lanes
+    allocate (extremes%nodes(degree + 1), extremes%to_series(degree + 1, degree + 1))
+    call lobatto_nodes(degree, extremes%nodes, extremes%to_series)
+    allocate (extremes%ranges(attempt%lanes))
+    do lane = 1, attempt%lanes
       call allocate_ranges(extremes%ranges(lane), functions)
     end do
-    allocate (extremes%last(functions, trial%lanes), extremes%values(functions, degree + 1), extremes%y(trial%components), &
+    allocate (extremes%last(functions, attempt%lanes), extremes%values(functions, degree + 1), extremes%y(attempt%components), &
               source=0.0_wp)
   end subroutine allocate_extremes
 
@@ -56,18 +56,18 @@ contains
   end subroutine allocate_ranges
 
   !> The ranges of a lane at its start.
-  subroutine start_extremes(extremes, observer, trial, lane)
+  subroutine start_extremes(extremes, observer, attempt, lane)
     type(extremes_t), intent(inout) :: extremes
     class(observer_t), intent(inout) :: observer
-    type(trial_t), intent(in) :: trial
+    type(step_attempt_t), intent(in) :: attempt
     integer, intent(in) :: lane
 
-    call resume_extremes(extremes, observer, trial, lane)
-    call begin_ranges(extremes%ranges(lane), extremes%last(:, lane), trial%t(lane))
+    call restart_extremes(extremes, observer, attempt, lane)
+    call start_ranges(extremes%ranges(lane), extremes%last(:, lane), attempt%t(lane))
   end subroutine start_extremes
 
   !> Ranges that hold the values of a single time.
-  pure subroutine begin_ranges(ranges, values, t)
+  pure subroutine start_ranges(ranges, values, t)
     type(ranges_t), intent(inout) :: ranges
     real(wp), contiguous, intent(in) :: values(:)   !! [functions]
     real(wp), intent(in) :: t
@@ -76,22 +76,22 @@ contains
     ranges%highest(:) = values
     ranges%lowest_time(:) = t
     ranges%highest_time(:) = t
-  end subroutine begin_ranges
+  end subroutine start_ranges
 
   !> Takes the tracked functions anew where a lane is: they may have jumped.
-  subroutine resume_extremes(extremes, observer, trial, lane)
+  subroutine restart_extremes(extremes, observer, attempt, lane)
     type(extremes_t), intent(inout) :: extremes
     class(observer_t), intent(inout) :: observer
-    type(trial_t), intent(in) :: trial
+    type(step_attempt_t), intent(in) :: attempt
     integer, intent(in) :: lane
 
-    extremes%y(:) = trial%y(lane, :trial%components)
-    call observer%tracked_values(lane, trial%t(lane), extremes%y, extremes%last(:, lane))
-  end subroutine resume_extremes
+    extremes%y(:) = attempt%y(lane, :attempt%components)
+    call observer%tracked_values(lane, attempt%t(lane), extremes%y, extremes%last(:, lane))
+  end subroutine restart_extremes
 
   !> Widens the ranges of a lane by its last step, up to t_end. A function that jumps at a crossing there is taken right before:
   !> a jump is no part of the step, and would spoil the polynomial.
-  subroutine follow_extremes(extremes, observer, dense, t_end, ends_at_crossing)
+  subroutine update_extremes(extremes, observer, dense, t_end, ends_at_crossing)
     type(extremes_t), intent(inout) :: extremes
     class(observer_t), intent(inout) :: observer
     type(dense_output_t), intent(inout) :: dense   !! of the lane
@@ -100,61 +100,61 @@ contains
     real(wp) :: t, half, middle
     integer :: i, last
 
-    last = size(extremes%places)
+    last = size(extremes%nodes)
     half = 0.5_wp * (t_end - dense%t)
     middle = dense%t + half
     extremes%values(:, 1) = extremes%last(:, dense%lane)
     do i = 2, last
-      t = middle + extremes%places(i) * half
-      if (i == last .and. ends_at_crossing) t = max(dense%t, t_end - right_before * spacing(t_end))
+      t = middle + extremes%nodes(i) * half
+      if (i == last .and. ends_at_crossing) t = max(dense%t, t_end - before_jump * spacing(t_end))
       call sample(dense, min(1.0_wp, (t - dense%t) / dense%h), extremes%y)
       call observer%tracked_values(dense%lane, t, extremes%y, extremes%values(:, i))
     end do
     extremes%last(:, dense%lane) = extremes%values(:, last)
-    call widen(last, extremes%places, extremes%to_series, extremes%values, extremes%ranges(dense%lane), dense%t, t_end)
-  end subroutine follow_extremes
+    call widen_ranges(last, extremes%nodes, extremes%to_series, extremes%values, extremes%ranges(dense%lane), dense%t, t_end)
+  end subroutine update_extremes
 
   !> Widens the ranges by the polynomials through `values_of`, over the times from t_start to t_end.
-  pure subroutine widen(n, places, to_series, values_of, ranges, t_start, t_end)
+  pure subroutine widen_ranges(n, nodes, to_series, values_of, ranges, t_start, t_end)
     integer, intent(in) :: n   !! places
-    real(wp), intent(in) :: places(n), to_series(n, n)
+    real(wp), intent(in) :: nodes(n), to_series(n, n)
     real(wp), contiguous, intent(in) :: values_of(:, :)   !! [functions, places]
     type(ranges_t), intent(inout) :: ranges
     real(wp), intent(in) :: t_start, t_end
-    real(wp) :: values(most_places), lowest, highest, margin
+    real(wp) :: values(max_nodes), lowest, highest, indicator
     integer :: function
 
     do function = 1, size(values_of, 1)
       values(:n) = values_of(function, :)
       lowest = minval(values(:n))
       highest = maxval(values(:n))
-      margin = overshoot * (highest - lowest)
-      if (highest + margin > ranges%highest(function)) then
-        call raise(n, places, to_series, values, t_start, t_end, ranges%highest(function), ranges%highest_time(function))
+      indicator = overshoot * (highest - lowest)
+      if (highest + indicator > ranges%highest(function)) then
+        call raise(n, nodes, to_series, values, t_start, t_end, ranges%highest(function), ranges%highest_time(function))
       end if
-      if (lowest - margin < ranges%lowest(function)) then
+      if (lowest - indicator < ranges%lowest(function)) then
         values(:n) = -values(:n)
         ranges%lowest(function) = -ranges%lowest(function)
-        call raise(n, places, to_series, values, t_start, t_end, ranges%lowest(function), ranges%lowest_time(function))
+        call raise(n, nodes, to_series, values, t_start, t_end, ranges%lowest(function), ranges%lowest_time(function))
         ranges%lowest(function) = -ranges%lowest(function)
       end if
     end do
-  end subroutine widen
+  end subroutine widen_ranges
 
   !> Raises `highest` to the largest value of the polynomial through `values`, if that is larger.
-  pure subroutine raise(n, places, to_series, values, t_start, t_end, highest, time)
+  pure subroutine raise(n, nodes, to_series, values, t_start, t_end, highest, time)
     integer, intent(in) :: n
-    real(wp), intent(in) :: places(n), to_series(n, n)
-    real(wp), intent(in) :: values(most_places)
+    real(wp), intent(in) :: nodes(n), to_series(n, n)
+    real(wp), intent(in) :: values(max_nodes)
     real(wp), intent(in) :: t_start, t_end
     real(wp), intent(inout) :: highest, time
-    real(wp) :: place, peak
+    real(wp) :: node, peak
 
-    call find_peak(n, places, to_series, values, place, peak)
+    call find_maximum(n, nodes, to_series, values, node, peak)
     if (peak <= highest) return
     highest = peak
-    time = t_start + 0.5_wp * (1 + place) * (t_end - t_start)
-    if (place >= 1) time = t_end
+    time = t_start + 0.5_wp * (1 + node) * (t_end - t_start)
+    if (node >= 1) time = t_end
   end subroutine raise
 
 end module nocdyn_extremes

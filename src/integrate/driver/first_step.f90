@@ -3,7 +3,7 @@ module nocdyn_first_step
   use nocdyn_kinds, only: wp
   use nocdyn_step_control, only: smallest_step, step_control_t
   use nocdyn_system, only: system_t
-  use nocdyn_trial, only: count_evaluations, evaluate_finite, set_out, trial_t
+  use nocdyn_step_attempt, only: count_evaluations, evaluate_finite, begin_attempt, step_attempt_t
   implicit none (type, external)
   private
 
@@ -14,80 +14,80 @@ module nocdyn_first_step
   real(wp), parameter :: no_curvature = 1.0e-15_wp
   real(wp), parameter :: small_step = 1.0e-6_wp
   real(wp), parameter :: small_change = 0.01_wp
-  real(wp), parameter :: most_growth = 100.0_wp
+  real(wp), parameter :: max_growth = 100.0_wp
   real(wp), parameter :: retreat = 0.01_wp           !! after a small step that cannot be evaluated
 
   real(wp), parameter :: largest_ratio = 1.0e100_wp  !! keeps squares finite
 
 contains
 
-  !> Sets the first step sizes of the lanes that are `working` by comparing the slopes at both ends of a small Euler step:
+  !> Sets the first step sizes of the lanes that are `active` by comparing the slopes at both ends of a small Euler step:
   !> Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I, 2nd ed. (1993), II.4.
-  subroutine guess_first_steps(control, order, system, trial)
+  subroutine guess_first_steps(control, order, system, attempt)
     type(step_control_t), intent(inout) :: control
     integer, intent(in) :: order
     class(system_t), intent(inout) :: system
-    type(trial_t), intent(inout) :: trial   !! t, y, slope and the lanes at work; h, y_new and deviation are scratch
+    type(step_attempt_t), intent(inout) :: attempt   !! t, y, slope and the lanes at work; h, y_new and deviation are scratch
     real(wp) :: slope, steepest, longer
     integer :: component, lane
 
-    do lane = 1, trial%lanes
-      trial%h(lane) = 0.0_wp
-      if (.not. trial%working(lane)) cycle
-      trial%h(lane) = euler_step(control, trial, lane)
-      control%h(lane) = retreat * trial%h(lane)
+    do lane = 1, attempt%lanes
+      attempt%h(lane) = 0.0_wp
+      if (.not. attempt%active(lane)) cycle
+      attempt%h(lane) = euler_step(control, attempt, lane)
+      control%h(lane) = retreat * attempt%h(lane)
     end do
-    call set_out(trial)
-    trial%scratch(:) = trial%t + trial%h
-    do component = 1, trial%components
-      trial%y_new(:, component) = trial%y(:, component) + trial%h * trial%slope(:, component)
+    call begin_attempt(attempt)
+    attempt%scratch(:) = attempt%t + attempt%h
+    do component = 1, attempt%components
+      attempt%y_new(:, component) = attempt%y(:, component) + attempt%h * attempt%slope(:, component)
     end do
-    call evaluate_finite(trial, system, trial%scratch, trial%y_new, trial%deviation)
-    call count_evaluations(trial)
-    trial%deviation(:, :) = trial%deviation - trial%slope
-    do lane = 1, trial%lanes
-      if (.not. trial%working(lane)) cycle
-      slope = weighted_size(control, trial, lane, trial%slope)
-      steepest = max(slope, weighted_size(control, trial, lane, trial%deviation) / trial%h(lane))
+    call evaluate_finite(attempt, system, attempt%scratch, attempt%y_new, attempt%error_estimate)
+    call count_evaluations(attempt)
+    attempt%error_estimate(:, :) = attempt%error_estimate - attempt%slope
+    do lane = 1, attempt%lanes
+      if (.not. attempt%active(lane)) cycle
+      slope = weighted_size(control, attempt, lane, attempt%slope)
+      steepest = max(slope, weighted_size(control, attempt, lane, attempt%error_estimate) / attempt%h(lane))
       if (steepest <= no_curvature) then
-        longer = max(small_step, trial%h(lane) * 1.0e-3_wp)
+        longer = max(small_step, attempt%h(lane) * 1.0e-3_wp)
       else
         longer = (small_change / steepest)**(1.0_wp / order)
       end if
-      control%h(lane) = min(most_growth * trial%h(lane), longer)
+      control%h(lane) = min(max_growth * attempt%h(lane), longer)
     end do
   end subroutine guess_first_steps
 
   !> A step over which y changes by about 1 % if the slope stays as it is.
-  pure function euler_step(control, trial, lane) result(h)
+  pure function euler_step(control, attempt, lane) result(h)
     type(step_control_t), intent(in) :: control
-    type(trial_t), intent(in) :: trial
+    type(step_attempt_t), intent(in) :: attempt
     integer, intent(in) :: lane
     real(wp) :: h
     real(wp) :: position, slope
 
-    position = weighted_size(control, trial, lane, trial%y)
-    slope = weighted_size(control, trial, lane, trial%slope)
+    position = weighted_size(control, attempt, lane, attempt%y)
+    slope = weighted_size(control, attempt, lane, attempt%slope)
     h = small_step
     if (min(position, slope) >= negligible) h = small_change * position / slope
-    h = min(h, control%longest, control%t_end - trial%t(lane))
-    h = max(h, smallest_step(trial%t(lane)))
+    h = min(h, control%longest, control%t_end - attempt%t(lane))
+    h = max(h, smallest_step(attempt%t(lane)))
   end function euler_step
 
   !> Root mean square of x / (atol + rtol |y|) over the states.
-  pure function weighted_size(control, trial, lane, x) result(rms)
+  pure function weighted_size(control, attempt, lane, x) result(rms)
     type(step_control_t), intent(in) :: control
-    type(trial_t), intent(in) :: trial
+    type(step_attempt_t), intent(in) :: attempt
     integer, intent(in) :: lane
     real(wp), intent(in) :: x(:, :)
     real(wp) :: rms
     integer :: i
 
     rms = 0.0_wp
-    do i = 1, trial%states
-      rms = rms + min(abs(x(lane, i)) / (control%atol + control%rtol * abs(trial%y(lane, i))), largest_ratio)**2
+    do i = 1, attempt%states
+      rms = rms + min(abs(x(lane, i)) / (control%atol + control%rtol * abs(attempt%y(lane, i))), largest_ratio)**2
     end do
-    rms = sqrt(rms / max(trial%states, 1))
+    rms = sqrt(rms / max(attempt%states, 1))
   end function weighted_size
 
 end module nocdyn_first_step

@@ -1,52 +1,52 @@
 !> Integration of a block of lanes from the first to the last requested time.
 module nocdyn_integration
   use nocdyn_errors, only: error_t, exit_input, raise
-  use nocdyn_following, only: cross_lanes, follow_lanes, show_steps
+  use nocdyn_after_step, only: change_branches, process_steps, observe_steps
   use nocdyn_integration_settings, only: check_settings, integration_settings_t
-  use nocdyn_judging, only: judge_lanes
+  use nocdyn_error_test, only: test_errors
   use nocdyn_kinds, only: wp
-  use nocdyn_masks, only: any_other, any_true
-  use nocdyn_march, only: advance_lanes, empty_lanes, fill_lanes, march_t, prepare, set_out_lanes
+  use nocdyn_masks, only: any_differs, any_true
+  use nocdyn_time_stepping, only: advance_lanes, release_lanes, fill_lanes, integrator_t, prepare_integrator, begin_attempts
   use nocdyn_methods, only: select_method
-  use nocdyn_outcome, only: allocate_outcome, integration_interrupted, integration_running, outcome_t
-  use nocdyn_queue, only: one_each, one_each_t, queue_t
+  use nocdyn_solver_status, only: allocate_solver_status, integration_interrupted, integration_running, solver_status_t
+  use nocdyn_ensemble, only: initial_states, initial_states_t, ensemble_t
   use nocdyn_stepper, only: stepper_t
   use nocdyn_system, only: observer_t, system_t
   use nocdyn_text, only: quoted
   implicit none (type, external)
   private
 
-  public :: integrate, integrate_queue, integrate_with
+  public :: integrate, integrate_ensemble, integrate_with
 
 contains
 
   !> Solves y' = f(t, y) once in each lane, with the method that `settings` names.
-  subroutine integrate(system, settings, times, y, observer, outcome, error)
+  subroutine integrate(system, settings, times, y, observer, solver_status, error)
     class(system_t), intent(inout) :: system
     type(integration_settings_t), intent(in) :: settings
     real(wp), contiguous, intent(in) :: times(:)       !! ascending; the first is the start, the last is the end
     real(wp), contiguous, intent(inout) :: y(:, :)     !! [lanes, components]: the start, on return where each lane stopped
     class(observer_t), intent(inout) :: observer
-    type(outcome_t), intent(out) :: outcome            !! says which lanes failed
+    type(solver_status_t), intent(out) :: solver_status            !! says which lanes failed
     type(error_t), allocatable, intent(out) :: error   !! allocated if a setting is refused
-    type(one_each_t) :: queue
+    type(initial_states_t) :: ensemble
 
     if (size(y, 1) /= system%lanes .or. size(y, 2) /= system%states + system%quadratures) then
       error stop 'nocdyn_integration: y must have the shape [lanes, states + quadratures]'
     end if
-    queue = one_each(y)
-    call integrate_queue(system, settings, times, queue, observer, outcome, error)
-    y = queue%y
+    ensemble = initial_states(y)
+    call integrate_ensemble(system, settings, times, ensemble, observer, solver_status, error)
+    y = ensemble%y
   end subroutine integrate
 
   !> Solves y' = f(t, y) for all variants of a queue; a lane that has ended takes the next variant.
-  subroutine integrate_queue(system, settings, times, queue, observer, outcome, error)
+  subroutine integrate_ensemble(system, settings, times, ensemble, observer, solver_status, error)
     class(system_t), intent(inout) :: system
     type(integration_settings_t), intent(in) :: settings
     real(wp), contiguous, intent(in) :: times(:)       !! of every variant
-    class(queue_t), intent(inout) :: queue             !! hands out the variants and takes their ends
+    class(ensemble_t), intent(inout) :: ensemble             !! hands out the variants and takes their ends
     class(observer_t), intent(inout) :: observer
-    type(outcome_t), intent(out) :: outcome            !! of the last variant in each lane
+    type(solver_status_t), intent(out) :: solver_status            !! of the last variant in each lane
     type(error_t), allocatable, intent(out) :: error   !! allocated if a setting is refused
     class(stepper_t), allocatable :: stepper
 
@@ -55,8 +55,8 @@ contains
     call select_method(settings, stepper, error)
     if (.not. allocated(error)) call refuse_missing_series(stepper, system, settings, error)
     if (allocated(error)) return
-    call integrate_with(stepper, system, settings, times, queue, observer, outcome)
-  end subroutine integrate_queue
+    call integrate_with(stepper, system, settings, times, ensemble, observer, solver_status)
+  end subroutine integrate_ensemble
 
   !> A method that is made of Taylor series needs a system that has them.
   subroutine refuse_missing_series(stepper, system, settings, error)
@@ -73,66 +73,67 @@ contains
   end subroutine refuse_missing_series
 
   !> The same with any stepper and with settings that have been checked.
-  subroutine integrate_with(stepper, system, settings, times, queue, observer, outcome)
+  subroutine integrate_with(stepper, system, settings, times, ensemble, observer, solver_status)
     class(stepper_t), intent(inout) :: stepper
     class(system_t), intent(inout) :: system
     type(integration_settings_t), intent(in) :: settings
     real(wp), contiguous, intent(in) :: times(:)
-    class(queue_t), intent(inout) :: queue
+    class(ensemble_t), intent(inout) :: ensemble
     class(observer_t), intent(inout) :: observer
-    type(outcome_t), intent(out) :: outcome
-    type(march_t) :: march
+    type(solver_status_t), intent(out) :: solver_status
+    type(integrator_t) :: integrator
     logical :: is_interrupted
 
     if (size(times) < 2) error stop 'nocdyn_integration: times needs a start and an end'
     if (.not. all(times(2:) > times(:size(times) - 1))) error stop 'nocdyn_integration: times must ascend'
-    call allocate_outcome(outcome, system%lanes)
+    call allocate_solver_status(solver_status, system%lanes)
     if (stepper%needs_series) call system%prepare_series(stepper%order)
-    call prepare(march, stepper, system, settings, times, observer)
+    call prepare_integrator(integrator, stepper, system, settings, times, observer)
     do
-      call fill_lanes(march, stepper, system, queue, times, observer, outcome)
-      if (march%free == system%lanes) exit
-      call set_out_lanes(march, stepper, system, outcome)
-      call stepper%attempt(system, march%trial)
-      call judge_lanes(march, stepper, system, observer, outcome)
-      if (any_true(system%lanes, march%accepted)) then
-        if (march%is_due .or. march%is_followed) call follow_lanes(march, system, times, observer, outcome)
-        if (march%is_followed) call show_steps(march, stepper, observer)
-        call advance_lanes(march, times)
-        call stepper%accept(march%accepted)
-        if (march%has_switches) call cross_lanes(march, stepper, system, observer, outcome)
+      call fill_lanes(integrator, stepper, system, ensemble, times, observer, solver_status)
+      if (integrator%free == system%lanes) exit
+      call begin_attempts(integrator, stepper, system, solver_status)
+      call stepper%take_step(system, integrator%attempt)
+      call test_errors(integrator, stepper, system, observer, solver_status)
+      if (any_true(system%lanes, integrator%accepted)) then
+        if (integrator%inspects .or. integrator%wants_steps) call process_steps(integrator, system, times, observer, &
+                                                                                solver_status)
+        if (integrator%wants_steps) call observe_steps(integrator, stepper, observer)
+        call advance_lanes(integrator, times)
+        call stepper%accept(integrator%accepted)
+        if (integrator%has_switches) call change_branches(integrator, stepper, system, observer, solver_status)
       end if
-      call interrupt_if_asked(march, observer, outcome, is_interrupted)
-      call empty_lanes(march, queue, observer, outcome)
+      call interrupt_if_asked(integrator, observer, solver_status, is_interrupted)
+      call release_lanes(integrator, ensemble, observer, solver_status)
       if (is_interrupted) exit
     end do
   end subroutine integrate_with
 
   !> Ends the lanes that are running if the observer wants to stop at the time of the slowest.
-  subroutine interrupt_if_asked(march, observer, outcome, is_interrupted)
-    type(march_t), intent(in) :: march
+  subroutine interrupt_if_asked(integrator, observer, solver_status, is_interrupted)
+    type(integrator_t), intent(in) :: integrator
     class(observer_t), intent(inout) :: observer
-    type(outcome_t), intent(inout) :: outcome
+    type(solver_status_t), intent(inout) :: solver_status
     logical, intent(out) :: is_interrupted
     real(wp) :: slowest
     integer :: lane
 
     is_interrupted = .false.
     slowest = huge(slowest)
-    if (any_other(size(outcome%status), outcome%status, integration_running)) then
-      do lane = 1, size(outcome%status)
-        if (outcome%status(lane) == integration_running) slowest = min(slowest, march%trial%t(lane))
+    if (any_differs(size(solver_status%code), solver_status%code, integration_running)) then
+      do lane = 1, size(solver_status%code)
+        if (solver_status%code(lane) == integration_running) slowest = min(slowest, integrator%attempt%t(lane))
       end do
     else
-      do lane = 1, size(outcome%status)
-        slowest = min(slowest, march%trial%t(lane))
+      do lane = 1, size(solver_status%code)
+        slowest = min(slowest, integrator%attempt%t(lane))
       end do
     end if
     if (slowest >= huge(slowest)) return
-    is_interrupted = observer%stops(slowest)
+    is_interrupted = observer%wants_stop(slowest)
     if (.not. is_interrupted) return
-    do lane = 1, size(outcome%status)
-      if (outcome%status(lane) == integration_running) outcome%status(lane) = integration_interrupted
+    do lane = 1, size(solver_status%code)
+      if (solver_status%code(lane) == integration_running) solver_status%code(lane) = integration_interrupted
     end do
   end subroutine interrupt_if_asked
 

@@ -12,7 +12,7 @@ module nocdyn_sampler
     real(wp), allocatable :: t(:, :)       !! [times, lanes]
     real(wp), allocatable :: y(:, :, :)    !! [components, times, lanes]
   contains
-    procedure :: record
+    procedure :: on_output
   end type sampler_t
 
 contains
@@ -26,7 +26,7 @@ contains
     allocate (sampler%t(times, lanes), sampler%y(components, times, lanes), source=0.0_wp)
   end function sampler
 
-  subroutine record(self, lane, t, y)
+  subroutine on_output(self, lane, t, y)
     class(sampler_t), intent(inout) :: self
     integer, intent(in) :: lane
     real(wp), intent(in) :: t
@@ -35,6 +35,6 @@ contains
     self%count(lane) = self%count(lane) + 1
     self%t(self%count(lane), lane) = t
     self%y(:, self%count(lane), lane) = y
-  end subroutine record
+  end subroutine on_output
 
 end module nocdyn_sampler

@@ -33,16 +33,16 @@ contains
     integer, intent(in) :: order(:)          !! state at each place
     type(entries_t), intent(in) :: entries   !! in the rows of states
     integer, intent(in) :: lanes
-    integer :: place(size(order))
+    integer :: index_of(size(order))
 
-    place = inverse(order)
+    index_of = inverse(order)
     matrix%states = size(order)
     call half_bandwidths(order, entries, matrix%lower, matrix%upper)
     allocate (matrix%order, source=order)
     allocate (matrix%position, source=entries%position)
     allocate (matrix%row(size(entries%row)), matrix%column(size(entries%row)), source=0)
-    matrix%column(:) = place(entries%column)
-    matrix%row(:) = matrix%lower + matrix%upper + 1 + place(entries%row) - matrix%column
+    matrix%column(:) = index_of(entries%column)
+    matrix%row(:) = matrix%lower + matrix%upper + 1 + index_of(entries%row) - matrix%column
     allocate (matrix%band(2 * matrix%lower + matrix%upper + 1, matrix%states, lanes), source=0.0_wp)
     allocate (matrix%pivots(matrix%states, lanes), source=0)
     allocate (matrix%x(matrix%states), source=0.0_wp)
@@ -53,25 +53,25 @@ contains
     integer, intent(in) :: order(:)
     type(entries_t), intent(in) :: entries
     integer, intent(out) :: lower, upper
-    integer :: place(size(order))
+    integer :: index_of(size(order))
     integer :: p
 
-    place = inverse(order)
+    index_of = inverse(order)
     lower = 0
     upper = 0
     do p = 1, size(entries%row)
-      lower = max(lower, place(entries%row(p)) - place(entries%column(p)))
-      upper = max(upper, place(entries%column(p)) - place(entries%row(p)))
+      lower = max(lower, index_of(entries%row(p)) - index_of(entries%column(p)))
+      upper = max(upper, index_of(entries%column(p)) - index_of(entries%row(p)))
     end do
   end subroutine half_bandwidths
 
-  pure function inverse(order) result(place)
+  pure function inverse(order) result(index_of)
     integer, intent(in) :: order(:)
-    integer :: place(size(order))
+    integer :: index_of(size(order))
     integer :: i
 
     do i = 1, size(order)
-      place(order(i)) = i
+      index_of(order(i)) = i
     end do
   end function inverse
 

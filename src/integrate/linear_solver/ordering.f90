@@ -127,7 +127,7 @@ contains
     type(groups_t), intent(in) :: graph   !! neighbours sorted by their degree
     integer, intent(in) :: root
     type(search_t), intent(inout) :: search
-    integer :: place, i, level_end
+    integer :: position, i, level_end
 
     search%searches = search%searches + 1
     search%levels = 0
@@ -139,8 +139,8 @@ contains
       search%last_level = level_end + 1
       level_end = search%last
       search%levels = search%levels + 1
-      do place = search%last_level, level_end
-        do i = graph%start(search%reached(place)), graph%start(search%reached(place) + 1) - 1
+      do position = search%last_level, level_end
+        do i = graph%start(search%reached(position)), graph%start(search%reached(position) + 1) - 1
           if (search%reached_in(graph%member(i)) == search%searches) cycle
           search%reached_in(graph%member(i)) = search%searches
           search%last = search%last + 1

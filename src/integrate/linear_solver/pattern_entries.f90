@@ -5,10 +5,10 @@ module nocdyn_pattern_entries
   implicit none (type, external)
   private
 
-  public :: pattern_fault, state_entries, quadrature_entries
+  public :: pattern_error, state_entries, quadrature_entries
 
   !> Of a text that is not allocatable: gfortran 12 keeps the lengths of those that functions return where all threads write.
-  integer, parameter, public :: fault_length = 50
+  integer, parameter, public :: message_length = 50
 
   !> Some entries of a pattern.
   type, public :: entries_t
@@ -20,41 +20,41 @@ module nocdyn_pattern_entries
 contains
 
   !> The rule of the contract that a pattern breaks; empty if it is a good one.
-  pure function pattern_fault(pattern, states, quadratures) result(fault)
+  pure function pattern_error(pattern, states, quadratures) result(pattern_message)
     type(pattern_t), intent(in) :: pattern
     integer, intent(in) :: states, quadratures
-    character(len=fault_length) :: fault
+    character(len=message_length) :: pattern_message
 
-    fault = ''
+    pattern_message = ''
     if (size(pattern%row) /= size(pattern%column)) then
-      fault = 'a pattern has as many rows as columns'
+      pattern_message = 'a pattern has as many rows as columns'
     else if (any(pattern%row < 1 .or. pattern%row > states + quadratures)) then
-      fault = 'the rows of a pattern are states or quadratures'
+      pattern_message = 'the rows of a pattern are states or quadratures'
     else if (any(pattern%column < 1 .or. pattern%column > states)) then
-      fault = 'the columns of a pattern are states'
-    else if (has_twins(pattern, states, states + quadratures)) then
-      fault = 'a pattern has each position at most once'
+      pattern_message = 'the columns of a pattern are states'
+    else if (has_duplicates(pattern, states, states + quadratures)) then
+      pattern_message = 'a pattern has each position at most once'
     end if
-  end function pattern_fault
+  end function pattern_error
 
-  pure function has_twins(pattern, columns, rows)
+  pure function has_duplicates(pattern, columns, rows)
     type(pattern_t), intent(in) :: pattern
     integer, intent(in) :: columns, rows
-    logical :: has_twins
+    logical :: has_duplicates
     type(groups_t) :: rows_of
     integer :: seen_in(rows)
     integer :: i, column
 
     rows_of = grouped(columns, pattern%column, pattern%row)
-    has_twins = .false.
+    has_duplicates = .false.
     seen_in = 0
     do column = 1, columns
       do i = rows_of%start(column), rows_of%start(column + 1) - 1
-        has_twins = has_twins .or. seen_in(rows_of%member(i)) == column
+        has_duplicates = has_duplicates .or. seen_in(rows_of%member(i)) == column
         seen_in(rows_of%member(i)) = column
       end do
     end do
-  end function has_twins
+  end function has_duplicates
 
   !> Entries in the rows of the states.
   pure function state_entries(pattern, states) result(entries)

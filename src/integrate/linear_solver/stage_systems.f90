@@ -2,11 +2,11 @@
 module nocdyn_stage_systems
   use nocdyn_finite, only: all_finite, is_finite
   use nocdyn_kinds, only: wp
-  use nocdyn_pattern_entries, only: entries_t, fault_length, pattern_fault, quadrature_entries, state_entries
+  use nocdyn_pattern_entries, only: entries_t, message_length, pattern_error, quadrature_entries, state_entries
   use nocdyn_stage_matrix, only: stage_matrix_t
   use nocdyn_stage_solver, only: choose_stage_matrix
-  use nocdyn_system, only: evaluation_fine, pattern_t, system_t
-  use nocdyn_trial, only: park, trial_not_finite, trial_shorten, trial_t
+  use nocdyn_system, only: evaluation_ok, pattern_t, system_t
+  use nocdyn_step_attempt, only: disable_lane, attempt_not_finite, attempt_recoverable, step_attempt_t
   implicit none (type, external)
   private
 
@@ -28,11 +28,11 @@ contains
     type(stage_system_t), intent(out) :: stage_system
     class(system_t), intent(in) :: system
     type(pattern_t) :: pattern
-    character(len=fault_length) :: fault
+    character(len=message_length) :: pattern_message
 
     pattern = system%jacobian_pattern()
-    fault = pattern_fault(pattern, system%states, system%quadratures)
-    if (fault /= '') error stop 'nocdyn_stage_systems: ' // fault
+    pattern_message = pattern_error(pattern, system%states, system%quadratures)
+    if (pattern_message /= '') error stop 'nocdyn_stage_systems: ' // pattern_message
     associate (lanes => system%lanes, states => system%states, components => system%states + system%quadratures)
       allocate (stage_system%dfdy(lanes, size(pattern%row)), source=0.0_wp)
       allocate (stage_system%dfdt(lanes, components), source=0.0_wp)
@@ -42,66 +42,66 @@ contains
   end subroutine allocate_stage_system
 
   !> The derivatives at the start of the step; lanes where they fail are parked.
-  subroutine renew_jacobian(stage_system, system, trial)
+  subroutine renew_jacobian(stage_system, system, attempt)
     type(stage_system_t), intent(inout) :: stage_system
     class(system_t), intent(inout) :: system
-    type(trial_t), intent(inout) :: trial
+    type(step_attempt_t), intent(inout) :: attempt
     integer :: lane
 
-    call system%jacobian(trial%t, trial%y, stage_system%dfdy, stage_system%dfdt, trial%status)
+    call system%jacobian(attempt%t, attempt%y, stage_system%dfdy, stage_system%dfdt, attempt%rhs_status)
     associate (dfdy => stage_system%dfdy, dfdt => stage_system%dfdt)
       if (all_finite(size(dfdy), dfdy) .and. all_finite(size(dfdt), dfdt) &
-          .and. all(trial%status == evaluation_fine)) return
-      do lane = 1, trial%lanes
-        if (trial%status(lane) == evaluation_fine) then
+          .and. all(attempt%rhs_status == evaluation_ok)) return
+      do lane = 1, attempt%lanes
+        if (attempt%rhs_status(lane) == evaluation_ok) then
           if (all(is_finite(dfdy(lane, :))) .and. all(is_finite(dfdt(lane, :)))) cycle
-          trial%status(lane) = trial_not_finite
+          attempt%rhs_status(lane) = attempt_not_finite
         end if
         dfdy(lane, :) = 0.0_wp
         dfdt(lane, :) = 0.0_wp
-        call park(trial, lane, trial%status(lane), 0)
-        trial%status(lane) = evaluation_fine
+        call disable_lane(attempt, lane, attempt%rhs_status(lane), 0)
+        attempt%rhs_status(lane) = evaluation_ok
       end do
     end associate
   end subroutine renew_jacobian
 
   !> Factors for the step sizes of this attempt; a lane whose matrix is singular is parked, to take a shorter step.
-  subroutine factor(stage_system, trial, gamma)
+  subroutine factor(stage_system, attempt, gamma)
     type(stage_system_t), intent(inout) :: stage_system
-    type(trial_t), intent(inout) :: trial
+    type(step_attempt_t), intent(inout) :: attempt
     real(wp), intent(in) :: gamma
     logical :: singular
     integer :: lane
 
-    if (trial%states == 0) return
-    do lane = 1, trial%lanes
-      if (.not. trial%working(lane)) cycle
-      call stage_system%matrix%factor(lane, 1 / gamma, trial%h(lane), stage_system%dfdy, singular)
-      trial%factorisations(lane) = trial%factorisations(lane) + 1
-      if (singular) call park(trial, lane, trial_shorten, 0)
+    if (attempt%states == 0) return
+    do lane = 1, attempt%lanes
+      if (.not. attempt%active(lane)) cycle
+      call stage_system%matrix%factor(lane, 1 / gamma, attempt%h(lane), stage_system%dfdy, singular)
+      attempt%factorisations(lane) = attempt%factorisations(lane) + 1
+      if (singular) call disable_lane(attempt, lane, attempt_recoverable, 0)
     end do
   end subroutine factor
 
   !> k from r; zero for the lanes that are not working.
-  subroutine solve(stage_system, trial, gamma, r, k)
+  subroutine solve(stage_system, attempt, gamma, r, k)
     type(stage_system_t), intent(inout) :: stage_system
-    type(trial_t), intent(in) :: trial
+    type(step_attempt_t), intent(in) :: attempt
     real(wp), intent(in) :: gamma
     real(wp), contiguous, intent(in) :: r(:, :)      !! shape [lanes, components]
     real(wp), contiguous, intent(inout) :: k(:, :)   !! shape [lanes, components]
     integer :: lane
 
-    if (trial%states > 0) then
-      do lane = 1, trial%lanes
-        if (trial%working(lane)) call stage_system%matrix%solve(lane, r, k)
+    if (attempt%states > 0) then
+      do lane = 1, attempt%lanes
+        if (attempt%active(lane)) call stage_system%matrix%solve(lane, r, k)
       end do
     end if
-    if (trial%components > trial%states) then
-      call solve_quadratures(trial%lanes, trial%states, trial%components, stage_system%quadratures, stage_system%dfdy, &
-                             gamma, trial%h, r, k)
+    if (attempt%components > attempt%states) then
+      call solve_quadratures(attempt%lanes, attempt%states, attempt%components, stage_system%quadratures, stage_system%dfdy, &
+                             gamma, attempt%h, r, k)
     end if
-    do lane = 1, trial%lanes
-      if (.not. trial%working(lane)) k(lane, :) = 0.0_wp
+    do lane = 1, attempt%lanes
+      if (.not. attempt%active(lane)) k(lane, :) = 0.0_wp
     end do
   end subroutine solve
 

@@ -4,7 +4,7 @@
 !> stability domain, as in Hairer's DOPRI5; an implicit lane has ceased to be stiff when explicit steps of its size have
 !> been stable for a while.
 module nocdyn_auto_stepper
-  use nocdyn_combinations, only: padded_columns
+  use nocdyn_stage_sums, only: padded_columns
   use nocdyn_explicit_stepper, only: explicit_stepper, explicit_stepper_t
   use nocdyn_explicit_tables, only: explicit_table_t
   use nocdyn_kinds, only: wp
@@ -12,35 +12,36 @@ module nocdyn_auto_stepper
   use nocdyn_rosenbrock_tables, only: rosenbrock_table_t
   use nocdyn_stepper, only: stepper_t
   use nocdyn_system, only: system_t
-  use nocdyn_trial, only: spread_steps, trial_t
+  use nocdyn_step_attempt, only: spread_steps, step_attempt_t
   implicit none (type, external)
   private
 
   public :: auto_stepper
 
-  integer, parameter :: most_hits = 15         !! accepted steps on the border of stability that make a lane stiff
-  integer, parameter :: calm_steps = 6         !! successive steps off the border that make the earlier ones forgotten
-  real(wp), parameter :: comfort = 0.8_wp      !! of the border: below it explicit steps are stable
+  integer, parameter :: max_stiff_steps = 15         !! accepted steps on the border of stability that make a lane stiff
+  integer, parameter :: nonstiff_steps = 6         !! successive steps off the border that make the earlier ones forgotten
+  real(wp), parameter :: stability_margin = 0.8_wp      !! of the border: below it explicit steps are stable
 
   type, extends(stepper_t), public :: auto_stepper_t
     private
     type(explicit_stepper_t) :: explicit
     type(rosenbrock_stepper_t) :: implicit
-    real(wp) :: border                              !! of the explicit method's stability domain on the negative real axis
+    real(wp) :: stability_limit                              !! of the explicit method's stability domain on the negative real
+                                                             !! axis
     logical, allocatable :: is_implicit(:)          !! lanes that take Rosenbrock steps
-    integer, allocatable :: hits(:)                 !! steps of the lane that spoke for the other kind
-    integer, allocatable :: calm(:)                 !! successive steps of an explicit lane that did not
+    integer, allocatable :: evidence(:)                 !! steps of the lane that spoke for the other kind
+    integer, allocatable :: nonstiff(:)                 !! successive steps of an explicit lane that did not
     real(wp), allocatable :: stiffness(:)           !! |h lambda| of the last attempt
     logical, allocatable :: mask(:)
-    logical, allocatable :: working(:)              !! at the beginning of the attempt, then at the end of the explicit ones
+    logical, allocatable :: active(:)              !! at the beginning of the attempt, then at the end of the explicit ones
     real(wp), allocatable :: h(:)
-    integer, allocatable :: verdict(:)
-    real(wp), allocatable :: y_new(:, :), deviation(:, :), coarse_deviation(:, :)   !! of the explicit lanes
+    integer, allocatable :: step_status(:)
+    real(wp), allocatable :: y_new(:, :), error_estimate(:, :), low_order_estimate(:, :)   !! of the explicit lanes
     real(wp), allocatable :: coefficients(:, :, :)
   contains
     procedure :: prepare
-    procedure :: begin
-    procedure :: attempt
+    procedure :: start
+    procedure :: take_step
     procedure :: interpolate
     procedure :: accept
     procedure :: resume
@@ -56,12 +57,12 @@ contains
 
     stepper%explicit = explicit_stepper(explicit_table)
     stepper%implicit = rosenbrock_stepper(rosenbrock_table)
-    stepper%border = explicit_table%stability_border
+    stepper%stability_limit = explicit_table%stability_limit
     stepper%order = stepper%explicit%order
     stepper%error_order = stepper%explicit%error_order
     stepper%degree = max(stepper%explicit%degree, stepper%implicit%degree)
-    stepper%most_growth = stepper%explicit%most_growth
-    stepper%has_coarse_error = stepper%explicit%has_coarse_error
+    stepper%max_growth = stepper%explicit%max_growth
+    stepper%has_low_order_error = stepper%explicit%has_low_order_error
   end function auto_stepper
 
   subroutine prepare(self, system)
@@ -71,144 +72,145 @@ contains
 
     call self%explicit%prepare(system)
     call self%implicit%prepare(system)
-    if (allocated(self%hits)) deallocate (self%is_implicit, self%hits, self%calm, self%stiffness, self%mask, self%working, &
-                                          self%h, self%verdict, self%y_new, self%deviation, self%coarse_deviation, &
+    if (allocated(self%evidence)) deallocate (self%is_implicit, self%evidence, self%nonstiff, self%stiffness, self%mask, &
+                                              self%active, &
+                                          self%h, self%step_status, self%y_new, self%error_estimate, self%low_order_estimate, &
                                           self%coefficients)
     columns = padded_columns(system%lanes, system%states + system%quadratures)
     associate (lanes => system%lanes)
-      allocate (self%is_implicit(lanes), self%mask(lanes), self%working(lanes), source=.false.)
-      allocate (self%hits(lanes), self%calm(lanes), self%verdict(lanes), source=0)
+      allocate (self%is_implicit(lanes), self%mask(lanes), self%active(lanes), source=.false.)
+      allocate (self%evidence(lanes), self%nonstiff(lanes), self%step_status(lanes), source=0)
       allocate (self%stiffness(lanes), self%h(lanes), source=0.0_wp)
-      allocate (self%y_new(lanes, columns), self%deviation(lanes, columns), self%coarse_deviation(lanes, columns), &
+      allocate (self%y_new(lanes, columns), self%error_estimate(lanes, columns), self%low_order_estimate(lanes, columns), &
                 source=0.0_wp)
       allocate (self%coefficients(lanes, columns, self%degree), source=0.0_wp)
     end associate
   end subroutine prepare
 
-  subroutine begin(self, trial, starting)
+  subroutine start(self, attempt, starting)
     class(auto_stepper_t), intent(inout) :: self
-    type(trial_t), intent(inout) :: trial
+    type(step_attempt_t), intent(inout) :: attempt
     logical, intent(in) :: starting(:)
 
-    call self%explicit%begin(trial, starting)
-    call self%implicit%forget(starting)   ! its slopes and Jacobians are renewed when the lane switches
+    call self%explicit%start(attempt, starting)
+    call self%implicit%reset_spectra(starting)   ! its slopes and Jacobians are renewed when the lane switches
     where (starting)
       self%is_implicit = .false.
-      self%hits = 0
-      self%calm = 0
+      self%evidence = 0
+      self%nonstiff = 0
     end where
-  end subroutine begin
+  end subroutine start
 
-  subroutine attempt(self, system, trial)
+  subroutine take_step(self, system, attempt)
     class(auto_stepper_t), intent(inout) :: self
     class(system_t), intent(inout) :: system
-    type(trial_t), intent(inout) :: trial
+    type(step_attempt_t), intent(inout) :: attempt
     integer :: lane
 
-    do lane = 1, trial%lanes
-      trial%implicit(lane) = self%is_implicit(lane)
-      trial%error_order(lane) = merge(self%implicit%error_order, self%explicit%error_order, self%is_implicit(lane))
-      trial%most_growth(lane) = merge(self%implicit%most_growth, self%explicit%most_growth, self%is_implicit(lane))
+    do lane = 1, attempt%lanes
+      attempt%implicit(lane) = self%is_implicit(lane)
+      attempt%error_order(lane) = merge(self%implicit%error_order, self%explicit%error_order, self%is_implicit(lane))
+      attempt%max_growth(lane) = merge(self%implicit%max_growth, self%explicit%max_growth, self%is_implicit(lane))
     end do
-    if (.not. any(self%is_implicit .and. trial%working)) then
-      call self%explicit%attempt(system, trial)
-    else if (all(self%is_implicit .or. .not. trial%working)) then
-      call self%implicit%attempt(system, trial)
-      if (trial%has_coarse_deviation) trial%coarse_deviation(:, :) = 0.0_wp
+    if (.not. any(self%is_implicit .and. attempt%active)) then
+      call self%explicit%take_step(system, attempt)
+    else if (all(self%is_implicit .or. .not. attempt%active)) then
+      call self%implicit%take_step(system, attempt)
+      if (attempt%has_low_order_estimate) attempt%low_order_estimate(:, :) = 0.0_wp
     else
-      call attempt_both(self, system, trial)
+      call attempt_both(self, system, attempt)
     end if
-    do lane = 1, trial%lanes
-      if (.not. trial%working(lane)) cycle
+    do lane = 1, attempt%lanes
+      if (.not. attempt%active(lane)) cycle
       if (self%is_implicit(lane)) then
-        self%stiffness(lane) = self%implicit%stiffness(trial, lane)
+        self%stiffness(lane) = self%implicit%stiffness(attempt, lane)
       else
-        self%stiffness(lane) = self%explicit%stiffness(trial, lane)
+        self%stiffness(lane) = self%explicit%stiffness(attempt, lane)
       end if
     end do
-  end subroutine attempt
+  end subroutine take_step
 
   !> The explicit lanes first, then the others; each time the rest is parked.
-  subroutine attempt_both(self, system, trial)
+  subroutine attempt_both(self, system, attempt)
     class(auto_stepper_t), intent(inout) :: self
     class(system_t), intent(inout) :: system
-    type(trial_t), intent(inout) :: trial
+    type(step_attempt_t), intent(inout) :: attempt
 
-    self%working(:) = trial%working
-    self%h(:) = trial%h
-    call narrow(self, trial, .false.)
-    call self%explicit%attempt(system, trial)
-    self%mask(:) = trial%working
-    self%verdict(:) = trial%verdict
-    self%y_new(:, :) = trial%y_new
-    self%deviation(:, :) = trial%deviation
-    self%coarse_deviation(:, :) = trial%coarse_deviation
-    call narrow(self, trial, .true.)
-    call self%implicit%attempt(system, trial)
-    call join(self, trial)
+    self%active(:) = attempt%active
+    self%h(:) = attempt%h
+    call select_kind(self, attempt, .false.)
+    call self%explicit%take_step(system, attempt)
+    self%mask(:) = attempt%active
+    self%step_status(:) = attempt%step_status
+    self%y_new(:, :) = attempt%y_new
+    self%error_estimate(:, :) = attempt%error_estimate
+    self%low_order_estimate(:, :) = attempt%low_order_estimate
+    call select_kind(self, attempt, .true.)
+    call self%implicit%take_step(system, attempt)
+    call merge_kinds(self, attempt)
   end subroutine attempt_both
 
   !> Only the lanes of one kind take part.
-  subroutine narrow(self, trial, implicit)
+  subroutine select_kind(self, attempt, implicit)
     type(auto_stepper_t), intent(in) :: self
-    type(trial_t), intent(inout) :: trial
+    type(step_attempt_t), intent(inout) :: attempt
     logical, intent(in) :: implicit
     integer :: lane
 
-    do lane = 1, trial%lanes
-      trial%working(lane) = self%working(lane) .and. (self%is_implicit(lane) .eqv. implicit)
-      trial%h(lane) = merge(self%h(lane), 0.0_wp, trial%working(lane))
+    do lane = 1, attempt%lanes
+      attempt%active(lane) = self%active(lane) .and. (self%is_implicit(lane) .eqv. implicit)
+      attempt%h(lane) = merge(self%h(lane), 0.0_wp, attempt%active(lane))
     end do
-    call spread_steps(trial)
-  end subroutine narrow
+    call spread_steps(attempt)
+  end subroutine select_kind
 
   !> Puts the results of the explicit lanes beside those of the implicit ones.
-  subroutine join(self, trial)
+  subroutine merge_kinds(self, attempt)
     type(auto_stepper_t), intent(in) :: self
-    type(trial_t), intent(inout) :: trial
+    type(step_attempt_t), intent(inout) :: attempt
     integer :: component, lane
 
-    do lane = 1, trial%lanes
+    do lane = 1, attempt%lanes
       if (self%is_implicit(lane)) cycle
-      trial%working(lane) = self%mask(lane)
-      trial%verdict(lane) = self%verdict(lane)
-      trial%h(lane) = merge(self%h(lane), 0.0_wp, self%mask(lane))
+      attempt%active(lane) = self%mask(lane)
+      attempt%step_status(lane) = self%step_status(lane)
+      attempt%h(lane) = merge(self%h(lane), 0.0_wp, self%mask(lane))
     end do
-    call spread_steps(trial)
-    do component = 1, trial%components
-      do lane = 1, trial%lanes
+    call spread_steps(attempt)
+    do component = 1, attempt%components
+      do lane = 1, attempt%lanes
         if (self%is_implicit(lane)) then
-          trial%coarse_deviation(lane, component) = 0.0_wp
+          attempt%low_order_estimate(lane, component) = 0.0_wp
         else
-          trial%y_new(lane, component) = self%y_new(lane, component)
-          trial%deviation(lane, component) = self%deviation(lane, component)
-          trial%coarse_deviation(lane, component) = self%coarse_deviation(lane, component)
+          attempt%y_new(lane, component) = self%y_new(lane, component)
+          attempt%error_estimate(lane, component) = self%error_estimate(lane, component)
+          attempt%low_order_estimate(lane, component) = self%low_order_estimate(lane, component)
         end if
       end do
     end do
-  end subroutine join
+  end subroutine merge_kinds
 
-  subroutine interpolate(self, system, trial, wanted, coefficients)
+  subroutine interpolate(self, system, attempt, wanted, coefficients)
     class(auto_stepper_t), intent(inout) :: self
     class(system_t), intent(inout) :: system
-    type(trial_t), intent(inout) :: trial
+    type(step_attempt_t), intent(inout) :: attempt
     logical, intent(in) :: wanted(:)
     real(wp), contiguous, intent(inout) :: coefficients(:, :, :)
     integer :: lane, power
 
     coefficients(:, :, self%explicit%degree + 1:) = 0.0_wp
     if (.not. any(self%is_implicit)) then
-      call self%explicit%interpolate(system, trial, wanted, coefficients(:, :, :self%explicit%degree))
+      call self%explicit%interpolate(system, attempt, wanted, coefficients(:, :, :self%explicit%degree))
       return
     end if
     self%mask(:) = wanted .and. .not. self%is_implicit
-    if (any(self%mask)) call self%explicit%interpolate(system, trial, self%mask, coefficients(:, :, :self%explicit%degree))
+    if (any(self%mask)) call self%explicit%interpolate(system, attempt, self%mask, coefficients(:, :, :self%explicit%degree))
     self%coefficients(:, :, self%implicit%degree + 1:) = 0.0_wp
     self%mask(:) = wanted .and. self%is_implicit
     if (.not. any(self%mask)) return
-    call self%implicit%interpolate(system, trial, self%mask, self%coefficients(:, :, :self%implicit%degree))
+    call self%implicit%interpolate(system, attempt, self%mask, self%coefficients(:, :, :self%implicit%degree))
     do power = 1, self%degree
-      do lane = 1, trial%lanes
+      do lane = 1, attempt%lanes
         if (self%mask(lane)) coefficients(lane, :, power) = self%coefficients(lane, :, power)
       end do
     end do
@@ -225,50 +227,50 @@ contains
     if (any(self%mask)) call self%implicit%accept(self%mask)
     do lane = 1, size(accepted)
       self%mask(lane) = .false.
-      if (accepted(lane)) call weigh_stiffness(self, lane, self%mask(lane))
+      if (accepted(lane)) call count_stiffness(self, lane, self%mask(lane))
     end do
     if (.not. any(self%mask)) return
     self%is_implicit(:) = self%is_implicit .neqv. self%mask
-    call self%explicit%renew(self%mask)
+    call self%explicit%invalidate_first_stage(self%mask)
     call self%implicit%accept(self%mask)
-    call self%implicit%forget(self%mask)
+    call self%implicit%reset_spectra(self%mask)
   end subroutine accept
 
   !> Each lane goes on with its kind of method and with what it knows of its stiffness.
-  subroutine resume(self, trial, resuming)
+  subroutine resume(self, attempt, resuming)
     class(auto_stepper_t), intent(inout) :: self
-    type(trial_t), intent(inout) :: trial
+    type(step_attempt_t), intent(inout) :: attempt
     logical, intent(in) :: resuming(:)
 
     self%mask(:) = resuming .and. .not. self%is_implicit
-    if (any(self%mask)) call self%explicit%begin(trial, self%mask)
+    if (any(self%mask)) call self%explicit%start(attempt, self%mask)
     self%mask(:) = resuming .and. self%is_implicit
-    if (any(self%mask)) call self%implicit%begin(trial, self%mask)
+    if (any(self%mask)) call self%implicit%start(attempt, self%mask)
   end subroutine resume
 
   !> Counts what an accepted step says about the stiffness of its lane.
-  pure subroutine weigh_stiffness(self, lane, switches)
+  pure subroutine count_stiffness(self, lane, switches)
     type(auto_stepper_t), intent(inout) :: self
     integer, intent(in) :: lane
     logical, intent(out) :: switches   !! the lane goes on with the other kind
 
-    associate (hits => self%hits(lane), calm => self%calm(lane))
+    associate (evidence => self%evidence(lane), nonstiff => self%nonstiff(lane))
       if (self%is_implicit(lane)) then
-        hits = merge(hits + 1, 0, self%stiffness(lane) < comfort * self%border)
-        switches = hits >= calm_steps
-      else if (self%stiffness(lane) > self%border) then
-        hits = hits + 1
-        calm = 0
-        switches = hits >= most_hits
+        evidence = merge(evidence + 1, 0, self%stiffness(lane) < stability_margin * self%stability_limit)
+        switches = evidence >= nonstiff_steps
+      else if (self%stiffness(lane) > self%stability_limit) then
+        evidence = evidence + 1
+        nonstiff = 0
+        switches = evidence >= max_stiff_steps
       else
-        calm = calm + 1
-        if (calm >= calm_steps) hits = 0
+        nonstiff = nonstiff + 1
+        if (nonstiff >= nonstiff_steps) evidence = 0
         switches = .false.
       end if
       if (.not. switches) return
-      hits = 0
-      calm = 0
+      evidence = 0
+      nonstiff = 0
     end associate
-  end subroutine weigh_stiffness
+  end subroutine count_stiffness
 
 end module nocdyn_auto_stepper

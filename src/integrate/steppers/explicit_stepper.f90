@@ -1,14 +1,15 @@
 !> Steps of any explicit Runge-Kutta method.
 module nocdyn_explicit_stepper
-  use nocdyn_combinations, only: combination
+  use nocdyn_stage_sums, only: stage_sum
   use nocdyn_explicit_tables, only: explicit_table_t
   use nocdyn_kinds, only: wp
   use nocdyn_masks, only: all_true, any_true
-  use nocdyn_stages, only: allocate_stages, estimate_error, expand, inner_state, set_weights, share_places, stages_t, &
+  use nocdyn_stages, only: allocate_stages, estimate_error, form_dense_output, stage_state, set_tableau, share_storage, &
+                           stages_t, &
     update_state
   use nocdyn_stepper, only: stepper_t
   use nocdyn_system, only: system_t
-  use nocdyn_trial, only: count_evaluations, evaluate, evaluate_finite, evaluate_start, trial_t
+  use nocdyn_step_attempt, only: count_evaluations, evaluate, evaluate_finite, evaluate_start, step_attempt_t
   implicit none (type, external)
   private
 
@@ -24,11 +25,11 @@ module nocdyn_explicit_stepper
     logical, allocatable :: moved(:)             !! lanes whose first stage is not known yet
   contains
     procedure :: prepare
-    procedure :: begin
-    procedure :: attempt
+    procedure :: start
+    procedure :: take_step
     procedure :: interpolate
     procedure :: accept
-    procedure :: renew
+    procedure :: invalidate_first_stage
     procedure :: stiffness
   end type explicit_stepper_t
 
@@ -41,14 +42,14 @@ contains
 
     stepper%order = table%order
     stepper%error_order = table%error_order
-    stepper%most_growth = table%most_growth
+    stepper%max_growth = table%max_growth
     stepper%degree = size(table%dense, 2)
     stepper%first_same_as_last = table%first_same_as_last
     allocate (stepper%c, source=table%c)
-    call set_weights(stepper%stages, table%a, table%b, table%error, table%dense)
-    stepper%has_coarse_error = allocated(table%coarse_error)
-    if (stepper%has_coarse_error) stepper%stages%coarse_error = combination(table%coarse_error)
-    call share_places(stepper%stages)
+    call set_tableau(stepper%stages, table%a, table%b, table%error, table%dense)
+    stepper%has_low_order_error = allocated(table%low_order_error)
+    if (stepper%has_low_order_error) stepper%stages%low_order_error = stage_sum(table%low_order_error)
+    call share_storage(stepper%stages)
   end function explicit_stepper
 
   subroutine prepare(self, system)
@@ -62,46 +63,47 @@ contains
     allocate (self%y_stage, source=self%stages%k(:, :, 1))
   end subroutine prepare
 
-  subroutine begin(self, trial, starting)
+  subroutine start(self, attempt, starting)
     class(explicit_stepper_t), intent(inout) :: self
-    type(trial_t), intent(inout) :: trial
+    type(step_attempt_t), intent(inout) :: attempt
     logical, intent(in) :: starting(:)
     integer :: lane
 
     do lane = 1, size(starting)
       if (.not. starting(lane)) cycle
-      self%stages%k(lane, :, 1) = trial%slope(lane, :)
+      self%stages%k(lane, :, 1) = attempt%slope(lane, :)
       self%moved(lane) = .false.
     end do
-  end subroutine begin
+  end subroutine start
 
-  subroutine attempt(self, system, trial)
+  subroutine take_step(self, system, attempt)
     class(explicit_stepper_t), intent(inout) :: self
     class(system_t), intent(inout) :: system
-    type(trial_t), intent(inout) :: trial
+    type(step_attempt_t), intent(inout) :: attempt
     integer :: last, stage
 
-    if (any_true(trial%lanes, self%moved)) then
-      if (any(self%moved .and. trial%working)) call renew_first_stage(self, system, trial)
+    if (any_true(attempt%lanes, self%moved)) then
+      if (any(self%moved .and. attempt%active)) call renew_first_stage(self, system, attempt)
     end if
     last = merge(self%stages%step - 1, self%stages%step, self%first_same_as_last)
     do stage = 2, last
-      if (.not. any(trial%working)) exit
-      call inner_state(self%stages, trial, stage, self%y_stage)
-      call place_stage(trial%lanes, trial%t, trial%h, self%c(stage), self%t_stage)
-      call evaluate(trial, system, self%t_stage, self%y_stage, self%stages%k(1, 1, self%stages%place(stage)))
+      if (.not. any(attempt%active)) exit
+      call stage_state(self%stages, attempt, stage, self%y_stage)
+      call set_stage_time(attempt%lanes, attempt%t, attempt%h, self%c(stage), self%t_stage)
+      call evaluate(attempt, system, self%t_stage, self%y_stage, self%stages%k(1, 1, self%stages%k_index(stage)))
     end do
-    call update_state(self%stages, trial)
+    call update_state(self%stages, attempt)
     if (self%first_same_as_last) then
-      call place_stage(trial%lanes, trial%t, trial%h, 1.0_wp, self%t_stage)
-      call evaluate_finite(trial, system, self%t_stage, trial%y_new, self%stages%k(1, 1, self%stages%place(self%stages%step)))
+      call set_stage_time(attempt%lanes, attempt%t, attempt%h, 1.0_wp, self%t_stage)
+      call evaluate_finite(attempt, system, self%t_stage, attempt%y_new, self%stages%k(1, 1, &
+                                                                                       self%stages%k_index(self%stages%step)))
     end if
-    call estimate_error(self%stages, trial)
-    call count_evaluations(trial)
-  end subroutine attempt
+    call estimate_error(self%stages, attempt)
+    call count_evaluations(attempt)
+  end subroutine take_step
 
   !> Times of a stage.
-  pure subroutine place_stage(lanes, t, h, c, t_stage)
+  pure subroutine set_stage_time(lanes, t, h, c, t_stage)
     integer, intent(in) :: lanes
     real(wp), intent(in) :: t(lanes), h(lanes), c
     real(wp), intent(inout) :: t_stage(lanes)
@@ -111,37 +113,37 @@ contains
     else
       t_stage = t + c * h
     end if
-  end subroutine place_stage
+  end subroutine set_stage_time
 
-  subroutine renew_first_stage(self, system, trial)
+  subroutine renew_first_stage(self, system, attempt)
     class(explicit_stepper_t), intent(inout) :: self
     class(system_t), intent(inout) :: system
-    type(trial_t), intent(inout) :: trial
+    type(step_attempt_t), intent(inout) :: attempt
 
-    call evaluate_start(trial, system, self%moved, self%stages%k)
-    self%moved(:) = self%moved .and. .not. trial%working
+    call evaluate_start(attempt, system, self%moved, self%stages%k)
+    self%moved(:) = self%moved .and. .not. attempt%active
   end subroutine renew_first_stage
 
   !> Evaluates the stages that only the solution inside the step needs, then the polynomials.
-  subroutine interpolate(self, system, trial, wanted, coefficients)
+  subroutine interpolate(self, system, attempt, wanted, coefficients)
     class(explicit_stepper_t), intent(inout) :: self
     class(system_t), intent(inout) :: system
-    type(trial_t), intent(inout) :: trial
+    type(step_attempt_t), intent(inout) :: attempt
     logical, intent(in) :: wanted(:)
     real(wp), contiguous, intent(inout) :: coefficients(:, :, :)
     integer :: stage
 
     if (self%stages%all > self%stages%step) then
-      trial%working(:) = wanted
+      attempt%active(:) = wanted
       do stage = self%stages%step + 1, self%stages%all
-        call inner_state(self%stages, trial, stage, self%y_stage)
-        call place_stage(trial%lanes, trial%t, trial%h, self%c(stage), self%t_stage)
-        call evaluate_finite(trial, system, self%t_stage, self%y_stage, &
-                             self%stages%k(1, 1, self%stages%place(stage)))
+        call stage_state(self%stages, attempt, stage, self%y_stage)
+        call set_stage_time(attempt%lanes, attempt%t, attempt%h, self%c(stage), self%t_stage)
+        call evaluate_finite(attempt, system, self%t_stage, self%y_stage, &
+                             self%stages%k(1, 1, self%stages%k_index(stage)))
       end do
-      call count_evaluations(trial)
+      call count_evaluations(attempt)
     end if
-    call expand(self%stages, trial, coefficients)
+    call form_dense_output(self%stages, attempt, coefficients)
   end subroutine interpolate
 
   subroutine accept(self, accepted)
@@ -153,7 +155,7 @@ contains
       self%moved(:) = self%moved .or. accepted
       return
     end if
-    associate (k => self%stages%k, last => self%stages%place(self%stages%step))
+    associate (k => self%stages%k, last => self%stages%k_index(self%stages%step))
       if (all_true(size(accepted), accepted)) then
         k(:, :, 1) = k(:, :, last)
       else
@@ -167,18 +169,18 @@ contains
   end subroutine accept
 
   !> Forgets the first stage of lanes that another method has moved.
-  pure subroutine renew(self, moved)
+  pure subroutine invalidate_first_stage(self, moved)
     class(explicit_stepper_t), intent(inout) :: self
     logical, intent(in) :: moved(:)
 
     self%moved(:) = self%moved .or. moved
-  end subroutine renew
+  end subroutine invalidate_first_stage
 
   !> |h lambda| of the dominant eigenvalue, from the last two stages at t + h: Hairer, Wanner, Solving Ordinary
   !> Differential Equations II, (IV.2.6), for methods whose last stage is f(t + h, y_new).
-  pure function stiffness(self, trial, lane) result(ratio)
+  pure function stiffness(self, attempt, lane) result(ratio)
     class(explicit_stepper_t), intent(in) :: self
-    type(trial_t), intent(in) :: trial
+    type(step_attempt_t), intent(in) :: attempt
     integer, intent(in) :: lane
     real(wp) :: ratio
     real(wp), parameter :: largest = 1.0e100_wp   ! keeps squares finite
@@ -187,15 +189,15 @@ contains
 
     slopes = 0.0_wp
     states = 0.0_wp
-    associate (k => self%stages%k, last => self%stages%place(self%stages%step), &
-               before => self%stages%place(self%stages%step - 1))
-      do i = 1, trial%states
+    associate (k => self%stages%k, last => self%stages%k_index(self%stages%step), &
+               before => self%stages%k_index(self%stages%step - 1))
+      do i = 1, attempt%states
         slopes = slopes + min(abs(k(lane, i, last) - k(lane, i, before)), largest)**2
-        states = states + min(abs(trial%y_new(lane, i) - self%y_stage(lane, i)), largest)**2
+        states = states + min(abs(attempt%y_new(lane, i) - self%y_stage(lane, i)), largest)**2
       end do
     end associate
     ratio = 0.0_wp
-    if (states > 0) ratio = trial%h(lane) * sqrt(slopes / states)
+    if (states > 0) ratio = attempt%h(lane) * sqrt(slopes / states)
   end function stiffness
 
 end module nocdyn_explicit_stepper

@@ -20,13 +20,13 @@ module nocdyn_explicit_tables
     integer :: error_order                   !! the estimated error of a step falls as h^(error_order + 1)
     integer :: dense_order                   !! of the solution inside a step
     logical :: first_same_as_last            !! the last stage is f(t + h, y_new), the first stage of the next step
-    real(wp) :: most_growth = 6.0_wp         !! of the step size, in the authors' code
-    real(wp) :: stability_border = 0.0_wp    !! just within the stability domain on the negative real axis
+    real(wp) :: max_growth = 6.0_wp         !! of the step size, in the authors' code
+    real(wp) :: stability_limit = 0.0_wp    !! just within the stability domain on the negative real axis
     real(wp), allocatable :: a(:, :)         !! strictly lower triangular, shape [all stages, all stages]
     real(wp), allocatable :: b(:)            !! shape [stages]
     real(wp), allocatable :: c(:)            !! shape [all stages]
     real(wp), allocatable :: error(:)        !! b minus the embedded weights, shape [stages]
-    real(wp), allocatable :: coarse_error(:) !! the same of a second embedded method of lower order, if there is one
+    real(wp), allocatable :: low_order_error(:) !! the same of a second embedded method of lower order, if there is one
     real(wp), allocatable :: dense(:, :)     !! b_i(theta) = sum_p dense(i, p) theta^p, shape [all stages, degree]
   end type explicit_table_t
 
@@ -44,8 +44,8 @@ contains
     table%error_order = 4
     table%dense_order = 4
     table%first_same_as_last = .true.
-    table%most_growth = 10.0_wp
-    table%stability_border = 3.25_wp
+    table%max_growth = 10.0_wp
+    table%stability_limit = 3.25_wp
     allocate (table%a(7, 7), table%b(7), table%c(7), table%error(7), table%dense(7, 4), source=0.0_wp)
     table%c(:) = [0.0_wp, 1.0_wp / 5, 3.0_wp / 10, 4.0_wp / 5, 8.0_wp / 9, 1.0_wp, 1.0_wp]
     table%a(2, 1) = 1.0_wp / 5
@@ -89,9 +89,9 @@ contains
     table%error_order = 7
     table%dense_order = 7
     table%first_same_as_last = .true.
-    table%stability_border = 6.1_wp
+    table%stability_limit = 6.1_wp
     allocate (table%a(16, 16), table%b(13), table%c(16), table%dense(16, 7), source=0.0_wp)
-    allocate (table%error(13), table%coarse_error(13), source=0.0_wp)
+    allocate (table%error(13), table%low_order_error(13), source=0.0_wp)
     table%c(2:5) = [5.26001519587677318785587544488e-2_wp, 7.89002279381515978178381316732e-2_wp, &
       0.118350341907227396726757197510_wp, 0.281649658092772603273242802490_wp]
     table%c(6:) = [1.0_wp / 3, 1.0_wp / 4, 4.0_wp / 13, 127.0_wp / 195, 3.0_wp / 5, 6.0_wp / 7, 1.0_wp, 1.0_wp, &
@@ -107,8 +107,8 @@ contains
     table%error(6:12) = [-1.225156446376204440720569753_wp, -0.4957589496572501915214079952_wp, &
       1.664377182454986536961530415_wp, -0.3503288487499736816886487290_wp, 0.3341791187130174790297318841_wp, &
       8.192320648511571246570742613e-2_wp, -2.235530786388629525884427845e-2_wp]
-    table%coarse_error(:) = table%b
-    table%coarse_error([1, 9, 12]) = table%b([1, 9, 12]) - [ &
+    table%low_order_error(:) = table%b
+    table%low_order_error([1, 9, 12]) = table%b([1, 9, 12]) - [ &
       0.244094488188976377952755905512_wp, 0.733846688281611857341361741547_wp, 2.20588235294117647058823529412e-2_wp]
     table%dense(:, :) = dormand_prince_8_dense(table%b)
   end function dormand_prince_8

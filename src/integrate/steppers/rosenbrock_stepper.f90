@@ -1,14 +1,14 @@
 !> Steps of any Rosenbrock method with the exact Jacobian.
 module nocdyn_rosenbrock_stepper
-  use nocdyn_combinations, only: combination, combination_t, combine, set_offsets
+  use nocdyn_stage_sums, only: stage_sum, stage_sum_t, sum_stages, set_offsets
   use nocdyn_kinds, only: wp
   use nocdyn_rosenbrock_tables, only: rosenbrock_table_t
-  use nocdyn_spectra, only: allocate_spectra, dominate, restart_spectrum, spectra_t
+  use nocdyn_spectral_radius, only: allocate_spectral_radius, estimate_spectral_radius, restart_power_iteration, spectral_radius_t
   use nocdyn_stage_systems, only: allocate_stage_system, factor, renew_jacobian, solve, stage_system_t
-  use nocdyn_stages, only: allocate_stages, estimate_error, expand, inner_state, set_weights, stages_t, update_state
+  use nocdyn_stages, only: allocate_stages, estimate_error, form_dense_output, stage_state, set_tableau, stages_t, update_state
   use nocdyn_stepper, only: stepper_t
   use nocdyn_system, only: system_t
-  use nocdyn_trial, only: count_evaluations, evaluate_finite, evaluate_start, trial_t
+  use nocdyn_step_attempt, only: count_evaluations, evaluate_finite, evaluate_start, step_attempt_t
   implicit none (type, external)
   private
 
@@ -20,9 +20,9 @@ module nocdyn_rosenbrock_stepper
     real(wp) :: gamma
     real(wp), allocatable :: alpha(:)                 !! places of the stages in the step
     real(wp), allocatable :: gamma_sum(:)             !! factors of h df/dt
-    type(combination_t), allocatable :: coupling(:)   !! rows of c_ij
+    type(stage_sum_t), allocatable :: coupling(:)   !! rows of c_ij
     type(stage_system_t) :: stage_system
-    type(spectra_t) :: spectra
+    type(spectral_radius_t) :: spectrum
     real(wp), allocatable :: t_stage(:)
     real(wp), allocatable :: y_stage(:, :)
     real(wp), allocatable :: f(:, :)
@@ -33,12 +33,12 @@ module nocdyn_rosenbrock_stepper
     logical, allocatable :: no_jacobian(:)            !! lanes that moved since the Jacobian was evaluated
   contains
     procedure :: prepare
-    procedure :: begin
-    procedure :: attempt
+    procedure :: start
+    procedure :: take_step
     procedure :: interpolate
     procedure :: accept
     procedure :: stiffness
-    procedure :: forget
+    procedure :: reset_spectra
   end type rosenbrock_stepper_t
 
 contains
@@ -57,9 +57,9 @@ contains
     allocate (stepper%gamma_sum, source=table%gamma_sum)
     allocate (stepper%coupling(table%stages))
     do i = 1, table%stages
-      stepper%coupling(i) = combination(table%c(i, :))
+      stepper%coupling(i) = stage_sum(table%c(i, :))
     end do
-    call set_weights(stepper%stages, table%a, table%m, table%error, table%dense)
+    call set_tableau(stepper%stages, table%a, table%m, table%error, table%dense)
   end function rosenbrock_stepper
 
   subroutine prepare(self, system)
@@ -69,7 +69,7 @@ contains
     call allocate_stages(self%stages, system)
     call set_offsets(self%coupling, system%lanes * size(self%stages%k, 2), self%stages%all)
     call allocate_stage_system(self%stage_system, system)
-    call allocate_spectra(self%spectra, system)
+    call allocate_spectral_radius(self%spectrum, system)
     if (allocated(self%slope)) deallocate (self%t_stage, self%y_stage, self%f, self%r, self%one, self%slope, &
                                            self%no_slope, self%no_jacobian)
     associate (lanes => system%lanes)
@@ -80,76 +80,76 @@ contains
     end associate
   end subroutine prepare
 
-  subroutine begin(self, trial, starting)
+  subroutine start(self, attempt, starting)
     class(rosenbrock_stepper_t), intent(inout) :: self
-    type(trial_t), intent(inout) :: trial
+    type(step_attempt_t), intent(inout) :: attempt
     logical, intent(in) :: starting(:)
     integer :: lane
 
     do lane = 1, size(starting)
-      trial%implicit(lane) = trial%implicit(lane) .or. starting(lane)
+      attempt%implicit(lane) = attempt%implicit(lane) .or. starting(lane)
       if (.not. starting(lane)) cycle
-      self%slope(lane, :) = trial%slope(lane, :)
+      self%slope(lane, :) = attempt%slope(lane, :)
       self%no_slope(lane) = .false.
       self%no_jacobian(lane) = .true.
     end do
-  end subroutine begin
+  end subroutine start
 
-  subroutine attempt(self, system, trial)
+  subroutine take_step(self, system, attempt)
     class(rosenbrock_stepper_t), intent(inout) :: self
     class(system_t), intent(inout) :: system
-    type(trial_t), intent(inout) :: trial
+    type(step_attempt_t), intent(inout) :: attempt
     integer :: stage
 
-    call renew_derivatives(self, system, trial)
-    call factor(self%stage_system, trial, self%gamma)
-    call solve_stage(self, trial, 1, self%slope)
+    call renew_derivatives(self, system, attempt)
+    call factor(self%stage_system, attempt, self%gamma)
+    call solve_stage(self, attempt, 1, self%slope)
     do stage = 2, self%stages%step
-      if (.not. any(trial%working)) exit
-      call inner_state(self%stages, trial, stage, self%y_stage)
-      self%t_stage(:) = trial%t + self%alpha(stage) * trial%h
-      call evaluate_finite(trial, system, self%t_stage, self%y_stage, self%f)
-      call solve_stage(self, trial, stage, self%f)
+      if (.not. any(attempt%active)) exit
+      call stage_state(self%stages, attempt, stage, self%y_stage)
+      self%t_stage(:) = attempt%t + self%alpha(stage) * attempt%h
+      call evaluate_finite(attempt, system, self%t_stage, self%y_stage, self%f)
+      call solve_stage(self, attempt, stage, self%f)
     end do
-    call update_state(self%stages, trial)
-    call estimate_error(self%stages, trial)
-    call count_evaluations(trial)
-  end subroutine attempt
+    call update_state(self%stages, attempt)
+    call estimate_error(self%stages, attempt)
+    call count_evaluations(attempt)
+  end subroutine take_step
 
   !> f and its derivatives at the start of the step; a rejected step keeps them.
-  subroutine renew_derivatives(self, system, trial)
+  subroutine renew_derivatives(self, system, attempt)
     class(rosenbrock_stepper_t), intent(inout) :: self
     class(system_t), intent(inout) :: system
-    type(trial_t), intent(inout) :: trial
+    type(step_attempt_t), intent(inout) :: attempt
     integer :: lane
 
-    if (any(self%no_slope .and. trial%working)) then
-      call evaluate_start(trial, system, self%no_slope, self%slope)
-      self%no_slope(:) = self%no_slope .and. .not. trial%working
+    if (any(self%no_slope .and. attempt%active)) then
+      call evaluate_start(attempt, system, self%no_slope, self%slope)
+      self%no_slope(:) = self%no_slope .and. .not. attempt%active
     end if
-    if (any(self%no_jacobian .and. trial%working)) then
-      do lane = 1, trial%lanes
-        if (self%no_jacobian(lane) .and. trial%working(lane)) trial%jacobians(lane) = trial%jacobians(lane) + 1
+    if (any(self%no_jacobian .and. attempt%active)) then
+      do lane = 1, attempt%lanes
+        if (self%no_jacobian(lane) .and. attempt%active(lane)) attempt%jacobians(lane) = attempt%jacobians(lane) + 1
       end do
-      call renew_jacobian(self%stage_system, system, trial)
-      self%no_jacobian(:) = self%no_jacobian .and. .not. trial%working
+      call renew_jacobian(self%stage_system, system, attempt)
+      self%no_jacobian(:) = self%no_jacobian .and. .not. attempt%active
     end if
   end subroutine renew_derivatives
 
   !> (1/gamma - h J) k_i = f_i + sum c_ij k_j + gamma_i h df/dt.
-  subroutine solve_stage(self, trial, stage, f)
+  subroutine solve_stage(self, attempt, stage, f)
     class(rosenbrock_stepper_t), intent(inout) :: self
-    type(trial_t), intent(in) :: trial
+    type(step_attempt_t), intent(in) :: attempt
     integer, intent(in) :: stage
-    real(wp), intent(in) :: f(trial%length)
+    real(wp), intent(in) :: f(attempt%length)
     logical :: all_finite
 
-    call combine(self%coupling(stage), self%stages%k, trial%length, f, size(self%one), self%one, self%r, all_finite)
+    call sum_stages(self%coupling(stage), self%stages%k, attempt%length, f, size(self%one), self%one, self%r, all_finite)
     if (abs(self%gamma_sum(stage)) > 0) then
-      call add_time_derivative(trial%lanes, trial%components, self%gamma_sum(stage), trial%h, &
+      call add_time_derivative(attempt%lanes, attempt%components, self%gamma_sum(stage), attempt%h, &
                                self%stage_system%dfdt, self%r)
     end if
-    call solve(self%stage_system, trial, self%gamma, self%r, self%stages%k(:, :, stage))
+    call solve(self%stage_system, attempt, self%gamma, self%r, self%stages%k(:, :, stage))
   end subroutine solve_stage
 
   pure subroutine add_time_derivative(lanes, components, gamma_sum, h, dfdt, r)
@@ -164,14 +164,14 @@ contains
     end do
   end subroutine add_time_derivative
 
-  subroutine interpolate(self, system, trial, wanted, coefficients)
+  subroutine interpolate(self, system, attempt, wanted, coefficients)
     class(rosenbrock_stepper_t), intent(inout) :: self
     class(system_t), intent(inout) :: system
-    type(trial_t), intent(inout) :: trial
+    type(step_attempt_t), intent(inout) :: attempt
     logical, intent(in) :: wanted(:)
     real(wp), contiguous, intent(inout) :: coefficients(:, :, :)
 
-    call expand(self%stages, trial, coefficients)
+    call form_dense_output(self%stages, attempt, coefficients)
   end subroutine interpolate
 
   !> Each lane that moved needs new derivatives.
@@ -184,25 +184,25 @@ contains
   end subroutine accept
 
   !> Forgets the spectra of lanes that start or begin to take these steps.
-  pure subroutine forget(self, starting)
+  pure subroutine reset_spectra(self, starting)
     class(rosenbrock_stepper_t), intent(inout) :: self
     logical, intent(in) :: starting(:)
     integer :: lane
 
     do lane = 1, size(starting)
-      if (starting(lane)) call restart_spectrum(self%spectra, lane)
+      if (starting(lane)) call restart_power_iteration(self%spectrum, lane)
     end do
-  end subroutine forget
+  end subroutine reset_spectra
 
   !> |h lambda| of the dominant eigenvalue of the Jacobian at the start of the step.
-  function stiffness(self, trial, lane) result(ratio)
+  function stiffness(self, attempt, lane) result(ratio)
     class(rosenbrock_stepper_t), intent(inout) :: self
-    type(trial_t), intent(in) :: trial
+    type(step_attempt_t), intent(in) :: attempt
     integer, intent(in) :: lane
     real(wp) :: ratio
 
-    call dominate(self%spectra, lane, self%stage_system%dfdy, ratio)
-    ratio = trial%h(lane) * ratio
+    call estimate_spectral_radius(self%spectrum, lane, self%stage_system%dfdy, ratio)
+    ratio = attempt%h(lane) * ratio
   end function stiffness
 
 end module nocdyn_rosenbrock_stepper

@@ -6,14 +6,15 @@
 !> the numerical integration of ODEs by means of high-order Taylor methods, Experimental Mathematics 14 (2005) 99-117,
 !> who take the work for proportional to p^2. Here it grows more slowly, as long as p is small, and the order is higher.
 module nocdyn_taylor_stepper
-  use nocdyn_combinations, only: padded_columns, width
+  use nocdyn_stage_sums, only: padded_columns, width
   use nocdyn_finite, only: all_finite, is_finite
   use nocdyn_kinds, only: wp
-  use nocdyn_masks, only: all_true, any_other
+  use nocdyn_masks, only: all_true, any_differs
   use nocdyn_step_control, only: any_too_small, smallest_step, step_control_t
   use nocdyn_stepper, only: stepper_t
-  use nocdyn_system, only: evaluation_fine, observer_t, steps_t, system_t
-  use nocdyn_trial, only: park, park_infinities, trial_fine, trial_not_finite, trial_shorten, trial_t
+  use nocdyn_system, only: evaluation_ok, observer_t, step_block_t, system_t
+  use nocdyn_step_attempt, only: disable_lane, disable_non_finite_lanes, attempt_ok, attempt_not_finite, attempt_recoverable, &
+                                 step_attempt_t
   use nocdyn_vector_functions, only: exp2s, log2s
   implicit none (type, external)
   private
@@ -27,20 +28,20 @@ module nocdyn_taylor_stepper
   type, extends(stepper_t), public :: taylor_stepper_t
     private
     real(wp), allocatable :: series(:, :, :)   !! y_0, y_1, ... of each lane, [lanes, padded columns, 0:order]
-    real(wp), allocatable :: last(:)           !! norms of the last coefficients and then their steps, [lanes]
-    real(wp), allocatable :: last_but_one(:)
+    real(wp), allocatable :: last_norm(:)           !! norms of the last coefficients and then their steps, [lanes]
+    real(wp), allocatable :: previous_norm(:)
     logical, allocatable :: moved(:)           !! lanes that have moved since they were expanded
-    integer, allocatable :: verdict(:)         !! trial_... on the series of each lane
-    integer, allocatable :: culprit(:)         !! component that the verdict is due to, 0 if there is none
+    integer, allocatable :: step_status(:)         !! trial_... on the series of each lane
+    integer, allocatable :: component(:)         !! component that the verdict is due to, 0 if there is none
     integer, allocatable :: infinite(:)        !! first component whose new series is not finite, 0 if all are
   contains
-    procedure :: plan
+    procedure :: choose_steps
     procedure :: prepare
-    procedure :: begin
-    procedure :: attempt
+    procedure :: start
+    procedure :: take_step
     procedure :: interpolate
     procedure :: accept
-    procedure :: show
+    procedure :: pass_steps
   end type taylor_stepper_t
 
 contains
@@ -56,101 +57,104 @@ contains
     stepper%error_order = stepper%order
     stepper%degree = stepper%order
     stepper%needs_series = .true.
-    stepper%plans_steps = .true.
-    stepper%shows_own = .true.
+    stepper%chooses_steps = .true.
+    stepper%passes_series = .true.
   end function taylor_stepper
 
   subroutine prepare(self, system)
     class(taylor_stepper_t), intent(inout) :: self
     class(system_t), intent(in) :: system
 
-    if (allocated(self%series)) deallocate (self%series, self%last, self%last_but_one, self%moved, self%verdict, self%culprit, &
+    if (allocated(self%series)) deallocate (self%series, self%last_norm, self%previous_norm, self%moved, self%step_status, &
+                                            self%component, &
                                              self%infinite)
     associate (lanes => system%lanes)
       allocate (self%series(lanes, padded_columns(lanes, system%states + system%quadratures), 0:self%order), source=0.0_wp)
-      allocate (self%last(lanes), self%last_but_one(lanes), source=0.0_wp)
+      allocate (self%last_norm(lanes), self%previous_norm(lanes), source=0.0_wp)
       allocate (self%moved(lanes), source=.true.)
-      allocate (self%verdict(lanes), source=trial_fine)
-      allocate (self%culprit(lanes), self%infinite(lanes), source=0)
+      allocate (self%step_status(lanes), source=attempt_ok)
+      allocate (self%component(lanes), self%infinite(lanes), source=0)
     end associate
   end subroutine prepare
 
-  subroutine begin(self, trial, starting)
+  subroutine start(self, attempt, starting)
     class(taylor_stepper_t), intent(inout) :: self
-    type(trial_t), intent(inout) :: trial
+    type(step_attempt_t), intent(inout) :: attempt
     logical, intent(in) :: starting(:)
 
-    call note_moves(size(starting), starting, self%moved)
-  end subroutine begin
+    call mark_moved(size(starting), starting, self%moved)
+  end subroutine start
 
   !> Expands the lanes that have moved and sets their steps; a lane that cannot be expanded is parked by `attempt`.
-  subroutine plan(self, system, trial, control)
+  subroutine choose_steps(self, system, attempt, control)
     class(taylor_stepper_t), intent(inout) :: self
     class(system_t), intent(inout) :: system
-    type(trial_t), intent(inout) :: trial
+    type(step_attempt_t), intent(inout) :: attempt
     type(step_control_t), intent(inout) :: control
     logical :: are_finite, have_all_moved
 
-    have_all_moved = all_true(trial%lanes, self%moved) .and. all_true(trial%lanes, trial%working)
+    have_all_moved = all_true(attempt%lanes, self%moved) .and. all_true(attempt%lanes, attempt%active)
     if (.not. have_all_moved) then
-      if (.not. any(self%moved .and. trial%working)) return
+      if (.not. any(self%moved .and. attempt%active)) return
     end if
-    self%series(:, :, 0) = trial%y
-    call system%series(self%order, size(self%series, 2), trial%t, self%series, trial%status)
+    self%series(:, :, 0) = attempt%y
+    call system%series(self%order, size(self%series, 2), attempt%t, self%series, attempt%rhs_status)
     ! what is infinite between these coefficients alone shows up in y_new
-    are_finite = all_finite(2 * trial%length, self%series) .and. all_finite(2 * trial%length, self%series(1, 1, self%order - 1))
+    are_finite = all_finite(2 * attempt%length, self%series) .and. all_finite(2 * attempt%length, self%series(1, 1, &
+                                                                                                              self%order - 1))
     if (.not. are_finite) call clear_infinities(self)
-    call measure(trial%lanes, trial%states, size(self%series, 2), control%rtol, control%atol, self%series, &
-                 self%series(1, 1, self%order - 1), self%last, self%last_but_one)
-    call find_steps(trial%lanes, self%order, self%last, self%last_but_one)
-    if (have_all_moved .and. are_finite .and. .not. any_other(trial%lanes, trial%status, evaluation_fine)) then
-      if (.not. any_too_small(trial%lanes, trial%t, self%last)) then
-        call take_all_steps(trial%lanes, self%last, self%moved, self%verdict, self%culprit, trial%evaluations, control%h)
+    call measure(attempt%lanes, attempt%states, size(self%series, 2), control%rtol, control%atol, self%series, &
+                 self%series(1, 1, self%order - 1), self%last_norm, self%previous_norm)
+    call find_steps(attempt%lanes, self%order, self%last_norm, self%previous_norm)
+    if (have_all_moved .and. are_finite .and. .not. any_differs(attempt%lanes, attempt%rhs_status, evaluation_ok)) then
+      if (.not. any_too_small(attempt%lanes, attempt%t, self%last_norm)) then
+        call take_all_steps(attempt%lanes, self%last_norm, self%moved, self%step_status, self%component, attempt%evaluations, &
+                            control%h)
         return
       end if
     end if
-    call take_steps(self, trial, control)
-    trial%status(:) = evaluation_fine
-  end subroutine plan
+    call take_steps(self, attempt, control)
+    attempt%rhs_status(:) = evaluation_ok
+  end subroutine choose_steps
 
   !> Where all lanes have moved and have good series.
-  pure subroutine take_all_steps(lanes, steps, moved, verdict, culprit, evaluations, h)
+  pure subroutine take_all_steps(lanes, steps, moved, step_status, component, evaluations, h)
     integer, intent(in) :: lanes
     real(wp), intent(in) :: steps(lanes)
     logical, intent(inout) :: moved(lanes)
-    integer, intent(inout), dimension(lanes) :: verdict, culprit, evaluations
+    integer, intent(inout), dimension(lanes) :: step_status, component, evaluations
     real(wp), intent(inout) :: h(lanes)
 
     moved = .false.
-    verdict = trial_fine
-    culprit = 0
+    step_status = attempt_ok
+    component = 0
     evaluations = evaluations + 1
     h = steps
   end subroutine take_all_steps
 
   !> The verdicts on the lanes that have moved, and the steps of those with good series.
-  subroutine take_steps(self, trial, control)
+  subroutine take_steps(self, attempt, control)
     class(taylor_stepper_t), intent(inout) :: self
-    type(trial_t), intent(inout) :: trial
+    type(step_attempt_t), intent(inout) :: attempt
     type(step_control_t), intent(inout) :: control
     integer :: lane
 
-    do lane = 1, trial%lanes
-      if (.not. (self%moved(lane) .and. trial%working(lane))) cycle
+    do lane = 1, attempt%lanes
+      if (.not. (self%moved(lane) .and. attempt%active(lane))) cycle
       self%moved(lane) = .false.
-      self%verdict(lane) = trial%status(lane)
-      self%culprit(lane) = 0
+      self%step_status(lane) = attempt%rhs_status(lane)
+      self%component(lane) = 0
       if (self%infinite(lane) > 0) then
-        self%verdict(lane) = trial_not_finite
-        self%culprit(lane) = self%infinite(lane)
+        self%step_status(lane) = attempt_not_finite
+        self%component(lane) = self%infinite(lane)
       end if
-      trial%evaluations(lane) = trial%evaluations(lane) + 1
-      control%h(lane) = self%last(lane)
-      if (self%verdict(lane) == trial_fine .and. control%h(lane) <= smallest_step(trial%t(lane))) then
-        self%verdict(lane) = trial_shorten
-        self%culprit(lane) = maxloc(abs(self%series(lane, :trial%states, self%order)), dim=1)
+      attempt%evaluations(lane) = attempt%evaluations(lane) + 1
+      control%h(lane) = self%last_norm(lane)
+      if (self%step_status(lane) == attempt_ok .and. control%h(lane) <= smallest_step(attempt%t(lane))) then
+        self%step_status(lane) = attempt_recoverable
+        self%component(lane) = maxloc(abs(self%series(lane, :attempt%states, self%order)), dim=1)
       end if
-      if (self%verdict(lane) == trial_fine) cycle
+      if (self%step_status(lane) == attempt_ok) cycle
       control%h(lane) = 0.0_wp
       self%series(lane, :, 1:) = 0.0_wp
     end do
@@ -174,66 +178,66 @@ contains
 
   !> Largest |y_j| / (atol + rtol |y|) of the states of each lane, for the last two coefficients; no less than a number whose
   !> logarithm is finite.
-  pure subroutine measure(lanes, states, columns, rtol, atol, y, y_j, last, last_but_one)
+  pure subroutine measure(lanes, states, columns, rtol, atol, y, y_j, last_norm, previous_norm)
     integer, intent(in) :: lanes, states, columns
     real(wp), intent(in) :: rtol, atol
     real(wp), intent(in) :: y(lanes, states), y_j(lanes, columns, 2)   !! y_j of the orders p - 1 and p
-    real(wp), intent(inout) :: last(lanes), last_but_one(lanes)
+    real(wp), intent(inout) :: last_norm(lanes), previous_norm(lanes)
     real(wp), parameter :: smallest = 1.0e-300_wp
     real(wp) :: weight
     integer :: i, lane
 
-    last = smallest
-    last_but_one = smallest
+    last_norm = smallest
+    previous_norm = smallest
     if (lanes == 1) then
       do i = 1, states
         weight = 1.0_wp / (atol + rtol * abs(y(1, i)))
-        last_but_one(1) = max(last_but_one(1), weight * abs(y_j(1, i, 1)))
-        last(1) = max(last(1), weight * abs(y_j(1, i, 2)))
+        previous_norm(1) = max(previous_norm(1), weight * abs(y_j(1, i, 1)))
+        last_norm(1) = max(last_norm(1), weight * abs(y_j(1, i, 2)))
       end do
     else
       do i = 1, states
         do lane = 1, lanes
           weight = 1.0_wp / (atol + rtol * abs(y(lane, i)))
-          last_but_one(lane) = max(last_but_one(lane), weight * abs(y_j(lane, i, 1)))
-          last(lane) = max(last(lane), weight * abs(y_j(lane, i, 2)))
+          previous_norm(lane) = max(previous_norm(lane), weight * abs(y_j(lane, i, 1)))
+          last_norm(lane) = max(last_norm(lane), weight * abs(y_j(lane, i, 2)))
         end do
       end do
     end if
   end subroutine measure
 
   !> Replaces the norms of the last coefficients by the steps that both pairs allow.
-  pure subroutine find_steps(lanes, order, last, last_but_one)
+  pure subroutine find_steps(lanes, order, last_norm, previous_norm)
     integer, intent(in) :: lanes, order
-    real(wp), intent(inout) :: last(lanes), last_but_one(lanes)
+    real(wp), intent(inout) :: last_norm(lanes), previous_norm(lanes)
     real(wp) :: per_order, per_lower_order
     integer :: lane
 
     per_order = -1.0_wp / order
     per_lower_order = -1.0_wp / (order - 1)
-    call log2s(lanes, last)
-    call log2s(lanes, last_but_one)
+    call log2s(lanes, last_norm)
+    call log2s(lanes, previous_norm)
     do lane = 1, lanes
-      last(lane) = min(per_order * last(lane), per_lower_order * last_but_one(lane))
+      last_norm(lane) = min(per_order * last_norm(lane), per_lower_order * previous_norm(lane))
     end do
-    call exp2s(lanes, last)
+    call exp2s(lanes, last_norm)
   end subroutine find_steps
 
   !> The sum of the series at the end of the step.
-  subroutine attempt(self, system, trial)
+  subroutine take_step(self, system, attempt)
     class(taylor_stepper_t), intent(inout) :: self
     class(system_t), intent(inout) :: system
-    type(trial_t), intent(inout) :: trial
+    type(step_attempt_t), intent(inout) :: attempt
     integer :: lane
 
-    if (any_other(trial%lanes, self%verdict, trial_fine)) then
-      do lane = 1, trial%lanes
-        if (self%verdict(lane) /= trial_fine) call park(trial, lane, self%verdict(lane), self%culprit(lane))
+    if (any_differs(attempt%lanes, self%step_status, attempt_ok)) then
+      do lane = 1, attempt%lanes
+        if (self%step_status(lane) /= attempt_ok) call disable_lane(attempt, lane, self%step_status(lane), self%component(lane))
       end do
     end if
-    call sum_series(trial%length, self%order, self%series, trial%h_length, trial%h_spread, trial%y_new)
-    if (.not. all_finite(trial%length, trial%y_new)) call park_infinities(trial, trial%y_new)
-  end subroutine attempt
+    call sum_series(attempt%length, self%order, self%series, attempt%h_length, attempt%h_spread, attempt%y_new)
+    if (.not. all_finite(attempt%length, attempt%y_new)) call disable_non_finite_lanes(attempt, attempt%y_new)
+  end subroutine take_step
 
   !> y = sum over k of h^k series(:, k).
   pure subroutine sum_series(n, order, series, h_length, h, y)
@@ -278,14 +282,14 @@ contains
   end subroutine sum_long_vectors
 
   !> The series itself, in powers of theta.
-  subroutine interpolate(self, system, trial, wanted, coefficients)
+  subroutine interpolate(self, system, attempt, wanted, coefficients)
     class(taylor_stepper_t), intent(inout) :: self
     class(system_t), intent(inout) :: system
-    type(trial_t), intent(inout) :: trial
+    type(step_attempt_t), intent(inout) :: attempt
     logical, intent(in) :: wanted(:)
     real(wp), contiguous, intent(inout) :: coefficients(:, :, :)
 
-    call scale_series(trial%length, self%order, self%series, trial%h_length, trial%h_spread, coefficients)
+    call scale_series(attempt%length, self%order, self%series, attempt%h_length, attempt%h_spread, coefficients)
   end subroutine interpolate
 
   !> c(:, k) = h^k series(:, k).
@@ -312,27 +316,27 @@ contains
     class(taylor_stepper_t), intent(inout) :: self
     logical, intent(in) :: accepted(:)
 
-    call note_moves(size(accepted), accepted, self%moved)
+    call mark_moved(size(accepted), accepted, self%moved)
   end subroutine accept
 
-  pure subroutine note_moves(lanes, moving, moved)
+  pure subroutine mark_moved(lanes, moving, moved)
     integer, intent(in) :: lanes
     logical, intent(in) :: moving(lanes)
     logical, intent(inout) :: moved(lanes)
 
     moved = merge(.true., moved, moving)
-  end subroutine note_moves
+  end subroutine mark_moved
 
   !> The series as it is, in powers of the time.
-  subroutine show(self, steps, trial, coefficients, observer)
+  subroutine pass_steps(self, steps, attempt, coefficients, observer)
     class(taylor_stepper_t), intent(in) :: self
-    type(steps_t), intent(inout) :: steps
-    type(trial_t), intent(in) :: trial
+    type(step_block_t), intent(inout) :: steps
+    type(step_attempt_t), intent(in) :: attempt
     real(wp), contiguous, intent(in) :: coefficients(:, :, :)
     class(observer_t), intent(inout) :: observer
 
     steps%scale(:) = steps%h
-    call observer%follow_steps(steps, trial%y, trial%y_new, self%series(:, :, 1:))
-  end subroutine show
+    call observer%on_steps(steps, attempt%y, attempt%y_new, self%series(:, :, 1:))
+  end subroutine pass_steps
 
 end module nocdyn_taylor_stepper

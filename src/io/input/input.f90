@@ -49,7 +49,7 @@ module nocdyn_input
     procedure :: groups_named   !! indices of the groups of one kind, perhaps only of one law
     procedure :: single         !! the one group of a kind that occurs once
     procedure :: label          !! "&gear 'reducer'"
-    procedure :: place          !! where a group or a key comes from, to begin a message with
+    procedure :: location          !! where a group or a key comes from, to begin a message with
   end type input_t
 
 contains
@@ -222,7 +222,7 @@ contains
 
   !> "machine.nml:12: &gear 'reducer'", with the line of `key` if the file sets it, or "--set PATH=VALUE: &gear
   !> 'reducer'" if an override does.
-  pure function place(self, index, key) result(text)
+  pure function location(self, index, key) result(text)
     class(input_t), intent(in) :: self
     integer, intent(in) :: index   !! of the group
     character(len=*), optional, intent(in) :: key
@@ -242,7 +242,7 @@ contains
     if (line > 0) text = text // ':' // to_text(line)
     if (override > 0) text = '--set ' // self%overrides(override)%text
     text = text // ': ' // self%label(index)
-  end function place
+  end function location
 
   pure function label(self, index) result(text)
     class(input_t), intent(in) :: self

@@ -3,12 +3,12 @@
 !> The directory of the results does not count. The title does, though it changes no number: files of a sweep carry it. The order
 !> of named groups counts: sums are formed in it, so that their last bits depend on it.
 module nocdyn_input_differences
-  use nocdyn_mistakes, only: mistakes_t
+  use nocdyn_diagnostics, only: diagnostics_t
   use nocdyn_namelist, only: assignment_t, namelist_t
   use nocdyn_namelist_scanner, only: scan_namelist
   use nocdyn_schema, only: group_rule_index, group_rules, is_single
   use nocdyn_text, only: append, quoted, string_t, to_text
-  use nocdyn_text_order, only: find_order, first_position
+  use nocdyn_text_sort, only: argsort, sorted_position
   implicit none (type, external)
   private
 
@@ -39,7 +39,7 @@ contains
     call take_apart(new, after)
     allocate (partner(before%namelist%group_count))
     do g = 1, size(partner)
-      partner(g) = first_position(before%labels(g)%text, after%labels, after%order)
+      partner(g) = sorted_position(before%labels(g)%text, after%labels, after%order)
       if (partner(g) > 0) then
         call compare_groups(before, g, after, partner(g), sentences)
       else
@@ -56,12 +56,12 @@ contains
   subroutine take_apart(text, parts)
     character(len=*), intent(in) :: text
     type(parts_t), intent(out) :: parts
-    type(mistakes_t) :: mistakes
+    type(diagnostics_t) :: diagnostics
     integer :: count(size(group_rules))
     integer :: g, rule
 
-    call scan_namelist(text, parts%namelist, mistakes)
-    if (mistakes%count > 0) error stop 'nocdyn_input_differences: only texts of nocdyn_input_text are compared'
+    call scan_namelist(text, parts%namelist, diagnostics)
+    if (diagnostics%count > 0) error stop 'nocdyn_input_differences: only texts of nocdyn_input_text are compared'
     allocate (parts%labels(parts%namelist%group_count), parts%name_space(parts%namelist%group_count))
     count = 0
     do g = 1, parts%namelist%group_count
@@ -74,7 +74,7 @@ contains
         parts%name_space(g) = findloc(group_rules%name_space == group_rules(rule)%name_space, .true., dim=1)
       end if
     end do
-    call find_order(parts%labels, parts%order)
+    call argsort(parts%labels, parts%order)
   end subroutine take_apart
 
   !> What a group is called in both inputs.

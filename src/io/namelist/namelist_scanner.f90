@@ -3,7 +3,7 @@
 !> Two habits of Fortran are mistakes here, because they hide slips: a text that goes on past the end of its line, and
 !> text behind the end of a group.
 module nocdyn_namelist_scanner
-  use nocdyn_mistakes, only: mistakes_t
+  use nocdyn_diagnostics, only: diagnostics_t
   use nocdyn_namelist, only: assignment_t, namelist_t
   use nocdyn_namelist_cursor, only: cursor_t
   use nocdyn_namelist_values, only: longest_list, read_subscript, scan_items
@@ -16,54 +16,54 @@ module nocdyn_namelist_scanner
 contains
 
   !> Scans the text of a file; mistakes carry the index of their group.
-  subroutine scan_namelist(text, namelist, mistakes)
+  subroutine scan_namelist(text, namelist, diagnostics)
     character(len=*), intent(in) :: text
     type(namelist_t), intent(out) :: namelist
-    type(mistakes_t), intent(inout) :: mistakes
+    type(diagnostics_t), intent(inout) :: diagnostics
     type(cursor_t) :: cursor
 
-    call begin(text, namelist, cursor, mistakes)
+    call begin(text, namelist, cursor, diagnostics)
     call cursor%skip_blanks()
     do while (.not. cursor%at_end())
       if (cursor%group_begins()) then
-        call scan_group(cursor, namelist, mistakes)
+        call scan_group(cursor, namelist, diagnostics)
       else
-        call refuse_text_outside(cursor, namelist, mistakes)
+        call refuse_text_outside(cursor, namelist, diagnostics)
       end if
       call cursor%skip_blanks()
     end do
   end subroutine scan_namelist
 
   !> Scans the VALUE of an override into the items of `namelist`; bare words may hold what would end a group in a file.
-  subroutine scan_value(text, namelist, mistakes)
+  subroutine scan_value(text, namelist, diagnostics)
     character(len=*), intent(in) :: text
     type(namelist_t), intent(out) :: namelist
-    type(mistakes_t), intent(inout) :: mistakes
+    type(diagnostics_t), intent(inout) :: diagnostics
     type(cursor_t) :: cursor
     logical :: is_damaged
 
-    call begin(text, namelist, cursor, mistakes)
+    call begin(text, namelist, cursor, diagnostics)
     cursor%is_value = .true.
-    call scan_items(cursor, namelist, mistakes, is_damaged)
+    call scan_items(cursor, namelist, diagnostics, is_damaged)
   end subroutine scan_value
 
   !> The text without byte-order mark, with a final line end, and with control characters refused.
-  subroutine begin(text, namelist, cursor, mistakes)
+  subroutine begin(text, namelist, cursor, diagnostics)
     character(len=*), intent(in) :: text
     type(namelist_t), intent(inout) :: namelist
     type(cursor_t), intent(out) :: cursor
-    type(mistakes_t), intent(inout) :: mistakes
+    type(diagnostics_t), intent(inout) :: diagnostics
     character(len=*), parameter :: byte_order_mark = char(239) // char(187) // char(191)
 
     cursor%text = text(merge(4, 1, index(text, byte_order_mark) == 1):) // new_line('a')
-    call blank_control_characters(cursor%text, mistakes)
+    call blank_control_characters(cursor%text, diagnostics)
     namelist%source = cursor%text
   end subroutine begin
 
   !> Control characters become blanks; the first of each line is a mistake.
-  subroutine blank_control_characters(text, mistakes)
+  subroutine blank_control_characters(text, diagnostics)
     character(len=:), allocatable, intent(inout) :: text
-    type(mistakes_t), intent(inout) :: mistakes
+    type(diagnostics_t), intent(inout) :: diagnostics
     integer :: code, i, line, refused_line
 
     line = 1
@@ -75,20 +75,20 @@ contains
       text(i:i) = ' '
       if (line == refused_line .or. (code == 13 .and. text(i + 1:i + 1) == new_line('a'))) cycle
       refused_line = line
-      call mistakes%add(line, 0, 'a control character (code ' // to_text(code) // ') does not belong in an input file')
+      call diagnostics%add(line, 0, 'a control character (code ' // to_text(code) // ') does not belong in an input file')
     end do
   end subroutine blank_control_characters
 
   !> One mistake for all that stands between two groups.
-  subroutine refuse_text_outside(cursor, namelist, mistakes)
+  subroutine refuse_text_outside(cursor, namelist, diagnostics)
     type(cursor_t), intent(inout) :: cursor
     type(namelist_t), intent(in) :: namelist
-    type(mistakes_t), intent(inout) :: mistakes
+    type(diagnostics_t), intent(inout) :: diagnostics
 
     if (cursor%is_first_of_line() .or. namelist%group_count == 0) then
-      call mistakes%add(cursor%line, 0, 'text outside groups: ' // cursor%excerpt() // '; a group is written &NAME ... /')
+      call diagnostics%add(cursor%line, 0, 'text outside groups: ' // cursor%excerpt() // '; a group is written &NAME ... /')
     else
-      call mistakes%add(cursor%line, namelist%group_count, &
+      call diagnostics%add(cursor%line, namelist%group_count, &
         'text behind the end of the group: ' // cursor%excerpt() // "; a value that holds '/' needs quotes")
     end if
 
@@ -99,10 +99,10 @@ contains
   end subroutine refuse_text_outside
 
   !> From & or $ to the end mark, or to where the end mark should have been.
-  subroutine scan_group(cursor, namelist, mistakes)
+  subroutine scan_group(cursor, namelist, diagnostics)
     type(cursor_t), intent(inout) :: cursor
     type(namelist_t), intent(inout) :: namelist
-    type(mistakes_t), intent(inout) :: mistakes
+    type(diagnostics_t), intent(inout) :: diagnostics
     integer :: last
 
     call cursor%move_to(cursor%at + 1)
@@ -114,61 +114,61 @@ contains
       call cursor%skip_blanks()
       if (cursor%group_ends() > 0 .or. cursor%group_begins() .or. cursor%at_end()) exit
       if (cursor%key_follows()) then
-        call scan_assignment(cursor, namelist, mistakes)
+        call scan_assignment(cursor, namelist, diagnostics)
       else
-        call refuse_text_without_key(cursor, namelist, mistakes)
+        call refuse_text_without_key(cursor, namelist, diagnostics)
       end if
     end do
 
     if (cursor%group_ends() > 0) then
       call cursor%move_to(cursor%at + cursor%group_ends())
     else
-      call refuse_unclosed(cursor, namelist, mistakes)
+      call refuse_unclosed(cursor, namelist, diagnostics)
     end if
   end subroutine scan_group
 
   !> Nothing is said of a damaged group, whose end may be in the part that could not be understood.
-  subroutine refuse_unclosed(cursor, namelist, mistakes)
+  subroutine refuse_unclosed(cursor, namelist, diagnostics)
     type(cursor_t), intent(in) :: cursor
     type(namelist_t), intent(in) :: namelist
-    type(mistakes_t), intent(inout) :: mistakes
+    type(diagnostics_t), intent(inout) :: diagnostics
 
     associate (group => namelist%groups(namelist%group_count))
       if (group%is_damaged) return
       if (cursor%at_end()) then
-        call mistakes%add(group%line, namelist%group_count, "not closed: '/' is missing before the end of the file")
+        call diagnostics%add(group%line, namelist%group_count, "not closed: '/' is missing before the end of the file")
       else
-        call mistakes%add(group%line, namelist%group_count, &
+        call diagnostics%add(group%line, namelist%group_count, &
           "not closed: '/' is missing before the next group on line " // to_text(cursor%line))
       end if
     end associate
   end subroutine refuse_unclosed
 
   !> Values where a key was expected.
-  subroutine refuse_text_without_key(cursor, namelist, mistakes)
+  subroutine refuse_text_without_key(cursor, namelist, diagnostics)
     type(cursor_t), intent(inout) :: cursor
     type(namelist_t), intent(inout) :: namelist
-    type(mistakes_t), intent(inout) :: mistakes
-    integer :: item_count, line, mistake_count
+    type(diagnostics_t), intent(inout) :: diagnostics
+    integer :: item_count, line, diagnostic_count
     character(len=:), allocatable :: found
     logical :: is_damaged
 
     line = cursor%line
     found = cursor%excerpt()
     item_count = namelist%item_count
-    mistake_count = mistakes%count
+    diagnostic_count = diagnostics%count
     if (cursor%next() == '=') call cursor%move_to(cursor%at + 1)
-    call scan_items(cursor, namelist, mistakes, is_damaged)
+    call scan_items(cursor, namelist, diagnostics, is_damaged)
     namelist%item_count = item_count
     namelist%groups(namelist%group_count)%is_damaged = .true.
-    if (mistakes%count > mistake_count) return
-    call mistakes%add(line, namelist%group_count, 'KEY = VALUE was expected, but found is ' // found)
+    if (diagnostics%count > diagnostic_count) return
+    call diagnostics%add(line, namelist%group_count, 'KEY = VALUE was expected, but found is ' // found)
   end subroutine refuse_text_without_key
 
-  subroutine scan_assignment(cursor, namelist, mistakes)
+  subroutine scan_assignment(cursor, namelist, diagnostics)
     type(cursor_t), intent(inout) :: cursor
     type(namelist_t), intent(inout) :: namelist
-    type(mistakes_t), intent(inout) :: mistakes
+    type(diagnostics_t), intent(inout) :: diagnostics
     type(assignment_t) :: assignment
     character(len=:), allocatable :: subscript
     logical :: is_damaged
@@ -181,14 +181,14 @@ contains
     if (after > last + 1) then
       subscript = trim(adjustl(cursor%text(last + 1:after - 1)))
       call read_subscript(subscript(2:len(subscript) - 1), assignment)
-      if (assignment%is_damaged) call mistakes%add(cursor%line, namelist%group_count, assignment%key // subscript // &
+      if (assignment%is_damaged) call diagnostics%add(cursor%line, namelist%group_count, assignment%key // subscript // &
         ': the subscript is neither a place such as (3) nor a section such as (1:3), from 1 to ' // to_text(longest_list))
     end if
     call cursor%move_to(after)
     call cursor%move_to(cursor%at + index(cursor%text(cursor%at:), '='))
 
     assignment%first_item = namelist%item_count + 1
-    call scan_items(cursor, namelist, mistakes, is_damaged)
+    call scan_items(cursor, namelist, diagnostics, is_damaged)
     assignment%last_item = namelist%item_count
     if (assignment%is_damaged) namelist%groups(namelist%group_count)%is_damaged = .true.
     assignment%is_damaged = assignment%is_damaged .or. is_damaged

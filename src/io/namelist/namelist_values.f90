@@ -1,7 +1,7 @@
 !> The right-hand side of a namelist assignment, and the subscript of its left-hand side.
 module nocdyn_namelist_values
   use nocdyn_literals, only: digits_end, literal_fine, read_integer
-  use nocdyn_mistakes, only: mistakes_t
+  use nocdyn_diagnostics, only: diagnostics_t
   use nocdyn_namelist, only: assignment_t, item_t, namelist_t
   use nocdyn_namelist_cursor, only: cursor_t
   use nocdyn_text, only: to_text
@@ -16,10 +16,10 @@ module nocdyn_namelist_values
 contains
 
   !> Appends the values at the cursor up to the next key or the end of the group.
-  subroutine scan_items(cursor, namelist, mistakes, is_damaged)
+  subroutine scan_items(cursor, namelist, diagnostics, is_damaged)
     type(cursor_t), intent(inout) :: cursor
     type(namelist_t), intent(inout) :: namelist
-    type(mistakes_t), intent(inout) :: mistakes
+    type(diagnostics_t), intent(inout) :: diagnostics
     logical, intent(out) :: is_damaged   !! some could not be understood
     logical :: is_fine, is_after_value
 
@@ -35,7 +35,7 @@ contains
       else if (cursor%key_follows()) then
         exit
       else
-        call scan_item(cursor, namelist, mistakes, is_fine)
+        call scan_item(cursor, namelist, diagnostics, is_fine)
         is_damaged = is_damaged .or. .not. is_fine
         is_after_value = .true.
       end if
@@ -44,10 +44,10 @@ contains
   end subroutine scan_items
 
   !> One value, or several by a repeat count such as 3*0.5.
-  subroutine scan_item(cursor, namelist, mistakes, is_fine)
+  subroutine scan_item(cursor, namelist, diagnostics, is_fine)
     type(cursor_t), intent(inout) :: cursor
     type(namelist_t), intent(inout) :: namelist
-    type(mistakes_t), intent(inout) :: mistakes
+    type(diagnostics_t), intent(inout) :: diagnostics
     logical, intent(out) :: is_fine
     type(item_t) :: item
     integer :: i, repeats
@@ -55,13 +55,13 @@ contains
     call scan_repeat_count(cursor, repeats)
     item%line = cursor%line
     is_fine = repeats >= 1 .and. repeats <= longest_list
-    if (.not. is_fine) call mistakes%add(cursor%line, namelist%group_count, &
+    if (.not. is_fine) call diagnostics%add(cursor%line, namelist%group_count, &
       'a repeat count such as 3*0.5 must be from 1 to ' // to_text(longest_list))
 
     if (scan(cursor%next(), '''"') == 1) then
-      call scan_quoted(cursor, namelist%group_count, mistakes, item, is_fine)
+      call scan_quoted(cursor, namelist%group_count, diagnostics, item, is_fine)
     else
-      call scan_bare(cursor, namelist%group_count, mistakes, item, is_fine)
+      call scan_bare(cursor, namelist%group_count, diagnostics, item, is_fine)
     end if
     if (.not. is_fine) return
     do i = 1, repeats
@@ -84,17 +84,18 @@ contains
     call cursor%move_to(last + 2)
   end subroutine scan_repeat_count
 
-  subroutine scan_quoted(cursor, group, mistakes, item, is_fine)
+  subroutine scan_quoted(cursor, group, diagnostics, item, is_fine)
     type(cursor_t), intent(inout) :: cursor
     integer, intent(in) :: group
-    type(mistakes_t), intent(inout) :: mistakes
+    type(diagnostics_t), intent(inout) :: diagnostics
     type(item_t), intent(inout) :: item
     logical, intent(inout) :: is_fine
     integer :: last
 
     last = cursor%quote_end()
     if (last == 0) then
-      call mistakes%add(cursor%line, group, 'a quote is missing: the text ' // cursor%excerpt() // ' is not closed on its line')
+      call diagnostics%add(cursor%line, group, &
+                           'a quote is missing: the text ' // cursor%excerpt() // ' is not closed on its line')
       call leave_broken_line(cursor)
     else if (is_separated(cursor, last + 1)) then
       item%first = cursor%at
@@ -103,17 +104,17 @@ contains
       call cursor%move_to(last + 1)
       return
     else
-      call mistakes%add(cursor%line, group, 'a quote or a comma is missing: ' // cursor%text(cursor%at:last) // &
+      call diagnostics%add(cursor%line, group, 'a quote or a comma is missing: ' // cursor%text(cursor%at:last) // &
         ' is followed directly by ' // cursor%text(last + 1:last + 1))
       call leave_broken_line(cursor)
     end if
     is_fine = .false.
   end subroutine scan_quoted
 
-  subroutine scan_bare(cursor, group, mistakes, item, is_fine)
+  subroutine scan_bare(cursor, group, diagnostics, item, is_fine)
     type(cursor_t), intent(inout) :: cursor
     integer, intent(in) :: group
-    type(mistakes_t), intent(inout) :: mistakes
+    type(diagnostics_t), intent(inout) :: diagnostics
     type(item_t), intent(inout) :: item
     logical, intent(inout) :: is_fine
     integer :: last
@@ -126,10 +127,10 @@ contains
     if (is_separated(cursor, cursor%at)) return
 
     if (cursor%next() == '=') then
-      call mistakes%add(cursor%line, group, "'=' without a key before it: " // cursor%excerpt())
+      call diagnostics%add(cursor%line, group, "'=' without a key before it: " // cursor%excerpt())
       call cursor%move_to(cursor%at + 1)
     else
-      call mistakes%add(cursor%line, group, 'a quote stands inside ' // cursor%text(item%first:last + 1) // &
+      call diagnostics%add(cursor%line, group, 'a quote stands inside ' // cursor%text(item%first:last + 1) // &
         '; a text begins and ends with a quote')
       call leave_broken_line(cursor)
     end if

@@ -6,7 +6,7 @@ module nocdyn_output_file
   implicit none (type, external)
   private
 
-  public :: write_whole
+  public :: write_file
 
   integer, parameter :: buffer_size = 65536
 
@@ -34,7 +34,7 @@ module nocdyn_output_file
 contains
 
   !> A file with this text, whole or not at all.
-  subroutine write_whole(folder, name, text, error)
+  subroutine write_file(folder, name, text, error)
     character(len=*), intent(in) :: folder, name, text
     type(error_t), allocatable, intent(out) :: error
     type(output_file_t) :: file
@@ -42,7 +42,7 @@ contains
     call file%open(folder, name)
     call file%put(text)
     call file%finish(name, error)
-  end subroutine write_whole
+  end subroutine write_file
 
   !> Opens a hidden file in `folder`, which is made if need be.
   subroutine open_aside(self, folder, name)

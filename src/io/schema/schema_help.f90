@@ -81,67 +81,67 @@ contains
   end function input_template
 
   !> A group's keys: those before its kind and the kind itself, those of each kind, those behind.
-  subroutine append_group(buffer, rule, margin)
+  subroutine append_group(buffer, rule, indicator)
     type(text_buffer_t), intent(inout) :: buffer
     integer, intent(in) :: rule
-    character(len=*), intent(in) :: margin   !! at the begin of each line
+    character(len=*), intent(in) :: indicator   !! at the begin of each line
     integer :: k, key, kind_key
 
-    call buffer%append_line(margin // '&' // trim(group_rules(rule)%name) // ', ' // &
+    call buffer%append_line(indicator // '&' // trim(group_rules(rule)%name) // ', ' // &
                             occurrence_text(group_rules(rule)%occurrence))
-    call buffer%append_line(margin // '  ' // trim(group_rules(rule)%help))
+    call buffer%append_line(indicator // '  ' // trim(group_rules(rule)%help))
     kind_key = kind_rule_index(rule)
     if (kind_key == 0) kind_key = last_key(rule)
     do key = first_key(rule), kind_key
-      call append_key(buffer, key_rules(key), margin)
+      call append_key(buffer, key_rules(key), indicator)
     end do
     do k = 1, size(kind_rules)
-      if (kind_rules(k)%group == group_rules(rule)%name) call append_kind(buffer, k, rule, margin)
+      if (kind_rules(k)%group == group_rules(rule)%name) call append_kind(buffer, k, rule, indicator)
     end do
     if (any(key_rules(kind_key + 1:last_key(rule))%kinds == '')) then
-      call buffer%append_line(margin // '  of every ' // kind_name(rule))
+      call buffer%append_line(indicator // '  of every ' // kind_name(rule))
     end if
     do key = kind_key + 1, last_key(rule)
-      if (key_rules(key)%kinds == '') call append_key(buffer, key_rules(key), margin)
+      if (key_rules(key)%kinds == '') call append_key(buffer, key_rules(key), indicator)
     end do
-    call append_sentences(buffer, rule, margin)
+    call append_sentences(buffer, rule, indicator)
   end subroutine append_group
 
   !> The law of a kind and its keys; those that an earlier kind has too are only named.
-  subroutine append_kind(buffer, kind, rule, margin)
+  subroutine append_kind(buffer, kind, rule, indicator)
     type(text_buffer_t), intent(inout) :: buffer
     integer, intent(in) :: kind, rule
-    character(len=*), intent(in) :: margin
+    character(len=*), intent(in) :: indicator
     type(string_t), allocatable :: known(:)
     integer :: key
 
-    call buffer%append_line(margin // '  ' // kind_name(rule) // ' = ' // quoted(trim(kind_rules(kind)%word)) // ': ' // &
+    call buffer%append_line(indicator // '  ' // kind_name(rule) // ' = ' // quoted(trim(kind_rules(kind)%word)) // ': ' // &
                             trim(kind_rules(kind)%help))
     allocate (known(0))
     do key = first_key(rule), last_key(rule)
       if (.not. has_word(key_rules(key)%kinds, kind_rules(kind)%word)) cycle
       if (index(key_rules(key)%kinds, trim(kind_rules(kind)%word) // ' ') == 1) then
-        call append_key(buffer, key_rules(key), margin)
+        call append_key(buffer, key_rules(key), indicator)
       else
         call append(known, trim(key_rules(key)%name))
       end if
     end do
-    if (size(known) > 0) call buffer%append_line(margin // '    ' // listed(known, ' and ') // ' as above')
+    if (size(known) > 0) call buffer%append_line(indicator // '    ' // listed(known, ' and ') // ' as above')
   end subroutine append_kind
 
-  subroutine append_key(buffer, rule, margin)
+  subroutine append_key(buffer, rule, indicator)
     type(text_buffer_t), intent(inout) :: buffer
     type(key_rule_t), intent(in) :: rule
-    character(len=*), intent(in) :: margin
+    character(len=*), intent(in) :: indicator
 
-    call buffer%append_line(margin // '    ' // rule%name // short_rule(rule, margin))
-    call buffer%append_line(margin // '      ' // trim(rule%help))
+    call buffer%append_line(indicator // '    ' // rule%name // short_rule(rule, indicator))
+    call buffer%append_line(indicator // '      ' // trim(rule%help))
   end subroutine append_key
 
   !> Type, allowed values and default in one line, the default in a column of its own; in a line of its own after long ones.
-  function short_rule(rule, margin) result(text)
+  function short_rule(rule, indicator) result(text)
     type(key_rule_t), intent(in) :: rule
-    character(len=*), intent(in) :: margin   !! of the lines
+    character(len=*), intent(in) :: indicator   !! of the lines
     character(len=:), allocatable :: text
 
     select case (rule%kind)
@@ -158,37 +158,37 @@ contains
     end select
     text = ' ' // text
     if (len(text) > longest) then
-      text = text // new_line('a') // margin // repeat(' ', 5 + len(rule%name) + column)
+      text = text // new_line('a') // indicator // repeat(' ', 5 + len(rule%name) + column)
     else
       text = text // repeat(' ', max(0, column + 1 - len(text)))
     end if
     text = text // ' ' // default_text(rule)
   end function short_rule
 
-  subroutine append_sentences(buffer, rule, margin)
+  subroutine append_sentences(buffer, rule, indicator)
     type(text_buffer_t), intent(inout) :: buffer
     integer, intent(in) :: rule
-    character(len=*), intent(in) :: margin
+    character(len=*), intent(in) :: indicator
     type(string_t), allocatable :: sentences(:)
     integer :: i
 
     allocate (sentences, source=sentences_on(rule))
     do i = 1, size(sentences)
-      call append_wrapped(buffer, sentences(i)%text, margin // '  ')
+      call append_wrapped(buffer, sentences(i)%text, indicator // '  ')
     end do
   end subroutine append_sentences
 
   !> A sentence on as many lines as it needs.
-  subroutine append_wrapped(buffer, text, margin)
+  subroutine append_wrapped(buffer, text, indicator)
     type(text_buffer_t), intent(inout) :: buffer
-    character(len=*), intent(in) :: text, margin
+    character(len=*), intent(in) :: text, indicator
     integer :: first, last
 
     first = 1
     do
       last = len(text)
       if (len(text) - first >= line_width) last = first - 1 + index(text(first:first + line_width - 1), ' ', back=.true.)
-      call buffer%append_line(margin // repeat('  ', merge(0, 1, first == 1)) // trim(text(first:last)))
+      call buffer%append_line(indicator // repeat('  ', merge(0, 1, first == 1)) // trim(text(first:last)))
       first = last + 1
       if (first > len(text)) exit
     end do

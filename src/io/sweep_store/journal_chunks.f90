@@ -12,77 +12,77 @@ module nocdyn_journal_chunks
 
   public :: check_sweep
 
-  integer, parameter :: most_said = 3   !! of equal things in a message
+  integer, parameter :: max_listed = 3   !! of equal things in a message
 
   !> Where the next chunk is; to begin again, begin again.
-  type, public :: sweep_records_t
-    integer, allocatable, private :: journal(:), record(:)   !! in the order of the variants
+  type, public :: chunk_cursor_t
+    integer, allocatable, private :: journal(:), entry(:)   !! in the order of the variants
     integer, private :: next = 1
   contains
-    procedure :: begin
-    procedure :: take
-  end type sweep_records_t
+    procedure :: rewind_to_start
+    procedure :: next_chunk
+  end type chunk_cursor_t
 
 contains
 
-  subroutine begin(self, journals)
-    class(sweep_records_t), intent(inout) :: self
+  subroutine rewind_to_start(self, journals)
+    class(chunk_cursor_t), intent(inout) :: self
     type(sweep_journal_t), intent(in) :: journals(:)
     type(range_t), allocatable :: ranges(:)
-    integer, allocatable :: order(:), journal(:), record(:)
+    integer, allocatable :: order(:), journal(:), entry(:)
     integer :: i
 
-    call list_records(journals, ranges, journal, record)
+    call list_entries(journals, ranges, journal, entry)
     call ascending_order(ranges, order)
     self%journal = [(journal(order(i)), i=1, size(order))]
-    self%record = [(record(order(i)), i=1, size(order))]
+    self%entry = [(entry(order(i)), i=1, size(order))]
     self%next = 1
-  end subroutine begin
+  end subroutine rewind_to_start
 
-  pure subroutine list_records(journals, ranges, journal, record)
+  pure subroutine list_entries(journals, ranges, journal, entry)
     type(sweep_journal_t), intent(in) :: journals(:)
     type(range_t), allocatable, intent(out) :: ranges(:)
-    integer, allocatable, intent(out) :: journal(:), record(:)   !! where each is from
+    integer, allocatable, intent(out) :: journal(:), entry(:)   !! where each is from
     integer :: i, last, k
 
-    allocate (ranges(sum(journals%records)), journal(sum(journals%records)), record(sum(journals%records)))
+    allocate (ranges(sum(journals%entries)), journal(sum(journals%entries)), entry(sum(journals%entries)))
     last = 0
     do k = 1, size(journals)
-      ranges(last + 1:last + journals(k)%records) = journals(k)%ranges()
-      do i = 1, journals(k)%records
+      ranges(last + 1:last + journals(k)%entries) = journals(k)%ranges()
+      do i = 1, journals(k)%entries
         journal(last + i) = k
-        record(last + i) = i
+        entry(last + i) = i
       end do
-      last = last + journals(k)%records
+      last = last + journals(k)%entries
     end do
-  end subroutine list_records
+  end subroutine list_entries
 
   !> The next chunk, as long as there is one.
-  subroutine take(self, journals, chunk, is_there, error)
-    class(sweep_records_t), intent(inout) :: self
-    type(sweep_journal_t), intent(inout) :: journals(:)   !! those of `begin`
+  subroutine next_chunk(self, journals, chunk, is_there, error)
+    class(chunk_cursor_t), intent(inout) :: self
+    type(sweep_journal_t), intent(inout) :: journals(:)   !! those of `rewind_to_start`
     type(chunk_t), intent(inout) :: chunk
     logical, intent(out) :: is_there
     type(error_t), allocatable, intent(out) :: error
 
-    is_there = self%next <= size(self%record)
+    is_there = self%next <= size(self%entry)
     if (.not. is_there) return
-    call journals(self%journal(self%next))%read_record(self%record(self%next), chunk, error)
+    call journals(self%journal(self%next))%read_entry(self%entry(self%next), chunk, error)
     self%next = self%next + 1
-  end subroutine take
+  end subroutine next_chunk
 
   !> Whether the journals are of one sweep and hold every variant of it once.
   subroutine check_sweep(journals, error)
     type(sweep_journal_t), intent(in) :: journals(:)     !! one at least
     type(error_t), allocatable, intent(out) :: error
     type(range_t), allocatable :: ranges(:), open_ranges(:)
-    integer, allocatable :: journal(:), record(:), order(:)
+    integer, allocatable :: journal(:), entry(:), order(:)
     integer :: i
 
     call check_headers(journals, error)
     if (.not. allocated(error)) call check_wholeness(journals, error)
     if (allocated(error)) return
-    call list_records(journals, ranges, journal, record)
+    call list_entries(journals, ranges, journal, entry)
     call ascending_order(ranges, order)
     do i = 2, size(order)
       if (ranges(order(i))%first > ranges(order(i - 1))%last) cycle
@@ -92,7 +92,7 @@ contains
     end do
     call gaps(ranges, range_t(1, journals(1)%header%variants), open_ranges)
     if (size(open_ranges) > 0) call raise(error, exit_input, absent_shards(journals) // 'no journal holds ' // &
-                                          said(open_ranges) // ' of ' // to_text(journals(1)%header%variants))
+                                          ranges_text(open_ranges) // ' of ' // to_text(journals(1)%header%variants))
   end subroutine check_sweep
 
   !> 'sweep.2-of-5.journal is not there: ', as far as the names of the others tell.
@@ -111,11 +111,11 @@ contains
       end do
       if (i <= size(journals)) cycle
       absent = absent + 1
-      if (absent > most_said) cycle
+      if (absent > max_listed) cycle
       if (text /= '') text = text // ', '
       text = text // name
     end do
-    if (absent > most_said) text = text // ' and ' // to_text(absent - most_said) // ' more'
+    if (absent > max_listed) text = text // ' and ' // to_text(absent - max_listed) // ' more'
     if (absent > 0) text = text // trim(merge(' is ', ' are', absent == 1)) // ' not there: '
   end function absent_shards
 
@@ -186,7 +186,7 @@ contains
         call gaps(journals(i)%ranges(), range_t(header%first, header%last), open_ranges)
         if (size(open_ranges) == 0) cycle
         if (message /= '') message = message // new_line('a')
-        message = message // journals(i)%path() // ': unfinished, without ' // said(open_ranges) // ' of ' // &
+        message = message // journals(i)%path() // ': unfinished, without ' // ranges_text(open_ranges) // ' of ' // &
                   to_text(header%first) // ' to ' // to_text(header%last) // '; --resume goes on with it'
       end associate
     end do
@@ -194,19 +194,19 @@ contains
   end subroutine check_wholeness
 
   !> 'variants 3 to 5, 8 and 2 more ranges'.
-  pure function said(ranges) result(text)
+  pure function ranges_text(ranges) result(text)
     type(range_t), intent(in) :: ranges(:)
     character(len=:), allocatable :: text
     integer :: i
 
     text = 'variants '
     if (size(ranges) == 1) text = trim(merge('variant ', 'variants', ranges(1)%first == ranges(1)%last)) // ' '
-    do i = 1, min(size(ranges), most_said)
+    do i = 1, min(size(ranges), max_listed)
       if (i > 1) text = text // ', '
       text = text // to_text(ranges(i)%first)
       if (ranges(i)%last > ranges(i)%first) text = text // ' to ' // to_text(ranges(i)%last)
     end do
-    if (size(ranges) > most_said) text = text // ' and ' // to_text(size(ranges) - most_said) // ' more ranges'
-  end function said
+    if (size(ranges) > max_listed) text = text // ' and ' // to_text(size(ranges) - max_listed) // ' more ranges'
+  end function ranges_text
 
 end module nocdyn_journal_chunks

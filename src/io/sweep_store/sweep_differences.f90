@@ -7,7 +7,7 @@ module nocdyn_sweep_differences
 
   public :: input_difference
 
-  integer, parameter :: most_told = 5   ! differences
+  integer, parameter :: max_listed = 5   ! differences
 
 contains
 
@@ -21,11 +21,11 @@ contains
     text = ''
     if (old == new) return
     call find_differences(old, new, changes)
-    do i = 1, min(size(changes), most_told)
+    do i = 1, min(size(changes), max_listed)
       if (i > 1) text = text // '; '
       text = text // changes(i)%text
     end do
-    if (size(changes) > most_told) text = text // '; and ' // to_text(size(changes) - most_told) // ' more'
+    if (size(changes) > max_listed) text = text // '; and ' // to_text(size(changes) - max_listed) // ' more'
   end function input_difference
 
 end module nocdyn_sweep_differences

@@ -6,7 +6,7 @@ module nocdyn_sweep_header
 
   public :: pack_header, unpack_header
 
-  character(len=*), parameter, public :: sweep_file_name = 'sweep.nc'
+  character(len=*), parameter, public :: sweep_netcdf_name = 'sweep.nc'
 
   !> One varied number or one result.
   type, public :: quantity_t

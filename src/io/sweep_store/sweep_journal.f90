@@ -4,11 +4,11 @@ module nocdyn_sweep_journal
   use nocdyn_errors, only: error_t, exit_file, exit_input, raise
   use nocdyn_folders, only: folder_names
   use nocdyn_number_ranges, only: gaps, range_t
-  use nocdyn_record_file, only: frame_bytes, record_file_t
+  use nocdyn_log_file, only: frame_bytes, log_file_t
   use nocdyn_sweep_chunk, only: chunk_summary_t, chunk_t, pack_chunk, read_summary, unpack_chunk
   use nocdyn_sweep_header, only: pack_header, sweep_header_t, unpack_header
   use nocdyn_text, only: append_text => append, string_t, to_text
-  use nocdyn_text_order, only: find_order
+  use nocdyn_text_sort, only: argsort
   implicit none (type, external)
   private
 
@@ -17,30 +17,30 @@ module nocdyn_sweep_journal
   integer(int32), parameter :: header_mark = int(z'64616568', int32), chunk_mark = int(z'6B6E6863', int32)   ! 'head', 'chnk'
 
   !> Where a chunk stands.
-  type :: record_t
+  type :: log_entry_t
     integer(int64) :: offset = 0   !! of its frame
     integer :: first = 1, count = 0
-  end type record_t
+  end type log_entry_t
 
   type, public :: sweep_journal_t
     type(sweep_header_t) :: header
     integer :: done = 0, refused = 0, failed = 0   !! variants in it
-    integer :: records = 0                         !! chunks in it
+    integer :: entries = 0                         !! chunks in it
     integer :: longest_reason = 0                  !! [characters]
     integer(int64) :: damaged_bytes = 0            !! left out by `open_journal`
-    type(record_file_t), private :: file
-    type(record_t), allocatable, private :: index(:)
+    type(log_file_t), private :: file
+    type(log_entry_t), allocatable, private :: index(:)
   contains
     procedure :: path
     procedure :: append
     procedure :: append_packed
     procedure :: ranges
     procedure :: missing
-    procedure :: record_of
-    procedure :: read_record
+    procedure :: entry_of
+    procedure :: read_entry
     procedure :: close => close_journal
     procedure :: remove => remove_journal
-    procedure, private :: note_record
+    procedure, private :: add_entry
     procedure, private :: read_chunks
   end type sweep_journal_t
 
@@ -65,7 +65,7 @@ contains
     integer :: i
 
     allocate (all_names, source=folder_names(folder))
-    call find_order(all_names, order)
+    call argsort(all_names, order)
     allocate (names(0))
     do i = 1, size(all_names)
       associate (name => all_names(order(i))%text)
@@ -131,7 +131,7 @@ contains
       if (is_good) is_good = belongs(summary, self%header)
       if (is_good) then
         self%damaged_bytes = self%damaged_bytes + offset - self%file%end
-        call self%note_record(offset, summary)
+        call self%add_entry(offset, summary)
         self%file%end = offset + frame_bytes + length
       end if
       offset = offset + frame_bytes + length
@@ -147,24 +147,24 @@ contains
               summary%first >= header%first .and. summary%count <= header%last - summary%first + 1
   end function belongs
 
-  subroutine note_record(self, offset, summary)
+  subroutine add_entry(self, offset, summary)
     class(sweep_journal_t), intent(inout) :: self
     integer(int64), intent(in) :: offset
     type(chunk_summary_t), intent(in) :: summary
-    type(record_t), allocatable :: longer(:)
+    type(log_entry_t), allocatable :: longer(:)
 
-    if (self%records == size(self%index)) then
-      allocate (longer(2 * self%records))
-      longer(:self%records) = self%index
+    if (self%entries == size(self%index)) then
+      allocate (longer(2 * self%entries))
+      longer(:self%entries) = self%index
       call move_alloc(longer, self%index)
     end if
-    self%records = self%records + 1
-    self%index(self%records) = record_t(offset, summary%first, summary%count)
+    self%entries = self%entries + 1
+    self%index(self%entries) = log_entry_t(offset, summary%first, summary%count)
     self%refused = self%refused + summary%refused
     self%failed = self%failed + summary%failed
     self%done = self%done + summary%count - summary%refused - summary%failed
     self%longest_reason = max(self%longest_reason, summary%longest_reason)
-  end subroutine note_record
+  end subroutine add_entry
 
   !> Adds a chunk. After an error the journal is as it was before, if the disk lets it be.
   subroutine append(self, chunk, error)
@@ -191,7 +191,7 @@ contains
     if (.not. is_whole) error stop 'nocdyn_sweep_journal: append_packed needs a chunk of this sweep'
     offset = self%file%end
     call self%file%write(chunk_mark, bytes, error)
-    if (.not. allocated(error)) call self%note_record(offset, summary)
+    if (.not. allocated(error)) call self%add_entry(offset, summary)
   end subroutine append_packed
 
   pure function path(self)
@@ -207,8 +207,8 @@ contains
     type(range_t), allocatable :: ranges(:)
     integer :: i
 
-    allocate (ranges(self%records))
-    do i = 1, self%records
+    allocate (ranges(self%entries))
+    do i = 1, self%entries
       ranges(i) = range_t(self%index(i)%first, self%index(i)%first + self%index(i)%count - 1)
     end do
   end function ranges
@@ -226,17 +226,17 @@ contains
   end subroutine missing
 
   !> The number of the record that holds a variant, 0 if none does.
-  pure integer function record_of(self, variant) result(number)
+  pure integer function entry_of(self, variant) result(number)
     class(sweep_journal_t), intent(in) :: self
     integer, intent(in) :: variant
 
-    do number = self%records, 1, -1
+    do number = self%entries, 1, -1
       if (variant >= self%index(number)%first .and. variant - self%index(number)%first < self%index(number)%count) return
     end do
-  end function record_of
+  end function entry_of
 
-  !> The chunk of record `number`, 1 to `records`.
-  subroutine read_record(self, number, chunk, error)
+  !> The chunk of record `number`, 1 to `entries`.
+  subroutine read_entry(self, number, chunk, error)
     class(sweep_journal_t), intent(inout) :: self
     integer, intent(in) :: number
     type(chunk_t), intent(inout) :: chunk
@@ -250,7 +250,7 @@ contains
     else
       call raise(error, exit_file, self%path() // ': cannot be read: it is not as it was when it was opened')
     end if
-  end subroutine read_record
+  end subroutine read_entry
 
   !> Ends the work on the journal, which stays.
   subroutine close_journal(self)

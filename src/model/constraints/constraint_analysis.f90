@@ -3,7 +3,7 @@
 !> Rows of two bodies come first: they tie the bodies to rigid trains, in time linear in their number. What the other rows
 !> add is a small problem between trains, of which only the core that does not peel is dense.
 module nocdyn_constraint_analysis
-  use nocdyn_constraint_conflicts, only: locked_trains, refuse_locked, refuse_loop
+  use nocdyn_constraint_conflicts, only: locked_trains, raise_lock, raise_loop_conflict
   use nocdyn_constraints, only: constraints_t
   use nocdyn_coordinate_choice, only: choose_coordinates, eliminate
   use nocdyn_errors, only: error_t
@@ -14,7 +14,7 @@ module nocdyn_constraint_analysis
   use nocdyn_sparse_map, only: transposed_order
   use nocdyn_text, only: string_t
   use nocdyn_train_motion, only: elimination_t, find_loads, find_motion, train_motion_t
-  use nocdyn_train_relations, only: distinct_trains, new_relations, paced_rows, peeling_t, train_relations_t
+  use nocdyn_train_relations, only: distinct_trains, new_relations, scaled_rows, leaf_elimination_t, train_relations_t
   implicit none (type, external)
   private
 
@@ -23,13 +23,13 @@ module nocdyn_constraint_analysis
 contains
 
   !> Finds the trains and groups and analyses them; locked bodies and unusable coordinates are errors.
-  subroutine analyse_constraints(constraints, body_names, wanted, trains, groups, culprit, error)
+  subroutine analyse_constraints(constraints, body_names, wanted, trains, groups, offending_row, error)
     type(constraints_t), intent(in) :: constraints
     type(string_t), intent(in) :: body_names(:)
     integer, intent(in) :: wanted(:)                 !! bodies that are to be the coordinates; empty: found here
     type(rigid_trains_t), intent(out) :: trains      !! led by the coordinates, or by their fastest bodies
     type(geared_group_t), allocatable, intent(out) :: groups(:)
-    integer, intent(out) :: culprit                  !! row that the error is about, 0 if it is about `wanted`
+    integer, intent(out) :: offending_row                  !! row that the error is about, 0 if it is about `wanted`
     type(error_t), allocatable, intent(out) :: error
     type(train_relations_t) :: relations
     integer, allocatable :: group_of(:)
@@ -38,35 +38,35 @@ contains
 
     call find_groups(constraints, groups, group_of)
     call find_trains(constraints, trains, is_kept)
-    culprit = first_contradiction(constraints, trains, is_kept)
-    if (culprit > 0) then
-      call refuse_loop(constraints, body_names, trains, culprit, error)
+    offending_row = first_contradiction(constraints, trains, is_kept)
+    if (offending_row > 0) then
+      call raise_loop_conflict(constraints, body_names, trains, offending_row, error)
       return
     end if
-    call trains%choose_leads(constraints, trains%fastest_bodies(constraints))
+    call trains%choose_roots(constraints, trains%fastest_bodies(constraints))
     relations = new_relations(constraints, trains)
-    call distribute_trains(group_of(trains%lead), groups)
-    call sift_relations(relations, group_of(trains%lead), size(groups), is_kept)
+    call distribute_trains(group_of(trains%root), groups)
+    call find_independent_relations(relations, group_of(trains%root), size(groups), is_kept)
     do r = 1, size(groups)
       groups(r)%kept = pack(groups(r)%rows, is_kept(groups(r)%rows))
     end do
     call eliminate(relations, is_kept(relations%row), group_of, trains, groups)
-    call refuse_locks(constraints, body_names, trains, relations, groups, culprit, error)
+    call raise_first_lock(constraints, body_names, trains, relations, groups, offending_row, error)
     if (allocated(error)) return
     call explain_redundancies(constraints, trains, relations, groups)
     call choose_coordinates(constraints, body_names, wanted, group_of, is_kept, trains, groups, error)
   end subroutine analyse_constraints
 
   !> The first row of two bodies that closes a loop with another ratio than that of the rows before it, 0 if none does.
-  integer function first_contradiction(constraints, trains, is_tied) result(row)
+  integer function first_contradiction(constraints, trains, is_tree) result(row)
     type(constraints_t), intent(in) :: constraints
     type(rigid_trains_t), intent(in) :: trains
-    logical, intent(in) :: is_tied(:)
+    logical, intent(in) :: is_tree(:)
     integer, allocatable :: loops(:)
     integer :: r
 
-    loops = pack([(r, r=1, constraints%rows())], [(constraints%entries(r) == 2 .and. .not. is_tied(r), r=1, constraints%rows())])
-    row = findloc(trains%contradicts(constraints, loops), .true., dim=1)
+    loops = pack([(r, r=1, constraints%rows())], [(constraints%entries(r) == 2 .and. .not. is_tree(r), r=1, constraints%rows())])
+    row = findloc(trains%is_inconsistent(constraints, loops), .true., dim=1)
     if (row > 0) row = loops(row)
   end function first_contradiction
 
@@ -82,12 +82,12 @@ contains
   end subroutine distribute_trains
 
   !> Keeps, in the order of the input, the relations that are independent of those before them; all that peel are.
-  subroutine sift_relations(relations, group_of, groups, is_kept)
+  subroutine find_independent_relations(relations, group_of, groups, is_kept)
     type(train_relations_t), intent(in) :: relations
     integer, intent(in) :: group_of(:)         !! of the trains
     integer, intent(in) :: groups
     logical, intent(inout) :: is_kept(:)       !! rows
-    type(peeling_t) :: peeling
+    type(leaf_elimination_t) :: leaves
     integer, allocatable :: order(:)
     integer :: first(groups + 1), g, i
     logical :: all_relations(size(relations%row)), no_train(size(group_of))
@@ -95,19 +95,19 @@ contains
     all_relations = .true.
     no_train = .false.
     is_kept(relations%row) = .true.
-    peeling = relations%peel(all_relations, no_train)
-    if (size(peeling%core) == 0) return
-    allocate (order(size(peeling%core)))
-    call transposed_order([(group_of(relations%between%body(relations%between%first(peeling%core(i)))), &
-                            i=1, size(peeling%core))], groups, order, first)
+    leaves = relations%eliminate_leaves(all_relations, no_train)
+    if (size(leaves%core) == 0) return
+    allocate (order(size(leaves%core)))
+    call transposed_order([(group_of(relations%between%body(relations%between%first(leaves%core(i)))), &
+                            i=1, size(leaves%core))], groups, order, first)
     do g = 1, groups
-      if (first(g + 1) > first(g)) call sift_core(relations, peeling%core(order(first(g):first(g + 1) - 1)), is_kept)
+      if (first(g + 1) > first(g)) call find_independent_core(relations, leaves%core(order(first(g):first(g + 1) - 1)), is_kept)
     end do
-  end subroutine sift_relations
+  end subroutine find_independent_relations
 
   !> Drops the relations that are combinations of those before them; then, where rounding hid one, the first that does not
   !> raise the rank (column-pivoted QR), and so on until the rank is full.
-  subroutine sift_core(relations, core, is_kept)
+  subroutine find_independent_core(relations, core, is_kept)
     type(train_relations_t), intent(in) :: relations
     integer, intent(in) :: core(:)
     logical, intent(inout) :: is_kept(:)
@@ -116,8 +116,8 @@ contains
     integer :: dependent, fine, i, middle
     logical :: adds(size(core))
 
-    allocate (rows, source=paced_rows(relations%between, core, distinct_trains(relations%between, core)))
-    adds = new_directions(rows)
+    allocate (rows, source=scaled_rows(relations%between, core, distinct_trains(relations%between, core)))
+    adds = independent_rows(rows)
     is_kept(relations%row(pack(core, .not. adds))) = .false.
     left = pack(core, adds)
     rows(:size(left), :) = rows(pack([(i, i=1, size(core))], adds), :)
@@ -137,10 +137,10 @@ contains
       rows(dependent:size(left) - 1, :) = rows(dependent + 1:size(left), :)
       left = [left(:dependent - 1), left(dependent + 1:)]
     end do
-  end subroutine sift_core
+  end subroutine find_independent_core
 
   !> Which rows of unit length have a part that is no combination of those before them: Gram and Schmidt, each twice.
-  function new_directions(rows) result(adds)
+  function independent_rows(rows) result(adds)
     real(wp), intent(in) :: rows(:, :)
     logical :: adds(size(rows, 1))
     real(wp) :: basis(size(rows, 2), size(rows, 1)), part(size(rows, 2))   ! the basis is orthonormal
@@ -159,7 +159,7 @@ contains
       n = n + 1
       basis(:, n) = part / norm2(part)
     end do
-  end function new_directions
+  end function independent_rows
 
   integer function rank_of(rows)
     real(wp), intent(in) :: rows(:, :)
@@ -171,13 +171,13 @@ contains
   end function rank_of
 
   !> Error for the first group that relations lock.
-  subroutine refuse_locks(constraints, body_names, trains, relations, groups, culprit, error)
+  subroutine raise_first_lock(constraints, body_names, trains, relations, groups, offending_row, error)
     type(constraints_t), intent(in) :: constraints
     type(string_t), intent(in) :: body_names(:)
     type(rigid_trains_t), intent(in) :: trains
     type(train_relations_t), intent(in) :: relations
     type(geared_group_t), intent(in) :: groups(:)
-    integer, intent(inout) :: culprit
+    integer, intent(inout) :: offending_row
     type(error_t), allocatable, intent(out) :: error
     integer :: g
 
@@ -185,12 +185,12 @@ contains
       associate (elimination => groups(g)%elimination)
         if (size(elimination%relation) + size(elimination%core) == 0) cycle
         if (.not. any(locked_trains(relations, elimination))) cycle
-        call refuse_locked(constraints, body_names, trains, relations, &
-                           [elimination%relation, elimination%core], culprit, error)
+        call raise_lock(constraints, body_names, trains, relations, &
+                           [elimination%relation, elimination%core], offending_row, error)
         return
       end associate
     end do
-  end subroutine refuse_locks
+  end subroutine raise_first_lock
 
   !> The kept rows that each redundant row repeats.
   subroutine explain_redundancies(constraints, trains, relations, groups)
@@ -200,15 +200,15 @@ contains
     type(geared_group_t), intent(inout) :: groups(:)
     type(train_motion_t) :: found
     integer, allocatable :: bodies(:), redundant(:), rows(:)
-    integer :: g, i, k, next, place(size(trains%lead))
+    integer :: g, i, k, next, local(size(trains%root))
 
     do g = 1, size(groups)
       associate (group => groups(g))
         allocate (group%redundancies(size(group%rows) - size(group%kept)))
         if (size(group%redundancies) == 0) cycle
         allocate (redundant, source=other_rows(group%rows, group%kept))
-        place(group%trains) = [(k, k=1, size(group%trains))]
-        call find_motion(relations, group%elimination, place, size(group%trains), 1, found)
+        local(group%trains) = [(k, k=1, size(group%trains))]
+        call find_motion(relations, group%elimination, local, size(group%trains), 1, found)
         do i = 1, size(redundant)
           group%redundancies(i)%row = redundant(i)
           next = constraints%first(redundant(i))
@@ -266,7 +266,7 @@ contains
     integer, intent(in) :: row
     integer, allocatable :: rows(:)
     integer :: relation
-    real(wp) :: lambda(size(relations%row)), moment(size(trains%lead))
+    real(wp) :: lambda(size(relations%row)), moment(size(trains%root))
 
     relation = findloc(relations%row, row, dim=1)
     moment = 0.0_wp

@@ -9,11 +9,11 @@ module nocdyn_constraint_conflicts
   use nocdyn_rigid_trains, only: ratio_tolerance, rigid_trains_t
   use nocdyn_text, only: joined, quoted, rounded_text, selected, string_t
   use nocdyn_train_motion, only: elimination_t, find_loads, find_motion, train_motion_t
-  use nocdyn_train_relations, only: distinct_trains, paced_rows, peeling_t, train_relations_t
+  use nocdyn_train_relations, only: distinct_trains, scaled_rows, leaf_elimination_t, train_relations_t
   implicit none (type, external)
   private
 
-  public :: locked_trains, refuse_locked, refuse_loop
+  public :: locked_trains, raise_lock, raise_loop_conflict
 
   integer, parameter :: most_names = 12     ! in a message
   integer, parameter :: ratio_digits = 12   ! enough to tell two ratios apart, without the noise of rounding
@@ -21,7 +21,7 @@ module nocdyn_constraint_conflicts
 contains
 
   !> The error for a row of two bodies that closes a loop with another ratio.
-  subroutine refuse_loop(constraints, body_names, trains, row, error)
+  subroutine raise_loop_conflict(constraints, body_names, trains, row, error)
     type(constraints_t), intent(in) :: constraints
     type(string_t), intent(in) :: body_names(:)
     type(rigid_trains_t), intent(in) :: trains
@@ -53,7 +53,7 @@ contains
                rounded_text(ratio_along(constraints, bodies_of_tree, way), ratio_digits) // ' and ' // &
                rounded_text(ratio_along(constraints, bodies_of_row, other_way), ratio_digits) // ' times ' // &
                quoted(body_names(bodies_of_tree(1))%text))
-  end subroutine refuse_loop
+  end subroutine raise_loop_conflict
 
   !> omega(last body) / omega(first body) along rows of two bodies.
   pure real(wp) function ratio_along(constraints, bodies, rows) result(ratio)
@@ -65,7 +65,7 @@ contains
 
     ratio = 1.0_wp
     do i = 1, size(rows)
-      call constraints%split_pair(1, rows(i), bodies(i), own, other)
+      call constraints%pair_coefficients(1, rows(i), bodies(i), own, other)
       ratio = -ratio * own / other
     end do
   end function ratio_along
@@ -77,7 +77,7 @@ contains
     integer, intent(in) :: locked(:)   !! trains
     character(len=:), allocatable :: names
     integer :: b
-    logical :: is_locked(size(trains%lead))
+    logical :: is_locked(size(trains%root))
 
     is_locked = .false.
     is_locked(locked) = .true.
@@ -93,14 +93,14 @@ contains
     type(train_motion_t) :: found
     real(wp) :: bound(size(elimination%free)), speed(size(elimination%free))
     integer, allocatable :: trains(:)
-    integer :: entry, i, place(relations%between%bodies)
+    integer :: entry, i, local(relations%between%bodies)
 
     is_locked = .false.
     allocate (trains, source=[elimination%core_trains, distinct_trains(relations%between, elimination%relation)])
-    place(trains) = [(i, i=1, size(trains))]
-    place(elimination%free) = [(size(trains) + i, i=1, size(elimination%free))]
-    call find_motion(relations, elimination, place, size(trains) + size(elimination%free), 1, found)
-    if (size(elimination%core) > 0) is_locked(elimination%core_trains) = resting(relations, elimination)
+    local(trains) = [(i, i=1, size(trains))]
+    local(elimination%free) = [(size(trains) + i, i=1, size(elimination%free))]
+    call find_motion(relations, elimination, local, size(trains) + size(elimination%free), 1, found)
+    if (size(elimination%core) > 0) is_locked(elimination%core_trains) = has_zero_speed(relations, elimination)
     associate (between => relations%between)
       do i = size(elimination%relation), 1, -1
         bound = 0.0_wp
@@ -108,8 +108,8 @@ contains
         do entry = between%first(elimination%relation(i)), between%first(elimination%relation(i) + 1) - 1
           associate (train => between%body(entry))
             if (train == elimination%train(i) .or. is_locked(train)) cycle
-            speed = speed + between%coefficient(1, entry) * found%motion(place(train), :)
-            bound = bound + abs(between%coefficient(1, entry) * found%motion(place(train), :))
+            speed = speed + between%coefficient(1, entry) * found%motion(local(train), :)
+            bound = bound + abs(between%coefficient(1, entry) * found%motion(local(train), :))
           end associate
         end do
         is_locked(elimination%train(i)) = all(abs(speed) <= ratio_tolerance * bound)
@@ -118,7 +118,7 @@ contains
   end function locked_trains
 
   !> Whether the trains of the core rest, from its complement between paced speeds.
-  function resting(relations, elimination) result(rests)
+  function has_zero_speed(relations, elimination) result(rests)
     type(train_relations_t), intent(in) :: relations
     type(elimination_t), intent(in) :: elimination
     logical :: rests(size(elimination%core_trains))
@@ -127,25 +127,25 @@ contains
     integer :: pivots(size(rests)), rank
     logical :: is_singular
 
-    rows = paced_rows(relations%between, elimination%core, elimination%core_trains)
+    rows = scaled_rows(relations%between, elimination%core, elimination%core_trains)
     call pivoted_rank(rows, ratio_tolerance, rank, pivots)
     call natural_complement(rows, pivots(rank + 1:), motion, dual, log_determinant, is_singular)
     if (is_singular) error stop 'nocdyn_constraint_conflicts: relations must be independent here'
     rests = .true.
     if (size(motion, 2) > 0) rests = maxval(abs(motion), dim=2) <= ratio_tolerance
-  end function resting
+  end function has_zero_speed
 
   !> The error for the first relation with which a lock begins, among those of a group that locks.
-  subroutine refuse_locked(constraints, body_names, trains, relations, members, culprit, error)
+  subroutine raise_lock(constraints, body_names, trains, relations, members, offending_row, error)
     type(constraints_t), intent(in) :: constraints
     type(string_t), intent(in) :: body_names(:)
     type(rigid_trains_t), intent(in) :: trains
     type(train_relations_t), intent(in) :: relations
     integer, intent(in) :: members(:)      !! the independent relations of the group
-    integer, intent(out) :: culprit        !! constraint row
+    integer, intent(out) :: offending_row        !! constraint row
     type(error_t), allocatable, intent(out) :: error
     type(elimination_t) :: elimination
-    logical :: is_member(size(relations%row)), is_locked(size(trains%lead))
+    logical :: is_member(size(relations%row)), is_locked(size(trains%root))
     integer, allocatable :: inputs(:), rows(:)
     integer :: fine, i, lock, middle
 
@@ -162,14 +162,14 @@ contains
         fine = middle
       end if
     end do
-    culprit = relations%row(inputs(lock))
+    offending_row = relations%row(inputs(lock))
     elimination = partial_elimination(relations, inputs(:lock))
     is_locked = locked_trains(relations, elimination)
     rows = locking_rows(constraints, trains, relations, elimination, findloc(is_locked, .true., dim=1))
-    rows = pack(rows, rows /= culprit)
+    rows = pack(rows, rows /= offending_row)
     call raise(error, exit_input, 'locks ' // locked_names(body_names, trains, pack([(i, i=1, size(is_locked))], is_locked)) // &
                reason(selected(constraints%names, rows)))
-  end subroutine refuse_locked
+  end subroutine raise_lock
 
   !> Why the relations lock: the other rows that take part.
   function reason(names) result(text)
@@ -188,15 +188,15 @@ contains
     type(train_relations_t), intent(in) :: relations
     integer, intent(in) :: chosen(:)
     type(elimination_t) :: elimination
-    type(peeling_t) :: peeling
+    type(leaf_elimination_t) :: leaves
     logical :: takes_part(size(relations%row)), no_train(relations%between%bodies)
 
     takes_part = .false.
     takes_part(chosen) = .true.
     no_train = .false.
-    peeling = relations%peel(takes_part, no_train)
-    elimination = pivoted_elimination(relations, distinct_trains(relations%between, chosen), peeling%relation, &
-                                      peeling%train, peeling%core)
+    leaves = relations%eliminate_leaves(takes_part, no_train)
+    elimination = pivoted_elimination(relations, distinct_trains(relations%between, chosen), leaves%relation, &
+                                      leaves%train, leaves%core)
   end function partial_elimination
 
   !> The rows whose combination says that a train rests.
@@ -208,16 +208,16 @@ contains
     integer, intent(in) :: locked   !! train
     integer, allocatable :: rows(:)
     type(train_motion_t) :: found
-    real(wp) :: lambda(size(relations%row)), moment(size(trains%lead))
-    integer :: i, place(size(trains%lead))
+    real(wp) :: lambda(size(relations%row)), moment(size(trains%root))
+    integer :: i, local(size(trains%root))
 
-    place = [(i, i=1, size(place))]
-    call find_motion(relations, elimination, place, size(place), 1, found)
+    local = [(i, i=1, size(local))]
+    call find_motion(relations, elimination, local, size(local), 1, found)
     moment = 0.0_wp
     moment(locked) = 1.0_wp
     lambda = 0.0_wp
     call find_loads(relations, elimination, found%dual, 1, moment, lambda)
-    rows = relations%loaded_rows(constraints, trains, lambda, trains%lead(locked))
+    rows = relations%loaded_rows(constraints, trains, lambda, trains%root(locked))
   end function locking_rows
 
 end module nocdyn_constraint_conflicts

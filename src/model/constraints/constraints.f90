@@ -1,7 +1,7 @@
 !> The rigid part of a machine: rows of L_lambda, eqs. (8), (23), each a linear relation between body speeds.
 module nocdyn_constraints
   use nocdyn_kinds, only: wp
-  use nocdyn_lane_numbers, only: lane_numbers_t
+  use nocdyn_lane_parameters, only: lane_parameters_t
   use nocdyn_sparse_map, only: transposed_order
   use nocdyn_text, only: string_t, strings
   implicit none (type, external)
@@ -29,11 +29,11 @@ module nocdyn_constraints
   contains
     procedure :: rows
     procedure :: entries
-    procedure :: split_pair
-    procedure :: list_rows
+    procedure :: pair_coefficients
+    procedure :: list_body_rows
     procedure :: block
     procedure :: residual
-    procedure :: list_numbers
+    procedure :: list_parameters
   end type constraints_t
 
 contains
@@ -82,7 +82,7 @@ contains
   end function entries
 
   !> The coefficients of a body and of the other one in a row of two.
-  pure subroutine split_pair(self, lane, row, body, own, other)
+  pure subroutine pair_coefficients(self, lane, row, body, own, other)
     class(constraints_t), intent(in) :: self
     integer, intent(in) :: lane, row, body
     real(wp), intent(out) :: own, other
@@ -96,10 +96,10 @@ contains
         other = self%coefficient(lane, first)
       end if
     end associate
-  end subroutine split_pair
+  end subroutine pair_coefficients
 
   !> The chosen rows that each body is in, ascending: row(first(b)) to row(first(b + 1) - 1).
-  subroutine list_rows(self, is_chosen, first, row)
+  subroutine list_body_rows(self, is_chosen, first, row)
     class(constraints_t), intent(in) :: self
     logical, intent(in) :: is_chosen(:)   !! [rows]
     integer, allocatable, intent(out) :: first(:), row(:)
@@ -119,7 +119,7 @@ contains
     allocate (first(self%bodies + 1), order(n))
     call transposed_order(body(:n), self%bodies, order, first)
     row = row_of(order)
-  end subroutine list_rows
+  end subroutine list_body_rows
 
   !> The dense part of L_lambda in the given rows and columns; entries in other columns are left out.
   pure function block(self, lane, chosen, bodies) result(dense)
@@ -155,14 +155,14 @@ contains
     end do
   end subroutine residual
 
-  subroutine list_numbers(self, numbers)
+  subroutine list_parameters(self, parameters)
     class(constraints_t), target, intent(inout) :: self
-    type(lane_numbers_t), intent(inout) :: numbers
+    type(lane_parameters_t), intent(inout) :: parameters
 
-    call numbers%remark(self%first)
-    call numbers%remark(self%body)
-    call numbers%add('constraints: coefficient', self%coefficient)
-    call numbers%add('constraints: factor', self%members%factor)
-  end subroutine list_numbers
+    call parameters%add_structure(self%first)
+    call parameters%add_structure(self%body)
+    call parameters%add('constraints: coefficient', self%coefficient)
+    call parameters%add('constraints: factor', self%members%factor)
+  end subroutine list_parameters
 
 end module nocdyn_constraints

@@ -5,11 +5,11 @@ module nocdyn_coordinate_choice
   use nocdyn_geared_groups, only: geared_group_t
   use nocdyn_kinds, only: wp
   use nocdyn_lapack, only: pivoted_rank
-  use nocdyn_rigid_trains, only: ratio_tolerance, rigid_trains_t, steepest
+  use nocdyn_rigid_trains, only: ratio_tolerance, rigid_trains_t, max_exponent
   use nocdyn_sparse_map, only: transposed_order
   use nocdyn_text, only: joined, quoted, selected, string_t, to_text
   use nocdyn_train_motion, only: elimination_t
-  use nocdyn_train_relations, only: distinct_trains, new_relations, paced_rows, peeling_t, train_relations_t
+  use nocdyn_train_relations, only: distinct_trains, new_relations, scaled_rows, leaf_elimination_t, train_relations_t
   implicit none (type, external)
   private
 
@@ -26,40 +26,40 @@ contains
     integer, intent(in) :: group_of(:)     !! [bodies]
     type(rigid_trains_t), intent(in) :: trains
     type(geared_group_t), intent(inout) :: groups(:)
-    logical :: is_free_lead(size(group_of)), no_train(size(trains%lead))
+    logical :: is_free_root(size(group_of)), no_train(size(trains%root))
     integer :: g
 
     no_train = .false.
-    call distribute(relations, relations%peel(takes_part, no_train), group_of(trains%lead), groups)
-    is_free_lead = .false.
+    call distribute(relations, relations%eliminate_leaves(takes_part, no_train), group_of(trains%root), groups)
+    is_free_root = .false.
     do g = 1, size(groups)
       associate (group => groups(g))
         group%elimination = pivoted_elimination(relations, group%trains, group%elimination%relation, &
                                                 group%elimination%train, group%elimination%core)
-        is_free_lead(trains%lead(group%elimination%free)) = .true.
-        group%independent = pack(group%bodies, is_free_lead(group%bodies))
+        is_free_root(trains%root(group%elimination%free)) = .true.
+        group%independent = pack(group%bodies, is_free_root(group%bodies))
         group%elimination%free = trains%train(group%independent)
       end associate
     end do
   end subroutine eliminate
 
   !> Hands what was peeled, and what was left, out to the groups.
-  subroutine distribute(relations, peeling, group_of, groups)
+  subroutine distribute(relations, leaves, group_of, groups)
     type(train_relations_t), intent(in) :: relations
-    type(peeling_t), intent(in) :: peeling
+    type(leaf_elimination_t), intent(in) :: leaves
     integer, intent(in) :: group_of(:)   !! [trains]
     type(geared_group_t), intent(inout) :: groups(:)
     integer :: first(size(groups) + 1), first_core(size(groups) + 1), g, i
-    integer :: core(size(peeling%core)), order(size(peeling%train))
+    integer :: core(size(leaves%core)), order(size(leaves%train))
 
-    call transposed_order(group_of(peeling%train), size(groups), order, first)
-    call transposed_order([(group_of(relations%between%body(relations%between%first(peeling%core(i)))), &
-                            i=1, size(peeling%core))], size(groups), core, first_core)
+    call transposed_order(group_of(leaves%train), size(groups), order, first)
+    call transposed_order([(group_of(relations%between%body(relations%between%first(leaves%core(i)))), &
+                            i=1, size(leaves%core))], size(groups), core, first_core)
     do g = 1, size(groups)
       associate (elimination => groups(g)%elimination)
-        elimination%relation = peeling%relation(order(first(g):first(g + 1) - 1))
-        elimination%train = peeling%train(order(first(g):first(g + 1) - 1))
-        elimination%core = peeling%core(core(first_core(g):first_core(g + 1) - 1))
+        elimination%relation = leaves%relation(order(first(g):first(g + 1) - 1))
+        elimination%train = leaves%train(order(first(g):first(g + 1) - 1))
+        elimination%core = leaves%core(core(first_core(g):first_core(g + 1) - 1))
         if (size(elimination%core) > 0) then
           elimination%core_trains = distinct_trains(relations%between, elimination%core)
         else
@@ -117,35 +117,35 @@ contains
     type(geared_group_t), intent(inout) :: groups(:)    !! with coordinates that were found
     type(error_t), allocatable, intent(out) :: error
     type(train_relations_t) :: relations
-    logical :: is_barred(size(trains%lead))
+    logical :: must_be_free(size(trains%root))
     integer :: g
 
     if (size(wanted) == 0) return
-    call take_wanted(body_names, wanted, group_of, trains, groups, error)
+    call set_wanted(body_names, wanted, group_of, trains, groups, error)
     if (allocated(error)) return
-    call lead_by(constraints, body_names, wanted, trains, error)
+    call set_wanted_roots(constraints, body_names, wanted, trains, error)
     if (allocated(error)) return
     relations = new_relations(constraints, trains)
-    is_barred = .false.
-    is_barred(trains%train(wanted)) = .true.
-    call distribute(relations, relations%peel(is_kept(relations%row), is_barred), group_of(trains%lead), groups)
+    must_be_free = .false.
+    must_be_free(trains%train(wanted)) = .true.
+    call distribute(relations, relations%eliminate_leaves(is_kept(relations%row), must_be_free), group_of(trains%root), groups)
     do g = 1, size(groups)
       groups(g)%elimination%free = trains%train(groups(g)%independent)
-      if (is_solvable(relations, groups(g)%elimination, is_barred)) cycle
+      if (is_solvable(relations, groups(g)%elimination, must_be_free)) cycle
       call raise_related(body_names, groups(g)%independent, error)
       return
     end do
   end subroutine choose_coordinates
 
   !> Replaces the independent bodies of each group by the wanted ones in it, which must be as many, of different trains.
-  subroutine take_wanted(body_names, wanted, group_of, trains, groups, error)
+  subroutine set_wanted(body_names, wanted, group_of, trains, groups, error)
     type(string_t), intent(in) :: body_names(:)
     integer, intent(in) :: wanted(:), group_of(:)
     type(rigid_trains_t), intent(in) :: trains
     type(geared_group_t), intent(inout) :: groups(:)
     type(error_t), allocatable, intent(out) :: error
     integer :: first(size(groups) + 1), order(size(wanted)), freedoms, g, k
-    logical :: is_taken(size(trains%lead))
+    logical :: is_taken(size(trains%root))
 
     is_taken = .false.
     call transposed_order(group_of(wanted), size(groups), order, first)
@@ -167,43 +167,43 @@ contains
         end associate
       end do
     end do
-  end subroutine take_wanted
+  end subroutine set_wanted
 
   !> Makes the wanted bodies leads; an error where a body turns so much faster that numbers overflow.
-  subroutine lead_by(constraints, body_names, wanted, trains, error)
+  subroutine set_wanted_roots(constraints, body_names, wanted, trains, error)
     type(constraints_t), intent(in) :: constraints
     type(string_t), intent(in) :: body_names(:)
     integer, intent(in) :: wanted(:)
     type(rigid_trains_t), intent(inout) :: trains
     type(error_t), allocatable, intent(out) :: error
-    integer :: body(size(trains%lead)), largest(size(trains%lead)), leads(size(trains%lead)), t
+    integer :: body(size(trains%root)), largest(size(trains%root)), roots(size(trains%root)), t
 
-    leads = trains%lead
-    leads(trains%train(wanted)) = wanted
-    call trains%choose_leads(constraints, leads)
-    call trains%steepness(constraints, largest, body)
+    roots = trains%root
+    roots(trains%train(wanted)) = wanted
+    call trains%choose_roots(constraints, roots)
+    call trains%largest_exponents(constraints, largest, body)
     t = maxloc(largest, dim=1)
     if (t == 0) return
-    if (largest(t) > steepest) call raise(error, exit_input, quoted(body_names(trains%lead(t))%text) // &
+    if (largest(t) > max_exponent) call raise(error, exit_input, quoted(body_names(trains%root(t))%text) // &
                                           ' cannot be independent: ' // quoted(body_names(body(t))%text) // &
                                           ' turns more than 1e150 times as fast')
-  end subroutine lead_by
+  end subroutine set_wanted_roots
 
   !> Whether the core gives the trains that are not to be free.
-  logical function is_solvable(relations, elimination, is_barred)
+  logical function is_solvable(relations, elimination, must_be_free)
     type(train_relations_t), intent(in) :: relations
     type(elimination_t), intent(in) :: elimination
-    logical, intent(in) :: is_barred(:)
+    logical, intent(in) :: must_be_free(:)
     real(wp), allocatable :: rows(:, :)
     integer, allocatable :: dependent(:)
     integer :: i, pivots(size(elimination%core)), rank
 
     is_solvable = .true.
     if (size(elimination%core) == 0) return
-    dependent = pack([(i, i=1, size(elimination%core_trains))], .not. is_barred(elimination%core_trains))
+    dependent = pack([(i, i=1, size(elimination%core_trains))], .not. must_be_free(elimination%core_trains))
     is_solvable = .false.
     if (size(dependent) /= size(elimination%core)) return
-    allocate (rows, source=paced_rows(relations%between, elimination%core, elimination%core_trains))
+    allocate (rows, source=scaled_rows(relations%between, elimination%core, elimination%core_trains))
     call pivoted_rank(rows(:, dependent), ratio_tolerance, rank, pivots)
     is_solvable = rank == size(dependent)
   end function is_solvable

@@ -9,9 +9,9 @@ module nocdyn_coordinates
   use nocdyn_errors, only: error_t, exit_input, raise
   use nocdyn_geared_groups, only: geared_group_t
   use nocdyn_kinds, only: wp
-  use nocdyn_lane_numbers, only: lane_numbers_t
+  use nocdyn_lane_parameters, only: lane_parameters_t
   use nocdyn_lapack, only: solve_positive_definite
-  use nocdyn_reaction_sweep, only: new_reaction_sweep, reaction_sweep_t
+  use nocdyn_reaction_solver, only: new_reaction_solver, reaction_solver_t
   use nocdyn_rigid_trains, only: rigid_trains_t
   use nocdyn_text, only: joined, selected, string_t
   use nocdyn_train_motion, only: find_motion, train_motion_t
@@ -30,7 +30,7 @@ module nocdyn_coordinates
     integer, allocatable :: coordinate(:)      !! [entries]
     real(wp), allocatable :: ratio(:, :)       !! nonzero blocks of L_tau, [lanes, entries]
     real(wp), allocatable :: response(:, :)    !! those of ((L_tau^T J L_tau)^-1 L_tau^T)^T, [lanes, entries]
-    type(reaction_sweep_t) :: sweep            !! reactions from imbalances
+    type(reaction_solver_t) :: reactions            !! reactions from imbalances
     integer, allocatable, private :: geared(:)          !! bodies in groups with rows
     real(wp), allocatable, private :: inertia(:, :)     !! J [kg m2], [lanes, bodies]
     real(wp), allocatable, private :: imbalance(:)      !! J omega' - T [N m], [bodies], work space
@@ -42,7 +42,7 @@ module nocdyn_coordinates
     procedure :: project
     procedure :: reactions_of_torques
     procedure :: reactions_of_imbalances
-    procedure :: list_numbers
+    procedure :: list_parameters
   end type coordinates_t
 
 contains
@@ -59,26 +59,26 @@ contains
     type(coordinates_t), intent(out) :: self
     type(error_t), allocatable, intent(out) :: error
     type(train_relations_t) :: relations
-    integer :: first_coordinate(size(inertia, 2)), place(size(trains%lead))
-    integer :: culprit, g, k, lane
+    integer :: first_coordinate(size(inertia, 2)), local(size(trains%root))
+    integer :: offending_group, g, k, lane
 
     call number_coordinates(groups, wanted, self, first_coordinate)
     call lay_out_entries(groups, first_coordinate, size(inertia, 2), size(inertia, 1), self)
     relations = new_relations(constraints, trains)
     do g = 1, size(groups)
-      place(groups(g)%trains) = [(k, k=1, size(groups(g)%trains))]
+      local(groups(g)%trains) = [(k, k=1, size(groups(g)%trains))]
     end do
-    self%sweep = new_reaction_sweep(constraints, trains, relations, groups)
+    self%reactions = new_reaction_solver(constraints, trains, relations, groups)
     allocate (self%inertia, source=inertia)
     do lane = 1, size(inertia, 1)
-      call fill_lane(constraints, trains, relations, groups, place, inertia(lane, :), choice, lane, self, culprit)
-      if (culprit > 0) then
-        call raise(error, exit_input, joined(selected(body_names, groups(culprit)%independent), ', ', most_names) // &
+      call fill_lane(constraints, trains, relations, groups, local, inertia(lane, :), choice, lane, self, offending_group)
+      if (offending_group > 0) then
+        call raise(error, exit_input, joined(selected(body_names, groups(offending_group)%independent), ', ', most_names) // &
                    ' cannot be independent: rounding hides what differs between their speeds; name faster bodies')
         return
       end if
     end do
-    call self%sweep%share_out(constraints, groups)
+    call self%reactions%find_null_vectors(constraints, groups)
     self%geared = geared_bodies(groups, size(inertia, 2))
     allocate (self%imbalance(size(inertia, 2)), self%acceleration(self%freedoms))
   end subroutine build_coordinates
@@ -144,36 +144,36 @@ contains
   end subroutine lay_out_entries
 
   !> L_tau of one lane, group by group, and what the sweep of its reactions needs.
-  subroutine fill_lane(constraints, trains, relations, groups, place, inertia, choice, lane, self, culprit)
+  subroutine fill_lane(constraints, trains, relations, groups, local, inertia, choice, lane, self, offending_group)
     type(constraints_t), intent(in) :: constraints
     type(rigid_trains_t), intent(in) :: trains
     type(train_relations_t), intent(in) :: relations
     type(geared_group_t), intent(in) :: groups(:)
-    integer, intent(in) :: place(:)    !! of every train in its group
+    integer, intent(in) :: local(:)    !! of every train in its group
     real(wp), intent(in) :: inertia(:)
     integer, intent(in) :: choice, lane
     type(coordinates_t), intent(inout) :: self
-    integer, intent(out) :: culprit    !! group whose mass matrix is not positive definite, 0 if there is none
+    integer, intent(out) :: offending_group    !! group whose mass matrix is not positive definite, 0 if there is none
     type(train_motion_t) :: found
     real(wp) :: factor, ratio(size(inertia))
     integer :: g
     logical :: is_indefinite
 
-    culprit = 0
+    offending_group = 0
     ratio = trains%ratios(constraints, lane)
-    call self%sweep%take_ratios(lane, ratio)
+    call self%reactions%set_ratios(lane, ratio)
     do g = 1, size(groups)
-      call find_motion(relations, groups(g)%elimination, place, size(groups(g)%trains), lane, found)
+      call find_motion(relations, groups(g)%elimination, local, size(groups(g)%trains), lane, found)
       factor = complement_factor(choice, found%log_determinant + pair_determinant(constraints, trains, groups(g)%bodies, lane), &
                                  size(groups(g)%kept))
-      call fill_ratios(groups(g)%bodies, place(trains%train(groups(g)%bodies)), ratio(groups(g)%bodies), &
+      call fill_ratios(groups(g)%bodies, local(trains%train(groups(g)%bodies)), ratio(groups(g)%bodies), &
                        factor * found%motion, lane, self)
       call self%weigh(trains, groups(g), inertia, lane, is_indefinite)
       if (is_indefinite) then
-        culprit = g
+        offending_group = g
         return
       end if
-      call self%sweep%take_core(g, lane, found%dual)
+      call self%reactions%set_core(g, lane, found%dual)
     end do
   end subroutine fill_lane
 
@@ -188,7 +188,7 @@ contains
     log_determinant = 0.0_wp
     do i = 1, size(bodies)
       if (trains%parent(bodies(i)) == 0) cycle
-      call constraints%split_pair(lane, trains%parent_row(bodies(i)), bodies(i), own, other)
+      call constraints%pair_coefficients(lane, trains%parent_row(bodies(i)), bodies(i), own, other)
       log_determinant = log_determinant + log(abs(own))
     end do
   end function pair_determinant
@@ -220,18 +220,18 @@ contains
     real(wp), allocatable :: response(:, :)
     real(wp), dimension(size(group%trains), size(group%independent)) :: momentum, motion
     real(wp) :: mass(size(group%trains))
-    integer :: i, k, place(size(trains%lead))
+    integer :: i, k, local(size(trains%root))
 
     mass = 0.0_wp
     do i = 1, size(group%trains)
-      place(group%trains(i)) = i
-      k = self%first(trains%lead(group%trains(i)))
+      local(group%trains(i)) = i
+      k = self%first(trains%root(group%trains(i)))
       motion(i, :) = self%ratio(lane, k:k + size(motion, 2) - 1)   ! a lead has the motion of its train
     end do
     do i = 1, size(group%bodies)
       associate (b => group%bodies(i))
-        associate (of_train => mass(place(trains%train(b))))
-          of_train = of_train + inertia(b) * self%sweep%lead_ratio(lane, b)**2
+        associate (of_train => mass(local(trains%train(b))))
+          of_train = of_train + inertia(b) * self%reactions%root_ratio(lane, b)**2
         end associate
       end associate
     end do
@@ -243,7 +243,7 @@ contains
     do i = 1, size(group%bodies)
       associate (b => group%bodies(i))
         k = self%first(b)
-        self%response(lane, k:k + size(motion, 2) - 1) = self%sweep%lead_ratio(lane, b) * response(:, place(trains%train(b)))
+        self%response(lane, k:k + size(motion, 2) - 1) = self%reactions%root_ratio(lane, b) * response(:, local(trains%train(b)))
         self%inertia(lane, b) = inertia(b)
       end associate
     end do
@@ -321,7 +321,7 @@ contains
       end do
       self%imbalance(b) = self%inertia(lane, b) * acceleration - torque(b)
     end do
-    call self%sweep%find_reactions(lane, self%imbalance, lambda)
+    call self%reactions%find_reactions(lane, self%imbalance, lambda)
   end subroutine reactions_of_torques
 
   !> Reactions of all rows from eq. (12), L_lambda^T lambda = J omega' - T, with accelerations found elsewhere.
@@ -332,21 +332,21 @@ contains
     real(wp), intent(inout) :: lambda(:)   !! [rows]
 
     self%imbalance(:) = imbalance
-    call self%sweep%find_reactions(lane, self%imbalance, lambda)
+    call self%reactions%find_reactions(lane, self%imbalance, lambda)
   end subroutine reactions_of_imbalances
 
-  subroutine list_numbers(self, numbers)
+  subroutine list_parameters(self, parameters)
     class(coordinates_t), target, intent(inout) :: self
-    type(lane_numbers_t), intent(inout) :: numbers
+    type(lane_parameters_t), intent(inout) :: parameters
 
-    call numbers%remark(self%body)
-    call numbers%remark(self%first)
-    call numbers%remark(self%coordinate)
-    call numbers%remark(self%geared)
-    call numbers%add('coordinates: ratio', self%ratio)
-    call numbers%add('coordinates: response', self%response)
-    call numbers%add('coordinates: inertia', self%inertia)
-    call self%sweep%list_numbers(numbers)
-  end subroutine list_numbers
+    call parameters%add_structure(self%body)
+    call parameters%add_structure(self%first)
+    call parameters%add_structure(self%coordinate)
+    call parameters%add_structure(self%geared)
+    call parameters%add('coordinates: ratio', self%ratio)
+    call parameters%add('coordinates: response', self%response)
+    call parameters%add('coordinates: inertia', self%inertia)
+    call self%reactions%list_parameters(parameters)
+  end subroutine list_parameters
 
 end module nocdyn_coordinates

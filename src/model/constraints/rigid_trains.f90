@@ -14,21 +14,21 @@ module nocdyn_rigid_trains
   !> Two ratios agree, and a sum is zero, up to this times their size: decimals such as 0.1 * 3 against 0.3 agree.
   real(wp), parameter, public :: ratio_tolerance = 1.0e-9_wp
 
-  integer, parameter, public :: steepest = 500   !! binary exponent up to which squares of ratios are real numbers
+  integer, parameter, public :: max_exponent = 500   !! binary exponent up to which squares of ratios are real numbers
 
   type, public :: rigid_trains_t
     integer, allocatable :: order(:)         !! bodies, train by train, each behind its parent
-    integer, allocatable :: place(:)         !! of each body in `order`
+    integer, allocatable :: position(:)         !! of each body in `order`
     integer, allocatable :: parent(:)        !! neighbour of each body towards the lead, 0 for the lead
     integer, allocatable :: parent_row(:)    !! the row that ties it to its parent, 0 for the lead
     integer, allocatable :: train(:)         !! of each body
-    integer, allocatable :: lead(:)          !! of each train
+    integer, allocatable :: root(:)          !! of each train
   contains
-    procedure :: choose_leads
+    procedure :: choose_roots
     procedure :: fastest_bodies
-    procedure :: steepness
+    procedure :: largest_exponents
     procedure :: ratios
-    procedure :: contradicts
+    procedure :: is_inconsistent
     procedure :: find_path
     procedure :: loaded_rows
     procedure, private :: scaled_ratios
@@ -37,22 +37,22 @@ module nocdyn_rigid_trains
 contains
 
   !> The trains that the rows of two bodies tie, led by their first bodies and numbered in the order of those.
-  subroutine find_trains(constraints, trains, is_tied)
+  subroutine find_trains(constraints, trains, is_tree)
     type(constraints_t), intent(in) :: constraints
     type(rigid_trains_t), intent(out) :: trains
-    logical, allocatable, intent(out) :: is_tied(:)   !! whether a row belongs to a tree; later rows close loops, [rows]
+    logical, allocatable, intent(out) :: is_tree(:)   !! whether a row belongs to a tree; later rows close loops, [rows]
     integer :: root(constraints%bodies), a, b, r
 
-    allocate (is_tied(constraints%rows()), source=.false.)
+    allocate (is_tree(constraints%rows()), source=.false.)
     root = [(b, b=1, constraints%bodies)]
     do r = 1, constraints%rows()
       if (constraints%entries(r) /= 2) cycle
       call find_root(root, constraints%body(constraints%first(r)), a)
       call find_root(root, constraints%body(constraints%first(r) + 1), b)
-      is_tied(r) = a /= b
+      is_tree(r) = a /= b
       root(max(a, b)) = min(a, b)
     end do
-    call lay_out(constraints, is_tied, pack([(b, b=1, constraints%bodies)], root == [(b, b=1, constraints%bodies)]), trains)
+    call build_trees(constraints, is_tree, pack([(b, b=1, constraints%bodies)], root == [(b, b=1, constraints%bodies)]), trains)
   end subroutine find_trains
 
   !> The root of a body's tree, with path halving (union-find).
@@ -69,51 +69,51 @@ contains
   end subroutine find_root
 
   !> The trees as seen from other leads, one of each train.
-  subroutine choose_leads(self, constraints, leads)
+  subroutine choose_roots(self, constraints, roots)
     class(rigid_trains_t), intent(inout) :: self
     type(constraints_t), intent(in) :: constraints
-    integer, intent(in) :: leads(:)   !! [trains]
+    integer, intent(in) :: roots(:)   !! [trains]
     type(rigid_trains_t) :: other
-    logical :: is_tied(constraints%rows())
+    logical :: is_tree(constraints%rows())
     integer :: b
 
-    is_tied = .false.
+    is_tree = .false.
     do b = 1, size(self%parent)
-      if (self%parent(b) > 0) is_tied(self%parent_row(b)) = .true.
+      if (self%parent(b) > 0) is_tree(self%parent_row(b)) = .true.
     end do
-    call lay_out(constraints, is_tied, leads, other)
+    call build_trees(constraints, is_tree, roots, other)
     self%order = other%order
-    self%place = other%place
+    self%position = other%position
     self%parent = other%parent
     self%parent_row = other%parent_row
     self%train = other%train
-    self%lead = other%lead
-  end subroutine choose_leads
+    self%root = other%root
+  end subroutine choose_roots
 
   !> Walks the trees from their leads outwards, breadth first.
-  subroutine lay_out(constraints, is_tied, leads, trains)
+  subroutine build_trees(constraints, is_tree, roots, trains)
     type(constraints_t), intent(in) :: constraints
-    logical, intent(in) :: is_tied(:)
-    integer, intent(in) :: leads(:)
+    logical, intent(in) :: is_tree(:)
+    integer, intent(in) :: roots(:)
     type(rigid_trains_t), intent(inout) :: trains
     integer, allocatable :: first(:), rows(:)
     integer :: b, begin, k, next, other, r, t
 
-    call constraints%list_rows(is_tied, first, rows)
+    call constraints%list_body_rows(is_tree, first, rows)
     associate (n => constraints%bodies)
-      allocate (trains%order(n), trains%place(n), trains%train(n))
+      allocate (trains%order(n), trains%position(n), trains%train(n))
       allocate (trains%parent(n), trains%parent_row(n), source=0)
     end associate
-    allocate (trains%lead, source=leads)
+    allocate (trains%root, source=roots)
     next = 0
-    do t = 1, size(leads)
+    do t = 1, size(roots)
       begin = next + 1
       next = begin
-      trains%order(next) = leads(t)
+      trains%order(next) = roots(t)
       do while (begin <= next)
         b = trains%order(begin)
         trains%train(b) = t
-        trains%place(b) = begin
+        trains%position(b) = begin
         do k = first(b), first(b + 1) - 1
           r = rows(k)
           if (r == trains%parent_row(b)) cycle
@@ -126,7 +126,7 @@ contains
         begin = begin + 1
       end do
     end do
-  end subroutine lay_out
+  end subroutine build_trees
 
   !> omega(body) = fraction * 2**exponent * omega(lead of its train), with 1/2 <= |fraction| < 1.
   subroutine scaled_ratios(self, constraints, lane, fractions, exponents)
@@ -143,7 +143,7 @@ contains
       fractions(b) = 0.5_wp
       exponents(b) = 1
       if (self%parent(b) == 0) cycle
-      call constraints%split_pair(lane, self%parent_row(b), b, own, other)
+      call constraints%pair_coefficients(lane, self%parent_row(b), b, own, other)
       quotient = -fraction(other) / fraction(own) * fractions(self%parent(b))
       fractions(b) = fraction(quotient)
       exponents(b) = exponents(self%parent(b)) + exponent(other) - exponent(own) + exponent(quotient)
@@ -166,7 +166,7 @@ contains
   function fastest_bodies(self, constraints) result(fastest)
     class(rigid_trains_t), intent(in) :: self
     type(constraints_t), intent(in) :: constraints
-    integer :: fastest(size(self%lead))
+    integer :: fastest(size(self%root))
     real(wp) :: fractions(constraints%bodies)
     integer :: exponents(constraints%bodies), b
 
@@ -188,11 +188,11 @@ contains
     real(wp), intent(in) :: fractions(:)
     integer, intent(in) :: exponents(:), a, b
 
-    quotient = scale(abs(fractions(a) / fractions(b)), max(-steepest, min(steepest, exponents(a) - exponents(b))))
+    quotient = scale(abs(fractions(a) / fractions(b)), max(-max_exponent, min(max_exponent, exponents(a) - exponents(b))))
   end function quotient_of
 
   !> The largest binary exponent of a ratio to the lead, and the body that has it, for each train in the first lane.
-  subroutine steepness(self, constraints, largest, body)
+  subroutine largest_exponents(self, constraints, largest, body)
     class(rigid_trains_t), intent(in) :: self
     type(constraints_t), intent(in) :: constraints
     integer, intent(out) :: largest(:), body(:)   !! [trains]
@@ -200,7 +200,7 @@ contains
     integer :: exponents(constraints%bodies), b
 
     call self%scaled_ratios(constraints, 1, fractions, exponents)
-    body = self%lead
+    body = self%root
     largest = exponents(body)
     do b = 1, constraints%bodies
       associate (t => self%train(b))
@@ -209,10 +209,10 @@ contains
         body(t) = b
       end associate
     end do
-  end subroutine steepness
+  end subroutine largest_exponents
 
   !> Whether rows of two bodies of one train ask for other ratios than its tree, in the first lane, [rows].
-  function contradicts(self, constraints, rows) result(answer)
+  function is_inconsistent(self, constraints, rows) result(answer)
     class(rigid_trains_t), intent(in) :: self
     type(constraints_t), intent(in) :: constraints
     integer, intent(in) :: rows(:)
@@ -232,7 +232,7 @@ contains
       end associate
       answer(i) = abs(scale(quotient, max(-3, min(3, power))) - 1.0_wp) > ratio_tolerance
     end do
-  end function contradicts
+  end function is_inconsistent
 
   !> The way through the tree from body a to body b of one train: bodies(i) and bodies(i + 1) are tied by rows(i).
   subroutine find_path(self, a, b, bodies, rows)
@@ -246,7 +246,7 @@ contains
     i = a
     j = b
     do while (i /= j)   ! a body has a later place than its parent
-      if (self%place(i) > self%place(j)) then
+      if (self%position(i) > self%position(j)) then
         i = self%parent(i)
         from_a = from_a + 1
       else
@@ -291,7 +291,7 @@ contains
       parent = self%parent(b)
       if (parent == 0 .or. abs(moment(b)) <= ratio_tolerance * bound(b)) cycle
       is_loaded(self%parent_row(b)) = .true.
-      call constraints%split_pair(1, self%parent_row(b), b, own, other)
+      call constraints%pair_coefficients(1, self%parent_row(b), b, own, other)
       lever = other / own
       moment(parent) = moment(parent) - lever * moment(b)
       bound(parent) = bound(parent) + abs(lever) * bound(b)

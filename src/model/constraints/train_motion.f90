@@ -5,7 +5,7 @@
 module nocdyn_train_motion
   use nocdyn_complement, only: natural_complement
   use nocdyn_kinds, only: wp
-  use nocdyn_lane_numbers, only: lane_numbers_t
+  use nocdyn_lane_parameters, only: lane_parameters_t
   use nocdyn_train_relations, only: train_relations_t
   implicit none (type, external)
   private
@@ -20,7 +20,7 @@ module nocdyn_train_motion
     integer, allocatable :: core(:)          !! relations that are solved together
     integer, allocatable :: core_trains(:)   !! all trains in them
   contains
-    procedure :: list_layout
+    procedure :: list_structure
   end type elimination_t
 
   !> The motion of the trains of a group in one lane.
@@ -33,10 +33,10 @@ module nocdyn_train_motion
 contains
 
   !> L_tau of the trains, eq. (81).
-  subroutine find_motion(relations, elimination, place, trains, lane, found)
+  subroutine find_motion(relations, elimination, local, trains, lane, found)
     type(train_relations_t), intent(in) :: relations
     type(elimination_t), intent(in) :: elimination
-    integer, intent(in) :: place(:)    !! of every train in its group
+    integer, intent(in) :: local(:)    !! of every train in its group
     integer, intent(in) :: trains      !! in this group
     integer, intent(in) :: lane
     type(train_motion_t), intent(out) :: found
@@ -45,27 +45,27 @@ contains
 
     allocate (found%motion(trains, size(elimination%free)), source=0.0_wp)
     do k = 1, size(elimination%free)
-      found%motion(place(elimination%free(k)), k) = 1.0_wp
+      found%motion(local(elimination%free(k)), k) = 1.0_wp
     end do
-    call move_core(relations, elimination, place, lane, found)
+    call move_core(relations, elimination, local, lane, found)
     do i = size(elimination%relation), 1, -1
       associate (relation => elimination%relation(i), train => elimination%train(i), between => relations%between)
-        own = relations%split(lane, relation, train)
+        own = relations%coefficient_of(lane, relation, train)
         found%log_determinant = found%log_determinant + log(abs(own))
         do entry = between%first(relation), between%first(relation + 1) - 1
           if (between%body(entry) == train) cycle
-          found%motion(place(train), :) = found%motion(place(train), :) &
-                                          - between%coefficient(lane, entry) / own * found%motion(place(between%body(entry)), :)
+          found%motion(local(train), :) = found%motion(local(train), :) &
+                                          - between%coefficient(lane, entry) / own * found%motion(local(between%body(entry)), :)
         end do
       end associate
     end do
   end subroutine find_motion
 
   !> The natural complement of the core.
-  subroutine move_core(relations, elimination, place, lane, found)
+  subroutine move_core(relations, elimination, local, lane, found)
     type(train_relations_t), intent(in) :: relations
     type(elimination_t), intent(in) :: elimination
-    integer, intent(in) :: place(:), lane
+    integer, intent(in) :: local(:), lane
     type(train_motion_t), intent(inout) :: found
     real(wp), allocatable :: complement(:, :)
     integer :: column(size(elimination%free)), k
@@ -79,7 +79,7 @@ contains
     call natural_complement(relations%between%block(lane, elimination%core, elimination%core_trains), &
                             pack(column, column > 0), complement, found%dual, found%log_determinant, is_singular)
     if (is_singular) error stop 'nocdyn_train_motion: the constraints must have been analysed'
-    found%motion(place(elimination%core_trains), pack([(k, k=1, size(column))], column > 0)) = complement
+    found%motion(local(elimination%core_trains), pack([(k, k=1, size(column))], column > 0)) = complement
   end subroutine move_core
 
   !> The multipliers of relations that balance moments on the trains; moments on the free trains are what is left over.
@@ -95,7 +95,7 @@ contains
     associate (between => relations%between)
       do i = 1, size(elimination%relation)
         associate (relation => elimination%relation(i))
-          lambda(relation) = moment(elimination%train(i)) / relations%split(lane, relation, elimination%train(i))
+          lambda(relation) = moment(elimination%train(i)) / relations%coefficient_of(lane, relation, elimination%train(i))
           do entry = between%first(relation), between%first(relation + 1) - 1
             moment(between%body(entry)) = moment(between%body(entry)) - between%coefficient(lane, entry) * lambda(relation)
           end do
@@ -110,15 +110,15 @@ contains
     end do
   end subroutine find_loads
 
-  subroutine list_layout(self, numbers)
+  subroutine list_structure(self, parameters)
     class(elimination_t), intent(in) :: self
-    type(lane_numbers_t), intent(inout) :: numbers
+    type(lane_parameters_t), intent(inout) :: parameters
 
-    call numbers%remark(self%free)
-    call numbers%remark(self%relation)
-    call numbers%remark(self%train)
-    call numbers%remark(self%core)
-    call numbers%remark(self%core_trains)
-  end subroutine list_layout
+    call parameters%add_structure(self%free)
+    call parameters%add_structure(self%relation)
+    call parameters%add_structure(self%train)
+    call parameters%add_structure(self%core)
+    call parameters%add_structure(self%core_trains)
+  end subroutine list_structure
 
 end module nocdyn_train_motion

@@ -10,24 +10,24 @@ module nocdyn_train_relations
   implicit none (type, external)
   private
 
-  public :: new_relations, paced_rows, distinct_trains
+  public :: new_relations, scaled_rows, distinct_trains
 
   type, public :: train_relations_t
     integer, allocatable :: row(:)     !! of the constraints, of each relation
     type(constraints_t) :: between     !! the relations; its bodies are the trains, and it has zeros where terms cancel
   contains
-    procedure :: peel
-    procedure :: split
+    procedure :: eliminate_leaves
+    procedure :: coefficient_of
     procedure :: loaded_rows
   end type train_relations_t
 
   !> Relations in the order in which they are taken away: train(i) is in relation(i) and in none behind it.
-  type, public :: peeling_t
+  type, public :: leaf_elimination_t
     integer, allocatable :: relation(:), train(:)
     integer, allocatable :: core(:)    !! relations that are left, ascending
-  end type peeling_t
+  end type leaf_elimination_t
 
-  real(wp), parameter :: weakest = 1.0e-3_wp   ! share of a relation's largest coefficient that may be divided by
+  real(wp), parameter :: min_pivot_share = 1.0e-3_wp   ! share of a relation's largest coefficient that may be divided by
 
 contains
 
@@ -46,7 +46,7 @@ contains
     do lane = 1, size(coefficient, 1)
       coefficient(lane, :) = summed(constraints, self%row, entry_of, trains%ratios(constraints, lane), lane, size(train))
     end do
-    self%between = new_constraints(size(trains%lead), selected(constraints%names, self%row), &
+    self%between = new_constraints(size(trains%root), selected(constraints%names, self%row), &
                                    selected(constraints%units, self%row), first, train, coefficient)
   end function new_relations
 
@@ -57,7 +57,7 @@ contains
     integer, intent(in) :: rows(:)
     integer, allocatable, intent(out) :: first(:), train(:)
     integer, allocatable, intent(out) :: entry_of(:)   !! of each entry of `rows`, one after another
-    integer :: at(size(trains%lead)), entry, i, k, next
+    integer :: at(size(trains%root)), entry, i, k, next
 
     k = sum([(constraints%entries(rows(i)), i=1, size(rows))])
     allocate (first(size(rows) + 1), train(k), entry_of(k))
@@ -105,7 +105,7 @@ contains
   end function summed
 
   !> The coefficient of one train in a relation.
-  pure real(wp) function split(self, lane, relation, train) result(coefficient)
+  pure real(wp) function coefficient_of(self, lane, relation, train) result(coefficient)
     class(train_relations_t), intent(in) :: self
     integer, intent(in) :: lane, relation, train
     integer :: entry
@@ -113,71 +113,71 @@ contains
     do entry = self%between%first(relation), self%between%first(relation + 1) - 1
       if (self%between%body(entry) == train) coefficient = self%between%coefficient(lane, entry)
     end do
-  end function split
+  end function coefficient_of
 
   !> Takes away what can be, by the coefficients of the first lane.
-  function peel(self, takes_part, is_barred) result(peeling)
+  function eliminate_leaves(self, takes_part, must_be_free) result(leaves)
     class(train_relations_t), intent(in) :: self
     logical, intent(in) :: takes_part(:)   !! [relations]
-    logical, intent(in) :: is_barred(:)    !! trains whose speeds are not to be given by others, [trains]
-    type(peeling_t) :: peeling
+    logical, intent(in) :: must_be_free(:)    !! trains whose speeds are not to be given by others, [trains]
+    type(leaf_elimination_t) :: leaves
     integer, allocatable :: first(:), of_train(:)
-    integer :: uses(size(is_barred)), waiting(size(takes_part) + size(self%between%body))
+    integer :: uses(size(must_be_free)), queue(size(takes_part) + size(self%between%body))
     integer :: entry, i, last, train
     logical :: is_left(size(takes_part))
 
-    call self%between%list_rows(takes_part, first, of_train)
+    call self%between%list_body_rows(takes_part, first, of_train)
     uses = first(2:) - first(:size(uses))
     is_left = takes_part
-    allocate (peeling%relation(count(takes_part)), peeling%train(count(takes_part)))
+    allocate (leaves%relation(count(takes_part)), leaves%train(count(takes_part)))
     last = count(takes_part)
-    waiting(:last) = pack([(i, i=1, size(takes_part))], takes_part)
-    peeling%core = waiting(:last)
+    queue(:last) = pack([(i, i=1, size(takes_part))], takes_part)
+    leaves%core = queue(:last)
     i = 0
-    do entry = 1, size(waiting)
+    do entry = 1, size(queue)
       if (entry > last) exit
-      associate (relation => waiting(entry))
+      associate (relation => queue(entry))
         if (.not. is_left(relation)) cycle
-        train = end_of(self%between, relation, uses, is_barred)
+        train = leaf_train(self%between, relation, uses, must_be_free)
         if (train == 0) cycle
         i = i + 1
-        peeling%relation(i) = relation
-        peeling%train(i) = train
+        leaves%relation(i) = relation
+        leaves%train(i) = train
         is_left(relation) = .false.
-        call leave(self%between, relation, first, of_train, is_left, uses, waiting, last)
+        call drop_relation(self%between, relation, first, of_train, is_left, uses, queue, last)
       end associate
     end do
-    peeling%relation = peeling%relation(:i)
-    peeling%train = peeling%train(:i)
-    peeling%core = pack(peeling%core, is_left(peeling%core))
-  end function peel
+    leaves%relation = leaves%relation(:i)
+    leaves%train = leaves%train(:i)
+    leaves%core = pack(leaves%core, is_left(leaves%core))
+  end function eliminate_leaves
 
   !> The train that only this relation has, with the largest coefficient; 0 if there is none fit to be divided by.
-  pure integer function end_of(between, relation, uses, is_barred) result(train)
+  pure integer function leaf_train(between, relation, uses, must_be_free) result(train)
     type(constraints_t), intent(in) :: between
     integer, intent(in) :: relation, uses(:)
-    logical, intent(in) :: is_barred(:)
+    logical, intent(in) :: must_be_free(:)
     real(wp) :: largest
     integer :: entry
 
     associate (first => between%first(relation), last => between%first(relation + 1) - 1)
-      largest = weakest * maxval(abs(between%coefficient(1, first:last)))
+      largest = min_pivot_share * maxval(abs(between%coefficient(1, first:last)))
       train = 0
       do entry = first, last
-        if (uses(between%body(entry)) /= 1 .or. is_barred(between%body(entry))) cycle
+        if (uses(between%body(entry)) /= 1 .or. must_be_free(between%body(entry))) cycle
         if (abs(between%coefficient(1, entry)) <= largest) cycle
         largest = abs(between%coefficient(1, entry))
         train = between%body(entry)
       end do
     end associate
-  end function end_of
+  end function leaf_train
 
   !> A relation that is taken away may leave trains that only one other relation has: that one is looked at again.
-  pure subroutine leave(between, relation, first, of_train, is_left, uses, waiting, last)
+  pure subroutine drop_relation(between, relation, first, of_train, is_left, uses, queue, last)
     type(constraints_t), intent(in) :: between
     integer, intent(in) :: relation, first(:), of_train(:)
     logical, intent(in) :: is_left(:)
-    integer, intent(inout) :: uses(:), waiting(:), last
+    integer, intent(inout) :: uses(:), queue(:), last
     integer :: entry, k
 
     do entry = between%first(relation), between%first(relation + 1) - 1
@@ -187,41 +187,41 @@ contains
         do k = first(train), first(train + 1) - 1
           if (.not. is_left(of_train(k))) cycle
           last = last + 1
-          waiting(last) = of_train(k)
+          queue(last) = of_train(k)
         end do
       end associate
     end do
-  end subroutine leave
+  end subroutine drop_relation
 
   !> The constraint rows that take part where the relations have these multipliers, ascending: those relations whose
   !> multiplier is more than rounding, and the rows of trees that they load. In the first lane.
-  function loaded_rows(self, constraints, trains, lambda, lead) result(rows)
+  function loaded_rows(self, constraints, trains, lambda, root) result(rows)
     class(train_relations_t), intent(in) :: self
     type(constraints_t), intent(in) :: constraints
     type(rigid_trains_t), intent(in) :: trains
     real(wp), intent(in) :: lambda(:)   !! [relations]
-    integer, intent(in) :: lead         !! whose moment is not carried further: the lead of a train; 0: none
+    integer, intent(in) :: root         !! whose moment is not carried further: the lead of a train; 0: none
     integer, allocatable :: rows(:)
-    integer, allocatable :: taking(:)
+    integer, allocatable :: active(:)
     real(wp), allocatable :: sizes(:)
     real(wp) :: moment(constraints%bodies)
     integer :: i, r
 
-    taking = pack([(i, i=1, size(lambda))], abs(lambda) > 0.0_wp)
-    allocate (sizes, source=row_sizes(self%between, taking))
-    associate (weight => abs(lambda(taking)) * sizes)   ! a relation of size 0 says nothing between trains, but in them
-      taking = pack(taking, sizes <= 0.0_wp .or. weight > ratio_tolerance * maxval(weight))
+    active = pack([(i, i=1, size(lambda))], abs(lambda) > 0.0_wp)
+    allocate (sizes, source=row_sizes(self%between, active))
+    associate (weight => abs(lambda(active)) * sizes)   ! a relation of size 0 says nothing between trains, but in them
+      active = pack(active, sizes <= 0.0_wp .or. weight > ratio_tolerance * maxval(weight))
     end associate
     moment = 0.0_wp
-    if (lead > 0) moment(lead) = -1.0_wp
-    do i = 1, size(taking)
-      r = self%row(taking(i))
+    if (root > 0) moment(root) = -1.0_wp
+    do i = 1, size(active)
+      r = self%row(active(i))
       associate (first => constraints%first(r), last => constraints%first(r + 1) - 1)
         moment(constraints%body(first:last)) = moment(constraints%body(first:last)) &
-                                               + lambda(taking(i)) * constraints%coefficient(1, first:last)
+                                               + lambda(active(i)) * constraints%coefficient(1, first:last)
       end associate
     end do
-    rows = merged(self%row(taking), trains%loaded_rows(constraints, moment))
+    rows = merged(self%row(active), trains%loaded_rows(constraints, moment))
   end function loaded_rows
 
   !> The largest term of each relation where the trains turn at their pace.
@@ -234,7 +234,7 @@ contains
     integer :: i
 
     allocate (trains, source=distinct_trains(between, relations))
-    pace(trains) = paces(between, relations, trains)
+    pace(trains) = effective_speeds(between, relations, trains)
     do i = 1, size(relations)
       associate (first => between%first(relations(i)), last => between%first(relations(i) + 1) - 1)
         sizes(i) = maxval(abs(between%coefficient(1, first:last)) * pace(between%body(first:last)))
@@ -281,20 +281,20 @@ contains
 
   !> Relations of the first lane as rows of unit length between speeds that are measured by the pace of each train, so that
   !> metres and teeth compare and a large ratio is not taken for a lock.
-  function paced_rows(between, relations, trains) result(matrix)
+  function scaled_rows(between, relations, trains) result(matrix)
     type(constraints_t), intent(in) :: between
     integer, intent(in) :: relations(:), trains(:)
     real(wp) :: matrix(size(relations), size(trains))
     integer :: i
 
-    matrix = between%block(1, relations, trains) * spread(paces(between, relations, trains), 1, size(relations))
+    matrix = between%block(1, relations, trains) * spread(effective_speeds(between, relations, trains), 1, size(relations))
     do i = 1, size(matrix, 1)
       if (norm2(matrix(i, :)) > 0.0_wp) matrix(i, :) = matrix(i, :) / norm2(matrix(i, :))
     end do
-  end function paced_rows
+  end function scaled_rows
 
   !> Speeds that make the terms of each relation alike, carried from train to train: the measure of what is small.
-  pure function paces(between, relations, trains) result(pace)
+  pure function effective_speeds(between, relations, trains) result(pace)
     type(constraints_t), intent(in) :: between
     integer, intent(in) :: relations(:), trains(:)
     real(wp) :: pace(size(trains))
@@ -323,6 +323,6 @@ contains
       end do
     end do
     pace = known(trains)
-  end function paces
+  end function effective_speeds
 
 end module nocdyn_train_relations

@@ -10,13 +10,13 @@
 !>
 !> A law with kinks is evaluated on a *branch* that only `choose` changes: one formula, extended smoothly beyond its
 !> borders. The branches part the plane of the law's variables and are chosen by where these are, so that a law has no
-!> memory. Each border of a branch is moved outwards by a tiny part `border_width` of the law's scale: a lane that has just
+!> memory. Each border of a branch is moved outwards by a tiny part `boundary_width` of the law's scale: a lane that has just
 !> crossed it is well inside its new branch.
 module nocdyn_bank
   use nocdyn_elements, only: elements_t
   use nocdyn_text, only: string_t
   use nocdyn_kinds, only: wp
-  use nocdyn_lane_numbers, only: lane_numbers_t
+  use nocdyn_lane_parameters, only: lane_parameters_t
   use nocdyn_polynomial_laws, only: polynomial_laws_t
   implicit none (type, external)
   private
@@ -28,7 +28,7 @@ module nocdyn_bank
   integer, parameter, public :: role_motor = 3        !! in Q_m of eq. (18); puts energy in
   integer, parameter, public :: role_excitation = 4   !! in Q_0 of eq. (17); puts energy in
 
-  real(wp), parameter, public :: border_width = 1.0e-10_wp   !! of borders of branches, relative to the scale of a law
+  real(wp), parameter, public :: boundary_width = 1.0e-10_wp   !! of borders of branches, relative to the scale of a law
 
   character(len=*), parameter, public :: role_names(4) = ['coupling  ', 'load      ', 'motor     ', 'excitation']
 
@@ -43,7 +43,7 @@ module nocdyn_bank
     type(string_t), allocatable :: names(:)
     integer, allocatable :: from(:)          !! body, 0 = ground
     integer, allocatable :: to(:)            !! body, 0 = ground
-    integer, allocatable :: accounted(:)     !! elements whose power is integrated, numbered within the bank
+    integer, allocatable :: with_work(:)     !! elements whose power is integrated, numbered within the bank
     integer, allocatable :: elastic(:)       !! elements that can have a restoring moment, numbered within the bank
     integer :: role = role_coupling          !! role_...: which term of eq. (12) the bank belongs to
     integer :: lanes = 1
@@ -51,33 +51,33 @@ module nocdyn_bank
     integer :: values = 0                    !! lanes * elements
     integer :: first_value = 1               !! the place of lane 1 of `first` in the values of the machine
     logical :: is_polynomial = .true.        !! whether `polynomials` says all of its law
-    logical :: is_external = .false.         !! whether the rest of its law depends on the time alone
-    logical :: is_of_paper = .true.          !! whether its law is that of eqs. (3), (5), (17) or (20)
-    integer :: inner = 0                     !! inner states of each element
-    integer :: first_inner = 1               !! number of the first inner state of `first` in the machine
-    integer :: inner_values = 0              !! lanes * inner * elements
-    integer :: first_inner_value = 1         !! the place of lane 1 of `first_inner`
-    integer, allocatable :: switching(:)     !! element of each switch, numbered within the bank
+    logical :: is_time_only = .false.         !! whether the rest of its law depends on the time alone
+    logical :: has_paper_law = .true.          !! whether its law is that of eqs. (3), (5), (17) or (20)
+    integer :: states = 0                     !! inner states of each element
+    integer :: first_internal = 1               !! number of the first inner state of `first` in the machine
+    integer :: internal_values = 0              !! lanes * inner * elements
+    integer :: first_internal_value = 1         !! the place of lane 1 of `first_internal`
+    integer, allocatable :: switch_element(:)     !! element of each switch, numbered within the bank
     integer, allocatable :: branch(:, :)     !! present branch of each switch, [lanes, switches]
   contains
     procedure :: polynomials
     procedure :: evaluate
     procedure :: differentiate
-    procedure :: assess
+    procedure :: evaluate_energies
     procedure :: has_series
-    procedure :: drive
+    procedure :: forcing_series
     procedure :: series
-    procedure :: settle
-    procedure :: start_inner
-    procedure :: evaluate_inner
-    procedure :: inner_name
+    procedure :: to_mean_torque
+    procedure :: start_internal
+    procedure :: evaluate_internal
+    procedure :: internal_name
     procedure :: choose
-    procedure :: margin
+    procedure :: indicator
     procedure :: switch_name
     procedure :: connect
-    procedure :: let_switch
-    procedure :: list_layout
-    procedure :: list_numbers
+    procedure :: set_switches
+    procedure :: list_structure
+    procedure :: list_parameters
     procedure :: last
     procedure :: is_source
     procedure :: quantities
@@ -115,7 +115,7 @@ contains
     time_reached = t + 8.0_wp * spacing(t)
   end function time_reached
 
-  !> Sets the connectivity; every extension's constructor calls it, with `inner` set where its elements have inner states.
+  !> Sets the connectivity; every extension's constructor calls it, with `internal` set where its elements have inner states.
   subroutine connect(self, role, lanes, names, from, to)
     class(bank_t), intent(inout) :: self
     integer, intent(in) :: role
@@ -130,41 +130,41 @@ contains
     self%names = names
     self%from = from
     self%to = to
-    self%accounted = [(e, e=1, size(to))]
+    self%with_work = [(e, e=1, size(to))]
     self%elastic = [(e, e=1, merge(size(to), 0, role == role_coupling))]
-    self%inner_values = lanes * self%inner * size(to)
-    call self%let_switch([integer ::])
+    self%internal_values = lanes * self%states * size(to)
+    call self%set_switches([integer ::])
   end subroutine connect
 
   !> Gives elements one switch each; the branches are 0 until they are chosen.
-  subroutine let_switch(self, elements)
+  subroutine set_switches(self, elements)
     class(bank_t), intent(inout) :: self
     integer, intent(in) :: elements(:)   !! numbered within the bank
 
-    self%switching = elements
+    self%switch_element = elements
     if (allocated(self%branch)) deallocate (self%branch)
     allocate (self%branch(self%lanes, size(elements)), source=0)
-  end subroutine let_switch
+  end subroutine set_switches
 
   !> Notes which elements the bank has, and what they do.
-  subroutine list_layout(self, numbers)
+  subroutine list_structure(self, parameters)
     class(bank_t), intent(in) :: self
-    type(lane_numbers_t), intent(inout) :: numbers
+    type(lane_parameters_t), intent(inout) :: parameters
 
-    call numbers%remark([self%role, self%first, self%inner])
-    call numbers%remark(self%is_polynomial)
-    call numbers%remark(self%names)
-    call numbers%remark(self%from)
-    call numbers%remark(self%to)
-    call numbers%remark(self%accounted)
-    call numbers%remark(self%switching)
-  end subroutine list_layout
+    call parameters%add_structure([self%role, self%first, self%states])
+    call parameters%add_structure(self%is_polynomial)
+    call parameters%add_structure(self%names)
+    call parameters%add_structure(self%from)
+    call parameters%add_structure(self%to)
+    call parameters%add_structure(self%with_work)
+    call parameters%add_structure(self%switch_element)
+  end subroutine list_structure
 
   !> Lists the parameters of its elements: those that stand in the input as they are by the name that they have there.
-  subroutine list_numbers(self, numbers)
+  subroutine list_parameters(self, parameters)
     class(bank_t), target, intent(inout) :: self
-    type(lane_numbers_t), intent(inout) :: numbers
-  end subroutine list_numbers
+    type(lane_parameters_t), intent(inout) :: parameters
+  end subroutine list_parameters
 
   !> Number of its last element in the machine.
   pure integer function last(self)
@@ -188,11 +188,11 @@ contains
 
   !> Adds what is not polynomial to the moments of the bank's elements. All arrays but `time` are flat: the lanes of its
   !> first element, then those of its second, and so on.
-  subroutine evaluate(self, time, angle, speed, restoring, working)
+  subroutine evaluate(self, time, angle, speed, restoring, applied)
     class(bank_t), intent(in) :: self
     real(wp), intent(in) :: time(self%lanes)                                  !! t [s]
     real(wp), intent(in) :: angle(self%values), speed(self%values)            !! u [rad], u' [rad/s]
-    real(wp), intent(inout) :: restoring(self%values), working(self%values)   !! [N m]
+    real(wp), intent(inout) :: restoring(self%values), applied(self%values)   !! [N m]
   end subroutine evaluate
 
   !> Adds the derivatives of what `evaluate` adds.
@@ -202,98 +202,98 @@ contains
   end subroutine differentiate
 
   !> Adds the potential energies, secant stiffnesses and dampings of what `evaluate` adds.
-  subroutine assess(self, elements)
+  subroutine evaluate_energies(self, elements)
     class(bank_t), intent(in) :: self
     type(elements_t), intent(inout) :: elements   !! of the machine
-  end subroutine assess
+  end subroutine evaluate_energies
 
-  !> Whether the moments have a Taylor series: that of `polynomials`, and that of `evaluate` by `drive` and `series`.
+  !> Whether the moments have a Taylor series: that of `polynomials`, and that of `evaluate` by `forcing_series` and `series`.
   pure logical function has_series(self)
     class(bank_t), intent(in) :: self
 
     has_series = self%is_polynomial
   end function has_series
 
-  !> Sets the Taylor coefficients, number 0 to last, of what of `working` depends on the time alone. Here and in `series`
+  !> Sets the Taylor coefficients, number 0 to last, of what of `applied` depends on the time alone. Here and in `series`
   !> the arrays begin with the bank's first value, and column k holds the coefficients number k.
-  subroutine drive(self, last, stride, time, working)
+  subroutine forcing_series(self, last, stride, time, applied)
     class(bank_t), intent(in) :: self
     integer, intent(in) :: last
     integer, intent(in) :: stride   !! from column to column
     real(wp), intent(in) :: time(self%lanes)
-    real(wp), intent(inout) :: working(stride, 0:last)
-  end subroutine drive
+    real(wp), intent(inout) :: applied(stride, 0:last)
+  end subroutine forcing_series
 
   !> Adds the Taylor coefficients number k of the rest of what `evaluate` adds. Those of the angles, which are counted from
   !> the rest in `polynomials`, and speeds are known up to k, those of the moments up to k - 1.
-  subroutine series(self, k, stride, time, angle, speed, restoring, working)
+  subroutine series(self, k, stride, time, angle, speed, restoring, applied)
     class(bank_t), intent(in) :: self
     integer, intent(in) :: k
     integer, intent(in) :: stride
     real(wp), intent(in) :: time(self%lanes)
     real(wp), intent(in) :: angle(stride, 0:k), speed(stride, 0:k)
-    real(wp), intent(inout) :: restoring(stride, 0:k), working(stride, 0:k)
+    real(wp), intent(inout) :: restoring(stride, 0:k), applied(stride, 0:k)
   end subroutine series
 
   !> Replaces torques that go on changing, with the time or with the angle of a body that turns, by their means: by default
   !> there are none. What comes to an end, as a step does, is found by evaluating at a late time.
-  subroutine settle(self)
+  subroutine to_mean_torque(self)
     class(bank_t), intent(inout) :: self
-  end subroutine settle
+  end subroutine to_mean_torque
 
   !> The inner states at the start, 0 by default.
-  subroutine start_inner(self, speed, inner)
+  subroutine start_internal(self, speed, internal)
     class(bank_t), intent(in) :: self
     real(wp), intent(in) :: speed(self%values)             !! u' at the start [rad/s]
-    real(wp), intent(inout) :: inner(self%inner_values)    !! [lanes, inner, elements]
+    real(wp), intent(inout) :: internal(self%internal_values)    !! [lanes, inner, elements]
 
-    inner = 0.0_wp
-  end subroutine start_inner
+    internal = 0.0_wp
+  end subroutine start_internal
 
-  !> Brings the inner states into `working`, which holds what `evaluate` and the polynomials gave, and sets their rates.
-  subroutine evaluate_inner(self, speed, inner, working, rate)
+  !> Brings the inner states into `applied`, which holds what `evaluate` and the polynomials gave, and sets their rates.
+  subroutine evaluate_internal(self, speed, internal, applied, rate)
     class(bank_t), intent(in) :: self
     real(wp), intent(in) :: speed(self%values)             !! u' [rad/s]
-    real(wp), intent(in) :: inner(self%inner_values)       !! [lanes, inner, elements]
-    real(wp), intent(inout) :: working(self%values)        !! [N m]
-    real(wp), intent(inout) :: rate(self%inner_values)     !! [lanes, inner, elements]
+    real(wp), intent(in) :: internal(self%internal_values)       !! [lanes, inner, elements]
+    real(wp), intent(inout) :: applied(self%values)        !! [N m]
+    real(wp), intent(inout) :: rate(self%internal_values)     !! [lanes, inner, elements]
 
     error stop 'nocdyn_bank: a bank with inner states overrides evaluate_inner'
-  end subroutine evaluate_inner
+  end subroutine evaluate_internal
 
   !> What an inner state is, e.g. 'armature current'.
-  function inner_name(self, index) result(name)
+  function internal_name(self, index) result(name)
     class(bank_t), intent(in) :: self
     integer, intent(in) :: index   !! 1 to inner
     character(len=:), allocatable :: name
 
     name = ''
     error stop 'nocdyn_bank: a bank with inner states overrides inner_name'
-  end function inner_name
+  end function internal_name
 
   !> Chooses the branch of a switch in which a lane is.
-  subroutine choose(self, switch, lane, t, angle, speed, inner)
+  subroutine choose(self, switch, lane, t, angle, speed, internal)
     class(bank_t), intent(inout) :: self
     integer, intent(in) :: switch, lane
     real(wp), intent(in) :: t              !! [s]
     real(wp), intent(in) :: angle, speed   !! u [rad], u' [rad/s] of the switching element
-    real(wp), intent(in) :: inner(:)       !! its inner states
+    real(wp), intent(in) :: internal(:)       !! its inner states
 
     error stop 'nocdyn_bank: a bank with switches overrides choose'
   end subroutine choose
 
   !> How far a lane is from the nearest border of its present branch: negative beyond it, continuous.
-  pure function margin(self, switch, lane, t, angle, speed, inner)
+  pure function indicator(self, switch, lane, t, angle, speed, internal)
     class(bank_t), intent(in) :: self
     integer, intent(in) :: switch, lane
     real(wp), intent(in) :: t              !! [s]
     real(wp), intent(in) :: angle, speed   !! u [rad], u' [rad/s] of the switching element
-    real(wp), intent(in) :: inner(:)       !! its inner states
-    real(wp) :: margin
+    real(wp), intent(in) :: internal(:)       !! its inner states
+    real(wp) :: indicator
 
-    margin = 0.0_wp
+    indicator = 0.0_wp
     error stop 'nocdyn_bank: a bank with switches overrides margin'
-  end function margin
+  end function indicator
 
   !> What the borders of a switch are, e.g. 'edge of the gap'.
   function switch_name(self, switch) result(name)
@@ -325,7 +325,7 @@ contains
     integer, intent(in) :: lane
     real(wp), intent(out) :: values(:)   !! [elements of the bank]
 
-    values = elements%restoring(lane, self%first:self%last()) + elements%working(lane, self%first:self%last())
+    values = elements%restoring(lane, self%first:self%last()) + elements%applied(lane, self%first:self%last())
     if (quantity /= 1) error stop 'nocdyn_bank: a bank with several quantities overrides observe'
   end subroutine observe
 

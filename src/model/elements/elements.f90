@@ -1,6 +1,6 @@
 !> The elements of a machine, of all banks numbered through: what they join and their values, on a block of lanes.
 module nocdyn_elements
-  use nocdyn_inner_states, only: inner_states_t, new_inner_states
+  use nocdyn_internal_states, only: internal_states_t, new_internal_states
   use nocdyn_kinds, only: wp
   implicit none (type, external)
   private
@@ -16,18 +16,18 @@ module nocdyn_elements
     real(wp), allocatable :: speed(:, :)           !! u' [rad/s]
     ! by `evaluate` of the banks:
     real(wp), allocatable :: restoring(:, :)       !! part of M with a potential, a function of u alone [N m]
-    real(wp), allocatable :: working(:, :)         !! the rest of M, whose power enters or leaves the machine [N m]
+    real(wp), allocatable :: applied(:, :)         !! the rest of M, whose power enters or leaves the machine [N m]
     ! by `differentiate`:
     real(wp), allocatable :: restoring_angle(:, :)       !! derivative of `restoring` by u
     real(wp), allocatable :: restoring_curvature(:, :)   !! second derivative of `restoring` by u
-    real(wp), allocatable :: working_angle(:, :)         !! derivative of `working` by u
-    real(wp), allocatable :: working_speed(:, :)         !! derivative of `working` by u'
-    real(wp), allocatable :: working_time(:, :)          !! derivative of `working` by t
-    ! by `assess`:
+    real(wp), allocatable :: applied_angle(:, :)         !! derivative of `applied` by u
+    real(wp), allocatable :: applied_speed(:, :)         !! derivative of `applied` by u'
+    real(wp), allocatable :: applied_time(:, :)          !! derivative of `applied` by t
+    ! by `evaluate_energies`:
     real(wp), allocatable :: stored(:, :)          !! potential energy of `restoring` [J]
     real(wp), allocatable :: secant(:, :)          !! secant stiffness K12 of eq. (3), the -K12 u in `restoring` [N m/rad]
-    real(wp), allocatable :: damping(:, :)         !! c, the -c u' in `working` [N m s/rad]
-    type(inner_states_t) :: inner
+    real(wp), allocatable :: damping(:, :)         !! c, the -c u' in `applied` [N m s/rad]
+    type(internal_states_t) :: internal
   contains
     procedure :: gather
     procedure :: scatter
@@ -36,21 +36,21 @@ module nocdyn_elements
 contains
 
   !> Elements between the given bodies, at rest and without moments.
-  function new_elements(lanes, from, to, inner) result(self)
+  function new_elements(lanes, from, to, internal) result(self)
     integer, intent(in) :: lanes
     integer, intent(in) :: from(:), to(:)
-    integer, intent(in) :: inner(:)   !! inner states of each
+    integer, intent(in) :: internal(:)   !! inner states of each
     type(elements_t) :: self
 
     allocate (self%from, source=from)
     allocate (self%to, source=to)
     allocate (self%time(lanes), source=0.0_wp)
     allocate (self%angle(lanes, size(to)), source=0.0_wp)
-    allocate (self%speed, self%restoring, self%working, source=self%angle)
+    allocate (self%speed, self%restoring, self%applied, source=self%angle)
     allocate (self%restoring_angle, self%restoring_curvature, source=self%angle)
-    allocate (self%working_angle, self%working_speed, self%working_time, source=self%angle)
+    allocate (self%applied_angle, self%applied_speed, self%applied_time, source=self%angle)
     allocate (self%stored, self%secant, self%damping, source=self%angle)
-    self%inner = new_inner_states(lanes, inner)
+    self%internal = new_internal_states(lanes, internal)
   end function new_elements
 
   !> Relative angles and speeds of the elements from those of the bodies.
@@ -78,7 +78,7 @@ contains
     torque(:, :) = 0.0_wp
     do e = 1, size(self%to)
       do l = 1, size(self%time)
-        moment = self%restoring(l, e) + self%working(l, e)
+        moment = self%restoring(l, e) + self%applied(l, e)
         torque(l, self%to(e)) = torque(l, self%to(e)) + moment
         torque(l, self%from(e)) = torque(l, self%from(e)) - moment
       end do

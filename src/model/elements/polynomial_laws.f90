@@ -7,7 +7,7 @@
 module nocdyn_polynomial_laws
   use nocdyn_elements, only: elements_t
   use nocdyn_kinds, only: wp
-  use nocdyn_lane_numbers, only: lane_numbers_t
+  use nocdyn_lane_parameters, only: lane_parameters_t
   implicit none (type, external)
   private
 
@@ -26,14 +26,14 @@ module nocdyn_polynomial_laws
     logical, private :: is_divided = .false.          !! into parts that are evaluated one after the other
     integer, private :: parts = 0
     integer, allocatable, private :: first(:)         !! element of each part, [parts + 1]
-    logical, allocatable, private :: is_bare(:)       !! of each part: whether all its elements are
+    logical, allocatable, private :: is_plain(:)       !! of each part: whether all its elements are
   contains
-    procedure :: divide
-    procedure :: admit
-    procedure :: list_numbers
+    procedure :: find_plain_parts
+    procedure :: refresh_lane
+    procedure :: list_parameters
     procedure :: evaluate
     procedure :: differentiate
-    procedure :: assess
+    procedure :: evaluate_energies
   end type polynomial_laws_t
 
   integer, parameter :: short = 64   ! values [lanes, elements] that are not worth a loop of their own
@@ -49,11 +49,11 @@ contains
     allocate (self%linear, self%cubic, self%constant, self%by_speed, self%by_speed_squared, self%damping, source=self%rest)
     self%values = lanes * elements
     allocate (self%first(elements + 1), source=1)
-    allocate (self%is_bare(elements), source=.false.)
+    allocate (self%is_plain(elements), source=.false.)
   end function new_polynomial_laws
 
   !> Tells the long runs of bare elements from the others, once the coefficients are set.
-  subroutine divide(self)
+  subroutine find_plain_parts(self)
     class(polynomial_laws_t), intent(inout) :: self
     integer :: e, run
     logical :: is_long
@@ -61,80 +61,80 @@ contains
     self%parts = 0
     e = 1
     do while (e <= size(self%rest, 2))
-      run = bare_run(self, e)
+      run = plain_run(self, e)
       is_long = size(self%rest, 1) * run >= short
       if (is_long .or. self%parts == 0) then
         call begin_part()
-      else if (self%is_bare(self%parts)) then
+      else if (self%is_plain(self%parts)) then
         call begin_part()
       end if
       e = e + max(run, 1)
     end do
     self%first(self%parts + 1) = e
-    self%is_divided = any(self%is_bare(:self%parts))
+    self%is_divided = any(self%is_plain(:self%parts))
 
   contains
 
     subroutine begin_part()
       self%parts = self%parts + 1
       self%first(self%parts) = e
-      self%is_bare(self%parts) = is_long
+      self%is_plain(self%parts) = is_long
     end subroutine begin_part
 
-  end subroutine divide
+  end subroutine find_plain_parts
 
   !> Divides anew if an element of a bare run is not bare any more in a lane that has new numbers.
-  subroutine admit(self, lane)
+  subroutine refresh_lane(self, lane)
     class(polynomial_laws_t), intent(inout) :: self
     integer, intent(in) :: lane
     integer :: e, part
 
     if (.not. self%is_divided) return
     do part = 1, self%parts
-      if (.not. self%is_bare(part)) cycle
+      if (.not. self%is_plain(part)) cycle
       do e = self%first(part), self%first(part + 1) - 1
-        if (is_bare_in(self, lane, e)) cycle
-        call self%divide()
+        if (is_plain_in(self, lane, e)) cycle
+        call self%find_plain_parts()
         return
       end do
     end do
-  end subroutine admit
+  end subroutine refresh_lane
 
-  pure logical function is_bare_in(self, lane, element)
+  pure logical function is_plain_in(self, lane, element)
     type(polynomial_laws_t), intent(in) :: self
     integer, intent(in) :: lane, element
 
-    is_bare_in = .not. (abs(self%rest(lane, element)) > 0 .or. abs(self%constant(lane, element)) > 0 .or. &
+    is_plain_in = .not. (abs(self%rest(lane, element)) > 0 .or. abs(self%constant(lane, element)) > 0 .or. &
                         abs(self%by_speed_squared(lane, element)) > 0)
-  end function is_bare_in
+  end function is_plain_in
 
-  subroutine list_numbers(self, numbers)
+  subroutine list_parameters(self, parameters)
     class(polynomial_laws_t), target, intent(inout) :: self
-    type(lane_numbers_t), intent(inout) :: numbers
+    type(lane_parameters_t), intent(inout) :: parameters
 
-    call numbers%add('laws: rest', self%rest)
-    call numbers%add('laws: linear', self%linear)
-    call numbers%add('laws: cubic', self%cubic)
-    call numbers%add('laws: constant', self%constant)
-    call numbers%add('laws: by_speed', self%by_speed)
-    call numbers%add('laws: by_speed_squared', self%by_speed_squared)
-    call numbers%add('laws: damping', self%damping)
-  end subroutine list_numbers
+    call parameters%add('laws: rest', self%rest)
+    call parameters%add('laws: linear', self%linear)
+    call parameters%add('laws: cubic', self%cubic)
+    call parameters%add('laws: constant', self%constant)
+    call parameters%add('laws: by_speed', self%by_speed)
+    call parameters%add('laws: by_speed_squared', self%by_speed_squared)
+    call parameters%add('laws: damping', self%damping)
+  end subroutine list_parameters
 
   !> How many elements from `first` on are bare in all lanes.
-  pure integer function bare_run(self, first)
+  pure integer function plain_run(self, first)
     type(polynomial_laws_t), intent(in) :: self
     integer, intent(in) :: first
     integer :: e, l
 
-    bare_run = 0
+    plain_run = 0
     do e = first, size(self%rest, 2)
       do l = 1, size(self%rest, 1)
-        if (.not. is_bare_in(self, l, e)) return
+        if (.not. is_plain_in(self, l, e)) return
       end do
-      bare_run = bare_run + 1
+      plain_run = plain_run + 1
     end do
-  end function bare_run
+  end function plain_run
 
   !> Eqs. (3), (49), (50) in the restoring sense; eqs. (5) and (20). Sets the moments of all elements.
   subroutine evaluate(self, elements)
@@ -145,7 +145,7 @@ contains
       call evaluate_parts(self, elements)
     else
       call moments(self%values, self%rest, self%linear, self%cubic, self%constant, self%by_speed, self%by_speed_squared, &
-                   elements%angle, elements%speed, elements%restoring, elements%working)
+                   elements%angle, elements%speed, elements%restoring, elements%applied)
     end if
   end subroutine evaluate
 
@@ -156,44 +156,44 @@ contains
 
     do part = 1, self%parts
       associate (e => self%first(part), n => size(self%rest, 1) * (self%first(part + 1) - self%first(part)))
-        if (self%is_bare(part)) then
-          call bare_moments(n, self%linear(1, e), self%cubic(1, e), self%by_speed(1, e), elements%angle(1, e), &
-                            elements%speed(1, e), elements%restoring(1, e), elements%working(1, e))
+        if (self%is_plain(part)) then
+          call plain_moments(n, self%linear(1, e), self%cubic(1, e), self%by_speed(1, e), elements%angle(1, e), &
+                            elements%speed(1, e), elements%restoring(1, e), elements%applied(1, e))
         else
           call moments(n, self%rest(1, e), self%linear(1, e), self%cubic(1, e), self%constant(1, e), self%by_speed(1, e), &
                        self%by_speed_squared(1, e), elements%angle(1, e), elements%speed(1, e), elements%restoring(1, e), &
-                       elements%working(1, e))
+                       elements%applied(1, e))
         end if
       end associate
     end do
   end subroutine evaluate_parts
 
-  pure subroutine moments(n, rest, linear, cubic, constant, by_speed, by_speed_squared, angle, speed, restoring, working)
+  pure subroutine moments(n, rest, linear, cubic, constant, by_speed, by_speed_squared, angle, speed, restoring, applied)
     integer, intent(in) :: n   !! values of the part
     real(wp), intent(in), dimension(n) :: rest, linear, cubic, constant, by_speed, by_speed_squared, angle, speed
-    real(wp), intent(inout) :: restoring(n), working(n)
+    real(wp), intent(inout) :: restoring(n), applied(n)
     real(wp) :: w
     integer :: i
 
     do i = 1, n
       w = angle(i) - rest(i)
       restoring(i) = -(linear(i) + cubic(i) * w * w) * w
-      working(i) = constant(i) + (by_speed(i) + by_speed_squared(i) * speed(i)) * speed(i)
+      applied(i) = constant(i) + (by_speed(i) + by_speed_squared(i) * speed(i)) * speed(i)
     end do
   end subroutine moments
 
   !> The same for bare elements, to the last bit: the zero keeps the sign of a zero.
-  pure subroutine bare_moments(n, linear, cubic, by_speed, angle, speed, restoring, working)
+  pure subroutine plain_moments(n, linear, cubic, by_speed, angle, speed, restoring, applied)
     integer, intent(in) :: n   !! values of the part
     real(wp), intent(in), dimension(n) :: linear, cubic, by_speed, angle, speed
-    real(wp), intent(inout) :: restoring(n), working(n)
+    real(wp), intent(inout) :: restoring(n), applied(n)
     integer :: i
 
     do i = 1, n
       restoring(i) = -(linear(i) + cubic(i) * angle(i) * angle(i)) * angle(i)
-      working(i) = 0.0_wp + by_speed(i) * speed(i)
+      applied(i) = 0.0_wp + by_speed(i) * speed(i)
     end do
-  end subroutine bare_moments
+  end subroutine plain_moments
 
   !> Sets the derivatives of the moments: the tangent stiffness K1 + 3 k1 w^2 of eqs. (64)-(68), negative, and the others.
   subroutine differentiate(self, elements)
@@ -207,15 +207,15 @@ contains
         w = elements%angle(l, e) - self%rest(l, e)
         elements%restoring_angle(l, e) = -(self%linear(l, e) + 3.0_wp * self%cubic(l, e) * w * w)
         elements%restoring_curvature(l, e) = -6.0_wp * self%cubic(l, e) * w
-        elements%working_angle(l, e) = 0.0_wp
-        elements%working_speed(l, e) = self%by_speed(l, e) + 2.0_wp * self%by_speed_squared(l, e) * elements%speed(l, e)
-        elements%working_time(l, e) = 0.0_wp
+        elements%applied_angle(l, e) = 0.0_wp
+        elements%applied_speed(l, e) = self%by_speed(l, e) + 2.0_wp * self%by_speed_squared(l, e) * elements%speed(l, e)
+        elements%applied_time(l, e) = 0.0_wp
       end do
     end do
   end subroutine differentiate
 
   !> Sets the stored energies linear w^2 / 2 + cubic w^4 / 4, the secant stiffnesses K12 of eq. (3) and the dampings.
-  subroutine assess(self, elements)
+  subroutine evaluate_energies(self, elements)
     class(polynomial_laws_t), intent(in) :: self
     type(elements_t), intent(inout) :: elements
     real(wp) :: w2
@@ -229,6 +229,6 @@ contains
         elements%damping(l, e) = self%damping(l, e)
       end do
     end do
-  end subroutine assess
+  end subroutine evaluate_energies
 
 end module nocdyn_polynomial_laws

@@ -4,7 +4,7 @@ module nocdyn_body_formulation
   use nocdyn_incidence, only: add_coefficients, add_moment
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
-  use nocdyn_system, only: evaluation_fine
+  use nocdyn_system, only: evaluation_ok
   use nocdyn_text, only: quoted
   implicit none (type, external)
   private
@@ -19,11 +19,11 @@ module nocdyn_body_formulation
     real(wp), allocatable :: by_angle(:, :)      !! derivative of T by phi, [bodies, bodies], work space
     real(wp), allocatable :: by_speed(:, :)      !! derivative of T by omega
     real(wp), allocatable :: by_time(:)          !! derivative of T by t
-    real(wp), allocatable :: by_inner(:)         !! derivative of T by an inner state
+    real(wp), allocatable :: by_state(:)         !! derivative of T by an inner state
   contains
     procedure :: attach_bodies
     procedure :: start => start_of_bodies
-    procedure :: place
+    procedure :: set_state
     procedure :: observe => observe_bodies
     procedure :: jacobian => jacobian_of_bodies
     procedure :: component_name
@@ -32,19 +32,19 @@ module nocdyn_body_formulation
 
 contains
 
-  subroutine attach_bodies(self, machine, mechanical, audited)
+  subroutine attach_bodies(self, machine, mechanical, with_energy_balance)
     class(body_formulation_t), intent(inout) :: self
     type(machine_t), intent(in) :: machine
     integer, intent(in) :: mechanical   !! states, at least 2 * bodies
-    logical, intent(in) :: audited
+    logical, intent(in) :: with_energy_balance
     integer :: l
 
-    call self%attach(machine, mechanical, audited)
+    call self%attach(machine, mechanical, with_energy_balance)
     allocate (self%slope(self%lanes, self%states + self%quadratures), source=0.0_wp)
-    allocate (self%status(self%lanes), source=evaluation_fine)
+    allocate (self%status(self%lanes), source=evaluation_ok)
     allocate (self%mobility(machine%bodies, machine%bodies, self%lanes))
     allocate (self%by_angle(machine%bodies, machine%bodies), self%by_speed(machine%bodies, machine%bodies))
-    allocate (self%by_time(machine%bodies), self%by_inner(machine%bodies))
+    allocate (self%by_time(machine%bodies), self%by_state(machine%bodies))
     do l = 1, self%lanes
       self%mobility(:, :, l) = machine%coordinates%mobility(l)
     end do
@@ -58,10 +58,10 @@ contains
     allocate (y(self%lanes, self%states + self%quadratures), source=0.0_wp)
     y(:, :self%machine%bodies) = self%machine%start_speed
     y(:, self%machine%bodies + 1:2 * self%machine%bodies) = self%machine%start_angle
-    y(:, self%mechanical + 1:self%states) = self%machine%start_inner()
+    y(:, self%mechanical + 1:self%states) = self%machine%start_internal()
   end function start_of_bodies
 
-  subroutine place(self, y)
+  subroutine set_state(self, y)
     class(body_formulation_t), intent(inout) :: self
     real(wp), contiguous, intent(in) :: y(:, :)
     integer :: b
@@ -70,7 +70,7 @@ contains
       self%omega(:, b) = y(:, b)
       self%phi(:, b) = y(:, self%machine%bodies + b)
     end do
-  end subroutine place
+  end subroutine set_state
 
   !> Evaluates the right-hand side, whose value stays in `slope`.
   subroutine observe_bodies(self, t, y)
@@ -78,8 +78,8 @@ contains
     real(wp), contiguous, intent(in) :: t(:)
     real(wp), contiguous, intent(in) :: y(:, :)
 
-    call self%place(y)
-    if (self%switches > 0) call self%choose_branches(t, y)
+    call self%set_state(y)
+    if (self%switches > 0) call self%choose_all_branches(t, y)
     call self%derivative(t, y, self%slope, self%status)
   end subroutine observe_bodies
 
@@ -128,8 +128,8 @@ contains
     integer :: b, l, n
 
     n = self%machine%bodies
-    call self%place(y)
-    call self%place_inner(y(:, self%mechanical + 1:))
+    call self%set_state(y)
+    call self%place_internal(y(:, self%mechanical + 1:))
     call self%machine%differentiate(t, self%phi, self%omega)
     dfdy = 0.0_wp
     dfdt = 0.0_wp
@@ -142,7 +142,7 @@ contains
       end do
       call multiply(self%mobility(:, :, l), self%by_time, dfdt(l, :n))
       call differentiate_powers(self, l, dfdy(l, :, :), dfdt(l, :))
-      call differentiate_inner(self, l, dfdy(l, :, :))
+      call differentiate_internal(self, l, dfdy(l, :, :))
     end do
   end subroutine fill_of_bodies
 
@@ -157,10 +157,10 @@ contains
     self%by_time(:) = 0.0_wp
     associate (elements => self%machine%elements)
       call add_coefficients(elements%from, elements%to, -1.0_wp, elements%restoring_angle(lane, :), self%by_angle)
-      call add_coefficients(elements%from, elements%to, -1.0_wp, elements%working_angle(lane, :), self%by_angle)
-      call add_coefficients(elements%from, elements%to, -1.0_wp, elements%working_speed(lane, :), self%by_speed)
+      call add_coefficients(elements%from, elements%to, -1.0_wp, elements%applied_angle(lane, :), self%by_angle)
+      call add_coefficients(elements%from, elements%to, -1.0_wp, elements%applied_speed(lane, :), self%by_speed)
       do e = 1, size(elements%to)
-        call add_moment(elements%from(e), elements%to(e), elements%working_time(lane, e), self%by_time)
+        call add_moment(elements%from(e), elements%to(e), elements%applied_time(lane, e), self%by_time)
       end do
     end associate
   end subroutine differentiate_torques
@@ -176,41 +176,41 @@ contains
     n = self%machine%bodies
     associate (elements => self%machine%elements)
       do k = 1, self%quadratures
-        e = self%machine%accounted(k)
-        call add_moment(elements%from(e), elements%to(e), elements%working(lane, e) &
-                        + elements%speed(lane, e) * elements%working_speed(lane, e), dfdy(self%states + k, :n))
-        call add_moment(elements%from(e), elements%to(e), elements%speed(lane, e) * elements%working_angle(lane, e), &
+        e = self%machine%with_work(k)
+        call add_moment(elements%from(e), elements%to(e), elements%applied(lane, e) &
+                        + elements%speed(lane, e) * elements%applied_speed(lane, e), dfdy(self%states + k, :n))
+        call add_moment(elements%from(e), elements%to(e), elements%speed(lane, e) * elements%applied_angle(lane, e), &
                         dfdy(self%states + k, n + 1:2 * n))
-        dfdt(self%states + k) = elements%working_time(lane, e) * elements%speed(lane, e)
+        dfdt(self%states + k) = elements%applied_time(lane, e) * elements%speed(lane, e)
       end do
     end associate
   end subroutine differentiate_powers
 
   !> The columns and rows of the inner states of one lane.
-  subroutine differentiate_inner(self, lane, dfdy)
+  subroutine differentiate_internal(self, lane, dfdy)
     class(body_formulation_t), intent(inout) :: self
     integer, intent(in) :: lane
     real(wp), intent(inout) :: dfdy(:, :)
     integer :: e, i, k, n, s
 
     n = self%machine%bodies
-    associate (elements => self%machine%elements, inner => self%machine%elements%inner)
-      do s = 1, self%inner
-        e = inner%element(s)
-        self%by_inner(:) = 0.0_wp
-        call add_moment(elements%from(e), elements%to(e), inner%working(lane, s), self%by_inner)
-        call multiply(self%mobility(:, :, lane), self%by_inner, dfdy(:n, self%mechanical + s))
-        call add_moment(elements%from(e), elements%to(e), inner%rate_speed(lane, s), dfdy(self%mechanical + s, :n))
-        do i = 1, inner%members(s)
-          dfdy(self%mechanical + s, self%mechanical + inner%first(s) + i - 1) = inner%rate_inner(lane, i, s)
+    associate (elements => self%machine%elements, internal => self%machine%elements%internal)
+      do s = 1, self%internal
+        e = internal%element(s)
+        self%by_state(:) = 0.0_wp
+        call add_moment(elements%from(e), elements%to(e), internal%applied(lane, s), self%by_state)
+        call multiply(self%mobility(:, :, lane), self%by_state, dfdy(:n, self%mechanical + s))
+        call add_moment(elements%from(e), elements%to(e), internal%rate_speed(lane, s), dfdy(self%mechanical + s, :n))
+        do i = 1, internal%members(s)
+          dfdy(self%mechanical + s, self%mechanical + internal%first(s) + i - 1) = internal%rate_internal(lane, i, s)
         end do
         do k = 1, self%quadratures
-          if (self%machine%accounted(k) /= e) cycle
-          dfdy(self%states + k, self%mechanical + s) = elements%speed(lane, e) * inner%working(lane, s)
+          if (self%machine%with_work(k) /= e) cycle
+          dfdy(self%states + k, self%mechanical + s) = elements%speed(lane, e) * internal%applied(lane, s)
         end do
       end do
     end associate
-  end subroutine differentiate_inner
+  end subroutine differentiate_internal
 
   pure subroutine multiply(matrix, vector, product)
     real(wp), intent(in) :: matrix(:, :), vector(:)
@@ -236,9 +236,9 @@ contains
       else if (index <= self%mechanical) then
         name = 'elastic moment on ' // quoted(self%machine%names(index - 2 * n)%text)
       else if (index <= self%states) then
-        name = self%machine%inner_name(index - self%mechanical)
+        name = self%machine%internal_name(index - self%mechanical)
       else
-        name = 'work of ' // quoted(self%machine%accounted_name(index - self%states))
+        name = 'work of ' // quoted(self%machine%work_element_name(index - self%states))
       end if
     end associate
   end function component_name

@@ -23,14 +23,14 @@ module nocdyn_multiplier
 contains
 
   !> The formulation of a machine; its matrix is factored here.
-  function new_multiplier(machine, audited) result(self)
+  function new_multiplier(machine, with_energy_balance) result(self)
     type(machine_t), intent(in) :: machine
-    logical, intent(in) :: audited   !! whether the works of the accounted elements are integrated
+    logical, intent(in) :: with_energy_balance   !! whether the works of the accounted elements are integrated
     type(multiplier_t) :: self
     integer :: b, g, l, order
     logical :: is_singular
 
-    call self%attach_bodies(machine, 2 * machine%bodies, audited)
+    call self%attach_bodies(machine, 2 * machine%bodies, with_energy_balance)
     self%kept = [(machine%groups(g)%kept, g=1, size(machine%groups))]
     order = machine%bodies + size(self%kept)
     allocate (self%factors(order, order, machine%lanes), source=0.0_wp)
@@ -57,8 +57,8 @@ contains
     integer :: l, n
 
     n = self%machine%bodies
-    call self%place(y)
-    call self%place_inner(y(:, self%mechanical + 1:))
+    call self%set_state(y)
+    call self%place_internal(y(:, self%mechanical + 1:))
     call self%machine%evaluate(t, self%phi, self%omega, self%torque)
     do l = 1, self%lanes
       self%solution(:n, l) = self%torque(l, 1:)
@@ -67,7 +67,7 @@ contains
       dydt(l, :n) = self%solution(:n, l)
     end do
     dydt(:, n + 1:2 * n) = y(:, :n)
-    if (self%inner > 0) dydt(:, self%mechanical + 1:self%states) = self%machine%elements%inner%rate
+    if (self%internal > 0) dydt(:, self%mechanical + 1:self%states) = self%machine%elements%internal%rate
     if (self%quadratures > 0) call self%machine%power(dydt(:, self%states + 1:))
   end subroutine derivative
 
@@ -82,7 +82,7 @@ contains
     do i = 1, size(self%kept)
       lambda(self%kept(i)) = self%solution(self%machine%bodies + i, lane)
     end do
-    call self%machine%coordinates%sweep%share(lane, lambda)
+    call self%machine%coordinates%reactions%share_loads(lane, lambda)
   end subroutine reactions
 
   function series_obstacle(self) result(obstacle)

@@ -43,9 +43,9 @@ module nocdyn_paper
 contains
 
   !> The formulation of a machine; J_3 is assembled and factored here.
-  function new_paper(machine, audited) result(self)
+  function new_paper(machine, with_energy_balance) result(self)
     type(machine_t), intent(in) :: machine
-    logical, intent(in) :: audited   !! whether the works of the accounted elements are integrated
+    logical, intent(in) :: with_energy_balance   !! whether the works of the accounted elements are integrated
     type(paper_t) :: self
     integer :: b, g, l, n
     logical :: is_singular
@@ -53,7 +53,7 @@ contains
     real(wp) :: inertia_of_2(2 * machine%bodies, 2 * machine%bodies)
 
     n = machine%bodies
-    call self%attach_bodies(machine, 3 * n, audited)
+    call self%attach_bodies(machine, 3 * n, with_energy_balance)
     call allocate_matrices(n, self%work)
     allocate (self%complement(n, machine%coordinates%freedoms, machine%lanes))
     allocate (self%factors(3 * n, 3 * n, machine%lanes), self%pivots(3 * n, machine%lanes))
@@ -126,8 +126,8 @@ contains
     t = 0.0_wp
     phi(:, 1:) = self%machine%start_angle
     machine = self%machine
-    if (self%inner > 0) machine%elements%inner%value = machine%start_inner()
-    call machine%choose_all(t, phi, omega)
+    if (self%internal > 0) machine%elements%internal%value = machine%start_internal()
+    call machine%choose_branches(t, phi, omega)
     call machine%evaluate(t, phi, omega, torque)
     do l = 1, self%lanes
       call elastic_moments(machine, l, moments)
@@ -144,10 +144,10 @@ contains
     integer :: l, n
 
     n = self%machine%bodies
-    call self%place(y)
-    call self%place_inner(y(:, self%mechanical + 1:))
+    call self%set_state(y)
+    call self%place_internal(y(:, self%mechanical + 1:))
     call self%machine%evaluate(t, self%phi, self%omega, self%torque)
-    call self%machine%assess()
+    call self%machine%evaluate_energies()
     call self%machine%differentiate_elements(t)
     do l = 1, self%lanes
       call assemble(self%machine, l, self%complement(:, :, l), self%work)
@@ -155,7 +155,7 @@ contains
       call solve_generalised_system(self%factors(:, :, l), self%pivots(:, l), self%work)
       dydt(l, :3 * n) = self%work%beta
     end do
-    if (self%inner > 0) dydt(:, self%mechanical + 1:self%states) = self%machine%elements%inner%rate
+    if (self%internal > 0) dydt(:, self%mechanical + 1:self%states) = self%machine%elements%internal%rate
     if (self%quadratures > 0) call self%machine%power(dydt(:, self%states + 1:))
   end subroutine derivative
 

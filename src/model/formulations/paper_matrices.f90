@@ -1,7 +1,7 @@
 !> The matrices and vectors of the paper, eqs. (13)-(72), for any machine of n bodies.
 !>
 !> They are those of one lane at the angles and speeds to which the machine was last brought by `evaluate`,
-!> `differentiate` and `assess`. What a law has beyond -K12 u - c u' (the rest twist of a coupling,
+!> `differentiate` and `evaluate_energies`. What a law has beyond -K12 u - c u' (the rest twist of a coupling,
 !> the torque of a motor) stands in Q. Every procedure overwrites its last argument and allocates nothing.
 module nocdyn_paper_matrices
   use nocdyn_incidence, only: add_coefficients, add_moment
@@ -47,7 +47,7 @@ contains
         do e = bank%first, bank%last()
           call add_moment(elements%from(e), elements%to(e), &
                           (elements%restoring(lane, e) + elements%secant(lane, e) * elements%angle(lane, e)) &
-                          + (elements%working(lane, e) + elements%damping(lane, e) * elements%speed(lane, e)), torque)
+                          + (elements%applied(lane, e) + elements%damping(lane, e) * elements%speed(lane, e)), torque)
         end do
       end associate
     end do

@@ -7,12 +7,12 @@
 module nocdyn_reduced
   use nocdyn_element_coordinates, only: element_coordinates_t, new_element_coordinates, twist_map
   use nocdyn_formulation, only: formulation_t
-  use nocdyn_inner_jacobian, only: inner_jacobian_t, new_inner_jacobian
+  use nocdyn_internal_jacobian, only: internal_jacobian_t, new_internal_jacobian
   use nocdyn_kinds, only: wp
-  use nocdyn_lane_numbers, only: lane_numbers_t
+  use nocdyn_lane_parameters, only: lane_parameters_t
   use nocdyn_lane_motion, only: lane_motion_t, motion_strip, new_lane_motion
   use nocdyn_lane_series, only: lane_series_t, new_lane_series
-  use nocdyn_lane_terms, only: is_plain, lane_terms_t, new_lane_terms
+  use nocdyn_lane_terms, only: is_polynomial_or_external, lane_terms_t, new_lane_terms
   use nocdyn_machine, only: machine_t
   use nocdyn_reduced_jacobian, only: new_reduced_jacobian, reduced_jacobian_t
   use nocdyn_reduced_series, only: new_reduced_series, reduced_series_t
@@ -31,20 +31,20 @@ module nocdyn_reduced
     type(sparse_map_t), private :: twists                      !! U
     type(sparse_map_t), private :: accelerations               !! R
     type(element_coordinates_t), private :: incidence          !! of which both are made
-    integer, allocatable, private :: responding(:)             !! its entry of each entry of R
-    type(reduced_jacobian_t), private :: sums                  !! R diag U
-    type(reduced_series_t), private :: motion                  !! after `prepare_series`
+    integer, allocatable, private :: response_entry(:)             !! its entry of each entry of R
+    type(reduced_jacobian_t), private :: element_jacobian                  !! R diag U
+    type(reduced_series_t), private :: series_kernel                  !! after `prepare_series`
     type(lane_terms_t), allocatable, private :: terms          !! of many lanes of a plain machine without works
     type(lane_motion_t), allocatable, private :: lane_motion   !! if there are `terms` and whole strips of lanes
     type(lane_series_t), allocatable, private :: lane_series   !! instead of `motion`, after `prepare_series`
-    type(inner_jacobian_t), private :: inner_rows              !! of the inner states
+    type(internal_jacobian_t), private :: internal_rows              !! of the inner states
     type(element_coordinates_t), private :: switching          !! of the switching elements
-    real(wp), allocatable, private :: none(:, :)               !! zeros, [lanes, elements]
+    real(wp), allocatable, private :: zeros(:, :)               !! zeros, [lanes, elements]
   contains
     procedure :: formulate
-    procedure :: weigh
-    procedure :: list_numbers
-    procedure :: receive
+    procedure :: update_inertia
+    procedure :: list_parameters
+    procedure :: refresh_lane
     procedure :: derivative
     procedure :: jacobian
     procedure :: jacobian_pattern
@@ -53,8 +53,8 @@ module nocdyn_reduced
     procedure :: prepare_series
     procedure :: series
     procedure :: start
-    procedure :: start_coordinates
-    procedure :: place
+    procedure :: project_start_speeds
+    procedure :: set_state
     procedure :: reactions
     procedure :: switch_motion
   end type reduced_t
@@ -62,9 +62,9 @@ module nocdyn_reduced
 contains
 
   !> The formulation of a machine whose coordinates are known.
-  function new_reduced(machine, audited, as_block) result(self)
+  function new_reduced(machine, with_energy_balance, as_block) result(self)
     type(machine_t), intent(in) :: machine
-    logical, intent(in) :: audited              !! whether the works of the accounted elements are integrated
+    logical, intent(in) :: with_energy_balance              !! whether the works of the accounted elements are integrated
     logical, intent(in), optional :: as_block   !! whether a single lane is laid out as those of a block: .false.
     type(reduced_t) :: self
     logical :: is_block
@@ -72,29 +72,29 @@ contains
     is_block = .false.
     if (present(as_block)) is_block = as_block
     self%machine = machine
-    call self%formulate(audited, is_block)
+    call self%formulate(with_energy_balance, is_block)
   end function new_reduced
 
   !> Forms the equations of the machine that is there.
-  subroutine formulate(self, audited, as_block)
+  subroutine formulate(self, with_energy_balance, as_block)
     class(reduced_t), intent(inout) :: self
-    logical, intent(in) :: audited
+    logical, intent(in) :: with_energy_balance
     logical, intent(in) :: as_block
 
-    call self%make_room(2 * self%machine%coordinates%freedoms, audited)
+    call self%allocate_state(2 * self%machine%coordinates%freedoms, with_energy_balance)
     self%incidence = new_element_coordinates(self%machine%elements, self%machine%coordinates)
     associate (machine => self%machine, incidence => self%incidence, freedoms => self%machine%coordinates%freedoms)
       call form_responses(freedoms, as_block, self)
-      self%sums = new_reduced_jacobian(freedoms, incidence, machine%accounted(:self%quadratures), self%inner)
-      self%inner_rows = new_inner_jacobian(freedoms, incidence, machine%accounted(:self%quadratures), &
-                                           machine%elements%inner, size(self%sums%pattern%row))
-      self%switching = incidence%selected(machine%switches%element, turning=.true.)
+      self%element_jacobian = new_reduced_jacobian(freedoms, incidence, machine%with_work(:self%quadratures), self%internal)
+      self%internal_rows = new_internal_jacobian(freedoms, incidence, machine%with_work(:self%quadratures), &
+                                           machine%elements%internal, size(self%element_jacobian%pattern%row))
+      self%switching = incidence%selected(machine%switches%element, with_ratio_only=.true.)
       call find_start_twists(self)
-      self%twists = twist_map(incidence, without_offset=.not. any(abs(self%start_twist) > 0), is_loose=as_block)
-      self%none = 0.0_wp * self%start_twist
+      self%twists = twist_map(incidence, without_offset=.not. any(abs(self%start_twist) > 0), without_bands=as_block)
+      self%zeros = 0.0_wp * self%start_twist
       if (allocated(self%terms)) deallocate (self%terms)
       if (allocated(self%lane_motion)) deallocate (self%lane_motion)
-      if (machine%lanes > 1 .and. self%quadratures == 0 .and. is_plain(machine)) then
+      if (machine%lanes > 1 .and. self%quadratures == 0 .and. is_polynomial_or_external(machine)) then
         allocate (self%terms, source=new_lane_terms(machine))
         if (modulo(machine%lanes, motion_strip) == 0) then
           allocate (self%lane_motion, source=new_lane_motion(machine%lanes, size(machine%elements%to)))
@@ -113,9 +113,9 @@ contains
   end subroutine find_start_twists
 
   !> R, whose rows are the coordinates.
-  subroutine form_responses(freedoms, is_loose, self)
+  subroutine form_responses(freedoms, without_bands, self)
     integer, intent(in) :: freedoms
-    logical, intent(in) :: is_loose
+    logical, intent(in) :: without_bands
     type(reduced_t), intent(inout) :: self
     integer :: element_of(size(self%incidence%coordinate)), first(freedoms + 1)
     integer :: e
@@ -124,16 +124,16 @@ contains
       do e = 1, size(incidence%first) - 1
         element_of(incidence%first(e):incidence%first(e + 1) - 1) = e
       end do
-      if (allocated(self%responding)) deallocate (self%responding)
-      allocate (self%responding(size(incidence%coordinate)))
-      call transposed_order(incidence%coordinate, freedoms, self%responding, first)
-      self%accelerations = new_sparse_map(first, element_of(self%responding), incidence%response(:, self%responding), &
-                                          is_loose=is_loose)
+      if (allocated(self%response_entry)) deallocate (self%response_entry)
+      allocate (self%response_entry(size(incidence%coordinate)))
+      call transposed_order(incidence%coordinate, freedoms, self%response_entry, first)
+      self%accelerations = new_sparse_map(first, element_of(self%response_entry), incidence%response(:, self%response_entry), &
+                                          without_bands=without_bands)
     end associate
   end subroutine form_responses
 
   !> Other inertias in a lane of a block; start speeds that were projected would be others too.
-  subroutine weigh(self, lane, bodies, inertia, groups, is_indefinite)
+  subroutine update_inertia(self, lane, bodies, inertia, groups, is_indefinite)
     class(reduced_t), intent(inout) :: self
     integer, intent(in) :: lane
     integer, intent(in) :: bodies(:)         !! with other inertias
@@ -148,42 +148,42 @@ contains
                                           lane, is_indefinite)
       if (is_indefinite) return
     end do
-    call self%incidence%take_responses(lane, self%machine%elements, self%machine%coordinates)
-    call self%accelerations%take_lane(lane, self%incidence%response, self%responding)
-    call self%sums%take_lane(lane, self%incidence)
-    call self%inner_rows%take_lane(lane, self%incidence, self%machine%elements%inner)
-    call self%switching%take_selected(lane, self%incidence, self%machine%switches%element, turning=.true.)
-  end subroutine weigh
+    call self%incidence%refresh_responses(lane, self%machine%elements, self%machine%coordinates)
+    call self%accelerations%set_lane(lane, self%incidence%response, self%response_entry)
+    call self%element_jacobian%refresh_lane(lane, self%incidence)
+    call self%internal_rows%refresh_lane(lane, self%incidence, self%machine%elements%internal)
+    call self%switching%refresh_selected(lane, self%incidence, self%machine%switches%element, with_ratio_only=.true.)
+  end subroutine update_inertia
 
   !> Lists what may differ from variant to variant, but for what the series takes when a lane is entered; of a block, or
   !> laid out as one.
-  subroutine list_numbers(self, numbers)
+  subroutine list_parameters(self, parameters)
     class(reduced_t), target, intent(inout) :: self
-    type(lane_numbers_t), intent(inout) :: numbers
+    type(lane_parameters_t), intent(inout) :: parameters
 
-    call numbers%clear()
-    call numbers%remark([self%states, self%quadratures, self%switches])
-    call self%machine%list_numbers(numbers)
-    call numbers%add('start_twist', self%start_twist)
-    call self%incidence%list_numbers(numbers)
-    call self%twists%list_numbers(numbers)
-    call self%accelerations%list_numbers(numbers)
-    call self%sums%list_numbers(numbers)
-    call self%inner_rows%list_numbers(numbers)
-    call self%switching%list_numbers(numbers)
-  end subroutine list_numbers
+    call parameters%clear()
+    call parameters%add_structure([self%states, self%quadratures, self%switches])
+    call self%machine%list_parameters(parameters)
+    call parameters%add('start_twist', self%start_twist)
+    call self%incidence%list_parameters(parameters)
+    call self%twists%list_parameters(parameters)
+    call self%accelerations%list_parameters(parameters)
+    call self%element_jacobian%list_parameters(parameters)
+    call self%internal_rows%list_parameters(parameters)
+    call self%switching%list_parameters(parameters)
+  end subroutine list_parameters
 
   !> What saves work or is a copy follows the numbers.
-  subroutine receive(self, lane)
+  subroutine refresh_lane(self, lane)
     class(reduced_t), intent(inout) :: self
     integer, intent(in) :: lane
 
-    call self%machine%laws%admit(lane)
-    call self%motion%take_lane(lane, self%machine%laws, self%twists, self%accelerations)
+    call self%machine%laws%refresh_lane(lane)
+    call self%series_kernel%refresh_lane(lane, self%machine%laws, self%twists, self%accelerations)
     if (.not. allocated(self%terms)) return
-    call self%terms%note_lane(self%machine, lane)
-    if (allocated(self%lane_motion)) call self%lane_motion%forget(lane)
-  end subroutine receive
+    call self%terms%add_lane_terms(self%machine, lane)
+    if (allocated(self%lane_motion)) call self%lane_motion%invalidate(lane)
+  end subroutine refresh_lane
 
   function start(self) result(y)
     class(reduced_t), intent(in) :: self
@@ -192,23 +192,23 @@ contains
 
     allocate (y(self%lanes, self%states + self%quadratures), source=0.0_wp)
     do l = 1, self%lanes
-      call self%start_coordinates(l, y(l, :))
+      call self%project_start_speeds(l, y(l, :))
     end do
-    y(:, self%mechanical + 1:self%states) = self%machine%start_inner()
+    y(:, self%mechanical + 1:self%states) = self%machine%start_internal()
   end function start
 
   !> The speeds of the coordinates in which one lane starts; the rest of the state stays.
-  pure subroutine start_coordinates(self, lane, y)
+  pure subroutine project_start_speeds(self, lane, y)
     class(reduced_t), intent(in) :: self
     integer, intent(in) :: lane
     real(wp), intent(inout) :: y(:)   !! [states + quadratures]
 
     call self%machine%coordinates%project(lane, self%machine%inertia(lane, :), self%machine%start_speed(lane, :), &
                                           y(:self%machine%coordinates%freedoms))
-  end subroutine start_coordinates
+  end subroutine project_start_speeds
 
   !> omega = L_tau q', eq. (82) of section 5.
-  subroutine place(self, y)
+  subroutine set_state(self, y)
     class(reduced_t), intent(inout) :: self
     real(wp), contiguous, intent(in) :: y(:, :)
     integer :: b, c, f, k, l
@@ -227,7 +227,7 @@ contains
         end do
       end do
     end associate
-  end subroutine place
+  end subroutine set_state
 
   subroutine derivative(self, t, y, dydt, status)
     class(reduced_t), intent(inout) :: self
@@ -236,46 +236,46 @@ contains
     real(wp), intent(inout) :: dydt(self%lanes, self%states + self%quadratures)
     integer, intent(inout) :: status(self%lanes)
 
-    call advance(self, self%lanes * self%machine%coordinates%freedoms, self%lanes * self%inner, self%quadratures, t, y, dydt)
+    call advance(self, self%lanes * self%machine%coordinates%freedoms, self%lanes * self%internal, self%quadratures, t, y, dydt)
   end subroutine derivative
 
   !> The derivatives of the speeds and angles of the coordinates, of the inner states and of the works, one after the other.
-  subroutine advance(self, n, inner, quadratures, t, y, dydt)
+  subroutine advance(self, n, internal, quadratures, t, y, dydt)
     type(reduced_t), intent(inout) :: self
     integer, intent(in) :: n       !! lanes * freedoms
-    integer, intent(in) :: inner   !! lanes * inner states
+    integer, intent(in) :: internal   !! lanes * inner states
     integer, intent(in) :: quadratures
     real(wp), intent(in) :: t(self%lanes)
-    real(wp), intent(in) :: y(2 * n + inner)
-    real(wp), intent(inout) :: dydt(2 * n + inner + self%lanes * quadratures)
+    real(wp), intent(in) :: y(2 * n + internal)
+    real(wp), intent(inout) :: dydt(2 * n + internal + self%lanes * quadratures)
     integer :: i
 
     if (allocated(self%lane_motion)) then
       call self%lane_motion%accelerate(self%machine, self%terms, self%twists, self%accelerations, self%start_twist, t, y, &
                                        y(n + 1), dydt)
     else
-      call turn(self, n, inner, t, y)
-      call self%accelerations%map_sum(self%machine%elements%restoring, self%machine%elements%working, dydt)
+      call evaluate_at(self, n, internal, t, y)
+      call self%accelerations%multiply_sum(self%machine%elements%restoring, self%machine%elements%applied, dydt)
     end if
     do i = 1, n
       dydt(n + i) = y(i)
     end do
-    if (inner > 0) call copy(inner, self%machine%elements%inner%rate, dydt(2 * n + 1))
-    if (quadratures > 0) call self%machine%power(dydt(2 * n + inner + 1))
+    if (internal > 0) call copy(internal, self%machine%elements%internal%rate, dydt(2 * n + 1))
+    if (quadratures > 0) call self%machine%power(dydt(2 * n + internal + 1))
   end subroutine advance
 
   !> Brings the elements to a state and evaluates them.
-  subroutine turn(self, n, inner, t, y)
+  subroutine evaluate_at(self, n, internal, t, y)
     type(reduced_t), intent(inout) :: self
     integer, intent(in) :: n       !! lanes * freedoms
-    integer, intent(in) :: inner   !! lanes * inner states
+    integer, intent(in) :: internal   !! lanes * inner states
     real(wp), intent(in) :: t(self%lanes)
-    real(wp), intent(in) :: y(2 * n + inner)
+    real(wp), intent(in) :: y(2 * n + internal)
 
-    call self%twists%map_pair(self%start_twist, y(n + 1), y(1), self%machine%elements%angle, self%machine%elements%speed)
-    if (inner > 0) call copy(inner, y(2 * n + 1), self%machine%elements%inner%value)
+    call self%twists%multiply_pair(self%start_twist, y(n + 1), y(1), self%machine%elements%angle, self%machine%elements%speed)
+    if (internal > 0) call copy(internal, y(2 * n + 1), self%machine%elements%internal%value)
     call self%machine%evaluate_elements(t)
-  end subroutine turn
+  end subroutine evaluate_at
 
   function series_obstacle(self) result(obstacle)
     class(reduced_t), intent(in) :: self
@@ -292,7 +292,7 @@ contains
     if (allocated(self%terms) .and. modulo(self%lanes, strip) == 0) then
       allocate (self%lane_series, source=new_lane_series(self%machine, self%twists, self%accelerations, order))
     else
-      self%motion = new_reduced_series(self%machine, self%twists, self%accelerations, self%is_audited, order)
+      self%series_kernel = new_reduced_series(self%machine, self%twists, self%accelerations, self%has_energy_balance, order)
     end if
   end subroutine prepare_series
 
@@ -306,7 +306,7 @@ contains
     if (allocated(self%lane_series)) then
       call self%lane_series%expand(self%machine, self%terms, self%twists, self%accelerations, self%start_twist, columns, t, y)
     else
-      call self%motion%expand(self%machine, self%twists, self%accelerations, self%start_twist, &
+      call self%series_kernel%expand(self%machine, self%twists, self%accelerations, self%start_twist, &
                               self%lanes * self%machine%coordinates%freedoms, self%lanes * columns, t, y)
     end if
   end subroutine series
@@ -347,15 +347,15 @@ contains
 
     f = self%machine%coordinates%freedoms
     associate (machine => self%machine, elements => self%machine%elements)
-      call turn(self, self%lanes * f, self%lanes * self%inner, t, y)
+      call evaluate_at(self, self%lanes * f, self%lanes * self%internal, t, y)
       call machine%differentiate_elements(t)
-      call self%sums%fill(elements, dfdy)
-      if (self%inner > 0) call self%inner_rows%fill(elements, dfdy)
-      call self%accelerations%map_sum(self%none, elements%working_time, dfdt)
+      call self%element_jacobian%fill(elements, dfdy)
+      if (self%internal > 0) call self%internal_rows%fill(elements, dfdy)
+      call self%accelerations%multiply_sum(self%zeros, elements%applied_time, dfdt)
       dfdt(:, f + 1:self%states) = 0.0_wp
       do k = 1, self%quadratures
-        e = machine%accounted(k)
-        dfdt(:, self%states + k) = elements%working_time(:, e) * elements%speed(:, e)
+        e = machine%with_work(k)
+        dfdt(:, self%states + k) = elements%applied_time(:, e) * elements%speed(:, e)
       end do
     end associate
   end subroutine jacobian
@@ -364,8 +364,8 @@ contains
     class(reduced_t), intent(in) :: self
     type(pattern_t) :: pattern
 
-    allocate (pattern%row, source=[self%sums%pattern%row, self%inner_rows%pattern%row])
-    allocate (pattern%column, source=[self%sums%pattern%column, self%inner_rows%pattern%column])
+    allocate (pattern%row, source=[self%element_jacobian%pattern%row, self%internal_rows%pattern%row])
+    allocate (pattern%column, source=[self%element_jacobian%pattern%column, self%internal_rows%pattern%column])
   end function jacobian_pattern
 
   !> Tooth forces straight from the torques of the elements.
@@ -388,9 +388,9 @@ contains
       else if (index <= self%mechanical) then
         name = 'angle of ' // quoted(self%machine%names(coordinates%body(index - coordinates%freedoms))%text)
       else if (index <= self%states) then
-        name = self%machine%inner_name(index - self%mechanical)
+        name = self%machine%internal_name(index - self%mechanical)
       else
-        name = 'work of ' // quoted(self%machine%accounted_name(index - self%states))
+        name = 'work of ' // quoted(self%machine%work_element_name(index - self%states))
       end if
     end associate
   end function component_name

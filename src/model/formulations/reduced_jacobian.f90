@@ -7,7 +7,7 @@ module nocdyn_reduced_jacobian
   use nocdyn_element_coordinates, only: element_coordinates_t
   use nocdyn_elements, only: elements_t
   use nocdyn_kinds, only: wp
-  use nocdyn_lane_numbers, only: lane_numbers_t
+  use nocdyn_lane_parameters, only: lane_parameters_t
   use nocdyn_sparse_map, only: transposed_order
   use nocdyn_system, only: pattern_t
   implicit none (type, external)
@@ -22,33 +22,33 @@ module nocdyn_reduced_jacobian
     integer, private :: freedoms = 0
     integer, private :: pairs = 0                      !! positions of dq''/dq'
     integer, allocatable, private :: element(:)        !! of each product
-    integer, allocatable, private :: place(:)          !! of each product, 1 to pairs
-    integer, allocatable, private :: responding(:)     !! entry of the response of each product
-    integer, allocatable, private :: turning(:)        !! entry of its ratio
+    integer, allocatable, private :: position(:)          !! of each product, 1 to pairs
+    integer, allocatable, private :: response_entry(:)     !! entry of the response of each product
+    integer, allocatable, private :: ratio_entry(:)        !! entry of its ratio
     real(wp), allocatable, private :: product(:, :)    !! response * ratio, [lanes, products]
     integer, allocatable, private :: worker(:)         !! accounted element of each work's entry
     real(wp), allocatable, private :: ratio(:, :)      !! of that entry, [lanes, work's entries]
   contains
     procedure :: fill
-    procedure :: take_lane
-    procedure :: list_numbers
+    procedure :: refresh_lane
+    procedure :: list_parameters
   end type reduced_jacobian_t
 
 contains
 
   !> The positions of the Jacobian of the reduced formulation.
-  function new_reduced_jacobian(freedoms, incidence, accounted, inner) result(self)
+  function new_reduced_jacobian(freedoms, incidence, with_work, internal) result(self)
     integer, intent(in) :: freedoms
     type(element_coordinates_t), intent(in) :: incidence
-    integer, intent(in) :: accounted(:)   !! elements whose works follow the states
-    integer, intent(in) :: inner          !! states between those of the coordinates and the works
+    integer, intent(in) :: with_work(:)   !! elements whose works follow the states
+    integer, intent(in) :: internal          !! states between those of the coordinates and the works
     type(reduced_jacobian_t) :: self
     integer, allocatable :: row(:), column(:)
     integer :: c, e, products
 
     self%freedoms = freedoms
     products = product_count(incidence)
-    allocate (self%element(products), self%place(products), self%responding(products), self%turning(products))
+    allocate (self%element(products), self%position(products), self%response_entry(products), self%ratio_entry(products))
     allocate (row(products), column(products))
     allocate (self%product(size(incidence%ratio, 1), size(self%element)))
     call form_products(freedoms, incidence, row, column, self)
@@ -56,9 +56,9 @@ contains
     column = column(:self%pairs)
     self%pattern%row = [row, row, [(freedoms + c, c=1, freedoms)]]
     self%pattern%column = [column, freedoms + column, [(c, c=1, freedoms)]]
-    call append_works(freedoms, incidence, accounted, 2 * freedoms + inner, self)
-    self%worker = [(spread(accounted(e), 1, incidence%first(accounted(e) + 1) - incidence%first(accounted(e))), &
-                    e=1, size(accounted))]
+    call append_works(freedoms, incidence, with_work, 2 * freedoms + internal, self)
+    self%worker = [(spread(with_work(e), 1, incidence%first(with_work(e) + 1) - incidence%first(with_work(e))), &
+                    e=1, size(with_work))]
   end function new_reduced_jacobian
 
   !> Pairs of entries of an element of which the second has a ratio.
@@ -81,14 +81,14 @@ contains
     integer, intent(inout) :: row(:), column(:)   !! of each position
     type(reduced_jacobian_t), intent(inout) :: self
     integer :: element_of(size(incidence%coordinate)), order(size(incidence%coordinate)), first(freedoms + 1)
-    integer :: place(freedoms)   ! the position in this column, if not below `begin`
+    integer :: position(freedoms)   ! the position in this column, if not below `begin`
     integer :: a, b, begin, e, i, n, q
 
     do e = 1, size(incidence%first) - 1
       element_of(incidence%first(e):incidence%first(e + 1) - 1) = e
     end do
     call transposed_order(incidence%coordinate, freedoms, order, first)
-    place = 0
+    position = 0
     n = 0
     do q = 1, freedoms
       begin = self%pairs + 1
@@ -97,7 +97,7 @@ contains
         if (.not. incidence%has_ratio(b)) cycle
         e = element_of(b)
         do a = incidence%first(e), incidence%first(e + 1) - 1
-          associate (at => place(incidence%coordinate(a)))
+          associate (at => position(incidence%coordinate(a)))
             if (at < begin) then
               self%pairs = self%pairs + 1
               at = self%pairs
@@ -106,9 +106,9 @@ contains
             end if
             n = n + 1
             self%element(n) = e
-            self%place(n) = at
-            self%responding(n) = a
-            self%turning(n) = b
+            self%position(n) = at
+            self%response_entry(n) = a
+            self%ratio_entry(n) = b
             self%product(:, n) = incidence%response(:, a) * incidence%ratio(:, b)
           end associate
         end do
@@ -117,23 +117,23 @@ contains
   end subroutine form_products
 
   !> The positions of the works' rows: two for each entry of an accounted element.
-  subroutine append_works(freedoms, incidence, accounted, states, self)
+  subroutine append_works(freedoms, incidence, with_work, states, self)
     integer, intent(in) :: freedoms
     type(element_coordinates_t), intent(in) :: incidence
-    integer, intent(in) :: accounted(:)
+    integer, intent(in) :: with_work(:)
     integer, intent(in) :: states
     type(reduced_jacobian_t), intent(inout) :: self
     integer, allocatable :: row(:), column(:), entry(:)
     integer :: i, k, n
 
     n = 0
-    do k = 1, size(accounted)
-      n = n + incidence%first(accounted(k) + 1) - incidence%first(accounted(k))
+    do k = 1, size(with_work)
+      n = n + incidence%first(with_work(k) + 1) - incidence%first(with_work(k))
     end do
     allocate (row(2 * n), column(2 * n), entry(n))
     n = 0
-    do k = 1, size(accounted)
-      do i = incidence%first(accounted(k)), incidence%first(accounted(k) + 1) - 1
+    do k = 1, size(with_work)
+      do i = incidence%first(with_work(k)), incidence%first(with_work(k) + 1) - 1
         n = n + 1
         entry(n) = i
         row(2 * n - 1:2 * n) = states + k
@@ -157,11 +157,11 @@ contains
     dfdy(:, 2 * self%pairs + 1:2 * self%pairs + self%freedoms) = 1.0_wp
     do n = 1, size(self%element)
       e = self%element(n)
-      at = self%place(n)
+      at = self%position(n)
       do l = 1, size(dfdy, 1)
-        dfdy(l, at) = dfdy(l, at) + self%product(l, n) * elements%working_speed(l, e)
+        dfdy(l, at) = dfdy(l, at) + self%product(l, n) * elements%applied_speed(l, e)
         dfdy(l, self%pairs + at) = dfdy(l, self%pairs + at) &
-                                   + self%product(l, n) * (elements%restoring_angle(l, e) + elements%working_angle(l, e))
+                                   + self%product(l, n) * (elements%restoring_angle(l, e) + elements%applied_angle(l, e))
       end do
     end do
     at = 2 * self%pairs + self%freedoms
@@ -169,8 +169,8 @@ contains
       e = self%worker(n)
       do l = 1, size(dfdy, 1)
         associate (speed => elements%speed(l, e), ratio => self%ratio(l, n))
-          dfdy(l, at + 1) = ratio * (elements%working(l, e) + speed * elements%working_speed(l, e))
-          dfdy(l, at + 2) = ratio * speed * elements%working_angle(l, e)
+          dfdy(l, at + 1) = ratio * (elements%applied(l, e) + speed * elements%applied_speed(l, e))
+          dfdy(l, at + 2) = ratio * speed * elements%applied_angle(l, e)
         end associate
       end do
       at = at + 2
@@ -178,28 +178,28 @@ contains
   end subroutine fill
 
   !> The products of one lane anew.
-  pure subroutine take_lane(self, lane, incidence)
+  pure subroutine refresh_lane(self, lane, incidence)
     class(reduced_jacobian_t), intent(inout) :: self
     integer, intent(in) :: lane
     type(element_coordinates_t), intent(in) :: incidence
     integer :: n
 
     do n = 1, size(self%element)
-      self%product(lane, n) = incidence%response(lane, self%responding(n)) * incidence%ratio(lane, self%turning(n))
+      self%product(lane, n) = incidence%response(lane, self%response_entry(n)) * incidence%ratio(lane, self%ratio_entry(n))
     end do
-  end subroutine take_lane
+  end subroutine refresh_lane
 
-  subroutine list_numbers(self, numbers)
+  subroutine list_parameters(self, parameters)
     class(reduced_jacobian_t), target, intent(inout) :: self
-    type(lane_numbers_t), intent(inout) :: numbers
+    type(lane_parameters_t), intent(inout) :: parameters
 
-    call numbers%remark(self%element)
-    call numbers%remark(self%place)
-    call numbers%remark(self%worker)
-    call numbers%remark(self%pattern%row)
-    call numbers%remark(self%pattern%column)
-    call numbers%add('jacobian: product', self%product)
-    call numbers%add('jacobian: ratio', self%ratio)
-  end subroutine list_numbers
+    call parameters%add_structure(self%element)
+    call parameters%add_structure(self%position)
+    call parameters%add_structure(self%worker)
+    call parameters%add_structure(self%pattern%row)
+    call parameters%add_structure(self%pattern%column)
+    call parameters%add('jacobian: product', self%product)
+    call parameters%add('jacobian: ratio', self%ratio)
+  end subroutine list_parameters
 
 end module nocdyn_reduced_jacobian

@@ -4,10 +4,10 @@
 !> that a lane's result is the same to the last bit in a block of any size.
 module nocdyn_sparse_map
   use nocdyn_kinds, only: wp
-  use nocdyn_lane_numbers, only: lane_numbers_t
-  use nocdyn_map_products, only: multiply_lanes, multiply_rows
-  use nocdyn_stretches, only: multiply_even_stretch, multiply_stretch, pair_of_even_stretch, pair_of_stretch, &
-    sum_of_even_stretch, sum_of_stretch
+  use nocdyn_lane_parameters, only: lane_parameters_t
+  use nocdyn_csr_products, only: multiply_lanes, multiply_rows
+  use nocdyn_band_products, only: multiply_toeplitz, multiply_band, pair_of_toeplitz, pair_of_band, &
+    sum_of_toeplitz, sum_of_band
   implicit none (type, external)
   private
 
@@ -22,24 +22,24 @@ module nocdyn_sparse_map
     integer, private :: lanes = 1
     integer, private :: all_rows = 0
     integer, private :: columns = 0                      !! the last that has an entry
-    integer, private :: loose_rows = 0
-    integer, private :: stretches = 0
+    integer, private :: csr_rows = 0
+    integer, private :: bands = 0
     logical, private :: without_offset = .false.         !! in even stretches offsets need not be read
     integer, allocatable, private :: row(:)              !! each loose row
     integer, allocatable :: first(:)            !! its first entry, [loose_rows + 1]
     integer, allocatable, private :: first_row(:)        !! of each stretch
     integer, allocatable, private :: rows(:)             !! of each stretch
     integer, allocatable, private :: width(:)            !! entries of each of its rows, at least 1
-    logical, allocatable, private :: is_even(:)          !! of each stretch
+    logical, allocatable, private :: is_toeplitz(:)          !! of each stretch
     integer, allocatable, private :: first_entry(:)      !! of each stretch
     integer, allocatable :: column(:)                    !! [entries]
     real(wp), allocatable :: coefficient(:, :)           !! [lanes, entries]
   contains
-    procedure :: map_one
-    procedure :: map_pair
-    procedure :: map_sum
-    procedure :: take_lane
-    procedure :: list_numbers
+    procedure :: multiply
+    procedure :: multiply_pair
+    procedure :: multiply_sum
+    procedure :: set_lane
+    procedure :: list_parameters
   end type sparse_map_t
 
   integer, parameter :: short = 16   !! fewer rows are not worth a vector loop
@@ -47,112 +47,112 @@ module nocdyn_sparse_map
 contains
 
   !> A map from its rows: row r has the entries first(r) to first(r + 1) - 1.
-  function new_sparse_map(first, column, coefficient, without_offset, is_loose) result(self)
+  function new_sparse_map(first, column, coefficient, without_offset, without_bands) result(self)
     integer, intent(in) :: first(:)               !! [rows + 1]
     integer, intent(in) :: column(:)              !! [entries]
     real(wp), intent(in) :: coefficient(:, :)     !! [lanes, entries]
-    logical, intent(in), optional :: without_offset   !! whether all offsets handed to `map_pair` will be zero: .false.
-    logical, intent(in), optional :: is_loose         !! whether there are to be no stretches: .false.
+    logical, intent(in), optional :: without_offset   !! whether all offsets handed to `multiply_pair` will be zero: .false.
+    logical, intent(in), optional :: without_bands         !! whether there are to be no stretches: .false.
     type(sparse_map_t) :: self
-    logical :: has_stretches
-    integer :: order(size(column)), straight(size(first) - 1)
+    logical :: has_bands
+    integer :: order(size(column)), band_rows(size(first) - 1)
     integer :: begin, entries, rows, width
 
     rows = size(first) - 1
     self%lanes = size(coefficient, 1)
     if (present(without_offset)) self%without_offset = without_offset
-    has_stretches = self%lanes == 1
-    if (present(is_loose)) has_stretches = has_stretches .and. .not. is_loose
+    has_bands = self%lanes == 1
+    if (present(without_bands)) has_bands = has_bands .and. .not. without_bands
     self%all_rows = rows
     self%columns = maxval([0, column])
     allocate (self%row(rows), self%first(rows + 1))
     allocate (self%first_row(rows / short), self%first_entry(rows / short))
-    allocate (self%rows(rows / short), self%width(rows / short), self%is_even(rows / short))
+    allocate (self%rows(rows / short), self%width(rows / short), self%is_toeplitz(rows / short))
     self%first(1) = 1
-    straight = straight_runs(first, column)
+    band_rows = band_lengths(first, column)
     begin = 1
     do while (begin <= rows)
       width = first(begin + 1) - first(begin)
-      if (has_stretches .and. width > 0 .and. straight(begin) >= short) then
-        self%stretches = self%stretches + 1
-        self%first_row(self%stretches) = begin
-        self%rows(self%stretches) = straight(begin)
-        self%width(self%stretches) = width
-        self%is_even(self%stretches) = has_equal_rows(first(begin), width, straight(begin), coefficient)
+      if (has_bands .and. width > 0 .and. band_rows(begin) >= short) then
+        self%bands = self%bands + 1
+        self%first_row(self%bands) = begin
+        self%rows(self%bands) = band_rows(begin)
+        self%width(self%bands) = width
+        self%is_toeplitz(self%bands) = has_constant_diagonals(first(begin), width, band_rows(begin), coefficient)
       else
-        call append_loose_rows(first, begin, begin + straight(begin) - 1, order, self)
+        call append_csr_rows(first, begin, begin + band_rows(begin) - 1, order, self)
       end if
-      begin = begin + straight(begin)
+      begin = begin + band_rows(begin)
     end do
-    call append_stretches(first, order, entries, self)
+    call append_bands(first, order, entries, self)
     allocate (self%column(entries), self%coefficient(self%lanes, entries))
     self%column(:) = column(order(:entries))
     self%coefficient(:, :) = coefficient(:, order(:entries))
   end function new_sparse_map
 
   !> How many rows from each row on have columns that advance by one from row to row.
-  pure function straight_runs(first, column) result(straight)
+  pure function band_lengths(first, column) result(band_rows)
     integer, intent(in) :: first(:), column(:)
-    integer :: straight(size(first) - 1)
+    integer :: band_rows(size(first) - 1)
     integer :: r, width
 
-    straight = 1
-    do r = size(straight) - 1, 1, -1
+    band_rows = 1
+    do r = size(band_rows) - 1, 1, -1
       width = first(r + 1) - first(r)
       if (first(r + 2) - first(r + 1) /= width) cycle
       if (all(column(first(r + 1):first(r + 2) - 1) == column(first(r):first(r + 1) - 1) + 1)) then
-        straight(r) = straight(r + 1) + 1
+        band_rows(r) = band_rows(r + 1) + 1
       end if
     end do
-  end function straight_runs
+  end function band_lengths
 
-  pure logical function has_equal_rows(first, width, rows, coefficient)
+  pure logical function has_constant_diagonals(first, width, rows, coefficient)
     integer, intent(in) :: first   !! entry of the first of these rows
     integer, intent(in) :: width, rows
     real(wp), intent(in) :: coefficient(:, :)   !! [lanes, entries]
     integer :: k
 
-    has_equal_rows = .false.
+    has_constant_diagonals = .false.
     do k = first + width, first + width * rows - 1
       if (any(abs(coefficient(:, k) - coefficient(:, k - width)) > 0)) return
     end do
-    has_equal_rows = .true.
-  end function has_equal_rows
+    has_constant_diagonals = .true.
+  end function has_constant_diagonals
 
-  subroutine append_loose_rows(first, begin, end, order, self)
+  subroutine append_csr_rows(first, begin, end, order, self)
     integer, intent(in) :: first(:), begin, end
     integer, intent(inout) :: order(:)
     type(sparse_map_t), intent(inout) :: self
     integer :: entry, row
 
     do row = begin, end
-      associate (next => self%first(self%loose_rows + 1), entries => first(row + 1) - first(row))
+      associate (next => self%first(self%csr_rows + 1), entries => first(row + 1) - first(row))
         order(next:next + entries - 1) = [(entry, entry=first(row), first(row + 1) - 1)]
-        self%first(self%loose_rows + 2) = next + entries
+        self%first(self%csr_rows + 2) = next + entries
       end associate
-      self%loose_rows = self%loose_rows + 1
-      self%row(self%loose_rows) = row
+      self%csr_rows = self%csr_rows + 1
+      self%row(self%csr_rows) = row
     end do
-  end subroutine append_loose_rows
+  end subroutine append_csr_rows
 
   !> The entries of the stretches follow those of the loose rows.
-  subroutine append_stretches(first, order, entries, self)
+  subroutine append_bands(first, order, entries, self)
     integer, intent(in) :: first(:)
     integer, intent(inout) :: order(:)
     integer, intent(out) :: entries   !! that are stored
     type(sparse_map_t), intent(inout) :: self
     integer :: i, j, rows, s
 
-    entries = self%first(self%loose_rows + 1) - 1
-    do s = 1, self%stretches
+    entries = self%first(self%csr_rows + 1) - 1
+    do s = 1, self%bands
       self%first_entry(s) = entries + 1
-      rows = merge(1, self%rows(s), self%is_even(s))
+      rows = merge(1, self%rows(s), self%is_toeplitz(s))
       do j = 0, self%width(s) - 1
         order(entries + 1:entries + rows) = [(first(self%first_row(s) + i) + j, i=0, rows - 1)]
         entries = entries + rows
       end do
     end do
-  end subroutine append_stretches
+  end subroutine append_bands
 
   !> Order of the entries of some rows in which they are sorted by their columns, and where those begin in it.
   pure subroutine transposed_order(column, columns, order, first)
@@ -178,7 +178,7 @@ contains
   end subroutine transposed_order
 
   !> u = map x.
-  subroutine map_one(self, x, u)
+  subroutine multiply(self, x, u)
     class(sparse_map_t), intent(in) :: self
     real(wp), intent(in) :: x(self%lanes * self%columns)        !! [lanes, columns]
     real(wp), intent(inout) :: u(self%lanes * self%all_rows)    !! [lanes, rows]
@@ -189,23 +189,23 @@ contains
                           self%coefficient, x, u)
       return
     end if
-    call multiply_rows(self%loose_rows, self%all_rows, self%columns, size(self%column), self%row, self%first, self%column, &
+    call multiply_rows(self%csr_rows, self%all_rows, self%columns, size(self%column), self%row, self%first, self%column, &
                        self%coefficient, x, u)
-    do s = 1, self%stretches
+    do s = 1, self%bands
       associate (entry => self%first_entry(s))
-        if (self%is_even(s)) then
-          call multiply_even_stretch(self%rows(s), self%width(s), self%columns, self%column(entry), &
+        if (self%is_toeplitz(s)) then
+          call multiply_toeplitz(self%rows(s), self%width(s), self%columns, self%column(entry), &
                                      self%coefficient(1, entry), x, u(self%first_row(s)))
         else
-          call multiply_stretch(self%rows(s), self%width(s), self%columns, self%column(entry), self%coefficient(1, entry), &
+          call multiply_band(self%rows(s), self%width(s), self%columns, self%column(entry), self%coefficient(1, entry), &
                                 x, u(self%first_row(s)))
         end if
       end associate
     end do
-  end subroutine map_one
+  end subroutine multiply
 
   !> u = offset + map x and v = map y.
-  subroutine map_pair(self, offset, x, y, u, v)
+  subroutine multiply_pair(self, offset, x, y, u, v)
     class(sparse_map_t), intent(in) :: self
     real(wp), intent(in) :: offset(self%lanes * self%all_rows)                                  !! [lanes, rows]
     real(wp), intent(in) :: x(self%lanes * self%columns), y(self%lanes * self%columns)          !! [lanes, columns]
@@ -217,20 +217,20 @@ contains
                          self%coefficient, offset, x, y, u, v)
       return
     end if
-    call pair_of_rows(self%loose_rows, self%all_rows, self%columns, size(self%column), self%row, self%first, self%column, &
+    call pair_of_rows(self%csr_rows, self%all_rows, self%columns, size(self%column), self%row, self%first, self%column, &
                       self%coefficient, offset, x, y, u, v)
-    do s = 1, self%stretches
+    do s = 1, self%bands
       associate (entry => self%first_entry(s), row => self%first_row(s))
-        if (self%is_even(s)) then
-          call pair_of_even_stretch(self%rows(s), self%width(s), self%columns, self%column(entry), &
+        if (self%is_toeplitz(s)) then
+          call pair_of_toeplitz(self%rows(s), self%width(s), self%columns, self%column(entry), &
                                     self%coefficient(1, entry), self%without_offset, offset(row), x, y, u(row), v(row))
         else
-          call pair_of_stretch(self%rows(s), self%width(s), self%columns, self%column(entry), self%coefficient(1, entry), &
+          call pair_of_band(self%rows(s), self%width(s), self%columns, self%column(entry), self%coefficient(1, entry), &
                                offset(row), x, y, u(row), v(row))
         end if
       end associate
     end do
-  end subroutine map_pair
+  end subroutine multiply_pair
 
   pure subroutine pair_of_rows(rows, all_rows, columns, entries, row, first, column, coefficient, offset, x, y, u, v)
     integer, intent(in) :: rows, all_rows, columns, entries
@@ -282,7 +282,7 @@ contains
   end subroutine pair_on_lanes
 
   !> u = map (x + y).
-  subroutine map_sum(self, x, y, u)
+  subroutine multiply_sum(self, x, y, u)
     class(sparse_map_t), intent(in) :: self
     real(wp), intent(in) :: x(self%lanes * self%columns), y(self%lanes * self%columns)   !! [lanes, columns]
     real(wp), intent(inout) :: u(self%lanes * self%all_rows)                             !! [lanes, rows]
@@ -293,20 +293,20 @@ contains
                         self%coefficient, x, y, u)
       return
     end if
-    call sum_of_rows(self%loose_rows, self%all_rows, self%columns, size(self%column), self%row, self%first, self%column, &
+    call sum_of_rows(self%csr_rows, self%all_rows, self%columns, size(self%column), self%row, self%first, self%column, &
                      self%coefficient, x, y, u)
-    do s = 1, self%stretches
+    do s = 1, self%bands
       associate (entry => self%first_entry(s))
-        if (self%is_even(s)) then
-          call sum_of_even_stretch(self%rows(s), self%width(s), self%columns, self%column(entry), &
+        if (self%is_toeplitz(s)) then
+          call sum_of_toeplitz(self%rows(s), self%width(s), self%columns, self%column(entry), &
                                    self%coefficient(1, entry), x, y, u(self%first_row(s)))
         else
-          call sum_of_stretch(self%rows(s), self%width(s), self%columns, self%column(entry), self%coefficient(1, entry), &
+          call sum_of_band(self%rows(s), self%width(s), self%columns, self%column(entry), self%coefficient(1, entry), &
                               x, y, u(self%first_row(s)))
         end if
       end associate
     end do
-  end subroutine map_sum
+  end subroutine multiply_sum
 
   pure subroutine sum_of_rows(rows, all_rows, columns, entries, row, first, column, coefficient, x, y, u)
     integer, intent(in) :: rows, all_rows, columns, entries
@@ -352,7 +352,7 @@ contains
   end subroutine sum_on_lanes
 
   !> New numbers of one lane of a map without stretches: of entry i that in column order(i).
-  subroutine take_lane(self, lane, coefficient, order)
+  subroutine set_lane(self, lane, coefficient, order)
     class(sparse_map_t), intent(inout) :: self
     integer, intent(in) :: lane
     real(wp), intent(in) :: coefficient(:, :)   !! [lanes, columns]
@@ -362,17 +362,17 @@ contains
     do i = 1, size(self%column)
       self%coefficient(lane, i) = coefficient(lane, order(i))
     end do
-  end subroutine take_lane
+  end subroutine set_lane
 
   !> A map of many lanes, or one without stretches.
-  subroutine list_numbers(self, numbers)
+  subroutine list_parameters(self, parameters)
     class(sparse_map_t), target, intent(inout) :: self
-    type(lane_numbers_t), intent(inout) :: numbers
+    type(lane_parameters_t), intent(inout) :: parameters
 
-    if (self%stretches > 0) error stop 'nocdyn_sparse_map: the numbers in stretches are not those of lanes'
-    call numbers%remark(self%first(:self%loose_rows + 1))
-    call numbers%remark(self%column)
-    call numbers%add('map: coefficient', self%coefficient)
-  end subroutine list_numbers
+    if (self%bands > 0) error stop 'nocdyn_sparse_map: the numbers in stretches are not those of lanes'
+    call parameters%add_structure(self%first(:self%csr_rows + 1))
+    call parameters%add_structure(self%column)
+    call parameters%add('map: coefficient', self%coefficient)
+  end subroutine list_parameters
 
 end module nocdyn_sparse_map

@@ -3,7 +3,7 @@ module nocdyn_element_coordinates
   use nocdyn_coordinates, only: coordinates_t
   use nocdyn_elements, only: elements_t
   use nocdyn_kinds, only: wp
-  use nocdyn_lane_numbers, only: lane_numbers_t
+  use nocdyn_lane_parameters, only: lane_parameters_t
   use nocdyn_sparse_map, only: new_sparse_map, sparse_map_t
   implicit none (type, external)
   private
@@ -19,10 +19,10 @@ module nocdyn_element_coordinates
     real(wp), allocatable :: response(:, :)    !! the same difference of ((L_tau^T J L_tau)^-1 L_tau^T)^T, [lanes, entries]
   contains
     procedure :: selected
-    procedure :: take_responses
-    procedure :: take_selected
+    procedure :: refresh_responses
+    procedure :: refresh_selected
     procedure :: has_ratio
-    procedure :: list_numbers
+    procedure :: list_parameters
   end type element_coordinates_t
 
 contains
@@ -32,7 +32,7 @@ contains
     type(elements_t), intent(in) :: elements
     type(coordinates_t), intent(in) :: coordinates
     type(element_coordinates_t) :: self
-    integer :: place(coordinates%freedoms)   ! the entry of a coordinate that an element already has
+    integer :: entry_of(coordinates%freedoms)   ! the entry of a coordinate that an element already has
     integer :: e, entries
 
     entries = 0
@@ -42,12 +42,12 @@ contains
     allocate (self%first(size(elements%to) + 1), self%coordinate(entries))
     allocate (self%ratio(size(elements%time), entries), source=0.0_wp)
     allocate (self%response, source=self%ratio)
-    place = 0
+    entry_of = 0
     self%first(1) = 1
     do e = 1, size(elements%to)
       self%first(e + 1) = self%first(e)
-      call add_body(coordinates, elements%to(e), 1.0_wp, self%first(e), self%first(e + 1), place, self)
-      call add_body(coordinates, elements%from(e), -1.0_wp, self%first(e), self%first(e + 1), place, self)
+      call add_body(coordinates, elements%to(e), 1.0_wp, self%first(e), self%first(e + 1), entry_of, self)
+      call add_body(coordinates, elements%from(e), -1.0_wp, self%first(e), self%first(e + 1), entry_of, self)
       call sort_entries(self, self%first(e), self%first(e + 1) - 1)
     end do
     entries = self%first(size(self%first)) - 1
@@ -57,10 +57,10 @@ contains
   end function new_element_coordinates
 
   !> Those of some elements, in the given order.
-  function selected(self, elements, turning) result(some)
+  function selected(self, elements, with_ratio_only) result(some)
     class(element_coordinates_t), intent(in) :: self
     integer, intent(in) :: elements(:)
-    logical, intent(in) :: turning   !! whether entries without ratio are left out
+    logical, intent(in) :: with_ratio_only   !! whether entries without ratio are left out
     type(element_coordinates_t) :: some
     integer, allocatable :: entry(:)
     integer :: i, k, next
@@ -70,7 +70,7 @@ contains
     do i = 1, size(elements)
       some%first(i) = next
       do k = self%first(elements(i)), self%first(elements(i) + 1) - 1
-        if (turning .and. .not. self%has_ratio(k)) cycle
+        if (with_ratio_only .and. .not. self%has_ratio(k)) cycle
         entry(next) = k
         next = next + 1
       end do
@@ -83,7 +83,7 @@ contains
   end function selected
 
   !> The responses of one lane anew, in the entries that are there.
-  pure subroutine take_responses(self, lane, elements, coordinates)
+  pure subroutine refresh_responses(self, lane, elements, coordinates)
     class(element_coordinates_t), intent(inout) :: self
     integer, intent(in) :: lane
     type(elements_t), intent(in) :: elements
@@ -95,7 +95,7 @@ contains
       call add_response(coordinates, elements%to(e), 1.0_wp, lane, self%first(e), self)
       call add_response(coordinates, elements%from(e), -1.0_wp, lane, self%first(e), self)
     end do
-  end subroutine take_responses
+  end subroutine refresh_responses
 
   pure subroutine add_response(coordinates, body, sign, lane, begin, self)
     type(coordinates_t), intent(in) :: coordinates
@@ -117,23 +117,23 @@ contains
   end subroutine add_response
 
   !> The responses of one lane anew, in entries that are those of `selected`.
-  pure subroutine take_selected(self, lane, all, elements, turning)
+  pure subroutine refresh_selected(self, lane, all, elements, with_ratio_only)
     class(element_coordinates_t), intent(inout) :: self
     integer, intent(in) :: lane
     type(element_coordinates_t), intent(in) :: all
     integer, intent(in) :: elements(:)
-    logical, intent(in) :: turning
+    logical, intent(in) :: with_ratio_only
     integer :: i, k, next
 
     next = 0
     do i = 1, size(elements)
       do k = all%first(elements(i)), all%first(elements(i) + 1) - 1
-        if (turning .and. .not. abs(all%ratio(lane, k)) > 0) cycle
+        if (with_ratio_only .and. .not. abs(all%ratio(lane, k)) > 0) cycle
         next = next + 1
         self%response(lane, next) = all%response(lane, k)
       end do
     end do
-  end subroutine take_selected
+  end subroutine refresh_selected
 
   !> Whether an element turns with the coordinate of an entry. In a group of several freedoms it may respond without.
   pure logical function has_ratio(self, entry)
@@ -152,26 +152,26 @@ contains
   end function body_entries
 
   !> Adds the coordinates of a body to those of an element; both bodies may have the same.
-  pure subroutine add_body(coordinates, body, sign, begin, next, place, self)
+  pure subroutine add_body(coordinates, body, sign, begin, next, entry_of, self)
     type(coordinates_t), intent(in) :: coordinates
     integer, intent(in) :: body           !! 0 = ground, which has none
     real(wp), intent(in) :: sign
     integer, intent(in) :: begin          !! first entry of the element
     integer, intent(inout) :: next        !! its next free entry
-    integer, intent(inout) :: place(:)
+    integer, intent(inout) :: entry_of(:)
     type(element_coordinates_t), intent(inout) :: self
     integer :: c, k
 
     do k = 1, body_entries(coordinates, body)
       associate (of_body => coordinates%first(body) + k - 1)
         c = coordinates%coordinate(of_body)
-        if (place(c) < begin) then
-          place(c) = next
+        if (entry_of(c) < begin) then
+          entry_of(c) = next
           self%coordinate(next) = c
           next = next + 1
         end if
-        self%ratio(:, place(c)) = self%ratio(:, place(c)) + sign * coordinates%ratio(:, of_body)
-        self%response(:, place(c)) = self%response(:, place(c)) + sign * coordinates%response(:, of_body)
+        self%ratio(:, entry_of(c)) = self%ratio(:, entry_of(c)) + sign * coordinates%ratio(:, of_body)
+        self%response(:, entry_of(c)) = self%response(:, entry_of(c)) + sign * coordinates%response(:, of_body)
       end associate
     end do
   end subroutine add_body
@@ -192,21 +192,21 @@ contains
     end do
   end subroutine sort_entries
 
-  subroutine list_numbers(self, numbers)
+  subroutine list_parameters(self, parameters)
     class(element_coordinates_t), target, intent(inout) :: self
-    type(lane_numbers_t), intent(inout) :: numbers
+    type(lane_parameters_t), intent(inout) :: parameters
 
-    call numbers%remark(self%first)
-    call numbers%remark(self%coordinate)
-    call numbers%add('elements: ratio', self%ratio)
-    call numbers%add('elements: response', self%response)
-  end subroutine list_numbers
+    call parameters%add_structure(self%first)
+    call parameters%add_structure(self%coordinate)
+    call parameters%add('elements: ratio', self%ratio)
+    call parameters%add('elements: response', self%response)
+  end subroutine list_parameters
 
   !> U, whose rows are the elements: their speeds are U q'.
-  function twist_map(incidence, without_offset, is_loose) result(map)
+  function twist_map(incidence, without_offset, without_bands) result(map)
     type(element_coordinates_t), intent(in) :: incidence
     logical, intent(in) :: without_offset   !! whether the start twists are zero
-    logical, intent(in) :: is_loose         !! whether the map has no stretches
+    logical, intent(in) :: without_bands         !! whether the map has no stretches
     type(sparse_map_t) :: map
     integer :: kept(size(incidence%coordinate)), first(size(incidence%first))
     integer :: e, entry, next
@@ -222,7 +222,7 @@ contains
     end do
     first(size(first)) = next
     map = new_sparse_map(first, incidence%coordinate(kept(:next - 1)), incidence%ratio(:, kept(:next - 1)), without_offset, &
-                         is_loose)
+                         without_bands)
   end function twist_map
 
 end module nocdyn_element_coordinates

@@ -7,8 +7,8 @@ module nocdyn_block_sizes
   public :: lanes_for
 
   ! By measurement: chains of 10 rotors are fastest with 32 lanes, those of 100 with 8 to 32, those of 1000 with 4 to 8.
-  integer, parameter :: most_states = 250   !! whose numbers, of `strip` lanes, stay in the second cache
-  integer, parameter :: few = 8             !! whole vectors of any processor
+  integer, parameter :: max_states = 250   !! whose numbers, of `strip` lanes, stay in the second cache
+  integer, parameter :: small_block = 8             !! whole vectors of any processor
 
 contains
 
@@ -16,7 +16,7 @@ contains
   pure integer function lanes_for(states)
     integer, intent(in) :: states
 
-    lanes_for = merge(strip, few, states <= most_states)
+    lanes_for = merge(strip, small_block, states <= max_states)
   end function lanes_for
 
 end module nocdyn_block_sizes

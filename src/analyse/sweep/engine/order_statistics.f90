@@ -56,11 +56,11 @@ contains
       if (allocated(error)) return
       do i = 1, size(selections)
         if (pass == 1) call choose_ranks(statistics(i)%count, selections(i)%rank)
-        if (statistics(i)%count > 0) call settle_digit(selections(i))
+        if (statistics(i)%count > 0) call resolve_digit(selections(i))
       end do
     end do
     do i = 1, size(selections)
-      call conclude(selections(i), statistics(i))
+      call interpolate_quantiles(selections(i), statistics(i))
     end do
   end subroutine find_order_statistics
 
@@ -78,18 +78,18 @@ contains
       selections(i)%histogram = 0
     end do
     do j = 1, size(journals)
-      do k = 1, journals(j)%records
-        call journals(j)%read_record(k, chunk, error)
+      do k = 1, journals(j)%entries
+        call journals(j)%read_entry(k, chunk, error)
         if (allocated(error)) return
         do i = 1, size(selections)
-          if (pass == 1) call note_extremes(chunk, i, statistics(i))
+          if (pass == 1) call update_extremes(chunk, i, statistics(i))
           call count_chunk(chunk, i, digit_bits * (passes - pass), selections(i))
         end do
       end do
     end do
   end subroutine count_digits
 
-  pure subroutine note_extremes(chunk, result, statistics)
+  pure subroutine update_extremes(chunk, result, statistics)
     type(chunk_t), intent(in) :: chunk
     integer, intent(in) :: result                            !! its number
     type(order_statistics_t), intent(inout) :: statistics
@@ -100,25 +100,25 @@ contains
       statistics%count = statistics%count + 1
       variant = chunk%first - 1 + i
       associate (value => chunk%results(result, i))
-        if (goes_before(value, variant, statistics%minimum, statistics%variant_of_minimum)) then
+        if (precedes(value, variant, statistics%minimum, statistics%variant_of_minimum)) then
           statistics%minimum = value
           statistics%variant_of_minimum = variant
         end if
-        if (goes_before(-value, variant, -statistics%maximum, statistics%variant_of_maximum)) then
+        if (precedes(-value, variant, -statistics%maximum, statistics%variant_of_maximum)) then
           statistics%maximum = value
           statistics%variant_of_maximum = variant
         end if
       end associate
     end do
-  end subroutine note_extremes
+  end subroutine update_extremes
 
-  pure logical function goes_before(value, variant, best, variant_of_best)
+  pure logical function precedes(value, variant, best, variant_of_best)
     real(wp), intent(in) :: value, best
     integer, intent(in) :: variant, variant_of_best   !! 0: there is no best one yet
 
-    goes_before = variant_of_best == 0 .or. value < best .or. &
+    precedes = variant_of_best == 0 .or. value < best .or. &
                   (value <= best .and. variant < variant_of_best)
-  end function goes_before
+  end function precedes
 
   pure subroutine count_chunk(chunk, result, shift, selection)
     type(chunk_t), intent(in) :: chunk
@@ -176,7 +176,7 @@ contains
   end subroutine choose_ranks
 
   !> One more digit of every wanted value, from the histograms.
-  pure subroutine settle_digit(selection)
+  pure subroutine resolve_digit(selection)
     type(selection_t), intent(inout) :: selection
     integer :: digit, i, j
 
@@ -198,9 +198,9 @@ contains
       selection%prefix_of_group(j) = selection%prefix(i)
       selection%groups = max(selection%groups, j)
     end do
-  end subroutine settle_digit
+  end subroutine resolve_digit
 
-  pure subroutine conclude(selection, statistics)
+  pure subroutine interpolate_quantiles(selection, statistics)
     type(selection_t), intent(in) :: selection
     type(order_statistics_t), intent(inout) :: statistics
     real(wp) :: found(size(quantiles))
@@ -219,15 +219,15 @@ contains
     statistics%low = found(1)
     statistics%median = found(2)
     statistics%high = found(3)
-  end subroutine conclude
+  end subroutine interpolate_quantiles
 
   !> Linear interpolation from the nearer end.
-  pure real(wp) function between(a, b, place)
+  pure real(wp) function between(a, b, position)
     real(wp), intent(in) :: a, b
-    real(wp), intent(in) :: place   !! of which the fraction counts
+    real(wp), intent(in) :: position   !! of which the fraction counts
     real(wp) :: fraction
 
-    fraction = place - int(place)
+    fraction = position - int(position)
     between = a + (b - a) * fraction
     if (fraction >= 0.5_wp) between = b - (b - a) * (1.0_wp - fraction)
   end function between

@@ -1,7 +1,7 @@
 !> What do many variants of a machine do: threads that take chunks of variants until none are left.
 module nocdyn_sweep
   use, intrinsic :: iso_fortran_env, only: int64
-  use nocdyn_dispatcher, only: dispatcher_t
+  use nocdyn_scheduler, only: scheduler_t
   use nocdyn_errors, only: error_t
   use nocdyn_kinds, only: wp
   use nocdyn_sweep_block, only: new_sweep_block, sweep_block_t
@@ -15,26 +15,26 @@ module nocdyn_sweep
 
 contains
 
-  !> Computes what `dispatcher` hands out with so many threads, each with a block of its own.
-  subroutine compute_variants(plan, setup, threads, dispatcher)
+  !> Computes what `scheduler` hands out with so many threads, each with a block of its own.
+  subroutine compute_variants(plan, setup, threads, scheduler)
     type(sweep_plan_t), intent(in) :: plan
     type(sweep_setup_t), intent(in) :: setup   !! of the plan
     integer, intent(in) :: threads
-    class(dispatcher_t), intent(inout) :: dispatcher
+    class(scheduler_t), intent(inout) :: scheduler
 
-    call dispatcher%open()
+    call scheduler%create_lock()
     !$omp parallel num_threads(threads) default(shared)
-    call compute_chunks(plan, setup, dispatcher)
+    call compute_chunks(plan, setup, scheduler)
     !$omp end parallel
-    call dispatcher%conclude()
-    call dispatcher%close()
+    call scheduler%finalise()
+    call scheduler%destroy_lock()
   end subroutine compute_variants
 
   !> One thread's work.
-  subroutine compute_chunks(plan, setup, dispatcher)
+  subroutine compute_chunks(plan, setup, scheduler)
     type(sweep_plan_t), intent(in) :: plan
     type(sweep_setup_t), intent(in) :: setup
-    class(dispatcher_t), intent(inout) :: dispatcher
+    class(scheduler_t), intent(inout) :: scheduler
     type(sweep_block_t), allocatable, target :: block
     type(chunk_t) :: chunk
     type(error_t), allocatable :: error
@@ -43,20 +43,20 @@ contains
     logical :: is_complete
 
     allocate (block)
-    call new_sweep_block(plan, setup, dispatcher, block, error)
+    call new_sweep_block(plan, setup, scheduler, block, error)
     if (allocated(error)) error stop 'nocdyn_sweep: the base machine has been assembled before'
     do
-      call dispatcher%enter()
-      call dispatcher%hand_out(first, count)
-      call dispatcher%leave()
+      call scheduler%lock()
+      call scheduler%next_chunk(first, count)
+      call scheduler%unlock()
       if (count == 0) exit
       seconds = time_now()
       call block%compute(first, count, chunk, is_complete)
       seconds = time_now() - seconds
       if (.not. is_complete) exit
-      call dispatcher%enter()
-      call dispatcher%take(chunk, seconds)
-      call dispatcher%leave()
+      call scheduler%lock()
+      call scheduler%submit(chunk, seconds)
+      call scheduler%unlock()
     end do
     call block%release()
   end subroutine compute_chunks

@@ -10,17 +10,17 @@ module nocdyn_sweep_setup
   use nocdyn_machine, only: machine_t
   use nocdyn_run_settings, only: settings_of
   use nocdyn_size_limits, only: check_size, choose_method
-  use nocdyn_statistics_observer, only: needs_works
+  use nocdyn_statistics_observer, only: needs_work_integrals
   use nocdyn_sweep_plan, only: sweep_plan_t
   use nocdyn_text, only: string_t
   implicit none (type, external)
   private
 
-  public :: prepare_sweep, take_settings
+  public :: prepare_sweep, read_settings
 
   type, public :: sweep_setup_t
     integer :: lanes = 1               !! of a block
-    logical :: is_audited = .false.    !! whether a recorded column needs the works
+    logical :: has_energy_balance = .false.    !! whether a recorded column needs the works
   end type sweep_setup_t
 
 contains
@@ -41,14 +41,14 @@ contains
     if (allocated(error)) return
     run = plan%input%single('run')
     call new_formulation(run%text('formulation'), machine, formulation)
-    call take_settings(plan%input, formulation, settings, times, error)
+    call read_settings(plan%input, formulation, settings, times, error)
     if (allocated(error)) return
-    setup%is_audited = needs_works(formulation, plan%statistics)
+    setup%has_energy_balance = needs_work_integrals(formulation, plan%statistics)
     setup%lanes = lanes_for(formulation%states)
   end subroutine prepare_sweep
 
   !> What &run says of the integration.
-  subroutine take_settings(input, formulation, settings, times, error)
+  subroutine read_settings(input, formulation, settings, times, error)
     type(input_t), intent(in) :: input
     class(formulation_t), intent(in) :: formulation
     type(integration_settings_t), intent(out) :: settings
@@ -63,6 +63,6 @@ contains
     run = input%single('run')
     settings = settings_of(input, method)
     times = [run%number('t_start'), run%number('t_end')]
-  end subroutine take_settings
+  end subroutine read_settings
 
 end module nocdyn_sweep_setup

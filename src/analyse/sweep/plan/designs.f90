@@ -4,7 +4,7 @@
 !> Only a list holds anything as long as the number of variants.
 module nocdyn_designs
   use, intrinsic :: iso_fortran_env, only: int64
-  use nocdyn_distributions, only: distribution_t, farthest, lognormal_distribution, normal_distribution, uniform_distribution
+  use nocdyn_distributions, only: distribution_t, tail_end, lognormal_distribution, normal_distribution, uniform_distribution
   use nocdyn_kinds, only: wp
   use nocdyn_permutations, only: permutation_t, random_permutation
   use nocdyn_random_numbers, only: random_number_at, stream_offsets, stream_values
@@ -13,9 +13,9 @@ module nocdyn_designs
   private
 
   public :: grid_design, random_design, latin_design, sobol_design, list_design
-  public :: grid_size, leaves_numbers, probability_between
+  public :: grid_size, can_overflow, probability_between
 
-  integer, parameter, public :: most_variants = 2000000000
+  integer, parameter, public :: max_variants = 2000000000
 
   real(wp), parameter :: last_offset = 1.0_wp - 2.0_wp**(-20)   ! so that no rounding moves a value into the next stratum
 
@@ -89,23 +89,23 @@ contains
   !> Every combination of `count` equally spaced values from `low` to `high` each (`low` alone if there is one); the last
   !> factor runs fastest. The distributions do not matter.
   function grid_design(factors) result(design)
-    type(factor_t), intent(in) :: factors(:)   !! `grid_size` at most `most_variants`
+    type(factor_t), intent(in) :: factors(:)   !! `grid_size` at most `max_variants`
     type(grid_design_t) :: design
 
-    if (grid_size(factors) > most_variants) error stop 'nocdyn_designs: the grid has too many variants'
+    if (grid_size(factors) > max_variants) error stop 'nocdyn_designs: the grid has too many variants'
     design%variants = int(grid_size(factors))
     design%varied = size(factors)
     allocate (design%factors, source=factors)
   end function grid_design
 
-  !> Points of a grid; more than `most_variants` are `most_variants` + 1.
+  !> Points of a grid; more than `max_variants` are `max_variants` + 1.
   pure integer(int64) function grid_size(factors)
     type(factor_t), intent(in) :: factors(:)
     integer :: i
 
     grid_size = 1
     do i = 1, size(factors)
-      grid_size = min(grid_size * factors(i)%count, most_variants + 1_int64)
+      grid_size = min(grid_size * factors(i)%count, max_variants + 1_int64)
     end do
   end function grid_size
 
@@ -138,7 +138,7 @@ contains
     integer, intent(in) :: seed      !! at least 0
     type(random_design_t) :: design
 
-    call start(design, factors, samples, seed)
+    call initialise(design, factors, samples, seed)
   end function random_design
 
   pure subroutine random_values(self, variant, x)
@@ -161,7 +161,7 @@ contains
     type(latin_design_t) :: design
     integer :: i
 
-    call start(design, factors, samples, seed)
+    call initialise(design, factors, samples, seed)
     allocate (design%strata(size(factors)))
     do i = 1, size(factors)
       design%strata(i) = random_permutation(samples, seed, i)
@@ -183,12 +183,12 @@ contains
 
   !> Sobol points, the first of them for variant 1; a seed other than 0 shifts them all.
   function sobol_design(factors, samples, seed) result(design)
-    type(factor_t), intent(in) :: factors(:)   !! at most `most_dimensions`
+    type(factor_t), intent(in) :: factors(:)   !! at most `max_dimensions`
     integer, intent(in) :: samples             !! at least 1
     integer, intent(in) :: seed                !! at least 0
     type(sobol_design_t) :: design
 
-    call start(design, factors, samples, seed)
+    call initialise(design, factors, samples, seed)
     design%points = sobol_points(size(factors), seed)
   end function sobol_design
 
@@ -221,7 +221,7 @@ contains
     x = self%list(:, variant)
   end subroutine list_values
 
-  subroutine start(design, factors, samples, seed)
+  subroutine initialise(design, factors, samples, seed)
     class(sampled_design_t), intent(inout) :: design
     type(factor_t), intent(in) :: factors(:)
     integer, intent(in) :: samples, seed
@@ -234,7 +234,7 @@ contains
     do i = 1, size(factors)
       design%distributions(i) = distribution_of(factors(i))
     end do
-  end subroutine start
+  end subroutine initialise
 
   !> How probable `low` to `high` is if nothing is truncated. Nothing can be drawn from a range of probability 0.
   pure real(wp) function probability_between(factor)
@@ -246,23 +246,23 @@ contains
   end function probability_between
 
   !> Whether the width of a uniform factor, or a value of another one, can be above the largest number.
-  pure logical function leaves_numbers(factor)
+  pure logical function can_overflow(factor)
     type(factor_t), intent(in) :: factor
     real(wp), parameter :: part = 0.01_wp   ! of each number: sums of such parts do not overflow
 
     select case (factor%distribution)
     case ('uniform')
-      leaves_numbers = part * factor%high - part * factor%low > part * huge(part)
+      can_overflow = part * factor%high - part * factor%low > part * huge(part)
     case ('normal')
-      associate (middle => part * factor%mean, reach => part * farthest * factor%deviation)
-        leaves_numbers = (factor%high >= huge(part) .and. middle + reach > part * huge(part)) .or. &
+      associate (middle => part * factor%mean, reach => part * tail_end * factor%deviation)
+        can_overflow = (factor%high >= huge(part) .and. middle + reach > part * huge(part)) .or. &
                          (factor%low <= -huge(part) .and. middle - reach < -part * huge(part))
       end associate
     case default
-      leaves_numbers = factor%high >= huge(part) .and. &
-                       log(factor%median) + farthest * factor%log_deviation > log(huge(part))
+      can_overflow = factor%high >= huge(part) .and. &
+                       log(factor%median) + tail_end * factor%log_deviation > log(huge(part))
     end select
-  end function leaves_numbers
+  end function can_overflow
 
   pure function distribution_of(factor) result(distribution)
     type(factor_t), intent(in) :: factor

@@ -1,16 +1,16 @@
 !> What a sweep varies, and the values of each variant: &sweep and &vary, or the file of a list.
 module nocdyn_sweep_design
   use nocdyn_checksums, only: checksum_digits
-  use nocdyn_designs, only: design_t, factor_t, grid_design, grid_size, latin_design, leaves_numbers, list_design, &
-    most_variants, probability_between, random_design, sobol_design
+  use nocdyn_designs, only: design_t, factor_t, grid_design, grid_size, latin_design, can_overflow, list_design, &
+    max_variants, probability_between, random_design, sobol_design
   use nocdyn_errors, only: error_t, exit_file
   use nocdyn_input, only: group_t, input_t
   use nocdyn_kinds, only: wp
-  use nocdyn_mistakes, only: mistakes_t, no_line
-  use nocdyn_sobol_points, only: most_dimensions
-  use nocdyn_sweep_mistakes, only: add_mistake
+  use nocdyn_diagnostics, only: diagnostics_t, no_line
+  use nocdyn_sobol_points, only: max_dimensions
+  use nocdyn_sweep_diagnostics, only: report
   use nocdyn_table_file, only: read_list_text
-  use nocdyn_target_company, only: find_targets, target_at
+  use nocdyn_target_consistency, only: find_targets, target_at
   use nocdyn_targets, only: target_t
   use nocdyn_text, only: quoted, string_t, to_text
   use nocdyn_text_file, only: path_in, read_text_file
@@ -22,29 +22,29 @@ module nocdyn_sweep_design
 contains
 
   !> Targets and design; the design is allocated if there is no mistake.
-  subroutine read_design(input, sweep, targets, design, list_checksum, mistakes)
+  subroutine read_design(input, sweep, targets, design, list_checksum, diagnostics)
     type(input_t), intent(in) :: input
     integer, intent(in) :: sweep   !! index of &sweep
     type(target_t), allocatable, intent(out) :: targets(:)
     class(design_t), allocatable, intent(out) :: design
     character(len=:), allocatable, intent(out) :: list_checksum   !! of the file's bytes; '' without a list
-    type(mistakes_t), intent(inout) :: mistakes
+    type(diagnostics_t), intent(inout) :: diagnostics
     type(factor_t), allocatable :: factors(:)
     real(wp), allocatable :: values(:, :)
     integer :: before
 
-    before = mistakes%count
+    before = diagnostics%count
     list_checksum = ''
     associate (group => input%groups(sweep), varied => input%groups_named('vary'))
       if (group%text('design') == 'list') then
-        call read_list(input, sweep, targets, values, list_checksum, mistakes)
-        call refuse_varied(input, varied, mistakes)
-        call refuse_overrides(input, [integer ::], targets, mistakes)
-        if (mistakes%count == before) allocate (design, source=list_design(values))
+        call read_list(input, sweep, targets, values, list_checksum, diagnostics)
+        call refuse_varied(input, varied, diagnostics)
+        call refuse_overrides(input, [integer ::], targets, diagnostics)
+        if (diagnostics%count == before) allocate (design, source=list_design(values))
       else
-        call read_varied(input, sweep, varied, targets, factors, mistakes)
-        call refuse_overrides(input, varied, targets, mistakes)
-        if (mistakes%count == before) call make_design(group, factors, design)
+        call read_varied(input, sweep, varied, targets, factors, diagnostics)
+        call refuse_overrides(input, varied, targets, diagnostics)
+        if (diagnostics%count == before) call make_design(group, factors, design)
       end if
     end associate
   end subroutine read_design
@@ -75,15 +75,15 @@ contains
   end subroutine make_design
 
   !> The targets in the first line of a file, and the values in the others.
-  subroutine read_list(input, sweep, targets, values, list_checksum, mistakes)
+  subroutine read_list(input, sweep, targets, values, list_checksum, diagnostics)
     type(input_t), intent(in) :: input
     integer, intent(in) :: sweep
     type(target_t), allocatable, intent(out) :: targets(:)
     real(wp), allocatable, intent(out) :: values(:, :)   !! [targets, variants]
     character(len=:), allocatable, intent(inout) :: list_checksum
-    type(mistakes_t), intent(inout) :: mistakes
+    type(diagnostics_t), intent(inout) :: diagnostics
     type(error_t), allocatable :: error
-    type(string_t), allocatable :: complaints(:), names(:), paths(:), units(:)
+    type(string_t), allocatable :: messages(:), names(:), paths(:), units(:)
     character(len=:), allocatable :: file, text
     integer :: i, line
 
@@ -91,29 +91,29 @@ contains
     file = path_in(input%file(:index(input%file, '/', back=.true.)), input%groups(sweep)%text('file'))
     call read_text_file(file, text, error)
     if (allocated(error)) then
-      call add_mistake(input, sweep, 'file', 'file: ' // error%message, mistakes, exit_file)
+      call report(input, sweep, 'file', 'file: ' // error%message, diagnostics, exit_file)
       return
     end if
     list_checksum = checksum_digits(text)
-    call read_list_text(text, file, names, line, values, complaints)
-    do i = 1, size(complaints)
-      call add_mistake(input, sweep, 'file', 'file: ' // complaints(i)%text, mistakes)
+    call read_list_text(text, file, names, line, values, messages)
+    do i = 1, size(messages)
+      call report(input, sweep, 'file', 'file: ' // messages(i)%text, diagnostics)
     end do
-    call take_units_off(names, paths, units)
-    call find_targets(input, paths, targets, complaints)
+    call split_units(names, paths, units)
+    call find_targets(input, paths, targets, messages)
     do i = 1, size(paths)
-      if (complaints(i)%text == '' .and. units(i)%text /= '' .and. units(i)%text /= targets(i)%unit) then
-        complaints(i)%text = 'another unit; needed: ' // paths(i)%text
-        if (targets(i)%unit /= '') complaints(i)%text = complaints(i)%text // ' [' // targets(i)%unit // ']'
+      if (messages(i)%text == '' .and. units(i)%text /= '' .and. units(i)%text /= targets(i)%unit) then
+        messages(i)%text = 'another unit; needed: ' // paths(i)%text
+        if (targets(i)%unit /= '') messages(i)%text = messages(i)%text // ' [' // targets(i)%unit // ']'
       end if
-      if (complaints(i)%text == '') cycle
-      call add_mistake(input, sweep, 'file', 'file: ' // file // ':' // to_text(line) // ': column ' // to_text(i) // ', ' // &
-                       quoted(names(i)%text) // ': ' // complaints(i)%text, mistakes)
+      if (messages(i)%text == '') cycle
+      call report(input, sweep, 'file', 'file: ' // file // ':' // to_text(line) // ': column ' // to_text(i) // ', ' // &
+                       quoted(names(i)%text) // ': ' // messages(i)%text, diagnostics)
     end do
   end subroutine read_list
 
   !> "load.work.viscous [N m s/rad]", as sweep.csv has it.
-  subroutine take_units_off(names, paths, units)
+  subroutine split_units(names, paths, units)
     type(string_t), intent(in) :: names(:)
     type(string_t), allocatable, intent(out) :: paths(:), units(:)   !! '' where there is no unit
     integer :: bracket, i
@@ -127,26 +127,26 @@ contains
         units(i)%text = name(bracket + 1:len(name) - 1)
       end associate
     end do
-  end subroutine take_units_off
+  end subroutine split_units
 
-  subroutine refuse_varied(input, varied, mistakes)
+  subroutine refuse_varied(input, varied, diagnostics)
     type(input_t), intent(in) :: input
     integer, intent(in) :: varied(:)
-    type(mistakes_t), intent(inout) :: mistakes
+    type(diagnostics_t), intent(inout) :: diagnostics
     integer :: i
 
     do i = 1, size(varied)
-      call mistakes%add(input%groups(varied(i))%line, varied(i), &
+      call diagnostics%add(input%groups(varied(i))%line, varied(i), &
                         "design = 'list' takes targets and values from its file; allowed: no &vary")
     end do
   end subroutine refuse_varied
 
   !> An override of a number that varies would be without effect.
-  subroutine refuse_overrides(input, varied, targets, mistakes)
+  subroutine refuse_overrides(input, varied, targets, diagnostics)
     type(input_t), intent(in) :: input
     integer, intent(in) :: varied(:)   !! the &vary of each target; none if these are those of a list
     type(target_t), intent(in) :: targets(:)
-    type(mistakes_t), intent(inout) :: mistakes
+    type(diagnostics_t), intent(inout) :: diagnostics
     character(len=:), allocatable :: source
     integer :: i, t
 
@@ -161,46 +161,47 @@ contains
         source = 'the &vary on line ' // to_text(input%groups(varied(t))%line) // ' gives this number its values; to ' // &
                  'change those, write vary(' // to_text(t) // ').KEY=VALUE'
       end if
-      call mistakes%add(no_line, 0, 'has no effect on a sweep: ' // source, i)
+      call diagnostics%add(no_line, 0, 'has no effect on a sweep: ' // source, i)
     end do
   end subroutine refuse_overrides
 
   !> The targets and factors of all &vary.
-  subroutine read_varied(input, sweep, varied, targets, factors, mistakes)
+  subroutine read_varied(input, sweep, varied, targets, factors, diagnostics)
     type(input_t), intent(in) :: input
     integer, intent(in) :: sweep, varied(:)
     type(target_t), allocatable, intent(out) :: targets(:)
     type(factor_t), allocatable, intent(out) :: factors(:)
-    type(mistakes_t), intent(inout) :: mistakes
+    type(diagnostics_t), intent(inout) :: diagnostics
     character(len=:), allocatable :: design
     integer :: i
 
     design = input%groups(sweep)%text('design')
-    call find_varied(input, varied, targets, mistakes)
+    call find_varied(input, varied, targets, diagnostics)
     allocate (factors(size(varied)))
     do i = 1, size(varied)
       factors(i) = factor_of(input%groups(varied(i)))
-      call check_factor(input, varied(i), design, factors(i), mistakes)
-      if (design == 'grid' .and. targets(i)%is_whole) call check_whole_grid(input, varied(i), targets(i), factors(i), mistakes)
+      call check_factor(input, varied(i), design, factors(i), diagnostics)
+      if (design == 'grid' .and. targets(i)%is_integer) call check_whole_grid(input, varied(i), targets(i), factors(i), &
+                                                                              diagnostics)
     end do
     if (size(varied) == 0) then
-      call add_mistake(input, sweep, 'design', 'design = ' // quoted(design) // ' has nothing to vary; needed: a &vary', mistakes)
-    else if (design == 'sobol' .and. size(varied) > most_dimensions) then
-      call add_mistake(input, sweep, 'design', "design = 'sobol' varies at most " // to_text(most_dimensions) // &
-                       ' numbers; here vary ' // to_text(size(varied)), mistakes)
-    else if (design == 'grid' .and. grid_size(factors) > most_variants) then
-      call add_mistake(input, sweep, 'design', 'the grid has too many variants; allowed: at most ' // to_text(most_variants) // &
-                       ' by the product of all count', mistakes)
+      call report(input, sweep, 'design', 'design = ' // quoted(design) // ' has nothing to vary; needed: a &vary', diagnostics)
+    else if (design == 'sobol' .and. size(varied) > max_dimensions) then
+      call report(input, sweep, 'design', "design = 'sobol' varies at most " // to_text(max_dimensions) // &
+                       ' numbers; here vary ' // to_text(size(varied)), diagnostics)
+    else if (design == 'grid' .and. grid_size(factors) > max_variants) then
+      call report(input, sweep, 'design', 'the grid has too many variants; allowed: at most ' // to_text(max_variants) // &
+                       ' by the product of all count', diagnostics)
     end if
   end subroutine read_varied
 
   !> The targets of all &vary, as far as they are there.
-  subroutine find_varied(input, varied, targets, mistakes)
+  subroutine find_varied(input, varied, targets, diagnostics)
     type(input_t), intent(in) :: input
     integer, intent(in) :: varied(:)
     type(target_t), allocatable, intent(out) :: targets(:)
-    type(mistakes_t), intent(inout) :: mistakes
-    type(string_t), allocatable :: complaints(:), paths(:)
+    type(diagnostics_t), intent(inout) :: diagnostics
+    type(string_t), allocatable :: messages(:), paths(:)
     integer :: i
 
     allocate (paths(size(varied)))
@@ -208,10 +209,10 @@ contains
       paths(i)%text = ''
       if (input%groups(varied(i))%has_value('target')) paths(i)%text = input%groups(varied(i))%text('target')
     end do
-    call find_targets(input, paths, targets, complaints)
+    call find_targets(input, paths, targets, messages)
     do i = 1, size(varied)
-      if (complaints(i)%text == '' .or. .not. input%groups(varied(i))%has_value('target')) cycle
-      call add_mistake(input, varied(i), 'target', 'target = ' // quoted(paths(i)%text) // ': ' // complaints(i)%text, mistakes)
+      if (messages(i)%text == '' .or. .not. input%groups(varied(i))%has_value('target')) cycle
+      call report(input, varied(i), 'target', 'target = ' // quoted(paths(i)%text) // ': ' // messages(i)%text, diagnostics)
     end do
   end subroutine find_varied
 
@@ -230,83 +231,83 @@ contains
   end function factor_of
 
   !> What the design asks of a factor, and the distribution of its ends.
-  subroutine check_factor(input, varied, design, factor, mistakes)
+  subroutine check_factor(input, varied, design, factor, diagnostics)
     type(input_t), intent(in) :: input
     integer, intent(in) :: varied   !! index of the &vary
     character(len=*), intent(in) :: design
     type(factor_t), intent(in) :: factor
-    type(mistakes_t), intent(inout) :: mistakes
+    type(diagnostics_t), intent(inout) :: diagnostics
     logical :: has_count
 
     has_count = input%groups(varied)%has_value('count')
     if (design /= 'grid') then
       if (has_count) then
-        call add_mistake(input, varied, 'count', "count belongs to design = 'grid'; here design = " // quoted(design), mistakes)
+        call report(input, varied, 'count', "count belongs to design = 'grid'; here design = " // quoted(design), diagnostics)
       end if
       if (factor%distribution == 'uniform' .and. factor%high <= factor%low) then
-        call add_mistake(input, varied, 'high', 'high = ' // to_text(factor%high) // ' is out of range; allowed: > low = ' // &
-                         to_text(factor%low), mistakes)
-      else if (leaves_numbers(factor)) then
-        call refuse_overflow(input, varied, factor, mistakes)
+        call report(input, varied, 'high', 'high = ' // to_text(factor%high) // ' is out of range; allowed: > low = ' // &
+                         to_text(factor%low), diagnostics)
+      else if (can_overflow(factor)) then
+        call refuse_overflow(input, varied, factor, diagnostics)
       else if (probability_between(factor) <= 0.0_wp) then
-        call add_mistake(input, varied, 'distribution', 'the distribution has nothing from low to high; allowed: ends ' // &
-                         'nearer to its middle', mistakes)
+        call report(input, varied, 'distribution', 'the distribution has nothing from low to high; allowed: ends ' // &
+                         'nearer to its middle', diagnostics)
       end if
       return
     end if
     if (.not. has_count) then
-      call add_mistake(input, varied, 'count', "count is missing; design = 'grid' needs it", mistakes)
+      call report(input, varied, 'count', "count is missing; design = 'grid' needs it", diagnostics)
     else if (factor%count > 1 .and. factor%high <= factor%low) then
-      call add_mistake(input, varied, 'count', 'count = ' // to_text(factor%count) // ' values from low = ' // &
+      call report(input, varied, 'count', 'count = ' // to_text(factor%count) // ' values from low = ' // &
                        to_text(factor%low) // ' to high = ' // to_text(factor%high) // ' are all the same; allowed: count = 1', &
-                       mistakes)
-    else if (factor%distribution == 'uniform' .and. factor%count > 1 .and. leaves_numbers(factor)) then
-      call refuse_overflow(input, varied, factor, mistakes)
+                       diagnostics)
+    else if (factor%distribution == 'uniform' .and. factor%count > 1 .and. can_overflow(factor)) then
+      call refuse_overflow(input, varied, factor, diagnostics)
     end if
     if (factor%distribution /= 'uniform') then
-      call add_mistake(input, varied, 'distribution', 'distribution = ' // quoted(trim(factor%distribution)) // &
-                       " has no grid; allowed with design = 'grid': 'uniform'", mistakes)
+      call report(input, varied, 'distribution', 'distribution = ' // quoted(trim(factor%distribution)) // &
+                       " has no grid; allowed with design = 'grid': 'uniform'", diagnostics)
     end if
   end subroutine check_factor
 
-  subroutine refuse_overflow(input, varied, factor, mistakes)
+  subroutine refuse_overflow(input, varied, factor, diagnostics)
     type(input_t), intent(in) :: input
     integer, intent(in) :: varied   !! index of the &vary
     type(factor_t), intent(in) :: factor
-    type(mistakes_t), intent(inout) :: mistakes
+    type(diagnostics_t), intent(inout) :: diagnostics
     character(len=:), allocatable :: most
 
     most = to_text(huge(factor%high))
     select case (factor%distribution)
     case ('uniform')
-      call add_mistake(input, varied, 'high', 'high = ' // to_text(factor%high) // ' is too far from low = ' // &
-                       to_text(factor%low) // '; allowed: high - low at most ' // most, mistakes)
+      call report(input, varied, 'high', 'high = ' // to_text(factor%high) // ' is too far from low = ' // &
+                       to_text(factor%low) // '; allowed: high - low at most ' // most, diagnostics)
     case ('normal')
-      call add_mistake(input, varied, 'deviation', 'mean = ' // to_text(factor%mean) // ' and deviation = ' // &
+      call report(input, varied, 'deviation', 'mean = ' // to_text(factor%mean) // ' and deviation = ' // &
                        to_text(factor%deviation) // ' reach numbers beyond ' // most // &
-                       '; allowed: smaller ones, or low and high', mistakes)
+                       '; allowed: smaller ones, or low and high', diagnostics)
     case default
-      call add_mistake(input, varied, 'log_deviation', 'median = ' // to_text(factor%median) // ' and log_deviation = ' // &
+      call report(input, varied, 'log_deviation', 'median = ' // to_text(factor%median) // ' and log_deviation = ' // &
                        to_text(factor%log_deviation) // ' reach numbers beyond ' // most // &
-                       '; allowed: smaller ones, or high', mistakes)
+                       '; allowed: smaller ones, or high', diagnostics)
     end select
   end subroutine refuse_overflow
 
   !> Values of a whole number must not round to the same one.
-  subroutine check_whole_grid(input, varied, target, factor, mistakes)
+  subroutine check_whole_grid(input, varied, target, factor, diagnostics)
     type(input_t), intent(in) :: input
     integer, intent(in) :: varied   !! index of the &vary
     type(target_t), intent(in) :: target
     type(factor_t), intent(in) :: factor
-    type(mistakes_t), intent(inout) :: mistakes
+    type(diagnostics_t), intent(inout) :: diagnostics
     real(wp) :: room
 
-    if (factor%distribution /= 'uniform' .or. factor%high <= factor%low .or. leaves_numbers(factor)) return
+    if (factor%distribution /= 'uniform' .or. factor%high <= factor%low .or. can_overflow(factor)) return
     room = anint(factor%high) - anint(factor%low) + 1.0_wp
     if (factor%count <= room) return
-    call add_mistake(input, varied, 'count', 'count = ' // to_text(factor%count) // ' has repeats: ' // target%path // &
+    call report(input, varied, 'count', 'count = ' // to_text(factor%count) // ' has repeats: ' // target%path // &
                      ' is a whole number, of which low = ' // to_text(factor%low) // ' to high = ' // to_text(factor%high) // &
-                     ' holds ' // to_text(nint(room)) // '; allowed: 1 to ' // to_text(nint(room)), mistakes)
+                     ' holds ' // to_text(nint(room)) // '; allowed: 1 to ' // to_text(nint(room)), diagnostics)
   end subroutine check_whole_grid
 
 end module nocdyn_sweep_design

@@ -7,15 +7,15 @@ module nocdyn_sweep_plan
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
   use nocdyn_machine_report, only: counted
-  use nocdyn_mistakes, only: mistakes_t
-  use nocdyn_mistakes_report, only: mistakes_report
+  use nocdyn_diagnostics, only: diagnostics_t
+  use nocdyn_diagnostics_text, only: diagnostics_text
   use nocdyn_output_times, only: check_output_times
   use nocdyn_schema, only: has_word
   use nocdyn_size_limits, only: check_size
   use nocdyn_statistics, only: statistic_t
   use nocdyn_sweep_design, only: find_varied, read_design
-  use nocdyn_sweep_mistakes, only: add_mistake
-  use nocdyn_sweep_records, only: check_quantities, read_records, time_span_t, wanted_trajectories
+  use nocdyn_sweep_diagnostics, only: report
+  use nocdyn_recorded_quantities, only: check_quantities, read_recorded_quantities, time_span_t, wanted_trajectories
   use nocdyn_targets, only: target_t
   use nocdyn_text, only: string_t
   use nocdyn_trajectory_columns, only: column_t, list_columns
@@ -23,7 +23,7 @@ module nocdyn_sweep_plan
   implicit none (type, external)
   private
 
-  public :: make_plan, add_plan_mistakes, has_sweep, without_sweep
+  public :: make_plan, add_plan_diagnostics, has_sweep, without_sweep
 
   character(len=*), parameter :: kinds = 'sweep vary record'   !! of the groups of a sweep
 
@@ -46,7 +46,7 @@ contains
     type(input_t), intent(in) :: input   !! read without mistakes
     type(sweep_plan_t), intent(out) :: plan
     type(error_t), allocatable, intent(out) :: error
-    type(mistakes_t) :: mistakes
+    type(diagnostics_t) :: diagnostics
     type(error_t), allocatable :: failure
     type(string_t), allocatable :: labels(:)
     integer, allocatable :: sweeps(:)
@@ -58,26 +58,26 @@ contains
       return
     end if
     plan%input = input
-    call read_design(input, sweeps(1), plan%targets, plan%design, plan%list_checksum, mistakes)
+    call read_design(input, sweeps(1), plan%targets, plan%design, plan%list_checksum, diagnostics)
     variants = huge(variants)
     if (allocated(plan%design)) variants = plan%design%variants
     call label_columns(input, labels, failure)
     if (.not. allocated(failure)) then
       call add_variant_columns(input, plan%targets, labels)
-      call read_records(input, labels, fixed_span(input, plan%targets), variants, plan%statistics, mistakes)
+      call read_recorded_quantities(input, labels, fixed_span(input, plan%targets), variants, plan%statistics, diagnostics)
       allocate (plan%trajectories, source=wanted_trajectories(input))
-      if (size(plan%statistics) == 0 .and. mistakes%count == 0) call add_mistake(input, sweeps(1), 'design', &
-        'no number of the variants is kept; needed: a &record with quantity and statistic', mistakes)
+      if (size(plan%statistics) == 0 .and. diagnostics%count == 0) call report(input, sweeps(1), 'design', &
+        'no number of the variants is kept; needed: a &record with quantity and statistic', diagnostics)
       if (size(plan%trajectories) > 0) call check_output_times(input, failure)
     end if
-    call conclude(input, mistakes, failure, error)
+    call merge_errors(input, diagnostics, failure, error)
   end subroutine make_plan
 
   !> Adds wrong targets and quantities to the error of an input with mistakes, if all of these are in groups of the sweep and
   !> it is known what varies: columns can depend on that.
-  subroutine add_plan_mistakes(input, mistakes, error)
+  subroutine add_plan_diagnostics(input, diagnostics, error)
     type(input_t), intent(in) :: input
-    type(mistakes_t), intent(inout) :: mistakes   !! of reading the input
+    type(diagnostics_t), intent(inout) :: diagnostics   !! of reading the input
     type(error_t), allocatable, intent(inout) :: error
     type(error_t), allocatable :: failure
     type(string_t), allocatable :: labels(:)
@@ -85,20 +85,20 @@ contains
     integer, allocatable :: varied(:)
     integer :: i
 
-    if (mistakes%count == 0) return
-    do i = 1, mistakes%count
-      if (mistakes%list(i)%group == 0) return
-      if (.not. has_word(kinds, input%groups(mistakes%list(i)%group)%kind)) return
+    if (diagnostics%count == 0) return
+    do i = 1, diagnostics%count
+      if (diagnostics%list(i)%group == 0) return
+      if (.not. has_word(kinds, input%groups(diagnostics%list(i)%group)%kind)) return
     end do
     allocate (varied, source=input%groups_named('vary'))
-    call find_varied(input, varied, targets, mistakes)
+    call find_varied(input, varied, targets, diagnostics)
     call label_columns(input, labels, failure)
     if (size(varied) > 0 .and. .not. allocated(failure)) then
       call add_variant_columns(input, targets, labels)
-      call check_quantities(input, labels, mistakes)
+      call check_quantities(input, labels, diagnostics)
     end if
-    call conclude(input, mistakes, failure, error)
-  end subroutine add_plan_mistakes
+    call merge_errors(input, diagnostics, failure, error)
+  end subroutine add_plan_diagnostics
 
   !> The numbers of one variant as they are used: those of the design, whole ones rounded to the nearest.
   pure subroutine values(self, variant, x)
@@ -107,7 +107,7 @@ contains
     real(wp), intent(out) :: x(:)    !! [targets]
 
     call self%design%values(variant, x)
-    where (self%targets%is_whole) x = anint(x)
+    where (self%targets%is_integer) x = anint(x)
   end subroutine values
 
   !> 'random, 100000 variants that differ in 2 numbers, 7 results'
@@ -151,21 +151,21 @@ contains
   end function fixed_span
 
   !> One error of the mistakes in the sweep and of what is wrong with the base machine.
-  subroutine conclude(input, mistakes, failure, error)
+  subroutine merge_errors(input, diagnostics, failure, error)
     type(input_t), intent(in) :: input
-    type(mistakes_t), intent(in) :: mistakes
+    type(diagnostics_t), intent(in) :: diagnostics
     type(error_t), allocatable, intent(in) :: failure
     type(error_t), allocatable, intent(out) :: error
 
-    if (mistakes%count > 0 .and. allocated(failure)) then
-      call raise(error, max(failure%code, mistakes%worst_code()), mistakes_report(input, mistakes) // new_line('a') // &
+    if (diagnostics%count > 0 .and. allocated(failure)) then
+      call raise(error, max(failure%code, diagnostics%worst_code()), diagnostics_text(input, diagnostics) // new_line('a') // &
                  failure%message)
-    else if (mistakes%count > 0) then
-      call raise(error, mistakes%worst_code(), mistakes_report(input, mistakes))
+    else if (diagnostics%count > 0) then
+      call raise(error, diagnostics%worst_code(), diagnostics_text(input, diagnostics))
     else if (allocated(failure)) then
       error = failure
     end if
-  end subroutine conclude
+  end subroutine merge_errors
 
   !> Whether an input has groups of a sweep.
   pure logical function has_sweep(input)

@@ -17,7 +17,7 @@ module nocdyn_variant_columns
 
   public :: add_variant_columns
 
-  real(wp), parameter :: something = 1.0_wp   ! in place of 0 or nothing
+  real(wp), parameter :: nonzero_value = 1.0_wp   ! in place of 0 or nothing
 
 contains
 
@@ -64,14 +64,14 @@ contains
     type(error_t), allocatable :: error
     type(column_t), allocatable :: columns(:)
     type(string_t), allocatable :: others(:)
-    character(len=:), allocatable :: complaint
+    character(len=:), allocatable :: message
     integer :: i
 
     changed = input
     do i = 1, size(hidden)
       before = changed
-      call set_target(changed, hidden(i), something, complaint)
-      if (complaint /= '') changed = before
+      call set_target(changed, hidden(i), nonzero_value, message)
+      if (message /= '') changed = before
     end do
     call assemble_machine(changed, machine, error)
     can_be = .not. allocated(error)

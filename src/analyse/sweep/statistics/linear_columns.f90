@@ -15,7 +15,7 @@ module nocdyn_linear_columns
   implicit none (type, external)
   private
 
-  public :: is_linear, has_law, new_linear_columns, strip_of, place_of
+  public :: is_linear, has_law, new_linear_columns, strip_of, lane_in_strip
 
   integer, parameter, public :: width = 8   !! lanes of a strip, which are looked at together
 
@@ -33,8 +33,8 @@ module nocdyn_linear_columns
     integer, allocatable, private :: element(:)     !! that has the law, 0 if none has
     integer, allocatable, private :: from(:), to(:) !! bodies, 0 is the ground
   contains
-    procedure :: take_lane
-    procedure :: is_rising
+    procedure :: copy_lane
+    procedure :: is_increasing
     procedure :: argument
     procedure :: law
   end type linear_columns_t
@@ -88,7 +88,7 @@ contains
     end associate
   end function is_quantity
 
-  !> The given columns, each `is_linear`; the numbers of the lanes come by `take_lane`.
+  !> The given columns, each `is_linear`; the numbers of the lanes come by `copy_lane`.
   function new_linear_columns(block, columns) result(self)
     class(formulation_t), intent(in) :: block
     type(column_t), intent(in) :: columns(:)
@@ -102,7 +102,7 @@ contains
     allocate (self%is_speed, source=columns%kind == column_speed)
     allocate (self%element(self%count), self%from(self%count), self%to(self%count), source=0)
     do i = 1, self%count
-      call place_column(self, i, block%machine, columns(i))
+      call set_column(self, i, block%machine, columns(i))
       call add_entries(self, i, block%machine%coordinates)
     end do
     allocate (self%factor(width, size(self%component), strips), self%offset(width, self%count, strips), &
@@ -110,20 +110,20 @@ contains
     allocate (self%linear(width, self%count, strips), source=1.0_wp)
   end function new_linear_columns
 
-  subroutine place_column(self, number, machine, column)
+  subroutine set_column(self, number, machine, column)
     type(linear_columns_t), intent(inout) :: self
     integer, intent(in) :: number
     type(machine_t), intent(in) :: machine
     type(column_t), intent(in) :: column
     integer :: element
 
-    self%to(number) = column%place
+    self%to(number) = column%index
     if (column%kind /= column_element) return
-    element = machine%banks(column%bank)%bank%first - 1 + column%place
+    element = machine%banks(column%bank)%bank%first - 1 + column%index
     self%to(number) = machine%elements%to(element)
     self%from(number) = machine%elements%from(element)
     if (has_law(machine, column)) self%element(number) = element
-  end subroutine place_column
+  end subroutine set_column
 
   subroutine add_entries(self, number, coordinates)
     type(linear_columns_t), intent(inout) :: self
@@ -149,13 +149,13 @@ contains
   end subroutine add_entries
 
   !> Takes over the numbers of a lane.
-  pure subroutine take_lane(self, block, lane)
+  pure subroutine copy_lane(self, block, lane)
     class(linear_columns_t), intent(inout) :: self
     class(formulation_t), intent(in) :: block
     integer, intent(in) :: lane
     integer :: i, k
 
-    associate (machine => block%machine, at => place_of(lane), strip => strip_of(lane))
+    associate (machine => block%machine, at => lane_in_strip(lane), strip => strip_of(lane))
       do k = 1, size(self%ratio)
         if (self%ratio(k) == 0) cycle
         associate (ratio => machine%coordinates%ratio(lane, self%ratio(k)))
@@ -175,7 +175,7 @@ contains
         end associate
       end do
     end associate
-  end subroutine take_lane
+  end subroutine copy_lane
 
   elemental integer function strip_of(lane)
     integer, intent(in) :: lane
@@ -184,22 +184,22 @@ contains
   end function strip_of
 
   !> Place of a lane in its strip.
-  elemental integer function place_of(lane)
+  elemental integer function lane_in_strip(lane)
     integer, intent(in) :: lane
 
-    place_of = modulo(lane - 1, width) + 1
-  end function place_of
+    lane_in_strip = modulo(lane - 1, width) + 1
+  end function lane_in_strip
 
   !> Whether a column rises with x.
-  pure logical function is_rising(self, number, lane)
+  pure logical function is_increasing(self, number, lane)
     class(linear_columns_t), intent(in) :: self
     integer, intent(in) :: number, lane
 
-    associate (linear => self%linear(place_of(lane), number, strip_of(lane)), &
-               cubic => self%cubic(place_of(lane), number, strip_of(lane)))
-      is_rising = min(linear, cubic) >= 0 .and. max(linear, cubic) > 0
+    associate (linear => self%linear(lane_in_strip(lane), number, strip_of(lane)), &
+               cubic => self%cubic(lane_in_strip(lane), number, strip_of(lane)))
+      is_increasing = min(linear, cubic) >= 0 .and. max(linear, cubic) > 0
     end associate
-  end function is_rising
+  end function is_increasing
 
   !> x of a state of a lane.
   pure real(wp) function argument(self, number, lane, y) result(x)
@@ -208,7 +208,7 @@ contains
     real(wp), contiguous, intent(in) :: y(:)
     integer :: k
 
-    associate (at => place_of(lane), strip => strip_of(lane))
+    associate (at => lane_in_strip(lane), strip => strip_of(lane))
       x = self%offset(at, number, strip)
       do k = self%first(number), self%first(number + 1) - 1
         x = x + self%factor(at, k, strip) * y(self%component(k))
@@ -222,7 +222,7 @@ contains
     integer, intent(in) :: number, lane
     real(wp), intent(in) :: x
 
-    associate (at => place_of(lane), strip => strip_of(lane))
+    associate (at => lane_in_strip(lane), strip => strip_of(lane))
       law = (self%linear(at, number, strip) + self%cubic(at, number, strip) * x * x) * x
     end associate
   end function law

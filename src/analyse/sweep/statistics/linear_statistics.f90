@@ -3,16 +3,16 @@
 !> The elastic moment of a coupling that stiffens rises with its twist: its extremes are where those of the twist are. Bounds
 !> from the coefficients of x, in vector loops over the lanes, say in which steps an extremum may pass those before.
 module nocdyn_linear_statistics
-  use nocdyn_bernstein, only: lay_bernstein_matrix, most_degrees, raise_to_maximum
+  use nocdyn_bernstein, only: make_bernstein_matrix, max_degree, raise_to_maximum
   use nocdyn_formulation, only: formulation_t
   use nocdyn_kinds, only: wp
-  use nocdyn_linear_columns, only: linear_columns_t, new_linear_columns, place_of, strip_of, width
-  use nocdyn_linear_tracks, only: lay_tracks, open_gate, track_t
-  use nocdyn_quadrature, only: lay_gauss_rule
+  use nocdyn_linear_columns, only: linear_columns_t, new_linear_columns, lane_in_strip, strip_of, width
+  use nocdyn_linear_accumulators, only: new_accumulators, start_range, accumulator_t
+  use nocdyn_quadrature, only: gauss_legendre_rule
   use nocdyn_statistics, only: statistic_final, statistic_max, statistic_max_abs, statistic_mean, statistic_min, statistic_rms, &
     statistic_t, statistic_time_of_max
-  use nocdyn_step_strips, only: add_integrals, expand, forget_slopes, lay_depths, strip_t, take_part
-  use nocdyn_system, only: steps_t
+  use nocdyn_step_strips, only: add_integrals, expand, exclude_monotonic, fill_chord_gaps, strip_t, cut_step
+  use nocdyn_system, only: step_block_t
   use nocdyn_trajectory_columns, only: column_t
   implicit none (type, external)
   private
@@ -24,20 +24,20 @@ module nocdyn_linear_statistics
     real(wp), private :: t_end = 0.0_wp
     type(statistic_t), allocatable, private :: statistics(:)
     integer, allocatable, private :: column(:)                !! of each statistic among the linear ones
-    integer, allocatable, private :: track(:)                 !! of each statistic, 0 for those of the end
-    type(track_t), allocatable, private :: tracks(:)          !! in the order of their columns
+    integer, allocatable, private :: acc(:)                 !! of each statistic, 0 for those of the end
+    type(accumulator_t), allocatable, private :: accumulators(:)          !! in the order of their columns
     real(wp), allocatable, private :: nodes(:), weights(:)    !! of Gauss, 0 to 1
-    real(wp), allocatable, private :: depth(:)                !! largest value of s - s^p between s = 0 and 1, [degree]
+    real(wp), allocatable, private :: chord_gap(:)                !! largest value of s - s^p between s = 0 and 1, [degree]
     real(wp), allocatable, private :: to_bernstein(:, :)
     real(wp), private :: t_start = 0.0_wp
     real(wp), allocatable, private :: x_end(:, :)             !! [lanes, columns]
     real(wp), allocatable, private :: y_last(:, :), y_new_last(:, :), c_last(:, :, :)   !! of the last lanes, with padding
     type(strip_t), private :: strip, cut
   contains
-    procedure :: begin
-    procedure :: is_rising
-    procedure :: follow
-    procedure :: conclude
+    procedure :: start_lane
+    procedure :: is_increasing
+    procedure :: add_steps
+    procedure :: finish_lane
     procedure :: value
   end type linear_statistics_t
 
@@ -59,42 +59,42 @@ contains
     allocate (self%column, source=[(findloc(wanted, statistics(i)%column, dim=1), i=1, size(statistics))])
     self%columns = new_linear_columns(block, columns(wanted))
     allocate (self%x_end(block%lanes, size(wanted)), source=0.0_wp)
-    call lay_tracks(statistics, self%column, block%lanes, self%tracks, self%track)
+    call new_accumulators(statistics, self%column, block%lanes, self%accumulators, self%acc)
   end function new_linear_statistics
 
   !> A lane of the block starts anew at y.
-  subroutine begin(self, block, lane, y)
+  subroutine start_lane(self, block, lane, y)
     class(linear_statistics_t), intent(inout) :: self
     class(formulation_t), intent(in) :: block
     integer, intent(in) :: lane
     real(wp), contiguous, intent(in) :: y(:)
     integer :: i
 
-    call self%columns%take_lane(block, lane)
-    do i = 1, size(self%tracks)
-      associate (track => self%tracks(i), at => place_of(lane), strip => strip_of(lane))
-        track%highest(at, strip) = -huge(0.0_wp)
-        track%lowest(at, strip) = huge(0.0_wp)
-        track%gate(at, strip) = huge(0.0_wp)
-        track%integral(at, strip) = 0.0_wp
-        track%square(at, strip) = 0.0_wp
-        if (track%from > self%t_start) cycle
-        call open_gate(track, at, strip, self%columns%argument(track%column, lane, y), self%t_start)
+    call self%columns%copy_lane(block, lane)
+    do i = 1, size(self%accumulators)
+      associate (acc => self%accumulators(i), at => lane_in_strip(lane), strip => strip_of(lane))
+        acc%highest(at, strip) = -huge(0.0_wp)
+        acc%lowest(at, strip) = huge(0.0_wp)
+        acc%bound(at, strip) = huge(0.0_wp)
+        acc%integral(at, strip) = 0.0_wp
+        acc%square(at, strip) = 0.0_wp
+        if (acc%from > self%t_start) cycle
+        call start_range(acc, at, strip, self%columns%argument(acc%column, lane, y), self%t_start)
       end associate
     end do
-  end subroutine begin
+  end subroutine start_lane
 
   !> Whether the column of a statistic rises with x in a lane.
-  pure logical function is_rising(self, number, lane)
+  pure logical function is_increasing(self, number, lane)
     class(linear_statistics_t), intent(in) :: self
     integer, intent(in) :: number   !! of the statistic
     integer, intent(in) :: lane
 
-    is_rising = self%columns%is_rising(self%column(number), lane)
-  end function is_rising
+    is_increasing = self%columns%is_increasing(self%column(number), lane)
+  end function is_increasing
 
   !> The end of a lane.
-  subroutine conclude(self, lane, y)
+  subroutine finish_lane(self, lane, y)
     class(linear_statistics_t), intent(inout) :: self
     integer, intent(in) :: lane
     real(wp), contiguous, intent(in) :: y(:)
@@ -103,53 +103,53 @@ contains
     do i = 1, self%columns%count
       self%x_end(lane, i) = self%columns%argument(i, lane, y)
     end do
-  end subroutine conclude
+  end subroutine finish_lane
 
   !> The steps of a block.
-  subroutine follow(self, steps, y, y_new, c)
+  subroutine add_steps(self, steps, y, y_new, c)
     class(linear_statistics_t), intent(inout) :: self
-    type(steps_t), intent(in) :: steps
+    type(step_block_t), intent(in) :: steps
     real(wp), contiguous, intent(in) :: y(:, :), y_new(:, :)   !! [lanes, padded columns]
     real(wp), contiguous, intent(in) :: c(:, :, :)             !! [lanes, padded columns, degree]
     integer :: column, i, number
 
-    if (size(self%tracks) == 0) return
-    if (.not. allocated(self%nodes)) call lay_out(self, size(c, 2), size(c, 3))
-    do number = 1, size(self%tracks(1)%gate, 2)
-      call take_strip(self, number, steps, y, y_new, c)
+    if (size(self%accumulators) == 0) return
+    if (.not. allocated(self%nodes)) call allocate_work(self, size(c, 2), size(c, 3))
+    do number = 1, size(self%accumulators(1)%bound, 2)
+      call load_strip(self, number, steps, y, y_new, c)
       column = 0
-      do i = 1, size(self%tracks)
-        associate (track => self%tracks(i))
-          if (track%column /= column) call expand_strip(self, track%column, number, y, y_new, c)
-          column = track%column
-          if (track%has_range) call widen_strip(self, track, number, steps, size(c, 3))
-          if (track%has_sums) call integrate_strip(self, track, number, steps, size(c, 3))
+      do i = 1, size(self%accumulators)
+        associate (acc => self%accumulators(i))
+          if (acc%column /= column) call expand_strip(self, acc%column, number, y, y_new, c)
+          column = acc%column
+          if (acc%has_range) call widen_strip(self, acc, number, steps, size(c, 3))
+          if (acc%has_sums) call integrate_strip(self, acc, number, steps, size(c, 3))
         end associate
       end do
     end do
-  end subroutine follow
+  end subroutine add_steps
 
   !> Room and nodes for a degree of the solution inside the steps.
-  subroutine lay_out(self, columns, degree)
+  subroutine allocate_work(self, columns, degree)
     type(linear_statistics_t), intent(inout) :: self
     integer, intent(in) :: columns   !! of the states
     integer, intent(in) :: degree
 
-    if (degree > most_degrees) error stop 'nocdyn_linear_statistics: the solution inside the step has too many coefficients'
+    if (degree > max_degree) error stop 'nocdyn_linear_statistics: the solution inside the step has too many coefficients'
     allocate (self%nodes(degree + 1), self%weights(degree + 1))
-    call lay_gauss_rule(degree + 1, self%nodes, self%weights)
-    allocate (self%depth(degree))
-    call lay_depths(self%depth)
-    allocate (self%to_bernstein(0:most_degrees, 0:degree))
-    call lay_bernstein_matrix(degree, self%to_bernstein)
+    call gauss_legendre_rule(degree + 1, self%nodes, self%weights)
+    allocate (self%chord_gap(degree))
+    call fill_chord_gaps(self%chord_gap)
+    allocate (self%to_bernstein(0:max_degree, 0:degree))
+    call make_bernstein_matrix(degree, self%to_bernstein)
     allocate (self%y_last(width, columns), self%y_new_last(width, columns), self%c_last(width, columns, degree), source=0.0_wp)
-  end subroutine lay_out
+  end subroutine allocate_work
 
   !> The steps of the lanes of a strip. Those of the last one, if it is not full, are copied to where there is room beside them.
-  subroutine take_strip(self, number, steps, y, y_new, c)
+  subroutine load_strip(self, number, steps, y, y_new, c)
     type(linear_statistics_t), intent(inout) :: self
     integer, intent(in) :: number
-    type(steps_t), intent(in) :: steps
+    type(step_block_t), intent(in) :: steps
     real(wp), contiguous, intent(in) :: y(:, :), y_new(:, :), c(:, :, :)
     integer :: i
 
@@ -171,7 +171,7 @@ contains
       self%y_new_last(:strip%lanes, :) = y_new(strip%before + 1:, :)
       self%c_last(:strip%lanes, :, :) = c(strip%before + 1:, :, :)
     end associate
-  end subroutine take_strip
+  end subroutine load_strip
 
   !> x of a column in the steps of the strip.
   subroutine expand_strip(self, column, number, y, y_new, c)
@@ -183,11 +183,11 @@ contains
     associate (columns => self%columns, first => self%columns%first(column))
       associate (entries => columns%first(column + 1) - first)
         if (self%strip%lanes < width) then
-          call expand(width, size(c, 2), size(c, 3), 1, self%depth, entries, columns%component(first), &
+          call expand(width, size(c, 2), size(c, 3), 1, self%chord_gap, entries, columns%component(first), &
                       columns%factor(1, first, number), &
                       columns%offset(1, column, number), self%y_last, self%y_new_last, self%c_last, self%strip)
         else
-          call expand(size(c, 1), size(c, 2), size(c, 3), self%strip%before + 1, self%depth, entries, &
+          call expand(size(c, 1), size(c, 2), size(c, 3), self%strip%before + 1, self%chord_gap, entries, &
                       columns%component(first), &
                       columns%factor(1, first, number), columns%offset(1, column, number), y, y_new, c, self%strip)
         end if
@@ -200,80 +200,80 @@ contains
   end subroutine expand_strip
 
   !> Widens the range of x by the steps of the strip.
-  subroutine widen_strip(self, track, number, steps, degree)
+  subroutine widen_strip(self, acc, number, steps, degree)
     type(linear_statistics_t), intent(in) :: self
-    type(track_t), intent(inout) :: track
+    type(accumulator_t), intent(inout) :: acc
     integer, intent(in) :: number
-    type(steps_t), intent(in) :: steps
+    type(step_block_t), intent(in) :: steps
     integer, intent(in) :: degree
     real(wp) :: rise(width), fall(width)   ! of x beyond what is of interest, at most
     integer :: i
 
     associate (strip => self%strip)
-      call widen_by_ends(track%has_time, strip%t_end, strip%x_end, track%gate(1, number), track%highest(1, number), &
-                         track%lowest(1, number), track%highest_time(1, number))
-      call bound_excess(track, strip%x_start, strip%x_end, strip%above, strip%below, track%gate(1, number), &
-                        track%highest(1, number), track%lowest(1, number), rise, fall)
-      if (any_positive(rise, fall)) call forget_slopes(degree, self%depth, strip%scale, strip%c, rise, fall)
-      if (.not. (steps%may_be_cut .or. track%from > self%t_start)) then
+      call widen_by_ends(acc%has_time, strip%t_end, strip%x_end, acc%bound(1, number), acc%highest(1, number), &
+                         acc%lowest(1, number), acc%highest_time(1, number))
+      call bound_excess(acc, strip%x_start, strip%x_end, strip%above, strip%below, acc%bound(1, number), &
+                        acc%highest(1, number), acc%lowest(1, number), rise, fall)
+      if (any_positive(rise, fall)) call exclude_monotonic(degree, self%chord_gap, strip%scale, strip%c, rise, fall)
+      if (.not. (steps%may_be_cut .or. acc%from > self%t_start)) then
         if (.not. any_positive(rise, fall)) return
       end if
       do i = 1, strip%lanes
         associate (lane => strip%before + i)
-          if (steps%until(lane) < 1 .or. track%gate(i, number) > 0) then   ! the bounds do not hold
+          if (steps%theta_end(lane) < 1 .or. acc%bound(i, number) > 0) then   ! the bounds do not hold
             rise(i) = 1.0_wp
             fall(i) = 1.0_wp
           end if
           if (max(rise(i), fall(i)) <= 0) cycle
-          if (.not. steps%taken(lane) .or. strip%t_end(i) <= track%from) cycle
-          call look_inside(self, track, i, number, steps%t(lane), steps%h(lane), steps%until(lane), degree, rise(i), fall(i))
+          if (.not. steps%taken(lane) .or. strip%t_end(i) <= acc%from) cycle
+          call look_inside(self, acc, i, number, steps%t(lane), steps%h(lane), steps%theta_end(lane), degree, rise(i), fall(i))
         end associate
       end do
     end associate
   end subroutine widen_strip
 
   !> By x at the ends of the steps of the lanes that have passed `from`.
-  pure subroutine widen_by_ends(has_time, t_end, x_end, gate, highest, lowest, highest_time)
+  pure subroutine widen_by_ends(has_time, t_end, x_end, bound, highest, lowest, highest_time)
     logical, intent(in) :: has_time
-    real(wp), intent(in) :: t_end(width), x_end(width), gate(width)
+    real(wp), intent(in) :: t_end(width), x_end(width), bound(width)
     real(wp), intent(inout) :: highest(width), lowest(width), highest_time(width)
     integer :: i
 
     if (has_time) then
       do i = 1, width
-        highest_time(i) = merge(t_end(i), highest_time(i), min(x_end(i), -gate(i)) > highest(i))
+        highest_time(i) = merge(t_end(i), highest_time(i), min(x_end(i), -bound(i)) > highest(i))
       end do
     end if
     do i = 1, width
-      highest(i) = max(highest(i), min(x_end(i), -gate(i)))
+      highest(i) = max(highest(i), min(x_end(i), -bound(i)))
     end do
     do i = 1, width
-      lowest(i) = min(lowest(i), max(x_end(i), gate(i)))
+      lowest(i) = min(lowest(i), max(x_end(i), bound(i)))
     end do
   end subroutine widen_by_ends
 
   !> How far x and -x can pass what they must exceed to be of interest.
-  pure subroutine bound_excess(track, x_start, x_end, above, below, gate, highest, lowest, rise, fall)
-    type(track_t), intent(in) :: track
-    real(wp), intent(in), dimension(width) :: x_start, x_end, above, below, gate, highest, lowest
+  pure subroutine bound_excess(acc, x_start, x_end, above, below, bound, highest, lowest, rise, fall)
+    type(accumulator_t), intent(in) :: acc
+    real(wp), intent(in), dimension(width) :: x_start, x_end, above, below, bound, highest, lowest
     real(wp), intent(out) :: rise(width), fall(width)
     integer :: i
 
     rise = huge(0.0_wp)
     fall = huge(0.0_wp)
-    if (track%has_size) then
+    if (acc%has_size) then
       do i = 1, width
         rise(i) = max(highest(i), -lowest(i))
       end do
       fall = rise
     end if
-    if (track%has_max) rise = highest
-    if (track%has_min) fall = -lowest
+    if (acc%has_max) rise = highest
+    if (acc%has_min) fall = -lowest
     do i = 1, width
-      rise(i) = (max(x_start(i), x_end(i)) + above(i)) - max(rise(i), gate(i))
+      rise(i) = (max(x_start(i), x_end(i)) + above(i)) - max(rise(i), bound(i))
     end do
     do i = 1, width
-      fall(i) = (below(i) - min(x_start(i), x_end(i))) - max(fall(i), gate(i))
+      fall(i) = (below(i) - min(x_start(i), x_end(i))) - max(fall(i), bound(i))
     end do
   end subroutine bound_excess
 
@@ -289,35 +289,35 @@ contains
   end function any_positive
 
   !> Widens the range by the extremes of a step, or of what of it lies after `from` and before its cut.
-  pure subroutine look_inside(self, track, i, number, t, h, until, degree, rise, fall)
+  pure subroutine look_inside(self, acc, i, number, t, h, until, degree, rise, fall)
     type(linear_statistics_t), intent(in) :: self
-    type(track_t), intent(inout) :: track
+    type(accumulator_t), intent(inout) :: acc
     integer, intent(in) :: i, number
     real(wp), intent(in) :: t, h, until   !! the step
     integer, intent(in) :: degree
     real(wp), intent(in) :: rise, fall   !! positive if x, if -x can be of interest
-    real(wp) :: bar, c(0:most_degrees), place, t_start
+    real(wp) :: bar, c(0:max_degree), place, t_start
     logical :: found
 
-    associate (highest => track%highest(i, number), lowest => track%lowest(i, number), time => track%highest_time(i, number), &
+    associate (highest => acc%highest(i, number), lowest => acc%lowest(i, number), time => acc%highest_time(i, number), &
                x_end => self%strip%x_end(i), t_end => self%strip%t_end(i))
-      call take_part(self%strip, i, track%from, t, h, until, degree, c, t_start)
-      if (track%gate(i, number) > 0) then
-        call open_gate(track, i, number, c(0), t_start)
+      call cut_step(self%strip, i, acc%from, t, h, until, degree, c, t_start)
+      if (acc%bound(i, number) > 0) then
+        call start_range(acc, i, number, c(0), t_start)
         if (x_end > highest) time = t_end
         highest = max(highest, x_end)
         lowest = min(lowest, x_end)
       end if
-      if (rise > 0 .and. (track%has_max .or. track%has_size)) then
+      if (rise > 0 .and. (acc%has_max .or. acc%has_size)) then
         bar = highest
-        if (.not. track%has_max) bar = max(highest, -lowest)
+        if (.not. acc%has_max) bar = max(highest, -lowest)
         call raise_to_maximum(degree, self%to_bernstein, c, bar, place, found)
         if (found) highest = bar
         if (found) time = t_start + place * (t_end - t_start)
       end if
-      if (fall > 0 .and. (track%has_min .or. track%has_size)) then
+      if (fall > 0 .and. (acc%has_min .or. acc%has_size)) then
         bar = -lowest
-        if (.not. track%has_min) bar = max(highest, -lowest)
+        if (.not. acc%has_min) bar = max(highest, -lowest)
         c(:degree) = -c(:degree)
         call raise_to_maximum(degree, self%to_bernstein, c, bar, place, found)
         if (found) lowest = -bar
@@ -326,38 +326,38 @@ contains
   end subroutine look_inside
 
   !> Adds the integrals of a column and of its square over what of the steps lies after `from`.
-  subroutine integrate_strip(self, track, number, steps, degree)
+  subroutine integrate_strip(self, acc, number, steps, degree)
     type(linear_statistics_t), intent(inout) :: self
-    type(track_t), intent(inout) :: track
+    type(accumulator_t), intent(inout) :: acc
     integer, intent(in) :: number
-    type(steps_t), intent(in) :: steps
+    type(step_block_t), intent(in) :: steps
     integer, intent(in) :: degree
-    real(wp) :: c(0:most_degrees), duration(width), t_start
+    real(wp) :: c(0:max_degree), duration(width), t_start
     integer :: i
 
     duration = 0.0_wp
-    if (steps%may_be_cut .or. track%from > self%t_start) then
+    if (steps%may_be_cut .or. acc%from > self%t_start) then
       self%cut = self%strip
       do i = 1, self%strip%lanes
         associate (lane => self%strip%before + i)
-          if (.not. steps%taken(lane) .or. steps%t_new(lane) <= track%from) cycle
-          call take_part(self%strip, i, track%from, steps%t(lane), steps%h(lane), steps%until(lane), degree, c(:degree), t_start)
+          if (.not. steps%taken(lane) .or. steps%t_new(lane) <= acc%from) cycle
+          call cut_step(self%strip, i, acc%from, steps%t(lane), steps%h(lane), steps%theta_end(lane), degree, c(:degree), t_start)
           duration(i) = steps%t_new(lane) - t_start
         end associate
         self%cut%x_start(i) = c(0)
         self%cut%c(i, :degree) = c(1:degree)
         self%cut%scale(i) = 1.0_wp
       end do
-      call add_integrals(self%cut, degree, self%nodes, self%weights, duration, self%columns%linear(1, track%column, number), &
-                         self%columns%cubic(1, track%column, number), track%integral(1, number), track%square(1, number))
+      call add_integrals(self%cut, degree, self%nodes, self%weights, duration, self%columns%linear(1, acc%column, number), &
+                         self%columns%cubic(1, acc%column, number), acc%integral(1, number), acc%square(1, number))
     else
       do i = 1, self%strip%lanes
         associate (lane => self%strip%before + i)
           if (steps%taken(lane)) duration(i) = steps%t_new(lane) - steps%t(lane)
         end associate
       end do
-      call add_integrals(self%strip, degree, self%nodes, self%weights, duration, self%columns%linear(1, track%column, number), &
-                         self%columns%cubic(1, track%column, number), track%integral(1, number), track%square(1, number))
+      call add_integrals(self%strip, degree, self%nodes, self%weights, duration, self%columns%linear(1, acc%column, number), &
+                         self%columns%cubic(1, acc%column, number), acc%integral(1, number), acc%square(1, number))
     end if
   end subroutine integrate_strip
 
@@ -372,20 +372,20 @@ contains
         value = columns%law(column, lane, self%x_end(lane, column))
         return
       end if
-      associate (track => self%tracks(self%track(number)), at => place_of(lane), strip => strip_of(lane))
+      associate (acc => self%accumulators(self%acc(number)), at => lane_in_strip(lane), strip => strip_of(lane))
         select case (self%statistics(number)%kind)
         case (statistic_max)
-          value = columns%law(column, lane, track%highest(at, strip))
+          value = columns%law(column, lane, acc%highest(at, strip))
         case (statistic_min)
-          value = columns%law(column, lane, track%lowest(at, strip))
+          value = columns%law(column, lane, acc%lowest(at, strip))
         case (statistic_max_abs)
-          value = columns%law(column, lane, max(track%highest(at, strip), -track%lowest(at, strip)))
+          value = columns%law(column, lane, max(acc%highest(at, strip), -acc%lowest(at, strip)))
         case (statistic_time_of_max)
-          value = track%highest_time(at, strip)
+          value = acc%highest_time(at, strip)
         case (statistic_mean)
-          value = track%integral(at, strip) / (self%t_end - track%from)
+          value = acc%integral(at, strip) / (self%t_end - acc%from)
         case (statistic_rms)
-          value = sqrt(track%square(at, strip) / (self%t_end - track%from))
+          value = sqrt(acc%square(at, strip) / (self%t_end - acc%from))
         case default
           error stop 'nocdyn_linear_statistics: there is no such statistic'
         end select

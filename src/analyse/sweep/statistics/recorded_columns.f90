@@ -2,7 +2,7 @@
 module nocdyn_recorded_columns
   use nocdyn_formulation, only: formulation_t
   use nocdyn_kinds, only: wp
-  use nocdyn_lane_numbers, only: lane_numbers_t
+  use nocdyn_lane_parameters, only: lane_parameters_t
   use nocdyn_reduced, only: reduced_t
   use nocdyn_trajectory_columns, only: column_angle, column_elastic, column_element, column_kinetic, column_member, &
     column_reaction, column_residual, column_speed, column_t, column_time, column_work_in, column_work_out
@@ -16,7 +16,7 @@ module nocdyn_recorded_columns
   type, public :: recorded_columns_t
     class(formulation_t), allocatable :: formulation
     type(column_t), allocatable, private :: columns(:)
-    type(lane_numbers_t), private :: numbers             !! of `formulation`, once a lane has been copied
+    type(lane_parameters_t), private :: parameters             !! of `formulation`, once a lane has been copied
     logical, private :: have_reactions = .false., have_energies = .false.
     real(wp), allocatable, private :: values(:)          !! of one quantity of a bank, work space
     real(wp), allocatable, private :: lambda(:)          !! multipliers, work space
@@ -24,9 +24,9 @@ module nocdyn_recorded_columns
     real(wp), allocatable, private :: start_energy(:)    !! [J], [lanes]
   contains
     procedure :: copy_lane
-    procedure :: begin
+    procedure :: start_lane
     procedure :: observe
-    procedure :: take_values
+    procedure :: fill_row
   end type recorded_columns_t
 
 contains
@@ -37,7 +37,7 @@ contains
     type(recorded_columns_t) :: self
     integer :: i
 
-    if (any(columns%kind >= column_work_in) .and. .not. formulation%is_audited) then
+    if (any(columns%kind >= column_work_in) .and. .not. formulation%has_energy_balance) then
       error stop 'nocdyn_recorded_columns: works need a formulation that is audited'
     end if
     allocate (self%formulation, source=formulation)
@@ -46,33 +46,33 @@ contains
     self%have_energies = any(columns%kind == column_elastic .or. columns%kind == column_residual)
     associate (banks => formulation%machine%banks)
       allocate (self%values(maxval([(size(banks(i)%bank%to), i=1, size(banks))])), source=0.0_wp)
-      allocate (self%is_source, source=[(spread(banks(i)%bank%is_source(), 1, size(banks(i)%bank%accounted)), i=1, size(banks))])
+      allocate (self%is_source, source=[(spread(banks(i)%bank%is_source(), 1, size(banks(i)%bank%with_work)), i=1, size(banks))])
     end associate
     allocate (self%lambda(formulation%machine%constraints%rows()), source=0.0_wp)
     allocate (self%start_energy(formulation%lanes), source=0.0_wp)
   end function new_recorded_columns
 
   !> Gives a lane the numbers that it has in the formulation which is integrated.
-  subroutine copy_lane(self, lane, numbers)
+  subroutine copy_lane(self, lane, parameters)
     class(recorded_columns_t), target, intent(inout) :: self
     integer, intent(in) :: lane
-    type(lane_numbers_t), intent(in) :: numbers
+    type(lane_parameters_t), intent(in) :: parameters
 
     select type (formulation => self%formulation)
     class is (reduced_t)
-      if (self%numbers%slabs == 0) call formulation%list_numbers(self%numbers)
+      if (self%parameters%arrays == 0) call formulation%list_parameters(self%parameters)
     end select
-    call self%numbers%copy_lane(lane, numbers, lane)
-    call self%formulation%receive(lane)
+    call self%parameters%copy_lane(lane, parameters, lane)
+    call self%formulation%refresh_lane(lane)
   end subroutine copy_lane
 
   !> Takes the energy of a lane at its start, after `observe`.
-  subroutine begin(self, lane)
+  subroutine start_lane(self, lane)
     class(recorded_columns_t), intent(inout) :: self
     integer, intent(in) :: lane
 
     if (self%have_energies) self%start_energy(lane) = kinetic_energy(self, lane) + elastic_energy(self, lane)
-  end subroutine begin
+  end subroutine start_lane
 
   !> Brings all lanes to a time and state.
   subroutine observe(self, t, y)
@@ -81,11 +81,11 @@ contains
     real(wp), contiguous, intent(in) :: y(:, :)   !! [lanes, states + quadratures]
 
     call self%formulation%observe(t, y)
-    if (self%have_energies) call self%formulation%machine%assess()
+    if (self%have_energies) call self%formulation%machine%evaluate_energies()
   end subroutine observe
 
   !> The values of a lane's columns, after `observe` at (t, y).
-  subroutine take_values(self, lane, t, y, row)
+  subroutine fill_row(self, lane, t, y, row)
     class(recorded_columns_t), intent(inout) :: self
     integer, intent(in) :: lane
     real(wp), contiguous, intent(in) :: t(:)
@@ -103,9 +103,9 @@ contains
           case (column_time)
             row(i) = t(lane)
           case (column_angle)
-            row(i) = self%formulation%phi(lane, column%place)
+            row(i) = self%formulation%phi(lane, column%index)
           case (column_speed)
-            row(i) = self%formulation%omega(lane, column%place)
+            row(i) = self%formulation%omega(lane, column%index)
           case (column_element)
             if (column%bank /= bank .or. column%quantity /= quantity) then
               bank = column%bank
@@ -113,19 +113,19 @@ contains
               call machine%banks(bank)%bank%observe(machine%elements, quantity, lane, &
                                                     self%values(:size(machine%banks(bank)%bank%to)))
             end if
-            row(i) = self%values(column%place)
+            row(i) = self%values(column%index)
           case (column_reaction)
-            row(i) = self%lambda(column%place)
+            row(i) = self%lambda(column%index)
           case (column_member)
-            row(i) = machine%constraints%members%factor(lane, column%place) &
-                     * self%lambda(machine%constraints%members%row(column%place))
+            row(i) = machine%constraints%members%factor(lane, column%index) &
+                     * self%lambda(machine%constraints%members%row(column%index))
           case default
             row(i) = energy(self, lane, column%kind, y)
           end select
         end associate
       end do
     end associate
-  end subroutine take_values
+  end subroutine fill_row
 
   !> Of a column of the whole machine [J].
   real(wp) function energy(self, lane, kind, y)

@@ -4,16 +4,16 @@
 !> Chebyshev-Lobatto places, as many as the solution has coefficients there. Integrals are taken by as many Gauss nodes: a
 !> linear function of the state and its square are integrated exactly.
 module nocdyn_sampled_statistics
-  use nocdyn_chebyshev, only: lay_places
-  use nocdyn_extremes, only: allocate_ranges, begin_ranges, right_before, widen
+  use nocdyn_chebyshev, only: lobatto_nodes
+  use nocdyn_extremes, only: allocate_ranges, start_ranges, before_jump, widen_ranges
   use nocdyn_formulation, only: formulation_t
   use nocdyn_kinds, only: wp
-  use nocdyn_quadrature, only: lay_gauss_rule
+  use nocdyn_quadrature, only: gauss_legendre_rule
   use nocdyn_recorded_columns, only: new_recorded_columns, recorded_columns_t
-  use nocdyn_settling, only: settling_t
+  use nocdyn_settling_time, only: settling_history_t
   use nocdyn_statistics, only: statistic_final, statistic_max, statistic_max_abs, statistic_mean, statistic_min, statistic_rms, &
     statistic_settling_time, statistic_t, statistic_time_of_max
-  use nocdyn_system, only: ranges_t, steps_t
+  use nocdyn_system, only: ranges_t, step_block_t
   use nocdyn_trajectory_columns, only: column_t
   implicit none (type, external)
   private
@@ -21,27 +21,27 @@ module nocdyn_sampled_statistics
   public :: new_sampled_statistics
 
   !> What is kept from a time on. A column is of no use here unless a statistic asks for it.
-  type :: span_t
+  type :: window_t
     real(wp) :: from = 0.0_wp                              !! [s]
     integer, allocatable :: ranged(:)                      !! columns whose extremes are wanted
     integer, allocatable :: summed(:)                      !! whose integrals are
     integer, allocatable :: settled(:)                     !! whose last exit from a band is
-    logical, allocatable :: begun(:)                       !! whether a lane has passed `from`, [lanes]
+    logical, allocatable :: has_started(:)                       !! whether a lane has passed `from`, [lanes]
     type(ranges_t), allocatable :: ranges(:)               !! of `ranged`, [lanes]
     real(wp), allocatable :: integral(:, :), square(:, :)  !! over time, [summed, lanes]
     real(wp), allocatable :: first(:, :)                   !! values at `from`, [settled, lanes]
-    type(settling_t), allocatable :: kept(:)               !! [lanes]
+    type(settling_history_t), allocatable :: kept(:)               !! [lanes]
     real(wp), allocatable :: sample(:, :)                  !! of `ranged`, [ranged, places]
-  end type span_t
+  end type window_t
 
   type, public :: sampled_statistics_t
     type(recorded_columns_t) :: recorded
     real(wp), private :: t_end = 0.0_wp
     type(statistic_t), allocatable, private :: statistics(:)
     integer, allocatable, private :: column(:)      !! of each statistic among the recorded
-    integer, allocatable, private :: span(:)        !! of each statistic
-    integer, allocatable, private :: place(:)       !! of its column in the list of the span
-    type(span_t), allocatable, private :: spans(:)
+    integer, allocatable, private :: window(:)        !! of each statistic
+    integer, allocatable, private :: position(:)       !! of its column in the list of the span
+    type(window_t), allocatable, private :: windows(:)
     logical, private :: has_places = .false., has_nodes = .false.
     real(wp), allocatable, private :: places(:)     !! of Chebyshev and Lobatto, -1 to 1
     real(wp), allocatable, private :: to_series(:, :)
@@ -54,9 +54,9 @@ module nocdyn_sampled_statistics
     real(wp), allocatable, private :: row(:)                      !! [columns]
     real(wp), allocatable, private :: t(:), theta(:), y(:, :)     !! where the lanes are looked at
   contains
-    procedure :: begin
-    procedure :: follow
-    procedure :: conclude
+    procedure :: start_lane
+    procedure :: add_steps
+    procedure :: finish_lane
     procedure :: value
   end type sampled_statistics_t
 
@@ -74,9 +74,9 @@ contains
     allocate (self%statistics, source=statistics)
     allocate (column_numbers(size(statistics)), source=statistics%column)
     wanted = distinct(column_numbers)
-    self%column = places_in(wanted, column_numbers)
+    self%column = positions_in(wanted, column_numbers)
     self%recorded = new_recorded_columns(formulation, columns(wanted))
-    call divide_spans(self, formulation%lanes)
+    call make_windows(self, formulation%lanes)
     associate (lanes => formulation%lanes)
       allocate (self%active(lanes), source=.false.)
       allocate (self%start(lanes), self%sampled_start(lanes), self%t(lanes), self%theta(lanes), source=0.0_wp)
@@ -95,89 +95,89 @@ contains
   end function distinct
 
   !> Where the numbers of a list stand in another, 0 if they do not.
-  pure function places_in(list, numbers) result(places)
+  pure function positions_in(list, numbers) result(places)
     integer, intent(in) :: list(:), numbers(:)
     integer :: places(size(numbers))
     integer :: i
 
     places = [(findloc(list, numbers(i), dim=1), i=1, size(numbers))]
-  end function places_in
+  end function positions_in
 
   !> One span for each `from`.
-  subroutine divide_spans(self, lanes)
+  subroutine make_windows(self, lanes)
     type(sampled_statistics_t), intent(inout) :: self
     integer, intent(in) :: lanes
-    integer :: i, k, spans
+    integer :: i, k, windows
 
-    allocate (self%span(size(self%statistics)), self%place(size(self%statistics)), source=0)
-    spans = 0
+    allocate (self%window(size(self%statistics)), self%position(size(self%statistics)), source=0)
+    windows = 0
     do i = 1, size(self%statistics)
       if (self%statistics(i)%kind == statistic_final) cycle
       do k = 1, i - 1
-        if (abs(self%statistics(k)%from - self%statistics(i)%from) <= 0) self%span(i) = max(self%span(i), self%span(k))
+        if (abs(self%statistics(k)%from - self%statistics(i)%from) <= 0) self%window(i) = max(self%window(i), self%window(k))
       end do
-      if (self%span(i) == 0) spans = spans + 1
-      if (self%span(i) == 0) self%span(i) = spans
+      if (self%window(i) == 0) windows = windows + 1
+      if (self%window(i) == 0) self%window(i) = windows
     end do
-    allocate (self%spans(spans))
+    allocate (self%windows(windows))
     do i = 1, size(self%statistics)
-      if (self%span(i) > 0) self%spans(self%span(i))%from = self%statistics(i)%from
+      if (self%window(i) > 0) self%windows(self%window(i))%from = self%statistics(i)%from
     end do
-    do i = 1, spans
-      call fill_span(self, i, lanes)
+    do i = 1, windows
+      call fill_window(self, i, lanes)
     end do
-    self%has_places = any([(size(self%spans(i)%ranged) + size(self%spans(i)%settled) > 0, i=1, spans)])
-    self%has_nodes = any([(size(self%spans(i)%summed) > 0, i=1, spans)])
-  end subroutine divide_spans
+    self%has_places = any([(size(self%windows(i)%ranged) + size(self%windows(i)%settled) > 0, i=1, windows)])
+    self%has_nodes = any([(size(self%windows(i)%summed) > 0, i=1, windows)])
+  end subroutine make_windows
 
-  subroutine fill_span(self, number, lanes)
+  subroutine fill_window(self, number, lanes)
     type(sampled_statistics_t), intent(inout) :: self
     integer, intent(in) :: number, lanes
     logical, dimension(size(self%statistics)) :: here, is_settled, is_summed
     integer :: lane
 
-    here = self%span == number
+    here = self%window == number
     is_settled = self%statistics%kind == statistic_settling_time
     is_summed = self%statistics%kind == statistic_mean .or. self%statistics%kind == statistic_rms
-    associate (span => self%spans(number))
-      span%settled = distinct(pack(self%column, here .and. is_settled))
-      span%summed = distinct(pack(self%column, here .and. is_summed))
-      span%ranged = distinct(pack(self%column, here .and. .not. (is_settled .or. is_summed)))
-      where (here) self%place = places_in(span%ranged, self%column)
-      where (here .and. is_summed) self%place = places_in(span%summed, self%column)
-      where (here .and. is_settled) self%place = places_in(span%settled, self%column)
-      allocate (span%begun(lanes), source=.false.)
-      allocate (span%integral(size(span%summed), lanes), span%square(size(span%summed), lanes), &
-                span%first(size(span%settled), lanes), source=0.0_wp)
-      allocate (span%kept(lanes), span%ranges(lanes))
+    associate (window => self%windows(number))
+      window%settled = distinct(pack(self%column, here .and. is_settled))
+      window%summed = distinct(pack(self%column, here .and. is_summed))
+      window%ranged = distinct(pack(self%column, here .and. .not. (is_settled .or. is_summed)))
+      where (here) self%position = positions_in(window%ranged, self%column)
+      where (here .and. is_summed) self%position = positions_in(window%summed, self%column)
+      where (here .and. is_settled) self%position = positions_in(window%settled, self%column)
+      allocate (window%has_started(lanes), source=.false.)
+      allocate (window%integral(size(window%summed), lanes), window%square(size(window%summed), lanes), &
+                window%first(size(window%settled), lanes), source=0.0_wp)
+      allocate (window%kept(lanes), window%ranges(lanes))
       do lane = 1, lanes
-        call allocate_ranges(span%ranges(lane), size(span%ranged))
+        call allocate_ranges(window%ranges(lane), size(window%ranged))
       end do
     end associate
-  end subroutine fill_span
+  end subroutine fill_window
 
   !> A lane starts anew; the numbers of its machine are in `recorded` already.
-  subroutine begin(self, lane, t, y)
+  subroutine start_lane(self, lane, t, y)
     class(sampled_statistics_t), intent(inout) :: self
     integer, intent(in) :: lane
     real(wp), intent(in) :: t
     real(wp), contiguous, intent(in) :: y(:)   !! [states + quadratures]
     integer :: i
 
-    call look_at(self, lane, t, y)
-    call self%recorded%begin(lane)
-    do i = 1, size(self%spans)
-      associate (span => self%spans(i))
-        span%begun(lane) = .false.
-        span%integral(:, lane) = 0.0_wp
-        span%square(:, lane) = 0.0_wp
-        call span%kept(lane)%clear()
+    call observe_lane(self, lane, t, y)
+    call self%recorded%start_lane(lane)
+    do i = 1, size(self%windows)
+      associate (window => self%windows(i))
+        window%has_started(lane) = .false.
+        window%integral(:, lane) = 0.0_wp
+        window%square(:, lane) = 0.0_wp
+        call window%kept(lane)%clear()
       end associate
     end do
-  end subroutine begin
+  end subroutine start_lane
 
   !> Brings one lane to a time and state, and leaves the others where they are.
-  subroutine look_at(self, lane, t, y)
+  subroutine observe_lane(self, lane, t, y)
     type(sampled_statistics_t), intent(inout) :: self
     integer, intent(in) :: lane
     real(wp), intent(in) :: t
@@ -186,47 +186,47 @@ contains
     self%t(lane) = t
     self%y(lane, :) = y
     call self%recorded%observe(self%t, self%y)
-  end subroutine look_at
+  end subroutine observe_lane
 
   !> The end of a lane.
-  subroutine conclude(self, lane, t, y)
+  subroutine finish_lane(self, lane, t, y)
     class(sampled_statistics_t), intent(inout) :: self
     integer, intent(in) :: lane
     real(wp), intent(in) :: t
     real(wp), contiguous, intent(in) :: y(:)
 
-    call look_at(self, lane, t, y)
-    call self%recorded%take_values(lane, self%t, self%y, self%row)
+    call observe_lane(self, lane, t, y)
+    call self%recorded%fill_row(lane, self%t, self%y, self%row)
     self%final(:, lane) = self%row
-  end subroutine conclude
+  end subroutine finish_lane
 
   !> The steps of a block.
-  subroutine follow(self, steps, chosen, y, c)
+  subroutine add_steps(self, steps, chosen, y, c)
     class(sampled_statistics_t), intent(inout) :: self
-    type(steps_t), intent(in) :: steps
+    type(step_block_t), intent(in) :: steps
     logical, intent(in) :: chosen(:)                 !! lanes that are wanted
     real(wp), contiguous, intent(in) :: y(:, :)      !! [lanes, padded columns]
     real(wp), contiguous, intent(in) :: c(:, :, :)   !! [lanes, padded columns, degree]
     integer :: i, lane
 
-    if (size(self%spans) == 0) return
-    call lay_out(self, size(c, 3))
+    if (size(self%windows) == 0) return
+    call allocate_work(self, size(c, 3))
     self%sampled_start(:) = huge(0.0_wp)
-    do i = 1, size(self%spans)
-      associate (span => self%spans(i))
-        self%active(:) = steps%taken .and. chosen .and. steps%t_new > span%from
+    do i = 1, size(self%windows)
+      associate (window => self%windows(i))
+        self%active(:) = steps%taken .and. chosen .and. steps%t_new > window%from
         if (.not. any(self%active)) cycle
-        self%start(:) = merge(max(steps%t, span%from), huge(0.0_wp), self%active)
+        self%start(:) = merge(max(steps%t, window%from), huge(0.0_wp), self%active)
         if (any(abs(self%start - self%sampled_start) > 0)) call sample_parts(self, steps, y, c)
         do lane = 1, size(self%active)
-          if (self%active(lane)) call take_part(self, span, lane, steps%t_new(lane))
+          if (self%active(lane)) call accumulate(self, window, lane, steps%t_new(lane))
         end do
       end associate
     end do
-  end subroutine follow
+  end subroutine add_steps
 
   !> Places and nodes for a degree of the solution inside the steps.
-  subroutine lay_out(self, degree)
+  subroutine allocate_work(self, degree)
     type(sampled_statistics_t), intent(inout) :: self
     integer, intent(in) :: degree
     integer :: i
@@ -236,21 +236,21 @@ contains
       return
     end if
     allocate (self%places(degree + 1), self%to_series(degree + 1, degree + 1), self%nodes(degree + 1), self%weights(degree + 1))
-    call lay_places(degree, self%places, self%to_series)
-    call lay_gauss_rule(degree + 1, self%nodes, self%weights)
+    call lobatto_nodes(degree, self%places, self%to_series)
+    call gauss_legendre_rule(degree + 1, self%nodes, self%weights)
     associate (columns => size(self%row), lanes => size(self%active))
       allocate (self%values(degree + 1, columns, lanes), self%at_nodes(columns, degree + 1, lanes), source=0.0_wp)
     end associate
-    do i = 1, size(self%spans)
-      allocate (self%spans(i)%sample(size(self%spans(i)%ranged), degree + 1), source=0.0_wp)
+    do i = 1, size(self%windows)
+      allocate (self%windows(i)%sample(size(self%windows(i)%ranged), degree + 1), source=0.0_wp)
     end do
-  end subroutine lay_out
+  end subroutine allocate_work
 
   !> The columns at the places and nodes of the parts of the steps of the active lanes. A column that jumps at a crossing where
   !> the step ends is taken right before: a jump is no part of the step.
   subroutine sample_parts(self, steps, y, c)
     type(sampled_statistics_t), intent(inout) :: self
-    type(steps_t), intent(in) :: steps
+    type(step_block_t), intent(in) :: steps
     real(wp), contiguous, intent(in) :: y(:, :), c(:, :, :)
     real(wp) :: half
     integer :: i, lane, last
@@ -264,13 +264,13 @@ contains
         half = 0.5_wp * (steps%t_new(lane) - self%start(lane))
         self%t(lane) = self%start(lane) + half + self%places(i) * half
         if (i == last .and. steps%crosses(lane)) then
-          self%t(lane) = max(self%start(lane), steps%t_new(lane) - right_before * spacing(steps%t_new(lane)))
+          self%t(lane) = max(self%start(lane), steps%t_new(lane) - before_jump * spacing(steps%t_new(lane)))
         end if
       end do
       call sample_states(self, steps, y, c)
       do lane = 1, size(self%active)
         if (.not. self%active(lane)) cycle
-        call self%recorded%take_values(lane, self%t, self%y, self%row)
+        call self%recorded%fill_row(lane, self%t, self%y, self%row)
         self%values(i, :, lane) = self%row
       end do
     end do
@@ -282,7 +282,7 @@ contains
       call sample_states(self, steps, y, c)
       do lane = 1, size(self%active)
         if (.not. self%active(lane)) cycle
-        call self%recorded%take_values(lane, self%t, self%y, self%row)
+        call self%recorded%fill_row(lane, self%t, self%y, self%row)
         self%at_nodes(:, i, lane) = self%row
       end do
     end do
@@ -291,7 +291,7 @@ contains
   !> Observes the active lanes at the times t, and the others where their steps start.
   subroutine sample_states(self, steps, y, c)
     type(sampled_statistics_t), intent(inout) :: self
-    type(steps_t), intent(in) :: steps
+    type(step_block_t), intent(in) :: steps
     real(wp), contiguous, intent(in) :: y(:, :), c(:, :, :)
     integer :: component, lane, p
 
@@ -313,38 +313,39 @@ contains
   end subroutine sample_states
 
   !> Takes part of a lane's step into what is kept of a span.
-  subroutine take_part(self, span, lane, t_end)
+  subroutine accumulate(self, window, lane, t_end)
     type(sampled_statistics_t), intent(in) :: self
-    type(span_t), intent(inout) :: span
+    type(window_t), intent(inout) :: window
     integer, intent(in) :: lane
     real(wp), intent(in) :: t_end   !! of the step
     integer :: i, k
 
     associate (duration => t_end - self%start(lane))
-      do i = 1, size(span%ranged)
-        span%sample(i, :) = self%values(:, span%ranged(i), lane)
+      do i = 1, size(window%ranged)
+        window%sample(i, :) = self%values(:, window%ranged(i), lane)
       end do
-      if (.not. span%begun(lane)) then
-        call begin_ranges(span%ranges(lane), span%sample(:, 1), self%start(lane))
-        do i = 1, size(span%settled)
-          span%first(i, lane) = self%values(1, span%settled(i), lane)
+      if (.not. window%has_started(lane)) then
+        call start_ranges(window%ranges(lane), window%sample(:, 1), self%start(lane))
+        do i = 1, size(window%settled)
+          window%first(i, lane) = self%values(1, window%settled(i), lane)
         end do
       end if
-      span%begun(lane) = .true.
-      if (size(span%ranged) > 0) then
-        call widen(size(self%places), self%places, self%to_series, span%sample, span%ranges(lane), self%start(lane), t_end)
+      window%has_started(lane) = .true.
+      if (size(window%ranged) > 0) then
+        call widen_ranges(size(self%places), self%places, self%to_series, window%sample, window%ranges(lane), self%start(lane), &
+                          t_end)
       end if
-      if (size(span%settled) > 0) call span%kept(lane)%keep(self%start(lane), t_end, span%settled, self%values(:, :, lane))
-      do i = 1, size(span%summed)
+      if (size(window%settled) > 0) call window%kept(lane)%add(self%start(lane), t_end, window%settled, self%values(:, :, lane))
+      do i = 1, size(window%summed)
         do k = 1, size(self%nodes)
-          associate (x => self%at_nodes(span%summed(i), k, lane))
-            span%integral(i, lane) = span%integral(i, lane) + duration * self%weights(k) * x
-            span%square(i, lane) = span%square(i, lane) + duration * self%weights(k) * x**2
+          associate (x => self%at_nodes(window%summed(i), k, lane))
+            window%integral(i, lane) = window%integral(i, lane) + duration * self%weights(k) * x
+            window%square(i, lane) = window%square(i, lane) + duration * self%weights(k) * x**2
           end associate
         end do
       end do
     end associate
-  end subroutine take_part
+  end subroutine accumulate
 
   !> A statistic of a lane that has reached its end.
   real(wp) function value(self, number, lane)
@@ -352,30 +353,30 @@ contains
     integer, intent(in) :: number   !! of the statistic
     integer, intent(in) :: lane
 
-    associate (statistic => self%statistics(number), i => self%place(number))
+    associate (statistic => self%statistics(number), i => self%position(number))
       if (statistic%kind == statistic_final) then
         value = self%final(self%column(number), lane)
         return
       end if
-      associate (span => self%spans(self%span(number)))
+      associate (window => self%windows(self%window(number)))
         select case (statistic%kind)
         case (statistic_max)
-          value = span%ranges(lane)%highest(i)
+          value = window%ranges(lane)%highest(i)
         case (statistic_min)
-          value = span%ranges(lane)%lowest(i)
+          value = window%ranges(lane)%lowest(i)
         case (statistic_max_abs)
-          value = max(abs(span%ranges(lane)%lowest(i)), abs(span%ranges(lane)%highest(i)))
+          value = max(abs(window%ranges(lane)%lowest(i)), abs(window%ranges(lane)%highest(i)))
         case (statistic_time_of_max)
-          value = span%ranges(lane)%highest_time(i)
+          value = window%ranges(lane)%highest_time(i)
         case (statistic_mean)
-          value = span%integral(i, lane) / (self%t_end - span%from)
+          value = window%integral(i, lane) / (self%t_end - window%from)
         case (statistic_rms)
-          value = sqrt(span%square(i, lane) / (self%t_end - span%from))
+          value = sqrt(window%square(i, lane) / (self%t_end - window%from))
         case (statistic_settling_time)
           associate (end_value => self%final(self%column(number), lane))
-            value = span%kept(lane)%last_exit(self%to_series, i, end_value, &
-                                              statistic%band * abs(span%first(i, lane) - end_value)) &
-                    - span%from
+            value = window%kept(lane)%last_exit(self%to_series, i, end_value, &
+                                              statistic%band * abs(window%first(i, lane) - end_value)) &
+                    - window%from
           end associate
         case default
           error stop 'nocdyn_sampled_statistics: there is no such statistic'

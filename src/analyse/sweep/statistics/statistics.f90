@@ -5,7 +5,7 @@ module nocdyn_statistics
   implicit none (type, external)
   private
 
-  public :: new_statistic, find_columns, is_torque, value_of_nothing
+  public :: new_statistic, find_columns, is_torque, value_of_zero_column
 
   integer, parameter, public :: statistic_final = 1           !! at the end
   integer, parameter, public :: statistic_max = 2             !! in continuous time, as all of them are
@@ -93,11 +93,11 @@ contains
   end function is_torque
 
   !> The statistic of a column that is 0 all the time.
-  elemental real(wp) function value_of_nothing(statistic) result(value)
+  elemental real(wp) function value_of_zero_column(statistic) result(value)
     type(statistic_t), intent(in) :: statistic
 
     value = 0.0_wp
     if (statistic%kind == statistic_time_of_max) value = statistic%from
-  end function value_of_nothing
+  end function value_of_zero_column
 
 end module nocdyn_statistics

@@ -1,12 +1,12 @@
 !> A linear function x of the state in the last steps of some lanes: a polynomial in each, in vector loops over the lanes.
 module nocdyn_step_strips
-  use nocdyn_bernstein, only: most_degrees, shift_origin
+  use nocdyn_bernstein, only: max_degree, shift_origin
   use nocdyn_kinds, only: wp
   use nocdyn_linear_columns, only: width
   implicit none (type, external)
   private
 
-  public :: lay_depths, expand, forget_slopes, take_part, add_integrals
+  public :: fill_chord_gaps, expand, exclude_monotonic, cut_step, add_integrals
 
   !> The steps of some lanes that are looked at together, and x in them.
   type, public :: strip_t
@@ -16,27 +16,27 @@ module nocdyn_step_strips
     real(wp), dimension(width) :: t_end = 0.0_wp
     real(wp), dimension(width) :: scale = 0.0_wp      !! 0 in lanes that have not taken a step: x stands still there
     real(wp), dimension(width) :: x_start = 0.0_wp, x_end = 0.0_wp
-    real(wp) :: c(width, most_degrees) = 0.0_wp       !! x = x_start + sum of c_p (scale * place)^p
+    real(wp) :: c(width, max_degree) = 0.0_wp       !! x = x_start + sum of c_p (scale * place)^p
     real(wp), dimension(width) :: above = 0.0_wp, below = 0.0_wp   !! that x can leave the range of its ends by, at most
   end type strip_t
 
 contains
 
   !> The largest values of s - s^p between s = 0 and 1.
-  pure subroutine lay_depths(depth)
-    real(wp), intent(out) :: depth(:)   !! of p = 1, 2, ...
+  pure subroutine fill_chord_gaps(chord_gap)
+    real(wp), intent(out) :: chord_gap(:)   !! of p = 1, 2, ...
     integer :: p
 
-    depth(1) = 0.0_wp
-    do p = 2, size(depth)
-      depth(p) = (1.0_wp / p)**(1.0_wp / (p - 1)) * (1.0_wp - 1.0_wp / p)
+    chord_gap(1) = 0.0_wp
+    do p = 2, size(chord_gap)
+      chord_gap(p) = (1.0_wp / p)**(1.0_wp / (p - 1)) * (1.0_wp - 1.0_wp / p)
     end do
-  end subroutine lay_depths
+  end subroutine fill_chord_gaps
 
   !> x = offset + sum of factor * y, and its coefficients, in the lanes from `at` on.
-  pure subroutine expand(lanes, states, degree, at, depth, entries, component, factor, offset, y, y_new, c, strip)
+  pure subroutine expand(lanes, states, degree, at, chord_gap, entries, component, factor, offset, y, y_new, c, strip)
     integer, intent(in) :: lanes, states, degree, at
-    real(wp), intent(in) :: depth(degree)
+    real(wp), intent(in) :: chord_gap(degree)
     integer, intent(in) :: entries   !! an even number
     integer, intent(in) :: component(entries)
     real(wp), intent(in) :: factor(width, entries), offset(width)
@@ -50,14 +50,14 @@ contains
       strip%x_start = strip%x_start + factor(:, k) * y(at:at + width - 1, component(k))
       strip%x_end = strip%x_end + factor(:, k) * y_new(at:at + width - 1, component(k))
     end do
-    call take_pair(lanes, states, degree, at, component(1), component(2), factor(:, 1), factor(:, 2), c, strip%c)
+    call set_pair(lanes, states, degree, at, component(1), component(2), factor(:, 1), factor(:, 2), c, strip%c)
     do k = 3, entries, 2
       call add_pair(lanes, states, degree, at, component(k), component(k + 1), factor(:, k), factor(:, k + 1), c, strip%c)
     end do
-    call bound_bulges(degree, depth, strip%scale, strip%c, strip%above, strip%below)
+    call bound_excursions(degree, chord_gap, strip%scale, strip%c, strip%above, strip%below)
   end subroutine expand
 
-  pure subroutine take_pair(lanes, states, degree, at, j, k, factor_j, factor_k, c, x)
+  pure subroutine set_pair(lanes, states, degree, at, j, k, factor_j, factor_k, c, x)
     integer, intent(in) :: lanes, states, degree, at, j, k
     real(wp), intent(in) :: factor_j(width), factor_k(width), c(lanes, states, degree)
     real(wp), intent(inout) :: x(width, degree)
@@ -66,7 +66,7 @@ contains
     do p = 1, degree
       x(:, p) = factor_j * c(at:at + width - 1, j, p) + factor_k * c(at:at + width - 1, k, p)
     end do
-  end subroutine take_pair
+  end subroutine set_pair
 
   pure subroutine add_pair(lanes, states, degree, at, j, k, factor_j, factor_k, c, x)
     integer, intent(in) :: lanes, states, degree, at, j, k
@@ -80,9 +80,9 @@ contains
   end subroutine add_pair
 
   !> How far x can leave the range of its ends: x(s) = (1 - s) x(0) + s x(1) - sum of c_p scale^p (s - s^p).
-  pure subroutine bound_bulges(degree, depth, scale, c, above, below)
+  pure subroutine bound_excursions(degree, chord_gap, scale, c, above, below)
     integer, intent(in) :: degree
-    real(wp), intent(in) :: depth(degree), scale(width), c(width, degree)
+    real(wp), intent(in) :: chord_gap(degree), scale(width), c(width, degree)
     real(wp), intent(out) :: above(width), below(width)
     real(wp) :: sizes(width), sum(width), term
     integer :: i, p
@@ -92,7 +92,7 @@ contains
     do p = degree, 2, -1
       !GCC$ unroll 1
       do i = 1, width
-        term = depth(p) * c(i, p)
+        term = chord_gap(p) * c(i, p)
         sum(i) = term + scale(i) * sum(i)
         sizes(i) = abs(term) + scale(i) * sizes(i)
       end do
@@ -102,42 +102,42 @@ contains
       above(i) = 0.5_wp * (scale(i) * scale(i)) * (sizes(i) - sum(i))
       below(i) = 0.5_wp * (scale(i) * scale(i)) * (sizes(i) + sum(i))
     end do
-  end subroutine bound_bulges
+  end subroutine bound_excursions
 
   !> Nothing is of interest inside the steps in which x only rises or only falls:
   !> x' = (1 - s) x'(0) + s x'(1) - sum of p c_p scale^p (s - s^(p-1)).
-  pure subroutine forget_slopes(degree, depth, scale, c, rise, fall)
+  pure subroutine exclude_monotonic(degree, chord_gap, scale, c, rise, fall)
     integer, intent(in) :: degree
-    real(wp), intent(in) :: depth(degree), scale(width), c(width, degree)
+    real(wp), intent(in) :: chord_gap(degree), scale(width), c(width, degree)
     real(wp), intent(inout) :: rise(width), fall(width)
-    real(wp) :: bulges(width), end_slope(width), factor, least, most, sum(width), term
+    real(wp) :: excursions(width), end_slope(width), factor, least, most, sum(width), term
     integer :: i, p
 
     end_slope = 0.0_wp
     sum = 0.0_wp
-    bulges = 0.0_wp
+    excursions = 0.0_wp
     do p = degree, 2, -1
       factor = real(p, wp)
       !GCC$ unroll 1
       do i = 1, width
         term = factor * c(i, p)
         end_slope(i) = (term + end_slope(i)) * scale(i)
-        sum(i) = (depth(p - 1) * term + sum(i)) * scale(i)
-        bulges(i) = (depth(p - 1) * abs(term) + bulges(i)) * scale(i)
+        sum(i) = (chord_gap(p - 1) * term + sum(i)) * scale(i)
+        excursions(i) = (chord_gap(p - 1) * abs(term) + excursions(i)) * scale(i)
       end do
     end do
     !GCC$ unroll 1
     do i = 1, width
       end_slope(i) = c(i, 1) + end_slope(i)
-      least = min(c(i, 1), end_slope(i)) - 0.5_wp * (bulges(i) + sum(i))
-      most = max(c(i, 1), end_slope(i)) + 0.5_wp * (bulges(i) - sum(i))
+      least = min(c(i, 1), end_slope(i)) - 0.5_wp * (excursions(i) + sum(i))
+      most = max(c(i, 1), end_slope(i)) + 0.5_wp * (excursions(i) - sum(i))
       rise(i) = merge(rise(i), -1.0_wp, least * most <= 0)
       fall(i) = merge(fall(i), -1.0_wp, least * most <= 0)
     end do
-  end subroutine forget_slopes
+  end subroutine exclude_monotonic
 
   !> x in what of a step lies after `from` and before its cut, as a polynomial in the place there, 0 to 1.
-  pure subroutine take_part(strip, i, from, t, h, until, degree, c, t_start)
+  pure subroutine cut_step(strip, i, from, t, h, until, degree, c, t_start)
     type(strip_t), intent(in) :: strip
     integer, intent(in) :: i
     real(wp), intent(in) :: from
@@ -157,7 +157,7 @@ contains
     t_start = max(t, from)
     if (t_start <= t .and. until >= 1) return
     call shift_origin(degree, c, (t_start - t) / h, until)
-  end subroutine take_part
+  end subroutine cut_step
 
   !> By Gauss's rule with as many nodes as x has coefficients: x and its square are integrated exactly.
   pure subroutine add_integrals(strip, degree, nodes, weights, duration, linear, cubic, integral, square)

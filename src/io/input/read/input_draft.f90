@@ -33,28 +33,28 @@ module nocdyn_input_draft
 contains
 
   !> Takes over one assignment of the file.
-  subroutine assign(self, namelist, assignment, rule, complaint)
+  subroutine assign(self, namelist, assignment, rule, message)
     class(draft_t), intent(inout) :: self
     type(namelist_t), intent(in) :: namelist
     type(assignment_t), intent(in) :: assignment
     type(key_rule_t), intent(in) :: rule
-    character(len=:), allocatable, intent(out) :: complaint   !! '' if all is well
+    character(len=:), allocatable, intent(out) :: message   !! '' if all is well
     integer :: last
 
     if (self%is_written .and. (self%is_whole .or. assignment%is_whole)) then
-      complaint = doubled(self, trim(rule%name))
+      message = doubled(self, trim(rule%name))
     else
-      call find_last(namelist, assignment, rule, last, complaint)
+      call find_last(namelist, assignment, rule, last, message)
     end if
     if (.not. self%is_written) self%line = assignment%line
     self%is_written = .true.
     self%is_whole = self%is_whole .or. assignment%is_whole
-    self%is_damaged = self%is_damaged .or. assignment%is_damaged .or. complaint /= ''
+    self%is_damaged = self%is_damaged .or. assignment%is_damaged .or. message /= ''
     if (self%is_damaged) return
 
     call widen(self, last)
     if (any(self%slots(assignment%first:last:assignment%stride)%is_assigned)) then
-      complaint = doubled(self, trim(rule%name))
+      message = doubled(self, trim(rule%name))
       self%is_damaged = .true.
     else
       call fill(self, namelist, assignment, last)
@@ -62,13 +62,13 @@ contains
   end subroutine assign
 
   !> Takes over an override, which wins over the file and over earlier overrides.
-  subroutine replace(self, namelist, assignment, rule, override, complaint)
+  subroutine replace(self, namelist, assignment, rule, override, message)
     class(draft_t), intent(inout) :: self
     type(namelist_t), intent(in) :: namelist
     type(assignment_t), intent(in) :: assignment
     type(key_rule_t), intent(in) :: rule
     integer, intent(in) :: override
-    character(len=:), allocatable, intent(out) :: complaint   !! '' if all is well
+    character(len=:), allocatable, intent(out) :: message   !! '' if all is well
     integer :: last
 
     self%is_written = .true.
@@ -77,8 +77,8 @@ contains
       self%slots = [slot_t ::]
       self%is_damaged = .false.
     end if
-    call find_last(namelist, assignment, rule, last, complaint)
-    self%is_damaged = self%is_damaged .or. assignment%is_damaged .or. complaint /= ''
+    call find_last(namelist, assignment, rule, last, message)
+    self%is_damaged = self%is_damaged .or. assignment%is_damaged .or. message /= ''
     if (self%is_damaged) return
     call widen(self, last)
     call fill(self, namelist, assignment, last)
@@ -93,12 +93,12 @@ contains
   end function doubled
 
   !> Index of the last value that an assignment can reach.
-  subroutine find_last(namelist, assignment, rule, last, complaint)
+  subroutine find_last(namelist, assignment, rule, last, message)
     type(namelist_t), intent(in) :: namelist
     type(assignment_t), intent(in) :: assignment
     type(key_rule_t), intent(in) :: rule
     integer, intent(out) :: last
-    character(len=:), allocatable, intent(out) :: complaint
+    character(len=:), allocatable, intent(out) :: message
     integer :: items
 
     items = assignment%last_item - assignment%first_item + 1
@@ -106,13 +106,13 @@ contains
     if (last == 0) last = rule%count
     if (last == 0) last = assignment%first + (items - 1) * assignment%stride
 
-    complaint = ''
+    message = ''
     if (rule%count == 1 .and. .not. assignment%is_whole) then
-      complaint = trim(rule%name) // ' is a single value and takes no subscript'
+      message = trim(rule%name) // ' is a single value and takes no subscript'
     else if (rule%count /= any_number .and. max(last, assignment%first) > rule%count) then
-      complaint = 'the subscript of ' // trim(rule%name) // ' is out of range; allowed: 1 to ' // to_text(rule%count)
+      message = 'the subscript of ' // trim(rule%name) // ' is out of range; allowed: 1 to ' // to_text(rule%count)
     else if (items > (last - assignment%first) / assignment%stride + 1) then
-      complaint = trim(rule%name) // ' has ' // to_text(items) // ' values (' // found_values(namelist, assignment) &
+      message = trim(rule%name) // ' has ' // to_text(items) // ' values (' // found_values(namelist, assignment) &
         // '); allowed: ' // to_text((last - assignment%first) / assignment%stride + 1)
     end if
   end subroutine find_last

@@ -2,12 +2,12 @@
 module nocdyn_input_group
   use nocdyn_input, only: group_t, value_t
   use nocdyn_input_columns, only: complete_columns
-  use nocdyn_input_orders, only: applies, find_order_keys, order_complaint
+  use nocdyn_ordering_rules, only: applies, find_order_keys, ordering_message
   use nocdyn_input_overrides, only: override_t
-  use nocdyn_input_relations, only: relate_keys
+  use nocdyn_key_relations, only: relate_keys
   use nocdyn_input_values, only: convert
   use nocdyn_input_work, only: new_work, work_t
-  use nocdyn_mistakes, only: mistakes_t, no_line
+  use nocdyn_diagnostics, only: diagnostics_t, no_line
   use nocdyn_namelist, only: assignment_t, namelist_group_t, namelist_t
   use nocdyn_schema, only: group_rules, is_single, key_rule_index, key_rules, orders
   use nocdyn_schema_relations, only: relations_t
@@ -22,7 +22,7 @@ module nocdyn_input_group
 contains
 
   !> Reads the group `index` of the input; `source` is empty for a single group that the file lacks.
-  subroutine read_group(namelist, source, index, overrides, folder, relations, group, mistakes)
+  subroutine read_group(namelist, source, index, overrides, folder, relations, group, diagnostics)
     type(namelist_t), intent(in) :: namelist
     type(namelist_group_t), intent(in) :: source
     integer, intent(in) :: index
@@ -30,55 +30,55 @@ contains
     character(len=*), intent(in) :: folder  !! of the input file, with a slash at its end, or ''
     type(relations_t), intent(in) :: relations   !! of the keys of this kind of group
     type(group_t), intent(inout) :: group   !! `rule`, `kind` and `line` are known
-    type(mistakes_t), intent(inout) :: mistakes
+    type(diagnostics_t), intent(inout) :: diagnostics
     type(work_t), allocatable :: work
     integer :: i
 
     allocate (work, source=new_work(index, group%rule, group%line, source%is_damaged))
     allocate (group%values(size(work%drafts)))
-    call take_assignments(namelist, source, work, mistakes)
+    call take_assignments(namelist, source, work, diagnostics)
     group%name = name_of(work)
-    call take_overrides(group%name, number_of(namelist, index, group%rule), overrides, work, mistakes)
-    call relate_keys(work, relations, mistakes)
+    call take_overrides(group%name, number_of(namelist, index, group%rule), overrides, work, diagnostics)
+    call relate_keys(work, relations, diagnostics)
     do i = 1, size(work%drafts)
-      call complete(work, i, group%values(i), mistakes)
+      call complete(work, i, group%values(i), diagnostics)
     end do
-    call complete_columns(work, relations%columns, folder, group, mistakes)
-    call check_orders(group, index, mistakes)
+    call complete_columns(work, relations%columns, folder, group, diagnostics)
+    call check_orders(group, index, diagnostics)
   end subroutine read_group
 
-  subroutine take_assignments(namelist, source, work, mistakes)
+  subroutine take_assignments(namelist, source, work, diagnostics)
     type(namelist_t), intent(in) :: namelist
     type(namelist_group_t), intent(in) :: source
     type(work_t), intent(inout) :: work
-    type(mistakes_t), intent(inout) :: mistakes
-    character(len=:), allocatable :: complaint
+    type(diagnostics_t), intent(inout) :: diagnostics
+    character(len=:), allocatable :: message
     integer :: i, key
 
     do i = source%first_assignment, source%last_assignment
       associate (assignment => namelist%assignments(i))
         key = key_rule_index(work%rule, assignment%key)
         if (key == 0) then
-          call refuse_key(assignment, work, mistakes)
+          call refuse_key(assignment, work, diagnostics)
           cycle
         end if
-        call work%drafts(key - work%first + 1)%assign(namelist, assignment, key_rules(key), complaint)
-        if (complaint == '') cycle
+        call work%drafts(key - work%first + 1)%assign(namelist, assignment, key_rules(key), message)
+        if (message == '') cycle
         key = key_without_equals(namelist, assignment, work%rule)
         if (key > 0) then
-          complaint = complaint // "; is '=' missing behind " // trim(key_rules(key)%name) // '?'
+          message = message // "; is '=' missing behind " // trim(key_rules(key)%name) // '?'
           work%may_miss(key - work%first + 1) = .true.
         end if
-        call mistakes%add(assignment%line, work%index, complaint)
+        call diagnostics%add(assignment%line, work%index, message)
       end associate
     end do
   end subroutine take_assignments
 
   !> The keys that were probably meant are not missed in addition.
-  subroutine refuse_key(assignment, work, mistakes)
+  subroutine refuse_key(assignment, work, diagnostics)
     type(assignment_t), intent(in) :: assignment
     type(work_t), intent(inout) :: work
-    type(mistakes_t), intent(inout) :: mistakes
+    type(diagnostics_t), intent(inout) :: diagnostics
     type(string_t), allocatable :: meant(:)
     integer :: i
 
@@ -86,7 +86,7 @@ contains
     do i = 1, size(meant)
       work%may_miss(key_rule_index(work%rule, meant(i)%text) - work%first + 1) = .true.
     end do
-    call mistakes%add(assignment%line, work%index, assignment%key // ' is not a key of &' &
+    call diagnostics%add(assignment%line, work%index, assignment%key // ' is not a key of &' &
       // trim(group_rules(work%rule)%name) // key_suggestion(work%rule, assignment%key))
   end subroutine refuse_key
 
@@ -135,13 +135,13 @@ contains
     is_of = group%name == kind
   end function is_of
 
-  subroutine take_overrides(name, number, overrides, work, mistakes)
+  subroutine take_overrides(name, number, overrides, work, diagnostics)
     character(len=*), intent(in) :: name
     integer, intent(in) :: number   !! among the groups without names
     type(override_t), intent(inout) :: overrides(:)
     type(work_t), intent(inout) :: work
-    type(mistakes_t), intent(inout) :: mistakes
-    character(len=:), allocatable :: complaint
+    type(diagnostics_t), intent(inout) :: diagnostics
+    character(len=:), allocatable :: message
     integer :: i, key
 
     do i = 1, size(overrides)
@@ -150,19 +150,19 @@ contains
       overrides(i)%is_used = .true.
       key = overrides(i)%key_rule
       call work%drafts(key - work%first + 1)%replace(overrides(i)%namelist, overrides(i)%assignment, key_rules(key), i, &
-        complaint)
-      if (complaint /= '') call mistakes%add(no_line, 0, complaint, i)
+        message)
+      if (message /= '') call diagnostics%add(no_line, 0, message, i)
     end do
   end subroutine take_overrides
 
   !> Fills defaults in and converts.
-  subroutine complete(work, i, value, mistakes)
+  subroutine complete(work, i, value, diagnostics)
     type(work_t), intent(inout) :: work
     integer, intent(in) :: i
     type(value_t), intent(inout) :: value
-    type(mistakes_t), intent(inout) :: mistakes
+    type(diagnostics_t), intent(inout) :: diagnostics
     type(key_rule_t) :: rule
-    character(len=:), allocatable :: complaint
+    character(len=:), allocatable :: message
     integer :: known, said
 
     rule = work%key(i)
@@ -178,16 +178,16 @@ contains
       known = draft%values_said()
       if (known == 0 .and. .not. work%is_needed(i)) return
       if (known == 0) then
-        complaint = trim(merge(' has no value', ' is missing  ', draft%is_written)) // '; needed: ' // allowed_text(rule)
+        message = trim(merge(' has no value', ' is missing  ', draft%is_written)) // '; needed: ' // allowed_text(rule)
       else if (known < size(draft%slots)) then
-        complaint = ' has ' // counted(said) // '; needed: ' // to_text(size(draft%slots))
+        message = ' has ' // counted(said) // '; needed: ' // to_text(size(draft%slots))
       else if (known < rule%least) then
-        complaint = ' has ' // counted(known) // '; needed: at least ' // to_text(rule%least)
+        message = ' has ' // counted(known) // '; needed: at least ' // to_text(rule%least)
       else
-        call convert(draft, rule, work%index, value, mistakes)
+        call convert(draft, rule, work%index, value, diagnostics)
         return
       end if
-      call mistakes%add(merge(draft%line, work%line, draft%line > 0), work%index, trim(rule%name) // complaint, draft%override)
+      call diagnostics%add(merge(draft%line, work%line, draft%line > 0), work%index, trim(rule%name) // message, draft%override)
     end associate
   end subroutine complete
 
@@ -198,20 +198,20 @@ contains
     text = to_text(values) // trim(merge(' value ', ' values', values == 1))
   end function counted
 
-  subroutine check_orders(group, index, mistakes)
+  subroutine check_orders(group, index, diagnostics)
     type(group_t), intent(in) :: group
     integer, intent(in) :: index
-    type(mistakes_t), intent(inout) :: mistakes
-    character(len=:), allocatable :: complaint
+    type(diagnostics_t), intent(inout) :: diagnostics
+    character(len=:), allocatable :: message
     integer :: o, lower, upper
 
     do o = 1, size(orders)
       if (.not. applies(o, group)) cycle
-      complaint = order_complaint(o, group)
-      if (complaint == '') cycle
+      message = ordering_message(o, group)
+      if (message == '') cycle
       call find_order_keys(o, group, lower, upper)
       associate (low => group%values(lower), high => group%values(upper))
-        call mistakes%add(max(low%line, high%line), index, complaint, max(low%override, high%override))
+        call diagnostics%add(max(low%line, high%line), index, message, max(low%override, high%override))
       end associate
     end do
   end subroutine check_orders

@@ -1,7 +1,7 @@
 !> Overrides of the command line: PATH=VALUE.
 module nocdyn_input_overrides
-  use nocdyn_input_path, only: path_t, read_path
-  use nocdyn_mistakes, only: mistakes_t, no_line
+  use nocdyn_key_path, only: key_path_t, read_path
+  use nocdyn_diagnostics, only: diagnostics_t, no_line
   use nocdyn_namelist, only: assignment_t, item_t, namelist_t
   use nocdyn_namelist_scanner, only: scan_value
   use nocdyn_namelist_values, only: longest_list
@@ -28,11 +28,11 @@ module nocdyn_input_overrides
 contains
 
   !> Takes PATH=VALUE texts apart; what cannot be understood is a mistake and not `is_fine`.
-  subroutine read_overrides(texts, overrides, mistakes)
+  subroutine read_overrides(texts, overrides, diagnostics)
     type(string_t), intent(in) :: texts(:)
     type(override_t), allocatable, intent(out) :: overrides(:)
-    type(mistakes_t), intent(inout) :: mistakes
-    character(len=:), allocatable :: complaint
+    type(diagnostics_t), intent(inout) :: diagnostics
+    character(len=:), allocatable :: message
     integer :: equals, i
 
     allocate (overrides(size(texts)))
@@ -40,51 +40,51 @@ contains
       overrides(i)%name = ''
       equals = index(texts(i)%text, '=')
       if (equals == 0) then
-        complaint = 'there is no = in it; write PATH=VALUE'
+        message = 'there is no = in it; write PATH=VALUE'
       else
-        call find_key(trim(adjustl(texts(i)%text(:equals - 1))), overrides(i), complaint)
-        if (complaint == '') call read_value(texts(i)%text(equals + 1:), overrides(i), complaint)
+        call find_key(trim(adjustl(texts(i)%text(:equals - 1))), overrides(i), message)
+        if (message == '') call read_value(texts(i)%text(equals + 1:), overrides(i), message)
       end if
-      overrides(i)%is_fine = complaint == ''
-      if (complaint /= '') call mistakes%add(no_line, 0, complaint, i)
+      overrides(i)%is_fine = message == ''
+      if (message /= '') call diagnostics%add(no_line, 0, message, i)
     end do
   end subroutine read_overrides
 
-  subroutine find_key(text, override, complaint)
+  subroutine find_key(text, override, message)
     character(len=*), intent(in) :: text   !! before the equals sign
     type(override_t), intent(inout) :: override
-    character(len=:), allocatable, intent(out) :: complaint
+    character(len=:), allocatable, intent(out) :: message
     type(key_rule_t) :: rule
-    type(path_t) :: path
+    type(key_path_t) :: path
 
     if (text == '') then
-      complaint = 'there is nothing before the =; write GROUP.KEY=VALUE or GROUP.NAME.KEY=VALUE'
+      message = 'there is nothing before the =; write GROUP.KEY=VALUE or GROUP.NAME.KEY=VALUE'
       return
     end if
-    call read_path(text, '=VALUE', path, complaint)
+    call read_path(text, '=VALUE', path, message)
     override%group_rule = path%group_rule
     override%key_rule = path%key_rule
     override%name = path%name
     override%number = path%number
     override%assignment = path%place
-    if (complaint /= '') return
+    if (message /= '') return
     rule = key_rules(path%key_rule)
     if (rule%kind == a_name) then
-      complaint = 'a name cannot be overridden: other groups refer to it'
+      message = 'a name cannot be overridden: other groups refer to it'
     else if (path%is_outside .and. rule%count == 1) then
-      complaint = trim(rule%name) // ' is a single value and takes no subscript'
+      message = trim(rule%name) // ' is a single value and takes no subscript'
     else if (path%is_outside) then
-      complaint = 'the subscript of ' // trim(rule%name) // ' is out of range; allowed: 1 to ' // &
+      message = 'the subscript of ' // trim(rule%name) // ' is out of range; allowed: 1 to ' // &
                   to_text(merge(rule%count, longest_list, rule%count /= any_number))
     end if
   end subroutine find_key
 
   !> A single text is taken as it stands if it has no quotes: the shell has eaten them.
-  subroutine read_value(text, override, complaint)
+  subroutine read_value(text, override, message)
     character(len=*), intent(in) :: text
     type(override_t), intent(inout) :: override
-    character(len=:), allocatable, intent(out) :: complaint
-    type(mistakes_t) :: mistakes
+    character(len=:), allocatable, intent(out) :: message
+    type(diagnostics_t) :: diagnostics
     type(key_rule_t) :: rule
 
     rule = key_rules(override%key_rule)
@@ -92,14 +92,14 @@ contains
       override%namelist%source = text
       call override%namelist%append_item(item_t(first=1, last=len(text)))
     else
-      call scan_value(text, override%namelist, mistakes)
+      call scan_value(text, override%namelist, diagnostics)
     end if
     override%assignment%last_item = override%namelist%item_count
-    complaint = ''
-    if (mistakes%count > 0) then
-      complaint = mistakes%list(1)%text
+    message = ''
+    if (diagnostics%count > 0) then
+      message = diagnostics%list(1)%text
     else if (override%namelist%item_count == 0) then
-      complaint = 'there is no value after the ='
+      message = 'there is no value after the ='
     end if
   end subroutine read_value
 

@@ -2,12 +2,12 @@
 module nocdyn_input_reader
   use nocdyn_errors, only: error_t, exit_input, raise
   use nocdyn_input, only: group_t, input_t
-  use nocdyn_input_constraints, only: check_constraints
+  use nocdyn_joint_checks, only: check_joints
   use nocdyn_input_group, only: read_group
-  use nocdyn_input_names, only: check_doubled_names, check_references, collect_names
+  use nocdyn_name_checks, only: check_duplicate_names, check_references, collect_names
   use nocdyn_input_overrides, only: override_t, read_overrides
-  use nocdyn_mistakes, only: mistakes_t, no_line
-  use nocdyn_mistakes_report, only: mistakes_report
+  use nocdyn_diagnostics, only: diagnostics_t, no_line
+  use nocdyn_diagnostics_text, only: diagnostics_text
   use nocdyn_namelist, only: namelist_group_t, namelist_t
   use nocdyn_namelist_scanner, only: scan_namelist
   use nocdyn_schema, only: first_key, group_rule_index, group_rules, is_single, key_rules, last_key
@@ -24,29 +24,29 @@ module nocdyn_input_reader
 contains
 
   !> Reads and checks a file; every mistake is a line of the error's message, in the order of the file.
-  subroutine read_input(file, overrides, input, error, mistakes)
+  subroutine read_input(file, overrides, input, error, diagnostics)
     character(len=*), intent(in) :: file
     type(string_t), intent(in) :: overrides(:)   !! PATH=VALUE
     type(input_t), intent(out) :: input
     type(error_t), allocatable, intent(out) :: error
-    type(mistakes_t), intent(out), optional :: mistakes   !! those of the error
+    type(diagnostics_t), intent(out), optional :: diagnostics   !! those of the error
     character(len=:), allocatable :: text
 
     call read_text_file(file, text, error)
     if (allocated(error)) return
-    call read_input_text(text, file, overrides, input, error, mistakes)
+    call read_input_text(text, file, overrides, input, error, diagnostics)
   end subroutine read_input
 
   !> Reads and checks the text of a file.
-  subroutine read_input_text(text, file, overrides, input, error, all_mistakes)
+  subroutine read_input_text(text, file, overrides, input, error, all_diagnostics)
     character(len=*), intent(in) :: text
     character(len=*), intent(in) :: file         !! what messages call it
     type(string_t), intent(in) :: overrides(:)   !! PATH=VALUE
     type(input_t), intent(out) :: input
     type(error_t), allocatable, intent(out) :: error
-    type(mistakes_t), intent(out), optional :: all_mistakes   !! those of the error
+    type(diagnostics_t), intent(out), optional :: all_diagnostics   !! those of the error
     type(namelist_t) :: namelist
-    type(mistakes_t) :: mistakes
+    type(diagnostics_t) :: diagnostics
     type(override_t), allocatable :: parsed(:)
 
     input%file = file
@@ -55,29 +55,29 @@ contains
       call raise(error, exit_input, file // ': not a text file')
       return
     end if
-    call scan_namelist(text, namelist, mistakes)
-    if (namelist%group_count == 0 .and. mistakes%count == 0) then
+    call scan_namelist(text, namelist, diagnostics)
+    if (namelist%group_count == 0 .and. diagnostics%count == 0) then
       call raise(error, exit_input, file // ": no group in it; 'nocdyn new FILE' writes an example")
       return
     end if
 
-    call read_overrides(overrides, parsed, mistakes)
-    call read_groups(namelist, parsed, input, mistakes)
-    call check_occurrences(input%groups, mistakes)
-    call refuse_unused(input%groups, parsed, mistakes)
-    call check_doubled_names(input%groups, mistakes)
-    call check_references(input%groups, bodies_are_known(input%groups), mistakes)
-    call check_constraints(input%groups, mistakes)
-    if (mistakes%count > 0) call raise(error, mistakes%worst_code(), mistakes_report(input, mistakes))
-    if (present(all_mistakes)) all_mistakes = mistakes
+    call read_overrides(overrides, parsed, diagnostics)
+    call read_groups(namelist, parsed, input, diagnostics)
+    call check_occurrences(input%groups, diagnostics)
+    call refuse_unused(input%groups, parsed, diagnostics)
+    call check_duplicate_names(input%groups, diagnostics)
+    call check_references(input%groups, bodies_are_known(input%groups), diagnostics)
+    call check_joints(input%groups, diagnostics)
+    if (diagnostics%count > 0) call raise(error, diagnostics%worst_code(), diagnostics_text(input, diagnostics))
+    if (present(all_diagnostics)) all_diagnostics = diagnostics
   end subroutine read_input_text
 
   !> All groups of the file, then the single groups that it lacks.
-  subroutine read_groups(namelist, overrides, input, mistakes)
+  subroutine read_groups(namelist, overrides, input, diagnostics)
     type(namelist_t), intent(in) :: namelist
     type(override_t), intent(inout) :: overrides(:)
     type(input_t), intent(inout) :: input
-    type(mistakes_t), intent(inout) :: mistakes
+    type(diagnostics_t), intent(inout) :: diagnostics
     integer, allocatable :: added(:)
     character(len=:), allocatable :: folder
     type(relations_t) :: relations(size(group_rules))
@@ -96,16 +96,16 @@ contains
         if (g > n) then
           group%rule = added(g - n)
           group%kind = trim(group_rules(group%rule)%name)
-          call read_group(namelist, namelist_group_t(), g, overrides, folder, relations(group%rule), group, mistakes)
+          call read_group(namelist, namelist_group_t(), g, overrides, folder, relations(group%rule), group, diagnostics)
           cycle
         end if
         group%kind = namelist%groups(g)%name
         group%rule = group_rule_index(group%kind)
         group%line = namelist%groups(g)%line
         if (group%rule > 0) then
-          call read_group(namelist, namelist%groups(g), g, overrides, folder, relations(group%rule), group, mistakes)
+          call read_group(namelist, namelist%groups(g), g, overrides, folder, relations(group%rule), group, diagnostics)
         else
-          call mistakes%add(group%line, g, 'there is no such group' // suggestion(group%kind, group_names()))
+          call diagnostics%add(group%line, g, 'there is no such group' // suggestion(group%kind, group_names()))
         end if
       end associate
     end do
@@ -139,9 +139,9 @@ contains
   end function has_required_key
 
   !> Groups that must be there, and groups that may be there only once.
-  subroutine check_occurrences(groups, mistakes)
+  subroutine check_occurrences(groups, diagnostics)
     type(group_t), intent(in) :: groups(:)
-    type(mistakes_t), intent(inout) :: mistakes
+    type(diagnostics_t), intent(inout) :: diagnostics
     integer :: first(size(group_rules))
     integer :: g, rule
     logical :: is_misspelt(size(group_rules))
@@ -156,47 +156,47 @@ contains
       else if (first(rule) == 0) then
         first(rule) = g
       else if (is_single(rule)) then
-        call mistakes%add(groups(g)%line, g, 'given twice, first on line ' // to_text(groups(first(rule))%line) &
+        call diagnostics%add(groups(g)%line, g, 'given twice, first on line ' // to_text(groups(first(rule))%line) &
           // '; allowed: ' // occurrence_text(group_rules(rule)%occurrence))
       end if
     end do
     do rule = 1, size(group_rules)
       if (first(rule) > 0 .or. is_misspelt(rule)) cycle
       if (all(group_rules(rule)%occurrence /= [exactly_once, at_least_once])) cycle
-      call mistakes%add(no_line, 0, 'there is no &' // trim(group_rules(rule)%name) // '; needed: ' &
+      call diagnostics%add(no_line, 0, 'there is no &' // trim(group_rules(rule)%name) // '; needed: ' &
         // occurrence_text(group_rules(rule)%occurrence))
     end do
   end subroutine check_occurrences
 
   !> Overrides whose element does not exist.
-  subroutine refuse_unused(groups, overrides, mistakes)
+  subroutine refuse_unused(groups, overrides, diagnostics)
     type(group_t), intent(in) :: groups(:)
     type(override_t), intent(in) :: overrides(:)
-    type(mistakes_t), intent(inout) :: mistakes
+    type(diagnostics_t), intent(inout) :: diagnostics
     type(string_t), allocatable :: names(:)
     integer :: g, i
 
     do i = 1, size(overrides)
       if (overrides(i)%is_used .or. .not. overrides(i)%is_fine) cycle
       if (overrides(i)%number > 0) then
-        call refuse_number(groups, overrides(i), i, mistakes)
+        call refuse_number(groups, overrides(i), i, diagnostics)
         cycle
       end if
       call collect_names(groups, pack([(g, g=1, size(groups))], groups%rule == overrides(i)%group_rule), names)
-      call mistakes%add(no_line, 0, 'there is no &' // trim(group_rules(overrides(i)%group_rule)%name) // ' ' &
+      call diagnostics%add(no_line, 0, 'there is no &' // trim(group_rules(overrides(i)%group_rule)%name) // ' ' &
         // quoted(overrides(i)%name) // suggestion(overrides(i)%name, names), i)
     end do
   end subroutine refuse_unused
 
-  subroutine refuse_number(groups, override, which, mistakes)
+  subroutine refuse_number(groups, override, which, diagnostics)
     type(group_t), intent(in) :: groups(:)
     type(override_t), intent(in) :: override
     integer, intent(in) :: which   !! index of the override
-    type(mistakes_t), intent(inout) :: mistakes
+    type(diagnostics_t), intent(inout) :: diagnostics
     character(len=:), allocatable :: kind
 
     kind = trim(group_rules(override%group_rule)%name)
-    call mistakes%add(no_line, 0, 'there is no ' // kind // '(' // to_text(override%number) // '); the file has ' // &
+    call diagnostics%add(no_line, 0, 'there is no ' // kind // '(' // to_text(override%number) // '); the file has ' // &
                       to_text(count(groups%rule == override%group_rule)) // ' &' // kind, which)
   end subroutine refuse_number
 

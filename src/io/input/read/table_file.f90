@@ -11,7 +11,7 @@ module nocdyn_table_file
 
   public :: read_table_file, read_table_text, read_list_text
 
-  integer, parameter :: most_complaints = 5   !! a file of another form has as many mistakes as lines
+  integer, parameter :: most_messages = 5   !! a file of another form has as many mistakes as lines
   character(len=*), parameter :: line_end = achar(10), tab = achar(9), carriage_return = achar(13)
   character(len=*), parameter :: byte_order_mark = char(239) // char(187) // char(191)
   character(len=*), parameter :: blanks = ' ' // tab, comments = '#!', quotes = '"' // "'"
@@ -25,16 +25,16 @@ module nocdyn_table_file
     integer :: last_good = 0            !! line of the last row
     integer :: wrong = 0                !! lines with a mistake
     logical :: is_other = .false.       !! the file has another form altogether, which was reported
-    type(string_t), allocatable :: complaints(:)
+    type(string_t), allocatable :: messages(:)
   end type reading_t
 
 contains
 
   !> Reads a file of which the first column ascends and which has two rows at least.
-  subroutine read_table_file(file, first, second, complaints, code)
+  subroutine read_table_file(file, first, second, messages, code)
     character(len=*), intent(in) :: file
     real(wp), allocatable, intent(out) :: first(:), second(:)
-    type(string_t), allocatable, intent(out) :: complaints(:)   !! sentences that begin with file and line; empty: all is well
+    type(string_t), allocatable, intent(out) :: messages(:)   !! sentences that begin with file and line; empty: all is well
     integer, intent(out) :: code                                !! exit code of the complaints
     type(error_t), allocatable :: error
     character(len=:), allocatable :: text
@@ -42,46 +42,46 @@ contains
     code = exit_input
     call read_text_file(file, text, error)
     if (.not. allocated(error)) then
-      call read_table_text(text, file, first, second, complaints)
+      call read_table_text(text, file, first, second, messages)
       return
     end if
     code = exit_file
-    allocate (complaints(0), first(0), second(0))
-    call append(complaints, error%message)
+    allocate (messages(0), first(0), second(0))
+    call append(messages, error%message)
   end subroutine read_table_file
 
   !> Two columns of numbers, the first ascending; without complaints there are at least two rows.
-  subroutine read_table_text(text, file, first, second, complaints)
+  subroutine read_table_text(text, file, first, second, messages)
     character(len=*), intent(in) :: text
     character(len=*), intent(in) :: file   !! what complaints call it
     real(wp), allocatable, intent(out) :: first(:), second(:)
-    type(string_t), allocatable, intent(out) :: complaints(:)
+    type(string_t), allocatable, intent(out) :: messages(:)
     type(reading_t) :: reading
     real(wp), allocatable :: values(:, :)
     integer :: rows
 
-    allocate (reading%complaints(0))
+    allocate (reading%messages(0))
     reading%file = file
     call read_rows(text, first_position(text), reading, values, rows)
     call conclude(reading, rows, least=2, is_binary=index(text, achar(0)) > 0)
     first = values(1, :rows)
     second = values(2, :rows)
-    call move_alloc(reading%complaints, complaints)
+    call move_alloc(reading%messages, messages)
   end subroutine read_table_text
 
   !> A list: the names of the columns in the first line that is no comment, then rows of as many numbers, one at least.
-  subroutine read_list_text(text, file, names, line, values, complaints)
+  subroutine read_list_text(text, file, names, line, values, messages)
     character(len=*), intent(in) :: text
     character(len=*), intent(in) :: file   !! what complaints call it
     type(string_t), allocatable, intent(out) :: names(:)
     integer, intent(out) :: line                                !! of the names
     real(wp), allocatable, intent(out) :: values(:, :)          !! [names, rows]
-    type(string_t), allocatable, intent(out) :: complaints(:)   !! sentences that begin with file and line; empty: all is well
+    type(string_t), allocatable, intent(out) :: messages(:)   !! sentences that begin with file and line; empty: all is well
     type(reading_t) :: reading
     real(wp), allocatable :: lines(:, :)
     integer :: rows, start
 
-    allocate (reading%complaints(0))
+    allocate (reading%messages(0))
     reading%file = file
     reading%is_list = .true.
     start = first_position(text)
@@ -93,7 +93,7 @@ contains
     call conclude(reading, rows, least=1, is_binary=index(text, achar(0)) > 0)
     allocate (values(size(names), rows))
     values = lines(:, :rows)
-    call move_alloc(reading%complaints, complaints)
+    call move_alloc(reading%messages, messages)
   end subroutine read_list_text
 
   !> Behind the byte order mark, if there is one.
@@ -141,26 +141,26 @@ contains
   subroutine judge_names(reading, names)
     type(reading_t), intent(inout) :: reading
     type(string_t), allocatable, intent(inout) :: names(:)
-    character(len=:), allocatable :: complaint
+    character(len=:), allocatable :: message
     integer :: i
 
-    complaint = ''
+    message = ''
     do i = 1, size(names)
       if (index(names(i)%text, ';') > 0) then
-        complaint = 'the columns are separated by semicolons; needed: commas, and points in numbers'
+        message = 'the columns are separated by semicolons; needed: commas, and points in numbers'
       else if (index(names(i)%text, tab) > 0) then
-        complaint = 'the names of the columns are separated by tabs; needed: commas'
+        message = 'the names of the columns are separated by tabs; needed: commas'
       else if (names(i)%text == 'variant') then
-        complaint = "'variant' is a column of a sweep.csv; needed: the columns of the numbers that vary alone"
+        message = "'variant' is a column of a sweep.csv; needed: the columns of the numbers that vary alone"
       else if (names(i)%text == '') then
-        complaint = 'column ' // to_text(i) // ' has no name; needed: the path of a number'
-        if (i == 1) complaint = complaint // ', and no numbers of rows (pandas: to_csv(FILE, index=False))'
+        message = 'column ' // to_text(i) // ' has no name; needed: the path of a number'
+        if (i == 1) message = message // ', and no numbers of rows (pandas: to_csv(FILE, index=False))'
       end if
-      if (complaint /= '') exit
+      if (message /= '') exit
     end do
-    if (complaint == '') return
+    if (message == '') return
     reading%is_other = .true.
-    call complain(reading, ':' // to_text(reading%line) // ': ' // complaint)
+    call add_error(reading, ':' // to_text(reading%line) // ': ' // message)
     deallocate (names)
     allocate (names(0))
   end subroutine judge_names
@@ -221,30 +221,30 @@ contains
     real(wp), intent(inout) :: values(:, :)   !! [columns, lines]
     integer, intent(inout) :: rows
     integer :: begins(reading%columns), ends(reading%columns), column, found
-    character(len=:), allocatable :: complaint
+    character(len=:), allocatable :: message
 
     if (content == '') return
     if (reading%is_list .and. scan(content, quotes) > 0) then
       reading%is_other = .true.
-      call complain(reading, ':' // to_text(reading%line) // ': quotes in ' // excerpt(content) // '; needed: plain numbers')
+      call add_error(reading, ':' // to_text(reading%line) // ': quotes in ' // excerpt(content) // '; needed: plain numbers')
       return
     end if
     call split(content, begins, ends, found)
     if (found /= reading%columns) then
-      complaint = to_text(found) // trim(merge(' column ', ' columns', found == 1)) // ' in ' // excerpt(content) // &
+      message = to_text(found) // trim(merge(' column ', ' columns', found == 1)) // ' in ' // excerpt(content) // &
                   '; needed: ' // to_text(reading%columns) // ', separated by blanks or a comma'
     else
-      complaint = ''
+      message = ''
       do column = 1, found
-        if (complaint == '') call read_column(content(begins(column):ends(column)), column, values(column, rows + 1), complaint)
+        if (message == '') call read_column(content(begins(column):ends(column)), column, values(column, rows + 1), message)
       end do
     end if
     if (.not. reading%is_list) then
-      if (complaint /= '' .and. rows == 0 .and. reading%wrong == 0) complaint = complaint // header_hint(content)
-      if (complaint == '' .and. rows > 0) call check_ascent(values(1, rows), values(1, rows + 1), reading%last_good, complaint)
+      if (message /= '' .and. rows == 0 .and. reading%wrong == 0) message = message // header_hint(content)
+      if (message == '' .and. rows > 0) call check_ascent(values(1, rows), values(1, rows + 1), reading%last_good, message)
     end if
-    if (complaint /= '') then
-      call complain(reading, ':' // to_text(reading%line) // ': ' // complaint)
+    if (message /= '') then
+      call add_error(reading, ':' // to_text(reading%line) // ': ' // message)
     else
       rows = rows + 1
       reading%last_good = reading%line
@@ -276,26 +276,26 @@ contains
     end do
   end subroutine split
 
-  subroutine read_column(text, column, value, complaint)
+  subroutine read_column(text, column, value, message)
     character(len=*), intent(in) :: text
     integer, intent(in) :: column
     real(wp), intent(out) :: value
-    character(len=:), allocatable, intent(out) :: complaint
+    character(len=:), allocatable, intent(out) :: message
     integer :: status
 
     call read_real(text, value, status)
     select case (status)
     case (literal_fine)
-      complaint = ''
+      message = ''
       return
     case (literal_not_finite)
-      complaint = 'is not a finite number'
+      message = 'is not a finite number'
     case (literal_too_large)
-      complaint = 'is too large for a number'
+      message = 'is too large for a number'
     case default
-      complaint = 'is not a number'
+      message = 'is not a number'
     end select
-    complaint = 'column ' // to_text(column) // ', ' // excerpt(text) // ', ' // complaint
+    message = 'column ' // to_text(column) // ', ' // excerpt(text) // ', ' // message
   end subroutine read_column
 
   !> A first line without any digit names the columns.
@@ -307,13 +307,13 @@ contains
     if (scan(content, '0123456789') == 0) hint = '; a line with names of columns must begin with #'
   end function header_hint
 
-  subroutine check_ascent(last, this, line, complaint)
+  subroutine check_ascent(last, this, line, message)
     real(wp), intent(in) :: last, this   !! first column of the last row and of this one
     integer, intent(in) :: line          !! of the last row
-    character(len=:), allocatable, intent(inout) :: complaint
+    character(len=:), allocatable, intent(inout) :: message
 
     if (this > last) return
-    complaint = 'column 1, ' // to_text(this) // ', is not above ' // to_text(last) // ' on line ' // to_text(line) // &
+    message = 'column 1, ' // to_text(this) // ', is not above ' // to_text(last) // ' on line ' // to_text(line) // &
                 '; needed: ascending values'
   end subroutine check_ascent
 
@@ -326,13 +326,13 @@ contains
     if (len(text) > most) excerpt = quoted(text(:most) // '...')
   end function excerpt
 
-  subroutine complain(reading, text)
+  subroutine add_error(reading, text)
     type(reading_t), intent(inout) :: reading
     character(len=*), intent(in) :: text
 
     reading%wrong = reading%wrong + 1
-    if (reading%wrong <= most_complaints) call append(reading%complaints, reading%file // text)
-  end subroutine complain
+    if (reading%wrong <= most_messages) call append(reading%messages, reading%file // text)
+  end subroutine add_error
 
   !> Complaints about the file as a whole.
   subroutine conclude(reading, rows, least, is_binary)
@@ -342,14 +342,14 @@ contains
     logical, intent(in) :: is_binary
 
     if (is_binary) then
-      deallocate (reading%complaints)
-      allocate (reading%complaints(0))
-      call append(reading%complaints, reading%file // ': not a text file')
-    else if (reading%wrong > most_complaints) then
-      call append(reading%complaints, reading%file // ': ' // to_text(reading%wrong - most_complaints) // &
+      deallocate (reading%messages)
+      allocate (reading%messages(0))
+      call append(reading%messages, reading%file // ': not a text file')
+    else if (reading%wrong > most_messages) then
+      call append(reading%messages, reading%file // ': ' // to_text(reading%wrong - most_messages) // &
                   ' more lines are wrong')
     else if (reading%wrong == 0 .and. rows < least) then
-      call complain(reading, ': ' // to_text(rows) // trim(merge(' row ', ' rows', rows == 1)) // '; needed: at least ' // &
+      call add_error(reading, ': ' // to_text(rows) // trim(merge(' row ', ' rows', rows == 1)) // '; needed: at least ' // &
                     to_text(least))
     end if
   end subroutine conclude

@@ -5,7 +5,7 @@ module nocdyn_couplings
   use nocdyn_bank, only: bank_t, quantity_t, role_coupling
   use nocdyn_elements, only: elements_t
   use nocdyn_kinds, only: wp
-  use nocdyn_lane_numbers, only: lane_numbers_t
+  use nocdyn_lane_parameters, only: lane_parameters_t
   use nocdyn_polynomial_laws, only: polynomial_laws_t
   use nocdyn_text, only: string_t
   use nocdyn_vector_functions, only: tanh_of
@@ -23,7 +23,7 @@ module nocdyn_couplings
     real(wp), allocatable :: friction(:, :)          !! [N m]; not allocated: none
     real(wp), allocatable :: friction_speed(:, :)    !! [rad/s]
   contains
-    procedure :: list_numbers
+    procedure :: list_parameters
     procedure :: polynomials
     procedure :: evaluate
     procedure :: differentiate
@@ -57,12 +57,12 @@ contains
     is_dissipative = any(abs(damping) > 0.0_wp, dim=1)
     if (present(friction)) then
       bank%is_polynomial = .false.
-      bank%is_of_paper = .false.
+      bank%has_paper_law = .false.
       allocate (bank%friction, source=friction)
       allocate (bank%friction_speed, source=friction_speed)
       is_dissipative = is_dissipative .or. any(abs(friction) > 0.0_wp, dim=1)
     end if
-    bank%accounted = pack([(e, e=1, size(to))], is_dissipative)
+    bank%with_work = pack([(e, e=1, size(to))], is_dissipative)
     bank%elastic = pack([(e, e=1, size(to))], any(abs(stiffness) > 0.0_wp .or. abs(cubic_stiffness) > 0.0_wp, dim=1))
   end function new_couplings
 
@@ -79,22 +79,22 @@ contains
     end associate
   end subroutine polynomials
 
-  subroutine evaluate(self, time, angle, speed, restoring, working)
+  subroutine evaluate(self, time, angle, speed, restoring, applied)
     class(couplings_t), intent(in) :: self
     real(wp), intent(in) :: time(self%lanes), angle(self%values), speed(self%values)
-    real(wp), intent(inout) :: restoring(self%values), working(self%values)
+    real(wp), intent(inout) :: restoring(self%values), applied(self%values)
 
-    if (allocated(self%friction)) call add_friction(self%values, self%friction, self%friction_speed, speed, working)
+    if (allocated(self%friction)) call add_friction(self%values, self%friction, self%friction_speed, speed, applied)
   end subroutine evaluate
 
-  pure subroutine add_friction(n, friction, friction_speed, speed, working)
+  pure subroutine add_friction(n, friction, friction_speed, speed, applied)
     integer, intent(in) :: n
     real(wp), intent(in) :: friction(n), friction_speed(n), speed(n)
-    real(wp), intent(inout) :: working(n)
+    real(wp), intent(inout) :: applied(n)
     integer :: i
 
     do i = 1, n
-      working(i) = working(i) - friction(i) * tanh_of(speed(i) / friction_speed(i))
+      applied(i) = applied(i) - friction(i) * tanh_of(speed(i) / friction_speed(i))
     end do
   end subroutine add_friction
 
@@ -106,7 +106,7 @@ contains
     if (.not. allocated(self%friction)) return
     do e = 1, size(self%to)
       do l = 1, self%lanes
-        associate (slope => elements%working_speed(l, self%first + e - 1), scale => self%friction_speed(l, e), &
+        associate (slope => elements%applied_speed(l, self%first + e - 1), scale => self%friction_speed(l, e), &
                    speed => elements%speed(l, self%first + e - 1))
           slope = slope - self%friction(l, e) / scale * (1.0_wp - tanh_of(speed / scale)**2)
         end associate
@@ -122,7 +122,7 @@ contains
     allocate (columns(3))
     columns(twist) = quantity_t('twist', 'rad', [(e, e=1, size(self%to))])
     columns(moment) = quantity_t('moment', 'N m', [(e, e=1, size(self%to))])
-    columns(damping_moment) = quantity_t('damping', 'N m', self%accounted)
+    columns(damping_moment) = quantity_t('damping', 'N m', self%with_work)
   end function quantities
 
   !> Twist, and the moments that act on the first body: F1 of the paper and the damping moment.
@@ -139,22 +139,22 @@ contains
     case (moment)
       values = -elements%restoring(lane, self%first:self%last())
     case default
-      values = -elements%working(lane, self%first:self%last())
+      values = -elements%applied(lane, self%first:self%last())
     end select
   end subroutine observe
 
-  subroutine list_numbers(self, numbers)
+  subroutine list_parameters(self, parameters)
     class(couplings_t), target, intent(inout) :: self
-    type(lane_numbers_t), intent(inout) :: numbers
+    type(lane_parameters_t), intent(inout) :: parameters
 
-    call numbers%add('stiffness', self%stiffness)
-    call numbers%add('cubic_stiffness', self%cubic_stiffness)
-    call numbers%add('damping', self%damping)
-    call numbers%add('rest_twist', self%rest_twist)
-    call numbers%remark(allocated(self%friction))
+    call parameters%add('stiffness', self%stiffness)
+    call parameters%add('cubic_stiffness', self%cubic_stiffness)
+    call parameters%add('damping', self%damping)
+    call parameters%add('rest_twist', self%rest_twist)
+    call parameters%add_structure(allocated(self%friction))
     if (.not. allocated(self%friction)) return
-    call numbers%add('friction', self%friction)
-    call numbers%add('friction_speed', self%friction_speed)
-  end subroutine list_numbers
+    call parameters%add('friction', self%friction)
+    call parameters%add('friction_speed', self%friction_speed)
+  end subroutine list_parameters
 
 end module nocdyn_couplings

@@ -5,10 +5,10 @@
 !> Library. What the limited damping does is work; while the bodies separate faster than the contact can follow, it is the
 !> opposite of the elastic moment, and takes the energy that the contact still stores.
 module nocdyn_gap_couplings
-  use nocdyn_bank, only: border_width
+  use nocdyn_bank, only: boundary_width
   use nocdyn_elements, only: elements_t
   use nocdyn_kinds, only: wp
-  use nocdyn_lane_numbers, only: lane_numbers_t
+  use nocdyn_lane_parameters, only: lane_parameters_t
   use nocdyn_polynomial_couplings, only: elastic_curvature, elastic_energy, elastic_moment, elastic_slope, &
                                          new_polynomial_couplings, polynomial_couplings_t
   use nocdyn_polynomial_laws, only: polynomial_laws_t
@@ -20,16 +20,16 @@ module nocdyn_gap_couplings
 
   type, extends(polynomial_couplings_t), public :: gap_couplings_t
     real(wp), allocatable :: gap(:, :)      !! total play [rad], positive, shape [lanes, couplings] as all that follow
-    real(wp), allocatable :: border(:, :)   !! by which borders are moved, as moment [N m]
+    real(wp), allocatable :: boundary_shift(:, :)   !! by which borders are moved, as moment [N m]
     real(wp), allocatable :: scale(:, :)    !! stiffness that makes a moment of a penetration [N m/rad]
   contains
-    procedure :: list_numbers
+    procedure :: list_parameters
     procedure :: polynomials
     procedure :: evaluate
     procedure :: differentiate
-    procedure :: assess
+    procedure :: evaluate_energies
     procedure :: choose
-    procedure :: margin
+    procedure :: indicator
     procedure :: switch_name
   end type gap_couplings_t
 
@@ -56,17 +56,17 @@ contains
     bank%polynomial_couplings_t = new_polynomial_couplings(names, from, to, coefficient, damping, rest_twist, &
                                                            friction, friction_speed)
     allocate (bank%gap, source=gap)
-    allocate (bank%border, bank%scale, source=0.0_wp * gap)
+    allocate (bank%boundary_shift, bank%scale, source=0.0_wp * gap)
     do e = 1, size(to)
       do l = 1, size(gap, 1)
         bank%scale(l, e) = sum([(abs(coefficient(k, l, e)) * gap(l, e)**(k - 1), k=1, size(coefficient, 1))])
       end do
     end do
     if (any(bank%gap <= 0) .or. any(bank%scale <= 0)) error stop 'nocdyn_gap_couplings: gaps have widths and edges stiffness'
-    bank%border = border_width * bank%scale * bank%gap
-    bank%accounted = pack([(e, e=1, size(to))], [(any(bank%accounted == e) .or. can_pull(coefficient(:, :, e)), &
+    bank%boundary_shift = boundary_width * bank%scale * bank%gap
+    bank%with_work = pack([(e, e=1, size(to))], [(any(bank%with_work == e) .or. can_pull(coefficient(:, :, e)), &
                                                   e=1, size(to))])
-    call bank%let_switch([(e, e=1, size(to))])
+    call bank%set_switches([(e, e=1, size(to))])
   end function new_gap_couplings
 
   !> Whether the elastic moment of a contact can change its sign. A contact that would pull gives up what it stores, which is
@@ -93,10 +93,10 @@ contains
     x = (angle - self%rest_twist(lane, coupling)) - sign(0.5_wp * self%gap(lane, coupling), real(branch, wp))
   end function penetration
 
-  subroutine evaluate(self, time, angle, speed, restoring, working)
+  subroutine evaluate(self, time, angle, speed, restoring, applied)
     class(gap_couplings_t), intent(in) :: self
     real(wp), intent(in) :: time(self%lanes), angle(self%values), speed(self%values)
-    real(wp), intent(inout) :: restoring(self%values), working(self%values)
+    real(wp), intent(inout) :: restoring(self%values), applied(self%values)
     real(wp) :: moment
     integer :: e, i, l
 
@@ -108,11 +108,11 @@ contains
           if (branch == free) cycle
           moment = elastic_moment(self%coefficient(:, l, e), penetration(self, branch, l, e, angle(i)))
           restoring(i) = restoring(i) - moment
-          working(i) = working(i) - damping_moment(branch, moment, self%damping(l, e) * speed(i))
+          applied(i) = applied(i) - damping_moment(branch, moment, self%damping(l, e) * speed(i))
         end associate
       end do
     end do
-    call self%couplings_t%evaluate(time, angle, speed, restoring, working)
+    call self%couplings_t%evaluate(time, angle, speed, restoring, applied)
   end subroutine evaluate
 
   pure function damping_moment(branch, elastic, viscous) result(moment)
@@ -145,15 +145,15 @@ contains
           stiffness = elastic_slope(self%coefficient(:, l, e), x)
           elements%restoring_angle(l, i) = elements%restoring_angle(l, i) - stiffness
           curvature = curvature - elastic_curvature(self%coefficient(:, l, e), x)
-          elements%working_angle(l, i) = elements%working_angle(l, i) - damping_moment(branch, stiffness, 0.0_wp)
-          elements%working_speed(l, i) = elements%working_speed(l, i) - damping_moment(branch, 0.0_wp, self%damping(l, e))
+          elements%applied_angle(l, i) = elements%applied_angle(l, i) - damping_moment(branch, stiffness, 0.0_wp)
+          elements%applied_speed(l, i) = elements%applied_speed(l, i) - damping_moment(branch, 0.0_wp, self%damping(l, e))
         end associate
       end do
     end do
     call self%couplings_t%differentiate(elements)
   end subroutine differentiate
 
-  subroutine assess(self, elements)
+  subroutine evaluate_energies(self, elements)
     class(gap_couplings_t), intent(in) :: self
     type(elements_t), intent(inout) :: elements
     real(wp) :: x
@@ -172,7 +172,7 @@ contains
         end associate
       end do
     end do
-  end subroutine assess
+  end subroutine evaluate_energies
 
   !> The elastic and the viscous moment, both positive where they push.
   pure subroutine contact_moments(self, side, lane, coupling, angle, speed, depth, elastic, viscous)
@@ -190,11 +190,11 @@ contains
     viscous = side * self%damping(lane, coupling) * speed
   end subroutine contact_moments
 
-  subroutine choose(self, switch, lane, t, angle, speed, inner)
+  subroutine choose(self, switch, lane, t, angle, speed, internal)
     class(gap_couplings_t), intent(inout) :: self
     integer, intent(in) :: switch, lane
     real(wp), intent(in) :: t, angle, speed
-    real(wp), intent(in) :: inner(:)
+    real(wp), intent(in) :: internal(:)
     real(wp) :: depth, elastic, viscous
     integer :: side
 
@@ -213,12 +213,12 @@ contains
     end associate
   end subroutine choose
 
-  pure function margin(self, switch, lane, t, angle, speed, inner)
+  pure function indicator(self, switch, lane, t, angle, speed, internal)
     class(gap_couplings_t), intent(in) :: self
     integer, intent(in) :: switch, lane
     real(wp), intent(in) :: t, angle, speed
-    real(wp), intent(in) :: inner(:)
-    real(wp) :: margin
+    real(wp), intent(in) :: internal(:)
+    real(wp) :: indicator
     real(wp) :: depth, elastic, viscous
     integer :: side
 
@@ -228,17 +228,17 @@ contains
       depth = depth * self%scale(lane, switch)
       select case (abs(branch))
       case (free)
-        margin = self%scale(lane, switch) * (0.5_wp * gap - abs(angle - self%rest_twist(lane, switch)))
+        indicator = self%scale(lane, switch) * (0.5_wp * gap - abs(angle - self%rest_twist(lane, switch)))
       case (contact)
-        margin = min(depth, elastic - abs(viscous))
+        indicator = min(depth, elastic - abs(viscous))
       case (closing)
-        margin = min(depth, elastic, viscous - elastic)
+        indicator = min(depth, elastic, viscous - elastic)
       case default
-        margin = min(depth, -(elastic + min(viscous, 0.0_wp)))
+        indicator = min(depth, -(elastic + min(viscous, 0.0_wp)))
       end select
     end associate
-    margin = margin + self%border(lane, switch)
-  end function margin
+    indicator = indicator + self%boundary_shift(lane, switch)
+  end function indicator
 
   function switch_name(self, switch) result(name)
     class(gap_couplings_t), intent(in) :: self
@@ -248,14 +248,14 @@ contains
     name = 'edge of the gap'
   end function switch_name
 
-  subroutine list_numbers(self, numbers)
+  subroutine list_parameters(self, parameters)
     class(gap_couplings_t), target, intent(inout) :: self
-    type(lane_numbers_t), intent(inout) :: numbers
+    type(lane_parameters_t), intent(inout) :: parameters
 
-    call self%polynomial_couplings_t%list_numbers(numbers)
-    call numbers%add('gap', self%gap)
-    call numbers%add('border', self%border)
-    call numbers%add('scale', self%scale)
-  end subroutine list_numbers
+    call self%polynomial_couplings_t%list_parameters(parameters)
+    call parameters%add('gap', self%gap)
+    call parameters%add('border', self%boundary_shift)
+    call parameters%add('scale', self%scale)
+  end subroutine list_parameters
 
 end module nocdyn_gap_couplings

@@ -3,7 +3,7 @@ module nocdyn_polynomial_couplings
   use nocdyn_couplings, only: couplings_t, new_couplings
   use nocdyn_elements, only: elements_t
   use nocdyn_kinds, only: wp
-  use nocdyn_lane_numbers, only: lane_numbers_t
+  use nocdyn_lane_parameters, only: lane_parameters_t
   use nocdyn_text, only: string_t
   implicit none (type, external)
   private
@@ -16,10 +16,10 @@ module nocdyn_polynomial_couplings
     integer :: order = 1
     real(wp), allocatable :: coefficient(:, :, :)   !! p_k [N m/rad^k], shape [order, lanes, couplings]
   contains
-    procedure :: list_numbers
+    procedure :: list_parameters
     procedure :: evaluate
     procedure :: differentiate
-    procedure :: assess
+    procedure :: evaluate_energies
   end type polynomial_couplings_t
 
 contains
@@ -38,7 +38,7 @@ contains
     bank%couplings_t = new_couplings(names, from, to, 0.0_wp * damping, 0.0_wp * damping, damping, rest_twist, &
                                      friction, friction_speed)
     bank%is_polynomial = .false.
-    bank%is_of_paper = .false.
+    bank%has_paper_law = .false.
     bank%order = size(coefficient, 1)
     allocate (bank%coefficient, source=coefficient)
     bank%elastic = pack([(e, e=1, size(to))], [(any(abs(coefficient(:, :, e)) > 0.0_wp), e=1, size(to))])
@@ -56,13 +56,13 @@ contains
     coefficient(3) = coefficient(3) + cubic_stiffness
   end function elastic_coefficients
 
-  subroutine evaluate(self, time, angle, speed, restoring, working)
+  subroutine evaluate(self, time, angle, speed, restoring, applied)
     class(polynomial_couplings_t), intent(in) :: self
     real(wp), intent(in) :: time(self%lanes), angle(self%values), speed(self%values)
-    real(wp), intent(inout) :: restoring(self%values), working(self%values)
+    real(wp), intent(inout) :: restoring(self%values), applied(self%values)
 
     call add_terms(self%values, self%order, self%coefficient, self%rest_twist, angle, restoring)
-    call self%couplings_t%evaluate(time, angle, speed, restoring, working)
+    call self%couplings_t%evaluate(time, angle, speed, restoring, applied)
   end subroutine evaluate
 
   !> Adds -sum p_k w^k, w = angle - rest.
@@ -94,7 +94,7 @@ contains
     call self%couplings_t%differentiate(elements)
   end subroutine differentiate
 
-  subroutine assess(self, elements)
+  subroutine evaluate_energies(self, elements)
     class(polynomial_couplings_t), intent(in) :: self
     type(elements_t), intent(inout) :: elements
     real(wp) :: w
@@ -108,7 +108,7 @@ contains
         elements%secant(l, i) = elements%secant(l, i) + self%coefficient(1, l, e) + elastic_moment(self%coefficient(2:, l, e), w)
       end do
     end do
-  end subroutine assess
+  end subroutine evaluate_energies
 
   !> p_1 w + p_2 w^2 + ...
   pure function elastic_moment(p, w) result(moment)
@@ -159,12 +159,12 @@ contains
     energy = energy * w
   end function elastic_energy
 
-  subroutine list_numbers(self, numbers)
+  subroutine list_parameters(self, parameters)
     class(polynomial_couplings_t), target, intent(inout) :: self
-    type(lane_numbers_t), intent(inout) :: numbers
+    type(lane_parameters_t), intent(inout) :: parameters
 
-    call self%couplings_t%list_numbers(numbers)
-    call numbers%add('coefficient', self%coefficient)
-  end subroutine list_numbers
+    call self%couplings_t%list_parameters(parameters)
+    call parameters%add('coefficient', self%coefficient)
+  end subroutine list_parameters
 
 end module nocdyn_polynomial_couplings

@@ -3,7 +3,7 @@ module nocdyn_saturated_couplings
   use nocdyn_couplings, only: couplings_t, new_couplings
   use nocdyn_elements, only: elements_t
   use nocdyn_kinds, only: wp
-  use nocdyn_lane_numbers, only: lane_numbers_t
+  use nocdyn_lane_parameters, only: lane_parameters_t
   use nocdyn_text, only: string_t
   use nocdyn_vector_functions, only: tanh_of
   implicit none (type, external)
@@ -15,10 +15,10 @@ module nocdyn_saturated_couplings
     real(wp), allocatable :: initial_stiffness(:, :)   !! K1 [N m/rad], positive, shape [lanes, couplings] as all parameters
     real(wp), allocatable :: saturation(:, :)          !! S [N m], positive
   contains
-    procedure :: list_numbers
+    procedure :: list_parameters
     procedure :: evaluate
     procedure :: differentiate
-    procedure :: assess
+    procedure :: evaluate_energies
   end type saturated_couplings_t
 
 contains
@@ -39,19 +39,19 @@ contains
     bank%couplings_t = new_couplings(names, from, to, 0.0_wp * stiffness, 0.0_wp * stiffness, damping, rest_twist, &
                                      friction, friction_speed)
     bank%is_polynomial = .false.
-    bank%is_of_paper = .false.
+    bank%has_paper_law = .false.
     allocate (bank%initial_stiffness, source=stiffness)
     allocate (bank%saturation, source=saturation)
     bank%elastic = [(e, e=1, size(to))]
   end function new_saturated_couplings
 
-  subroutine evaluate(self, time, angle, speed, restoring, working)
+  subroutine evaluate(self, time, angle, speed, restoring, applied)
     class(saturated_couplings_t), intent(in) :: self
     real(wp), intent(in) :: time(self%lanes), angle(self%values), speed(self%values)
-    real(wp), intent(inout) :: restoring(self%values), working(self%values)
+    real(wp), intent(inout) :: restoring(self%values), applied(self%values)
 
     call add_moments(self%values, self%initial_stiffness, self%saturation, self%rest_twist, angle, restoring)
-    call self%couplings_t%evaluate(time, angle, speed, restoring, working)
+    call self%couplings_t%evaluate(time, angle, speed, restoring, applied)
   end subroutine evaluate
 
   pure subroutine add_moments(n, stiffness, saturation, rest, angle, restoring)
@@ -87,7 +87,7 @@ contains
   end subroutine differentiate
 
   !> The energy S^2 / K1 ln cosh(K1 w / S).
-  subroutine assess(self, elements)
+  subroutine evaluate_energies(self, elements)
     class(saturated_couplings_t), intent(in) :: self
     type(elements_t), intent(inout) :: elements
     real(wp) :: w, x
@@ -104,7 +104,7 @@ contains
         end associate
       end do
     end do
-  end subroutine assess
+  end subroutine evaluate_energies
 
   !> ln cosh x for x >= 0, where it would lose digits by its series x^2 / 2 - x^4 / 12 + x^6 / 45.
   pure real(wp) function log_cosh(x)
@@ -117,13 +117,13 @@ contains
     end if
   end function log_cosh
 
-  subroutine list_numbers(self, numbers)
+  subroutine list_parameters(self, parameters)
     class(saturated_couplings_t), target, intent(inout) :: self
-    type(lane_numbers_t), intent(inout) :: numbers
+    type(lane_parameters_t), intent(inout) :: parameters
 
-    call self%couplings_t%list_numbers(numbers)
-    call numbers%add('stiffness', self%initial_stiffness)
-    call numbers%add('saturation', self%saturation)
-  end subroutine list_numbers
+    call self%couplings_t%list_parameters(parameters)
+    call parameters%add('stiffness', self%initial_stiffness)
+    call parameters%add('saturation', self%saturation)
+  end subroutine list_parameters
 
 end module nocdyn_saturated_couplings

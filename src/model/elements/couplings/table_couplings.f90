@@ -1,11 +1,11 @@
 !> Couplings whose elastic moment over the twist is a table.
 module nocdyn_table_couplings
-  use nocdyn_bank, only: border_width
+  use nocdyn_bank, only: boundary_width
   use nocdyn_couplings, only: couplings_t, new_couplings
   use nocdyn_curves, only: curve_t
   use nocdyn_elements, only: elements_t
   use nocdyn_kinds, only: wp
-  use nocdyn_lane_numbers, only: lane_numbers_t
+  use nocdyn_lane_parameters, only: lane_parameters_t
   use nocdyn_text, only: string_t
   implicit none (type, external)
   private
@@ -16,12 +16,12 @@ module nocdyn_table_couplings
   type, extends(couplings_t), public :: table_couplings_t
     type(curve_t), allocatable :: curve(:, :)   !! [N m] over [rad], shape [lanes, couplings]
   contains
-    procedure :: list_numbers
+    procedure :: list_parameters
     procedure :: evaluate
     procedure :: differentiate
-    procedure :: assess
+    procedure :: evaluate_energies
     procedure :: choose
-    procedure :: margin
+    procedure :: indicator
     procedure :: switch_name
   end type table_couplings_t
 
@@ -41,16 +41,16 @@ contains
     bank%couplings_t = new_couplings(names, from, to, 0.0_wp * damping, 0.0_wp * damping, damping, rest_twist, &
                                      friction, friction_speed)
     bank%is_polynomial = .false.
-    bank%is_of_paper = .false.
+    bank%has_paper_law = .false.
     allocate (bank%curve, source=curve)
     bank%elastic = [(e, e=1, size(to))]
-    call bank%let_switch([(e, e=1, size(to))])
+    call bank%set_switches([(e, e=1, size(to))])
   end function new_table_couplings
 
-  subroutine evaluate(self, time, angle, speed, restoring, working)
+  subroutine evaluate(self, time, angle, speed, restoring, applied)
     class(table_couplings_t), intent(in) :: self
     real(wp), intent(in) :: time(self%lanes), angle(self%values), speed(self%values)
-    real(wp), intent(inout) :: restoring(self%values), working(self%values)
+    real(wp), intent(inout) :: restoring(self%values), applied(self%values)
     integer :: e, i, l
 
     i = 0
@@ -60,7 +60,7 @@ contains
         restoring(i) = restoring(i) - self%curve(l, e)%value(self%branch(l, e), angle(i) - self%rest_twist(l, e))
       end do
     end do
-    call self%couplings_t%evaluate(time, angle, speed, restoring, working)
+    call self%couplings_t%evaluate(time, angle, speed, restoring, applied)
   end subroutine evaluate
 
   subroutine differentiate(self, elements)
@@ -83,7 +83,7 @@ contains
   end subroutine differentiate
 
   !> The energy is counted from w = 0.
-  subroutine assess(self, elements)
+  subroutine evaluate_energies(self, elements)
     class(table_couplings_t), intent(in) :: self
     type(elements_t), intent(inout) :: elements
     real(wp) :: w
@@ -100,26 +100,26 @@ contains
         end associate
       end do
     end do
-  end subroutine assess
+  end subroutine evaluate_energies
 
-  subroutine choose(self, switch, lane, t, angle, speed, inner)
+  subroutine choose(self, switch, lane, t, angle, speed, internal)
     class(table_couplings_t), intent(inout) :: self
     integer, intent(in) :: switch, lane
     real(wp), intent(in) :: t, angle, speed
-    real(wp), intent(in) :: inner(:)
+    real(wp), intent(in) :: internal(:)
 
     self%branch(lane, switch) = self%curve(lane, switch)%segment(angle - self%rest_twist(lane, switch))
   end subroutine choose
 
-  pure function margin(self, switch, lane, t, angle, speed, inner)
+  pure function indicator(self, switch, lane, t, angle, speed, internal)
     class(table_couplings_t), intent(in) :: self
     integer, intent(in) :: switch, lane
     real(wp), intent(in) :: t, angle, speed
-    real(wp), intent(in) :: inner(:)
-    real(wp) :: margin
+    real(wp), intent(in) :: internal(:)
+    real(wp) :: indicator
 
-    margin = self%curve(lane, switch)%margin(self%branch(lane, switch), angle - self%rest_twist(lane, switch), border_width)
-  end function margin
+    indicator = self%curve(lane, switch)%inset(self%branch(lane, switch), angle - self%rest_twist(lane, switch), boundary_width)
+  end function indicator
 
   function switch_name(self, switch) result(name)
     class(table_couplings_t), intent(in) :: self
@@ -129,12 +129,12 @@ contains
     name = 'point in the table'
   end function switch_name
 
-  subroutine list_numbers(self, numbers)
+  subroutine list_parameters(self, parameters)
     class(table_couplings_t), target, intent(inout) :: self
-    type(lane_numbers_t), intent(inout) :: numbers
+    type(lane_parameters_t), intent(inout) :: parameters
 
-    call self%couplings_t%list_numbers(numbers)
-    call numbers%add_curves(self%curve)
-  end subroutine list_numbers
+    call self%couplings_t%list_parameters(parameters)
+    call parameters%add_curves(self%curve)
+  end subroutine list_parameters
 
 end module nocdyn_table_couplings

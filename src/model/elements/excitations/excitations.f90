@@ -3,7 +3,7 @@ module nocdyn_excitations
   use nocdyn_bank, only: bank_t, role_excitation
   use nocdyn_elements, only: elements_t
   use nocdyn_kinds, only: wp
-  use nocdyn_lane_numbers, only: lane_numbers_t
+  use nocdyn_lane_parameters, only: lane_parameters_t
   use nocdyn_text, only: string_t
   use nocdyn_vector_functions, only: cosines, sine_of, sines
   implicit none (type, external)
@@ -16,12 +16,12 @@ module nocdyn_excitations
     real(wp), allocatable :: frequency(:, :)   !! omega_p [rad/s]
     real(wp), allocatable :: phase(:, :)       !! [rad]
   contains
-    procedure :: list_numbers
+    procedure :: list_parameters
     procedure :: evaluate
     procedure :: differentiate
     procedure :: has_series
-    procedure :: drive
-    procedure :: settle
+    procedure :: forcing_series
+    procedure :: to_mean_torque
   end type excitations_t
 
   integer, parameter :: strip = 64   ! arguments whose sines are taken at a time
@@ -37,31 +37,31 @@ contains
     integer :: e
 
     bank%is_polynomial = .false.
-    bank%is_external = .true.
+    bank%is_time_only = .true.
     call bank%connect(role_excitation, size(amplitude, 1), names, [(0, e=1, size(body))], body)
     bank%amplitude = amplitude
     bank%frequency = frequency
     bank%phase = phase
   end function new_excitations
 
-  subroutine evaluate(self, time, angle, speed, restoring, working)
+  subroutine evaluate(self, time, angle, speed, restoring, applied)
     class(excitations_t), intent(in) :: self
     real(wp), intent(in) :: time(self%lanes), angle(self%values), speed(self%values)
-    real(wp), intent(inout) :: restoring(self%values), working(self%values)
+    real(wp), intent(inout) :: restoring(self%values), applied(self%values)
 
-    call harmonic_torques(self%lanes, self%values, self%amplitude, self%frequency, self%phase, time, working)
+    call harmonic_torques(self%lanes, self%values, self%amplitude, self%frequency, self%phase, time, applied)
   end subroutine evaluate
 
   !> Eq. (17).
-  pure subroutine harmonic_torques(lanes, n, amplitude, frequency, phase, time, working)
+  pure subroutine harmonic_torques(lanes, n, amplitude, frequency, phase, time, applied)
     integer, intent(in) :: lanes, n
     real(wp), intent(in) :: amplitude(n), frequency(n), phase(n), time(lanes)
-    real(wp), intent(inout) :: working(n)
+    real(wp), intent(inout) :: applied(n)
     real(wp) :: wave(strip)
     integer :: before, i, length, next
 
     if (n == 1) then
-      working(1) = working(1) + amplitude(1) * sine_of(frequency(1) * time(1) + phase(1))
+      applied(1) = applied(1) + amplitude(1) * sine_of(frequency(1) * time(1) + phase(1))
       return
     end if
     before = 0
@@ -79,7 +79,7 @@ contains
       end if
       call sines(length, wave)
       do i = 1, length
-        working(before + i) = working(before + i) + amplitude(before + i) * wave(i)
+        applied(before + i) = applied(before + i) + amplitude(before + i) * wave(i)
       end do
       before = before + length
     end do
@@ -91,40 +91,40 @@ contains
     has_series = .true.
   end function has_series
 
-  subroutine drive(self, last, stride, time, working)
+  subroutine forcing_series(self, last, stride, time, applied)
     class(excitations_t), intent(in) :: self
     integer, intent(in) :: last, stride
     real(wp), intent(in) :: time(self%lanes)
-    real(wp), intent(inout) :: working(stride, 0:last)
+    real(wp), intent(inout) :: applied(stride, 0:last)
 
-    call harmonic_series(self%lanes, self%values, last, stride, self%amplitude, self%frequency, self%phase, time, working)
-  end subroutine drive
+    call harmonic_series(self%lanes, self%values, last, stride, self%amplitude, self%frequency, self%phase, time, applied)
+  end subroutine forcing_series
 
   !> M'' = -omega_p^2 M, from M and M' at the given time.
-  pure subroutine harmonic_series(lanes, n, last, stride, amplitude, frequency, phase, time, working)
+  pure subroutine harmonic_series(lanes, n, last, stride, amplitude, frequency, phase, time, applied)
     integer, intent(in) :: lanes, n, last, stride
     real(wp), intent(in) :: amplitude(n), frequency(n), phase(n), time(lanes)
-    real(wp), intent(inout) :: working(stride, 0:last)
+    real(wp), intent(inout) :: applied(stride, 0:last)
     real(wp) :: factor
     integer :: e, i, k, l
 
     do e = 1, n / lanes
       do l = 1, lanes
         i = (e - 1) * lanes + l
-        working(i, 0) = frequency(i) * time(l) + phase(i)
+        applied(i, 0) = frequency(i) * time(l) + phase(i)
       end do
     end do
-    working(:n, 1) = working(:n, 0)
-    call sines(n, working(:n, 0))
-    call cosines(n, working(:n, 1))
+    applied(:n, 1) = applied(:n, 0)
+    call sines(n, applied(:n, 0))
+    call cosines(n, applied(:n, 1))
     do i = 1, n
-      working(i, 0) = amplitude(i) * working(i, 0)
-      working(i, 1) = amplitude(i) * frequency(i) * working(i, 1)
+      applied(i, 0) = amplitude(i) * applied(i, 0)
+      applied(i, 1) = amplitude(i) * frequency(i) * applied(i, 1)
     end do
     do k = 2, last
       factor = -1.0_wp / (k * (k - 1))
       do i = 1, n
-        working(i, k) = factor * frequency(i)**2 * working(i, k - 2)
+        applied(i, k) = factor * frequency(i)**2 * applied(i, k - 2)
       end do
     end do
   end subroutine harmonic_series
@@ -135,7 +135,7 @@ contains
     real(wp) :: wave(1)
     integer :: e, l
 
-    associate (slope => elements%working_time(:, self%first:self%last()))
+    associate (slope => elements%applied_time(:, self%first:self%last()))
       do e = 1, size(self%to)
         do l = 1, self%lanes
           wave(1) = self%frequency(l, e) * elements%time(l) + self%phase(l, e)
@@ -147,20 +147,20 @@ contains
   end subroutine differentiate
 
   !> The mean of a sine is zero; without a frequency it is a constant.
-  subroutine settle(self)
+  subroutine to_mean_torque(self)
     class(excitations_t), intent(inout) :: self
 
     where (abs(self%frequency) > 0.0_wp) self%amplitude = 0.0_wp
     self%frequency = 0.0_wp
-  end subroutine settle
+  end subroutine to_mean_torque
 
-  subroutine list_numbers(self, numbers)
+  subroutine list_parameters(self, parameters)
     class(excitations_t), target, intent(inout) :: self
-    type(lane_numbers_t), intent(inout) :: numbers
+    type(lane_parameters_t), intent(inout) :: parameters
 
-    call numbers%add('amplitude', self%amplitude)
-    call numbers%add('frequency', self%frequency)
-    call numbers%add('phase', self%phase)
-  end subroutine list_numbers
+    call parameters%add('amplitude', self%amplitude)
+    call parameters%add('frequency', self%frequency)
+    call parameters%add('phase', self%phase)
+  end subroutine list_parameters
 
 end module nocdyn_excitations

@@ -4,7 +4,7 @@ module nocdyn_table_excitations
   use nocdyn_curves, only: curve_t
   use nocdyn_elements, only: elements_t
   use nocdyn_kinds, only: wp
-  use nocdyn_lane_numbers, only: lane_numbers_t
+  use nocdyn_lane_parameters, only: lane_parameters_t
   use nocdyn_text, only: string_t
   implicit none (type, external)
   private
@@ -15,11 +15,11 @@ module nocdyn_table_excitations
   type, extends(bank_t), public :: table_excitations_t
     type(curve_t), allocatable :: curve(:, :)   !! [N m] over [s], shape [lanes, excitations]
   contains
-    procedure :: list_numbers
+    procedure :: list_parameters
     procedure :: evaluate
     procedure :: differentiate
     procedure :: choose
-    procedure :: margin
+    procedure :: indicator
     procedure :: switch_name
   end type table_excitations_t
 
@@ -34,23 +34,23 @@ contains
     integer :: e
 
     bank%is_polynomial = .false.
-    bank%is_of_paper = .false.
+    bank%has_paper_law = .false.
     call bank%connect(role_excitation, size(curve, 1), names, [(0, e=1, size(body))], body)
     allocate (bank%curve, source=curve)
-    call bank%let_switch([(e, e=1, size(body))])
+    call bank%set_switches([(e, e=1, size(body))])
   end function new_table_excitations
 
-  subroutine evaluate(self, time, angle, speed, restoring, working)
+  subroutine evaluate(self, time, angle, speed, restoring, applied)
     class(table_excitations_t), intent(in) :: self
     real(wp), intent(in) :: time(self%lanes), angle(self%values), speed(self%values)
-    real(wp), intent(inout) :: restoring(self%values), working(self%values)
+    real(wp), intent(inout) :: restoring(self%values), applied(self%values)
     integer :: e, i, l
 
     i = 0
     do e = 1, size(self%to)
       do l = 1, self%lanes
         i = i + 1
-        working(i) = working(i) + self%curve(l, e)%value(self%branch(l, e), time(l))
+        applied(i) = applied(i) + self%curve(l, e)%value(self%branch(l, e), time(l))
       end do
     end do
   end subroutine evaluate
@@ -62,32 +62,32 @@ contains
 
     do e = 1, size(self%to)
       do l = 1, self%lanes
-        associate (slope => elements%working_time(l, self%first + e - 1))
+        associate (slope => elements%applied_time(l, self%first + e - 1))
           slope = slope + self%curve(l, e)%slope(self%branch(l, e), elements%time(l))
         end associate
       end do
     end do
   end subroutine differentiate
 
-  subroutine choose(self, switch, lane, t, angle, speed, inner)
+  subroutine choose(self, switch, lane, t, angle, speed, internal)
     class(table_excitations_t), intent(inout) :: self
     integer, intent(in) :: switch, lane
     real(wp), intent(in) :: t, angle, speed
-    real(wp), intent(in) :: inner(:)
+    real(wp), intent(in) :: internal(:)
 
     self%branch(lane, switch) = self%curve(lane, switch)%segment(time_reached(t))
   end subroutine choose
 
   !> In seconds; time does not go back across a border.
-  pure function margin(self, switch, lane, t, angle, speed, inner)
+  pure function indicator(self, switch, lane, t, angle, speed, internal)
     class(table_excitations_t), intent(in) :: self
     integer, intent(in) :: switch, lane
     real(wp), intent(in) :: t, angle, speed
-    real(wp), intent(in) :: inner(:)
-    real(wp) :: margin
+    real(wp), intent(in) :: internal(:)
+    real(wp) :: indicator
 
-    margin = self%curve(lane, switch)%room_above(self%branch(lane, switch), t)
-  end function margin
+    indicator = self%curve(lane, switch)%distance_to_end(self%branch(lane, switch), t)
+  end function indicator
 
   function switch_name(self, switch) result(name)
     class(table_excitations_t), intent(in) :: self
@@ -97,11 +97,11 @@ contains
     name = 'point in the table'
   end function switch_name
 
-  subroutine list_numbers(self, numbers)
+  subroutine list_parameters(self, parameters)
     class(table_excitations_t), target, intent(inout) :: self
-    type(lane_numbers_t), intent(inout) :: numbers
+    type(lane_parameters_t), intent(inout) :: parameters
 
-    call numbers%add_curves(self%curve)
-  end subroutine list_numbers
+    call parameters%add_curves(self%curve)
+  end subroutine list_parameters
 
 end module nocdyn_table_excitations

@@ -3,7 +3,7 @@ module nocdyn_timed_excitations
   use nocdyn_bank, only: bank_t, role_excitation, time_reached
   use nocdyn_elements, only: elements_t
   use nocdyn_kinds, only: wp
-  use nocdyn_lane_numbers, only: lane_numbers_t
+  use nocdyn_lane_parameters, only: lane_parameters_t
   use nocdyn_text, only: string_t
   use nocdyn_vector_functions, only: cosines, sine_of
   implicit none (type, external)
@@ -21,11 +21,11 @@ module nocdyn_timed_excitations
     real(wp), allocatable :: begin(:, :)       !! [s]
     real(wp), allocatable :: duration(:, :)    !! [s], positive; of no meaning for steps
   contains
-    procedure :: list_numbers
+    procedure :: list_parameters
     procedure :: evaluate
     procedure :: differentiate
     procedure :: choose
-    procedure :: margin
+    procedure :: indicator
     procedure :: switch_name
   end type timed_excitations_t
 
@@ -44,26 +44,26 @@ contains
     integer :: e
 
     bank%is_polynomial = .false.
-    bank%is_of_paper = .false.
+    bank%has_paper_law = .false.
     call bank%connect(role_excitation, size(amplitude, 1), names, [(0, e=1, size(body))], body)
     allocate (bank%shape, source=shape)
     allocate (bank%amplitude, source=amplitude)
     allocate (bank%begin, source=begin)
     allocate (bank%duration, source=duration)
-    call bank%let_switch([(e, e=1, size(body))])
+    call bank%set_switches([(e, e=1, size(body))])
   end function new_timed_excitations
 
-  subroutine evaluate(self, time, angle, speed, restoring, working)
+  subroutine evaluate(self, time, angle, speed, restoring, applied)
     class(timed_excitations_t), intent(in) :: self
     real(wp), intent(in) :: time(self%lanes), angle(self%values), speed(self%values)
-    real(wp), intent(inout) :: restoring(self%values), working(self%values)
+    real(wp), intent(inout) :: restoring(self%values), applied(self%values)
     integer :: e, i, l
 
     i = 0
     do e = 1, size(self%to)
       do l = 1, self%lanes
         i = i + 1
-        working(i) = working(i) + self%amplitude(l, e) * part_of_amplitude(self, l, e, time(l))
+        applied(i) = applied(i) + self%amplitude(l, e) * part_of_amplitude(self, l, e, time(l))
       end do
     end do
   end subroutine evaluate
@@ -100,7 +100,7 @@ contains
           call cosines(1, wave)
           wave(1) = pi * wave(1)
         end if
-        associate (slope => elements%working_time(l, self%first + e - 1))
+        associate (slope => elements%applied_time(l, self%first + e - 1))
           slope = slope + self%amplitude(l, e) * wave(1) / self%duration(l, e)
         end associate
       end do
@@ -117,11 +117,11 @@ contains
     if (self%shape(excitation) /= shape_step) time = time + self%duration(lane, excitation)
   end function end_of_change
 
-  subroutine choose(self, switch, lane, t, angle, speed, inner)
+  subroutine choose(self, switch, lane, t, angle, speed, internal)
     class(timed_excitations_t), intent(inout) :: self
     integer, intent(in) :: switch, lane
     real(wp), intent(in) :: t, angle, speed
-    real(wp), intent(in) :: inner(:)
+    real(wp), intent(in) :: internal(:)
 
     if (time_reached(t) < self%begin(lane, switch)) then
       self%branch(lane, switch) = before
@@ -133,29 +133,29 @@ contains
   end subroutine choose
 
   !> In seconds; a lane that has passed a border does not come back.
-  pure function margin(self, switch, lane, t, angle, speed, inner)
+  pure function indicator(self, switch, lane, t, angle, speed, internal)
     class(timed_excitations_t), intent(in) :: self
     integer, intent(in) :: switch, lane
     real(wp), intent(in) :: t, angle, speed
-    real(wp), intent(in) :: inner(:)
-    real(wp) :: margin
+    real(wp), intent(in) :: internal(:)
+    real(wp) :: indicator
 
     select case (self%branch(lane, switch))
     case (before)
-      margin = self%begin(lane, switch) - t
+      indicator = self%begin(lane, switch) - t
     case (during)
-      margin = end_of_change(self, lane, switch) - t
+      indicator = end_of_change(self, lane, switch) - t
     case default
-      margin = huge(margin)
+      indicator = huge(indicator)
     end select
-  end function margin
+  end function indicator
 
   function switch_name(self, switch) result(name)
     class(timed_excitations_t), intent(in) :: self
     integer, intent(in) :: switch
     character(len=:), allocatable :: name
 
-    select case (self%shape(self%switching(switch)))
+    select case (self%shape(self%switch_element(switch)))
     case (shape_step)
       name = 'step'
     case (shape_ramp)
@@ -165,14 +165,14 @@ contains
     end select
   end function switch_name
 
-  subroutine list_numbers(self, numbers)
+  subroutine list_parameters(self, parameters)
     class(timed_excitations_t), target, intent(inout) :: self
-    type(lane_numbers_t), intent(inout) :: numbers
+    type(lane_parameters_t), intent(inout) :: parameters
 
-    call numbers%remark(self%shape)
-    call numbers%add('amplitude', self%amplitude)
-    call numbers%add('time', self%begin)
-    call numbers%add('duration', self%duration)
-  end subroutine list_numbers
+    call parameters%add_structure(self%shape)
+    call parameters%add('amplitude', self%amplitude)
+    call parameters%add('time', self%begin)
+    call parameters%add('duration', self%duration)
+  end subroutine list_parameters
 
 end module nocdyn_timed_excitations

@@ -6,7 +6,7 @@ module nocdyn_wave_excitations
   use nocdyn_bank, only: bank_t, role_excitation
   use nocdyn_elements, only: elements_t
   use nocdyn_kinds, only: wp
-  use nocdyn_lane_numbers, only: lane_numbers_t
+  use nocdyn_lane_parameters, only: lane_parameters_t
   use nocdyn_text, only: string_t
   use nocdyn_vector_functions, only: cosines, sine_of
   implicit none (type, external)
@@ -21,10 +21,10 @@ module nocdyn_wave_excitations
     real(wp), allocatable :: order(:, :)
     real(wp), allocatable :: phase(:, :)       !! [rad]
   contains
-    procedure :: list_numbers
+    procedure :: list_parameters
     procedure :: evaluate
     procedure :: differentiate
-    procedure :: settle
+    procedure :: to_mean_torque
   end type wave_excitations_t
 
 contains
@@ -39,7 +39,7 @@ contains
     integer :: e
 
     bank%is_polynomial = .false.
-    bank%is_of_paper = .false.
+    bank%has_paper_law = .false.
     call bank%connect(role_excitation, size(amplitude, 1), names, [(0, e=1, size(body))], body)
     allocate (bank%owner, source=owner)
     allocate (bank%amplitude, source=amplitude)
@@ -48,16 +48,16 @@ contains
     allocate (bank%phase, source=phase)
   end function new_wave_excitations
 
-  subroutine evaluate(self, time, angle, speed, restoring, working)
+  subroutine evaluate(self, time, angle, speed, restoring, applied)
     class(wave_excitations_t), intent(in) :: self
     real(wp), intent(in) :: time(self%lanes), angle(self%values), speed(self%values)
-    real(wp), intent(inout) :: restoring(self%values), working(self%values)
+    real(wp), intent(inout) :: restoring(self%values), applied(self%values)
     integer :: i, k, l
 
     do k = 1, size(self%owner)
       do l = 1, self%lanes
         i = self%lanes * (self%owner(k) - 1) + l
-        working(i) = working(i) + self%amplitude(l, k) * sine_of(self%frequency(l, k) * time(l) + self%order(l, k) * angle(i) &
+        applied(i) = applied(i) + self%amplitude(l, k) * sine_of(self%frequency(l, k) * time(l) + self%order(l, k) * angle(i) &
                                                                  + self%phase(l, k))
       end do
     end do
@@ -75,29 +75,29 @@ contains
         wave(1) = self%frequency(l, k) * elements%time(l) + self%order(l, k) * elements%angle(l, i) + self%phase(l, k)
         call cosines(1, wave)
         wave(1) = self%amplitude(l, k) * wave(1)
-        elements%working_angle(l, i) = elements%working_angle(l, i) + self%order(l, k) * wave(1)
-        elements%working_time(l, i) = elements%working_time(l, i) + self%frequency(l, k) * wave(1)
+        elements%applied_angle(l, i) = elements%applied_angle(l, i) + self%order(l, k) * wave(1)
+        elements%applied_time(l, i) = elements%applied_time(l, i) + self%frequency(l, k) * wave(1)
       end do
     end do
   end subroutine differentiate
 
   !> The mean of a sine is zero.
-  subroutine settle(self)
+  subroutine to_mean_torque(self)
     class(wave_excitations_t), intent(inout) :: self
 
     self%amplitude = 0.0_wp
     self%frequency = 0.0_wp
-  end subroutine settle
+  end subroutine to_mean_torque
 
-  subroutine list_numbers(self, numbers)
+  subroutine list_parameters(self, parameters)
     class(wave_excitations_t), target, intent(inout) :: self
-    type(lane_numbers_t), intent(inout) :: numbers
+    type(lane_parameters_t), intent(inout) :: parameters
 
-    call numbers%remark(self%owner)
-    call numbers%add('amplitude', self%amplitude)
-    call numbers%add('frequency', self%frequency)
-    call numbers%add('order', self%order)
-    call numbers%add('phase', self%phase)
-  end subroutine list_numbers
+    call parameters%add_structure(self%owner)
+    call parameters%add('amplitude', self%amplitude)
+    call parameters%add('frequency', self%frequency)
+    call parameters%add('order', self%order)
+    call parameters%add('phase', self%phase)
+  end subroutine list_parameters
 
 end module nocdyn_wave_excitations

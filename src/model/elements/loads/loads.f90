@@ -2,7 +2,7 @@
 module nocdyn_loads
   use nocdyn_bank, only: bank_t, role_load
   use nocdyn_kinds, only: wp
-  use nocdyn_lane_numbers, only: lane_numbers_t
+  use nocdyn_lane_parameters, only: lane_parameters_t
   use nocdyn_polynomial_laws, only: polynomial_laws_t
   use nocdyn_text, only: string_t
   implicit none (type, external)
@@ -13,7 +13,7 @@ module nocdyn_loads
   type, extends(bank_t), public :: loads_t
     real(wp), allocatable :: viscous(:, :)   !! c [N m s/rad], shape [lanes, loads]
   contains
-    procedure :: list_numbers
+    procedure :: list_parameters
     procedure :: polynomials
   end type loads_t
 
@@ -40,11 +40,11 @@ contains
     laws%damping(:, self%first:self%last()) = self%viscous
   end subroutine polynomials
 
-  subroutine list_numbers(self, numbers)
+  subroutine list_parameters(self, parameters)
     class(loads_t), target, intent(inout) :: self
-    type(lane_numbers_t), intent(inout) :: numbers
+    type(lane_parameters_t), intent(inout) :: parameters
 
-    call numbers%add('viscous', self%viscous)
-  end subroutine list_numbers
+    call parameters%add('viscous', self%viscous)
+  end subroutine list_parameters
 
 end module nocdyn_loads

@@ -3,7 +3,7 @@
 module nocdyn_nonlinear_loads
   use nocdyn_elements, only: elements_t
   use nocdyn_kinds, only: wp
-  use nocdyn_lane_numbers, only: lane_numbers_t
+  use nocdyn_lane_parameters, only: lane_parameters_t
   use nocdyn_loads, only: loads_t, new_loads
   use nocdyn_text, only: string_t
   use nocdyn_vector_functions, only: tanh_of
@@ -17,7 +17,7 @@ module nocdyn_nonlinear_loads
     real(wp), allocatable :: constant(:, :)         !! [N m]
     real(wp), allocatable :: constant_speed(:, :)   !! [rad/s], positive
   contains
-    procedure :: list_numbers
+    procedure :: list_parameters
     procedure :: evaluate
     procedure :: differentiate
   end type nonlinear_loads_t
@@ -33,28 +33,28 @@ contains
 
     bank%loads_t = new_loads(names, body, viscous)
     bank%is_polynomial = .false.
-    bank%is_of_paper = .false.
+    bank%has_paper_law = .false.
     allocate (bank%quadratic, source=quadratic)
     allocate (bank%constant, source=constant)
     allocate (bank%constant_speed, source=constant_speed)
   end function new_nonlinear_loads
 
-  subroutine evaluate(self, time, angle, speed, restoring, working)
+  subroutine evaluate(self, time, angle, speed, restoring, applied)
     class(nonlinear_loads_t), intent(in) :: self
     real(wp), intent(in) :: time(self%lanes), angle(self%values), speed(self%values)
-    real(wp), intent(inout) :: restoring(self%values), working(self%values)
+    real(wp), intent(inout) :: restoring(self%values), applied(self%values)
 
-    call resist(self%values, self%quadratic, self%constant, self%constant_speed, speed, working)
+    call resist(self%values, self%quadratic, self%constant, self%constant_speed, speed, applied)
   end subroutine evaluate
 
-  pure subroutine resist(n, quadratic, constant, constant_speed, speed, working)
+  pure subroutine resist(n, quadratic, constant, constant_speed, speed, applied)
     integer, intent(in) :: n
     real(wp), intent(in) :: quadratic(n), constant(n), constant_speed(n), speed(n)
-    real(wp), intent(inout) :: working(n)
+    real(wp), intent(inout) :: applied(n)
     integer :: i
 
     do i = 1, n
-      working(i) = working(i) - (quadratic(i) * abs(speed(i)) * speed(i) + constant(i) * tanh_of(speed(i) / constant_speed(i)))
+      applied(i) = applied(i) - (quadratic(i) * abs(speed(i)) * speed(i) + constant(i) * tanh_of(speed(i) / constant_speed(i)))
     end do
   end subroutine resist
 
@@ -65,7 +65,7 @@ contains
 
     do e = 1, size(self%to)
       do l = 1, self%lanes
-        associate (slope => elements%working_speed(l, self%first + e - 1), speed => elements%speed(l, self%first + e - 1), &
+        associate (slope => elements%applied_speed(l, self%first + e - 1), speed => elements%speed(l, self%first + e - 1), &
                    constant_speed => self%constant_speed(l, e))
           slope = slope - (2.0_wp * self%quadratic(l, e) * abs(speed) &
                            + self%constant(l, e) / constant_speed * (1.0_wp - tanh_of(speed / constant_speed)**2))
@@ -74,14 +74,14 @@ contains
     end do
   end subroutine differentiate
 
-  subroutine list_numbers(self, numbers)
+  subroutine list_parameters(self, parameters)
     class(nonlinear_loads_t), target, intent(inout) :: self
-    type(lane_numbers_t), intent(inout) :: numbers
+    type(lane_parameters_t), intent(inout) :: parameters
 
-    call self%loads_t%list_numbers(numbers)
-    call numbers%add('quadratic', self%quadratic)
-    call numbers%add('constant', self%constant)
-    call numbers%add('constant_speed', self%constant_speed)
-  end subroutine list_numbers
+    call self%loads_t%list_parameters(parameters)
+    call parameters%add('quadratic', self%quadratic)
+    call parameters%add('constant', self%constant)
+    call parameters%add('constant_speed', self%constant_speed)
+  end subroutine list_parameters
 
 end module nocdyn_nonlinear_loads

@@ -3,7 +3,7 @@ module nocdyn_curve_motors
   use nocdyn_bank, only: bank_t, role_motor
   use nocdyn_elements, only: elements_t
   use nocdyn_kinds, only: wp
-  use nocdyn_lane_numbers, only: lane_numbers_t
+  use nocdyn_lane_parameters, only: lane_parameters_t
   use nocdyn_text, only: string_t
   use nocdyn_torque_curves, only: torque_curve_t
   implicit none (type, external)
@@ -15,11 +15,11 @@ module nocdyn_curve_motors
   type, extends(bank_t), public :: curve_motors_t
     class(torque_curve_t), allocatable :: curve
   contains
-    procedure :: list_numbers
+    procedure :: list_parameters
     procedure :: evaluate
     procedure :: differentiate
     procedure :: choose
-    procedure :: margin
+    procedure :: indicator
     procedure :: switch_name
     procedure :: segment
   end type curve_motors_t
@@ -36,10 +36,10 @@ contains
     integer :: e
 
     bank%is_polynomial = .false.
-    bank%is_of_paper = .false.
+    bank%has_paper_law = .false.
     call bank%connect(role_motor, lanes, names, [(0, e=1, size(body))], body)
     allocate (bank%curve, source=curve)
-    if (curve%has_segments()) call bank%let_switch([(e, e=1, size(body))])
+    if (curve%has_segments()) call bank%set_switches([(e, e=1, size(body))])
   end function new_curve_motors
 
   !> The present segment of the curve of a motor.
@@ -51,17 +51,17 @@ contains
     if (self%curve%has_segments()) segment = self%branch(lane, motor)
   end function segment
 
-  subroutine evaluate(self, time, angle, speed, restoring, working)
+  subroutine evaluate(self, time, angle, speed, restoring, applied)
     class(curve_motors_t), intent(in) :: self
     real(wp), intent(in) :: time(self%lanes), angle(self%values), speed(self%values)
-    real(wp), intent(inout) :: restoring(self%values), working(self%values)
+    real(wp), intent(inout) :: restoring(self%values), applied(self%values)
     integer :: e, i, l
 
     i = 0
     do e = 1, size(self%to)
       do l = 1, self%lanes
         i = i + 1
-        working(i) = working(i) + self%curve%torque(l, e, self%segment(l, e), speed(i))
+        applied(i) = applied(i) + self%curve%torque(l, e, self%segment(l, e), speed(i))
       end do
     end do
   end subroutine evaluate
@@ -74,30 +74,30 @@ contains
     do e = 1, size(self%to)
       i = self%first + e - 1
       do l = 1, self%lanes
-        elements%working_speed(l, i) = elements%working_speed(l, i) &
+        elements%applied_speed(l, i) = elements%applied_speed(l, i) &
                                        + self%curve%slope(l, e, self%segment(l, e), elements%speed(l, i))
       end do
     end do
   end subroutine differentiate
 
-  subroutine choose(self, switch, lane, t, angle, speed, inner)
+  subroutine choose(self, switch, lane, t, angle, speed, internal)
     class(curve_motors_t), intent(inout) :: self
     integer, intent(in) :: switch, lane
     real(wp), intent(in) :: t, angle, speed
-    real(wp), intent(in) :: inner(:)
+    real(wp), intent(in) :: internal(:)
 
     self%branch(lane, switch) = self%curve%segment(lane, switch, speed)
   end subroutine choose
 
-  pure function margin(self, switch, lane, t, angle, speed, inner)
+  pure function indicator(self, switch, lane, t, angle, speed, internal)
     class(curve_motors_t), intent(in) :: self
     integer, intent(in) :: switch, lane
     real(wp), intent(in) :: t, angle, speed
-    real(wp), intent(in) :: inner(:)
-    real(wp) :: margin
+    real(wp), intent(in) :: internal(:)
+    real(wp) :: indicator
 
-    margin = self%curve%margin(lane, switch, self%branch(lane, switch), speed)
-  end function margin
+    indicator = self%curve%indicator(lane, switch, self%branch(lane, switch), speed)
+  end function indicator
 
   function switch_name(self, switch) result(name)
     class(curve_motors_t), intent(in) :: self
@@ -107,11 +107,11 @@ contains
     name = 'point in the table'
   end function switch_name
 
-  subroutine list_numbers(self, numbers)
+  subroutine list_parameters(self, parameters)
     class(curve_motors_t), target, intent(inout) :: self
-    type(lane_numbers_t), intent(inout) :: numbers
+    type(lane_parameters_t), intent(inout) :: parameters
 
-    call self%curve%list_numbers(numbers)
-  end subroutine list_numbers
+    call self%curve%list_parameters(parameters)
+  end subroutine list_parameters
 
 end module nocdyn_curve_motors

@@ -4,7 +4,7 @@ module nocdyn_dc_motors
   use nocdyn_elements, only: elements_t
   use nocdyn_governors, only: governor_t
   use nocdyn_kinds, only: wp
-  use nocdyn_lane_numbers, only: lane_numbers_t
+  use nocdyn_lane_parameters, only: lane_parameters_t
   use nocdyn_text, only: string_t
   implicit none (type, external)
   private
@@ -19,13 +19,13 @@ module nocdyn_dc_motors
     real(wp), allocatable :: inductance(:, :)      !! [H], positive
     type(governor_t), allocatable :: governor
   contains
-    procedure :: list_numbers
-    procedure :: start_inner
-    procedure :: evaluate_inner
+    procedure :: list_parameters
+    procedure :: start_internal
+    procedure :: evaluate_internal
     procedure :: differentiate
-    procedure :: inner_name
+    procedure :: internal_name
     procedure :: choose
-    procedure :: margin
+    procedure :: indicator
     procedure :: switch_name
     procedure :: quantities
     procedure :: observe
@@ -43,9 +43,9 @@ contains
     integer :: e
 
     bank%is_polynomial = .false.
-    bank%is_of_paper = .false.
-    bank%inner = 1
-    if (present(governor)) bank%inner = 2
+    bank%has_paper_law = .false.
+    bank%states = 1
+    if (present(governor)) bank%states = 2
     call bank%connect(role_motor, size(voltage, 1), names, [(0, e=1, size(body))], body)
     allocate (bank%voltage, source=voltage)
     allocate (bank%resistance, source=resistance)
@@ -53,30 +53,30 @@ contains
     allocate (bank%inductance, source=inductance)
     if (.not. present(governor)) return
     allocate (bank%governor, source=governor)
-    call bank%let_switch([(e, e=1, size(body))])
+    call bank%set_switches([(e, e=1, size(body))])
   end function new_dc_motors
 
-  subroutine start_inner(self, speed, inner)
+  subroutine start_internal(self, speed, internal)
     class(dc_motors_t), intent(in) :: self
     real(wp), intent(in) :: speed(self%values)
-    real(wp), intent(inout) :: inner(self%inner_values)
+    real(wp), intent(inout) :: internal(self%internal_values)
     integer :: e, l
 
-    inner = 0.0_wp
+    internal = 0.0_wp
     if (.not. allocated(self%governor)) return
     do e = 1, size(self%to)
       do l = 1, self%lanes
-        inner(self%lanes * (2 * e - 1) + l) = self%governor%start_integral(l, e, speed(self%lanes * (e - 1) + l))
+        internal(self%lanes * (2 * e - 1) + l) = self%governor%start_integral(l, e, speed(self%lanes * (e - 1) + l))
       end do
     end do
-  end subroutine start_inner
+  end subroutine start_internal
 
-  subroutine evaluate_inner(self, speed, inner, working, rate)
+  subroutine evaluate_internal(self, speed, internal, applied, rate)
     class(dc_motors_t), intent(in) :: self
     real(wp), intent(in) :: speed(self%values)
-    real(wp), intent(in) :: inner(self%inner_values)
-    real(wp), intent(inout) :: working(self%values)
-    real(wp), intent(inout) :: rate(self%inner_values)
+    real(wp), intent(in) :: internal(self%internal_values)
+    real(wp), intent(inout) :: applied(self%values)
+    real(wp), intent(inout) :: rate(self%internal_values)
     real(wp) :: throttle
     integer :: current, e, i, l
 
@@ -85,19 +85,19 @@ contains
     do e = 1, size(self%to)
       do l = 1, self%lanes
         i = i + 1
-        current = self%lanes * self%inner * (e - 1) + l
+        current = self%lanes * self%states * (e - 1) + l
         if (allocated(self%governor)) then
           associate (integral => current + self%lanes)
-            throttle = self%governor%throttle(l, e, self%branch(l, e), inner(integral), speed(i))
-            rate(integral) = self%governor%rate(l, e, throttle, inner(integral))
+            throttle = self%governor%throttle(l, e, self%branch(l, e), internal(integral), speed(i))
+            rate(integral) = self%governor%rate(l, e, throttle, internal(integral))
           end associate
         end if
-        working(i) = working(i) + self%flux_constant(l, e) * inner(current)
-        rate(current) = (throttle * self%voltage(l, e) - self%resistance(l, e) * inner(current) &
+        applied(i) = applied(i) + self%flux_constant(l, e) * internal(current)
+        rate(current) = (throttle * self%voltage(l, e) - self%resistance(l, e) * internal(current) &
                          - self%flux_constant(l, e) * speed(i)) / self%inductance(l, e)
       end do
     end do
-  end subroutine evaluate_inner
+  end subroutine evaluate_internal
 
   subroutine differentiate(self, elements)
     class(dc_motors_t), intent(in) :: self
@@ -106,51 +106,51 @@ contains
     integer :: e, l, s
 
     do e = 1, size(self%to)
-      s = self%first_inner + self%inner * (e - 1)
+      s = self%first_internal + self%states * (e - 1)
       do l = 1, self%lanes
-        associate (inner => elements%inner, inductance => self%inductance(l, e))
-          inner%working(l, s) = self%flux_constant(l, e)
-          inner%rate_speed(l, s) = -self%flux_constant(l, e) / inductance
-          inner%rate_inner(l, 1, s) = -self%resistance(l, e) / inductance
+        associate (internal => elements%internal, inductance => self%inductance(l, e))
+          internal%applied(l, s) = self%flux_constant(l, e)
+          internal%rate_speed(l, s) = -self%flux_constant(l, e) / inductance
+          internal%rate_internal(l, 1, s) = -self%resistance(l, e) / inductance
           if (.not. allocated(self%governor)) cycle
-          call self%governor%slopes(l, e, self%branch(l, e), by_integral, by_speed, inner%rate_inner(l, 2, s + 1), &
-                                    inner%rate_speed(l, s + 1))
-          inner%rate_speed(l, s) = inner%rate_speed(l, s) + by_speed * self%voltage(l, e) / inductance
-          inner%rate_inner(l, 2, s) = by_integral * self%voltage(l, e) / inductance
-          inner%working(l, s + 1) = 0.0_wp
-          inner%rate_inner(l, 1, s + 1) = 0.0_wp
+          call self%governor%slopes(l, e, self%branch(l, e), by_integral, by_speed, internal%rate_internal(l, 2, s + 1), &
+                                    internal%rate_speed(l, s + 1))
+          internal%rate_speed(l, s) = internal%rate_speed(l, s) + by_speed * self%voltage(l, e) / inductance
+          internal%rate_internal(l, 2, s) = by_integral * self%voltage(l, e) / inductance
+          internal%applied(l, s + 1) = 0.0_wp
+          internal%rate_internal(l, 1, s + 1) = 0.0_wp
         end associate
       end do
     end do
   end subroutine differentiate
 
-  function inner_name(self, index) result(name)
+  function internal_name(self, index) result(name)
     class(dc_motors_t), intent(in) :: self
     integer, intent(in) :: index
     character(len=:), allocatable :: name
 
     name = 'armature current'
     if (index == 2) name = 'governor integral'
-  end function inner_name
+  end function internal_name
 
-  subroutine choose(self, switch, lane, t, angle, speed, inner)
+  subroutine choose(self, switch, lane, t, angle, speed, internal)
     class(dc_motors_t), intent(inout) :: self
     integer, intent(in) :: switch, lane
     real(wp), intent(in) :: t, angle, speed
-    real(wp), intent(in) :: inner(:)
+    real(wp), intent(in) :: internal(:)
 
-    self%branch(lane, switch) = self%governor%branch(lane, switch, inner(2), speed)
+    self%branch(lane, switch) = self%governor%branch(lane, switch, internal(2), speed)
   end subroutine choose
 
-  pure function margin(self, switch, lane, t, angle, speed, inner)
+  pure function indicator(self, switch, lane, t, angle, speed, internal)
     class(dc_motors_t), intent(in) :: self
     integer, intent(in) :: switch, lane
     real(wp), intent(in) :: t, angle, speed
-    real(wp), intent(in) :: inner(:)
-    real(wp) :: margin
+    real(wp), intent(in) :: internal(:)
+    real(wp) :: indicator
 
-    margin = self%governor%margin(lane, switch, self%branch(lane, switch), inner(2), speed)
-  end function margin
+    indicator = self%governor%indicator(lane, switch, self%branch(lane, switch), internal(2), speed)
+  end function indicator
 
   function switch_name(self, switch) result(name)
     class(dc_motors_t), intent(in) :: self
@@ -166,7 +166,7 @@ contains
     type(quantity_t), allocatable :: columns(:)
     integer :: e
 
-    allocate (columns(1 + self%inner))
+    allocate (columns(1 + self%states))
     columns(1) = quantity_t('torque', 'N m', [(e, e=1, size(self%to))])
     columns(2) = quantity_t('current', 'A', [(e, e=1, size(self%to))])
     if (allocated(self%governor)) columns(3) = quantity_t('throttle', '1', [(e, e=1, size(self%to))])
@@ -182,28 +182,28 @@ contains
 
     do e = 1, size(self%to)
       associate (speed => elements%speed(lane, self%first + e - 1), &
-                 inner => elements%inner%value(lane, self%first_inner + self%inner * (e - 1):))
+                 internal => elements%internal%value(lane, self%first_internal + self%states * (e - 1):))
         select case (quantity)
         case (1)
-          values(e) = elements%working(lane, self%first + e - 1)
+          values(e) = elements%applied(lane, self%first + e - 1)
         case (2)
-          values(e) = inner(1)
+          values(e) = internal(1)
         case default
-          values(e) = self%governor%throttle(lane, e, self%branch(lane, e), inner(2), speed)
+          values(e) = self%governor%throttle(lane, e, self%branch(lane, e), internal(2), speed)
         end select
       end associate
     end do
   end subroutine observe
 
-  subroutine list_numbers(self, numbers)
+  subroutine list_parameters(self, parameters)
     class(dc_motors_t), target, intent(inout) :: self
-    type(lane_numbers_t), intent(inout) :: numbers
+    type(lane_parameters_t), intent(inout) :: parameters
 
-    call numbers%add('voltage', self%voltage)
-    call numbers%add('resistance', self%resistance)
-    call numbers%add('flux_constant', self%flux_constant)
-    call numbers%add('inductance', self%inductance)
-    if (allocated(self%governor)) call self%governor%list_numbers(numbers)
-  end subroutine list_numbers
+    call parameters%add('voltage', self%voltage)
+    call parameters%add('resistance', self%resistance)
+    call parameters%add('flux_constant', self%flux_constant)
+    call parameters%add('inductance', self%inductance)
+    if (allocated(self%governor)) call self%governor%list_parameters(parameters)
+  end subroutine list_parameters
 
 end module nocdyn_dc_motors

@@ -5,7 +5,7 @@ module nocdyn_governed_motors
   use nocdyn_elements, only: elements_t
   use nocdyn_governors, only: governor_t
   use nocdyn_kinds, only: wp
-  use nocdyn_lane_numbers, only: lane_numbers_t
+  use nocdyn_lane_parameters, only: lane_parameters_t
   use nocdyn_polynomial_laws, only: polynomial_laws_t
   use nocdyn_text, only: string_t
   use nocdyn_torque_curves, only: torque_curve_t
@@ -20,15 +20,15 @@ module nocdyn_governed_motors
     type(governor_t) :: governor
     real(wp), allocatable :: drag(:, :)   !! what no throttle changes [N m s/rad], shape [lanes, motors]
   contains
-    procedure :: list_numbers
+    procedure :: list_parameters
     procedure :: polynomials
     procedure :: evaluate
     procedure :: differentiate
-    procedure :: start_inner
-    procedure :: evaluate_inner
-    procedure :: inner_name
+    procedure :: start_internal
+    procedure :: evaluate_internal
+    procedure :: internal_name
     procedure :: choose
-    procedure :: margin
+    procedure :: indicator
     procedure :: switch_name
     procedure :: quantities
     procedure :: observe
@@ -50,9 +50,9 @@ contains
     bank%curve_motors_t = new_curve_motors(names, body, size(drag, 1), curve)
     bank%governor = governor
     allocate (bank%drag, source=drag)
-    bank%inner = 1
-    bank%inner_values = bank%values
-    call bank%let_switch([bank%switching, (e, e=1, size(body))])
+    bank%states = 1
+    bank%internal_values = bank%values
+    call bank%set_switches([bank%switch_element, (e, e=1, size(body))])
   end function new_governed_motors
 
   subroutine polynomials(self, laws)
@@ -66,37 +66,37 @@ contains
   pure integer function first_governor(self)
     class(governed_motors_t), intent(in) :: self
 
-    first_governor = size(self%switching) - size(self%to)
+    first_governor = size(self%switch_element) - size(self%to)
   end function first_governor
 
   !> All of it needs the throttle.
-  subroutine evaluate(self, time, angle, speed, restoring, working)
+  subroutine evaluate(self, time, angle, speed, restoring, applied)
     class(governed_motors_t), intent(in) :: self
     real(wp), intent(in) :: time(self%lanes), angle(self%values), speed(self%values)
-    real(wp), intent(inout) :: restoring(self%values), working(self%values)
+    real(wp), intent(inout) :: restoring(self%values), applied(self%values)
   end subroutine evaluate
 
-  subroutine start_inner(self, speed, inner)
+  subroutine start_internal(self, speed, internal)
     class(governed_motors_t), intent(in) :: self
     real(wp), intent(in) :: speed(self%values)
-    real(wp), intent(inout) :: inner(self%inner_values)
+    real(wp), intent(inout) :: internal(self%internal_values)
     integer :: e, i, l
 
     i = 0
     do e = 1, size(self%to)
       do l = 1, self%lanes
         i = i + 1
-        inner(i) = self%governor%start_integral(l, e, speed(i))
+        internal(i) = self%governor%start_integral(l, e, speed(i))
       end do
     end do
-  end subroutine start_inner
+  end subroutine start_internal
 
-  subroutine evaluate_inner(self, speed, inner, working, rate)
+  subroutine evaluate_internal(self, speed, internal, applied, rate)
     class(governed_motors_t), intent(in) :: self
     real(wp), intent(in) :: speed(self%values)
-    real(wp), intent(in) :: inner(self%inner_values)
-    real(wp), intent(inout) :: working(self%values)
-    real(wp), intent(inout) :: rate(self%inner_values)
+    real(wp), intent(in) :: internal(self%internal_values)
+    real(wp), intent(inout) :: applied(self%values)
+    real(wp), intent(inout) :: rate(self%internal_values)
     real(wp) :: throttle
     integer :: e, i, l
 
@@ -104,12 +104,12 @@ contains
     do e = 1, size(self%to)
       do l = 1, self%lanes
         i = i + 1
-        throttle = self%governor%throttle(l, e, self%branch(l, self%first_governor() + e), inner(i), speed(i))
-        working(i) = working(i) + throttle * self%curve%torque(l, e, self%segment(l, e), speed(i))
-        rate(i) = self%governor%rate(l, e, throttle, inner(i))
+        throttle = self%governor%throttle(l, e, self%branch(l, self%first_governor() + e), internal(i), speed(i))
+        applied(i) = applied(i) + throttle * self%curve%torque(l, e, self%segment(l, e), speed(i))
+        rate(i) = self%governor%rate(l, e, throttle, internal(i))
       end do
     end do
-  end subroutine evaluate_inner
+  end subroutine evaluate_internal
 
   subroutine differentiate(self, elements)
     class(governed_motors_t), intent(in) :: self
@@ -119,58 +119,58 @@ contains
 
     do e = 1, size(self%to)
       i = self%first + e - 1
-      s = self%first_inner + e - 1
+      s = self%first_internal + e - 1
       do l = 1, self%lanes
         branch = self%branch(l, self%first_governor() + e)
-        throttle = self%governor%throttle(l, e, branch, elements%inner%value(l, s), elements%speed(l, i))
-        call self%governor%slopes(l, e, branch, by_integral, by_speed, elements%inner%rate_inner(l, 1, s), &
-                                  elements%inner%rate_speed(l, s))
+        throttle = self%governor%throttle(l, e, branch, elements%internal%value(l, s), elements%speed(l, i))
+        call self%governor%slopes(l, e, branch, by_integral, by_speed, elements%internal%rate_internal(l, 1, s), &
+                                  elements%internal%rate_speed(l, s))
         torque = self%curve%torque(l, e, self%segment(l, e), elements%speed(l, i))
         slope = self%curve%slope(l, e, self%segment(l, e), elements%speed(l, i))
-        elements%working_speed(l, i) = elements%working_speed(l, i) + (throttle * slope + by_speed * torque)
-        elements%inner%working(l, s) = by_integral * torque
+        elements%applied_speed(l, i) = elements%applied_speed(l, i) + (throttle * slope + by_speed * torque)
+        elements%internal%applied(l, s) = by_integral * torque
       end do
     end do
   end subroutine differentiate
 
-  function inner_name(self, index) result(name)
+  function internal_name(self, index) result(name)
     class(governed_motors_t), intent(in) :: self
     integer, intent(in) :: index
     character(len=:), allocatable :: name
 
     name = 'governor integral'
-  end function inner_name
+  end function internal_name
 
-  subroutine choose(self, switch, lane, t, angle, speed, inner)
+  subroutine choose(self, switch, lane, t, angle, speed, internal)
     class(governed_motors_t), intent(inout) :: self
     integer, intent(in) :: switch, lane
     real(wp), intent(in) :: t, angle, speed
-    real(wp), intent(in) :: inner(:)
+    real(wp), intent(in) :: internal(:)
 
     associate (motor => switch - self%first_governor())
       if (motor > 0) then
-        self%branch(lane, switch) = self%governor%branch(lane, motor, inner(1), speed)
+        self%branch(lane, switch) = self%governor%branch(lane, motor, internal(1), speed)
       else
-        call self%curve_motors_t%choose(switch, lane, t, angle, speed, inner)
+        call self%curve_motors_t%choose(switch, lane, t, angle, speed, internal)
       end if
     end associate
   end subroutine choose
 
-  pure function margin(self, switch, lane, t, angle, speed, inner)
+  pure function indicator(self, switch, lane, t, angle, speed, internal)
     class(governed_motors_t), intent(in) :: self
     integer, intent(in) :: switch, lane
     real(wp), intent(in) :: t, angle, speed
-    real(wp), intent(in) :: inner(:)
-    real(wp) :: margin
+    real(wp), intent(in) :: internal(:)
+    real(wp) :: indicator
 
     associate (motor => switch - self%first_governor())
       if (motor > 0) then
-        margin = self%governor%margin(lane, motor, self%branch(lane, switch), inner(1), speed)
+        indicator = self%governor%indicator(lane, motor, self%branch(lane, switch), internal(1), speed)
       else
-        margin = self%curve_motors_t%margin(switch, lane, t, angle, speed, inner)
+        indicator = self%curve_motors_t%indicator(switch, lane, t, angle, speed, internal)
       end if
     end associate
-  end function margin
+  end function indicator
 
   function switch_name(self, switch) result(name)
     class(governed_motors_t), intent(in) :: self
@@ -201,23 +201,23 @@ contains
     integer :: e
 
     if (quantity == 1) then
-      values = elements%working(lane, self%first:self%last())
+      values = elements%applied(lane, self%first:self%last())
     else
       do e = 1, size(self%to)
         values(e) = self%governor%throttle(lane, e, self%branch(lane, self%first_governor() + e), &
-                                           elements%inner%value(lane, self%first_inner + e - 1), &
+                                           elements%internal%value(lane, self%first_internal + e - 1), &
                                            elements%speed(lane, self%first + e - 1))
       end do
     end if
   end subroutine observe
 
-  subroutine list_numbers(self, numbers)
+  subroutine list_parameters(self, parameters)
     class(governed_motors_t), target, intent(inout) :: self
-    type(lane_numbers_t), intent(inout) :: numbers
+    type(lane_parameters_t), intent(inout) :: parameters
 
-    call self%curve_motors_t%list_numbers(numbers)
-    call self%governor%list_numbers(numbers)
-    call numbers%add('drag', self%drag)
-  end subroutine list_numbers
+    call self%curve_motors_t%list_parameters(parameters)
+    call self%governor%list_parameters(parameters)
+    call parameters%add('drag', self%drag)
+  end subroutine list_parameters
 
 end module nocdyn_governed_motors

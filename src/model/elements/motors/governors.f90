@@ -4,9 +4,9 @@
 !> instead of away from it; a governor that stops integrating there would have to slide along the limit while it leaves it.
 !> (K. J. Astrom, T. Hagglund, PID Controllers, 2nd ed. 1995, section 3.5: tracking with the integral time.)
 module nocdyn_governors
-  use nocdyn_bank, only: border_width
+  use nocdyn_bank, only: boundary_width
   use nocdyn_kinds, only: wp
-  use nocdyn_lane_numbers, only: lane_numbers_t
+  use nocdyn_lane_parameters, only: lane_parameters_t
   implicit none (type, external)
   private
 
@@ -17,13 +17,13 @@ module nocdyn_governors
     real(wp), allocatable :: time(:, :)        !! integral time [s], positive
     real(wp), allocatable :: start(:, :)       !! throttle at the start, 0 to 1
   contains
-    procedure :: list_numbers
+    procedure :: list_parameters
     procedure :: start_integral
     procedure :: throttle
     procedure :: rate
     procedure :: slopes
     procedure :: branch
-    procedure :: margin
+    procedure :: indicator
   end type governor_t
 
   integer, parameter :: closed = -1, governing = 0, open = 1   ! the branches
@@ -93,33 +93,33 @@ contains
   end function branch
 
   !> How far the throttle is inside a branch.
-  pure function margin(self, lane, motor, branch, z, speed)
+  pure function indicator(self, lane, motor, branch, z, speed)
     class(governor_t), intent(in) :: self
     integer, intent(in) :: lane, motor, branch
     real(wp), intent(in) :: z, speed
-    real(wp) :: margin
+    real(wp) :: indicator
 
     associate (y => self%throttle(lane, motor, governing, z, speed))
       select case (branch)
       case (governing)
-        margin = min(y, 1.0_wp - y)
+        indicator = min(y, 1.0_wp - y)
       case (open)
-        margin = y - 1.0_wp
+        indicator = y - 1.0_wp
       case default
-        margin = -y
+        indicator = -y
       end select
     end associate
-    margin = margin + border_width
-  end function margin
+    indicator = indicator + boundary_width
+  end function indicator
 
-  subroutine list_numbers(self, numbers)
+  subroutine list_parameters(self, parameters)
     class(governor_t), target, intent(inout) :: self
-    type(lane_numbers_t), intent(inout) :: numbers
+    type(lane_parameters_t), intent(inout) :: parameters
 
-    call numbers%add('governor_speed', self%set_speed)
-    call numbers%add('governor_gain', self%gain)
-    call numbers%add('governor_time', self%time)
-    call numbers%add('governor_start', self%start)
-  end subroutine list_numbers
+    call parameters%add('governor_speed', self%set_speed)
+    call parameters%add('governor_gain', self%gain)
+    call parameters%add('governor_time', self%time)
+    call parameters%add('governor_start', self%start)
+  end subroutine list_parameters
 
 end module nocdyn_governors

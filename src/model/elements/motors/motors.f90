@@ -2,7 +2,7 @@
 module nocdyn_motors
   use nocdyn_bank, only: bank_t, role_motor
   use nocdyn_kinds, only: wp
-  use nocdyn_lane_numbers, only: lane_numbers_t
+  use nocdyn_lane_parameters, only: lane_parameters_t
   use nocdyn_polynomial_laws, only: polynomial_laws_t
   use nocdyn_text, only: string_t
   implicit none (type, external)
@@ -15,7 +15,7 @@ module nocdyn_motors
     real(wp), allocatable :: b(:, :)   !! B [N m s/rad]
     real(wp), allocatable :: c(:, :)   !! C [N m s2/rad2]
   contains
-    procedure :: list_numbers
+    procedure :: list_parameters
     procedure :: polynomials
   end type motors_t
 
@@ -46,13 +46,13 @@ contains
     end associate
   end subroutine polynomials
 
-  subroutine list_numbers(self, numbers)
+  subroutine list_parameters(self, parameters)
     class(motors_t), target, intent(inout) :: self
-    type(lane_numbers_t), intent(inout) :: numbers
+    type(lane_parameters_t), intent(inout) :: parameters
 
-    call numbers%add('a', self%a)
-    call numbers%add('b', self%b)
-    call numbers%add('c', self%c)
-  end subroutine list_numbers
+    call parameters%add('a', self%a)
+    call parameters%add('b', self%b)
+    call parameters%add('c', self%c)
+  end subroutine list_parameters
 
 end module nocdyn_motors

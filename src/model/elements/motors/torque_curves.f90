@@ -1,9 +1,9 @@
 !> Torques of motors over their speed.
 module nocdyn_torque_curves
-  use nocdyn_bank, only: border_width
+  use nocdyn_bank, only: boundary_width
   use nocdyn_curves, only: curve_t
   use nocdyn_kinds, only: wp
-  use nocdyn_lane_numbers, only: lane_numbers_t
+  use nocdyn_lane_parameters, only: lane_parameters_t
   implicit none (type, external)
   private
 
@@ -12,10 +12,10 @@ module nocdyn_torque_curves
   contains
     procedure(torque_interface), deferred :: torque   !! [N m]
     procedure(torque_interface), deferred :: slope    !! by the speed [N m s/rad]
-    procedure(list_interface), deferred :: list_numbers
+    procedure(list_interface), deferred :: list_parameters
     procedure :: has_segments
     procedure :: segment
-    procedure :: margin
+    procedure :: indicator
   end type torque_curve_t
 
   abstract interface
@@ -28,10 +28,10 @@ module nocdyn_torque_curves
       real(wp) :: value
     end function torque_interface
 
-    subroutine list_interface(self, numbers)
-      import :: lane_numbers_t, torque_curve_t
+    subroutine list_interface(self, parameters)
+      import :: lane_parameters_t, torque_curve_t
       class(torque_curve_t), target, intent(inout) :: self
-      type(lane_numbers_t), intent(inout) :: numbers
+      type(lane_parameters_t), intent(inout) :: parameters
     end subroutine list_interface
   end interface
 
@@ -41,7 +41,7 @@ module nocdyn_torque_curves
   contains
     procedure :: torque => quadratic_torque
     procedure :: slope => quadratic_slope
-    procedure :: list_numbers => list_quadratic
+    procedure :: list_parameters => list_quadratic
   end type quadratic_curve_t
 
   !> Kloss: 2 T_k / (s / s_k + s_k / s) with the slip s = 1 - omega / synchronous_speed, as 2 T_k s s_k / (s^2 + s_k^2).
@@ -52,7 +52,7 @@ module nocdyn_torque_curves
   contains
     procedure :: torque => induction_torque
     procedure :: slope => induction_slope
-    procedure :: list_numbers => list_induction
+    procedure :: list_parameters => list_induction
   end type induction_curve_t
 
   type, extends(torque_curve_t), public :: table_curve_t
@@ -60,10 +60,10 @@ module nocdyn_torque_curves
   contains
     procedure :: torque => table_torque
     procedure :: slope => table_slope
-    procedure :: list_numbers => list_table
+    procedure :: list_parameters => list_table
     procedure :: has_segments => table_has_segments
     procedure :: segment => table_segment
-    procedure :: margin => table_margin
+    procedure :: indicator => table_margin
   end type table_curve_t
 
 contains
@@ -85,14 +85,14 @@ contains
   end function segment
 
   !> How far a speed is inside a segment.
-  pure function margin(self, lane, motor, segment, speed)
+  pure function indicator(self, lane, motor, segment, speed)
     class(torque_curve_t), intent(in) :: self
     integer, intent(in) :: lane, motor, segment
     real(wp), intent(in) :: speed
-    real(wp) :: margin
+    real(wp) :: indicator
 
-    margin = huge(margin)
-  end function margin
+    indicator = huge(indicator)
+  end function indicator
 
   pure function quadratic_torque(self, lane, motor, segment, speed) result(value)
     class(quadratic_curve_t), intent(in) :: self
@@ -169,38 +169,38 @@ contains
     table_segment = self%curve(lane, motor)%segment(speed)
   end function table_segment
 
-  pure function table_margin(self, lane, motor, segment, speed) result(margin)
+  pure function table_margin(self, lane, motor, segment, speed) result(indicator)
     class(table_curve_t), intent(in) :: self
     integer, intent(in) :: lane, motor, segment
     real(wp), intent(in) :: speed
-    real(wp) :: margin
+    real(wp) :: indicator
 
-    margin = self%curve(lane, motor)%margin(segment, speed, border_width)
+    indicator = self%curve(lane, motor)%inset(segment, speed, boundary_width)
   end function table_margin
 
-  subroutine list_quadratic(self, numbers)
+  subroutine list_quadratic(self, parameters)
     class(quadratic_curve_t), target, intent(inout) :: self
-    type(lane_numbers_t), intent(inout) :: numbers
+    type(lane_parameters_t), intent(inout) :: parameters
 
-    call numbers%add('a', self%a)
-    call numbers%add('b', self%b)
-    call numbers%add('c', self%c)
+    call parameters%add('a', self%a)
+    call parameters%add('b', self%b)
+    call parameters%add('c', self%c)
   end subroutine list_quadratic
 
-  subroutine list_induction(self, numbers)
+  subroutine list_induction(self, parameters)
     class(induction_curve_t), target, intent(inout) :: self
-    type(lane_numbers_t), intent(inout) :: numbers
+    type(lane_parameters_t), intent(inout) :: parameters
 
-    call numbers%add('breakdown_torque', self%breakdown_torque)
-    call numbers%add('breakdown_slip', self%breakdown_slip)
-    call numbers%add('synchronous_speed', self%synchronous_speed)
+    call parameters%add('breakdown_torque', self%breakdown_torque)
+    call parameters%add('breakdown_slip', self%breakdown_slip)
+    call parameters%add('synchronous_speed', self%synchronous_speed)
   end subroutine list_induction
 
-  subroutine list_table(self, numbers)
+  subroutine list_table(self, parameters)
     class(table_curve_t), target, intent(inout) :: self
-    type(lane_numbers_t), intent(inout) :: numbers
+    type(lane_parameters_t), intent(inout) :: parameters
 
-    call numbers%add_curves(self%curve)
+    call parameters%add_curves(self%curve)
   end subroutine list_table
 
 end module nocdyn_torque_curves

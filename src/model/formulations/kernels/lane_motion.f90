@@ -20,13 +20,13 @@ module nocdyn_lane_motion
     real(wp), allocatable :: angle(:), speed(:)   !! u - rest, u' of one element, [strip]
     real(wp), allocatable :: moment(:, :)   !! [lanes, elements]; those of external elements hold at `time`
     real(wp), allocatable :: time(:)        !! [lanes]
-    real(wp), allocatable :: none(:, :)     !! for the restoring moments that external banks do not have
+    real(wp), allocatable :: zeros(:, :)     !! for the restoring moments that external banks do not have
   contains
-    procedure :: forget
+    procedure :: invalidate
     procedure :: accelerate
   end type lane_motion_t
 
-  real(wp), parameter :: never = -huge(1.0_wp)
+  real(wp), parameter :: no_time = -huge(1.0_wp)
 
 contains
 
@@ -34,18 +34,18 @@ contains
     integer, intent(in) :: lanes, elements
     type(lane_motion_t) :: self
 
-    allocate (self%moment(lanes, elements), self%none(lanes, elements), self%angle(strip), self%speed(strip), &
+    allocate (self%moment(lanes, elements), self%zeros(lanes, elements), self%angle(strip), self%speed(strip), &
               source=0.0_wp)
-    allocate (self%time(lanes), source=never)
+    allocate (self%time(lanes), source=no_time)
   end function new_lane_motion
 
   !> A lane may have other numbers than before.
-  pure subroutine forget(self, lane)
+  pure subroutine invalidate(self, lane)
     class(lane_motion_t), intent(inout) :: self
     integer, intent(in) :: lane
 
-    self%time(lane) = never
-  end subroutine forget
+    self%time(lane) = no_time
+  end subroutine invalidate
 
   !> q'' = R M.
   subroutine accelerate(self, machine, terms, twists, accelerations, start_twist, t, speed, angle, acceleration)
@@ -54,16 +54,16 @@ contains
     type(lane_terms_t), intent(in) :: terms
     type(sparse_map_t), intent(in) :: twists          !! U
     type(sparse_map_t), intent(in) :: accelerations   !! R
-    real(wp), intent(in) :: start_twist(machine%lanes, size(terms%is_external))
+    real(wp), intent(in) :: start_twist(machine%lanes, size(terms%is_time_only))
     real(wp), intent(in) :: t(machine%lanes)
     real(wp), intent(in), dimension(machine%lanes, machine%coordinates%freedoms) :: speed, angle   !! q', q
     real(wp), intent(inout) :: acceleration(machine%lanes, machine%coordinates%freedoms)
     integer :: at
 
-    if (have_passed(machine%lanes, t, self%time)) call take_external(self, machine, terms, t)
+    if (time_differs(machine%lanes, t, self%time)) call evaluate_external(self, machine, terms, t)
     do at = 1, machine%lanes, strip
       call find_moments(self, machine, terms, twists, start_twist, at, machine%lanes, machine%coordinates%freedoms, speed, angle)
-      call sum_moments(machine%lanes, at, size(terms%is_external), machine%coordinates%freedoms, size(accelerations%column), &
+      call sum_moments(machine%lanes, at, size(terms%is_time_only), machine%coordinates%freedoms, size(accelerations%column), &
                        accelerations%first, accelerations%column, accelerations%coefficient, self%moment, acceleration)
     end do
   end subroutine accelerate
@@ -75,13 +75,13 @@ contains
     type(lane_terms_t), intent(in) :: terms
     type(sparse_map_t), intent(in) :: twists
     integer, intent(in) :: at, lanes, freedoms
-    real(wp), intent(in) :: start_twist(lanes, size(terms%is_external))
+    real(wp), intent(in) :: start_twist(lanes, size(terms%is_time_only))
     real(wp), intent(in), dimension(lanes, freedoms) :: speed, angle
     integer :: e
 
     associate (laws => machine%laws, entries => size(twists%column), column => twists%column, ratio => twists%coefficient)
-      do e = 1, size(terms%is_external)
-        if (terms%is_external(e)) cycle
+      do e = 1, size(terms%is_time_only)
+        if (terms%is_time_only(e)) cycle
         associate (first => twists%first(e), last => twists%first(e + 1) - 1)
           if (terms%has_speed(e)) then
             call sum_speeds(lanes, at, freedoms, entries, first, last, column, ratio, speed, self%speed)
@@ -101,14 +101,14 @@ contains
   end subroutine find_moments
 
   !> Whether any of the times is another one.
-  pure logical function have_passed(lanes, t, time)
+  pure logical function time_differs(lanes, t, time)
     integer, intent(in) :: lanes
     real(wp), intent(in) :: t(lanes), time(lanes)
     real(wp) :: largest(strip), part(strip / 4)
     integer :: before, l
 
-    have_passed = abs(t(1) - time(1)) > 0
-    if (have_passed) return
+    time_differs = abs(t(1) - time(1)) > 0
+    if (time_differs) return
     largest = 0.0_wp
     do before = 0, lanes - 1, strip
       do l = 1, strip
@@ -118,11 +118,11 @@ contains
     do l = 1, strip / 4
       part(l) = max(max(largest(l), largest(l + 8)), max(largest(l + 16), largest(l + 24)))
     end do
-    have_passed = max(max(max(part(1), part(2)), max(part(3), part(4))), max(max(part(5), part(6)), max(part(7), part(8)))) > 0
-  end function have_passed
+    time_differs = max(max(max(part(1), part(2)), max(part(3), part(4))), max(max(part(5), part(6)), max(part(7), part(8)))) > 0
+  end function time_differs
 
   !> The torques that depend on the time alone.
-  subroutine take_external(self, machine, terms, t)
+  subroutine evaluate_external(self, machine, terms, t)
     type(lane_motion_t), intent(inout) :: self
     type(machine_t), intent(in) :: machine
     type(lane_terms_t), intent(in) :: terms
@@ -130,18 +130,18 @@ contains
     integer :: e, i
 
     self%time(:) = t
-    do e = 1, size(terms%is_external)
-      if (terms%is_external(e)) self%moment(:, e) = machine%laws%constant(:, e)
+    do e = 1, size(terms%is_time_only)
+      if (terms%is_time_only(e)) self%moment(:, e) = machine%laws%constant(:, e)
     end do
-    do i = 1, size(machine%other_banks)
-      associate (bank => machine%banks(machine%other_banks(i))%bank)
+    do i = 1, size(machine%general_banks)
+      associate (bank => machine%banks(machine%general_banks(i))%bank)
         associate (first => bank%first)
           call bank%evaluate(t, machine%elements%angle(1, first), machine%elements%speed(1, first), &
-                             self%none(1, first), self%moment(1, first))
+                             self%zeros(1, first), self%moment(1, first))
         end associate
       end associate
     end do
-  end subroutine take_external
+  end subroutine evaluate_external
 
   !> u' of an element, from the entries `first` to `last` of U.
   pure subroutine sum_speeds(lanes, at, freedoms, entries, first, last, column, ratio, q, v)

@@ -66,7 +66,7 @@ contains
     real(wp), intent(inout) :: y(machine%lanes, columns, 0:self%order)
     integer :: l
 
-    call drive(self, machine, t)
+    call forcing_series(self, machine, t)
     associate (lanes => machine%lanes, f => machine%coordinates%freedoms, n => self%elements, laws => machine%laws, &
                entries => size(twists%column), responses => size(accelerations%column))
       do l = 1, lanes, strip
@@ -78,7 +78,7 @@ contains
                          y(1, f + 1, 0), self%start_twist, self%rest, self%speed, self%angle)
         call gather(lanes, l, responses, accelerations%coefficient, self%response)
         call gather_laws(lanes, l, n, laws%constant, laws%by_speed, laws%by_speed_squared, laws%linear, laws%cubic, self%law)
-        call expand_strip(l, lanes, f, n, self%order, terms%is_external, terms%has_angle, terms%has_cubic, terms%has_square, &
+        call expand_strip(l, lanes, f, n, self%order, terms%is_time_only, terms%has_angle, terms%has_cubic, terms%has_square, &
                           entries, twists%first, twists%column, self%ratio, responses, accelerations%first, &
                           accelerations%column, self%response, self%law, self%external, self%speed, self%angle, self%square, &
                           self%restoring, self%moment, self%motion, columns, y)
@@ -87,17 +87,17 @@ contains
   end subroutine expand
 
   !> The coefficients of the external torques.
-  subroutine drive(self, machine, t)
+  subroutine forcing_series(self, machine, t)
     type(lane_series_t), intent(inout) :: self
     type(machine_t), intent(in) :: machine
     real(wp), intent(in) :: t(machine%lanes)
     integer :: i
 
-    do i = 1, size(machine%other_banks)
-      associate (bank => machine%banks(machine%other_banks(i))%bank)
-        call bank%drive(self%order - 1, machine%lanes * self%elements, t, self%external(1, bank%first, 0))
+    do i = 1, size(machine%general_banks)
+      associate (bank => machine%banks(machine%general_banks(i))%bank)
+        call bank%forcing_series(self%order - 1, machine%lanes * self%elements, t, self%external(1, bank%first, 0))
       end associate
     end do
-  end subroutine drive
+  end subroutine forcing_series
 
 end module nocdyn_lane_series

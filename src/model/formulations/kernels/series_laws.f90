@@ -17,12 +17,12 @@ module nocdyn_series_laws
     real(wp), allocatable :: constant(:)
     real(wp), allocatable :: by_speed(:)
     real(wp), allocatable :: by_speed_squared(:)
-    integer, allocatable :: cubed(:)               !! first values of the vectors with terms by (u - rest)^3
-    integer, allocatable :: squared(:)             !! first values of the vectors with terms by u'^2
-    logical, allocatable, private :: is_cubed(:)   !! of each vector
-    logical, allocatable, private :: is_squared(:)
+    integer, allocatable :: cubic_vectors(:)               !! first values of the vectors with terms by (u - rest)^3
+    integer, allocatable :: square_vectors(:)             !! first values of the vectors with terms by u'^2
+    logical, allocatable, private :: has_cubic(:)   !! of each vector
+    logical, allocatable, private :: has_square(:)
   contains
-    procedure :: take_lane
+    procedure :: refresh_lane
   end type series_laws_t
 
 contains
@@ -39,18 +39,18 @@ contains
     do lane = 1, size(laws%rest, 1)
       call copy_lane(lane, laws, self)
     end do
-    call find_strips(self)
+    call find_term_vectors(self)
   end function new_series_laws
 
   !> Takes the numbers that a lane has now.
-  subroutine take_lane(self, lane, laws)
+  subroutine refresh_lane(self, lane, laws)
     class(series_laws_t), intent(inout) :: self
     integer, intent(in) :: lane
     type(polynomial_laws_t), intent(in) :: laws
 
     call copy_lane(lane, laws, self)
-    if (needs_other_strips(self, lane, size(laws%rest, 1))) call find_strips(self)
-  end subroutine take_lane
+    if (has_new_terms(self, lane, size(laws%rest, 1))) call find_term_vectors(self)
+  end subroutine refresh_lane
 
   subroutine copy_lane(lane, laws, self)
     integer, intent(in) :: lane
@@ -71,29 +71,29 @@ contains
   end subroutine copy_lane
 
   !> Whether a lane has terms of higher degree in vectors that had none.
-  pure logical function needs_other_strips(self, lane, lanes)
+  pure logical function has_new_terms(self, lane, lanes)
     type(series_laws_t), intent(in) :: self
     integer, intent(in) :: lane, lanes
     integer :: i, v
 
-    needs_other_strips = .true.
+    has_new_terms = .true.
     do i = lane, size(self%cubic), lanes
       v = (i - 1) / width + 1
-      if (abs(self%cubic(i)) > 0 .and. .not. self%is_cubed(v)) return
-      if (abs(self%by_speed_squared(i)) > 0 .and. .not. self%is_squared(v)) return
+      if (abs(self%cubic(i)) > 0 .and. .not. self%has_cubic(v)) return
+      if (abs(self%by_speed_squared(i)) > 0 .and. .not. self%has_square(v)) return
     end do
-    needs_other_strips = .false.
-  end function needs_other_strips
+    has_new_terms = .false.
+  end function has_new_terms
 
   !> Finds the vectors with terms of higher degree.
-  subroutine find_strips(self)
+  subroutine find_term_vectors(self)
     type(series_laws_t), intent(inout) :: self
     integer :: i
 
-    self%is_cubed = [(any(abs(self%cubic(i:i + width - 1)) > 0), i=1, size(self%cubic), width)]
-    self%is_squared = [(any(abs(self%by_speed_squared(i:i + width - 1)) > 0), i=1, size(self%cubic), width)]
-    self%cubed = pack([(i, i=1, size(self%cubic), width)], self%is_cubed)
-    self%squared = pack([(i, i=1, size(self%cubic), width)], self%is_squared)
-  end subroutine find_strips
+    self%has_cubic = [(any(abs(self%cubic(i:i + width - 1)) > 0), i=1, size(self%cubic), width)]
+    self%has_square = [(any(abs(self%by_speed_squared(i:i + width - 1)) > 0), i=1, size(self%cubic), width)]
+    self%cubic_vectors = pack([(i, i=1, size(self%cubic), width)], self%has_cubic)
+    self%square_vectors = pack([(i, i=1, size(self%cubic), width)], self%has_square)
+  end subroutine find_term_vectors
 
 end module nocdyn_series_laws

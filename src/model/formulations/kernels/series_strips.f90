@@ -77,11 +77,11 @@ contains
   end subroutine begin_strip
 
   !> The coefficients number 1 to order of q', and, in y, those of q' and q, which follow each other there.
-  pure subroutine expand_strip(l, lanes, freedoms, elements, order, is_external, has_angle, has_cubic, has_square, entries, &
+  pure subroutine expand_strip(l, lanes, freedoms, elements, order, is_time_only, has_angle, has_cubic, has_square, entries, &
                                first, column, ratio, responses, first_response, element, response, law, external, speed, &
                                angle, square, restoring, moment, q, columns, y)
     integer, intent(in) :: l, lanes, freedoms, elements, order
-    logical, intent(in), dimension(elements) :: is_external, has_angle, has_cubic, has_square   !! as in `lane_terms_t`
+    logical, intent(in), dimension(elements) :: is_time_only, has_angle, has_cubic, has_square   !! as in `lane_terms_t`
     integer, intent(in) :: entries, first(elements + 1), column(entries)   !! of U
     real(wp), intent(in) :: ratio(strip, entries)
     integer, intent(in) :: responses, first_response(freedoms + 1), element(responses)   !! of R
@@ -107,7 +107,7 @@ contains
         end if
       end do
       do e = 1, elements
-        if (is_external(e)) then
+        if (is_time_only(e)) then
           call copy(external(l, e, k), moment(1, e))
           cycle
         end if

@@ -1,0 +1,158 @@
+!> Where the energy of a machine came from over a run, and where it went.
+module nocdyn_energy_balance
+  use nocdyn_bank, only: role_names
+  use nocdyn_json, only: json_t
+  use nocdyn_kinds, only: wp
+  use nocdyn_machine, only: machine_t
+  use nocdyn_table_text, only: cell, padded, text_width
+  use nocdyn_text, only: rounded_text, string_t, to_text
+  use nocdyn_text_buffer, only: text_buffer_t
+  implicit none (type, external)
+  private
+
+  public :: work_element_names, put_energy_balance, energy_balance_text
+
+  integer, parameter :: most_lines = 10   ! of each side that are printed
+
+  type, public :: energy_balance_t
+    type(string_t), allocatable :: work_elements(:)      !! elements whose work is integrated, with their kind
+    real(wp), allocatable :: work(:)               !! into the machine [J]
+    type(string_t), allocatable :: elastic_elements(:)       !! elastic couplings
+    real(wp), allocatable :: stored_start(:), stored_end(:)   !! [J]
+    real(wp) :: kinetic_start = 0.0_wp, kinetic_end = 0.0_wp  !! [J]
+  contains
+    procedure :: residual
+  end type energy_balance_t
+
+  !> One line of the printed table.
+  type :: entry_t
+    character(len=:), allocatable :: name
+    real(wp) :: energy = 0.0_wp   !! put in, negative if taken out [J]
+  end type entry_t
+
+contains
+
+  !> "motor drive": the elements whose work is integrated, in the order of the works.
+  function work_element_names(machine) result(names)
+    type(machine_t), intent(in) :: machine
+    type(string_t), allocatable :: names(:)
+    integer :: e, i, next
+
+    allocate (names(machine%work_count()))
+    next = 1
+    do i = 1, size(machine%banks)
+      associate (bank => machine%banks(i)%bank)
+        do e = 1, size(bank%with_work)
+          names(next)%text = trim(role_names(bank%role)) // ' ' // bank%names(bank%with_work(e))%text
+          next = next + 1
+        end do
+      end associate
+    end do
+  end function work_element_names
+
+  !> What the energies have grown by, less the works [J].
+  pure real(wp) function residual(self)
+    class(energy_balance_t), intent(in) :: self
+
+    residual = (self%kinetic_end + sum(self%stored_end) - (self%kinetic_start + sum(self%stored_start))) - sum(self%work)
+  end function residual
+
+  !> Every entry, for summary.json.
+  subroutine put_energy_balance(json, self)
+    type(json_t), intent(inout) :: json
+    type(energy_balance_t), intent(in) :: self
+    integer :: i
+
+    call json%open('energy_account')
+    call json%open('work_in_J')
+    do i = 1, size(self%work_elements)
+      call json%put(self%work_elements(i)%text, self%work(i))
+    end do
+    call json%close()
+    call json%open('stored_J')
+    do i = 1, size(self%elastic_elements)
+      call json%put(self%elastic_elements(i)%text, [self%stored_start(i), self%stored_end(i)])
+    end do
+    call json%close()
+    call json%put('kinetic_J', [self%kinetic_start, self%kinetic_end])
+    call json%put('residual_J', self%residual())
+    call json%close()
+  end subroutine put_energy_balance
+
+  !> Who put energy in and where it went, in shares of all that was put in; the largest of each, and the others together.
+  !> Empty if no energy was turned over.
+  function energy_balance_text(self) result(text)
+    type(energy_balance_t), intent(in) :: self
+    character(len=:), allocatable :: text
+    type(entry_t), allocatable :: entries(:)
+    type(text_buffer_t) :: report
+    integer :: i, width
+
+    text = ''
+    allocate (entries, source=all_entries(self))
+    if (all(abs(entries%energy) <= 0.0_wp)) return
+    width = len('what does not add up')
+    do i = 1, size(entries)
+      if (abs(entries(i)%energy) > 0.0_wp) width = max(width, text_width(entries(i)%name) + 2)
+    end do
+    call report%append('energy came from [J]')
+    call put_side(entries, 1.0_wp, width, report)
+    call report%append(new_line('a') // 'and went to [J]')
+    call put_side(entries, -1.0_wp, width, report)
+    call report%append(new_line('a') // padded('what does not add up', width) // cell(self%residual()))
+    text = report%text()
+  end function energy_balance_text
+
+  !> Works, and what the stores have released.
+  function all_entries(self) result(entries)
+    type(energy_balance_t), intent(in) :: self
+    type(entry_t), allocatable :: entries(:)
+    integer :: i, n
+
+    n = size(self%work_elements)
+    allocate (entries(n + size(self%elastic_elements) + 1))
+    do i = 1, n
+      entries(i)%name = self%work_elements(i)%text
+      entries(i)%energy = self%work(i)
+    end do
+    do i = 1, size(self%elastic_elements)
+      entries(n + i)%name = 'stored in ' // self%elastic_elements(i)%text
+      entries(n + i)%energy = self%stored_start(i) - self%stored_end(i)
+    end do
+    entries(size(entries))%name = 'kinetic energy'
+    entries(size(entries))%energy = self%kinetic_start - self%kinetic_end
+  end function all_entries
+
+  !> The entries of one side, the largest first.
+  subroutine put_side(entries, sign, width, report)
+    type(entry_t), intent(in) :: entries(:)
+    real(wp), intent(in) :: sign              !! of their energies
+    integer, intent(in) :: width
+    type(text_buffer_t), intent(inout) :: report
+    real(wp) :: left(size(entries)), turned_over
+    integer :: i, lines, others, largest
+
+    left = max(sign * entries%energy, 0.0_wp)
+    turned_over = sum(max(entries%energy, 0.0_wp))
+    others = count(left > 0.0_wp)
+    lines = merge(others, most_lines - 1, others <= most_lines)
+    do i = 1, lines
+      largest = maxloc(left, dim=1)
+      call report%append(new_line('a') // line(entries(largest)%name, left(largest), turned_over, width))
+      left(largest) = 0.0_wp
+    end do
+    others = others - lines
+    if (others > 0) call report%append(new_line('a') // line(to_text(others) // ' others', sum(left), turned_over, width))
+  end subroutine put_side
+
+  function line(name, energy, turned_over, width) result(text)
+    character(len=*), intent(in) :: name
+    real(wp), intent(in) :: energy, turned_over
+    integer, intent(in) :: width
+    character(len=:), allocatable :: text
+
+    text = padded('  ' // name, width) // cell(energy)
+    if (turned_over > 0.0_wp) text = text // '  ' // rounded_text(100.0_wp * energy / turned_over, 3) // ' %'
+  end function line
+
+end module nocdyn_energy_balance

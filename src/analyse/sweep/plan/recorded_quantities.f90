@@ -1,0 +1,281 @@
+!> What a sweep keeps of each variant: &record, resolved against the columns of trajectory.csv.
+module nocdyn_recorded_quantities
+  use nocdyn_input, only: input_t
+  use nocdyn_kinds, only: wp
+  use nocdyn_diagnostics, only: diagnostics_t
+  use nocdyn_statistics, only: default_band, new_statistic, statistic_names, statistic_settling_time, statistic_t
+  use nocdyn_sweep_diagnostics, only: report
+  use nocdyn_text, only: append, joined, nearest_word, quoted, string_t, to_text
+  implicit none (type, external)
+  private
+
+  public :: read_recorded_quantities, check_quantities, restrict_statistics, wanted_trajectories
+
+  real(wp), parameter :: unknown_start = -huge(1.0_wp)   !! in place of `from` where t_start varies and `from` is not given
+
+  !> The time in which statistics can be taken; an end that varies is not known.
+  type, public :: time_span_t
+    real(wp) :: t_start = unknown_start, t_end = huge(1.0_wp)   !! [s]
+  end type time_span_t
+
+contains
+
+  !> Statistics in the order of the file.
+  subroutine read_recorded_quantities(input, labels, span, variants, statistics, diagnostics)
+    type(input_t), intent(in) :: input
+    type(string_t), intent(in) :: labels(:)   !! of the columns
+    type(time_span_t), intent(in) :: span
+    integer, intent(in) :: variants           !! huge if that is not known
+    type(statistic_t), allocatable, intent(out) :: statistics(:)
+    type(diagnostics_t), intent(inout) :: diagnostics
+    type(string_t), allocatable :: names(:)
+    integer :: i
+
+    allocate (statistics(0))
+    call remove_units(labels, names)
+    associate (records => input%groups_named('record'))
+      do i = 1, size(records)
+        associate (group => input%groups(records(i)))
+          if (group%has_value('quantity')) then
+            call add_statistics(input, records(i), labels, names, span, statistics, diagnostics)
+          else if (.not. group%has_value('trajectories')) then
+            call diagnostics%add(group%line, records(i), 'there is nothing to record; needed: quantity or trajectories')
+          end if
+          if (group%has_value('trajectories')) call check_trajectories(input, records(i), variants, diagnostics)
+        end associate
+      end do
+    end associate
+  end subroutine read_recorded_quantities
+
+  !> The quantities alone, as far as an input with mistakes has them.
+  subroutine check_quantities(input, labels, diagnostics)
+    type(input_t), intent(in) :: input
+    type(string_t), intent(in) :: labels(:)   !! of the columns
+    type(diagnostics_t), intent(inout) :: diagnostics
+    type(string_t), allocatable :: names(:)
+    integer :: column, i
+
+    call remove_units(labels, names)
+    associate (records => input%groups_named('record'))
+      do i = 1, size(records)
+        if (.not. input%groups(records(i))%has_value('quantity')) cycle
+        call find_column(input, records(i), labels, names, column, diagnostics)
+      end do
+    end associate
+  end subroutine check_quantities
+
+  !> The statistics of a variant that runs from `t_start` to `t_end` [s]. If they have no time left in it, a complaint says so,
+  !> and they begin at `t_start`.
+  subroutine restrict_statistics(statistics, t_start, t_end, fitted, message)
+    type(statistic_t), intent(in) :: statistics(:)   !! of the plan
+    real(wp), intent(in) :: t_start, t_end
+    type(statistic_t), allocatable, intent(out) :: fitted(:)
+    character(len=:), allocatable, intent(out) :: message   !! '' if all is well
+    integer :: i
+
+    message = ''
+    allocate (fitted, source=statistics)
+    do i = 1, size(fitted)
+      if (fitted(i)%from >= t_start .and. fitted(i)%from < t_end) cycle
+      if (fitted(i)%from > unknown_start .and. message == '') message = fitted(i)%label // ': from = ' // &
+        to_text(fitted(i)%from) // ' is out of range; allowed: from t_start = ' // to_text(t_start) // ' to t_end = ' // &
+        to_text(t_end)
+      fitted(i)%from = t_start
+    end do
+  end subroutine restrict_statistics
+
+  subroutine remove_units(labels, names)
+    type(string_t), intent(in) :: labels(:)
+    type(string_t), allocatable, intent(out) :: names(:)
+    integer :: i
+
+    allocate (names(size(labels)))
+    do i = 1, size(labels)
+      names(i)%text = labels(i)%text(:index(labels(i)%text, ' [', back=.true.) - 1)
+    end do
+  end subroutine remove_units
+
+  subroutine add_statistics(input, record, labels, names, span, statistics, diagnostics)
+    type(input_t), intent(in) :: input
+    integer, intent(in) :: record   !! index of the group
+    type(string_t), intent(in) :: labels(:), names(:)   !! with and without units
+    type(time_span_t), intent(in) :: span
+    type(statistic_t), allocatable, intent(inout) :: statistics(:)
+    type(diagnostics_t), intent(inout) :: diagnostics
+    type(statistic_t) :: statistic
+    type(string_t), allocatable :: words(:)
+    real(wp) :: band
+    integer :: column, i, kind
+
+    call find_column(input, record, labels, names, column, diagnostics)
+    call check_from(input, record, span, diagnostics)
+    if (column == 0) return
+    associate (group => input%groups(record))
+      words = group%texts('statistic')
+      band = group%number('band', default_band)
+      do i = 1, size(words)
+        kind = kind_of(words(i)%text)
+        if (group%has_value('from')) then
+          statistic = new_statistic(labels, column, kind, span%t_start, group%number('from'), band)
+        else
+          statistic = new_statistic(labels, column, kind, span%t_start, band=band)
+        end if
+        if (kind == statistic_settling_time .and. group%has_value('band')) call name_band(statistic)
+        if (any_has_label(statistics, statistic%label)) then
+          call report(input, record, 'statistic', quoted(statistic%label) // ' is recorded already; allowed: once', diagnostics)
+        else
+          call append_statistic(statistics, statistic)
+        end if
+      end do
+    end associate
+  end subroutine add_statistics
+
+  subroutine name_band(statistic)
+    type(statistic_t), intent(inout) :: statistic
+
+    statistic%label = statistic%label // '_band_' // to_text(statistic%band)
+    statistic%long_name = statistic%long_name // ' in a band of ' // to_text(statistic%band)
+  end subroutine name_band
+
+  pure integer function kind_of(word) result(kind)
+    character(len=*), intent(in) :: word
+
+    do kind = 1, size(statistic_names)
+      if (statistic_names(kind) == word) return
+    end do
+    error stop 'nocdyn_recorded_quantities: the schema allows a statistic that is not there'
+  end function kind_of
+
+  !> The column of a quantity, which is written with its unit or without; 0 if there is none.
+  subroutine find_column(input, record, labels, names, column, diagnostics)
+    type(input_t), intent(in) :: input
+    integer, intent(in) :: record
+    type(string_t), intent(in) :: labels(:), names(:)
+    integer, intent(out) :: column
+    type(diagnostics_t), intent(inout) :: diagnostics
+    character(len=:), allocatable :: hint, quantity
+
+    quantity = trim(adjustl(input%groups(record)%text('quantity')))
+    do column = 1, size(labels)
+      if (quantity == labels(column)%text .or. quantity == names(column)%text) return
+    end do
+    column = 0
+    if (index(quantity, '[') > 0) then
+      hint = near_match(quantity, labels)
+    else
+      hint = near_match(quantity, names)
+    end if
+    if (hint == '') hint = ', which has ' // related_names(quantity, names)
+    call report(input, record, 'quantity', 'quantity = ' // quoted(quantity) // ' is no column of trajectory.csv' // hint, &
+                     diagnostics)
+  end subroutine find_column
+
+  !> "; did you mean 'omega_motor'?", '' if nothing is near.
+  pure function near_match(quantity, candidates) result(text)
+    character(len=*), intent(in) :: quantity
+    type(string_t), intent(in) :: candidates(:)
+    character(len=:), allocatable :: text
+    integer :: nearest
+
+    text = ''
+    nearest = nearest_word(quantity, candidates)
+    if (nearest > 0) text = '; did you mean ' // quoted(candidates(nearest)%text) // '?'
+  end function near_match
+
+  !> The columns of the element or of the kind that a quantity seems to name; the first of all columns if there are none.
+  pure function related_names(quantity, names) result(text)
+    character(len=*), intent(in) :: quantity
+    type(string_t), intent(in) :: names(:)   !! without units
+    character(len=:), allocatable :: text
+    integer, parameter :: most = 16
+    type(string_t), allocatable :: related(:)
+    character(len=:), allocatable :: element, name
+    integer :: i
+
+    name = quantity(:index(quantity // ' [', ' [') - 1)
+    element = name(index(name, '_') + 1:)
+    allocate (related(0))
+    do i = 1, size(names)
+      if (index(names(i)%text // '|', '_' // element // '|') == 0 .and. index(names(i)%text, name // '_') /= 1) cycle
+      call append(related, names(i)%text)
+    end do
+    if (size(related) > 0) then
+      text = joined(related, ', ', most)
+    else
+      text = joined(names, ', ', most)
+      if (size(names) > most) text = text // ' in its first line'
+    end if
+  end function related_names
+
+  subroutine check_from(input, record, span, diagnostics)
+    type(input_t), intent(in) :: input
+    integer, intent(in) :: record
+    type(time_span_t), intent(in) :: span
+    type(diagnostics_t), intent(inout) :: diagnostics
+    real(wp) :: from
+
+    if (.not. input%groups(record)%has_value('from')) return
+    from = input%groups(record)%number('from')
+    if (from < span%t_start) then
+      call report(input, record, 'from', 'from = ' // to_text(from) // ' is out of range; allowed: >= t_start = ' // &
+                       to_text(span%t_start), diagnostics)
+    else if (from >= span%t_end) then
+      call report(input, record, 'from', 'from = ' // to_text(from) // ' is out of range; allowed: < t_end = ' // &
+                       to_text(span%t_end), diagnostics)
+    end if
+  end subroutine check_from
+
+  pure logical function any_has_label(statistics, label)
+    type(statistic_t), intent(in) :: statistics(:)
+    character(len=*), intent(in) :: label
+    integer :: i
+
+    any_has_label = any([(statistics(i)%label == label, i=1, size(statistics))])
+  end function any_has_label
+
+  subroutine append_statistic(statistics, statistic)
+    type(statistic_t), allocatable, intent(inout) :: statistics(:)
+    type(statistic_t), intent(in) :: statistic
+    type(statistic_t), allocatable :: longer(:)
+
+    allocate (longer(size(statistics) + 1))
+    longer(:size(statistics)) = statistics
+    longer(size(longer)) = statistic
+    call move_alloc(longer, statistics)
+  end subroutine append_statistic
+
+  !> The variants of which trajectories are wanted, ascending, each once.
+  pure function wanted_trajectories(input) result(wanted)
+    type(input_t), intent(in) :: input
+    integer, allocatable :: wanted(:)
+    integer, allocatable :: numbers(:), records(:)
+    integer :: i, k
+
+    allocate (wanted(0))
+    allocate (records, source=input%groups_named('record'))
+    do i = 1, size(records)
+      if (.not. input%groups(records(i))%has_value('trajectories')) cycle
+      numbers = input%groups(records(i))%whole_numbers('trajectories')
+      do k = 1, size(numbers)
+        if (all(wanted /= numbers(k))) wanted = [pack(wanted, wanted < numbers(k)), numbers(k), pack(wanted, wanted > numbers(k))]
+      end do
+    end do
+  end function wanted_trajectories
+
+  subroutine check_trajectories(input, record, variants, diagnostics)
+    type(input_t), intent(in) :: input
+    integer, intent(in) :: record
+    integer, intent(in) :: variants
+    type(diagnostics_t), intent(inout) :: diagnostics
+    integer, allocatable :: wanted(:)
+    integer :: i
+
+    allocate (wanted, source=input%groups(record)%whole_numbers('trajectories'))
+    do i = 1, size(wanted)
+      if (wanted(i) <= variants) cycle
+      call report(input, record, 'trajectories', 'trajectories(' // to_text(i) // ') = ' // to_text(wanted(i)) // &
+                       ' is out of range; allowed: 1 to ' // to_text(variants) // ', the number of variants', diagnostics)
+    end do
+  end subroutine check_trajectories
+
+end module nocdyn_recorded_quantities

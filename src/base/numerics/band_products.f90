@@ -1,0 +1,184 @@
+!> The vector loops of a sparse map over rows whose columns all advance by one from row to row.
+!>
+!> `multiply`: u = map x; `pair`: u = offset + map x and v = map y; `sum`: u = map (x + y). A stretch is given diagonal by
+!> diagonal, an even one, whose rows all have the same coefficients, by its first row. The terms of a row are added one
+!> after the other.
+module nocdyn_band_products
+  use nocdyn_kinds, only: wp
+  implicit none (type, external)
+  private
+
+  public :: multiply_band, multiply_toeplitz, pair_of_band, pair_of_toeplitz, sum_of_band, sum_of_toeplitz
+
+  integer, parameter :: strip = 256   !! rows that stay in the first cache from diagonal to diagonal
+
+contains
+
+  !> u = A x for rows with coefficients of their own.
+  pure subroutine multiply_band(rows, width, columns, column, coefficient, x, u)
+    integer, intent(in) :: rows, width, columns
+    integer, intent(in) :: column(rows, width)
+    real(wp), intent(in) :: coefficient(rows, width), x(columns)
+    real(wp), intent(inout) :: u(rows)
+    integer :: begin, c, i, k
+
+    do begin = 1, rows, strip
+      c = column(1, 1) - 1
+      do i = begin, min(begin + strip - 1, rows)
+        u(i) = 0.0_wp + coefficient(i, 1) * x(c + i)
+      end do
+      do k = 2, width
+        c = column(1, k) - 1
+        do i = begin, min(begin + strip - 1, rows)
+          u(i) = u(i) + coefficient(i, k) * x(c + i)
+        end do
+      end do
+    end do
+  end subroutine multiply_band
+
+  !> u = A x for rows with equal coefficients.
+  pure subroutine multiply_toeplitz(rows, width, columns, column, coefficient, x, u)
+    integer, intent(in) :: rows, width, columns
+    integer, intent(in) :: column(width)
+    real(wp), intent(in) :: coefficient(width), x(columns)
+    real(wp), intent(inout) :: u(rows)
+    integer :: begin, c, i, k
+
+    do begin = 1, rows, strip
+      c = column(1) - 1
+      do i = begin, min(begin + strip - 1, rows)
+        u(i) = 0.0_wp + coefficient(1) * x(c + i)
+      end do
+      do k = 2, width
+        c = column(k) - 1
+        do i = begin, min(begin + strip - 1, rows)
+          u(i) = u(i) + coefficient(k) * x(c + i)
+        end do
+      end do
+    end do
+  end subroutine multiply_toeplitz
+
+  !> u = offset + A x and v = A y.
+  pure subroutine pair_of_band(rows, width, columns, column, coefficient, offset, x, y, u, v)
+    integer, intent(in) :: rows, width, columns
+    integer, intent(in) :: column(rows, width)
+    real(wp), intent(in) :: coefficient(rows, width), offset(rows), x(columns), y(columns)
+    real(wp), intent(inout) :: u(rows), v(rows)
+    integer :: begin, c, i, k
+
+    do begin = 1, rows, strip
+      c = column(1, 1) - 1
+      do i = begin, min(begin + strip - 1, rows)
+        u(i) = offset(i) + coefficient(i, 1) * x(c + i)
+        v(i) = 0.0_wp + coefficient(i, 1) * y(c + i)
+      end do
+      do k = 2, width
+        c = column(1, k) - 1
+        do i = begin, min(begin + strip - 1, rows)
+          u(i) = u(i) + coefficient(i, k) * x(c + i)
+          v(i) = v(i) + coefficient(i, k) * y(c + i)
+        end do
+      end do
+    end do
+  end subroutine pair_of_band
+
+  !> u = offset + A x and v = A y for rows with equal coefficients.
+  pure subroutine pair_of_toeplitz(rows, width, columns, column, coefficient, without_offset, offset, x, y, u, v)
+    integer, intent(in) :: rows, width, columns
+    integer, intent(in) :: column(width)
+    logical, intent(in) :: without_offset   !! whether `offset` is zero
+    real(wp), intent(in) :: coefficient(width), offset(rows), x(columns), y(columns)
+    real(wp), intent(inout) :: u(rows), v(rows)
+    real(wp) :: a, b
+    integer :: begin, c, d, i, k
+
+    if (width == 2) then   ! a chain's: nothing is read twice
+      a = coefficient(1)
+      b = coefficient(2)
+      c = column(1) - 1
+      d = column(2) - 1
+      if (without_offset) then
+        do i = 1, rows
+          u(i) = (0.0_wp + a * x(c + i)) + b * x(d + i)
+          v(i) = (0.0_wp + a * y(c + i)) + b * y(d + i)
+        end do
+      else
+        do i = 1, rows
+          u(i) = (offset(i) + a * x(c + i)) + b * x(d + i)
+          v(i) = (0.0_wp + a * y(c + i)) + b * y(d + i)
+        end do
+      end if
+      return
+    end if
+    do begin = 1, rows, strip
+      c = column(1) - 1
+      do i = begin, min(begin + strip - 1, rows)
+        u(i) = offset(i) + coefficient(1) * x(c + i)
+        v(i) = 0.0_wp + coefficient(1) * y(c + i)
+      end do
+      do k = 2, width
+        c = column(k) - 1
+        do i = begin, min(begin + strip - 1, rows)
+          u(i) = u(i) + coefficient(k) * x(c + i)
+          v(i) = v(i) + coefficient(k) * y(c + i)
+        end do
+      end do
+    end do
+  end subroutine pair_of_toeplitz
+
+  !> u = A (x + y).
+  pure subroutine sum_of_band(rows, width, columns, column, coefficient, x, y, u)
+    integer, intent(in) :: rows, width, columns
+    integer, intent(in) :: column(rows, width)
+    real(wp), intent(in) :: coefficient(rows, width), x(columns), y(columns)
+    real(wp), intent(inout) :: u(rows)
+    integer :: begin, c, i, k
+
+    do begin = 1, rows, strip
+      c = column(1, 1) - 1
+      do i = begin, min(begin + strip - 1, rows)
+        u(i) = 0.0_wp + coefficient(i, 1) * (x(c + i) + y(c + i))
+      end do
+      do k = 2, width
+        c = column(1, k) - 1
+        do i = begin, min(begin + strip - 1, rows)
+          u(i) = u(i) + coefficient(i, k) * (x(c + i) + y(c + i))
+        end do
+      end do
+    end do
+  end subroutine sum_of_band
+
+  !> u = A (x + y) for rows with equal coefficients.
+  pure subroutine sum_of_toeplitz(rows, width, columns, column, coefficient, x, y, u)
+    integer, intent(in) :: rows, width, columns
+    integer, intent(in) :: column(width)
+    real(wp), intent(in) :: coefficient(width), x(columns), y(columns)
+    real(wp), intent(inout) :: u(rows)
+    real(wp) :: a, b
+    integer :: begin, c, d, i, k
+
+    if (width == 2) then   ! a chain's: nothing is read twice
+      a = coefficient(1)
+      b = coefficient(2)
+      c = column(1) - 1
+      d = column(2) - 1
+      do i = 1, rows
+        u(i) = (0.0_wp + a * (x(c + i) + y(c + i))) + b * (x(d + i) + y(d + i))
+      end do
+      return
+    end if
+    do begin = 1, rows, strip
+      c = column(1) - 1
+      do i = begin, min(begin + strip - 1, rows)
+        u(i) = 0.0_wp + coefficient(1) * (x(c + i) + y(c + i))
+      end do
+      do k = 2, width
+        c = column(k) - 1
+        do i = begin, min(begin + strip - 1, rows)
+          u(i) = u(i) + coefficient(k) * (x(c + i) + y(c + i))
+        end do
+      end do
+    end do
+  end subroutine sum_of_toeplitz
+
+end module nocdyn_band_products

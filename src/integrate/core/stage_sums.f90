@@ -1,0 +1,347 @@
+!> Linear combinations of stages: the inner loops of every one-step method.
+module nocdyn_stage_sums
+  use, intrinsic :: iso_fortran_env, only: int64
+  use nocdyn_finite, only: are_finite => all_finite
+  use nocdyn_kinds, only: wp
+  implicit none (type, external)
+  private
+
+  public :: stage_sum, set_offsets, sum_stages, padded_columns
+
+  integer, parameter :: max_terms = 12     !! of a row of any table
+  integer(int64), parameter :: exponent_mask = shiftl(2047_int64, 52)   ! all ones in a number that is not finite
+  integer, parameter, public :: width = 4   !! all arrays here consist of whole vectors of this length
+  integer, parameter :: few = 16            !! numbers in which infinities are soonest found one vector after the other
+  integer, parameter :: tile = 32          !! of many numbers, that is combined at once
+  integer, parameter, public :: large_tile = 256 !! numbers of each stage that are combined at a time
+
+  !> The non-zero weights of a row of a method's table and where the stages are that they belong to.
+  type, public :: stage_sum_t
+    integer :: terms = 0
+    real(wp) :: weights(max_terms) = 0.0_wp
+    integer :: stages(max_terms) = 0    !! places among all stages
+    integer :: length = 0                !! of a stage
+    integer :: extent = 0                !! of all stages together
+    integer :: offsets(max_terms) = 0   !! of these stages among them
+  end type stage_sum_t
+
+contains
+
+  !> The non-zero weights of a row, in the order of the stages.
+  pure function stage_sum(row)
+    real(wp), intent(in) :: row(:)   !! one weight per stage
+    type(stage_sum_t) :: stage_sum
+    integer :: stage
+
+    do stage = 1, size(row)
+      if (.not. abs(row(stage)) > 0) cycle
+      if (stage_sum%terms == max_terms) error stop 'nocdyn_stage_sums: a row has more than most_terms weights'
+      stage_sum%terms = stage_sum%terms + 1
+      stage_sum%weights(stage_sum%terms) = row(stage)
+      stage_sum%stages(stage_sum%terms) = stage
+    end do
+  end function stage_sum
+
+  !> Finds the stages in an array [length, stages].
+  elemental subroutine set_offsets(stage_sum, length, stages)
+    type(stage_sum_t), intent(inout) :: stage_sum
+    integer, intent(in) :: length   !! of a stage, whole vectors
+    integer, intent(in) :: stages
+
+    stage_sum%length = length
+    stage_sum%extent = length * stages
+    stage_sum%offsets = length * (stage_sum%stages - 1)
+  end subroutine set_offsets
+
+  !> Columns, at least one, of an array [lanes, columns] that holds all components and consists of whole vectors.
+  pure integer function padded_columns(lanes, components)
+    integer, intent(in) :: lanes, components
+
+    padded_columns = max(components, 1)
+    do while (modulo(lanes * padded_columns, width) /= 0)
+      padded_columns = padded_columns + 1
+    end do
+  end function padded_columns
+
+  !> y = x + h * (sum of weights times stages). Every number goes through the same operations in the same order wherever it
+  !> stands in the arrays, so that a lane's result does not depend on its place in a block.
+  !>
+  !> x and h may be shorter than the stages: then they are as long as a strip, and serve every strip alike.
+  pure recursive subroutine sum_stages(stage_sum, k, x_length, x, h_length, h, y, all_finite)
+    type(stage_sum_t), intent(in) :: stage_sum   !! with offsets
+    real(wp), intent(in) :: k(stage_sum%extent)    !! the stages, one after the other
+    integer, intent(in) :: x_length, h_length        !! the length of a stage, or `large_tile` if that is less
+    real(wp), intent(in) :: x(x_length), h(h_length)
+    real(wp), intent(inout) :: y(stage_sum%length)
+    logical, intent(out), optional :: all_finite     !! whether no element of y is infinite or NaN
+    real(wp) :: total(width)   ! of the sizes, finite if they all are
+    integer :: i
+
+    if (stage_sum%length > large_tile) then
+      call sum_large_tiles(stage_sum, k, x_length, x, h_length, h, y, all_finite)
+      return
+    end if
+    associate (n => stage_sum%length, m => stage_sum%extent, terms => stage_sum%terms, w => stage_sum%weights, &
+               o => stage_sum%offsets)
+      if (modulo(n, tile) == 0) then
+        call sum_tiles(n, m, terms, w, o, k, x, h, y)
+      else if (terms <= 4) then
+        call sum_up_to_4(n, m, terms, w, o, k, x, h, y)
+      else if (terms <= 8) then
+        call sum_up_to_8(n, m, terms, w, o, k, x, h, y)
+      else
+        call sum_up_to_12(n, m, terms, w, o, k, x, h, y)
+      end if
+    end associate
+    if (.not. present(all_finite)) return
+    if (stage_sum%length > few) then
+      all_finite = are_finite(stage_sum%length, y)
+      return
+    end if
+    total = 0.0_wp
+    do i = 1, stage_sum%length, width
+      total = total + abs(y(i:i + 3))
+    end do
+    all_finite = iand(transfer((total(1) + total(2)) + (total(3) + total(4)), exponent_mask), exponent_mask) /= exponent_mask
+  end subroutine sum_stages
+
+  !> The same strip by strip, each of which stays in the first cache until it is known to be finite.
+  pure recursive subroutine sum_large_tiles(stage_sum, k, x_length, x, h_length, h, y, all_finite)
+    type(stage_sum_t), intent(in) :: stage_sum
+    real(wp), intent(in) :: k(stage_sum%extent)
+    integer, intent(in) :: x_length, h_length
+    real(wp), intent(in) :: x(x_length), h(h_length)
+    real(wp), intent(inout) :: y(stage_sum%length)
+    logical, intent(out), optional :: all_finite
+    type(stage_sum_t) :: part
+    logical :: is_finite
+    integer :: before
+
+    part = stage_sum
+    if (present(all_finite)) all_finite = .true.
+    do before = 0, stage_sum%length - 1, large_tile
+      part%length = min(large_tile, stage_sum%length - before)
+      part%extent = stage_sum%extent - before
+      call sum_stages(part, k(before + 1), part%length, x(merge(before, 0, x_length > large_tile) + 1), &
+                   part%length, h(merge(before, 0, h_length > large_tile) + 1), y(before + 1), is_finite)
+      if (present(all_finite)) all_finite = all_finite .and. is_finite
+    end do
+  end subroutine sum_large_tiles
+
+  !> Sums of any number of terms, of many numbers: the loops over the numbers of a piece have no end to be guessed.
+  pure subroutine sum_tiles(n, m, terms, w, o, k, x, h, y)
+    integer, intent(in) :: n, m, terms
+    real(wp), intent(in) :: w(max_terms)
+    integer, intent(in) :: o(max_terms)
+    real(wp), intent(in) :: k(m), x(n), h(n)
+    real(wp), intent(inout) :: y(n)
+    real(wp) :: total(tile)
+    integer :: before, i, term
+
+    if (terms == 0) y = x
+    if (terms == 0) return
+    do before = 0, n - 1, tile
+      call begin_sum(m, min(terms, 4), w, o, before, k, total)
+      do term = 5, terms, 4
+        call continue_sum(m, min(terms - term + 1, 4), w(term), o(term), before, k, total)
+      end do
+      do i = 1, tile
+        y(before + i) = x(before + i) + h(before + i) * total(i)
+      end do
+    end do
+  end subroutine sum_tiles
+
+  !> The first one to four terms of a sum.
+  pure subroutine begin_sum(m, terms, w, o, before, k, total)
+    integer, intent(in) :: m, terms
+    real(wp), intent(in) :: w(4)
+    integer, intent(in) :: o(4)
+    integer, intent(in) :: before
+    real(wp), intent(in) :: k(m)
+    real(wp), intent(inout) :: total(tile)
+    integer :: a, b, c, d, i
+
+    a = before + o(1)
+    b = before + o(2)
+    c = before + o(3)
+    d = before + o(4)
+    select case (terms)
+    case (1)
+      do i = 1, tile
+        total(i) = w(1) * k(a + i)
+      end do
+    case (2)
+      do i = 1, tile
+        total(i) = w(1) * k(a + i) + w(2) * k(b + i)
+      end do
+    case (3)
+      do i = 1, tile
+        total(i) = w(1) * k(a + i) + w(2) * k(b + i) + w(3) * k(c + i)
+      end do
+    case default
+      do i = 1, tile
+        total(i) = w(1) * k(a + i) + w(2) * k(b + i) + w(3) * k(c + i) + w(4) * k(d + i)
+      end do
+    end select
+  end subroutine begin_sum
+
+  !> The next one to four terms of a sum, in the same order as in the sums of fewer numbers.
+  pure subroutine continue_sum(m, terms, w, o, before, k, total)
+    integer, intent(in) :: m, terms
+    real(wp), intent(in) :: w(4)
+    integer, intent(in) :: o(4)
+    integer, intent(in) :: before
+    real(wp), intent(in) :: k(m)
+    real(wp), intent(inout) :: total(tile)
+    integer :: a, b, c, d, i
+
+    a = before + o(1)
+    b = before + o(2)
+    c = before + o(3)
+    d = before + o(4)
+    select case (terms)
+    case (1)
+      do i = 1, tile
+        total(i) = total(i) + w(1) * k(a + i)
+      end do
+    case (2)
+      do i = 1, tile
+        total(i) = total(i) + w(1) * k(a + i) + w(2) * k(b + i)
+      end do
+    case (3)
+      do i = 1, tile
+        total(i) = total(i) + w(1) * k(a + i) + w(2) * k(b + i) + w(3) * k(c + i)
+      end do
+    case default
+      do i = 1, tile
+        total(i) = total(i) + w(1) * k(a + i) + w(2) * k(b + i) + w(3) * k(c + i) + w(4) * k(d + i)
+      end do
+    end select
+  end subroutine continue_sum
+
+  !> Sums of up to four terms.
+  pure subroutine sum_up_to_4(n, m, terms, w, o, k, x, h, y)
+    integer, intent(in) :: n, m, terms
+    real(wp), intent(in) :: w(max_terms)
+    integer, intent(in) :: o(max_terms)
+    real(wp), intent(in) :: k(m), x(n), h(n)
+    real(wp), intent(inout) :: y(n)
+    integer :: i
+
+    select case (terms)
+    case (0)
+      y = x
+    case (1)
+      do i = 1, n, width
+        y(i:i + 3) = x(i:i + 3) + h(i:i + 3) * (w(1) * k(i + o(1):i + 3 + o(1)))
+      end do
+    case (2)
+      do i = 1, n, width
+        y(i:i + 3) = x(i:i + 3) + h(i:i + 3) * (w(1) * k(i + o(1):i + 3 + o(1)) + w(2) * k(i + o(2):i + 3 + o(2)))
+      end do
+    case (3)
+      do i = 1, n, width
+        y(i:i + 3) = x(i:i + 3) + h(i:i + 3) * (w(1) * k(i + o(1):i + 3 + o(1)) + w(2) * k(i + o(2):i + 3 + o(2)) &
+                                   + w(3) * k(i + o(3):i + 3 + o(3)))
+      end do
+    case (4)
+      do i = 1, n, width
+        y(i:i + 3) = x(i:i + 3) + h(i:i + 3) * (w(1) * k(i + o(1):i + 3 + o(1)) + w(2) * k(i + o(2):i + 3 + o(2)) &
+                                   + w(3) * k(i + o(3):i + 3 + o(3)) + w(4) * k(i + o(4):i + 3 + o(4)))
+      end do
+    case default
+      error stop 'nocdyn_stage_sums: a sum of so many terms belongs elsewhere'
+    end select
+  end subroutine sum_up_to_4
+
+  !> Sums of five to eight terms.
+  pure subroutine sum_up_to_8(n, m, terms, w, o, k, x, h, y)
+    integer, intent(in) :: n, m, terms
+    real(wp), intent(in) :: w(max_terms)
+    integer, intent(in) :: o(max_terms)
+    real(wp), intent(in) :: k(m), x(n), h(n)
+    real(wp), intent(inout) :: y(n)
+    integer :: i
+
+    select case (terms)
+    case (5)
+      do i = 1, n, width
+        y(i:i + 3) = x(i:i + 3) + h(i:i + 3) * (w(1) * k(i + o(1):i + 3 + o(1)) + w(2) * k(i + o(2):i + 3 + o(2)) &
+                                   + w(3) * k(i + o(3):i + 3 + o(3)) + w(4) * k(i + o(4):i + 3 + o(4)) &
+                                   + w(5) * k(i + o(5):i + 3 + o(5)))
+      end do
+    case (6)
+      do i = 1, n, width
+        y(i:i + 3) = x(i:i + 3) + h(i:i + 3) * (w(1) * k(i + o(1):i + 3 + o(1)) + w(2) * k(i + o(2):i + 3 + o(2)) &
+                                   + w(3) * k(i + o(3):i + 3 + o(3)) + w(4) * k(i + o(4):i + 3 + o(4)) &
+                                   + w(5) * k(i + o(5):i + 3 + o(5)) + w(6) * k(i + o(6):i + 3 + o(6)))
+      end do
+    case (7)
+      do i = 1, n, width
+        y(i:i + 3) = x(i:i + 3) + h(i:i + 3) * (w(1) * k(i + o(1):i + 3 + o(1)) + w(2) * k(i + o(2):i + 3 + o(2)) &
+                                   + w(3) * k(i + o(3):i + 3 + o(3)) + w(4) * k(i + o(4):i + 3 + o(4)) &
+                                   + w(5) * k(i + o(5):i + 3 + o(5)) + w(6) * k(i + o(6):i + 3 + o(6)) &
+                                   + w(7) * k(i + o(7):i + 3 + o(7)))
+      end do
+    case (8)
+      do i = 1, n, width
+        y(i:i + 3) = x(i:i + 3) + h(i:i + 3) * (w(1) * k(i + o(1):i + 3 + o(1)) + w(2) * k(i + o(2):i + 3 + o(2)) &
+                                   + w(3) * k(i + o(3):i + 3 + o(3)) + w(4) * k(i + o(4):i + 3 + o(4)) &
+                                   + w(5) * k(i + o(5):i + 3 + o(5)) + w(6) * k(i + o(6):i + 3 + o(6)) &
+                                   + w(7) * k(i + o(7):i + 3 + o(7)) + w(8) * k(i + o(8):i + 3 + o(8)))
+      end do
+    case default
+      error stop 'nocdyn_stage_sums: a sum of so many terms belongs elsewhere'
+    end select
+  end subroutine sum_up_to_8
+
+  !> Sums of nine to twelve terms.
+  pure subroutine sum_up_to_12(n, m, terms, w, o, k, x, h, y)
+    integer, intent(in) :: n, m, terms
+    real(wp), intent(in) :: w(max_terms)
+    integer, intent(in) :: o(max_terms)
+    real(wp), intent(in) :: k(m), x(n), h(n)
+    real(wp), intent(inout) :: y(n)
+    integer :: i
+
+    select case (terms)
+    case (9)
+      do i = 1, n, width
+        y(i:i + 3) = x(i:i + 3) + h(i:i + 3) * (w(1) * k(i + o(1):i + 3 + o(1)) + w(2) * k(i + o(2):i + 3 + o(2)) &
+                                   + w(3) * k(i + o(3):i + 3 + o(3)) + w(4) * k(i + o(4):i + 3 + o(4)) &
+                                   + w(5) * k(i + o(5):i + 3 + o(5)) + w(6) * k(i + o(6):i + 3 + o(6)) &
+                                   + w(7) * k(i + o(7):i + 3 + o(7)) + w(8) * k(i + o(8):i + 3 + o(8)) &
+                                   + w(9) * k(i + o(9):i + 3 + o(9)))
+      end do
+    case (10)
+      do i = 1, n, width
+        y(i:i + 3) = x(i:i + 3) + h(i:i + 3) * (w(1) * k(i + o(1):i + 3 + o(1)) + w(2) * k(i + o(2):i + 3 + o(2)) &
+                                   + w(3) * k(i + o(3):i + 3 + o(3)) + w(4) * k(i + o(4):i + 3 + o(4)) &
+                                   + w(5) * k(i + o(5):i + 3 + o(5)) + w(6) * k(i + o(6):i + 3 + o(6)) &
+                                   + w(7) * k(i + o(7):i + 3 + o(7)) + w(8) * k(i + o(8):i + 3 + o(8)) &
+                                   + w(9) * k(i + o(9):i + 3 + o(9)) + w(10) * k(i + o(10):i + 3 + o(10)))
+      end do
+    case (11)
+      do i = 1, n, width
+        y(i:i + 3) = x(i:i + 3) + h(i:i + 3) * (w(1) * k(i + o(1):i + 3 + o(1)) + w(2) * k(i + o(2):i + 3 + o(2)) &
+                                   + w(3) * k(i + o(3):i + 3 + o(3)) + w(4) * k(i + o(4):i + 3 + o(4)) &
+                                   + w(5) * k(i + o(5):i + 3 + o(5)) + w(6) * k(i + o(6):i + 3 + o(6)) &
+                                   + w(7) * k(i + o(7):i + 3 + o(7)) + w(8) * k(i + o(8):i + 3 + o(8)) &
+                                   + w(9) * k(i + o(9):i + 3 + o(9)) + w(10) * k(i + o(10):i + 3 + o(10)) &
+                                   + w(11) * k(i + o(11):i + 3 + o(11)))
+      end do
+    case (12)
+      do i = 1, n, width
+        y(i:i + 3) = x(i:i + 3) + h(i:i + 3) * (w(1) * k(i + o(1):i + 3 + o(1)) + w(2) * k(i + o(2):i + 3 + o(2)) &
+                                   + w(3) * k(i + o(3):i + 3 + o(3)) + w(4) * k(i + o(4):i + 3 + o(4)) &
+                                   + w(5) * k(i + o(5):i + 3 + o(5)) + w(6) * k(i + o(6):i + 3 + o(6)) &
+                                   + w(7) * k(i + o(7):i + 3 + o(7)) + w(8) * k(i + o(8):i + 3 + o(8)) &
+                                   + w(9) * k(i + o(9):i + 3 + o(9)) + w(10) * k(i + o(10):i + 3 + o(10)) &
+                                   + w(11) * k(i + o(11):i + 3 + o(11)) + w(12) * k(i + o(12):i + 3 + o(12)))
+      end do
+    case default
+      error stop 'nocdyn_stage_sums: a sum of so many terms belongs elsewhere'
+    end select
+  end subroutine sum_up_to_12
+
+end module nocdyn_stage_sums

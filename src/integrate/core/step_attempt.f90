@@ -1,0 +1,208 @@
+!> One attempted step of every lane of a block: what the steppers read and what they leave.
+module nocdyn_step_attempt
+  use nocdyn_stage_sums, only: padded_columns, large_tile
+  use nocdyn_finite, only: all_finite, is_finite
+  use nocdyn_kinds, only: wp
+  use nocdyn_masks, only: all_true, any_differs
+  use nocdyn_system, only: evaluation_ok, evaluation_fatal, evaluation_recoverable, system_t
+  implicit none (type, external)
+  private
+
+  public :: allocate_step_attempt, begin_attempt, spread_steps, evaluate, evaluate_finite, evaluate_start, count_evaluations
+  public :: disable_lane, disable_non_finite_lanes
+
+  integer, parameter, public :: attempt_ok = evaluation_ok
+  integer, parameter, public :: attempt_recoverable = evaluation_recoverable
+  integer, parameter, public :: attempt_fatal = evaluation_fatal
+  integer, parameter, public :: attempt_not_finite = 3
+
+  !> A lane that fails is parked: its step becomes zero, so that it stays at its good state y while the others go on.
+  type, public :: step_attempt_t
+    integer :: lanes
+    integer :: states
+    integer :: components                          !! states and quadratures
+    integer :: length                              !! of the state arrays: whole vectors, the rest after the components is 0
+    integer :: h_length                            !! of h_spread: the same, of one lane a strip at most
+    real(wp), allocatable :: t(:)                  !! start of the step
+    real(wp), allocatable :: h(:)                  !! size of the step, 0 for a lane that is not working
+    real(wp), allocatable :: h_spread(:, :)        !! h of each lane, repeated
+    real(wp), allocatable :: y(:, :)               !! state at t, shape [lanes, padded columns] as all these
+    real(wp), allocatable :: y_new(:, :)           !! state at t + h
+    real(wp), allocatable :: error_estimate(:, :)       !! y_new minus the embedded solution
+    real(wp), allocatable :: low_order_estimate(:, :)   !! the same of a coarser one, for methods with two estimates
+    real(wp), allocatable :: slope(:, :)           !! f(t, y) when a lane was last started
+    integer :: first_dense, last_dense           !! columns of the state whose course inside the step is of interest
+    logical, allocatable :: active(:)             !! lanes that take part and have not failed
+    logical :: has_low_order_estimate = .false.
+    real(wp), allocatable :: scratch(:)            !! work space, shape [lanes]
+    logical, allocatable :: implicit(:)            !! lanes that an implicit method moves
+    integer, allocatable :: error_order(:)         !! of the method that moves the lane
+    real(wp), allocatable :: max_growth(:)        !! of its step size
+    integer, allocatable :: step_status(:)             !! trial_... of each lane
+    integer, allocatable :: component(:)             !! component that is not finite, 0 if there is none
+    integer, allocatable :: rhs_status(:)              !! answers to the last evaluation; evaluation_fine between evaluations
+    integer :: uncounted = 0                            !! evaluations that have not been counted yet
+    integer, allocatable :: evaluations(:)         !! counts of the whole integration
+    integer, allocatable :: jacobians(:)
+    integer, allocatable :: factorisations(:)
+  end type step_attempt_t
+
+contains
+
+  !> Room for one attempted step of every lane of the system.
+  subroutine allocate_step_attempt(attempt, system)
+    type(step_attempt_t), intent(out) :: attempt
+    class(system_t), intent(in) :: system
+    integer :: columns
+
+    associate (lanes => system%lanes, components => system%states + system%quadratures)
+      columns = padded_columns(lanes, components)
+      attempt%lanes = lanes
+      attempt%states = system%states
+      attempt%components = components
+      attempt%length = lanes * columns
+      attempt%first_dense = 1
+      attempt%last_dense = columns
+      allocate (attempt%t(lanes), attempt%h(lanes), attempt%scratch(lanes), attempt%max_growth(lanes), source=0.0_wp)
+      attempt%h_length = merge(min(columns, large_tile), lanes * columns, lanes == 1)
+      allocate (attempt%h_spread(lanes, attempt%h_length / lanes), source=0.0_wp)
+      allocate (attempt%y(lanes, columns), attempt%y_new(lanes, columns), attempt%error_estimate(lanes, columns), &
+                attempt%low_order_estimate(lanes, columns), attempt%slope(lanes, columns), source=0.0_wp)
+      allocate (attempt%active(lanes), source=.true.)
+      allocate (attempt%implicit(lanes), source=.false.)
+      allocate (attempt%error_order(lanes), attempt%step_status(lanes), attempt%component(lanes), attempt%rhs_status(lanes), &
+                attempt%evaluations(lanes), attempt%jacobians(lanes), attempt%factorisations(lanes), source=0)
+    end associate
+  end subroutine allocate_step_attempt
+
+  !> A new attempt of the lanes that are `active`, with the step sizes `h`.
+  pure subroutine begin_attempt(attempt)
+    type(step_attempt_t), intent(inout) :: attempt
+
+    attempt%step_status(:) = attempt_ok
+    call spread_steps(attempt)
+  end subroutine begin_attempt
+
+  !> Repeats the step size of each lane for all components.
+  pure subroutine spread_steps(attempt)
+    type(step_attempt_t), intent(inout) :: attempt
+    integer :: column
+
+    if (attempt%lanes == 1) then
+      attempt%h_spread(:, :) = attempt%h(1)
+    else
+      do column = 1, size(attempt%h_spread, 2)
+        attempt%h_spread(:, column) = attempt%h
+      end do
+    end if
+  end subroutine spread_steps
+
+  !> dydt = f(t, y) within the step; lanes that cannot go on are parked. Values that are not finite are left to the caller.
+  subroutine evaluate(attempt, system, t, y, dydt)
+    type(step_attempt_t), intent(inout) :: attempt
+    class(system_t), intent(inout) :: system
+    real(wp), intent(in) :: t(attempt%lanes)
+    real(wp), intent(in) :: y(attempt%length)
+    real(wp), intent(inout) :: dydt(attempt%length)
+
+    attempt%uncounted = attempt%uncounted + 1
+    call system%derivative(t, y, dydt, attempt%rhs_status)
+    if (attempt%lanes == 1) then
+      if (attempt%rhs_status(1) /= evaluation_ok) call disable_failed_lanes(attempt, dydt)
+    else if (any_differs(attempt%lanes, attempt%rhs_status, evaluation_ok)) then
+      call disable_failed_lanes(attempt, dydt)
+    end if
+  end subroutine evaluate
+
+  !> The same, and lanes whose values are not finite are parked too.
+  subroutine evaluate_finite(attempt, system, t, y, dydt)
+    type(step_attempt_t), intent(inout) :: attempt
+    class(system_t), intent(inout) :: system
+    real(wp), intent(in) :: t(attempt%lanes)
+    real(wp), intent(in) :: y(attempt%length)
+    real(wp), intent(inout) :: dydt(attempt%length)
+
+    call evaluate(attempt, system, t, y, dydt)
+    if (.not. all_finite(attempt%length, dydt)) call disable_non_finite_lanes(attempt, dydt)
+  end subroutine evaluate_finite
+
+  !> slope = f(t, y) at the start of the step, new only for the lanes that moved since the last call.
+  subroutine evaluate_start(attempt, system, moved, slope)
+    type(step_attempt_t), intent(inout) :: attempt
+    class(system_t), intent(inout) :: system
+    logical, intent(in) :: moved(:)
+    real(wp), intent(inout) :: slope(attempt%length)
+    integer :: lane
+
+    do lane = 1, attempt%lanes
+      if (attempt%active(lane) .and. moved(lane)) attempt%evaluations(lane) = attempt%evaluations(lane) + 1
+    end do
+    call system%derivative(attempt%t, attempt%y, slope, attempt%rhs_status)
+    if (any(attempt%rhs_status /= evaluation_ok)) call disable_failed_lanes(attempt, slope)
+    if (.not. all_finite(attempt%length, slope)) call disable_non_finite_lanes(attempt, slope)
+  end subroutine evaluate_start
+
+  !> Counts the evaluations made for the lanes that are still working.
+  pure subroutine count_evaluations(attempt)
+    type(step_attempt_t), intent(inout) :: attempt
+    integer :: lane
+
+    if (attempt%lanes == 1) then
+      if (attempt%active(1)) attempt%evaluations(1) = attempt%evaluations(1) + attempt%uncounted
+    else if (all_true(attempt%lanes, attempt%active)) then
+      attempt%evaluations(:) = attempt%evaluations + attempt%uncounted
+    else
+      do lane = 1, attempt%lanes
+        if (attempt%active(lane)) attempt%evaluations(lane) = attempt%evaluations(lane) + attempt%uncounted
+      end do
+    end if
+    attempt%uncounted = 0
+  end subroutine count_evaluations
+
+  !> Parks the lanes whose status is not fine, and clears their values and the status.
+  pure subroutine disable_failed_lanes(attempt, values)
+    type(step_attempt_t), intent(inout) :: attempt
+    real(wp), intent(inout) :: values(attempt%lanes, attempt%components)
+    integer :: lane
+
+    do lane = 1, attempt%lanes
+      if (attempt%rhs_status(lane) == evaluation_ok) cycle
+      values(lane, :) = 0.0_wp
+      call disable_lane(attempt, lane, attempt%rhs_status(lane), 0)
+      attempt%rhs_status(lane) = evaluation_ok
+    end do
+  end subroutine disable_failed_lanes
+
+  !> Parks the lanes with values that are not finite, and clears these values.
+  pure subroutine disable_non_finite_lanes(attempt, values)
+    type(step_attempt_t), intent(inout) :: attempt
+    real(wp), intent(inout) :: values(attempt%lanes, attempt%components)
+    integer :: component, lane
+
+    do lane = 1, attempt%lanes
+      do component = 1, attempt%components
+        if (is_finite(values(lane, component))) cycle
+        values(lane, :) = 0.0_wp
+        call disable_lane(attempt, lane, attempt_not_finite, component)
+        exit
+      end do
+    end do
+  end subroutine disable_non_finite_lanes
+
+  !> Takes a lane out of this step; the first verdict on it stands.
+  pure subroutine disable_lane(attempt, lane, step_status, component)
+    type(step_attempt_t), intent(inout) :: attempt
+    integer, intent(in) :: lane
+    integer, intent(in) :: step_status   !! trial_shorten, trial_give_up or trial_not_finite
+    integer, intent(in) :: component
+
+    if (.not. attempt%active(lane)) return
+    attempt%active(lane) = .false.
+    attempt%step_status(lane) = step_status
+    attempt%component(lane) = component
+    attempt%evaluations(lane) = attempt%evaluations(lane) + attempt%uncounted
+    attempt%h(lane) = 0.0_wp
+    attempt%h_spread(lane, :) = 0.0_wp
+  end subroutine disable_lane
+
+end module nocdyn_step_attempt

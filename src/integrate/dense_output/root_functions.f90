@@ -1,0 +1,258 @@
+!> Functions g(t, y) whose signs are followed on the solution inside the steps: an observer's events, a system's switches.
+!>
+!> Their values are taken at the ends of a few equal parts of every step; a change of sign between two of them is followed to
+!> the last bits of the time.
+module nocdyn_root_functions
+  use nocdyn_dense_output, only: dense_output_t, sample
+  use nocdyn_finite, only: is_finite
+  use nocdyn_kinds, only: wp
+  use nocdyn_system, only: observer_t, system_t
+  use nocdyn_step_attempt, only: step_attempt_t
+  implicit none (type, external)
+  private
+
+  public :: allocate_root_functions, start_root_functions, scan_step, evaluate, part_end, part_bracket, find_root, &
+    find_grazing, sign_of
+
+  integer, parameter :: least_parts = 4                 !! of a step; more for solutions of higher degree, whose steps are longer
+  integer, parameter :: max_grazing_steps = 10
+  real(wp), parameter :: promising = 0.5_wp             ! a parabola that goes no lower than this share says that there is no dip
+  real(wp), parameter :: least_distance = 1.0e-8_wp     ! of places in a dip: closer ones say nothing about the curvature
+
+  type, public :: root_functions_t
+    logical :: of_system = .false.                      !! switches of the system, else events of the observer
+    integer :: parts = least_parts                      !! of a step
+    integer, allocatable :: side(:, :)                  !! sign of the last value, 0 after a zero; [lanes, functions]
+    real(wp), allocatable :: values(:, :)               !! at the ends of the parts of the last step; [functions, 0:parts]
+    real(wp), allocatable, private :: last(:, :)        !! at the end of the last step; [functions, lanes]
+    real(wp), allocatable, private :: g(:)
+    real(wp), allocatable, private :: y(:)              !! state at which the functions are taken
+  end type root_functions_t
+
+  !> Two places in a step between which a function changes its sign.
+  type, public :: bracket_t
+    integer :: function = 0
+    real(wp) :: before = 0.0_wp, after = 0.0_wp
+    real(wp) :: g_before = 0.0_wp, g_after = 0.0_wp     !! values there
+  end type bracket_t
+
+contains
+
+  !> Room for the functions of an observer or a system.
+  subroutine allocate_root_functions(roots, functions, of_system, degree, attempt)
+    type(root_functions_t), intent(out) :: roots
+    integer, intent(in) :: functions
+    logical, intent(in) :: of_system
+    integer, intent(in) :: degree   !! of the solution inside the step
+    type(step_attempt_t), intent(in) :: attempt
+
+    roots%of_system = of_system
+    roots%parts = max(least_parts, degree / 2)
+    allocate (roots%side(attempt%lanes, functions), source=0)
+    allocate (roots%values(functions, 0:roots%parts), roots%last(functions, attempt%lanes), roots%g(functions), &
+              roots%y(attempt%components), source=0.0_wp)
+  end subroutine allocate_root_functions
+
+  !> Takes the signs where a lane starts.
+  subroutine start_root_functions(roots, system, observer, attempt, lane)
+    type(root_functions_t), intent(inout) :: roots
+    class(system_t), intent(inout) :: system
+    class(observer_t), intent(inout) :: observer
+    type(step_attempt_t), intent(in) :: attempt
+    integer, intent(in) :: lane
+
+    roots%y(:) = attempt%y(lane, :attempt%components)
+    if (roots%of_system) then
+      call system%indicator_values(lane, attempt%t(lane), roots%y, roots%last(:, lane))
+    else
+      call observer%event_values(lane, attempt%t(lane), roots%y, roots%last(:, lane))
+    end if
+    roots%side(lane, :) = sign_of(roots%last(:, lane))
+  end subroutine start_root_functions
+
+  !> Takes the values at the ends of the parts of a lane's last step.
+  subroutine scan_step(roots, system, observer, dense, theta_end)
+    type(root_functions_t), intent(inout) :: roots
+    class(system_t), intent(inout) :: system
+    class(observer_t), intent(inout) :: observer
+    type(dense_output_t), intent(inout) :: dense   !! of the lane
+    real(wp), intent(in) :: theta_end                  !! end of the step, 1 if it has not been cut
+    integer :: part
+
+    roots%values(:, 0) = roots%last(:, dense%lane)
+    do part = 1, roots%parts
+      call evaluate(roots%of_system, system, observer, dense, part_end(roots, part, theta_end), roots%y, &
+                    roots%values(:, part))
+    end do
+    roots%last(:, dense%lane) = roots%values(:, roots%parts)
+  end subroutine scan_step
+
+  !> Place of the end of a part in a step.
+  pure real(wp) function part_end(roots, part, theta_end)
+    type(root_functions_t), intent(in) :: roots
+    integer, intent(in) :: part
+    real(wp), intent(in) :: theta_end
+
+    part_end = theta_end * part / roots%parts
+  end function part_end
+
+  !> One part of a step as a bracket of one function.
+  pure type(bracket_t) function part_bracket(roots, function, part, theta_end)
+    type(root_functions_t), intent(in) :: roots
+    integer, intent(in) :: function, part
+    real(wp), intent(in) :: theta_end
+
+    part_bracket%function = function
+    part_bracket%before = part_end(roots, part - 1, theta_end)
+    part_bracket%after = part_end(roots, part, theta_end)
+    part_bracket%g_before = roots%values(function, part - 1)
+    part_bracket%g_after = roots%values(function, part)
+  end function part_bracket
+
+  !> 0 also for what is not finite.
+  elemental integer function sign_of(g)
+    real(wp), intent(in) :: g
+
+    sign_of = 0
+    if (is_finite(g)) sign_of = merge(1, 0, g > 0) - merge(1, 0, g < 0)
+  end function sign_of
+
+  !> The functions at a place in the step.
+  subroutine evaluate(of_system, system, observer, dense, theta, y, g)
+    logical, intent(in) :: of_system
+    class(system_t), intent(inout) :: system
+    class(observer_t), intent(inout) :: observer
+    type(dense_output_t), intent(inout) :: dense
+    real(wp), intent(in) :: theta
+    real(wp), contiguous, intent(inout) :: y(:)   !! the state there
+    real(wp), contiguous, intent(inout) :: g(:)
+
+    call sample(dense, theta, y)
+    if (of_system) then
+      call system%indicator_values(dense%lane, dense%t + theta * dense%h, y, g)
+    else
+      call observer%event_values(dense%lane, dense%t + theta * dense%h, y, g)
+    end if
+  end subroutine evaluate
+
+  !> Root of one function in a bracket, to the spacing of the times there: the place where it is zero, or the first one
+  !> found beyond its change of sign. T. R. Chandrupatla, Adv. Eng. Software 28 (1997) 145-149.
+  subroutine find_root(roots, system, observer, dense, bracket, root)
+    type(root_functions_t), intent(inout) :: roots
+    class(system_t), intent(inout) :: system
+    class(observer_t), intent(inout) :: observer
+    type(dense_output_t), intent(inout) :: dense
+    type(bracket_t), intent(in) :: bracket
+    real(wp), intent(out) :: root
+    real(wp) :: a, b, c, ga, gb, gc   ! the newest place, the best one of the other sign, the one that they have replaced
+    real(wp) :: fraction, least, tolerance, x
+
+    tolerance = max(spacing(abs(dense%t) + dense%h) / dense%h, epsilon(a))
+    a = bracket%after
+    b = bracket%before
+    ga = bracket%g_after
+    gb = bracket%g_before
+    fraction = 0.5_wp
+    do while (abs(ga) > 0 .and. abs(b - a) > 2 * tolerance)
+      x = a + fraction * (b - a)
+      call evaluate(roots%of_system, system, observer, dense, x, roots%y, roots%g)
+      if (sign_of(roots%g(bracket%function)) == sign_of(ga)) then
+        c = a
+        gc = ga
+      else
+        c = b
+        gc = gb
+        b = a
+        gb = ga
+      end if
+      a = x
+      ga = roots%g(bracket%function)
+      least = min(0.5_wp, tolerance / abs(b - a))
+      fraction = min(1 - least, max(least, next_fraction(a, b, c, ga, gb, gc)))
+    end do
+    root = a
+    if (abs(ga) > 0) root = max(a, b)
+  end subroutine find_root
+
+  !> Where to look next between a (0) and b (1): inverse quadratic interpolation where it can be trusted, else the middle.
+  pure real(wp) function next_fraction(a, b, c, ga, gb, gc)
+    real(wp), intent(in) :: a, b, c, ga, gb, gc   !! ga and gc differ from gb in sign, or a is the root
+    real(wp) :: part_end, share
+
+    next_fraction = 0.5_wp
+    part_end = (a - b) / (c - b)
+    share = (ga - gb) / (gc - gb)
+    if (share**2 >= part_end .or. (1 - share)**2 >= 1 - part_end) return
+    next_fraction = ga / (gb - ga) * (gc / (gb - gc)) + (c - a) / (b - a) * (ga / (gc - ga)) * (gb / (gc - gb))
+  end function next_fraction
+
+  !> Looks between three ends of parts, at which a function is positive, for a place where it is not: by parabolas through the
+  !> three places around the lowest value, as long as these promise one.
+  subroutine find_grazing(roots, system, observer, dense, function, middle, bracket, found)
+    type(root_functions_t), intent(inout) :: roots
+    class(system_t), intent(inout) :: system
+    class(observer_t), intent(inout) :: observer
+    type(dense_output_t), intent(inout) :: dense
+    integer, intent(in) :: function
+    integer, intent(in) :: middle               !! part whose end is between the other two
+    type(bracket_t), intent(inout) :: bracket   !! of the function's fall, if there is one
+    logical, intent(out) :: found
+    real(wp) :: x(3), g(3), lowest
+    logical :: is_promising
+    integer :: i, left, step
+
+    found = .false.
+    x(:) = [(part_end(roots, middle - 1 + i, 1.0_wp), i=0, 2)]
+    g(:) = roots%values(function, middle - 1:middle + 1)
+    do step = 1, max_grazing_steps
+      call guess_minimum(x, g, lowest, is_promising)
+      if (.not. is_promising) return
+      call evaluate(roots%of_system, system, observer, dense, lowest, roots%y, roots%g)
+      if (.not. is_finite(roots%g(function))) return
+      left = merge(2, 1, lowest > x(2))
+      found = roots%g(function) <= 0
+      if (found) exit
+      call keep_lowest_three(x, g, left, lowest, roots%g(function))
+    end do
+    if (found) bracket = bracket_t(function, x(left), lowest, g(left), roots%g(function))
+  end subroutine find_grazing
+
+  !> The vertex of the parabola through three points.
+  pure subroutine guess_minimum(x, g, vertex, is_promising)
+    real(wp), intent(in) :: x(3), g(3)     !! x ascending, g positive
+    real(wp), intent(out) :: vertex
+    logical, intent(out) :: is_promising   !! it is a minimum between the points and far below them
+    real(wp) :: curvature, slope
+
+    vertex = x(2)
+    is_promising = .false.
+    slope = (g(2) - g(1)) / (x(2) - x(1))
+    curvature = ((g(3) - g(2)) / (x(3) - x(2)) - slope) / (x(3) - x(1))
+    if (curvature <= 0) return
+    slope = slope + curvature * (x(2) - x(1))
+    if (abs(slope) >= 2 * curvature * (x(3) - x(1))) return
+    if (g(2) - 0.25_wp * slope * (slope / curvature) > promising * minval(g)) return
+    vertex = x(2) - 0.5_wp * slope / curvature
+    is_promising = vertex > x(1) .and. vertex < x(3) .and. minval(abs(vertex - x)) > least_distance
+  end subroutine guess_minimum
+
+  !> Adds a point behind number `left` and keeps the three around the lowest.
+  pure subroutine keep_lowest_three(x, g, left, x_new, g_new)
+    real(wp), intent(inout) :: x(3), g(3)
+    integer, intent(in) :: left
+    real(wp), intent(in) :: x_new, g_new
+    real(wp) :: places(4), values(4)
+    integer :: first
+
+    places(:3) = x
+    values(:3) = g
+    places(left + 2:) = x(left + 1:)
+    values(left + 2:) = g(left + 1:)
+    places(left + 1) = x_new
+    values(left + 1) = g_new
+    first = merge(1, 2, minloc(values, dim=1) <= 2)
+    x = places(first:first + 2)
+    g = values(first:first + 2)
+  end subroutine keep_lowest_three
+
+end module nocdyn_root_functions

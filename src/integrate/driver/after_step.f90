@@ -1,0 +1,184 @@
+!> What happens inside the accepted steps of the lanes: requested times, events, extremes, crossings from branch to branch.
+module nocdyn_after_step
+  use nocdyn_dense_output, only: batch, sample, sample_batch, take_lane
+  use nocdyn_events, only: find_events
+  use nocdyn_extremes, only: update_extremes, restart_extremes
+  use nocdyn_kinds, only: wp
+  use nocdyn_masks, only: all_true
+  use nocdyn_time_stepping, only: integrator_t, evaluate_starts
+  use nocdyn_solver_status, only: integration_done, integration_running, integration_stopped, integration_too_many_steps, &
+                                  solver_status_t
+  use nocdyn_step_control, only: resume_control
+  use nocdyn_stepper, only: stepper_t
+  use nocdyn_switching, only: cross_boundaries, find_crossing
+  use nocdyn_system, only: observer_t, system_t
+  implicit none (type, external)
+  private
+
+  public :: process_steps, observe_steps, change_branches
+
+contains
+
+  !> Tells the observer what lies in the accepted steps: requested times, events, extremes.
+  subroutine process_steps(integrator, system, times, observer, solver_status)
+    type(integrator_t), intent(inout) :: integrator
+    class(system_t), intent(inout) :: system
+    real(wp), contiguous, intent(in) :: times(:)
+    class(observer_t), intent(inout) :: observer
+    type(solver_status_t), intent(inout) :: solver_status
+    integer :: lane
+
+    associate (steps => integrator%steps)
+      steps%theta_end(:) = 1.0_wp
+      steps%crosses(:) = .false.
+      if (.not. integrator%inspects) return
+      do lane = 1, integrator%attempt%lanes
+        if (.not. integrator%accepted(lane)) cycle
+        if (integrator%inspected(lane)) call take_lane(integrator%dense, integrator%attempt, integrator%coefficients, lane)
+        if (integrator%has_switches) then
+          call end_at_crossing(integrator, system, observer, lane, solver_status, steps%theta_end(lane))
+          steps%crosses(lane) = integrator%switching%pending(lane) > 0
+        end if
+        if (integrator%has_events) call pass_events(integrator, system, lane, steps%theta_end(lane), times, observer, &
+                                                    solver_status)
+        if (integrator%next_time(lane) <= integrator%t_new(lane)) call record_until(integrator, lane, integrator%t_new(lane), &
+                                                                                    times, observer)
+        if (integrator%has_extremes) then
+          call update_extremes(integrator%extremes, observer, integrator%dense, integrator%t_new(lane), steps%crosses(lane))
+        end if
+      end do
+    end associate
+  end subroutine process_steps
+
+  !> Hands an observer that follows the steps those of the whole block, after `process_steps`.
+  subroutine observe_steps(integrator, stepper, observer)
+    type(integrator_t), intent(inout) :: integrator
+    class(stepper_t), intent(in) :: stepper
+    class(observer_t), intent(inout) :: observer
+
+    associate (steps => integrator%steps, attempt => integrator%attempt)
+      steps%taken(:) = integrator%accepted
+      steps%are_all_taken = all_true(size(integrator%accepted), integrator%accepted)
+      steps%may_be_cut = integrator%has_switches .or. integrator%has_events
+      steps%t(:) = attempt%t
+      steps%h(:) = attempt%h
+      steps%t_new(:) = integrator%t_new
+      call stepper%pass_steps(steps, attempt, integrator%coefficients, observer)
+    end associate
+  end subroutine observe_steps
+
+  !> Cuts the step of a lane where a branch of the system ends.
+  subroutine end_at_crossing(integrator, system, observer, lane, solver_status, theta_end)
+    type(integrator_t), intent(inout) :: integrator
+    class(system_t), intent(inout) :: system
+    class(observer_t), intent(inout) :: observer
+    integer, intent(in) :: lane
+    type(solver_status_t), intent(inout) :: solver_status
+    real(wp), intent(out) :: theta_end   !! place of the cut in the step, 1 if there is none
+    real(wp) :: t
+
+    call find_crossing(integrator%switching, system, observer, integrator%dense, theta_end)
+    if (integrator%switching%pending(lane) == 0) return
+    t = integrator%attempt%t(lane) + theta_end * integrator%attempt%h(lane)
+    if (t >= integrator%t_new(lane)) then
+      theta_end = 1.0_wp
+      return
+    end if
+    integrator%t_new(lane) = t
+    call sample(integrator%dense, theta_end, integrator%sample)
+    integrator%attempt%y_new(lane, :integrator%attempt%components) = integrator%sample
+    if (solver_status%code(lane) /= integration_done) return
+    solver_status%code(lane) = merge(integration_too_many_steps, integration_running, &
+                                     solver_status%steps(lane) >= integrator%max_steps)
+  end subroutine end_at_crossing
+
+  !> The events of a lane in their order, with the requested times between them; a terminal event ends the step and the lane.
+  subroutine pass_events(integrator, system, lane, theta_end, times, observer, solver_status)
+    type(integrator_t), intent(inout) :: integrator
+    class(system_t), intent(inout) :: system
+    integer, intent(in) :: lane
+    real(wp), intent(inout) :: theta_end   !! end of the step, 1 if it has not been cut
+    real(wp), contiguous, intent(in) :: times(:)
+    class(observer_t), intent(inout) :: observer
+    type(solver_status_t), intent(inout) :: solver_status
+    real(wp) :: t
+    logical :: is_terminal
+    integer :: i
+
+    call find_events(integrator%events, system, observer, integrator%dense, theta_end)
+    do i = 1, integrator%events%found
+      t = min(integrator%attempt%t(lane) + integrator%events%theta(i) * integrator%attempt%h(lane), integrator%t_new(lane))
+      call record_until(integrator, lane, t, times, observer)
+      call sample(integrator%dense, integrator%events%theta(i), integrator%sample)
+      call observer%on_event(lane, integrator%events%which(i), t, integrator%sample, is_terminal)
+      if (.not. is_terminal) cycle
+      solver_status%code(lane) = integration_stopped
+      theta_end = integrator%events%theta(i)
+      integrator%t_new(lane) = t
+      integrator%attempt%y_new(lane, :integrator%attempt%components) = integrator%sample
+      exit
+    end do
+  end subroutine pass_events
+
+  !> Records the requested times up to t that have not been recorded yet.
+  subroutine record_until(integrator, lane, t, times, observer)
+    type(integrator_t), intent(inout) :: integrator
+    integer, intent(in) :: lane
+    real(wp), intent(in) :: t
+    real(wp), contiguous, intent(in) :: times(:)
+    class(observer_t), intent(inout) :: observer
+    real(wp) :: theta(batch)
+    integer :: ahead, i
+
+    associate (next => integrator%next(lane))
+      do while (next <= size(times))
+        theta = 0.0_wp
+        ahead = 0
+        do while (ahead < min(batch, size(times) + 1 - next))
+          if (times(next + ahead) > t .or. times(next + ahead) >= integrator%t_new(lane)) exit
+          ahead = ahead + 1
+          theta(ahead) = (times(next + ahead - 1) - integrator%dense%t) / integrator%dense%h
+        end do
+        if (ahead == 0) exit
+        call sample_batch(integrator%dense, theta)
+        do i = 1, ahead
+          call observer%on_output(lane, times(next), integrator%dense%states(:integrator%attempt%components, i))
+          next = next + 1
+        end do
+      end do
+      if (next > size(times)) return
+      if (times(next) > t) return
+      integrator%sample(:) = integrator%attempt%y_new(lane, :integrator%attempt%components)
+      call observer%on_output(lane, times(next), integrator%sample)
+      next = next + 1
+    end associate
+  end subroutine record_until
+
+  !> The lanes that have moved to the end of a branch, and go on, change to the next one and start again there.
+  subroutine change_branches(integrator, stepper, system, observer, solver_status)
+    type(integrator_t), intent(inout) :: integrator
+    class(stepper_t), intent(inout) :: stepper
+    class(system_t), intent(inout) :: system
+    class(observer_t), intent(inout) :: observer
+    type(solver_status_t), intent(inout) :: solver_status
+    integer :: lane
+
+    associate (attempt => integrator%attempt, starting => integrator%starting)
+      do lane = 1, attempt%lanes
+        starting(lane) = integrator%accepted(lane) .and. solver_status%code(lane) == integration_running &
+                         .and. integrator%switching%pending(lane) > 0
+        if (.not. starting(lane)) cycle
+        call cross_boundaries(integrator%switching, system, observer, attempt, lane, solver_status)
+        call resume_control(integrator%control, lane, solver_status%h(lane))
+      end do
+      if (.not. any(starting)) return
+      call evaluate_starts(integrator, system, solver_status)
+      call stepper%resume(attempt, starting)
+      if (.not. integrator%has_extremes) return
+      do lane = 1, attempt%lanes
+        if (starting(lane)) call restart_extremes(integrator%extremes, observer, attempt, lane)
+      end do
+    end associate
+  end subroutine change_branches
+
+end module nocdyn_after_step

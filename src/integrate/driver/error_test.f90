@@ -1,0 +1,225 @@
+!> What becomes of the attempts of the lanes: steps, shorter attempts, or ends.
+module nocdyn_error_test
+  use nocdyn_stage_sums, only: width
+  use nocdyn_kinds, only: wp
+  use nocdyn_time_stepping, only: integrator_t
+  use nocdyn_masks, only: all_true, any_true
+  use nocdyn_solver_status, only: integration_done, integration_rhs_failed, integration_not_finite, integration_step_too_small, &
+    integration_too_many_steps, count_step, solver_status_t
+  use nocdyn_step_control, only: adapt_steps, shorten_step, smallest_step, measure_error
+  use nocdyn_stepper, only: stepper_t
+  use nocdyn_system, only: observer_t, system_t
+  use nocdyn_step_attempt, only: attempt_ok, attempt_fatal, attempt_not_finite
+  implicit none (type, external)
+  private
+
+  public :: test_errors
+
+contains
+
+  !> Accepts or rejects the last attempt of each lane, and ends the lanes that cannot go on.
+  subroutine test_errors(integrator, stepper, system, observer, solver_status)
+    type(integrator_t), intent(inout) :: integrator
+    class(stepper_t), intent(inout) :: stepper
+    class(system_t), intent(inout) :: system
+    class(observer_t), intent(in) :: observer
+    type(solver_status_t), intent(inout) :: solver_status
+    integer :: failed, lane, wanted
+    logical :: is_plain   ! whether all lanes have taken steps that have only to be counted
+
+    if (.not. stepper%chooses_steps) call measure_error(integrator%control, integrator%attempt)
+    integrator%inspects = integrator%has_events .or. integrator%has_extremes .or. integrator%has_switches
+    is_plain = .false.
+    if (integrator%attempt%lanes > 1) is_plain = is_plain_step(integrator, solver_status)
+    if (is_plain) then
+      call accept_all(integrator, wanted)
+    else
+      call find_wanted(integrator, wanted)
+    end if
+    if (wanted > 0) then
+      call choose_columns(integrator, observer)
+      call stepper%interpolate(system, integrator%attempt, integrator%wanted, integrator%coefficients)
+      is_plain = is_plain .and. all_true(integrator%attempt%lanes, integrator%attempt%active)
+    end if
+    failed = 0
+    if (is_plain) then
+      solver_status%accepted(:) = solver_status%accepted + 1
+      call end_lanes(integrator%attempt%lanes, integrator%control%ends_at_t_end, solver_status%code)
+      integrator%inspects = has_passed(integrator%attempt%lanes, integrator%next_time, integrator%t_new)
+    else
+      call finish_steps(integrator, solver_status, failed)
+    end if
+    if (.not. stepper%chooses_steps) then
+      call adapt_steps(integrator%control, integrator%attempt%lanes, integrator%accepted, integrator%rejected, &
+                       integrator%attempt%error_order, &
+                 integrator%attempt%max_growth, solver_status%h)
+    end if
+    if (failed == 0) return
+    do lane = 1, integrator%attempt%lanes
+      if (integrator%running(lane) .and. .not. integrator%accepted(lane)) call handle_rejection(integrator, lane, solver_status)
+    end do
+  end subroutine test_errors
+
+  !> Whether all lanes have taken explicit steps within the tolerances, in which no requested time lies but at their end: nothing
+  !> has to be decided for one of them then. The answer is no too if they do not make whole vectors.
+  pure logical function is_plain_step(integrator, solver_status)
+    type(integrator_t), intent(in) :: integrator
+    type(solver_status_t), intent(in) :: solver_status
+
+    is_plain_step = .false.
+    associate (attempt => integrator%attempt)
+      if (modulo(attempt%lanes, width) /= 0 .or. integrator%inspects) return
+      if (largest_excess(attempt%lanes, integrator%control%mean_square, integrator%t_new, integrator%next_time) > 0) return
+      if (largest_count(attempt%lanes, solver_status%steps) >= integrator%max_steps) return
+      if (any_true(attempt%lanes, attempt%implicit) .or. any_true(attempt%lanes, solver_status%implicit)) return
+      is_plain_step = all_true(attempt%lanes, attempt%active)
+    end associate
+  end function is_plain_step
+
+  !> The largest error beyond the tolerances or time beyond the next requested one; whole vectors.
+  pure real(wp) function largest_excess(lanes, mean_square, t_new, next_time) result(excess)
+    integer, intent(in) :: lanes
+    real(wp), intent(in), dimension(lanes) :: mean_square, t_new, next_time
+    real(wp) :: most(width)
+    integer :: i
+
+    most = -1.0_wp
+    do i = 1, lanes, width
+      most = max(most, max(mean_square(i:i + width - 1) - 1.0_wp, t_new(i:i + width - 1) - next_time(i:i + width - 1)))
+    end do
+    excess = max(max(most(1), most(2)), max(most(3), most(4)))
+  end function largest_excess
+
+  pure integer function largest_count(lanes, counts) result(largest)
+    integer, intent(in) :: lanes
+    integer, intent(in) :: counts(lanes)
+    integer :: i
+
+    largest = 0
+    do i = 1, lanes
+      largest = max(largest, counts(i))
+    end do
+  end function largest_count
+
+  !> The lanes whose steps end on the final time are done.
+  pure subroutine end_lanes(lanes, ends_at_t_end, status)
+    integer, intent(in) :: lanes
+    logical, intent(in) :: ends_at_t_end(lanes)
+    integer, intent(inout) :: status(lanes)
+    integer :: i
+
+    do i = 1, lanes
+      status(i) = merge(integration_done, status(i), ends_at_t_end(i))
+    end do
+  end subroutine end_lanes
+
+  !> Whether a lane has passed a time.
+  pure logical function has_passed(lanes, time, t)
+    integer, intent(in) :: lanes
+    real(wp), intent(in) :: time(lanes), t(lanes)
+    integer :: i, passed
+
+    passed = 0
+    do i = 1, lanes
+      passed = passed + merge(1, 0, time(i) <= t(i))
+    end do
+    has_passed = passed > 0
+  end function has_passed
+
+  !> Accepts the steps of all lanes.
+  pure subroutine accept_all(integrator, wanted)
+    type(integrator_t), intent(inout) :: integrator
+    integer, intent(out) :: wanted
+
+    integrator%accepted(:) = .true.
+    integrator%rejected(:) = .false.
+    integrator%inspected(:) = .false.
+    integrator%wanted(:) = integrator%wants_dense_steps
+    wanted = merge(integrator%attempt%lanes, 0, integrator%wants_dense_steps)
+  end subroutine accept_all
+
+  !> The lanes whose error is within the tolerances, and those of them whose solution inside the step is wanted.
+  pure subroutine find_wanted(integrator, wanted)
+    type(integrator_t), intent(inout) :: integrator
+    integer, intent(out) :: wanted   !! how many
+    integer :: lane
+
+    wanted = 0
+    do lane = 1, integrator%attempt%lanes
+      integrator%accepted(lane) = integrator%attempt%active(lane) .and. integrator%control%mean_square(lane) <= 1
+      integrator%inspected(lane) = integrator%accepted(lane) .and. (integrator%inspects .or. &
+                                                                      integrator%next_time(lane) < integrator%t_new(lane))
+      integrator%wanted(lane) = integrator%inspected(lane) .or. (integrator%accepted(lane) .and. integrator%wants_dense_steps)
+      if (integrator%wanted(lane)) wanted = wanted + 1
+    end do
+  end subroutine find_wanted
+
+  !> The columns of the state whose course is of interest: those that the observer follows, or all for the lanes that are
+  !> looked at on their own.
+  pure subroutine choose_columns(integrator, observer)
+    type(integrator_t), intent(inout) :: integrator
+    class(observer_t), intent(in) :: observer
+
+    associate (attempt => integrator%attempt)
+      attempt%first_dense = 1
+      attempt%last_dense = size(attempt%y, 2)
+      if (modulo(attempt%lanes, width) /= 0 .or. any(integrator%inspected)) return
+      attempt%first_dense = observer%first_read
+      attempt%last_dense = min(observer%last_read, attempt%last_dense)
+    end associate
+  end subroutine choose_columns
+
+  !> Counts the accepted steps and ends the lanes that have reached the final time or may take no more steps.
+  pure subroutine finish_steps(integrator, solver_status, failed)
+    type(integrator_t), intent(inout) :: integrator
+    type(solver_status_t), intent(inout) :: solver_status
+    integer, intent(out) :: failed   !! attempts that were not accepted
+    logical :: is_fine
+    integer :: lane
+
+    failed = 0
+    do lane = 1, integrator%attempt%lanes
+      integrator%rejected(lane) = .false.
+      if (.not. integrator%running(lane)) cycle
+      if (solver_status%steps(lane) >= integrator%max_steps) solver_status%code(lane) = integration_too_many_steps
+      is_fine = integrator%attempt%step_status(lane) == attempt_ok
+      integrator%rejected(lane) = is_fine .and. .not. integrator%accepted(lane)
+      integrator%accepted(lane) = is_fine .and. integrator%accepted(lane)
+      if (integrator%accepted(lane)) then
+        call count_step(solver_status, lane, integrator%attempt%t(lane), integrator%attempt%implicit(lane))
+        if (integrator%control%ends_at_t_end(lane)) solver_status%code(lane) = integration_done
+        if (integrator%next_time(lane) <= integrator%t_new(lane)) integrator%inspects = .true.
+      else
+        failed = failed + 1
+      end if
+    end do
+  end subroutine finish_steps
+
+  !> A lane takes a shorter step, or fails if no shorter step will help or none is possible.
+  subroutine handle_rejection(integrator, lane, solver_status)
+    type(integrator_t), intent(inout) :: integrator
+    integer, intent(in) :: lane
+    type(solver_status_t), intent(inout) :: solver_status
+
+    solver_status%rejected(lane) = solver_status%rejected(lane) + 1
+    associate (attempt => integrator%attempt)
+      if (attempt%step_status(lane) /= attempt_ok) call shorten_step(integrator%control, lane, solver_status%h(lane))
+      if (attempt%step_status(lane) == attempt_fatal) then
+        solver_status%code(lane) = integration_rhs_failed
+      else if (solver_status%h(lane) <= smallest_step(attempt%t(lane))) then
+        select case (attempt%step_status(lane))
+        case (attempt_ok)
+          solver_status%code(lane) = integration_step_too_small
+          solver_status%component(lane) = maxloc(attempt%error_estimate(lane, :attempt%states), dim=1)
+        case (attempt_not_finite)
+          solver_status%code(lane) = integration_not_finite
+          solver_status%component(lane) = attempt%component(lane)
+        case default
+          solver_status%code(lane) = integration_step_too_small
+          solver_status%component(lane) = attempt%component(lane)
+        end select
+      end if
+    end associate
+  end subroutine handle_rejection
+
+end module nocdyn_error_test

@@ -1,0 +1,346 @@
+!> The march of a block of lanes through time: each lane at its own pace, all of them in one loop.
+module nocdyn_time_stepping
+  use nocdyn_dense_output, only: allocate_dense_output, dense_output_t
+  use nocdyn_events, only: allocate_events, events_t, start_events
+  use nocdyn_extremes, only: allocate_extremes, extremes_t, start_extremes
+  use nocdyn_first_step, only: guess_first_steps
+  use nocdyn_integration_settings, only: integration_settings_t
+  use nocdyn_kinds, only: wp
+  use nocdyn_masks, only: all_true, any_differs
+  use nocdyn_solver_status, only: integration_rhs_failed, integration_not_finite, integration_running, solver_status_t, &
+                                  reset_solver_status
+  use nocdyn_ensemble, only: ensemble_t
+  use nocdyn_step_control, only: propose_steps, reset_control, step_control, step_control_t
+  use nocdyn_stepper, only: stepper_t
+  use nocdyn_switching, only: allocate_switching, start_switching, switching_t
+  use nocdyn_system, only: observer_t, step_block_t, system_t
+  use nocdyn_step_attempt, only: allocate_step_attempt, evaluate_start, begin_attempt, attempt_not_finite, step_attempt_t
+  implicit none (type, external)
+  private
+
+  public :: prepare_integrator, fill_lanes, evaluate_starts, begin_attempts, advance_lanes, release_lanes
+
+  type, public :: integrator_t
+    type(step_attempt_t) :: attempt
+    type(step_control_t) :: control
+    type(dense_output_t) :: dense                    !! the lane that is looked at
+    type(events_t) :: events
+    type(extremes_t) :: extremes
+    type(switching_t) :: switching
+    real(wp) :: first_step                           !! 0: find it
+    integer :: max_steps
+    logical :: has_events = .false.
+    logical :: has_extremes = .false.
+    logical :: has_switches = .false.
+    logical :: wants_steps = .false.                 !! whether the observer is handed the solution inside all steps
+    logical :: wants_dense_steps = .false.                   !! whether it is that of `interpolate`
+    logical :: is_exhausted = .false.                !! the queue has no variant left
+    integer :: free = 0                              !! lanes that hold no variant
+    logical :: inspects = .false.                      !! whether the accepted steps are looked at lane by lane
+    logical, allocatable :: occupied(:)              !! lanes that hold a variant
+    logical, allocatable :: running(:)               !! lanes that took part in the last attempt
+    logical, allocatable :: rejected(:)              !! lanes whose last attempt was finished, but not accepted
+    logical, allocatable :: starting(:)              !! lanes that have just been given one, or go on from branch to branch
+    logical, allocatable :: accepted(:)              !! lanes whose last attempt was accepted
+    logical, allocatable :: wanted(:)                !! lanes whose solution inside the last step is wanted
+    logical, allocatable :: inspected(:)             !! lanes whose solution there is looked at on its own
+    type(step_block_t) :: steps                           !! as the observer is told of them
+    real(wp), allocatable :: t_new(:)                !! end of the last attempt of each lane
+    real(wp), allocatable :: next_time(:)            !! first requested time of each lane that is not recorded yet; or never
+    integer, allocatable :: next(:)                  !! number of the first requested time of each lane that is not recorded yet
+    real(wp), allocatable :: sample(:)               !! one lane's state at a requested time
+    real(wp), allocatable :: coefficients(:, :, :)   !! of the solution inside the last step
+  end type integrator_t
+
+contains
+
+  !> Allocates all that the march needs; nothing is allocated later.
+  subroutine prepare_integrator(integrator, stepper, system, settings, times, observer)
+    type(integrator_t), intent(out) :: integrator
+    class(stepper_t), intent(inout) :: stepper
+    class(system_t), intent(in) :: system
+    type(integration_settings_t), intent(in) :: settings
+    real(wp), intent(in) :: times(:)
+    class(observer_t), intent(in) :: observer
+
+    call stepper%prepare(system)
+    call allocate_step_attempt(integrator%attempt, system)
+    integrator%attempt%t(:) = times(1)
+    integrator%attempt%error_order(:) = stepper%error_order
+    integrator%attempt%max_growth(:) = stepper%max_growth
+    integrator%attempt%has_low_order_estimate = stepper%has_low_order_error
+    integrator%control = step_control(system%lanes, settings%rtol, settings%atol, times(size(times)), settings%longest_step)
+    integrator%first_step = settings%first_step
+    integrator%max_steps = settings%max_steps
+    call allocate_lanes(integrator, system%lanes, system%states + system%quadratures, stepper%degree, times(1))
+    call allocate_dense_output(integrator%dense, integrator%attempt%components, stepper%degree)
+    integrator%wants_steps = observer%wants_steps
+    integrator%wants_dense_steps = integrator%wants_steps .and. .not. stepper%passes_series
+    integrator%has_switches = system%switches > 0
+    if (integrator%has_switches) then
+      call allocate_switching(integrator%switching, system, stepper%degree, integrator%attempt, times(size(times)) - times(1))
+    end if
+    integrator%has_extremes = observer%tracked > 0
+    if (integrator%has_extremes) call allocate_extremes(integrator%extremes, observer%tracked, stepper%degree, integrator%attempt)
+    if (.not. allocated(observer%directions)) return
+    integrator%has_events = size(observer%directions) > 0
+    if (integrator%has_events) call allocate_events(integrator%events, observer, stepper%degree, integrator%attempt)
+  end subroutine prepare_integrator
+
+  !> What is known of each lane; none holds a variant.
+  pure subroutine allocate_lanes(integrator, lanes, components, degree, t_start)
+    type(integrator_t), intent(inout) :: integrator
+    integer, intent(in) :: lanes, components, degree
+    real(wp), intent(in) :: t_start
+
+    integrator%free = lanes
+    allocate (integrator%occupied(lanes), integrator%running(lanes), integrator%starting(lanes), integrator%accepted(lanes), &
+              integrator%rejected(lanes), integrator%wanted(lanes), integrator%inspected(lanes), integrator%steps%taken(lanes), &
+              integrator%steps%crosses(lanes), source=.false.)
+    allocate (integrator%t_new(lanes), integrator%next_time(lanes), source=t_start)
+    allocate (integrator%steps%t(lanes), integrator%steps%h(lanes), integrator%steps%scale(lanes), &
+              integrator%steps%theta_end(lanes), &
+              integrator%steps%t_new(lanes), source=0.0_wp)
+    allocate (integrator%next(lanes), source=2)
+    allocate (integrator%sample(components), source=0.0_wp)
+    allocate (integrator%coefficients(lanes, size(integrator%attempt%y, 2), degree), source=0.0_wp)
+  end subroutine allocate_lanes
+
+  !> Gives the free lanes their next variants and starts them.
+  subroutine fill_lanes(integrator, stepper, system, ensemble, times, observer, solver_status)
+    type(integrator_t), intent(inout) :: integrator
+    class(stepper_t), intent(inout) :: stepper
+    class(system_t), intent(inout) :: system
+    class(ensemble_t), intent(inout) :: ensemble
+    real(wp), contiguous, intent(in) :: times(:)
+    class(observer_t), intent(inout) :: observer
+    type(solver_status_t), intent(inout) :: solver_status
+    real(wp) :: t
+    integer :: lane
+
+    if (integrator%is_exhausted .or. integrator%free == 0) return
+    do lane = 1, size(integrator%occupied)
+      integrator%starting(lane) = .false.
+      if (integrator%occupied(lane) .or. integrator%is_exhausted) cycle
+      t = times(1)
+      call ensemble%next(system, lane, t, integrator%sample, integrator%starting(lane))
+      integrator%occupied(lane) = integrator%starting(lane)
+      integrator%is_exhausted = .not. integrator%starting(lane)
+      if (.not. integrator%starting(lane)) cycle
+      integrator%free = integrator%free - 1
+      call set_start(integrator, lane, t, times, solver_status)
+    end do
+    if (any(integrator%starting)) call start_lanes(integrator, stepper, system, times, observer, solver_status)
+  end subroutine fill_lanes
+
+  !> Puts the state in `sample` at the start of a lane that has done nothing yet.
+  subroutine set_start(integrator, lane, t, times, solver_status)
+    type(integrator_t), intent(inout) :: integrator
+    integer, intent(in) :: lane
+    real(wp), intent(in) :: t
+    real(wp), contiguous, intent(in) :: times(:)
+    type(solver_status_t), intent(inout) :: solver_status
+
+    associate (attempt => integrator%attempt)
+      attempt%t(lane) = t
+      attempt%y(lane, :attempt%components) = integrator%sample
+      attempt%evaluations(lane) = 0
+      attempt%jacobians(lane) = 0
+      attempt%factorisations(lane) = 0
+      attempt%implicit(lane) = .false.
+    end associate
+    if (.not. (t >= times(1) .and. t < times(size(times)))) then
+      error stop 'nocdyn_time_stepping: a variant must start within the times'
+    end if
+    integrator%next(lane) = 2
+    do while (times(integrator%next(lane)) <= t)
+      integrator%next(lane) = integrator%next(lane) + 1
+    end do
+    integrator%next_time(lane) = times(integrator%next(lane))
+    call reset_control(integrator%control, lane)
+    call reset_solver_status(solver_status, lane)
+  end subroutine set_start
+
+  !> Records the start if it is a requested time, evaluates the slope there and chooses the first step of the lanes in `starting`.
+  subroutine start_lanes(integrator, stepper, system, times, observer, solver_status)
+    type(integrator_t), intent(inout) :: integrator
+    class(stepper_t), intent(inout) :: stepper
+    class(system_t), intent(inout) :: system
+    real(wp), contiguous, intent(in) :: times(:)
+    class(observer_t), intent(inout) :: observer
+    type(solver_status_t), intent(inout) :: solver_status
+    integer :: lane
+
+    associate (attempt => integrator%attempt)
+      do lane = 1, attempt%lanes
+        if (integrator%starting(lane)) call choose_branches(integrator, system, observer, lane, solver_status)
+      end do
+      call evaluate_starts(integrator, system, solver_status)
+      call stepper%start(attempt, integrator%starting)
+      do lane = 1, attempt%lanes
+        if (.not. integrator%starting(lane)) cycle
+        integrator%sample(:) = attempt%y(lane, :attempt%components)
+        if (times(integrator%next(lane) - 1) >= attempt%t(lane)) call observer%on_output(lane, attempt%t(lane), integrator%sample)
+        integrator%control%h(lane) = integrator%first_step
+        if (.not. attempt%active(lane)) cycle
+        if (integrator%has_events) call start_events(integrator%events, system, observer, attempt, lane)
+        if (integrator%has_extremes) call start_extremes(integrator%extremes, observer, attempt, lane)
+      end do
+      if (integrator%first_step > 0 .or. stepper%chooses_steps) return
+      call guess_first_steps(integrator%control, stepper%order, system, attempt)
+    end associate
+  end subroutine start_lanes
+
+  subroutine choose_branches(integrator, system, observer, lane, solver_status)
+    type(integrator_t), intent(inout) :: integrator
+    class(system_t), intent(inout) :: system
+    class(observer_t), intent(inout) :: observer
+    integer, intent(in) :: lane
+    type(solver_status_t), intent(inout) :: solver_status
+
+    associate (attempt => integrator%attempt)
+      integrator%sample(:) = attempt%y(lane, :attempt%components)
+      call system%start_lane(lane, attempt%t(lane), integrator%sample)
+      if (integrator%has_switches) call start_switching(integrator%switching, system, observer, attempt, lane, solver_status)
+    end associate
+  end subroutine choose_branches
+
+  !> Evaluates the slope where the lanes in `starting` are, and ends those where that fails.
+  subroutine evaluate_starts(integrator, system, solver_status)
+    type(integrator_t), intent(inout) :: integrator
+    class(system_t), intent(inout) :: system
+    type(solver_status_t), intent(inout) :: solver_status
+    integer :: lane
+
+    associate (attempt => integrator%attempt)
+      attempt%active(:) = integrator%starting
+      call evaluate_start(attempt, system, integrator%starting, attempt%slope)
+      do lane = 1, attempt%lanes
+        if (.not. integrator%starting(lane) .or. attempt%active(lane)) cycle
+        if (solver_status%code(lane) /= integration_running) cycle
+        solver_status%code(lane) = merge(integration_not_finite, integration_rhs_failed, &
+                                         attempt%step_status(lane) == attempt_not_finite)
+        solver_status%component(lane) = attempt%component(lane)
+      end do
+    end associate
+  end subroutine evaluate_starts
+
+  !> The next attempt of the lanes that are still running.
+  subroutine begin_attempts(integrator, stepper, system, solver_status)
+    type(integrator_t), intent(inout) :: integrator
+    class(stepper_t), intent(inout) :: stepper
+    class(system_t), intent(inout) :: system
+    type(solver_status_t), intent(inout) :: solver_status
+
+    associate (attempt => integrator%attempt)
+      call find_running(attempt%lanes, integrator%occupied, solver_status%code, integrator%running)
+      attempt%active(:) = integrator%running
+      if (stepper%chooses_steps) call choose_step_sizes(integrator, stepper, system, solver_status)
+      call propose_steps(integrator%control, attempt%lanes, attempt%t, attempt%h, integrator%t_new)
+      call count_attempts(attempt%lanes, integrator%running, attempt%h, solver_status%h, solver_status%steps)
+      call begin_attempt(attempt)
+    end associate
+  end subroutine begin_attempts
+
+  pure subroutine find_running(lanes, occupied, status, running)
+    integer, intent(in) :: lanes
+    logical, intent(in) :: occupied(lanes)
+    integer, intent(in) :: status(lanes)
+    logical, intent(inout) :: running(lanes)
+
+    running = merge(occupied, .false., status == integration_running)
+  end subroutine find_running
+
+  !> Notes and counts the attempts of the running lanes; the others get steps of zero.
+  pure subroutine count_attempts(lanes, running, h, h_noted, steps)
+    integer, intent(in) :: lanes
+    logical, intent(in) :: running(lanes)
+    real(wp), intent(inout) :: h(lanes), h_noted(lanes)
+    integer, intent(inout) :: steps(lanes)
+    integer :: lane
+
+    do lane = 1, lanes
+      h_noted(lane) = merge(h(lane), h_noted(lane), running(lane))
+      h(lane) = merge(h(lane), 0.0_wp, running(lane))
+      steps(lane) = steps(lane) + merge(1, 0, running(lane))
+    end do
+  end subroutine count_attempts
+
+  !> Lets the stepper choose the steps; the first is not longer than the one that was asked for.
+  subroutine choose_step_sizes(integrator, stepper, system, solver_status)
+    type(integrator_t), intent(inout) :: integrator
+    class(stepper_t), intent(inout) :: stepper
+    class(system_t), intent(inout) :: system
+    type(solver_status_t), intent(in) :: solver_status
+    integer :: lane
+
+    call stepper%choose_steps(system, integrator%attempt, integrator%control)
+    if (integrator%first_step <= 0) return
+    do lane = 1, integrator%attempt%lanes
+      if (solver_status%steps(lane) == 0) integrator%control%h(lane) = min(integrator%control%h(lane), integrator%first_step)
+    end do
+  end subroutine choose_step_sizes
+
+  !> The accepted lanes move to the end of their step.
+  subroutine advance_lanes(integrator, times)
+    type(integrator_t), intent(inout) :: integrator
+    real(wp), contiguous, intent(in) :: times(:)
+    real(wp), allocatable :: spare(:, :)
+    integer :: component, lane
+
+    associate (attempt => integrator%attempt, accepted => integrator%accepted)
+      if (all_true(attempt%lanes, accepted)) then   ! the arrays change their names: nothing asks for y_new any more
+        attempt%t(:) = integrator%t_new
+        call move_alloc(attempt%y, spare)
+        call move_alloc(attempt%y_new, attempt%y)
+        call move_alloc(spare, attempt%y_new)
+      else
+        do lane = 1, attempt%lanes
+          if (accepted(lane)) attempt%t(lane) = integrator%t_new(lane)
+        end do
+        do component = 1, attempt%components
+          call copy_accepted(attempt%lanes, accepted, attempt%y_new(1, component), attempt%y(1, component))
+        end do
+      end if
+      if (.not. integrator%inspects) return
+      do lane = 1, attempt%lanes
+        integrator%next_time(lane) = huge(integrator%next_time)
+        if (integrator%next(lane) <= size(times)) integrator%next_time(lane) = times(integrator%next(lane))
+      end do
+    end associate
+  end subroutine advance_lanes
+
+  pure subroutine copy_accepted(lanes, accepted, new, old)
+    integer, intent(in) :: lanes
+    logical, intent(in) :: accepted(lanes)
+    real(wp), intent(in) :: new(lanes)
+    real(wp), intent(inout) :: old(lanes)
+
+    old = merge(new, old, accepted)
+  end subroutine copy_accepted
+
+  !> Hands the lanes that have ended to the queue and frees them.
+  subroutine release_lanes(integrator, ensemble, observer, solver_status)
+    type(integrator_t), intent(inout) :: integrator
+    class(ensemble_t), intent(inout) :: ensemble
+    class(observer_t), intent(inout) :: observer
+    type(solver_status_t), intent(inout) :: solver_status
+    integer :: lane
+
+    if (.not. any_differs(size(solver_status%code), solver_status%code, integration_running)) return
+    do lane = 1, size(integrator%occupied)
+      if (.not. integrator%occupied(lane) .or. solver_status%code(lane) == integration_running) cycle
+      integrator%occupied(lane) = .false.
+      integrator%free = integrator%free + 1
+      solver_status%t(lane) = integrator%attempt%t(lane)
+      solver_status%evaluations(lane) = integrator%attempt%evaluations(lane)
+      solver_status%jacobians(lane) = integrator%attempt%jacobians(lane)
+      solver_status%factorisations(lane) = integrator%attempt%factorisations(lane)
+      if (integrator%has_extremes .and. solver_status%steps(lane) > 0) call observer%on_extremes(lane, &
+                                                                                                 integrator%extremes%ranges(lane))
+      integrator%sample(:) = integrator%attempt%y(lane, :integrator%attempt%components)
+      call ensemble%finish(lane, integrator%sample, solver_status)
+    end do
+  end subroutine release_lanes
+
+end module nocdyn_time_stepping

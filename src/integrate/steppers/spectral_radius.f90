@@ -1,0 +1,93 @@
+!> Estimates of the dominant eigenvalue of the Jacobian of each lane.
+module nocdyn_spectral_radius
+  use nocdyn_kinds, only: wp
+  use nocdyn_system, only: pattern_t, system_t
+  implicit none (type, external)
+  private
+
+  public :: allocate_spectral_radius, restart_power_iteration, estimate_spectral_radius
+
+  real(wp), parameter :: start_share = 1.0e-3_wp   !! of the start in the vector: another eigenvalue may come to dominate
+
+  !> A power iteration that goes on from step to step.
+  type, public :: spectral_radius_t
+    integer, allocatable, private :: position(:)   !! of the Jacobian's entries in the rows of states
+    integer, allocatable, private :: row(:)
+    integer, allocatable, private :: column(:)
+    real(wp), allocatable, private :: vector(:, :) !! of unit length, shape [states, lanes]
+    real(wp), allocatable, private :: start(:)     !! of every iteration, of unit length, shape [states]
+    real(wp), allocatable, private :: image(:)     !! shape [states]
+  end type spectral_radius_t
+
+contains
+
+  !> Room for one vector of each lane.
+  subroutine allocate_spectral_radius(spectrum, system)
+    type(spectral_radius_t), intent(out) :: spectrum
+    class(system_t), intent(in) :: system
+    type(pattern_t) :: pattern
+    integer :: i, lane
+
+    pattern = system%jacobian_pattern()
+    allocate (spectrum%position, source=pack([(i, i=1, size(pattern%row))], pattern%row <= system%states))
+    allocate (spectrum%row(size(spectrum%position)), spectrum%column(size(spectrum%position)))
+    spectrum%row(:) = pattern%row(spectrum%position)   ! gfortran 12 counts from 0 with `source=` here
+    spectrum%column(:) = pattern%column(spectrum%position)
+    allocate (spectrum%image(system%states), spectrum%vector(system%states, system%lanes), source=0.0_wp)
+    allocate (spectrum%start(system%states))
+    spectrum%start(:) = [(1 + 0.5_wp * mod(i, 3), i=1, system%states)]
+    spectrum%start(:) = spectrum%start / max(norm2(spectrum%start), tiny(1.0_wp))
+    do lane = 1, system%lanes
+      call restart_power_iteration(spectrum, lane)
+    end do
+  end subroutine allocate_spectral_radius
+
+  !> Forgets what has been found in a lane.
+  pure subroutine restart_power_iteration(spectrum, lane)
+    type(spectral_radius_t), intent(inout) :: spectrum
+    integer, intent(in) :: lane
+
+    spectrum%vector(:, lane) = spectrum%start
+  end subroutine restart_power_iteration
+
+  !> Size of the dominant eigenvalue, by two steps of the iteration: the mean growth over both also measures a pair of
+  !> conjugate eigenvalues.
+  pure subroutine estimate_spectral_radius(spectrum, lane, dfdy, size_of_eigenvalue)
+    type(spectral_radius_t), intent(inout) :: spectrum
+    integer, intent(in) :: lane
+    real(wp), contiguous, intent(in) :: dfdy(:, :)   !! shape [lanes, positions]
+    real(wp), intent(out) :: size_of_eigenvalue
+    real(wp) :: growth(2)
+    integer :: i
+
+    growth(:) = 0.0_wp
+    do i = 1, 2
+      call multiply(spectrum%position, spectrum%row, spectrum%column, dfdy, lane, spectrum%vector(:, lane), spectrum%image)
+      growth(i) = norm2(spectrum%image)
+      if (.not. growth(i) > 0) exit
+      spectrum%vector(:, lane) = spectrum%image / growth(i)
+    end do
+    size_of_eigenvalue = sqrt(growth(1) * growth(2))
+    if (growth(2) > 0) then
+      spectrum%vector(:, lane) = spectrum%vector(:, lane) + start_share * spectrum%start
+      spectrum%vector(:, lane) = spectrum%vector(:, lane) / norm2(spectrum%vector(:, lane))
+    else
+      spectrum%vector(:, lane) = spectrum%start
+    end if
+  end subroutine estimate_spectral_radius
+
+  pure subroutine multiply(position, row, column, dfdy, lane, vector, image)
+    integer, intent(in) :: position(:), row(:), column(:)
+    real(wp), contiguous, intent(in) :: dfdy(:, :)
+    integer, intent(in) :: lane
+    real(wp), contiguous, intent(in) :: vector(:)
+    real(wp), contiguous, intent(out) :: image(:)
+    integer :: i
+
+    image(:) = 0.0_wp
+    do i = 1, size(position)
+      image(row(i)) = image(row(i)) + dfdy(lane, position(i)) * vector(column(i))
+    end do
+  end subroutine multiply
+
+end module nocdyn_spectral_radius

@@ -1,0 +1,142 @@
+!> Checks that need all groups: names that occur twice, and references to bodies.
+module nocdyn_name_checks
+  use nocdyn_input, only: group_t, value_t
+  use nocdyn_diagnostics, only: diagnostics_t
+  use nocdyn_schema, only: first_key, group_rules, key_rules
+  use nocdyn_schema_rules, only: a_body, body_or_ground, ground, key_rule_t
+  use nocdyn_schema_text, only: suggestion
+  use nocdyn_text, only: quoted, string_t, to_text
+  use nocdyn_text_sort, only: sorted_position, argsort
+  implicit none (type, external)
+  private
+
+  public :: check_duplicate_names, check_references, collect_names
+
+  integer, parameter :: most_suggestions = 20   !! a near match is a search through all bodies
+
+contains
+
+  !> Elements of one name space must have different names.
+  subroutine check_duplicate_names(groups, diagnostics)
+    type(group_t), intent(in) :: groups(:)
+    type(diagnostics_t), intent(inout) :: diagnostics
+    integer, allocatable :: members(:), order(:)
+    type(string_t), allocatable :: names(:)
+    character(len=len(group_rules%name_space)) :: name_space
+    integer :: i, rule
+
+    do rule = 1, size(group_rules)
+      name_space = group_rules(rule)%name_space
+      if (name_space == '' .or. any(group_rules(:rule - 1)%name_space == name_space)) cycle
+      members = pack([(i, i=1, size(groups))], [(is_member(groups(i), name_space), i=1, size(groups))])
+      call collect_names(groups, members, names)
+      call argsort(names, order)
+      call report_doubles(groups, members(order), diagnostics)
+    end do
+  end subroutine check_duplicate_names
+
+  pure logical function is_member(group, name_space)
+    type(group_t), intent(in) :: group
+    character(len=*), intent(in) :: name_space
+
+    is_member = .false.
+    if (group%rule > 0) is_member = group_rules(group%rule)%name_space == name_space .and. group%name /= ''
+  end function is_member
+
+  !> Names of the groups `members`.
+  subroutine collect_names(groups, members, names)
+    type(group_t), intent(in) :: groups(:)
+    integer, intent(in) :: members(:)
+    type(string_t), allocatable, intent(out) :: names(:)
+    integer :: i
+
+    allocate (names(size(members)))
+    do i = 1, size(members)
+      names(i)%text = groups(members(i))%name
+    end do
+  end subroutine collect_names
+
+  subroutine report_doubles(groups, sorted, diagnostics)
+    type(group_t), intent(in) :: groups(:)
+    integer, intent(in) :: sorted(:)   !! groups in the order of their names
+    type(diagnostics_t), intent(inout) :: diagnostics
+    integer :: first, i
+
+    first = 1
+    do i = 2, size(sorted)
+      associate (earlier => groups(sorted(first)), later => groups(sorted(i)))
+        if (earlier%name == later%name) then
+          call diagnostics%add(later%line, sorted(i), 'the name ' // quoted(later%name) // ' is taken by &' // earlier%kind &
+            // ' on line ' // to_text(earlier%line))
+        else
+          first = i
+        end if
+      end associate
+    end do
+  end subroutine report_doubles
+
+  !> Every body that is referred to must be there, and no key may name one twice.
+  subroutine check_references(groups, bodies_are_known, diagnostics)
+    type(group_t), intent(in) :: groups(:)
+    logical, intent(in) :: bodies_are_known   !! false: a &body has a name that could not be read
+    type(diagnostics_t), intent(inout) :: diagnostics
+    type(string_t), allocatable :: bodies(:)
+    integer, allocatable :: members(:), order(:)
+    type(key_rule_t) :: rule
+    integer :: g, i, key, missing
+
+    members = pack([(i, i=1, size(groups))], [(is_member(groups(i), 'body'), i=1, size(groups))])
+    call collect_names(groups, members, bodies)
+    call argsort(bodies, order)
+    missing = 0
+    do g = 1, size(groups)
+      if (groups(g)%rule == 0) cycle
+      do key = 1, size(groups(g)%values)
+        rule = key_rules(first_key(groups(g)%rule) + key - 1)
+        if (rule%kind /= a_body .and. rule%kind /= body_or_ground) cycle
+        if (.not. allocated(groups(g)%values(key)%texts)) cycle
+        if (bodies_are_known) call check_missing(groups(g)%values(key), g, trim(rule%name), bodies, order, missing, diagnostics)
+        call check_repeated(groups(g)%values(key), g, trim(rule%name), diagnostics)
+      end do
+    end do
+  end subroutine check_references
+
+  subroutine check_missing(value, group, key, bodies, order, missing, diagnostics)
+    type(value_t), intent(in) :: value
+    integer, intent(in) :: group
+    character(len=*), intent(in) :: key
+    type(string_t), intent(in) :: bodies(:)
+    integer, intent(in) :: order(:)
+    integer, intent(inout) :: missing   !! how many were reported so far
+    type(diagnostics_t), intent(inout) :: diagnostics
+    character(len=:), allocatable :: hint
+    integer :: i
+
+    do i = 1, size(value%texts)
+      if (value%texts(i)%text == ground) cycle
+      if (sorted_position(value%texts(i)%text, bodies, order) > 0) cycle
+      missing = missing + 1
+      hint = ''
+      if (missing <= most_suggestions) hint = suggestion(value%texts(i)%text, bodies)
+      call diagnostics%add(value%line, group, key // ': there is no &body ' // quoted(value%texts(i)%text) // hint, &
+                           value%override)
+    end do
+  end subroutine check_missing
+
+  subroutine check_repeated(value, group, key, diagnostics)
+    type(value_t), intent(in) :: value
+    integer, intent(in) :: group
+    character(len=*), intent(in) :: key
+    type(diagnostics_t), intent(inout) :: diagnostics
+    integer, allocatable :: order(:)
+    integer :: i
+
+    call argsort(value%texts, order)
+    do i = 2, size(order)
+      if (value%texts(order(i))%text /= value%texts(order(i - 1))%text) cycle
+      call diagnostics%add(value%line, group, key // ' has ' // quoted(value%texts(order(i))%text) &
+        // ' twice; allowed: different bodies', value%override)
+    end do
+  end subroutine check_repeated
+
+end module nocdyn_name_checks

@@ -1,0 +1,263 @@
+!> Files that only grow, by checksummed records, so that nothing written is ever lost.
+!>
+!> Such a file begins with a line of text, the format's version and a mark of the byte order. A record is [checksum, mark,
+!> length] in four bytes each, then that many bytes; the checksum covers all behind it. A record is one `write`: the death of
+!> the process at any moment leaves whole records and at most a piece of one. For the death of the machine the file is flushed
+!> to the disk every few seconds.
+module nocdyn_log_file
+  use, intrinsic :: iso_fortran_env, only: int32, int64
+  use nocdyn_bytes, only: byte_reader_t, integer_bytes, put_integers
+  use nocdyn_checksums, only: checksum_table_t, make_checksum_table
+  use nocdyn_errors, only: error_t, exit_file, exit_input, raise
+  use nocdyn_posix, only: close_file, last_failure, make_folders, remove_file, write_bytes
+  use nocdyn_posix_files, only: file_size, lock_file, open_existing, open_new, read_at, sync_file, truncate_file
+  use nocdyn_text, only: quoted, to_text
+  implicit none (type, external)
+  private
+
+  character(len=*), parameter :: first_line = 'nocdyn sweep journal   ' // new_line('a')
+  integer(int32), parameter :: format_version = 1, byte_order = int(z'01020304', int32)
+  integer, parameter :: start_bytes = len(first_line) + 2 * integer_bytes
+  integer, parameter :: initial_buffer = 65536
+  real, parameter :: flush_interval = 5.0   ! [s]: the work that a failure of the power can cost
+
+  integer, parameter, public :: frame_bytes = 3 * integer_bytes
+
+  type, public :: log_file_t
+    character(len=:), allocatable :: path
+    integer(int64) :: end = 0                      !! bytes up to the end of the last whole record
+    character(len=:), allocatable :: buffer        !! holds what `read` found, behind `frame_bytes`
+    type(checksum_table_t), private :: table
+    integer(int64), private :: flushed = 0         !! count of the clock at the last flush
+    integer, private :: descriptor = -1
+  contains
+    procedure :: create
+    procedure :: open => open_file
+    procedure :: write => write_entry
+    procedure :: read => read_entry
+    procedure :: size => bytes_in_file
+    procedure :: cut
+    procedure :: close => close_log_file
+    procedure :: remove
+    procedure, private :: prepare
+    procedure, private :: lock
+    procedure, private :: read_start
+    procedure, private :: widen_buffer
+    procedure, private :: flush_if_due
+    procedure, private :: raise_write_error
+  end type log_file_t
+
+contains
+
+  !> Begins a file in `folder`, which is made if need be; a file of that name must not be there, unless it is empty: a process
+  !> was killed before its first record.
+  subroutine create(self, folder, name, error)
+    class(log_file_t), intent(inout) :: self
+    character(len=*), intent(in) :: folder, name
+    type(error_t), allocatable, intent(out) :: error
+    character(len=:), allocatable :: failure
+
+    call self%prepare(folder, name)
+    call make_folders(folder, failure)
+    if (allocated(failure)) then
+      call self%raise_write_error('the folder cannot be made: ' // failure, error)
+      return
+    end if
+    self%descriptor = open_new(self%path)
+    if (self%descriptor < 0) then
+      call self%raise_write_error(last_failure(), error)
+      self%descriptor = open_existing(self%path, .true.)
+      if (self%size() == 0) deallocate (error)
+    end if
+    if (.not. allocated(error)) call self%lock(error)
+    if (allocated(error)) call self%close()
+  end subroutine create
+
+  !> Opens a file that is there, to read it and to write on once `end` is set.
+  subroutine open_file(self, folder, name, error)
+    class(log_file_t), intent(inout) :: self
+    character(len=*), intent(in) :: folder, name
+    type(error_t), allocatable, intent(out) :: error   !! exit_file: cannot be opened; exit_input: not such a file, or in use
+
+    call self%prepare(folder, name)
+    self%descriptor = open_existing(self%path, .true.)
+    if (self%descriptor < 0) then
+      call raise(error, exit_file, self%path // ': cannot be opened: ' // last_failure())
+      return
+    end if
+    call self%lock(error)
+    if (.not. allocated(error)) call self%read_start(error)
+    if (allocated(error)) call self%close()
+  end subroutine open_file
+
+  subroutine prepare(self, folder, name)
+    class(log_file_t), intent(inout) :: self
+    character(len=*), intent(in) :: folder, name
+
+    self%path = folder // '/' // name
+    if (folder == '.') self%path = name
+    allocate (character(len=initial_buffer) :: self%buffer)
+    call make_checksum_table(self%table)
+    call system_clock(self%flushed)
+  end subroutine prepare
+
+  subroutine lock(self, error)
+    class(log_file_t), intent(in) :: self
+    type(error_t), allocatable, intent(out) :: error
+    logical :: is_done
+
+    call lock_file(self%descriptor, is_done)
+    if (.not. is_done) call raise(error, exit_input, self%path // ': another process is at work on this sweep')
+  end subroutine lock
+
+  !> What stands before the records.
+  subroutine read_start(self, error)
+    class(log_file_t), intent(inout) :: self
+    type(error_t), allocatable, intent(out) :: error
+    character(len=start_bytes) :: start
+    type(byte_reader_t) :: reader
+    integer(int32) :: numbers(2)
+    logical :: is_done
+
+    start = ''
+    call read_at(self%descriptor, 0_int64, start, is_done)
+    if (start(:len(first_line)) /= first_line .or. .not. is_done) then
+      call raise(error, exit_input, self%path // ': is no journal of a sweep, or its beginning is lost')
+      return
+    end if
+    reader%next = len(first_line) + 1
+    call reader%take_integers(start, numbers)
+    if (numbers(2) /= byte_order) then
+      call raise(error, exit_input, self%path // ': was written on a machine with another order of bytes')
+    else if (numbers(1) /= format_version) then
+      call raise(error, exit_input, self%path // ': has format ' // to_text(numbers(1)) // &
+                 ' of journals; this nocdyn reads format ' // to_text(format_version))
+    end if
+    self%end = start_bytes
+  end subroutine read_start
+
+  !> Adds a record in one `write`. After an error the file is as it was before, if the disk lets it be.
+  subroutine write_entry(self, mark, bytes, error)
+    class(log_file_t), intent(inout) :: self
+    integer(int32), intent(in) :: mark         !! the kind of record
+    character(len=*), intent(in) :: bytes
+    type(error_t), allocatable, intent(out) :: error
+    integer :: begins, length, used
+    logical :: is_cut, is_done
+
+    call self%widen_buffer(start_bytes + frame_bytes + len(bytes))
+    used = 0
+    if (self%end == 0) then
+      self%buffer(:len(first_line)) = first_line
+      used = len(first_line)
+      call put_integers(self%buffer, used, [format_version, byte_order])
+    end if
+    begins = used
+    used = begins + integer_bytes
+    call put_integers(self%buffer, used, [mark, len(bytes)])
+    length = used + len(bytes)
+    self%buffer(used + 1:length) = bytes
+    call put_integers(self%buffer, begins, [self%table%checksum(self%buffer(begins + integer_bytes + 1:length))])
+    call write_bytes(self%descriptor, self%buffer(:length), is_done)
+    if (is_done) call self%flush_if_due(is_done)
+    if (is_done) then
+      self%end = self%end + length
+    else
+      call self%raise_write_error(last_failure(), error)
+      call truncate_file(self%descriptor, self%end, is_cut)
+    end if
+  end subroutine write_entry
+
+  subroutine flush_if_due(self, is_done)
+    class(log_file_t), intent(inout) :: self
+    logical, intent(out) :: is_done
+    integer(int64) :: now, rate
+
+    call system_clock(now, rate)
+    is_done = .true.
+    if (real(now - self%flushed) < flush_interval * real(rate)) return
+    call sync_file(self%descriptor, is_done)
+    self%flushed = now
+  end subroutine flush_if_due
+
+  !> Reads the record at `offset` into the buffer, frame included.
+  subroutine read_entry(self, offset, mark, length, is_there, is_good)
+    class(log_file_t), intent(inout) :: self
+    integer(int64), intent(in) :: offset
+    integer(int32), intent(in) :: mark       !! that it must have
+    integer, intent(out) :: length           !! of its bytes behind the frame
+    logical, intent(out) :: is_there         !! there is a frame, and as many bytes as it says
+    logical, intent(out) :: is_good          !! and they are as they were written
+    type(byte_reader_t) :: reader
+    integer(int32) :: numbers(3)
+
+    is_good = .false.
+    length = 0
+    call read_at(self%descriptor, offset, self%buffer(:frame_bytes), is_there)
+    if (.not. is_there) return
+    call reader%take_integers(self%buffer(:frame_bytes), numbers)
+    is_there = numbers(2) == mark .and. numbers(3) > 0
+    if (is_there) is_there = numbers(3) <= self%size() - offset - frame_bytes
+    if (.not. is_there) return
+    length = numbers(3)
+    call self%widen_buffer(frame_bytes + length)
+    call read_at(self%descriptor, offset, self%buffer(:frame_bytes + length), is_there)
+    if (is_there) is_good = self%table%checksum(self%buffer(integer_bytes + 1:frame_bytes + length)) == numbers(1)
+  end subroutine read_entry
+
+  subroutine widen_buffer(self, needed)
+    class(log_file_t), intent(inout) :: self
+    integer, intent(in) :: needed   !! [bytes]
+
+    if (needed <= len(self%buffer)) return
+    deallocate (self%buffer)
+    allocate (character(len=needed + needed / 2) :: self%buffer)
+  end subroutine widen_buffer
+
+  integer(int64) function bytes_in_file(self)
+    class(log_file_t), intent(in) :: self
+
+    bytes_in_file = file_size(self%descriptor)
+  end function bytes_in_file
+
+  !> Removes what stands behind `end`, where writing goes on.
+  subroutine cut(self, error)
+    class(log_file_t), intent(in) :: self
+    type(error_t), allocatable, intent(out) :: error
+    logical :: is_done
+
+    call truncate_file(self%descriptor, self%end, is_done)
+    if (.not. is_done) call self%raise_write_error(last_failure(), error)
+  end subroutine cut
+
+  subroutine raise_write_error(self, reason, error)
+    class(log_file_t), intent(in) :: self
+    character(len=*), intent(in) :: reason
+    type(error_t), allocatable, intent(out) :: error
+
+    call raise(error, exit_file, 'cannot write ' // quoted(self%path) // ': ' // reason)
+  end subroutine raise_write_error
+
+  !> Ends the work on the file, which stays.
+  subroutine close_log_file(self)
+    class(log_file_t), intent(inout) :: self
+    logical :: is_done
+
+    if (self%descriptor < 0) return
+    call sync_file(self%descriptor, is_done)
+    call close_file(self%descriptor, is_done)
+    self%descriptor = -1
+  end subroutine close_log_file
+
+  !> Ends the work and leaves no file.
+  subroutine remove(self)
+    class(log_file_t), intent(inout) :: self
+    logical :: is_done
+
+    if (self%descriptor < 0) return
+    call remove_file(self%path)
+    call close_file(self%descriptor, is_done)
+    self%descriptor = -1
+  end subroutine remove
+
+end module nocdyn_log_file

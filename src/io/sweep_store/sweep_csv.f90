@@ -1,0 +1,125 @@
+!> sweep.csv: the same numbers as sweep.nc, as text.
+module nocdyn_sweep_csv
+  use nocdyn_csv, only: write_header
+  use nocdyn_errors, only: error_t
+  use nocdyn_journal_chunks, only: check_sweep, chunk_cursor_t
+  use nocdyn_kinds, only: wp
+  use nocdyn_output_file, only: output_file_t
+  use nocdyn_sweep_chunk, only: chunk_t, status_done, status_words
+  use nocdyn_sweep_header, only: quantity_t, sweep_header_t
+  use nocdyn_sweep_journal, only: sweep_journal_t
+  use nocdyn_text, only: append, number_width, string_t, to_text, write_number
+  implicit none (type, external)
+  private
+
+  public :: write_sweep_csv
+
+  character(len=*), parameter, public :: sweep_csv_name = 'sweep.csv'
+
+contains
+
+  !> One row per variant; the results of one that is not done are empty.
+  subroutine write_sweep_csv(folder, journals, error)
+    character(len=*), intent(in) :: folder
+    type(sweep_journal_t), intent(inout) :: journals(:)   !! of all shards
+    type(error_t), allocatable, intent(out) :: error
+    type(output_file_t) :: file
+    type(chunk_cursor_t) :: cursor
+    type(chunk_t) :: chunk
+    integer :: i
+    logical :: is_there
+
+    call check_sweep(journals, error)
+    if (allocated(error)) return
+    call file%open(folder, sweep_csv_name)
+    call write_header(file, column_labels(journals(1)%header))
+    call cursor%rewind_to_start(journals)
+    do
+      call cursor%next_chunk(journals, chunk, is_there, error)
+      if (allocated(error) .or. file%has_failed .or. .not. is_there) exit
+      do i = 1, chunk%count
+        call write_variant(file, chunk, i)
+      end do
+    end do
+    if (allocated(error)) then
+      call file%discard()
+    else
+      call file%finish(sweep_csv_name, error)
+    end if
+  end subroutine write_sweep_csv
+
+  pure function column_labels(header) result(labels)
+    type(sweep_header_t), intent(in) :: header
+    type(string_t), allocatable :: labels(:)
+
+    allocate (labels(0))
+    call append(labels, 'variant')
+    call append_quantities(labels, header%parameters)
+    call append_quantities(labels, header%results)
+    call append(labels, 'status')
+    call append(labels, 'steps')
+    call append(labels, 'reason')
+  end function column_labels
+
+  pure subroutine append_quantities(labels, quantities)
+    type(string_t), allocatable, intent(inout) :: labels(:)
+    type(quantity_t), intent(in) :: quantities(:)
+    integer :: i
+
+    do i = 1, size(quantities)
+      if (quantities(i)%unit == '') then
+        call append(labels, quantities(i)%label)
+      else
+        call append(labels, quantities(i)%label // ' [' // quantities(i)%unit // ']')
+      end if
+    end do
+  end subroutine append_quantities
+
+  subroutine write_variant(file, chunk, position)
+    type(output_file_t), intent(inout) :: file
+    type(chunk_t), intent(in) :: chunk
+    integer, intent(in) :: position   !! in the chunk
+    logical :: is_done
+
+    is_done = chunk%status(position) == status_done
+    call file%put(to_text(chunk%first - 1 + position))
+    call write_numbers(file, chunk%parameters(:, position))
+    if (is_done) then
+      call write_numbers(file, chunk%results(:, position))
+    else
+      call file%put(repeat(',', size(chunk%results, 1)))
+    end if
+    call file%put(',' // trim(status_words(chunk%status(position))) // ',' // to_text(chunk%steps(position)) // ',')
+    if (.not. is_done) call write_quoted(file, chunk%reasons(position)%text)
+    call file%put(new_line('a'))
+  end subroutine write_variant
+
+  !> A comma before each.
+  subroutine write_numbers(file, values)
+    type(output_file_t), intent(inout) :: file
+    real(wp), intent(in) :: values(:)
+    character(len=number_width) :: number
+    integer :: i, length
+
+    do i = 1, size(values)
+      call write_number(values(i), number, length)
+      call file%put(',')
+      call file%put(number(:length))
+    end do
+  end subroutine write_numbers
+
+  !> Between double quotes, those inside doubled.
+  subroutine write_quoted(file, text)
+    type(output_file_t), intent(inout) :: file
+    character(len=*), intent(in) :: text
+    integer :: i
+
+    call file%put('"')
+    do i = 1, len(text)
+      if (text(i:i) == '"') call file%put('"')
+      call file%put(text(i:i))
+    end do
+    call file%put('"')
+  end subroutine write_quoted
+
+end module nocdyn_sweep_csv

@@ -1,0 +1,78 @@
+!> The mistakes of an input, collected so that all are reported in one go.
+module nocdyn_diagnostics
+  use nocdyn_errors, only: exit_input
+  use nocdyn_text, only: string_t
+  use nocdyn_text_sort, only: argsort
+  implicit none (type, external)
+  private
+
+  integer, parameter, public :: no_line = huge(1)   !! for a mistake of the file as a whole; sorts last
+
+  !> A sentence without its place, which is put before it when the names of all groups are known.
+  type, public :: diagnostic_t
+    integer :: line = no_line
+    integer :: group = 0      !! index in the file, 0: outside groups
+    integer :: override = 0   !! index of the override that is wrong, 0: the file is
+    integer :: code = exit_input   !! exit code of the program
+    character(len=:), allocatable :: text
+  end type diagnostic_t
+
+  type, public :: diagnostics_t
+    integer :: count = 0
+    type(diagnostic_t), allocatable :: list(:)   !! the first `count` are in use
+  contains
+    procedure :: add
+    procedure :: sort_by_line
+    procedure :: worst_code
+  end type diagnostics_t
+
+contains
+
+  subroutine add(self, line, group, text, override, code)
+    class(diagnostics_t), intent(inout) :: self
+    integer, intent(in) :: line, group
+    character(len=*), intent(in) :: text
+    integer, optional, intent(in) :: override, code
+    type(diagnostic_t), allocatable :: longer(:)
+
+    if (.not. allocated(self%list)) allocate (self%list(16))
+    if (self%count == size(self%list)) then
+      allocate (longer(2 * self%count))
+      longer(:self%count) = self%list
+      call move_alloc(longer, self%list)
+    end if
+    self%count = self%count + 1
+    associate (diagnostic => self%list(self%count))
+      diagnostic%line = line
+      diagnostic%group = group
+      if (present(override)) diagnostic%override = override
+      if (present(code)) diagnostic%code = code
+      diagnostic%text = text
+    end associate
+  end subroutine add
+
+  !> Positions in the list by line, mistakes of one line in the order of their discovery, those of overrides last.
+  subroutine sort_by_line(self, order)
+    class(diagnostics_t), intent(in) :: self
+    integer, allocatable, intent(out) :: order(:)
+    type(string_t), allocatable :: keys(:)
+    character(len=24) :: key
+    integer :: i
+
+    allocate (keys(self%count))
+    do i = 1, self%count
+      write (key, '(i12.12, i12.12)') self%list(i)%override, self%list(i)%line
+      keys(i)%text = key
+    end do
+    call argsort(keys, order)
+  end subroutine sort_by_line
+
+  !> The largest exit code of all mistakes.
+  pure integer function worst_code(self)
+    class(diagnostics_t), intent(in) :: self
+
+    worst_code = exit_input
+    if (self%count > 0) worst_code = maxval(self%list(:self%count)%code)
+  end function worst_code
+
+end module nocdyn_diagnostics

@@ -1,0 +1,83 @@
+!> Sorting and searching of texts, so that names are found among thousands without comparing each with each.
+module nocdyn_text_sort
+  use nocdyn_text, only: string_t
+  implicit none (type, external)
+  private
+
+  public :: argsort, sorted_position
+
+contains
+
+  !> Permutation that sorts `texts`; equal texts stay in their order. Merge sort from runs of one upwards.
+  pure subroutine argsort(texts, order)
+    type(string_t), intent(in) :: texts(:)
+    integer, allocatable, intent(out) :: order(:)
+    integer, allocatable :: merged(:)
+    integer :: first, middle, last, width
+
+    allocate (order(size(texts)), merged(size(texts)))
+    order = [(first, first=1, size(texts))]
+    width = 1
+    do while (width < size(texts))
+      do first = 1, size(texts), 2 * width
+        middle = min(first + width - 1, size(texts))
+        last = min(first + 2 * width - 1, size(texts))
+        call merge_runs(texts, order(first:middle), order(middle + 1:last), merged(first:last))
+      end do
+      order = merged
+      width = 2 * width
+    end do
+  end subroutine argsort
+
+  pure subroutine merge_runs(texts, left, right, merged)
+    type(string_t), intent(in) :: texts(:)
+    integer, intent(in) :: left(:), right(:)   !! sorted positions in `texts`
+    integer, intent(out) :: merged(:)
+    integer :: i, l, r
+
+    l = 1
+    r = 1
+    do i = 1, size(merged)
+      if (takes_left(texts, left, right, l, r)) then
+        merged(i) = left(l)
+        l = l + 1
+      else
+        merged(i) = right(r)
+        r = r + 1
+      end if
+    end do
+  end subroutine merge_runs
+
+  pure logical function takes_left(texts, left, right, l, r)
+    type(string_t), intent(in) :: texts(:)
+    integer, intent(in) :: left(:), right(:), l, r
+
+    takes_left = r > size(right)
+    if (takes_left .or. l > size(left)) return
+    takes_left = texts(left(l))%text <= texts(right(r))%text
+  end function takes_left
+
+  !> Position in `texts` of the first one that equals `text`, 0 if there is none.
+  pure integer function sorted_position(text, texts, order) result(position)
+    character(len=*), intent(in) :: text
+    type(string_t), intent(in) :: texts(:)
+    integer, intent(in) :: order(:)   !! of find_order
+    integer :: low, high, middle
+
+    low = 1
+    high = size(order) + 1
+    do while (low < high)
+      middle = (low + high) / 2
+      if (texts(order(middle))%text < text) then
+        low = middle + 1
+      else
+        high = middle
+      end if
+    end do
+
+    position = 0
+    if (low > size(order)) return
+    if (texts(order(low))%text == text .and. len(texts(order(low))%text) == len(text)) position = order(low)
+  end function sorted_position
+
+end module nocdyn_text_sort

@@ -1,0 +1,168 @@
+!> How redundant rows share loads: of all reactions that do the same to the bodies, those of smallest norm.
+!>
+!> Reactions that leave every body in balance are idle; each redundant row has such a combination with the rows that it
+!> repeats. Taking the idle part off, by projection, leaves the reactions of smallest norm. Redundancies that have no row
+!> in common are independent of one another, so that parallel gears in each of thousands of stages stay thousands of
+!> small problems.
+module nocdyn_load_sharing
+  use nocdyn_geared_groups, only: geared_group_t, redundancy_t
+  use nocdyn_kinds, only: wp
+  use nocdyn_lane_parameters, only: lane_parameters_t
+  use nocdyn_rigid_trains, only: find_root
+  use nocdyn_sparse_map, only: transposed_order
+  implicit none (type, external)
+  private
+
+  public :: new_load_sharing
+
+  !> Redundancies that share rows.
+  type, public :: load_sharing_block_t
+    type(redundancy_t), allocatable :: redundancies(:)
+    integer, allocatable :: rows(:)              !! all rows in them
+    real(wp), allocatable :: idle(:, :, :)       !! their idle combinations, made orthonormal, [rows, redundancies, lanes]
+  contains
+    procedure :: orthonormalise
+  end type load_sharing_block_t
+
+  type, public :: load_sharing_t
+    type(load_sharing_block_t), allocatable :: blocks(:)
+  contains
+    procedure :: minimise_norm
+    procedure :: list_parameters
+  end type load_sharing_t
+
+contains
+
+  !> The blocks of all groups; `idle` is allocated and to be filled.
+  function new_load_sharing(groups, rows, lanes) result(self)
+    type(geared_group_t), intent(in) :: groups(:)
+    integer, intent(in) :: rows, lanes
+    type(load_sharing_t) :: self
+    integer :: above(rows), block_of(rows)   ! union-find over the rows
+    integer :: g, i, k, r, root
+
+    above = [(r, r=1, rows)]
+    block_of = 0
+    k = 0
+    do g = 1, size(groups)
+      do i = 1, size(groups(g)%redundancies)
+        call join(groups(g)%redundancies(i), above)
+      end do
+    end do
+    do g = 1, size(groups)
+      do i = 1, size(groups(g)%redundancies)
+        call find_root(above, groups(g)%redundancies(i)%row, root)
+        if (block_of(root) > 0) cycle
+        k = k + 1
+        block_of(root) = k
+      end do
+    end do
+    allocate (self%blocks(k))
+    if (k == 0) return
+    do r = 1, rows
+      call find_root(above, r, root)
+      block_of(r) = block_of(root)
+    end do
+    call fill_blocks(groups, block_of, lanes, self%blocks)
+  end function new_load_sharing
+
+  pure subroutine join(redundancy, above)
+    type(redundancy_t), intent(in) :: redundancy
+    integer, intent(inout) :: above(:)
+    integer :: a, b, i
+
+    do i = 1, size(redundancy%repeats)
+      call find_root(above, redundancy%row, a)
+      call find_root(above, redundancy%repeats(i), b)
+      above(max(a, b)) = min(a, b)
+    end do
+  end subroutine join
+
+  !> Hands the rows and the redundancies out to the blocks, in their order.
+  subroutine fill_blocks(groups, block_of, lanes, blocks)
+    type(geared_group_t), intent(in) :: groups(:)
+    integer, intent(in) :: block_of(:)   !! of each row, 0: of none
+    integer, intent(in) :: lanes
+    type(load_sharing_block_t), intent(inout) :: blocks(:)
+    integer, allocatable :: rows(:), order(:)
+    integer :: first(size(blocks) + 1), g, i, k, next(size(blocks))
+
+    rows = pack([(i, i=1, size(block_of))], block_of > 0)
+    allocate (order(size(rows)))
+    call transposed_order(block_of(rows), size(blocks), order, first)
+    next = 0
+    do g = 1, size(groups)
+      do i = 1, size(groups(g)%redundancies)
+        k = block_of(groups(g)%redundancies(i)%row)
+        next(k) = next(k) + 1
+      end do
+    end do
+    do k = 1, size(blocks)
+      blocks(k)%rows = rows(order(first(k):first(k + 1) - 1))
+      allocate (blocks(k)%redundancies(next(k)))
+      allocate (blocks(k)%idle(size(blocks(k)%rows), next(k), lanes), source=0.0_wp)
+    end do
+    next = 0
+    do g = 1, size(groups)
+      do i = 1, size(groups(g)%redundancies)
+        k = block_of(groups(g)%redundancies(i)%row)
+        next(k) = next(k) + 1
+        blocks(k)%redundancies(next(k)) = groups(g)%redundancies(i)
+      end do
+    end do
+  end subroutine fill_blocks
+
+  !> Makes the idle combinations of one lane orthonormal: Gram and Schmidt, each twice, which is enough.
+  pure subroutine orthonormalise(self, lane)
+    class(load_sharing_block_t), intent(inout) :: self
+    integer, intent(in) :: lane
+    integer :: j, k, pass
+
+    associate (idle => self%idle)
+      do k = 1, size(idle, 2)
+        idle(:, k, lane) = idle(:, k, lane) / norm2(idle(:, k, lane))
+        do pass = 1, 2
+          do j = 1, k - 1
+            idle(:, k, lane) = idle(:, k, lane) - dot_product(idle(:, j, lane), idle(:, k, lane)) * idle(:, j, lane)
+          end do
+          idle(:, k, lane) = idle(:, k, lane) / norm2(idle(:, k, lane))
+        end do
+      end do
+    end associate
+  end subroutine orthonormalise
+
+  !> Takes the idle part off the reactions.
+  pure subroutine minimise_norm(self, lane, lambda)
+    class(load_sharing_t), intent(in) :: self
+    integer, intent(in) :: lane
+    real(wp), intent(inout) :: lambda(:)   !! [rows]
+    integer :: b, i, k
+    real(wp) :: part
+
+    do b = 1, size(self%blocks)
+      associate (block => self%blocks(b))
+        do k = 1, size(block%idle, 2)
+          part = 0.0_wp
+          do i = 1, size(block%rows)
+            part = part + block%idle(i, k, lane) * lambda(block%rows(i))
+          end do
+          do i = 1, size(block%rows)
+            lambda(block%rows(i)) = lambda(block%rows(i)) - part * block%idle(i, k, lane)
+          end do
+        end do
+      end associate
+    end do
+  end subroutine minimise_norm
+
+  subroutine list_parameters(self, parameters)
+    class(load_sharing_t), target, intent(inout) :: self
+    type(lane_parameters_t), intent(inout) :: parameters
+    integer :: b
+
+    do b = 1, size(self%blocks)
+      call parameters%add_structure(self%blocks(b)%rows)
+      call parameters%add_blocks('shares: idle', self%blocks(b)%idle)
+    end do
+  end subroutine list_parameters
+
+end module nocdyn_load_sharing

@@ -1,0 +1,293 @@
+!> Reactions lambda = D^T (J omega' - T) of all rows, D the right inverse of L_lambda, without forming it.
+!>
+!> The transposed equations of L_lambda^ext are swept from the outside inwards: the relations between trains first, then in
+!> each train every body hands what is left over on it to its parent through the row between them. What redundant rows
+!> carry is then shared out so that the norm of the reactions is smallest. All work is linear in the entries of the rows
+!> but for the dense cores of relations and the loops that redundant rows close. To set it up takes a sweep for each
+!> redundant row.
+module nocdyn_reaction_solver
+  use nocdyn_constraints, only: constraints_t
+  use nocdyn_geared_groups, only: geared_group_t
+  use nocdyn_kinds, only: wp
+  use nocdyn_lane_parameters, only: lane_parameters_t
+  use nocdyn_rigid_trains, only: rigid_trains_t
+  use nocdyn_load_sharing, only: new_load_sharing, load_sharing_t
+  use nocdyn_train_motion, only: elimination_t, find_loads
+  use nocdyn_train_relations, only: train_relations_t
+  implicit none (type, external)
+  private
+
+  public :: new_reaction_solver
+
+  !> The relations of one group.
+  type :: relation_group_t
+    integer, allocatable :: bodies(:)
+    type(elimination_t) :: elimination
+    real(wp), allocatable :: dual(:, :, :)   !! D of the core, [core_trains, core, lanes]
+  end type relation_group_t
+
+  type, public :: reaction_solver_t
+    private
+    integer, allocatable :: train(:)           !! of each body
+    real(wp), allocatable :: ratio(:, :)       !! of each body to the lead of its train, [lanes, bodies]
+    type(train_relations_t) :: relations
+    integer, allocatable :: first(:)           !! entries of the relations between bodies, [relations + 1]
+    integer, allocatable :: body(:)            !! [entries]
+    real(wp), allocatable :: coefficient(:, :) !! [lanes, entries]
+    type(relation_group_t), allocatable :: groups(:)   !! those with relations
+    integer, allocatable :: group_index(:)           !! of each group among them, 0 without relations
+    integer, allocatable :: child(:), parent(:), row(:)   !! the pairs of all trains, from the outside inwards
+    real(wp), allocatable :: own(:, :), other(:, :)       !! coefficients of child and parent, [lanes, pairs]
+    type(load_sharing_t) :: load_sharing
+    real(wp), allocatable :: of_trains(:)      !! moments on trains, work space
+    real(wp), allocatable :: of_relations(:)   !! multipliers, work space
+  contains
+    procedure :: set_core
+    procedure :: set_ratios
+    procedure :: root_ratio
+    procedure :: find_null_vectors
+    procedure :: share_loads
+    procedure :: find_reactions
+    procedure :: list_parameters
+    procedure, private :: back_substitute
+    procedure, private :: solve_relations
+  end type reaction_solver_t
+
+contains
+
+  !> The order of the sweep; the numbers of each lane are to be taken by `set_core` and `set_ratios`.
+  function new_reaction_solver(constraints, trains, relations, groups) result(self)
+    type(constraints_t), intent(in) :: constraints
+    type(rigid_trains_t), intent(in) :: trains
+    type(train_relations_t), intent(in) :: relations
+    type(geared_group_t), intent(in) :: groups(:)
+    type(reaction_solver_t) :: self
+    integer :: entry, i, lanes, next
+
+    lanes = size(constraints%coefficient, 1)
+    allocate (self%train, source=trains%train)
+    self%relations = relations
+    allocate (self%ratio(lanes, constraints%bodies))
+    allocate (self%of_trains(size(trains%root)), self%of_relations(size(relations%row)))
+    next = sum([(constraints%entries(relations%row(i)), i=1, size(relations%row))])
+    allocate (self%first(size(relations%row) + 1), self%body(next), self%coefficient(lanes, next))
+    next = 1
+    do i = 1, size(relations%row)
+      self%first(i) = next
+      do entry = constraints%first(relations%row(i)), constraints%first(relations%row(i) + 1) - 1
+        self%body(next) = constraints%body(entry)
+        self%coefficient(:, next) = constraints%coefficient(:, entry)
+        next = next + 1
+      end do
+    end do
+    self%first(size(self%first)) = next
+    call list_groups(groups, lanes, self)
+    call list_pairs(constraints, trains, self)
+  end function new_reaction_solver
+
+  subroutine list_groups(groups, lanes, self)
+    type(geared_group_t), intent(in) :: groups(:)
+    integer, intent(in) :: lanes
+    type(reaction_solver_t), intent(inout) :: self
+    integer :: g, k
+
+    allocate (self%group_index(size(groups)), source=0)
+    k = 0
+    do g = 1, size(groups)
+      if (size(groups(g)%elimination%relation) + size(groups(g)%elimination%core) == 0) cycle
+      k = k + 1
+      self%group_index(g) = k
+    end do
+    allocate (self%groups(k))
+    do g = 1, size(groups)
+      if (self%group_index(g) == 0) cycle
+      associate (group => self%groups(self%group_index(g)), elimination => groups(g)%elimination)
+        group%bodies = groups(g)%bodies
+        group%elimination = elimination
+        allocate (group%dual(size(elimination%core_trains), size(elimination%core), lanes))
+      end associate
+    end do
+  end subroutine list_groups
+
+  subroutine list_pairs(constraints, trains, self)
+    type(constraints_t), intent(in) :: constraints
+    type(rigid_trains_t), intent(in) :: trains
+    type(reaction_solver_t), intent(inout) :: self
+    integer :: b, i, k, lane, pairs
+
+    pairs = count(trains%parent > 0)
+    allocate (self%child(pairs), self%parent(pairs), self%row(pairs))
+    allocate (self%own(size(constraints%coefficient, 1), pairs), self%other(size(constraints%coefficient, 1), pairs))
+    k = 0
+    do i = size(trains%order), 1, -1
+      b = trains%order(i)
+      if (trains%parent(b) == 0) cycle
+      k = k + 1
+      self%child(k) = b
+      self%parent(k) = trains%parent(b)
+      self%row(k) = trains%parent_row(b)
+      do lane = 1, size(self%own, 1)
+        call constraints%pair_coefficients(lane, self%row(k), b, self%own(lane, k), self%other(lane, k))
+      end do
+    end do
+  end subroutine list_pairs
+
+  !> The inverse of the core of group number `group`.
+  pure subroutine set_core(self, group, lane, dual)
+    class(reaction_solver_t), intent(inout) :: self
+    integer, intent(in) :: group, lane
+    real(wp), intent(in) :: dual(:, :)
+
+    if (self%group_index(group) > 0) self%groups(self%group_index(group))%dual(:, :, lane) = dual
+  end subroutine set_core
+
+  pure subroutine set_ratios(self, lane, ratio)
+    class(reaction_solver_t), intent(inout) :: self
+    integer, intent(in) :: lane
+    real(wp), intent(in) :: ratio(:)   !! [bodies]
+
+    self%ratio(lane, :) = ratio
+  end subroutine set_ratios
+
+  !> How fast a body is, measured by the lead of its train.
+  pure real(wp) function root_ratio(self, lane, body) result(ratio)
+    class(reaction_solver_t), intent(in) :: self
+    integer, intent(in) :: lane, body
+
+    ratio = self%ratio(lane, body)
+  end function root_ratio
+
+  !> Finds the idle combinations of redundant rows, once the numbers of all lanes are there: a reaction 1 of such a row and
+  !> the negative of what the rows that it repeats carry in its place.
+  subroutine find_null_vectors(self, constraints, groups)
+    class(reaction_solver_t), intent(inout) :: self
+    type(constraints_t), intent(in) :: constraints
+    type(geared_group_t), intent(in) :: groups(:)
+    real(wp) :: idle(constraints%rows()), moment(constraints%bodies)
+    integer :: b, i, lane, row
+
+    self%load_sharing = new_load_sharing(groups, constraints%rows(), size(self%own, 1))
+    do b = 1, size(self%load_sharing%blocks)
+      associate (block => self%load_sharing%blocks(b))
+        do lane = 1, size(self%own, 1)
+          do i = 1, size(block%redundancies)
+            row = block%redundancies(i)%row
+            moment = 0.0_wp
+            associate (first => constraints%first(row), last => constraints%first(row + 1) - 1)
+              moment(constraints%body(first:last)) = -constraints%coefficient(lane, first:last)
+            end associate
+            call self%back_substitute(lane, moment, idle)
+            idle(row) = 1.0_wp
+            where (block%rows == row .or. is_among(block%rows, block%redundancies(i)%repeats)) &
+              block%idle(:, i, lane) = idle(block%rows)
+          end do
+          call block%orthonormalise(lane)
+        end do
+      end associate
+    end do
+  end subroutine find_null_vectors
+
+  !> Which of some ascending rows are in a second ascending list.
+  pure function is_among(rows, list) result(answer)
+    integer, intent(in) :: rows(:), list(:)
+    logical :: answer(size(rows))
+    integer :: i, k
+
+    k = 1
+    do i = 1, size(rows)
+      do while (k < size(list))
+        if (list(k) >= rows(i)) exit
+        k = k + 1
+      end do
+      answer(i) = list(k) == rows(i)
+    end do
+  end function is_among
+
+  !> Reactions that balance moments on the bodies.
+  pure subroutine find_reactions(self, lane, moment, lambda)
+    class(reaction_solver_t), intent(inout) :: self
+    integer, intent(in) :: lane
+    real(wp), intent(inout) :: moment(:)   !! J omega' - T [N m], [bodies]; what is left over on return is rounding
+    real(wp), intent(inout) :: lambda(:)   !! [rows]
+
+    call self%back_substitute(lane, moment, lambda)
+    call self%load_sharing%minimise_norm(lane, lambda)
+  end subroutine find_reactions
+
+  !> Shares reactions of the kept rows out over all rows.
+  pure subroutine share_loads(self, lane, lambda)
+    class(reaction_solver_t), intent(in) :: self
+    integer, intent(in) :: lane
+    real(wp), intent(inout) :: lambda(:)   !! [rows], 0 for redundant ones
+
+    call self%load_sharing%minimise_norm(lane, lambda)
+  end subroutine share_loads
+
+  !> Reactions of the kept rows alone.
+  pure subroutine back_substitute(self, lane, moment, lambda)
+    class(reaction_solver_t), intent(inout) :: self
+    integer, intent(in) :: lane
+    real(wp), intent(inout) :: moment(:), lambda(:)
+    integer :: k
+
+    lambda = 0.0_wp
+    if (size(self%groups) > 0) call self%solve_relations(lane, moment, lambda)
+    do k = 1, size(self%child)
+      lambda(self%row(k)) = moment(self%child(k)) / self%own(lane, k)
+      moment(self%parent(k)) = moment(self%parent(k)) - self%other(lane, k) * lambda(self%row(k))
+    end do
+  end subroutine back_substitute
+
+  !> Reactions of the relations; they are taken off the moments on the bodies.
+  pure subroutine solve_relations(self, lane, moment, lambda)
+    class(reaction_solver_t), intent(inout) :: self
+    integer, intent(in) :: lane
+    real(wp), intent(inout) :: moment(:), lambda(:)
+    integer :: b, entry, g, i
+
+    self%of_trains(:) = 0.0_wp
+    self%of_relations(:) = 0.0_wp
+    do g = 1, size(self%groups)
+      associate (group => self%groups(g))
+        do i = 1, size(group%bodies)
+          b = group%bodies(i)
+          self%of_trains(self%train(b)) = self%of_trains(self%train(b)) + self%ratio(lane, b) * moment(b)
+        end do
+        call find_loads(self%relations, group%elimination, group%dual(:, :, lane), lane, self%of_trains, self%of_relations)
+      end associate
+    end do
+    do i = 1, size(self%of_relations)
+      lambda(self%relations%row(i)) = self%of_relations(i)
+      do entry = self%first(i), self%first(i + 1) - 1
+        moment(self%body(entry)) = moment(self%body(entry)) - self%coefficient(lane, entry) * self%of_relations(i)
+      end do
+    end do
+  end subroutine solve_relations
+
+  subroutine list_parameters(self, parameters)
+    class(reaction_solver_t), target, intent(inout) :: self
+    type(lane_parameters_t), intent(inout) :: parameters
+    integer :: g
+
+    call parameters%add_structure(self%train)
+    call parameters%add_structure(self%relations%row)
+    call parameters%add_structure(self%first)
+    call parameters%add_structure(self%body)
+    call parameters%add_structure(self%group_index)
+    call parameters%add_structure(self%child)
+    call parameters%add_structure(self%parent)
+    call parameters%add_structure(self%row)
+    call self%relations%between%list_parameters(parameters)
+    call parameters%add('sweep: ratio', self%ratio)
+    call parameters%add('sweep: coefficient', self%coefficient)
+    call parameters%add('sweep: own', self%own)
+    call parameters%add('sweep: other', self%other)
+    do g = 1, size(self%groups)
+      call parameters%add_structure(self%groups(g)%bodies)
+      call self%groups(g)%elimination%list_structure(parameters)
+      call parameters%add_blocks('sweep: dual', self%groups(g)%dual)
+    end do
+    call self%load_sharing%list_parameters(parameters)
+  end subroutine list_parameters
+
+end module nocdyn_reaction_solver

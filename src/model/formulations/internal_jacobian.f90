@@ -1,0 +1,122 @@
+!> What the inner states of the elements add to the sparse Jacobian of the reduced formulation.
+!>
+!> An inner state z of an element with the speed u' = U q' changes at a rate r(u', z), and the moment M(z) of the element
+!> acts on q'' = R M and on its work, W' = M u'.
+module nocdyn_internal_jacobian
+  use nocdyn_element_coordinates, only: element_coordinates_t
+  use nocdyn_elements, only: elements_t
+  use nocdyn_internal_states, only: internal_states_t
+  use nocdyn_kinds, only: wp
+  use nocdyn_lane_parameters, only: lane_parameters_t
+  use nocdyn_system, only: pattern_t
+  implicit none (type, external)
+  private
+
+  public :: new_internal_jacobian
+
+  !> The values are, for each inner state in turn: dq''/dz and, where it turns with the coordinate, dr/dq' of each entry of its
+  !> element; dr/dz of each inner state of that element; dW'/dz if its work is integrated.
+  type, public :: internal_jacobian_t
+    type(pattern_t) :: pattern
+    integer, private :: before = 0                          !! positions of the Jacobian before these
+    type(element_coordinates_t), private :: incidence       !! of the element of each inner state
+    logical, allocatable, private :: has_work_integral(:)        !! [inner states]
+  contains
+    procedure :: fill
+    procedure :: refresh_lane
+    procedure :: list_parameters
+  end type internal_jacobian_t
+
+contains
+
+  !> The positions; the rows of the inner states follow those of the coordinates, those of the works come last.
+  function new_internal_jacobian(freedoms, incidence, with_work, internal, before) result(self)
+    integer, intent(in) :: freedoms
+    type(element_coordinates_t), intent(in) :: incidence
+    integer, intent(in) :: with_work(:)   !! elements whose works follow the states
+    type(internal_states_t), intent(in) :: internal
+    integer, intent(in) :: before         !! positions of the Jacobian before these
+    type(internal_jacobian_t) :: self
+    integer :: i, next, s, work(size(incidence%first) - 1)   ! number of an element's work, or 0
+
+    work = 0
+    work(with_work) = [(i, i=1, size(with_work))]
+    self%before = before
+    self%incidence = incidence%selected(internal%element, with_ratio_only=.false.)
+    self%has_work_integral = work(internal%element) > 0
+    next = size(self%incidence%coordinate) + sum(internal%members) + count(self%has_work_integral) &
+           + count([(self%incidence%has_ratio(i), i=1, size(self%incidence%coordinate))])
+    allocate (self%pattern%row(next), self%pattern%column(next))
+    next = 1
+    do s = 1, internal%count
+      do i = self%incidence%first(s), self%incidence%first(s + 1) - 1
+        call add_position(self%incidence%coordinate(i), 2 * freedoms + s, self%pattern, next)
+        if (self%incidence%has_ratio(i)) call add_position(2 * freedoms + s, self%incidence%coordinate(i), self%pattern, next)
+      end do
+      do i = 0, internal%members(s) - 1
+        call add_position(2 * freedoms + s, 2 * freedoms + internal%first(s) + i, self%pattern, next)
+      end do
+      if (self%has_work_integral(s)) then
+        call add_position(2 * freedoms + internal%count + work(internal%element(s)), 2 * freedoms + s, self%pattern, next)
+      end if
+    end do
+  end function new_internal_jacobian
+
+  subroutine add_position(row, column, pattern, next)
+    integer, intent(in) :: row, column
+    type(pattern_t), intent(inout) :: pattern
+    integer, intent(inout) :: next
+
+    pattern%row(next) = row
+    pattern%column(next) = column
+    next = next + 1
+  end subroutine add_position
+
+  !> The values at the positions of `pattern`, from the elements after `differentiate`.
+  subroutine fill(self, elements, dfdy)
+    class(internal_jacobian_t), intent(in) :: self
+    type(elements_t), intent(in) :: elements
+    real(wp), contiguous, intent(inout) :: dfdy(:, :)   !! [lanes, positions]
+    integer :: at, i, s
+
+    at = self%before
+    associate (internal => elements%internal, incidence => self%incidence)
+      do s = 1, internal%count
+        do i = incidence%first(s), incidence%first(s + 1) - 1
+          at = at + 1
+          dfdy(:, at) = incidence%response(:, i) * internal%applied(:, s)
+          if (.not. incidence%has_ratio(i)) cycle
+          at = at + 1
+          dfdy(:, at) = incidence%ratio(:, i) * internal%rate_speed(:, s)
+        end do
+        do i = 1, internal%members(s)
+          dfdy(:, at + i) = internal%rate_internal(:, i, s)
+        end do
+        at = at + internal%members(s)
+        if (.not. self%has_work_integral(s)) cycle
+        at = at + 1
+        dfdy(:, at) = elements%speed(:, internal%element(s)) * internal%applied(:, s)
+      end do
+    end associate
+  end subroutine fill
+
+  !> The responses of one lane anew.
+  pure subroutine refresh_lane(self, lane, incidence, internal)
+    class(internal_jacobian_t), intent(inout) :: self
+    integer, intent(in) :: lane
+    type(element_coordinates_t), intent(in) :: incidence
+    type(internal_states_t), intent(in) :: internal
+
+    call self%incidence%refresh_selected(lane, incidence, internal%element, with_ratio_only=.false.)
+  end subroutine refresh_lane
+
+  subroutine list_parameters(self, parameters)
+    class(internal_jacobian_t), target, intent(inout) :: self
+    type(lane_parameters_t), intent(inout) :: parameters
+
+    call parameters%add_structure(self%pattern%row)
+    call parameters%add_structure(self%pattern%column)
+    call self%incidence%list_parameters(parameters)
+  end subroutine list_parameters
+
+end module nocdyn_internal_jacobian

@@ -1,0 +1,294 @@
+!> The numbers of the lanes of one formulation: all that may differ between variants of a machine, wherever it is held.
+!>
+!> A formulation lists its arrays in a fixed order, its own and those that it has derived from them, and notes beside them
+!> what its layout depends on: which elements are in which bank, which entries the maps have. Where two lists have the same
+!> layout, a lane of one is made that of the other by copying numbers.
+module nocdyn_lane_parameters
+  use, intrinsic :: iso_fortran_env, only: int64
+  use nocdyn_curves, only: curve_t
+  use nocdyn_kinds, only: wp
+  use nocdyn_text, only: string_t
+  implicit none (type, external)
+  private
+
+  integer, parameter :: longest = 24   ! of a name
+
+  !> One array; its lanes are the second dimension.
+  type, public :: parameter_array_t
+    character(len=longest) :: name
+    real(wp), pointer, contiguous :: value(:, :, :) => null()   !! [numbers, lanes, numbers]
+  end type parameter_array_t
+
+  !> Where a number is in a list.
+  type, public :: parameter_index_t
+    integer :: array, row, column
+  end type parameter_index_t
+
+  !> The curves of some elements.
+  type :: curve_array_t
+    type(curve_t), pointer :: curve(:, :) => null()   !! [lanes, elements]
+  end type curve_array_t
+
+  !> What is listed must have the attribute `target` and stay where it is as long as the list is used.
+  type, public :: lane_parameters_t
+    integer :: arrays = 0
+    type(parameter_array_t), allocatable :: array(:)                        !! [slabs], and room
+    integer, private :: curve_arrays = 0
+    type(curve_array_t), allocatable, private :: curve_array(:)   !! [curve_slabs], and room
+    integer, private :: notes = 0
+    integer, allocatable, private :: note(:)                    !! [notes], and room: of the layout
+  contains
+    procedure :: clear
+    generic :: add => add_matrix, add_stack
+    procedure :: add_blocks
+    procedure :: add_curves
+    generic :: add_structure => add_integer, add_integers, add_flag, add_names
+    procedure :: has_same_structure
+    procedure :: copy_lane
+    procedure :: differences
+    procedure :: has_same_curves
+    procedure :: value
+    procedure :: set_value
+    procedure :: name_at
+    procedure, private :: add_matrix, add_stack
+    procedure, private :: add_integer, add_integers, add_flag, add_names
+    procedure, private :: next_array
+  end type lane_parameters_t
+
+contains
+
+  !> Empties the list; the room stays.
+  subroutine clear(self)
+    class(lane_parameters_t), intent(inout) :: self
+
+    if (.not. allocated(self%array)) allocate (self%array(64), self%curve_array(4), self%note(256))
+    self%arrays = 0
+    self%curve_arrays = 0
+    self%notes = 0
+  end subroutine clear
+
+  !> Lists an array [lanes, numbers].
+  subroutine add_matrix(self, name, value)
+    class(lane_parameters_t), intent(inout) :: self
+    character(len=*), intent(in) :: name   !! of a bank's parameter: the key of the input whose values stand there as they are
+    real(wp), contiguous, target, intent(inout) :: value(:, :)
+
+    call self%next_array(name)
+    self%array(self%arrays)%value(1:1, 1:size(value, 1), 1:size(value, 2)) => value
+  end subroutine add_matrix
+
+  !> Lists an array [numbers, lanes, numbers].
+  subroutine add_stack(self, name, value)
+    class(lane_parameters_t), intent(inout) :: self
+    character(len=*), intent(in) :: name
+    real(wp), contiguous, target, intent(inout) :: value(:, :, :)
+
+    call self%next_array(name)
+    self%array(self%arrays)%value => value
+  end subroutine add_stack
+
+  !> Lists an array [numbers, numbers, lanes].
+  subroutine add_blocks(self, name, value)
+    class(lane_parameters_t), intent(inout) :: self
+    character(len=*), intent(in) :: name
+    real(wp), contiguous, target, intent(inout) :: value(:, :, :)
+
+    call self%next_array(name)
+    self%array(self%arrays)%value(1:size(value, 1) * size(value, 2), 1:size(value, 3), 1:1) => value
+    call self%add_structure(shape(value))
+  end subroutine add_blocks
+
+  !> Makes room for one more array.
+  subroutine next_array(self, name)
+    class(lane_parameters_t), intent(inout) :: self
+    character(len=*), intent(in) :: name
+    type(parameter_array_t), allocatable :: longer(:)
+
+    if (self%arrays == size(self%array)) then
+      allocate (longer(2 * self%arrays))
+      longer(:self%arrays) = self%array
+      call move_alloc(longer, self%array)
+    end if
+    self%arrays = self%arrays + 1
+    self%array(self%arrays)%name = name
+  end subroutine next_array
+
+  !> Lists curves [lanes, elements].
+  subroutine add_curves(self, curve)
+    class(lane_parameters_t), intent(inout) :: self
+    type(curve_t), target, intent(inout) :: curve(:, :)
+    type(curve_array_t), allocatable :: longer(:)
+    integer :: e
+
+    if (self%curve_arrays == size(self%curve_array)) then
+      allocate (longer(2 * self%curve_arrays))
+      longer(:self%curve_arrays) = self%curve_array
+      call move_alloc(longer, self%curve_array)
+    end if
+    self%curve_arrays = self%curve_arrays + 1
+    self%curve_array(self%curve_arrays)%curve => curve
+    call self%add_structure([(curve(1, e)%points(), e=1, size(curve, 2))])
+  end subroutine add_curves
+
+  subroutine add_integer(self, note)
+    class(lane_parameters_t), intent(inout) :: self
+    integer, intent(in) :: note
+
+    call self%add_structure([note])
+  end subroutine add_integer
+
+  !> Notes what the layout depends on; how many notes there are is one of them.
+  subroutine add_integers(self, notes)
+    class(lane_parameters_t), intent(inout) :: self
+    integer, intent(in) :: notes(:)
+    integer, allocatable :: longer(:)
+
+    if (self%notes + size(notes) + 1 > size(self%note)) then
+      allocate (longer(2 * (self%notes + size(notes) + 1)))
+      longer(:self%notes) = self%note(:self%notes)
+      call move_alloc(longer, self%note)
+    end if
+    self%note(self%notes + 1) = size(notes)
+    self%note(self%notes + 2:self%notes + 1 + size(notes)) = notes
+    self%notes = self%notes + 1 + size(notes)
+  end subroutine add_integers
+
+  subroutine add_flag(self, note)
+    class(lane_parameters_t), intent(inout) :: self
+    logical, intent(in) :: note
+
+    call self%add_structure([merge(1, 0, note)])
+  end subroutine add_flag
+
+  subroutine add_names(self, names)
+    class(lane_parameters_t), intent(inout) :: self
+    type(string_t), intent(in) :: names(:)
+    integer :: i, k
+
+    do i = 1, size(names)
+      call self%add_structure([(iachar(names(i)%text(k:k)), k=1, len(names(i)%text))])
+    end do
+  end subroutine add_names
+
+  !> Whether two lists have the same layout, but for the number of lanes.
+  pure logical function has_same_structure(self, other)
+    class(lane_parameters_t), intent(in) :: self
+    type(lane_parameters_t), intent(in) :: other
+    integer :: i
+
+    has_same_structure = .false.
+    if (self%arrays /= other%arrays .or. self%curve_arrays /= other%curve_arrays .or. self%notes /= other%notes) return
+    do i = 1, self%notes
+      if (self%note(i) /= other%note(i)) return
+    end do
+    do i = 1, self%arrays
+      associate (here => self%array(i), there => other%array(i))
+        if (size(here%value, 1) /= size(there%value, 1) .or. size(here%value, 3) /= size(there%value, 3)) return
+        if (here%name /= there%name) return
+      end associate
+    end do
+    has_same_structure = .true.
+  end function has_same_structure
+
+  !> Makes a lane that of another list, which is congruent.
+  subroutine copy_lane(self, lane, from, from_lane)
+    class(lane_parameters_t), intent(inout) :: self
+    integer, intent(in) :: lane
+    type(lane_parameters_t), intent(in) :: from
+    integer, intent(in) :: from_lane
+    integer :: e, i, k, s
+
+    do s = 1, self%arrays
+      associate (into => self%array(s)%value, value => from%array(s)%value)
+        do k = 1, size(into, 3)
+          do i = 1, size(into, 1)
+            into(i, lane, k) = value(i, from_lane, k)
+          end do
+        end do
+      end associate
+    end do
+    do s = 1, self%curve_arrays
+      associate (into => self%curve_array(s)%curve, curve => from%curve_array(s)%curve)
+        do e = 1, size(into, 2)
+          into(lane, e) = curve(from_lane, e)
+        end do
+      end associate
+    end do
+  end subroutine copy_lane
+
+  !> Where a lane differs from that of another list, which is congruent, in a single bit; curves are left out.
+  pure function differences(self, lane, other, other_lane) result(indices)
+    class(lane_parameters_t), intent(in) :: self
+    integer, intent(in) :: lane
+    type(lane_parameters_t), intent(in) :: other
+    integer, intent(in) :: other_lane
+    type(parameter_index_t), allocatable :: indices(:)
+    type(parameter_index_t) :: index
+    integer :: found, i, k, pass, s
+
+    do pass = 1, 2   ! to count, and to write down
+      found = 0
+      do s = 1, self%arrays
+        do k = 1, size(self%array(s)%value, 3)
+          do i = 1, size(self%array(s)%value, 1)
+            index = parameter_index_t(s, i, k)
+            if (have_same_bits(self%value(index, lane), other%value(index, other_lane))) cycle
+            found = found + 1
+            if (pass == 2) indices(found) = index
+          end do
+        end do
+      end do
+      if (pass == 1) allocate (indices(found))
+    end do
+  end function differences
+
+  pure logical function have_same_bits(a, b)
+    real(wp), intent(in) :: a, b
+
+    have_same_bits = transfer(a, 0_int64) == transfer(b, 0_int64)
+  end function have_same_bits
+
+  !> Whether a lane has the curves of another list, which is congruent.
+  pure logical function has_same_curves(self, lane, other, other_lane)
+    class(lane_parameters_t), intent(in) :: self
+    integer, intent(in) :: lane
+    type(lane_parameters_t), intent(in) :: other
+    integer, intent(in) :: other_lane
+    integer :: e, s
+
+    has_same_curves = .false.
+    do s = 1, self%curve_arrays
+      do e = 1, size(self%curve_array(s)%curve, 2)
+        if (.not. self%curve_array(s)%curve(lane, e)%is_same(other%curve_array(s)%curve(other_lane, e))) return
+      end do
+    end do
+    has_same_curves = .true.
+  end function has_same_curves
+
+  pure real(wp) function value(self, index, lane)
+    class(lane_parameters_t), intent(in) :: self
+    type(parameter_index_t), intent(in) :: index
+    integer, intent(in) :: lane
+
+    value = self%array(index%array)%value(index%row, lane, index%column)
+  end function value
+
+  subroutine set_value(self, index, lane, value)
+    class(lane_parameters_t), intent(inout) :: self
+    type(parameter_index_t), intent(in) :: index
+    integer, intent(in) :: lane
+    real(wp), intent(in) :: value
+
+    self%array(index%array)%value(index%row, lane, index%column) = value
+  end subroutine set_value
+
+  !> Under which name the array of a number is listed.
+  pure function name_at(self, index) result(name)
+    class(lane_parameters_t), intent(in) :: self
+    type(parameter_index_t), intent(in) :: index
+    character(len=longest) :: name
+
+    name = self%array(index%array)%name
+  end function name_at
+
+end module nocdyn_lane_parameters
