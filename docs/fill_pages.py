@@ -13,6 +13,7 @@ A place lies between <!-- fill: WHAT --> and <!-- filled -->, where WHAT is
 
 Without pages: README.md and all of docs/pages. Names the pages that it changes. Exit codes: 0 done, 1 something asked for is not there.
 """
+
 import argparse
 import re
 import shutil
@@ -79,14 +80,21 @@ def picture(name, folder):
 
 def filled(text, examples=None, tables=None, bench=None):
     """The text with the places filled whose sources are given; the others stay as they are."""
+
     def fill(place):
         what, argument = place.groups(default="")
         source = {"file": ROOT, "run": examples, "table": tables, "bench": bench, "picture": bench}[what]
         if source is None:
             return place[0]
-        content = {"file": lambda name, _: quoted_file(name), "run": quoted_run, "table": table,
-                   "bench": section_of_bench, "picture": picture}[what](argument, source)
+        content = {
+            "file": lambda name, _: quoted_file(name),
+            "run": quoted_run,
+            "table": table,
+            "bench": section_of_bench,
+            "picture": picture,
+        }[what](argument, source)
         return f"<!-- fill: {f'{what} {argument}'.strip()} -->\n\n{content}\n\n<!-- filled -->"
+
     return PLACE.sub(fill, text)
 
 

@@ -5,7 +5,9 @@ usage: search_index.py SITE PAGES
 PAGES holds the pages as FORD has read them. What is found are their sections, then modules, procedures and types by name and summary. The index is
 made here (FORD's own is made in the browser, for every search, and takes minutes to write). Exit code 1: a section has no place in the site.
 """
+
 import html
+import itertools
 import json
 import re
 import shutil
@@ -21,7 +23,7 @@ LIST_ROW = re.compile(r"<tr[^>]*>\s*<td><a href='\.\./([^']+)'>([^<]+)</a></td>.
 MARKUP = re.compile(r"<!--.*?-->|<[^>]+>|\]\([^)]*\)|\[\[|[\[\]]|\$\$|\\[()]|^```\w*$|^[\s|:-]+$|[`*|]", re.MULTILINE | re.DOTALL)
 LISTS = {"modules": "module", "procedures": "procedure", "types": "type", "programs": "program"}
 
-TITLE_BOOST, GUIDE_BOOST = 10, 5   # a heading before text, the guide before the sources
+TITLE_BOOST, GUIDE_BOOST = 10, 5  # a heading before text, the guide before the sources
 FORM = """
             <div class="d-flex align-items-end flex-grow-1">
               <form action="{root}search.html" role="search" class="ms-auto">
@@ -45,13 +47,18 @@ def slug(heading):
 def sections_of(name, text):
     """What there is to find in a page: the part before the first heading, and that below each heading."""
     title = re.match(r"title: *(.*)", text)[1]
-    blank = FENCED.sub(lambda block: " " * len(block[0]), text)   # comments in code are no headings
+    blank = FENCED.sub(lambda block: " " * len(block[0]), text)  # comments in code are no headings
     starts = [match.start() for match in HEADING.finditer(blank)] + [len(text)]
     url = f"page/{name.removesuffix('.md')}.html"
-    yield {"url": url, "title": title, "part": "guide", "text": plain(text[text.index("\n"):starts[0]])}
-    for first, last in zip(starts, starts[1:]):
+    yield {"url": url, "title": title, "part": "guide", "text": plain(text[text.index("\n") : starts[0]])}
+    for first, last in itertools.pairwise(starts):
         heading = HEADING.match(text, first)
-        yield {"url": f"{url}#{slug(heading[1])}", "title": plain(heading[1]), "part": title, "text": plain(text[heading.end():last])}
+        yield {
+            "url": f"{url}#{slug(heading[1])}",
+            "title": plain(heading[1]),
+            "part": title,
+            "text": plain(text[heading.end() : last]),
+        }
 
 
 def sources_of(site):
@@ -66,8 +73,13 @@ def sources_of(site):
 
 def index_of(documents):
     """A lunr index of the documents, which are known in it by their numbers."""
-    numbered = [({"id": number, "title": document["title"], "names": document["title"].replace("_", " "), "text": document["text"]},
-                 {"boost": GUIDE_BOOST if document["url"].startswith("page/") else 1}) for number, document in enumerate(documents)]
+    numbered = [
+        (
+            {"id": number, "title": document["title"], "names": document["title"].replace("_", " "), "text": document["text"]},
+            {"boost": GUIDE_BOOST if document["url"].startswith("page/") else 1},
+        )
+        for number, document in enumerate(documents)
+    ]
     fields = [{"field_name": "title", "boost": TITLE_BOOST}, {"field_name": "names", "boost": TITLE_BOOST // 2}, "text"]
     return lunr(ref="id", fields=fields, documents=numbered)
 
@@ -97,11 +109,15 @@ def add_form(site):
 
 
 def main(site, pages):
-    documents = [section for page in sorted(pages.glob("*.md")) for section in sections_of(page.name, page.read_text(encoding="utf-8"))]
+    documents = [
+        section for page in sorted(pages.glob("*.md")) for section in sections_of(page.name, page.read_text(encoding="utf-8"))
+    ]
     check_anchors(site, documents)
     documents += sources_of(site)
     (site / "search").mkdir(exist_ok=True)
-    data = json.dumps({"documents": documents, "index": index_of(documents).serialize()}, ensure_ascii=False, separators=(",", ":"))
+    data = json.dumps(
+        {"documents": documents, "index": index_of(documents).serialize()}, ensure_ascii=False, separators=(",", ":")
+    )
     (site / "search" / "index.js").write_text(f"const site = {data}\n", encoding="utf-8")
     shutil.copy(Path(__file__).with_name("search.js"), site / "search")
     add_form(site)

@@ -5,6 +5,7 @@ usage: self_contained.py SITE
 The copies come from the Debian packages libjs-bootstrap5, libjs-lunr and libjs-mathjax (scripts/setup docs). Exit code 1: the pages load
 something that this script does not know, or a package is missing.
 """
+
 import os
 import pathlib
 import re
@@ -13,15 +14,23 @@ import sys
 
 INSTALLED = pathlib.Path("/usr/share/javascript")
 COPIES = [
-    "bootstrap5/css/bootstrap.min.css", "bootstrap5/js/bootstrap.bundle.min.js", "lunr/lunr.js", "mathjax/MathJax.js",
-    "mathjax/config/TeX-AMS-MML_SVG.js", "mathjax/extensions", "mathjax/jax/element", "mathjax/jax/input/TeX",
-    "mathjax/jax/output/SVG/autoload", "mathjax/jax/output/SVG/fonts/TeX", "mathjax/jax/output/SVG/jax.js",
+    "bootstrap5/css/bootstrap.min.css",
+    "bootstrap5/js/bootstrap.bundle.min.js",
+    "lunr/lunr.js",
+    "mathjax/MathJax.js",
+    "mathjax/config/TeX-AMS-MML_SVG.js",
+    "mathjax/extensions",
+    "mathjax/jax/element",
+    "mathjax/jax/input/TeX",
+    "mathjax/jax/output/SVG/autoload",
+    "mathjax/jax/output/SVG/fonts/TeX",
+    "mathjax/jax/output/SVG/jax.js",
 ]
 LOCAL = {
     "bootstrap.min.css": "bootstrap5/css/bootstrap.min.css",
     "bootstrap.bundle.min.js": "bootstrap5/js/bootstrap.bundle.min.js",
     "lunr.js": "lunr/lunr.js",
-    "MathJax.js": "mathjax/MathJax.js?config=TeX-AMS-MML_SVG",   # formulas as SVG need no font files
+    "MathJax.js": "mathjax/MathJax.js?config=TeX-AMS-MML_SVG",  # formulas as SVG need no font files
 }
 LOADED = re.compile(r"<(?:script|link)\b[^>]*\"https?://[^>]*>")
 ADDRESS = re.compile(r'"https?://[^"?]*/([^"/?]+)[^"]*"')
@@ -39,8 +48,10 @@ def copy_libraries(target):
 
 def localised(html, libraries):
     """The page with links to the copies; KeyError names what has none."""
+
     def local(tag):
         return INTEGRITY.sub("", ADDRESS.sub(lambda address: f'"{libraries}/{LOCAL[address[1]]}"', tag[0]))
+
     return LOADED.sub(local, html)
 
 

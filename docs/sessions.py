@@ -6,6 +6,7 @@ In a block of code, a line that begins with '$ ' is a command; the lines up to t
 of the page, in a new folder that has the project's folders docs, input and scripts in it. This script runs them with the program NOCDYN and writes
 their output into the pages. Exit code 1: a command failed that had not failed before.
 """
+
 import os
 import re
 import subprocess
@@ -18,7 +19,7 @@ BLOCK = re.compile(r"^```(?:text)?\n(\$ .*?)^```$", re.MULTILINE | re.DOTALL)
 COMMAND = re.compile(r"^\$ ((?:.*\\\n)*.*)\n((?:(?!\$ ).*\n)*)", re.MULTILINE)
 TIME = re.compile(r"[\d.e+-]+(?= (?:ms|s|per second)\b)")
 NUMBER = re.compile(r"[+-]?\d[\d.]*(?:[eE][+-]?\d+)?")
-SAME = {"relative": 1e-4, "absolute": 1e-8}   # the output has seven digits; sums that should be 0 are rounding errors
+SAME = {"relative": 1e-4, "absolute": 1e-8}  # the output has seven digits; sums that should be 0 are rounding errors
 
 
 def sessions_of(page):
@@ -31,7 +32,7 @@ def make_folder(folder, nocdyn):
     for name in ("docs", "input"):
         (folder / name).symlink_to(ROOT / name)
     (folder / "scripts").mkdir()
-    for script in ("plot", "plot_modes", "plot_sweep"):   # without the installation of packages
+    for script in ("plot", "plot_modes", "plot_sweep"):  # without the installation of packages
         module = re.search(r"-m (\S+)", (ROOT / "scripts" / script).read_text(encoding="utf-8"))[1]
         stand_in = folder / "scripts" / script
         stand_in.write_text(f'#!/bin/sh\nPYTHONPATH={ROOT}/scripts exec {sys.executable} -m {module} "$@"\n', encoding="utf-8")
@@ -41,8 +42,16 @@ def make_folder(folder, nocdyn):
 
 def output_of(command, folder, environment):
     """What a command prints, on both streams."""
-    return subprocess.run(["bash", "-c", command], cwd=folder, env=environment, text=True, check=False,
-                          stdout=subprocess.PIPE, stderr=subprocess.STDOUT, stdin=subprocess.DEVNULL).stdout
+    return subprocess.run(
+        ["bash", "-c", command],
+        cwd=folder,
+        env=environment,
+        text=True,
+        check=False,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        stdin=subprocess.DEVNULL,
+    ).stdout
 
 
 def is_same(shown, seen):

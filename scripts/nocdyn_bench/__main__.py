@@ -28,12 +28,27 @@ def main() -> None:
     parser.add_argument("workloads", nargs="*", metavar="WORKLOAD", help=f"{', '.join(WORKLOADS)} (all of them)")
     parser.add_argument("--rounds", type=int, metavar="N", help="how often each contestant takes its turn (15, quick: 3)")
     parser.add_argument("--quick", action="store_true", help="fewer rounds, tolerances and slow peers")
-    parser.add_argument("--build", type=Path, default=ROOT / "build" / "release", metavar="DIR",
-                        help="where the programs were built (%(default)s)")
-    parser.add_argument("--plain", type=Path, default=ROOT / "build" / "plain" / "bench", metavar="DIR",
-                        help="programs for processors with AVX2, whose instructions are counted (%(default)s)")
-    parser.add_argument("--out", type=Path, default=ROOT / "results" / "bench", metavar="DIR",
-                        help="where bench.md, bench.json and the figures go (%(default)s)")
+    parser.add_argument(
+        "--build",
+        type=Path,
+        default=ROOT / "build" / "release",
+        metavar="DIR",
+        help="where the programs were built (%(default)s)",
+    )
+    parser.add_argument(
+        "--plain",
+        type=Path,
+        default=ROOT / "build" / "plain" / "bench",
+        metavar="DIR",
+        help="programs for processors with AVX2, whose instructions are counted (%(default)s)",
+    )
+    parser.add_argument(
+        "--out",
+        type=Path,
+        default=ROOT / "results" / "bench",
+        metavar="DIR",
+        help="where bench.md, bench.json and the figures go (%(default)s)",
+    )
     arguments = parser.parse_args()
     names = arguments.workloads or list(WORKLOADS)
     unknown = [name for name in names if name not in WORKLOADS]
@@ -46,8 +61,13 @@ def main() -> None:
     measured = []
     with tempfile.TemporaryDirectory() as folder:
         scratch = Path(folder)
-        bench = Bench(arguments.build / "bin" / "nocdyn", Programs(arguments.build / "bench", scratch), arguments.plain, scratch,
-                      arguments.quick)
+        bench = Bench(
+            arguments.build / "bin" / "nocdyn",
+            Programs(arguments.build / "bench", scratch),
+            arguments.plain,
+            scratch,
+            arguments.quick,
+        )
         try:
             for name in names:
                 measured.append(WORKLOADS[name](bench))

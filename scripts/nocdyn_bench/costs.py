@@ -106,17 +106,39 @@ def step_costs(sweeping: Sweeping, plain: Path, cases: list[Case], rounds: int) 
         fast = sweeping.best(rounds, case, VARIANTS, 2048)
         few, more = (count_instructions(sweeping, plain, case, variants) for variants in (FEW, MORE))
         steps, flops = more.steps - few.steps, (more.flops - few.flops) / (MORE - FEW)
-        rows.append([f"`{case.method}`", f"{case.tolerance:.1e}", str(fast.lanes), f"{fast.steps / VARIANTS:.1f}",
-                     f"{(more.flops - few.flops) / steps:.0f}", f"{(more.instructions - few.instructions) / steps:.0f}",
-                     f"{1e9 * fast.compute / fast.steps:.0f}", f"{1e-9 * flops * fast.rate:.1f}", f"{flops * fast.rate / peak:.0%}"])
-    head = ["method", "tolerance", "lanes", "steps of a variant", "operations in a step", "instructions in a step", "ns for a step",
-            "Gflop/s", "share of the peak"]
-    return [*table(head, rows), "",
-            "A step is that of one lane, its share of starting variants and following statistics included. Operations are additions, "
-            "subtractions, multiplications, divisions and square roots of doubles, counted by valgrind from the instructions that "
-            f"{MORE - FEW} variants execute, in a program for AVX2 (four doubles in a register); times are those of the program for "
-            "this processor. The peak is that of a loop of unfused additions and multiplications in registers, measured here: "
-            f"{1e-9 * peak:.0f} Gflop/s."]
+        rows.append(
+            [
+                f"`{case.method}`",
+                f"{case.tolerance:.1e}",
+                str(fast.lanes),
+                f"{fast.steps / VARIANTS:.1f}",
+                f"{(more.flops - few.flops) / steps:.0f}",
+                f"{(more.instructions - few.instructions) / steps:.0f}",
+                f"{1e9 * fast.compute / fast.steps:.0f}",
+                f"{1e-9 * flops * fast.rate:.1f}",
+                f"{flops * fast.rate / peak:.0%}",
+            ]
+        )
+    head = [
+        "method",
+        "tolerance",
+        "lanes",
+        "steps of a variant",
+        "operations in a step",
+        "instructions in a step",
+        "ns for a step",
+        "Gflop/s",
+        "share of the peak",
+    ]
+    return [
+        *table(head, rows),
+        "",
+        "A step is that of one lane, its share of starting variants and following statistics included. Operations are additions, "
+        "subtractions, multiplications, divisions and square roots of doubles, counted by valgrind from the instructions that "
+        f"{MORE - FEW} variants execute, in a program for AVX2 (four doubles in a register); times are those of the program for "
+        "this processor. The peak is that of a loop of unfused additions and multiplications in registers, measured here: "
+        f"{1e-9 * peak:.0f} Gflop/s.",
+    ]
 
 
 def chunk_costs(sweeping: Sweeping, case: Case, has_mpi: bool, rounds: int) -> list[str]:
@@ -126,27 +148,52 @@ def chunk_costs(sweeping: Sweeping, case: Case, has_mpi: bool, rounds: int) -> l
     rows = []
     for cost, message in zip(costs, messages):
         own = 1e6 * (cost.compute - cost.variants / fastest) / cost.chunks
-        rows.append([str(cost.chunk), f"{cost.rate:.3g}", f"{cost.rate / fastest:.0%}", f"{own:.0f}",
-                     f"{1e6 * cost.hand_out / cost.chunks:.2f}", f"{1e6 * cost.journal / cost.chunks:.1f}", str(cost.bytes),
-                     f"{1e6 * message:.1f}" if has_mpi else "-"])
-    head = ["variants in a chunk", "variants per second", "efficiency", "start and end, us", "hand-out, us", "journal, us", "bytes",
-            "messages, us"]
-    return [*table(head, rows), "",
-            f"`{case.method}`, {costs[0].lanes} lanes, one thread. Start and end: what the lanes that begin together and run empty one by "
-            "one cost, beside the fastest chunk. Hand-out: lock and books. Journal: packing, checksum, one write. Messages: request, "
-            "answer, results and time between two ranks on this machine, without the work of either.", "",
-            scaling_out(costs[-1], messages[-1], fastest)]
+        rows.append(
+            [
+                str(cost.chunk),
+                f"{cost.rate:.3g}",
+                f"{cost.rate / fastest:.0%}",
+                f"{own:.0f}",
+                f"{1e6 * cost.hand_out / cost.chunks:.2f}",
+                f"{1e6 * cost.journal / cost.chunks:.1f}",
+                str(cost.bytes),
+                f"{1e6 * message:.1f}" if has_mpi else "-",
+            ]
+        )
+    head = [
+        "variants in a chunk",
+        "variants per second",
+        "efficiency",
+        "start and end, us",
+        "hand-out, us",
+        "journal, us",
+        "bytes",
+        "messages, us",
+    ]
+    return [
+        *table(head, rows),
+        "",
+        f"`{case.method}`, {costs[0].lanes} lanes, one thread. Start and end: what the lanes that begin together and run empty one by "
+        "one cost, beside the fastest chunk. Hand-out: lock and books. Journal: packing, checksum, one write. Messages: request, "
+        "answer, results and time between two ranks on this machine, without the work of either.",
+        "",
+        scaling_out(costs[-1], messages[-1], fastest),
+    ]
 
 
 def scaling_out(cost: Cost, message: float | None, rate: float) -> str:
     """What the largest chunk says of many workers."""
     journal = cost.journal / cost.variants
-    text = (f"A chunk is made to take {CHUNK_SECONDS} s, which are {CHUNK_SECONDS * rate:.0f} variants here, but has at most "
-            f"{MOST_AT_ONCE}. In the journal a variant takes {1e6 * journal:.2g} us, beside {1e6 / rate:.3g} us for its integration")
+    text = (
+        f"A chunk is made to take {CHUNK_SECONDS} s, which are {CHUNK_SECONDS * rate:.0f} variants here, but has at most "
+        f"{MOST_AT_ONCE}. In the journal a variant takes {1e6 * journal:.2g} us, beside {1e6 / rate:.3g} us for its integration"
+    )
     if message is not None:
         both = journal + message / cost.chunk
-        text += (f", and {1e6 * message / cost.chunk:.2g} us in messages. Rank 0, which does both for all others, has nothing but "
-                 f"that to do at about {1 / (rate * both):.0f} ranks of one thread")
+        text += (
+            f", and {1e6 * message / cost.chunk:.2g} us in messages. Rank 0, which does both for all others, has nothing but "
+            f"that to do at about {1 / (rate * both):.0f} ranks of one thread"
+        )
     return text + ". Variants that take longer move that limit out in proportion."
 
 
@@ -159,8 +206,14 @@ class Executed:
 
 def count_instructions(sweeping: Sweeping, plain: Path, case: Case, variants: int) -> Executed:
     profile = sweeping.scratch / "callgrind.out"
-    valgrind = ("valgrind", "--tool=callgrind", "--dump-instr=yes", "--compress-pos=no", "--compress-strings=no",
-                f"--callgrind-out-file={profile}")
+    valgrind = (
+        "valgrind",
+        "--tool=callgrind",
+        "--dump-instr=yes",
+        "--compress-pos=no",
+        "--compress-strings=no",
+        f"--callgrind-out-file={profile}",
+    )
     steps = sweeping.run(case, variants, variants, valgrind, plain).steps
     program = plain / "chunk_costs"
     counts = executions(profile.read_text(encoding="utf-8"), program.name)
@@ -188,8 +241,9 @@ def executions(profile: str, program: str) -> Counter:
 def operations(disassembly: str) -> Counter:
     """Operations on doubles of each instruction, by address."""
     weights = Counter()
-    for address, name, operands in re.findall(r"^\s*([0-9a-f]+):\s+(v?(?:add|sub|mul|div|sqrt|fn?m(?:add|sub)\d+)[ps]d)\s+(.*)$",
-                                              disassembly, re.MULTILINE):
+    for address, name, operands in re.findall(
+        r"^\s*([0-9a-f]+):\s+(v?(?:add|sub|mul|div|sqrt|fn?m(?:add|sub)\d+)[ps]d)\s+(.*)$", disassembly, re.MULTILINE
+    ):
         width = 1 if name.endswith("sd") else 8 if "zmm" in operands else 4 if "ymm" in operands else 2
         weights[int(address, 16)] = width * (2 if "fm" in name or "fnm" in name else 1)
     return weights

@@ -5,7 +5,6 @@ from pathlib import Path
 
 from matplotlib import pyplot
 from matplotlib.axes import Axes
-
 from nocdyn_report.style import COLOURS, REFERENCE, add_title, save
 
 from .chains import Scaling
@@ -23,8 +22,14 @@ def styles(labels: Sequence[str]) -> dict[str, dict]:
     for i, label in enumerate(own):
         found[label] = {"color": COLOURS[i % len(COLOURS)], "marker": MARKERS[i], "linewidth": 1.8, "markersize": 5}
     for i, label in enumerate(others):
-        found[label] = {"color": COLOURS[-1 - i % len(COLOURS)], "marker": MARKERS[i % len(MARKERS)], "linewidth": 0.8,
-                        "linestyle": (0, (4, 2)), "markersize": 4, "markerfacecolor": "white"}
+        found[label] = {
+            "color": COLOURS[-1 - i % len(COLOURS)],
+            "marker": MARKERS[i % len(MARKERS)],
+            "linewidth": 0.8,
+            "linestyle": (0, (4, 2)),
+            "markersize": 4,
+            "markerfacecolor": "white",
+        }
     return found
 
 
@@ -33,8 +38,12 @@ def draw_work_precision(workload: WorkPrecision, folder: Path) -> None:
     drawn = styles([contestant.label for contestant in workload.contestants])
     for contestant in workload.contestants:
         points = [point for point in workload.points_of(contestant) if 0.0 < point.errors["states"] < 1e3]
-        axes.loglog([point.errors["states"] for point in points], [1e3 * point.seconds for point in points],
-                    label=contestant.label, **drawn[contestant.label])
+        axes.loglog(
+            [point.errors["states"] for point in points],
+            [1e3 * point.seconds for point in points],
+            label=contestant.label,
+            **drawn[contestant.label],
+        )
     for error in workload.errors_wanted:
         axes.axvline(error, **REFERENCE)
     axes.set_xlim(right=min(axes.get_xlim()[1], 1.0))
@@ -51,8 +60,12 @@ def draw_scaling(workload: Scaling, folder: Path) -> None:
     for label in workload.labels:
         found = [(chain.bodies, workload.point(chain, label)) for chain in workload.chains]
         found = [(bodies, point) for bodies, point in found if point]
-        axes.loglog([bodies for bodies, _ in found], [1e6 * point.seconds / bodies for bodies, point in found],
-                    label=label, **drawn[label])
+        axes.loglog(
+            [bodies for bodies, _ in found],
+            [1e6 * point.seconds / bodies for bodies, point in found],
+            label=label,
+            **drawn[label],
+        )
     axes.set_xlabel("rotors N")
     axes.set_ylabel("time / N [us]: level if the time is linear in N")
     _finish(axes, workload.title)

@@ -16,8 +16,13 @@ from .problems import Case2
 from .scale import WITH_MEMORY
 from .variants import RANGES, TARGETS, Found, SweepContestant
 
-RECORDS = {"omega_motor": "final", "omega_pinion": "final", "phi_motor": "final", "phi_pinion": "final",
-           "moment_coupling": "max_abs"}
+RECORDS = {
+    "omega_motor": "final",
+    "omega_pinion": "final",
+    "phi_motor": "final",
+    "phi_pinion": "final",
+    "moment_coupling": "max_abs",
+}
 MPIRUN = ["mpirun", "--allow-run-as-root", "--oversubscribe", "--bind-to", "none"]
 MOST_WORDS = 40  # of the message of a program that fails
 
@@ -73,18 +78,27 @@ class Sweeper:
         shutil.rmtree(out, ignore_errors=True)
         write_input(file, design)
         program = [*MPIRUN, "-n", str(self.ranks), self.folder / "nocdyn-mpi"] if self.ranks else [self.folder / "nocdyn"]
-        settings = [word for name, value in (("method", self.method), ("rtol", repr(tolerance)), ("atol", repr(tolerance)))
-                    for word in ("--set", f"run.{name}={value}")]
-        done = subprocess.run([*before, *program, "sweep", file, "--out", out, "--threads", str(self.threads), "--quiet", *settings,
-                               *options], capture_output=True, text=True, stdin=subprocess.DEVNULL)
+        settings = [
+            word
+            for name, value in (("method", self.method), ("rtol", repr(tolerance)), ("atol", repr(tolerance)))
+            for word in ("--set", f"run.{name}={value}")
+        ]
+        done = subprocess.run(
+            [*before, *program, "sweep", file, "--out", out, "--threads", str(self.threads), "--quiet", *settings, *options],
+            capture_output=True,
+            text=True,
+            stdin=subprocess.DEVNULL,
+        )
         if done.returncode != 0:
             raise ContestantError(" ".join(done.stderr.split()[:MOST_WORDS]))
         return out, done.stdout
 
 
 def random_design(count: int) -> list[str]:
-    return [f"&sweep design = 'random' samples = {count} seed = 1 /",
-            *(f"&vary target = '{target}' low = {low} high = {high} /" for target, (low, high) in zip(TARGETS, RANGES))]
+    return [
+        f"&sweep design = 'random' samples = {count} seed = 1 /",
+        *(f"&vary target = '{target}' low = {low} high = {high} /" for target, (low, high) in zip(TARGETS, RANGES)),
+    ]
 
 
 def write_input(file: Path, design: list[str], settings: str = "") -> None:

@@ -88,11 +88,17 @@ class Chain:
 
     def write_input(self, file: Path) -> None:
         lines = [f"&body name = 'r{i}' inertia = 1.0 /" for i in range(self.bodies)]
-        lines += [f"&coupling name = 'c{i}' bodies = 'r{i}', 'r{i + 1}' stiffness = {self.stiffness} "
-                  f"cubic_stiffness = {self.cubic_stiffness} damping = {self.damping} /" for i in range(self.bodies - 1)]
-        lines += [f"&motor name = 'drive' body = 'r0' a = {self.torque} b = 0.0 c = 0.0 /",
-                  f"&load name = 'work' body = 'r{self.bodies - 1}' viscous = {self.viscous} /",
-                  f"&run t_end = {self.t_end} /", "&output points = 2 /"]
+        lines += [
+            f"&coupling name = 'c{i}' bodies = 'r{i}', 'r{i + 1}' stiffness = {self.stiffness} "
+            f"cubic_stiffness = {self.cubic_stiffness} damping = {self.damping} /"
+            for i in range(self.bodies - 1)
+        ]
+        lines += [
+            f"&motor name = 'drive' body = 'r0' a = {self.torque} b = 0.0 c = 0.0 /",
+            f"&load name = 'work' body = 'r{self.bodies - 1}' viscous = {self.viscous} /",
+            f"&run t_end = {self.t_end} /",
+            "&output points = 2 /",
+        ]
         file.write_text("\n".join(lines) + "\n")
 
 

@@ -35,13 +35,23 @@ class Programs:
             self.inputs[problem] = self.scratch / f"machine_{len(self.inputs)}.nml"
             problem.write_input(self.inputs[problem])
         known = self.methods()
-        return [Contestant(f"nocdyn {method}", "the machine from its input file, reduced formulation, energy audit off",
-                           self._solve(problem, ["nocdyn_workloads", self.inputs[problem], method], []), is_nocdyn=True)
-                for method in methods if method in known]
+        return [
+            Contestant(
+                f"nocdyn {method}",
+                "the machine from its input file, reduced formulation, energy audit off",
+                self._solve(problem, ["nocdyn_workloads", self.inputs[problem], method], []),
+                is_nocdyn=True,
+            )
+            for method in methods
+            if method in known
+        ]
 
     def handwritten(self) -> Contestant:
-        return Contestant("hand-written loop", "Dormand-Prince 5(4) for this machine alone, bench/handwritten.f90",
-                          self._solve(Case2(), ["handwritten"], [], selects=False))
+        return Contestant(
+            "hand-written loop",
+            "Dormand-Prince 5(4) for this machine alone, bench/handwritten.f90",
+            self._solve(Case2(), ["handwritten"], [], selects=False),
+        )
 
     def sundials(self, problem: Problem, solvers: list[str]) -> list[Contestant]:
         notes = {
@@ -53,21 +63,30 @@ class Programs:
         }
         if not self.has("sundials_workloads"):
             return []
-        return [Contestant(*notes[solver],
-                           self._solve(problem, ["sundials_workloads", solver], problem.words, selects=False))
-                for solver in solvers]
+        return [
+            Contestant(*notes[solver], self._solve(problem, ["sundials_workloads", solver], problem.words, selects=False))
+            for solver in solvers
+        ]
 
     def handwritten_sweep(self) -> SweepContestant:
-        return SweepContestant("hand-written loop", "Dormand-Prince 5(4) for this machine alone, one variant after the other, peaks "
-                               "from its dense output, bench/handwritten_sweep.f90", self._solve_all(["handwritten_sweep"], [], []))
+        return SweepContestant(
+            "hand-written loop",
+            "Dormand-Prince 5(4) for this machine alone, one variant after the other, peaks "
+            "from its dense output, bench/handwritten_sweep.f90",
+            self._solve_all(["handwritten_sweep"], [], []),
+        )
 
     def sundials_sweep(self, solvers: list[str]) -> list[SweepContestant]:
-        notes = {"adams": ("CVODE Adams", "fixed-point iteration, peaks by CVodeRootInit"),
-                 "erk5": ("ARKODE ERK 5(4)", "Dormand-Prince, peaks by ERKStepRootInit")}
+        notes = {
+            "adams": ("CVODE Adams", "fixed-point iteration, peaks by CVodeRootInit"),
+            "erk5": ("ARKODE ERK 5(4)", "Dormand-Prince, peaks by ERKStepRootInit"),
+        }
         if not self.has("sundials_workloads"):
             return []
-        return [SweepContestant(*notes[solver], self._solve_all(["sundials_workloads", solver], ["1"], ["sweep"]), share=0.02)
-                for solver in solvers]
+        return [
+            SweepContestant(*notes[solver], self._solve_all(["sundials_workloads", solver], ["1"], ["sweep"]), share=0.02)
+            for solver in solvers
+        ]
 
     def _solve_all(self, head: list, before: list[str], after: list[str]) -> SolveAll:
         """`before` and `after` the name of the file with the results; that with the parameters comes last."""
@@ -75,10 +94,19 @@ class Programs:
 
         def solve(tolerance: float, parameters: np.ndarray) -> Found:
             parameters.tofile(parameters_file)
-            command = [self.folder / head[0], *head[1:], repr(tolerance), repr(tolerance), *before, results_file, *after,
-                       parameters_file]
-            done = subprocess.run(command, capture_output=True, text=True, stdin=subprocess.DEVNULL,
-                                  env={**os.environ, "OMP_NUM_THREADS": "1"})
+            command = [
+                self.folder / head[0],
+                *head[1:],
+                repr(tolerance),
+                repr(tolerance),
+                *before,
+                results_file,
+                *after,
+                parameters_file,
+            ]
+            done = subprocess.run(
+                command, capture_output=True, text=True, stdin=subprocess.DEVNULL, env={**os.environ, "OMP_NUM_THREADS": "1"}
+            )
             if done.returncode != 0:
                 raise ContestantError(" ".join(done.stderr.split()[:MOST_WORDS]))
             return Found(json.loads(done.stdout)["seconds"][0], np.fromfile(results_file).reshape(-1, 5))

@@ -18,8 +18,13 @@ from .whole_process import Workload, largest_error
 from .work_precision import WorkPrecision
 
 PEERS = ("heyoka", "numbalsoda", "numba", "scipy", "numpy")
-VERDICTS = {"W1": targets.case2_verdicts, "W2": targets.throughput_verdicts, "W4": targets.stiff_case2_verdicts,
-            "W3": targets.chain_verdicts, "W3_stiff": targets.stiff_chain_verdicts}
+VERDICTS = {
+    "W1": targets.case2_verdicts,
+    "W2": targets.throughput_verdicts,
+    "W4": targets.stiff_case2_verdicts,
+    "W3": targets.chain_verdicts,
+    "W3_stiff": targets.stiff_chain_verdicts,
+}
 
 
 Measured = Workload | WorkPrecision | Scaling | Throughput | Costs
@@ -48,20 +53,31 @@ def write_report(measured: list, folder: Path, build: Path) -> None:
     """Leaves bench.md and bench.json in the folder."""
     folder.mkdir(parents=True, exist_ok=True)
     machine = describe_machine(build)
-    sections = ["# Benchmarks", "\n".join(f"- {name}: {text}" for name, text in machine.items()),
-                "Times are the shortest of all rounds, taken in turns, in process unless the title says otherwise: start-up and "
-                "compilation do not count, nor does nocdyn's energy audit, which the others have not. Ratios travel to other machines, milliseconds do not."]
+    sections = [
+        "# Benchmarks",
+        "\n".join(f"- {name}: {text}" for name, text in machine.items()),
+        "Times are the shortest of all rounds, taken in turns, in process unless the title says otherwise: start-up and "
+        "compilation do not count, nor does nocdyn's energy audit, which the others have not. Ratios travel to other machines, milliseconds do not.",
+    ]
     reached = [f"- {verdict}" for workload in measured for verdict in verdicts(workload)]
     if reached:
         sections.append("## Targets\n\n" + "\n".join(reached))
     ratios = ratio_table(measured)
     if ratios:
-        sections.append("## Ratios\n\nTime as a multiple of the fastest method of nocdyn; below 1 is faster than nocdyn.\n\n" + ratios)
+        sections.append(
+            "## Ratios\n\nTime as a multiple of the fastest method of nocdyn; below 1 is faster than nocdyn.\n\n" + ratios
+        )
     sections += map(markdown, measured)
     (folder / "bench.md").write_text("\n\n".join(sections) + "\n", encoding="utf-8")
-    content = {"machine": machine, "workloads": {workload.name: _content(workload) for workload in measured},
-               "targets": [{"sentence": verdict.sentence, "reached": verdict.is_reached}
-                           for workload in measured for verdict in verdicts(workload)]}
+    content = {
+        "machine": machine,
+        "workloads": {workload.name: _content(workload) for workload in measured},
+        "targets": [
+            {"sentence": verdict.sentence, "reached": verdict.is_reached}
+            for workload in measured
+            for verdict in verdicts(workload)
+        ],
+    }
     (folder / "bench.json").write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
 
 
@@ -130,14 +146,17 @@ def ratio_table(measured: list) -> str:
         if isinstance(workload, WorkPrecision):
             for error in workload.errors_wanted:
                 columns[f"{workload.name}, error {error:.0e}"] = {
-                    contestant.label: workload.time_at(contestant, error) for contestant in workload.contestants}
+                    contestant.label: workload.time_at(contestant, error) for contestant in workload.contestants
+                }
         elif isinstance(workload, Scaling):
             for chain in workload.chains:
                 columns[f"{workload.name}, N = {chain.bodies}"] = {
-                    point.contestant.label: point.seconds for point in workload.points[chain]}
+                    point.contestant.label: point.seconds for point in workload.points[chain]
+                }
         elif isinstance(workload, Throughput):
             columns[f"{workload.name}, error {workload.error_wanted:.0e}"] = {
-                rate.contestant.label: 1.0 / rate.best for rate in workload.rates if rate.contestant.has_peak}
+                rate.contestant.label: 1.0 / rate.best for rate in workload.rates if rate.contestant.has_peak
+            }
     labels = list(dict.fromkeys(label for column in columns.values() for label in column))
     rows = [[label] for label in labels]
     for column in columns.values():
@@ -153,9 +172,12 @@ def _milliseconds(seconds: float | None) -> str:
 
 
 def _work_precision(workload: WorkPrecision) -> list[str]:
-    head = ["time, ms", *(f"error {error:.0e}" for error in workload.errors_wanted),
-            *(f"moment {error:.0e}" for error in workload.errors_wanted),
-            *(f"tol {tolerance:.0e} (error)" for tolerance in workload.tolerances_wanted)]
+    head = [
+        "time, ms",
+        *(f"error {error:.0e}" for error in workload.errors_wanted),
+        *(f"moment {error:.0e}" for error in workload.errors_wanted),
+        *(f"tol {tolerance:.0e} (error)" for tolerance in workload.tolerances_wanted),
+    ]
     rows = []
     for contestant in workload.contestants:
         row = [contestant.label]
@@ -165,29 +187,51 @@ def _work_precision(workload: WorkPrecision) -> list[str]:
             point = workload.point_at(contestant, tolerance)
             row.append(f"{_milliseconds(point.seconds)} ({point.errors['states']:.0e})" if point else "-")
         rows.append(row)
-    return [*table(head, rows), "", "Errors are the largest absolute ones, of all states [rad, rad/s] or of the elastic moment [N m], "
-            "over all outputs; times between two tolerances are interpolated, linear in the logarithms; - : not reached before the sweep ends, at the "
-            "first run slower than 2 s (SciPy Radau: 8 s) or the tightest tolerance. rtol = atol.", "",
-            f"Reference: {workload.reference.note}; they differ by {workload.reference.distance:.1e}.", "",
-            *_notes(workload.contestants, workload.failures)]
+    return [
+        *table(head, rows),
+        "",
+        "Errors are the largest absolute ones, of all states [rad, rad/s] or of the elastic moment [N m], "
+        "over all outputs; times between two tolerances are interpolated, linear in the logarithms; - : not reached before the sweep ends, at the "
+        "first run slower than 2 s (SciPy Radau: 8 s) or the tightest tolerance. rtol = atol.",
+        "",
+        f"Reference: {workload.reference.note}; they differ by {workload.reference.distance:.1e}.",
+        "",
+        *_notes(workload.contestants, workload.failures),
+    ]
 
 
 def _scaling(workload: Scaling) -> list[str]:
     rows = []
     for label in workload.labels:
         found = [workload.point(chain, label) for chain in workload.chains]
-        rows.append([label, *(_milliseconds(point.seconds) if point else "-" for point in found),
-                     *(f"{1e6 * point.seconds / chain.bodies:.3g}" if point else "-" for chain, point in zip(workload.chains, found)),
-                     *(f"{point.errors['states']:.0e}" if point else "-" for point in found),
-                     *(_count(point) for point in found)])
+        rows.append(
+            [
+                label,
+                *(_milliseconds(point.seconds) if point else "-" for point in found),
+                *(f"{1e6 * point.seconds / chain.bodies:.3g}" if point else "-" for chain, point in zip(workload.chains, found)),
+                *(f"{point.errors['states']:.0e}" if point else "-" for point in found),
+                *(_count(point) for point in found),
+            ]
+        )
     lengths = [str(chain.bodies) for chain in workload.chains]
-    head = ["N =", *(f"{text}, ms" for text in lengths), *(f"{text}, us/N" for text in lengths),
-            *(f"{text}, error" for text in lengths), *(f"{text}, steps" for text in lengths)]
+    head = [
+        "N =",
+        *(f"{text}, ms" for text in lengths),
+        *(f"{text}, us/N" for text in lengths),
+        *(f"{text}, error" for text in lengths),
+        *(f"{text}, steps" for text in lengths),
+    ]
     references = [f"{chain.bodies}: {reference.distance:.0e}" for chain, reference in workload.references.items()]
     contestants = {contestant.label: contestant for chain in workload.chains for contestant in workload.contestants[chain]}
-    return [*table(head, rows), "", "Errors are the largest absolute ones of the states at the end [rad, rad/s].", "",
-            f"Reference: {next(iter(workload.references.values())).note}; they differ by, at N = {', '.join(references)}.", "",
-            *_notes(list(contestants.values()), workload.failures)]
+    return [
+        *table(head, rows),
+        "",
+        "Errors are the largest absolute ones of the states at the end [rad, rad/s].",
+        "",
+        f"Reference: {next(iter(workload.references.values())).note}; they differ by, at N = {', '.join(references)}.",
+        "",
+        *_notes(list(contestants.values()), workload.failures),
+    ]
 
 
 def _throughput(workload: Throughput) -> list[str]:
@@ -195,22 +239,44 @@ def _throughput(workload: Throughput) -> list[str]:
     rows = []
     for rate in workload.rates:
         whole = workload.whole_rate(rate)
-        rows.append([rate.contestant.label, _rounded(rate.best),
-                     *(f"{rate.best / rival.best:.3g}" if rival else "-" for rival in rivals),
-                     _rounded(whole) if whole else "-", f"{rate.tolerance:.1e}", f"{rate.errors.state:.0e}",
-                     f"{rate.errors.peak:.0e}" if rate.contestant.has_peak else "-", _rounded(rate.variants)])
-    head = ["", "variants per second", "hand-written loop = 1", "heyoka with the peak = 1", "whole process", "tolerance",
-            "error of the state", "error of the peak", "variants"]
-    return [*table(head, rows), "",
-            "Each contestant has the loosest tolerance, in tenths of a decade, with which its errors are below "
-            f"{workload.error_wanted:.0e}: the largest absolute one of the four states at the end [rad, rad/s], and the largest "
-            f"relative one of the peak, of the first {_rounded(SAMPLE)} variants, {SLOW_SAMPLE} of those that integrate a part of the "
-            f"{_rounded(workload.count)} variants. One thread where nothing else is said. Whole process: from its start until the "
-            "files are written.", "",
-            f"Reference: heyoka with 80-bit numbers at tolerance 1e-18; SciPy DOP853 at 1e-13 differs by "
-            f"{workload.distance.state:.1e} and {workload.distance.peak:.1e}.", "",
-            *_memory_lines(workload),
-            *_notes([rate.contestant for rate in workload.rates], workload.failures)]
+        rows.append(
+            [
+                rate.contestant.label,
+                _rounded(rate.best),
+                *(f"{rate.best / rival.best:.3g}" if rival else "-" for rival in rivals),
+                _rounded(whole) if whole else "-",
+                f"{rate.tolerance:.1e}",
+                f"{rate.errors.state:.0e}",
+                f"{rate.errors.peak:.0e}" if rate.contestant.has_peak else "-",
+                _rounded(rate.variants),
+            ]
+        )
+    head = [
+        "",
+        "variants per second",
+        "hand-written loop = 1",
+        "heyoka with the peak = 1",
+        "whole process",
+        "tolerance",
+        "error of the state",
+        "error of the peak",
+        "variants",
+    ]
+    return [
+        *table(head, rows),
+        "",
+        "Each contestant has the loosest tolerance, in tenths of a decade, with which its errors are below "
+        f"{workload.error_wanted:.0e}: the largest absolute one of the four states at the end [rad, rad/s], and the largest "
+        f"relative one of the peak, of the first {_rounded(SAMPLE)} variants, {SLOW_SAMPLE} of those that integrate a part of the "
+        f"{_rounded(workload.count)} variants. One thread where nothing else is said. Whole process: from its start until the "
+        "files are written.",
+        "",
+        f"Reference: heyoka with 80-bit numbers at tolerance 1e-18; SciPy DOP853 at 1e-13 differs by "
+        f"{workload.distance.state:.1e} and {workload.distance.peak:.1e}.",
+        "",
+        *_memory_lines(workload),
+        *_notes([rate.contestant for rate in workload.rates], workload.failures),
+    ]
 
 
 def _memory_lines(workload: Throughput) -> list[str]:
@@ -225,10 +291,16 @@ def _rounded(number: float) -> str:
 
 
 def _rate(workload: Throughput, rate: Rate) -> dict:
-    return {"contestant": rate.contestant.label, "variants_per_second": rate.best, "median_variants_per_second": rate.median,
-            "rounds": len(rate.rounds), "variants": rate.variants, "tolerance": rate.tolerance,
-            "whole_process_variants_per_second": workload.whole_rate(rate),
-            "errors": {"state": rate.errors.state, "peak": rate.errors.peak if math.isfinite(rate.errors.peak) else None}}
+    return {
+        "contestant": rate.contestant.label,
+        "variants_per_second": rate.best,
+        "median_variants_per_second": rate.median,
+        "rounds": len(rate.rounds),
+        "variants": rate.variants,
+        "tolerance": rate.tolerance,
+        "whole_process_variants_per_second": workload.whole_rate(rate),
+        "errors": {"state": rate.errors.state, "peak": rate.errors.peak if math.isfinite(rate.errors.peak) else None},
+    }
 
 
 def _count(point: Point | None) -> str:
@@ -250,8 +322,10 @@ def _whole_process(workload: Workload) -> list[str]:
     ]
     for contestant in workload.contestants:
         error = _error(contestant.trajectory, workload.reference)
-        lines.append(f"| {contestant.label} | {1e3 * contestant.median:.1f} | {1e3 * min(contestant.seconds):.1f} "
-                     f"| {contestant.median / first.median:.2f} | {'' if error is None else f'{error:.1e}'} |")
+        lines.append(
+            f"| {contestant.label} | {1e3 * contestant.median:.1f} | {1e3 * min(contestant.seconds):.1f} "
+            f"| {contestant.median / first.median:.2f} | {'' if error is None else f'{error:.1e}'} |"
+        )
     if workload.target:
         lines += ["", workload.target]
     return lines
@@ -269,8 +343,11 @@ def _content(workload: Measured) -> dict | list:
     if isinstance(workload, Costs):
         return workload.lines
     if isinstance(workload, Throughput):
-        return {"variants": workload.count, "memory_MB": workload.memory,
-                "rates": [_rate(workload, rate) for rate in workload.rates]}
+        return {
+            "variants": workload.count,
+            "memory_MB": workload.memory,
+            "rates": [_rate(workload, rate) for rate in workload.rates],
+        }
     return {
         contestant.label: {"seconds": contestant.seconds, "largest_error": _error(contestant.trajectory, workload.reference)}
         for contestant in workload.contestants
@@ -278,6 +355,14 @@ def _content(workload: Measured) -> dict | list:
 
 
 def _point(point: Point) -> dict:
-    return {"contestant": point.contestant.label, "rtol": point.rtol, "atol": point.atol, "seconds": point.seconds,
-            "median_seconds": point.median, "rounds": len(point.rounds), "steps": point.steps, "evaluations": point.evaluations,
-            "errors": {kind: error if math.isfinite(error) else None for kind, error in point.errors.items()}}
+    return {
+        "contestant": point.contestant.label,
+        "rtol": point.rtol,
+        "atol": point.atol,
+        "seconds": point.seconds,
+        "median_seconds": point.median,
+        "rounds": len(point.rounds),
+        "steps": point.steps,
+        "evaluations": point.evaluations,
+        "errors": {kind: error if math.isfinite(error) else None for kind, error in point.errors.items()},
+    }

@@ -36,13 +36,18 @@ def _gear(i: int, bodies: tuple[str, str]) -> str:
 
 
 def _driven(first: str, last: str) -> list[str]:
-    return [f"&motor name = 'drive' body = '{first}' a = 100.0 b = 0.0 c = 0.0 /",
-            f"&load name = 'work' body = '{last}' viscous = 10.0 /"]
+    return [
+        f"&motor name = 'drive' body = '{first}' a = 100.0 b = 0.0 c = 0.0 /",
+        f"&load name = 'work' body = '{last}' viscous = 10.0 /",
+    ]
 
 
 def chain(n: int, law: str = "") -> list[str]:
-    return [*(_body(f"b{i}") for i in range(n)), *(_coupling(i, (f"b{i}", f"b{i + 1}"), law) for i in range(n - 1)),
-            *_driven("b0", f"b{n - 1}")]
+    return [
+        *(_body(f"b{i}") for i in range(n)),
+        *(_coupling(i, (f"b{i}", f"b{i + 1}"), law) for i in range(n - 1)),
+        *_driven("b0", f"b{n - 1}"),
+    ]
 
 
 def train(n: int) -> list[str]:
@@ -51,8 +56,12 @@ def train(n: int) -> list[str]:
 
 def pairs(n: int) -> list[str]:
     names = [(f"a{i}", f"b{i}") for i in range(n // 2)]
-    return [*(_body(name) for pair in names for name in pair), *(_gear(i, pair) for i, pair in enumerate(names)),
-            *(_coupling(i, (f"b{i}", f"a{i + 1}")) for i in range(n // 2 - 1)), *_driven("a0", names[-1][1])]
+    return [
+        *(_body(name) for pair in names for name in pair),
+        *(_gear(i, pair) for i, pair in enumerate(names)),
+        *(_coupling(i, (f"b{i}", f"a{i + 1}")) for i in range(n // 2 - 1)),
+        *_driven("a0", names[-1][1]),
+    ]
 
 
 @dataclass(frozen=True)
@@ -73,8 +82,16 @@ KINDS = {
 def run(nocdyn: Path, kind: Kind, n: int, method: str, folder: Path, rounds: int) -> tuple[dict, float, float]:
     """The counts, the shortest time of the integration [s] and the largest memory [MB]."""
     file = folder / "machine.nml"
-    file.write_text("\n".join([*kind.lines(n), f"&run t_end = {kind.t_end} method = '{method}' rtol = {RTOL} atol = {ATOL} /",
-                               "&output points = 2 /"]) + "\n")
+    file.write_text(
+        "\n".join(
+            [
+                *kind.lines(n),
+                f"&run t_end = {kind.t_end} method = '{method}' rtol = {RTOL} atol = {ATOL} /",
+                "&output points = 2 /",
+            ]
+        )
+        + "\n"
+    )
     times, memory = [], []
     for _ in range(rounds):
         process = [sys.executable, "-c", WITH_MEMORY, nocdyn, "run", "--quiet", "--out", folder / "out", file]
@@ -96,13 +113,22 @@ def row(nocdyn: Path, name: str, method: str, sizes: list[int], folder: Path, ro
 
 def main() -> None:
     parser = argparse.ArgumentParser(prog="scripts/scale", description=__doc__)
-    parser.add_argument("kinds", nargs="*", metavar="KIND",
-                        help="; ".join(f"{name}: {kind.title}" for name, kind in KINDS.items()) + " (all of them)")
+    parser.add_argument(
+        "kinds",
+        nargs="*",
+        metavar="KIND",
+        help="; ".join(f"{name}: {kind.title}" for name, kind in KINDS.items()) + " (all of them)",
+    )
     parser.add_argument("--methods", nargs="+", choices=METHODS, default=METHODS, metavar="METHOD", help="(%(default)s)")
     parser.add_argument("--sizes", nargs="+", type=int, default=SIZES, metavar="N", help="numbers of bodies (%(default)s)")
     parser.add_argument("--rounds", type=int, default=3, metavar="N", help="of which the shortest time counts (%(default)s)")
-    parser.add_argument("--nocdyn", type=Path, default=ROOT / "build" / "release" / "bin" / "nocdyn", metavar="PATH",
-                        help="the program (%(default)s)")
+    parser.add_argument(
+        "--nocdyn",
+        type=Path,
+        default=ROOT / "build" / "release" / "bin" / "nocdyn",
+        metavar="PATH",
+        help="the program (%(default)s)",
+    )
     arguments = parser.parse_args()
     unknown = [name for name in arguments.kinds if name not in KINDS]
     if unknown:

@@ -21,11 +21,24 @@ RATIO = R1 / R2
 J23 = J2 + RATIO**2 * J3  # of bodies 2 and 3, about the axis of body 2
 
 LABELS = (
-    "t [s]", "phi_motor [rad]", "phi_pinion [rad]", "phi_machine [rad]",
-    "omega_motor [rad/s]", "omega_pinion [rad/s]", "omega_machine [rad/s]",
-    "twist_coupling [rad]", "moment_coupling [N m]", "torque_drive [N m]", "torque_work [N m]", "torque_shaker [N m]",
+    "t [s]",
+    "phi_motor [rad]",
+    "phi_pinion [rad]",
+    "phi_machine [rad]",
+    "omega_motor [rad/s]",
+    "omega_pinion [rad/s]",
+    "omega_machine [rad/s]",
+    "twist_coupling [rad]",
+    "moment_coupling [N m]",
+    "torque_drive [N m]",
+    "torque_work [N m]",
+    "torque_shaker [N m]",
     "reaction_reducer [N]",
-    "kinetic_energy [J]", "elastic_energy [J]", "work_in [J]", "work_out [J]", "energy_residual [J]",
+    "kinetic_energy [J]",
+    "elastic_energy [J]",
+    "work_in [J]",
+    "work_out [J]",
+    "energy_residual [J]",
 )
 
 
@@ -60,11 +73,28 @@ def table(t: np.ndarray, y: np.ndarray) -> np.ndarray:
     kinetic = 0.5 * (J1 * omega_1**2 + J2 * omega_2**2 + J3 * omega_3**2)
     stored = 0.5 * K1 * twist**2 + 0.25 * CUBIC * twist**4
     work_in = motor_work + excitation_work
-    return np.column_stack((
-        t, phi_1, phi_2, -RATIO * phi_2, omega_1, omega_2, omega_3,
-        twist, elastic, motor, load, excitation, (J3 * omega_dot_3 - load) / R2,
-        kinetic, stored, work_in, load_work, kinetic + stored - work_in + load_work,
-    ))
+    return np.column_stack(
+        (
+            t,
+            phi_1,
+            phi_2,
+            -RATIO * phi_2,
+            omega_1,
+            omega_2,
+            omega_3,
+            twist,
+            elastic,
+            motor,
+            load,
+            excitation,
+            (J3 * omega_dot_3 - load) / R2,
+            kinetic,
+            stored,
+            work_in,
+            load_work,
+            kinetic + stored - work_in + load_work,
+        )
+    )
 
 
 def main() -> None:
@@ -75,8 +105,9 @@ def main() -> None:
     parser.add_argument("--atol", type=float, default=1e-9)
     arguments = parser.parse_args()
     times = np.arange(1001) * 0.01
-    solution = solve_ivp(derivative, (0.0, 10.0), np.zeros(7), method=arguments.method, t_eval=times,
-                         rtol=arguments.rtol, atol=arguments.atol)
+    solution = solve_ivp(
+        derivative, (0.0, 10.0), np.zeros(7), method=arguments.method, t_eval=times, rtol=arguments.rtol, atol=arguments.atol
+    )
     if not solution.success:
         raise SystemExit(f"SciPy: {solution.message}")
     rows = (",".join(map(repr, row)) for row in table(solution.t, solution.y).tolist())

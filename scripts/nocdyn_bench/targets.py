@@ -19,7 +19,7 @@ class Verdict:
     is_reached: bool | None  # None: not measured
 
     def __str__(self) -> str:
-        return f"{self.sentence}: **{ {True: 'reached', False: 'missed', None: 'not measured'}[self.is_reached]}**"
+        return f"{self.sentence}: **{ {True: 'reached', False: 'missed', None: 'not measured'}[self.is_reached] }**"
 
 
 def fastest(workload: WorkPrecision, contestants: list[Contestant], error: float) -> tuple[Contestant, float] | None:
@@ -34,6 +34,7 @@ def fastest(workload: WorkPrecision, contestants: list[Contestant], error: float
 
 def end_of_sweep(workload: WorkPrecision) -> Callable[[Contestant], str]:
     """What a contestant's tightest run took and achieved: a sweep ends after the first run slower than `slowest_point`."""
+
     def describe(contestant: Contestant) -> str:
         points = workload.points_of(contestant)
         return f"{1e3 * points[-1].seconds:.3g} ms for {points[-1].errors['states']:.1e}" if points else "no run"
@@ -49,12 +50,17 @@ def at_error(workload: WorkPrecision, error: float, own: list[Contestant], rival
         return Verdict(f"{place}, at most {most:g} times: no method reaches the error", False if own and rivals else None)
     if theirs is None:
         names = " or ".join(rival.label for rival in rivals)
-        return Verdict(f"{place}: {ours[0].label} takes {1e3 * ours[1]:.3g} ms; {names or 'the rival'} does not "
-                       f"reach the error before the sweep ends ({' or '.join(map(end_of_sweep(workload), rivals))})",
-                       True if rivals else None)
+        return Verdict(
+            f"{place}: {ours[0].label} takes {1e3 * ours[1]:.3g} ms; {names or 'the rival'} does not "
+            f"reach the error before the sweep ends ({' or '.join(map(end_of_sweep(workload), rivals))})",
+            True if rivals else None,
+        )
     factor = ours[1] / theirs[1]
-    return Verdict(f"{place}: {ours[0].label} takes {factor:.2f} times as long as {theirs[0].label} "
-                   f"({1e3 * ours[1]:.3g} and {1e3 * theirs[1]:.3g} ms); wanted at most {most:g}", factor <= most)
+    return Verdict(
+        f"{place}: {ours[0].label} takes {factor:.2f} times as long as {theirs[0].label} "
+        f"({1e3 * ours[1]:.3g} and {1e3 * theirs[1]:.3g} ms); wanted at most {most:g}",
+        factor <= most,
+    )
 
 
 def case2_verdicts(workload: WorkPrecision) -> list[Verdict]:
@@ -83,8 +89,11 @@ def chain_verdicts(workload: Scaling) -> list[Verdict]:
     place = f"{workload.name}, N = {longest.bodies}"
     if own and rival:
         factor = own.seconds / rival.seconds
-        against = Verdict(f"{place}: nocdyn rk853 takes {factor:.2f} times as long as {rival.contestant.label} "
-                          f"({1e3 * own.seconds:.3g} and {1e3 * rival.seconds:.3g} ms); wanted at most 1.5", factor <= 1.5)
+        against = Verdict(
+            f"{place}: nocdyn rk853 takes {factor:.2f} times as long as {rival.contestant.label} "
+            f"({1e3 * own.seconds:.3g} and {1e3 * rival.seconds:.3g} ms); wanted at most 1.5",
+            factor <= 1.5,
+        )
     else:
         against = Verdict(f"{place}: nocdyn rk853 beside a DOP853", None)
     return [against, growth(workload, "nocdyn rk853")]
@@ -103,14 +112,22 @@ def growth(workload: Scaling, label: str) -> Verdict:
     first, last = workload.point(shorter, label), workload.point(longer, label)
     if not (first and last):
         return Verdict(f"{sentence} N", None)
-    exponent = (math.log(last.seconds / last.steps) - math.log(first.seconds / first.steps)) / math.log(longer.bodies / shorter.bodies)
-    return Verdict(f"{sentence} N^{exponent:.2f} from {shorter.bodies} to {longer.bodies} rotors; "
-                   f"wanted linear (at most N^{GROWTH})", exponent <= GROWTH)
+    exponent = (math.log(last.seconds / last.steps) - math.log(first.seconds / first.steps)) / math.log(
+        longer.bodies / shorter.bodies
+    )
+    return Verdict(
+        f"{sentence} N^{exponent:.2f} from {shorter.bodies} to {longer.bodies} rotors; wanted linear (at most N^{GROWTH})",
+        exponent <= GROWTH,
+    )
 
 
 def throughput_verdicts(workload: Throughput) -> list[Verdict]:
-    rules = [("nocdyn rk45", "hand-written loop", 6.0), ("nocdyn taylor", "hand-written loop", 15.0),
-             ("nocdyn taylor", "heyoka with the peak", 6.0), ("nocdyn taylor, 2 threads", "nocdyn taylor", 1.9)]
+    rules = [
+        ("nocdyn rk45", "hand-written loop", 6.0),
+        ("nocdyn taylor", "hand-written loop", 15.0),
+        ("nocdyn taylor", "heyoka with the peak", 6.0),
+        ("nocdyn taylor, 2 threads", "nocdyn taylor", 1.9),
+    ]
     return [*(faster(workload, *rule) for rule in rules), little_memory(workload)]
 
 
@@ -119,8 +136,11 @@ def faster(workload: Throughput, own: str, rival: str, least: float) -> Verdict:
     if not (ours and theirs):
         return Verdict(f"{workload.name}: {own} beside {rival}, wanted {least:g} times as many variants per second", None)
     factor = ours.best / theirs.best
-    return Verdict(f"{workload.name}: {own} makes {ours.best:.4g} variants per second, {factor:.2f} times as many as {rival} "
-                   f"({theirs.best:.4g}); wanted {least:g} times", factor >= least)
+    return Verdict(
+        f"{workload.name}: {own} makes {ours.best:.4g} variants per second, {factor:.2f} times as many as {rival} "
+        f"({theirs.best:.4g}); wanted {least:g} times",
+        factor >= least,
+    )
 
 
 def little_memory(workload: Throughput, most: float = 500.0) -> Verdict:

@@ -65,7 +65,7 @@ class Throughput:
                 self.memory[count] = sweeper.memory(self.rate(sweeper.label).tolerance, count)
         for _ in range(rounds):
             for rate in self.rates:
-                seconds = rate.contestant.time(rate.tolerance, parameters[:rate.variants])
+                seconds = rate.contestant.time(rate.tolerance, parameters[: rate.variants])
                 rate.rounds.append(rate.variants / seconds)
 
     def _chosen(self, contestant: SweepContestant, parameters: np.ndarray, exact: np.ndarray) -> Rate:

@@ -41,20 +41,26 @@ Workload = whole_process.Workload | WorkPrecision | Scaling | Throughput | Costs
 
 
 def start_up(bench: Bench) -> whole_process.Workload:
-    return whole_process.Workload("start_up", "Start-up", [
-        whole_process.Contestant("nocdyn --version", [bench.nocdyn, "--version"]),
-        whole_process.Contestant("Python", [sys.executable, "-c", "pass"]),
-        whole_process.Contestant("Python and scipy.integrate", [sys.executable, "-c", "import scipy.integrate"]),
-    ])
+    return whole_process.Workload(
+        "start_up",
+        "Start-up",
+        [
+            whole_process.Contestant("nocdyn --version", [bench.nocdyn, "--version"]),
+            whole_process.Contestant("Python", [sys.executable, "-c", "pass"]),
+            whole_process.Contestant("Python and scipy.integrate", [sys.executable, "-c", "import scipy.integrate"]),
+        ],
+    )
 
 
 def case2(bench: Bench) -> whole_process.Workload:
     """The paper's case 2 as a whole process, 1001 rows written, at the tolerances of its input (1e-9)."""
+
     def run(label: str, *settings: str) -> whole_process.Contestant:
         folder = bench.scratch / "_".join(("nocdyn", *settings))
         options = [option for setting in settings for option in ("--set", f"run.{setting}")]
-        return whole_process.Contestant(label, [bench.nocdyn, "run", "--quiet", "--out", folder, *options, CASE2],
-                                        folder / "trajectory.csv")
+        return whole_process.Contestant(
+            label, [bench.nocdyn, "run", "--quiet", "--out", folder, *options, CASE2], folder / "trajectory.csv"
+        )
 
     def scipy_process(method: str) -> whole_process.Contestant:
         file = bench.scratch / f"scipy_{method}.csv"
@@ -62,86 +68,141 @@ def case2(bench: Bench) -> whole_process.Workload:
 
     reference = bench.scratch / "reference"
     subprocess.run([bench.nocdyn, "run", "--quiet", "--out", reference, *REFERENCE_TOLERANCES, CASE2], check=True)
-    return whole_process.Workload("case2", "Paper, case 2, whole process", [
-        run("nocdyn"),
-        run("nocdyn, formulation paper", "formulation=paper"),
-        run("nocdyn, formulation multiplier", "formulation=multiplier"),
-        run("nocdyn, method rosenbrock", "method=rosenbrock"),
-        scipy_process("LSODA"),
-        scipy_process("DOP853"),
-        scipy_process("RK45"),
-    ], reference / "trajectory.csv", rival="SciPy LSODA", factor=20.0)
+    return whole_process.Workload(
+        "case2",
+        "Paper, case 2, whole process",
+        [
+            run("nocdyn"),
+            run("nocdyn, formulation paper", "formulation=paper"),
+            run("nocdyn, formulation multiplier", "formulation=multiplier"),
+            run("nocdyn, method rosenbrock", "method=rosenbrock"),
+            scipy_process("LSODA"),
+            scipy_process("DOP853"),
+            scipy_process("RK45"),
+        ],
+        reference / "trajectory.csv",
+        rival="SciPy LSODA",
+        factor=20.0,
+    )
 
 
 def w1(bench: Bench) -> WorkPrecision:
     problem = Case2()
-    return WorkPrecision("W1", "W1: case 2, 1001 outputs, in process", problem, [
-        *bench.programs.nocdyn(problem, ["rk45", "rk853", "taylor", "auto", "rodas4", "rodas5p"]),
-        bench.programs.handwritten(),
-        *heyoka.contestants(problem),
-        *numbalsoda.contestants(problem, ["DOP853, dense", "LSODA"]),
-        *bench.programs.sundials(problem, ["adams", "bdf", "bdf2", "erk5"]),
-        *scipy.contestants(problem, ["DOP853"] if bench.is_quick else ["RK45", "DOP853", "LSODA"]),
-    ], errors_wanted=[1e-6, 1e-9, 1e-12])
+    return WorkPrecision(
+        "W1",
+        "W1: case 2, 1001 outputs, in process",
+        problem,
+        [
+            *bench.programs.nocdyn(problem, ["rk45", "rk853", "taylor", "auto", "rodas4", "rodas5p"]),
+            bench.programs.handwritten(),
+            *heyoka.contestants(problem),
+            *numbalsoda.contestants(problem, ["DOP853, dense", "LSODA"]),
+            *bench.programs.sundials(problem, ["adams", "bdf", "bdf2", "erk5"]),
+            *scipy.contestants(problem, ["DOP853"] if bench.is_quick else ["RK45", "DOP853", "LSODA"]),
+        ],
+        errors_wanted=[1e-6, 1e-9, 1e-12],
+    )
 
 
 def w2(bench: Bench) -> Throughput:
     own = sweepers(bench.nocdyn.parent, bench.scratch)
     count, memory = (10_000, [10_000]) if bench.is_quick else (100_000, [100_000, 1_000_000])
-    return Throughput("W2", "W2: variants of case 2, final state and largest elastic moment", count, [
-        *(sweeper.contestant() for sweeper in own),
-        bench.programs.handwritten_sweep(),
-        *heyoka_sweep.contestants(),
-        *numbalsoda_sweep.contestants(),
-        *bench.programs.sundials_sweep(["erk5", "adams"]),
-        *scipy_sweep.contestants(["DOP853"] if bench.is_quick else ["DOP853", "LSODA", "RK45"]),
-    ], error_wanted=1e-6, sweepers=own, counts=memory)
+    return Throughput(
+        "W2",
+        "W2: variants of case 2, final state and largest elastic moment",
+        count,
+        [
+            *(sweeper.contestant() for sweeper in own),
+            bench.programs.handwritten_sweep(),
+            *heyoka_sweep.contestants(),
+            *numbalsoda_sweep.contestants(),
+            *bench.programs.sundials_sweep(["erk5", "adams"]),
+            *scipy_sweep.contestants(["DOP853"] if bench.is_quick else ["DOP853", "LSODA", "RK45"]),
+        ],
+        error_wanted=1e-6,
+        sweepers=own,
+        counts=memory,
+    )
 
 
 def steps(bench: Bench) -> Costs:
     sweeping = Sweeping(bench.programs.folder, bench.scratch)
-    return Costs("step_costs", "Step costs in sweeps of case 2",
-                 lambda rounds: step_costs(sweeping, bench.plain, SWEEP_CASES, rounds))
+    return Costs(
+        "step_costs", "Step costs in sweeps of case 2", lambda rounds: step_costs(sweeping, bench.plain, SWEEP_CASES, rounds)
+    )
 
 
 def chunks(bench: Bench) -> Costs:
     sweeping, has_mpi = Sweeping(bench.programs.folder, bench.scratch), bench.programs.has("mpi_message_costs")
-    return Costs("chunk_costs", "Chunk costs in sweeps of case 2",
-                 lambda rounds: chunk_costs(sweeping, SWEEP_CASES[0], has_mpi, rounds))
+    return Costs(
+        "chunk_costs", "Chunk costs in sweeps of case 2", lambda rounds: chunk_costs(sweeping, SWEEP_CASES[0], has_mpi, rounds)
+    )
 
 
 def w3(bench: Bench) -> Scaling:
     chains = [Chain(bodies) for bodies in (10, 100, 1000, 10000)]
-    return Scaling("W3", "W3: chain of N rotors, rtol 1e-6, atol 1e-8", chains, {chain: [
-        *bench.programs.nocdyn(chain, ["rk45", "rk853", "taylor", "auto"]),
-        *numbalsoda.contestants(chain, ["DOP853"]),
-        *(numbalsoda.contestants(chain, ["LSODA"]) if chain.bodies <= 100 else []),  # its Jacobian is dense
-        *heyoka.contestants(chain),
-        *bench.programs.sundials(chain, ["adams", "bdf", "erk5", "erk8"]),
-        *scipy.contestants(chain, ["ode DOP853", "LSODA"]),
-    ] for chain in chains}, reference_tolerance=1e-12)
+    return Scaling(
+        "W3",
+        "W3: chain of N rotors, rtol 1e-6, atol 1e-8",
+        chains,
+        {
+            chain: [
+                *bench.programs.nocdyn(chain, ["rk45", "rk853", "taylor", "auto"]),
+                *numbalsoda.contestants(chain, ["DOP853"]),
+                *(numbalsoda.contestants(chain, ["LSODA"]) if chain.bodies <= 100 else []),  # its Jacobian is dense
+                *heyoka.contestants(chain),
+                *bench.programs.sundials(chain, ["adams", "bdf", "erk5", "erk8"]),
+                *scipy.contestants(chain, ["ode DOP853", "LSODA"]),
+            ]
+            for chain in chains
+        },
+        reference_tolerance=1e-12,
+    )
 
 
 def w3_stiff(bench: Bench) -> Scaling:
     chains = [Chain(bodies, 1.0e8, 1.0e9, t_end=0.01) for bodies in (10, 100, 1000, 10000)]
-    return Scaling("W3_stiff", "W3, implicit: the chain with stiffnesses 1e8 and 1e9, to 0.01 s", chains, {chain: [
-        *bench.programs.nocdyn(chain, ["rodas4", "rodas5p", "auto"]),
-        *bench.programs.sundials(chain, ["bdf", "bdf2"]),
-    ] for chain in chains}, reference_tolerance=1e-12)
+    return Scaling(
+        "W3_stiff",
+        "W3, implicit: the chain with stiffnesses 1e8 and 1e9, to 0.01 s",
+        chains,
+        {
+            chain: [
+                *bench.programs.nocdyn(chain, ["rodas4", "rodas5p", "auto"]),
+                *bench.programs.sundials(chain, ["bdf", "bdf2"]),
+            ]
+            for chain in chains
+        },
+        reference_tolerance=1e-12,
+    )
 
 
 def w4(bench: Bench) -> WorkPrecision:
     problem = Case2(1.0e8, 1.0e9, 1.0e-4)
-    return WorkPrecision("W4", "W4: case 2 with K1 = 1e8, k1 = 1e9, J3 = 1e-4, 1001 outputs, in process", problem, [
-        *bench.programs.nocdyn(problem, ["rodas4", "rodas5p", "auto", "rk45", "rk853", "taylor"]),
-        *heyoka.contestants(problem),
-        *numbalsoda.contestants(problem, ["DOP853", "LSODA"]),
-        *bench.programs.sundials(problem, ["bdf2", "bdf"]),
-        *scipy.contestants(problem, [] if bench.is_quick else ["Radau"]),
-    ], errors_wanted=[1e-4, 1e-6], tolerances_wanted=[1e-6])
+    return WorkPrecision(
+        "W4",
+        "W4: case 2 with K1 = 1e8, k1 = 1e9, J3 = 1e-4, 1001 outputs, in process",
+        problem,
+        [
+            *bench.programs.nocdyn(problem, ["rodas4", "rodas5p", "auto", "rk45", "rk853", "taylor"]),
+            *heyoka.contestants(problem),
+            *numbalsoda.contestants(problem, ["DOP853", "LSODA"]),
+            *bench.programs.sundials(problem, ["bdf2", "bdf"]),
+            *scipy.contestants(problem, [] if bench.is_quick else ["Radau"]),
+        ],
+        errors_wanted=[1e-4, 1e-6],
+        tolerances_wanted=[1e-6],
+    )
 
 
 WORKLOADS: dict[str, Callable[[Bench], Workload]] = {
-    "start_up": start_up, "case2": case2, "W1": w1, "W2": w2, "W3": w3, "W3_stiff": w3_stiff, "W4": w4,
-    "step_costs": steps, "chunk_costs": chunks,
+    "start_up": start_up,
+    "case2": case2,
+    "W1": w1,
+    "W2": w2,
+    "W3": w3,
+    "W3_stiff": w3_stiff,
+    "W4": w4,
+    "step_costs": steps,
+    "chunk_costs": chunks,
 }

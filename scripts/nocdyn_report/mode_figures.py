@@ -64,8 +64,9 @@ def read_modes(folder: Path) -> Modes:
 
 def draw_modes(modes: Modes, chosen: list[dict]) -> Figure:
     """A row for every mode: its shape, and the shares of bodies and couplings in its energies."""
-    figure, grid = pyplot.subplots(len(chosen), 2, squeeze=False, sharex="col", figsize=(1.5 * WIDTH, 1.9 * len(chosen) + 1.6),
-                                   width_ratios=(3, 2))
+    figure, grid = pyplot.subplots(
+        len(chosen), 2, squeeze=False, sharex="col", figsize=(1.5 * WIDTH, 1.9 * len(chosen) + 1.6), width_ratios=(3, 2)
+    )
     for (shape, energy), mode in zip(grid, chosen):
         _draw_shape(shape, modes, mode)
         _draw_energy(energy, modes, mode)
@@ -86,8 +87,15 @@ def _draw_shape(axes: Axes, modes: Modes, mode: dict) -> None:
     for gear in modes.joints("gears"):
         axes.plot(gear["places"], motion[gear["places"]], **REFERENCE)
         if few:
-            axes.annotate(f"1 : {gear['ratio']:.3g}", (np.mean(gear["places"]), np.mean(motion[gear["places"]])), fontsize=8,
-                          color="0.35", ha="center", va="center", bbox={"facecolor": "white", "edgecolor": "none", "pad": 1})
+            axes.annotate(
+                f"1 : {gear['ratio']:.3g}",
+                (np.mean(gear["places"]), np.mean(motion[gear["places"]])),
+                fontsize=8,
+                color="0.35",
+                ha="center",
+                va="center",
+                bbox={"facecolor": "white", "edgecolor": "none", "pad": 1},
+            )
     places = np.arange(len(motion))
     if few:
         axes.vlines(places, 0.0, motion, color=SHAPE, linewidth=4, alpha=0.35)
@@ -96,8 +104,11 @@ def _draw_shape(axes: Axes, modes: Modes, mode: dict) -> None:
         axes.plot(places[lagging], np.copysign(amplitude, motion)[lagging], "o", color=SHAPE, markersize=5, fillstyle="none")
     axes.set_ylim(-1 - STRETCH, 1 + STRETCH)
     damping = mode["damping_ratio"]
-    axes.set_title(f"mode {mode['mode']}: {mode['frequency_Hz']:.5g} Hz, damping ratio {damping:.3g}"
-                   + (", unstable" if damping < 0 else ""), loc="left")
+    axes.set_title(
+        f"mode {mode['mode']}: {mode['frequency_Hz']:.5g} Hz, damping ratio {damping:.3g}"
+        + (", unstable" if damping < 0 else ""),
+        loc="left",
+    )
 
 
 def _draw_energy(axes: Axes, modes: Modes, mode: dict) -> None:
@@ -106,8 +117,9 @@ def _draw_energy(axes: Axes, modes: Modes, mode: dict) -> None:
     ends = [[body - 1 for body in coupling["bodies"] if body > 0] for coupling in modes.content["couplings"]]
     places = np.array([np.mean(places) for places in ends])
     axes.bar(bodies, 100 * np.array(mode["kinetic_share"]), width=0.8, color=KINETIC, label="kinetic energy\nin bodies [%]")
-    axes.bar(places, -100 * np.array(mode["potential_share"]), width=0.5, color=POTENTIAL,
-             label="potential energy\nin couplings [%]")
+    axes.bar(
+        places, -100 * np.array(mode["potential_share"]), width=0.5, color=POTENTIAL, label="potential energy\nin couplings [%]"
+    )
     axes.axhline(0.0, color="0.5", linewidth=0.6)
     axes.yaxis.set_major_formatter(lambda value, _: f"{abs(value):g}")
 
@@ -116,8 +128,12 @@ def _name_bodies(axes: Axes, modes: Modes) -> None:
     count = len(modes.bodies)
     places = np.arange(count) if count <= MOST_NAMES else np.unique(np.linspace(0, count - 1, 8).round().astype(int))
     slanted = sum(len(modes.bodies[place]) for place in places) > MOST_LETTERS
-    axes.set_xticks(places, [plain(modes.bodies[place]) for place in places], rotation=45 if slanted else 0,
-                    ha="right" if slanted else "center")
+    axes.set_xticks(
+        places,
+        [plain(modes.bodies[place]) for place in places],
+        rotation=45 if slanted else 0,
+        ha="right" if slanted else "center",
+    )
 
 
 def draw_all(modes: Modes, most: int, folder: Path) -> list[str]:
@@ -125,7 +141,7 @@ def draw_all(modes: Modes, most: int, folder: Path) -> list[str]:
     chosen = modes.oscillating[:most]
     names = []
     for part in range(math.ceil(len(chosen) / MOST_MODES)):
-        figure = draw_modes(modes, chosen[part * MOST_MODES:(part + 1) * MOST_MODES])
+        figure = draw_modes(modes, chosen[part * MOST_MODES : (part + 1) * MOST_MODES])
         add_title(figure, *modes.titles)
         names.append("modes" if part == 0 else f"modes_{part + 1}")
         save(figure, folder, names[-1])
@@ -135,10 +151,14 @@ def draw_all(modes: Modes, most: int, folder: Path) -> list[str]:
 def main() -> None:
     parser = argparse.ArgumentParser(prog="scripts/plot_modes", description=__doc__)
     parser.add_argument("results", type=Path, metavar="RESULTS", help="folder that 'nocdyn modes --out' wrote")
-    parser.add_argument("--modes", type=int, default=2 * MOST_MODES, metavar="N",
-                        help=f"how many modes are drawn, from the lowest on ({2 * MOST_MODES})")
-    parser.add_argument("--out", type=Path, metavar="DIR",
-                        help="where the figures go, as PNG, SVG and PDF (RESULTS/figures)")
+    parser.add_argument(
+        "--modes",
+        type=int,
+        default=2 * MOST_MODES,
+        metavar="N",
+        help=f"how many modes are drawn, from the lowest on ({2 * MOST_MODES})",
+    )
+    parser.add_argument("--out", type=Path, metavar="DIR", help="where the figures go, as PNG, SVG and PDF (RESULTS/figures)")
     arguments = parser.parse_args()
     if arguments.modes < 1:
         parser.error("--modes must be at least 1")

@@ -47,8 +47,13 @@ def draw_paper_figures(case1: Results, case2: Results, folder: Path) -> list[str
 def main() -> None:
     parser = argparse.ArgumentParser(prog="scripts/figures", description=__doc__)
     parser.add_argument("results", nargs=2, type=Path, metavar="RESULTS", help="results folders of case 1 and of case 2")
-    parser.add_argument("--out", type=Path, default=ROOT / "results" / "figures", metavar="DIR",
-                        help="where figure2 ... figure5 go, as PNG, SVG and PDF (%(default)s)")
+    parser.add_argument(
+        "--out",
+        type=Path,
+        default=ROOT / "results" / "figures",
+        metavar="DIR",
+        help="where figure2 ... figure5 go, as PNG, SVG and PDF (%(default)s)",
+    )
     parser.add_argument("--media", action="store_true", help="also copy the PNG files to docs/media, for the README")
     arguments = parser.parse_args()
     try:

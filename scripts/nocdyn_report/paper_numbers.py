@@ -22,8 +22,11 @@ def table(results: Results) -> str:
     """A row for each speed, the elastic moment and the tooth force."""
     rows = last_period(results)
     excited = rows.sum() > 1
-    lines = [results.title, f"  {'':24}{f't = {results.time[-1]:g} s':>15}{'uniform motion':>17}"
-             + (f"{'range in the last period':>29}" if excited else f"{'difference':>13}")]
+    lines = [
+        results.title,
+        f"  {'':24}{f't = {results.time[-1]:g} s':>15}{'uniform motion':>17}"
+        + (f"{'range in the last period':>29}" if excited else f"{'difference':>13}"),
+    ]
     for label, steady in steady_state(results).values.items():
         values = results.values(label)
         spread = f"{values[rows].min():14.6f} ..{values[rows].max():12.6f}" if excited else f"{values[-1] - steady:13.1e}"

@@ -62,7 +62,7 @@ def _draw_apart(kinds: list[Kind]) -> Figure:
         axes.plot(plane.angle[-1], plane.rate[-1], "o", color="black", label="end")
         axes.set_title(plain(f"{kind.noun} {plane.name}"))
         _label(axes, kind)
-    for axes in grid.flat[len(panels):]:
+    for axes in grid.flat[len(panels) :]:
         axes.set_visible(False)
     figure.legend(*grid.flat[0].get_legend_handles_labels(), loc="outside lower center", ncols=2)
     return figure

@@ -9,8 +9,10 @@ import f90nml
 import numpy as np
 import pandas as pd
 
-COLUMN = re.compile(r"(?P<quantity>phi|omega|twist|moment|damping|torque|throttle|current|reaction)_(?P<element>.+) "
-                    r"\[(?P<unit>[^]]+)\]")
+COLUMN = re.compile(
+    r"(?P<quantity>phi|omega|twist|moment|damping|torque|throttle|current|reaction)_(?P<element>.+) "
+    r"\[(?P<unit>[^]]+)\]"
+)
 TIME = "t [s]"
 
 

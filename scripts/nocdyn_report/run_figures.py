@@ -108,8 +108,7 @@ def _advise(results: Results) -> str:
 def main() -> None:
     parser = argparse.ArgumentParser(prog="scripts/plot", description=__doc__)
     parser.add_argument("results", type=Path, metavar="RESULTS", help="folder that 'nocdyn run' wrote")
-    parser.add_argument("--out", type=Path, metavar="DIR",
-                        help="where the figures go, as PNG, SVG and PDF (RESULTS/figures)")
+    parser.add_argument("--out", type=Path, metavar="DIR", help="where the figures go, as PNG, SVG and PDF (RESULTS/figures)")
     arguments = parser.parse_args()
     folder = arguments.out or arguments.results / "figures"
     try:

@@ -21,27 +21,29 @@ TITLE_LENGTH = 75  # characters that fit on a line of that width
 MOST_TICKS = 8  # on the colour bar that stands for a legend of many lines
 
 matplotlib.use("Agg")
-matplotlib.rcParams.update({
-    "agg.path.chunksize": 20000,  # lines of any length
-    "axes.axisbelow": True,
-    "axes.formatter.limits": (-4, 5),
-    "axes.formatter.use_mathtext": True,
-    "axes.grid": True,
-    "axes.spines.right": False,
-    "axes.spines.top": False,
-    "axes.titlesize": 10,
-    "figure.constrained_layout.use": True,
-    "figure.titlesize": 12,
-    "font.size": 10,
-    "grid.color": "0.88",
-    "grid.linewidth": 0.6,
-    "legend.frameon": False,
-    "lines.linewidth": 1.3,
-    "pdf.fonttype": 42,  # fonts as TrueType, so that the text stays text
-    "savefig.dpi": 160,
-    "svg.fonttype": "none",
-    "svg.hashsalt": "nocdyn",  # the same picture gives the same file
-})
+matplotlib.rcParams.update(
+    {
+        "agg.path.chunksize": 20000,  # lines of any length
+        "axes.axisbelow": True,
+        "axes.formatter.limits": (-4, 5),
+        "axes.formatter.use_mathtext": True,
+        "axes.grid": True,
+        "axes.spines.right": False,
+        "axes.spines.top": False,
+        "axes.titlesize": 10,
+        "figure.constrained_layout.use": True,
+        "figure.titlesize": 12,
+        "font.size": 10,
+        "grid.color": "0.88",
+        "grid.linewidth": 0.6,
+        "legend.frameon": False,
+        "lines.linewidth": 1.3,
+        "pdf.fonttype": 42,  # fonts as TrueType, so that the text stays text
+        "savefig.dpi": 160,
+        "svg.fonttype": "none",
+        "svg.hashsalt": "nocdyn",  # the same picture gives the same file
+    }
+)
 
 
 def plain(text: str) -> str:

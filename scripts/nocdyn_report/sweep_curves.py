@@ -62,16 +62,28 @@ def draw_family(axes: Axes, sweep: Sweep, family: Family, result: Variable) -> N
         name = "" if family.parameter is None else f"{value:.5g}"
         if has_peaks and np.isfinite(y).any():
             name = _mark_peak(axes, family, result, (x, y), name)
-        axes.plot(x, y, color=colour, marker="o" if len(x) <= FEW else None, markersize=3, zorder=2,
-                  label=plain(name) if family.parameter is not None else None)
+        axes.plot(
+            x,
+            y,
+            color=colour,
+            marker="o" if len(x) <= FEW else None,
+            markersize=3,
+            zorder=2,
+            label=plain(name) if family.parameter is not None else None,
+        )
     if is_wide(family.key.values):
         axes.set_xscale("log")
     if has_peaks and 0.0 < STEEP * values.min() < values.max():
         axes.set_yscale("log")
     if has_peaks or family.parameter is not None:
         title = None if family.parameter is None else wrapped(family.parameter.label)
-        axes.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), title=title, alignment="left",
-                    fontsize=10 if family.parameter is None else 9)
+        axes.legend(
+            loc="upper left",
+            bbox_to_anchor=(1.0, 1.0),
+            title=title,
+            alignment="left",
+            fontsize=10 if family.parameter is None else 9,
+        )
     mark_not_done(axes, sweep, family.key)
     axes.set_title(plain(result.long_name), loc="left")
     axes.set_ylabel(wrapped(result.label))
@@ -86,8 +98,15 @@ def _mark_peak(axes: Axes, family: Family, result: Variable, curve: tuple[np.nda
         axes.plot(x[peak], y[peak], "o", color="black", markersize=3.5, zorder=3)
         return f"{name}: {word} {height} at {place}"
     axes.axvline(x[peak], **REFERENCE)
-    axes.plot(x[peak], y[peak], "o", color="black", markersize=5, zorder=3,
-              label=plain(f"{word}: {height}\nat {place} = {x[peak] / TURN:.4g} Hz"))
+    axes.plot(
+        x[peak],
+        y[peak],
+        "o",
+        color="black",
+        markersize=5,
+        zorder=3,
+        label=plain(f"{word}: {height}\nat {place} = {x[peak] / TURN:.4g} Hz"),
+    )
     return name
 
 

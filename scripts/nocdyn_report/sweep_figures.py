@@ -46,9 +46,14 @@ def draw_scatters(sweep: Sweep, results: Sequence[Variable], influence: Influenc
     """A row for each result; a column for each varied number, or for those with the most influence on the result."""
     columns = min(COLUMNS, len(sweep.varied))
     are_all = columns == len(sweep.varied)
-    figure, grid = pyplot.subplots(len(results), columns, squeeze=False, sharex="col" if are_all else "none", sharey="row",
-                                   figsize=(max(0.85 * WIDTH, 2.9 * columns + 1.0),
-                                            (2.5 if are_all else 2.9) * len(results) + 1.2))
+    figure, grid = pyplot.subplots(
+        len(results),
+        columns,
+        squeeze=False,
+        sharex="col" if are_all else "none",
+        sharey="row",
+        figsize=(max(0.85 * WIDTH, 2.9 * columns + 1.0), (2.5 if are_all else 2.9) * len(results) + 1.2),
+    )
     for row, result in zip(grid, results):
         row[0].set_ylabel(wrapped(result.label))
         for axes, key in zip(row, sweep.varied if are_all else influence.strongest_first(result)):
@@ -56,10 +61,13 @@ def draw_scatters(sweep: Sweep, results: Sequence[Variable], influence: Influenc
             if not are_all or result is results[-1]:
                 axes.set_xlabel(wrapped(key.label))
     far_out = any(has_outliers(sweep, result.values[sweep.known(result)]) for result in results)
-    add_note(figure, "" if are_all else f"of {len(sweep.varied)} varied numbers the {columns} most correlated with the result",
-             "grey: no more than chance alone gives, 95 % of the time",
-             "darker: more variants" if sweep.status.size > MOST_POINTS else "",
-             "triangles: beyond the axis" if far_out else "")
+    add_note(
+        figure,
+        "" if are_all else f"of {len(sweep.varied)} varied numbers the {columns} most correlated with the result",
+        "grey: no more than chance alone gives, 95 % of the time",
+        "darker: more variants" if sweep.status.size > MOST_POINTS else "",
+        "triangles: beyond the axis" if far_out else "",
+    )
     explain_not_done(figure, sweep, **TICK)
     return figure
 
@@ -83,8 +91,11 @@ def draw_influences(sweep: Sweep, results: Sequence[Variable], influence: Influe
     for axes, result in zip(panels, results):
         draw_influence(axes, sweep, influence, result)
     panels[-1].set_xlabel("rank correlation with the result")
-    add_note(figure, "grey: what chance alone gives, 95 % of the time",
-             f"{bars} of {len(sweep.varied)} varied numbers" if bars < len(sweep.varied) else "")
+    add_note(
+        figure,
+        "grey: what chance alone gives, 95 % of the time",
+        f"{bars} of {len(sweep.varied)} varied numbers" if bars < len(sweep.varied) else "",
+    )
     return figure
 
 
@@ -103,8 +114,11 @@ def draw_parallels(sweep: Sweep, results: Sequence[Variable], keys: Sequence[Var
     for axes, result in zip(panels, results):
         draw_parallel(axes, sweep, keys, result)
     numbers = f"{len(keys)} of {len(sweep.varied)} varied numbers, the most correlated first"
-    add_note(figure, f"{LINES} of {sweep.status.size} variants are drawn" if sweep.status.size > LINES else "",
-             numbers if len(keys) < len(sweep.varied) else "")
+    add_note(
+        figure,
+        f"{LINES} of {sweep.status.size} variants are drawn" if sweep.status.size > LINES else "",
+        numbers if len(keys) < len(sweep.varied) else "",
+    )
     explain_not_done(figure, sweep, NOT_DONE_LINES, linestyle=(0, (3, 2)), linewidth=0.9)
     return figure
 
@@ -140,7 +154,7 @@ def _clouds(sweep: Sweep) -> Iterator[tuple[str, Figure]]:
 
 def _paged(name: str, sweep: Sweep, draw: Callable[[Sweep, Sequence[Variable]], Figure]) -> Iterator[tuple[str, Figure]]:
     for page, first in enumerate(range(0, len(sweep.results), ROWS), start=1):
-        yield name if page == 1 else f"{name}_{page}", draw(sweep, sweep.results[first:first + ROWS])
+        yield name if page == 1 else f"{name}_{page}", draw(sweep, sweep.results[first : first + ROWS])
 
 
 def formats(text: str) -> list[str]:
@@ -155,10 +169,14 @@ def formats(text: str) -> list[str]:
 def main() -> None:
     parser = argparse.ArgumentParser(prog="scripts/plot_sweep", description=__doc__)
     parser.add_argument("results", type=Path, metavar="RESULTS", help="folder that 'nocdyn sweep' wrote")
-    parser.add_argument("--out", type=Path, metavar="DIR",
-                        help="where the figures go (RESULTS/figures)")
-    parser.add_argument("--format", type=formats, default=list(FORMATS), metavar="KINDS",
-                        help=f"of the figures, separated by commas: some of {','.join(FORMATS)} (all)")
+    parser.add_argument("--out", type=Path, metavar="DIR", help="where the figures go (RESULTS/figures)")
+    parser.add_argument(
+        "--format",
+        type=formats,
+        default=list(FORMATS),
+        metavar="KINDS",
+        help=f"of the figures, separated by commas: some of {','.join(FORMATS)} (all)",
+    )
     arguments = parser.parse_args()
     folder = arguments.out or arguments.results / "figures"
     try:

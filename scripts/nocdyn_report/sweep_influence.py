@@ -18,8 +18,9 @@ class Influence:
 
     def __init__(self, sweep: Sweep) -> None:
         self.keys = sweep.varied
-        self.correlations = {result.name: np.array([_correlation(sweep, key, result) for key in sweep.varied])
-                             for result in sweep.results}
+        self.correlations = {
+            result.name: np.array([_correlation(sweep, key, result) for key in sweep.varied]) for result in sweep.results
+        }
 
     def strongest_first(self, result: Variable | None = None) -> list[Variable]:
         """The varied numbers by their influence on a result, or on any."""
@@ -45,8 +46,15 @@ def draw_influence(axes: Axes, sweep: Sweep, influence: Influence, result: Varia
         axes.axvspan(-chance(variants), chance(variants), color="0.9", linewidth=0, zorder=0)
     axes.barh(places, values, height=0.7, color=np.where(values >= 0.0, RISING, FALLING))
     for place, value in zip(places, values):
-        axes.annotate(f"{round(value, 2) + 0.0:+.2f}", (value, place), xytext=(4 if value >= 0.0 else -4, 0),
-                      textcoords="offset points", ha="left" if value >= 0.0 else "right", va="center", fontsize=8)
+        axes.annotate(
+            f"{round(value, 2) + 0.0:+.2f}",
+            (value, place),
+            xytext=(4 if value >= 0.0 else -4, 0),
+            textcoords="offset points",
+            ha="left" if value >= 0.0 else "right",
+            va="center",
+            fontsize=8,
+        )
     axes.axvline(0.0, color="0.2", linewidth=0.9)
     axes.set_xlim(-1.15, 1.15)
     axes.set_yticks(places, [plain(key.name) for key in keys], fontsize=9)

@@ -73,7 +73,7 @@ def add_note(figure: Figure, *remarks: str) -> None:
 
 def thinned(places: np.ndarray, most: int) -> np.ndarray:
     """At most so many, evenly taken."""
-    return places[::max(1, -(-places.size // most))]
+    return places[:: max(1, -(-places.size // most))]
 
 
 def has_outliers(sweep: Sweep, values: np.ndarray) -> bool:
@@ -110,8 +110,13 @@ def draw_histogram(axes: Axes, sweep: Sweep, result: Variable) -> None:
         axes.hist(inside, bins=_bins(inside, high - low), color=COLOURS[0], alpha=0.5)
     digits = _digits(low, high)
     for value, name, style in ((low, "5 %", (0, (2, 2))), (median, "median", "-"), (high, "95 %", (0, (5, 3)))):
-        axes.axvline(value, color="black", linestyle=style, linewidth=1.1,
-                     label=plain(f"{name}: {value:.{digits}g} {result.shown_unit}".rstrip()))
+        axes.axvline(
+            value,
+            color="black",
+            linestyle=style,
+            linewidth=1.1,
+            label=plain(f"{name}: {value:.{digits}g} {result.shown_unit}".rstrip()),
+        )
     if len(inside) < len(values):
         axes.plot([], [], " ", label=plain(f"{len(values) - len(inside)} further out,\n{_far_ends(values, inside, result)}"))
     axes.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
@@ -152,14 +157,23 @@ def draw_scatter(axes: Axes, sweep: Sweep, key: Variable, result: Variable) -> N
         _draw_density(axes, x[is_near], y[is_near])
     else:
         size = np.clip(6000.0 / len(x), 1.5, 16.0)
-        axes.scatter(x[is_near], y[is_near], s=size, color=COLOURS[0], alpha=0.9 if len(x) < 200 else 0.45, linewidths=0,
-                     rasterized=len(x) > RASTER)
+        axes.scatter(
+            x[is_near],
+            y[is_near],
+            s=size,
+            color=COLOURS[0],
+            alpha=0.9 if len(x) < 200 else 0.45,
+            linewidths=0,
+            rasterized=len(x) > RASTER,
+        )
     _mark_outliers(axes, x[y > inside.max()], "^", 1.0)
     _mark_outliers(axes, x[y < inside.min()], "v", 0.0)
     mark_not_done(axes, sweep, key)
     correlation = rank_correlation(x, y)
-    axes.set_title("constant" if np.isnan(correlation) else f"rank correlation {round(correlation, 2) + 0.0:+.2f}",
-                   color="black" if abs(correlation) > chance(len(x)) else "0.5")
+    axes.set_title(
+        "constant" if np.isnan(correlation) else f"rank correlation {round(correlation, 2) + 0.0:+.2f}",
+        color="black" if abs(correlation) > chance(len(x)) else "0.5",
+    )
 
 
 def _draw_density(axes: Axes, x: np.ndarray, y: np.ndarray) -> None:
@@ -172,8 +186,16 @@ def _mark_outliers(axes: Axes, x: np.ndarray, marker: str, edge: float) -> None:
     """Triangles at the upper or lower edge, where their result is far beyond."""
     if x.size:
         places = thinned(x, MOST_MARKS)
-        axes.plot(places, np.full(places.size, edge), marker, color="0.35", markersize=4, markeredgewidth=0, clip_on=False,
-                  transform=axes.get_xaxis_transform())
+        axes.plot(
+            places,
+            np.full(places.size, edge),
+            marker,
+            color="0.35",
+            markersize=4,
+            markeredgewidth=0,
+            clip_on=False,
+            transform=axes.get_xaxis_transform(),
+        )
 
 
 def mark_not_done(axes: Axes, sweep: Sweep, key: Variable) -> None:
@@ -181,8 +203,16 @@ def mark_not_done(axes: Axes, sweep: Sweep, key: Variable) -> None:
     if sweep.not_done.size == 0:  # an empty line that is not clipped would spoil the layout
         return
     places = thinned(key.values[sweep.not_done], MOST_MARKS)
-    axes.plot(places, np.zeros(places.size), "|", color=NOT_DONE, markersize=8, markeredgewidth=1.0, clip_on=False,
-              transform=axes.get_xaxis_transform())
+    axes.plot(
+        places,
+        np.zeros(places.size),
+        "|",
+        color=NOT_DONE,
+        markersize=8,
+        markeredgewidth=1.0,
+        clip_on=False,
+        transform=axes.get_xaxis_transform(),
+    )
 
 
 def explain_not_done(figure: Figure, sweep: Sweep, most: int = MOST_MARKS, **style: object) -> None:
@@ -205,12 +235,19 @@ def draw_map(axes: Axes, sweep: Sweep, result: Variable) -> None:
     scale = {"cmap": COLOUR_MAP, "norm": (LogNorm if is_steep else Normalize)(limits.min(), limits.max())}
     if sweep.is_grid:
         drawn = axes.pcolormesh(*grid_cells(sweep, result), rasterized=True, **scale)
-    elif DENSE < len(x) and not is_wide(x) and not is_wide(y) and not is_constant(limits) and fill_a_plane(x, y):
+    elif len(x) > DENSE and not is_wide(x) and not is_wide(y) and not is_constant(limits) and fill_a_plane(x, y):
         drawn = _draw_contours(axes, x, y, colour, scale)
     else:
         chosen = thinned(np.arange(len(x)), MOST_POINTS)
-        drawn = axes.scatter(x[chosen], y[chosen], c=colour[chosen], s=np.clip(16000.0 / len(x), 3.0, 24.0),
-                             linewidths=0, rasterized=len(x) > RASTER, **scale)
+        drawn = axes.scatter(
+            x[chosen],
+            y[chosen],
+            c=colour[chosen],
+            s=np.clip(16000.0 / len(x), 3.0, 24.0),
+            linewidths=0,
+            rasterized=len(x) > RASTER,
+            **scale,
+        )
     if not sweep.is_grid and is_wide(x):
         axes.set_xscale("log")
     if not sweep.is_grid and is_wide(y):
@@ -257,8 +294,9 @@ def _draw_contours(axes: Axes, x: np.ndarray, y: np.ndarray, colour: np.ndarray,
     # between 0 and 1 the triangles do not depend on the units
     triangles = Triangulation((x[chosen] - x.min()) / np.ptp(x), (y[chosen] - y.min()) / np.ptp(y)).triangles
     levels = np.linspace(scale["norm"].vmin, scale["norm"].vmax, CONTOURS + 1)
-    contours = axes.tricontourf(Triangulation(x[chosen], y[chosen], triangles), colour[chosen], levels=levels, extend="both",
-                                **scale)
+    contours = axes.tricontourf(
+        Triangulation(x[chosen], y[chosen], triangles), colour[chosen], levels=levels, extend="both", **scale
+    )
     contours.set_rasterized(True)
     return contours
 
@@ -276,12 +314,19 @@ def draw_parallel(axes: Axes, sweep: Sweep, keys: Sequence[Variable], result: Va
     chosen = chosen[middle_first]
     values = result.values[sweep.known(result)]
     limits = shown(sweep, values)
-    lines = LineCollection([np.column_stack((places, row)) for row in shares[chosen]], array=result.values[chosen],
-                           norm=Normalize(limits.min(), limits.max()), cmap=COLOUR_MAP, linewidths=0.7, alpha=0.5,
-                           rasterized=True)
+    lines = LineCollection(
+        [np.column_stack((places, row)) for row in shares[chosen]],
+        array=result.values[chosen],
+        norm=Normalize(limits.min(), limits.max()),
+        cmap=COLOUR_MAP,
+        linewidths=0.7,
+        alpha=0.5,
+        rasterized=True,
+    )
     axes.add_collection(lines)
-    axes.plot(places[:-1], shares[thinned(sweep.not_done, NOT_DONE_LINES), :-1].T, color=NOT_DONE, linewidth=0.9,
-              linestyle=(0, (3, 2)))
+    axes.plot(
+        places[:-1], shares[thinned(sweep.not_done, NOT_DONE_LINES), :-1].T, color=NOT_DONE, linewidth=0.9, linestyle=(0, (3, 2))
+    )
     axes.set_xlim(-0.3, len(variables) - 0.7)
     axes.set_ylim(-0.12, 1.12)
     axes.set_yticks([])

@@ -68,8 +68,11 @@ class Sweep:
     @property
     def remark(self) -> str:
         """What the sweep was, in a line."""
-        counts = [f"{np.count_nonzero(self.status == status)} {word}" for word, status in STATUS_WORDS.items()
-                  if status != DONE and (self.status == status).any()]
+        counts = [
+            f"{np.count_nonzero(self.status == status)} {word}"
+            for word, status in STATUS_WORDS.items()
+            if status != DONE and (self.status == status).any()
+        ]
         variants = f"{self.status.size:,} variants".replace(",", " ")
         return ", ".join([f"{DESIGN_NAMES.get(self.design, self.design)} design", variants, *counts])
 
@@ -89,13 +92,16 @@ def read_sweep(folder: Path) -> Sweep:
     elif (folder / "sweep.csv").is_file():
         sweep = _read_table(folder / "sweep.csv")
     elif any(folder.glob("sweep*.journal")):
-        raise ResultsError(f"{folder}: the sweep is not finished; 'nocdyn sweep --resume' goes on with it, "
-                           "'nocdyn merge' joins the shards of one")
+        raise ResultsError(
+            f"{folder}: the sweep is not finished; 'nocdyn sweep --resume' goes on with it, "
+            "'nocdyn merge' joins the shards of one"
+        )
     else:
         raise ResultsError(f"{folder}: no sweep.nc or sweep.csv here; is this the results folder of a 'nocdyn sweep'?")
     if not sweep.varied or not sweep.results:
-        raise ResultsError(f"{folder}: nothing to draw: the sweep has {len(sweep.varied)} varied numbers and "
-                           f"{len(sweep.results)} results")
+        raise ResultsError(
+            f"{folder}: nothing to draw: the sweep has {len(sweep.varied)} varied numbers and {len(sweep.results)} results"
+        )
     if not (sweep.status == DONE).any():
         raise ResultsError(f"{folder}: nothing to draw: none of the {sweep.status.size} variants was done")
     drawn = [result for result in sweep.results if sweep.known(result).size]
@@ -123,8 +129,13 @@ def _read_netcdf(file: Path) -> Sweep:
 
 def _variables(content: h5netcdf.File, role: str) -> list[Variable]:
     return [
-        Variable(*(_text(variable.attrs.get(attribute, default)) for attribute, default in
-                   (("label", name), ("units", ""), ("long_name", name))), values=np.asarray(variable[...], dtype=float))
+        Variable(
+            *(
+                _text(variable.attrs.get(attribute, default))
+                for attribute, default in (("label", name), ("units", ""), ("long_name", name))
+            ),
+            values=np.asarray(variable[...], dtype=float),
+        )
         for name, variable in content.variables.items()
         if _text(variable.attrs.get("role", "")) == role
     ]
@@ -144,11 +155,12 @@ def _read_table(file: Path) -> Sweep:
     try:
         table = pd.read_csv(file, index_col=False)
         labels = list(table)
-        columns = [_column(table, label) for label in labels[labels.index("variant") + 1:labels.index("status")]]
+        columns = [_column(table, label) for label in labels[labels.index("variant") + 1 : labels.index("status")]]
         status = np.array([STATUS_WORDS[word] for word in table["status"]], dtype=int)
     except KeyError as error:
-        raise ResultsError(f"{file}: not the table of a sweep: the status {error.args[0]!r} is none of "
-                           f"{', '.join(STATUS_WORDS)}") from None
+        raise ResultsError(
+            f"{file}: not the table of a sweep: the status {error.args[0]!r} is none of {', '.join(STATUS_WORDS)}"
+        ) from None
     except (ValueError, OSError) as error:  # pandas' own parser errors are ValueErrors
         raise ResultsError(f"{file}: not the table of a sweep: {' '.join(str(error).split())}") from None
     machine = _read_input(file.with_name("input.nml"))
@@ -157,7 +169,7 @@ def _read_table(file: Path) -> Sweep:
         title=machine.get("case", {}).get("title") or file.resolve().parent.name,
         design=machine["sweep"]["design"],
         varied=varied,
-        results=columns[len(varied):],
+        results=columns[len(varied) :],
         status=status,
     )
 

@@ -96,7 +96,9 @@ def peak_memory(nocdyn, *words):
     """Of a run that succeeds [MB], and its output."""
     file = nocdyn.folder / "peak"
     limits = "import resource, subprocess, sys; out = subprocess.run(sys.argv[2:], capture_output=True, text=True, check=True)"
-    script = f"{limits}; open(sys.argv[1], 'w').write(str(resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss)); print(out.stdout)"
+    script = (
+        f"{limits}; open(sys.argv[1], 'w').write(str(resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss)); print(out.stdout)"
+    )
     command = [sys.executable, "-c", script, file, nocdyn.executable, *words]
     output = subprocess.run(command, cwd=nocdyn.folder, check=True, capture_output=True, text=True).stdout
     return int(file.read_text()) / 1024, output

@@ -44,8 +44,11 @@ class Machine:
         return self.run[""]["t_end"]
 
     def table(self, group):
-        rows = [line.replace(",", " ").split() for line in (self.folder / group["table_file"]).read_text().splitlines()
-                if line.strip() and line.lstrip()[0] not in "#!"]
+        rows = [
+            line.replace(",", " ").split()
+            for line in (self.folder / group["table_file"]).read_text().splitlines()
+            if line.strip() and line.lstrip()[0] not in "#!"
+        ]
         return np.array(rows, dtype=float).T
 
 
@@ -57,7 +60,7 @@ class Motion:
     """A solution in pieces; in each the laws are on one branch."""
 
     def __init__(self):
-        self.pieces = []   # (start, end, mode, solution)
+        self.pieces = []  # (start, end, mode, solution)
 
     def at(self, t):
         return next(piece[3](t) for piece in reversed(self.pieces) if piece[0] <= t)
@@ -70,8 +73,9 @@ class Motion:
             values = [sign * value(s, solution(s), mode) for s in t]
             i = int(np.argmax(values))
             bounds = (t[max(i - 1, 0)], t[min(i + 1, len(t) - 1)])
-            found = minimize_scalar(lambda s: -sign * value(s, solution(s), mode), bounds=bounds, method="bounded",
-                                    options={"xatol": 1e-12})
+            found = minimize_scalar(
+                lambda s: -sign * value(s, solution(s), mode), bounds=bounds, method="bounded", options={"xatol": 1e-12}
+            )
             best = max(best, values[i], -found.fun)
         return sign * best
 
@@ -86,13 +90,23 @@ def motion_of(rate, state, end, mode=None, borders=None, breaks=()):
         while t < stop:
             events, beyond = [], []
             for function, other in borders(mode) if borders else ():
+
                 def event(s, y, function=function):
                     return function(s, y)
+
                 event.terminal, event.direction = True, -1
                 events.append(event)
                 beyond.append(other)
-            piece = solve_ivp(lambda s, y: rate(s, y, mode, middle), (t, stop), state, method="DOP853", rtol=1e-13, atol=1e-14,
-                              dense_output=True, events=events)
+            piece = solve_ivp(
+                lambda s, y: rate(s, y, mode, middle),
+                (t, stop),
+                state,
+                method="DOP853",
+                rtol=1e-13,
+                atol=1e-14,
+                dense_output=True,
+                events=events,
+            )
             assert piece.success, piece.message
             motion.pieces.append((t, piece.t[-1], mode, piece.sol))
             t, state = piece.t[-1], piece.y[:, -1]
@@ -136,7 +150,7 @@ class Gap:
 
     def __init__(self, coupling, twist, rate):
         self.stiffness, self.damping, self.gap = coupling["stiffness"], coupling["damping"], coupling["gap"]
-        self.twist, self.rate = twist, rate   # functions of the state
+        self.twist, self.rate = twist, rate  # functions of the state
 
     def elastic(self, mode, y):
         side, phase = mode
@@ -145,8 +159,12 @@ class Gap:
     def moment(self, mode, y):
         """Total: positive if it turns the first body forwards."""
         elastic = self.elastic(mode, y)
-        return {self.FREE: 0.0, self.CONTACT: elastic + self.damping * self.rate(y), self.CLOSING: 2 * elastic,
-                self.SEPARATING: 0.0}[mode[1]]
+        return {
+            self.FREE: 0.0,
+            self.CONTACT: elastic + self.damping * self.rate(y),
+            self.CLOSING: 2 * elastic,
+            self.SEPARATING: 0.0,
+        }[mode[1]]
 
     def borders(self, mode):
         side, phase = mode
@@ -184,8 +202,13 @@ def three_rotors():
         return [y[2], y[3], (moment - c * y[2] + ratio * torque(t)) / (gear + ratio**2 * motor), -moment / load]
 
     y = motion_of(rate, np.zeros(4), m.end()).at(m.end())
-    return {"phi_gear [rad]": y[0], "phi_load [rad]": y[1], "omega_gear [rad/s]": y[2], "omega_load [rad/s]": y[3],
-            "reaction_reducer [N m]": motor * ratio * rate(m.end(), y)[2] - torque(m.end())}
+    return {
+        "phi_gear [rad]": y[0],
+        "phi_load [rad]": y[1],
+        "omega_gear [rad/s]": y[2],
+        "omega_load [rad/s]": y[3],
+        "reaction_reducer [N m]": motor * ratio * rate(m.end(), y)[2] - torque(m.end()),
+    }
 
 
 def backlash(times=(0.1, 0.25, 0.5)):
@@ -193,8 +216,9 @@ def backlash(times=(0.1, 0.25, 0.5)):
     j, spring = m.inertia("held"), m.coupling["spring"]
     gap = Gap(m.coupling["play"], lambda y: y[0], lambda y: y[1])
     start = [m.start("angle", "loose")[0], 0.0]
-    loose = motion_of(lambda t, y, mode, _: [y[1], -gap.moment(mode, y) / m.inertia("loose")], start, m.end(),
-                      (1, Gap.CONTACT), gap.borders)
+    loose = motion_of(
+        lambda t, y, mode, _: [y[1], -gap.moment(mode, y) / m.inertia("loose")], start, m.end(), (1, Gap.CONTACT), gap.borders
+    )
     # a damped oscillation in closed form
     decay = spring["damping"] / (2 * j)
     frequency = np.sqrt(spring["stiffness"] / j - decay**2)
@@ -210,15 +234,19 @@ def motor_coupling_gear():
     viscous = m.load["work"]["viscous"] / ratio**2
 
     def rate(t, y, *_):
-        moment = c["stiffness"] * y[0] + c["cubic_stiffness"] * y[0]**3 + c["damping"] * y[2]
+        moment = c["stiffness"] * y[0] + c["cubic_stiffness"] * y[0] ** 3 + c["damping"] * y[2]
         torque = m.motor["drive"]["a"] + shake["amplitude"] * np.sin(shake["frequency"] * t)
         acceleration = -(moment + viscous * y[3]) / (pinion + wheel / ratio**2)
         return [y[2], y[3], acceleration - (torque + moment) / motor, acceleration]
 
     y = motion_of(rate, np.zeros(4), m.end()).at(m.end())
-    return {"phi_motor [rad]": y[1] - y[0], "phi_wheel [rad]": y[1] / ratio, "omega_motor [rad/s]": y[3] - y[2],
-            "omega_wheel [rad/s]": y[3] / ratio,
-            "reaction_reducer [N m]": -(wheel / ratio**2 * rate(m.end(), y)[3] + viscous * y[3])}
+    return {
+        "phi_motor [rad]": y[1] - y[0],
+        "phi_wheel [rad]": y[1] / ratio,
+        "omega_motor [rad/s]": y[3] - y[2],
+        "omega_wheel [rad/s]": y[3] / ratio,
+        "reaction_reducer [N m]": -(wheel / ratio**2 * rate(m.end(), y)[3] + viscous * y[3]),
+    }
 
 
 def kloss_run_up():
@@ -259,9 +287,13 @@ def fan_start():
 
     motion = motion_of(rate, np.zeros(4), m.end())
     y = motion.at(m.end())
-    return {"phi_rotor [rad]": y[0], "omega_rotor [rad/s]": y[2], "omega_fan [rad/s]": y[3],
-            "max torque_motor [N m]": motion.largest(lambda t, y, mode: kloss(motor, y[2])),
-            "min moment_tyre [N m]": motion.largest(lambda t, y, mode: tyre["stiffness"] * (y[1] - y[0]), sign=-1)}
+    return {
+        "phi_rotor [rad]": y[0],
+        "omega_rotor [rad/s]": y[2],
+        "omega_fan [rad/s]": y[3],
+        "max torque_motor [N m]": motion.largest(lambda t, y, mode: kloss(motor, y[2])),
+        "min moment_tyre [N m]": motion.largest(lambda t, y, mode: tyre["stiffness"] * (y[1] - y[0]), sign=-1),
+    }
 
 
 def half_sine(shake, t):
@@ -304,15 +336,21 @@ def wind_turbine():
     def on_sun(t, y, middle):
         """The planets turn the sun, the sun's wheel the rest."""
         acceleration = rate(t, y, None, middle)[3]
-        on_middle = (generator * to_generator**2 + middle_shaft * to_middle**2) * acceleration \
-            - to_generator * electric(t, y, middle)
+        on_middle = (generator * to_generator**2 + middle_shaft * to_middle**2) * acceleration - to_generator * electric(
+            t, y, middle
+        )
         return sun * to_sun * acceleration + on_middle / to_sun
 
     t, y = m.end(), motion.at(m.end())
-    return {"phi_rotor [rad]": y[0], "omega_rotor [rad/s]": y[2], "omega_generator [rad/s]": to_generator * y[3],
-            "reaction_planets [N m]": on_sun(t, y, t), "reaction_planets_ring [N m]": 5 * on_sun(t, y, t),
-            "reaction_planets_carrier [N m]": -6 * on_sun(t, y, t),
-            "min moment_main_shaft [N m]": motion.largest(lambda t, y, mode: shaft["stiffness"] * (y[1] - y[0]), sign=-1)}
+    return {
+        "phi_rotor [rad]": y[0],
+        "omega_rotor [rad/s]": y[2],
+        "omega_generator [rad/s]": to_generator * y[3],
+        "reaction_planets [N m]": on_sun(t, y, t),
+        "reaction_planets_ring [N m]": 5 * on_sun(t, y, t),
+        "reaction_planets_carrier [N m]": -6 * on_sun(t, y, t),
+        "min moment_main_shaft [N m]": motion.largest(lambda t, y, mode: shaft["stiffness"] * (y[1] - y[0]), sign=-1),
+    }
 
 
 SHIP = ("propeller", "bull", "hp_wheel", "hp_turbine", "lp_wheel", "lp_turbine")
@@ -357,10 +395,15 @@ def ship_turbine():
     shaft = m.coupling["hp_shaft"]
     moment = shaft["stiffness"] * (y[3] - driver * y[2]) + shaft["damping"] * (y[9] - driver * y[8])
     force = (m.inertia("hp_driver") * driver * acceleration[2] - moment) / m.gear["hp_first"]["radii"][1]
-    return {"phi_propeller [rad]": y[0], "omega_propeller [rad/s]": y[6], "omega_hp_turbine [rad/s]": y[9],
-            "omega_lp_turbine [rad/s]": y[11], "reaction_hp_first [N]": force,
-            "max moment_line_shaft [N m]": motion.largest(lambda t, y, mode: k * (y[0] - y[1])),
-            "min moment_line_shaft [N m]": motion.largest(lambda t, y, mode: k * (y[0] - y[1]), sign=-1)}
+    return {
+        "phi_propeller [rad]": y[0],
+        "omega_propeller [rad/s]": y[6],
+        "omega_hp_turbine [rad/s]": y[9],
+        "omega_lp_turbine [rad/s]": y[11],
+        "reaction_hp_first [N]": force,
+        "max moment_line_shaft [N m]": motion.largest(lambda t, y, mode: k * (y[0] - y[1])),
+        "min moment_line_shaft [N m]": motion.largest(lambda t, y, mode: k * (y[0] - y[1]), sign=-1),
+    }
 
 
 def torque_split():
@@ -373,8 +416,10 @@ def torque_split():
     reduced = bull + (left + right) * to_shaft**2 + pinion * to_pinion**2
 
     def moments(y):
-        return (quill["stiffness"] * (to_pinion * y[1] - y[0]) + quill["damping"] * (to_pinion * y[4] - y[3]),
-                mast["stiffness"] * (y[2] - y[1]) + mast["damping"] * (y[5] - y[4]))
+        return (
+            quill["stiffness"] * (to_pinion * y[1] - y[0]) + quill["damping"] * (to_pinion * y[4] - y[3]),
+            mast["stiffness"] * (y[2] - y[1]) + mast["damping"] * (y[5] - y[4]),
+        )
 
     def rate(t, y, mode, middle):
         first, last = moments(y)
@@ -390,8 +435,9 @@ def torque_split():
     on_pinion = pinion * to_pinion * acceleration + first
     on_bull = bull * acceleration - last
     force = {"first": on_pinion / m.gear["left_first"]["radii"][0] / 2, "second": on_bull / m.gear["left_second"]["radii"][1] / 2}
-    return {"omega_engine [rad/s]": y[3], "omega_bull [rad/s]": y[4], "omega_rotor [rad/s]": y[5]} | \
-        {f"reaction_{side}_{stage} [N]": force[stage] for side in ("left", "right") for stage in force}
+    return {"omega_engine [rad/s]": y[3], "omega_bull [rad/s]": y[4], "omega_rotor [rad/s]": y[5]} | {
+        f"reaction_{side}_{stage} [N]": force[stage] for side in ("left", "right") for stage in force
+    }
 
 
 def rolling_mill_motion(m):
@@ -416,9 +462,15 @@ def rolling_mill():
     m = example("rolling_mill")
     motion, shaft, spindle = rolling_mill_motion(m)
     y = motion.at(m.end())
-    return {"phi_motor [rad]": y[0], "phi_roll [rad]": y[2], "omega_motor [rad/s]": y[3], "omega_stand [rad/s]": y[4],
-            "omega_roll [rad/s]": y[5], "min moment_shaft [N m]": motion.largest(shaft, sign=-1),
-            "min moment_spindle [N m]": motion.largest(spindle, sign=-1)}
+    return {
+        "phi_motor [rad]": y[0],
+        "phi_roll [rad]": y[2],
+        "omega_motor [rad/s]": y[3],
+        "omega_stand [rad/s]": y[4],
+        "omega_roll [rad/s]": y[5],
+        "min moment_shaft [N m]": motion.largest(shaft, sign=-1),
+        "min moment_spindle [N m]": motion.largest(spindle, sign=-1),
+    }
 
 
 def engine():
@@ -448,14 +500,15 @@ def engine():
     return {f"omega_{name} [rad/s]": y[n + names.index(name)] for name in picked} | {
         "phi_flywheel [rad]": y[names.index("flywheel")],
         "max moment_crank_8 [N m]": motion.largest(lambda t, y, mode: stiffness[8] * (y[9] - y[8])),
-        "min moment_rubber [N m]": motion.largest(lambda t, y, mode: stiffness[9] * (y[10] - y[9]), sign=-1)}
+        "min moment_rubber [N m]": motion.largest(lambda t, y, mode: stiffness[9] * (y[10] - y[9]), sign=-1),
+    }
 
 
 def modal_pulse(inertia, stiffness, struck, shake, t):
     """Angles and speeds at t of a machine at rest after a half-sine on the body `struck`: the sum of all modes."""
     square, shape = eigh(stiffness, np.diag(inertia))
     frequency = np.sqrt(np.abs(square))
-    frequency[0] = 0.0   # rigid
+    frequency[0] = 0.0  # rigid
     height, length = shake["amplitude"] * shape[struck], shake["duration"]
     pulse, s = np.pi / length, min(t - shake["time"], shake["duration"])
     w = np.where(frequency > 0, frequency, 1.0)
@@ -471,7 +524,7 @@ def modal_pulse(inertia, stiffness, struck, shake, t):
 def chain_stiffness(values):
     matrix = np.zeros((len(values) + 1,) * 2)
     for i, k in enumerate(values):
-        matrix[i:i + 2, i:i + 2] += k * np.array([[1, -1], [-1, 1]])
+        matrix[i : i + 2, i : i + 2] += k * np.array([[1, -1], [-1, 1]])
     return matrix
 
 
@@ -479,8 +532,9 @@ def chain_200():
     m = example("chain_200")
     stiffness = chain_stiffness([group["stiffness"] for group in m.coupling.values()])
     angle, speed = modal_pulse(m.inertia(), stiffness, 0, m.excitation["blow"], m.end())
-    return {f"phi_r{i:03} [rad]": angle[i - 1] for i in (1, 100, 200)} | \
-        {f"omega_r{i:03} [rad/s]": speed[i - 1] for i in (1, 100, 110, 200)}
+    return {f"phi_r{i:03} [rad]": angle[i - 1] for i in (1, 100, 200)} | {
+        f"omega_r{i:03} [rad/s]": speed[i - 1] for i in (1, 100, 110, 200)
+    }
 
 
 def ieee_first_benchmark():
@@ -491,7 +545,8 @@ def ieee_first_benchmark():
     mean = m.start("speed", *names)
     angle, speed = angle + m.start("angle", *names) + mean * m.end(), speed + mean
     return {f"omega_{name} [rad/s]": speed[names.index(name)] for name in ("hp", "lpb", "generator", "exciter")} | {
-        f"twist_{group['name']} [rad]": angle[i + 1] - angle[i] for i, group in enumerate(m.coupling.values())}
+        f"twist_{group['name']} [rad]": angle[i + 1] - angle[i] for i, group in enumerate(m.coupling.values())
+    }
 
 
 def synchronous_start():
@@ -507,14 +562,23 @@ def synchronous_start():
         last = high["stiffness"] * (y[2] - ratio * y[1]) + high["damping"] * (y[5] - ratio * y[4])
         pulsation = shake["amplitude"] * np.sin(2 * (shake["frequency"] * t - shake["pole_pairs"] * y[0]))
         gas = m.load["gas"]["quadratic"] * abs(y[5]) * y[5]
-        return [*y[3:], (cage(segment, y[3]) + pulsation + first) / motor,
-                (ratio * last - first) / (wheel + ratio**2 * pinion), (-last - gas) / compressor]
+        return [
+            *y[3:],
+            (cage(segment, y[3]) + pulsation + first) / motor,
+            (ratio * last - first) / (wheel + ratio**2 * pinion),
+            (-last - gas) / compressor,
+        ]
 
     motion = motion_of(rate, np.zeros(6), m.end(), cage.segment(0.0), lambda segment: cage.borders(segment, 3))
     y = motion.at(m.end())
-    return {"phi_motor [rad]": y[0], "omega_motor [rad/s]": y[3], "omega_wheel [rad/s]": y[4], "omega_compressor [rad/s]": y[5],
-            "min moment_low_speed [N m]": motion.largest(lambda t, y, mode: low["stiffness"] * (y[1] - y[0]), sign=-1),
-            "max moment_low_speed [N m]": motion.largest(lambda t, y, mode: low["stiffness"] * (y[1] - y[0]))}
+    return {
+        "phi_motor [rad]": y[0],
+        "omega_motor [rad/s]": y[3],
+        "omega_wheel [rad/s]": y[4],
+        "omega_compressor [rad/s]": y[5],
+        "min moment_low_speed [N m]": motion.largest(lambda t, y, mode: low["stiffness"] * (y[1] - y[0]), sign=-1),
+        "max moment_low_speed [N m]": motion.largest(lambda t, y, mode: low["stiffness"] * (y[1] - y[0])),
+    }
 
 
 def dc_governed():
@@ -533,8 +597,14 @@ def dc_governed():
         steps = sum(group["amplitude"] for group in m.excitation.values() if middle > group["time"])
         opened = throttle(y) if limit is None else limit
         current = (drive["voltage"] * opened - drive["resistance"] * y[4] - flux * y[2]) / drive["inductance"]
-        return [y[2], y[3], (flux * y[4] + moment) / armature, (steps - viscous * y[3] - moment) / machine, current,
-                (opened - y[5]) / drive["governor_time"]]
+        return [
+            y[2],
+            y[3],
+            (flux * y[4] + moment) / armature,
+            (steps - viscous * y[3] - moment) / machine,
+            current,
+            (opened - y[5]) / drive["governor_time"],
+        ]
 
     def borders(limit):
         if limit is None:
@@ -547,9 +617,14 @@ def dc_governed():
     start = [0.0, 0.0, *speed, 0.0, drive["governor_start"] - gain * (drive["governor_speed"] - speed[0])]
     motion = motion_of(rate, start, m.end(), None, borders, [group["time"] for group in m.excitation.values()])
     y = motion.at(m.end())
-    return {"phi_armature [rad]": y[0], "omega_armature [rad/s]": y[2], "omega_machine [rad/s]": y[3],
-            "torque_drive [N m]": flux * y[4], "max torque_drive [N m]": motion.largest(lambda t, y, mode: flux * y[4]),
-            "min omega_machine [rad/s]": motion.largest(lambda t, y, mode: y[3], sign=-1)}
+    return {
+        "phi_armature [rad]": y[0],
+        "omega_armature [rad/s]": y[2],
+        "omega_machine [rad/s]": y[3],
+        "torque_drive [N m]": flux * y[4],
+        "max torque_drive [N m]": motion.largest(lambda t, y, mode: flux * y[4]),
+        "min omega_machine [rad/s]": motion.largest(lambda t, y, mode: y[3], sign=-1),
+    }
 
 
 def differential():
@@ -575,8 +650,9 @@ def differential():
 
     def rate(t, y, segment, middle):
         at_input, moments = sides(y)
-        slip = np.array([group["friction"] * np.tanh((y[11] - y[9 + i]) / group["friction_speed"])
-                         for i, group in enumerate(tyres)])
+        slip = np.array(
+            [group["friction"] * np.tanh((y[11] - y[9 + i]) / group["friction_speed"]) for i, group in enumerate(tyres)]
+        )
         drag = resistance["constant"] * np.tanh(y[11] / resistance["constant_speed"])
         drag += resistance["quadratic"] * abs(y[11]) * y[11]
         axle = np.linalg.solve(inertia, moments + at_input * to_input / 2)
@@ -590,7 +666,9 @@ def differential():
     segment = motion.pieces[-1][2]
     acceleration = rate(m.end(), y, segment, m.end())
     return {f"omega_{name} [rad/s]": y[6 + i] for i, name in enumerate(names)} | {
-        "omega_case [rad/s]": (y[7] + y[8]) / 2, "reaction_axle [N m]": j["left"] * acceleration[7] - sides(y)[1][0]}
+        "omega_case [rad/s]": (y[7] + y[8]) / 2,
+        "reaction_axle [N m]": j["left"] * acceleration[7] - sides(y)[1][0],
+    }
 
 
 def natural_frequencies(inertia, stiffness):
@@ -602,18 +680,25 @@ def frequencies():
     """Natural frequencies [Hz] by machine."""
     ieee, ship = example("ieee_first_benchmark"), example("ship_turbine")
     discs, wind = Machine(DATA / "two_discs.nml"), example("wind_turbine")
-    reduced = [wind.inertia("rotor"), wind.inertia("carrier") + 36 * wind.inertia("sun") + 24.25**2 * wind.inertia("intermediate")
-               + 97**2 * wind.inertia("generator")]
+    reduced = [
+        wind.inertia("rotor"),
+        wind.inertia("carrier")
+        + 36 * wind.inertia("sun")
+        + 24.25**2 * wind.inertia("intermediate")
+        + 97**2 * wind.inertia("generator"),
+    ]
     return {
         "two_discs": natural_frequencies(np.diag(discs.inertia()), chain_stiffness([discs.coupling["shaft"]["stiffness"]])),
-        "ieee_first_benchmark": natural_frequencies(np.diag(ieee.inertia()), chain_stiffness(
-            [group["stiffness"] for group in ieee.coupling.values()])),
+        "ieee_first_benchmark": natural_frequencies(
+            np.diag(ieee.inertia()), chain_stiffness([group["stiffness"] for group in ieee.coupling.values()])
+        ),
         "ship_turbine": natural_frequencies(*ship_matrices(ship)[:2]),
         # the published ones
         "ship_turbine without pinions": natural_frequencies(*ship_matrices(ship, pinions=False)[:2]),
         "wind_turbine": natural_frequencies(np.diag(reduced), chain_stiffness([wind.coupling["main_shaft"]["stiffness"]])),
         # the five lowest
-        "chain_200": 2 * np.sqrt(2.0e4 / 0.02) * np.sin(np.arange(1, 200) * np.pi / 400)[:5] / (2 * np.pi)}
+        "chain_200": 2 * np.sqrt(2.0e4 / 0.02) * np.sin(np.arange(1, 200) * np.pi / 400)[:5] / (2 * np.pi),
+    }
 
 
 def steady_speeds():
@@ -625,31 +710,51 @@ def steady_speeds():
         return kloss(fan.motor["motor"], w) - fan.load["air"]["viscous"] * w - fan.load["air"]["quadratic"] * w**2
 
     def ship_balance(w):
-        steam = sum(ratio * (ship.motor[name]["a"] - ship.motor[name]["b"] * ratio * w)
-                    for name, ratio in (("hp_steam", 9.4094 * 7.82365 / 0.94094), ("lp_steam", 9.4094 * 4.00424 / 0.94094)))
+        steam = sum(
+            ratio * (ship.motor[name]["a"] - ship.motor[name]["b"] * ratio * w)
+            for name, ratio in (("hp_steam", 9.4094 * 7.82365 / 0.94094), ("lp_steam", 9.4094 * 4.00424 / 0.94094))
+        )
         return steam - ship.load["water"]["quadratic"] * w**2
 
     cage = Curve(start.table(start.motor["cage"]), cubic=True)
 
     def start_balance(w):
-        return cage(cage.segment(w), w) - 6 * start.load["gas"]["quadratic"] * (6 * w)**2
+        return cage(cage.segment(w), w) - 6 * start.load["gas"]["quadratic"] * (6 * w) ** 2
 
     pinion = 124 / 32 * 176 / 27
     turbine = split.motor["turbine"]["torque"] + split.excitation["cut"]["amplitude"]
     return {
         "fan_start": ("omega_fan [rad/s]", brentq(fan_balance, 140, 157, xtol=1e-13)),
-        "wind_turbine": ("omega_generator [rad/s]", np.sqrt((wind.motor["wind"]["torque"] + wind.excitation["gust"]["amplitude"])
-                                                            / 97 / wind.load["grid"]["quadratic"])),
+        "wind_turbine": (
+            "omega_generator [rad/s]",
+            np.sqrt((wind.motor["wind"]["torque"] + wind.excitation["gust"]["amplitude"]) / 97 / wind.load["grid"]["quadratic"]),
+        ),
         "ship_turbine": ("omega_propeller [rad/s]", brentq(ship_balance, 1, 10, xtol=1e-13)),
         "torque_split": ("omega_rotor [rad/s]", np.sqrt(turbine * pinion / split.load["air"]["quadratic"])),
         "synchronous_start": ("omega_motor [rad/s]", brentq(start_balance, 150, 157.08, xtol=1e-13)),
         "engine": ("omega_generator [rad/s]", engine_.motor["gas"]["torque"] / engine_.load["grid"]["viscous"]),
-        "dc_governed": ("omega_machine [rad/s]", dc.motor["drive"]["governor_speed"])}
+        "dc_governed": ("omega_machine [rad/s]", dc.motor["drive"]["governor_speed"]),
+    }
 
 
-EXAMPLE_MACHINES = (three_rotors, backlash, fan_start, wind_turbine, ship_turbine, torque_split, rolling_mill, engine, chain_200,
-                    synchronous_start, ieee_first_benchmark, dc_governed, differential, motor_coupling_gear, kloss_run_up,
-                    fan_law)
+EXAMPLE_MACHINES = (
+    three_rotors,
+    backlash,
+    fan_start,
+    wind_turbine,
+    ship_turbine,
+    torque_split,
+    rolling_mill,
+    engine,
+    chain_200,
+    synchronous_start,
+    ieee_first_benchmark,
+    dc_governed,
+    differential,
+    motor_coupling_gear,
+    kloss_run_up,
+    fan_law,
+)
 
 
 def main(names):

@@ -13,7 +13,7 @@ import numpy as np
 from example_references import Machine, motion_of, rolling_mill_motion
 
 SWEEPS = Path(__file__).parents[2] / "input/sweeps"
-RATIO = 2.0 / 3.0   # of the radii of case 2
+RATIO = 2.0 / 3.0  # of the radii of case 2
 
 
 def variant_of(name, values):
@@ -35,7 +35,7 @@ def case2_motion(m):
         return c["stiffness"] * twist + c["cubic_stiffness"] * twist**3
 
     def rate(t, y, *_):
-        torque = drive["a"] - drive["b"] * y[0] - drive["c"] * y[0]**2 + shake["amplitude"] * np.sin(shake["frequency"] * t)
+        torque = drive["a"] - drive["b"] * y[0] - drive["c"] * y[0] ** 2 + shake["amplitude"] * np.sin(shake["frequency"] * t)
         resistance = moment(t, y) + RATIO**2 * load["viscous"] * y[1]
         return [(torque + moment(t, y)) / motor, -resistance / (pinion + RATIO**2 * machine), y[0], y[1]]
 
@@ -44,38 +44,49 @@ def case2_motion(m):
 
 def largest_after(motion, value, begin, sign=1):
     """Of a motion in one piece, from `begin` to its end: the highest of all maxima."""
-    (_, end, _, solution), = motion.pieces
+    ((_, end, _, solution),) = motion.pieces
     t = np.linspace(begin, end, 20001)
     values = sign * value(t, solution(t))
     i = int(np.argmax(values))
     if i in (0, len(t) - 1):
         return sign * values[i]
-    before, middle, after = values[i - 1:i + 2]
-    return sign * (middle + (after - before)**2 / (8 * (2 * middle - before - after)))   # vertex of the parabola
+    before, middle, after = values[i - 1 : i + 2]
+    return sign * (middle + (after - before) ** 2 / (8 * (2 * middle - before - after)))  # vertex of the parabola
 
 
 def throughput(values):
     m = variant_of("throughput", values)
     motion, moment = case2_motion(m)
     omega_motor, omega_pinion, phi_motor, phi_pinion = motion.at(m.end())
-    return {"phi_motor_final": phi_motor, "phi_pinion_final": phi_pinion, "phi_machine_final": -RATIO * phi_pinion,
-            "omega_motor_final": omega_motor, "omega_pinion_final": omega_pinion, "omega_machine_final": -RATIO * omega_pinion,
-            "moment_coupling_max_abs": max(sign * largest_after(motion, moment, 0.0, sign) for sign in (1, -1))}
+    return {
+        "phi_motor_final": phi_motor,
+        "phi_pinion_final": phi_pinion,
+        "phi_machine_final": -RATIO * phi_pinion,
+        "omega_motor_final": omega_motor,
+        "omega_pinion_final": omega_pinion,
+        "omega_machine_final": -RATIO * omega_pinion,
+        "moment_coupling_max_abs": max(sign * largest_after(motion, moment, 0.0, sign) for sign in (1, -1)),
+    }
 
 
 def resonance(values, begin=12.0):
     motion, moment = case2_motion(variant_of("resonance", values))
     high, low = (largest_after(motion, moment, begin, sign) for sign in (1, -1))
-    return {"moment_coupling_max_abs_from_12": max(high, -low), "moment_coupling_max_from_12": high,
-            "moment_coupling_min_from_12": low}
+    return {
+        "moment_coupling_max_abs_from_12": max(high, -low),
+        "moment_coupling_max_from_12": high,
+        "moment_coupling_min_from_12": low,
+    }
 
 
 def tolerance(values):
     motion, shaft, spindle = rolling_mill_motion(variant_of("tolerance", values))
-    return {"moment_shaft_max_abs": max(sign * motion.largest(shaft, sign) for sign in (1, -1)),
-            "moment_spindle_max_abs": max(sign * motion.largest(spindle, sign) for sign in (1, -1)),
-            "moment_spindle_max": motion.largest(spindle),
-            "omega_roll_min": motion.largest(lambda t, y, mode: y[5], sign=-1)}
+    return {
+        "moment_shaft_max_abs": max(sign * motion.largest(shaft, sign) for sign in (1, -1)),
+        "moment_spindle_max_abs": max(sign * motion.largest(spindle, sign) for sign in (1, -1)),
+        "moment_spindle_max": motion.largest(spindle),
+        "omega_roll_min": motion.largest(lambda t, y, mode: y[5], sign=-1),
+    }
 
 
 def results(name, values):

@@ -7,7 +7,7 @@ import pytest
 from conftest import SOURCE
 
 sys.path.insert(0, str(SOURCE / "scripts"))
-from nocdyn_bench import costs, variants  # noqa: E402
+from nocdyn_bench import costs, variants
 
 PROFILE = """\
 events: Ir
@@ -36,16 +36,16 @@ DISASSEMBLY = """\
 
 
 def test_instructions_of_the_program_count_and_those_of_called_procedures_once():
-    assert costs.executions(PROFILE, "program") == {0x401000: 10, 0x401004: 21, 0x40100c: 5}
+    assert costs.executions(PROFILE, "program") == {0x401000: 10, 0x401004: 21, 0x40100C: 5}
 
 
 def test_an_instruction_has_an_operation_for_each_double_of_its_registers():
-    assert costs.operations(DISASSEMBLY) == {0x401000: 4, 0x401004: 1, 0x40100c: 16, 0x401014: 2}
+    assert costs.operations(DISASSEMBLY) == {0x401000: 4, 0x401004: 1, 0x40100C: 16, 0x401014: 2}
 
 
 def test_the_errors_of_a_sweep_are_the_largest_of_states_and_relative_peaks():
     exact = np.array([[1.0, 2.0, 3.0, 4.0, 200.0], [1.0, 2.0, 3.0, 4.0, 100.0]])
-    found = exact + [[0, 0, 0, 1e-7, 1e-5], [0, -3e-7, 0, 0, 0]]
+    found = [*exact, [0, 0, 0, 1e-07, 1e-05], [0, -3e-07, 0, 0, 0]]
     errors = variants.errors_of(found, exact)
     assert (errors.state, errors.peak) == (pytest.approx(3e-7, rel=1e-6), pytest.approx(5e-8, rel=1e-6))
     assert errors.are_below(1e-6) and not errors.are_below(2e-7)

@@ -30,8 +30,11 @@ def one_line(text):
         (["new"], "exactly one file is needed: nocdyn new FILE"),
         (["run", CASE_1, "--ouy", "x"], "'--ouy' is not an option"),
         (["run", CASE_1, "--ouy", "x"], "did you mean '--out'?"),
-        (["sweep", CASE_1, "--resum"], "'--resum' is not an option of nocdyn sweep; did you mean '--resume'? "
-         "allowed: '--out', '--set', '--threads', '--shard', '--resume', '--csv', '--quiet', '--help'\n"),
+        (
+            ["sweep", CASE_1, "--resum"],
+            "'--resum' is not an option of nocdyn sweep; did you mean '--resume'? "
+            "allowed: '--out', '--set', '--threads', '--shard', '--resume', '--csv', '--quiet', '--help'\n",
+        ),
         (["new", "a.nml", "--force"], "'--force' is not an option of nocdyn new; allowed: '--help'\n"),
         (["run", CASE_1, "--out"], "--out needs a value: --out DIR\n"),
         (["run", CASE_1, "--out="], "--out needs a value: --out DIR\n"),
@@ -44,7 +47,10 @@ def one_line(text):
         (["equilibrium", CASE_1, "--at", "rest"], "--at is an option of nocdyn modes"),
         (["modes", CASE_1, "--quiet"], "--quiet is an option of nocdyn run, sweep and merge"),
         (["check", CASE_1, "--quiet"], "--quiet is an option of nocdyn run, sweep and merge"),
-        (["new", "a.nml", "--set", "run.t_end=1"], "--set is an option of nocdyn run, check, equilibrium, modes, matrices and sweep"),
+        (
+            ["new", "a.nml", "--set", "run.t_end=1"],
+            "--set is an option of nocdyn run, check, equilibrium, modes, matrices and sweep",
+        ),
         (["--version", "now"], "--version takes no arguments"),
         (["help", "gear"], "'gear' is a group of the input: nocdyn help input gear"),
         (["--versoin"], "'--versoin' is not a command; did you mean '--version'?"),

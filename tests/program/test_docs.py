@@ -1,4 +1,5 @@
 """What the documentation claims about the program, its sources and its tests."""
+
 import importlib.util
 import os
 import re
@@ -14,7 +15,9 @@ DOCUMENTS = [page for page in [*sorted(PAGES.glob("*.md")), *TOP_PAGES] if page.
 
 UNIT = re.compile(
     r"^\s*(?:(?:pure|elemental|recursive|integer|logical|real\(wp\))\s+)*"
-    r"(?:module(?!\s+procedure)|program|subroutine|function|type\b[^:!]*::)\s+(\w+)", re.MULTILINE)
+    r"(?:module(?!\s+procedure)|program|subroutine|function|type\b[^:!]*::)\s+(\w+)",
+    re.MULTILINE,
+)
 COMMENTED_UNIT = re.compile(r"((?:^[ \t]*!>.*\n)+)" + UNIT.pattern, re.MULTILINE)
 
 
@@ -93,14 +96,18 @@ def test_pages_quote_files_as_they_are(page, fill_pages):
 
 
 def test_every_file_of_the_examples_is_quoted():
-    quoted = {name for page in PAGES.glob("*.md") for name in re.findall(r"<!-- fill: file (\S+) -->", page.read_text(encoding="utf-8"))}
+    quoted = {
+        name for page in PAGES.glob("*.md") for name in re.findall(r"<!-- fill: file (\S+) -->", page.read_text(encoding="utf-8"))
+    }
     files = {name_of(path) for path in (SOURCE / "docs" / "examples").iterdir()}
     assert files == {name for name in quoted if name.startswith("docs/examples/")}
 
 
 def test_every_place_of_a_page_is_filled():
     for page in PAGES.glob("*.md"):
-        for what, content in re.findall(r"<!-- fill: (.*?) -->\n(.*?)<!-- filled -->", page.read_text(encoding="utf-8"), re.DOTALL):
+        for what, content in re.findall(
+            r"<!-- fill: (.*?) -->\n(.*?)<!-- filled -->", page.read_text(encoding="utf-8"), re.DOTALL
+        ):
             assert content.strip(), f"{page.name}: nothing at {what}"
 
 
@@ -108,7 +115,9 @@ def test_tables_pictures_and_sections_go_to_their_places(fill_pages, tmp_path, m
     monkeypatch.setattr(fill_pages, "ROOT", tmp_path)
     (tmp_path / "docs" / "media").mkdir(parents=True)
     (tmp_path / "curve.svg").write_text("<svg/>")
-    (tmp_path / "bench.md").write_text("# Title\n\n- processor: fast\n\n## W3: chain\n\n| a |\n\nW3: wanted 1: **missed**.\n\n## W4: x\n\ny\n")
+    (tmp_path / "bench.md").write_text(
+        "# Title\n\n- processor: fast\n\n## W3: chain\n\n| a |\n\nW3: wanted 1: **missed**.\n\n## W4: x\n\ny\n"
+    )
     (tmp_path / "digits.md").write_text("digits\n\n| 1 |\n| - |\n\nprices\n\n| 2 |\n| - |\n")
     places = ["table digits 2", "bench", "bench W3:", "picture curve", "run nothing"]
     page = "\n".join(f"<!-- fill: {place} -->\nold\n<!-- filled -->" for place in places)
@@ -192,10 +201,16 @@ def index(reference):
     return lambda words: [document["url"] for document in search_index.search(serialized, documents, words)]
 
 
-@pytest.mark.parametrize(("words", "first"), [
-    ("planetary", "page/input.html#planetary"), ("planet", "page/input.html#planetary"), ("&gear", "page/input.html#gear"),
-    ("tolerances", "page/choosing-a-method.html#tolerances"), ("natural orthogonal complement", "page/theory.html#the-natural-orthogonal-complement-73-to-82"),
-])
+@pytest.mark.parametrize(
+    ("words", "first"),
+    [
+        ("planetary", "page/input.html#planetary"),
+        ("planet", "page/input.html#planetary"),
+        ("&gear", "page/input.html#gear"),
+        ("tolerances", "page/choosing-a-method.html#tolerances"),
+        ("natural orthogonal complement", "page/theory.html#the-natural-orthogonal-complement-73-to-82"),
+    ],
+)
 def test_search_finds_the_section_about_a_word_first(index, words, first):
     assert index(words)[0] == first
 
@@ -212,9 +227,11 @@ def test_site_gets_search_and_scripts_that_need_no_network(tmp_path):
         (self_contained.INSTALLED / part).parent.mkdir(parents=True, exist_ok=True)
         (self_contained.INSTALLED / part).write_text("")
     site, pages = tmp_path / "site", tmp_path / "pages"
-    page = ('<html><link href="https://cdn.test/bootstrap.min.css" rel="stylesheet"\n integrity="sha384-x" crossorigin="anonymous">'
-            '<script src="https://cdn.test/MathJax.js?config=TeX-AMS-MML_HTMLorMML" async></script>'
-            '<div></div><!--/.nav-collapse --><h2 id="gaps">Gaps</h2></body></html>')
+    page = (
+        '<html><link href="https://cdn.test/bootstrap.min.css" rel="stylesheet"\n integrity="sha384-x" crossorigin="anonymous">'
+        '<script src="https://cdn.test/MathJax.js?config=TeX-AMS-MML_HTMLorMML" async></script>'
+        '<div></div><!--/.nav-collapse --><h2 id="gaps">Gaps</h2></body></html>'
+    )
     row = "<tr>\n<td><a href='../proc/find_gap.html'>find_gap</a></td>\n<td>x</td>\n<td><p>Where a <em>gap</em> opens.</p></td>\n</tr>"
     for name, text in {"page/a.html": page, "search.html": page, "lists/procedures.html": row}.items():
         (site / name).parent.mkdir(parents=True, exist_ok=True)
@@ -224,7 +241,11 @@ def test_site_gets_search_and_scripts_that_need_no_network(tmp_path):
     search_index.main(site, pages)
     self_contained.main(site)
     linked = (site / "page" / "a.html").read_text()
-    assert "https://" not in linked and 'href="../lib/bootstrap5/css/bootstrap.min.css"' in linked and 'action="../search.html"' in linked
+    assert (
+        "https://" not in linked
+        and 'href="../lib/bootstrap5/css/bootstrap.min.css"' in linked
+        and 'action="../search.html"' in linked
+    )
     for script in re.findall(r'src="([^"?]+)', (site / "search.html").read_text()):
         assert (site / script).exists(), script
     data = (site / "search" / "index.js").read_text()
@@ -257,5 +278,7 @@ def test_outputs_differ_in_words_and_numbers_but_not_in_times_and_rounding(sessi
 
 def test_sessions_are_read_with_long_commands_and_outputs(sessions, tmp_path):
     page = tmp_path / "page.md"
-    page.write_text("```\n$ nocdyn run \\\n  a.nml\none\ntwo\n$ ls\n```\n```\nnocdyn new a.nml\n```\n```text\n$ cat a\nthree\n```\n")
+    page.write_text(
+        "```\n$ nocdyn run \\\n  a.nml\none\ntwo\n$ ls\n```\n```\nnocdyn new a.nml\n```\n```text\n$ cat a\nthree\n```\n"
+    )
     assert sessions.sessions_of(page) == [("nocdyn run \\\n  a.nml", "one\ntwo\n"), ("ls", ""), ("cat a", "three\n")]

@@ -19,7 +19,13 @@ def test_the_works_of_the_elements_add_up_to_the_columns(full):
     last = dict(zip(header, rows[-1]))
     works = account["work_in_J"]
     assert list(works) == [
-        "coupling shaft", "coupling anchor", "motor drive", "motor booster", "load fan", "excitation engine", "excitation gust",
+        "coupling shaft",
+        "coupling anchor",
+        "motor drive",
+        "motor booster",
+        "load fan",
+        "excitation engine",
+        "excitation gust",
     ]
     put_in = sum(work for name, work in works.items() if name.startswith(("motor", "excitation")))
     assert put_in == pytest.approx(last["work_in [J]"], rel=SAME)
@@ -93,29 +99,54 @@ ROTOR = "&body name = 'rotor' inertia = 2.0 speed = {speed} /\n{elements}\n&run 
 LISTS = {
     # what an element takes out stands on the other side, whatever its kind
     "a dc motor that drives": (
-        ROTOR.format(speed=0.0, run="", elements="&motor name = 'dc' body = 'rotor' kind = 'dc' voltage = 100.0 resistance = 0.5 "
-                     "flux_constant = 1.2 inductance = 0.01 /\n&load name = 'mill' body = 'rotor' viscous = 0.8 /"),
-        ["motor dc"], ["load mill", "kinetic energy"],
+        ROTOR.format(
+            speed=0.0,
+            run="",
+            elements="&motor name = 'dc' body = 'rotor' kind = 'dc' voltage = 100.0 resistance = 0.5 "
+            "flux_constant = 1.2 inductance = 0.01 /\n&load name = 'mill' body = 'rotor' viscous = 0.8 /",
+        ),
+        ["motor dc"],
+        ["load mill", "kinetic energy"],
     ),
     "a dc motor that brakes": (
-        ROTOR.format(speed=200.0, run="", elements="&motor name = 'dc' body = 'rotor' kind = 'dc' voltage = 0.0 resistance = 0.5 "
-                     "flux_constant = 1.2 inductance = 0.01 /"),
-        ["kinetic energy"], ["motor dc"],
+        ROTOR.format(
+            speed=200.0,
+            run="",
+            elements="&motor name = 'dc' body = 'rotor' kind = 'dc' voltage = 0.0 resistance = 0.5 "
+            "flux_constant = 1.2 inductance = 0.01 /",
+        ),
+        ["kinetic energy"],
+        ["motor dc"],
     ),
     "a load that drives": (
-        ROTOR.format(speed=0.0, run="", elements="&load name = 'river' body = 'rotor' table_speed = -10.0, 10.0 "
-                     "table_torque = -5.0, -5.0 /\n&motor name = 'brake' body = 'rotor' a = 0.0 b = 1.0 c = 0.0 /"),
-        ["load river"], ["motor brake", "kinetic energy"],
+        ROTOR.format(
+            speed=0.0,
+            run="",
+            elements="&load name = 'river' body = 'rotor' table_speed = -10.0, 10.0 "
+            "table_torque = -5.0, -5.0 /\n&motor name = 'brake' body = 'rotor' a = 0.0 b = 1.0 c = 0.0 /",
+        ),
+        ["load river"],
+        ["motor brake", "kinetic energy"],
     ),
     "a gap that is hit": (
-        ROTOR.format(speed=5.0, run="", elements="&coupling name = 'stop' bodies = 'ground', 'rotor' stiffness = 2e4 damping = 50.0 "
-                     "gap = 0.8 rest_twist = -1.0 /"),
-        ["stored in stop", "kinetic energy"], ["coupling stop"],
+        ROTOR.format(
+            speed=5.0,
+            run="",
+            elements="&coupling name = 'stop' bodies = 'ground', 'rotor' stiffness = 2e4 damping = 50.0 "
+            "gap = 0.8 rest_twist = -1.0 /",
+        ),
+        ["stored in stop", "kinetic energy"],
+        ["coupling stop"],
     ),
     "a start that is projected": (
-        ROTOR.format(speed=20.0, run="start = 'projected'", elements="&body name = 'wheel' inertia = 3.0 /\n"
-                     "&gear name = 'mesh' bodies = 'rotor', 'wheel' teeth = 20, 40 /\n&load name = 'drag' body = 'rotor' viscous = 0.8 /"),
-        ["kinetic energy"], ["load drag"],
+        ROTOR.format(
+            speed=20.0,
+            run="start = 'projected'",
+            elements="&body name = 'wheel' inertia = 3.0 /\n"
+            "&gear name = 'mesh' bodies = 'rotor', 'wheel' teeth = 20, 40 /\n&load name = 'drag' body = 'rotor' viscous = 0.8 /",
+        ),
+        ["kinetic energy"],
+        ["load drag"],
     ),
 }
 
@@ -125,8 +156,10 @@ def test_every_entry_stands_on_its_side_and_both_sides_add_up(nocdyn, machine):
     text, sources, sinks = LISTS[machine]
     _, table = nocdyn("run", nocdyn.write("machine.nml", text)).stdout.split("energy came from [J]\n")
     sides = table.split("what does not add up")[0].split("and went to [J]\n")
-    entries = [{name.strip(): float(energy) for name, energy, *_ in (line.rsplit(maxsplit=3) for line in side.splitlines())}
-               for side in sides]
+    entries = [
+        {name.strip(): float(energy) for name, energy, *_ in (line.rsplit(maxsplit=3) for line in side.splitlines())}
+        for side in sides
+    ]
     assert [sorted(side) for side in entries] == [sorted(sources), sorted(sinks)]
     came, went = (sum(side.values()) for side in entries)
     account = nocdyn.summary("results/machine")["energy_account"]
@@ -143,10 +176,13 @@ def test_the_energy_that_a_projected_start_loses_is_no_part_of_the_run(nocdyn):
 
 
 @pytest.mark.parametrize("method", ["rk45", "auto", "rodas4", "rodas5p"])
-@pytest.mark.parametrize("torque", [
-    "kind = 'ramp'  amplitude = 10.0  time = 0.5  duration = 3.0",
-    "kind = 'table'  table_time = 0.3, 0.8, 1.1, 1.9  table_torque = 1.0, -2.0, 5.0, 3.0  interpolation = 'cubic'",
-])
+@pytest.mark.parametrize(
+    "torque",
+    [
+        "kind = 'ramp'  amplitude = 10.0  time = 0.5  duration = 3.0",
+        "kind = 'table'  table_time = 0.3, 0.8, 1.1, 1.9  table_torque = 1.0, -2.0, 5.0, 3.0  interpolation = 'cubic'",
+    ],
+)
 def test_works_are_right_where_nothing_else_limits_the_steps(nocdyn, tmp_path, method, torque):
     # the speed is a polynomial of the time, which a method may follow without any error; its power is not
     tmp_path.joinpath("lone.nml").write_text(f"""

@@ -137,7 +137,9 @@ def test_what_nothing_drives_keeps_the_speed_of_its_start(nocdyn):
     path = nocdyn.write("machine.nml", TRAIN + free + joint)
     outcome = nocdyn("equilibrium", path, "--out", "out")
     assert outcome.returncode == 0
-    assert "note: nothing drives or brakes 'idler', 'disc': any speed is steady, and the one of the start is kept" in outcome.stdout
+    assert (
+        "note: nothing drives or brakes 'idler', 'disc': any speed is steady, and the one of the start is kept" in outcome.stdout
+    )
     (state,) = steady_states(nocdyn)
     assert state["values"]["omega_disc [rad/s]"] == pytest.approx(2, rel=EXACT)  # the angular momentum stays
     assert state["stability"] == "neutral"  # the joint has no damping
@@ -165,8 +167,10 @@ def test_machines_side_by_side_have_every_combination(nocdyn):
 
 def test_two_solutions_that_lie_close_together_are_found(nocdyn):
     # 1e-6 - (w - 7)^2 = 0: closer than the points of the scan
-    states = analyse(nocdyn, "&body name = 'a' inertia = 1.0 /\n&motor name = 'm' body = 'a' a = -48.999999 b = -14.0 c = 1.0 /\n"
-                             "&run t_end = 1.0 /\n")
+    states = analyse(
+        nocdyn,
+        "&body name = 'a' inertia = 1.0 /\n&motor name = 'm' body = 'a' a = -48.999999 b = -14.0 c = 1.0 /\n&run t_end = 1.0 /\n",
+    )
     assert [state["values"]["omega_a [rad/s]"] for state in states] == pytest.approx([6.999, 7.001], abs=1e-9)
     assert [state["stability"] for state in states] == ["unstable", "stable"]
 
@@ -286,7 +290,8 @@ def test_a_long_chain_is_solved_in_linear_time(nocdyn):
     count = 5000
     bodies = "".join(f"&body name = 'b{i}' inertia = 1.0 /\n" for i in range(count))
     shafts = "".join(
-        f"&coupling name = 's{i}' bodies = 'b{i}', 'b{i + 1}' stiffness = 100.0 cubic_stiffness = 1e4 /\n" for i in range(count - 1)
+        f"&coupling name = 's{i}' bodies = 'b{i}', 'b{i + 1}' stiffness = 100.0 cubic_stiffness = 1e4 /\n"
+        for i in range(count - 1)
     )
     ends = "&motor name = 'm' body = 'b0' a = 7.0 b = 0.0 c = 0.0 /\n&load name = 'l' body = 'b4999' viscous = 2.0 /\n"
     (state,) = analyse(nocdyn, bodies + shafts + ends + "&run t_end = 1.0 /\n")
@@ -297,7 +302,9 @@ def test_a_long_chain_is_solved_in_linear_time(nocdyn):
 
 
 def test_a_large_machine_s_table_stops_and_says_so(nocdyn):
-    bodies = "".join(f"&body name = 'b{i}' inertia = 1.0 /\n&load name = 'l{i}' body = 'b{i}' viscous = 1.0 /\n" for i in range(70))
+    bodies = "".join(
+        f"&body name = 'b{i}' inertia = 1.0 /\n&load name = 'l{i}' body = 'b{i}' viscous = 1.0 /\n" for i in range(70)
+    )
     outcome = nocdyn("equilibrium", nocdyn.write("many.nml", bodies + "&run t_end = 1.0 /\n"))
     lines = outcome.stdout.splitlines()
     assert "  (82 more values in equilibrium.json)" in lines
@@ -383,8 +390,10 @@ def test_a_speed_at_which_constant_torques_balance_is_not_determined_and_that_of
 &run t_end = 1.0 /
 """
     outcome = nocdyn("equilibrium", nocdyn.write("machine.nml", text.format(speed=20.0)), "--out", "out")
-    assert ("note: the torques on 'drum' balance over a range of speeds: any of them is steady, and of those that were found the one "
-            "nearest to the start is kept, 20 rad/s of 'drum'\n") in outcome.stdout
+    assert (
+        "note: the torques on 'drum' balance over a range of speeds: any of them is steady, and of those that were found the one "
+        "nearest to the start is kept, 20 rad/s of 'drum'\n"
+    ) in outcome.stdout
     (state,) = steady_states(nocdyn)
     assert (state["values"]["omega_drum [rad/s]"], state["stability"]) == (pytest.approx(20, rel=EXACT), "neutral")
     # at rest nothing brakes; the range begins where the hyperbolic tangent is 1 to rounding, tanh(18.4) = 1 - 2e-16
@@ -394,7 +403,9 @@ def test_a_speed_at_which_constant_torques_balance_is_not_determined_and_that_of
 
 def test_a_clutch_that_slips_at_the_torque_of_its_motor_has_one_range_of_speeds(nocdyn):
     text = SHAFT.format(shaft="friction = 10.0", motor="kind = 'constant' torque = 10.0", load="viscous = 0.5")
-    outcome = nocdyn("equilibrium", nocdyn.write("machine.nml", text.replace("stiffness = 1000.0 damping = 2.0", "")), "--out", "out")
+    outcome = nocdyn(
+        "equilibrium", nocdyn.write("machine.nml", text.replace("stiffness = 1000.0 damping = 2.0", "")), "--out", "out"
+    )
     assert "the torques on 'rotor', 'fan' balance over a range of speeds" in outcome.stdout
     (state,) = steady_states(nocdyn)
     assert state["values"]["omega_fan [rad/s]"] == pytest.approx(20, rel=1e-9)

@@ -161,26 +161,35 @@ STEADY_SPEEDS = {
 
 # Numbers from elsewhere, with the accuracy to which they are known.
 PUBLISHED = {
-    "three_rotors": (1e-9, {
-        "phi_gear [rad]": 0.1623282270274,
-        "phi_load [rad]": 0.1628616428800,
-        "omega_gear [rad/s]": -0.1122493092032,
-        "omega_load [rad/s]": -0.1381452799178,
-        # the library counts the torque at a flange into the gear, here it is that on the motor
-        "reaction_reducer [N m]": 0.538054301463,
-    }),
-    "backlash": (1e-7, {
-        "phi_loose [rad] at 0.1": 0.24983586,
-        "phi_loose [rad] at 0.25": 0.58081557,
-        "phi_loose [rad] at 0.5": -0.30995804,
-    }),
-    "motor_coupling_gear": (1e-9, {
-        "phi_motor [rad]": 56.47598491122,
-        "phi_wheel [rad]": 14.11521985166,
-        "omega_motor [rad/s]": 54.56693223929,
-        "omega_wheel [rad/s]": 13.59750467860,
-        "reaction_reducer [N m]": -7.329820484048,
-    }),
+    "three_rotors": (
+        1e-9,
+        {
+            "phi_gear [rad]": 0.1623282270274,
+            "phi_load [rad]": 0.1628616428800,
+            "omega_gear [rad/s]": -0.1122493092032,
+            "omega_load [rad/s]": -0.1381452799178,
+            # the library counts the torque at a flange into the gear, here it is that on the motor
+            "reaction_reducer [N m]": 0.538054301463,
+        },
+    ),
+    "backlash": (
+        1e-7,
+        {
+            "phi_loose [rad] at 0.1": 0.24983586,
+            "phi_loose [rad] at 0.25": 0.58081557,
+            "phi_loose [rad] at 0.5": -0.30995804,
+        },
+    ),
+    "motor_coupling_gear": (
+        1e-9,
+        {
+            "phi_motor [rad]": 56.47598491122,
+            "phi_wheel [rad]": 14.11521985166,
+            "omega_motor [rad/s]": 54.56693223929,
+            "omega_wheel [rad/s]": 13.59750467860,
+            "reaction_reducer [N m]": -7.329820484048,
+        },
+    ),
     "kloss_run_up": (1e-9, {"omega_rotor [rad/s]": 0.95 * 2 * math.pi * 25}),
     "fan_law": (1e-9, {"omega_fan [rad/s]": 43.052858579027}),
 }
@@ -325,5 +334,3 @@ def test_the_reference_is_what_its_program_computes(name):
 
     values = getattr(example_references, name)()
     assert values == pytest.approx(REFERENCE[name], rel=1e-10, abs=1e-11)
-
-

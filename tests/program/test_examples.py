@@ -8,9 +8,15 @@ import pytest
 from conftest import SOURCE
 
 PAGES = SOURCE / "docs" / "pages"
-QUOTED = {name: output for page in sorted(PAGES.glob("*.md"))
-          for name, output in re.findall(r"<!-- fill: run (\w+) -->\n\n```text\n\$ [^\n]*\n(.*?)```\n\n<!-- filled -->",
-                                         page.read_text(encoding="utf-8"), re.DOTALL)}
+QUOTED = {
+    name: output
+    for page in sorted(PAGES.glob("*.md"))
+    for name, output in re.findall(
+        r"<!-- fill: run (\w+) -->\n\n```text\n\$ [^\n]*\n(.*?)```\n\n<!-- filled -->",
+        page.read_text(encoding="utf-8"),
+        re.DOTALL,
+    )
+}
 
 
 def run(*words):
@@ -23,8 +29,15 @@ def run(*words):
 def built(tmp_path_factory):
     prefix, build = tmp_path_factory.mktemp("installed"), tmp_path_factory.mktemp("build")
     run("cmake", "--install", os.environ["NOCDYN_BUILD"], "--prefix", prefix)
-    run("cmake", "-S", SOURCE / "docs/examples", "-B", build, f"-DCMAKE_PREFIX_PATH={prefix}",
-        f"-DCMAKE_Fortran_COMPILER={os.environ.get('FC', 'gfortran')}")
+    run(
+        "cmake",
+        "-S",
+        SOURCE / "docs/examples",
+        "-B",
+        build,
+        f"-DCMAKE_PREFIX_PATH={prefix}",
+        f"-DCMAKE_Fortran_COMPILER={os.environ.get('FC', 'gfortran')}",
+    )
     run("cmake", "--build", build)
     return build
 

@@ -174,9 +174,7 @@ def test_a_folder_that_cannot_be_made_is_exit_code_3(nocdyn, spinner):
     nocdyn.write("file", "in the way")
     outcome = nocdyn("run", spinner, "--out", "file/out")
     assert (outcome.returncode, outcome.stdout) == (3, "")
-    assert outcome.stderr == (
-        "nocdyn: cannot write 'file/out/trajectory.csv': the folder cannot be made: Not a directory\n"
-    )
+    assert outcome.stderr == ("nocdyn: cannot write 'file/out/trajectory.csv': the folder cannot be made: Not a directory\n")
     assert (nocdyn.folder / "file").read_text() == "in the way"
 
 

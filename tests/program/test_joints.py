@@ -125,7 +125,8 @@ def test_two_columns_of_one_name_are_refused(nocdyn):
 def test_a_loop_that_locks_is_refused_with_both_ways_and_ratios(nocdyn, command):
     pairs = ((1, 2, 1, -1.0), (2, 4, 1, -0.5), (1, 3, 1, -1.0), (3, 4, 2.2, -1))
     gears = [
-        f"&gear name = 'g{i}' bodies = 'body{a}', 'body{b}' radii = {r}, {-s} /\n" for i, (a, b, r, s) in enumerate(pairs, start=1)
+        f"&gear name = 'g{i}' bodies = 'body{a}', 'body{b}' radii = {r}, {-s} /\n"
+        for i, (a, b, r, s) in enumerate(pairs, start=1)
     ]
     complaint = refusal(nocdyn, command, "".join(gears) + FOUR)
     assert complaint == (

@@ -104,17 +104,15 @@ def test_dense_matrices_too_large_for_memory_are_refused(nocdyn, bodies, overrid
 def hub(shared_nocdyn):
     """A disc with so many branches that no order of the states makes the band of the Jacobian narrow."""
     branches = [
-        f"&body name = 'b{i}' inertia = 1.0 /\n&coupling name = 'c{i}' bodies = 'hub', 'b{i}' stiffness = 1.0 /" for i in range(3000)
+        f"&body name = 'b{i}' inertia = 1.0 /\n&coupling name = 'c{i}' bodies = 'hub', 'b{i}' stiffness = 1.0 /"
+        for i in range(3000)
     ]
     lines = ["&body name = 'hub' inertia = 1.0 speed = 1.0 /", *branches, "&run t_end = 0.01 method = 'auto' /"]
     shared_nocdyn.write("hub.nml", "\n".join([*lines, "&output points = 2 /\n"]))
     return shared_nocdyn
 
 
-NEED = (
-    "a matrix of 6002 x 6002 entries for this machine, whose couplings leave no narrower band;"
-    " at most 6000 x 6000 are allowed"
-)
+NEED = "a matrix of 6002 x 6002 entries for this machine, whose couplings leave no narrower band; at most 6000 x 6000 are allowed"
 
 
 @pytest.mark.parametrize("method", ["rosenbrock", "rodas4", "rodas5p"])

@@ -70,7 +70,7 @@ EXPECTED = {
     "37": ZERO,
     "38": blocks([C_1, ZERO], [ZERO, ZERO]),
     "39": blocks([ZERO, K_1], [ONE, ZERO]),
-    "40": [Q_1 + [0, 0, 0]],
+    "40": [[*Q_1, 0, 0, 0]],
     "41": [OMEGA_RATE + OMEGA],
     "42": [OMEGA + PHI],
     "44": blocks([J_1, ZERO, ZERO], [ZERO, ONE, ZERO], [ZERO, ZERO, ONE]),

@@ -83,7 +83,9 @@ def test_a_softer_shaft_between_gears_counts_with_the_square_of_the_ratio(nocdyn
     at_steady_state = modes_of(nocdyn, TRAIN)
     assert oscillations(at_steady_state, "undamped_frequency_Hz") == [pytest.approx(11.4525188732, abs=1e-10)]
     at_rest = modes_of(nocdyn, TRAIN, "--at", "rest")
-    assert oscillations(at_rest, "undamped_frequency_Hz") == [pytest.approx(sqrt(800 * (1 / 0.5 + 1 / 0.55)) / (2 * pi), rel=EXACT)]
+    assert oscillations(at_rest, "undamped_frequency_Hz") == [
+        pytest.approx(sqrt(800 * (1 / 0.5 + 1 / 0.55)) / (2 * pi), rel=EXACT)
+    ]
 
 
 def test_at_rest_the_speeds_of_the_start_do_not_count(nocdyn):
@@ -369,7 +371,10 @@ def test_a_machine_with_too_many_states_is_refused(nocdyn):
     bodies = "".join(f"&body name = 'b{i}' inertia = 1.0 /\n" for i in range(1501))
     outcome = nocdyn("modes", nocdyn.write("many.nml", bodies + "&run t_end = 1.0 /\n"))
     assert (outcome.returncode, outcome.stdout) == (2, "")
-    assert "many.nml: the modes of this machine are those of a dense matrix of 3002 states; at most 3000 are allowed" in outcome.stderr
+    assert (
+        "many.nml: the modes of this machine are those of a dense matrix of 3002 states; at most 3000 are allowed"
+        in outcome.stderr
+    )
 
 
 def test_the_files_of_a_large_machine_have_the_shapes_of_its_first_modes(nocdyn):
@@ -381,7 +386,10 @@ def test_the_files_of_a_large_machine_have_the_shapes_of_its_first_modes(nocdyn)
     outcome = nocdyn("modes", path, "--at", "rest", "--out", "out")
     modes = json.loads((nocdyn.folder / "out/modes.json").read_text())["modes"]
     told = 1000000 // (3 * count)
-    assert f"note: of the {len(modes)} modes, modes.csv and modes.json have the shapes and energies of the first {told}\n" in outcome.stdout
+    assert (
+        f"note: of the {len(modes)} modes, modes.csv and modes.json have the shapes and energies of the first {told}\n"
+        in outcome.stdout
+    )
     assert ["shape" in mode for mode in modes] == [True] * told + [False] * (len(modes) - told)
     rows = list(csv.reader((nocdyn.folder / "out/modes.csv").read_text().splitlines()))
     assert {len(row) for row in rows} == {8 + 3 * count}

@@ -106,11 +106,14 @@ def test_percentiles_that_differ_little_are_told_apart(tmp_path, monkeypatch, ca
     assert "5 %: 33.333 rad/s<" in text and "95 %: 33.333 rad/s<" in text
 
 
-@pytest.mark.parametrize(("extremes", "words"), [
-    ({7: 1e9}, ["1 further out,", "up to 1e+09 N m"]),
-    ({7: -1e9}, ["1 further out,", "down to -1e+09 N m"]),
-    ({7: -1e6, 8: 1e9, 9: -1e7}, ["3 further out,", "down to -1e+07 N m,", "up to 1e+09 N m"]),
-])
+@pytest.mark.parametrize(
+    ("extremes", "words"),
+    [
+        ({7: 1e9}, ["1 further out,", "up to 1e+09 N m"]),
+        ({7: -1e9}, ["1 further out,", "down to -1e+09 N m"]),
+        ({7: -1e6, 8: 1e9, 9: -1e7}, ["3 further out,", "down to -1e+07 N m,", "up to 1e+09 N m"]),
+    ],
+)
 def test_outliers_are_counted_beside_the_histogram(extremes, words, tmp_path, monkeypatch, capsys):
     values = np.linspace(0.0, 1.0, 100)
     values[list(extremes)] = list(extremes.values())
@@ -197,9 +200,13 @@ def test_many_scattered_variants_become_shades_and_contours(tmp_path, monkeypatc
 def test_frequency_alone_gives_a_resonance_curve_with_its_peak(tmp_path, monkeypatch, capsys):
     frequency = np.random.default_rng(1).permutation(np.linspace(0.5, 12.0, 116))
     moment = 1.0 / np.abs(6.4 + 0.1j - frequency)
-    folder = write_sweep(tmp_path, "grid", {"excitation.shaker.frequency": frequency},
-                         {MOMENT: moment, "moment_coupling_time_of_max": frequency, "moment_coupling_min_from_2": -moment},
-                         np.where(frequency > 11.0, FAILED, DONE))
+    folder = write_sweep(
+        tmp_path,
+        "grid",
+        {"excitation.shaker.frequency": frequency},
+        {MOMENT: moment, "moment_coupling_time_of_max": frequency, "moment_coupling_min_from_2": -moment},
+        np.where(frequency > 11.0, FAILED, DONE),
+    )
     assert draw(monkeypatch, capsys, folder) == ["resonance"]
     text = text_of(folder, "resonance")
     assert "largest: 10 N m" in text and "at 6.4 rad/s = 1.019 Hz" in text and "frequency [Hz]" in text
@@ -222,7 +229,15 @@ def test_many_numbers_and_results_go_on_in_further_figures(tmp_path, monkeypatch
     results = {f"omega_rotor{i}_final": numbers[2 - i % 2] + 0.01 * numbers[0] for i in range(3)}
     folder = write_sweep(tmp_path, "latin", varied, results, np.arange(150) % 50 == 0)
     assert draw(monkeypatch, capsys, folder) == [
-        "histograms", "histograms_2", "influence", "influence_2", "scatter", "scatter_2", "parallel", "parallel_2"]
+        "histograms",
+        "histograms_2",
+        "influence",
+        "influence_2",
+        "scatter",
+        "scatter_2",
+        "parallel",
+        "parallel_2",
+    ]
     text = text_of(folder, "scatter_2")  # of the third result, which is the third number with some of the first
     assert "body.rotor2.inertia" in text and "body.rotor0.inertia" in text and "body.rotor1.inertia" not in text
     assert "of 3 varied numbers the 2 most correlated with the result" in text
@@ -258,12 +273,15 @@ def test_parallel_axes_say_what_they_leave_out(tmp_path, monkeypatch, capsys):
     assert "failed (one in 3 is shown)" in text
 
 
-@pytest.mark.parametrize(("load", "cubic"), [
-    (np.ones(1), np.zeros(1)),
-    (np.ones(3000), np.arange(3000.0)),
-    (np.arange(3000.0), np.arange(3000.0)),
-    (np.geomspace(1e-3, 1e3, 3000), np.random.default_rng(1).random(3000)),
-])
+@pytest.mark.parametrize(
+    ("load", "cubic"),
+    [
+        (np.ones(1), np.zeros(1)),
+        (np.ones(3000), np.arange(3000.0)),
+        (np.arange(3000.0), np.arange(3000.0)),
+        (np.geomspace(1e-3, 1e3, 3000), np.random.default_rng(1).random(3000)),
+    ],
+)
 def test_awkward_lists_are_drawn(load, cubic, tmp_path, monkeypatch, capsys):
     folder = write_sweep(tmp_path, "list", {LOAD: load, CUBIC: cubic}, {MOMENT: cubic, SPEED: 0.0 * load})
     assert draw(monkeypatch, capsys, folder) == ["histograms", "influence", "scatter", "map"]
@@ -287,18 +305,22 @@ def test_table_is_drawn_where_there_is_no_netcdf_file(tmp_path, monkeypatch, cap
 """)
     (tmp_path / "sweep.csv").write_text(
         f"variant,{LOAD} [N m s/rad],body.rotor.teeth,{MOMENT} [N m],omega_a.b_final [rad/s],status,steps,reason\n"
-        "1,50.0,20,3.5,1.0,done,100,\n2,60.0,21,,,failed,90,\"too, many steps\"\n3,70.0,22,4.5,2.0,done,95,\n")
+        '1,50.0,20,3.5,1.0,done,100,\n2,60.0,21,,,failed,90,"too, many steps"\n3,70.0,22,4.5,2.0,done,95,\n'
+    )
     assert draw(monkeypatch, capsys, tmp_path) == ["histograms", "influence", "scatter", "map"]
     text = text_of(tmp_path, "scatter")
     assert "From a table" in text and "list design, 3 variants, 1 failed" in text and "body.rotor.teeth<" in text
     assert "omega_a.b_final [rad/s]" in text
 
 
-@pytest.mark.parametrize("store", [
-    lambda text: np.bytes_(text.encode()),  # as the NetCDF library does it: UTF-8 that is marked as ASCII
-    lambda text: np.bytes_(text.encode("latin-1")),
-    lambda text: text,
-])
+@pytest.mark.parametrize(
+    "store",
+    [
+        lambda text: np.bytes_(text.encode()),  # as the NetCDF library does it: UTF-8 that is marked as ASCII
+        lambda text: np.bytes_(text.encode("latin-1")),
+        lambda text: text,
+    ],
+)
 def test_names_beyond_ascii_are_drawn(store, tmp_path, monkeypatch, capsys):
     import h5py
 
@@ -328,26 +350,39 @@ def test_only_the_formats_that_are_asked_for_are_written(tmp_path, monkeypatch, 
     assert leaving.value.code == 2 and "'tiff' is none of png, svg, pdf" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize(("files", "message"), [
-    (None, "there is no such results folder"),
-    ({}, "no sweep.nc or sweep.csv here"),
-    ({"sweep.journal": ""}, "the sweep is not finished; 'nocdyn sweep --resume' goes on with it"),
-    ({"sweep.nc": "no NetCDF"}, "sweep.nc: cannot be read: "),
-    ({"sweep.csv": ""}, "sweep.csv: not the table of a sweep: "),
-    ({"sweep.csv": "t [s],phi_a [rad]\n0,1\n"}, "sweep.csv: not the table of a sweep: "),
-    ({"sweep.csv": "variant,a.b.c,d,status\n1,1,one,done\n"}, "sweep.csv: not the table of a sweep: "),
-    ({"sweep.csv": "variant,a.b.c,d,status\n1,1,1,well\n"},
-     "sweep.csv: not the table of a sweep: the status 'well' is none of done, refused, failed"),
-    ({"sweep.csv": "variant,a.b.c,d,status\n1,1,1,done\n"}, "input.nml: missing; the figures of a table need the input"),
-    ({"sweep.csv": "variant,a.b.c,d,status\n1,1,1,done\n", "input.nml": "&run t_end = 1.0 /\n"},
-     "input.nml: this is not the input of a sweep"),
-    ({"sweep.csv": "variant,a.b.c,d,status\n1,1,,failed\n", "input.nml": "&a b = 1 /\n&sweep design = 'random' /\n"},
-     "nothing to draw: none of the 1 variants was done"),
-    ({"sweep.csv": "variant,a.b.c,d,status\n1,1,,done\n", "input.nml": "&a b = 1 /\n&sweep design = 'random' /\n"},
-     "nothing to draw: no variant has any of the results"),
-    ({"sweep.csv": "variant,a.b.c,status\n1,1,done\n", "input.nml": "&a b = 1 /\n&sweep design = 'random' /\n"},
-     "nothing to draw: the sweep has 1 varied numbers and 0 results"),
-])
+@pytest.mark.parametrize(
+    ("files", "message"),
+    [
+        (None, "there is no such results folder"),
+        ({}, "no sweep.nc or sweep.csv here"),
+        ({"sweep.journal": ""}, "the sweep is not finished; 'nocdyn sweep --resume' goes on with it"),
+        ({"sweep.nc": "no NetCDF"}, "sweep.nc: cannot be read: "),
+        ({"sweep.csv": ""}, "sweep.csv: not the table of a sweep: "),
+        ({"sweep.csv": "t [s],phi_a [rad]\n0,1\n"}, "sweep.csv: not the table of a sweep: "),
+        ({"sweep.csv": "variant,a.b.c,d,status\n1,1,one,done\n"}, "sweep.csv: not the table of a sweep: "),
+        (
+            {"sweep.csv": "variant,a.b.c,d,status\n1,1,1,well\n"},
+            "sweep.csv: not the table of a sweep: the status 'well' is none of done, refused, failed",
+        ),
+        ({"sweep.csv": "variant,a.b.c,d,status\n1,1,1,done\n"}, "input.nml: missing; the figures of a table need the input"),
+        (
+            {"sweep.csv": "variant,a.b.c,d,status\n1,1,1,done\n", "input.nml": "&run t_end = 1.0 /\n"},
+            "input.nml: this is not the input of a sweep",
+        ),
+        (
+            {"sweep.csv": "variant,a.b.c,d,status\n1,1,,failed\n", "input.nml": "&a b = 1 /\n&sweep design = 'random' /\n"},
+            "nothing to draw: none of the 1 variants was done",
+        ),
+        (
+            {"sweep.csv": "variant,a.b.c,d,status\n1,1,,done\n", "input.nml": "&a b = 1 /\n&sweep design = 'random' /\n"},
+            "nothing to draw: no variant has any of the results",
+        ),
+        (
+            {"sweep.csv": "variant,a.b.c,status\n1,1,done\n", "input.nml": "&a b = 1 /\n&sweep design = 'random' /\n"},
+            "nothing to draw: the sweep has 1 varied numbers and 0 results",
+        ),
+    ],
+)
 def test_unusable_results_are_one_clear_line(files, message, tmp_path, monkeypatch):
     folder = tmp_path / "results"
     for name, text in (files or {}).items():

@@ -6,8 +6,8 @@ from graphlib import TopologicalSorter
 from conftest import SOURCE
 
 LAYERS = ["base", "integrate", "model", "io", "analyse", "app"]
-MODEL_AND_FILES_APART = {"integrate", "model", "io"}   # which do not use one another
-LEAST_MODULES = 200   # fewer than that were not found where they are
+MODEL_AND_FILES_APART = {"integrate", "model", "io"}  # which do not use one another
+LEAST_MODULES = 200  # fewer than that were not found where they are
 MOST_FILES = 12
 ROW = re.compile(r"^\| `([a-z_/]+)` \| (.+) \| (.+) \|$", re.MULTILINE)
 MODULE = re.compile(r"^\s*(?:module|program)\s+(nocdyn\w*)", re.MULTILINE | re.IGNORECASE)
@@ -47,8 +47,11 @@ def test_the_test_sees_the_modules_of_src():
 
 def test_every_use_is_allowed_by_the_table_of_rooms():
     allowed = table()
-    wrong = [f"{name} ({room}) uses {used} ({other})" for name, room, used, other in arrows()
-             if room != other and other not in allowed.get(room, ())]
+    wrong = [
+        f"{name} ({room}) uses {used} ({other})"
+        for name, room, used, other in arrows()
+        if room != other and other not in allowed.get(room, ())
+    ]
     assert not wrong
 
 
@@ -67,7 +70,7 @@ def test_no_rooms_use_each_other_in_a_circle():
     for _, room, _, other in arrows():
         if room != other:
             graph.setdefault(room, set()).add(other)
-    TopologicalSorter(graph).prepare()   # raises CycleError with the circle
+    TopologicalSorter(graph).prepare()  # raises CycleError with the circle
 
 
 def test_use_points_down_the_layers():

@@ -76,8 +76,10 @@ def one_format(monkeypatch) -> tuple[str, ...]:
 
 def chain(bodies: int, run: str) -> str:
     groups = [f"&body name = 'rotor{i}' inertia = 1.0 /" for i in range(bodies)]
-    groups += [f"&coupling name = 'shaft{i}' bodies = 'rotor{i - 1}', 'rotor{i}' stiffness = 1e3 damping = 1.0 /"
-               for i in range(1, bodies)]
+    groups += [
+        f"&coupling name = 'shaft{i}' bodies = 'rotor{i - 1}', 'rotor{i}' stiffness = 1e3 damping = 1.0 /"
+        for i in range(1, bodies)
+    ]
     return "\n".join([*groups, "&motor name = 'drive' body = 'rotor0' a = 100.0 b = 1.0 c = 0.0 /", f"&run {run} /", ""])
 
 
@@ -94,14 +96,17 @@ def test_single_body_is_drawn(tmp_path, monkeypatch):
 
 
 def test_machine_with_ground_and_awkward_names_is_drawn(tmp_path, monkeypatch, one_format):
-    results = run_input(tmp_path, """
+    results = run_input(
+        tmp_path,
+        """
 &case title = 'Costs $5, and a title that is far too long for one line: 50 % of a lot of words that nobody wants to read' /
 &body name = 'a $ b' inertia = 1.0 speed = 1.0 /
 &body name = 'wheel_2' inertia = 1.0 speed = -1.0 /
 &coupling name = 'mount [x]' bodies = 'ground', 'a $ b' stiffness = 100.0 damping = 0.1 /
 &gear name = 'g' bodies = 'a $ b', 'wheel_2' teeth = 20, 20 /
 &run t_end = 1.0 /
-""")
+""",
+    )
     call(monkeypatch, "run_figures", results)
     assert_figures(results / "figures", "motion", "phase_planes", "torques", "energy", formats=one_format)
 
@@ -129,12 +134,15 @@ def test_corners_of_a_fast_oscillation_are_told_with_the_interval_that_rounds_th
 
 
 def test_throttle_and_current_are_drawn(tmp_path, monkeypatch, one_format):
-    results = run_input(tmp_path, """
+    results = run_input(
+        tmp_path,
+        """
 &body name = 'rotor' inertia = 1.0 /
 &motor name = 'drive' body = 'rotor' kind = 'dc' voltage = 24.0 resistance = 1.0 flux_constant = 0.5 inductance = 0.1
        governor_speed = 20.0 governor_gain = 0.1 governor_time = 1.0 /
 &run t_end = 1.0 /
-""")
+""",
+    )
     call(monkeypatch, "run_figures", results)
     text = (results / "figures" / "torques.svg").read_text(encoding="utf-8")
     assert "throttle [1]" in text and "current [A]" in text
@@ -145,8 +153,11 @@ def test_numbers_stand_beside_their_closed_forms(paper_results, monkeypatch, cap
     case1, case2 = capsys.readouterr().out.split("\n\n")
     moment = -100.0 * 4.0 / 9.0 * UNIFORM_SPEED
     uniform = [UNIFORM_SPEED, UNIFORM_SPEED, -2.0 / 3.0 * UNIFORM_SPEED, moment, moment / 2.0]
-    last_columns = [[float(word) for word in line.split("]")[1].replace("..", " ").split()]
-                    for case in (case1, case2) for line in case.splitlines()[2:]]
+    last_columns = [
+        [float(word) for word in line.split("]")[1].replace("..", " ").split()]
+        for case in (case1, case2)
+        for line in case.splitlines()[2:]
+    ]
     for expected, (end, steady, difference) in zip(uniform, last_columns[:5], strict=True):
         assert steady == pytest.approx(expected, rel=1e-8)
         assert end == pytest.approx(expected, rel=SETTLED)
@@ -170,7 +181,9 @@ def modes_of(folder: Path, text: str) -> Path:
 
 
 def test_modes_of_a_geared_machine_on_the_ground_are_drawn(tmp_path, monkeypatch):
-    results = modes_of(tmp_path, """
+    results = modes_of(
+        tmp_path,
+        """
 &case title = 'Costs $5' /
 &body name = 'a $ b' inertia = 1.0 /
 &body name = 'wheel' inertia = 1.0 /
@@ -179,7 +192,8 @@ def test_modes_of_a_geared_machine_on_the_ground_are_drawn(tmp_path, monkeypatch
 &coupling name = 'shaft' bodies = 'wheel', 'disc' stiffness = 100.0 damping = 0.1 /
 &gear name = 'g' bodies = 'a $ b', 'wheel' teeth = 20, 50 /
 &run t_end = 1.0 /
-""")
+""",
+    )
     call(monkeypatch, "mode_figures", results)
     assert_figures(results / "figures", "modes")
     text = (results / "figures" / "modes.svg").read_text(encoding="utf-8")
@@ -192,11 +206,14 @@ def test_many_modes_of_many_bodies_are_drawn_in_several_figures(tmp_path, monkey
     assert_figures(results / "figures", "modes", "modes_2", formats=one_format)
 
 
-@pytest.mark.parametrize(("content", "message"), [
-    (None, "no modes.json here; 'nocdyn modes FILE --out "),
-    ("{", "modes.json: cannot be read: "),
-    ("{}", "this is no modes.json of nocdyn"),
-])
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        (None, "no modes.json here; 'nocdyn modes FILE --out "),
+        ("{", "modes.json: cannot be read: "),
+        ("{}", "this is no modes.json of nocdyn"),
+    ],
+)
 def test_a_folder_without_modes_is_refused(tmp_path, monkeypatch, content, message):
     if content is not None:
         (tmp_path / "modes.json").write_text(content)
@@ -208,16 +225,19 @@ def test_a_machine_that_does_not_oscillate_is_refused(tmp_path, monkeypatch):
     assert "nothing to draw: no mode oscillates" in refusal(monkeypatch, "mode_figures", results)
 
 
-@pytest.mark.parametrize(("files", "message"), [
-    (None, "there is no such results folder"),
-    ({}, "no trajectory.csv here"),
-    ({"trajectory.csv": ""}, "not a table of numbers"),
-    ({"trajectory.csv": "t [s],phi_a [rad]\n0,one\n"}, "not a table of numbers"),
-    ({"trajectory.csv": "a,b\n0,1\n2,3\n"}, "there is no column 't [s]'"),
-    ({"trajectory.csv": "t [s],phi_a [rad]\n0,1\n"}, "nothing to draw: the trajectory has 1 row(s)"),
-    ({"trajectory.partial.csv": "t [s],phi_a [rad]\n"}, "nothing to draw: the trajectory has 0 row(s)"),
-    ({"trajectory.csv": "t [s],phi_a [rad]\n0,1\n1,1\n"}, "input.nml: missing"),
-])
+@pytest.mark.parametrize(
+    ("files", "message"),
+    [
+        (None, "there is no such results folder"),
+        ({}, "no trajectory.csv here"),
+        ({"trajectory.csv": ""}, "not a table of numbers"),
+        ({"trajectory.csv": "t [s],phi_a [rad]\n0,one\n"}, "not a table of numbers"),
+        ({"trajectory.csv": "a,b\n0,1\n2,3\n"}, "there is no column 't [s]'"),
+        ({"trajectory.csv": "t [s],phi_a [rad]\n0,1\n"}, "nothing to draw: the trajectory has 1 row(s)"),
+        ({"trajectory.partial.csv": "t [s],phi_a [rad]\n"}, "nothing to draw: the trajectory has 0 row(s)"),
+        ({"trajectory.csv": "t [s],phi_a [rad]\n0,1\n1,1\n"}, "input.nml: missing"),
+    ],
+)
 def test_unusable_results_are_one_clear_line(files, message, tmp_path, monkeypatch):
     folder = tmp_path / "results"
     for name, text in (files or {}).items():
@@ -230,8 +250,12 @@ def test_unusable_results_are_one_clear_line(files, message, tmp_path, monkeypat
 
 
 def test_refusals_leave_with_exit_code_1_and_one_line(tmp_path):
-    result = subprocess.run([sys.executable, "-m", "nocdyn_report.run_figures", tmp_path / "none"], text=True,
-                            capture_output=True, env={**os.environ, "PYTHONPATH": str(SCRIPTS)})
+    result = subprocess.run(
+        [sys.executable, "-m", "nocdyn_report.run_figures", tmp_path / "none"],
+        text=True,
+        capture_output=True,
+        env={**os.environ, "PYTHONPATH": str(SCRIPTS)},
+    )
     assert result.returncode == 1
     assert result.stderr.count("\n") == 1 and result.stderr.startswith("scripts/plot: ")
 
@@ -257,22 +281,26 @@ class BareMachine:
 
     def setup(self, *parts: str) -> subprocess.CompletedProcess:
         environment = {"PATH": str(self.folder), "HOME": str(self.folder)}
-        return subprocess.run([SETUP, *parts], text=True, capture_output=True, stdin=subprocess.DEVNULL,
-                              env=environment, cwd=self.folder)
+        return subprocess.run(
+            [SETUP, *parts], text=True, capture_output=True, stdin=subprocess.DEVNULL, env=environment, cwd=self.folder
+        )
 
 
 @pytest.fixture
 def bare_machine(tmp_path) -> BareMachine:
     machine = BareMachine(tmp_path)
     machine.stand_in("id", "#!/usr/bin/env bash\necho 1000\n")
-    machine.stand_in("apt-get", f'''#!/usr/bin/env bash
+    machine.stand_in(
+        "apt-get",
+        f"""#!/usr/bin/env bash
 echo "$@" >> '{machine.calls}'
 [[ $1 == install ]] || exit 0
 for name in {" ".join(machine.COMPILERS)}; do
   printf '%s\\n' '{machine.COMPILER}' > '{tmp_path}'/$name
   chmod +x '{tmp_path}'/$name
 done
-''')
+""",
+    )
     return machine
 
 
@@ -296,7 +324,9 @@ def test_setup_installs_what_is_missing_by_sudo(bare_machine):
     result = bare_machine.setup("build")
     assert (result.returncode, result.stderr) == (0, "")
     assert bare_machine.calls.read_text(encoding="utf-8").splitlines() == [
-        "update", f"install --yes --no-install-recommends {bare_machine.PACKAGES}"]
+        "update",
+        f"install --yes --no-install-recommends {bare_machine.PACKAGES}",
+    ]
 
 
 def test_setup_says_when_an_installation_did_not_help(bare_machine):

@@ -17,123 +17,153 @@ SAMPLES = {"throughput": 200, "resonance": None, "tolerance": 100}
 # By variant the values of the varied keys and the results, by sweep_references.py, which prints these tables.
 REFERENCE = {
     "throughput": {
-        1: ({
-            "load.work.viscous": 146.95758488280666,
-            "coupling.coupling.cubic_stiffness": 19.202909718728364,
-        }, {
-            "phi_motor_final": 26.08868003655,
-            "phi_pinion_final": 24.92759732216,
-            "phi_machine_final": -16.61839821477,
-            "omega_motor_final": 2.291120576061,
-            "omega_pinion_final": 2.316982846003,
-            "omega_machine_final": -1.544655230669,
-            "moment_coupling_max_abs": 249.3257141204,
-        }),
-        57: ({
-            "load.work.viscous": 94.77047582407627,
-            "coupling.coupling.cubic_stiffness": 11.545499889641507,
-        }, {
-            "phi_motor_final": 35.71034109625,
-            "phi_pinion_final": 34.55957192425,
-            "phi_machine_final": -23.03971461617,
-            "omega_motor_final": 3.306029502414,
-            "omega_pinion_final": 3.344967124202,
-            "omega_machine_final": -2.229978082802,
-            "moment_coupling_max_abs": 211.2973860527,
-        }),
-        200: ({
-            "load.work.viscous": 133.45308228398875,
-            "coupling.coupling.cubic_stiffness": 12.90433398734631,
-        }, {
-            "phi_motor_final": 28.08974183112,
-            "phi_pinion_final": 26.87564517581,
-            "phi_machine_final": -17.91709678387,
-            "omega_motor_final": 2.439548617485,
-            "omega_pinion_final": 2.551045550137,
-            "omega_machine_final": -1.700697033425,
-            "moment_coupling_max_abs": 235.3477148416,
-        }),
+        1: (
+            {
+                "load.work.viscous": 146.95758488280666,
+                "coupling.coupling.cubic_stiffness": 19.202909718728364,
+            },
+            {
+                "phi_motor_final": 26.08868003655,
+                "phi_pinion_final": 24.92759732216,
+                "phi_machine_final": -16.61839821477,
+                "omega_motor_final": 2.291120576061,
+                "omega_pinion_final": 2.316982846003,
+                "omega_machine_final": -1.544655230669,
+                "moment_coupling_max_abs": 249.3257141204,
+            },
+        ),
+        57: (
+            {
+                "load.work.viscous": 94.77047582407627,
+                "coupling.coupling.cubic_stiffness": 11.545499889641507,
+            },
+            {
+                "phi_motor_final": 35.71034109625,
+                "phi_pinion_final": 34.55957192425,
+                "phi_machine_final": -23.03971461617,
+                "omega_motor_final": 3.306029502414,
+                "omega_pinion_final": 3.344967124202,
+                "omega_machine_final": -2.229978082802,
+                "moment_coupling_max_abs": 211.2973860527,
+            },
+        ),
+        200: (
+            {
+                "load.work.viscous": 133.45308228398875,
+                "coupling.coupling.cubic_stiffness": 12.90433398734631,
+            },
+            {
+                "phi_motor_final": 28.08974183112,
+                "phi_pinion_final": 26.87564517581,
+                "phi_machine_final": -17.91709678387,
+                "omega_motor_final": 2.439548617485,
+                "omega_pinion_final": 2.551045550137,
+                "omega_machine_final": -1.700697033425,
+                "moment_coupling_max_abs": 235.3477148416,
+            },
+        ),
     },
     "resonance": {
-        1: ({
-            "excitation.shaker.frequency": 0.5,
-        }, {
-            "moment_coupling_max_abs_from_12": 167.964062617,
-            "moment_coupling_max_from_12": -138.9201835766,
-            "moment_coupling_min_from_12": -167.964062617,
-        }),
-        91: ({
-            "excitation.shaker.frequency": 5.0,
-        }, {
-            "moment_coupling_max_abs_from_12": 172.7607721814,
-            "moment_coupling_max_from_12": -134.9285440525,
-            "moment_coupling_min_from_12": -172.7607721814,
-        }),
-        231: ({
-            "excitation.shaker.frequency": 12.0,
-        }, {
-            "moment_coupling_max_abs_from_12": 156.1724006086,
-            "moment_coupling_max_from_12": -150.8637170499,
-            "moment_coupling_min_from_12": -156.1724006086,
-        }),
+        1: (
+            {
+                "excitation.shaker.frequency": 0.5,
+            },
+            {
+                "moment_coupling_max_abs_from_12": 167.964062617,
+                "moment_coupling_max_from_12": -138.9201835766,
+                "moment_coupling_min_from_12": -167.964062617,
+            },
+        ),
+        91: (
+            {
+                "excitation.shaker.frequency": 5.0,
+            },
+            {
+                "moment_coupling_max_abs_from_12": 172.7607721814,
+                "moment_coupling_max_from_12": -134.9285440525,
+                "moment_coupling_min_from_12": -172.7607721814,
+            },
+        ),
+        231: (
+            {
+                "excitation.shaker.frequency": 12.0,
+            },
+            {
+                "moment_coupling_max_abs_from_12": 156.1724006086,
+                "moment_coupling_max_from_12": -150.8637170499,
+                "moment_coupling_min_from_12": -156.1724006086,
+            },
+        ),
     },
     "tolerance": {
-        1: ({
-            "coupling.shaft.stiffness": 59260731.93181561,
-            "coupling.spindle.stiffness": 38869305.038695276,
-            "body.stand.inertia": 2517.9850030327416,
-            "body.roll.inertia": 1882.0920355266337,
-            "coupling.shaft.damping": 44215.25399048966,
-            "coupling.spindle.damping": 54654.021817701214,
-            "coupling.spindle.gap": 0.037964177362483635,
-        }, {
-            "moment_shaft_max_abs": 1488520.6515,
-            "moment_spindle_max_abs": 984749.1152097,
-            "moment_spindle_max": 431516.0309271,
-            "omega_roll_min": 3.272087386124,
-        }),
-        15: ({
-            "coupling.shaft.stiffness": 56243023.92883748,
-            "coupling.spindle.stiffness": 39995216.03519418,
-            "body.stand.inertia": 2488.949609847259,
-            "body.roll.inertia": 1799.1866573298907,
-            "coupling.shaft.damping": 51205.8128946832,
-            "coupling.spindle.damping": 63007.06217439572,
-            "coupling.spindle.gap": 0.04731380160183713,
-        }, {
-            "moment_shaft_max_abs": 1536963.34248,
-            "moment_spindle_max_abs": 980704.9637315,
-            "moment_spindle_max": 348723.9489997,
-            "omega_roll_min": 2.85737138406,
-        }),
-        25: ({
-            "coupling.shaft.stiffness": 56016647.289850205,
-            "coupling.spindle.stiffness": 42856886.94597547,
-            "body.stand.inertia": 2430.0682537264393,
-            "body.roll.inertia": 1797.0148315587476,
-            "coupling.shaft.damping": 27901.241406699366,
-            "coupling.spindle.damping": 13566.456973800805,
-            "coupling.spindle.gap": 0.026204956635053775,
-        }, {
-            "moment_shaft_max_abs": 1410291.411598,
-            "moment_spindle_max_abs": 1010413.146392,
-            "moment_spindle_max": 718535.2983313,
-            "omega_roll_min": 3.736975621882,
-        }),
-        81: ({
-            "coupling.shaft.stiffness": 53739625.75672951,
-            "coupling.spindle.stiffness": 44801098.16233931,
-            "body.stand.inertia": 2586.0912994141595,
-            "body.roll.inertia": 1831.300453642845,
-            "coupling.shaft.damping": 34129.09163985772,
-            "coupling.spindle.damping": 23562.578546291265,
-            "coupling.spindle.gap": 0.040431772855414695,
-        }, {
-            "moment_shaft_max_abs": 1564097.391678,
-            "moment_spindle_max_abs": 1058520.250336,
-            "moment_spindle_max": 534725.2827429,
-            "omega_roll_min": 3.084797513315,
-        }),
+        1: (
+            {
+                "coupling.shaft.stiffness": 59260731.93181561,
+                "coupling.spindle.stiffness": 38869305.038695276,
+                "body.stand.inertia": 2517.9850030327416,
+                "body.roll.inertia": 1882.0920355266337,
+                "coupling.shaft.damping": 44215.25399048966,
+                "coupling.spindle.damping": 54654.021817701214,
+                "coupling.spindle.gap": 0.037964177362483635,
+            },
+            {
+                "moment_shaft_max_abs": 1488520.6515,
+                "moment_spindle_max_abs": 984749.1152097,
+                "moment_spindle_max": 431516.0309271,
+                "omega_roll_min": 3.272087386124,
+            },
+        ),
+        15: (
+            {
+                "coupling.shaft.stiffness": 56243023.92883748,
+                "coupling.spindle.stiffness": 39995216.03519418,
+                "body.stand.inertia": 2488.949609847259,
+                "body.roll.inertia": 1799.1866573298907,
+                "coupling.shaft.damping": 51205.8128946832,
+                "coupling.spindle.damping": 63007.06217439572,
+                "coupling.spindle.gap": 0.04731380160183713,
+            },
+            {
+                "moment_shaft_max_abs": 1536963.34248,
+                "moment_spindle_max_abs": 980704.9637315,
+                "moment_spindle_max": 348723.9489997,
+                "omega_roll_min": 2.85737138406,
+            },
+        ),
+        25: (
+            {
+                "coupling.shaft.stiffness": 56016647.289850205,
+                "coupling.spindle.stiffness": 42856886.94597547,
+                "body.stand.inertia": 2430.0682537264393,
+                "body.roll.inertia": 1797.0148315587476,
+                "coupling.shaft.damping": 27901.241406699366,
+                "coupling.spindle.damping": 13566.456973800805,
+                "coupling.spindle.gap": 0.026204956635053775,
+            },
+            {
+                "moment_shaft_max_abs": 1410291.411598,
+                "moment_spindle_max_abs": 1010413.146392,
+                "moment_spindle_max": 718535.2983313,
+                "omega_roll_min": 3.736975621882,
+            },
+        ),
+        81: (
+            {
+                "coupling.shaft.stiffness": 53739625.75672951,
+                "coupling.spindle.stiffness": 44801098.16233931,
+                "body.stand.inertia": 2586.0912994141595,
+                "body.roll.inertia": 1831.300453642845,
+                "coupling.shaft.damping": 34129.09163985772,
+                "coupling.spindle.damping": 23562.578546291265,
+                "coupling.spindle.gap": 0.040431772855414695,
+            },
+            {
+                "moment_shaft_max_abs": 1564097.391678,
+                "moment_spindle_max_abs": 1058520.250336,
+                "moment_spindle_max": 534725.2827429,
+                "omega_roll_min": 3.084797513315,
+            },
+        ),
     },
 }
 
@@ -155,8 +185,10 @@ def rows_of(shared_nocdyn):
             outcome = shared_nocdyn("sweep", SWEEPS / f"{name}.nml", "--out", name, "--csv", "--quiet", *options)
             assert (outcome.returncode, outcome.stderr) == (0, "")
             with open(shared_nocdyn.folder / name / "sweep.csv", newline="") as file:
-                tables[name] = {int(row["variant"]): {label.partition(" [")[0]: text for label, text in row.items()}
-                                for row in csv.DictReader(file)}
+                tables[name] = {
+                    int(row["variant"]): {label.partition(" [")[0]: text for label, text in row.items()}
+                    for row in csv.DictReader(file)
+                }
         return tables[name]
 
     return rows

@@ -102,8 +102,21 @@ def test_a_number_that_changes_the_columns_leaves_every_quantity_its_own(nocdyn,
 
 def test_several_numbers_may_change_the_columns(nocdyn, quantities_of):
     nocdyn.write("machine.nml", MACHINE)
-    targets = ["coupling.shaft.damping", "coupling.shaft.gap", "coupling.clutch.friction", "load.rub.constant", "load.rub.quadratic"]
-    rows = [(0.1, 0, 0.4, 0.2, 0.1), (0, 0, 0.4, 0, 0), (0.2, 0.1, 0, 0.2, 0), (0, 0.1, 0, 0, 0.1), (0, 0, 0, 0, 0), (1, 0, 1, 1, 1)]
+    targets = [
+        "coupling.shaft.damping",
+        "coupling.shaft.gap",
+        "coupling.clutch.friction",
+        "load.rub.constant",
+        "load.rub.quadratic",
+    ]
+    rows = [
+        (0.1, 0, 0.4, 0.2, 0.1),
+        (0, 0, 0.4, 0, 0),
+        (0.2, 0.1, 0, 0.2, 0),
+        (0, 0.1, 0, 0, 0.1),
+        (0, 0, 0, 0, 0),
+        (1, 0, 1, 1, 1),
+    ]
     runs = [quantities_of(*(f"--set={t}={v}" for t, v in zip(targets, row, strict=True))) for row in rows]
     results = sweep(nocdyn, targets, rows, runs[0])
     for row, run in zip(results, runs, strict=True):

@@ -66,7 +66,10 @@ def test_help_explains_the_groups(nocdyn, group, parts):
         ("&sweep design = 'random' samples = 0 /", "&sweep: samples = 0 is out of range; allowed: 1 to 2e+09"),
         ("&sweep design = 'sobol' samples = 2000000001 /", "&sweep: samples = 2000000001 is out of range; allowed: 1 to 2e+09"),
         ("&sweep design = 'random' samples = 3 seed = -1 /", "&sweep: seed = -1 is out of range; allowed: >= 0"),
-        ("&sweep design = 'grid' samples = 3 /", "samples belongs to design = 'random', 'latin' or 'sobol'; here design = 'grid'"),
+        (
+            "&sweep design = 'grid' samples = 3 /",
+            "samples belongs to design = 'random', 'latin' or 'sobol'; here design = 'grid'",
+        ),
         ("&sweep design = 'list' /", "&sweep: file is missing; needed: path of a file"),
         ("&sweep design = 'grid' file = 'x' /", "&sweep: file belongs to design = 'list'; here design = 'grid'"),
         ("&sweep design = 'grid' / &sweep design = 'grid' /", "&sweep: given twice, first on line 5; allowed: at most once"),
@@ -76,19 +79,40 @@ def test_help_explains_the_groups(nocdyn, group, parts):
         ("&vary target = 'run.t_end' low = 2 high = 1 count = 3 /", "&vary: high = 1 is out of range; allowed: > low = 2"),
         ("&vary target = 'run.t_end' low = 2 high = 1 count = 1 /", "&vary: high = 1 is out of range; allowed: >= low = 2"),
         ("&vary target = 'run.t_end' low = 1 high = 2 count = 0 /", "&vary: count = 0 is out of range; allowed: >= 1"),
-        ("&vary target = 'run.t_end' low = 1 high = 2 mean = 1 /", "mean belongs to distribution = 'normal'; here distribution = 'uniform', the default"),
+        (
+            "&vary target = 'run.t_end' low = 1 high = 2 mean = 1 /",
+            "mean belongs to distribution = 'normal'; here distribution = 'uniform', the default",
+        ),
         ("&vary target = 'run.t_end' distribution = 'normal' mean = 1 /", "&vary: deviation is missing; needed: > 0"),
-        ("&vary target = 'run.t_end' distribution = 'normal' mean = 1 sigma = 2 /", "sigma is not a key of &vary; did you mean 'deviation' or 'log_deviation'?"),
-        ("&vary target = 'run.t_end' distribution = 'lognormal' mu = 1 log_deviation = 2 /", "mu is not a key of &vary; did you mean 'mean' or 'median'?"),
+        (
+            "&vary target = 'run.t_end' distribution = 'normal' mean = 1 sigma = 2 /",
+            "sigma is not a key of &vary; did you mean 'deviation' or 'log_deviation'?",
+        ),
+        (
+            "&vary target = 'run.t_end' distribution = 'lognormal' mu = 1 log_deviation = 2 /",
+            "mu is not a key of &vary; did you mean 'mean' or 'median'?",
+        ),
         ("&vary target = 'run.t_end' min = 1 high = 2 /", "min is not a key of &vary; did you mean 'low'?"),
         ("&sweep design = 'random' n = 3 /", "&sweep: n is not a key of &sweep; did you mean 'samples'?"),
         ("&record column = 'x' statistic = 'max' /", "column is not a key of &record; did you mean 'quantity'?"),
-        ("&vary target = 'run.t_end' distribution = 'gauss' /", "distribution = 'gauss' is not known; allowed: 'uniform', 'normal', 'lognormal'"),
-        ("&vary target = 'run.t_end' distribution = 'lognormal' median = 0 log_deviation = 1 /", "median = 0 is out of range; allowed: > 0"),
+        (
+            "&vary target = 'run.t_end' distribution = 'gauss' /",
+            "distribution = 'gauss' is not known; allowed: 'uniform', 'normal', 'lognormal'",
+        ),
+        (
+            "&vary target = 'run.t_end' distribution = 'lognormal' median = 0 log_deviation = 1 /",
+            "median = 0 is out of range; allowed: > 0",
+        ),
         ("&record quantity = 'x' /", "&record: quantity needs statistic"),
         ("&record statistic = 'max' /", "&record: statistic needs quantity"),
-        ("&record quantity = 'x' statistic = 'max', 'maximum' /", "&record: statistic(2) = 'maximum' is not known; allowed: 'final', 'max', "),
-        ("&record quantity = 'x' statistic = 'max', 'min' band = 0.1 /", "band belongs to statistic = 'settling_time'; here statistic = 'max', 'min'"),
+        (
+            "&record quantity = 'x' statistic = 'max', 'maximum' /",
+            "&record: statistic(2) = 'maximum' is not known; allowed: 'final', 'max', ",
+        ),
+        (
+            "&record quantity = 'x' statistic = 'max', 'min' band = 0.1 /",
+            "band belongs to statistic = 'settling_time'; here statistic = 'max', 'min'",
+        ),
         ("&record trajectories = 1 band = 0.1 /", "&record: band belongs to statistic = 'settling_time'; here is no statistic"),
         ("&record quantity = 'x' statistic = 'settling_time' band = 0 /", "&record: band = 0 is out of range; allowed: > 0"),
         ("&record trajectories = 1 from = 2 /", "&record: from needs quantity"),
@@ -126,11 +150,23 @@ def test_groups_without_names_are_not_reached_without_their_number(nocdyn, overr
     outcome = nocdyn("check", VARIED, "--set", override)
     assert outcome.returncode == 2
     group, key = override.split(".")[0], override.split(".")[-1][:-2]
-    assert outcome.stderr == f"nocdyn: --set {override}: &{group} has no name; write {group}(1).{key}=VALUE for the first one in the file\n"
+    assert (
+        outcome.stderr
+        == f"nocdyn: --set {override}: &{group} has no name; write {group}(1).{key}=VALUE for the first one in the file\n"
+    )
 
 
 def test_groups_without_names_are_reached_by_their_number(nocdyn):
-    words = ("--set", "vary(2).mean=2", "--set", "record(1).statistic=max", "--set", "sweep.samples=7", "--set", "record(2).trajectories=5")
+    words = (
+        "--set",
+        "vary(2).mean=2",
+        "--set",
+        "record(1).statistic=max",
+        "--set",
+        "sweep.samples=7",
+        "--set",
+        "record(2).trajectories=5",
+    )
     assert nocdyn("run", VARIED, "--out", "out", "-q", *words).returncode == 0
     text = (nocdyn.folder / "out/input.nml").read_text()
     assert all(line in text for line in ("  mean = 2\n", "  statistic = 'max'\n", "  samples = 7\n", "  trajectories = 5\n"))

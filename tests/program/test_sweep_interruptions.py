@@ -124,7 +124,9 @@ def test_a_sweep_with_another_input_is_not_gone_on_with(nocdyn, discs, words, di
 
 def test_a_group_that_has_gone_is_named(nocdyn, discs):
     interrupt(nocdyn, discs)
-    nocdyn.write("discs.nml", (TWO_DISCS + SWEEP).replace("&load     name = 'drag'", "&load     name = 'brake'").replace("drag", "brake"))
+    nocdyn.write(
+        "discs.nml", (TWO_DISCS + SWEEP).replace("&load     name = 'drag'", "&load     name = 'brake'").replace("drag", "brake")
+    )
     outcome = nocdyn("sweep", discs, "--out", "out", "--resume", *ENDLESS)
     assert outcome.returncode == 2
     assert "the input has changed: the new input has no &load 'drag'" in outcome.stderr
@@ -298,8 +300,7 @@ def test_a_table_of_results_that_are_done_already_is_refused(nocdyn, discs):
     outcome = nocdyn("sweep", discs, "--out", "out", "--resume", "--csv")
     assert (outcome.returncode, outcome.stdout) == (2, "")
     assert outcome.stderr == (
-        f"nocdyn: {discs}: all 60 variants are done already; results in out, without sweep.csv; "
-        "to have it, leave out --resume\n"
+        f"nocdyn: {discs}: all 60 variants are done already; results in out, without sweep.csv; to have it, leave out --resume\n"
     )
     nocdyn("sweep", discs, "--out", "out", "--csv")
     assert nocdyn("sweep", discs, "--out", "out", "--resume", "--csv").returncode == 0
@@ -383,9 +384,7 @@ def test_a_full_disk_ends_all_ranks(nocdyn, discs):
     environment = MPI_ENVIRONMENT | {"OMPI_MCA_btl": "self,tcp", "PMIX_MCA_gds": "hash"}
     limited = f"ulimit -f 60; exec {MPI_PROGRAM} sweep discs.nml --out out {' '.join(ENDLESS)}"
     command = ["mpirun", "-n", "2", "sh", "-c", limited]
-    outcome = subprocess.run(
-        command, cwd=nocdyn.folder, env=environment, check=False, capture_output=True, text=True, timeout=60
-    )
+    outcome = subprocess.run(command, cwd=nocdyn.folder, env=environment, check=False, capture_output=True, text=True, timeout=60)
     assert outcome.returncode == 3
     assert "nocdyn: cannot write 'out/sweep.journal': File too large; once" in outcome.stderr
     assert nocdyn.files("out") == ["sweep.journal"]
@@ -405,7 +404,10 @@ def test_a_rank_with_another_list_ends_the_job(nocdyn, rows, complaint):
     (nocdyn.folder / "there").mkdir()
     if rows:
         nocdyn.write("there/list.csv", f"load.drag.viscous\n{rows}")
-    ranks = [["-n", "1", "--wdir", nocdyn.folder / name, MPI_PROGRAM, "sweep", "discs.nml", "--out", "out"] for name in ("here", "there")]
+    ranks = [
+        ["-n", "1", "--wdir", nocdyn.folder / name, MPI_PROGRAM, "sweep", "discs.nml", "--out", "out"]
+        for name in ("here", "there")
+    ]
     command = ["mpirun", *ranks[0], ":", *ranks[1]]
     outcome = subprocess.run(command, env=MPI_ENVIRONMENT, check=False, capture_output=True, text=True, timeout=60)
     assert outcome.returncode != 0 and f"{complaint}\n" in outcome.stderr
@@ -417,7 +419,10 @@ def test_a_rank_with_another_list_ends_the_job(nocdyn, rows, complaint):
     ("words", "complaint"),
     [
         (["run", "discs.nml"], "nocdyn-mpi knows the command 'sweep' only; everything else is asked of nocdyn"),
-        (["sweep", "discs.nml", "--shard", "1/2"], "--shard is an option of nocdyn sweep; nocdyn-mpi hands out the variants itself"),
+        (
+            ["sweep", "discs.nml", "--shard", "1/2"],
+            "--shard is an option of nocdyn sweep; nocdyn-mpi hands out the variants itself",
+        ),
         (["sweep", "none.nml"], "none.nml: cannot be read: there is no such file"),
     ],
 )

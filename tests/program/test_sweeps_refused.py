@@ -108,7 +108,9 @@ def test_quantities_are_not_judged_before_it_is_known_what_varies(nocdyn):
 
 
 def test_a_mistake_in_the_machine_is_told_without_those_that_need_the_machine(nocdyn):
-    path = nocdyn.write("m.nml", SPINNER.replace("2.0", "-2.0") + GROUPS["sweep"] + GROUPS["vary"] + GROUPS["record"].replace("disc", "disk"))
+    path = nocdyn.write(
+        "m.nml", SPINNER.replace("2.0", "-2.0") + GROUPS["sweep"] + GROUPS["vary"] + GROUPS["record"].replace("disc", "disk")
+    )
     outcome = nocdyn("sweep", path, "--out", "out")
     assert mistaken_keys(outcome.stderr.replace(f"{nocdyn.folder}/", "")) == ["m.nml:1: &body 'disc': inertia"]
 
@@ -138,7 +140,9 @@ def test_columns_of_a_table_of_results_are_a_list(nocdyn):
     nocdyn.write("list.csv", "".join(f"{row[1]}\n" for row in rows))
     again = nocdyn.write("again.nml", SPINNER + "&sweep design = 'list' file = 'list.csv' /\n" + GROUPS["record"])
     assert nocdyn("sweep", again, "--out", "again", "--csv").returncode == 0
-    assert [line.split(",")[:3] for line in (nocdyn.folder / "again/sweep.csv").read_text().splitlines()] == [row[:3] for row in rows]
+    assert [line.split(",")[:3] for line in (nocdyn.folder / "again/sweep.csv").read_text().splitlines()] == [
+        row[:3] for row in rows
+    ]
 
 
 @pytest.mark.parametrize("command", ["sweep", "check"])
@@ -184,7 +188,9 @@ def test_trajectories_of_refused_variants_are_said_to_be_missing(nocdyn):
 
 
 def test_a_trajectory_of_a_machine_that_cannot_be_is_said_to_be_missing(nocdyn):
-    machine = SPINNER.replace("&run", "&body name = 'rim' inertia = 1 speed = -0.5 /\n&gear name = 'mesh' bodies = 'disc', 'rim' radii = 1, 2 /\n&run")
+    machine = SPINNER.replace(
+        "&run", "&body name = 'rim' inertia = 1 speed = -0.5 /\n&gear name = 'mesh' bodies = 'disc', 'rim' radii = 1, 2 /\n&run"
+    )
     nocdyn.write("list.csv", "body.rim.speed\n-0.5\n9\n")
     groups = "&sweep design = 'list' file = 'list.csv' /\n" + GROUPS["record"] + "&record trajectories = 2 /\n"
     outcome = nocdyn("sweep", nocdyn.write("m.nml", machine + groups), "--out", "out")
@@ -200,7 +206,9 @@ def test_check_looks_at_the_sweep_too(nocdyn):
     assert outcome.stdout.endswith("\n  sweep: random, 1 variant that differs in 1 number, 1 result, 1 trajectory\n")
     outcome = nocdyn("check", path, "--set", "sweep.samples=1")
     assert (outcome.returncode, outcome.stdout) == (2, "")
-    assert outcome.stderr.endswith("m.nml:8: &record: trajectories(2) = 2 is out of range; allowed: 1 to 1, the number of variants\n")
+    assert outcome.stderr.endswith(
+        "m.nml:8: &record: trajectories(2) = 2 is out of range; allowed: 1 to 1, the number of variants\n"
+    )
 
 
 def test_check_wants_a_sweep_where_something_varies(nocdyn):

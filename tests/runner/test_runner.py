@@ -8,8 +8,18 @@ from pathlib import Path
 import pytest
 
 RUNNER = Path(__file__).parent
-COMPILE = [os.environ.get("FC", "gfortran"), "-std=f2018", "-Wall", "-Wextra", "-pedantic", "-Werror", "-g",
-           "-fcheck=all", "-ffpe-trap=invalid,zero,overflow", "-ffree-line-length-none"]
+COMPILE = [
+    os.environ.get("FC", "gfortran"),
+    "-std=f2018",
+    "-Wall",
+    "-Wextra",
+    "-pedantic",
+    "-Werror",
+    "-g",
+    "-fcheck=all",
+    "-ffpe-trap=invalid,zero,overflow",
+    "-ffree-line-length-none",
+]
 LIBRARY = ["funit_failures", "funit_numbers", "funit", "funit_runner"]
 
 # Each statement with the line that it must print, or None where it must pass.
@@ -24,21 +34,26 @@ ASSERTIONS = [
     ("@assertEqual([1], [integer ::])", "expected the shape [1], found [0]"),
     ("@assertEqual(reshape([1, 2], [2, 0]), reshape([1, 2], [2, 0]))", None),
     ("@assertEqual(reshape([1, 2], [1, 2]), reshape([1, 2], [2, 1]))", "expected the shape [1, 2], found [2, 1]"),
-    ("@assertEqual(reshape([1, 2], [1, 1, 2]), reshape([1, 3], [1, 1, 2]))",
-     "expected 2, found 3, element [1, 1, 2]"),
+    ("@assertEqual(reshape([1, 2], [1, 1, 2]), reshape([1, 3], [1, 1, 2]))", "expected 2, found 3, element [1, 1, 2]"),
     ("@assertEqual(0.5_wp, 0.5_wp)", None),
     ("@assertEqual(1, 1.0_wp)", None),
     ("@assertEqual(0.5_wp, 0.75_wp, tolerance=0.25_wp)", None),
-    ("@assertEqual(0.0_wp, spread([0.25_wp, 0.5_wp], 1, 2), tolerance=0.25_wp)",
-     "expected 0.0000000000000000, found 0.50000000000000000, difference 0.50000000000000000, "
-     "tolerance 0.25000000000000000, element [1, 2]"),
+    (
+        "@assertEqual(0.0_wp, spread([0.25_wp, 0.5_wp], 1, 2), tolerance=0.25_wp)",
+        "expected 0.0000000000000000, found 0.50000000000000000, difference 0.50000000000000000, "
+        "tolerance 0.25000000000000000, element [1, 2]",
+    ),
     ("@assertEqual(nan, nan)", "expected NaN, found NaN"),
     ("@assertEqual([1.0_wp, nan], [1.0_wp, nan])", "expected NaN, found NaN, element [2]"),
-    ("@assertEqual(1.0_wp, nan, tolerance=huge(1.0_wp))",
-     "expected 1.0000000000000000, found NaN, difference NaN, tolerance 0.17976931348623157E+309"),
+    (
+        "@assertEqual(1.0_wp, nan, tolerance=huge(1.0_wp))",
+        "expected 1.0000000000000000, found NaN, difference NaN, tolerance 0.17976931348623157E+309",
+    ),
     ("@assertEqual(infinity, infinity)", None),
-    ("@assertEqual(infinity, -infinity, tolerance=1.0_wp)",
-     "expected Inf, found -Inf, difference -Inf, tolerance 1.0000000000000000"),
+    (
+        "@assertEqual(infinity, -infinity, tolerance=1.0_wp)",
+        "expected Inf, found -Inf, difference -Inf, tolerance 1.0000000000000000",
+    ),
     ("@assertEqual('a b', ' a b  ')", None),
     ("@assertEqual('', '   ')", None),
     ("@assertEqual('a b', 'a  b')", "expected 'a b', found 'a  b'"),
@@ -60,9 +75,11 @@ ASSERTIONS = [
     ("@assertGreaterThan(2.0_wp, nan)", "2.0000000000000000 is not > NaN"),
     ("@assertGreaterThanOrEqual(1, 2)", "1 is not >= 2"),
     ("@assertRelativelyEqual(100.0_wp, 101.0_wp, 0.01_wp)", None),
-    ("@assertRelativelyEqual(0.0_wp, 0.0_wp, 0.5_wp)",
-     "expected 0.0000000000000000, found 0.0000000000000000, difference 0.0000000000000000, "
-     "tolerance 0.50000000000000000 of the expected value, which may not be 0"),
+    (
+        "@assertRelativelyEqual(0.0_wp, 0.0_wp, 0.5_wp)",
+        "expected 0.0000000000000000, found 0.0000000000000000, difference 0.0000000000000000, "
+        "tolerance 0.50000000000000000 of the expected value, which may not be 0",
+    ),
     ("@assertIsFinite(1.0_wp)", None),
     ("@assertIsFinite(nan)", "expected a finite number, found an infinity or NaN"),
 ]
@@ -96,14 +113,15 @@ def sample(body, declarations=""):
 
 def test_every_assertion_passes_and_fails_as_it_should(tmp_path, library):
     declarations = "integer, parameter :: wp = kind(1.0d0)\nreal(wp), volatile :: nan, infinity\n"
-    body = ("@before\nsubroutine set()\nuse, intrinsic :: ieee_arithmetic\n"
-            "nan = ieee_value(nan, ieee_quiet_nan)\ninfinity = ieee_value(nan, ieee_positive_inf)\nend subroutine\n")
+    body = (
+        "@before\nsubroutine set()\nuse, intrinsic :: ieee_arithmetic\n"
+        "nan = ieee_value(nan, ieee_quiet_nan)\ninfinity = ieee_value(nan, ieee_positive_inf)\nend subroutine\n"
+    )
     first_line = 4 + (declarations + body).count("\n") + 2
     for i, (statement, _) in enumerate(ASSERTIONS):
         body += f"@test\nsubroutine t{i}()\n{statement}\nend subroutine\n"
     run = build(tmp_path, library, sample(body, declarations))()
-    expected = [f"test_sample.pf:{first_line + 1 + 4 * i}: t{i}: {report}"
-                for i, (_, report) in enumerate(ASSERTIONS) if report]
+    expected = [f"test_sample.pf:{first_line + 1 + 4 * i}: t{i}: {report}" for i, (_, report) in enumerate(ASSERTIONS) if report]
     assert run.stdout.splitlines() == [*expected, f"{len(ASSERTIONS)} tests, {len(expected)} failed"]
     assert run.returncode == 1
 
@@ -137,9 +155,18 @@ THREE_TESTS = sample("""
 def test_fixtures_surround_every_test_and_a_failure_ends_only_its_own(tmp_path, library):
     run = build(tmp_path, library, THREE_TESTS)("--verbose")
     assert run.stdout.splitlines() == [
-        "asserts_nothing", "prepare", "clear", "stops_at_its_first_failure", "prepare",
-        "test_sample.pf:20: stops_at_its_first_failure: expected .true., found .false.", "clear",
-        "passes", "prepare", "clear", "3 tests, 1 failed"]
+        "asserts_nothing",
+        "prepare",
+        "clear",
+        "stops_at_its_first_failure",
+        "prepare",
+        "test_sample.pf:20: stops_at_its_first_failure: expected .true., found .false.",
+        "clear",
+        "passes",
+        "prepare",
+        "clear",
+        "3 tests, 1 failed",
+    ]
     assert (run.returncode, run.stderr) == (1, "")
 
 
@@ -158,23 +185,31 @@ def test_filter_and_exit_codes(tmp_path, library):
 def test_compiler_names_the_line_of_the_pf_file(tmp_path, library):
     source = sample("@test\nsubroutine t()\n@assertTrue(.true.)\n@assertTrue(unknown)\nend subroutine\n")
     assert translate(tmp_path, source).returncode == 0
-    compilation = subprocess.run([*COMPILE, f"-I{library}", "-c", "test_sample.f90"], cwd=tmp_path,
-                                 capture_output=True, text=True)
+    compilation = subprocess.run(
+        [*COMPILE, f"-I{library}", "-c", "test_sample.f90"], cwd=tmp_path, capture_output=True, text=True
+    )
     assert f"{tmp_path / 'test_sample.pf'}:8:" in compilation.stderr
 
 
-@pytest.mark.parametrize("body, line, mistake", [
-    ("@test\nsubroutine t()\n@assertEquals(1, 1)\nend subroutine\n", 7, "unknown annotation @assertEquals: did you"),
-    ("@test\nsubroutine t()\n@assertTrue(.true.) ! so\nend subroutine\n", 7, "all on its line and nothing after"),
-    ("@test\nsubroutine t()\n@assertTrue( &\n.true.)\nend subroutine\n", 7, "all on its line"),
-    ("@test(ifdef=X)\nsubroutine t()\nend subroutine\n", 5, "@test stands alone"),
-    ("@test\nsubroutine t(this)\nend subroutine\n", 6, "expected 'subroutine NAME()' after @test"),
-    ("@test\ninteger function t()\nend function\n", 6, "expected 'subroutine NAME()' after @test"),
-    ("subroutine t()\nend subroutine\n", 1, "no @test in this file"),
-    ("pure integer function run()\nend function\n", 5, "run is a name of pFUnit's"),
-    ("@before\nsubroutine a()\nend subroutine\n@before\nsubroutine b()\nend subroutine\n@test\nsubroutine c()\n"
-     "end subroutine\n", 1, "more than one @before"),
-])
+@pytest.mark.parametrize(
+    "body, line, mistake",
+    [
+        ("@test\nsubroutine t()\n@assertEquals(1, 1)\nend subroutine\n", 7, "unknown annotation @assertEquals: did you"),
+        ("@test\nsubroutine t()\n@assertTrue(.true.) ! so\nend subroutine\n", 7, "all on its line and nothing after"),
+        ("@test\nsubroutine t()\n@assertTrue( &\n.true.)\nend subroutine\n", 7, "all on its line"),
+        ("@test(ifdef=X)\nsubroutine t()\nend subroutine\n", 5, "@test stands alone"),
+        ("@test\nsubroutine t(this)\nend subroutine\n", 6, "expected 'subroutine NAME()' after @test"),
+        ("@test\ninteger function t()\nend function\n", 6, "expected 'subroutine NAME()' after @test"),
+        ("subroutine t()\nend subroutine\n", 1, "no @test in this file"),
+        ("pure integer function run()\nend function\n", 5, "run is a name of pFUnit's"),
+        (
+            "@before\nsubroutine a()\nend subroutine\n@before\nsubroutine b()\nend subroutine\n@test\nsubroutine c()\n"
+            "end subroutine\n",
+            1,
+            "more than one @before",
+        ),
+    ],
+)
 def test_mistakes_are_refused_with_file_and_line(tmp_path, body, line, mistake):
     translation = translate(tmp_path, sample(body))
     assert translation.returncode == 1

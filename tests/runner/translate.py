@@ -11,8 +11,16 @@ import sys
 from pathlib import Path
 
 ASSERTIONS = (
-    "assertTrue", "assertFalse", "assertEqual", "assertNotEqual", "assertRelativelyEqual", "assertIsFinite",
-    "assertLessThan", "assertLessThanOrEqual", "assertGreaterThan", "assertGreaterThanOrEqual",
+    "assertTrue",
+    "assertFalse",
+    "assertEqual",
+    "assertNotEqual",
+    "assertRelativelyEqual",
+    "assertIsFinite",
+    "assertLessThan",
+    "assertLessThanOrEqual",
+    "assertGreaterThan",
+    "assertGreaterThanOrEqual",
 )
 MARKERS = ("test", "before", "after")
 # Procedures and short words that pFUnit's `funit` exports: a test module that defines one does not build with it.
@@ -106,9 +114,7 @@ class Translation:
         self.lines.append(f'# {number} "{self.source}"')
 
     def main_program(self) -> list[str]:
-        fixture = "".join(
-            f", {marker}={name}" for marker in ("before", "after") for name in self.procedures[marker]
-        )
+        fixture = "".join(f", {marker}={name}" for marker in ("before", "after") for name in self.procedures[marker])
         names = [name for marker in MARKERS for name in self.procedures[marker]]
         return [
             "",

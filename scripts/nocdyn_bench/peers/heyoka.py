@@ -1,5 +1,6 @@
 """heyoka: Taylor series, compiled by LLVM for each system and tolerance."""
 
+import itertools
 import time
 
 import heyoka
@@ -50,8 +51,9 @@ def _solve(problem: Problem) -> Solve:
 def _integrator(problem: Problem, real: type, tolerance: float) -> "heyoka.taylor_adaptive":
     equations = _case2(problem, real) if isinstance(problem, Case2) else _chain(problem)
     is_compact = isinstance(problem, Chain) and problem.bodies > COMPACT_ABOVE
-    return heyoka.taylor_adaptive(equations, np.zeros(problem.states, dtype=real), tol=tolerance, fp_type=real,
-                                  compact_mode=is_compact)
+    return heyoka.taylor_adaptive(
+        equations, np.zeros(problem.states, dtype=real), tol=tolerance, fp_type=real, compact_mode=is_compact
+    )
 
 
 def _case2(problem: Case2, real: type) -> list:
@@ -77,9 +79,10 @@ def _chain(problem: Chain) -> list:
     moments = []
     for i in range(n - 1):
         twist = phi[i + 1] - phi[i]
-        moments.append((problem.stiffness + problem.cubic_stiffness * twist * twist) * twist
-                       + problem.damping * (omega[i + 1] - omega[i]))
-    rates = [after - before for before, after in zip(moments, moments[1:])]
+        moments.append(
+            (problem.stiffness + problem.cubic_stiffness * twist * twist) * twist + problem.damping * (omega[i + 1] - omega[i])
+        )
+    rates = [after - before for before, after in itertools.pairwise(moments)]
     equations = [(omega[0], problem.torque + moments[0])]
     equations += list(zip(omega[1:-1], rates))
     equations += [(omega[-1], -moments[-1] - problem.viscous * omega[-1])]

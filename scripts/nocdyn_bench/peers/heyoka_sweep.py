@@ -17,8 +17,12 @@ STIFFNESS = Case2.stiffness
 
 def contestants() -> list[SweepContestant]:
     return [
-        SweepContestant("heyoka with the peak", f"{STEPPED_LANES} lanes, each refilled when it ends; peaks from the Taylor "
-                        "coefficients of each step, by a function compiled by Numba", _Peaks(STEPPED_LANES).solve),
+        SweepContestant(
+            "heyoka with the peak",
+            f"{STEPPED_LANES} lanes, each refilled when it ends; peaks from the Taylor "
+            "coefficients of each step, by a function compiled by Numba",
+            _Peaks(STEPPED_LANES).solve,
+        ),
         SweepContestant("heyoka, final state only", f"{LANES} lanes, propagate_until", _Ends(LANES).solve, has_peak=False),
     ]
 
@@ -34,8 +38,9 @@ def accurate_results(parameters: np.ndarray) -> np.ndarray:
 
     equations = _equations(real)
     extreme = heyoka.nt_event(equations[3][1] - equations[2][1], keep, fp_type=real)
-    integrator = heyoka.taylor_adaptive(equations, np.zeros(4, dtype=real), tol=real(1e-18), fp_type=real,
-                                        pars=np.zeros(2, dtype=real), nt_events=[extreme])
+    integrator = heyoka.taylor_adaptive(
+        equations, np.zeros(4, dtype=real), tol=real(1e-18), fp_type=real, pars=np.zeros(2, dtype=real), nt_events=[extreme]
+    )
     found = np.empty((len(parameters), 5))
     for row, variant in zip(found, parameters):
         integrator.time, twist[0] = real(0), real(0)
@@ -73,7 +78,8 @@ class _Batches:
     def integrator(self, tolerance: float) -> "heyoka.taylor_adaptive_batch":
         if tolerance not in self.integrators:
             self.integrators[tolerance] = heyoka.taylor_adaptive_batch(
-                _equations(float), np.zeros((4, self.lanes)), tol=tolerance, pars=np.zeros((2, self.lanes)), force_avx512=True)
+                _equations(float), np.zeros((4, self.lanes)), tol=tolerance, pars=np.zeros((2, self.lanes)), force_avx512=True
+            )
         integrator = self.integrators[tolerance]
         integrator.set_time(0.0)
         integrator.state[:] = 0.0
@@ -86,12 +92,12 @@ class _Ends(_Batches):
         found = np.full((len(parameters), 5), np.nan)
         began = time.perf_counter()
         for first in range(0, len(parameters), self.lanes):
-            some = parameters[first:first + self.lanes]
+            some = parameters[first : first + self.lanes]
             integrator.set_time(0.0)
             integrator.state[:] = 0.0
-            integrator.pars[:, :len(some)] = some.T
+            integrator.pars[:, : len(some)] = some.T
             integrator.propagate_until(CASE2_END)
-            found[first:first + self.lanes, :4] = integrator.state.T[:len(some)]
+            found[first : first + self.lanes, :4] = integrator.state.T[: len(some)]
         return Found(time.perf_counter() - began, found)
 
 
@@ -119,8 +125,17 @@ class _Lanes:
         self.variant = np.full(lanes, -1)
         self.t, self.left, self.twist = np.full(lanes, CASE2_END), np.zeros(lanes), np.zeros(lanes)
         self.next = np.zeros(1, dtype=int)
-        _refill(np.arange(lanes), self.next, parameters, self.variant, self.t, self.left, self.twist,
-                integrator.state, integrator.pars)
+        _refill(
+            np.arange(lanes),
+            self.next,
+            parameters,
+            self.variant,
+            self.t,
+            self.left,
+            self.twist,
+            integrator.state,
+            integrator.pars,
+        )
         integrator.set_time(self.t)
 
     @property
@@ -129,8 +144,19 @@ class _Lanes:
 
     def go_on(self) -> bool:
         """After a step; true if a lane has got another variant."""
-        return _go_on(self.integrator.tc, self.integrator.last_h, self.integrator.state, self.integrator.pars, self.parameters,
-                      self.found, self.next, self.variant, self.t, self.left, self.twist)
+        return _go_on(
+            self.integrator.tc,
+            self.integrator.last_h,
+            self.integrator.state,
+            self.integrator.pars,
+            self.parameters,
+            self.found,
+            self.next,
+            self.variant,
+            self.t,
+            self.left,
+            self.twist,
+        )
 
 
 @numba.njit

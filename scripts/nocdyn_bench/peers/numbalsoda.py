@@ -20,8 +20,14 @@ NOTES = {
 
 def contestants(problem: Problem, methods: list[str]) -> list[Contestant]:
     """Of the two ways to DOP853, solve_ivp is the faster one for 1001 outputs, dop853 for two; solve_ivp fails on W4."""
-    return [Contestant(f"numbalsoda {method.removesuffix(', dense')}", f"{NOTES[method]}; right-hand side a Numba cfunc",
-                       _solve(problem, method)) for method in methods]
+    return [
+        Contestant(
+            f"numbalsoda {method.removesuffix(', dense')}",
+            f"{NOTES[method]}; right-hand side a Numba cfunc",
+            _solve(problem, method),
+        )
+        for method in methods
+    ]
 
 
 def _solve(problem: Problem, method: str) -> Solve:

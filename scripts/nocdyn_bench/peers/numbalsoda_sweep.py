@@ -12,13 +12,17 @@ from .right_hand_sides import CASE2_END, variant_derivative
 
 OUTPUTS = 201  # close enough for a polynomial of degree 5 between two of them
 MOST_STEPS = 10**6
-NOTE = ("{}, {} outputs, peaks from the polynomial of degree 5 through twist, rate and acceleration at two of them; "
-        "all compiled by Numba")
+NOTE = (
+    "{}, {} outputs, peaks from the polynomial of degree 5 through twist, rate and acceleration at two of them; "
+    "all compiled by Numba"
+)
 
 
 def contestants() -> list[SweepContestant]:
-    return [SweepContestant(f"numbalsoda {method}", NOTE.format(call, OUTPUTS), _solve(method), share=0.1)
-            for method, call in (("DOP853", "solve_ivp"), ("LSODA", "lsoda"))]
+    return [
+        SweepContestant(f"numbalsoda {method}", NOTE.format(call, OUTPUTS), _solve(method), share=0.1)
+        for method, call in (("DOP853", "solve_ivp"), ("LSODA", "lsoda"))
+    ]
 
 
 def _solve(method: str) -> SolveAll:

@@ -20,8 +20,15 @@ MOST_STEPS = 10**8
 
 
 def contestants(problem: Problem, methods: list[str]) -> list[Contestant]:
-    return [Contestant(f"SciPy {method}", f"{NOTES[method]}; right-hand side compiled by Numba", _compiled_dop853(problem) if method == "ode DOP853" else _solve(problem, method),
-                       slowest_point=8.0 if method == "Radau" else 2.0) for method in methods]
+    return [
+        Contestant(
+            f"SciPy {method}",
+            f"{NOTES[method]}; right-hand side compiled by Numba",
+            _compiled_dop853(problem) if method == "ode DOP853" else _solve(problem, method),
+            slowest_point=8.0 if method == "Radau" else 2.0,
+        )
+        for method in methods
+    ]
 
 
 def _solve(problem: Problem, method: str) -> Solve:
@@ -36,8 +43,9 @@ def _solve(problem: Problem, method: str) -> Solve:
         seconds = []
         for _ in range(repetitions):
             began = time.perf_counter()
-            found = solve_ivp(derivative, (times[0], times[-1]), start, method=method, t_eval=times, rtol=rtol, atol=atol,
-                              **options)
+            found = solve_ivp(
+                derivative, (times[0], times[-1]), start, method=method, t_eval=times, rtol=rtol, atol=atol, **options
+            )
             seconds.append(time.perf_counter() - began)
             if not found.success:
                 raise ContestantError(found.message)

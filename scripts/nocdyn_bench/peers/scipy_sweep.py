@@ -14,8 +14,15 @@ SHARE = 0.002  # of the variants
 
 
 def contestants(methods: list[str]) -> list[SweepContestant]:
-    return [SweepContestant(f"SciPy {method}", "solve_ivp, the rate of the twist an event; right-hand side compiled by Numba",
-                            _solve(method), share=SHARE) for method in methods]
+    return [
+        SweepContestant(
+            f"SciPy {method}",
+            "solve_ivp, the rate of the twist an event; right-hand side compiled by Numba",
+            _solve(method),
+            share=SHARE,
+        )
+        for method in methods
+    ]
 
 
 def _solve(method: str) -> SolveAll:
@@ -36,8 +43,17 @@ def _solve(method: str) -> SolveAll:
         found = np.full((len(parameters), 5), np.nan)
         began = time.perf_counter()
         for row, variant in zip(found, parameters):
-            motion = solve_ivp(derivative, (0.0, CASE2_END), start, method=method, t_eval=[CASE2_END], args=tuple(variant),
-                               events=twist_rate, rtol=tolerance, atol=tolerance)
+            motion = solve_ivp(
+                derivative,
+                (0.0, CASE2_END),
+                start,
+                method=method,
+                t_eval=[CASE2_END],
+                args=tuple(variant),
+                events=twist_rate,
+                rtol=tolerance,
+                atol=tolerance,
+            )
             row[:4] = motion.y[:, -1]
             states = np.vstack((motion.y_events[0], row[:4]))
             largest = np.abs(states[:, 3] - states[:, 2]).max()
