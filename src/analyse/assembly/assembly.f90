@@ -30,7 +30,7 @@ contains
     type(input_t), intent(in) :: input
     type(machine_t), intent(out) :: machine
     type(error_t), allocatable, intent(out) :: error
-    integer, intent(in), optional :: lanes   !! absent: 1
+    integer, intent(in), optional :: lanes   !! 1 if absent
     type(body_index_t) :: body_index
 
     if (present(lanes)) machine%lanes = lanes

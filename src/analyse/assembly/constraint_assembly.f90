@@ -14,7 +14,7 @@ module nocdyn_constraint_assembly
 
   !> One row before the ground is dropped; `members` names those members whose torque has a column of its own.
   type :: joint_t
-    integer, allocatable :: bodies(:)             !! 0: the ground
+    integer, allocatable :: bodies(:)             !! 0 is the ground
     real(wp), allocatable :: coefficients(:)
     character(len=3) :: unit = 'N m'
     character(len=7), allocatable :: members(:)   !! of each body, '' without a column
@@ -97,7 +97,7 @@ contains
     joint%members = [character(len=7) :: '', '']
   end subroutine read_gear
 
-  !> Willis: z_s omega_s + z_r omega_r - (z_s + z_r) omega_c = 0, scaled so that the multiplier is the torque on the sun.
+  !> Willis' equation z_s omega_s + z_r omega_r - (z_s + z_r) omega_c = 0, scaled so that the multiplier is the torque on the sun.
   subroutine read_planetary(planetary, body_index, joint)
     type(group_t), intent(in) :: planetary
     type(body_index_t), intent(in) :: body_index

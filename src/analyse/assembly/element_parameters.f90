@@ -66,7 +66,7 @@ contains
     integer, intent(in) :: indices(:)
     integer, intent(in) :: lanes
     character(len=*), intent(in) :: x, y                    !! keys of the lists
-    character(len=*), intent(in), optional :: extrapolation   !! absent: that of the group
+    character(len=*), intent(in), optional :: extrapolation   !! that of the group if absent
     type(curve_t) :: curves(lanes, size(indices))
     character(len=:), allocatable :: beyond
     integer :: i, inside, lane, outside

@@ -135,7 +135,7 @@ contains
     type(string_t), intent(in) :: names(:)
     integer, intent(in) :: body(:)
     type(bank_slot_t), allocatable, intent(inout) :: banks(:)
-    type(governor_t), intent(in), optional :: governor   !! absent: no motor has one
+    type(governor_t), intent(in), optional :: governor   !! no motor has one if absent
 
     call append_bank(banks, new_dc_motors(names, body, values_of(input, indices, lanes, 'voltage'), &
                                           values_of(input, indices, lanes, 'resistance'), &

@@ -1,4 +1,4 @@
-!> nocdyn: dynamics of drivetrains from namelist files.
+!> The program nocdyn, dynamics of drivetrains from namelist files.
 program nocdyn
   use nocdyn_analysis_commands, only: equilibrium_command, modes_command
   use nocdyn_arguments, only: arguments_t, command_line, parse_arguments

@@ -1,4 +1,4 @@
-!> nocdyn-mpi: sweeps on all ranks of an MPI job.
+!> The program nocdyn-mpi, sweeps on all ranks of an MPI job.
 program nocdyn_mpi_program
   use mpi_f08, only: mpi_comm_rank, mpi_comm_world, mpi_finalize, mpi_init_thread, mpi_thread_serialized
   use nocdyn_arguments, only: arguments_t, command_line, parse_arguments

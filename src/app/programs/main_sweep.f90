@@ -1,5 +1,5 @@
-!> nocdyn-sweep: what nocdyn becomes for the commands sweep and merge. It links NetCDF, whose libraries nocdyn would
-!> have to load for every other command.
+!> The program nocdyn-sweep, which nocdyn executes for the commands sweep and merge. Only this program loads the libraries of
+!> NetCDF, which take milliseconds to load.
 program nocdyn_sweep_program
   use nocdyn_arguments, only: arguments_t, command_line, parse_arguments
   use nocdyn_commands, only: help_command, version_command

@@ -103,7 +103,7 @@ contains
   pure function joined(texts, separator, most)
     type(string_t), intent(in) :: texts(:)
     character(len=*), intent(in) :: separator
-    integer, intent(in), optional :: most   !! absent: all are written
+    integer, intent(in), optional :: most   !! all are written if absent
     character(len=:), allocatable :: joined
     integer :: i, last
 

@@ -18,7 +18,7 @@ module nocdyn_permutations
   type, public :: permutation_t
     private
     integer :: length
-    integer(int64) :: side          !! s: the least whole number with s^2 >= length
+    integer(int64) :: side          !! least whole number with side^2 >= length
     integer(int64) :: keys(rounds)
   contains
     procedure :: image

@@ -14,7 +14,7 @@ module nocdyn_integration_settings
     character(len=16) :: method = 'auto'            !! one of `method_names`
     real(wp) :: rtol = 1.0e-6_wp                    !! relative tolerance, at least the spacing of numbers
     real(wp) :: atol = 1.0e-9_wp                    !! absolute tolerance, positive
-    real(wp) :: first_step = 0.0_wp                 !! 0: found automatically
+    real(wp) :: first_step = 0.0_wp                 !! 0 if it is to be found automatically
     real(wp) :: longest_step = huge(1.0_wp)
     integer :: max_steps = 1000000                  !! attempts of a lane, accepted or rejected
   end type integration_settings_t

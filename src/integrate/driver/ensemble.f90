@@ -26,7 +26,7 @@ module nocdyn_ensemble
       integer, intent(in) :: lane
       real(wp), intent(inout) :: t                  !! the first requested time; may be set to a later start
       real(wp), contiguous, intent(inout) :: y(:)   !! [states + quadratures]
-      logical, intent(out) :: found                 !! false: there is no variant left, and none will be asked for
+      logical, intent(out) :: found                 !! .false. if no variant is left; then none is asked for again
     end subroutine next_interface
 
     !> Takes the end of the variant in a lane: done, stopped by an event, failed or interrupted.

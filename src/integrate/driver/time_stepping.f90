@@ -27,7 +27,7 @@ module nocdyn_time_stepping
     type(events_t) :: events
     type(extremes_t) :: extremes
     type(switching_t) :: switching
-    real(wp) :: first_step                           !! 0: find it
+    real(wp) :: first_step                           !! 0 if it is to be found
     integer :: max_steps
     logical :: has_events = .false.
     logical :: has_extremes = .false.

@@ -32,7 +32,7 @@ module nocdyn_explicit_tables
 
 contains
 
-  !> DOPRI5: the pair RK5(4)7M with the fourth-order dense output of its authors' and Hairer's code.
+  !> DOPRI5, the pair RK5(4)7M with the fourth-order dense output of its authors' and Hairer's code.
   function dormand_prince_5() result(table)
     type(explicit_table_t) :: table
 
@@ -76,7 +76,7 @@ contains
     call expand(dense)
   end function dormand_prince_5_dense
 
-  !> DOP853: order 8 with twelve stages, embedded methods of orders 5 and 3, dense output of order 7.
+  !> DOP853, of order 8 with twelve stages, embedded methods of orders 5 and 3, dense output of order 7.
   function dormand_prince_8() result(table)
     type(explicit_table_t) :: table
 

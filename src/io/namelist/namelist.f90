@@ -17,7 +17,7 @@ module nocdyn_namelist
     character(len=:), allocatable :: key   !! in lower case
     integer :: line = 0
     integer :: first = 1
-    integer :: last = 0               !! 0: as far as the values go
+    integer :: last = 0               !! 0 if it is as far as the values go
     integer :: stride = 1
     logical :: is_whole = .true.      !! no subscript was written
     logical :: is_damaged = .false.   !! subscript or values could not be understood

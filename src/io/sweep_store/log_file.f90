@@ -77,7 +77,7 @@ contains
   subroutine open_file(self, folder, name, error)
     class(log_file_t), intent(inout) :: self
     character(len=*), intent(in) :: folder, name
-    type(error_t), allocatable, intent(out) :: error   !! exit_file: cannot be opened; exit_input: not such a file, or in use
+    type(error_t), allocatable, intent(out) :: error   !! `exit_file` if it cannot be opened, else `exit_input`
 
     call self%prepare(folder, name)
     self%descriptor = open_existing(self%path, .true.)

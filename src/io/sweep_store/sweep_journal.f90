@@ -96,7 +96,7 @@ contains
   subroutine open_journal(folder, name, journal, error)
     character(len=*), intent(in) :: folder, name
     type(sweep_journal_t), intent(out) :: journal
-    type(error_t), allocatable, intent(out) :: error   !! exit_file: cannot be opened; exit_input: no journal, or in use
+    type(error_t), allocatable, intent(out) :: error   !! `exit_file` if it cannot be opened, else `exit_input`
     integer :: length
     logical :: is_good, is_there
 

@@ -44,8 +44,8 @@ contains
     type(string_t), intent(in) :: names(:), units(:)
     integer, intent(in) :: first(:), body(:)
     real(wp), intent(in) :: coefficient(:, :)
-    type(string_t), intent(in), optional :: kinds(:)            !! absent: all are 'constraint'
-    type(member_torques_t), intent(in), optional :: members     !! absent: none
+    type(string_t), intent(in), optional :: kinds(:)            !! all are 'constraint' if absent
+    type(member_torques_t), intent(in), optional :: members     !! none if absent
     type(constraints_t) :: constraints
 
     if (size(first) /= size(names) + 1) error stop 'nocdyn_constraints: first must have one entry more than names'

@@ -114,7 +114,7 @@ contains
 
   pure logical function precedes(value, variant, best, variant_of_best)
     real(wp), intent(in) :: value, best
-    integer, intent(in) :: variant, variant_of_best   !! 0: there is no best one yet
+    integer, intent(in) :: variant, variant_of_best   !! 0 if there is no best one yet
 
     precedes = variant_of_best == 0 .or. value < best .or. &
                   (value <= best .and. variant < variant_of_best)

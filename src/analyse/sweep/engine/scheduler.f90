@@ -39,7 +39,7 @@ module nocdyn_scheduler
       real(wp), intent(in) :: seconds
     end subroutine submit_interface
 
-    !> attend: called often while variants are computed; conclude: once, when nothing is left to compute here.
+    !> `poll` is called often while variants are computed, `finalise` once, when nothing is left to compute here.
     subroutine poll_interface(self)
       import :: scheduler_t
       class(scheduler_t), intent(inout) :: self

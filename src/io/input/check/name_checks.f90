@@ -78,7 +78,7 @@ contains
   !> Every body that is referred to must be there, and no key may name one twice.
   subroutine check_references(groups, bodies_are_known, diagnostics)
     type(group_t), intent(in) :: groups(:)
-    logical, intent(in) :: bodies_are_known   !! false: a &body has a name that could not be read
+    logical, intent(in) :: bodies_are_known   !! .false. if the name of a &body could not be read
     type(diagnostics_t), intent(inout) :: diagnostics
     type(string_t), allocatable :: bodies(:)
     integer, allocatable :: members(:), order(:)

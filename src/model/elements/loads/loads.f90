@@ -1,4 +1,4 @@
-!> Loads: the viscous resistance of eq. (5), M_r = -c omega.
+!> Loads with the viscous resistance of eq. (5), M_r = -c omega.
 module nocdyn_loads
   use nocdyn_bank, only: bank_t, role_load
   use nocdyn_kinds, only: wp

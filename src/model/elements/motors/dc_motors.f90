@@ -38,7 +38,7 @@ contains
     type(string_t), intent(in) :: names(:)
     integer, intent(in) :: body(:)
     real(wp), intent(in) :: voltage(:, :), resistance(:, :), flux_constant(:, :), inductance(:, :)   !! [lanes, motors]
-    type(governor_t), intent(in), optional :: governor   !! absent: no motor has one
+    type(governor_t), intent(in), optional :: governor   !! no motor has one if absent
     type(dc_motors_t) :: bank
     integer :: e
 

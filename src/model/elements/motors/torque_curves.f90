@@ -44,7 +44,7 @@ module nocdyn_torque_curves
     procedure :: list_parameters => list_quadratic
   end type quadratic_curve_t
 
-  !> Kloss: 2 T_k / (s / s_k + s_k / s) with the slip s = 1 - omega / synchronous_speed, as 2 T_k s s_k / (s^2 + s_k^2).
+  !> Kloss' formula 2 T_k / (s / s_k + s_k / s) with the slip s = 1 - omega / synchronous_speed, as 2 T_k s s_k / (s^2 + s_k^2).
   type, extends(torque_curve_t), public :: induction_curve_t
     real(wp), allocatable :: breakdown_torque(:, :)    !! T_k [N m], shape [lanes, motors]
     real(wp), allocatable :: breakdown_slip(:, :)      !! s_k, positive
