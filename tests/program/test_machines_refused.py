@@ -163,3 +163,44 @@ def test_a_formulation_without_taylor_series_is_refused(nocdyn, formulation):
         f"formulation '{formulation}' has no Taylor series; 'reduced' has one\n"
     )
     assert not (nocdyn.folder / "out").exists()
+
+
+LIGHT = """\
+&body name = 'motor' inertia = 2.0 /
+&body name = 'pinion' inertia = {pinion} /
+&body name = 'wheel' inertia = {wheel} /
+&coupling name = 'shaft' bodies = 'motor', 'pinion' stiffness = 100.0 damping = 0.1 /
+&gear name = 'reducer' bodies = 'pinion', 'wheel' radii = 1.0, 2.0 /
+&motor name = 'drive' body = 'motor' a = 20.0 b = 1.0 c = 0.0 /
+&load name = 'work' body = 'wheel' viscous = 4.0 /
+&run t_end = 1.0 formulation = '{formulation}' /
+"""
+
+
+@pytest.mark.parametrize("command", ["run", "check", "matrices", "modes", "equilibrium"])
+def test_bodies_that_move_without_any_inertia_are_refused_by_name(nocdyn, command):
+    message = refusal(nocdyn, command, LIGHT.format(pinion=0, wheel=0, formulation="reduced"))
+    assert message == (
+        "nocdyn: pair.nml:2: &body 'pinion': inertia = 0: 'pinion', 'wheel' can turn while every body with an inertia stands "
+        "still; allowed: > 0 [kg m2], or 0 where a body with an inertia is geared to it\n"
+    )
+
+
+@pytest.mark.parametrize("formulation", ["reduced", "paper", "multiplier"])
+@pytest.mark.parametrize("command", ["run", "check", "matrices", "modes", "equilibrium"])
+def test_a_pinion_may_be_without_inertia(nocdyn, command, formulation):
+    nocdyn.write("light.nml", LIGHT.format(pinion=0, wheel=3.0, formulation=formulation))
+    outcome = nocdyn(command, "light.nml")
+    assert (outcome.returncode, outcome.stderr) == (0, "")
+
+
+def test_the_inertia_of_a_pinion_may_stand_at_its_wheel(nocdyn):
+    nocdyn.write("light.nml", LIGHT.format(pinion=0, wheel=3.0, formulation="reduced"))
+    nocdyn.write("heavy.nml", LIGHT.format(pinion=0.5, wheel=1.0, formulation="reduced"))
+    nocdyn("run", "light.nml", "--out", "light")
+    nocdyn("run", "heavy.nml", "--out", "heavy")
+    columns = []
+    for name in ("light", "heavy"):
+        header, rows = nocdyn.table(name)
+        columns.append([row[header.index("omega_wheel [rad/s]")] for row in rows])
+    assert columns[0] == pytest.approx(columns[1], rel=1e-5, abs=1e-7)

@@ -7,20 +7,24 @@ module nocdyn_assembly
   use nocdyn_coordinates, only: build_coordinates
   use nocdyn_coupling_assembly, only: add_couplings, check_couplings
   use nocdyn_element_parameters, only: names_of, values_of
-  use nocdyn_errors, only: error_t
+  use nocdyn_errors, only: error_t, exit_input, raise
   use nocdyn_formulation, only: formulation_t
   use nocdyn_input, only: group_t, input_t
   use nocdyn_machine, only: machine_t
+  use nocdyn_massless_motion, only: massless_bodies
   use nocdyn_motor_assembly, only: add_motors, check_motors
   use nocdyn_multiplier, only: new_multiplier
   use nocdyn_paper, only: new_paper
   use nocdyn_reduced, only: new_reduced
   use nocdyn_start_speeds, only: fit_start_speeds
+  use nocdyn_text, only: joined, selected
   use nocdyn_torque_assembly, only: add_excitations, add_loads
   implicit none (type, external)
   private
 
   public :: assemble_machine, new_formulation
+
+  integer, parameter :: most_names = 12   ! in a message
 
 contains
 
@@ -69,12 +73,29 @@ contains
     wanted = bodies_of(run, 'independent', body_index)
     call analyse_constraints(machine%constraints, machine%names, wanted, machine%trains, machine%groups, offending_row, error)
     if (.not. allocated(error)) then
+      call refuse_massless_motion(input, machine, error)
+      if (allocated(error)) return
       call build_coordinates(machine%constraints, machine%names, machine%trains, machine%groups, machine%inertia, wanted, &
                              complement_choice(run%text('complement')), machine%coordinates, error)
     end if
     if (.not. allocated(error)) call fit_start_speeds(machine, run%text('start') == 'projected', offending_row, error)
     if (allocated(error)) call add_location(input, offending_row, error)
   end subroutine analyse_machine_constraints
+
+  !> Refuses bodies without inertia that nothing with inertia moves along with: the reduced mass matrix has no inverse.
+  subroutine refuse_massless_motion(input, machine, error)
+    type(input_t), intent(in) :: input
+    type(machine_t), intent(in) :: machine   !! its constraints are analysed
+    type(error_t), allocatable, intent(out) :: error
+    integer, allocatable :: bodies(:), indices(:)
+
+    allocate (bodies, source=massless_bodies(machine))
+    if (size(bodies) == 0) return
+    allocate (indices, source=input%groups_named('body'))
+    call raise(error, exit_input, input%location(indices(bodies(1)), 'inertia') // ': inertia = 0: ' // &
+               joined(selected(machine%names, bodies), ', ', most_names) // ' can turn while every body with an inertia ' // &
+               'stands still; allowed: > 0 [kg m2], or 0 where a body with an inertia is geared to it')
+  end subroutine refuse_massless_motion
 
   !> The system that an integrator solves, by the word of the input.
   subroutine new_formulation(word, machine, formulation, with_energy_balance)

@@ -8,7 +8,8 @@ module nocdyn_schema
   use nocdyn_schema_couplings, only: coupling_alternatives, coupling_columns, coupling_examples, coupling_keys, coupling_needs
   use nocdyn_schema_rules, only: a_body, a_flag, a_kind, a_file, a_name, a_number, a_text, a_word, allowed_t, alternative_t, &
     an_integer, any_number, any_times, anything, at_least_once, at_most_once, body_or_ground, columns_t, exactly_once, &
-    example_t, from_1, from_2, group_rule_t, key_rule_t, kind_rule_t, need_t, order_t, positive, required, synonym_t, unset
+    example_t, from_1, from_2, group_rule_t, key_rule_t, kind_rule_t, need_t, not_negative, order_t, positive, required, &
+    synonym_t, unset
   use nocdyn_schema_sweep, only: sweep_examples, sweep_groups, sweep_keys, sweep_kinds, sweep_needs, sweep_orders, &
     sweep_synonyms
   use nocdyn_schema_torques, only: excitation_keys, load_keys, motor_keys, torque_alternatives, torque_columns, &
@@ -45,8 +46,8 @@ module nocdyn_schema
       'one line that summaries and figures repeat'), &
     key_rule_t('body',       'name',            a_name,         1, '',            required,    anything, &
       'what couplings, gears, torques and results call it'), &
-    key_rule_t('body',       'inertia',         a_number,       1, 'kg m2',       required,    positive, &
-      'moment of inertia about the axis'), &
+    key_rule_t('body',       'inertia',         a_number,       1, 'kg m2',       required,    not_negative, &
+      'moment of inertia about the axis; 0 where a body with an inertia is geared to it'), &
     key_rule_t('body',       'angle',           a_number,       1, 'rad',         '0',         anything, &
       'angle at the start'), &
     key_rule_t('body',       'speed',           a_number,       1, 'rad/s',       '0',         anything, &

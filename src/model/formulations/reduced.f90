@@ -142,6 +142,8 @@ contains
     logical, intent(out) :: is_indefinite    !! the numbers of the lane are of no use then
     integer :: g
 
+    is_indefinite = .not. all(inertia > 0)   ! whether a motion without inertia is left is for an assembly to find
+    if (is_indefinite) return
     self%machine%inertia(lane, bodies) = inertia
     do g = 1, size(groups)
       call self%machine%coordinates%weigh(self%machine%trains, self%machine%groups(groups(g)), self%machine%inertia(lane, :), &

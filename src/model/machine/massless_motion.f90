@@ -1,0 +1,84 @@
+!> Motions without kinetic energy, by which the reduced mass matrix L_tau^T J L_tau is not positive definite.
+!>
+!> A body may have no inertia of its own where those that it is geared to have one. It may not where a group of geared bodies
+!> can move while all of its bodies with inertia stand still.
+module nocdyn_massless_motion
+  use nocdyn_kinds, only: wp
+  use nocdyn_lapack, only: pivoted_rank
+  use nocdyn_machine, only: machine_t
+  use nocdyn_rigid_trains, only: ratio_tolerance
+  use nocdyn_train_motion, only: find_motion, train_motion_t
+  use nocdyn_train_relations, only: new_relations, train_relations_t
+  implicit none (type, external)
+  private
+
+  public :: massless_bodies
+
+contains
+
+  !> The bodies that move without kinetic energy in the first group where some do; none if there is no such motion.
+  function massless_bodies(machine) result(bodies)
+    type(machine_t), intent(in) :: machine   !! its constraints are analysed; lane 1 is examined
+    integer, allocatable :: bodies(:)
+    type(train_motion_t) :: found
+    type(train_relations_t) :: relations
+    logical, allocatable :: has_mass(:), is_massless(:)
+    integer :: local(size(machine%trains%root))   ! of every train in its group
+    integer :: g, k
+
+    allocate (bodies(0))
+    if (all(machine%inertia(1, :) > 0)) return
+    relations = new_relations(machine%constraints, machine%trains)
+    do g = 1, size(machine%groups)
+      associate (group => machine%groups(g))
+        local(group%trains) = [(k, k=1, size(group%trains))]
+        if (allocated(has_mass)) deallocate (has_mass)
+        allocate (has_mass(size(group%trains)), source=.false.)
+        has_mass(local(machine%trains%train(pack(group%bodies, machine%inertia(1, group%bodies) > 0)))) = .true.
+        if (all(has_mass)) cycle
+        call find_motion(relations, group%elimination, local, size(group%trains), 1, found)
+        is_massless = moves_alone(found%motion, has_mass)
+        if (.not. any(is_massless)) cycle
+        bodies = pack(group%bodies, is_massless(local(machine%trains%train(group%bodies))))
+        return
+      end associate
+    end do
+  end function massless_bodies
+
+  !> Whether a train moves in a motion of the group in which all trains with mass stand still.
+  function moves_alone(motion, has_mass)
+    real(wp), intent(in) :: motion(:, :)   !! speeds of the roots by the coordinates, [trains, coordinates]
+    logical, intent(in) :: has_mass(:)     !! [trains]
+    logical :: moves_alone(size(has_mass))
+    integer :: rank, t
+    logical :: with_train(size(has_mass))
+
+    moves_alone = .false.
+    rank = rank_of(motion, has_mass)
+    if (rank == size(motion, 2)) return
+    do t = 1, size(has_mass)
+      if (has_mass(t)) cycle
+      with_train = has_mass
+      with_train(t) = .true.
+      moves_alone(t) = rank_of(motion, with_train) > rank
+    end do
+  end function moves_alone
+
+  !> Rank of the selected rows, each scaled to the length 1.
+  integer function rank_of(motion, selected)
+    real(wp), intent(in) :: motion(:, :)
+    logical, intent(in) :: selected(:)   !! [rows]
+    real(wp), allocatable :: rows(:, :)
+    integer :: pivots(count(selected)), i
+
+    allocate (rows(size(motion, 2), count(selected)))
+    do i = 1, size(motion, 2)
+      rows(i, :) = pack(motion(:, i), selected)
+    end do
+    do i = 1, size(rows, 2)
+      rows(:, i) = rows(:, i) / norm2(rows(:, i))
+    end do
+    call pivoted_rank(rows, ratio_tolerance, rank_of, pivots)
+  end function rank_of
+
+end module nocdyn_massless_motion
