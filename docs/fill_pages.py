@@ -11,7 +11,8 @@ A place lies between <!-- fill: WHAT --> and <!-- filled -->, where WHAT is
   bench             what stands before the sections
   picture NAME      the same folder's picture NAME.svg, copied to docs/media
 
-Without pages: README.md and all of docs/pages. Names the pages that it changes. Exit codes: 0 done, 1 something asked for is not there.
+Without pages: README.md and all of docs/pages. Names the pages that it changes.
+Exit codes: 0 done, 1 something asked for is not there.
 """
 
 import argparse
@@ -27,20 +28,20 @@ LANGUAGES = {".f90": "fortran", ".nml": "fortran", ".txt": "cmake"}
 VERDICT = re.compile(r".*\*\*(?:reached|missed)\*\*.*\n*")
 
 
-class NotThere(Exception):
+class MissingError(Exception):
     """A file, a table or a section that a page asks for."""
 
 
 def quoted_file(name):
     file = ROOT / name
     if not file.exists():
-        raise NotThere(file)
+        raise MissingError(file)
     return f"```{LANGUAGES[file.suffix]}\n{file.read_text(encoding='utf-8')}```"
 
 
 def quoted_run(name, folder):
     if not (folder / name).exists():
-        raise NotThere(folder / name)
+        raise MissingError(folder / name)
     said = subprocess.run([folder / name], check=True, capture_output=True, text=True).stdout
     return f"```text\n$ build/{name}\n{said}```"
 
@@ -49,17 +50,17 @@ def table(argument, folder):
     name, number = argument.split()
     file = folder / f"{name}.md"
     if not file.exists():
-        raise NotThere(file)
+        raise MissingError(file)
     tables = re.findall(r"^\|.*(?:\n\|.*)*", file.read_text(encoding="utf-8"), re.MULTILINE)
     if int(number) > len(tables):
-        raise NotThere(f"table {number} in {file}")
+        raise MissingError(f"table {number} in {file}")
     return tables[int(number) - 1]
 
 
 def section_of_bench(title, folder):
     file = folder / "bench.md"
     if not file.exists():
-        raise NotThere(file)
+        raise MissingError(file)
     head, *sections = re.split(r"^## ", file.read_text(encoding="utf-8"), flags=re.MULTILINE)
     if not title:
         return head.partition("\n")[2].strip()
@@ -67,13 +68,13 @@ def section_of_bench(title, folder):
         name, _, text = section.partition("\n")
         if name.startswith(title):
             return f"*{name}*\n\n{VERDICT.sub('', text).strip()}"
-    raise NotThere(f"section {title} in {file}")
+    raise MissingError(f"section {title} in {file}")
 
 
 def picture(name, folder):
     file = folder / f"{name}.svg"
     if not file.exists():
-        raise NotThere(file)
+        raise MissingError(file)
     shutil.copy(file, ROOT / "docs" / "media" / file.name)
     return f"![{name.replace('_', ' ')}](../media/{file.name})"
 
@@ -108,7 +109,7 @@ def main():
         text = page.read_text(encoding="utf-8")
         try:
             new = filled(text, arguments.examples, arguments.tables, arguments.bench)
-        except NotThere as missing:
+        except MissingError as missing:
             sys.exit(f"{page.name}: there is no {missing}")
         if new != text:
             page.write_text(new, encoding="utf-8")

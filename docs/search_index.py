@@ -2,8 +2,9 @@
 
 usage: search_index.py SITE PAGES
 
-PAGES holds the pages as FORD has read them. What is found are their sections, then modules, procedures and types by name and summary. The index is
-made here (FORD's own is made in the browser, for every search, and takes minutes to write). Exit code 1: a section has no place in the site.
+PAGES holds the pages as FORD has read them. The search finds their sections, then modules, procedures and types by name
+and summary. The index is made here: FORD's own is made in the browser, for every search, and takes minutes to write.
+Exit code 1: a section has no place in the site.
 """
 
 import html
@@ -27,7 +28,8 @@ TITLE_BOOST, GUIDE_BOOST = 10, 5  # a heading before text, the guide before the 
 FORM = """
             <div class="d-flex align-items-end flex-grow-1">
               <form action="{root}search.html" role="search" class="ms-auto">
-                <input type="text" class="form-control" aria-label="Search" placeholder="Search" name="q" autocomplete="off" required>
+                <input type="text" class="form-control" aria-label="Search" placeholder="Search" name="q"
+                       autocomplete="off" required>
               </form>
             </div>
           </div><!--/.nav-collapse -->"""

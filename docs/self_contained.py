@@ -2,8 +2,8 @@
 
 usage: self_contained.py SITE
 
-The copies come from the Debian packages libjs-bootstrap5, libjs-lunr and libjs-mathjax (scripts/setup docs). Exit code 1: the pages load
-something that this script does not know, or a package is missing.
+The copies come from the Debian packages libjs-bootstrap5, libjs-lunr and libjs-mathjax (scripts/setup docs). Exit code 1: the
+pages load something that this script does not know, or a package is missing.
 """
 
 import os

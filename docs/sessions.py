@@ -2,9 +2,10 @@
 
 usage: sessions.py NOCDYN PAGE...
 
-In a block of code, a line that begins with '$ ' is a command; the lines up to the next one are its output. The commands of a page run in the order
-of the page, in a new folder that has the project's folders docs, input and scripts in it. This script runs them with the program NOCDYN and writes
-their output into the pages. Exit code 1: a command failed that had not failed before.
+In a block of code, a line that begins with '$ ' is a command; the lines up to the next one are its output. The commands of
+a page run in the order of the page, in a new folder that has the project's folders docs, input and scripts in it. This script
+runs them with the program NOCDYN and writes their output into the pages. Exit code 1: a command failed that had not failed
+before.
 """
 
 import os

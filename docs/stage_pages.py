@@ -2,8 +2,9 @@
 
 usage: stage_pages.py REFERENCE FOLDER
 
-REFERENCE is what nocdyn_input_reference prints: its groups go to the end of the page on input files. In FOLDER, links from page to page lead to
-the HTML files of the site, and a code block without a language is marked as text, because FORD would guess one.
+REFERENCE is what nocdyn_input_reference prints: its groups go to the end of the page on input files. In FOLDER, links from
+page to page lead to the HTML files of the site, and a code block without a language is marked as text, because FORD would
+guess one.
 """
 
 import re

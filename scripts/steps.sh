@@ -1,4 +1,5 @@
 # Sourced by the other scripts.
+# shellcheck shell=bash
 
 # quietly LABEL COMMAND...: one line with the time it took; the end of what the command printed only if it failed.
 quietly() {

@@ -173,9 +173,9 @@ def chunk_costs(sweeping: Sweeping, case: Case, has_mpi: bool, rounds: int) -> l
     return [
         *table(head, rows),
         "",
-        f"`{case.method}`, {costs[0].lanes} lanes, one thread. Start and end: what the lanes that begin together and run empty one by "
-        "one cost, beside the fastest chunk. Hand-out: lock and books. Journal: packing, checksum, one write. Messages: request, "
-        "answer, results and time between two ranks on this machine, without the work of either.",
+        f"`{case.method}`, {costs[0].lanes} lanes, one thread. Start and end: what the lanes that begin together and run empty "
+        "one by one cost, beside the fastest chunk. Hand-out: lock and books. Journal: packing, checksum, one write. Messages: "
+        "request, answer, results and time between two ranks on this machine, without the work of either.",
         "",
         scaling_out(costs[-1], messages[-1], fastest),
     ]

@@ -67,13 +67,13 @@ class Sweeper:
 
     def memory(self, tolerance: float, count: int) -> float:
         """Largest one of the process [MB], for a random design of so many variants."""
-        said = self._command(tolerance, random_design(count), before=[sys.executable, "-c", WITH_MEMORY])[1]
+        said = self._command(tolerance, random_design(count), before=(sys.executable, "-c", WITH_MEMORY))[1]
         return int(said.split()[-1]) * 1024 / 1e6
 
     def _run(self, tolerance: float, design: list[str], *options: str) -> Path:
         return self._command(tolerance, design, *options)[0]
 
-    def _command(self, tolerance: float, design: list[str], *options: str, before: list[str] = []) -> tuple[Path, str]:
+    def _command(self, tolerance: float, design: list[str], *options: str, before: tuple[str, ...] = ()) -> tuple[Path, str]:
         file, out = self.scratch / "sweep.nml", self.scratch / "sweep"
         shutil.rmtree(out, ignore_errors=True)
         write_input(file, design)

@@ -48,7 +48,8 @@ class Case2:
 &body       name = 'motor'    inertia = {self.inertia_1} /
 &body       name = 'pinion'   inertia = {self.inertia_2} /
 &body       name = 'machine'  inertia = {self.inertia_3} /
-&coupling   name = 'coupling' bodies = 'motor', 'pinion'   stiffness = {self.stiffness}  cubic_stiffness = {self.cubic_stiffness} /
+&coupling   name = 'coupling' bodies = 'motor', 'pinion'   stiffness = {self.stiffness}
+            cubic_stiffness = {self.cubic_stiffness} /
 &gear       name = 'reducer'  bodies = 'pinion', 'machine' radii = 2.0, 3.0 /
 &motor      name = 'drive'    body = 'motor'    a = {self.motor_a}  b = {self.motor_b}  c = {self.motor_c} /
 &load       name = 'work'     body = 'machine'  viscous = {self.viscous} /

@@ -57,7 +57,8 @@ def write_report(measured: list, folder: Path, build: Path) -> None:
         "# Benchmarks",
         "\n".join(f"- {name}: {text}" for name, text in machine.items()),
         "Times are the shortest of all rounds, taken in turns, in process unless the title says otherwise: start-up and "
-        "compilation do not count, nor does nocdyn's energy audit, which the others have not. Ratios travel to other machines, milliseconds do not.",
+        "compilation do not count, nor does nocdyn's energy audit, which the others have not. Ratios "
+        "travel to other machines, milliseconds do not.",
     ]
     reached = [f"- {verdict}" for workload in measured for verdict in verdicts(workload)]
     if reached:
@@ -191,8 +192,8 @@ def _work_precision(workload: WorkPrecision) -> list[str]:
         *table(head, rows),
         "",
         "Errors are the largest absolute ones, of all states [rad, rad/s] or of the elastic moment [N m], "
-        "over all outputs; times between two tolerances are interpolated, linear in the logarithms; - : not reached before the sweep ends, at the "
-        "first run slower than 2 s (SciPy Radau: 8 s) or the tightest tolerance. rtol = atol.",
+        "over all outputs; times between two tolerances are interpolated, linear in the logarithms; - : not reached before the "
+        "sweep ends, at the first run slower than 2 s (SciPy Radau: 8 s) or the tightest tolerance. rtol = atol.",
         "",
         f"Reference: {workload.reference.note}; they differ by {workload.reference.distance:.1e}.",
         "",
@@ -267,9 +268,9 @@ def _throughput(workload: Throughput) -> list[str]:
         "",
         "Each contestant has the loosest tolerance, in tenths of a decade, with which its errors are below "
         f"{workload.error_wanted:.0e}: the largest absolute one of the four states at the end [rad, rad/s], and the largest "
-        f"relative one of the peak, of the first {_rounded(SAMPLE)} variants, {SLOW_SAMPLE} of those that integrate a part of the "
-        f"{_rounded(workload.count)} variants. One thread where nothing else is said. Whole process: from its start until the "
-        "files are written.",
+        f"relative one of the peak, of the first {_rounded(SAMPLE)} variants, {SLOW_SAMPLE} of those that integrate a part of "
+        f"the {_rounded(workload.count)} variants. One thread where nothing else is said. Whole process: from its start until "
+        "the files are written.",
         "",
         f"Reference: heyoka with 80-bit numbers at tolerance 1e-18; SciPy DOP853 at 1e-13 differs by "
         f"{workload.distance.state:.1e} and {workload.distance.peak:.1e}.",

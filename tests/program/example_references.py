@@ -70,12 +70,14 @@ class Motion:
         best = -np.inf
         for start, end, mode, solution in self.pieces:
             t = np.linspace(start, end, max(5, min(4000, int(1e5 * (end - start)))))
-            values = [sign * value(s, solution(s), mode) for s in t]
+
+            def objective(s, mode=mode, solution=solution):
+                return sign * value(s, solution(s), mode)
+
+            values = [objective(s) for s in t]
             i = int(np.argmax(values))
             bounds = (t[max(i - 1, 0)], t[min(i + 1, len(t) - 1)])
-            found = minimize_scalar(
-                lambda s: -sign * value(s, solution(s), mode), bounds=bounds, method="bounded", options={"xatol": 1e-12}
-            )
+            found = minimize_scalar(lambda s, f=objective: -f(s), bounds=bounds, method="bounded", options={"xatol": 1e-12})
             best = max(best, values[i], -found.fun)
         return sign * best
 
@@ -98,7 +100,7 @@ def motion_of(rate, state, end, mode=None, borders=None, breaks=()):
                 events.append(event)
                 beyond.append(other)
             piece = solve_ivp(
-                lambda s, y: rate(s, y, mode, middle),
+                lambda s, y, mode=mode, middle=middle: rate(s, y, mode, middle),
                 (t, stop),
                 state,
                 method="DOP853",

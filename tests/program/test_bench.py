@@ -45,7 +45,7 @@ def test_an_instruction_has_an_operation_for_each_double_of_its_registers():
 
 def test_the_errors_of_a_sweep_are_the_largest_of_states_and_relative_peaks():
     exact = np.array([[1.0, 2.0, 3.0, 4.0, 200.0], [1.0, 2.0, 3.0, 4.0, 100.0]])
-    found = [*exact, [0, 0, 0, 1e-07, 1e-05], [0, -3e-07, 0, 0, 0]]
+    found = exact + np.array([[0, 0, 0, 1e-7, 1e-5], [0, -3e-7, 0, 0, 0]])
     errors = variants.errors_of(found, exact)
     assert (errors.state, errors.peak) == (pytest.approx(3e-7, rel=1e-6), pytest.approx(5e-8, rel=1e-6))
     assert errors.are_below(1e-6) and not errors.are_below(2e-7)

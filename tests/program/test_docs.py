@@ -127,7 +127,7 @@ def test_tables_pictures_and_sections_go_to_their_places(fill_pages, tmp_path, m
     assert new == "\n".join([*expected, "<!-- fill: run nothing -->\nold\n<!-- filled -->"])
     assert fill_pages.filled(new, tables=tmp_path, bench=tmp_path) == new
     assert (tmp_path / "docs" / "media" / "curve.svg").exists()
-    with pytest.raises(fill_pages.NotThere, match="table 3"):
+    with pytest.raises(fill_pages.MissingError, match="table 3"):
         fill_pages.filled("<!-- fill: table digits 3 -->\n<!-- filled -->", tables=tmp_path)
 
 
@@ -232,7 +232,10 @@ def test_site_gets_search_and_scripts_that_need_no_network(tmp_path):
         '<script src="https://cdn.test/MathJax.js?config=TeX-AMS-MML_HTMLorMML" async></script>'
         '<div></div><!--/.nav-collapse --><h2 id="gaps">Gaps</h2></body></html>'
     )
-    row = "<tr>\n<td><a href='../proc/find_gap.html'>find_gap</a></td>\n<td>x</td>\n<td><p>Where a <em>gap</em> opens.</p></td>\n</tr>"
+    row = (
+        "<tr>\n<td><a href='../proc/find_gap.html'>find_gap</a></td>\n<td>x</td>\n"
+        "<td><p>Where a <em>gap</em> opens.</p></td>\n</tr>"
+    )
     for name, text in {"page/a.html": page, "search.html": page, "lists/procedures.html": row}.items():
         (site / name).parent.mkdir(parents=True, exist_ok=True)
         (site / name).write_text(text)

@@ -23,7 +23,8 @@ def test_check_tells_what_the_joints_allow(nocdyn):
         "  speed of 'carrier' = 0.25 * speed of 'pump'",
         "  speed of 'output' = -0.1666667 * speed of 'pump'",
         "  speed of 'left' = -1 * speed of 'right' - 0.3333333 * speed of 'pump'",
-        "  note: gear 'twin' repeats what 'pair' already fixes; its tooth force is not unique, the smallest-norm share is reported",
+        "  note: gear 'twin' repeats what 'pair' already fixes; its tooth force is not unique, the smallest-norm share is"
+        " reported",
         "  note: constraint 'sum' repeats what 'mixer' already fixes; its multiplier is not unique, the smallest-norm share is"
         " reported",
         lines[-1],
@@ -176,8 +177,8 @@ PAIR = """\
 def test_start_speeds_that_violate_a_joint_are_refused_with_the_nearest_that_do_not(nocdyn, command):
     complaint = refusal(nocdyn, command, PAIR.format(a=1.0, b=1.0, start=""))
     assert complaint == (
-        "nocdyn: pair.nml:3: &gear 'g': the start speeds violate it: 0.5 * 1 rad/s ('a') + 0.5 * 1 rad/s ('b') = 1, which must be 0; "
-        "nearest speeds that fit: -0.5 ('a'), 0.5 ('b'); &run start = 'projected' takes them\n"
+        "nocdyn: pair.nml:3: &gear 'g': the start speeds violate it: 0.5 * 1 rad/s ('a') + 0.5 * 1 rad/s ('b') = 1, "
+        "which must be 0; nearest speeds that fit: -0.5 ('a'), 0.5 ('b'); &run start = 'projected' takes them\n"
     )
     nocdyn.write("fits.nml", PAIR.format(a=-0.5, b=0.5, start=""))
     assert nocdyn(command, "fits.nml").returncode == 0

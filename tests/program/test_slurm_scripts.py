@@ -1,7 +1,6 @@
 """scripts/slurm, with stand-ins for sbatch and srun that run the jobs at once."""
 
 import os
-import shutil
 import subprocess
 
 import pytest
@@ -133,10 +132,3 @@ def test_wrong_usage_is_told(slurm, words):
     outcome = slurm(SOURCE / "scripts/slurm/submit_shards", *words)
     assert (outcome.returncode, outcome.stdout) == (2, "")
     assert outcome.stderr.startswith("usage: ")
-
-
-@pytest.mark.skipif(not shutil.which("shellcheck"), reason="shellcheck is not installed")
-def test_the_scripts_are_clean():
-    scripts = sorted((SOURCE / "scripts/slurm").iterdir())
-    outcome = subprocess.run(["shellcheck", *scripts], check=False, capture_output=True, text=True)
-    assert (outcome.returncode, outcome.stdout) == (0, "")

@@ -311,8 +311,8 @@ def test_parts_of_different_sweeps_are_not_merged(nocdyn, discs):
     outcome = nocdyn("merge", "out")
     assert (outcome.returncode, outcome.stdout) == (2, "")
     assert outcome.stderr == (
-        "nocdyn: out/sweep.1-of-2.journal and out/sweep.2-of-2.journal are not of one sweep: their inputs differ, from the first to "
-        "the second: &case: title was 'Two discs', is 'Three'; &run: rtol was 1e-08, is 1e-07\n"
+        "nocdyn: out/sweep.1-of-2.journal and out/sweep.2-of-2.journal are not of one sweep: their inputs differ, from the "
+        "first to the second: &case: title was 'Two discs', is 'Three'; &run: rtol was 1e-08, is 1e-07\n"
     )
 
 

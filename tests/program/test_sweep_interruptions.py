@@ -20,7 +20,10 @@ pytestmark = needs_sweeps
 SAMPLES = 1500 if TRAPS_EXCEPTIONS else 15000
 LONG = ("--set", f"sweep.samples={SAMPLES}", "--set", "run.t_end=20")
 ENDLESS = ("--set", "sweep.samples=100000000", "--set", "run.t_end=20")
-INTERRUPTED = r"nocdyn: .*discs\.nml: interrupted with (\d+) of 100000000 variants done; the same command with --resume goes on from there\n"
+INTERRUPTED = (
+    r"nocdyn: .*discs\.nml: interrupted with (\d+) of 100000000 variants done; "
+    r"the same command with --resume goes on from there\n"
+)
 
 
 @pytest.fixture
@@ -252,8 +255,8 @@ def test_a_whole_sweep_does_not_go_to_the_folder_of_parts(nocdyn, discs, words):
     outcome = nocdyn("sweep", discs, "--out", "out", *words)
     assert (outcome.returncode, outcome.stdout) == (2, "")
     assert outcome.stderr == (
-        f"nocdyn: out holds journals of parts of a sweep: '{journals[0]}', '{journals[1]}'; go on with them by --shard, remove them, "
-        "or choose another folder by --out\n"
+        f"nocdyn: out holds journals of parts of a sweep: '{journals[0]}', '{journals[1]}'; go on with them by --shard, "
+        "remove them, or choose another folder by --out\n"
     )
     assert nocdyn.files("out") == journals
 

@@ -129,7 +129,8 @@ def test_a_list_of_another_form_is_refused_once(nocdyn):
     nocdyn.write("list.csv", '"load.drag.viscous";"run.t_end"\n0,5;1\n0,75;2\n')
     message = refusal(nocdyn, sweep="&sweep design = 'list' file = 'list.csv' /\n", vary="")
     assert message == (
-        "nocdyn: m.nml:5: &sweep: file: list.csv:1: the columns are separated by semicolons; needed: commas, and points in numbers\n"
+        "nocdyn: m.nml:5: &sweep: file: list.csv:1: the columns are separated by semicolons; "
+        "needed: commas, and points in numbers\n"
     )
 
 
