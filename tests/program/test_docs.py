@@ -73,7 +73,7 @@ def test_tests_that_pages_name_exist(page):
 @pytest.mark.parametrize("page", DOCUMENTS, ids=name_of)
 def test_files_that_pages_name_exist(page):
     for path in re.findall(r"`((?:src|docs|tests|scripts|input)/[\w./]+)`", page.read_text()):
-        assert (SOURCE / path).exists(), f"there is no {path}"
+        assert path == "docs/site" or (SOURCE / path).exists(), f"there is no {path}"  # scripts/docs makes docs/site
 
 
 def script_of_docs(name):
