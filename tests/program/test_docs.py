@@ -255,7 +255,10 @@ def test_site_gets_search_and_scripts_that_need_no_network(tmp_path):
     assert '"url":"page/a.html#gaps"' in data and "no heading Two." in data and '"text":"Where a gap opens."' in data
 
 
-PAGES_WITH_SESSIONS = [SOURCE / "README.md", *(PAGES / f"{name}.md" for name in ("tutorial", "input", "equilibrium-and-modes", "sweeps"))]
+PAGES_WITH_SESSIONS = [
+    SOURCE / "README.md",
+    *(PAGES / f"{name}.md" for name in ("tutorial", "input", "equilibrium-and-modes", "sweeps")),
+]
 
 
 @pytest.fixture(scope="module")
