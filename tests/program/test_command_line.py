@@ -12,7 +12,7 @@ def one_line(text):
 
 
 @pytest.mark.parametrize(
-    ("words", "complaint"),
+    ("words", "message"),
     [
         ([], "a command is missing"),
         (
@@ -42,7 +42,7 @@ def one_line(text):
         (["run", CASE_1, "--out", "a", "--out", "b"], "--out is given twice"),
         (["run", CASE_1, "--quiet=yes"], "--quiet takes no value"),
         (["check", CASE_1, "--out", "a"], "--out is an option of nocdyn run, equilibrium, modes and sweep"),
-        (["modes", CASE_1, "--at"], "--at needs a value: --at equilibrium, --at rest or --at TIME\n"),
+        (["modes", CASE_1, "--at"], "--at needs a value: --at equilibrium|rest|TIME\n"),
         (["modes", CASE_1, "--at", "rest", "--at=0"], "--at is given twice"),
         (["equilibrium", CASE_1, "--at", "rest"], "--at is an option of nocdyn modes"),
         (["modes", CASE_1, "--quiet"], "--quiet is an option of nocdyn run, sweep and merge"),
@@ -62,10 +62,10 @@ def one_line(text):
         (["help", "input", "boddy"], "there is no group 'boddy'; did you mean 'body'?"),
     ],
 )
-def test_wrong_usage_is_refused_with_code_2(nocdyn, words, complaint):
+def test_wrong_usage_is_refused_with_code_2(nocdyn, words, message):
     outcome = nocdyn(*words)
     assert (outcome.returncode, outcome.stdout) == (2, "")
-    assert complaint in outcome.stderr
+    assert message in outcome.stderr
     assert one_line(outcome.stderr) and outcome.stderr.startswith("nocdyn: ")
     assert list(nocdyn.folder.iterdir()) == []
 
@@ -141,7 +141,7 @@ def test_new_leaves_a_file_that_exists_alone(nocdyn):
     nocdyn.write("mine.nml", "precious")
     outcome = nocdyn("new", "mine.nml")
     assert (outcome.returncode, outcome.stdout) == (3, "")
-    assert outcome.stderr == "nocdyn: 'mine.nml' exists; it was left as it is\n"
+    assert outcome.stderr == "nocdyn: 'mine.nml' exists and was not changed\n"
     assert (nocdyn.folder / "mine.nml").read_text() == "precious"
 
 

@@ -398,7 +398,7 @@ def test_names_beyond_ascii_are_read_as_they_are(nocdyn):
 def test_the_program_for_sweeps_says_what_it_is_for(nocdyn):
     outcome = subprocess.run([SWEEP_PROGRAM, "check", "x.nml"], check=False, capture_output=True, text=True)
     assert (outcome.returncode, outcome.stdout) == (2, "")
-    assert outcome.stderr == "nocdyn: nocdyn-sweep knows 'sweep' and 'merge' only; everything else is asked of nocdyn\n"
+    assert outcome.stderr == "nocdyn: nocdyn-sweep has no command 'check'; use nocdyn check\n"
 
 
 @pytest.mark.parametrize(
@@ -428,6 +428,6 @@ def test_without_the_program_for_sweeps_a_sweep_says_why_it_cannot_be(nocdyn, di
     assert (outcome.returncode, outcome.stdout) == (3, "")
     missing = nocdyn.folder / "nocdyn-sweep"
     assert outcome.stderr == (
-        f"nocdyn: '{missing}' is not there: this program for sweeps is built beside nocdyn by "
-        "cmake --build --preset release, unless -DNOCDYN_SWEEP=OFF leaves it out\n"
+        f"nocdyn: '{missing}', the program for nocdyn sweep, does not exist; "
+        "cmake --build --preset release builds it beside nocdyn, unless -DNOCDYN_SWEEP=OFF is set\n"
     )

@@ -421,10 +421,10 @@ def test_a_rank_with_another_list_ends_the_job(nocdyn, rows, complaint):
 @pytest.mark.parametrize(
     ("words", "complaint"),
     [
-        (["run", "discs.nml"], "nocdyn-mpi knows the command 'sweep' only; everything else is asked of nocdyn"),
+        (["run", "discs.nml"], "nocdyn-mpi has no command 'run'; use nocdyn run"),
         (
             ["sweep", "discs.nml", "--shard", "1/2"],
-            "--shard is an option of nocdyn sweep; nocdyn-mpi hands out the variants itself",
+            "--shard is an option of nocdyn sweep; nocdyn-mpi distributes the variants itself",
         ),
         (["sweep", "none.nml"], "none.nml: cannot be read: there is no such file"),
     ],

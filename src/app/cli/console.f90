@@ -54,9 +54,10 @@ contains
     if (.not. is_done) output_is_lost = .true.
   end subroutine print_text
 
-  !> The message of an error on standard error, every line with the program's name before it.
-  subroutine report_error(error)
+  !> Prints the message of an error to standard error, every line with the program's name before it, and raises the exit code.
+  subroutine report_error(error, code)
     type(error_t), intent(in) :: error
+    integer, intent(inout) :: code   !! becomes that of the error if that is higher
     integer :: first, last
 
     first = 1
@@ -65,6 +66,7 @@ contains
       write (error_unit, '(a)') 'nocdyn: ' // error%message(first:last)
       first = last + 2
     end do
+    code = max(code, error%code)
   end subroutine report_error
 
   !> A line that shows after a second of work if standard error is a terminal, after longer if it is a log.

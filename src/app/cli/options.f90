@@ -1,32 +1,31 @@
-!> The options of the command line: how they are written, and which commands take them.
+!> The options of the command line. Which commands take them is said in the table of commands.
 module nocdyn_options
-  use nocdyn_text, only: append, string_t
   implicit none (type, external)
   private
 
-  public :: option_index, option_names, accepted_by_text, accepts_option
+  public :: option_index
 
   type, public :: option_t
     character(len=9) :: name
-    character(len=2) :: short       !! another name, blank if there is none
-    character(len=48) :: value      !! how the option is written with its value, blank if it takes none
-    character(len=48) :: commands   !! that take it, separated by blanks
+    character(len=2) :: short = ''         !! another name, blank if there is none
+    character(len=26) :: value = ''        !! what follows the name, blank if the option has no value
+    logical :: may_repeat = .false.        !! whether it may be given more than once
   end type option_t
 
   type(option_t), parameter, public :: options(*) = [ &
-    option_t('--out', '', '--out DIR', 'run equilibrium modes sweep'), &
-    option_t('--set', '', '--set PATH=VALUE', 'run check equilibrium modes matrices sweep'), &
-    option_t('--at', '', '--at equilibrium, --at rest or --at TIME', 'modes'), &
-    option_t('--threads', '', '--threads NUMBER', 'sweep'), &
-    option_t('--shard', '', '--shard K/N', 'sweep'), &
-    option_t('--resume', '', '', 'sweep'), &
-    option_t('--csv', '', '', 'sweep merge'), &
-    option_t('--quiet', '-q', '', 'run sweep merge'), &
-    option_t('--help', '-h', '', '')]
+    option_t('--out', value='DIR'), &
+    option_t('--set', value='PATH=VALUE', may_repeat=.true.), &
+    option_t('--at', value='equilibrium|rest|TIME'), &
+    option_t('--threads', value='NUMBER'), &
+    option_t('--shard', value='K/N'), &
+    option_t('--resume', may_repeat=.true.), &
+    option_t('--csv', may_repeat=.true.), &
+    option_t('--quiet', short='-q', may_repeat=.true.), &
+    option_t('--help', short='-h', may_repeat=.true.)]
 
 contains
 
-  !> The number of an option, 0 if there is none of this name.
+  !> The position of an option in `options`, 0 if none has this name.
   pure integer function option_index(name)
     character(len=*), intent(in) :: name
 
@@ -35,45 +34,5 @@ contains
       if (name /= '' .and. options(option_index)%short == name) return
     end do
   end function option_index
-
-  !> The options of a command by their long names; --help is one of each.
-  function option_names(command) result(names)
-    character(len=*), intent(in) :: command
-    type(string_t), allocatable :: names(:)
-    integer :: i
-
-    allocate (names(0))
-    do i = 1, size(options)
-      if (options(i)%commands == '' .or. accepts_option(command, options(i))) call append(names, trim(options(i)%name))
-    end do
-  end function option_names
-
-  pure logical function accepts_option(command, option)
-    character(len=*), intent(in) :: command
-    type(option_t), intent(in) :: option
-
-    accepts_option = index(' ' // option%commands // ' ', ' ' // command // ' ') > 0
-  end function accepts_option
-
-  !> "--out is an option of nocdyn run, equilibrium and modes"
-  function accepted_by_text(option) result(text)
-    type(option_t), intent(in) :: option
-    character(len=:), allocatable :: text
-    integer :: first, last
-
-    text = trim(option%name) // ' is an option of nocdyn '
-    first = 1
-    do
-      last = first + index(option%commands(first:) // ' ', ' ') - 2
-      text = text // option%commands(first:last)
-      first = last + 2
-      if (first > len_trim(option%commands)) exit
-      if (index(trim(option%commands(first:)), ' ') > 0) then
-        text = text // ', '
-      else
-        text = text // ' and '
-      end if
-    end do
-  end function accepted_by_text
 
 end module nocdyn_options

@@ -1,5 +1,6 @@
 !> The folders that results go to.
 module nocdyn_result_folders
+  use nocdyn_arguments, only: arguments_t
   use nocdyn_errors, only: error_t, exit_input, raise
   use nocdyn_input, only: group_t, input_t
   use nocdyn_sweep_header, only: sweep_netcdf_name
@@ -8,7 +9,7 @@ module nocdyn_result_folders
   implicit none (type, external)
   private
 
-  public :: normalised_path, result_folder, stem, refuse_shared_folders, refuse_sweep_folder
+  public :: normalised_path, out_folder, result_folder, refuse_shared_folders, refuse_sweep_folder
 
   integer, parameter :: max_listed = 3   ! names
 
@@ -31,12 +32,27 @@ contains
     if (plain == '') plain = merge('/', '.', index(path, '/') == 1)
   end function normalised_path
 
-  !> Where the results of a file go if there is no --out: to what the input says, else to results/<its name>.
-  function result_folder(input) result(folder)
+  !> The folder of --out, if there are several input files the folder of one of them in it; '' without --out.
+  function out_folder(arguments, file) result(folder)
+    type(arguments_t), intent(in) :: arguments
+    character(len=*), intent(in) :: file   !! path of the input
+    character(len=:), allocatable :: folder
+
+    folder = ''
+    if (.not. arguments%is_given('--out')) return
+    folder = normalised_path(arguments%value('--out'))
+    if (size(arguments%operands) > 1) folder = folder // '/' // stem(file)
+  end function out_folder
+
+  !> The folder for the results of an input: that of --out, else &output directory, else results/<name of the file>.
+  function result_folder(arguments, input) result(folder)
+    type(arguments_t), intent(in) :: arguments
     type(input_t), intent(in) :: input
     character(len=:), allocatable :: folder
     type(group_t) :: output
 
+    folder = out_folder(arguments, input%file)
+    if (folder /= '') return
     output = input%single('output')
     folder = output%text('directory')
     if (folder == '') then
@@ -46,7 +62,7 @@ contains
     end if
   end function result_folder
 
-  !> The file's name without its folders and its last ending.
+  !> The name of a file without its folders and without its extension.
   pure function stem(path)
     character(len=*), intent(in) :: path
     character(len=:), allocatable :: stem
@@ -57,17 +73,17 @@ contains
     if (dot > 1) stem = stem(:dot - 1)
   end function stem
 
-  !> Two files of one call must not write over each other.
-  subroutine refuse_shared_folders(files, folders, is_valid, error)
-    type(string_t), intent(in) :: files(:), folders(:)
-    logical, intent(in) :: is_valid(:)
+  !> Refuses two input files of one call whose results would go to the same folder.
+  subroutine refuse_shared_folders(files, folders, error)
+    type(string_t), intent(in) :: files(:)     !! paths of the inputs
+    type(string_t), intent(in) :: folders(:)   !! of their results, '' where nothing is written
     type(error_t), allocatable, intent(out) :: error
     integer :: i, k
 
     do i = 2, size(folders)
-      if (.not. is_valid(i)) cycle
+      if (folders(i)%text == '') cycle
       do k = 1, i - 1
-        if (.not. is_valid(k) .or. folders(k)%text /= folders(i)%text) cycle
+        if (folders(k)%text /= folders(i)%text) cycle
         call raise(error, exit_input, quoted(files(k)%text) // ' and ' // quoted(files(i)%text) // &
                    ' would both write to ' // quoted(folders(i)%text) // '; nothing was run')
         return

@@ -1,6 +1,6 @@
 !> nocdyn-mpi sweep: the variants of a machine on all ranks of an MPI job.
 module nocdyn_mpi_command
-  use mpi_f08, only: mpi_abort, mpi_comm_rank, mpi_comm_size, mpi_comm_world
+  use mpi_f08, only: mpi_abort, mpi_comm_rank, mpi_comm_size, mpi_comm_world, mpi_query_thread, mpi_thread_serialized
   use nocdyn_arguments, only: arguments_t
   use nocdyn_console, only: report_error
   use nocdyn_errors, only: error_t, exit_done, exit_input, raise
@@ -28,17 +28,36 @@ contains
   !> Called by all ranks; only rank 0 reads, writes and prints.
   subroutine mpi_command(arguments, code)
     type(arguments_t), intent(in) :: arguments
-    integer, intent(out) :: code
+    integer, intent(out) :: code   !! 0 on all ranks but the root
+    type(error_t), allocatable :: error
     integer :: rank
 
+    code = exit_done
     call catch_interrupts()
     call mpi_comm_rank(mpi_comm_world, rank)
-    if (rank == root) then
+    call check_arguments(arguments, error)
+    if (allocated(error)) then
+      if (rank == root) call report_error(error, code)
+    else if (rank == root) then
       call run_root(arguments, usable_threads(max(1, arguments%threads)), code)
     else
       call run_worker(usable_threads(max(1, arguments%threads)), code)
     end if
   end subroutine mpi_command
+
+  !> Refuses what only one process can do, and more threads than the MPI library allows.
+  subroutine check_arguments(arguments, error)
+    type(arguments_t), intent(in) :: arguments
+    type(error_t), allocatable, intent(out) :: error
+    integer :: provided
+
+    call mpi_query_thread(provided)
+    if (arguments%shards > 0) then
+      call raise(error, exit_input, '--shard is an option of nocdyn sweep; nocdyn-mpi distributes the variants itself')
+    else if (arguments%threads > 1 .and. provided < mpi_thread_serialized) then
+      call raise(error, exit_input, '--threads above 1 needs an MPI library with MPI_THREAD_SERIALIZED')
+    end if
+  end subroutine check_arguments
 
   !> Rank 0's part.
   subroutine run_root(arguments, threads, code)
@@ -56,13 +75,10 @@ contains
     text = ''
     if (.not. allocated(error) .and. .not. job%is_done) text = input_text(job%plan%input)
     call broadcast_text(text)
-    if (allocated(error)) then
-      call report_error(error)
-      code = error%code
-    end if
+    if (allocated(error)) call report_error(error, code)
     if (text == '') return
     file = job%plan%input%file
-    if (.not. arguments%is_quiet) call print_thread_note(file, max(1, arguments%threads))
+    if (.not. arguments%is_given('--quiet')) call print_thread_note(file, max(1, arguments%threads))
     call broadcast_text(file)
     call broadcast_text(job%plan%list_checksum)
     call mpi_comm_size(mpi_comm_world, ranks)
@@ -95,8 +111,8 @@ contains
       call raise(error, exit_input, file // ': the file of &sweep with the variants is not that of rank 0')
     end if
     if (allocated(error)) then
-      call report_error(error)
-      call mpi_abort(mpi_comm_world, error%code)
+      call report_error(error, code)
+      call mpi_abort(mpi_comm_world, code)
     end if
     call compute_variants(plan, setup, threads, worker)
   end subroutine run_worker

@@ -29,11 +29,10 @@ contains
 
     code = exit_done
     call catch_interrupts()
-    call merge_folder(normalised_path(arguments%operands(1)%text), results_options_t(arguments%wants_csv, arguments%is_quiet), &
-                      code, error)
+    call merge_folder(normalised_path(arguments%operands(1)%text), &
+                      results_options_t(arguments%is_given('--csv'), arguments%is_given('--quiet')), code, error)
     if (.not. allocated(error)) return
-    call report_error(error)
-    code = max(code, error%code)
+    call report_error(error, code)
   end subroutine merge_command
 
   subroutine merge_folder(folder, options, code, error)

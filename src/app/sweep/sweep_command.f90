@@ -29,13 +29,12 @@ contains
     call refuse_ranks(arguments, error)
     if (.not. allocated(error)) call start_job(arguments, job, error)
     if (allocated(error)) then
-      call report_error(error)
-      code = error%code
+      call report_error(error, code)
       return
     end if
     if (job%is_done) return
     threads = usable_threads(thread_count(arguments))
-    if (.not. arguments%is_quiet) call print_thread_note(job%plan%input%file, thread_count(arguments))
+    if (.not. arguments%is_given('--quiet')) call print_thread_note(job%plan%input%file, thread_count(arguments))
     call initialise_scheduler(scheduler, job%journals(1), job%progress, threads, job%setup%lanes)
     call compute_variants(job%plan, job%setup, threads, scheduler)
     call finish_job(job, scheduler, threads, 1, code)

@@ -7,7 +7,7 @@ module nocdyn_sweep_job
   use nocdyn_input, only: input_t
   use nocdyn_input_reader, only: read_input
   use nocdyn_diagnostics, only: diagnostics_t
-  use nocdyn_result_folders, only: normalised_path, result_folder
+  use nocdyn_result_folders, only: result_folder
   use nocdyn_sweep_header, only: sweep_netcdf_name, sweep_header_t
   use nocdyn_plan_header, only: new_sweep_header
   use nocdyn_sweep_journal, only: create_journal, journal_name, open_journal, sweep_journal_t
@@ -46,17 +46,18 @@ contains
     type(diagnostics_t) :: diagnostics
     type(sweep_header_t) :: header
 
+    if (arguments%shards > 1 .and. arguments%is_given('--csv')) then
+      call raise(error, exit_input, '--csv and --shard: a part of a sweep has no table; ' // &
+                 'nocdyn merge DIR --csv writes that of all parts')
+      return
+    end if
     job%arguments = arguments
     call read_input(arguments%operands(1)%text, arguments%overrides, input, error, diagnostics)
     if (allocated(error)) call add_plan_diagnostics(input, diagnostics, error)
     if (.not. allocated(error)) call make_plan(input, job%plan, error)
     if (.not. allocated(error)) call prepare_sweep(job%plan, job%setup, error)
     if (allocated(error)) return
-    if (allocated(arguments%out)) then
-      job%folder = normalised_path(arguments%out)
-    else
-      job%folder = result_folder(input)
-    end if
+    job%folder = result_folder(arguments, input)
     if (arguments%shards > job%plan%design%variants) then
       call raise(error, exit_input, '--shard ' // to_text(arguments%shard) // '/' // to_text(arguments%shards) // &
                  ': the sweep has ' // to_text(job%plan%design%variants) // ' variants; allowed: at most as many parts')
@@ -66,7 +67,7 @@ contains
     call prepare_journal(job, header, error)
     if (allocated(error) .or. job%is_done) return
     job%progress%title = job%plan%input%file
-    job%progress%line = new_status_line(arguments%is_quiet, shows_in_logs=.true.)
+    job%progress%line = new_status_line(arguments%is_given('--quiet'), shows_in_logs=.true.)
   end subroutine start_job
 
   !> Opens the journal that is there, or makes one if the sweep is not done already.
@@ -82,14 +83,14 @@ contains
     inquire (file=job%folder // '/' // name, exist=is_there, size=bytes)
     if (is_there .and. bytes > 0) then
       call open_journal(job%folder, name, job%journals(1), error)
-      if (.not. allocated(error)) call check_journal(job%journals(1), header, job%arguments%resumes, error)
+      if (.not. allocated(error)) call check_journal(job%journals(1), header, job%arguments%is_given('--resume'), error)
       if (.not. allocated(error)) call print_journal_state(job)
     else
-      if (job%arguments%resumes) call check_finished_results(job, header, error)
+      if (job%arguments%is_given('--resume')) call check_finished_results(job, header, error)
       if (allocated(error) .or. job%is_done) return
       call refuse_other_journals(job%folder, job%arguments%shards, error)
       if (allocated(error)) return
-      if (job%arguments%resumes .and. .not. job%arguments%is_quiet) then
+      if (job%arguments%is_given('--resume') .and. .not. job%arguments%is_given('--quiet')) then
         call print_text(job%plan%input%file // ': there is nothing to go on with in ' // job%folder // &
                  '; the sweep starts from its beginning')
       end if
@@ -113,9 +114,9 @@ contains
     message = job%plan%input%file // ': all ' // to_text(header%variants) // ' variants are done already; results in ' // &
               job%folder
     inquire (file=job%folder // '/' // sweep_csv_name, exist=has_table)
-    if (job%arguments%wants_csv .and. .not. has_table) then
+    if (job%arguments%is_given('--csv') .and. .not. has_table) then
       call raise(error, exit_input, message // ', without ' // sweep_csv_name // '; to have it, leave out --resume')
-    else if (.not. job%arguments%is_quiet) then
+    else if (.not. job%arguments%is_given('--quiet')) then
       call print_text(message)
     end if
   end subroutine check_finished_results
@@ -125,7 +126,7 @@ contains
   subroutine print_journal_state(job)
     type(sweep_job_t), intent(in) :: job
 
-    if (job%arguments%is_quiet) return
+    if (job%arguments%is_given('--quiet')) return
     associate (file => job%plan%input%file, journal => job%journals(1))
       if (journal%damaged_bytes > 0) call print_text(file // ': note: ' // journal%path() // ' has damaged records; ' // &
                                               'their variants are computed again')
@@ -152,9 +153,9 @@ contains
     else if (.not. scheduler%is_complete()) then
       call raise(error, exit_failed, interruption_text(job, scheduler))
     else if (job%arguments%shards > 1) then
-      if (.not. job%arguments%is_quiet) call print_text(part_text(job, scheduler))
+      if (.not. job%arguments%is_given('--quiet')) call print_text(part_text(job, scheduler))
     else
-      options = results_options_t(job%arguments%wants_csv, job%arguments%is_quiet)
+      options = results_options_t(job%arguments%is_given('--csv'), job%arguments%is_given('--quiet'))
       call write_results(job%plan, job%folder, job%journals, options, summary, error)
       if (.not. allocated(error)) then
         call job%journals(1)%remove()   ! first: a reader of the output who is gone ends the program
@@ -165,8 +166,7 @@ contains
     if (.not. allocated(error)) return
     if (error%code == exit_file) error%message = error%message // '; once it can be written, the same command with ' // &
                                                  '--resume goes on from there'
-    call report_error(error)
-    code = max(code, error%code)
+    call report_error(error, code)
   end subroutine finish_job
 
   function interruption_text(job, scheduler) result(text)

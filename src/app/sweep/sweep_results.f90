@@ -123,10 +123,9 @@ contains
       call print_text(sweep_line(plan%input, summary, folder))
     end if
     if (summary%done > 0) return
-    code = exit_failed
-    call raise(error, code, plan%input%file // ': no variant can be computed, the first one because: ' // &
+    call raise(error, exit_failed, plan%input%file // ': no variant can be computed, the first one because: ' // &
                summary%first_reason // '; all reasons are in ' // folder // '/' // sweep_netcdf_name)
-    call report_error(error)
+    call report_error(error, code)
   end subroutine print_results
 
   !> Why the first variant of a sweep is not done.

@@ -1,0 +1,89 @@
+!> The table of commands. A new command is a row here and a module with its procedure.
+module nocdyn_command_table
+  use nocdyn_check_command, only: check_command
+  use nocdyn_commands, only: add_command, command_t
+  use nocdyn_companion_command, only: companion_command
+  use nocdyn_equilibrium_command, only: equilibrium_command
+  use nocdyn_matrices_command, only: matrices_command
+  use nocdyn_modes_command, only: modes_command
+  use nocdyn_new_command, only: new_command
+  use nocdyn_run_command, only: run_command
+  implicit none (type, external)
+  private
+
+  public :: list_commands
+
+  character(len=*), parameter :: nl = new_line('a')
+
+contains
+
+  !> All commands, as nocdyn runs them: it leaves sweeps to a companion program.
+  subroutine list_commands(commands)
+    type(command_t), allocatable, intent(out) :: commands(:)
+
+    call list_analyses(commands)
+    call list_sweeps(commands)
+    call add_command(commands, 'new', 'FILE', '', 'write a commented input to start from', &
+                     'Writes a commented input file. A file that exists is not overwritten.', new_command)
+    call add_command(commands, 'help', '[COMMAND]', '', 'help on a command', &
+                     'nocdyn help input [GROUP] describes the groups and keys of an input file.')
+  end subroutine list_commands
+
+  subroutine list_analyses(commands)
+    type(command_t), allocatable, intent(inout) :: commands(:)
+
+    call add_command(commands, 'run', 'FILE...', '--out --set --quiet', 'integrate machines and write their results', &
+      'Integrates every input file and writes trajectory.csv, summary.json and input.nml.' // nl // nl // &
+      '  --out DIR          write to DIR, with several files to DIR/<name of the file>;' // nl // &
+      '                     default: &output directory, else results/<name of the file>' // nl // &
+      '  --set PATH=VALUE   override a key: run.rtol=1e-9, load.work.viscous=80, gear.reducer.radii=2,3' // nl // &
+      '  --quiet            print nothing but errors' // nl // nl // &
+      'A file with errors does not stop the others; the exit code is the highest of all files. After Ctrl-C or a' // nl // &
+      'failed computation, the rows up to there are in trajectory.partial.csv.', run_command)
+    call add_command(commands, 'check', 'FILE...', '--set', 'read and analyse, integrate nothing', &
+      'Reads the files and analyses the machines. Prints every error with its line, or the degrees of freedom,' // nl // &
+      'independent coordinates, ratios between geared bodies, redundant gears, and the sweep if there is one.', check_command)
+    call add_command(commands, 'equilibrium', 'FILE...', '--out --set', &
+      'steady states: speeds, torques, twists, powers, stability', &
+      'Finds the steady states of the machines: constant speeds at which the mean torques balance, and the' // nl // &
+      'twists of the couplings that transmit them. If there are several steady states, all are printed with' // nl // &
+      'their stability. Excitations enter with their mean.' // nl // nl // &
+      '  --out DIR          write equilibrium.json to DIR, with several files to DIR/<name of the file>' // nl // nl // &
+      'Exit code 1: there is no steady state.', equilibrium_command)
+    call add_command(commands, 'modes', 'FILE...', '--out --set --at', &
+      'natural frequencies, damping, shapes and energies of the modes', &
+      'Linearises the machines and prints natural frequencies, damping ratios, time constants and the' // nl // &
+      'distribution of the energy of each mode.' // nl // nl // &
+      '  --at equilibrium   about the steady state (default); of several, the stable one nearest to the start' // nl // &
+      '  --at rest          at the start angles, with zero speeds and mean torques' // nl // &
+      '  --at TIME          at a time of the run [s], which is integrated up to there' // nl // &
+      '  --out DIR          write modes.csv and modes.json to DIR, with several files to DIR/<name of the file>', modes_command)
+    call add_command(commands, 'matrices', 'FILE', '--set', 'print the matrices of the method for a machine', &
+      'Prints every matrix and vector of the method for the machine at its start, with its equation number.', matrices_command)
+  end subroutine list_analyses
+
+  subroutine list_sweeps(commands)
+    type(command_t), allocatable, intent(inout) :: commands(:)
+
+    call add_command(commands, 'sweep', 'FILE', '--out --set --threads --shard --resume --csv --quiet', &
+      'run many variants of a machine', &
+      'Runs all variants of a machine that &sweep and &vary of the file describe, and writes the quantities of' // nl // &
+      '&record to sweep.nc, with summary.json and input.nml. A variant that fails is recorded with the reason.' // nl // nl // &
+      '  --out DIR          write to DIR; default: &output directory, else results/<name of the file>' // nl // &
+      '  --set PATH=VALUE   override a key: sweep.samples=1000, vary(2).high=20, run.rtol=1e-9' // nl // &
+      '  --threads NUMBER   default: OMP_NUM_THREADS, else the number of cores that the process may use' // nl // &
+      "  --shard K/N        compute part K of N only, for 'nocdyn merge'" // nl // &
+      '  --resume           continue an interrupted sweep' // nl // &
+      "  --csv              write sweep.csv too; with shards, 'nocdyn merge' writes it" // nl // &
+      '  --quiet            print nothing but errors' // nl // nl // &
+      'Results are the same to the last bit for any number of threads, shards or interruptions. On several computers:' // nl // &
+      'mpirun -n N nocdyn-mpi sweep FILE, with the same options except --shard.' // nl // nl // &
+      'Exit code 1: interrupted, or no variant can be computed.', companion_command)
+    call add_command(commands, 'merge', 'DIR', '--csv --quiet', 'combine the parts of a sweep', &
+      'Makes sweep.nc and summary.json of the journals that the shards of a sweep have written to DIR.' // nl // nl // &
+      '  --csv              write sweep.csv too' // nl // &
+      '  --quiet            print nothing but errors' // nl // nl // &
+      'Exit code 2: the journals are not of one sweep, or variants are missing.', companion_command)
+  end subroutine list_sweeps
+
+end module nocdyn_command_table

@@ -1,0 +1,37 @@
+!> Commands that another program beside this one runs: sweep and merge.
+module nocdyn_companion_command
+  use nocdyn_arguments, only: arguments_t
+  use nocdyn_command_line, only: command_line
+  use nocdyn_console, only: report_error
+  use nocdyn_errors, only: error_t, exit_done, exit_file, raise
+  use nocdyn_posix_programs, only: exec_program, program_folder
+  use nocdyn_text, only: quoted
+  implicit none (type, external)
+  private
+
+  public :: companion_command
+
+contains
+
+  !> Replaces this program by nocdyn-sweep with the same command line. Returns only if that fails.
+  subroutine companion_command(arguments, code)
+    type(arguments_t), intent(in) :: arguments
+    integer, intent(out) :: code
+    type(error_t), allocatable :: error
+    character(len=:), allocatable :: failure, path
+    logical :: exists
+
+    path = program_folder() // 'nocdyn-sweep'
+    inquire (file=path, exist=exists)
+    if (exists) then
+      call exec_program(path, command_line(), failure)
+      call raise(error, exit_file, quoted(path) // ' cannot be started: ' // failure)
+    else
+      call raise(error, exit_file, quoted(path) // ', the program for nocdyn ' // arguments%command // ', does not exist; ' // &
+                 'cmake --build --preset release builds it beside nocdyn, unless -DNOCDYN_SWEEP=OFF is set')
+    end if
+    code = exit_done
+    call report_error(error, code)
+  end subroutine companion_command
+
+end module nocdyn_companion_command

@@ -1,0 +1,102 @@
+!> Help on the program and on its commands, made of the tables of commands and options.
+module nocdyn_help_command
+  use nocdyn_arguments, only: arguments_t
+  use nocdyn_commands, only: command_index, command_names, command_t
+  use nocdyn_console, only: print_text, report_error
+  use nocdyn_errors, only: error_t, exit_done, exit_input, raise
+  use nocdyn_options, only: options
+  use nocdyn_schema, only: group_rule_index
+  use nocdyn_schema_help, only: group_help, input_help
+  use nocdyn_text, only: joined, lower_case, quoted
+  implicit none (type, external)
+  private
+
+  public :: help_command
+
+  character(len=*), parameter :: nl = new_line('a')
+  integer, parameter :: max_width = 112   ! of a line of usage
+
+contains
+
+  !> help, help COMMAND, help input, help input GROUP.
+  subroutine help_command(commands, arguments, code)
+    type(command_t), intent(in) :: commands(:)
+    type(arguments_t), intent(in) :: arguments
+    integer, intent(out) :: code
+    type(error_t), allocatable :: error
+    character(len=:), allocatable :: text, topic
+    integer :: row
+
+    topic = ''
+    if (size(arguments%operands) > 0) topic = arguments%operands(1)%text
+    row = 0
+    if (size(arguments%operands) == 1) row = command_index(commands, topic)
+    if (size(arguments%operands) == 0) then
+      text = overview(commands)
+    else if (topic == 'input' .and. size(arguments%operands) == 1) then
+      text = input_help()
+    else if (topic == 'input' .and. size(arguments%operands) == 2) then
+      call group_help(arguments%operands(2)%text, text, error)
+    else if (row > 0) then
+      text = command_help(commands(row))
+    else if (group_rule_index(lower_case(topic)) > 0) then
+      call raise(error, exit_input, quoted(topic) // ' is a group of the input: nocdyn help input ' // topic)
+    else
+      call raise(error, exit_input, 'there is no help on ' // joined(arguments%operands, ' ') // '; try ' // &
+                 joined(command_names(commands), ', ') // " or 'input'")
+    end if
+    code = exit_done
+    if (allocated(error)) then
+      call report_error(error, code)
+    else
+      call print_text(text)
+    end if
+  end subroutine help_command
+
+  !> Usage and description of a command.
+  pure function command_help(command) result(text)
+    type(command_t), intent(in) :: command
+    character(len=:), allocatable :: text
+
+    text = usage(command)
+    if (command%help /= '') text = text // nl // nl // command%help
+  end function command_help
+
+  !> "nocdyn run FILE... [--out DIR] [--set PATH=VALUE]... [--quiet]", on as many lines as it needs.
+  pure function usage(command) result(text)
+    type(command_t), intent(in) :: command
+    character(len=:), allocatable :: text, part
+    integer :: i, start
+
+    text = 'nocdyn ' // command%name // ' ' // command%operands
+    start = 0
+    do i = 1, size(options)
+      if (options(i)%name == '--help' .or. .not. command%takes(trim(options(i)%name))) cycle
+      part = ' [' // trim(trim(options(i)%name) // ' ' // options(i)%value) // ']'
+      if (options(i)%may_repeat .and. options(i)%value /= '') part = part // '...'
+      if (len(text) - start + len(part) > max_width) then
+        start = len(text) + 1
+        text = text // nl // repeat(' ', len('nocdyn ' // command%name))
+      end if
+      text = text // part
+    end do
+  end function usage
+
+  !> All commands with one line each.
+  pure function overview(commands) result(text)
+    type(command_t), intent(in) :: commands(:)
+    character(len=:), allocatable :: text
+    character(len=27) :: call
+    integer :: i
+
+    text = 'nocdyn: dynamics of drivetrains: rotating bodies, nonlinear elastic couplings, gears.' // nl
+    do i = 1, size(commands)
+      call = 'nocdyn ' // commands(i)%name // ' ' // commands(i)%operands
+      text = text // nl // '  ' // call // commands(i)%summary
+    end do
+    text = text // nl // '  nocdyn help input [GROUP]  the groups and keys of an input file' // nl // '  nocdyn --version' // &
+           nl // nl // &
+           'Exit codes: 0 done, 1 a computation failed, 2 wrong usage or input, 3 a file cannot be read or written.'
+  end function overview
+
+end module nocdyn_help_command
