@@ -150,6 +150,8 @@ contains
       call parse_threads(value, arguments%threads, error)
     case ('--shard')
       call parse_shard(value, arguments%shard, arguments%shards, error)
+    case default
+      ! read by `is_given` and `value`
     end select
     arguments%given = [arguments%given, given_option_t(trim(option%name), value)]
   end subroutine add_option
@@ -252,6 +254,8 @@ contains
       if (size(arguments%operands) /= 1) call raise(error, exit_input, 'exactly one file is needed: ' // usage)
     case ('DIR')
       if (size(arguments%operands) /= 1) call raise(error, exit_input, 'exactly one folder is needed: ' // usage)
+    case default
+      ! optional ones: their command checks them
     end select
   end subroutine check_operands
 
