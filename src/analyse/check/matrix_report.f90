@@ -6,10 +6,10 @@ module nocdyn_matrix_report
   use nocdyn_lapack_lu, only: lu_factor, lu_solve
   use nocdyn_machine, only: machine_t
   use nocdyn_machine_report, only: coordinate_names
-  use nocdyn_paper_matrices, only: constrained_inertia, constrained_matrix, constrained_vector, damping_2, damping_3, &
-                                   damping_matrix, elastic_moments, elastic_rates, inertia_2, inertia_3, inertia_matrix, &
-                                   stacked_2, stacked_3, stiffness_2, stiffness_3, stiffness_matrix, tangent_matrix, &
-                                   torque_2, torque_3, torque_vector, unit_matrix, zero_matrix
+  use nocdyn_paper_matrices, only: append_zeros, constrained_inertia, constrained_matrix, constrained_vector, &
+                                   damping_matrix, elastic_moments, elastic_rates, extend_by_unit, extend_by_zero, &
+                                   inertia_matrix, stack, stiffness_2, stiffness_3, stiffness_matrix, tangent_matrix, &
+                                   torque_vector, unit_matrix
   use nocdyn_text, only: append, joined, rounded_text, string_t, to_text
   use nocdyn_text_buffer, only: text_buffer_t
   implicit none (type, external)
@@ -190,19 +190,19 @@ contains
     real(wp), dimension(2 * equations%n, 2 * equations%n) :: inertia, damping, stiffness
     real(wp) :: block(equations%n, equations%n), torque(2 * equations%n), alpha(2 * equations%n)
 
-    call inertia_2(equations%inertia, inertia)
+    call extend_by_unit(equations%inertia, inertia)
     call equations%put_matrix('(35) J_2', inertia)
     call unit_matrix(block)
     call equations%put_matrix('(36) I', block)
-    call zero_matrix(block)
+    block = 0.0_wp
     call equations%put_matrix('(37) 0', block)
-    call damping_2(equations%damping, damping)
+    call extend_by_zero(equations%damping, damping)
     call equations%put_matrix('(38) C_2', damping)
     call stiffness_2(equations%stiffness, stiffness)
     call equations%put_matrix('(39) K_2', stiffness)
-    call torque_2(equations%torque, torque)
+    call append_zeros(equations%torque, torque)
     call equations%put_vector('(40) Q_2', torque)
-    call stacked_2(equations%machine%start_speed(1, :), equations%machine%start_angle(1, :), alpha)
+    call stack(equations%machine%start_speed(1, :), equations%machine%start_angle(1, :), alpha)
     call equations%put_vector('(42) alpha', alpha)
     equations%inertia = inertia
     equations%damping = damping
@@ -217,16 +217,16 @@ contains
     real(wp), dimension(3 * equations%n) :: torque, beta
     real(wp) :: alpha(2 * equations%n)
 
-    call inertia_3(equations%inertia, inertia)
+    call extend_by_unit(equations%inertia, inertia)
     call equations%put_matrix('(44) J_3', inertia)
     call elastic_moments(equations%machine, 1, equations%moments)
     call equations%put_vector('(48)-(51) F, elastic moments on the bodies [N m]', equations%moments)
-    call stacked_2(equations%machine%start_speed(1, :), equations%machine%start_angle(1, :), alpha)
-    call stacked_3(alpha, equations%moments, beta)
+    call stack(equations%machine%start_speed(1, :), equations%machine%start_angle(1, :), alpha)
+    call stack(alpha, equations%moments, beta)
     call equations%put_vector('(46) beta', beta)
-    call torque_3(equations%torque, torque)
+    call append_zeros(equations%torque, torque)
     call equations%put_vector('(58), (59) Q_3', torque)
-    call damping_3(equations%damping, damping)
+    call extend_by_zero(equations%damping, damping)
     call equations%put_matrix('(60) C_3', damping)
     call tangent_matrix(equations%machine, 1, equations%tangent)
     call stiffness_3(equations%stiffness, equations%tangent, stiffness)

@@ -11,35 +11,42 @@ module nocdyn_body_formulation
 
   public :: start_of_bodies, observe_bodies, jacobian_of_bodies   ! for extensions that add to them
 
-  !> Extensions find the accelerations; the first 2n states are omega, phi, further mechanical states may follow.
+  !> Extensions compute the accelerations. The first 2n states are omega, phi; further mechanical states may follow.
   type, abstract, extends(formulation_t), public :: body_formulation_t
-    real(wp), allocatable :: slope(:, :)         !! y' at the state last observed, [lanes, states + quadratures]
-    integer, allocatable :: status(:)            !! of that evaluation, [lanes]
-    real(wp), allocatable :: mobility(:, :, :)   !! omega' = mobility T, shape [bodies, bodies, lanes]
-    real(wp), allocatable :: by_angle(:, :)      !! derivative of T by phi, [bodies, bodies], work space
-    real(wp), allocatable :: by_speed(:, :)      !! derivative of T by omega
-    real(wp), allocatable :: by_time(:)          !! derivative of T by t
-    real(wp), allocatable :: by_state(:)         !! derivative of T by an inner state
+    character(len=10) :: word = ''               !! name of the formulation in the input
+    real(wp), allocatable :: slope(:, :)         !! y' at the last observed state, [lanes, states + quadratures]
+    integer, allocatable :: status(:)            !! evaluation_... of that evaluation, [lanes]
+    real(wp), allocatable :: mobility(:, :, :)   !! matrix of omega' = mobility T [1/(kg m2)], [bodies, bodies, lanes]
+    ! work space of the Jacobian, one lane:
+    real(wp), allocatable :: by_angle(:, :)      !! derivative of the torques T by phi [N m/rad], [bodies, bodies]
+    real(wp), allocatable :: by_speed(:, :)      !! derivative of T by omega [N m s/rad], [bodies, bodies]
+    real(wp), allocatable :: by_time(:)          !! derivative of T by t [N m/s], [bodies]
+    real(wp), allocatable :: by_state(:)         !! derivative of T by an internal state, [bodies]
   contains
-    procedure :: attach_bodies
+    procedure :: set_machine
     procedure :: start => start_of_bodies
     procedure :: set_state
     procedure :: observe => observe_bodies
     procedure :: jacobian => jacobian_of_bodies
     procedure :: component_name
+    procedure :: series_obstacle
     procedure :: switch_motion
   end type body_formulation_t
 
 contains
 
-  subroutine attach_bodies(self, machine, mechanical, with_energy_balance)
+  !> Copies the machine, counts the states and allocates the work space.
+  subroutine set_machine(self, word, machine, mechanical, with_energy_balance)
     class(body_formulation_t), intent(inout) :: self
+    character(len=*), intent(in) :: word         !! name of the formulation in the input
     type(machine_t), intent(in) :: machine
-    integer, intent(in) :: mechanical   !! states, at least 2 * bodies
-    logical, intent(in) :: with_energy_balance
+    integer, intent(in) :: mechanical            !! number of mechanical states, at least 2 * bodies
+    logical, intent(in) :: with_energy_balance   !! whether the powers of the elements `machine%with_work` are integrated
     integer :: l
 
-    call self%attach(machine, mechanical, with_energy_balance)
+    self%word = word
+    self%machine = machine
+    call self%allocate_state(mechanical, with_energy_balance)
     allocate (self%slope(self%lanes, self%states + self%quadratures), source=0.0_wp)
     allocate (self%status(self%lanes), source=evaluation_ok)
     allocate (self%mobility(machine%bodies, machine%bodies, self%lanes))
@@ -48,9 +55,9 @@ contains
     do l = 1, self%lanes
       self%mobility(:, :, l) = machine%coordinates%mobility(l)
     end do
-  end subroutine attach_bodies
+  end subroutine set_machine
 
-  !> Start speeds, angles and inner states; further mechanical states and the works are zero.
+  !> Start speeds, angles and internal states; further mechanical states and the work integrals are zero.
   function start_of_bodies(self) result(y)
     class(body_formulation_t), intent(in) :: self
     real(wp), allocatable :: y(:, :)
@@ -61,6 +68,7 @@ contains
     y(:, self%mechanical + 1:self%states) = self%machine%start_internal()
   end function start_of_bodies
 
+  !> Copies the speeds and angles of the bodies from the state.
   subroutine set_state(self, y)
     class(body_formulation_t), intent(inout) :: self
     real(wp), contiguous, intent(in) :: y(:, :)
@@ -72,7 +80,7 @@ contains
     end do
   end subroutine set_state
 
-  !> Evaluates the right-hand side, whose value stays in `slope`.
+  !> Evaluates the right-hand side at a state and keeps it in `slope`.
   subroutine observe_bodies(self, t, y)
     class(body_formulation_t), intent(inout) :: self
     real(wp), contiguous, intent(in) :: t(:)
@@ -83,6 +91,7 @@ contains
     call self%derivative(t, y, self%slope, self%status)
   end subroutine observe_bodies
 
+  !> Relative angle and speed of the element of a switch.
   pure subroutine switch_motion(self, lane, switch, y, angle, speed)
     class(body_formulation_t), intent(in) :: self
     integer, intent(in) :: lane, switch
@@ -105,7 +114,8 @@ contains
     end associate
   end subroutine switch_motion
 
-  !> omega' = mobility T(phi, omega, t), phi' = omega, and the works; further states are the extension's.
+  !> The Jacobian of omega' = mobility T(phi, omega, t), phi' = omega and the work integrals. Rows of further mechanical states
+  !> are left zero; the extension fills them.
   subroutine jacobian_of_bodies(self, t, y, dfdy, dfdt, status)
     class(body_formulation_t), intent(inout) :: self
     real(wp), intent(in) :: t(self%lanes)
@@ -117,19 +127,19 @@ contains
     call fill_of_bodies(self, t, y, size(dfdt, 2), dfdy, dfdt)
   end subroutine jacobian_of_bodies
 
-  !> The Jacobian, all of whose positions are kept, as the array that it then is.
+  !> The Jacobian as a dense array, as `jacobian_pattern` names all positions.
   subroutine fill_of_bodies(self, t, y, components, dfdy, dfdt)
     class(body_formulation_t), intent(inout) :: self
     real(wp), contiguous, intent(in) :: t(:)
     real(wp), contiguous, intent(in) :: y(:, :)
-    integer, intent(in) :: components
+    integer, intent(in) :: components   !! states + quadratures
     real(wp), intent(inout) :: dfdy(self%lanes, components, self%states)
     real(wp), intent(inout) :: dfdt(self%lanes, components)
     integer :: b, l, n
 
     n = self%machine%bodies
     call self%set_state(y)
-    call self%place_internal(y(:, self%mechanical + 1:))
+    call self%set_internal_states(y(:, self%mechanical + 1:))
     call self%machine%differentiate(t, self%phi, self%omega)
     dfdy = 0.0_wp
     dfdt = 0.0_wp
@@ -146,7 +156,7 @@ contains
     end do
   end subroutine fill_of_bodies
 
-  !> The derivatives of the torques T of one lane from those of the elements.
+  !> Derivatives of the torques T of one lane, from those of the elements.
   subroutine differentiate_torques(self, lane)
     class(body_formulation_t), intent(inout) :: self
     integer, intent(in) :: lane
@@ -165,12 +175,12 @@ contains
     end associate
   end subroutine differentiate_torques
 
-  !> The rows of the integrated works of one lane: the power is M u', M the working moment.
+  !> The rows of the work integrals of one lane. The power is M u' with the applied torque M and the relative speed u'.
   subroutine differentiate_powers(self, lane, dfdy, dfdt)
     class(body_formulation_t), intent(in) :: self
     integer, intent(in) :: lane
-    real(wp), intent(inout) :: dfdy(:, :)
-    real(wp), intent(inout) :: dfdt(:)
+    real(wp), intent(inout) :: dfdy(:, :)   !! [states + quadratures, states]
+    real(wp), intent(inout) :: dfdt(:)      !! [states + quadratures]
     integer :: e, k, n
 
     n = self%machine%bodies
@@ -186,11 +196,11 @@ contains
     end associate
   end subroutine differentiate_powers
 
-  !> The columns and rows of the inner states of one lane.
+  !> The columns and rows of the internal states of one lane.
   subroutine differentiate_internal(self, lane, dfdy)
     class(body_formulation_t), intent(inout) :: self
     integer, intent(in) :: lane
-    real(wp), intent(inout) :: dfdy(:, :)
+    real(wp), intent(inout) :: dfdy(:, :)   !! [states + quadratures, states]
     integer :: e, i, k, n, s
 
     n = self%machine%bodies
@@ -212,6 +222,7 @@ contains
     end associate
   end subroutine differentiate_internal
 
+  !> Product of a matrix and a vector, added up column by column.
   pure subroutine multiply(matrix, vector, product)
     real(wp), intent(in) :: matrix(:, :), vector(:)
     real(wp), intent(inout) :: product(:)
@@ -223,6 +234,7 @@ contains
     end do
   end subroutine multiply
 
+  !> Name of a component of the state, for messages.
   function component_name(self, index) result(name)
     class(body_formulation_t), intent(in) :: self
     integer, intent(in) :: index
@@ -242,5 +254,13 @@ contains
       end if
     end associate
   end function component_name
+
+  !> Only the reduced formulation has a Taylor series.
+  function series_obstacle(self) result(obstacle)
+    class(body_formulation_t), intent(in) :: self
+    character(len=:), allocatable :: obstacle
+
+    obstacle = 'formulation ' // quoted(trim(self%word)) // " has no Taylor series; 'reduced' has one"
+  end function series_obstacle
 
 end module nocdyn_body_formulation

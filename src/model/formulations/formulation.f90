@@ -1,4 +1,4 @@
-!> A machine as a first-order system: what the three formulations have in common.
+!> A machine as a first-order system: the common part of the three formulations.
 module nocdyn_formulation
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
@@ -6,24 +6,23 @@ module nocdyn_formulation
   implicit none (type, external)
   private
 
-  !> Extensions choose the mechanical states; the inner states of the elements follow, then, where the works are audited,
-  !> those of the accounted elements as quadratures.
+  !> Extensions choose the mechanical states. The internal states of the elements follow. If there is an energy balance, the
+  !> work integrals of the elements `machine%with_work` come last, as quadratures.
   type, abstract, extends(system_t), public :: formulation_t
     type(machine_t) :: machine
-    integer :: mechanical = 0               !! states before the inner states of the elements
-    integer :: internal = 0                    !! inner states
-    logical :: has_energy_balance = .true.          !! whether the power of the accounted elements is integrated
-    real(wp), allocatable :: phi(:, :)      !! angles [rad] after `set_state`, shape [lanes, 0:bodies], 0 is the ground
-    real(wp), allocatable :: omega(:, :)    !! speeds [rad/s] after `set_state`
-    real(wp), allocatable :: torque(:, :)   !! torques of the elements [N m] after `observe`
+    integer :: mechanical = 0                !! number of states before the internal states
+    integer :: internal = 0                  !! number of internal states
+    logical :: has_energy_balance = .true.   !! whether the powers of the elements `machine%with_work` are integrated
+    real(wp), allocatable :: phi(:, :)       !! angles [rad] after `set_state`, [lanes, 0:bodies], body 0 is the ground
+    real(wp), allocatable :: omega(:, :)     !! speeds [rad/s] after `set_state`, [lanes, 0:bodies]
+    real(wp), allocatable :: torque(:, :)    !! torques of the elements on the bodies [N m] after `observe`, [lanes, 0:bodies]
   contains
     procedure(start_interface), deferred :: start
     procedure(set_state_interface), deferred :: set_state
     procedure(reactions_interface), deferred :: reactions
     procedure(motion_interface), deferred :: switch_motion
-    procedure :: attach
     procedure :: allocate_state
-    procedure :: place_internal
+    procedure :: set_internal_states
     procedure :: choose_all_branches
     procedure :: observe
     procedure :: refresh_lane
@@ -35,57 +34,48 @@ module nocdyn_formulation
 
   abstract interface
 
-    !> The state in which the machine starts, shape [lanes, states + quadratures].
+    !> The start state of the machine, [lanes, states + quadratures].
     function start_interface(self) result(y)
       import :: formulation_t, wp
       class(formulation_t), intent(in) :: self
       real(wp), allocatable :: y(:, :)
     end function start_interface
 
-    !> Angles and speeds of the bodies from the state: fills `phi` and `omega`.
+    !> Fills `phi` and `omega` from the state.
     subroutine set_state_interface(self, y)
       import :: formulation_t, wp
       class(formulation_t), intent(inout) :: self
-      real(wp), contiguous, intent(in) :: y(:, :)
+      real(wp), contiguous, intent(in) :: y(:, :)   !! [lanes, states + quadratures], or without the quadratures
     end subroutine set_state_interface
 
-    !> Multipliers lambda of all constraint rows of one lane, after `observe`: tooth forces [N] or [N m], shape [rows].
+    !> Reactions of all constraint rows of one lane, after `observe`.
     subroutine reactions_interface(self, lane, lambda)
       import :: formulation_t, wp
       class(formulation_t), intent(inout) :: self
       integer, intent(in) :: lane
-      real(wp), intent(out) :: lambda(:)
+      real(wp), intent(out) :: lambda(:)   !! multipliers in the units of `machine%constraints`, [rows]
     end subroutine reactions_interface
 
-    !> Relative angle [rad] and speed [rad/s] of the element of a switch, from the state of one lane.
+    !> Relative angle and speed of the element of a switch, from the state of one lane.
     pure subroutine motion_interface(self, lane, switch, y, angle, speed)
       import :: formulation_t, wp
       class(formulation_t), intent(in) :: self
-      integer, intent(in) :: lane, switch
-      real(wp), contiguous, intent(in) :: y(:)
-      real(wp), intent(out) :: angle, speed
+      integer, intent(in) :: lane
+      integer, intent(in) :: switch                  !! 1 to `switches`
+      real(wp), contiguous, intent(in) :: y(:)       !! [states + quadratures]
+      real(wp), intent(out) :: angle                 !! [rad]
+      real(wp), intent(out) :: speed                 !! [rad/s]
     end subroutine motion_interface
 
   end interface
 
 contains
 
-  !> Takes the machine and allocates what every formulation needs.
-  subroutine attach(self, machine, mechanical, with_energy_balance)
-    class(formulation_t), intent(inout) :: self
-    type(machine_t), intent(in) :: machine
-    integer, intent(in) :: mechanical   !! states before the inner states
-    logical, intent(in) :: with_energy_balance
-
-    self%machine = machine
-    call self%allocate_state(mechanical, with_energy_balance)
-  end subroutine attach
-
-  !> Counts the states of the machine that is there, and allocates what every formulation needs.
+  !> Counts the states of `machine` and allocates the arrays of the bodies.
   subroutine allocate_state(self, mechanical, with_energy_balance)
     class(formulation_t), intent(inout) :: self
-    integer, intent(in) :: mechanical
-    logical, intent(in) :: with_energy_balance
+    integer, intent(in) :: mechanical            !! number of states before the internal states
+    logical, intent(in) :: with_energy_balance   !! whether the powers of the elements `machine%with_work` are integrated
 
     associate (machine => self%machine)
       self%mechanical = mechanical
@@ -101,43 +91,45 @@ contains
     end associate
   end subroutine allocate_state
 
-  !> Hands the elements their inner states, [lanes, inner states].
-  subroutine place_internal(self, internal)
+  !> Copies the internal states to the elements.
+  subroutine set_internal_states(self, internal)
     class(formulation_t), intent(inout) :: self
-    real(wp), intent(in) :: internal(self%lanes, self%internal)
+    real(wp), intent(in) :: internal(self%lanes, self%internal)   !! part of the state
 
     if (self%internal > 0) self%machine%elements%internal%value(:, :) = internal
-  end subroutine place_internal
+  end subroutine set_internal_states
 
-  !> Chooses the branches of all lanes at a state to which `set_state` has brought the bodies.
+  !> Chooses the branches of the laws in all lanes, after `set_state` with the same state.
   subroutine choose_all_branches(self, t, y)
     class(formulation_t), intent(inout) :: self
-    real(wp), contiguous, intent(in) :: t(:)
-    real(wp), contiguous, intent(in) :: y(:, :)
+    real(wp), contiguous, intent(in) :: t(:)      !! [s], [lanes]
+    real(wp), contiguous, intent(in) :: y(:, :)   !! [lanes, states], at least
 
-    call self%place_internal(y(:, self%mechanical + 1:))
+    call self%set_internal_states(y(:, self%mechanical + 1:))
     call self%machine%choose_branches(t, self%phi, self%omega)
   end subroutine choose_all_branches
 
-  !> Brings bodies, elements and torques to the state y, so that they and the reactions can be read. Chooses the branches
-  !> there: the observed formulation is not the one that is being integrated.
+  !> Evaluates bodies, elements and torques at a state, so that they and the reactions can be read.
+  !>
+  !> The branches of the laws are chosen by the state. So the formulation must be another one than that of the integrator.
   subroutine observe(self, t, y)
     class(formulation_t), intent(inout) :: self
-    real(wp), contiguous, intent(in) :: t(:)
-    real(wp), contiguous, intent(in) :: y(:, :)
+    real(wp), contiguous, intent(in) :: t(:)      !! [s], [lanes]
+    real(wp), contiguous, intent(in) :: y(:, :)   !! [lanes, states], at least
 
     call self%set_state(y)
     if (self%switches > 0) call self%choose_all_branches(t, y)
-    if (self%internal > 0) call self%place_internal(y(:, self%mechanical + 1:))
+    if (self%internal > 0) call self%set_internal_states(y(:, self%mechanical + 1:))
     call self%machine%evaluate(t, self%phi, self%omega, self%torque)
   end subroutine observe
 
-  !> A lane may have other numbers than before.
+  !> Updates everything that depends on the parameters of a lane, after they have changed. By default nothing does.
   subroutine refresh_lane(self, lane)
     class(formulation_t), intent(inout) :: self
     integer, intent(in) :: lane
   end subroutine refresh_lane
 
+  !> Prepares a lane that starts at time t and state y, with new parameters perhaps.
   subroutine start_lane(self, lane, t, y)
     class(formulation_t), intent(inout) :: self
     integer, intent(in) :: lane
@@ -151,6 +143,7 @@ contains
     end do
   end subroutine start_lane
 
+  !> Indicators of all switches of one lane: positive on the present branches, zero at their boundaries.
   subroutine indicator_values(self, lane, t, y, g)
     class(formulation_t), intent(inout) :: self
     integer, intent(in) :: lane
@@ -164,17 +157,18 @@ contains
       do switch = 1, self%switches
         call self%switch_motion(lane, switch, y, angle, speed)
         g(switch) = switches%indicator(self%machine%banks, switch, lane, t, angle, speed, &
-                                    y(self%mechanical + switches%first_internal(switch): &
-                                      self%mechanical + switches%last_internal(switch)))
+                                       y(self%mechanical + switches%first_internal(switch): &
+                                         self%mechanical + switches%last_internal(switch)))
       end do
     end associate
   end subroutine indicator_values
 
-  !> Beyond the widened border of its branch a lane is inside the one that `choose` finds.
+  !> Puts one lane on the branch to which its state belongs, after it has crossed a boundary. Boundaries are shifted outwards,
+  !> so that the state is inside the new branch.
   subroutine change_branch(self, lane, which, t, y)
     class(formulation_t), intent(inout) :: self
     integer, intent(in) :: lane
-    integer, intent(in) :: which
+    integer, intent(in) :: which   !! switch, 1 to `switches`
     real(wp), intent(in) :: t
     real(wp), contiguous, intent(in) :: y(:)
     real(wp) :: angle, speed
@@ -186,10 +180,10 @@ contains
     end associate
   end subroutine change_branch
 
-  !> What the borders of a switch are, for messages, e.g. "edge of the gap of coupling 'mesh'".
+  !> Name of the boundaries of a switch, for messages, e.g. "edge of the gap of coupling 'mesh'".
   function switch_name(self, which) result(name)
     class(formulation_t), intent(in) :: self
-    integer, intent(in) :: which
+    integer, intent(in) :: which   !! 1 to `switches`
     character(len=:), allocatable :: name
 
     name = self%machine%switches%name(self%machine%banks, which)

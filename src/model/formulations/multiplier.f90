@@ -10,27 +10,26 @@ module nocdyn_multiplier
   public :: new_multiplier
 
   type, extends(body_formulation_t), public :: multiplier_t
-    integer, allocatable :: kept(:)               !! constraint rows in the system: those that are independent
-    real(wp), allocatable :: factors(:, :, :)     !! LU of the matrix, which is constant, [n + kept, n + kept, lanes]
-    integer, allocatable :: pivots(:, :)          !! [n + kept, lanes]
-    real(wp), allocatable :: solution(:, :)       !! omega' and lambda, [n + kept, lanes]
+    integer, allocatable :: kept(:)               !! independent constraint rows, which are those of the system
+    real(wp), allocatable :: factors(:, :, :)     !! LU factors of the constant matrix, [n + kept, n + kept, lanes]
+    integer, allocatable :: pivots(:, :)          !! of the LU factors, [n + kept, lanes]
+    real(wp), allocatable :: solution(:, :)       !! omega' [rad/s2] and lambda of the kept rows, [n + kept, lanes]
   contains
     procedure :: derivative
     procedure :: reactions
-    procedure :: series_obstacle
   end type multiplier_t
 
 contains
 
-  !> The formulation of a machine; its matrix is factored here.
+  !> The formulation of a machine. Its constant matrix is factored here.
   function new_multiplier(machine, with_energy_balance) result(self)
     type(machine_t), intent(in) :: machine
-    logical, intent(in) :: with_energy_balance   !! whether the works of the accounted elements are integrated
+    logical, intent(in) :: with_energy_balance   !! whether the powers of the elements `machine%with_work` are integrated
     type(multiplier_t) :: self
     integer :: b, g, l, order
     logical :: is_singular
 
-    call self%attach_bodies(machine, 2 * machine%bodies, with_energy_balance)
+    call self%set_machine('multiplier', machine, 2 * machine%bodies, with_energy_balance)
     self%kept = [(machine%groups(g)%kept, g=1, size(machine%groups))]
     order = machine%bodies + size(self%kept)
     allocate (self%factors(order, order, machine%lanes), source=0.0_wp)
@@ -44,10 +43,11 @@ contains
         self%factors(:machine%bodies, machine%bodies + 1:, l) = -transpose(constraint)
       end associate
       call lu_factor(self%factors(:, :, l), self%pivots(:, l), is_singular)
-      if (is_singular) error stop 'nocdyn_multiplier: inertias must be positive and the kept rows independent'
+      if (is_singular) error stop 'nocdyn_multiplier: the mass matrix must be positive definite and the kept rows independent'
     end do
   end function new_multiplier
 
+  !> Solves for omega' and the multipliers.
   subroutine derivative(self, t, y, dydt, status)
     class(multiplier_t), intent(inout) :: self
     real(wp), intent(in) :: t(self%lanes)
@@ -58,7 +58,7 @@ contains
 
     n = self%machine%bodies
     call self%set_state(y)
-    call self%place_internal(y(:, self%mechanical + 1:))
+    call self%set_internal_states(y(:, self%mechanical + 1:))
     call self%machine%evaluate(t, self%phi, self%omega, self%torque)
     do l = 1, self%lanes
       self%solution(:n, l) = self%torque(l, 1:)
@@ -71,11 +71,11 @@ contains
     if (self%quadratures > 0) call self%machine%power(dydt(:, self%states + 1:))
   end subroutine derivative
 
-  !> lambda of the system itself, shared out where rows are redundant.
+  !> The multipliers of the last evaluation, shared with redundant rows.
   subroutine reactions(self, lane, lambda)
     class(multiplier_t), intent(inout) :: self
     integer, intent(in) :: lane
-    real(wp), intent(out) :: lambda(:)
+    real(wp), intent(out) :: lambda(:)   !! [rows]
     integer :: i
 
     lambda = 0.0_wp
@@ -84,12 +84,5 @@ contains
     end do
     call self%machine%coordinates%reactions%share_loads(lane, lambda)
   end subroutine reactions
-
-  function series_obstacle(self) result(obstacle)
-    class(multiplier_t), intent(in) :: self
-    character(len=:), allocatable :: obstacle
-
-    obstacle = "formulation 'multiplier' has no Taylor series; 'reduced' has one"
-  end function series_obstacle
 
 end module nocdyn_multiplier

@@ -7,15 +7,15 @@ module nocdyn_paper
   use nocdyn_lapack, only: pseudo_inverse
   use nocdyn_lapack_lu, only: lu_factor, lu_solve
   use nocdyn_machine, only: machine_t
-  use nocdyn_paper_matrices, only: constrained_inertia, constrained_matrix, constrained_vector, damping_2, damping_3, &
-                                   damping_matrix, elastic_moments, inertia_2, inertia_3, inertia_matrix, stiffness_2, &
-                                   stiffness_3, stiffness_matrix, tangent_matrix, torque_2, torque_3, torque_vector
+  use nocdyn_paper_matrices, only: append_zeros, constrained_inertia, constrained_matrix, constrained_vector, &
+                                   damping_matrix, elastic_moments, extend_by_unit, extend_by_zero, inertia_matrix, &
+                                   stiffness_2, stiffness_3, stiffness_matrix, tangent_matrix, torque_vector
   implicit none (type, external)
   private
 
   public :: new_paper
 
-  !> All matrices of one lane; n bodies.
+  !> Work space for the matrices of one lane with n bodies; index 1 has size n, index 2 has 2n, index 3 has 3n.
   type :: matrices_t
     real(wp), allocatable :: stiffness(:, :), stiffness_1(:, :), stiffness_2(:, :), stiffness_3(:, :)   !! K, K_1, K_2, K_3
     real(wp), allocatable :: damping(:, :), damping_1(:, :), damping_2(:, :), damping_3(:, :)           !! C, C_1, C_2, C_3
@@ -29,7 +29,7 @@ module nocdyn_paper
     real(wp), allocatable, private :: complement(:, :, :)         !! L_tau, [n, freedoms, lanes]
     real(wp), allocatable, private :: factors(:, :, :)            !! LU of J_3, [3n, 3n, lanes]
     integer, allocatable, private :: pivots(:, :)                 !! [3n, lanes]
-    real(wp), allocatable, private :: moment_of_bodies(:, :)      !! coupling moments from moments on the bodies, [couplings, n]
+    real(wp), allocatable, private :: moment_of_bodies(:, :)      !! coupling moments from body moments, [couplings, n]
     type(matrices_t), private :: work
   contains
     procedure :: derivative
@@ -37,15 +37,14 @@ module nocdyn_paper
     procedure :: start
     procedure :: observe
     procedure :: reactions
-    procedure :: series_obstacle
   end type paper_t
 
 contains
 
-  !> The formulation of a machine; J_3 is assembled and factored here.
+  !> The formulation of a machine. J_3 is assembled and factored here.
   function new_paper(machine, with_energy_balance) result(self)
     type(machine_t), intent(in) :: machine
-    logical, intent(in) :: with_energy_balance   !! whether the works of the accounted elements are integrated
+    logical, intent(in) :: with_energy_balance   !! whether the powers of the elements `machine%with_work` are integrated
     type(paper_t) :: self
     integer :: b, g, l, n
     logical :: is_singular
@@ -53,7 +52,7 @@ contains
     real(wp) :: inertia_of_2(2 * machine%bodies, 2 * machine%bodies)
 
     n = machine%bodies
-    call self%attach_bodies(machine, 3 * n, with_energy_balance)
+    call self%set_machine('paper', machine, 3 * n, with_energy_balance)
     call allocate_matrices(n, self%work)
     allocate (self%complement(n, machine%coordinates%freedoms, machine%lanes))
     allocate (self%factors(3 * n, 3 * n, machine%lanes), self%pivots(3 * n, machine%lanes))
@@ -63,16 +62,17 @@ contains
       call constrained_inertia(self%complement(:, :, l), inertia, &
                                machine%constraints%block(l, [(machine%groups(g)%kept, g=1, size(machine%groups))], &
                                                          [(b, b=1, n)]), inertia_of_1)
-      call inertia_2(inertia_of_1, inertia_of_2)
-      call inertia_3(inertia_of_2, self%factors(:, :, l))
+      call extend_by_unit(inertia_of_1, inertia_of_2)
+      call extend_by_unit(inertia_of_2, self%factors(:, :, l))
       call lu_factor(self%factors(:, :, l), self%pivots(:, l), is_singular)
-      if (is_singular) error stop 'nocdyn_paper: inertias must be positive and the kept rows independent'
+      if (is_singular) error stop 'nocdyn_paper: the mass matrix must be positive definite and the kept rows independent'
     end do
     self%moment_of_bodies = pseudo_inverse(coupling_incidence(machine), 1.0e-10_wp)
   end function new_paper
 
+  !> Allocates the work space.
   subroutine allocate_matrices(n, work)
-    integer, intent(in) :: n
+    integer, intent(in) :: n   !! bodies
     type(matrices_t), intent(inout) :: work
 
     allocate (work%stiffness(n, n), work%damping(n, n), work%torque(n), work%term(n), work%tangent(n, n))
@@ -81,7 +81,7 @@ contains
     allocate (work%stiffness_3(3 * n, 3 * n), work%damping_3(3 * n, 3 * n), work%torque_3(3 * n), work%beta(3 * n))
   end subroutine allocate_matrices
 
-  !> Moments on the bodies from the restoring moments of the couplings, [n, couplings].
+  !> Matrix that gives the moments on the bodies from the restoring moments of the couplings, [n, couplings].
   function coupling_incidence(machine) result(incidence)
     type(machine_t), intent(in) :: machine
     real(wp), allocatable :: incidence(:, :)
@@ -100,6 +100,7 @@ contains
     end do
   end function coupling_incidence
 
+  !> Number of couplings of a machine.
   pure integer function coupling_count(machine)
     type(machine_t), intent(in) :: machine
     integer :: i
@@ -110,7 +111,7 @@ contains
     end do
   end function coupling_count
 
-  !> beta at the start: F are the elastic moments at the start angles, eqs. (48)-(51).
+  !> beta at the start. F are the elastic moments at the start angles, eqs. (48)-(51).
   function start(self) result(y)
     class(paper_t), intent(in) :: self
     real(wp), allocatable :: y(:, :)
@@ -135,6 +136,7 @@ contains
     end do
   end function start
 
+  !> Assembles and solves eq. (43) for beta'.
   subroutine derivative(self, t, y, dydt, status)
     class(paper_t), intent(inout) :: self
     real(wp), intent(in) :: t(self%lanes)
@@ -145,7 +147,7 @@ contains
 
     n = self%machine%bodies
     call self%set_state(y)
-    call self%place_internal(y(:, self%mechanical + 1:))
+    call self%set_internal_states(y(:, self%mechanical + 1:))
     call self%machine%evaluate(t, self%phi, self%omega, self%torque)
     call self%machine%evaluate_energies()
     call self%machine%differentiate_elements(t)
@@ -163,7 +165,7 @@ contains
   subroutine assemble(machine, lane, complement, work)
     type(machine_t), intent(in) :: machine
     integer, intent(in) :: lane
-    real(wp), intent(in) :: complement(:, :)
+    real(wp), intent(in) :: complement(:, :)   !! L_tau, [n, freedoms]
     type(matrices_t), intent(inout) :: work
     integer, parameter :: roles(4) = [role_coupling, role_load, role_motor, role_excitation]
     integer :: i
@@ -179,18 +181,18 @@ contains
     call constrained_vector(complement, work%torque, work%torque_1)
     call constrained_matrix(complement, work%damping, work%damping_1)
     call constrained_matrix(complement, work%stiffness, work%stiffness_1)
-    call torque_2(work%torque_1, work%torque_2)
-    call damping_2(work%damping_1, work%damping_2)
+    call append_zeros(work%torque_1, work%torque_2)
+    call extend_by_zero(work%damping_1, work%damping_2)
     call stiffness_2(work%stiffness_1, work%stiffness_2)
-    call torque_3(work%torque_2, work%torque_3)
-    call damping_3(work%damping_2, work%damping_3)
+    call append_zeros(work%torque_2, work%torque_3)
+    call extend_by_zero(work%damping_2, work%damping_3)
     call stiffness_3(work%stiffness_2, work%tangent, work%stiffness_3)
   end subroutine assemble
 
   !> Eq. (43): replaces beta by its derivative.
   subroutine solve_generalised_system(factors, pivots, work)
-    real(wp), contiguous, intent(in) :: factors(:, :)
-    integer, contiguous, intent(in) :: pivots(:)
+    real(wp), contiguous, intent(in) :: factors(:, :)   !! LU factors of J_3, [3n, 3n]
+    integer, contiguous, intent(in) :: pivots(:)        !! [3n]
     type(matrices_t), intent(inout) :: work
     integer :: j
 
@@ -201,7 +203,7 @@ contains
     call lu_solve(factors, pivots, work%beta)
   end subroutine solve_generalised_system
 
-  !> Adds the rows F' = K_4 omega.
+  !> The Jacobian of the bodies and the rows of F' = K_4 omega.
   subroutine jacobian(self, t, y, dfdy, dfdt, status)
     class(paper_t), intent(inout) :: self
     real(wp), intent(in) :: t(self%lanes)
@@ -217,7 +219,7 @@ contains
   !> The derivatives of F' = K_4 omega by omega and phi.
   subroutine fill_moment_rows(self, components, dfdy)
     type(paper_t), intent(inout) :: self
-    integer, intent(in) :: components
+    integer, intent(in) :: components   !! states + quadratures
     real(wp), intent(inout) :: dfdy(self%lanes, components, self%states)
     integer :: e, l, n
 
@@ -236,8 +238,10 @@ contains
     end associate
   end subroutine fill_moment_rows
 
-  !> The moments of the couplings are then read from the states F: of all moments that add up to F on the bodies, those
-  !> nearest to the law's (where the couplings form no loop, F determines them).
+  !> Evaluates the machine at a state, with the moments of the couplings from the states F.
+  !>
+  !> Where the couplings form no loop, F determines their moments. Elsewhere the moments are those nearest to the laws' among all
+  !> that add up to F on the bodies.
   subroutine observe(self, t, y)
     class(paper_t), intent(inout) :: self
     real(wp), contiguous, intent(in) :: t(:)
@@ -267,17 +271,10 @@ contains
   subroutine reactions(self, lane, lambda)
     class(paper_t), intent(inout) :: self
     integer, intent(in) :: lane
-    real(wp), intent(out) :: lambda(:)
+    real(wp), intent(out) :: lambda(:)   !! [rows]
 
     self%work%term(:) = self%machine%inertia(lane, :) * self%slope(lane, :self%machine%bodies) - self%torque(lane, 1:)
     call self%machine%coordinates%reactions_of_imbalances(lane, self%work%term, lambda)
   end subroutine reactions
-
-  function series_obstacle(self) result(obstacle)
-    class(paper_t), intent(in) :: self
-    character(len=:), allocatable :: obstacle
-
-    obstacle = "formulation 'paper' has no Taylor series; 'reduced' has one"
-  end function series_obstacle
 
 end module nocdyn_paper

@@ -1,8 +1,8 @@
 !> The matrices and vectors of the paper, eqs. (13)-(72), for any machine of n bodies.
 !>
-!> They are those of one lane at the angles and speeds to which the machine was last brought by `evaluate`,
-!> `differentiate` and `evaluate_energies`. What a law has beyond -K12 u - c u' (the rest twist of a coupling,
-!> the torque of a motor) stands in Q. Every procedure overwrites its last argument and allocates nothing.
+!> They are those of one lane, at the state at which `evaluate`, `differentiate` and `evaluate_energies` of the machine were last
+!> called. The parts of a law beyond -K12 u - c u' (the rest twist of a coupling, the torque of a motor) are terms of Q. Every
+!> procedure overwrites its last argument and allocates nothing.
 module nocdyn_paper_matrices
   use nocdyn_incidence, only: add_coefficients, add_moment
   use nocdyn_kinds, only: wp
@@ -12,9 +12,8 @@ module nocdyn_paper_matrices
 
   public :: inertia_matrix, torque_vector, stiffness_matrix, damping_matrix, tangent_matrix, elastic_moments
   public :: constrained_inertia, constrained_matrix, constrained_vector
-  public :: inertia_2, damping_2, stiffness_2, torque_2
-  public :: inertia_3, damping_3, stiffness_3, torque_3
-  public :: unit_matrix, zero_matrix, stacked_2, stacked_3, elastic_rates
+  public :: stiffness_2, stiffness_3, extend_by_unit, extend_by_zero, append_zeros
+  public :: unit_matrix, stack, elastic_rates
 
 contains
 
@@ -31,8 +30,8 @@ contains
     end do
   end subroutine inertia_matrix
 
-  !> The terms of Q, eq. (16), from the banks of one role: Q_0 of eq. (17) from the excitations, Q_m of eqs. (18), (20)
-  !> from the motors, and what couplings and loads have beyond K phi and C omega, [n].
+  !> The terms of Q, eq. (16), from the banks of one role, [n]: Q_0 of eq. (17) from the excitations, Q_m of eqs. (18), (20)
+  !> from the motors, and from couplings and loads the parts beyond K phi and C omega.
   subroutine torque_vector(machine, lane, role, torque)
     type(machine_t), intent(in) :: machine
     integer, intent(in) :: lane
@@ -84,7 +83,7 @@ contains
     call add_coefficients(machine%elements%from, machine%elements%to, -1.0_wp, machine%elements%restoring_angle(lane, :), tangent)
   end subroutine tangent_matrix
 
-  !> F of eqs. (48)-(51): the elastic moment that acts on each body, [n].
+  !> F of eqs. (48)-(51): the elastic moment on each body [N m], [n].
   subroutine elastic_moments(machine, lane, moments)
     type(machine_t), intent(in) :: machine
     integer, intent(in) :: lane
@@ -102,7 +101,7 @@ contains
   !> F' of eqs. (47), (52)-(57): K_4 omega, [n].
   subroutine elastic_rates(tangent, omega, rates)
     real(wp), intent(in) :: tangent(:, :)   !! K_4, [n, n]
-    real(wp), intent(in) :: omega(:)
+    real(wp), intent(in) :: omega(:)         !! [rad/s], [n]
     real(wp), intent(inout) :: rates(:)
     integer :: j
 
@@ -125,7 +124,8 @@ contains
 
   !> C_1 of eq. (29) and K_1 of eq. (30): [L_tau^T M; 0], [n, n].
   subroutine constrained_matrix(complement, matrix, matrix_1)
-    real(wp), intent(in) :: complement(:, :), matrix(:, :)
+    real(wp), intent(in) :: complement(:, :)      !! L_tau, [n, freedoms]
+    real(wp), intent(in) :: matrix(:, :)          !! C or K, [n, n]
     real(wp), intent(inout) :: matrix_1(:, :)
     integer :: j
 
@@ -136,7 +136,8 @@ contains
 
   !> Q_1, Q_0^1, Q_m^1 of eqs. (26)-(28): [L_tau^T Q; 0], [n].
   subroutine constrained_vector(complement, vector, vector_1)
-    real(wp), intent(in) :: complement(:, :), vector(:)
+    real(wp), intent(in) :: complement(:, :)      !! L_tau, [n, freedoms]
+    real(wp), intent(in) :: vector(:)             !! Q, Q_0 or Q_m [N m], [n]
     real(wp), intent(inout) :: vector_1(:)
     integer :: i
 
@@ -148,50 +149,58 @@ contains
 
   !> I of eq. (36).
   subroutine unit_matrix(matrix)
-    real(wp), intent(inout) :: matrix(:, :)
+    real(wp), intent(inout) :: matrix(:, :)   !! [n, n]
     integer :: i
 
-    call zero_matrix(matrix)
+    matrix = 0.0_wp
     do i = 1, size(matrix, 1)
       matrix(i, i) = 1.0_wp
     end do
   end subroutine unit_matrix
 
-  !> 0 of eq. (37).
-  subroutine zero_matrix(matrix)
-    real(wp), intent(inout) :: matrix(:, :)
-
-    matrix = 0.0_wp
-  end subroutine zero_matrix
-
-  !> alpha = [omega; phi] of eq. (42) and alpha' = [omega'; phi'] of eq. (41), [2n]; phi' = omega, eqs. (32), (33).
-  subroutine stacked_2(upper, lower, vector)
-    real(wp), intent(in) :: upper(:), lower(:)   !! [n]
-    real(wp), intent(inout) :: vector(:)
+  !> alpha = [omega; phi] of eq. (42), alpha' = [omega'; phi'] of eq. (41), [2n]; beta = [alpha; F] of eq. (46),
+  !> beta' = [alpha'; F'] of eq. (45), [3n]. With phi' = omega, eqs. (32), (33).
+  subroutine stack(upper, lower, vector)
+    real(wp), intent(in) :: upper(:), lower(:)
+    real(wp), intent(inout) :: vector(:)         !! [upper + lower]
 
     vector(:size(upper)) = upper
     vector(size(upper) + 1:) = lower
-  end subroutine stacked_2
+  end subroutine stack
 
-  !> J_2 of eq. (35): diag(J_1, I) with the unit matrix of eq. (36), [2n, 2n].
-  subroutine inertia_2(inertia_1, matrix)
-    real(wp), intent(in) :: inertia_1(:, :)
+  !> diag(block, I): J_2 = diag(J_1, I) of eq. (35), [2n, 2n], and J_3 = diag(J_2, I) of eq. (44), [3n, 3n].
+  pure subroutine extend_by_unit(block, matrix)
+    real(wp), intent(in) :: block(:, :)         !! J_1 or J_2
+    real(wp), intent(inout) :: matrix(:, :)
+    integer :: i
+
+    call extend_by_zero(block, matrix)
+    do i = size(block, 1) + 1, size(matrix, 1)
+      matrix(i, i) = 1.0_wp
+    end do
+  end subroutine extend_by_unit
+
+  !> diag(block, 0) with the zero matrix of eq. (37): C_2 of eq. (38), [2n, 2n], and C_3 of eq. (60), [3n, 3n].
+  pure subroutine extend_by_zero(block, matrix)
+    real(wp), intent(in) :: block(:, :)         !! C_1 or C_2
     real(wp), intent(inout) :: matrix(:, :)
 
-    call extend_by_unit(inertia_1, matrix)
-  end subroutine inertia_2
+    matrix = 0.0_wp
+    matrix(:size(block, 1), :size(block, 2)) = block
+  end subroutine extend_by_zero
 
-  !> C_2 of eq. (38): [C_1, 0; 0, 0] with the zero matrix of eq. (37), [2n, 2n].
-  subroutine damping_2(damping_1, matrix)
-    real(wp), intent(in) :: damping_1(:, :)
-    real(wp), intent(inout) :: matrix(:, :)
+  !> [upper; 0] with the zero vector of eq. (59): Q_2 of eq. (40), [2n], and Q_3 of eq. (58), [3n].
+  pure subroutine append_zeros(upper, vector)
+    real(wp), intent(in) :: upper(:)         !! Q_1 or Q_2
+    real(wp), intent(inout) :: vector(:)
 
-    call extend_by_zero(damping_1, matrix)
-  end subroutine damping_2
+    vector = 0.0_wp
+    vector(:size(upper)) = upper
+  end subroutine append_zeros
 
   !> K_2 of eq. (39): [0, K_1; I, 0], [2n, 2n].
   subroutine stiffness_2(stiffness_1, matrix)
-    real(wp), intent(in) :: stiffness_1(:, :)
+    real(wp), intent(in) :: stiffness_1(:, :)   !! K_1, [n, n]
     real(wp), intent(inout) :: matrix(:, :)
     integer :: i, n
 
@@ -203,40 +212,6 @@ contains
     end do
   end subroutine stiffness_2
 
-  !> Q_2 of eq. (40): [Q_1; 0], [2n].
-  subroutine torque_2(torque_1, vector)
-    real(wp), intent(in) :: torque_1(:)
-    real(wp), intent(inout) :: vector(:)
-
-    vector = 0.0_wp
-    vector(:size(torque_1)) = torque_1
-  end subroutine torque_2
-
-  !> beta = [alpha; F] of eq. (46) and beta' = [alpha'; F'] of eq. (45), [3n].
-  subroutine stacked_3(upper, lower, vector)
-    real(wp), intent(in) :: upper(:)   !! [2n]
-    real(wp), intent(in) :: lower(:)   !! [n]
-    real(wp), intent(inout) :: vector(:)
-
-    call stacked_2(upper, lower, vector)
-  end subroutine stacked_3
-
-  !> J_3 of eq. (44): diag(J_1, I, I) = diag(J_2, I), [3n, 3n].
-  subroutine inertia_3(matrix_2, matrix)
-    real(wp), intent(in) :: matrix_2(:, :)
-    real(wp), intent(inout) :: matrix(:, :)
-
-    call extend_by_unit(matrix_2, matrix)
-  end subroutine inertia_3
-
-  !> C_3 of eq. (60): [C_2, 0; 0, 0], [3n, 3n].
-  subroutine damping_3(matrix_2, matrix)
-    real(wp), intent(in) :: matrix_2(:, :)
-    real(wp), intent(inout) :: matrix(:, :)
-
-    call extend_by_zero(matrix_2, matrix)
-  end subroutine damping_3
-
   !> K_3 of eq. (61): [K_2, 0; (K_4, 0), 0], K_4 acting on omega, [3n, 3n].
   subroutine stiffness_3(matrix_2, tangent, matrix)
     real(wp), intent(in) :: matrix_2(:, :)   !! K_2, [2n, 2n]
@@ -246,35 +221,5 @@ contains
     call extend_by_zero(matrix_2, matrix)
     matrix(size(matrix_2, 1) + 1:, :size(tangent, 2)) = tangent
   end subroutine stiffness_3
-
-  !> Q_3 of eq. (58): [Q_2; 0] with the zero vector of eq. (59), [3n].
-  subroutine torque_3(vector_2, vector)
-    real(wp), intent(in) :: vector_2(:)
-    real(wp), intent(inout) :: vector(:)
-
-    vector = 0.0_wp
-    vector(:size(vector_2)) = vector_2
-  end subroutine torque_3
-
-  !> diag(block, I).
-  pure subroutine extend_by_unit(block, matrix)
-    real(wp), intent(in) :: block(:, :)
-    real(wp), intent(inout) :: matrix(:, :)
-    integer :: i
-
-    call extend_by_zero(block, matrix)
-    do i = size(block, 1) + 1, size(matrix, 1)
-      matrix(i, i) = 1.0_wp
-    end do
-  end subroutine extend_by_unit
-
-  !> diag(block, 0).
-  pure subroutine extend_by_zero(block, matrix)
-    real(wp), intent(in) :: block(:, :)
-    real(wp), intent(inout) :: matrix(:, :)
-
-    matrix = 0.0_wp
-    matrix(:size(block, 1), :size(block, 2)) = block
-  end subroutine extend_by_zero
 
 end module nocdyn_paper_matrices
