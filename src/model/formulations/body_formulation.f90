@@ -18,10 +18,10 @@ module nocdyn_body_formulation
     integer, allocatable :: status(:)            !! evaluation_... of that evaluation, [lanes]
     real(wp), allocatable :: mobility(:, :, :)   !! matrix of omega' = mobility T [1/(kg m2)], [bodies, bodies, lanes]
     ! work space of the Jacobian, one lane:
-    real(wp), allocatable :: by_angle(:, :)      !! derivative of the torques T by phi [N m/rad], [bodies, bodies]
-    real(wp), allocatable :: by_speed(:, :)      !! derivative of T by omega [N m s/rad], [bodies, bodies]
-    real(wp), allocatable :: by_time(:)          !! derivative of T by t [N m/s], [bodies]
-    real(wp), allocatable :: by_state(:)         !! derivative of T by an internal state, [bodies]
+    real(wp), allocatable :: by_angle(:, :)   !! derivative of the torques T by phi [N m/rad], [bodies, bodies]
+    real(wp), allocatable :: by_speed(:, :)   !! derivative of T by omega [N m s/rad], [bodies, bodies]
+    real(wp), allocatable :: by_time(:)       !! derivative of T by t [N m/s], [bodies]
+    real(wp), allocatable :: by_state(:)      !! derivative of T by an internal state, [bodies]
   contains
     procedure :: set_machine
     procedure :: start => start_of_bodies
@@ -38,7 +38,7 @@ contains
   !> Copies the machine, counts the states and allocates the work space.
   subroutine set_machine(self, word, machine, mechanical, with_energy_balance)
     class(body_formulation_t), intent(inout) :: self
-    character(len=*), intent(in) :: word         !! name of the formulation in the input
+    character(len=*), intent(in) :: word   !! name of the formulation in the input
     type(machine_t), intent(in) :: machine
     integer, intent(in) :: mechanical            !! number of mechanical states, at least 2 * bodies
     logical, intent(in) :: with_energy_balance   !! whether the powers of the elements `machine%with_work` are integrated

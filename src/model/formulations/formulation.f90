@@ -61,10 +61,10 @@ module nocdyn_formulation
       import :: formulation_t, wp
       class(formulation_t), intent(in) :: self
       integer, intent(in) :: lane
-      integer, intent(in) :: switch                  !! 1 to `switches`
-      real(wp), contiguous, intent(in) :: y(:)       !! [states + quadratures]
-      real(wp), intent(out) :: angle                 !! [rad]
-      real(wp), intent(out) :: speed                 !! [rad/s]
+      integer, intent(in) :: switch              !! 1 to `switches`
+      real(wp), contiguous, intent(in) :: y(:)   !! [states + quadratures]
+      real(wp), intent(out) :: angle             !! [rad]
+      real(wp), intent(out) :: speed             !! [rad/s]
     end subroutine motion_interface
 
   end interface

@@ -1,7 +1,7 @@
-!> What the inner states of the elements add to the sparse Jacobian of the reduced formulation.
+!> The part of the sparse Jacobian of the reduced formulation that comes from internal states.
 !>
-!> An inner state z of an element with the speed u' = U q' changes at a rate r(u', z), and the moment M(z) of the element
-!> acts on q'' = R M and on its work, W' = M u'.
+!> An internal state z of an element with the speed u' = U q' has the rate r(u', z). The moment M(z) of the element acts on
+!> q'' = R M and on its work integral, W' = M u'.
 module nocdyn_internal_jacobian
   use nocdyn_element_coordinates, only: element_coordinates_t
   use nocdyn_elements, only: elements_t
@@ -14,13 +14,13 @@ module nocdyn_internal_jacobian
 
   public :: new_internal_jacobian
 
-  !> The values are, for each inner state in turn: dq''/dz and, where it turns with the coordinate, dr/dq' of each entry of its
-  !> element; dr/dz of each inner state of that element; dW'/dz if its work is integrated.
+  !> Order of the values, for each internal state: for each entry of its element dq''/dz and, if the entry has a ratio, dr/dq';
+  !> dr/dz of each internal state of that element; dW'/dz if the element has a work integral.
   type, public :: internal_jacobian_t
     type(pattern_t) :: pattern
-    integer, private :: before = 0                          !! positions of the Jacobian before these
-    type(element_coordinates_t), private :: incidence       !! of the element of each inner state
-    logical, allocatable, private :: has_work_integral(:)        !! [inner states]
+    integer, private :: before = 0                          !! number of positions of the Jacobian before these
+    type(element_coordinates_t), private :: incidence       !! entries of the element of each internal state
+    logical, allocatable, private :: has_work_integral(:)   !! of the element of each internal state
   contains
     procedure :: fill
     procedure :: refresh_lane
@@ -29,15 +29,15 @@ module nocdyn_internal_jacobian
 
 contains
 
-  !> The positions; the rows of the inner states follow those of the coordinates, those of the works come last.
+  !> The positions. Rows of internal states follow those of the coordinates; rows of the work integrals come last.
   function new_internal_jacobian(freedoms, incidence, with_work, internal, before) result(self)
-    integer, intent(in) :: freedoms
-    type(element_coordinates_t), intent(in) :: incidence
-    integer, intent(in) :: with_work(:)   !! elements whose works follow the states
+    integer, intent(in) :: freedoms                        !! number of coordinates
+    type(element_coordinates_t), intent(in) :: incidence   !! entries of all elements
+    integer, intent(in) :: with_work(:)                    !! elements with work integrals
     type(internal_states_t), intent(in) :: internal
-    integer, intent(in) :: before         !! positions of the Jacobian before these
+    integer, intent(in) :: before   !! number of positions of the Jacobian before these
     type(internal_jacobian_t) :: self
-    integer :: i, next, s, work(size(incidence%first) - 1)   ! number of an element's work, or 0
+    integer :: i, next, s, work(size(incidence%first) - 1)   ! number of the work integral of each element, or 0
 
     work = 0
     work(with_work) = [(i, i=1, size(with_work))]
@@ -62,17 +62,18 @@ contains
     end do
   end function new_internal_jacobian
 
+  !> Appends a position.
   subroutine add_position(row, column, pattern, next)
     integer, intent(in) :: row, column
     type(pattern_t), intent(inout) :: pattern
-    integer, intent(inout) :: next
+    integer, intent(inout) :: next   !! index of the position; increased by one
 
     pattern%row(next) = row
     pattern%column(next) = column
     next = next + 1
   end subroutine add_position
 
-  !> The values at the positions of `pattern`, from the elements after `differentiate`.
+  !> Computes the values at the positions of `pattern`, from the elements after `differentiate`.
   subroutine fill(self, elements, dfdy)
     class(internal_jacobian_t), intent(in) :: self
     type(elements_t), intent(in) :: elements
@@ -100,11 +101,11 @@ contains
     end associate
   end subroutine fill
 
-  !> The responses of one lane anew.
+  !> Updates the responses of one lane.
   pure subroutine refresh_lane(self, lane, incidence, internal)
     class(internal_jacobian_t), intent(inout) :: self
     integer, intent(in) :: lane
-    type(element_coordinates_t), intent(in) :: incidence
+    type(element_coordinates_t), intent(in) :: incidence   !! entries of all elements
     type(internal_states_t), intent(in) :: internal
 
     call self%incidence%refresh_selected(lane, incidence, internal%element, with_ratio_only=.false.)

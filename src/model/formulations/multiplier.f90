@@ -10,10 +10,10 @@ module nocdyn_multiplier
   public :: new_multiplier
 
   type, extends(body_formulation_t), public :: multiplier_t
-    integer, allocatable :: kept(:)               !! independent constraint rows, which are those of the system
-    real(wp), allocatable :: factors(:, :, :)     !! LU factors of the constant matrix, [n + kept, n + kept, lanes]
-    integer, allocatable :: pivots(:, :)          !! of the LU factors, [n + kept, lanes]
-    real(wp), allocatable :: solution(:, :)       !! omega' [rad/s2] and lambda of the kept rows, [n + kept, lanes]
+    integer, allocatable :: kept(:)             !! independent constraint rows, which are those of the system
+    real(wp), allocatable :: factors(:, :, :)   !! LU factors of the constant matrix, [n + kept, n + kept, lanes]
+    integer, allocatable :: pivots(:, :)        !! of the LU factors, [n + kept, lanes]
+    real(wp), allocatable :: solution(:, :)     !! omega' [rad/s2] and lambda of the kept rows, [n + kept, lanes]
   contains
     procedure :: derivative
     procedure :: reactions

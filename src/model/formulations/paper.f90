@@ -26,10 +26,10 @@ module nocdyn_paper
   end type matrices_t
 
   type, extends(body_formulation_t), public :: paper_t
-    real(wp), allocatable, private :: complement(:, :, :)         !! L_tau, [n, freedoms, lanes]
-    real(wp), allocatable, private :: factors(:, :, :)            !! LU of J_3, [3n, 3n, lanes]
-    integer, allocatable, private :: pivots(:, :)                 !! [3n, lanes]
-    real(wp), allocatable, private :: moment_of_bodies(:, :)      !! coupling moments from body moments, [couplings, n]
+    real(wp), allocatable, private :: complement(:, :, :)      !! L_tau, [n, freedoms, lanes]
+    real(wp), allocatable, private :: factors(:, :, :)         !! LU of J_3, [3n, 3n, lanes]
+    integer, allocatable, private :: pivots(:, :)              !! [3n, lanes]
+    real(wp), allocatable, private :: moment_of_bodies(:, :)   !! coupling moments from body moments, [couplings, n]
     type(matrices_t), private :: work
   contains
     procedure :: derivative

@@ -1,9 +1,9 @@
-!> The reduced formulation: L_tau^T J L_tau q'' = L_tau^T (Q + C omega + K phi), states q', q, the inner states z of the
-!> elements, and the works.
+!> The reduced formulation: L_tau^T J L_tau q'' = L_tau^T (Q + C omega + K phi). Its states are q', q and the internal states z of
+!> the elements; the work integrals follow.
 !>
-!> What the bodies do is not formed on the way: the angles of the elements are u = u_start + U q, their speeds
-!> u' = U q', and their moments M give q'' = R M with R = (L_tau^T J L_tau)^-1 L_tau^T B, where the columns of B are
-!> the elements' unit moments on their two bodies and U = B^T L_tau.
+!> The motion of the bodies is not computed on the way. The elements have the angles u = u_start + U q and the speeds
+!> u' = U q'. Their moments M give q'' = R M with R = (L_tau^T J L_tau)^-1 L_tau^T B, where the columns of B are
+!> the unit moments of the elements on their two bodies, and U = B^T L_tau.
 module nocdyn_reduced
   use nocdyn_element_coordinates, only: element_coordinates_t, new_element_coordinates, twist_map
   use nocdyn_formulation, only: formulation_t
@@ -25,21 +25,22 @@ module nocdyn_reduced
 
   public :: new_reduced
 
-  !> q is counted from the start: phi = start_angle + L_tau q.
+  !> q is measured from the start: phi = start_angle + L_tau q.
   type, extends(formulation_t), public :: reduced_t
-    real(wp), allocatable, private :: start_twist(:, :)        !! u_start [rad], [lanes, elements]
-    type(sparse_map_t), private :: twists                      !! U
-    type(sparse_map_t), private :: accelerations               !! R
-    type(element_coordinates_t), private :: incidence          !! of which both are made
-    integer, allocatable, private :: response_entry(:)             !! its entry of each entry of R
-    type(reduced_jacobian_t), private :: element_jacobian                  !! R diag U
-    type(reduced_series_t), private :: series_kernel                  !! after `prepare_series`
-    type(lane_terms_t), allocatable, private :: terms          !! of many lanes of a plain machine without works
-    type(lane_motion_t), allocatable, private :: lane_motion   !! if there are `terms` and whole strips of lanes
-    type(lane_series_t), allocatable, private :: lane_series   !! instead of `motion`, after `prepare_series`
-    type(internal_jacobian_t), private :: internal_rows              !! of the inner states
-    type(element_coordinates_t), private :: switching          !! of the switching elements
-    real(wp), allocatable, private :: zeros(:, :)               !! zeros, [lanes, elements]
+    real(wp), allocatable, private :: start_twist(:, :)     !! u_start [rad], [lanes, elements]
+    type(sparse_map_t), private :: twists                   !! U
+    type(sparse_map_t), private :: accelerations            !! R
+    type(element_coordinates_t), private :: incidence       !! entries of which U and R are made
+    integer, allocatable, private :: response_entry(:)      !! entry of `incidence` of each entry of R
+    type(reduced_jacobian_t), private :: element_jacobian   !! R diag U
+    type(reduced_series_t), private :: series_kernel        !! Taylor recurrence of any machine, after `prepare_series`
+    ! For a block of several lanes without work integrals whose laws are polynomials or depend on the time alone:
+    type(lane_terms_t), allocatable, private :: terms          !! terms of its laws
+    type(lane_motion_t), allocatable, private :: lane_motion   !! accelerations of strips, if the lanes are whole strips
+    type(lane_series_t), allocatable, private :: lane_series   !! replaces `series_kernel`, if the lanes are whole strips
+    type(internal_jacobian_t), private :: internal_rows        !! positions of the internal states in the Jacobian
+    type(element_coordinates_t), private :: switching          !! entries of the elements that switch
+    real(wp), allocatable, private :: zeros(:, :)              !! [lanes, elements]
   contains
     procedure :: formulate
     procedure :: update_inertia
@@ -64,8 +65,8 @@ contains
   !> The formulation of a machine whose coordinates are known.
   function new_reduced(machine, with_energy_balance, as_block) result(self)
     type(machine_t), intent(in) :: machine
-    logical, intent(in) :: with_energy_balance              !! whether the works of the accounted elements are integrated
-    logical, intent(in), optional :: as_block   !! whether a single lane is laid out as those of a block: .false.
+    logical, intent(in) :: with_energy_balance   !! whether the powers of the elements `machine%with_work` are integrated
+    logical, intent(in), optional :: as_block    !! whether a single lane gets the layout of a block; absent: no
     type(reduced_t) :: self
     logical :: is_block
 
@@ -75,11 +76,11 @@ contains
     call self%formulate(with_energy_balance, is_block)
   end function new_reduced
 
-  !> Forms the equations of the machine that is there.
+  !> Forms the equations of `machine`, after any change of its structure.
   subroutine formulate(self, with_energy_balance, as_block)
     class(reduced_t), intent(inout) :: self
-    logical, intent(in) :: with_energy_balance
-    logical, intent(in) :: as_block
+    logical, intent(in) :: with_energy_balance   !! as in `new_reduced`
+    logical, intent(in) :: as_block              !! as in `new_reduced`
 
     call self%allocate_state(2 * self%machine%coordinates%freedoms, with_energy_balance)
     self%incidence = new_element_coordinates(self%machine%elements, self%machine%coordinates)
@@ -87,7 +88,7 @@ contains
       call form_responses(freedoms, as_block, self)
       self%element_jacobian = new_reduced_jacobian(freedoms, incidence, machine%with_work(:self%quadratures), self%internal)
       self%internal_rows = new_internal_jacobian(freedoms, incidence, machine%with_work(:self%quadratures), &
-                                           machine%elements%internal, size(self%element_jacobian%pattern%row))
+                                                 machine%elements%internal, size(self%element_jacobian%pattern%row))
       self%switching = incidence%selected(machine%switches%element, with_ratio_only=.true.)
       call find_start_twists(self)
       self%twists = twist_map(incidence, without_offset=.not. any(abs(self%start_twist) > 0), without_bands=as_block)
@@ -103,6 +104,7 @@ contains
     end associate
   end subroutine formulate
 
+  !> Twists of the elements at the start angles.
   subroutine find_start_twists(self)
     type(reduced_t), intent(inout) :: self
     real(wp) :: angle(self%lanes, 0:self%machine%bodies)
@@ -112,10 +114,10 @@ contains
     self%start_twist = angle(:, self%machine%elements%to) - angle(:, self%machine%elements%from)
   end subroutine find_start_twists
 
-  !> R, whose rows are the coordinates.
+  !> The map R from moments to accelerations; its rows are the coordinates.
   subroutine form_responses(freedoms, without_bands, self)
     integer, intent(in) :: freedoms
-    logical, intent(in) :: without_bands
+    logical, intent(in) :: without_bands   !! whether the map is stored by rows only
     type(reduced_t), intent(inout) :: self
     integer :: element_of(size(self%incidence%coordinate)), first(freedoms + 1)
     integer :: e
@@ -132,14 +134,14 @@ contains
     end associate
   end subroutine form_responses
 
-  !> Other inertias in a lane of a block; start speeds that were projected would be others too.
+  !> Sets other inertias in one lane of a block. The start speeds stay, so they must not have been projected.
   subroutine update_inertia(self, lane, bodies, inertia, groups, is_indefinite)
     class(reduced_t), intent(inout) :: self
     integer, intent(in) :: lane
-    integer, intent(in) :: bodies(:)         !! with other inertias
-    real(wp), intent(in) :: inertia(:)       !! of those
-    integer, intent(in) :: groups(:)         !! groups of the machine in which they are
-    logical, intent(out) :: is_indefinite    !! the numbers of the lane are of no use then
+    integer, intent(in) :: bodies(:)        !! bodies whose inertia changes
+    real(wp), intent(in) :: inertia(:)      !! their new inertias [kg m2]
+    integer, intent(in) :: groups(:)        !! groups of the machine that contain these bodies
+    logical, intent(out) :: is_indefinite   !! the mass matrix is; the parameters of the lane are then invalid
     integer :: g
 
     is_indefinite = .not. all(inertia > 0)   ! whether a motion without inertia is left is for an assembly to find
@@ -157,8 +159,8 @@ contains
     call self%switching%refresh_selected(lane, self%incidence, self%machine%switches%element, with_ratio_only=.true.)
   end subroutine update_inertia
 
-  !> Lists what may differ from variant to variant, but for what the series takes when a lane is entered; of a block, or
-  !> laid out as one.
+  !> Registers all arrays whose values may differ from variant to variant. The parameters of the series are not among them:
+  !> `refresh_lane` updates those. The formulation must be a block, or laid out as one.
   subroutine list_parameters(self, parameters)
     class(reduced_t), target, intent(inout) :: self
     type(lane_parameters_t), intent(inout) :: parameters
@@ -175,7 +177,7 @@ contains
     call self%switching%list_parameters(parameters)
   end subroutine list_parameters
 
-  !> What saves work or is a copy follows the numbers.
+  !> Updates copies and precomputed values after the parameters of a lane have changed.
   subroutine refresh_lane(self, lane)
     class(reduced_t), intent(inout) :: self
     integer, intent(in) :: lane
@@ -187,6 +189,7 @@ contains
     if (allocated(self%lane_motion)) call self%lane_motion%invalidate(lane)
   end subroutine refresh_lane
 
+  !> Start speeds and angles of the coordinates and start values of the internal states; the work integrals are zero.
   function start(self) result(y)
     class(reduced_t), intent(in) :: self
     real(wp), allocatable :: y(:, :)
@@ -199,7 +202,7 @@ contains
     y(:, self%mechanical + 1:self%states) = self%machine%start_internal()
   end function start
 
-  !> The speeds of the coordinates in which one lane starts; the rest of the state stays.
+  !> Sets the start speeds of the coordinates of one lane; the rest of the state stays.
   pure subroutine project_start_speeds(self, lane, y)
     class(reduced_t), intent(in) :: self
     integer, intent(in) :: lane
@@ -209,7 +212,7 @@ contains
                                           y(:self%machine%coordinates%freedoms))
   end subroutine project_start_speeds
 
-  !> omega = L_tau q', eq. (82) of section 5.
+  !> omega = L_tau q', eq. (82) of section 5, and phi = start_angle + L_tau q.
   subroutine set_state(self, y)
     class(reduced_t), intent(inout) :: self
     real(wp), contiguous, intent(in) :: y(:, :)
@@ -231,6 +234,7 @@ contains
     end associate
   end subroutine set_state
 
+  !> q'' = R M, and the derivatives of internal states and work integrals.
   subroutine derivative(self, t, y, dydt, status)
     class(reduced_t), intent(inout) :: self
     real(wp), intent(in) :: t(self%lanes)
@@ -238,15 +242,17 @@ contains
     real(wp), intent(inout) :: dydt(self%lanes, self%states + self%quadratures)
     integer, intent(inout) :: status(self%lanes)
 
-    call advance(self, self%lanes * self%machine%coordinates%freedoms, self%lanes * self%internal, self%quadratures, t, y, dydt)
+    call fill_derivative(self, self%lanes * self%machine%coordinates%freedoms, self%lanes * self%internal, self%quadratures, &
+                         t, y, dydt)
   end subroutine derivative
 
-  !> The derivatives of the speeds and angles of the coordinates, of the inner states and of the works, one after the other.
-  subroutine advance(self, n, internal, quadratures, t, y, dydt)
+  !> The same with arrays of one dimension: derivatives of the coordinates' speeds, their angles, the internal states and the
+  !> work integrals follow one another.
+  subroutine fill_derivative(self, n, internal, quadratures, t, y, dydt)
     type(reduced_t), intent(inout) :: self
-    integer, intent(in) :: n       !! lanes * freedoms
-    integer, intent(in) :: internal   !! lanes * inner states
-    integer, intent(in) :: quadratures
+    integer, intent(in) :: n             !! lanes * freedoms
+    integer, intent(in) :: internal      !! lanes * internal states
+    integer, intent(in) :: quadratures   !! number of work integrals
     real(wp), intent(in) :: t(self%lanes)
     real(wp), intent(in) :: y(2 * n + internal)
     real(wp), intent(inout) :: dydt(2 * n + internal + self%lanes * quadratures)
@@ -264,13 +270,13 @@ contains
     end do
     if (internal > 0) call copy(internal, self%machine%elements%internal%rate, dydt(2 * n + 1))
     if (quadratures > 0) call self%machine%power(dydt(2 * n + internal + 1))
-  end subroutine advance
+  end subroutine fill_derivative
 
-  !> Brings the elements to a state and evaluates them.
+  !> Evaluates the elements at a state.
   subroutine evaluate_at(self, n, internal, t, y)
     type(reduced_t), intent(inout) :: self
-    integer, intent(in) :: n       !! lanes * freedoms
-    integer, intent(in) :: internal   !! lanes * inner states
+    integer, intent(in) :: n          !! lanes * freedoms
+    integer, intent(in) :: internal   !! lanes * internal states
     real(wp), intent(in) :: t(self%lanes)
     real(wp), intent(in) :: y(2 * n + internal)
 
@@ -279,6 +285,7 @@ contains
     call self%machine%evaluate_elements(t)
   end subroutine evaluate_at
 
+  !> Why the machine has no Taylor series, empty if it has one.
   function series_obstacle(self) result(obstacle)
     class(reduced_t), intent(in) :: self
     character(len=:), allocatable :: obstacle
@@ -286,6 +293,7 @@ contains
     obstacle = self%machine%series_obstacle()
   end function series_obstacle
 
+  !> Allocates the recurrence for series up to an order.
   subroutine prepare_series(self, order)
     class(reduced_t), intent(inout) :: self
     integer, intent(in) :: order
@@ -298,6 +306,7 @@ contains
     end if
   end subroutine prepare_series
 
+  !> Taylor coefficients of the solution through y(:, :, 0).
   subroutine series(self, order, columns, t, y, status)
     class(reduced_t), intent(inout) :: self
     integer, intent(in) :: order, columns
@@ -313,6 +322,7 @@ contains
     end if
   end subroutine series
 
+  !> Copies an array of any shape, by address.
   pure subroutine copy(n, x, y)
     integer, intent(in) :: n
     real(wp), intent(in) :: x(n)
@@ -321,6 +331,7 @@ contains
     y = x
   end subroutine copy
 
+  !> Relative angle and speed of the element of a switch.
   pure subroutine switch_motion(self, lane, switch, y, angle, speed)
     class(reduced_t), intent(in) :: self
     integer, intent(in) :: lane, switch
@@ -338,6 +349,7 @@ contains
     end associate
   end subroutine switch_motion
 
+  !> Values of the Jacobian at the positions of `jacobian_pattern`.
   subroutine jacobian(self, t, y, dfdy, dfdt, status)
     class(reduced_t), intent(inout) :: self
     real(wp), intent(in) :: t(self%lanes)
@@ -362,6 +374,7 @@ contains
     end associate
   end subroutine jacobian
 
+  !> Positions: those of the coordinates and work integrals, then those of the internal states.
   function jacobian_pattern(self) result(pattern)
     class(reduced_t), intent(in) :: self
     type(pattern_t) :: pattern
@@ -370,15 +383,16 @@ contains
     allocate (pattern%column, source=[self%element_jacobian%pattern%column, self%internal_rows%pattern%column])
   end function jacobian_pattern
 
-  !> Tooth forces straight from the torques of the elements.
+  !> Reactions from the torques of the last `observe`.
   subroutine reactions(self, lane, lambda)
     class(reduced_t), intent(inout) :: self
     integer, intent(in) :: lane
-    real(wp), intent(out) :: lambda(:)
+    real(wp), intent(out) :: lambda(:)   !! [rows]
 
     call self%machine%coordinates%reactions_of_torques(lane, self%torque(lane, 1:), lambda)
   end subroutine reactions
 
+  !> Name of a component of the state, for messages.
   function component_name(self, index) result(name)
     class(reduced_t), intent(in) :: self
     integer, intent(in) :: index

@@ -1,8 +1,8 @@
 !> The sparse Jacobian of the reduced formulation.
 !>
-!> With u' = U q' and q'' = R M, the derivative of q'' by q' is R diag(dM/du') U, that by q is R diag(dM/du) U: each
-!> element adds a product to the position of every pair of its coordinates. The products response * ratio are formed
-!> once, as are the positions; filling takes time linear in their number.
+!> With u' = U q' and q'' = R M, the derivative of q'' by q' is R diag(dM/du') U and the derivative by q is R diag(dM/du) U. Each
+!> element adds a product response * ratio * dM at the position of every pair of its coordinates. These products response * ratio
+!> and the positions are computed once, so the time to fill the Jacobian is linear in their number.
 module nocdyn_reduced_jacobian
   use nocdyn_element_coordinates, only: element_coordinates_t
   use nocdyn_elements, only: elements_t
@@ -15,19 +15,19 @@ module nocdyn_reduced_jacobian
 
   public :: new_reduced_jacobian
 
-  !> The values are the block dq''/dq', dq''/dq with the same pattern, the ones of dq/dt = q', then dW'/dq' and dW'/dq of each
-  !> entry of an accounted element, in turn.
+  !> Order of the values: the blocks dq''/dq' and dq''/dq with the same pattern; the ones of dq/dt = q'; then, for each entry of
+  !> each element with a work integral W, dW'/dq' and dW'/dq.
   type, public :: reduced_jacobian_t
     type(pattern_t) :: pattern
     integer, private :: freedoms = 0
-    integer, private :: pairs = 0                      !! positions of dq''/dq'
-    integer, allocatable, private :: element(:)        !! of each product
-    integer, allocatable, private :: position(:)          !! of each product, 1 to pairs
-    integer, allocatable, private :: response_entry(:)     !! entry of the response of each product
-    integer, allocatable, private :: ratio_entry(:)        !! entry of its ratio
-    real(wp), allocatable, private :: product(:, :)    !! response * ratio, [lanes, products]
-    integer, allocatable, private :: worker(:)         !! accounted element of each work's entry
-    real(wp), allocatable, private :: ratio(:, :)      !! of that entry, [lanes, work's entries]
+    integer, private :: pairs = 0                        !! number of positions of dq''/dq'
+    integer, allocatable, private :: element(:)          !! element of each product
+    integer, allocatable, private :: position(:)         !! position of each product, 1 to pairs
+    integer, allocatable, private :: response_entry(:)   !! entry of the response in each product
+    integer, allocatable, private :: ratio_entry(:)      !! entry of the ratio in each product
+    real(wp), allocatable, private :: product(:, :)      !! response * ratio, [lanes, products]
+    integer, allocatable, private :: work_element(:)     !! element of each entry of a work integral
+    real(wp), allocatable, private :: ratio(:, :)        !! ratio of these entries, [lanes, entries of work integrals]
   contains
     procedure :: fill
     procedure :: refresh_lane
@@ -36,12 +36,12 @@ module nocdyn_reduced_jacobian
 
 contains
 
-  !> The positions of the Jacobian of the reduced formulation.
+  !> The positions and products of a machine.
   function new_reduced_jacobian(freedoms, incidence, with_work, internal) result(self)
-    integer, intent(in) :: freedoms
-    type(element_coordinates_t), intent(in) :: incidence
-    integer, intent(in) :: with_work(:)   !! elements whose works follow the states
-    integer, intent(in) :: internal          !! states between those of the coordinates and the works
+    integer, intent(in) :: freedoms   !! number of coordinates
+    type(element_coordinates_t), intent(in) :: incidence   !! entries of all elements
+    integer, intent(in) :: with_work(:)   !! elements with work integrals
+    integer, intent(in) :: internal   !! number of internal states, which stand between the coordinates and the work integrals
     type(reduced_jacobian_t) :: self
     integer, allocatable :: row(:), column(:)
     integer :: c, e, products
@@ -57,11 +57,11 @@ contains
     self%pattern%row = [row, row, [(freedoms + c, c=1, freedoms)]]
     self%pattern%column = [column, freedoms + column, [(c, c=1, freedoms)]]
     call append_works(freedoms, incidence, with_work, 2 * freedoms + internal, self)
-    self%worker = [(spread(with_work(e), 1, incidence%first(with_work(e) + 1) - incidence%first(with_work(e))), &
-                    e=1, size(with_work))]
+    self%work_element = [(spread(with_work(e), 1, incidence%first(with_work(e) + 1) - incidence%first(with_work(e))), &
+                          e=1, size(with_work))]
   end function new_reduced_jacobian
 
-  !> Pairs of entries of an element of which the second has a ratio.
+  !> Number of pairs of entries of one element of which the second has a ratio.
   pure integer function product_count(incidence) result(products)
     type(element_coordinates_t), intent(in) :: incidence
     integer :: b, e
@@ -74,14 +74,14 @@ contains
     end do
   end function product_count
 
-  !> The products of those pairs, column by column, and their distinct positions.
+  !> Forms the products of these pairs, column by column, and their distinct positions.
   subroutine form_products(freedoms, incidence, row, column, self)
     integer, intent(in) :: freedoms
     type(element_coordinates_t), intent(in) :: incidence
     integer, intent(inout) :: row(:), column(:)   !! of each position
     type(reduced_jacobian_t), intent(inout) :: self
     integer :: element_of(size(incidence%coordinate)), order(size(incidence%coordinate)), first(freedoms + 1)
-    integer :: position(freedoms)   ! the position in this column, if not below `begin`
+    integer :: position(freedoms)   ! position of each row in the present column, if not below `begin`
     integer :: a, b, begin, e, i, n, q
 
     do e = 1, size(incidence%first) - 1
@@ -116,12 +116,12 @@ contains
     end do
   end subroutine form_products
 
-  !> The positions of the works' rows: two for each entry of an accounted element.
+  !> Appends the positions of the work integrals: two for each entry of an element.
   subroutine append_works(freedoms, incidence, with_work, states, self)
     integer, intent(in) :: freedoms
     type(element_coordinates_t), intent(in) :: incidence
-    integer, intent(in) :: with_work(:)
-    integer, intent(in) :: states
+    integer, intent(in) :: with_work(:)   !! elements with work integrals
+    integer, intent(in) :: states         !! number of states
     type(reduced_jacobian_t), intent(inout) :: self
     integer, allocatable :: row(:), column(:), entry(:)
     integer :: i, k, n
@@ -146,7 +146,7 @@ contains
     self%pattern%column = [self%pattern%column, column]
   end subroutine append_works
 
-  !> The values at the positions of `pattern`, from the elements after `differentiate`.
+  !> Computes the values at the positions of `pattern`, from the elements after `differentiate`.
   subroutine fill(self, elements, dfdy)
     class(reduced_jacobian_t), intent(in) :: self
     type(elements_t), intent(in) :: elements
@@ -165,8 +165,8 @@ contains
       end do
     end do
     at = 2 * self%pairs + self%freedoms
-    do n = 1, size(self%worker)
-      e = self%worker(n)
+    do n = 1, size(self%work_element)
+      e = self%work_element(n)
       do l = 1, size(dfdy, 1)
         associate (speed => elements%speed(l, e), ratio => self%ratio(l, n))
           dfdy(l, at + 1) = ratio * (elements%applied(l, e) + speed * elements%applied_speed(l, e))
@@ -177,7 +177,7 @@ contains
     end do
   end subroutine fill
 
-  !> The products of one lane anew.
+  !> Updates the products of one lane.
   pure subroutine refresh_lane(self, lane, incidence)
     class(reduced_jacobian_t), intent(inout) :: self
     integer, intent(in) :: lane
@@ -195,7 +195,7 @@ contains
 
     call parameters%add_structure(self%element)
     call parameters%add_structure(self%position)
-    call parameters%add_structure(self%worker)
+    call parameters%add_structure(self%work_element)
     call parameters%add_structure(self%pattern%row)
     call parameters%add_structure(self%pattern%column)
     call parameters%add('jacobian: product', self%product)

@@ -1,4 +1,4 @@
-!> How the elements of a machine depend on its coordinates, and its coordinates on the elements.
+!> How the twists of the elements depend on the coordinates, and the accelerations of the coordinates on the elements' moments.
 module nocdyn_element_coordinates
   use nocdyn_coordinates, only: coordinates_t
   use nocdyn_elements, only: elements_t
@@ -10,13 +10,13 @@ module nocdyn_element_coordinates
 
   public :: new_element_coordinates, twist_map
 
-  !> Element e has the entries first(e) to first(e + 1) - 1, one for each coordinate of its two bodies, in ascending order:
-  !> its speed is the sum of ratio * q'(coordinate), and its moment M adds response * M to q''(coordinate).
+  !> Element e has the entries first(e) to first(e + 1) - 1, one for each coordinate of its two bodies, in ascending order.
+  !> Its speed is the sum of ratio * q'(coordinate), and its moment M adds response * M to q''(coordinate).
   type, public :: element_coordinates_t
-    integer, allocatable :: first(:)           !! [elements + 1]
-    integer, allocatable :: coordinate(:)      !! [entries]
-    real(wp), allocatable :: ratio(:, :)       !! row of L_tau of `to` minus that of `from`, [lanes, entries]
-    real(wp), allocatable :: response(:, :)    !! the same difference of ((L_tau^T J L_tau)^-1 L_tau^T)^T, [lanes, entries]
+    integer, allocatable :: first(:)          !! first entry of each element, [elements + 1]
+    integer, allocatable :: coordinate(:)     !! [entries]
+    real(wp), allocatable :: ratio(:, :)      !! difference of the rows of L_tau of `to` and `from`, [lanes, entries]
+    real(wp), allocatable :: response(:, :)   !! the same difference of ((L_tau^T J L_tau)^-1 L_tau^T)^T, [lanes, entries]
   contains
     procedure :: selected
     procedure :: refresh_responses
@@ -27,12 +27,12 @@ module nocdyn_element_coordinates
 
 contains
 
-  !> The entries of all elements; both bodies of one may have the same coordinates, whose entries are then one.
+  !> The entries of all elements. A coordinate that both bodies of an element have is one entry.
   function new_element_coordinates(elements, coordinates) result(self)
     type(elements_t), intent(in) :: elements
     type(coordinates_t), intent(in) :: coordinates
     type(element_coordinates_t) :: self
-    integer :: entry_of(coordinates%freedoms)   ! the entry of a coordinate that an element already has
+    integer :: entry_of(coordinates%freedoms)   ! entry of each coordinate in the present element, if not below its first one
     integer :: e, entries
 
     entries = 0
@@ -56,10 +56,10 @@ contains
     self%response = self%response(:, :entries)
   end function new_element_coordinates
 
-  !> Those of some elements, in the given order.
+  !> The entries of some elements, in the given order.
   function selected(self, elements, with_ratio_only) result(some)
     class(element_coordinates_t), intent(in) :: self
-    integer, intent(in) :: elements(:)
+    integer, intent(in) :: elements(:)       !! numbers of the elements
     logical, intent(in) :: with_ratio_only   !! whether entries without ratio are left out
     type(element_coordinates_t) :: some
     integer, allocatable :: entry(:)
@@ -82,7 +82,7 @@ contains
     some%response(:, :) = self%response(:, entry(:next - 1))
   end function selected
 
-  !> The responses of one lane anew, in the entries that are there.
+  !> Updates the responses of one lane from the coordinates.
   pure subroutine refresh_responses(self, lane, elements, coordinates)
     class(element_coordinates_t), intent(inout) :: self
     integer, intent(in) :: lane
@@ -97,12 +97,13 @@ contains
     end do
   end subroutine refresh_responses
 
+  !> Adds the response of one body to those of an element in one lane.
   pure subroutine add_response(coordinates, body, sign, lane, begin, self)
     type(coordinates_t), intent(in) :: coordinates
-    integer, intent(in) :: body     !! 0 = ground, which has none
-    real(wp), intent(in) :: sign
+    integer, intent(in) :: body    !! 0 = ground, which has none
+    real(wp), intent(in) :: sign   !! 1 for `to`, -1 for `from`
     integer, intent(in) :: lane
-    integer, intent(in) :: begin    !! first entry of the element
+    integer, intent(in) :: begin   !! first entry of the element
     type(element_coordinates_t), intent(inout) :: self
     integer :: k, of_body
 
@@ -116,13 +117,13 @@ contains
     end do
   end subroutine add_response
 
-  !> The responses of one lane anew, in entries that are those of `selected`.
+  !> Updates the responses of one lane in entries made by `selected`.
   pure subroutine refresh_selected(self, lane, all, elements, with_ratio_only)
     class(element_coordinates_t), intent(inout) :: self
     integer, intent(in) :: lane
-    type(element_coordinates_t), intent(in) :: all
-    integer, intent(in) :: elements(:)
-    logical, intent(in) :: with_ratio_only
+    type(element_coordinates_t), intent(in) :: all   !! entries of all elements
+    integer, intent(in) :: elements(:)               !! as given to `selected`
+    logical, intent(in) :: with_ratio_only           !! as given to `selected`
     integer :: i, k, next
 
     next = 0
@@ -135,7 +136,8 @@ contains
     end do
   end subroutine refresh_selected
 
-  !> Whether an element turns with the coordinate of an entry. In a group of several freedoms it may respond without.
+  !> Whether an element turns with the coordinate of an entry. In a group of several freedoms an element may change the
+  !> acceleration of a coordinate with which it does not turn.
   pure logical function has_ratio(self, entry)
     class(element_coordinates_t), intent(in) :: self
     integer, intent(in) :: entry
@@ -143,22 +145,23 @@ contains
     has_ratio = any(abs(self%ratio(:, entry)) > 0.0_wp)
   end function has_ratio
 
+  !> Number of coordinates of a body.
   pure integer function body_entries(coordinates, body)
     type(coordinates_t), intent(in) :: coordinates
-    integer, intent(in) :: body
+    integer, intent(in) :: body   !! 0 = ground, which has none
 
     body_entries = 0
     if (body > 0) body_entries = coordinates%first(body + 1) - coordinates%first(body)
   end function body_entries
 
-  !> Adds the coordinates of a body to those of an element; both bodies may have the same.
+  !> Adds the coordinates of a body to the entries of an element.
   pure subroutine add_body(coordinates, body, sign, begin, next, entry_of, self)
     type(coordinates_t), intent(in) :: coordinates
-    integer, intent(in) :: body           !! 0 = ground, which has none
-    real(wp), intent(in) :: sign
-    integer, intent(in) :: begin          !! first entry of the element
-    integer, intent(inout) :: next        !! its next free entry
-    integer, intent(inout) :: entry_of(:)
+    integer, intent(in) :: body             !! 0 = ground, which has none
+    real(wp), intent(in) :: sign            !! 1 for `to`, -1 for `from`
+    integer, intent(in) :: begin            !! first entry of the element
+    integer, intent(inout) :: next          !! next free entry
+    integer, intent(inout) :: entry_of(:)   !! entry of each coordinate, [freedoms]; below `begin`: not in this element yet
     type(element_coordinates_t), intent(inout) :: self
     integer :: c, k
 
@@ -176,10 +179,10 @@ contains
     end do
   end subroutine add_body
 
-  !> Puts the entries of an element into the order of their coordinates.
+  !> Sorts the entries of an element by their coordinates.
   pure subroutine sort_entries(self, begin, end)
     type(element_coordinates_t), intent(inout) :: self
-    integer, intent(in) :: begin, end
+    integer, intent(in) :: begin, end   !! first and last entry of the element
     integer :: least, k, other
 
     do k = begin, end - 1
@@ -202,27 +205,17 @@ contains
     call parameters%add('elements: response', self%response)
   end subroutine list_parameters
 
-  !> U, whose rows are the elements: their speeds are U q'.
+  !> The map U from coordinates to twists: the speeds of the elements are U q'.
   function twist_map(incidence, without_offset, without_bands) result(map)
     type(element_coordinates_t), intent(in) :: incidence
-    logical, intent(in) :: without_offset   !! whether the start twists are zero
-    logical, intent(in) :: without_bands         !! whether the map has no stretches
+    logical, intent(in) :: without_offset   !! whether all start twists are zero
+    logical, intent(in) :: without_bands    !! whether the map is stored by rows only
     type(sparse_map_t) :: map
-    integer :: kept(size(incidence%coordinate)), first(size(incidence%first))
-    integer :: e, entry, next
+    type(element_coordinates_t) :: turning   ! entries with a ratio
+    integer :: e
 
-    next = 1
-    do e = 1, size(first) - 1
-      first(e) = next
-      do entry = incidence%first(e), incidence%first(e + 1) - 1
-        if (.not. incidence%has_ratio(entry)) cycle
-        kept(next) = entry
-        next = next + 1
-      end do
-    end do
-    first(size(first)) = next
-    map = new_sparse_map(first, incidence%coordinate(kept(:next - 1)), incidence%ratio(:, kept(:next - 1)), without_offset, &
-                         without_bands)
+    turning = incidence%selected([(e, e=1, size(incidence%first) - 1)], with_ratio_only=.true.)
+    map = new_sparse_map(turning%first, turning%coordinate, turning%ratio, without_offset, without_bands)
   end function twist_map
 
 end module nocdyn_element_coordinates

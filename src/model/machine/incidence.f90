@@ -1,4 +1,4 @@
-!> How an element between two bodies enters the vectors and matrices of the machine; body 0 is the ground.
+!> How an element between two bodies contributes to the vectors and matrices of the machine. Body 0 is the ground.
 module nocdyn_incidence
   use nocdyn_kinds, only: wp
   implicit none (type, external)
@@ -8,21 +8,21 @@ module nocdyn_incidence
 
 contains
 
-  !> A moment on `to` and its opposite on `from`; the ground takes what it gets.
+  !> Adds a moment on `to` and its opposite on `from`; nothing for the ground.
   pure subroutine add_moment(from, to, moment, vector)
     integer, intent(in) :: from, to
-    real(wp), intent(in) :: moment
-    real(wp), intent(inout) :: vector(:)
+    real(wp), intent(in) :: moment         !! [N m], or any derivative of it
+    real(wp), intent(inout) :: vector(:)   !! [bodies]
 
     if (to > 0) vector(to) = vector(to) + moment
     if (from > 0) vector(from) = vector(from) - moment
   end subroutine add_moment
 
-  !> The pattern of eq. (21): -k on the diagonal, k beside it.
+  !> Adds the pattern of eq. (21): -k on the diagonal, k beside it.
   pure subroutine add_coefficient(from, to, coefficient, matrix)
     integer, intent(in) :: from, to
-    real(wp), intent(in) :: coefficient
-    real(wp), intent(inout) :: matrix(:, :)
+    real(wp), intent(in) :: coefficient       !! k
+    real(wp), intent(inout) :: matrix(:, :)   !! [bodies, bodies]
 
     if (to > 0) matrix(to, to) = matrix(to, to) - coefficient
     if (from > 0) matrix(from, from) = matrix(from, from) - coefficient
@@ -32,12 +32,12 @@ contains
     end if
   end subroutine add_coefficient
 
-  !> The pattern of eq. (21) for many elements, with k = factor * coefficient.
+  !> Adds the pattern of eq. (21) for many elements, with k = factor * coefficient.
   pure subroutine add_coefficients(from, to, factor, coefficient, matrix)
-    integer, intent(in) :: from(:), to(:)          !! [elements]
+    integer, intent(in) :: from(:), to(:)   !! [elements]
     real(wp), intent(in) :: factor
-    real(wp), intent(in) :: coefficient(:)         !! [elements]
-    real(wp), intent(inout) :: matrix(:, :)
+    real(wp), intent(in) :: coefficient(:)    !! [elements]
+    real(wp), intent(inout) :: matrix(:, :)   !! [bodies, bodies]
     integer :: e
 
     do e = 1, size(to)

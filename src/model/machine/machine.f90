@@ -1,4 +1,4 @@
-!> A machine: bodies, banks of elements, constraints and the coordinates that they leave, on a block of lanes.
+!> A machine on a block of lanes: bodies, banks of elements, constraints, and the independent coordinates.
 module nocdyn_machine
   use nocdyn_bank, only: bank_slot_t, bank_t, role_names
   use nocdyn_constraints, only: constraints_t
@@ -14,28 +14,28 @@ module nocdyn_machine
   implicit none (type, external)
   private
 
-  !> What happened to start speeds that violated constraints and were projected.
+  !> Impulses of the start: start speeds that violate constraints are projected on those that obey them.
   type, public :: start_impulse_t
-    integer, allocatable :: row(:)            !! those with an impulse: violated ones, and others geared to them
-    real(wp), allocatable :: impulse(:)       !! in each of them, [unit of its multiplier * s]
-    real(wp) :: energy_lost = 0.0_wp          !! [J]
+    integer, allocatable :: row(:)        !! constraint rows with an impulse: violated rows, and rows geared to them
+    real(wp), allocatable :: impulse(:)   !! impulse in each of these rows [unit of the row's multiplier * s]
+    real(wp) :: energy_lost = 0.0_wp      !! kinetic energy lost [J]
   end type start_impulse_t
 
   type, public :: machine_t
     integer :: lanes = 1
     integer :: bodies = 0
-    type(string_t), allocatable :: names(:)         !! of the bodies
-    real(wp), allocatable :: inertia(:, :)          !! J [kg m2], shape [lanes, bodies]
-    real(wp), allocatable :: start_angle(:, :)      !! [rad]
-    real(wp), allocatable :: start_speed(:, :)      !! [rad/s], obeys the constraints
-    type(start_impulse_t), allocatable :: start_impulse       !! if the start speeds of the input had to be projected
+    type(string_t), allocatable :: names(:)               !! names of the bodies
+    real(wp), allocatable :: inertia(:, :)                !! J [kg m2], shape [lanes, bodies]
+    real(wp), allocatable :: start_angle(:, :)            !! [rad], [lanes, bodies]
+    real(wp), allocatable :: start_speed(:, :)            !! [rad/s], [lanes, bodies], obeys the constraints
+    type(start_impulse_t), allocatable :: start_impulse   !! if the start speeds of the input were projected
     type(bank_slot_t), allocatable :: banks(:)
-    type(elements_t) :: elements                    !! of all banks, after `number_elements`
-    type(polynomial_laws_t) :: laws                 !! what of their laws is polynomial, after `number_elements`
-    integer, allocatable :: general_banks(:)          !! those whose laws are more than that
-    integer, allocatable :: internal_banks(:)          !! those whose elements have inner states
-    type(switches_t) :: switches                    !! of all banks, after `number_elements`
-    integer, allocatable :: with_work(:)            !! elements whose power may be integrated, [accounts]
+    type(elements_t) :: elements                !! elements of all banks, after `number_elements`
+    type(polynomial_laws_t) :: laws             !! polynomial parts of their laws, after `number_elements`
+    integer, allocatable :: general_banks(:)    !! banks with laws that are not polynomials
+    integer, allocatable :: internal_banks(:)   !! banks with internal states
+    type(switches_t) :: switches                !! switches of all banks, after `number_elements`
+    integer, allocatable :: with_work(:)        !! elements whose power may be integrated, [work_count]
     type(constraints_t) :: constraints
     type(rigid_trains_t) :: trains
     type(geared_group_t), allocatable :: groups(:)
@@ -64,7 +64,7 @@ module nocdyn_machine
 
 contains
 
-  !> Numbers the elements of all banks through; to be called once the banks are there.
+  !> Numbers the elements of all banks consecutively, and collects their laws and switches. Call it once all banks are set.
   subroutine number_elements(self)
     class(machine_t), intent(inout) :: self
     integer :: i, internal, total
@@ -96,7 +96,7 @@ contains
     self%switches = new_switches(self%banks)
   end subroutine number_elements
 
-  !> Lists what may differ from variant to variant.
+  !> Registers all arrays whose values may differ from variant to variant.
   subroutine list_parameters(self, parameters)
     class(machine_t), target, intent(inout) :: self
     type(lane_parameters_t), intent(inout) :: parameters
@@ -115,7 +115,8 @@ contains
     call self%coordinates%list_parameters(parameters)
   end subroutine list_parameters
 
-  !> Leaves the mean torques of a machine that has run for long; to be evaluated at a late time.
+  !> Replaces periodic torques by their means, for the search of a steady state; to be evaluated at a time after all transients
+  !> of the excitations.
   subroutine to_mean_torque(self)
     class(machine_t), intent(inout) :: self
     integer :: i
@@ -126,7 +127,7 @@ contains
     call self%number_elements()
   end subroutine to_mean_torque
 
-  !> The elements that can have a restoring moment.
+  !> Elements that can have a restoring moment, ascending.
   pure function elastic(self) result(elements)
     class(machine_t), intent(in) :: self
     integer, allocatable :: elements(:)
@@ -135,7 +136,7 @@ contains
     elements = [(self%banks(i)%bank%first - 1 + self%banks(i)%bank%elastic, i=1, size(self%banks))]
   end function elastic
 
-  !> The inner states at the start, [lanes, inner states].
+  !> Internal states at the start, [lanes, internal states].
   function start_internal(self) result(internal)
     class(machine_t), intent(in) :: self
     real(wp), allocatable :: internal(:, :)
@@ -153,10 +154,10 @@ contains
     end do
   end function start_internal
 
-  !> E.g. "armature current of 'drive'".
+  !> Name of an internal state for messages, e.g. "armature current of motor 'drive'".
   function internal_name(self, index) result(name)
     class(machine_t), intent(in) :: self
-    integer, intent(in) :: index   !! 1 to elements%inner%count
+    integer, intent(in) :: index   !! 1 to elements%internal%count
     character(len=:), allocatable :: name
     integer :: i
 
@@ -173,11 +174,12 @@ contains
     error stop 'nocdyn_machine: there are not so many inner states'
   end function internal_name
 
-  !> Chooses the branches of all lanes, from the inner states in `elements`.
+  !> Chooses the branches of the laws in all lanes; reads the internal states in `elements`.
   subroutine choose_branches(self, t, phi, omega)
     class(machine_t), intent(inout) :: self
-    real(wp), contiguous, intent(in) :: t(:)
-    real(wp), contiguous, intent(in) :: phi(:, 0:), omega(:, 0:)   !! [lanes, ground and bodies]
+    real(wp), contiguous, intent(in) :: t(:)           !! [s], [lanes]
+    real(wp), contiguous, intent(in) :: phi(:, 0:)     !! angles [rad], [lanes, 0:bodies], body 0 is the ground
+    real(wp), contiguous, intent(in) :: omega(:, 0:)   !! speeds [rad/s], [lanes, 0:bodies]
     integer :: k, lane
 
     associate (switches => self%switches, internal => self%elements%internal%value)
@@ -193,25 +195,26 @@ contains
     end associate
   end subroutine choose_branches
 
-  !> How many elements may have their power integrated.
+  !> Number of elements whose power may be integrated.
   pure integer function work_count(self)
     class(machine_t), intent(in) :: self
 
     work_count = size(self%with_work)
   end function work_count
 
-  !> Name of the element whose power is integrated as number `index`.
+  !> Name of the element whose power is work integral number `index`.
   pure function work_element_name(self, index) result(name)
     class(machine_t), intent(in) :: self
-    integer, intent(in) :: index   !! 1 to accounts
+    integer, intent(in) :: index   !! 1 to work_count
     character(len=:), allocatable :: name
 
     name = self%element_name(self%with_work(index))
   end function work_element_name
 
+  !> Name of an element.
   pure function element_name(self, element) result(name)
     class(machine_t), intent(in) :: self
-    integer, intent(in) :: element
+    integer, intent(in) :: element   !! number in the machine
     character(len=:), allocatable :: name
     integer :: i
 
@@ -226,22 +229,23 @@ contains
     error stop 'nocdyn_machine: there are not so many elements'
   end function element_name
 
-  !> The torques T = Q + C omega + K phi of all elements on the bodies, the right-hand side of eq. (12) without reactions.
+  !> Torques T = Q + C omega + K phi of all elements on the bodies: the right-hand side of eq. (12) without reactions.
   subroutine evaluate(self, t, phi, omega, torque)
     class(machine_t), intent(inout) :: self
-    real(wp), contiguous, intent(in) :: t(:)
-    real(wp), contiguous, intent(in) :: phi(:, 0:), omega(:, 0:)   !! [lanes, ground and bodies]
-    real(wp), contiguous, intent(inout) :: torque(:, 0:)
+    real(wp), contiguous, intent(in) :: t(:)               !! [s], [lanes]
+    real(wp), contiguous, intent(in) :: phi(:, 0:)         !! angles [rad], [lanes, 0:bodies], body 0 is the ground
+    real(wp), contiguous, intent(in) :: omega(:, 0:)       !! speeds [rad/s], [lanes, 0:bodies]
+    real(wp), contiguous, intent(inout) :: torque(:, 0:)   !! [N m], [lanes, 0:bodies]
 
     call self%elements%gather(phi, omega)
     call self%evaluate_elements(t)
     call self%elements%scatter(torque)
   end subroutine evaluate
 
-  !> The moments of all elements from their angles and speeds.
+  !> Moments of all elements, from the angles and speeds in `elements`.
   subroutine evaluate_elements(self, t)
     class(machine_t), intent(inout) :: self
-    real(wp), intent(in) :: t(self%lanes)
+    real(wp), intent(in) :: t(self%lanes)   !! [s]
     integer :: i
 
     call self%laws%evaluate(self%elements)
@@ -259,45 +263,48 @@ contains
     end do
   end subroutine evaluate_elements
 
-  !> Hands a bank its part of the values, by address alone.
+  !> Calls the law of a bank with its part of all values. Only addresses are passed, no array descriptors.
   subroutine evaluate_bank(bank, n, t, angle, speed, restoring, applied)
     class(bank_t), intent(in) :: bank
-    integer, intent(in) :: n   ! lanes * elements
-    real(wp), intent(in) :: t(bank%lanes), angle(n), speed(n)
-    real(wp), intent(inout) :: restoring(n), applied(n)
+    integer, intent(in) :: n                              !! lanes * elements of the machine
+    real(wp), intent(in) :: t(bank%lanes)                 !! [s]
+    real(wp), intent(in) :: angle(n), speed(n)            !! [rad], [rad/s]
+    real(wp), intent(inout) :: restoring(n), applied(n)   !! [N m]
 
     associate (first => bank%first_value)
       call bank%evaluate(t, angle(first), speed(first), restoring(first), applied(first))
     end associate
   end subroutine evaluate_bank
 
+  !> The same for the rates and torques of the internal states of a bank.
   subroutine evaluate_internal_of_bank(bank, n, internal_values, speed, internal, applied, rate)
     class(bank_t), intent(in) :: bank
-    integer, intent(in) :: n              ! lanes * elements
-    integer, intent(in) :: internal_values   ! lanes * inner states
-    real(wp), intent(in) :: speed(n), internal(internal_values)
-    real(wp), intent(inout) :: applied(n), rate(internal_values)
+    integer, intent(in) :: n                                       !! lanes * elements of the machine
+    integer, intent(in) :: internal_values                         !! lanes * internal states of the machine
+    real(wp), intent(in) :: speed(n), internal(internal_values)    !! [rad/s], internal states
+    real(wp), intent(inout) :: applied(n), rate(internal_values)   !! [N m], derivatives of the internal states
 
     associate (first => bank%first_value, first_internal => bank%first_internal_value)
       call bank%evaluate_internal(speed(first), internal(first_internal), applied(first), rate(first_internal))
     end associate
   end subroutine evaluate_internal_of_bank
 
-  !> The moments of all elements and their derivatives.
+  !> Moments of all elements and their derivatives.
   subroutine differentiate(self, t, phi, omega)
     class(machine_t), intent(inout) :: self
-    real(wp), contiguous, intent(in) :: t(:)
-    real(wp), contiguous, intent(in) :: phi(:, 0:), omega(:, 0:)   !! [lanes, ground and bodies]
+    real(wp), contiguous, intent(in) :: t(:)           !! [s], [lanes]
+    real(wp), contiguous, intent(in) :: phi(:, 0:)     !! angles [rad], [lanes, 0:bodies], body 0 is the ground
+    real(wp), contiguous, intent(in) :: omega(:, 0:)   !! speeds [rad/s], [lanes, 0:bodies]
 
     call self%elements%gather(phi, omega)
     call self%evaluate_elements(t)
     call self%differentiate_elements(t)
   end subroutine differentiate
 
-  !> The derivatives of the moments, after `evaluate_elements`.
+  !> Derivatives of the moments, after `evaluate_elements`.
   subroutine differentiate_elements(self, t)
     class(machine_t), intent(inout) :: self
-    real(wp), intent(in) :: t(self%lanes)
+    real(wp), intent(in) :: t(self%lanes)   !! [s]
     integer :: i
 
     self%elements%time(:) = t
@@ -307,7 +314,7 @@ contains
     end do
   end subroutine differentiate_elements
 
-  !> Stored energies, secant stiffnesses and dampings of all elements from their angles.
+  !> Stored energies, secant stiffnesses and secant dampings of all elements, from the angles and speeds in `elements`.
   subroutine evaluate_energies(self)
     class(machine_t), intent(inout) :: self
     integer :: i
@@ -318,7 +325,7 @@ contains
     end do
   end subroutine evaluate_energies
 
-  !> The first element that has no Taylor series, as a sentence; empty if all have one.
+  !> Sentence about the first element without a Taylor series; empty if every element has one.
   function series_obstacle(self) result(obstacle)
     class(machine_t), intent(in) :: self
     character(len=:), allocatable :: obstacle
@@ -334,10 +341,10 @@ contains
     end do
   end function series_obstacle
 
-  !> Power of the accounted elements after `evaluate`, positive into the machine [W].
+  !> Powers of the elements `with_work` after `evaluate`, positive into the machine.
   subroutine power(self, watts)
     class(machine_t), intent(in) :: self
-    real(wp), intent(inout) :: watts(self%lanes, size(self%with_work))
+    real(wp), intent(inout) :: watts(self%lanes, size(self%with_work))   !! [W]
     integer :: e, k, l
 
     do k = 1, size(self%with_work)
@@ -348,17 +355,17 @@ contains
     end do
   end subroutine power
 
-  !> omega^T J omega / 2 of one lane [J].
+  !> Kinetic energy omega^T J omega / 2 of one lane [J].
   pure function kinetic_energy(self, lane, omega) result(energy)
     class(machine_t), intent(in) :: self
     integer, intent(in) :: lane
-    real(wp), intent(in) :: omega(:)   !! [bodies]
+    real(wp), intent(in) :: omega(:)   !! [rad/s], [bodies]
     real(wp) :: energy
 
     energy = 0.5_wp * sum(self%inertia(lane, :) * omega**2)
   end function kinetic_energy
 
-  !> Potential energy in the elements of one lane, at the angles of the last `evaluate` [J].
+  !> Potential energy of the elements of one lane, at the angles of the last `evaluate` [J].
   function stored_energy(self, lane) result(energy)
     class(machine_t), intent(inout) :: self
     integer, intent(in) :: lane
