@@ -1,7 +1,10 @@
-!> The accelerations of many lanes of a machine whose moments are polynomials or depend on the time alone: the same as those
-!> of `sparse_map_t` and `polynomial_laws_t`, to the last bit, without what no lane has.
+!> Accelerations of a block of many lanes, for machines whose laws are polynomials or depend on the time alone.
 !>
+!> The results have the same bits as those of `sparse_map_t` and `polynomial_laws_t`. Terms that no lane has are left out.
 !> Torques that depend on the time alone are kept while the times stay, as in the last two stages of a Runge-Kutta step.
+!>
+!> The procedures have up to 12 arguments. Their arrays have explicit shapes and are no components of types: gfortran then knows
+!> that they are contiguous and vectorises every loop over a strip.
 module nocdyn_lane_motion
   use nocdyn_kinds, only: wp
   use nocdyn_lane_terms, only: lane_terms_t
@@ -12,15 +15,15 @@ module nocdyn_lane_motion
 
   public :: new_lane_motion
 
-  integer, parameter, public :: motion_strip = 32   !! lanes that are moved at a time; their number is a multiple of it
+  integer, parameter, public :: motion_strip = 32   !! lanes that are computed together; the lanes of a block must be a multiple
   integer, parameter :: strip = motion_strip
 
   type, public :: lane_motion_t
     private
-    real(wp), allocatable :: angle(:), speed(:)   !! u - rest, u' of one element, [strip]
-    real(wp), allocatable :: moment(:, :)   !! [lanes, elements]; those of external elements hold at `time`
-    real(wp), allocatable :: time(:)        !! [lanes]
-    real(wp), allocatable :: zeros(:, :)     !! for the restoring moments that external banks do not have
+    real(wp), allocatable :: angle(:), speed(:)   !! u - rest [rad], u' [rad/s] of one element, [strip]
+    real(wp), allocatable :: moment(:, :)   !! [N m], [lanes, elements]; values of the time-only elements hold at `time`
+    real(wp), allocatable :: time(:)   !! [s], [lanes]
+    real(wp), allocatable :: zeros(:, :)   !! for the restoring moments that time-only banks do not have, [lanes, elements]
   contains
     procedure :: invalidate
     procedure :: accelerate
@@ -30,6 +33,7 @@ module nocdyn_lane_motion
 
 contains
 
+  !> Work space for a block.
   pure function new_lane_motion(lanes, elements) result(self)
     integer, intent(in) :: lanes, elements
     type(lane_motion_t) :: self
@@ -39,7 +43,7 @@ contains
     allocate (self%time(lanes), source=no_time)
   end function new_lane_motion
 
-  !> A lane may have other numbers than before.
+  !> Marks the kept torques of a lane as out of date, after its parameters have changed.
   pure subroutine invalidate(self, lane)
     class(lane_motion_t), intent(inout) :: self
     integer, intent(in) :: lane
@@ -47,17 +51,17 @@ contains
     self%time(lane) = no_time
   end subroutine invalidate
 
-  !> q'' = R M.
+  !> Computes q'' = R M.
   subroutine accelerate(self, machine, terms, twists, accelerations, start_twist, t, speed, angle, acceleration)
     class(lane_motion_t), intent(inout) :: self
     type(machine_t), intent(in) :: machine
     type(lane_terms_t), intent(in) :: terms
-    type(sparse_map_t), intent(in) :: twists          !! U
-    type(sparse_map_t), intent(in) :: accelerations   !! R
-    real(wp), intent(in) :: start_twist(machine%lanes, size(terms%is_time_only))
-    real(wp), intent(in) :: t(machine%lanes)
-    real(wp), intent(in), dimension(machine%lanes, machine%coordinates%freedoms) :: speed, angle   !! q', q
-    real(wp), intent(inout) :: acceleration(machine%lanes, machine%coordinates%freedoms)
+    type(sparse_map_t), intent(in) :: twists                                                       !! U
+    type(sparse_map_t), intent(in) :: accelerations                                                !! R
+    real(wp), intent(in) :: start_twist(machine%lanes, size(terms%is_time_only))                   !! [rad]
+    real(wp), intent(in) :: t(machine%lanes)                                                       !! [s]
+    real(wp), intent(in), dimension(machine%lanes, machine%coordinates%freedoms) :: speed, angle   !! q' [rad/s], q [rad]
+    real(wp), intent(inout) :: acceleration(machine%lanes, machine%coordinates%freedoms)           !! q'' [rad/s2]
     integer :: at
 
     if (time_differs(machine%lanes, t, self%time)) call evaluate_external(self, machine, terms, t)
@@ -68,15 +72,15 @@ contains
     end do
   end subroutine accelerate
 
-  !> The moments of the elements that are not external, in the lanes from `at` on.
+  !> Moments of the elements that do not depend on the time alone, in the lanes `at` to `at + strip - 1`.
   pure subroutine find_moments(self, machine, terms, twists, start_twist, at, lanes, freedoms, speed, angle)
     type(lane_motion_t), intent(inout) :: self
     type(machine_t), intent(in) :: machine
     type(lane_terms_t), intent(in) :: terms
-    type(sparse_map_t), intent(in) :: twists
+    type(sparse_map_t), intent(in) :: twists   !! U
     integer, intent(in) :: at, lanes, freedoms
-    real(wp), intent(in) :: start_twist(lanes, size(terms%is_time_only))
-    real(wp), intent(in), dimension(lanes, freedoms) :: speed, angle
+    real(wp), intent(in) :: start_twist(lanes, size(terms%is_time_only))   !! [rad]
+    real(wp), intent(in), dimension(lanes, freedoms) :: speed, angle       !! q', q
     integer :: e
 
     associate (laws => machine%laws, entries => size(twists%column), column => twists%column, ratio => twists%coefficient)
@@ -85,7 +89,7 @@ contains
         associate (first => twists%first(e), last => twists%first(e + 1) - 1)
           if (terms%has_speed(e)) then
             call sum_speeds(lanes, at, freedoms, entries, first, last, column, ratio, speed, self%speed)
-            call find_working(terms%has_square(e), laws%constant(at, e), laws%by_speed(at, e), laws%by_speed_squared(at, e), &
+            call find_applied(terms%has_square(e), laws%constant(at, e), laws%by_speed(at, e), laws%by_speed_squared(at, e), &
                               self%speed, self%moment(at, e))
           else
             self%moment(at:at + strip - 1, e) = laws%constant(at:at + strip - 1, e)
@@ -100,10 +104,10 @@ contains
     end associate
   end subroutine find_moments
 
-  !> Whether any of the times is another one.
+  !> Whether the time of any lane has changed.
   pure logical function time_differs(lanes, t, time)
     integer, intent(in) :: lanes
-    real(wp), intent(in) :: t(lanes), time(lanes)
+    real(wp), intent(in) :: t(lanes), time(lanes)   !! [s], present and kept times
     real(wp) :: largest(strip), part(strip / 4)
     integer :: before, l
 
@@ -121,12 +125,12 @@ contains
     time_differs = max(max(max(part(1), part(2)), max(part(3), part(4))), max(max(part(5), part(6)), max(part(7), part(8)))) > 0
   end function time_differs
 
-  !> The torques that depend on the time alone.
+  !> Evaluates the torques that depend on the time alone.
   subroutine evaluate_external(self, machine, terms, t)
     type(lane_motion_t), intent(inout) :: self
     type(machine_t), intent(in) :: machine
     type(lane_terms_t), intent(in) :: terms
-    real(wp), intent(in) :: t(machine%lanes)
+    real(wp), intent(in) :: t(machine%lanes)   !! [s]
     integer :: e, i
 
     self%time(:) = t
@@ -143,12 +147,12 @@ contains
     end do
   end subroutine evaluate_external
 
-  !> u' of an element, from the entries `first` to `last` of U.
+  !> Computes u' of an element, from the entries `first` to `last` of U.
   pure subroutine sum_speeds(lanes, at, freedoms, entries, first, last, column, ratio, q, v)
     integer, intent(in) :: lanes, at, freedoms, entries, first, last
-    integer, intent(in) :: column(entries)
-    real(wp), intent(in) :: ratio(lanes, entries), q(lanes, freedoms)
-    real(wp), intent(inout) :: v(strip)
+    integer, intent(in) :: column(entries)                              !! of the entries of U
+    real(wp), intent(in) :: ratio(lanes, entries), q(lanes, freedoms)   !! of the entries of U; q'
+    real(wp), intent(inout) :: v(strip)                                 !! u' of the lanes of the strip
     integer :: b, c, d, k
 
     b = at + strip - 1
@@ -169,12 +173,13 @@ contains
     end select
   end subroutine sum_speeds
 
-  !> u - rest of an element.
+  !> Computes u - rest of an element, from the entries `first` to `last` of U.
   pure subroutine sum_angles(lanes, at, freedoms, entries, first, last, column, ratio, q, start, rest, w)
     integer, intent(in) :: lanes, at, freedoms, entries, first, last
-    integer, intent(in) :: column(entries)
-    real(wp), intent(in) :: ratio(lanes, entries), q(lanes, freedoms), start(strip), rest(strip)
-    real(wp), intent(inout) :: w(strip)
+    integer, intent(in) :: column(entries)                              !! of the entries of U
+    real(wp), intent(in) :: ratio(lanes, entries), q(lanes, freedoms)   !! of the entries of U; q
+    real(wp), intent(in) :: start(strip), rest(strip)                   !! start twist and rest angle [rad]
+    real(wp), intent(inout) :: w(strip)                                 !! u - rest of the lanes of the strip
     integer :: b, c, d, k
 
     b = at + strip - 1
@@ -196,7 +201,8 @@ contains
     end select
   end subroutine sum_angles
 
-  pure subroutine find_working(has_square, constant, by_speed, by_speed_squared, v, moment)
+  !> Moment of the terms that depend on the speed v, and of the constant.
+  pure subroutine find_applied(has_square, constant, by_speed, by_speed_squared, v, moment)
     logical, intent(in) :: has_square
     real(wp), intent(in), dimension(strip) :: constant, by_speed, by_speed_squared, v
     real(wp), intent(inout) :: moment(strip)
@@ -206,8 +212,9 @@ contains
     else
       moment = constant + by_speed * v
     end if
-  end subroutine find_working
+  end subroutine find_applied
 
+  !> Adds the moment of the terms that depend on w = u - rest.
   pure subroutine add_restoring(has_cubic, linear, cubic, w, moment)
     logical, intent(in) :: has_cubic
     real(wp), intent(in), dimension(strip) :: linear, cubic, w
@@ -220,10 +227,10 @@ contains
     end if
   end subroutine add_restoring
 
-  !> R M, in the lanes from `at` on.
+  !> Computes R M, in the lanes `at` to `at + strip - 1`.
   pure subroutine sum_moments(lanes, at, elements, freedoms, entries, first, element, response, moment, acceleration)
     integer, intent(in) :: lanes, at, elements, freedoms, entries
-    integer, intent(in) :: first(freedoms + 1), element(entries)
+    integer, intent(in) :: first(freedoms + 1), element(entries)   !! first entry of each coordinate, element of each entry of R
     real(wp), intent(in) :: response(lanes, entries), moment(lanes, elements)
     real(wp), intent(inout) :: acceleration(lanes, freedoms)
     integer :: a, b, i, k, l, m, n

@@ -1,8 +1,9 @@
-!> Taylor series of the motion of many lanes, by the recurrence of `nocdyn_reduced_series` and to the same bits, for machines
-!> whose moments are polynomials or depend on the time alone.
+!> Taylor series of the motion of a block of many lanes, for machines whose laws are polynomials or depend on the time alone.
 !>
-!> A strip of lanes goes through all orders before the next one does. What it needs is gathered first, in arrays that stay in the
-!> first-level cache.
+!> It is the recurrence of `nocdyn_reduced_series`, with the same bits.
+!>
+!> A strip of lanes goes through all orders before the next strip starts. The parameters of a strip are first gathered in
+!> arrays that stay in the first-level cache.
 module nocdyn_lane_series
   use nocdyn_kinds, only: wp
   use nocdyn_lane_terms, only: lane_terms_t
@@ -18,24 +19,24 @@ module nocdyn_lane_series
     private
     integer :: order = 0
     integer :: elements = 0
-    real(wp), allocatable :: external(:, :, :)   !! moments of the external elements, [lanes, elements, 0:order]
-    ! Of the lanes of a strip, the first dimension of:
-    real(wp), allocatable, dimension(:, :, :) :: speed, angle, square   !! of the elements, [strip, 0:order, elements]
-    real(wp), allocatable, dimension(:, :) :: restoring, moment         !! [strip, elements]
+    real(wp), allocatable :: external(:, :, :)   !! series of the time-only elements' moments, [lanes, elements, 0:order]
+    ! work space of one strip:
+    real(wp), allocatable, dimension(:, :, :) :: speed, angle, square   !! u', u - rest and its square, [strip, 0:order, elements]
+    real(wp), allocatable, dimension(:, :) :: restoring, moment         !! present coefficients, [strip, elements]
     real(wp), allocatable :: motion(:, :, :)                            !! coefficients of q', [strip, freedoms, 0:order]
-    real(wp), allocatable, dimension(:, :) :: ratio, response           !! numbers of the machine, [strip, entries]
-    real(wp), allocatable :: law(:, :, :)                               !! [strip, 5, elements]
-    real(wp), allocatable, dimension(:, :) :: rest, start_twist         !! [strip, elements]
+    real(wp), allocatable, dimension(:, :) :: ratio, response           !! coefficients of U and R, [strip, entries]
+    real(wp), allocatable :: law(:, :, :)                               !! parameters of the laws, [strip, 5, elements]
+    real(wp), allocatable, dimension(:, :) :: rest, start_twist         !! [rad], [strip, elements]
   contains
     procedure :: expand
   end type lane_series_t
 
 contains
 
-  !> Room for series up to an order.
+  !> Work space for series up to an order.
   function new_lane_series(machine, twists, accelerations, order) result(self)
     type(machine_t), intent(in) :: machine
-    type(sparse_map_t), intent(in) :: twists, accelerations
+    type(sparse_map_t), intent(in) :: twists, accelerations   !! U, R
     integer, intent(in) :: order
     type(lane_series_t) :: self
 
@@ -53,17 +54,17 @@ contains
     end associate
   end function new_lane_series
 
-  !> The coefficients number 1 to order of q' and q, which follow each other in y.
+  !> Computes the coefficients number 1 to `order` of q' and q, which follow one another in y.
   subroutine expand(self, machine, terms, twists, accelerations, start_twist, columns, t, y)
     class(lane_series_t), intent(inout) :: self
     type(machine_t), intent(in) :: machine
     type(lane_terms_t), intent(in) :: terms
-    type(sparse_map_t), intent(in) :: twists          !! U
-    type(sparse_map_t), intent(in) :: accelerations   !! R
-    real(wp), contiguous, intent(in) :: start_twist(:, :)   !! [lanes, elements]
-    integer, intent(in) :: columns
-    real(wp), intent(in) :: t(machine%lanes)
-    real(wp), intent(inout) :: y(machine%lanes, columns, 0:self%order)
+    type(sparse_map_t), intent(in) :: twists                             !! U
+    type(sparse_map_t), intent(in) :: accelerations                      !! R
+    real(wp), contiguous, intent(in) :: start_twist(:, :)                !! [rad], [lanes, elements]
+    integer, intent(in) :: columns                                       !! components of the state
+    real(wp), intent(in) :: t(machine%lanes)                             !! [s]
+    real(wp), intent(inout) :: y(machine%lanes, columns, 0:self%order)   !! coefficients; number 0 is given
     integer :: l
 
     call forcing_series(self, machine, t)
@@ -86,11 +87,11 @@ contains
     end associate
   end subroutine expand
 
-  !> The coefficients of the external torques.
+  !> Coefficients of the torques that depend on the time alone.
   subroutine forcing_series(self, machine, t)
     type(lane_series_t), intent(inout) :: self
     type(machine_t), intent(in) :: machine
-    real(wp), intent(in) :: t(machine%lanes)
+    real(wp), intent(in) :: t(machine%lanes)   !! [s]
     integer :: i
 
     do i = 1, size(machine%general_banks)

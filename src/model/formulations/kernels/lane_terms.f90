@@ -1,6 +1,6 @@
-!> Which terms the laws of elements have in a block of many lanes, so that those that no lane has are left out.
+!> The terms that the laws of the elements have in at least one lane of a block, so that kernels leave the others out.
 !>
-!> A term that any lane has had once is kept: one of zero changes no bit of the others.
+!> A term stays once a lane has had it. That changes no bits, as a term with the coefficient zero adds zero.
 module nocdyn_lane_terms
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
@@ -9,20 +9,20 @@ module nocdyn_lane_terms
 
   public :: is_polynomial_or_external, new_lane_terms
 
-  !> Every array has one value per element.
+  !> Every array has the shape [elements].
   type, public :: lane_terms_t
     logical, allocatable :: is_time_only(:)   !! whether the moment depends on the time alone
-    logical, allocatable :: has_angle(:)     !! whether there is a restoring moment
-    logical, allocatable :: has_cubic(:)
-    logical, allocatable :: has_speed(:)     !! whether the other moment depends on the speed
-    logical, allocatable :: has_square(:)
+    logical, allocatable :: has_angle(:)      !! whether there is a restoring moment
+    logical, allocatable :: has_cubic(:)      !! whether there is a cubic restoring moment
+    logical, allocatable :: has_speed(:)      !! whether the applied moment depends on the speed
+    logical, allocatable :: has_square(:)     !! whether the applied moment depends on the square of the speed
   contains
     procedure :: add_lane_terms
   end type lane_terms_t
 
 contains
 
-  !> Whether all moments are polynomials or depend on the time alone.
+  !> Whether all laws of a machine are polynomials or depend on the time alone.
   pure logical function is_polynomial_or_external(machine)
     type(machine_t), intent(in) :: machine
     integer :: i
@@ -41,7 +41,7 @@ contains
     is_polynomial_or_external = .true.
   end function is_polynomial_or_external
 
-  !> The terms of a plain machine.
+  !> The terms of a machine of that kind.
   function new_lane_terms(machine) result(self)
     type(machine_t), intent(in) :: machine
     type(lane_terms_t) :: self
@@ -59,7 +59,7 @@ contains
     end do
   end function new_lane_terms
 
-  !> Takes notice of the terms in the laws of a lane, which may have other numbers than before.
+  !> Adds the terms of the present parameters of a lane.
   pure subroutine add_lane_terms(self, machine, lane)
     class(lane_terms_t), intent(inout) :: self
     type(machine_t), intent(in) :: machine

@@ -1,12 +1,12 @@
-!> Taylor series of the motion of a machine in its reduced formulation, by recurrence from one coefficient to the next.
+!> Taylor series of the motion of a machine in the reduced formulation, by recurrence from one coefficient to the next.
 !>
-!> With the coefficients of q' up to number k, those of the elements are u'_k = U q'_k and u_k = u'_(k-1) / k; their laws give
+!> From the coefficients of q' up to number k, those of the elements are u'_k = U q'_k and u_k = u'_(k-1) / k. Their laws give
 !> the moments M_k, and (k + 1) q'_(k+1) = R M_k. Products in the laws are sums over pairs of coefficients,
-!> (f g)_k = sum of f_j g_(k-j). They begin in the middle, with the pairs that have been known for longest, and end with
-!> the newest coefficients, so that a processor need not wait for those.
+!> (f g)_k = sum of f_j g_(k-j). The sums start in the middle, with pairs that were computed long ago, and end with
+!> the newest coefficients, so that the processor does not wait for these.
 !>
-!> Arrays are filled up with zeros to whole vectors: every number goes through the same operations wherever it stands.
-!> All procedures of the recurrence are here, so that compilers put them into its loop.
+!> Arrays are padded with zeros to whole vectors, so that every value goes through the same operations wherever it stands.
+!> All procedures of the recurrence are in this module, so that compilers inline them into its loop.
 module nocdyn_reduced_series
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
@@ -18,29 +18,30 @@ module nocdyn_reduced_series
 
   public :: new_reduced_series
 
-  integer, parameter :: max_dense_entries = 256   ! numbers in the matrix of a map that is worth its zeros
+  integer, parameter :: max_dense_entries = 256   ! entries of a matrix up to which multiplying its zeros is faster
 
-  !> Column k of an array holds the coefficients number k, the k-th derivatives over k factorial.
+  !> Column k of an array holds the coefficients number k: the k-th derivatives over k factorial.
   type, public :: reduced_series_t
     private
-    integer :: order = 0                       !! of the series of the state
+    integer :: order = 0   !! order of the series of the state
     integer :: lanes = 1
-    logical :: has_energy_balance = .false.            !! whether the works are integrated
-    integer :: stride = 0                      !! lanes * elements in whole vectors
-    logical :: is_dense = .false.              !! whether the maps are multiplied out
-    real(wp), allocatable :: angle(:, :)       !! u - rest, [stride, 0:order] as all these, the last column for the banks' offsets
+    logical :: has_energy_balance = .false.   !! whether the powers of the elements `machine%with_work` are integrated
+    integer :: stride = 0                     !! lanes * elements, rounded up to whole vectors
+    logical :: is_dense = .false.             !! whether U and R are dense matrices
+    ! [stride, 0:order]; banks write with offsets, for which the last column leaves room
+    real(wp), allocatable :: angle(:, :)       !! u - rest
     real(wp), allocatable :: speed(:, :)       !! u'
     real(wp), allocatable :: restoring(:, :)   !! as in `elements_t`
     real(wp), allocatable :: applied(:, :)
-    real(wp), allocatable :: external(:, :)    !! what of `applied` depends on the time alone
+    real(wp), allocatable :: external(:, :)    !! part of `applied` that depends on the time alone
     real(wp), allocatable :: moment(:)         !! present coefficients of the whole moments, [stride]
     real(wp), allocatable :: acceleration(:)   !! present coefficients of q'', [lanes * freedoms in whole vectors]
     real(wp), allocatable :: inverse(:)        !! 1 / k, [order]
     type(series_laws_t) :: laws
-    real(wp), allocatable :: twists(:, :)      !! U, [stride, freedoms], if it is dense
-    real(wp), allocatable :: responses(:, :)   !! R, [freedoms in whole vectors, elements], if it is dense
-    integer, allocatable :: internal_banks(:)     !! whose laws are more than polynomials and external torques
-    real(wp), allocatable :: square(:, :)      !! (u - rest)^2 in the vectors that are `cubic_vectors`
+    real(wp), allocatable :: twists(:, :)       !! U, [stride, freedoms], if dense
+    real(wp), allocatable :: responses(:, :)    !! R, [freedoms in whole vectors, elements], if dense
+    integer, allocatable :: series_banks(:)   !! banks whose laws are neither polynomials nor dependent on the time alone
+    real(wp), allocatable :: square(:, :)       !! (u - rest)^2 in the `cubic_vectors` of the laws
   contains
     procedure :: expand
     procedure :: refresh_lane
@@ -48,12 +49,12 @@ module nocdyn_reduced_series
 
 contains
 
-  !> Room for series up to an order, and what their coefficients need of the machine.
+  !> Work space for series up to an order.
   function new_reduced_series(machine, twists, accelerations, with_energy_balance, order) result(self)
     type(machine_t), intent(in) :: machine
     type(sparse_map_t), intent(in) :: twists          !! U
     type(sparse_map_t), intent(in) :: accelerations   !! R
-    logical, intent(in) :: with_energy_balance                    !! whether the works are integrated
+    logical, intent(in) :: with_energy_balance        !! whether the powers of the elements `machine%with_work` are integrated
     integer, intent(in) :: order
     type(reduced_series_t) :: self
     integer :: b, k
@@ -67,7 +68,7 @@ contains
     allocate (self%acceleration(whole_vectors(machine%lanes * machine%coordinates%freedoms)), source=0.0_wp)
     allocate (self%inverse(order))
     self%inverse(:) = [(1.0_wp / k, k=1, order)]
-    self%internal_banks = pack(machine%general_banks, [(.not. machine%banks(machine%general_banks(b))%bank%is_time_only, &
+    self%series_banks = pack(machine%general_banks, [(.not. machine%banks(machine%general_banks(b))%bank%is_time_only, &
                                                    b=1, size(machine%general_banks))])
     self%laws = new_series_laws(self%stride, machine%laws)
     allocate (self%moment(self%stride), source=0.0_wp)
@@ -75,12 +76,12 @@ contains
     call form_dense_maps(self, twists, accelerations, machine%coordinates%freedoms, size(machine%elements%to))
   end function new_reduced_series
 
-  !> Takes the numbers that a lane has now.
+  !> Updates everything that depends on the parameters of a lane.
   subroutine refresh_lane(self, lane, laws, twists, accelerations)
     class(reduced_series_t), intent(inout) :: self
     integer, intent(in) :: lane
     type(polynomial_laws_t), intent(in) :: laws
-    type(sparse_map_t), intent(in) :: twists, accelerations
+    type(sparse_map_t), intent(in) :: twists, accelerations   !! U, R
 
     if (self%order == 0) return
     call self%laws%refresh_lane(lane, laws)
@@ -88,10 +89,10 @@ contains
     if (self%is_dense) call form_matrices(self, twists, accelerations)
   end subroutine refresh_lane
 
-  !> The matrices of the maps, if they are small.
+  !> Forms the dense matrices of U and R, if they are small.
   subroutine form_dense_maps(self, twists, accelerations, freedoms, elements)
     type(reduced_series_t), intent(inout) :: self
-    type(sparse_map_t), intent(in) :: twists, accelerations
+    type(sparse_map_t), intent(in) :: twists, accelerations   !! U, R
     integer, intent(in) :: freedoms, elements
 
     self%is_dense = self%lanes == 1 .and. max(self%stride * freedoms, size(self%acceleration) * elements) <= max_dense_entries
@@ -100,9 +101,10 @@ contains
     call form_matrices(self, twists, accelerations)
   end subroutine form_dense_maps
 
+  !> Fills the dense matrices.
   subroutine form_matrices(self, twists, accelerations)
     type(reduced_series_t), intent(inout) :: self
-    type(sparse_map_t), intent(in) :: twists, accelerations
+    type(sparse_map_t), intent(in) :: twists, accelerations   !! U, R
     integer :: i
 
     do i = 1, size(self%twists, 2)
@@ -113,13 +115,14 @@ contains
     end do
   end subroutine form_matrices
 
-  !> The length of so many numbers in whole vectors.
+  !> A number of values, rounded up to whole vectors.
   pure integer function whole_vectors(numbers)
     integer, intent(in) :: numbers
 
     whole_vectors = width * ((numbers + width - 1) / width)
   end function whole_vectors
 
+  !> The unit vector number i of length n.
   pure function unit(n, i) result(vector)
     integer, intent(in) :: n, i
     real(wp) :: vector(n)
@@ -128,16 +131,16 @@ contains
     vector(i) = 1.0_wp
   end function unit
 
-  !> The coefficients number 1 to order of q', q and the works of the accounted elements, which follow each other in y.
+  !> Computes the coefficients number 1 to `order` of q', q and the work integrals, which follow one another in y.
   subroutine expand(self, machine, twists, accelerations, start_twist, n, length, t, y)
     class(reduced_series_t), intent(inout) :: self
     type(machine_t), intent(in) :: machine
-    type(sparse_map_t), intent(in) :: twists, accelerations
-    integer, intent(in) :: n                          !! lanes * freedoms
-    integer, intent(in) :: length                     !! of a column of y
-    real(wp), contiguous, intent(in) :: start_twist(:, :)   !! [lanes, elements]
-    real(wp), intent(in) :: t(self%lanes)
-    real(wp), intent(inout) :: y(length, 0:self%order)
+    type(sparse_map_t), intent(in) :: twists, accelerations   !! U, R
+    integer, intent(in) :: n                                  !! lanes * freedoms
+    integer, intent(in) :: length                             !! length of a column of y
+    real(wp), contiguous, intent(in) :: start_twist(:, :)     !! [rad], [lanes, elements]
+    real(wp), intent(in) :: t(self%lanes)                     !! [s]
+    real(wp), intent(inout) :: y(length, 0:self%order)        !! coefficients; number 0 is given
     integer :: k
 
     call forcing_series(self, machine, t)
@@ -151,11 +154,11 @@ contains
     end do
   end subroutine expand
 
-  !> The coefficients of the external torques.
+  !> Coefficients of the torques that depend on the time alone.
   subroutine forcing_series(self, machine, t)
     type(reduced_series_t), intent(inout) :: self
     type(machine_t), intent(in) :: machine
-    real(wp), intent(in) :: t(self%lanes)
+    real(wp), intent(in) :: t(self%lanes)   !! [s]
     integer :: i
 
     do i = 1, size(machine%general_banks)
@@ -165,13 +168,13 @@ contains
     end do
   end subroutine forcing_series
 
-  !> u'_k = U q'_k.
+  !> Computes u'_k = U q'_k.
   subroutine element_speeds(self, twists, n, q, u)
     type(reduced_series_t), intent(in) :: self
-    type(sparse_map_t), intent(in) :: twists
-    integer, intent(in) :: n
-    real(wp), intent(in) :: q(n)
-    real(wp), intent(inout) :: u(self%stride)
+    type(sparse_map_t), intent(in) :: twists    !! U
+    integer, intent(in) :: n                    !! lanes * freedoms
+    real(wp), intent(in) :: q(n)                !! q'_k
+    real(wp), intent(inout) :: u(self%stride)   !! u'_k
 
     if (self%is_dense) then
       call multiply(self%stride, n, self%twists, q, u)
@@ -180,12 +183,12 @@ contains
     end if
   end subroutine element_speeds
 
-  !> u_k, and the moments number k.
+  !> Computes u_k and the moments number k.
   subroutine find_moments(self, machine, k, t)
     type(reduced_series_t), intent(inout) :: self
     type(machine_t), intent(in) :: machine
     integer, intent(in) :: k
-    real(wp), intent(in) :: t(self%lanes)
+    real(wp), intent(in) :: t(self%lanes)   !! [s]
 
     if (k == 0) then
       call begin_moments(self%stride, self%laws%rest, self%laws%linear, self%laws%by_speed, self%external, self%angle, &
@@ -200,14 +203,14 @@ contains
     if (size(self%laws%square_vectors) > 0) then
       call add_squares(self%stride, k, self%laws%square_vectors, self%laws%by_speed_squared, self%speed, self%applied)
     end if
-    if (size(self%internal_banks) > 0) call add_banks(self, machine, k, t)
+    if (size(self%series_banks) > 0) call add_banks(self, machine, k, t)
     call add(self%stride, self%restoring(1, k), self%applied(1, k), self%moment)
   end subroutine find_moments
 
-  !> q''_k = R M_k.
+  !> Computes q''_k = R M_k.
   subroutine accelerate(self, accelerations)
     type(reduced_series_t), intent(inout) :: self
-    type(sparse_map_t), intent(in) :: accelerations
+    type(sparse_map_t), intent(in) :: accelerations   !! R
 
     if (self%is_dense) then
       call multiply(size(self%acceleration), size(self%responses, 2), self%responses, self%moment, self%acceleration)
@@ -216,16 +219,16 @@ contains
     end if
   end subroutine accelerate
 
-  !> What the inner banks add to the moments.
+  !> Adds the moments of the banks in `series_banks`.
   subroutine add_banks(self, machine, k, t)
     type(reduced_series_t), intent(inout) :: self
     type(machine_t), intent(in) :: machine
     integer, intent(in) :: k
-    real(wp), intent(in) :: t(self%lanes)
+    real(wp), intent(in) :: t(self%lanes)   !! [s]
     integer :: i
 
-    do i = 1, size(self%internal_banks)
-      associate (bank => machine%banks(self%internal_banks(i))%bank)
+    do i = 1, size(self%series_banks)
+      associate (bank => machine%banks(self%series_banks(i))%bank)
         associate (first => bank%first_value)
           call bank%series(k, self%stride, t, self%angle(first, 0), self%speed(first, 0), self%restoring(first, 0), &
                            self%applied(first, 0))
@@ -234,11 +237,11 @@ contains
     end do
   end subroutine add_banks
 
-  !> The moments at the start of the step, without the powers.
+  !> Moments at the start of the step, without the terms of higher degree.
   pure subroutine begin_moments(n, rest, linear, by_speed, external, angle, speed, restoring, applied)
-    integer, intent(in) :: n
+    integer, intent(in) :: n   !! stride
     real(wp), intent(in), dimension(n) :: rest, linear, by_speed, external, speed
-    real(wp), intent(inout) :: angle(n)   !! u, on return less `rest`
+    real(wp), intent(inout) :: angle(n)   !! u; on return u - rest
     real(wp), intent(inout) :: restoring(n), applied(n)
 
     angle = angle - rest
@@ -246,7 +249,7 @@ contains
     applied = external + by_speed * speed
   end subroutine begin_moments
 
-  !> u = matrix x, zeros included.
+  !> u = matrix x, with all zeros of the matrix.
   pure subroutine multiply(rows, columns, matrix, x, u)
     integer, intent(in) :: rows   !! whole vectors
     integer, intent(in) :: columns
@@ -264,7 +267,7 @@ contains
     end do
   end subroutine multiply
 
-  !> u_k, and the moments without the powers.
+  !> Computes u_k and the moments number k, without the terms of higher degree.
   pure subroutine continue_moments(n, k, inverse, linear, by_speed, external, speed, angle, restoring, applied)
     integer, intent(in) :: n, k
     real(wp), intent(in) :: inverse   !! 1 / k
@@ -281,12 +284,12 @@ contains
     end do
   end subroutine continue_moments
 
-  !> Adds -cubic (u - rest)^3. The coefficients of the square count each pair of different coefficients once, doubled.
+  !> Adds -cubic (u - rest)^3. The square counts each pair of different coefficients once and doubles it.
   pure subroutine add_cubes(n, k, vectors, cubic, w, w2, restoring)
-    integer, intent(in) :: n, k
-    integer, intent(in) :: vectors(:)   !! of values with such terms
-    real(wp), intent(in) :: cubic(n), w(n, 0:k)
-    real(wp), intent(inout) :: w2(n, 0:k), restoring(n, 0:k)
+    integer, intent(in) :: n, k                                !! stride, number of the coefficients
+    integer, intent(in) :: vectors(:)                          !! first values of the vectors with cubic terms
+    real(wp), intent(in) :: cubic(n), w(n, 0:k)                !! w = u - rest
+    real(wp), intent(inout) :: w2(n, 0:k), restoring(n, 0:k)   !! w2 = w^2
     real(wp) :: sum(width)
     integer :: i, j, s
 
@@ -310,8 +313,8 @@ contains
 
   !> Adds by_speed_squared u'^2.
   pure subroutine add_squares(n, k, vectors, by_speed_squared, speed, applied)
-    integer, intent(in) :: n, k
-    integer, intent(in) :: vectors(:)   !! of values with such terms
+    integer, intent(in) :: n, k         !! stride, number of the coefficients
+    integer, intent(in) :: vectors(:)   !! first values of the vectors with quadratic terms
     real(wp), intent(in) :: by_speed_squared(n), speed(n, 0:k)
     real(wp), intent(inout) :: applied(n, 0:k)
     real(wp) :: sum(width)
@@ -329,6 +332,7 @@ contains
     end do
   end subroutine add_squares
 
+  !> Sum of restoring and applied moments.
   pure subroutine add(n, restoring, applied, moment)
     integer, intent(in) :: n
     real(wp), intent(in) :: restoring(n), applied(n)
@@ -340,11 +344,11 @@ contains
     end do
   end subroutine add
 
-  !> The next coefficients of q' from those of q'', and of q from those of q'.
+  !> Computes the next coefficients of q' from those of q'', and of q from those of q'.
   pure subroutine integrate_coordinates(n, inverse, acceleration, speed, y)
-    integer, intent(in) :: n
-    real(wp), intent(in) :: inverse, acceleration(n), speed(n)
-    real(wp), intent(inout) :: y(n, 2)
+    integer, intent(in) :: n                                     !! lanes * freedoms
+    real(wp), intent(in) :: inverse, acceleration(n), speed(n)   !! inverse = 1 / (k + 1)
+    real(wp), intent(inout) :: y(n, 2)                           !! next coefficients of q' and q
     integer :: i
 
     if (n < width) then
@@ -361,12 +365,12 @@ contains
     end if
   end subroutine integrate_coordinates
 
-  !> The next coefficients of the works of the accounted elements, whose powers are `applied` times the speed.
+  !> Computes the next coefficients of the work integrals; the powers are `applied` times the speed.
   subroutine integrate_powers(self, machine, k, work)
     type(reduced_series_t), intent(in) :: self
     type(machine_t), intent(in) :: machine
     integer, intent(in) :: k
-    real(wp), intent(inout) :: work(self%lanes, size(machine%with_work))
+    real(wp), intent(inout) :: work(self%lanes, size(machine%with_work))   !! coefficients number k + 1
     integer :: a, before, j, l
 
     do a = 1, size(machine%with_work)

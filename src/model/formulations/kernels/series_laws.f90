@@ -1,4 +1,4 @@
-!> The polynomial laws of elements as the Taylor series of the motion uses them: whole vectors, and which have higher terms.
+!> The polynomial laws of the elements in the layout of the Taylor series: whole vectors, with lists of those with higher terms.
 module nocdyn_series_laws
   use nocdyn_kinds, only: wp
   use nocdyn_polynomial_laws, only: polynomial_laws_t
@@ -7,29 +7,29 @@ module nocdyn_series_laws
 
   public :: new_series_laws
 
-  integer, parameter, public :: width = 4   !! of a vector
+  integer, parameter, public :: width = 4   !! values of a vector
 
-  !> Every array of numbers holds the lanes of the first element, then those of the second, and so on, and zeros at its end.
+  !> Every array holds the lanes of the first element, then those of the second, and so on, and is padded with zeros.
   type, public :: series_laws_t
-    real(wp), allocatable :: rest(:)               !! as in `polynomial_laws_t`
+    real(wp), allocatable :: rest(:)   !! as in `polynomial_laws_t`
     real(wp), allocatable :: linear(:)
     real(wp), allocatable :: cubic(:)
     real(wp), allocatable :: constant(:)
     real(wp), allocatable :: by_speed(:)
     real(wp), allocatable :: by_speed_squared(:)
-    integer, allocatable :: cubic_vectors(:)               !! first values of the vectors with terms by (u - rest)^3
-    integer, allocatable :: square_vectors(:)             !! first values of the vectors with terms by u'^2
-    logical, allocatable, private :: has_cubic(:)   !! of each vector
-    logical, allocatable, private :: has_square(:)
+    integer, allocatable :: cubic_vectors(:)         !! first values of the vectors with terms in (u - rest)^3
+    integer, allocatable :: square_vectors(:)        !! first values of the vectors with terms in u'^2
+    logical, allocatable, private :: has_cubic(:)    !! of each vector
+    logical, allocatable, private :: has_square(:)   !! of each vector
   contains
     procedure :: refresh_lane
   end type series_laws_t
 
 contains
 
-  !> The laws in arrays of so many numbers.
+  !> Copies the laws.
   function new_series_laws(stride, laws) result(self)
-    integer, intent(in) :: stride   !! whole vectors
+    integer, intent(in) :: stride   !! length of the arrays, whole vectors
     type(polynomial_laws_t), intent(in) :: laws
     type(series_laws_t) :: self
     integer :: lane
@@ -42,7 +42,7 @@ contains
     call find_term_vectors(self)
   end function new_series_laws
 
-  !> Takes the numbers that a lane has now.
+  !> Copies the parameters of a lane.
   subroutine refresh_lane(self, lane, laws)
     class(series_laws_t), intent(inout) :: self
     integer, intent(in) :: lane
@@ -52,6 +52,7 @@ contains
     if (has_new_terms(self, lane, size(laws%rest, 1))) call find_term_vectors(self)
   end subroutine refresh_lane
 
+  !> Copies the parameters of a lane, without the lists.
   subroutine copy_lane(lane, laws, self)
     integer, intent(in) :: lane
     type(polynomial_laws_t), intent(in) :: laws
@@ -85,7 +86,7 @@ contains
     has_new_terms = .false.
   end function has_new_terms
 
-  !> Finds the vectors with terms of higher degree.
+  !> Lists the vectors with terms of higher degree.
   subroutine find_term_vectors(self)
     type(series_laws_t), intent(inout) :: self
     integer :: i

@@ -1,9 +1,12 @@
-!> The recurrence of Taylor series on a strip of lanes, to the same bits as that of `nocdyn_reduced_series`.
+!> The recurrence of Taylor series on a strip of lanes, with the same bits as that of `nocdyn_reduced_series`.
 !>
-!> A strip is of constant length, so that each loop over its lanes becomes a few vector operations. All of the recurrence is
-!> here, so that compilers put it into one loop over the orders. What of a coefficient has been known for longest comes first:
-!> restoring moments before those that depend on the speed, and sums of products from the middle on. A processor then need not
-!> wait for the newest numbers.
+!> A strip has a constant length, so that each loop over its lanes becomes a few vector instructions. The whole recurrence is in
+!> this module, so that compilers inline it into one loop over the orders. Coefficients that were computed long ago come first:
+!> restoring moments before those that depend on the speed, and sums of products from the middle. So the processor does not
+!> wait for the newest values.
+!>
+!> The procedures have up to 27 arguments. Their arrays have explicit shapes and are no components of types: gfortran then knows
+!> that they are contiguous and do not overlap, and vectorises every loop over a strip.
 module nocdyn_series_strips
   use nocdyn_kinds, only: wp
   implicit none (type, external)
@@ -11,15 +14,16 @@ module nocdyn_series_strips
 
   public :: gather, gather_laws, begin_strip, expand_strip
 
-  integer, parameter, public :: strip = 32   !! lanes that go through the recurrence together; those of a block are a multiple
+  integer, parameter, public :: strip = 32   !! lanes that are expanded together; the lanes of a block must be a multiple
 
-  integer, parameter, public :: constant = 1, by_speed = 2, by_speed_squared = 3, linear = 4, cubic = 5   !! numbers of a law
+  !> Index of a parameter in `law`.
+  integer, parameter, public :: constant = 1, by_speed = 2, by_speed_squared = 3, linear = 4, cubic = 5
 
 contains
 
-  !> The numbers of the lanes of a strip, of which `l` is the first.
+  !> Copies the columns of a strip of lanes.
   pure subroutine gather(lanes, l, columns, x, y)
-    integer, intent(in) :: lanes, l, columns
+    integer, intent(in) :: lanes, l, columns   !! lanes of the block, first lane of the strip
     real(wp), intent(in) :: x(lanes, columns)
     real(wp), intent(inout) :: y(strip, columns)
     integer :: c
@@ -29,8 +33,9 @@ contains
     end do
   end subroutine gather
 
+  !> Copies the laws of a strip of lanes.
   pure subroutine gather_laws(lanes, l, elements, constants, by_speeds, by_speeds_squared, linears, cubics, law)
-    integer, intent(in) :: lanes, l, elements
+    integer, intent(in) :: lanes, l, elements   !! lanes of the block, first lane of the strip
     real(wp), intent(in), dimension(lanes, elements) :: constants, by_speeds, by_speeds_squared, linears, cubics
     real(wp), intent(inout) :: law(strip, 5, elements)
     integer :: e
@@ -46,15 +51,15 @@ contains
     end do
   end subroutine gather_laws
 
-  !> u' and w = u - rest of the elements at the start.
+  !> Computes u' and w = u - rest of the elements at the start.
   pure subroutine begin_strip(l, lanes, freedoms, elements, order, entries, first, column, ratio, q_rate, q, start_twist, rest, &
                               speed, angle)
-    integer, intent(in) :: l, lanes, freedoms, elements, order, entries
-    integer, intent(in) :: first(elements + 1), column(entries)   !! of U
-    real(wp), intent(in) :: ratio(strip, entries)
-    real(wp), intent(in) :: q_rate(strip, freedoms), q(lanes, freedoms)
-    real(wp), intent(in), dimension(strip, elements) :: start_twist, rest
-    real(wp), intent(inout), dimension(strip, 0:order, elements) :: speed, angle
+    integer, intent(in) :: l, lanes, freedoms, elements, order, entries   !! l: first lane of the strip
+    integer, intent(in) :: first(elements + 1), column(entries)   !! first entry of each element and coordinate of each entry of U
+    real(wp), intent(in) :: ratio(strip, entries)   !! of the entries of U
+    real(wp), intent(in) :: q_rate(strip, freedoms), q(lanes, freedoms)   !! q', q
+    real(wp), intent(in), dimension(strip, elements) :: start_twist, rest   !! [rad]
+    real(wp), intent(inout), dimension(strip, 0:order, elements) :: speed, angle   !! u', w
     integer :: e, i, k
 
     do e = 1, elements
@@ -76,22 +81,22 @@ contains
     end do
   end subroutine begin_strip
 
-  !> The coefficients number 1 to order of q', and, in y, those of q' and q, which follow each other there.
+  !> Computes the coefficients number 1 to `order` of q', and in y those of q' and q, which follow one another there.
   pure subroutine expand_strip(l, lanes, freedoms, elements, order, is_time_only, has_angle, has_cubic, has_square, entries, &
                                first, column, ratio, responses, first_response, element, response, law, external, speed, &
                                angle, square, restoring, moment, q, columns, y)
-    integer, intent(in) :: l, lanes, freedoms, elements, order
+    integer, intent(in) :: l, lanes, freedoms, elements, order   !! l: first lane of the strip
     logical, intent(in), dimension(elements) :: is_time_only, has_angle, has_cubic, has_square   !! as in `lane_terms_t`
     integer, intent(in) :: entries, first(elements + 1), column(entries)   !! of U
-    real(wp), intent(in) :: ratio(strip, entries)
+    real(wp), intent(in) :: ratio(strip, entries)   !! of the entries of U
     integer, intent(in) :: responses, first_response(freedoms + 1), element(responses)   !! of R
-    real(wp), intent(in) :: response(strip, responses)
-    real(wp), intent(in) :: law(strip, 5, elements)
-    real(wp), intent(in) :: external(lanes, elements, 0:order)   !! moments of the external elements
+    real(wp), intent(in) :: response(strip, responses)   !! of the entries of R
+    real(wp), intent(in) :: law(strip, 5, elements)   !! parameters of the laws
+    real(wp), intent(in) :: external(lanes, elements, 0:order)   !! moments of the time-only elements
     real(wp), intent(inout), dimension(strip, 0:order, elements) :: speed, angle, square   !! u', w and w^2
-    real(wp), intent(inout), dimension(strip, elements) :: restoring, moment   !! present coefficients; zero to begin with
+    real(wp), intent(inout), dimension(strip, elements) :: restoring, moment   !! present coefficients; zero at the start
     real(wp), intent(inout) :: q(strip, freedoms, 0:order)   !! q'
-    integer, intent(in) :: columns
+    integer, intent(in) :: columns   !! components of the state
     real(wp), intent(inout) :: y(lanes, columns, 0:order)
     real(wp) :: inverse
     integer :: e, i, k
@@ -130,6 +135,7 @@ contains
     end do
   end subroutine expand_strip
 
+  !> Copies a strip, by address.
   pure subroutine copy(x, y)
     real(wp), intent(in) :: x(strip)
     real(wp), intent(inout) :: y(strip)
@@ -137,7 +143,7 @@ contains
     y = x
   end subroutine copy
 
-  !> The moments number 0, but for those by the square of the speed.
+  !> Moments number 0, without the terms in the square of the speed.
   pure subroutine begin_moments(constant, by_speed, speed, restoring, moment)
     real(wp), intent(in), dimension(strip) :: constant, by_speed, speed, restoring
     real(wp), intent(inout) :: moment(strip)
@@ -145,14 +151,14 @@ contains
     moment = restoring + (constant + by_speed * speed)
   end subroutine begin_moments
 
-  !> The speeds of an element, from the entries `begin` to `end` of U, and its moments, but for those by the square of the speed,
-  !> number k > 0.
+  !> Computes the speeds of an element number k > 0, from the entries `begin` to `end` of U, and its moments, without the terms in
+  !> the square of the speed.
   pure subroutine find_moments(freedoms, entries, begin, end, column, ratio, q, by_speed, restoring, speed, moment)
     integer, intent(in) :: freedoms, entries, begin, end
-    integer, intent(in) :: column(entries)
-    real(wp), intent(in) :: ratio(strip, entries)
-    real(wp), intent(in) :: q(strip, freedoms)   !! coefficients of q'
-    real(wp), intent(in) :: by_speed(strip), restoring(strip)
+    integer, intent(in) :: column(entries)                      !! of the entries of U
+    real(wp), intent(in) :: ratio(strip, entries)               !! of the entries of U
+    real(wp), intent(in) :: q(strip, freedoms)                  !! coefficients of q' number k
+    real(wp), intent(in) :: by_speed(strip), restoring(strip)   !! of the element
     real(wp), intent(inout) :: speed(strip), moment(strip)
     real(wp) :: v
     integer :: c, d, i, k
@@ -189,7 +195,7 @@ contains
     end select
   end subroutine find_moments
 
-  !> Coefficient k of w, for k > 0 from coefficient k - 1 of the speed, and of -linear w.
+  !> Computes coefficient k of w, from coefficient k - 1 of the speed if k > 0, and of -linear w.
   pure subroutine find_linear(k, inverse, linear, speed, w, restoring)
     integer, intent(in) :: k
     real(wp), intent(in) :: inverse   !! 1 / k
@@ -200,11 +206,11 @@ contains
     restoring = -linear * w
   end subroutine find_linear
 
-  !> Coefficient k of w, for k > 0 from coefficient k - 1 of the speed, of w^2 and of -(linear + cubic w^2) w. The products with
-  !> w^2 are added up beside those of w alone.
+  !> Computes coefficient k of w, from coefficient k - 1 of the speed if k > 0, of w2 = w^2 and of -(linear + cubic w^2) w. The
+  !> products with w2 are added up in the same loop as those of w.
   pure subroutine find_cubic(k, inverse, linear, cubic, speed, w, w2, restoring)
     integer, intent(in) :: k
-    real(wp), intent(in) :: inverse
+    real(wp), intent(in) :: inverse   !! 1 / k
     real(wp), intent(in) :: linear(strip), cubic(strip), speed(strip)
     real(wp), intent(inout) :: w(strip, 0:k), w2(strip, 0:k), restoring(strip)
     real(wp) :: sum(strip), sum_of_cubes(strip)
@@ -241,7 +247,7 @@ contains
     restoring = -linear * w(:, k) - cubic * (sum_of_cubes + (w(:, 0) * w2(:, k) + w(:, k) * w2(:, 0)))
   end subroutine find_cubic
 
-  !> The moments of an element with a term by the square of the speed v, number k.
+  !> Moments number k of an element with a term in the square of the speed v.
   pure subroutine find_moments_of_squares(k, constant, by_speed, by_speed_squared, v, restoring, moment)
     integer, intent(in) :: k
     real(wp), intent(in), dimension(strip) :: constant, by_speed, by_speed_squared, restoring
@@ -265,16 +271,16 @@ contains
     end if
   end subroutine find_moments_of_squares
 
-  !> The next coefficients of a coordinate, from the entries `begin` to `end` of R and the moments number k, and from those of
-  !> its speed.
+  !> Computes the next coefficients of a coordinate and of its speed, from the entries `begin` to `end` of R and the moments
+  !> number k.
   pure subroutine accelerate(elements, entries, begin, end, element, response, inverse, moment, speed, next_speed, y_speed, &
                              y_angle)
     integer, intent(in) :: elements, entries, begin, end
-    integer, intent(in) :: element(entries)
-    real(wp), intent(in) :: response(strip, entries)
+    integer, intent(in) :: element(entries)   !! of the entries of R
+    real(wp), intent(in) :: response(strip, entries)   !! of the entries of R
     real(wp), intent(in) :: inverse   !! 1 / (k + 1)
-    real(wp), intent(in) :: moment(strip, elements), speed(strip)
-    real(wp), intent(inout), dimension(strip) :: next_speed, y_speed, y_angle
+    real(wp), intent(in) :: moment(strip, elements), speed(strip)   !! moments and q' number k
+    real(wp), intent(inout), dimension(strip) :: next_speed, y_speed, y_angle   !! number k + 1: q'; q' and q in y
     real(wp) :: v
     integer :: a, b, c, i, k
 
