@@ -59,6 +59,12 @@ def test_no_installed_text_names_the_folder_of_the_build(prefix):
         assert os.environ["NOCDYN_BUILD"] not in text and str(SOURCE) not in text, path
 
 
+def test_the_package_adds_no_link_options(prefix):
+    for path in prefix.rglob("*.cmake"):
+        text = path.read_text()
+        assert "wrap" not in text and "INTERFACE_LINK_OPTIONS" not in text, path
+
+
 def test_a_version_that_does_not_fit_is_refused(prefix, tmp_path):
     project = (SOURCE / "tests/package/CMakeLists.txt").read_text().replace("nocdyn 0.1", "nocdyn 99")
     (tmp_path / "CMakeLists.txt").write_text(project)
