@@ -4,6 +4,7 @@ import importlib.util
 import os
 import re
 import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -276,6 +277,15 @@ def test_commands_of_a_page_print_what_it_shows(page, sessions, tmp_path):
     for command, shown in commands:
         seen = sessions.output_of(command, tmp_path, environment)
         assert sessions.is_same(shown, seen), f"$ {command}\n{seen}"
+
+
+@pytest.mark.skipif(not (Path(os.environ["NOCDYN"]).parent / "nocdyn-sweep").exists(), reason="built without sweeps")
+def test_python_of_the_page_on_sweeps_reads_a_sweep(nocdyn):
+    nocdyn("sweep", SOURCE / "input/sweeps/throughput.nml", "--set", "sweep.samples=20", "--quiet", "--out", "results/throughput")
+    page = (PAGES / "sweeps.md").read_text(encoding="utf-8")
+    code = "".join(re.findall(r"^```python\n(.*?)^```$", page, re.MULTILINE | re.DOTALL))
+    seen = subprocess.run([sys.executable, "-c", code], cwd=nocdyn.folder, capture_output=True, text=True, check=True).stdout
+    assert "N m" in seen and "count     20" in seen
 
 
 def test_outputs_differ_in_words_and_numbers_but_not_in_times_and_rounding(sessions):
