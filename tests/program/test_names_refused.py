@@ -10,7 +10,7 @@ from conftest import SPINNER
         ("", "'' is an empty name"),
         ("ground", "'ground' is not allowed as a name: it stands for what does not turn"),
         ("n" * 200, "is too long for a name; allowed: "),
-        (" disc", "' disc' is a name with a blank at its begin or end"),
+        (" disc", "' disc' is a name with a blank at its beginning or end"),
         ("a,b", "'a,b' is a name with a comma, semicolon, equals sign, quote or tab, which is not allowed"),
         ("a=b", "'a=b' is a name with a comma, semicolon, equals sign, quote or tab, which is not allowed"),
     ],

@@ -5,7 +5,7 @@ module nocdyn_text
   implicit none (type, external)
   private
 
-  public :: to_text, rounded_text, write_number, lower_case, quoted, joined, nearest_word, strings, append, selected
+  public :: to_text, rounded_text, write_number, lower_case, quoted, joined, shortened, nearest_word, strings, append, selected
 
   integer, parameter, public :: number_width = 32   !! no number of `write_number` is longer
 
@@ -98,6 +98,27 @@ contains
 
     quoted = "'" // text // "'"
   end function quoted
+
+  !> A text for a message: one of more than `most` bytes is cut between two characters of UTF-8 and ends with ' ...'.
+  pure function shortened(text, most) result(short)
+    character(len=*), intent(in) :: text
+    integer, intent(in), optional :: most   !! bytes; 72 if absent
+    character(len=:), allocatable :: short
+    integer, parameter :: longest_character = 4   ! bytes
+    integer :: i, last
+
+    last = 72
+    if (present(most)) last = most
+    if (len(text) <= last) then
+      short = text
+      return
+    end if
+    do i = 1, longest_character - 1
+      if (iachar(text(last + 1:last + 1)) < 128 .or. iachar(text(last + 1:last + 1)) > 191) exit   ! not inside a character
+      last = last - 1
+    end do
+    short = text(:last) // ' ...'
+  end function shortened
 
   !> The texts in quotes, separated by `separator`; of more than `most` the first ones "and N more".
   pure function joined(texts, separator, most)

@@ -1,8 +1,10 @@
 !> A checked input: groups in the order of the file, every key of the schema with its value or default.
 module nocdyn_input
+  use nocdyn_diagnostics, only: diagnostics_t, no_line
   use nocdyn_kinds, only: wp
   use nocdyn_schema, only: first_key, group_rules, key_rules
-  use nocdyn_text, only: string_t, to_text
+  use nocdyn_text, only: quoted, shortened, string_t, to_text
+  use nocdyn_text_buffer, only: text_buffer_t
   implicit none (type, external)
   private
 
@@ -18,6 +20,7 @@ module nocdyn_input
   contains
     procedure :: has_any
     procedure :: count => count_of
+    procedure :: number_at
   end type value_t
 
   !> One group of the file. Asking for a key that the schema lacks, or with another type, is an error of the program.
@@ -49,6 +52,7 @@ module nocdyn_input
     procedure :: groups_named   !! indices of the groups of one kind, perhaps only of one law
     procedure :: single         !! the one group of a kind that occurs once
     procedure :: label          !! "&gear 'reducer'"
+    procedure :: diagnostics_text   !! all messages with their locations
     procedure :: location          !! where a group or a key comes from, to begin a message with
   end type input_t
 
@@ -71,6 +75,18 @@ contains
     if (allocated(self%flags)) count_of = size(self%flags)
     if (allocated(self%texts)) count_of = size(self%texts)
   end function count_of
+
+  !> One value of a key of numbers or whole numbers.
+  pure real(wp) function number_at(self, position)
+    class(value_t), intent(in) :: self
+    integer, intent(in) :: position   !! in the list
+
+    if (allocated(self%whole_numbers)) then
+      number_at = real(self%whole_numbers(position), wp)
+    else
+      number_at = self%numbers(position)
+    end if
+  end function number_at
 
   pure real(wp) function number(self, key, absent)
     class(group_t), intent(in) :: self
@@ -238,11 +254,44 @@ contains
       end associate
     end if
 
-    text = self%file
-    if (line > 0) text = text // ':' // to_text(line)
-    if (override > 0) text = '--set ' // self%overrides(override)%text
-    text = text // ': ' // self%label(index)
+    text = source_text(self, line, override) // ': ' // self%label(index)
   end function location
+
+  !> "machine.nml:12", or "--set PATH=VALUE" of an override.
+  pure function source_text(input, line, override) result(text)
+    type(input_t), intent(in) :: input
+    integer, intent(in) :: line       !! 0 or `no_line`: the file as a whole
+    integer, intent(in) :: override   !! index of the override, 0: none
+    character(len=:), allocatable :: text
+
+    if (override > 0) then
+      text = '--set ' // shortened(input%overrides(override)%text)
+    else
+      text = input%file
+      if (line > 0 .and. line < no_line) text = text // ':' // to_text(line)
+    end if
+  end function source_text
+
+  !> All messages, one a line, each after its file and line or its override.
+  function diagnostics_text(self, diagnostics) result(text)
+    class(input_t), intent(in) :: self
+    type(diagnostics_t), intent(in) :: diagnostics
+    character(len=:), allocatable :: text
+    type(text_buffer_t) :: buffer
+    integer, allocatable :: order(:)
+    integer :: i
+
+    call diagnostics%sort_by_line(order)
+    do i = 1, size(order)
+      associate (diagnostic => diagnostics%list(order(i)))
+        if (i > 1) call buffer%append(new_line('a'))
+        call buffer%append(source_text(self, diagnostic%line, diagnostic%override) // ': ')
+        if (diagnostic%group > 0 .and. diagnostic%override == 0) call buffer%append(self%label(diagnostic%group) // ': ')
+        call buffer%append(diagnostic%text)
+      end associate
+    end do
+    text = buffer%text()
+  end function diagnostics_text
 
   pure function label(self, index) result(text)
     class(input_t), intent(in) :: self
@@ -250,7 +299,7 @@ contains
     character(len=:), allocatable :: text
 
     text = '&' // self%groups(index)%kind
-    if (len(self%groups(index)%name) > 0) text = text // " '" // self%groups(index)%name // "'"
+    if (len(self%groups(index)%name) > 0) text = text // ' ' // quoted(shortened(self%groups(index)%name))
   end function label
 
 end module nocdyn_input

@@ -18,7 +18,7 @@ module nocdyn_key_path
     character(len=:), allocatable :: name       !! of the element, '' for groups without names
     integer :: number = 0                       !! among the groups without names of its kind, 0: the path has none
     type(assignment_t) :: place                 !! key and subscript
-    logical :: is_outside = .false.             !! the subscript is a whole number that no list has as a place
+    logical :: is_out_of_range = .false.             !! the subscript is a whole number that no list has as a place
   end type key_path_t
 
 contains
@@ -63,7 +63,7 @@ contains
     else if (open <= len(text)) then
       call read_subscript(text(open + 1:max(open, len(text) - 1)), place)
       path%number = place%first
-      if (place%is_damaged .or. place%last /= place%first .or. text(len(text):) /= ')') message = text(open:) &
+      if (place%is_malformed .or. place%last /= place%first .or. text(len(text):) /= ')') message = text(open:) &
         // ' is no number of a group such as (3)'
     end if
   end subroutine read_group
@@ -85,8 +85,8 @@ contains
         // key_suggestion(path%group_rule, key)
     else if (open <= len(text)) then
       call read_subscript(text(open + 1:max(open, len(text) - 1)), path%place)
-      if (path%place%is_damaged) path%is_outside = is_whole_number(text(open + 1:max(open, len(text) - 1)))
-      if ((path%place%is_damaged .and. .not. path%is_outside) .or. text(len(text):) /= ')') message = text(open:) &
+      if (path%place%is_malformed) path%is_out_of_range = is_whole_number(text(open + 1:max(open, len(text) - 1)))
+      if ((path%place%is_malformed .and. .not. path%is_out_of_range) .or. text(len(text):) /= ')') message = text(open:) &
         // ' is neither a place such as (3) nor a section such as (1:3)'
     end if
   end subroutine read_key

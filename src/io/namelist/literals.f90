@@ -6,7 +6,7 @@ module nocdyn_literals
   implicit none (type, external)
   private
 
-  public :: read_real, read_integer, read_logical, digits_end
+  public :: read_real, read_integer, read_logical, number_problem, digits_end
 
   integer, parameter, public :: literal_fine = 0, literal_malformed = 1, literal_not_finite = 2, literal_too_large = 3
 
@@ -34,6 +34,23 @@ contains
       if (status == literal_fine) read (text, *) value
     end if
   end subroutine read_real
+
+  !> What is wrong with the text of a number: " is not a number"; '' if nothing is.
+  pure function number_problem(status) result(text)
+    integer, intent(in) :: status   !! of `read_real`
+    character(len=:), allocatable :: text
+
+    select case (status)
+    case (literal_fine)
+      text = ''
+    case (literal_not_finite)
+      text = ' is not a finite number'
+    case (literal_too_large)
+      text = ' is too large for a number'
+    case default
+      text = ' is not a number'
+    end select
+  end function number_problem
 
   !> Optional sign and digits.
   subroutine read_integer(text, value, status)

@@ -20,7 +20,7 @@ module nocdyn_namelist
     integer :: last = 0               !! 0 if it is as far as the values go
     integer :: stride = 1
     logical :: is_whole = .true.      !! no subscript was written
-    logical :: is_damaged = .false.   !! subscript or values could not be understood
+    logical :: is_malformed = .false.   !! subscript or values could not be understood
     integer :: first_item = 1, last_item = 0
   end type assignment_t
 
@@ -28,7 +28,7 @@ module nocdyn_namelist
     character(len=:), allocatable :: name   !! in lower case
     integer :: line = 0
     integer :: first_assignment = 1, last_assignment = 0
-    logical :: is_damaged = .false.   !! what seems to be missing may be in the part that could not be understood
+    logical :: is_malformed = .false.   !! what seems to be missing may be in the part that could not be understood
   end type namelist_group_t
 
   !> The assignments and items of all groups stand one after the other in flat lists.

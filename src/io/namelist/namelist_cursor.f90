@@ -1,6 +1,6 @@
 !> A place in the text of a namelist file, and the smallest pieces of its syntax.
 module nocdyn_namelist_cursor
-  use nocdyn_text, only: lower_case
+  use nocdyn_text, only: lower_case, shortened
   implicit none (type, external)
   private
 
@@ -15,7 +15,8 @@ module nocdyn_namelist_cursor
     character(len=:), allocatable :: text   !! ends with a line feed
     integer :: at = 1                       !! next character, len(text) + 1 at the end
     integer :: line = 1
-    logical :: is_value = .false.           !! of an override: '/', '!', '&' and '=' have no meaning
+    logical :: is_override = .false.        !! the text is the value of an override: '/', '!', '&' and '=' have no meaning
+    character(len=:), allocatable :: key    !! whose values are read, with ': ' for messages; '': none
   contains
     procedure :: at_end
     procedure :: next => next_character
@@ -69,7 +70,7 @@ contains
     do while (.not. self%at_end())
       if (scan(self%next(), blanks) == 1) then
         call self%move_to(self%at + 1)
-      else if (self%next() == '!' .and. .not. self%is_value) then
+      else if (self%next() == '!' .and. .not. self%is_override) then
         call self%move_to(self%line_end())
       else
         exit
@@ -103,7 +104,7 @@ contains
   pure integer function value_end(self)
     class(cursor_t), intent(in) :: self
 
-    if (self%is_value) then
+    if (self%is_override) then
       value_end = self%token_end(',')
     else
       value_end = self%token_end(value_delimiters)
@@ -142,7 +143,7 @@ contains
     integer :: i
 
     key_follows = .false.
-    if (self%is_value) return
+    if (self%is_override) return
     i = self%key_end() + 1
     if (i == self%at) return
     i = self%subscript_end(i)
@@ -181,7 +182,7 @@ contains
     class(cursor_t), intent(in) :: self
 
     group_begins = .false.
-    if (self%is_value .or. self%at >= len(self%text)) return
+    if (self%is_override .or. self%at >= len(self%text)) return
     group_begins = scan(self%next(), '&$') == 1 .and. scan(self%text(self%at + 1:self%at + 1), letters) == 1 &
       .and. self%group_ends() == 0
   end function group_begins
@@ -191,7 +192,7 @@ contains
     class(cursor_t), intent(in) :: self
 
     group_ends = 0
-    if (self%is_value) return
+    if (self%is_override) return
     if (self%next() == '/') group_ends = 1
     if (self%at + 4 > len(self%text) .or. scan(self%next(), '&$') == 0) return
     if (lower_case(self%text(self%at + 1:self%at + 3)) /= 'end') return
@@ -214,8 +215,7 @@ contains
 
     text = self%text(self%at:self%line_end() - 1)
     text = text(:verify(text, blanks, back=.true.))
-    if (len(text) > longest_excerpt) text = text(:longest_excerpt) // ' ...'
-    text = '<' // text // '>'
+    text = '<' // shortened(text, longest_excerpt) // '>'
   end function excerpt
 
 end module nocdyn_namelist_cursor

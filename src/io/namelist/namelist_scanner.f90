@@ -40,11 +40,11 @@ contains
     type(namelist_t), intent(out) :: namelist
     type(diagnostics_t), intent(inout) :: diagnostics
     type(cursor_t) :: cursor
-    logical :: is_damaged
+    logical :: is_malformed
 
     call begin(text, namelist, cursor, diagnostics)
-    cursor%is_value = .true.
-    call scan_items(cursor, namelist, diagnostics, is_damaged)
+    cursor%is_override = .true.
+    call scan_items(cursor, namelist, diagnostics, is_malformed)
   end subroutine scan_value
 
   !> The text without byte-order mark, with a final line end, and with control characters refused.
@@ -56,6 +56,7 @@ contains
     character(len=*), parameter :: byte_order_mark = char(239) // char(187) // char(191)
 
     cursor%text = text(merge(4, 1, index(text, byte_order_mark) == 1):) // new_line('a')
+    cursor%key = ''
     call blank_control_characters(cursor%text, diagnostics)
     namelist%source = cursor%text
   end subroutine begin
@@ -134,7 +135,7 @@ contains
     type(diagnostics_t), intent(inout) :: diagnostics
 
     associate (group => namelist%groups(namelist%group_count))
-      if (group%is_damaged) return
+      if (group%is_malformed) return
       if (cursor%at_end()) then
         call diagnostics%add(group%line, namelist%group_count, "not closed: '/' is missing before the end of the file")
       else
@@ -151,16 +152,16 @@ contains
     type(diagnostics_t), intent(inout) :: diagnostics
     integer :: item_count, line, diagnostic_count
     character(len=:), allocatable :: found
-    logical :: is_damaged
+    logical :: is_malformed
 
     line = cursor%line
     found = cursor%excerpt()
     item_count = namelist%item_count
     diagnostic_count = diagnostics%count
     if (cursor%next() == '=') call cursor%move_to(cursor%at + 1)
-    call scan_items(cursor, namelist, diagnostics, is_damaged)
+    call scan_items(cursor, namelist, diagnostics, is_malformed)
     namelist%item_count = item_count
-    namelist%groups(namelist%group_count)%is_damaged = .true.
+    namelist%groups(namelist%group_count)%is_malformed = .true.
     if (diagnostics%count > diagnostic_count) return
     call diagnostics%add(line, namelist%group_count, 'KEY = VALUE was expected, but found is ' // found)
   end subroutine refuse_text_without_key
@@ -171,7 +172,7 @@ contains
     type(diagnostics_t), intent(inout) :: diagnostics
     type(assignment_t) :: assignment
     character(len=:), allocatable :: subscript
-    logical :: is_damaged
+    logical :: is_malformed
     integer :: after, last
 
     last = cursor%key_end()
@@ -181,17 +182,19 @@ contains
     if (after > last + 1) then
       subscript = trim(adjustl(cursor%text(last + 1:after - 1)))
       call read_subscript(subscript(2:len(subscript) - 1), assignment)
-      if (assignment%is_damaged) call diagnostics%add(cursor%line, namelist%group_count, assignment%key // subscript // &
+      if (assignment%is_malformed) call diagnostics%add(cursor%line, namelist%group_count, assignment%key // subscript // &
         ': the subscript is neither a place such as (3) nor a section such as (1:3), from 1 to ' // to_text(longest_list))
     end if
     call cursor%move_to(after)
     call cursor%move_to(cursor%at + index(cursor%text(cursor%at:), '='))
 
     assignment%first_item = namelist%item_count + 1
-    call scan_items(cursor, namelist, diagnostics, is_damaged)
+    cursor%key = assignment%key // ': '
+    call scan_items(cursor, namelist, diagnostics, is_malformed)
+    cursor%key = ''
     assignment%last_item = namelist%item_count
-    if (assignment%is_damaged) namelist%groups(namelist%group_count)%is_damaged = .true.
-    assignment%is_damaged = assignment%is_damaged .or. is_damaged
+    if (assignment%is_malformed) namelist%groups(namelist%group_count)%is_malformed = .true.
+    assignment%is_malformed = assignment%is_malformed .or. is_malformed
     call namelist%append_assignment(assignment)
   end subroutine scan_assignment
 

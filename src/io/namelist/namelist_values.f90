@@ -4,7 +4,7 @@ module nocdyn_namelist_values
   use nocdyn_diagnostics, only: diagnostics_t
   use nocdyn_namelist, only: assignment_t, item_t, namelist_t
   use nocdyn_namelist_cursor, only: cursor_t
-  use nocdyn_text, only: to_text
+  use nocdyn_text, only: shortened, to_text
   implicit none (type, external)
   private
 
@@ -16,14 +16,14 @@ module nocdyn_namelist_values
 contains
 
   !> Appends the values at the cursor up to the next key or the end of the group.
-  subroutine scan_items(cursor, namelist, diagnostics, is_damaged)
+  subroutine scan_items(cursor, namelist, diagnostics, is_malformed)
     type(cursor_t), intent(inout) :: cursor
     type(namelist_t), intent(inout) :: namelist
     type(diagnostics_t), intent(inout) :: diagnostics
-    logical, intent(out) :: is_damaged   !! some could not be understood
+    logical, intent(out) :: is_malformed   !! some could not be understood
     logical :: is_fine, is_after_value
 
-    is_damaged = .false.
+    is_malformed = .false.
     is_after_value = .false.
     do
       call cursor%skip_blanks()
@@ -36,11 +36,11 @@ contains
         exit
       else
         call scan_item(cursor, namelist, diagnostics, is_fine)
-        is_damaged = is_damaged .or. .not. is_fine
+        is_malformed = is_malformed .or. .not. is_fine
         is_after_value = .true.
       end if
     end do
-    if (is_damaged .and. namelist%group_count > 0) namelist%groups(namelist%group_count)%is_damaged = .true.
+    if (is_malformed .and. namelist%group_count > 0) namelist%groups(namelist%group_count)%is_malformed = .true.
   end subroutine scan_items
 
   !> One value, or several by a repeat count such as 3*0.5.
@@ -55,7 +55,7 @@ contains
     call scan_repeat_count(cursor, repeats)
     item%line = cursor%line
     is_fine = repeats >= 1 .and. repeats <= longest_list
-    if (.not. is_fine) call diagnostics%add(cursor%line, namelist%group_count, &
+    if (.not. is_fine) call diagnostics%add(cursor%line, namelist%group_count, cursor%key // &
       'a repeat count such as 3*0.5 must be from 1 to ' // to_text(longest_list))
 
     if (scan(cursor%next(), '''"') == 1) then
@@ -94,9 +94,9 @@ contains
 
     last = cursor%quote_end()
     if (last == 0) then
-      call diagnostics%add(cursor%line, group, &
-                           'a quote is missing: the text ' // cursor%excerpt() // ' is not closed on its line')
-      call leave_broken_line(cursor)
+      call diagnostics%add(cursor%line, group, cursor%key // 'a quote is missing: the text ' // cursor%excerpt() // &
+                           ' is not closed on its line')
+      call skip_broken_line(cursor)
     else if (is_separated(cursor, last + 1)) then
       item%first = cursor%at
       item%last = last
@@ -104,9 +104,10 @@ contains
       call cursor%move_to(last + 1)
       return
     else
-      call diagnostics%add(cursor%line, group, 'a quote or a comma is missing: ' // cursor%text(cursor%at:last) // &
-        ' is followed directly by ' // cursor%text(last + 1:last + 1))
-      call leave_broken_line(cursor)
+      call diagnostics%add(cursor%line, group, cursor%key // 'a quote or a comma is missing: ' // &
+                           shortened(cursor%text(cursor%at:last)) // ' is followed directly by ' // &
+                           cursor%text(last + 1:last + 1))
+      call skip_broken_line(cursor)
     end if
     is_fine = .false.
   end subroutine scan_quoted
@@ -127,12 +128,12 @@ contains
     if (is_separated(cursor, cursor%at)) return
 
     if (cursor%next() == '=') then
-      call diagnostics%add(cursor%line, group, "'=' without a key before it: " // cursor%excerpt())
+      call diagnostics%add(cursor%line, group, cursor%key // "'=' without a key before it: " // cursor%excerpt())
       call cursor%move_to(cursor%at + 1)
     else
-      call diagnostics%add(cursor%line, group, 'a quote stands inside ' // cursor%text(item%first:last + 1) // &
-        '; a text begins and ends with a quote')
-      call leave_broken_line(cursor)
+      call diagnostics%add(cursor%line, group, cursor%key // 'a quote stands inside ' // &
+                           shortened(cursor%text(item%first:last + 1)) // '; a text begins and ends with a quote')
+      call skip_broken_line(cursor)
     end if
     is_fine = .false.
   end subroutine scan_bare
@@ -147,7 +148,7 @@ contains
   end function is_separated
 
   !> With the quotes of a line out of step its rest means nothing, but a slash at its end still ends the group.
-  subroutine leave_broken_line(cursor)
+  subroutine skip_broken_line(cursor)
     type(cursor_t), intent(inout) :: cursor
     character(len=:), allocatable :: rest
     integer :: slash
@@ -161,7 +162,7 @@ contains
       end if
     end if
     call cursor%move_to(cursor%line_end())
-  end subroutine leave_broken_line
+  end subroutine skip_broken_line
 
   !> `(first)` or `(first:last:stride)` with any part of a section left out.
   subroutine read_subscript(text, assignment)
@@ -186,7 +187,7 @@ contains
     assignment%first = bounds(1)
     assignment%last = bounds(2)
     assignment%stride = bounds(3)
-    assignment%is_damaged = part > 3 .or. .not. is_fine .or. (bounds(2) > 0 .and. bounds(2) < bounds(1))
+    assignment%is_malformed = part > 3 .or. .not. is_fine .or. (bounds(2) > 0 .and. bounds(2) < bounds(1))
   end subroutine read_subscript
 
   !> A bound that is left out keeps its value.

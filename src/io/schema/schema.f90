@@ -1,24 +1,22 @@
-!> What an input file may hold: every group and every key once, with type, unit, default, allowed values and help.
+!> The schema of an input file: every group and every key once, with type, unit, default, allowed values and help.
 !>
-!> A new key is a new row of `key_rules`, a new group one of `group_rules` with its keys and an example; reading,
-!> checking, help, template and reference follow from the rows. The rows of large groups stand in modules of their own.
+!> A new key is a new row of `key_rules`; a new group is a row of `group_rules` with its keys and an example. Reading, checking,
+!> help, template and reference use the rows. The rows of large groups are in modules of their own.
 module nocdyn_schema
   use nocdyn_kinds, only: wp
-  use nocdyn_schema_constraints, only: constraint_alternatives, constraint_examples, constraint_groups, constraint_keys
-  use nocdyn_schema_couplings, only: coupling_alternatives, coupling_columns, coupling_examples, coupling_keys, coupling_needs
-  use nocdyn_schema_rules, only: a_body, a_flag, a_kind, a_file, a_name, a_number, a_text, a_word, allowed_t, alternative_t, &
-    an_integer, any_number, any_times, anything, at_least_once, at_most_once, body_or_ground, columns_t, exactly_once, &
-    example_t, from_1, from_2, group_rule_t, key_rule_t, kind_rule_t, need_t, not_negative, order_t, positive, required, &
-    synonym_t, unset
-  use nocdyn_schema_sweep, only: sweep_examples, sweep_groups, sweep_keys, sweep_kinds, sweep_needs, sweep_orders, &
-    sweep_synonyms
-  use nocdyn_schema_torques, only: excitation_keys, load_keys, motor_keys, torque_alternatives, torque_columns, &
-    torque_examples, torque_kinds, torque_needs
+  use nocdyn_schema_constraints, only: constraint_examples, constraint_groups, constraint_keys, constraint_relations
+  use nocdyn_schema_couplings, only: coupling_examples, coupling_keys, coupling_relations
+  use nocdyn_schema_rules, only: a_body, a_file, a_flag, a_folder, a_name, a_number, a_selector, a_text, a_word, alias_t, &
+    allowed_t, an_integer, any_number, any_times, anything, at_least_once, at_most_once, at_most_one, body_or_ground, &
+    exactly_once, example_t, from_2, group_rule_t, key_rule_t, kind_rule_t, less_than, not_negative, positive, relation_rule_t, &
+    required, unset
+  use nocdyn_schema_sweep, only: sweep_aliases, sweep_examples, sweep_groups, sweep_keys, sweep_kinds, sweep_relations
+  use nocdyn_schema_torques, only: excitation_keys, load_keys, motor_keys, torque_examples, torque_kinds, torque_relations
   use nocdyn_text, only: append, string_t
   implicit none (type, external)
   private
 
-  public :: group_rule_index, key_rule_index, kind_rule_index, kind_name, first_key, last_key, is_single, &
+  public :: group_rule_index, key_rule_index, selector_rule, selector_name, first_key, last_key, key_name, is_single, &
     holds_texts, has_word, words_in, words_of
 
   type(allowed_t), parameter :: steps = allowed_t(low=1.0_wp, high=1.0e8_wp)
@@ -43,9 +41,9 @@ module nocdyn_schema
 
   type(key_rule_t), parameter :: frame_keys(*) = [ &
     key_rule_t('case',       'title',           a_text,         1, '',            "''",        anything, &
-      'one line that summaries and figures repeat'), &
+      'title of summaries and figures, one line'), &
     key_rule_t('body',       'name',            a_name,         1, '',            required,    anything, &
-      'what couplings, gears, torques and results call it'), &
+      'name in couplings, gears, torques and results'), &
     key_rule_t('body',       'inertia',         a_number,       1, 'kg m2',       required,    not_negative, &
       'moment of inertia about the axis; 0 where a body with an inertia is geared to it'), &
     key_rule_t('body',       'angle',           a_number,       1, 'rad',         '0',         anything, &
@@ -59,44 +57,37 @@ module nocdyn_schema
     key_rule_t('run',        'method',          a_word,         1, '',            default_method, methods, &
       'explicit: rk45, rk853, taylor; implicit: rodas4 = rosenbrock, rodas5p; auto: two of them'), &
     key_rule_t('run',        'rtol',            a_number,       1, '',            '1e-6',      tolerance, &
-      'relative error tolerated in a step'), &
+      'relative error tolerance of a step'), &
     key_rule_t('run',        'atol',            a_number,       1, '',            '1e-9',      positive, &
-      'absolute error tolerated in a step, in the unit of the state'), &
+      'absolute error tolerance of a step, in the unit of the state'), &
     key_rule_t('run',        'formulation',     a_word,         1, '',            "'reduced'", formulations, &
-      'equations that are integrated: the same motion, reduced is the fastest'), &
+      'equations that are integrated: they give the same motion, reduced is the fastest'), &
     key_rule_t('run',        'independent',     a_body,         any_number, '',   unset,       anything, &
       'bodies whose speeds are the coordinates; found if not given'), &
     key_rule_t('run',        'complement',      a_word,         1, '',            "'natural'", complements, &
-      'which orthogonal complement of the gear constraints'), &
+      'orthogonal complement of the gear constraints'), &
     key_rule_t('run',        'start',           a_word,         1, '',            "'given'",   starts, &
-      'start speeds that violate a constraint: refused, or changed as an impact in the gears would'), &
+      'start speeds that violate a constraint: refused (given) or corrected by an impact'), &
     key_rule_t('run',        'max_steps',       an_integer,     1, '',            '1000000',   steps, &
       'the run fails after this many steps'), &
     key_rule_t('output',     'interval',        a_number,       1, 's',           unset,       positive, &
       'time from row to row'), &
     key_rule_t('output',     'points',          an_integer,     1, '',            '1001',      from_2, &
       'number of rows from t_start to t_end'), &
-    key_rule_t('output',     'directory',       a_text,         1, '',            "''",        anything, &
-      "where results go; '' means results/ and the name of the input file")]
+    key_rule_t('output',     'directory',       a_folder,       1, '',            "''",        anything, &
+      "folder of the results; '' means results/ and the name of the input file")]
 
   type(kind_rule_t), parameter, public :: kind_rules(*) = [torque_kinds, sweep_kinds]
 
   type(key_rule_t), parameter, public :: key_rules(*) = &
     [frame_keys, coupling_keys, constraint_keys, motor_keys, load_keys, excitation_keys, sweep_keys]
 
-  type(alternative_t), parameter, public :: alternatives(*) = [ &
-    alternative_t('output', 'interval', 'points'), &
-    coupling_alternatives, constraint_alternatives, torque_alternatives]
+  type(relation_rule_t), parameter, public :: relation_rules(*) = [ &
+    relation_rule_t('run', less_than, 't_start', 't_end'), &
+    relation_rule_t('output', at_most_one, 'interval', 'points'), &
+    coupling_relations, constraint_relations, torque_relations, sweep_relations]
 
-  type(need_t), parameter, public :: needs(*) = [coupling_needs, torque_needs, sweep_needs]
-
-  type(columns_t), parameter, public :: columns(*) = [coupling_columns, torque_columns]
-
-  type(order_t), parameter, public :: orders(*) = [ &
-    order_t('run', 't_start', 't_end'), &
-    sweep_orders]
-
-  type(synonym_t), parameter, public :: synonyms(*) = sweep_synonyms
+  type(alias_t), parameter, public :: aliases(*) = sweep_aliases
 
   type(example_t), parameter, public :: examples(*) = [ &
     example_t('case',       "title = 'Paper, case 2: harmonic torque on the motor'"), &
@@ -107,7 +98,7 @@ module nocdyn_schema
     example_t('output',     'interval = 0.01'), &
     coupling_examples, constraint_examples, torque_examples, sweep_examples]
 
-  integer :: rule   ! of the list below alone
+  integer :: rule   ! index of the list below
   integer, parameter :: first_keys(size(group_rules)) = &
     [(findloc(key_rules%group, group_rules(rule)%name, dim=1), rule=1, size(group_rules))]
 
@@ -122,16 +113,16 @@ contains
     end do
   end function group_rule_index
 
-  !> First row of `key_rules` of a group; the rows of a group stand together.
+  !> First row of `key_rules` of a group; the rows of a group are consecutive.
   pure integer function first_key(group_rule) result(key)
-    integer, intent(in) :: group_rule
+    integer, intent(in) :: group_rule   !! row of `group_rules`
 
     key = first_keys(group_rule)
   end function first_key
 
   !> Last row of `key_rules` of a group.
   pure integer function last_key(group_rule) result(key)
-    integer, intent(in) :: group_rule
+    integer, intent(in) :: group_rule   !! row of `group_rules`
 
     do key = size(key_rules), 1, -1
       if (key_rules(key)%group == group_rules(group_rule)%name) return
@@ -140,7 +131,7 @@ contains
 
   !> Row of `key_rules`, 0 if the group has no such key.
   pure integer function key_rule_index(group_rule, name) result(key)
-    integer, intent(in) :: group_rule
+    integer, intent(in) :: group_rule      !! row of `group_rules`
     character(len=*), intent(in) :: name   !! in lower case
 
     do key = first_key(group_rule), last_key(group_rule)
@@ -149,36 +140,45 @@ contains
     key = 0
   end function key_rule_index
 
-  !> Row of `key_rules` of the key that says which other keys a group has, 0 if it has none.
-  pure integer function kind_rule_index(group_rule) result(key)
-    integer, intent(in) :: group_rule
-
-    do key = first_key(group_rule), last_key(group_rule)
-      if (key_rules(key)%kind == a_kind) return
-    end do
-    key = 0
-  end function kind_rule_index
-
-  !> The name of that key: "kind", "design" ...
-  pure function kind_name(group_rule) result(name)
-    integer, intent(in) :: group_rule   !! of a group that has one
+  !> Name of a key of a group.
+  pure function key_name(group_rule, position) result(name)
+    integer, intent(in) :: group_rule   !! row of `group_rules`
+    integer, intent(in) :: position     !! of the key among the keys of the group
     character(len=:), allocatable :: name
 
-    name = trim(key_rules(kind_rule_index(group_rule))%name)
-  end function kind_name
+    name = trim(key_rules(first_key(group_rule) + position - 1)%name)
+  end function key_name
 
-  !> Whether a group occurs at most once, so that its kind alone identifies it.
+  !> Row of `key_rules` of the selector key of a group, 0 if it has none.
+  pure integer function selector_rule(group_rule) result(key)
+    integer, intent(in) :: group_rule   !! row of `group_rules`
+
+    do key = first_key(group_rule), last_key(group_rule)
+      if (key_rules(key)%value_type == a_selector) return
+    end do
+    key = 0
+  end function selector_rule
+
+  !> Name of the selector key: "kind", "design" ...
+  pure function selector_name(group_rule) result(name)
+    integer, intent(in) :: group_rule   !! row of `group_rules`, of a group that has a selector key
+    character(len=:), allocatable :: name
+
+    name = trim(key_rules(selector_rule(group_rule))%name)
+  end function selector_name
+
+  !> Whether a group occurs at most once, so that paths to its keys need no name.
   pure logical function is_single(group_rule)
-    integer, intent(in) :: group_rule
+    integer, intent(in) :: group_rule   !! row of `group_rules`
 
     is_single = any(group_rules(group_rule)%occurrence == [exactly_once, at_most_once])
   end function is_single
 
-  !> Whether values of this kind are written in quotes.
-  pure logical function holds_texts(kind)
-    integer, intent(in) :: kind
+  !> Whether values of a type are written in quotes.
+  pure logical function holds_texts(value_type)
+    integer, intent(in) :: value_type   !! a_text ... a_folder
 
-    holds_texts = any(kind == [a_text, a_name, a_body, body_or_ground, a_word, a_kind, a_file])
+    holds_texts = all(value_type /= [a_number, an_integer, a_flag])
   end function holds_texts
 
   !> Whether a word is one of a list that is separated by blanks.
@@ -203,13 +203,13 @@ contains
     end do
   end function words_in
 
-  !> The words that a key of the kinds `a_word` and `a_kind` accepts.
+  !> The words that a key of the type `a_word` or `a_selector` accepts.
   pure function words_of(rule) result(words)
     type(key_rule_t), intent(in) :: rule
     type(string_t), allocatable :: words(:)
     integer :: i
 
-    if (rule%kind /= a_kind) then
+    if (rule%value_type /= a_selector) then
       words = words_in(rule%allowed%words)
       return
     end if

@@ -1,7 +1,7 @@
-!> Rows of the schema: keys of the rigid joints, &gear, &planetary, &differential and &constraint.
+!> Rows of the schema: the rigid joints, &gear, &planetary, &differential and &constraint.
 module nocdyn_schema_constraints
-  use nocdyn_schema_rules, only: a_body, a_flag, a_name, a_number, alternative_t, an_integer, any_number, any_times, anything, &
-    body_or_ground, example_t, from_1, group_rule_t, key_rule_t, not_zero, positive, required, unset
+  use nocdyn_schema_rules, only: a_body, a_flag, a_name, a_number, an_integer, any_number, any_times, anything, body_or_ground, &
+    equal_lengths, exactly_one, example_t, from_1, group_rule_t, key_rule_t, not_zero, positive, relation_rule_t, required, unset
   implicit none (type, external)
   private
 
@@ -14,7 +14,7 @@ module nocdyn_schema_constraints
 
   type(key_rule_t), parameter, public :: constraint_keys(*) = [ &
     key_rule_t('gear',       'name',            a_name,         1, '',            required,    anything, &
-      'what results and messages call it'), &
+      'name in results and messages'), &
     key_rule_t('gear',       'bodies',          body_or_ground, 2, '',            required,    anything, &
       "the two wheels; 'ground' does not turn, and locks the other one"), &
     key_rule_t('gear',       'radii',           a_number,       2, 'm',           unset,       positive, &
@@ -24,30 +24,31 @@ module nocdyn_schema_constraints
     key_rule_t('gear',       'internal',        a_flag,         1, '',            '.false.',   anything, &
       'an internal gear: both wheels turn in the same direction'), &
     key_rule_t('planetary',  'name',            a_name,         1, '',            required,    anything, &
-      'what results and messages call it'), &
+      'name in results and messages'), &
     key_rule_t('planetary',  'sun',             body_or_ground, 1, '',            required,    anything, &
       "the sun wheel; one of the three members may be 'ground', which does not turn"), &
     key_rule_t('planetary',  'ring',            body_or_ground, 1, '',            required,    anything, &
       'the ring, an internal wheel'), &
     key_rule_t('planetary',  'carrier',         body_or_ground, 1, '',            required,    anything, &
-      'the carrier; the mass of the planets counts with it, their spin does not count'), &
+      'the carrier; its inertia includes the mass of the planets, whose spin is neglected'), &
     key_rule_t('planetary',  'teeth',           an_integer,     2, '',            required,    from_1, &
-      'numbers of teeth of sun and ring; the ring has more'), &
+      'numbers of teeth of sun and ring; the ring has more', ascends=.true.), &
     key_rule_t('differential', 'name',          a_name,         1, '',            required,    anything, &
-      'what results and messages call it'), &
+      'name in results and messages'), &
     key_rule_t('differential', 'sides',         body_or_ground, 2, '',            required,    anything, &
       "the two side shafts; one of the three members may be 'ground', which does not turn"), &
     key_rule_t('differential', 'case',          body_or_ground, 1, '',            required,    anything, &
       'the case, which turns with the mean speed of the sides'), &
     key_rule_t('constraint', 'name',            a_name,         1, '',            required,    anything, &
-      'what results and messages call it'), &
+      'name in results and messages'), &
     key_rule_t('constraint', 'bodies',          a_body,         any_number, '',   required,    anything, &
-      'the bodies whose speeds are related', least=1), &
+      'the bodies whose speeds are related', fewest=1), &
     key_rule_t('constraint', 'coefficients',    a_number,       any_number, '',   required,    not_zero, &
-      'as many numbers as bodies', least=1)]
+      'as many numbers as bodies', fewest=1)]
 
-  type(alternative_t), parameter, public :: constraint_alternatives(*) = [ &
-    alternative_t('gear', 'radii', 'teeth', is_needed=.true.)]
+  type(relation_rule_t), parameter, public :: constraint_relations(*) = [ &
+    relation_rule_t('gear', exactly_one, 'radii', 'teeth'), &
+    relation_rule_t('constraint', equal_lengths, 'bodies coefficients', '')]
 
   type(example_t), parameter, public :: constraint_examples(*) = [ &
     example_t('gear',         "name = 'reducer'  bodies = 'pinion', 'machine' radii = 2.0, 3.0"), &

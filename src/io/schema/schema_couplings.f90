@@ -1,7 +1,8 @@
-!> Rows of the schema: keys of &coupling and how they go together.
+!> Rows of the schema: the keys of &coupling and the relations between them.
 module nocdyn_schema_couplings
-  use nocdyn_schema_rules, only: a_file, a_name, a_number, a_word, alternative_t, any_number, anything, body_or_ground, &
-    columns_t, example_t, extrapolations, interpolations, key_rule_t, need_t, not_negative, positive, required, unset
+  use nocdyn_schema_rules, only: a_file, a_name, a_number, a_word, any_number, anything, at_most_one, body_or_ground, &
+    equal_lengths, example_t, extrapolations, interpolations, key_rule_t, not_negative, positive, relation_rule_t, required, &
+    requires, unset
   implicit none (type, external)
   private
 
@@ -9,7 +10,7 @@ module nocdyn_schema_couplings
 
   type(key_rule_t), parameter, public :: coupling_keys(*) = [ &
     key_rule_t('coupling',   'name',            a_name,         1, '',            required,    anything, &
-      'what results and messages call it'), &
+      'name in results and messages'), &
     key_rule_t('coupling',   'bodies',          body_or_ground, 2, '',            required,    anything, &
       "the two ends; twist = angle of the second - angle of the first; 'ground' does not turn"), &
     key_rule_t('coupling',   'stiffness',       a_number,       1, 'N m/rad',     '0',         not_negative, &
@@ -17,7 +18,7 @@ module nocdyn_schema_couplings
     key_rule_t('coupling',   'cubic_stiffness', a_number,       1, 'N m/rad3',    '0',         anything, &
       'cubic part of the elastic moment; negative softens'), &
     key_rule_t('coupling',   'polynomial',      a_number,       any_number, 'N m/rad^k', unset, anything, &
-      'p_1, p_2, ...: p_k w^k, w = twist - rest_twist, are added to the elastic moment', least=1), &
+      'p_1, p_2, ...: p_k w^k, w = twist - rest_twist, are added to the elastic moment', fewest=1), &
     key_rule_t('coupling',   'damping',         a_number,       1, 'N m s/rad',   '0',         not_negative, &
       'moment per rate of twist; with a gap only in contact, at most as large as the elastic moment'), &
     key_rule_t('coupling',   'rest_twist',      a_number,       1, 'rad',         '0',         anything, &
@@ -31,29 +32,26 @@ module nocdyn_schema_couplings
     key_rule_t('coupling',   'friction_speed',  a_number,       1, 'rad/s',       '0.01',      positive, &
       'rate of twist at which the friction has 76 % of its full moment'), &
     key_rule_t('coupling',   'table_twist',     a_number,       any_number, 'rad', unset,      anything, &
-      'twist - rest_twist of the points of a table, ascending', least=2), &
+      'twist - rest_twist of the points of a table, ascending', fewest=2, ascends=.true.), &
     key_rule_t('coupling',   'table_moment',    a_number,       any_number, 'N m', unset,      anything, &
-      'elastic moment at these points', least=2), &
+      'elastic moment at these points', fewest=2), &
     key_rule_t('coupling',   'table_file',      a_file,         1, '',            unset,       anything, &
       'file with the table: two columns, twist - rest_twist [rad] and moment [N m]'), &
     key_rule_t('coupling',   'interpolation',   a_word,         1, '',            linear,      interpolations, &
       'between the points: straight lines, or the monotone cubic of Fritsch and Butland'), &
     key_rule_t('coupling',   'extrapolation',   a_word,         1, '',            linear,      extrapolations, &
-      'beyond the table: its end slope goes on, or its end value holds')]
+      'beyond the table: straight on with the end slope, or constant')]
 
-  type(alternative_t), parameter, public :: coupling_alternatives(*) = [ &
-    alternative_t('coupling', 'table_twist table_moment', 'table_file'), &
-    alternative_t('coupling', 'table_twist table_moment table_file', 'stiffness cubic_stiffness polynomial gap saturation'), &
-    alternative_t('coupling', 'saturation', 'cubic_stiffness polynomial gap')]
-
-  type(need_t), parameter, public :: coupling_needs(*) = [ &
-    need_t('coupling', 'gap', 'stiffness cubic_stiffness polynomial'), &
-    need_t('coupling', 'saturation', 'stiffness'), &
-    need_t('coupling', 'friction_speed', 'friction'), &
-    need_t('coupling', 'interpolation extrapolation', 'table_twist table_file')]
-
-  type(columns_t), parameter, public :: coupling_columns(*) = [ &
-    columns_t('coupling', 'table_twist table_moment', 'table_file')]
+  type(relation_rule_t), parameter, public :: coupling_relations(*) = [ &
+    relation_rule_t('coupling', at_most_one, 'table_twist table_moment', 'table_file'), &
+    relation_rule_t('coupling', at_most_one, 'table_twist table_moment table_file', &
+                    'stiffness cubic_stiffness polynomial gap saturation'), &
+    relation_rule_t('coupling', at_most_one, 'saturation', 'cubic_stiffness polynomial gap'), &
+    relation_rule_t('coupling', requires, 'gap', 'stiffness cubic_stiffness polynomial'), &
+    relation_rule_t('coupling', requires, 'saturation', 'stiffness'), &
+    relation_rule_t('coupling', requires, 'friction_speed', 'friction'), &
+    relation_rule_t('coupling', requires, 'interpolation extrapolation', 'table_twist table_file'), &
+    relation_rule_t('coupling', equal_lengths, 'table_twist table_moment', 'table_file')]
 
   type(example_t), parameter, public :: coupling_examples(*) = [ &
     example_t('coupling', "name = 'coupling' bodies = 'motor', 'pinion' stiffness = 100.0 cubic_stiffness = 10"), &

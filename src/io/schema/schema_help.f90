@@ -1,11 +1,11 @@
-!> The schema as people read it on the terminal: help, and an annotated example file.
+!> The schema on the terminal: help, and an example file with explanations.
 module nocdyn_schema_help
   use nocdyn_errors, only: error_t, exit_input, raise
-  use nocdyn_schema, only: examples, first_key, group_rule_index, group_rules, has_word, key_rules, kind_name, kind_rule_index, &
-    kind_rules, last_key
-  use nocdyn_schema_rules, only: a_flag, a_kind, a_number, a_word, an_integer, body_or_ground, example_t, key_rule_t
+  use nocdyn_schema, only: examples, first_key, group_rule_index, group_rules, has_word, key_rules, kind_rules, last_key, &
+    selector_name, selector_rule
+  use nocdyn_schema_rules, only: a_flag, a_number, a_selector, a_word, an_integer, body_or_ground, example_t, key_rule_t
   use nocdyn_schema_sentences, only: default_text, sentences_on
-  use nocdyn_schema_text, only: allowed_text, group_names, kind_text, listed, occurrence_text, suggestion
+  use nocdyn_schema_text, only: allowed_text, group_names, listed, occurrence_text, suggestion, type_text
   use nocdyn_text, only: append, lower_case, quoted, string_t
   use nocdyn_text_buffer, only: text_buffer_t
   implicit none (type, external)
@@ -15,7 +15,7 @@ module nocdyn_schema_help
 
   integer, parameter :: longest_group = maxval(len_trim(group_rules%name))
   integer, parameter :: column = 38       !! width of type and allowed values
-  integer, parameter :: longest = 54      !! that the default may follow in the same line
+  integer, parameter :: longest = 54      !! type and allowed values that leave room for the default in the same line
   integer, parameter :: line_width = 96   !! of sentences
   character(len=*), parameter :: comment = '! '
 
@@ -71,7 +71,7 @@ contains
     integer :: rule
 
     call buffer%append_line("! An input of nocdyn. 'nocdyn check FILE' checks it, 'nocdyn run FILE' computes it.")
-    call buffer%append_line('! SI units; texts in quotes; what stands behind an exclamation mark is a comment.')
+    call buffer%append_line('! SI units; texts in quotes; an exclamation mark begins a comment.')
     do rule = 1, size(group_rules)
       call buffer%append_line('')
       call append_group(buffer, rule, comment)
@@ -80,125 +80,125 @@ contains
     text = buffer%text()
   end function input_template
 
-  !> A group's keys: those before its kind and the kind itself, those of each kind, those behind.
-  subroutine append_group(buffer, rule, indicator)
+  !> A group with its keys: those up to the selector key, those of each kind, those of every kind.
+  subroutine append_group(buffer, rule, prefix)
     type(text_buffer_t), intent(inout) :: buffer
-    integer, intent(in) :: rule
-    character(len=*), intent(in) :: indicator   !! at the begin of each line
-    integer :: k, key, kind_key
+    integer, intent(in) :: rule              !! row of `group_rules`
+    character(len=*), intent(in) :: prefix   !! of each line
+    integer :: k, key, selector
 
-    call buffer%append_line(indicator // '&' // trim(group_rules(rule)%name) // ', ' // &
+    call buffer%append_line(prefix // '&' // trim(group_rules(rule)%name) // ', ' // &
                             occurrence_text(group_rules(rule)%occurrence))
-    call buffer%append_line(indicator // '  ' // trim(group_rules(rule)%help))
-    kind_key = kind_rule_index(rule)
-    if (kind_key == 0) kind_key = last_key(rule)
-    do key = first_key(rule), kind_key
-      call append_key(buffer, key_rules(key), indicator)
+    call buffer%append_line(prefix // '  ' // trim(group_rules(rule)%help))
+    selector = selector_rule(rule)
+    if (selector == 0) selector = last_key(rule)
+    do key = first_key(rule), selector
+      call append_key(buffer, key_rules(key), prefix)
     end do
     do k = 1, size(kind_rules)
-      if (kind_rules(k)%group == group_rules(rule)%name) call append_kind(buffer, k, rule, indicator)
+      if (kind_rules(k)%group == group_rules(rule)%name) call append_kind(buffer, k, rule, prefix)
     end do
-    if (any(key_rules(kind_key + 1:last_key(rule))%kinds == '')) then
-      call buffer%append_line(indicator // '  of every ' // kind_name(rule))
+    if (any(key_rules(selector + 1:last_key(rule))%only_if == '')) then
+      call buffer%append_line(prefix // '  of every ' // selector_name(rule))
     end if
-    do key = kind_key + 1, last_key(rule)
-      if (key_rules(key)%kinds == '') call append_key(buffer, key_rules(key), indicator)
+    do key = selector + 1, last_key(rule)
+      if (key_rules(key)%only_if == '') call append_key(buffer, key_rules(key), prefix)
     end do
-    call append_sentences(buffer, rule, indicator)
+    call append_sentences(buffer, rule, prefix)
   end subroutine append_group
 
-  !> The law of a kind and its keys; those that an earlier kind has too are only named.
-  subroutine append_kind(buffer, kind, rule, indicator)
+  !> A kind with its keys; of keys that an earlier kind has too only the names.
+  subroutine append_kind(buffer, kind, rule, prefix)
     type(text_buffer_t), intent(inout) :: buffer
-    integer, intent(in) :: kind, rule
-    character(len=*), intent(in) :: indicator
+    integer, intent(in) :: kind, rule   !! rows of `kind_rules` and `group_rules`
+    character(len=*), intent(in) :: prefix
     type(string_t), allocatable :: known(:)
     integer :: key
 
-    call buffer%append_line(indicator // '  ' // kind_name(rule) // ' = ' // quoted(trim(kind_rules(kind)%word)) // ': ' // &
+    call buffer%append_line(prefix // '  ' // selector_name(rule) // ' = ' // quoted(trim(kind_rules(kind)%word)) // ': ' // &
                             trim(kind_rules(kind)%help))
     allocate (known(0))
     do key = first_key(rule), last_key(rule)
-      if (.not. has_word(key_rules(key)%kinds, kind_rules(kind)%word)) cycle
-      if (index(key_rules(key)%kinds, trim(kind_rules(kind)%word) // ' ') == 1) then
-        call append_key(buffer, key_rules(key), indicator)
+      if (.not. has_word(key_rules(key)%only_if, kind_rules(kind)%word)) cycle
+      if (index(key_rules(key)%only_if, trim(kind_rules(kind)%word) // ' ') == 1) then
+        call append_key(buffer, key_rules(key), prefix)
       else
         call append(known, trim(key_rules(key)%name))
       end if
     end do
-    if (size(known) > 0) call buffer%append_line(indicator // '    ' // listed(known, ' and ') // ' as above')
+    if (size(known) > 0) call buffer%append_line(prefix // '    ' // listed(known, ' and ') // ' as above')
   end subroutine append_kind
 
-  subroutine append_key(buffer, rule, indicator)
+  subroutine append_key(buffer, rule, prefix)
     type(text_buffer_t), intent(inout) :: buffer
     type(key_rule_t), intent(in) :: rule
-    character(len=*), intent(in) :: indicator
+    character(len=*), intent(in) :: prefix
 
-    call buffer%append_line(indicator // '    ' // rule%name // short_rule(rule, indicator))
-    call buffer%append_line(indicator // '      ' // trim(rule%help))
+    call buffer%append_line(prefix // '    ' // rule%name // short_rule(rule, prefix))
+    call buffer%append_line(prefix // '      ' // trim(rule%help))
   end subroutine append_key
 
-  !> Type, allowed values and default in one line, the default in a column of its own; in a line of its own after long ones.
-  function short_rule(rule, indicator) result(text)
+  !> Type, allowed values and default in one line; the default is in a column of its own, after long texts in a line of its own.
+  function short_rule(rule, prefix) result(text)
     type(key_rule_t), intent(in) :: rule
-    character(len=*), intent(in) :: indicator   !! of the lines
+    character(len=*), intent(in) :: prefix   !! of the lines
     character(len=:), allocatable :: text
 
-    select case (rule%kind)
+    select case (rule%value_type)
     case (a_number, an_integer)
-      text = kind_text(rule) // ', ' // allowed_text(rule)
+      text = type_text(rule) // ', ' // allowed_text(rule)
     case (a_word, a_flag)
       text = allowed_text(rule)
-    case (a_kind)
+    case (a_selector)
       text = trim(merge('one of those below        ', 'one or more of those below', rule%count == 1))
     case (body_or_ground)
-      text = kind_text(rule) // " or 'ground'"
+      text = type_text(rule) // " or 'ground'"
     case default
-      text = kind_text(rule)
+      text = type_text(rule)
     end select
     text = ' ' // text
     if (len(text) > longest) then
-      text = text // new_line('a') // indicator // repeat(' ', 5 + len(rule%name) + column)
+      text = text // new_line('a') // prefix // repeat(' ', 5 + len(rule%name) + column)
     else
       text = text // repeat(' ', max(0, column + 1 - len(text)))
     end if
     text = text // ' ' // default_text(rule)
   end function short_rule
 
-  subroutine append_sentences(buffer, rule, indicator)
+  subroutine append_sentences(buffer, rule, prefix)
     type(text_buffer_t), intent(inout) :: buffer
-    integer, intent(in) :: rule
-    character(len=*), intent(in) :: indicator
+    integer, intent(in) :: rule              !! row of `group_rules`
+    character(len=*), intent(in) :: prefix
     type(string_t), allocatable :: sentences(:)
     integer :: i
 
     allocate (sentences, source=sentences_on(rule))
     do i = 1, size(sentences)
-      call append_wrapped(buffer, sentences(i)%text, indicator // '  ')
+      call append_wrapped(buffer, sentences(i)%text, prefix // '  ')
     end do
   end subroutine append_sentences
 
   !> A sentence on as many lines as it needs.
-  subroutine append_wrapped(buffer, text, indicator)
+  subroutine append_wrapped(buffer, text, prefix)
     type(text_buffer_t), intent(inout) :: buffer
-    character(len=*), intent(in) :: text, indicator
+    character(len=*), intent(in) :: text, prefix
     integer :: first, last
 
     first = 1
     do
       last = len(text)
       if (len(text) - first >= line_width) last = first - 1 + index(text(first:first + line_width - 1), ' ', back=.true.)
-      call buffer%append_line(indicator // repeat('  ', merge(0, 1, first == 1)) // trim(text(first:last)))
+      call buffer%append_line(prefix // repeat('  ', merge(0, 1, first == 1)) // trim(text(first:last)))
       first = last + 1
       if (first > len(text)) exit
     end do
   end subroutine append_wrapped
 
-  !> The example groups of one rule.
+  !> The examples of a group.
   subroutine append_examples(buffer, rule, only_template)
     type(text_buffer_t), intent(inout) :: buffer
-    integer, intent(in) :: rule
-    logical, intent(in) :: only_template   !! without the further examples
+    integer, intent(in) :: rule            !! row of `group_rules`
+    logical, intent(in) :: only_template   !! only those of the template
     integer :: i
 
     do i = 1, size(examples)
@@ -207,7 +207,7 @@ contains
     end do
   end subroutine append_examples
 
-  !> A whole group.
+  !> An example with & and /.
   pure function example_text(example) result(text)
     type(example_t), intent(in) :: example
     character(len=:), allocatable :: text

@@ -1,10 +1,10 @@
 !> The schema as a page of the documentation.
 module nocdyn_schema_reference
-  use nocdyn_schema, only: first_key, group_rules, has_word, key_rules, kind_name, kind_rules, last_key
+  use nocdyn_schema, only: first_key, group_rules, has_word, key_rules, kind_rules, last_key, selector_name
   use nocdyn_schema_help, only: append_examples
   use nocdyn_schema_rules, only: key_rule_t
   use nocdyn_schema_sentences, only: default_text, sentences_on
-  use nocdyn_schema_text, only: allowed_text, kind_text, occurrence_text
+  use nocdyn_schema_text, only: allowed_text, occurrence_text, type_text
   use nocdyn_text, only: quoted, string_t
   use nocdyn_text_buffer, only: text_buffer_t
   implicit none (type, external)
@@ -31,7 +31,7 @@ contains
 
   subroutine append_group(buffer, rule)
     type(text_buffer_t), intent(inout) :: buffer
-    integer, intent(in) :: rule
+    integer, intent(in) :: rule   !! row of `group_rules`
     integer :: k, key
 
     call buffer%append_line('')
@@ -40,7 +40,7 @@ contains
     call buffer%append_line(trim(group_rules(rule)%help) // ' Given ' // occurrence_text(group_rules(rule)%occurrence) // '.')
     call append_head(buffer)
     do key = first_key(rule), last_key(rule)
-      if (key_rules(key)%kinds == '') call append_key(buffer, key_rules(key))
+      if (key_rules(key)%only_if == '') call append_key(buffer, key_rules(key))
     end do
     do k = 1, size(kind_rules)
       if (kind_rules(k)%group == group_rules(rule)%name) call append_kind(buffer, k, rule)
@@ -52,18 +52,18 @@ contains
     call buffer%append_line('```')
   end subroutine append_group
 
-  !> The law of a kind and all its keys.
+  !> A kind with its keys.
   subroutine append_kind(buffer, kind, rule)
     type(text_buffer_t), intent(inout) :: buffer
-    integer, intent(in) :: kind, rule
+    integer, intent(in) :: kind, rule   !! rows of `kind_rules` and `group_rules`
     integer :: key
 
     call buffer%append_line('')
-    call buffer%append_line('`' // kind_name(rule) // ' = ' // quoted(trim(kind_rules(kind)%word)) // '`: ' // &
+    call buffer%append_line('`' // selector_name(rule) // ' = ' // quoted(trim(kind_rules(kind)%word)) // '`: ' // &
                             trim(kind_rules(kind)%help) // '.')
     call append_head(buffer)
     do key = first_key(rule), last_key(rule)
-      if (has_word(key_rules(key)%kinds, kind_rules(kind)%word)) call append_key(buffer, key_rules(key))
+      if (has_word(key_rules(key)%only_if, kind_rules(kind)%word)) call append_key(buffer, key_rules(key))
     end do
   end subroutine append_kind
 
@@ -79,13 +79,13 @@ contains
     type(text_buffer_t), intent(inout) :: buffer
     type(key_rule_t), intent(in) :: rule
 
-    call buffer%append_line('| `' // trim(rule%name) // '` | ' // kind_text(rule) // ' | ' // default_text(rule) // ' | ' // &
+    call buffer%append_line('| `' // trim(rule%name) // '` | ' // type_text(rule) // ' | ' // default_text(rule) // ' | ' // &
                             allowed_text(rule) // ' | ' // trim(rule%help) // ' |')
   end subroutine append_key
 
   subroutine append_sentences(buffer, rule)
     type(text_buffer_t), intent(inout) :: buffer
-    integer, intent(in) :: rule
+    integer, intent(in) :: rule   !! row of `group_rules`
     type(string_t), allocatable :: sentences(:)
     integer :: i
 

@@ -1,72 +1,49 @@
-!> How the keys of a group go together, as positions of keys: found once for all groups of one name.
+!> The relations between the keys of one group as positions of keys, found once for all groups of a kind.
 module nocdyn_schema_relations
-  use nocdyn_schema, only: alternatives, columns, first_key, group_rules, key_rule_index, kind_rule_index, needs, words_in
+  use nocdyn_schema, only: first_key, group_rules, key_rule_index, relation_rules, selector_rule, words_in
   use nocdyn_text, only: string_t
   implicit none (type, external)
   private
 
   public :: relations_of
 
-  !> Two sets of keys. Positions count the keys of a group in the order of the schema.
-  type, public :: key_sets_t
+  !> One relation. Positions count the keys of a group in the order of the schema.
+  type, public :: relation_t
+    integer :: form = 0                       !! `exactly_one` ... `less_than` of nocdyn_schema_rules
     integer, allocatable :: first(:), second(:)
-    logical :: is_needed = .false.
-  end type key_sets_t
+    integer :: equal_if_one = 0               !! position of that key, 0: none
+  end type relation_t
 
   type, public :: relations_t
-    integer :: kind = 0                                !! position of the key of the kind `a_kind`, 0 if there is none
-    type(key_sets_t), allocatable :: alternatives(:)   !! one of two sets
-    type(key_sets_t), allocatable :: needs(:)          !! keys, and what each of them needs one of
-    type(key_sets_t), allocatable :: columns(:)        !! lists, and the key of the file that may hold them, if any
+    integer :: selector = 0                   !! position of the selector key, 0: none
+    type(relation_t), allocatable :: list(:)
   end type relations_t
 
 contains
 
-  !> The relations between keys of one group, by the places of the keys in it.
+  !> The relations between the keys of a group.
   pure function relations_of(group_rule) result(relations)
-    integer, intent(in) :: group_rule
+    integer, intent(in) :: group_rule   !! row of `group_rules`
     type(relations_t) :: relations
     integer :: i, n
 
-    relations%kind = max(0, kind_rule_index(group_rule) - first_key(group_rule) + 1)
-
-    allocate (relations%alternatives(count(alternatives%group == group_rules(group_rule)%name)))
+    relations%selector = max(0, selector_rule(group_rule) - first_key(group_rule) + 1)
+    allocate (relations%list(count(relation_rules%group == group_rules(group_rule)%name)))
     n = 0
-    do i = 1, size(alternatives)
-      if (alternatives(i)%group /= group_rules(group_rule)%name) cycle
+    do i = 1, size(relation_rules)
+      if (relation_rules(i)%group /= group_rules(group_rule)%name) cycle
       n = n + 1
-      relations%alternatives(n) = key_sets(group_rule, alternatives(i)%first, alternatives(i)%second)
-      relations%alternatives(n)%is_needed = alternatives(i)%is_needed
-    end do
-
-    allocate (relations%needs(count(needs%group == group_rules(group_rule)%name)))
-    n = 0
-    do i = 1, size(needs)
-      if (needs(i)%group /= group_rules(group_rule)%name) cycle
-      n = n + 1
-      relations%needs(n) = key_sets(group_rule, needs(i)%keys, needs(i)%needed)
-    end do
-
-    allocate (relations%columns(count(columns%group == group_rules(group_rule)%name)))
-    n = 0
-    do i = 1, size(columns)
-      if (columns(i)%group /= group_rules(group_rule)%name) cycle
-      n = n + 1
-      relations%columns(n) = key_sets(group_rule, columns(i)%keys, columns(i)%file)
+      relations%list(n)%form = relation_rules(i)%form
+      allocate (relations%list(n)%first, source=positions(group_rule, relation_rules(i)%first))
+      allocate (relations%list(n)%second, source=positions(group_rule, relation_rules(i)%second))
+      relations%list(n)%equal_if_one = sum(positions(group_rule, relation_rules(i)%equal_if_one))
     end do
   end function relations_of
 
-  pure type(key_sets_t) function key_sets(group_rule, first, second)
-    integer, intent(in) :: group_rule
-    character(len=*), intent(in) :: first, second   !! keys separated by blanks
-
-    allocate (key_sets%first, source=positions(group_rule, first))
-    allocate (key_sets%second, source=positions(group_rule, second))
-  end function key_sets
-
+  !> Positions of keys in their group.
   pure function positions(group_rule, keys)
     integer, intent(in) :: group_rule
-    character(len=*), intent(in) :: keys
+    character(len=*), intent(in) :: keys   !! separated by blanks
     integer, allocatable :: positions(:)
     type(string_t), allocatable :: names(:)
     integer :: i

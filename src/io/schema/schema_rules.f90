@@ -1,23 +1,34 @@
-!> What the rows of the schema are made of.
+!> The types of the rows of the schema, and the values that they hold.
 module nocdyn_schema_rules
   use nocdyn_kinds, only: wp
   implicit none (type, external)
   private
 
-  public :: is_outside
+  public :: is_out_of_range
 
+  ! Occurrence of a group.
   integer, parameter, public :: exactly_once = 1, at_most_once = 2, at_least_once = 3, any_times = 4
 
+  ! Type of the values of a key.
   integer, parameter, public :: a_text = 1, a_name = 2   !! a name: of an element, unique in its name space
   integer, parameter, public :: a_body = 3, body_or_ground = 4   !! name of a &body
   integer, parameter, public :: a_word = 5, a_number = 6, an_integer = 7, a_flag = 8
-  integer, parameter, public :: a_kind = 9   !! a word of `kind_rules`, which says what keys the group has; one in a group
-  integer, parameter, public :: a_file = 10  !! path of a table file, relative to the folder of the input
+  integer, parameter, public :: a_selector = 9   !! a word of `kind_rules`, the kind of the group; at most one key of a group
+  integer, parameter, public :: a_file = 10      !! path of a table file, relative to the folder of the input
+  integer, parameter, public :: a_folder = 11    !! path of a folder
+
+  ! Relations between two sets of keys, `first` and `second`.
+  integer, parameter, public :: exactly_one = 1    !! keys of one set are given; those of the other lose their defaults
+  integer, parameter, public :: at_most_one = 2    !! the same, or neither set is given
+  integer, parameter, public :: requires = 3       !! `first` has values and defaults only beside one of `second`, but for a 0
+  integer, parameter, public :: equal_lengths = 4  !! of the lists `first`; `second`: a file with two of them as columns, or ''
+  integer, parameter, public :: less_than = 5      !! the number `first` is less than the number `second`
 
   integer, parameter, public :: any_number = 0   !! as `count`: a list of any length, possibly empty
   character(len=*), parameter, public :: required = '<required>', unset = '<unset>'   !! in place of a default
   character(len=*), parameter, public :: ground = 'ground'   !! stands for a body that does not turn
   integer, parameter, public :: longest_name = 63   !! bytes of an element's name
+  integer, parameter, public :: longest_path = 4000, longest_file_name = 255   !! bytes, as Linux allows, less names of files
 
   !> The values that a key accepts.
   type, public :: allowed_t
@@ -28,15 +39,15 @@ module nocdyn_schema_rules
     character(len=48) :: words = ''   !! separated by blanks, for `a_word`
   end type allowed_t
 
-  !> One kind of group.
+  !> One group.
   type, public :: group_rule_t
     character(len=12) :: name
     integer :: occurrence
-    character(len=12) :: name_space   !! elements of one name space have different names; '' where groups have no name
+    character(len=12) :: name_space   !! names are unique in a name space; '': groups without names
     character(len=96) :: help
   end type group_rule_t
 
-  !> One word of a group's key of the kind `a_kind`.
+  !> One kind of a group: a word of its selector key.
   type, public :: kind_rule_t
     character(len=12) :: group
     character(len=16) :: word
@@ -47,56 +58,36 @@ module nocdyn_schema_rules
   type, public :: key_rule_t
     character(len=12) :: group
     character(len=18) :: name
-    integer :: kind                !! a_text ... a_file
+    integer :: value_type          !! `a_text` ... `a_folder`
     integer :: count               !! how many values, or `any_number`
     character(len=12) :: unit
     character(len=12) :: default   !! of each value, as written in a file, or `required`, or `unset`
     type(allowed_t) :: allowed
     character(len=96) :: help
-    character(len=48) :: kinds = ''   !! words of `kind_rules` that have this key, separated by blanks; '': all
-    integer :: least = 0              !! fewest values of a list that is given
-    character(len=12) :: needed_by = ''   !! the word of `kind_rules` with which this key must be given
+    character(len=48) :: only_if = ''       !! kinds that have this key, separated by blanks; '': all
+    integer :: fewest = 0                   !! least number of values of a list that is given
+    character(len=12) :: required_if = ''   !! the kind with which this key must be given
+    logical :: ascends = .false.            !! each value of the list is greater than the one before
   end type key_rule_t
 
-  !> Two sets of keys, separated by blanks, of which a group has one: keys of both given are a mistake; the defaults of a
-  !> set do not stand beside the other.
-  type, public :: alternative_t
+  !> A relation between keys of one group.
+  type, public :: relation_rule_t
     character(len=12) :: group
-    character(len=64) :: first, second
-    logical :: is_needed = .false.   !! one of them must be given
-  end type alternative_t
+    integer :: form                          !! `exactly_one` ... `less_than`
+    character(len=64) :: first, second       !! keys, separated by blanks
+    character(len=18) :: equal_if_one = ''   !! `less_than`: the numbers may be equal if this key is 1
+  end type relation_rule_t
 
-  !> Each of `keys` must not be given without one of `needed`, and has its default only beside a value of one of these. Both
-  !> are separated by blanks. A zero needs nothing.
-  type, public :: need_t
-    character(len=12) :: group
-    character(len=48) :: keys, needed
-  end type need_t
-
-  !> Lists that have the same length and need each other; a list of numbers with a default may be absent.
-  type, public :: columns_t
-    character(len=12) :: group
-    character(len=48) :: keys          !! separated by blanks
-    character(len=12) :: file = ''     !! the key of a file that may hold the two lists as columns; the first one ascends then
-  end type columns_t
-
-  !> Two keys of a group: `upper` must be greater than `lower`.
-  type, public :: order_t
-    character(len=12) :: group
-    character(len=18) :: lower, upper
-    character(len=18) :: alone = ''   !! a key with which both may be equal if it is 1; if it is not, the sweep judges that
-  end type order_t
-
-  !> Words that stand for keys in other programs. Both are separated by blanks.
-  type, public :: synonym_t
+  !> Words that other programs use for keys. Both lists are separated by blanks.
+  type, public :: alias_t
     character(len=12) :: group
     character(len=48) :: words, keys
-  end type synonym_t
+  end type alias_t
 
-  !> The inside of a group as an example.
+  !> An example of a group.
   type, public :: example_t
     character(len=12) :: group
-    character(len=192) :: text   !! with | where a line ends
+    character(len=192) :: text   !! keys and values, with | where a line ends
     logical :: is_in_template = .true.   !! part of the example machine of help and template
   end type example_t
 
@@ -112,14 +103,14 @@ module nocdyn_schema_rules
 
 contains
 
-  !> Whether a number is none that a key accepts.
-  pure logical function is_outside(value, allowed)
+  !> Whether a key does not accept a number.
+  pure logical function is_out_of_range(value, allowed)
     real(wp), intent(in) :: value
     type(allowed_t), intent(in) :: allowed
 
-    is_outside = value < allowed%low .or. value > allowed%high
-    if (allowed%excludes_low) is_outside = is_outside .or. .not. value > allowed%low
-    if (allowed%excludes_zero) is_outside = is_outside .or. abs(value) <= 0.0_wp
-  end function is_outside
+    is_out_of_range = value < allowed%low .or. value > allowed%high
+    if (allowed%excludes_low) is_out_of_range = is_out_of_range .or. .not. value > allowed%low
+    if (allowed%excludes_zero) is_out_of_range = is_out_of_range .or. abs(value) <= 0.0_wp
+  end function is_out_of_range
 
 end module nocdyn_schema_rules

@@ -1,7 +1,8 @@
-!> How the keys of a group go together, in sentences for help and reference.
+!> The relations between the keys of a group as sentences for help and reference.
 module nocdyn_schema_sentences
-  use nocdyn_schema, only: alternatives, columns, group_rules, has_word, key_rule_index, key_rules, needs, words_in
-  use nocdyn_schema_rules, only: alternative_t, columns_t, key_rule_t, required, unset
+  use nocdyn_schema, only: group_rules, has_word, key_rule_index, key_rules, relation_rules, words_in
+  use nocdyn_schema_rules, only: at_most_one, equal_lengths, exactly_one, key_rule_t, less_than, relation_rule_t, required, &
+    requires, unset
   use nocdyn_schema_text, only: listed
   use nocdyn_text, only: append, quoted, string_t, to_text
   implicit none (type, external)
@@ -15,7 +16,6 @@ contains
   pure function default_text(rule) result(text)
     type(key_rule_t), intent(in) :: rule
     character(len=:), allocatable :: text
-    type(string_t), allocatable :: others(:)
     integer :: i
 
     if (rule%default == required) then
@@ -25,67 +25,56 @@ contains
     else
       text = 'optional'
     end if
-    if (rule%needed_by /= '') text = 'required by ' // quoted(trim(rule%needed_by))
-    do i = 1, size(alternatives)
-      if (alternatives(i)%group /= rule%group .or. .not. alternatives(i)%is_needed) cycle
-      if (has_word(alternatives(i)%first, rule%name)) then
-        others = words_in(alternatives(i)%second)
-        text = 'this or ' // others(1)%text
-      else if (has_word(alternatives(i)%second, rule%name)) then
-        others = words_in(alternatives(i)%first)
-        text = 'this or ' // others(1)%text
-      end if
+    if (rule%required_if /= '') text = 'required by ' // quoted(trim(rule%required_if))
+    do i = 1, size(relation_rules)
+      associate (relation => relation_rules(i))
+        if (relation%group /= rule%group .or. relation%form /= exactly_one) cycle
+        if (has_word(relation%first, rule%name)) text = 'this or ' // relation%second(:index(relation%second, ' ') - 1)
+        if (has_word(relation%second, rule%name)) text = 'this or ' // relation%first(:index(relation%first, ' ') - 1)
+      end associate
     end do
   end function default_text
 
-  !> What a group's keys ask of each other, one sentence each.
+  !> One sentence for each relation between the keys of a group.
   pure function sentences_on(group_rule) result(sentences)
-    integer, intent(in) :: group_rule
+    integer, intent(in) :: group_rule   !! row of `group_rules`
     type(string_t), allocatable :: sentences(:)
     integer :: i
 
     allocate (sentences(0))
-    do i = 1, size(alternatives)
-      if (alternatives(i)%group == group_rules(group_rule)%name) call append(sentences, sentence_on(alternatives(i)))
-    end do
-    do i = 1, size(needs)
-      if (needs(i)%group /= group_rules(group_rule)%name) cycle
-      call append(sentences, listed(words_in(needs(i)%keys), ' and ') // &
-                  trim(merge(' need ', ' needs', index(trim(needs(i)%keys), ' ') > 0)) // ' ' // &
-                  listed(words_in(needs(i)%needed), ' or ') // '.')
-    end do
-    do i = 1, size(columns)
-      if (columns(i)%group == group_rules(group_rule)%name) call append(sentences, sentence_on_columns(group_rule, columns(i)))
+    do i = 1, size(relation_rules)
+      if (relation_rules(i)%group /= group_rules(group_rule)%name) cycle
+      call append(sentences, sentence(group_rule, relation_rules(i)) // '.')
     end do
   end function sentences_on
 
-  !> "Either radii or teeth." if one of them is needed, else "No points beside interval.".
-  pure function sentence_on(alternative) result(text)
-    type(alternative_t), intent(in) :: alternative
-    character(len=:), allocatable :: text
-
-    if (alternative%is_needed) then
-      text = 'Either ' // listed(words_in(alternative%first), ' and ') // ' or ' // &
-             listed(words_in(alternative%second), ' and ') // '.'
-    else
-      text = 'No ' // listed(words_in(alternative%second), ' or ') // ' beside ' // &
-             listed(words_in(alternative%first), ' or ') // '.'
-    end if
-  end function sentence_on
-
-  pure function sentence_on_columns(group_rule, rule) result(text)
+  pure function sentence(group_rule, relation) result(text)
     integer, intent(in) :: group_rule
-    type(columns_t), intent(in) :: rule
+    type(relation_rule_t), intent(in) :: relation
     character(len=:), allocatable :: text
-    type(string_t), allocatable :: lists(:)
-    integer :: least
+    type(string_t), allocatable :: first(:), second(:)
 
-    allocate (lists, source=words_in(rule%keys))
-    least = key_rules(key_rule_index(group_rule, lists(1)%text))%least
-    text = listed(lists, ' and ') // ' have the same number of values'
-    if (least > 1) text = text // ', ' // to_text(least) // ' at least'
-    if (rule%file /= '') text = text // '; ' // lists(1)%text // ' ascends'
-    text = text // '.'
-  end function sentence_on_columns
+    allocate (first, source=words_in(relation%first))
+    allocate (second, source=words_in(relation%second))
+    select case (relation%form)
+    case (exactly_one)
+      text = 'Either ' // listed(first, ' and ') // ' or ' // listed(second, ' and ')
+    case (at_most_one)
+      text = 'No ' // listed(second, ' or ') // ' beside ' // listed(first, ' or ')
+    case (requires)
+      text = listed(first, ' and ') // trim(merge(' need ', ' needs', size(first) > 1)) // ' ' // listed(second, ' or ')
+    case (less_than)
+      text = first(1)%text // ' is less than ' // second(1)%text
+      if (relation%equal_if_one /= '') text = text // '; with ' // trim(relation%equal_if_one) // ' = 1 they may be equal'
+    case (equal_lengths)
+      associate (rule => key_rules(key_rule_index(group_rule, first(1)%text)))
+        text = listed(first, ' and ') // ' have the same number of values'
+        if (rule%fewest > 1) text = text // ', ' // to_text(rule%fewest) // ' at least'
+        if (rule%ascends) text = text // '; ' // first(1)%text // ' ascends'
+      end associate
+    case default
+      error stop 'nocdyn_schema_sentences: a relation has no sentence'
+    end select
+  end function sentence
 
 end module nocdyn_schema_sentences

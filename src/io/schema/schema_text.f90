@@ -1,14 +1,14 @@
-!> Rows of the schema in words, for messages and help.
+!> Rows of the schema as texts for messages and help.
 module nocdyn_schema_text
   use nocdyn_kinds, only: wp
-  use nocdyn_schema, only: first_key, group_rules, has_word, key_rules, last_key, synonyms, words_in, words_of
-  use nocdyn_schema_rules, only: a_body, a_file, a_flag, a_kind, a_name, a_number, a_text, a_word, allowed_t, &
+  use nocdyn_schema, only: aliases, first_key, group_rules, has_word, key_name, key_rules, last_key, words_in, words_of
+  use nocdyn_schema_rules, only: a_body, a_file, a_flag, a_folder, a_name, a_number, a_selector, a_text, a_word, allowed_t, &
     an_integer, any_number, at_least_once, at_most_once, body_or_ground, exactly_once, key_rule_t
   use nocdyn_text, only: append, joined, nearest_word, quoted, string_t, to_text
   implicit none (type, external)
   private
 
-  public :: allowed_text, kind_text, kinds_text, listed, occurrence_text, group_names, key_names, meant_keys, &
+  public :: allowed_text, type_text, only_if_text, listed, listed_keys, occurrence_text, group_names, key_names, similar_keys, &
     key_suggestion, suggestion
 
 contains
@@ -18,12 +18,12 @@ contains
     type(key_rule_t), intent(in) :: rule
     character(len=:), allocatable :: text
 
-    select case (rule%kind)
+    select case (rule%value_type)
     case (a_number, an_integer)
       text = range_text(rule%allowed)
       if (text == '') text = 'any value'
       if (rule%unit /= '') text = text // ' [' // trim(rule%unit) // ']'
-    case (a_word, a_kind)
+    case (a_word, a_selector)
       text = joined(words_of(rule), ', ')
     case (a_flag)
       text = '.true., .false.'
@@ -33,6 +33,8 @@ contains
       text = "name of a &body, or 'ground'"
     case (a_file)
       text = 'path of a file'
+    case (a_folder)
+      text = 'path of a folder'
     case (a_name)
       text = 'a name of its own'
     case default
@@ -57,20 +59,22 @@ contains
   end function range_text
 
   !> "number", "2 bodies", "list of bodies" ...
-  pure function kind_text(rule) result(text)
+  pure function type_text(rule) result(text)
     type(key_rule_t), intent(in) :: rule
     character(len=:), allocatable :: text
 
-    select case (rule%kind)
+    select case (rule%value_type)
     case (a_text)
       text = noun('text', 'texts', rule%count)
     case (a_file)
       text = noun('file', 'files', rule%count)
+    case (a_folder)
+      text = noun('folder', 'folders', rule%count)
     case (a_name)
       text = noun('name', 'names', rule%count)
     case (a_body, body_or_ground)
       text = noun('body', 'bodies', rule%count)
-    case (a_word, a_kind)
+    case (a_word, a_selector)
       text = noun('word', 'words', rule%count)
     case (a_number)
       text = noun('number', 'numbers', rule%count)
@@ -79,7 +83,7 @@ contains
     case default
       text = noun('logical', 'logicals', rule%count)
     end select
-  end function kind_text
+  end function type_text
 
   pure function noun(singular, plural, count) result(text)
     character(len=*), intent(in) :: singular, plural
@@ -96,19 +100,19 @@ contains
     end select
   end function noun
 
-  !> The words of a kind that have a key: "'ramp' or 'pulse'".
-  pure function kinds_text(rule) result(text)
+  !> The kinds that have a key: "'ramp' or 'pulse'".
+  pure function only_if_text(rule) result(text)
     type(key_rule_t), intent(in) :: rule
     character(len=:), allocatable :: text
     type(string_t), allocatable :: words(:)
     integer :: i
 
-    allocate (words, source=words_in(rule%kinds))
+    allocate (words, source=words_in(rule%only_if))
     do i = 1, size(words)
       words(i)%text = quoted(words(i)%text)
     end do
     text = listed(words, ' or ')
-  end function kinds_text
+  end function only_if_text
 
   !> "a, b or c".
   pure function listed(texts, conjunction) result(text)
@@ -126,6 +130,22 @@ contains
       end if
     end do
   end function listed
+
+  !> Names of keys of a group: "a, b or c".
+  pure function listed_keys(group_rule, positions, conjunction) result(text)
+    integer, intent(in) :: group_rule             !! row of `group_rules`
+    integer, intent(in) :: positions(:)           !! of the keys among the keys of the group
+    character(len=*), intent(in) :: conjunction   !! ' or ', ' and '
+    character(len=:), allocatable :: text
+    type(string_t), allocatable :: names(:)
+    integer :: i
+
+    allocate (names(size(positions)))
+    do i = 1, size(names)
+      names(i)%text = key_name(group_rule, positions(i))
+    end do
+    text = listed(names, conjunction)
+  end function listed_keys
 
   !> How often a group may occur, in words.
   pure function occurrence_text(occurrence) result(text)
@@ -157,45 +177,44 @@ contains
 
   !> The names of the keys of a group.
   pure function key_names(group_rule) result(names)
-    integer, intent(in) :: group_rule
+    integer, intent(in) :: group_rule   !! row of `group_rules`
     type(string_t), allocatable :: names(:)
-    integer :: first, i
+    integer :: i
 
-    first = first_key(group_rule)
-    allocate (names(last_key(group_rule) - first + 1))
+    allocate (names(last_key(group_rule) - first_key(group_rule) + 1))
     do i = 1, size(names)
-      names(i)%text = trim(key_rules(first + i - 1)%name)
+      names(i)%text = key_name(group_rule, i)
     end do
   end function key_names
 
-  !> The keys that a word which is no key of the group may stand for.
-  pure function meant_keys(group_rule, word) result(keys)
-    integer, intent(in) :: group_rule
+  !> The keys that the user may have meant by a word that is not a key of the group.
+  pure function similar_keys(group_rule, word) result(keys)
+    integer, intent(in) :: group_rule      !! row of `group_rules`
     character(len=*), intent(in) :: word   !! in lower case
     type(string_t), allocatable :: keys(:)
     type(string_t), allocatable :: names(:)
     integer :: i, nearest
 
     allocate (keys(0))
-    do i = 1, size(synonyms)
-      if (synonyms(i)%group /= group_rules(group_rule)%name .or. .not. has_word(synonyms(i)%words, word)) cycle
-      keys = words_in(synonyms(i)%keys)
+    do i = 1, size(aliases)
+      if (aliases(i)%group /= group_rules(group_rule)%name .or. .not. has_word(aliases(i)%words, word)) cycle
+      keys = words_in(aliases(i)%keys)
       return
     end do
     allocate (names, source=key_names(group_rule))
     nearest = nearest_word(word, names)
     if (nearest > 0) call append(keys, names(nearest)%text)
-  end function meant_keys
+  end function similar_keys
 
-  !> "; did you mean 'low'?", or all keys of the group if none is meant and they are few.
+  !> "; did you mean 'low'?", or all keys of the group if none is similar and they are few.
   pure function key_suggestion(group_rule, word) result(text)
-    integer, intent(in) :: group_rule
+    integer, intent(in) :: group_rule      !! row of `group_rules`
     character(len=*), intent(in) :: word   !! in lower case
     character(len=:), allocatable :: text
     type(string_t), allocatable :: keys(:)
     integer :: i
 
-    allocate (keys, source=meant_keys(group_rule, word))
+    allocate (keys, source=similar_keys(group_rule, word))
     if (size(keys) == 0) then
       text = suggestion(word, key_names(group_rule))
       return
@@ -206,7 +225,7 @@ contains
     text = '; did you mean ' // listed(keys, ' or ') // '?'
   end function key_suggestion
 
-  !> "; did you mean 'stiffness'?", or all candidates if none is near and they are few.
+  !> "; did you mean 'stiffness'?", or all candidates if none is similar and they are few.
   pure function suggestion(word, candidates) result(text)
     character(len=*), intent(in) :: word
     type(string_t), intent(in) :: candidates(:)

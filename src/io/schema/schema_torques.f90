@@ -1,8 +1,8 @@
-!> Rows of the schema: keys of &motor, &load and &excitation and how they go together.
+!> Rows of the schema: the keys of &motor, &load and &excitation and the relations between them.
 module nocdyn_schema_torques
-  use nocdyn_schema_rules, only: a_body, a_file, a_kind, a_name, a_number, a_word, alternative_t, an_integer, any_number, &
-    anything, columns_t, example_t, extrapolations, from_0_to_1, from_1, interpolations, key_rule_t, kind_rule_t, need_t, &
-    not_negative, not_zero, positive, required, unset
+  use nocdyn_schema_rules, only: a_body, a_file, a_name, a_number, a_selector, a_word, an_integer, any_number, anything, &
+    at_most_one, equal_lengths, exactly_one, example_t, extrapolations, from_0_to_1, from_1, interpolations, key_rule_t, &
+    kind_rule_t, not_negative, not_zero, positive, relation_rule_t, required, requires, unset
   implicit none (type, external)
   private
 
@@ -16,37 +16,37 @@ module nocdyn_schema_torques
     kind_rule_t('motor',      'dc',        'flux_constant i; inductance di/dt = voltage - resistance i - flux_constant omega'), &
     kind_rule_t('excitation', 'harmonic',  'amplitude sin(frequency t + phase)'), &
     kind_rule_t('excitation', 'orders',    'the sum of amplitude_k sin(order_k phi + phase_k), phi the angle of the body'), &
-    kind_rule_t('excitation', 'table',     'torque over time from a table, whose end values hold outside'), &
+    kind_rule_t('excitation', 'table',     'torque over time from a table; constant before and after it'), &
     kind_rule_t('excitation', 'step',      '0 before time, amplitude from then on'), &
-    kind_rule_t('excitation', 'ramp',      'from 0 at time to amplitude in a straight line, which holds after duration'), &
+    kind_rule_t('excitation', 'ramp',      'linear rise from 0 at time to amplitude within duration, then constant'), &
     kind_rule_t('excitation', 'pulse',     'half a sine of height amplitude from time to time + duration'), &
     kind_rule_t('excitation', 'startup',   'amplitude sin(2 (frequency t - pole_pairs phi) + phase), synchronous motor')]
 
   type(key_rule_t), parameter, public :: motor_keys(*) = [ &
     key_rule_t('motor',      'name',            a_name,         1, '',            required,    anything, &
-      'what results and messages call it'), &
+      'name in results and messages'), &
     key_rule_t('motor',      'body',            a_body,         1, '',            required,    anything, &
-      'the body that it drives'), &
-    key_rule_t('motor',      'kind',            a_kind,         1, '',            "'quadratic'", anything, &
+      'the driven body'), &
+    key_rule_t('motor',      'kind',            a_selector,     1, '',            "'quadratic'", anything, &
       'which law the torque follows; omega is the speed of the body'), &
     key_rule_t('motor',      'a',               a_number,       1, 'N m',         required,    anything, &
       'torque at standstill', 'quadratic'), &
     key_rule_t('motor',      'b',               a_number,       1, 'N m s/rad',   required,    anything, &
-      'fall of the torque with the speed', 'quadratic'), &
+      'decrease of the torque per speed', 'quadratic'), &
     key_rule_t('motor',      'c',               a_number,       1, 'N m s2/rad2', required,    anything, &
-      'fall of the torque with the square of the speed', 'quadratic'), &
+      'decrease of the torque per square of the speed', 'quadratic'), &
     key_rule_t('motor',      'torque',          a_number,       1, 'N m',         required,    anything, &
       'the torque', 'constant'), &
     key_rule_t('motor',      'table_speed',     a_number,       any_number, 'rad/s', unset,    anything, &
-      'speeds of the points of a table, ascending', 'table', least=2), &
+      'speeds of the points of a table, ascending', 'table', fewest=2, ascends=.true.), &
     key_rule_t('motor',      'table_torque',    a_number,       any_number, 'N m', unset,      anything, &
-      'torque at these speeds', 'table', least=2), &
+      'torque at these speeds', 'table', fewest=2), &
     key_rule_t('motor',      'table_file',      a_file,         1, '',            unset,       anything, &
       'file with the table: two columns, speed [rad/s] and torque [N m]', 'table'), &
     key_rule_t('motor',      'interpolation',   a_word,         1, '',            linear,      interpolations, &
       'between the points: straight lines, or the monotone cubic of Fritsch and Butland', 'table'), &
     key_rule_t('motor',      'extrapolation',   a_word,         1, '',            linear,      extrapolations, &
-      'beyond the table: its end slope goes on, or its end value holds', 'table'), &
+      'beyond the table: straight on with the end slope, or constant', 'table'), &
     key_rule_t('motor',      'breakdown_torque', a_number,      1, 'N m',         required,    not_zero, &
       'T_k, the largest torque; it has the sign of synchronous_speed', 'induction'), &
     key_rule_t('motor',      'breakdown_slip',  a_number,       1, '',            required,    positive, &
@@ -60,7 +60,7 @@ module nocdyn_schema_torques
     key_rule_t('motor',      'flux_constant',   a_number,       1, 'V s/rad',     required,    not_zero, &
       'torque per current, which is voltage per speed', 'dc'), &
     key_rule_t('motor',      'inductance',      a_number,       1, 'H',           '0',         not_negative, &
-      'inductance of the armature; 0: the current follows at once', 'dc'), &
+      'inductance of the armature; 0: the current has no delay', 'dc'), &
     key_rule_t('motor',      'governor_speed',  a_number,       1, 'rad/s',       unset,       anything, &
       'speed that a PI governor keeps by a throttle from 0 to 1 on the torque (dc: on the voltage)'), &
     key_rule_t('motor',      'governor_gain',   a_number,       1, 's/rad',       unset,       not_zero, &
@@ -68,13 +68,13 @@ module nocdyn_schema_torques
     key_rule_t('motor',      'governor_time',   a_number,       1, 's',           unset,       positive, &
       'integral time: z'' = (throttle - z) / governor_time'), &
     key_rule_t('motor',      'governor_start',  a_number,       1, '',            '1',         from_0_to_1, &
-      'throttle at the start')]
+      'throttle at t_start')]
 
   type(key_rule_t), parameter, public :: load_keys(*) = [ &
     key_rule_t('load',       'name',            a_name,         1, '',            required,    anything, &
-      'what results and messages call it'), &
+      'name in results and messages'), &
     key_rule_t('load',       'body',            a_body,         1, '',            required,    anything, &
-      'the body that it brakes'), &
+      'the braked body'), &
     key_rule_t('load',       'viscous',         a_number,       1, 'N m s/rad',   '0',         not_negative, &
       'torque per speed'), &
     key_rule_t('load',       'quadratic',       a_number,       1, 'N m s2/rad2', '0',         not_negative, &
@@ -84,22 +84,22 @@ module nocdyn_schema_torques
     key_rule_t('load',       'constant_speed',  a_number,       1, 'rad/s',       '0.01',      positive, &
       'speed at which the constant torque has 76 % of its full value'), &
     key_rule_t('load',       'table_speed',     a_number,       any_number, 'rad/s', unset,    anything, &
-      'speeds of the points of a table, ascending', least=2), &
+      'speeds of the points of a table, ascending', fewest=2, ascends=.true.), &
     key_rule_t('load',       'table_torque',    a_number,       any_number, 'N m', unset,      anything, &
-      'resisting torque at these speeds; positive resists a positive speed', least=2), &
+      'resisting torque at these speeds; positive resists a positive speed', fewest=2), &
     key_rule_t('load',       'table_file',      a_file,         1, '',            unset,       anything, &
       'file with the table: two columns, speed [rad/s] and resisting torque [N m]'), &
     key_rule_t('load',       'interpolation',   a_word,         1, '',            linear,      interpolations, &
       'between the points: straight lines, or the monotone cubic of Fritsch and Butland'), &
     key_rule_t('load',       'extrapolation',   a_word,         1, '',            linear,      extrapolations, &
-      'beyond the table: its end slope goes on, or its end value holds')]
+      'beyond the table: straight on with the end slope, or constant')]
 
   type(key_rule_t), parameter, public :: excitation_keys(*) = [ &
     key_rule_t('excitation', 'name',            a_name,         1, '',            required,    anything, &
-      'what results and messages call it'), &
+      'name in results and messages'), &
     key_rule_t('excitation', 'body',            a_body,         1, '',            required,    anything, &
-      'the body that it shakes'), &
-    key_rule_t('excitation', 'kind',            a_kind,         1, '',            "'harmonic'", anything, &
+      'the excited body'), &
+    key_rule_t('excitation', 'kind',            a_selector,     1, '',            "'harmonic'", anything, &
       'which law the torque follows'), &
     key_rule_t('excitation', 'amplitude',       a_number,       1, 'N m',         required,    anything, &
       'largest torque', 'harmonic step ramp pulse startup'), &
@@ -114,37 +114,33 @@ module nocdyn_schema_torques
     key_rule_t('excitation', 'phases',          a_number,       any_number, 'rad', '0',        anything, &
       'phase of each order at phi = 0', 'orders', 1), &
     key_rule_t('excitation', 'table_time',      a_number,       any_number, 's',  unset,       anything, &
-      'times of the points of a table, ascending', 'table', least=2), &
+      'times of the points of a table, ascending', 'table', fewest=2, ascends=.true.), &
     key_rule_t('excitation', 'table_torque',    a_number,       any_number, 'N m', unset,      anything, &
-      'torque at these times', 'table', least=2), &
+      'torque at these times', 'table', fewest=2), &
     key_rule_t('excitation', 'table_file',      a_file,         1, '',            unset,       anything, &
       'file with the table: two columns, time [s] and torque [N m]', 'table'), &
     key_rule_t('excitation', 'interpolation',   a_word,         1, '',            linear,      interpolations, &
       'between the points: straight lines, or the monotone cubic of Fritsch and Butland', 'table'), &
     key_rule_t('excitation', 'time',            a_number,       1, 's',           required,    anything, &
-      'when it begins', 'step ramp pulse'), &
+      'start of the step, ramp or pulse', 'step ramp pulse'), &
     key_rule_t('excitation', 'duration',        a_number,       1, 's',           required,    positive, &
-      'how long the ramp rises, how long the pulse lasts', 'ramp pulse'), &
+      'duration of the rise or of the pulse', 'ramp pulse'), &
     key_rule_t('excitation', 'pole_pairs',      an_integer,     1, '',            required,    from_1, &
       'pole pairs of the motor', 'startup')]
 
-  type(alternative_t), parameter, public :: torque_alternatives(*) = [ &
-    alternative_t('motor',      'table_speed table_torque', 'table_file', is_needed=.true.), &
-    alternative_t('load',       'table_speed table_torque', 'table_file'), &
-    alternative_t('excitation', 'table_time table_torque',  'table_file', is_needed=.true.)]
-
-  type(need_t), parameter, public :: torque_needs(*) = [ &
-    need_t('motor', 'governor_speed', 'governor_gain'), &
-    need_t('motor', 'governor_speed', 'governor_time'), &
-    need_t('motor', 'governor_gain governor_time governor_start', 'governor_speed'), &
-    need_t('load',  'constant_speed', 'constant'), &
-    need_t('load',  'interpolation extrapolation', 'table_speed table_file')]
-
-  type(columns_t), parameter, public :: torque_columns(*) = [ &
-    columns_t('motor',      'table_speed table_torque', 'table_file'), &
-    columns_t('load',       'table_speed table_torque', 'table_file'), &
-    columns_t('excitation', 'table_time table_torque',  'table_file'), &
-    columns_t('excitation', 'orders amplitudes phases')]
+  type(relation_rule_t), parameter, public :: torque_relations(*) = [ &
+    relation_rule_t('motor', exactly_one, 'table_speed table_torque', 'table_file'), &
+    relation_rule_t('load', at_most_one, 'table_speed table_torque', 'table_file'), &
+    relation_rule_t('excitation', exactly_one, 'table_time table_torque', 'table_file'), &
+    relation_rule_t('motor', requires, 'governor_speed', 'governor_gain'), &
+    relation_rule_t('motor', requires, 'governor_speed', 'governor_time'), &
+    relation_rule_t('motor', requires, 'governor_gain governor_time governor_start', 'governor_speed'), &
+    relation_rule_t('load', requires, 'constant_speed', 'constant'), &
+    relation_rule_t('load', requires, 'interpolation extrapolation', 'table_speed table_file'), &
+    relation_rule_t('motor', equal_lengths, 'table_speed table_torque', 'table_file'), &
+    relation_rule_t('load', equal_lengths, 'table_speed table_torque', 'table_file'), &
+    relation_rule_t('excitation', equal_lengths, 'table_time table_torque', 'table_file'), &
+    relation_rule_t('excitation', equal_lengths, 'orders amplitudes phases', '')]
 
   type(example_t), parameter, public :: torque_examples(*) = [ &
     example_t('motor',      "name = 'drive'    body = 'motor'    a = 200.0  b = 10.0  c = 1.0"), &

@@ -8,7 +8,6 @@ module nocdyn_sweep_plan
   use nocdyn_machine, only: machine_t
   use nocdyn_machine_report, only: counted
   use nocdyn_diagnostics, only: diagnostics_t
-  use nocdyn_diagnostics_text, only: diagnostics_text
   use nocdyn_output_times, only: check_output_times
   use nocdyn_schema, only: has_word
   use nocdyn_size_limits, only: check_size
@@ -158,10 +157,10 @@ contains
     type(error_t), allocatable, intent(out) :: error
 
     if (diagnostics%count > 0 .and. allocated(failure)) then
-      call raise(error, max(failure%code, diagnostics%worst_code()), diagnostics_text(input, diagnostics) // new_line('a') // &
+      call raise(error, max(failure%code, diagnostics%worst_code()), input%diagnostics_text(diagnostics) // new_line('a') // &
                  failure%message)
     else if (diagnostics%count > 0) then
-      call raise(error, diagnostics%worst_code(), diagnostics_text(input, diagnostics))
+      call raise(error, diagnostics%worst_code(), input%diagnostics_text(diagnostics))
     else if (allocated(failure)) then
       error = failure
     end if

@@ -69,11 +69,11 @@ contains
     override%assignment = path%place
     if (message /= '') return
     rule = key_rules(path%key_rule)
-    if (rule%kind == a_name) then
+    if (rule%value_type == a_name) then
       message = 'a name cannot be overridden: other groups refer to it'
-    else if (path%is_outside .and. rule%count == 1) then
+    else if (path%is_out_of_range .and. rule%count == 1) then
       message = trim(rule%name) // ' is a single value and takes no subscript'
-    else if (path%is_outside) then
+    else if (path%is_out_of_range) then
       message = 'the subscript of ' // trim(rule%name) // ' is out of range; allowed: 1 to ' // &
                   to_text(merge(rule%count, longest_list, rule%count /= any_number))
     end if
@@ -88,7 +88,7 @@ contains
     type(key_rule_t) :: rule
 
     rule = key_rules(override%key_rule)
-    if (holds_texts(rule%kind) .and. rule%count == 1 .and. scan(adjustl(text), '''"') /= 1) then
+    if (holds_texts(rule%value_type) .and. rule%count == 1 .and. scan(adjustl(text), '''"') /= 1) then
       override%namelist%source = text
       call override%namelist%append_item(item_t(first=1, last=len(text)))
     else

@@ -1,13 +1,11 @@
 !> Reads an input file: scanner, schema, overrides and all checks, with every mistake in one error.
 module nocdyn_input_reader
-  use nocdyn_errors, only: error_t, exit_input, raise
-  use nocdyn_input, only: group_t, input_t
-  use nocdyn_joint_checks, only: check_joints
-  use nocdyn_input_group, only: read_group
-  use nocdyn_name_checks, only: check_duplicate_names, check_references, collect_names
-  use nocdyn_input_overrides, only: override_t, read_overrides
   use nocdyn_diagnostics, only: diagnostics_t, no_line
-  use nocdyn_diagnostics_text, only: diagnostics_text
+  use nocdyn_errors, only: error_t, exit_input, raise
+  use nocdyn_group_reader, only: read_group
+  use nocdyn_input, only: group_t, input_t
+  use nocdyn_input_overrides, only: override_t, read_overrides
+  use nocdyn_name_checks, only: check_duplicate_names, check_references, collect_names
   use nocdyn_namelist, only: namelist_group_t, namelist_t
   use nocdyn_namelist_scanner, only: scan_namelist
   use nocdyn_schema, only: first_key, group_rule_index, group_rules, is_single, key_rules, last_key
@@ -67,8 +65,7 @@ contains
     call refuse_unused(input%groups, parsed, diagnostics)
     call check_duplicate_names(input%groups, diagnostics)
     call check_references(input%groups, bodies_are_known(input%groups), diagnostics)
-    call check_joints(input%groups, diagnostics)
-    if (diagnostics%count > 0) call raise(error, diagnostics%worst_code(), diagnostics_text(input, diagnostics))
+    if (diagnostics%count > 0) call raise(error, diagnostics%worst_code(), input%diagnostics_text(diagnostics))
     if (present(all_diagnostics)) all_diagnostics = diagnostics
   end subroutine read_input_text
 

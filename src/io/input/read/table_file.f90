@@ -3,8 +3,8 @@
 module nocdyn_table_file
   use nocdyn_errors, only: error_t, exit_file, exit_input
   use nocdyn_kinds, only: wp
-  use nocdyn_literals, only: literal_fine, literal_not_finite, literal_too_large, read_real
-  use nocdyn_text, only: append, quoted, string_t, to_text
+  use nocdyn_literals, only: number_problem, read_real
+  use nocdyn_text, only: append, quoted, shortened, string_t, to_text
   use nocdyn_text_file, only: read_text_file
   implicit none (type, external)
   private
@@ -284,18 +284,8 @@ contains
     integer :: status
 
     call read_real(text, value, status)
-    select case (status)
-    case (literal_fine)
-      message = ''
-      return
-    case (literal_not_finite)
-      message = 'is not a finite number'
-    case (literal_too_large)
-      message = 'is too large for a number'
-    case default
-      message = 'is not a number'
-    end select
-    message = 'column ' // to_text(column) // ', ' // excerpt(text) // ', ' // message
+    message = number_problem(status)
+    if (message /= '') message = 'column ' // to_text(column) // ', ' // excerpt(text) // ',' // message
   end subroutine read_column
 
   !> A first line without any digit names the columns.
@@ -313,8 +303,7 @@ contains
     character(len=:), allocatable, intent(inout) :: message
 
     if (this > last) return
-    message = 'column 1, ' // to_text(this) // ', is not above ' // to_text(last) // ' on line ' // to_text(line) // &
-                '; needed: ascending values'
+    message = 'column 1, ' // to_text(this) // ', must be greater than ' // to_text(last) // ' on line ' // to_text(line)
   end subroutine check_ascent
 
   pure function excerpt(text)
@@ -322,8 +311,7 @@ contains
     character(len=:), allocatable :: excerpt
     integer, parameter :: most = 40
 
-    excerpt = quoted(text)
-    if (len(text) > most) excerpt = quoted(text(:most) // '...')
+    excerpt = quoted(shortened(text, most))
   end function excerpt
 
   subroutine add_error(reading, text)

@@ -1,11 +1,12 @@
-!> Several numbers that vary together: each once, none beside an alternative of its key, none without the keys that it needs.
+!> Numbers that vary together: each once, none beside a key that excludes its own, none without the keys that it requires.
 module nocdyn_target_consistency
   use nocdyn_input, only: input_t
-  use nocdyn_schema, only: first_key, key_rules
+  use nocdyn_schema, only: key_name
   use nocdyn_schema_relations, only: relations_of, relations_t
-  use nocdyn_schema_text, only: listed
+  use nocdyn_schema_rules, only: at_most_one, exactly_one, requires
+  use nocdyn_schema_text, only: listed_keys
   use nocdyn_targets, only: find_target, target_t
-  use nocdyn_text, only: append, string_t, to_text
+  use nocdyn_text, only: string_t, to_text
   implicit none (type, external)
   private
 
@@ -57,33 +58,43 @@ contains
     same = 0
   end function same_target
 
-  !> Whether no alternative of a target's key is given, and one of the keys that it needs is.
+  !> Whether no key that excludes the key of a target is given, and one of the keys that it requires is.
   subroutine check_consistency(input, targets, which, message)
     type(input_t), intent(in) :: input
     type(target_t), intent(in) :: targets(:)   !! all that vary; those with group 0 were not found
-    integer, intent(in) :: which               !! the target to check, which was found
-    character(len=:), allocatable, intent(out) :: message   !! '' if fine
+    integer, intent(in) :: which               !! index of the target to check, which was found
+    character(len=:), allocatable, intent(out) :: message   !! '' if nothing is wrong
     type(relations_t) :: relations
-    logical, allocatable :: is_given(:)   !! [keys of the group]
+    logical, allocatable :: is_given(:)   ! [keys of the group]
     integer :: i
 
     message = ''
     call find_given(input, targets, targets(which)%group, is_given)
-    relations = relations_of(input%groups(targets(which)%group)%rule)
-    associate (key => targets(which)%key, first => first_key(input%groups(targets(which)%group)%rule) - 1)
-      do i = 1, size(relations%alternatives)
-        associate (sets => relations%alternatives(i))
-          if (any(sets%first == key)) call refuse_beside(first, key, pack(sets%second, is_given(sets%second)), message)
-          if (any(sets%second == key)) call refuse_beside(first, key, pack(sets%first, is_given(sets%first)), message)
-        end associate
-      end do
-      do i = 1, size(relations%needs)
-        associate (need => relations%needs(i))
-          if (all(need%first /= key) .or. any(is_given(need%second)) .or. message /= '') cycle
-          message = trim(key_rules(first + key)%name) // ' needs ' // names_of(first, need%second)
+    associate (rule => input%groups(targets(which)%group)%rule, key => targets(which)%key)
+      relations = relations_of(rule)
+      do i = 1, size(relations%list)
+        associate (relation => relations%list(i))
+          select case (relation%form)
+          case (exactly_one, at_most_one)
+            if (any(relation%first == key)) call refuse_beside(pack(relation%second, is_given(relation%second)))
+            if (any(relation%second == key)) call refuse_beside(pack(relation%first, is_given(relation%first)))
+          case (requires)
+            if (all(relation%first /= key) .or. any(is_given(relation%second)) .or. message /= '') cycle
+            message = key_name(rule, key) // ' needs ' // listed_keys(rule, relation%second, ' or ')
+          case default   ! of values, not of keys
+          end select
         end associate
       end do
     end associate
+  contains
+    subroutine refuse_beside(others)
+      integer, intent(in) :: others(:)   !! keys of the other set that are given
+
+      if (size(others) == 0 .or. message /= '') return
+      associate (group => input%groups(targets(which)%group))
+        message = listed_keys(group%rule, [targets(which)%key, others(1)], ' and ') // ' are both given; allowed: one of them'
+      end associate
+    end subroutine refuse_beside
   end subroutine check_consistency
 
   subroutine find_given(input, targets, group, is_given)
@@ -99,30 +110,5 @@ contains
       if (targets(t)%group == group) is_given(targets(t)%key) = .true.
     end do
   end subroutine find_given
-
-  subroutine refuse_beside(first, key, others, message)
-    integer, intent(in) :: first       !! row of `key_rules` before the group's
-    integer, intent(in) :: key
-    integer, intent(in) :: others(:)   !! keys of the other alternative that are given
-    character(len=:), allocatable, intent(inout) :: message
-
-    if (size(others) == 0 .or. message /= '') return
-    message = trim(key_rules(first + key)%name) // ' and ' // trim(key_rules(first + others(1))%name) // &
-                ' are both given; allowed: one of them'
-  end subroutine refuse_beside
-
-  !> "a, b or c".
-  pure function names_of(first, keys) result(text)
-    integer, intent(in) :: first, keys(:)
-    character(len=:), allocatable :: text
-    type(string_t), allocatable :: names(:)
-    integer :: i
-
-    allocate (names(0))
-    do i = 1, size(keys)
-      call append(names, trim(key_rules(first + keys(i))%name))
-    end do
-    text = listed(names, ' or ')
-  end function names_of
 
 end module nocdyn_target_consistency

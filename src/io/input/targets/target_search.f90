@@ -3,9 +3,9 @@ module nocdyn_target_search
   use nocdyn_input, only: group_t, input_t
   use nocdyn_name_checks, only: collect_names
   use nocdyn_key_path, only: key_path_t, read_path
-  use nocdyn_schema, only: first_key, group_rules, has_word, key_rules, kind_name, kind_rule_index, last_key
+  use nocdyn_schema, only: first_key, group_rules, has_word, key_rules, selector_name, selector_rule, last_key
   use nocdyn_schema_rules, only: a_number, an_integer, key_rule_t
-  use nocdyn_schema_text, only: kind_text, kinds_text, listed, suggestion
+  use nocdyn_schema_text, only: type_text, only_if_text, listed, suggestion
   use nocdyn_text, only: append, lower_case, nearest_word, quoted, string_t, to_text
   implicit none (type, external)
   private
@@ -112,14 +112,14 @@ contains
     do key = first_key(path%group_rule), last_key(path%group_rule)
       if (is_numeric(key_rules(key))) call append(names, trim(key_rules(key)%name))
     end do
-    message = trim(key_rules(path%key_rule)%name) // ' is no number (' // kind_text(key_rules(path%key_rule)) // ')'
+    message = trim(key_rules(path%key_rule)%name) // ' is no number (' // type_text(key_rules(path%key_rule)) // ')'
     if (size(names) > 0) message = message // '; allowed: ' // listed(names, ', ')
   end subroutine check_kind_of_key
 
   elemental logical function is_numeric(rule)
     type(key_rule_t), intent(in) :: rule
 
-    is_numeric = rule%kind == a_number .or. rule%kind == an_integer
+    is_numeric = rule%value_type == a_number .or. rule%value_type == an_integer
   end function is_numeric
 
   subroutine find_group(input, path, group, message)
@@ -145,10 +145,10 @@ contains
     character(len=:), allocatable, intent(inout) :: message
     character(len=:), allocatable :: law
 
-    if (rule%kinds == '' .or. kind_rule_index(group%rule) == 0) return
-    law = group%text(kind_name(group%rule))
-    if (.not. has_word(rule%kinds, law)) message = trim(rule%name) // ' belongs to ' // kind_name(group%rule) // ' = ' // &
-      kinds_text(rule) // '; here ' // kind_name(group%rule) // ' = ' // quoted(law)
+    if (rule%only_if == '' .or. selector_rule(group%rule) == 0) return
+    law = group%text(selector_name(group%rule))
+    if (.not. has_word(rule%only_if, law)) message = trim(rule%name) // ' belongs to ' // selector_name(group%rule) // ' = ' // &
+      only_if_text(rule) // '; here ' // selector_name(group%rule) // ' = ' // quoted(law)
   end subroutine check_law
 
   !> A list needs a place, a single value has none.

@@ -1,12 +1,12 @@
-!> Checks that need all groups: names that occur twice, and references to bodies.
+!> Checks that need all groups: duplicate names, and references to bodies.
 module nocdyn_name_checks
   use nocdyn_input, only: group_t, value_t
   use nocdyn_diagnostics, only: diagnostics_t
   use nocdyn_schema, only: first_key, group_rules, key_rules
   use nocdyn_schema_rules, only: a_body, body_or_ground, ground, key_rule_t
   use nocdyn_schema_text, only: suggestion
-  use nocdyn_text, only: quoted, string_t, to_text
-  use nocdyn_text_sort, only: sorted_position, argsort
+  use nocdyn_text, only: quoted, shortened, string_t, to_text
+  use nocdyn_text_sort, only: argsort, sorted_position
   implicit none (type, external)
   private
 
@@ -75,7 +75,7 @@ contains
     end do
   end subroutine report_doubles
 
-  !> Every body that is referred to must be there, and no key may name one twice.
+  !> Every body that a key names must exist.
   subroutine check_references(groups, bodies_are_known, diagnostics)
     type(group_t), intent(in) :: groups(:)
     logical, intent(in) :: bodies_are_known   !! .false. if the name of a &body could not be read
@@ -85,6 +85,7 @@ contains
     type(key_rule_t) :: rule
     integer :: g, i, key, missing
 
+    if (.not. bodies_are_known) return
     members = pack([(i, i=1, size(groups))], [(is_member(groups(i), 'body'), i=1, size(groups))])
     call collect_names(groups, members, bodies)
     call argsort(bodies, order)
@@ -93,10 +94,9 @@ contains
       if (groups(g)%rule == 0) cycle
       do key = 1, size(groups(g)%values)
         rule = key_rules(first_key(groups(g)%rule) + key - 1)
-        if (rule%kind /= a_body .and. rule%kind /= body_or_ground) cycle
+        if (rule%value_type /= a_body .and. rule%value_type /= body_or_ground) cycle
         if (.not. allocated(groups(g)%values(key)%texts)) cycle
-        if (bodies_are_known) call check_missing(groups(g)%values(key), g, trim(rule%name), bodies, order, missing, diagnostics)
-        call check_repeated(groups(g)%values(key), g, trim(rule%name), diagnostics)
+        call check_missing(groups(g)%values(key), g, trim(rule%name), bodies, order, missing, diagnostics)
       end do
     end do
   end subroutine check_references
@@ -118,25 +118,9 @@ contains
       missing = missing + 1
       hint = ''
       if (missing <= most_suggestions) hint = suggestion(value%texts(i)%text, bodies)
-      call diagnostics%add(value%line, group, key // ': there is no &body ' // quoted(value%texts(i)%text) // hint, &
+      call diagnostics%add(value%line, group, key // ': there is no &body ' // quoted(shortened(value%texts(i)%text)) // hint, &
                            value%override)
     end do
   end subroutine check_missing
-
-  subroutine check_repeated(value, group, key, diagnostics)
-    type(value_t), intent(in) :: value
-    integer, intent(in) :: group
-    character(len=*), intent(in) :: key
-    type(diagnostics_t), intent(inout) :: diagnostics
-    integer, allocatable :: order(:)
-    integer :: i
-
-    call argsort(value%texts, order)
-    do i = 2, size(order)
-      if (value%texts(order(i))%text /= value%texts(order(i - 1))%text) cycle
-      call diagnostics%add(value%line, group, key // ' has ' // quoted(value%texts(order(i))%text) &
-        // ' twice; allowed: different bodies', value%override)
-    end do
-  end subroutine check_repeated
 
 end module nocdyn_name_checks

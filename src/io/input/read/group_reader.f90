@@ -1,0 +1,180 @@
+!> One group of the input, from the texts of the file and the overrides to checked values.
+module nocdyn_group_reader
+  use nocdyn_diagnostics, only: diagnostics_t, no_line
+  use nocdyn_group_checks, only: check_group
+  use nocdyn_input, only: group_t, value_t
+  use nocdyn_input_overrides, only: override_t
+  use nocdyn_key_relations, only: apply_relations
+  use nocdyn_namelist, only: assignment_t, namelist_group_t, namelist_t
+  use nocdyn_raw_group, only: new_raw_group, raw_group_t
+  use nocdyn_schema, only: group_rules, is_single, key_rule_index, key_rules
+  use nocdyn_schema_relations, only: relations_t
+  use nocdyn_schema_rules, only: a_name, equal_lengths
+  use nocdyn_schema_text, only: key_suggestion, similar_keys
+  use nocdyn_table_file, only: read_table_file
+  use nocdyn_text, only: lower_case, string_t
+  use nocdyn_text_file, only: path_in
+  use nocdyn_value_conversion, only: convert_key
+  implicit none (type, external)
+  private
+
+  public :: read_group
+
+contains
+
+  !> Reads group `index` of the input: texts of file and overrides, relations between keys, conversion, tables of files, checks.
+  subroutine read_group(namelist, source, index, overrides, folder, relations, group, diagnostics)
+    type(namelist_t), intent(in) :: namelist
+    type(namelist_group_t), intent(in) :: source   !! empty for a single group that the file does not have
+    integer, intent(in) :: index
+    type(override_t), intent(inout) :: overrides(:)
+    character(len=*), intent(in) :: folder         !! of the input file, with a slash at its end, or ''
+    type(relations_t), intent(in) :: relations     !! of the keys of this group
+    type(group_t), intent(inout) :: group          !! `rule`, `kind` and `line` are set
+    type(diagnostics_t), intent(inout) :: diagnostics
+    type(raw_group_t), allocatable :: raw
+    integer :: i
+
+    allocate (raw, source=new_raw_group(index, group%rule, group%line, source%is_malformed))
+    call take_assignments(namelist, source, raw, diagnostics)
+    group%name = name_of(raw)
+    call take_overrides(group%name, number_of(namelist, index, group%rule), overrides, raw, diagnostics)
+    call apply_relations(raw, relations, diagnostics)
+    allocate (group%values(size(raw%keys)))
+    do i = 1, size(raw%keys)
+      call convert_key(raw, i, group%values(i), diagnostics)
+    end do
+    do i = 1, size(relations%list)
+      associate (relation => relations%list(i))
+        if (relation%form /= equal_lengths .or. size(relation%second) == 0) cycle
+        call read_table(folder, relation%second(1), relation%first, raw, group, diagnostics)
+      end associate
+    end do
+    call check_group(raw, relations, group, diagnostics)
+  end subroutine read_group
+
+  subroutine take_assignments(namelist, source, raw, diagnostics)
+    type(namelist_t), intent(in) :: namelist
+    type(namelist_group_t), intent(in) :: source
+    type(raw_group_t), intent(inout) :: raw
+    type(diagnostics_t), intent(inout) :: diagnostics
+    character(len=:), allocatable :: message
+    integer :: i, key
+
+    do i = source%first_assignment, source%last_assignment
+      associate (assignment => namelist%assignments(i))
+        key = key_rule_index(raw%rule, assignment%key)
+        if (key == 0) then
+          call refuse_key(assignment, raw, diagnostics)
+          cycle
+        end if
+        call raw%keys(raw%position(key))%assign(namelist, assignment, message)
+        if (message == '') cycle
+        key = key_without_equals(namelist, assignment, raw%rule)
+        if (key > 0) then
+          message = message // "; is '=' missing behind " // trim(key_rules(key)%name) // '?'
+          raw%keys(raw%position(key))%may_be_missing = .true.
+        end if
+        call diagnostics%add(assignment%line, raw%index, message)
+      end associate
+    end do
+  end subroutine take_assignments
+
+  !> The keys that were probably meant are not reported as missing in addition.
+  subroutine refuse_key(assignment, raw, diagnostics)
+    type(assignment_t), intent(in) :: assignment
+    type(raw_group_t), intent(inout) :: raw
+    type(diagnostics_t), intent(inout) :: diagnostics
+    type(string_t), allocatable :: similar(:)
+    integer :: i
+
+    allocate (similar, source=similar_keys(raw%rule, assignment%key))
+    do i = 1, size(similar)
+      raw%keys(raw%position(key_rule_index(raw%rule, similar(i)%text)))%may_be_missing = .true.
+    end do
+    call diagnostics%add(assignment%line, raw%index, assignment%key // ' is not a key of &' // &
+                         trim(group_rules(raw%rule)%name) // key_suggestion(raw%rule, assignment%key))
+  end subroutine refuse_key
+
+  !> Row of the first key among the values of an assignment, 0 if there is none: its equals sign was probably forgotten.
+  pure integer function key_without_equals(namelist, assignment, rule) result(key)
+    type(namelist_t), intent(in) :: namelist
+    type(assignment_t), intent(in) :: assignment
+    integer, intent(in) :: rule   !! row of `group_rules`
+    integer :: i
+
+    key = 0
+    do i = assignment%first_item, assignment%last_item
+      if (namelist%items(i)%is_quoted .or. namelist%items(i)%is_null) cycle
+      key = key_rule_index(rule, lower_case(namelist%item_text(namelist%items(i))))
+      if (key > 0) return
+    end do
+  end function key_without_equals
+
+  !> The name that the file gives to the element, '' if none.
+  pure function name_of(raw) result(name)
+    type(raw_group_t), intent(in) :: raw
+    character(len=:), allocatable :: name
+    integer :: i
+
+    name = ''
+    do i = 1, size(raw%keys)
+      if (key_rules(raw%keys(i)%rule)%value_type /= a_name .or. raw%keys(i)%count_given() /= 1) cycle
+      name = raw%keys(i)%values(1)%text
+    end do
+  end function name_of
+
+  !> Number of a group without name among those of its kind, 0 for other groups.
+  pure integer function number_of(namelist, index, rule) result(number)
+    type(namelist_t), intent(in) :: namelist
+    integer, intent(in) :: index, rule   !! of the group in the file, row of `group_rules`
+    integer :: g
+
+    number = 0
+    if (is_single(rule) .or. group_rules(rule)%name_space /= '') return
+    number = count([(namelist%groups(g)%name == group_rules(rule)%name, g=1, index)])
+  end function number_of
+
+  subroutine take_overrides(name, number, overrides, raw, diagnostics)
+    character(len=*), intent(in) :: name   !! of the element, '' for groups without names
+    integer, intent(in) :: number          !! among the groups without names
+    type(override_t), intent(inout) :: overrides(:)
+    type(raw_group_t), intent(inout) :: raw
+    type(diagnostics_t), intent(inout) :: diagnostics
+    character(len=:), allocatable :: message
+    integer :: i
+
+    do i = 1, size(overrides)
+      if (.not. overrides(i)%is_fine .or. overrides(i)%group_rule /= raw%rule) cycle
+      if (overrides(i)%name /= name .or. overrides(i)%number /= number) cycle
+      overrides(i)%is_used = .true.
+      call raw%keys(raw%position(overrides(i)%key_rule))%override_with(overrides(i)%namelist, overrides(i)%assignment, i, message)
+      if (message /= '') call diagnostics%add(no_line, 0, message, i)
+    end do
+  end subroutine take_overrides
+
+  !> Replaces the file of a table by its two columns.
+  subroutine read_table(folder, file, lists, raw, group, diagnostics)
+    character(len=*), intent(in) :: folder
+    integer, intent(in) :: file, lists(:)   !! positions of the keys of the file and of the columns
+    type(raw_group_t), intent(in) :: raw
+    type(group_t), intent(inout) :: group
+    type(diagnostics_t), intent(inout) :: diagnostics
+    type(string_t), allocatable :: messages(:)
+    type(value_t) :: source
+    integer :: code, i
+
+    if (.not. allocated(group%values(file)%texts)) return
+    source = group%values(file)
+    group%values(file) = value_t()
+    do i = 1, size(lists)
+      group%values(lists(i)) = value_t(source%is_given, source%line, source%override)
+    end do
+    call read_table_file(path_in(folder, source%texts(1)%text), group%values(lists(1))%numbers, &
+                         group%values(lists(2))%numbers, messages, code)
+    do i = 1, size(messages)
+      call diagnostics%add(source%line, raw%index, raw%keys(file)%name() // ': ' // messages(i)%text, source%override, code)
+    end do
+  end subroutine read_table
+
+end module nocdyn_group_reader

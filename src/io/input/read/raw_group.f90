@@ -1,0 +1,322 @@
+!> The keys of one group as the file and the overrides give them: texts that are not converted yet.
+module nocdyn_raw_group
+  use nocdyn_diagnostics, only: diagnostics_t
+  use nocdyn_namelist, only: assignment_t, namelist_t
+  use nocdyn_schema, only: first_key, key_rules, last_key
+  use nocdyn_schema_rules, only: any_number, key_rule_t, required, unset
+  use nocdyn_text, only: shortened, to_text
+  implicit none (type, external)
+  private
+
+  public :: new_raw_group, new_raw_key
+
+  !> One value of a key.
+  type, public :: raw_value_t
+    character(len=:), allocatable :: text      !! without quotes; not allocated: no value is given
+    character(len=:), allocatable :: written   !! as in the file
+    logical :: is_quoted = .false.
+    logical :: is_assigned = .false.           !! by an assignment, perhaps with a null value
+    integer :: line = 0
+  end type raw_value_t
+
+  !> One key.
+  type, public :: raw_key_t
+    integer :: rule = 0                   !! its row of `key_rules`
+    integer :: line = 0                   !! of its first assignment in the file
+    integer :: override = 0               !! the last override that sets it, 0: none
+    integer :: length = 0                 !! number of values that a default has
+    logical :: is_written = .false.       !! the key occurs in the file or in an override
+    logical :: has_whole_list = .false.   !! an assignment has no subscript
+    logical :: is_malformed = .false.     !! its values cannot be read, which is reported
+    logical :: may_be_missing = .false.   !! it is perhaps part of a text that cannot be read, which is reported
+    logical :: is_required = .false.
+    logical :: is_excluded = .false.      !! it has neither a value nor a default in this group
+    logical :: is_superseded = .false.    !! the file gives it; an override replaces it by another key
+    type(raw_value_t), allocatable :: values(:)
+  contains
+    procedure :: name
+    procedure :: assign
+    procedure :: override_with
+    procedure :: fill_defaults
+    procedure :: count_given
+    procedure :: is_given
+    procedure :: has_value
+    procedure :: exclude
+  end type raw_key_t
+
+  !> All keys of one group. Positions count them in the order of the schema.
+  type, public :: raw_group_t
+    integer :: index = 0                    !! of the group in the input
+    integer :: rule = 0                     !! its row of `group_rules`
+    integer :: line = 0
+    type(raw_key_t), allocatable :: keys(:)
+  contains
+    procedure :: position
+    procedure :: first_given
+    procedure :: report
+  end type raw_group_t
+
+contains
+
+  !> A group without values.
+  pure function new_raw_group(index, rule, line, is_malformed) result(group)
+    integer, intent(in) :: index, rule, line
+    logical, intent(in) :: is_malformed   !! parts of the group cannot be read, which is reported
+    type(raw_group_t) :: group
+    integer :: i
+
+    group%index = index
+    group%rule = rule
+    group%line = line
+    allocate (group%keys(last_key(rule) - first_key(rule) + 1))
+    do i = 1, size(group%keys)
+      group%keys(i) = new_raw_key(first_key(rule) + i - 1)
+      group%keys(i)%may_be_missing = is_malformed
+    end do
+  end function new_raw_group
+
+  !> A key without values.
+  pure function new_raw_key(rule) result(key)
+    integer, intent(in) :: rule   !! its row of `key_rules`
+    type(raw_key_t) :: key
+
+    key%rule = rule
+    key%length = key_rules(rule)%count
+    key%is_required = key_rules(rule)%default == required
+  end function new_raw_key
+
+  pure function name(self)
+    class(raw_key_t), intent(in) :: self
+    character(len=:), allocatable :: name
+
+    name = trim(key_rules(self%rule)%name)
+  end function name
+
+  !> Takes over one assignment of the file.
+  subroutine assign(self, namelist, assignment, message)
+    class(raw_key_t), intent(inout) :: self
+    type(namelist_t), intent(in) :: namelist
+    type(assignment_t), intent(in) :: assignment
+    character(len=:), allocatable, intent(out) :: message   !! '': the assignment is valid
+    integer :: last
+
+    if (self%is_written .and. (self%has_whole_list .or. assignment%is_whole)) then
+      message = duplicate_message(self)
+    else
+      call find_last(namelist, assignment, key_rules(self%rule), last, message)
+    end if
+    if (.not. self%is_written) self%line = assignment%line
+    self%is_written = .true.
+    self%has_whole_list = self%has_whole_list .or. assignment%is_whole
+    self%is_malformed = self%is_malformed .or. assignment%is_malformed .or. message /= ''
+    if (self%is_malformed) return
+
+    call lengthen(self, last)
+    if (any(self%values(assignment%first:last:assignment%stride)%is_assigned)) then
+      message = duplicate_message(self)
+      self%is_malformed = .true.
+    else
+      call take_items(self, namelist, assignment, last)
+    end if
+  end subroutine assign
+
+  !> Takes over an override, which replaces the values of the file and of earlier overrides.
+  subroutine override_with(self, namelist, assignment, override, message)
+    class(raw_key_t), intent(inout) :: self
+    type(namelist_t), intent(in) :: namelist
+    type(assignment_t), intent(in) :: assignment
+    integer, intent(in) :: override                         !! index of the override
+    character(len=:), allocatable, intent(out) :: message   !! '': the override is valid
+    integer :: last
+
+    self%is_written = .true.
+    self%override = override
+    if (assignment%is_whole) then
+      self%values = [raw_value_t ::]
+      self%is_malformed = .false.
+    end if
+    call find_last(namelist, assignment, key_rules(self%rule), last, message)
+    self%is_malformed = self%is_malformed .or. assignment%is_malformed .or. message /= ''
+    if (self%is_malformed) return
+    call lengthen(self, last)
+    call take_items(self, namelist, assignment, last)
+  end subroutine override_with
+
+  pure function duplicate_message(key) result(message)
+    type(raw_key_t), intent(in) :: key
+    character(len=:), allocatable :: message
+
+    message = key%name() // ' is given twice, first on line ' // to_text(key%line)
+  end function duplicate_message
+
+  !> Index of the last value that an assignment can set.
+  subroutine find_last(namelist, assignment, rule, last, message)
+    type(namelist_t), intent(in) :: namelist
+    type(assignment_t), intent(in) :: assignment
+    type(key_rule_t), intent(in) :: rule
+    integer, intent(out) :: last
+    character(len=:), allocatable, intent(out) :: message   !! '': the assignment fits the key
+    integer :: items
+
+    items = assignment%last_item - assignment%first_item + 1
+    last = assignment%last
+    if (last == 0) last = rule%count
+    if (last == 0) last = assignment%first + (items - 1) * assignment%stride
+
+    message = ''
+    if (rule%count == 1 .and. .not. assignment%is_whole) then
+      message = trim(rule%name) // ' is a single value and takes no subscript'
+    else if (rule%count /= any_number .and. max(last, assignment%first) > rule%count) then
+      message = 'the subscript of ' // trim(rule%name) // ' is out of range; allowed: 1 to ' // to_text(rule%count)
+    else if (items > (last - assignment%first) / assignment%stride + 1) then
+      message = trim(rule%name) // ' has ' // to_text(items) // ' values (' // found_values(namelist, assignment) &
+        // '); allowed: ' // to_text((last - assignment%first) / assignment%stride + 1)
+    end if
+  end subroutine find_last
+
+  !> The first few values as they are written.
+  pure function found_values(namelist, assignment) result(text)
+    type(namelist_t), intent(in) :: namelist
+    type(assignment_t), intent(in) :: assignment
+    character(len=:), allocatable :: text
+    integer, parameter :: few = 5
+    integer :: i
+
+    text = ''
+    do i = assignment%first_item, min(assignment%last_item, assignment%first_item + few - 1)
+      if (i > assignment%first_item) text = text // ', '
+      if (.not. namelist%items(i)%is_null) text = text // shortened(namelist%as_written(namelist%items(i)))
+    end do
+    if (assignment%last_item - assignment%first_item >= few) text = text // ' ...'
+  end function found_values
+
+  !> Makes room for `length` values at least.
+  subroutine lengthen(key, length)
+    type(raw_key_t), intent(inout) :: key
+    integer, intent(in) :: length
+    type(raw_value_t), allocatable :: longer(:)
+
+    if (.not. allocated(key%values)) allocate (key%values(max(0, length)))
+    if (size(key%values) >= length) return
+    allocate (longer(length))
+    longer(:size(key%values)) = key%values
+    call move_alloc(longer, key%values)
+  end subroutine lengthen
+
+  subroutine take_items(key, namelist, assignment, last)
+    type(raw_key_t), intent(inout) :: key
+    type(namelist_t), intent(in) :: namelist
+    type(assignment_t), intent(in) :: assignment
+    integer, intent(in) :: last   !! index of the last value that the assignment can set
+    integer :: i, item
+
+    item = assignment%first_item
+    do i = assignment%first, last, assignment%stride
+      key%values(i)%is_assigned = .true.
+      if (item > assignment%last_item) cycle
+      if (.not. namelist%items(item)%is_null) then
+        key%values(i)%text = namelist%item_text(namelist%items(item))
+        key%values(i)%written = namelist%as_written(namelist%items(item))
+        key%values(i)%is_quoted = namelist%items(item)%is_quoted
+        key%values(i)%line = namelist%items(item)%line
+      end if
+      item = item + 1
+    end do
+  end subroutine take_items
+
+  !> Gives the default, if there is one, to every value that is not given.
+  subroutine fill_defaults(self)
+    class(raw_key_t), intent(inout) :: self
+    character(len=len(key_rules%default)) :: default
+    integer :: i
+
+    call lengthen(self, self%length)
+    default = key_rules(self%rule)%default
+    if (default == required .or. default == unset) return
+    do i = 1, size(self%values)
+      if (allocated(self%values(i)%text)) cycle
+      self%values(i)%written = trim(default)
+      self%values(i)%is_quoted = default(1:1) == "'"
+      self%values(i)%text = self%values(i)%written
+      if (self%values(i)%is_quoted) self%values(i)%text = default(2:len_trim(default) - 1)
+    end do
+  end subroutine fill_defaults
+
+  !> Number of the values that are given.
+  pure integer function count_given(self)
+    class(raw_key_t), intent(in) :: self
+    integer :: i
+
+    count_given = 0
+    if (.not. allocated(self%values)) return
+    do i = 1, size(self%values)
+      if (allocated(self%values(i)%text)) count_given = count_given + 1
+    end do
+  end function count_given
+
+  !> Whether the user gives a value, perhaps one that cannot be read.
+  pure logical function is_given(self)
+    class(raw_key_t), intent(in) :: self
+
+    is_given = self%is_malformed .or. self%count_given() > 0
+  end function is_given
+
+  !> Whether the key has a value, given or by default.
+  pure logical function has_value(self)
+    class(raw_key_t), intent(in) :: self
+
+    has_value = self%is_given()
+    if (.not. has_value) has_value = .not. self%is_excluded .and. key_rules(self%rule)%default /= unset
+  end function has_value
+
+  !> Removes the values of the key and its default.
+  pure subroutine exclude(self)
+    class(raw_key_t), intent(inout) :: self
+
+    self%is_written = .false.
+    self%has_whole_list = .false.
+    self%is_malformed = .false.
+    self%line = 0
+    self%override = 0
+    if (allocated(self%values)) deallocate (self%values)
+    self%is_excluded = .true.
+  end subroutine exclude
+
+  !> Position of the key with this row of `key_rules`.
+  pure integer function position(self, rule)
+    class(raw_group_t), intent(in) :: self
+    integer, intent(in) :: rule
+
+    position = rule - first_key(self%rule) + 1
+  end function position
+
+  !> The first of these positions whose key is given, 0 if none is; keys of overrides come before those of the file.
+  pure integer function first_given(self, positions) result(given)
+    class(raw_group_t), intent(in) :: self
+    integer, intent(in) :: positions(:)
+    integer :: i
+
+    given = 0
+    do i = size(positions), 1, -1
+      if (.not. self%keys(positions(i))%is_given()) cycle
+      if (given > 0) then
+        if (self%keys(given)%override > 0 .and. self%keys(positions(i))%override == 0) cycle
+      end if
+      given = positions(i)
+    end do
+  end function first_given
+
+  !> Adds an error at the last of some keys, or at the group if there are none.
+  subroutine report(self, positions, text, diagnostics)
+    class(raw_group_t), intent(in) :: self
+    integer, intent(in) :: positions(:)   !! of the keys
+    character(len=*), intent(in) :: text
+    type(diagnostics_t), intent(inout) :: diagnostics
+    integer :: line
+
+    line = maxval([0, self%keys(positions)%line])
+    if (line == 0) line = self%line
+    call diagnostics%add(line, self%index, text, maxval([0, self%keys(positions)%override]))
+  end subroutine report
+
+end module nocdyn_raw_group

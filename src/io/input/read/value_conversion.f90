@@ -1,0 +1,257 @@
+!> From the texts of a key to typed values, with the checks that need no other key.
+module nocdyn_value_conversion
+  use nocdyn_diagnostics, only: diagnostics_t
+  use nocdyn_input, only: value_t
+  use nocdyn_kinds, only: wp
+  use nocdyn_literals, only: literal_fine, literal_too_large, number_problem, read_integer, read_logical, read_real
+  use nocdyn_raw_group, only: new_raw_key, raw_group_t, raw_key_t, raw_value_t
+  use nocdyn_schema, only: holds_texts, key_rules, words_of
+  use nocdyn_schema_rules, only: a_body, a_file, a_flag, a_folder, a_name, a_number, a_selector, a_word, an_integer, &
+    ground, is_out_of_range, key_rule_t, longest_file_name, longest_name, longest_path, unset
+  use nocdyn_schema_text, only: allowed_text
+  use nocdyn_text, only: joined, lower_case, nearest_word, quoted, shortened, string_t, to_text
+  implicit none (type, external)
+  private
+
+  public :: convert_key, default_value
+
+contains
+
+  !> Converts the values of one key, the missing ones by their default.
+  subroutine convert_key(group, position, value, diagnostics)
+    type(raw_group_t), intent(inout) :: group
+    integer, intent(in) :: position             !! of the key
+    type(value_t), intent(inout) :: value       !! unset if the key has no value or an error
+    type(diagnostics_t), intent(inout) :: diagnostics
+    character(len=:), allocatable :: message
+    integer :: given, known
+
+    associate (key => group%keys(position), rule => key_rules(group%keys(position)%rule))
+      given = key%count_given()
+      value%is_given = given > 0
+      value%line = key%line
+      value%override = key%override
+      if (key%is_malformed .or. (given == 0 .and. (key%may_be_missing .or. key%is_excluded))) return
+      if (given == 0 .and. rule%default == unset .and. .not. key%is_required) return
+
+      call key%fill_defaults()
+      known = key%count_given()
+      if (known == 0 .and. .not. key%is_required) return
+      if (known == 0) then
+        message = trim(merge(' has no value', ' is missing  ', key%is_written)) // '; needed: ' // allowed_text(rule)
+      else if (known < size(key%values)) then
+        message = ' has ' // counted(given) // '; needed: ' // to_text(size(key%values))
+      else if (known < rule%fewest) then
+        message = ' has ' // counted(known) // '; needed: at least ' // to_text(rule%fewest)
+      else
+        call convert_values(key, group%index, value, diagnostics)
+        return
+      end if
+      call group%report([position], key%name() // message, diagnostics)
+    end associate
+  end subroutine convert_key
+
+  !> "1 value", "2 values".
+  pure function counted(values) result(text)
+    integer, intent(in) :: values
+    character(len=:), allocatable :: text
+
+    text = to_text(values) // trim(merge(' value ', ' values', values == 1))
+  end function counted
+
+  !> The default of a key.
+  function default_value(rule) result(value)
+    integer, intent(in) :: rule   !! row of `key_rules` that has a default
+    type(value_t) :: value
+    type(raw_key_t) :: key
+    type(diagnostics_t) :: none
+
+    key = new_raw_key(rule)
+    call key%fill_defaults()
+    call convert_values(key, 0, value, none)
+  end function default_value
+
+  subroutine convert_values(key, group, value, diagnostics)
+    type(raw_key_t), intent(in) :: key     !! with all values given
+    integer, intent(in) :: group           !! index of the group, for the diagnostics
+    type(value_t), intent(inout) :: value
+    type(diagnostics_t), intent(inout) :: diagnostics
+    character(len=:), allocatable :: element, message
+    integer :: i
+    logical :: has_error
+
+    has_error = .false.
+    associate (rule => key_rules(key%rule))
+      call allocate_values(rule%value_type, size(key%values), value)
+      do i = 1, size(key%values)
+        call convert_value(key%values(i), rule, key%override > 0, i, value, message)
+        if (message == '') cycle
+        has_error = .true.
+        element = key%name()
+        if (rule%count /= 1) element = element // '(' // to_text(i) // ')'
+        call diagnostics%add(max(key%line, key%values(i)%line), group, &
+                             element // ' = ' // shortened(key%values(i)%written) // message, key%override)
+      end do
+    end associate
+    if (has_error) value = value_t(value%is_given, value%line, value%override)
+  end subroutine convert_values
+
+  subroutine allocate_values(value_type, count, value)
+    integer, intent(in) :: value_type, count
+    type(value_t), intent(inout) :: value
+
+    select case (value_type)
+    case (a_number)
+      allocate (value%numbers(count), source=0.0_wp)
+    case (an_integer)
+      allocate (value%whole_numbers(count), source=0)
+    case (a_flag)
+      allocate (value%flags(count), source=.false.)
+    case default
+      allocate (value%texts(count))
+    end select
+  end subroutine allocate_values
+
+  subroutine convert_value(raw, rule, may_be_bare, i, value, message)
+    type(raw_value_t), intent(in) :: raw
+    type(key_rule_t), intent(in) :: rule
+    logical, intent(in) :: may_be_bare                      !! texts need no quotes: the shell has removed them
+    integer, intent(in) :: i                                !! index of the value
+    type(value_t), intent(inout) :: value
+    character(len=:), allocatable, intent(out) :: message   !! behind 'KEY = VALUE'; '': the value is valid
+
+    message = ''
+    if (holds_texts(rule%value_type)) then
+      value%texts(i)%text = raw%text
+      if (.not. (raw%is_quoted .or. may_be_bare)) then
+        message = ' is not a text; texts are written in quotes: ' // quoted(shortened(raw%text))
+      else
+        call check_text(rule, value%texts(i), message)
+      end if
+    else if (raw%is_quoted) then
+      message = ' is a text; needed without quotes: ' // allowed_text(rule)
+    else
+      select case (rule%value_type)
+      case (a_number)
+        call convert_number(raw%text, rule, value%numbers(i), message)
+      case (an_integer)
+        call convert_integer(raw%text, rule, value%whole_numbers(i), message)
+      case default
+        call convert_flag(raw%text, value%flags(i), message)
+      end select
+      if (message /= '') message = message // '; allowed: ' // allowed_text(rule)
+    end if
+  end subroutine convert_value
+
+  subroutine convert_number(text, rule, value, message)
+    character(len=*), intent(in) :: text
+    type(key_rule_t), intent(in) :: rule
+    real(wp), intent(out) :: value
+    character(len=:), allocatable, intent(inout) :: message
+    integer :: status
+
+    call read_real(text, value, status)
+    message = number_problem(status)
+    if (message == '' .and. is_out_of_range(value, rule%allowed)) message = ' is out of range'
+  end subroutine convert_number
+
+  subroutine convert_integer(text, rule, value, message)
+    character(len=*), intent(in) :: text
+    type(key_rule_t), intent(in) :: rule
+    integer, intent(out) :: value
+    character(len=:), allocatable, intent(inout) :: message
+    integer :: status
+
+    call read_integer(text, value, status)
+    select case (status)
+    case (literal_fine)
+      if (is_out_of_range(real(value, wp), rule%allowed)) message = ' is out of range'
+    case (literal_too_large)
+      message = ' is too large; at most ' // to_text(huge(value))
+    case default
+      message = ' is not a whole number'
+    end select
+  end subroutine convert_integer
+
+  subroutine convert_flag(text, value, message)
+    character(len=*), intent(in) :: text
+    logical, intent(out) :: value
+    character(len=:), allocatable, intent(inout) :: message
+    integer :: status
+
+    call read_logical(text, value, status)
+    if (status /= literal_fine) message = ' is neither true nor false'
+  end subroutine convert_flag
+
+  subroutine check_text(rule, value, message)
+    type(key_rule_t), intent(in) :: rule
+    type(string_t), intent(inout) :: value   !! a word becomes that of the schema
+    character(len=:), allocatable, intent(inout) :: message
+
+    select case (rule%value_type)
+    case (a_name)
+      message = name_message(value%text)
+    case (a_body)
+      if (value%text == ground) message = ': the ground is not allowed here; allowed: ' // allowed_text(rule)
+    case (a_word, a_selector)
+      call check_word(words_of(rule), value, message)
+    case (a_file)
+      if (value%text == '') message = ' is not the name of a file'
+    case (a_folder)
+      if (is_too_long(value%text)) message = ' is too long for a folder; allowed: ' // to_text(longest_path) // &
+        ' bytes, ' // to_text(longest_file_name) // ' from slash to slash'
+    case default   ! any text
+    end select
+  end subroutine check_text
+
+  subroutine check_word(words, value, message)
+    type(string_t), intent(in) :: words(:)   !! that are allowed
+    type(string_t), intent(inout) :: value   !! in any case; becomes the word of the schema
+    character(len=:), allocatable, intent(inout) :: message
+    integer :: i
+
+    do i = 1, size(words)
+      if (lower_case(value%text) /= words(i)%text) cycle
+      value%text = words(i)%text
+      return
+    end do
+    message = ' is not known; allowed: ' // joined(words, ', ')
+    i = nearest_word(value%text, words)
+    if (i > 0) message = message // "; did you mean '" // words(i)%text // "'?"
+  end subroutine check_word
+
+  !> What is wrong with the name of an element, '' if nothing is. Names become parts of columns and of paths on the command line.
+  pure function name_message(name) result(message)
+    character(len=*), intent(in) :: name
+    character(len=:), allocatable :: message
+    character(len=*), parameter :: forbidden = ',;=''"'
+    integer :: i
+
+    message = ''
+    if (len_trim(name) == 0) then
+      message = ' is an empty name'
+    else if (name == ground) then
+      message = ' is not allowed as a name: it stands for what does not turn'
+    else if (len(name) > longest_name) then
+      message = ' is too long for a name; allowed: ' // to_text(longest_name) // ' bytes'
+    else if (name(1:1) == ' ' .or. name(len(name):) == ' ') then
+      message = ' is a name with a blank at its beginning or end'
+    else if (scan(name, forbidden) > 0 .or. any([(iachar(name(i:i)) < 32, i=1, len(name))])) then
+      message = ' is a name with a comma, semicolon, equals sign, quote or tab, which is not allowed'
+    end if
+  end function name_message
+
+  !> Whether the operating system has no folder with such a path.
+  pure logical function is_too_long(path)
+    character(len=*), intent(in) :: path
+    integer :: i, length
+
+    is_too_long = len(path) > longest_path
+    length = 0
+    do i = 1, len(path)
+      length = merge(0, length + 1, path(i:i) == '/')
+      is_too_long = is_too_long .or. length > longest_file_name
+    end do
+  end function is_too_long
+
+end module nocdyn_value_conversion
