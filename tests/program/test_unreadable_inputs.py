@@ -83,3 +83,57 @@ def test_damaged_inputs_are_read_or_refused_but_never_crash(nocdyn, part):
         assert all(path.name in line for line in outcome.stderr.splitlines()), outcome.stderr
         codes.add(outcome.returncode)
     assert codes == {0, 2}
+
+
+DISC = """\
+&body name = 'disc' inertia = 1.0 /
+&load name = 'l' viscous = 1.0
+  body = {body} /
+&run t_end = 1.0
+  rtol = {rtol} /
+&output
+  directory = {directory} /
+"""
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "place", "complaint"),
+    [
+        ("body", "'" + "\u00e4" * 5000 + "'", "3: &load 'l': body: there is no &body", "; allowed: 'disc'"),
+        ("rtol", "1" * 5000 + "x", "5: &run: rtol = 111", " is not a number; allowed: 1e-14 to 0.1"),
+        (
+            "directory",
+            "'" + "x" * 5000 + "'",
+            "7: &output: directory = 'xxx",
+            " is too long for a folder; allowed: 4000 bytes, 255 from slash to slash",
+        ),
+        (
+            "directory",
+            "'" + "x" * 5000,
+            "7: &output: directory: a quote is missing: the text <'xxx",
+            "> is not closed on its line",
+        ),
+        ("rtol", "2" * 5000 + "*1", "5: &run: rtol: ", "a repeat count such as 3*0.5 must be from 1 to 100000"),
+    ],
+)
+def test_messages_name_file_line_and_key_and_cut_long_values(nocdyn, key, value, place, complaint):
+    values = {"body": "'disc'", "rtol": "1e-6", "directory": "'out'"} | {key: value}
+    nocdyn.write("long.nml", DISC.format(**values))
+    outcome = nocdyn("run", "long.nml")
+    assert (outcome.returncode, outcome.stdout) == (2, "")
+    assert outcome.stderr.startswith(f"nocdyn: long.nml:{place}")
+    assert outcome.stderr.endswith(complaint + "\n")
+    assert len(outcome.stderr.encode()) < 300
+
+
+def test_a_long_override_is_cut(nocdyn):
+    outcome = nocdyn("run", CASE_2, "--set", "output.directory=" + "x/" * 3000)
+    assert outcome.returncode == 2
+    assert outcome.stderr.startswith("nocdyn: --set output.directory=x/x/") and len(outcome.stderr) < 400
+
+
+def test_a_long_folder_of_results_is_cut(nocdyn):
+    outcome = nocdyn("run", CASE_2, "--out", "x" * 5000)
+    assert outcome.returncode == 3
+    assert outcome.stderr.startswith("nocdyn: cannot write 'xxx") and "File name too long" in outcome.stderr
+    assert len(outcome.stderr) < 600

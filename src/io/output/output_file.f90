@@ -2,13 +2,14 @@
 module nocdyn_output_file
   use nocdyn_errors, only: error_t, exit_file, raise
   use nocdyn_posix, only: close_file, create_file, last_failure, make_folders, process_id, remove_file, rename_file, write_bytes
-  use nocdyn_text, only: quoted, to_text
+  use nocdyn_text, only: quoted, shortened, to_text
   implicit none (type, external)
   private
 
   public :: write_file
 
   integer, parameter :: buffer_size = 65536
+  integer, parameter :: longest_shown = 400   !! bytes of a path in a message
 
   !> The first failure is kept and told by `finish`; until then `has_failed` answers.
   type, public :: output_file_t
@@ -143,7 +144,7 @@ contains
     type(error_t), allocatable, intent(out) :: error
 
     call remove_file(self%aside)
-    call raise(error, exit_file, 'cannot write ' // quoted(self%folder // name) // ': ' // self%reason)
+    call raise(error, exit_file, 'cannot write ' // quoted(shortened(self%folder // name, longest_shown)) // ': ' // self%reason)
   end subroutine fail
 
   !> Keeps the reason of the first failure.
