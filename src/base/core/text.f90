@@ -30,6 +30,16 @@ module nocdyn_text
       integer(c_size_t), value, intent(in) :: capacity
       integer(c_int) :: length
     end function shortest_decimal
+
+    !> The same without an exponent, or always with one.
+    function shortest_form(value, has_exponent, buffer, capacity) result(length) bind(c, name='nocdyn_shortest_form')
+      import :: c_char, c_double, c_int, c_size_t
+      real(c_double), value, intent(in) :: value
+      integer(c_int), value, intent(in) :: has_exponent   !! 0 or 1
+      character(kind=c_char), intent(out) :: buffer(*)
+      integer(c_size_t), value, intent(in) :: capacity
+      integer(c_int) :: length
+    end function shortest_form
   end interface
 
 contains
@@ -54,20 +64,24 @@ contains
     text = buffer(:length)
   end function real_to_text
 
-  !> The value to `digits` significant digits, as short as it can be written.
+  !> The value to `digits` significant digits, for people: without an exponent from 0.0001 to below 1e9, with one elsewhere.
   function rounded_text(value, digits) result(text)
     real(wp), intent(in) :: value
     integer, intent(in) :: digits   !! 1 to 17
     character(len=:), allocatable :: text
     character(len=number_width) :: buffer
     character(len=12) :: edit
+    real(wp), parameter :: smallest = 1.0e-4_wp, largest = 1.0e9_wp   ! without an exponent
     real(wp) :: near
+    integer :: length
 
     write (edit, '(a, i0, a)') '(es32.', digits - 1, 'e4)'
     write (buffer, edit) value
     read (buffer, *) near
     if (abs(near) <= 0.0_wp) near = 0.0_wp   ! no "-0"
-    text = to_text(near)
+    length = int(shortest_form(near, merge(1_c_int, 0_c_int, abs(near) > 0.0_wp .and. (abs(near) < smallest .or. &
+                                                             .not. abs(near) < largest)), buffer, int(len(buffer), c_size_t)))
+    text = buffer(:length)
   end function rounded_text
 
   pure function integer_to_text(value) result(text)
