@@ -53,7 +53,7 @@ contains
     call eliminate(relations, is_kept(relations%row), group_of, trains, groups)
     call raise_first_lock(constraints, body_names, trains, relations, groups, offending_row, error)
     if (allocated(error)) return
-    call explain_redundancies(constraints, trains, relations, groups)
+    call explain_redundancies(constraints, trains, relations, is_kept, groups)
     call choose_coordinates(constraints, body_names, wanted, group_of, is_kept, trains, groups, error)
   end subroutine analyse_constraints
 
@@ -98,7 +98,7 @@ contains
     leaves = relations%eliminate_leaves(all_relations, no_train)
     if (size(leaves%core) == 0) return
     allocate (order(size(leaves%core)))
-    call transposed_order([(group_of(relations%between%body(relations%between%first(leaves%core(i)))), &
+    call transposed_order([(group_of(relations%equations%body(relations%equations%first(leaves%core(i)))), &
                             i=1, size(leaves%core))], groups, order, first)
     do g = 1, groups
       if (first(g + 1) > first(g)) call find_independent_core(relations, leaves%core(order(first(g):first(g + 1) - 1)), is_kept)
@@ -116,7 +116,7 @@ contains
     integer :: dependent, fine, i, middle
     logical :: adds(size(core))
 
-    allocate (rows, source=scaled_rows(relations%between, core, distinct_trains(relations%between, core)))
+    allocate (rows, source=scaled_rows(relations%equations, core, distinct_trains(relations%equations, core)))
     adds = independent_rows(rows)
     is_kept(relations%row(pack(core, .not. adds))) = .false.
     left = pack(core, adds)
@@ -193,10 +193,11 @@ contains
   end subroutine raise_first_lock
 
   !> The kept rows that each redundant row repeats.
-  subroutine explain_redundancies(constraints, trains, relations, groups)
+  subroutine explain_redundancies(constraints, trains, relations, is_kept, groups)
     type(constraints_t), intent(in) :: constraints
     type(rigid_trains_t), intent(in) :: trains
     type(train_relations_t), intent(in) :: relations
+    logical, intent(in) :: is_kept(:)   !! [rows]
     type(geared_group_t), intent(inout) :: groups(:)
     type(train_motion_t) :: found
     integer, allocatable :: bodies(:), redundant(:), rows(:)
@@ -206,7 +207,7 @@ contains
       associate (group => groups(g))
         allocate (group%redundancies(size(group%rows) - size(group%kept)))
         if (size(group%redundancies) == 0) cycle
-        allocate (redundant, source=other_rows(group%rows, group%kept))
+        redundant = pack(group%rows, .not. is_kept(group%rows))
         local(group%trains) = [(k, k=1, size(group%trains))]
         call find_motion(relations, group%elimination, local, size(group%trains), 1, found)
         do i = 1, size(redundant)
@@ -220,30 +221,9 @@ contains
                                                           redundant(i))
           end if
         end do
-        deallocate (redundant)
       end associate
     end do
   end subroutine explain_redundancies
-
-  !> What is in the first of two ascending lists and not in the second.
-  pure function other_rows(rows, kept) result(others)
-    integer, intent(in) :: rows(:), kept(:)
-    integer :: others(size(rows) - size(kept))
-    integer :: i, k, next
-
-    next = 1
-    k = 0
-    do i = 1, size(rows)
-      if (next <= size(kept)) then
-        if (rows(i) == kept(next)) then
-          next = next + 1
-          cycle
-        end if
-      end if
-      k = k + 1
-      others(k) = rows(i)
-    end do
-  end function other_rows
 
   pure function ascending(rows) result(sorted)
     integer, intent(in) :: rows(:)
@@ -270,9 +250,9 @@ contains
 
     relation = findloc(relations%row, row, dim=1)
     moment = 0.0_wp
-    associate (between => relations%between)
-      associate (first => between%first(relation), last => between%first(relation + 1) - 1)
-        moment(between%body(first:last)) = between%coefficient(1, first:last)
+    associate (equations => relations%equations)
+      associate (first => equations%first(relation), last => equations%first(relation + 1) - 1)
+        moment(equations%body(first:last)) = equations%coefficient(1, first:last)
       end associate
     end associate
     lambda = 0.0_wp

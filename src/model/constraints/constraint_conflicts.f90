@@ -89,27 +89,27 @@ contains
   function locked_trains(relations, elimination) result(is_locked)
     type(train_relations_t), intent(in) :: relations
     type(elimination_t), intent(in) :: elimination
-    logical :: is_locked(relations%between%bodies)
+    logical :: is_locked(relations%equations%bodies)
     type(train_motion_t) :: found
     real(wp) :: bound(size(elimination%free)), speed(size(elimination%free))
     integer, allocatable :: trains(:)
-    integer :: entry, i, local(relations%between%bodies)
+    integer :: entry, i, local(relations%equations%bodies)
 
     is_locked = .false.
-    allocate (trains, source=[elimination%core_trains, distinct_trains(relations%between, elimination%relation)])
+    allocate (trains, source=[elimination%core_trains, distinct_trains(relations%equations, elimination%relation)])
     local(trains) = [(i, i=1, size(trains))]
     local(elimination%free) = [(size(trains) + i, i=1, size(elimination%free))]
     call find_motion(relations, elimination, local, size(trains) + size(elimination%free), 1, found)
     if (size(elimination%core) > 0) is_locked(elimination%core_trains) = has_zero_speed(relations, elimination)
-    associate (between => relations%between)
+    associate (equations => relations%equations)
       do i = size(elimination%relation), 1, -1
         bound = 0.0_wp
         speed = 0.0_wp
-        do entry = between%first(elimination%relation(i)), between%first(elimination%relation(i) + 1) - 1
-          associate (train => between%body(entry))
+        do entry = equations%first(elimination%relation(i)), equations%first(elimination%relation(i) + 1) - 1
+          associate (train => equations%body(entry))
             if (train == elimination%train(i) .or. is_locked(train)) cycle
-            speed = speed + between%coefficient(1, entry) * found%motion(local(train), :)
-            bound = bound + abs(between%coefficient(1, entry) * found%motion(local(train), :))
+            speed = speed + equations%coefficient(1, entry) * found%motion(local(train), :)
+            bound = bound + abs(equations%coefficient(1, entry) * found%motion(local(train), :))
           end associate
         end do
         is_locked(elimination%train(i)) = all(abs(speed) <= ratio_tolerance * bound)
@@ -127,7 +127,7 @@ contains
     integer :: pivots(size(rests)), rank
     logical :: is_singular
 
-    rows = scaled_rows(relations%between, elimination%core, elimination%core_trains)
+    rows = scaled_rows(relations%equations, elimination%core, elimination%core_trains)
     call pivoted_rank(rows, ratio_tolerance, rank, pivots)
     call natural_complement(rows, pivots(rank + 1:), motion, dual, log_determinant, is_singular)
     if (is_singular) error stop 'nocdyn_constraint_conflicts: relations must be independent here'
@@ -189,13 +189,13 @@ contains
     integer, intent(in) :: chosen(:)
     type(elimination_t) :: elimination
     type(leaf_elimination_t) :: leaves
-    logical :: takes_part(size(relations%row)), no_train(relations%between%bodies)
+    logical :: takes_part(size(relations%row)), no_train(relations%equations%bodies)
 
     takes_part = .false.
     takes_part(chosen) = .true.
     no_train = .false.
     leaves = relations%eliminate_leaves(takes_part, no_train)
-    elimination = pivoted_elimination(relations, distinct_trains(relations%between, chosen), leaves%relation, &
+    elimination = pivoted_elimination(relations, distinct_trains(relations%equations, chosen), leaves%relation, &
                                       leaves%train, leaves%core)
   end function partial_elimination
 

@@ -53,7 +53,7 @@ contains
     integer :: core(size(leaves%core)), order(size(leaves%train))
 
     call transposed_order(group_of(leaves%train), size(groups), order, first)
-    call transposed_order([(group_of(relations%between%body(relations%between%first(leaves%core(i)))), &
+    call transposed_order([(group_of(relations%equations%body(relations%equations%first(leaves%core(i)))), &
                             i=1, size(leaves%core))], size(groups), core, first_core)
     do g = 1, size(groups)
       associate (elimination => groups(g)%elimination)
@@ -61,7 +61,7 @@ contains
         elimination%train = leaves%train(order(first(g):first(g + 1) - 1))
         elimination%core = leaves%core(core(first_core(g):first_core(g + 1) - 1))
         if (size(elimination%core) > 0) then
-          elimination%core_trains = distinct_trains(relations%between, elimination%core)
+          elimination%core_trains = distinct_trains(relations%equations, elimination%core)
         else
           elimination%core_trains = elimination%core
         end if
@@ -78,7 +78,7 @@ contains
     type(elimination_t) :: elimination
     integer, allocatable :: pivots(:)
     integer :: rank
-    logical :: is_given(relations%between%bodies)
+    logical :: is_given(relations%equations%bodies)
 
     allocate (elimination%relation, source=relation)
     allocate (elimination%train, source=train)
@@ -88,11 +88,11 @@ contains
       allocate (elimination%free, source=trains)
       return
     end if
-    allocate (elimination%core_trains, source=distinct_trains(relations%between, core))
+    allocate (elimination%core_trains, source=distinct_trains(relations%equations, core))
     is_given = .false.
     is_given(train) = .true.
     allocate (pivots(size(elimination%core_trains)))
-    call pivoted_rank(unit_rows(relations%between%block(1, core, elimination%core_trains)), ratio_tolerance, rank, pivots)
+    call pivoted_rank(unit_rows(relations%equations%block(1, core, elimination%core_trains)), ratio_tolerance, rank, pivots)
     is_given(elimination%core_trains(pivots(:size(core)))) = .true.
     allocate (elimination%free, source=pack(trains, .not. is_given(trains)))
   end function pivoted_elimination
@@ -203,7 +203,7 @@ contains
     dependent = pack([(i, i=1, size(elimination%core_trains))], .not. must_be_free(elimination%core_trains))
     is_solvable = .false.
     if (size(dependent) /= size(elimination%core)) return
-    allocate (rows, source=scaled_rows(relations%between, elimination%core, elimination%core_trains))
+    allocate (rows, source=scaled_rows(relations%equations, elimination%core, elimination%core_trains))
     call pivoted_rank(rows(:, dependent), ratio_tolerance, rank, pivots)
     is_solvable = rank == size(dependent)
   end function is_solvable

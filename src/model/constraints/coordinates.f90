@@ -36,7 +36,7 @@ module nocdyn_coordinates
     real(wp), allocatable, private :: imbalance(:)      !! J omega' - T [N m], [bodies], work space
     real(wp), allocatable, private :: acceleration(:)   !! q'', [freedoms], work space
   contains
-    procedure :: weigh
+    procedure :: update_inertia
     procedure :: complement
     procedure :: mobility
     procedure :: project
@@ -59,19 +59,16 @@ contains
     type(coordinates_t), intent(out) :: self
     type(error_t), allocatable, intent(out) :: error
     type(train_relations_t) :: relations
-    integer :: first_coordinate(size(inertia, 2)), local(size(trains%root))
-    integer :: offending_group, g, k, lane
+    integer :: coordinate_of(size(inertia, 2))
+    integer :: offending_group, lane
 
-    call number_coordinates(groups, wanted, self, first_coordinate)
-    call lay_out_entries(groups, first_coordinate, size(inertia, 2), size(inertia, 1), self)
+    call number_coordinates(groups, wanted, self, coordinate_of)
+    call lay_out_entries(groups, coordinate_of, size(inertia, 2), size(inertia, 1), self)
     relations = new_relations(constraints, trains)
-    do g = 1, size(groups)
-      local(groups(g)%trains) = [(k, k=1, size(groups(g)%trains))]
-    end do
     self%reactions = new_reaction_solver(constraints, trains, relations, groups)
     allocate (self%inertia, source=inertia)
     do lane = 1, size(inertia, 1)
-      call fill_lane(constraints, trains, relations, groups, local, inertia(lane, :), choice, lane, self, offending_group)
+      call fill_lane(constraints, trains, relations, groups, choice, lane, self, offending_group)
       if (offending_group > 0) then
         call raise(error, exit_input, joined(selected(body_names, groups(offending_group)%independent), ', ', most_names) // &
                    ' cannot be independent: rounding hides what differs between their speeds; name faster bodies')
@@ -144,31 +141,32 @@ contains
   end subroutine lay_out_entries
 
   !> L_tau of one lane, group by group, and what the sweep of its reactions needs.
-  subroutine fill_lane(constraints, trains, relations, groups, local, inertia, choice, lane, self, offending_group)
+  subroutine fill_lane(constraints, trains, relations, groups, choice, lane, self, offending_group)
     type(constraints_t), intent(in) :: constraints
     type(rigid_trains_t), intent(in) :: trains
     type(train_relations_t), intent(in) :: relations
     type(geared_group_t), intent(in) :: groups(:)
-    integer, intent(in) :: local(:)    !! of every train in its group
-    real(wp), intent(in) :: inertia(:)
-    integer, intent(in) :: choice, lane
+    integer, intent(in) :: choice                !! complement_...
+    integer, intent(in) :: lane
     type(coordinates_t), intent(inout) :: self
     integer, intent(out) :: offending_group    !! group whose mass matrix is not positive definite, 0 if there is none
     type(train_motion_t) :: found
-    real(wp) :: factor, ratio(size(inertia))
-    integer :: g
+    real(wp) :: factor, inertia(size(self%inertia, 2)), ratio(size(self%inertia, 2))
+    integer :: g, k, local(size(trains%root))   ! number of every train in its group
     logical :: is_indefinite
 
     offending_group = 0
+    inertia = self%inertia(lane, :)
     ratio = trains%ratios(constraints, lane)
     call self%reactions%set_ratios(lane, ratio)
     do g = 1, size(groups)
+      local(groups(g)%trains) = [(k, k=1, size(groups(g)%trains))]
       call find_motion(relations, groups(g)%elimination, local, size(groups(g)%trains), lane, found)
       factor = complement_factor(choice, found%log_determinant + pair_determinant(constraints, trains, groups(g)%bodies, lane), &
                                  size(groups(g)%kept))
       call fill_ratios(groups(g)%bodies, local(trains%train(groups(g)%bodies)), ratio(groups(g)%bodies), &
                        factor * found%motion, lane, self)
-      call self%weigh(trains, groups(g), inertia, lane, is_indefinite)
+      call self%update_inertia(trains, groups(g), inertia, lane, is_indefinite)
       if (is_indefinite) then
         offending_group = g
         return
@@ -210,7 +208,7 @@ contains
   end subroutine fill_ratios
 
   !> The response of a group whose ratios are known, from its mass matrix L_tau^T J L_tau, factored once.
-  subroutine weigh(self, trains, group, inertia, lane, is_indefinite)
+  subroutine update_inertia(self, trains, group, inertia, lane, is_indefinite)
     class(coordinates_t), intent(inout) :: self
     type(rigid_trains_t), intent(in) :: trains
     type(geared_group_t), intent(in) :: group
@@ -247,7 +245,7 @@ contains
         self%inertia(lane, b) = inertia(b)
       end associate
     end do
-  end subroutine weigh
+  end subroutine update_inertia
 
   !> L_tau as a dense matrix [bodies, freedoms], for the paper's matrices and for tests.
   pure function complement(self, lane) result(dense)

@@ -1,9 +1,9 @@
 !> The bodies of a machine in groups that are geared together; each is analysed for itself.
 module nocdyn_geared_groups
   use nocdyn_constraints, only: constraints_t
-  use nocdyn_rigid_trains, only: find_root
   use nocdyn_sparse_map, only: transposed_order
   use nocdyn_train_motion, only: elimination_t
+  use nocdyn_union_find, only: find_root, join_components
   implicit none (type, external)
   private
 
@@ -64,9 +64,7 @@ contains
     root = [(b, b=1, constraints%bodies)]
     do r = 1, constraints%rows()
       do entry = constraints%first(r) + 1, constraints%first(r + 1) - 1
-        call find_root(root, constraints%body(constraints%first(r)), a)
-        call find_root(root, constraints%body(entry), b)
-        root(max(a, b)) = min(a, b)
+        call join_components(constraints%body(constraints%first(r)), constraints%body(entry), root)
       end do
     end do
     do b = 1, constraints%bodies

@@ -8,8 +8,8 @@ module nocdyn_load_sharing
   use nocdyn_geared_groups, only: geared_group_t, redundancy_t
   use nocdyn_kinds, only: wp
   use nocdyn_lane_parameters, only: lane_parameters_t
-  use nocdyn_rigid_trains, only: find_root
   use nocdyn_sparse_map, only: transposed_order
+  use nocdyn_union_find, only: find_root, join_components
   implicit none (type, external)
   private
 
@@ -19,7 +19,7 @@ module nocdyn_load_sharing
   type, public :: load_sharing_block_t
     type(redundancy_t), allocatable :: redundancies(:)
     integer, allocatable :: rows(:)              !! all rows in them
-    real(wp), allocatable :: idle(:, :, :)       !! their idle combinations, made orthonormal, [rows, redundancies, lanes]
+    real(wp), allocatable :: null_vectors(:, :, :)       !! their idle combinations, made orthonormal, [rows, redundancies, lanes]
   contains
     procedure :: orthonormalise
   end type load_sharing_block_t
@@ -38,20 +38,24 @@ contains
     type(geared_group_t), intent(in) :: groups(:)
     integer, intent(in) :: rows, lanes
     type(load_sharing_t) :: self
-    integer :: above(rows), block_of(rows)   ! union-find over the rows
-    integer :: g, i, k, r, root
+    integer :: parent(rows), block_of(rows)   ! union-find over the rows
+    integer :: g, i, j, k, r, root
 
-    above = [(r, r=1, rows)]
+    parent = [(r, r=1, rows)]
     block_of = 0
     k = 0
     do g = 1, size(groups)
       do i = 1, size(groups(g)%redundancies)
-        call join(groups(g)%redundancies(i), above)
+        associate (redundancy => groups(g)%redundancies(i))
+          do j = 1, size(redundancy%repeats)
+            call join_components(redundancy%row, redundancy%repeats(j), parent)
+          end do
+        end associate
       end do
     end do
     do g = 1, size(groups)
       do i = 1, size(groups(g)%redundancies)
-        call find_root(above, groups(g)%redundancies(i)%row, root)
+        call find_root(parent, groups(g)%redundancies(i)%row, root)
         if (block_of(root) > 0) cycle
         k = k + 1
         block_of(root) = k
@@ -60,23 +64,11 @@ contains
     allocate (self%blocks(k))
     if (k == 0) return
     do r = 1, rows
-      call find_root(above, r, root)
+      call find_root(parent, r, root)
       block_of(r) = block_of(root)
     end do
     call fill_blocks(groups, block_of, lanes, self%blocks)
   end function new_load_sharing
-
-  pure subroutine join(redundancy, above)
-    type(redundancy_t), intent(in) :: redundancy
-    integer, intent(inout) :: above(:)
-    integer :: a, b, i
-
-    do i = 1, size(redundancy%repeats)
-      call find_root(above, redundancy%row, a)
-      call find_root(above, redundancy%repeats(i), b)
-      above(max(a, b)) = min(a, b)
-    end do
-  end subroutine join
 
   !> Hands the rows and the redundancies out to the blocks, in their order.
   subroutine fill_blocks(groups, block_of, lanes, blocks)
@@ -100,7 +92,7 @@ contains
     do k = 1, size(blocks)
       blocks(k)%rows = rows(order(first(k):first(k + 1) - 1))
       allocate (blocks(k)%redundancies(next(k)))
-      allocate (blocks(k)%idle(size(blocks(k)%rows), next(k), lanes), source=0.0_wp)
+      allocate (blocks(k)%null_vectors(size(blocks(k)%rows), next(k), lanes), source=0.0_wp)
     end do
     next = 0
     do g = 1, size(groups)
@@ -118,14 +110,14 @@ contains
     integer, intent(in) :: lane
     integer :: j, k, pass
 
-    associate (idle => self%idle)
-      do k = 1, size(idle, 2)
-        idle(:, k, lane) = idle(:, k, lane) / norm2(idle(:, k, lane))
+    associate (basis => self%null_vectors)
+      do k = 1, size(basis, 2)
+        basis(:, k, lane) = basis(:, k, lane) / norm2(basis(:, k, lane))
         do pass = 1, 2
           do j = 1, k - 1
-            idle(:, k, lane) = idle(:, k, lane) - dot_product(idle(:, j, lane), idle(:, k, lane)) * idle(:, j, lane)
+            basis(:, k, lane) = basis(:, k, lane) - dot_product(basis(:, j, lane), basis(:, k, lane)) * basis(:, j, lane)
           end do
-          idle(:, k, lane) = idle(:, k, lane) / norm2(idle(:, k, lane))
+          basis(:, k, lane) = basis(:, k, lane) / norm2(basis(:, k, lane))
         end do
       end do
     end associate
@@ -141,13 +133,13 @@ contains
 
     do b = 1, size(self%blocks)
       associate (block => self%blocks(b))
-        do k = 1, size(block%idle, 2)
+        do k = 1, size(block%null_vectors, 2)
           part = 0.0_wp
           do i = 1, size(block%rows)
-            part = part + block%idle(i, k, lane) * lambda(block%rows(i))
+            part = part + block%null_vectors(i, k, lane) * lambda(block%rows(i))
           end do
           do i = 1, size(block%rows)
-            lambda(block%rows(i)) = lambda(block%rows(i)) - part * block%idle(i, k, lane)
+            lambda(block%rows(i)) = lambda(block%rows(i)) - part * block%null_vectors(i, k, lane)
           end do
         end do
       end associate
@@ -161,7 +153,7 @@ contains
 
     do b = 1, size(self%blocks)
       call parameters%add_structure(self%blocks(b)%rows)
-      call parameters%add_blocks('shares: idle', self%blocks(b)%idle)
+      call parameters%add_blocks('load sharing: null vectors', self%blocks(b)%null_vectors)
     end do
   end subroutine list_parameters
 

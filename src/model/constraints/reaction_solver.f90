@@ -157,15 +157,17 @@ contains
     ratio = self%ratio(lane, body)
   end function root_ratio
 
-  !> Finds the idle combinations of redundant rows, once the numbers of all lanes are there: a reaction 1 of such a row and
+  !> Finds the null_vector combinations of redundant rows, once the numbers of all lanes are there: a reaction 1 of such a row and
   !> the negative of what the rows that it repeats carry in its place.
   subroutine find_null_vectors(self, constraints, groups)
     class(reaction_solver_t), intent(inout) :: self
     type(constraints_t), intent(in) :: constraints
     type(geared_group_t), intent(in) :: groups(:)
-    real(wp) :: idle(constraints%rows()), moment(constraints%bodies)
+    real(wp) :: null_vector(constraints%rows()), moment(constraints%bodies)
+    logical :: is_member(constraints%rows())   ! whether a row is the redundant one or one of those that it repeats
     integer :: b, i, lane, row
 
+    is_member = .false.
     self%load_sharing = new_load_sharing(groups, constraints%rows(), size(self%own, 1))
     do b = 1, size(self%load_sharing%blocks)
       associate (block => self%load_sharing%blocks(b))
@@ -176,32 +178,18 @@ contains
             associate (first => constraints%first(row), last => constraints%first(row + 1) - 1)
               moment(constraints%body(first:last)) = -constraints%coefficient(lane, first:last)
             end associate
-            call self%back_substitute(lane, moment, idle)
-            idle(row) = 1.0_wp
-            where (block%rows == row .or. is_among(block%rows, block%redundancies(i)%repeats)) &
-              block%idle(:, i, lane) = idle(block%rows)
+            call self%back_substitute(lane, moment, null_vector)
+            null_vector(row) = 1.0_wp
+            is_member(row) = .true.
+            is_member(block%redundancies(i)%repeats) = .true.
+            where (is_member(block%rows)) block%null_vectors(:, i, lane) = null_vector(block%rows)
+            is_member(block%rows) = .false.
           end do
           call block%orthonormalise(lane)
         end do
       end associate
     end do
   end subroutine find_null_vectors
-
-  !> Which of some ascending rows are in a second ascending list.
-  pure function is_among(rows, list) result(answer)
-    integer, intent(in) :: rows(:), list(:)
-    logical :: answer(size(rows))
-    integer :: i, k
-
-    k = 1
-    do i = 1, size(rows)
-      do while (k < size(list))
-        if (list(k) >= rows(i)) exit
-        k = k + 1
-      end do
-      answer(i) = list(k) == rows(i)
-    end do
-  end function is_among
 
   !> Reactions that balance moments on the bodies.
   pure subroutine find_reactions(self, lane, moment, lambda)
@@ -277,15 +265,15 @@ contains
     call parameters%add_structure(self%child)
     call parameters%add_structure(self%parent)
     call parameters%add_structure(self%row)
-    call self%relations%between%list_parameters(parameters)
-    call parameters%add('sweep: ratio', self%ratio)
-    call parameters%add('sweep: coefficient', self%coefficient)
-    call parameters%add('sweep: own', self%own)
-    call parameters%add('sweep: other', self%other)
+    call self%relations%equations%list_parameters(parameters)
+    call parameters%add('reactions: ratio', self%ratio)
+    call parameters%add('reactions: coefficient', self%coefficient)
+    call parameters%add('reactions: own', self%own)
+    call parameters%add('reactions: other', self%other)
     do g = 1, size(self%groups)
       call parameters%add_structure(self%groups(g)%bodies)
       call self%groups(g)%elimination%list_structure(parameters)
-      call parameters%add_blocks('sweep: dual', self%groups(g)%dual)
+      call parameters%add_blocks('reactions: dual', self%groups(g)%dual)
     end do
     call self%load_sharing%list_parameters(parameters)
   end subroutine list_parameters

@@ -6,10 +6,11 @@
 module nocdyn_rigid_trains
   use nocdyn_constraints, only: constraints_t
   use nocdyn_kinds, only: wp
+  use nocdyn_union_find, only: find_root, join_components
   implicit none (type, external)
   private
 
-  public :: find_trains, find_root
+  public :: find_trains
 
   !> Two ratios agree, and a sum is zero, up to this times their size: decimals such as 0.1 * 3 against 0.3 agree.
   real(wp), parameter, public :: ratio_tolerance = 1.0e-9_wp
@@ -30,7 +31,7 @@ module nocdyn_rigid_trains
     procedure :: ratios
     procedure :: is_inconsistent
     procedure :: find_path
-    procedure :: loaded_rows
+    procedure :: is_loaded
     procedure, private :: scaled_ratios
   end type rigid_trains_t
 
@@ -50,30 +51,16 @@ contains
       call find_root(root, constraints%body(constraints%first(r)), a)
       call find_root(root, constraints%body(constraints%first(r) + 1), b)
       is_tree(r) = a /= b
-      root(max(a, b)) = min(a, b)
+      if (is_tree(r)) call join_components(a, b, root)
     end do
     call build_trees(constraints, is_tree, pack([(b, b=1, constraints%bodies)], root == [(b, b=1, constraints%bodies)]), trains)
   end subroutine find_trains
-
-  !> The root of a body's tree, with path halving (union-find).
-  pure subroutine find_root(above, body, root)
-    integer, intent(inout) :: above(:)
-    integer, intent(in) :: body
-    integer, intent(out) :: root
-
-    root = body
-    do while (above(root) /= root)
-      above(root) = above(above(root))
-      root = above(root)
-    end do
-  end subroutine find_root
 
   !> The trees as seen from other leads, one of each train.
   subroutine choose_roots(self, constraints, roots)
     class(rigid_trains_t), intent(inout) :: self
     type(constraints_t), intent(in) :: constraints
     integer, intent(in) :: roots(:)   !! [trains]
-    type(rigid_trains_t) :: other
     logical :: is_tree(constraints%rows())
     integer :: b
 
@@ -81,21 +68,15 @@ contains
     do b = 1, size(self%parent)
       if (self%parent(b) > 0) is_tree(self%parent_row(b)) = .true.
     end do
-    call build_trees(constraints, is_tree, roots, other)
-    self%order = other%order
-    self%position = other%position
-    self%parent = other%parent
-    self%parent_row = other%parent_row
-    self%train = other%train
-    self%root = other%root
+    call build_trees(constraints, is_tree, roots, self)
   end subroutine choose_roots
 
   !> Walks the trees from their leads outwards, breadth first.
   subroutine build_trees(constraints, is_tree, roots, trains)
     type(constraints_t), intent(in) :: constraints
     logical, intent(in) :: is_tree(:)
-    integer, intent(in) :: roots(:)
-    type(rigid_trains_t), intent(inout) :: trains
+    integer, intent(in) :: roots(:)                  !! one body of each train
+    class(rigid_trains_t), intent(out) :: trains
     integer, allocatable :: first(:), rows(:)
     integer :: b, begin, k, next, other, r, t
 
@@ -273,30 +254,28 @@ contains
 
   !> The rows of trees whose reactions, with those of the leads, hold moments on the bodies in balance, ascending: those
   !> where the moments, carried from body to parent, do not cancel. In the first lane.
-  function loaded_rows(self, constraints, moments) result(rows)
+  function is_loaded(self, constraints, moments) result(loaded)
     class(rigid_trains_t), intent(in) :: self
     type(constraints_t), intent(in) :: constraints
     real(wp), intent(in) :: moments(:)   !! [bodies]
-    integer, allocatable :: rows(:)
-    logical :: is_loaded(constraints%rows())
+    logical :: loaded(constraints%rows())
     real(wp) :: moment(size(moments)), bound(size(moments))   ! carried to a body, and the sum of the absolute parts
     real(wp) :: lever, other, own
     integer :: b, k, parent
 
     moment = moments
     bound = abs(moments)
-    is_loaded = .false.
+    loaded = .false.
     do k = size(self%order), 1, -1
       b = self%order(k)
       parent = self%parent(b)
       if (parent == 0 .or. abs(moment(b)) <= ratio_tolerance * bound(b)) cycle
-      is_loaded(self%parent_row(b)) = .true.
+      loaded(self%parent_row(b)) = .true.
       call constraints%pair_coefficients(1, self%parent_row(b), b, own, other)
       lever = other / own
       moment(parent) = moment(parent) - lever * moment(b)
       bound(parent) = bound(parent) + abs(lever) * bound(b)
     end do
-    rows = pack([(k, k=1, size(is_loaded))], is_loaded)
-  end function loaded_rows
+  end function is_loaded
 
 end module nocdyn_rigid_trains

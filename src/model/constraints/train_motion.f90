@@ -49,13 +49,15 @@ contains
     end do
     call move_core(relations, elimination, local, lane, found)
     do i = size(elimination%relation), 1, -1
-      associate (relation => elimination%relation(i), train => elimination%train(i), between => relations%between)
+      associate (relation => elimination%relation(i), train => elimination%train(i), equations => relations%equations)
         own = relations%coefficient_of(lane, relation, train)
         found%log_determinant = found%log_determinant + log(abs(own))
-        do entry = between%first(relation), between%first(relation + 1) - 1
-          if (between%body(entry) == train) cycle
-          found%motion(local(train), :) = found%motion(local(train), :) &
-                                          - between%coefficient(lane, entry) / own * found%motion(local(between%body(entry)), :)
+        do entry = equations%first(relation), equations%first(relation + 1) - 1
+          if (equations%body(entry) == train) cycle
+          associate (other => local(equations%body(entry)))
+            found%motion(local(train), :) = found%motion(local(train), :) &
+                                            - equations%coefficient(lane, entry) / own * found%motion(other, :)
+          end associate
         end do
       end associate
     end do
@@ -76,7 +78,7 @@ contains
       return
     end if
     column = [(findloc(elimination%core_trains, elimination%free(k), dim=1), k=1, size(column))]
-    call natural_complement(relations%between%block(lane, elimination%core, elimination%core_trains), &
+    call natural_complement(relations%equations%block(lane, elimination%core, elimination%core_trains), &
                             pack(column, column > 0), complement, found%dual, found%log_determinant, is_singular)
     if (is_singular) error stop 'nocdyn_train_motion: the constraints must have been analysed'
     found%motion(local(elimination%core_trains), pack([(k, k=1, size(column))], column > 0)) = complement
@@ -92,12 +94,12 @@ contains
     real(wp), intent(inout) :: lambda(:)   !! [all relations], those of the elimination are set
     integer :: entry, i, k
 
-    associate (between => relations%between)
+    associate (equations => relations%equations)
       do i = 1, size(elimination%relation)
         associate (relation => elimination%relation(i))
           lambda(relation) = moment(elimination%train(i)) / relations%coefficient_of(lane, relation, elimination%train(i))
-          do entry = between%first(relation), between%first(relation + 1) - 1
-            moment(between%body(entry)) = moment(between%body(entry)) - between%coefficient(lane, entry) * lambda(relation)
+          do entry = equations%first(relation), equations%first(relation + 1) - 1
+            moment(equations%body(entry)) = moment(equations%body(entry)) - equations%coefficient(lane, entry) * lambda(relation)
           end do
         end associate
       end do

@@ -14,7 +14,7 @@ module nocdyn_train_relations
 
   type, public :: train_relations_t
     integer, allocatable :: row(:)     !! of the constraints, of each relation
-    type(constraints_t) :: between     !! the relations; its bodies are the trains, and it has zeros where terms cancel
+    type(constraints_t) :: equations     !! the relations; its bodies are the trains, and it has zeros where terms cancel
   contains
     procedure :: eliminate_leaves
     procedure :: coefficient_of
@@ -46,7 +46,7 @@ contains
     do lane = 1, size(coefficient, 1)
       coefficient(lane, :) = summed(constraints, self%row, entry_of, trains%ratios(constraints, lane), lane, size(train))
     end do
-    self%between = new_constraints(size(trains%root), selected(constraints%names, self%row), &
+    self%equations = new_constraints(size(trains%root), selected(constraints%names, self%row), &
                                    selected(constraints%units, self%row), first, train, coefficient)
   end function new_relations
 
@@ -110,8 +110,8 @@ contains
     integer, intent(in) :: lane, relation, train
     integer :: entry
 
-    do entry = self%between%first(relation), self%between%first(relation + 1) - 1
-      if (self%between%body(entry) == train) coefficient = self%between%coefficient(lane, entry)
+    do entry = self%equations%first(relation), self%equations%first(relation + 1) - 1
+      if (self%equations%body(entry) == train) coefficient = self%equations%coefficient(lane, entry)
     end do
   end function coefficient_of
 
@@ -122,11 +122,11 @@ contains
     logical, intent(in) :: must_be_free(:)    !! trains whose speeds are not to be given by others, [trains]
     type(leaf_elimination_t) :: leaves
     integer, allocatable :: first(:), of_train(:)
-    integer :: uses(size(must_be_free)), queue(size(takes_part) + size(self%between%body))
+    integer :: uses(size(must_be_free)), queue(size(takes_part) + size(self%equations%body))
     integer :: entry, i, last, train
     logical :: is_left(size(takes_part))
 
-    call self%between%list_body_rows(takes_part, first, of_train)
+    call self%equations%list_body_rows(takes_part, first, of_train)
     uses = first(2:) - first(:size(uses))
     is_left = takes_part
     allocate (leaves%relation(count(takes_part)), leaves%train(count(takes_part)))
@@ -138,13 +138,13 @@ contains
       if (entry > last) exit
       associate (relation => queue(entry))
         if (.not. is_left(relation)) cycle
-        train = leaf_train(self%between, relation, uses, must_be_free)
+        train = leaf_train(self%equations, relation, uses, must_be_free)
         if (train == 0) cycle
         i = i + 1
         leaves%relation(i) = relation
         leaves%train(i) = train
         is_left(relation) = .false.
-        call drop_relation(self%between, relation, first, of_train, is_left, uses, queue, last)
+        call drop_relation(self%equations, relation, first, of_train, is_left, uses, queue, last)
       end associate
     end do
     leaves%relation = leaves%relation(:i)
@@ -153,35 +153,35 @@ contains
   end function eliminate_leaves
 
   !> The train that only this relation has, with the largest coefficient; 0 if there is none fit to be divided by.
-  pure integer function leaf_train(between, relation, uses, must_be_free) result(train)
-    type(constraints_t), intent(in) :: between
+  pure integer function leaf_train(equations, relation, uses, must_be_free) result(train)
+    type(constraints_t), intent(in) :: equations
     integer, intent(in) :: relation, uses(:)
     logical, intent(in) :: must_be_free(:)
     real(wp) :: largest
     integer :: entry
 
-    associate (first => between%first(relation), last => between%first(relation + 1) - 1)
-      largest = min_pivot_share * maxval(abs(between%coefficient(1, first:last)))
+    associate (first => equations%first(relation), last => equations%first(relation + 1) - 1)
+      largest = min_pivot_share * maxval(abs(equations%coefficient(1, first:last)))
       train = 0
       do entry = first, last
-        if (uses(between%body(entry)) /= 1 .or. must_be_free(between%body(entry))) cycle
-        if (abs(between%coefficient(1, entry)) <= largest) cycle
-        largest = abs(between%coefficient(1, entry))
-        train = between%body(entry)
+        if (uses(equations%body(entry)) /= 1 .or. must_be_free(equations%body(entry))) cycle
+        if (abs(equations%coefficient(1, entry)) <= largest) cycle
+        largest = abs(equations%coefficient(1, entry))
+        train = equations%body(entry)
       end do
     end associate
   end function leaf_train
 
   !> A relation that is taken away may leave trains that only one other relation has: that one is looked at again.
-  pure subroutine drop_relation(between, relation, first, of_train, is_left, uses, queue, last)
-    type(constraints_t), intent(in) :: between
+  pure subroutine drop_relation(equations, relation, first, of_train, is_left, uses, queue, last)
+    type(constraints_t), intent(in) :: equations
     integer, intent(in) :: relation, first(:), of_train(:)
     logical, intent(in) :: is_left(:)
     integer, intent(inout) :: uses(:), queue(:), last
     integer :: entry, k
 
-    do entry = between%first(relation), between%first(relation + 1) - 1
-      associate (train => between%body(entry))
+    do entry = equations%first(relation), equations%first(relation + 1) - 1
+      associate (train => equations%body(entry))
         uses(train) = uses(train) - 1
         if (uses(train) /= 1) cycle
         do k = first(train), first(train + 1) - 1
@@ -205,10 +205,11 @@ contains
     integer, allocatable :: active(:)
     real(wp), allocatable :: sizes(:)
     real(wp) :: moment(constraints%bodies)
+    logical :: is_loaded(constraints%rows())
     integer :: i, r
 
     active = pack([(i, i=1, size(lambda))], abs(lambda) > 0.0_wp)
-    allocate (sizes, source=row_sizes(self%between, active))
+    allocate (sizes, source=row_sizes(self%equations, active))
     associate (weight => abs(lambda(active)) * sizes)   ! a relation of size 0 says nothing between trains, but in them
       active = pack(active, sizes <= 0.0_wp .or. weight > ratio_tolerance * maxval(weight))
     end associate
@@ -221,84 +222,64 @@ contains
                                                + lambda(active(i)) * constraints%coefficient(1, first:last)
       end associate
     end do
-    rows = merged(self%row(active), trains%loaded_rows(constraints, moment))
+    is_loaded = trains%is_loaded(constraints, moment)
+    is_loaded(self%row(active)) = .true.
+    rows = pack([(r, r=1, size(is_loaded))], is_loaded)
   end function loaded_rows
 
   !> The largest term of each relation where the trains turn at their pace.
-  function row_sizes(between, relations) result(sizes)
-    type(constraints_t), intent(in) :: between
+  function row_sizes(equations, relations) result(sizes)
+    type(constraints_t), intent(in) :: equations
     integer, intent(in) :: relations(:)
     real(wp) :: sizes(size(relations))
     integer, allocatable :: trains(:)
-    real(wp) :: pace(between%bodies)
+    real(wp) :: pace(equations%bodies)
     integer :: i
 
-    allocate (trains, source=distinct_trains(between, relations))
-    pace(trains) = effective_speeds(between, relations, trains)
+    allocate (trains, source=distinct_trains(equations, relations))
+    pace(trains) = effective_speeds(equations, relations, trains)
     do i = 1, size(relations)
-      associate (first => between%first(relations(i)), last => between%first(relations(i) + 1) - 1)
-        sizes(i) = maxval(abs(between%coefficient(1, first:last)) * pace(between%body(first:last)))
+      associate (first => equations%first(relations(i)), last => equations%first(relations(i) + 1) - 1)
+        sizes(i) = maxval(abs(equations%coefficient(1, first:last)) * pace(equations%body(first:last)))
       end associate
     end do
   end function row_sizes
 
-  !> Two ascending lists without common members as one.
-  pure function merged(a, b) result(list)
-    integer, intent(in) :: a(:), b(:)
-    integer :: list(size(a) + size(b))
-    integer :: i, k
-
-    k = 1
-    do i = 1, size(list)
-      if (k > size(b)) then
-        list(i) = a(i - k + 1)
-      else if (i - k + 1 > size(a)) then
-        list(i) = b(k)
-        k = k + 1
-      else if (a(i - k + 1) < b(k)) then
-        list(i) = a(i - k + 1)
-      else
-        list(i) = b(k)
-        k = k + 1
-      end if
-    end do
-  end function merged
-
   !> The trains of some relations, ascending.
-  function distinct_trains(between, relations) result(trains)
-    type(constraints_t), intent(in) :: between
+  function distinct_trains(equations, relations) result(trains)
+    type(constraints_t), intent(in) :: equations
     integer, intent(in) :: relations(:)
     integer, allocatable :: trains(:)
-    logical :: is_there(between%bodies)
+    logical :: is_there(equations%bodies)
     integer :: i, t
 
     is_there = .false.
     do i = 1, size(relations)
-      is_there(between%body(between%first(relations(i)):between%first(relations(i) + 1) - 1)) = .true.
+      is_there(equations%body(equations%first(relations(i)):equations%first(relations(i) + 1) - 1)) = .true.
     end do
     trains = pack([(t, t=1, size(is_there))], is_there)
   end function distinct_trains
 
   !> Relations of the first lane as rows of unit length between speeds that are measured by the pace of each train, so that
   !> metres and teeth compare and a large ratio is not taken for a lock.
-  function scaled_rows(between, relations, trains) result(matrix)
-    type(constraints_t), intent(in) :: between
+  function scaled_rows(equations, relations, trains) result(matrix)
+    type(constraints_t), intent(in) :: equations
     integer, intent(in) :: relations(:), trains(:)
     real(wp) :: matrix(size(relations), size(trains))
     integer :: i
 
-    matrix = between%block(1, relations, trains) * spread(effective_speeds(between, relations, trains), 1, size(relations))
+    matrix = equations%block(1, relations, trains) * spread(effective_speeds(equations, relations, trains), 1, size(relations))
     do i = 1, size(matrix, 1)
       if (norm2(matrix(i, :)) > 0.0_wp) matrix(i, :) = matrix(i, :) / norm2(matrix(i, :))
     end do
   end function scaled_rows
 
   !> Speeds that make the terms of each relation alike, carried from train to train: the measure of what is small.
-  pure function effective_speeds(between, relations, trains) result(pace)
-    type(constraints_t), intent(in) :: between
+  pure function effective_speeds(equations, relations, trains) result(pace)
+    type(constraints_t), intent(in) :: equations
     integer, intent(in) :: relations(:), trains(:)
     real(wp) :: pace(size(trains))
-    real(wp) :: known(between%bodies), largest   ! 0: not known yet
+    real(wp) :: known(equations%bodies), largest   ! 0: not known yet
     integer :: entry, i, k, unknown
 
     known = 0.0_wp
@@ -310,11 +291,11 @@ contains
       do while (count(known(trains) <= 0.0_wp) < unknown)
         unknown = count(known(trains) <= 0.0_wp)
         do i = 1, size(relations)
-          associate (first => between%first(relations(i)), last => between%first(relations(i) + 1) - 1)
-            largest = maxval(abs(between%coefficient(1, first:last)) * known(between%body(first:last)))
+          associate (first => equations%first(relations(i)), last => equations%first(relations(i) + 1) - 1)
+            largest = maxval(abs(equations%coefficient(1, first:last)) * known(equations%body(first:last)))
             if (largest <= 0.0_wp) cycle
             do entry = first, last
-              associate (speed => known(between%body(entry)), c => abs(between%coefficient(1, entry)))
+              associate (speed => known(equations%body(entry)), c => abs(equations%coefficient(1, entry)))
                 if (speed <= 0.0_wp .and. c > 0.0_wp) speed = largest / c
               end associate
             end do

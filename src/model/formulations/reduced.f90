@@ -148,8 +148,8 @@ contains
     if (is_indefinite) return
     self%machine%inertia(lane, bodies) = inertia
     do g = 1, size(groups)
-      call self%machine%coordinates%weigh(self%machine%trains, self%machine%groups(groups(g)), self%machine%inertia(lane, :), &
-                                          lane, is_indefinite)
+      call self%machine%coordinates%update_inertia(self%machine%trains, self%machine%groups(groups(g)), &
+                                                   self%machine%inertia(lane, :), lane, is_indefinite)
       if (is_indefinite) return
     end do
     call self%incidence%refresh_responses(lane, self%machine%elements, self%machine%coordinates)
