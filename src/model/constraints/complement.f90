@@ -15,8 +15,8 @@ contains
 
   !> L_lambda^ext, eq. (78): a unit row for each independent body, then the rows of L_lambda.
   pure function extended_constraint(constraint, independent) result(extended)
-    real(wp), intent(in) :: constraint(:, :)     !! L_lambda, shape [rows, bodies]
-    integer, intent(in) :: independent(:)        !! columns whose speeds are the coordinates, [bodies - rows]
+    real(wp), intent(in) :: constraint(:, :)   !! L_lambda, [rows, bodies]
+    integer, intent(in) :: independent(:)      !! columns whose speeds are the coordinates, [bodies - rows]
     real(wp) :: extended(size(constraint, 2), size(constraint, 2))
     integer :: i
 
@@ -29,7 +29,7 @@ contains
 
   !> l_lambda, eq. (79): the coordinates in the first rows, zero in the rows of the constraints.
   pure function coordinate_selector(bodies, coordinates) result(selector)
-    integer, intent(in) :: bodies, coordinates
+    integer, intent(in) :: bodies, coordinates   !! numbers of them
     real(wp) :: selector(bodies, coordinates)
     integer :: i
 
@@ -44,12 +44,12 @@ contains
   !> The remaining columns D of the inverse obey L_lambda D = 1; from J omega' - T = L_lambda^T lambda they give the
   !> reactions lambda = D^T (J omega' - T) (Blajer, J. Mech. Design 126 (2004) 341-350).
   subroutine natural_complement(constraint, independent, complement, dual, log_determinant, is_singular)
-    real(wp), intent(in) :: constraint(:, :)                 !! L_lambda, shape [rows, bodies], independent rows
-    integer, intent(in) :: independent(:)                    !! [bodies - rows]
-    real(wp), allocatable, intent(out) :: complement(:, :)   !! L_tau, shape [bodies, bodies - rows]
-    real(wp), allocatable, intent(out) :: dual(:, :)         !! D, shape [bodies, rows]
-    real(wp), intent(out) :: log_determinant                 !! of |L_lambda^ext|
-    logical, intent(out) :: is_singular                      !! these coordinates cannot be independent
+    real(wp), intent(in) :: constraint(:, :)                 !! L_lambda with independent rows, [rows, bodies]
+    integer, intent(in) :: independent(:)                    !! bodies whose speeds are the coordinates, [bodies - rows]
+    real(wp), allocatable, intent(out) :: complement(:, :)   !! L_tau, [bodies, bodies - rows]
+    real(wp), allocatable, intent(out) :: dual(:, :)         !! D, [bodies, rows]
+    real(wp), intent(out) :: log_determinant                 !! log |det L_lambda^ext|
+    logical, intent(out) :: is_singular                      !! whether these coordinates cannot be independent
     real(wp), allocatable :: inverse(:, :)
 
     call invert(extended_constraint(constraint, independent), inverse, log_determinant, is_singular)
@@ -62,9 +62,9 @@ contains
   !> Section 6 multiplies the column of the gear pair by R2 or by -R2, which is the determinant of L_lambda^ext up to
   !> its sign; for a group of r gears the factor is the geometric mean over the gears, and 1 for a free body.
   pure function complement_factor(choice, log_determinant, rows) result(factor)
-    integer, intent(in) :: choice            !! complement_...
-    real(wp), intent(in) :: log_determinant
-    integer, intent(in) :: rows              !! independent rows of the group
+    integer, intent(in) :: choice             !! complement_...
+    real(wp), intent(in) :: log_determinant   !! log |det L_lambda^ext| of the group
+    integer, intent(in) :: rows               !! number of independent rows of the group
     real(wp) :: factor
 
     factor = 1.0_wp

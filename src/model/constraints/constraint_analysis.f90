@@ -1,7 +1,7 @@
-!> What the constraint rows allow: rank, redundant rows, locked bodies, independent coordinates, group by group.
+!> Analysis of the constraint rows: rank, redundant rows, locked bodies and independent coordinates, group by group.
 !>
-!> Rows of two bodies come first: they tie the bodies to rigid trains, in time linear in their number. What the other rows
-!> add is a small problem between trains, of which only the core that does not peel is dense.
+!> Rows of two bodies come first: they join the bodies to rigid trains, in time linear in their number. The other rows are a
+!> small problem between trains, of which only the core without leaves is dense.
 module nocdyn_constraint_analysis
   use nocdyn_constraint_conflicts, only: locked_trains, raise_lock, raise_loop_conflict
   use nocdyn_constraints, only: constraints_t
@@ -22,14 +22,14 @@ module nocdyn_constraint_analysis
 
 contains
 
-  !> Finds the trains and groups and analyses them; locked bodies and unusable coordinates are errors.
+  !> Finds the trains and groups and analyses them. Locked bodies and impossible coordinates are errors.
   subroutine analyse_constraints(constraints, body_names, wanted, trains, groups, offending_row, error)
     type(constraints_t), intent(in) :: constraints
     type(string_t), intent(in) :: body_names(:)
-    integer, intent(in) :: wanted(:)                 !! bodies that are to be the coordinates; empty: found here
-    type(rigid_trains_t), intent(out) :: trains      !! led by the coordinates, or by their fastest bodies
+    integer, intent(in) :: wanted(:)              !! bodies chosen as coordinates; empty: they are chosen here
+    type(rigid_trains_t), intent(out) :: trains   !! their roots are the coordinates, or their fastest bodies
     type(geared_group_t), allocatable, intent(out) :: groups(:)
-    integer, intent(out) :: offending_row                  !! row that the error is about, 0 if it is about `wanted`
+    integer, intent(out) :: offending_row   !! row that the error is about, 0 if it is about `wanted`
     type(error_t), allocatable, intent(out) :: error
     type(train_relations_t) :: relations
     integer, allocatable :: group_of(:)
@@ -57,11 +57,11 @@ contains
     call choose_coordinates(constraints, body_names, wanted, group_of, is_kept, trains, groups, error)
   end subroutine analyse_constraints
 
-  !> The first row of two bodies that closes a loop with another ratio than that of the rows before it, 0 if none does.
+  !> The first row of two bodies that closes a loop with another ratio than that of the rows before it, 0 if there is none.
   integer function first_contradiction(constraints, trains, is_tree) result(row)
     type(constraints_t), intent(in) :: constraints
     type(rigid_trains_t), intent(in) :: trains
-    logical, intent(in) :: is_tree(:)
+    logical, intent(in) :: is_tree(:)   !! [rows]
     integer, allocatable :: loops(:)
     integer :: r
 
@@ -70,6 +70,7 @@ contains
     if (row > 0) row = loops(row)
   end function first_contradiction
 
+  !> Lists the trains of each group.
   subroutine distribute_trains(group_of, groups)
     integer, intent(in) :: group_of(:)   !! [trains]
     type(geared_group_t), intent(inout) :: groups(:)
@@ -81,12 +82,12 @@ contains
     end do
   end subroutine distribute_trains
 
-  !> Keeps, in the order of the input, the relations that are independent of those before them; all that peel are.
+  !> Finds the relations that are independent of those before them in the input. Relations with leaves always are.
   subroutine find_independent_relations(relations, group_of, groups, is_kept)
     type(train_relations_t), intent(in) :: relations
-    integer, intent(in) :: group_of(:)         !! of the trains
-    integer, intent(in) :: groups
-    logical, intent(inout) :: is_kept(:)       !! rows
+    integer, intent(in) :: group_of(:)     !! group of each train
+    integer, intent(in) :: groups          !! number of groups
+    logical, intent(inout) :: is_kept(:)   !! [rows]
     type(leaf_elimination_t) :: leaves
     integer, allocatable :: order(:)
     integer :: first(groups + 1), g, i
@@ -105,12 +106,12 @@ contains
     end do
   end subroutine find_independent_relations
 
-  !> Drops the relations that are combinations of those before them; then, where rounding hid one, the first that does not
-  !> raise the rank (column-pivoted QR), and so on until the rank is full.
+  !> Removes relations that are combinations of those before them. Where rounding hides one, it then removes the first relation
+  !> that does not raise the rank (column-pivoted QR), until the rank is full.
   subroutine find_independent_core(relations, core, is_kept)
     type(train_relations_t), intent(in) :: relations
-    integer, intent(in) :: core(:)
-    logical, intent(inout) :: is_kept(:)
+    integer, intent(in) :: core(:)         !! relations, ascending
+    logical, intent(inout) :: is_kept(:)   !! [rows]
     integer, allocatable :: left(:)
     real(wp), allocatable :: rows(:, :)
     integer :: dependent, fine, i, middle
@@ -139,7 +140,7 @@ contains
     end do
   end subroutine find_independent_core
 
-  !> Which rows of unit length have a part that is no combination of those before them: Gram and Schmidt, each twice.
+  !> Which rows of unit length are independent of those before them: Gram-Schmidt, twice per row.
   function independent_rows(rows) result(adds)
     real(wp), intent(in) :: rows(:, :)
     logical :: adds(size(rows, 1))
@@ -161,6 +162,7 @@ contains
     end do
   end function independent_rows
 
+  !> Rank by column-pivoted QR.
   integer function rank_of(rows)
     real(wp), intent(in) :: rows(:, :)
     integer :: pivots(size(rows, 2))
@@ -170,7 +172,7 @@ contains
     call pivoted_rank(rows, ratio_tolerance, rank_of, pivots)
   end function rank_of
 
-  !> Error for the first group that relations lock.
+  !> Raises the error for the first group that is locked.
   subroutine raise_first_lock(constraints, body_names, trains, relations, groups, offending_row, error)
     type(constraints_t), intent(in) :: constraints
     type(string_t), intent(in) :: body_names(:)
@@ -192,7 +194,7 @@ contains
     end do
   end subroutine raise_first_lock
 
-  !> The kept rows that each redundant row repeats.
+  !> Finds the kept rows that each redundant row repeats.
   subroutine explain_redundancies(constraints, trains, relations, is_kept, groups)
     type(constraints_t), intent(in) :: constraints
     type(rigid_trains_t), intent(in) :: trains
@@ -225,6 +227,7 @@ contains
     end do
   end subroutine explain_redundancies
 
+  !> Rows in ascending order.
   pure function ascending(rows) result(sorted)
     integer, intent(in) :: rows(:)
     integer, allocatable :: sorted(:)
@@ -236,14 +239,14 @@ contains
     sorted = pack([(i, i=lbound(is_there, 1), ubound(is_there, 1))], is_there)
   end function ascending
 
-  !> The rows of a group whose reactions together do what that of a redundant relation does.
+  !> The rows of a group whose reactions together have the effect of the reaction of a redundant relation.
   function repeated_rows(constraints, trains, relations, elimination, dual, row) result(rows)
     type(constraints_t), intent(in) :: constraints
     type(rigid_trains_t), intent(in) :: trains
     type(train_relations_t), intent(in) :: relations
     type(elimination_t), intent(in) :: elimination   !! of the group
     real(wp), intent(in) :: dual(:, :)               !! D of its core
-    integer, intent(in) :: row
+    integer, intent(in) :: row                       !! the redundant relation's row
     integer, allocatable :: rows(:)
     integer :: relation
     real(wp) :: lambda(size(relations%row)), moment(size(trains%root))

@@ -1,4 +1,4 @@
-!> Rows that lock bodies: which ones, what they ask of each other, and the sentence that says so.
+!> Errors for rows that lock bodies: which bodies, by which rows, and the message.
 module nocdyn_constraint_conflicts
   use nocdyn_complement, only: natural_complement
   use nocdyn_constraints, only: constraints_t
@@ -16,11 +16,11 @@ module nocdyn_constraint_conflicts
   public :: locked_trains, raise_lock, raise_loop_conflict
 
   integer, parameter :: most_names = 12     ! in a message
-  integer, parameter :: ratio_digits = 12   ! enough to tell two ratios apart, without the noise of rounding
+  integer, parameter :: ratio_digits = 12   ! enough to tell two ratios apart, without digits that are rounding
 
 contains
 
-  !> The error for a row of two bodies that closes a loop with another ratio.
+  !> Raises the error for a row of two bodies that closes a loop with another ratio.
   subroutine raise_loop_conflict(constraints, body_names, trains, row, error)
     type(constraints_t), intent(in) :: constraints
     type(string_t), intent(in) :: body_names(:)
@@ -70,7 +70,7 @@ contains
     end do
   end function ratio_along
 
-  !> The bodies of some trains, in their order.
+  !> Names of the bodies of some trains.
   function locked_names(body_names, trains, locked) result(names)
     type(string_t), intent(in) :: body_names(:)
     type(rigid_trains_t), intent(in) :: trains
@@ -84,8 +84,8 @@ contains
     names = joined(selected(body_names, pack([(b, b=1, size(body_names))], is_locked(trains%train))), ', ', most_names)
   end function locked_names
 
-  !> Trains that relations leave no speed: those of the core whose row of the complement is zero, and those that relations
-  !> give from locked ones, or from speeds that cancel.
+  !> Trains that the relations lock: those of the core whose row of the complement is zero, and those whose relation has only
+  !> locked trains or speeds that cancel.
   function locked_trains(relations, elimination) result(is_locked)
     type(train_relations_t), intent(in) :: relations
     type(elimination_t), intent(in) :: elimination
@@ -117,7 +117,7 @@ contains
     end associate
   end function locked_trains
 
-  !> Whether the trains of the core rest, from its complement between paced speeds.
+  !> Whether the trains of the core are locked, from the complement with effective speeds.
   function has_zero_speed(relations, elimination) result(rests)
     type(train_relations_t), intent(in) :: relations
     type(elimination_t), intent(in) :: elimination
@@ -135,14 +135,14 @@ contains
     if (size(motion, 2) > 0) rests = maxval(abs(motion), dim=2) <= ratio_tolerance
   end function has_zero_speed
 
-  !> The error for the first relation with which a lock begins, among those of a group that locks.
+  !> Raises the error for the first relation, in the order of the input, with which the group is locked.
   subroutine raise_lock(constraints, body_names, trains, relations, members, offending_row, error)
     type(constraints_t), intent(in) :: constraints
     type(string_t), intent(in) :: body_names(:)
     type(rigid_trains_t), intent(in) :: trains
     type(train_relations_t), intent(in) :: relations
-    integer, intent(in) :: members(:)      !! the independent relations of the group
-    integer, intent(out) :: offending_row        !! constraint row
+    integer, intent(in) :: members(:)       !! independent relations of the group
+    integer, intent(out) :: offending_row   !! constraint row
     type(error_t), allocatable, intent(out) :: error
     type(elimination_t) :: elimination
     logical :: is_member(size(relations%row)), is_locked(size(trains%root))
@@ -171,7 +171,7 @@ contains
                reason(selected(constraints%names, rows)))
   end subroutine raise_lock
 
-  !> Why the relations lock: the other rows that take part.
+  !> The other rows that cause the lock, as text.
   function reason(names) result(text)
     type(string_t), intent(in) :: names(:)
     character(len=:), allocatable :: text
@@ -183,7 +183,7 @@ contains
     end if
   end function reason
 
-  !> The elimination of some relations alone.
+  !> The elimination of some relations only.
   function partial_elimination(relations, chosen) result(elimination)
     type(train_relations_t), intent(in) :: relations
     integer, intent(in) :: chosen(:)
@@ -199,7 +199,7 @@ contains
                                       leaves%train, leaves%core)
   end function partial_elimination
 
-  !> The rows whose combination says that a train rests.
+  !> The rows whose combination locks a train.
   function locking_rows(constraints, trains, relations, elimination, locked) result(rows)
     type(constraints_t), intent(in) :: constraints
     type(rigid_trains_t), intent(in) :: trains

@@ -1,4 +1,4 @@
-!> The rigid part of a machine: rows of L_lambda, eqs. (8), (23), each a linear relation between body speeds.
+!> The rows of L_lambda, eqs. (8), (23): linear relations between the speeds of bodies that are joined rigidly.
 module nocdyn_constraints
   use nocdyn_kinds, only: wp
   use nocdyn_lane_parameters, only: lane_parameters_t
@@ -9,21 +9,21 @@ module nocdyn_constraints
 
   public :: new_constraints
 
-  !> Torques that rows exert on some of their members, reported beside the multipliers: factor * multiplier.
+  !> Torques of rows on some of their members, reported beside the multipliers: factor * multiplier [N m].
   type, public :: member_torques_t
-    type(string_t), allocatable :: names(:)   !! of the members, such as 'ring'
-    integer, allocatable :: row(:)            !! ascending
+    type(string_t), allocatable :: names(:)   !! names of the members, such as 'ring'
+    integer, allocatable :: row(:)            !! row of each member, ascending
     real(wp), allocatable :: factor(:, :)     !! coefficient of the member in the row, [lanes, members]
   end type member_torques_t
 
   !> Row r: sum over its entries of coefficient * omega(body) = 0, entries first(r) to first(r + 1) - 1.
   type, public :: constraints_t
-    integer :: bodies = 0                        !! of the machine
-    type(string_t), allocatable :: kinds(:)      !! what the input calls the rows, such as 'gear'
-    type(string_t), allocatable :: names(:)      !! of the rows
-    type(string_t), allocatable :: units(:)      !! of their multipliers
-    integer, allocatable :: first(:)             !! [rows + 1]
-    integer, allocatable :: body(:)              !! [entries], different ones in each row
+    integer :: bodies = 0                        !! bodies of the machine
+    type(string_t), allocatable :: kinds(:)      !! what the input calls each row, such as 'gear'
+    type(string_t), allocatable :: names(:)      !! names of the rows
+    type(string_t), allocatable :: units(:)      !! units of the multipliers
+    integer, allocatable :: first(:)             !! first entry of each row, [rows + 1]
+    integer, allocatable :: body(:)              !! [entries], different bodies in each row
     real(wp), allocatable :: coefficient(:, :)   !! never 0, [lanes, entries]
     type(member_torques_t) :: members
   contains
@@ -38,14 +38,14 @@ module nocdyn_constraints
 
 contains
 
-  !> Rows from their entries; the arrays are described at `constraints_t`.
+  !> Rows from their entries; the arrays are those of `constraints_t`.
   function new_constraints(bodies, names, units, first, body, coefficient, kinds, members) result(constraints)
-    integer, intent(in) :: bodies
+    integer, intent(in) :: bodies   !! bodies of the machine
     type(string_t), intent(in) :: names(:), units(:)
     integer, intent(in) :: first(:), body(:)
     real(wp), intent(in) :: coefficient(:, :)
-    type(string_t), intent(in), optional :: kinds(:)            !! all are 'constraint' if absent
-    type(member_torques_t), intent(in), optional :: members     !! none if absent
+    type(string_t), intent(in), optional :: kinds(:)          !! all are 'constraint' if absent
+    type(member_torques_t), intent(in), optional :: members   !! none if absent
     type(constraints_t) :: constraints
 
     if (size(first) /= size(names) + 1) error stop 'nocdyn_constraints: first must have one entry more than names'
@@ -67,13 +67,14 @@ contains
     end if
   end function new_constraints
 
+  !> Number of rows.
   pure integer function rows(self)
     class(constraints_t), intent(in) :: self
 
     rows = size(self%names)
   end function rows
 
-  !> How many bodies a row relates.
+  !> Number of bodies in a row.
   pure integer function entries(self, row)
     class(constraints_t), intent(in) :: self
     integer, intent(in) :: row
@@ -81,11 +82,11 @@ contains
     entries = self%first(row + 1) - self%first(row)
   end function entries
 
-  !> The coefficients of a body and of the other one in a row of two.
+  !> Coefficients of a body and of the other body, in a row of two bodies.
   pure subroutine pair_coefficients(self, lane, row, body, own, other)
     class(constraints_t), intent(in) :: self
-    integer, intent(in) :: lane, row, body
-    real(wp), intent(out) :: own, other
+    integer, intent(in) :: lane, row, body   !! body: one of the two
+    real(wp), intent(out) :: own, other      !! coefficients of `body` and of the other body
 
     associate (first => self%first(row))
       if (self%body(first) == body) then
@@ -98,11 +99,11 @@ contains
     end associate
   end subroutine pair_coefficients
 
-  !> The chosen rows that each body is in, ascending: row(first(b)) to row(first(b + 1) - 1).
+  !> Lists the chosen rows of each body, ascending: row(first(b)) to row(first(b + 1) - 1).
   subroutine list_body_rows(self, is_chosen, first, row)
     class(constraints_t), intent(in) :: self
-    logical, intent(in) :: is_chosen(:)   !! [rows]
-    integer, allocatable, intent(out) :: first(:), row(:)
+    logical, intent(in) :: is_chosen(:)                     !! [rows]
+    integer, allocatable, intent(out) :: first(:), row(:)   !! [bodies + 1], [entries of the chosen rows]
     integer :: body(size(self%body)), row_of(size(self%body))   ! of each entry of a chosen row
     integer, allocatable :: order(:)
     integer :: entry, n, r
@@ -121,7 +122,7 @@ contains
     row = row_of(order)
   end subroutine list_body_rows
 
-  !> The dense part of L_lambda in the given rows and columns; entries in other columns are left out.
+  !> Dense submatrix of L_lambda for the given rows and bodies.
   pure function block(self, lane, chosen, bodies) result(dense)
     class(constraints_t), intent(in) :: self
     integer, intent(in) :: lane
@@ -139,12 +140,12 @@ contains
     end do
   end function block
 
-  !> L_lambda omega of one row, and the sum of its absolute terms as the measure of what is small.
+  !> L_lambda omega of one row, and the sum of its absolute terms as a measure of rounding.
   pure subroutine residual(self, lane, row, omega, value, scale)
     class(constraints_t), intent(in) :: self
     integer, intent(in) :: lane, row
-    real(wp), intent(in) :: omega(:)   !! [bodies]
-    real(wp), intent(out) :: value, scale
+    real(wp), intent(in) :: omega(:)        !! [rad/s], [bodies]
+    real(wp), intent(out) :: value, scale   !! in the unit of the row
     integer :: entry
 
     value = 0.0_wp

@@ -1,4 +1,4 @@
-!> Which bodies are independent, and in which order the relations between trains give the others.
+!> Choice of the independent bodies, and of the order in which the relations between trains give the others.
 module nocdyn_coordinate_choice
   use nocdyn_constraints, only: constraints_t
   use nocdyn_errors, only: error_t, exit_input, raise
@@ -19,11 +19,11 @@ module nocdyn_coordinate_choice
 
 contains
 
-  !> Coordinates by peeling and pivoting: the leads of the trains that no relation gives.
+  !> Chooses coordinates by eliminating leaves and by pivoting: the roots of the trains that no relation gives.
   subroutine eliminate(relations, takes_part, group_of, trains, groups)
     type(train_relations_t), intent(in) :: relations
     logical, intent(in) :: takes_part(:)   !! relations that are not redundant
-    integer, intent(in) :: group_of(:)     !! [bodies]
+    integer, intent(in) :: group_of(:)     !! group of each body
     type(rigid_trains_t), intent(in) :: trains
     type(geared_group_t), intent(inout) :: groups(:)
     logical :: is_free_root(size(group_of)), no_train(size(trains%root))
@@ -43,11 +43,11 @@ contains
     end do
   end subroutine eliminate
 
-  !> Hands what was peeled, and what was left, out to the groups.
+  !> Assigns eliminated and remaining relations to the groups.
   subroutine distribute(relations, leaves, group_of, groups)
     type(train_relations_t), intent(in) :: relations
     type(leaf_elimination_t), intent(in) :: leaves
-    integer, intent(in) :: group_of(:)   !! [trains]
+    integer, intent(in) :: group_of(:)   !! group of each train
     type(geared_group_t), intent(inout) :: groups(:)
     integer :: first(size(groups) + 1), first_core(size(groups) + 1), g, i
     integer :: core(size(leaves%core)), order(size(leaves%train))
@@ -69,11 +69,11 @@ contains
     end do
   end subroutine distribute
 
-  !> The elimination whose core gives the trains that column pivoting takes first, so that the fast ones stay free.
+  !> The elimination whose core gives the trains that column pivoting takes first, so that fast trains are the free ones.
   function pivoted_elimination(relations, trains, relation, train, core) result(elimination)
     type(train_relations_t), intent(in) :: relations
-    integer, intent(in) :: trains(:)                !! among which the free ones are
-    integer, intent(in) :: relation(:), train(:)    !! peeled
+    integer, intent(in) :: trains(:)               !! trains that may be free
+    integer, intent(in) :: relation(:), train(:)   !! eliminated as leaves
     integer, intent(in) :: core(:)
     type(elimination_t) :: elimination
     integer, allocatable :: pivots(:)
@@ -97,6 +97,7 @@ contains
     allocate (elimination%free, source=pack(trains, .not. is_given(trains)))
   end function pivoted_elimination
 
+  !> The rows of a matrix, scaled to unit length.
   pure function unit_rows(matrix) result(scaled)
     real(wp), intent(in) :: matrix(:, :)
     real(wp) :: scaled(size(matrix, 1), size(matrix, 2))
@@ -107,14 +108,14 @@ contains
     end do
   end function unit_rows
 
-  !> Makes the wanted bodies the coordinates, where there are any; those that cannot be are an error.
+  !> Makes the wanted bodies the coordinates, if there are any. It is an error if they cannot be.
   subroutine choose_coordinates(constraints, body_names, wanted, group_of, is_kept, trains, groups, error)
     type(constraints_t), intent(in) :: constraints
     type(string_t), intent(in) :: body_names(:)
-    integer, intent(in) :: wanted(:), group_of(:)
-    logical, intent(in) :: is_kept(:)                   !! rows
+    integer, intent(in) :: wanted(:), group_of(:)   !! bodies; group of each body
+    logical, intent(in) :: is_kept(:)               !! [rows]
     type(rigid_trains_t), intent(inout) :: trains
-    type(geared_group_t), intent(inout) :: groups(:)    !! with coordinates that were found
+    type(geared_group_t), intent(inout) :: groups(:)   !! with coordinates chosen by `eliminate`
     type(error_t), allocatable, intent(out) :: error
     type(train_relations_t) :: relations
     logical :: must_be_free(size(trains%root))
@@ -137,10 +138,10 @@ contains
     end do
   end subroutine choose_coordinates
 
-  !> Replaces the independent bodies of each group by the wanted ones in it, which must be as many, of different trains.
+  !> Replaces the independent bodies of each group by the wanted ones. They must be as many, and of different trains.
   subroutine set_wanted(body_names, wanted, group_of, trains, groups, error)
     type(string_t), intent(in) :: body_names(:)
-    integer, intent(in) :: wanted(:), group_of(:)
+    integer, intent(in) :: wanted(:), group_of(:)   !! bodies; group of each body
     type(rigid_trains_t), intent(in) :: trains
     type(geared_group_t), intent(inout) :: groups(:)
     type(error_t), allocatable, intent(out) :: error
@@ -169,7 +170,7 @@ contains
     end do
   end subroutine set_wanted
 
-  !> Makes the wanted bodies leads; an error where a body turns so much faster that numbers overflow.
+  !> Makes the wanted bodies roots. It is an error if a body turns so much faster that ratios overflow.
   subroutine set_wanted_roots(constraints, body_names, wanted, trains, error)
     type(constraints_t), intent(in) :: constraints
     type(string_t), intent(in) :: body_names(:)
@@ -189,7 +190,7 @@ contains
                                           ' turns more than 1e150 times as fast')
   end subroutine set_wanted_roots
 
-  !> Whether the core gives the trains that are not to be free.
+  !> Whether the core can be solved for the trains that need not be free.
   logical function is_solvable(relations, elimination, must_be_free)
     type(train_relations_t), intent(in) :: relations
     type(elimination_t), intent(in) :: elimination
@@ -208,6 +209,7 @@ contains
     is_solvable = rank == size(dependent)
   end function is_solvable
 
+  !> Raises the error for independent bodies whose speeds the constraints relate.
   subroutine raise_related(body_names, independent, error)
     type(string_t), intent(in) :: body_names(:)
     integer, intent(in) :: independent(:)
@@ -217,9 +219,10 @@ contains
                ' cannot be independent: the constraints relate their speeds')
   end subroutine raise_related
 
+  !> Message for a wrong number of independent bodies in a group.
   function count_message(bodies, named, freedoms) result(text)
-    type(string_t), intent(in) :: bodies(:), named(:)
-    integer, intent(in) :: freedoms
+    type(string_t), intent(in) :: bodies(:), named(:)   !! of the group; those that the input names
+    integer, intent(in) :: freedoms                     !! number that must be named
     character(len=:), allocatable :: text
 
     if (size(bodies) == 1) then

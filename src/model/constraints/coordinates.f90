@@ -1,6 +1,6 @@
-!> The independent coordinates of a machine: L_tau and the operators that follow from it, sparse, on blocks of lanes.
+!> The independent coordinates of a machine: L_tau and the operators derived from it, sparse, on a block of lanes.
 !>
-!> A body moves only with the coordinates of its own group of geared bodies: omega(b) is the sum of
+!> The speed of a body depends on the coordinates of its own group only: omega(b) is the sum of
 !> ratio * q'(coordinate) over the entries first(b) to first(b + 1) - 1. With the same entries,
 !> q'' = (L_tau^T J L_tau)^-1 L_tau^T T is the sum of response * T(b).
 module nocdyn_coordinates
@@ -24,17 +24,17 @@ module nocdyn_coordinates
   integer, parameter :: most_names = 12   ! in a message
 
   type, public :: coordinates_t
-    integer :: freedoms = 0                    !! length of q
-    integer, allocatable :: body(:)            !! independent body of each coordinate, [freedoms]
-    integer, allocatable :: first(:)           !! [bodies + 1]
-    integer, allocatable :: coordinate(:)      !! [entries]
-    real(wp), allocatable :: ratio(:, :)       !! nonzero blocks of L_tau, [lanes, entries]
-    real(wp), allocatable :: response(:, :)    !! those of ((L_tau^T J L_tau)^-1 L_tau^T)^T, [lanes, entries]
-    type(reaction_solver_t) :: reactions            !! reactions from imbalances
-    integer, allocatable, private :: geared(:)          !! bodies in groups with rows
+    integer :: freedoms = 0                             !! number of coordinates
+    integer, allocatable :: body(:)                     !! independent body of each coordinate, [freedoms]
+    integer, allocatable :: first(:)                    !! first entry of each body, [bodies + 1]
+    integer, allocatable :: coordinate(:)               !! [entries]
+    real(wp), allocatable :: ratio(:, :)                !! nonzero blocks of L_tau, [lanes, entries]
+    real(wp), allocatable :: response(:, :)             !! the same blocks of ((L_tau^T J L_tau)^-1 L_tau^T)^T, [lanes, entries]
+    type(reaction_solver_t) :: reactions                !! gives the reactions from J omega' - T
+    integer, allocatable, private :: geared(:)          !! bodies in groups with rows, ascending
     real(wp), allocatable, private :: inertia(:, :)     !! J [kg m2], [lanes, bodies]
     real(wp), allocatable, private :: imbalance(:)      !! J omega' - T [N m], [bodies], work space
-    real(wp), allocatable, private :: acceleration(:)   !! q'', [freedoms], work space
+    real(wp), allocatable, private :: acceleration(:)   !! q'' [rad/s2], [freedoms], work space
   contains
     procedure :: update_inertia
     procedure :: complement
@@ -47,14 +47,14 @@ module nocdyn_coordinates
 
 contains
 
-  !> Builds the operators group by group; a group whose mass matrix rounding makes indefinite is an error.
+  !> Builds the operators, group by group. It is an error if rounding makes a mass matrix indefinite.
   subroutine build_coordinates(constraints, body_names, trains, groups, inertia, wanted, choice, self, error)
     type(constraints_t), intent(in) :: constraints
     type(string_t), intent(in) :: body_names(:)
     type(rigid_trains_t), intent(in) :: trains
-    type(geared_group_t), intent(in) :: groups(:)   !! analysed
-    real(wp), intent(in) :: inertia(:, :)           !! [lanes, bodies] [kg m2]
-    integer, intent(in) :: wanted(:)                !! order of the coordinates as bodies; empty: ascending bodies
+    type(geared_group_t), intent(in) :: groups(:)   !! after `analyse_constraints`
+    real(wp), intent(in) :: inertia(:, :)           !! J [kg m2], [lanes, bodies]
+    integer, intent(in) :: wanted(:)                !! bodies in the order of the coordinates; empty: ascending
     integer, intent(in) :: choice                   !! complement_...
     type(coordinates_t), intent(out) :: self
     type(error_t), allocatable, intent(out) :: error
@@ -80,7 +80,7 @@ contains
     allocate (self%imbalance(size(inertia, 2)), self%acceleration(self%freedoms))
   end subroutine build_coordinates
 
-  !> The bodies in groups with rows, ascending.
+  !> Bodies in groups with rows, ascending.
   pure function geared_bodies(groups, bodies) result(geared)
     type(geared_group_t), intent(in) :: groups(:)
     integer, intent(in) :: bodies
@@ -95,12 +95,12 @@ contains
     geared = pack([(b, b=1, bodies)], is_geared)
   end function geared_bodies
 
-  !> Gives every independent body its coordinate.
+  !> Numbers the coordinates.
   subroutine number_coordinates(groups, wanted, self, coordinate_of)
     type(geared_group_t), intent(in) :: groups(:)
-    integer, intent(in) :: wanted(:)
+    integer, intent(in) :: wanted(:)   !! as in `build_coordinates`
     type(coordinates_t), intent(inout) :: self
-    integer, intent(out) :: coordinate_of(:)   !! [bodies], 0 for dependent bodies
+    integer, intent(out) :: coordinate_of(:)   !! coordinate of each body, 0 for dependent bodies
     integer :: b, g, k
 
     coordinate_of = 0
@@ -116,10 +116,10 @@ contains
     coordinate_of(self%body) = [(k, k=1, self%freedoms)]
   end subroutine number_coordinates
 
-  !> Every body has one entry for each coordinate of its group.
+  !> Allocates the entries: every body has one for each coordinate of its group.
   subroutine lay_out_entries(groups, coordinate_of, bodies, lanes, self)
     type(geared_group_t), intent(in) :: groups(:)
-    integer, intent(in) :: coordinate_of(:), bodies, lanes
+    integer, intent(in) :: coordinate_of(:), bodies, lanes   !! coordinate_of: as in `number_coordinates`
     type(coordinates_t), intent(inout) :: self
     integer :: group_of(bodies)
     integer :: b, g
@@ -140,16 +140,16 @@ contains
     allocate (self%response, source=self%ratio)
   end subroutine lay_out_entries
 
-  !> L_tau of one lane, group by group, and what the sweep of its reactions needs.
+  !> Computes L_tau, the responses and the values of the reaction solver in one lane.
   subroutine fill_lane(constraints, trains, relations, groups, choice, lane, self, offending_group)
     type(constraints_t), intent(in) :: constraints
     type(rigid_trains_t), intent(in) :: trains
     type(train_relations_t), intent(in) :: relations
     type(geared_group_t), intent(in) :: groups(:)
-    integer, intent(in) :: choice                !! complement_...
+    integer, intent(in) :: choice   !! complement_...
     integer, intent(in) :: lane
     type(coordinates_t), intent(inout) :: self
-    integer, intent(out) :: offending_group    !! group whose mass matrix is not positive definite, 0 if there is none
+    integer, intent(out) :: offending_group   !! group whose mass matrix is not positive definite, 0 if there is none
     type(train_motion_t) :: found
     real(wp) :: factor, inertia(size(self%inertia, 2)), ratio(size(self%inertia, 2))
     integer :: g, k, local(size(trains%root))   ! number of every train in its group
@@ -175,7 +175,7 @@ contains
     end do
   end subroutine fill_lane
 
-  !> What the rows that tie trains add to the logarithm of |L_lambda^ext|: each gives its body by a division.
+  !> Part of log |det L_lambda^ext| from the tree rows of a group; each gives its body by a division.
   pure real(wp) function pair_determinant(constraints, trains, bodies, lane) result(log_determinant)
     type(constraints_t), intent(in) :: constraints
     type(rigid_trains_t), intent(in) :: trains
@@ -191,12 +191,12 @@ contains
     end do
   end function pair_determinant
 
-  !> L_tau of the group.
+  !> Sets L_tau of a group.
   subroutine fill_ratios(bodies, train, ratio, motion, lane, self)
-    integer, intent(in) :: bodies(:)
-    integer, intent(in) :: train(:)          !! of `bodies`, in the group
-    real(wp), intent(in) :: ratio(:)         !! of `bodies` to the leads of their trains
-    real(wp), intent(in) :: motion(:, :)     !! L_tau of the leads, [trains, coordinates of the group]
+    integer, intent(in) :: bodies(:)       !! of the group
+    integer, intent(in) :: train(:)        !! number of the train of each body within the group
+    real(wp), intent(in) :: ratio(:)       !! of each body to the root of its train
+    real(wp), intent(in) :: motion(:, :)   !! L_tau of the roots, [trains, coordinates of the group]
     integer, intent(in) :: lane
     type(coordinates_t), intent(inout) :: self
     integer :: i, k
@@ -207,14 +207,14 @@ contains
     end do
   end subroutine fill_ratios
 
-  !> The response of a group whose ratios are known, from its mass matrix L_tau^T J L_tau, factored once.
+  !> Computes the responses of a group from its ratios and new inertias, by its mass matrix L_tau^T J L_tau.
   subroutine update_inertia(self, trains, group, inertia, lane, is_indefinite)
     class(coordinates_t), intent(inout) :: self
     type(rigid_trains_t), intent(in) :: trains
     type(geared_group_t), intent(in) :: group
-    real(wp), intent(in) :: inertia(:)       !! of all bodies
+    real(wp), intent(in) :: inertia(:)   !! of all bodies [kg m2]
     integer, intent(in) :: lane
-    logical, intent(out) :: is_indefinite    !! the mass matrix is, and nothing is filled
+    logical, intent(out) :: is_indefinite   !! whether the mass matrix is not positive definite; nothing is set then
     real(wp), allocatable :: response(:, :)
     real(wp), dimension(size(group%trains), size(group%independent)) :: momentum, motion
     real(wp) :: mass(size(group%trains))
@@ -224,7 +224,7 @@ contains
     do i = 1, size(group%trains)
       local(group%trains(i)) = i
       k = self%first(trains%root(group%trains(i)))
-      motion(i, :) = self%ratio(lane, k:k + size(motion, 2) - 1)   ! a lead has the motion of its train
+      motion(i, :) = self%ratio(lane, k:k + size(motion, 2) - 1)   ! a root has the motion of its train
     end do
     do i = 1, size(group%bodies)
       associate (b => group%bodies(i))
@@ -247,7 +247,7 @@ contains
     end do
   end subroutine update_inertia
 
-  !> L_tau as a dense matrix [bodies, freedoms], for the paper's matrices and for tests.
+  !> L_tau as a dense matrix, [bodies, freedoms], for the matrices of the paper and for tests.
   pure function complement(self, lane) result(dense)
     class(coordinates_t), intent(in) :: self
     integer, intent(in) :: lane
@@ -262,7 +262,7 @@ contains
     end do
   end function complement
 
-  !> L_tau (L_tau^T J L_tau)^-1 L_tau^T: the accelerations omega' from the torques T, [bodies, bodies].
+  !> L_tau (L_tau^T J L_tau)^-1 L_tau^T: the matrix from torques T to accelerations omega' [1/(kg m2)], [bodies, bodies].
   pure function mobility(self, lane) result(matrix)
     class(coordinates_t), intent(in) :: self
     integer, intent(in) :: lane
@@ -279,12 +279,12 @@ contains
     end do
   end function mobility
 
-  !> Coordinate speeds q' of body speeds that obey the constraints.
+  !> Projects body speeds on the coordinates, weighted by the inertias; exact if the speeds obey the constraints.
   pure subroutine project(self, lane, inertia, omega, speed)
     class(coordinates_t), intent(in) :: self
     integer, intent(in) :: lane
-    real(wp), intent(in) :: inertia(:), omega(:)   !! [bodies]
-    real(wp), intent(out) :: speed(:)              !! [freedoms]; mass-weighted projection if omega breaks a constraint
+    real(wp), intent(in) :: inertia(:), omega(:)   !! J [kg m2], speeds [rad/s], [bodies]
+    real(wp), intent(out) :: speed(:)              !! q' [rad/s], [freedoms]
     integer :: b, k
 
     speed = 0.0_wp
@@ -295,12 +295,12 @@ contains
     end do
   end subroutine project
 
-  !> Reactions of all rows from the torques of the elements, where the bodies move as the coordinates say.
+  !> Reactions of all rows when the elements exert these torques and the bodies accelerate accordingly.
   pure subroutine reactions_of_torques(self, lane, torque, lambda)
     class(coordinates_t), intent(inout) :: self
     integer, intent(in) :: lane
-    real(wp), intent(in) :: torque(:)     !! T [N m], shape [bodies]
-    real(wp), intent(inout) :: lambda(:)  !! [rows]
+    real(wp), intent(in) :: torque(:)      !! T [N m], [bodies]
+    real(wp), intent(inout) :: lambda(:)   !! [rows]
     integer :: b, i, k
     real(wp) :: acceleration
 
@@ -322,11 +322,11 @@ contains
     call self%reactions%find_reactions(lane, self%imbalance, lambda)
   end subroutine reactions_of_torques
 
-  !> Reactions of all rows from eq. (12), L_lambda^T lambda = J omega' - T, with accelerations found elsewhere.
+  !> Reactions of all rows from eq. (12), L_lambda^T lambda = J omega' - T, with given accelerations.
   pure subroutine reactions_of_imbalances(self, lane, imbalance, lambda)
     class(coordinates_t), intent(inout) :: self
     integer, intent(in) :: lane
-    real(wp), intent(in) :: imbalance(:)   !! J omega' - T [N m], shape [bodies]
+    real(wp), intent(in) :: imbalance(:)   !! J omega' - T [N m], [bodies]
     real(wp), intent(inout) :: lambda(:)   !! [rows]
 
     self%imbalance(:) = imbalance

@@ -1,4 +1,4 @@
-!> The bodies of a machine in groups that are geared together; each is analysed for itself.
+!> Groups of bodies that are geared together; each group is analysed separately.
 module nocdyn_geared_groups
   use nocdyn_constraints, only: constraints_t
   use nocdyn_sparse_map, only: transposed_order
@@ -9,21 +9,21 @@ module nocdyn_geared_groups
 
   public :: find_groups
 
-  !> A row that other rows already imply; its own reaction is not unique.
+  !> A row that is a combination of other rows; its own reaction is not unique.
   type, public :: redundancy_t
     integer :: row
-    integer, allocatable :: repeats(:)   !! the earlier rows of which it is a combination
+    integer, allocatable :: repeats(:)   !! the other rows, ascending
   end type redundancy_t
 
-  !> Bodies joined by constraints, directly or through others; a free body is a group of its own.
+  !> Bodies joined by constraints, directly or through others. A free body is a group of its own.
   type, public :: geared_group_t
     integer, allocatable :: bodies(:)        !! ascending
     integer, allocatable :: rows(:)          !! all constraint rows of the group, ascending
-    integer, allocatable :: kept(:)          !! the independent ones among them
-    integer, allocatable :: independent(:)   !! bodies whose speeds are the group's coordinates
+    integer, allocatable :: kept(:)          !! independent rows among them
+    integer, allocatable :: independent(:)   !! bodies whose speeds are the coordinates of the group
     type(redundancy_t), allocatable :: redundancies(:)
-    integer, allocatable :: trains(:)        !! rigid trains of the group, ascending
-    type(elimination_t) :: elimination       !! of its relations between trains
+    integer, allocatable :: trains(:)    !! rigid trains of the group, ascending
+    type(elimination_t) :: elimination   !! order in which its relations between trains are solved
   end type geared_group_t
 
 contains
@@ -32,7 +32,7 @@ contains
   subroutine find_groups(constraints, groups, group_of)
     type(constraints_t), intent(in) :: constraints
     type(geared_group_t), allocatable, intent(out) :: groups(:)
-    integer, allocatable, intent(out) :: group_of(:)   !! [bodies]
+    integer, allocatable, intent(out) :: group_of(:)   !! group of each body, [bodies]
     integer :: root(constraints%bodies), bodies(constraints%bodies), rows(constraints%rows())
     integer, allocatable :: first_body(:), first_row(:)
     integer :: b, g, r
@@ -55,7 +55,7 @@ contains
     end do
   end subroutine find_groups
 
-  !> The smallest body of each body's component (union-find).
+  !> The smallest body of the component of each body.
   pure function component_roots(constraints) result(root)
     type(constraints_t), intent(in) :: constraints
     integer :: root(constraints%bodies)

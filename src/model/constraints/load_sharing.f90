@@ -1,9 +1,8 @@
-!> How redundant rows share loads: of all reactions that do the same to the bodies, those of smallest norm.
+!> Load sharing of redundant rows: of all reactions with the same effect on the bodies, those of minimum norm.
 !>
-!> Reactions that leave every body in balance are idle; each redundant row has such a combination with the rows that it
-!> repeats. Taking the idle part off, by projection, leaves the reactions of smallest norm. Redundancies that have no row
-!> in common are independent of one another, so that parallel gears in each of thousands of stages stay thousands of
-!> small problems.
+!> Reactions without effect on any body are null vectors. Each redundant row has one, together with the rows that it repeats.
+!> Projecting the null vectors out leaves the reactions of minimum norm. Redundancies without a common row are independent of
+!> one another: parallel gears in each of thousands of stages are thousands of small problems.
 module nocdyn_load_sharing
   use nocdyn_geared_groups, only: geared_group_t, redundancy_t
   use nocdyn_kinds, only: wp
@@ -15,11 +14,11 @@ module nocdyn_load_sharing
 
   public :: new_load_sharing
 
-  !> Redundancies that share rows.
+  !> Redundancies that have rows in common.
   type, public :: load_sharing_block_t
     type(redundancy_t), allocatable :: redundancies(:)
-    integer, allocatable :: rows(:)              !! all rows in them
-    real(wp), allocatable :: null_vectors(:, :, :)       !! their idle combinations, made orthonormal, [rows, redundancies, lanes]
+    integer, allocatable :: rows(:)                  !! all rows in them, ascending
+    real(wp), allocatable :: null_vectors(:, :, :)   !! orthonormal, [rows, redundancies, lanes]
   contains
     procedure :: orthonormalise
   end type load_sharing_block_t
@@ -33,7 +32,7 @@ module nocdyn_load_sharing
 
 contains
 
-  !> The blocks of all groups; `idle` is allocated and to be filled.
+  !> The blocks of all groups, with null vectors that are zero.
   function new_load_sharing(groups, rows, lanes) result(self)
     type(geared_group_t), intent(in) :: groups(:)
     integer, intent(in) :: rows, lanes
@@ -70,10 +69,10 @@ contains
     call fill_blocks(groups, block_of, lanes, self%blocks)
   end function new_load_sharing
 
-  !> Hands the rows and the redundancies out to the blocks, in their order.
+  !> Assigns rows and redundancies to the blocks.
   subroutine fill_blocks(groups, block_of, lanes, blocks)
     type(geared_group_t), intent(in) :: groups(:)
-    integer, intent(in) :: block_of(:)   !! of each row, 0: of none
+    integer, intent(in) :: block_of(:)   !! block of each row, 0: none
     integer, intent(in) :: lanes
     type(load_sharing_block_t), intent(inout) :: blocks(:)
     integer, allocatable :: rows(:), order(:)
@@ -104,7 +103,7 @@ contains
     end do
   end subroutine fill_blocks
 
-  !> Makes the idle combinations of one lane orthonormal: Gram and Schmidt, each twice, which is enough.
+  !> Orthonormalises the null vectors of one lane: Gram-Schmidt, twice per vector.
   pure subroutine orthonormalise(self, lane)
     class(load_sharing_block_t), intent(inout) :: self
     integer, intent(in) :: lane
@@ -123,7 +122,7 @@ contains
     end associate
   end subroutine orthonormalise
 
-  !> Takes the idle part off the reactions.
+  !> Subtracts the projections on the null vectors from the reactions.
   pure subroutine minimise_norm(self, lane, lambda)
     class(load_sharing_t), intent(in) :: self
     integer, intent(in) :: lane

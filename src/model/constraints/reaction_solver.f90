@@ -1,10 +1,9 @@
-!> Reactions lambda = D^T (J omega' - T) of all rows, D the right inverse of L_lambda, without forming it.
+!> Reactions lambda = D^T (J omega' - T) of all rows, with the right inverse D of L_lambda, which is not formed.
 !>
-!> The transposed equations of L_lambda^ext are swept from the outside inwards: the relations between trains first, then in
-!> each train every body hands what is left over on it to its parent through the row between them. What redundant rows
-!> carry is then shared out so that the norm of the reactions is smallest. All work is linear in the entries of the rows
-!> but for the dense cores of relations and the loops that redundant rows close. To set it up takes a sweep for each
-!> redundant row.
+!> The transposed equations of L_lambda^ext are solved from the outside inwards: first the relations between trains, then in each
+!> train every body transmits its remaining moment to its parent through the row between them. Last, redundant rows share the
+!> loads so that the norm of the reactions is minimal. All work is linear in the entries of the rows, except for the dense
+!> cores of relations and the loops that redundant rows close. The set-up takes one solution per redundant row.
 module nocdyn_reaction_solver
   use nocdyn_constraints, only: constraints_t
   use nocdyn_geared_groups, only: geared_group_t
@@ -21,26 +20,26 @@ module nocdyn_reaction_solver
 
   !> The relations of one group.
   type :: relation_group_t
-    integer, allocatable :: bodies(:)
+    integer, allocatable :: bodies(:)   !! of the group
     type(elimination_t) :: elimination
     real(wp), allocatable :: dual(:, :, :)   !! D of the core, [core_trains, core, lanes]
   end type relation_group_t
 
   type, public :: reaction_solver_t
     private
-    integer, allocatable :: train(:)           !! of each body
-    real(wp), allocatable :: ratio(:, :)       !! of each body to the lead of its train, [lanes, bodies]
+    integer, allocatable :: train(:)       !! train of each body
+    real(wp), allocatable :: ratio(:, :)   !! of each body to the root of its train, [lanes, bodies]
     type(train_relations_t) :: relations
-    integer, allocatable :: first(:)           !! entries of the relations between bodies, [relations + 1]
-    integer, allocatable :: body(:)            !! [entries]
-    real(wp), allocatable :: coefficient(:, :) !! [lanes, entries]
-    type(relation_group_t), allocatable :: groups(:)   !! those with relations
-    integer, allocatable :: group_index(:)           !! of each group among them, 0 without relations
-    integer, allocatable :: child(:), parent(:), row(:)   !! the pairs of all trains, from the outside inwards
+    integer, allocatable :: first(:)                      !! first entry of each relation between bodies, [relations + 1]
+    integer, allocatable :: body(:)                       !! [entries]
+    real(wp), allocatable :: coefficient(:, :)            !! [lanes, entries]
+    type(relation_group_t), allocatable :: groups(:)      !! groups with relations
+    integer, allocatable :: group_index(:)                !! index of each group in `groups`, 0 without relations
+    integer, allocatable :: child(:), parent(:), row(:)   !! bodies, parents, rows between them; outer ones first
     real(wp), allocatable :: own(:, :), other(:, :)       !! coefficients of child and parent, [lanes, pairs]
     type(load_sharing_t) :: load_sharing
-    real(wp), allocatable :: of_trains(:)      !! moments on trains, work space
-    real(wp), allocatable :: of_relations(:)   !! multipliers, work space
+    real(wp), allocatable :: of_trains(:)      !! moments on trains, [trains], work space
+    real(wp), allocatable :: of_relations(:)   !! multipliers, [relations], work space
   contains
     procedure :: set_core
     procedure :: set_ratios
@@ -55,7 +54,7 @@ module nocdyn_reaction_solver
 
 contains
 
-  !> The order of the sweep; the numbers of each lane are to be taken by `set_core` and `set_ratios`.
+  !> The order of the solution. The values of each lane are set by `set_core` and `set_ratios`.
   function new_reaction_solver(constraints, trains, relations, groups) result(self)
     type(constraints_t), intent(in) :: constraints
     type(rigid_trains_t), intent(in) :: trains
@@ -85,6 +84,7 @@ contains
     call list_pairs(constraints, trains, self)
   end function new_reaction_solver
 
+  !> Lists the groups with relations.
   subroutine list_groups(groups, lanes, self)
     type(geared_group_t), intent(in) :: groups(:)
     integer, intent(in) :: lanes
@@ -109,6 +109,7 @@ contains
     end do
   end subroutine list_groups
 
+  !> Lists the pairs of bodies and parents, from the outside inwards.
   subroutine list_pairs(constraints, trains, self)
     type(constraints_t), intent(in) :: constraints
     type(rigid_trains_t), intent(in) :: trains
@@ -132,15 +133,16 @@ contains
     end do
   end subroutine list_pairs
 
-  !> The inverse of the core of group number `group`.
+  !> Sets the inverse of the core of a group.
   pure subroutine set_core(self, group, lane, dual)
     class(reaction_solver_t), intent(inout) :: self
-    integer, intent(in) :: group, lane
-    real(wp), intent(in) :: dual(:, :)
+    integer, intent(in) :: group, lane   !! group: number in the machine
+    real(wp), intent(in) :: dual(:, :)   !! D of the core, [core_trains, core]
 
     if (self%group_index(group) > 0) self%groups(self%group_index(group))%dual(:, :, lane) = dual
   end subroutine set_core
 
+  !> Sets the ratios of all bodies to the roots of their trains.
   pure subroutine set_ratios(self, lane, ratio)
     class(reaction_solver_t), intent(inout) :: self
     integer, intent(in) :: lane
@@ -149,7 +151,7 @@ contains
     self%ratio(lane, :) = ratio
   end subroutine set_ratios
 
-  !> How fast a body is, measured by the lead of its train.
+  !> omega(body) / omega(root of its train).
   pure real(wp) function root_ratio(self, lane, body) result(ratio)
     class(reaction_solver_t), intent(in) :: self
     integer, intent(in) :: lane, body
@@ -157,14 +159,14 @@ contains
     ratio = self%ratio(lane, body)
   end function root_ratio
 
-  !> Finds the null_vector combinations of redundant rows, once the numbers of all lanes are there: a reaction 1 of such a row and
-  !> the negative of what the rows that it repeats carry in its place.
+  !> Finds the null vectors of the redundant rows, after the values of all lanes have been set: a reaction 1 of such a row and the
+  !> negative reactions that the rows which it repeats have instead.
   subroutine find_null_vectors(self, constraints, groups)
     class(reaction_solver_t), intent(inout) :: self
     type(constraints_t), intent(in) :: constraints
     type(geared_group_t), intent(in) :: groups(:)
     real(wp) :: null_vector(constraints%rows()), moment(constraints%bodies)
-    logical :: is_member(constraints%rows())   ! whether a row is the redundant one or one of those that it repeats
+    logical :: is_member(constraints%rows())   ! whether a row is the redundant row or one of those that it repeats
     integer :: b, i, lane, row
 
     is_member = .false.
@@ -191,31 +193,31 @@ contains
     end do
   end subroutine find_null_vectors
 
-  !> Reactions that balance moments on the bodies.
+  !> Reactions of all rows that balance moments on the bodies.
   pure subroutine find_reactions(self, lane, moment, lambda)
     class(reaction_solver_t), intent(inout) :: self
     integer, intent(in) :: lane
-    real(wp), intent(inout) :: moment(:)   !! J omega' - T [N m], [bodies]; what is left over on return is rounding
+    real(wp), intent(inout) :: moment(:)   !! J omega' - T [N m], [bodies]; rounding on return
     real(wp), intent(inout) :: lambda(:)   !! [rows]
 
     call self%back_substitute(lane, moment, lambda)
     call self%load_sharing%minimise_norm(lane, lambda)
   end subroutine find_reactions
 
-  !> Shares reactions of the kept rows out over all rows.
+  !> Distributes reactions of the kept rows over all rows.
   pure subroutine share_loads(self, lane, lambda)
     class(reaction_solver_t), intent(in) :: self
     integer, intent(in) :: lane
-    real(wp), intent(inout) :: lambda(:)   !! [rows], 0 for redundant ones
+    real(wp), intent(inout) :: lambda(:)   !! [rows]; on entry 0 for redundant rows
 
     call self%load_sharing%minimise_norm(lane, lambda)
   end subroutine share_loads
 
-  !> Reactions of the kept rows alone.
+  !> Reactions of the kept rows only.
   pure subroutine back_substitute(self, lane, moment, lambda)
     class(reaction_solver_t), intent(inout) :: self
     integer, intent(in) :: lane
-    real(wp), intent(inout) :: moment(:), lambda(:)
+    real(wp), intent(inout) :: moment(:), lambda(:)   !! as in `find_reactions`
     integer :: k
 
     lambda = 0.0_wp
@@ -226,11 +228,11 @@ contains
     end do
   end subroutine back_substitute
 
-  !> Reactions of the relations; they are taken off the moments on the bodies.
+  !> Reactions of the relations; subtracts their moments from those on the bodies.
   pure subroutine solve_relations(self, lane, moment, lambda)
     class(reaction_solver_t), intent(inout) :: self
     integer, intent(in) :: lane
-    real(wp), intent(inout) :: moment(:), lambda(:)
+    real(wp), intent(inout) :: moment(:), lambda(:)   !! as in `find_reactions`
     integer :: b, entry, g, i
 
     self%of_trains(:) = 0.0_wp

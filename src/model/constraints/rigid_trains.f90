@@ -1,8 +1,8 @@
-!> Rigid trains: bodies whose speeds rows of two bodies tie to one another, so that one of them, the lead, drives all.
+!> Rigid trains: bodies that rows of two bodies join, so that the speed of one of them, the root, gives all others.
 !>
-!> The rows that tie a train form a tree, and the ratio of every body to its lead is a product along its branch. A further
-!> row of two bodies of a train either repeats what the rows of the tree say or contradicts them. Ratios are carried as
-!> fraction and exponent, as those of a long reduction may leave the range of a real number.
+!> The rows that join a train form a tree. The ratio of a body to the root is the product of the ratios along its path. A further
+!> row between two bodies of a train is either redundant or inconsistent. Ratios are stored as fraction and exponent, as
+!> those of a long reduction may exceed the range of real numbers.
 module nocdyn_rigid_trains
   use nocdyn_constraints, only: constraints_t
   use nocdyn_kinds, only: wp
@@ -12,18 +12,18 @@ module nocdyn_rigid_trains
 
   public :: find_trains
 
-  !> Two ratios agree, and a sum is zero, up to this times their size: decimals such as 0.1 * 3 against 0.3 agree.
+  !> Relative tolerance for the agreement of two ratios and for sums that are zero: decimals such as 0.1 * 3 and 0.3 agree.
   real(wp), parameter, public :: ratio_tolerance = 1.0e-9_wp
 
-  integer, parameter, public :: max_exponent = 500   !! binary exponent up to which squares of ratios are real numbers
+  integer, parameter, public :: max_exponent = 500   !! binary exponent up to which squares of ratios do not overflow
 
   type, public :: rigid_trains_t
-    integer, allocatable :: order(:)         !! bodies, train by train, each behind its parent
-    integer, allocatable :: position(:)         !! of each body in `order`
-    integer, allocatable :: parent(:)        !! neighbour of each body towards the lead, 0 for the lead
-    integer, allocatable :: parent_row(:)    !! the row that ties it to its parent, 0 for the lead
-    integer, allocatable :: train(:)         !! of each body
-    integer, allocatable :: root(:)          !! of each train
+    integer, allocatable :: order(:)        !! bodies, train by train, each behind its parent
+    integer, allocatable :: position(:)     !! position of each body in `order`
+    integer, allocatable :: parent(:)       !! neighbour of each body towards the root, 0 for the root
+    integer, allocatable :: parent_row(:)   !! row between a body and its parent, 0 for the root
+    integer, allocatable :: train(:)        !! train of each body
+    integer, allocatable :: root(:)         !! root of each train
   contains
     procedure :: choose_roots
     procedure :: fastest_bodies
@@ -37,11 +37,11 @@ module nocdyn_rigid_trains
 
 contains
 
-  !> The trains that the rows of two bodies tie, led by their first bodies and numbered in the order of those.
+  !> The trains that the rows of two bodies join. Their roots are their first bodies, in whose order they are numbered.
   subroutine find_trains(constraints, trains, is_tree)
     type(constraints_t), intent(in) :: constraints
     type(rigid_trains_t), intent(out) :: trains
-    logical, allocatable, intent(out) :: is_tree(:)   !! whether a row belongs to a tree; later rows close loops, [rows]
+    logical, allocatable, intent(out) :: is_tree(:)   !! whether a row belongs to a tree, [rows]; later rows close loops
     integer :: root(constraints%bodies), a, b, r
 
     allocate (is_tree(constraints%rows()), source=.false.)
@@ -56,11 +56,11 @@ contains
     call build_trees(constraints, is_tree, pack([(b, b=1, constraints%bodies)], root == [(b, b=1, constraints%bodies)]), trains)
   end subroutine find_trains
 
-  !> The trees as seen from other leads, one of each train.
+  !> Makes other bodies the roots of the trees.
   subroutine choose_roots(self, constraints, roots)
     class(rigid_trains_t), intent(inout) :: self
     type(constraints_t), intent(in) :: constraints
-    integer, intent(in) :: roots(:)   !! [trains]
+    integer, intent(in) :: roots(:)   !! one body of each train
     logical :: is_tree(constraints%rows())
     integer :: b
 
@@ -71,11 +71,11 @@ contains
     call build_trees(constraints, is_tree, roots, self)
   end subroutine choose_roots
 
-  !> Walks the trees from their leads outwards, breadth first.
+  !> Builds the trees from their roots outwards, breadth first.
   subroutine build_trees(constraints, is_tree, roots, trains)
     type(constraints_t), intent(in) :: constraints
     logical, intent(in) :: is_tree(:)
-    integer, intent(in) :: roots(:)                  !! one body of each train
+    integer, intent(in) :: roots(:)   !! one body of each train
     class(rigid_trains_t), intent(out) :: trains
     integer, allocatable :: first(:), rows(:)
     integer :: b, begin, k, next, other, r, t
@@ -109,7 +109,7 @@ contains
     end do
   end subroutine build_trees
 
-  !> omega(body) = fraction * 2**exponent * omega(lead of its train), with 1/2 <= |fraction| < 1.
+  !> omega(body) = fraction * 2**exponent * omega(root of its train), with 1/2 <= |fraction| < 1.
   subroutine scaled_ratios(self, constraints, lane, fractions, exponents)
     class(rigid_trains_t), intent(in) :: self
     type(constraints_t), intent(in) :: constraints
@@ -131,7 +131,7 @@ contains
     end do
   end subroutine scaled_ratios
 
-  !> omega(body) / omega(lead of its train) of one lane, [bodies]; 0 where that is smaller than any real number.
+  !> omega(body) / omega(root of its train) of one lane, [bodies]; 0 where it underflows.
   function ratios(self, constraints, lane) result(ratio)
     class(rigid_trains_t), intent(in) :: self
     type(constraints_t), intent(in) :: constraints
@@ -143,7 +143,7 @@ contains
     ratio = scale(ratio, max(exponents, minexponent(1.0_wp) - digits(1.0_wp)))
   end function ratios
 
-  !> The body of each train that turns fastest in the first lane; of several, the first.
+  !> The fastest body of each train in the first lane; the first one of several.
   function fastest_bodies(self, constraints) result(fastest)
     class(rigid_trains_t), intent(in) :: self
     type(constraints_t), intent(in) :: constraints
@@ -164,7 +164,7 @@ contains
     end do
   end function fastest_bodies
 
-  !> |omega(a)| / |omega(b)|, cut off where it is very large or small.
+  !> |omega(a)| / |omega(b)|, limited to the exponents -max_exponent to max_exponent.
   pure real(wp) function quotient_of(fractions, exponents, a, b) result(quotient)
     real(wp), intent(in) :: fractions(:)
     integer, intent(in) :: exponents(:), a, b
@@ -172,7 +172,7 @@ contains
     quotient = scale(abs(fractions(a) / fractions(b)), max(-max_exponent, min(max_exponent, exponents(a) - exponents(b))))
   end function quotient_of
 
-  !> The largest binary exponent of a ratio to the lead, and the body that has it, for each train in the first lane.
+  !> The largest binary exponent of a ratio to the root in each train, and the body that has it, in the first lane.
   subroutine largest_exponents(self, constraints, largest, body)
     class(rigid_trains_t), intent(in) :: self
     type(constraints_t), intent(in) :: constraints
@@ -192,7 +192,7 @@ contains
     end do
   end subroutine largest_exponents
 
-  !> Whether rows of two bodies of one train ask for other ratios than its tree, in the first lane, [rows].
+  !> Whether each of some rows between two bodies of one train contradicts the ratios of its tree, in the first lane, [rows].
   function is_inconsistent(self, constraints, rows) result(answer)
     class(rigid_trains_t), intent(in) :: self
     type(constraints_t), intent(in) :: constraints
@@ -215,7 +215,7 @@ contains
     end do
   end function is_inconsistent
 
-  !> The way through the tree from body a to body b of one train: bodies(i) and bodies(i + 1) are tied by rows(i).
+  !> The path through the tree from body a to body b of one train: rows(i) is between bodies(i) and bodies(i + 1).
   subroutine find_path(self, a, b, bodies, rows)
     class(rigid_trains_t), intent(in) :: self
     integer, intent(in) :: a, b
@@ -226,7 +226,7 @@ contains
     from_b = 0
     i = a
     j = b
-    do while (i /= j)   ! a body has a later place than its parent
+    do while (i /= j)   ! a body has a later position than its parent
       if (self%position(i) > self%position(j)) then
         i = self%parent(i)
         from_a = from_a + 1
@@ -252,14 +252,14 @@ contains
     end do
   end subroutine find_path
 
-  !> The rows of trees whose reactions, with those of the leads, hold moments on the bodies in balance, ascending: those
-  !> where the moments, carried from body to parent, do not cancel. In the first lane.
+  !> Which tree rows carry load when their reactions, and torques on the roots, balance moments on the bodies, [rows].
+  !> A row does if the moments of all bodies behind it, transmitted from body to parent, do not cancel. In the first lane.
   function is_loaded(self, constraints, moments) result(loaded)
     class(rigid_trains_t), intent(in) :: self
     type(constraints_t), intent(in) :: constraints
-    real(wp), intent(in) :: moments(:)   !! [bodies]
+    real(wp), intent(in) :: moments(:)   !! [N m], [bodies]
     logical :: loaded(constraints%rows())
-    real(wp) :: moment(size(moments)), bound(size(moments))   ! carried to a body, and the sum of the absolute parts
+    real(wp) :: moment(size(moments)), bound(size(moments))   ! transmitted to a body, and the sum of the absolute terms
     real(wp) :: lever, other, own
     integer :: b, k, parent
 

@@ -1,7 +1,7 @@
-!> How the rigid trains of one group move, and how the relations between them are loaded: eqs. (73)-(82) for trains.
+!> Motion of the rigid trains of one group, and multipliers of the relations between them: eqs. (73)-(82) for trains.
 !>
-!> L_lambda^ext of the trains is block triangular: relations that peel give one train each, by a division; the core is
-!> inverted by LAPACK. Speeds follow from the core outwards; multipliers, by the transposed equations, towards the core.
+!> L_lambda^ext of the trains is block triangular: relations with a leaf give one train each, by a division; the core is
+!> inverted by LAPACK. Speeds are computed from the core outwards, multipliers by the transposed equations towards the core.
 module nocdyn_train_motion
   use nocdyn_complement, only: natural_complement
   use nocdyn_kinds, only: wp
@@ -12,22 +12,22 @@ module nocdyn_train_motion
 
   public :: find_motion, find_loads
 
-  !> Which train each relation of a group gives. Relations that are redundant have no part in it.
+  !> The order in which the relations of a group are solved. Redundant relations are not in it.
   type, public :: elimination_t
-    integer, allocatable :: free(:)          !! trains whose leads are the coordinates, in their order
-    integer, allocatable :: relation(:)      !! relations that give one train each, none of which is in a later one
-    integer, allocatable :: train(:)         !! that train
+    integer, allocatable :: free(:)          !! trains whose roots are the coordinates, in their order
+    integer, allocatable :: relation(:)      !! relations that give one train each, which is in no later one
+    integer, allocatable :: train(:)         !! the train that each gives
     integer, allocatable :: core(:)          !! relations that are solved together
-    integer, allocatable :: core_trains(:)   !! all trains in them
+    integer, allocatable :: core_trains(:)   !! all trains in the core
   contains
     procedure :: list_structure
   end type elimination_t
 
   !> The motion of the trains of a group in one lane.
   type, public :: train_motion_t
-    real(wp), allocatable :: motion(:, :)         !! L_tau of the leads, [trains of the group, free]
-    real(wp), allocatable :: dual(:, :)           !! D of the core, [core_trains, core]
-    real(wp) :: log_determinant = 0.0_wp          !! of |L_lambda^ext| of the trains
+    real(wp), allocatable :: motion(:, :)   !! L_tau of the roots, [trains of the group, free]
+    real(wp), allocatable :: dual(:, :)     !! D of the core, [core_trains, core]
+    real(wp) :: log_determinant = 0.0_wp    !! logarithm of |det L_lambda^ext| of the trains
   end type train_motion_t
 
 contains
@@ -36,8 +36,8 @@ contains
   subroutine find_motion(relations, elimination, local, trains, lane, found)
     type(train_relations_t), intent(in) :: relations
     type(elimination_t), intent(in) :: elimination
-    integer, intent(in) :: local(:)    !! of every train in its group
-    integer, intent(in) :: trains      !! in this group
+    integer, intent(in) :: local(:)   !! number of every train within its group
+    integer, intent(in) :: trains     !! number of trains in this group
     integer, intent(in) :: lane
     type(train_motion_t), intent(out) :: found
     integer :: entry, i, k
@@ -63,7 +63,7 @@ contains
     end do
   end subroutine find_motion
 
-  !> The natural complement of the core.
+  !> Computes the natural complement of the core.
   subroutine move_core(relations, elimination, local, lane, found)
     type(train_relations_t), intent(in) :: relations
     type(elimination_t), intent(in) :: elimination
@@ -84,14 +84,14 @@ contains
     found%motion(local(elimination%core_trains), pack([(k, k=1, size(column))], column > 0)) = complement
   end subroutine move_core
 
-  !> The multipliers of relations that balance moments on the trains; moments on the free trains are what is left over.
+  !> Multipliers of the relations that balance moments on the trains. Moments on the free trains remain.
   pure subroutine find_loads(relations, elimination, dual, lane, moment, lambda)
     type(train_relations_t), intent(in) :: relations
     type(elimination_t), intent(in) :: elimination
     real(wp), intent(in) :: dual(:, :)
     integer, intent(in) :: lane
-    real(wp), intent(inout) :: moment(:)   !! [all trains]; those of the relations that peel are taken off
-    real(wp), intent(inout) :: lambda(:)   !! [all relations], those of the elimination are set
+    real(wp), intent(inout) :: moment(:)   !! [N m], [trains]; on return without the moments of the eliminated relations
+    real(wp), intent(inout) :: lambda(:)   !! [relations]; those of the elimination are set
     integer :: entry, i, k
 
     associate (equations => relations%equations)

@@ -1,7 +1,7 @@
-!> Rows that are not between two bodies, as relations between the speeds of rigid trains.
+!> Relations between the speeds of rigid trains: all rows that are not between two bodies.
 !>
-!> A relation with a train that no other one has gives the speed of that train from the others. Relations are taken away
-!> one by one in this manner; those that are left, the core, are solved together by dense linear algebra.
+!> A train that is in one relation only is a leaf: its relation gives its speed from the others. Leaves are eliminated one after
+!> the other. The relations that remain, the core, are solved together by dense linear algebra.
 module nocdyn_train_relations
   use nocdyn_constraints, only: constraints_t, new_constraints
   use nocdyn_kinds, only: wp
@@ -13,25 +13,25 @@ module nocdyn_train_relations
   public :: new_relations, scaled_rows, distinct_trains
 
   type, public :: train_relations_t
-    integer, allocatable :: row(:)     !! of the constraints, of each relation
-    type(constraints_t) :: equations     !! the relations; its bodies are the trains, and it has zeros where terms cancel
+    integer, allocatable :: row(:)     !! constraint row of each relation
+    type(constraints_t) :: equations   !! the relations; its bodies are the trains; coefficients are zero where terms cancel
   contains
     procedure :: eliminate_leaves
     procedure :: coefficient_of
     procedure :: loaded_rows
   end type train_relations_t
 
-  !> Relations in the order in which they are taken away: train(i) is in relation(i) and in none behind it.
+  !> Relations in the order of elimination: train(i) is in relation(i) and in no later one.
   type, public :: leaf_elimination_t
     integer, allocatable :: relation(:), train(:)
-    integer, allocatable :: core(:)    !! relations that are left, ascending
+    integer, allocatable :: core(:)   !! relations that remain, ascending
   end type leaf_elimination_t
 
-  real(wp), parameter :: min_pivot_share = 1.0e-3_wp   ! share of a relation's largest coefficient that may be divided by
+  real(wp), parameter :: min_pivot_share = 1.0e-3_wp   ! smallest pivot, as a share of the relation's largest coefficient
 
 contains
 
-  !> The relations of a machine on all lanes.
+  !> The relations of a machine, for all lanes.
   function new_relations(constraints, trains) result(self)
     type(constraints_t), intent(in) :: constraints
     type(rigid_trains_t), intent(in) :: trains
@@ -50,13 +50,13 @@ contains
                                    selected(constraints%units, self%row), first, train, coefficient)
   end function new_relations
 
-  !> The trains of each relation once, and where the entries of the rows are added.
+  !> Lists the trains of each relation once, and the relation entry of each row entry.
   subroutine gather_trains(constraints, trains, rows, first, train, entry_of)
     type(constraints_t), intent(in) :: constraints
     type(rigid_trains_t), intent(in) :: trains
     integer, intent(in) :: rows(:)
     integer, allocatable, intent(out) :: first(:), train(:)
-    integer, allocatable, intent(out) :: entry_of(:)   !! of each entry of `rows`, one after another
+    integer, allocatable, intent(out) :: entry_of(:)   !! of each entry of `rows`, in order
     integer :: at(size(trains%root)), entry, i, k, next
 
     k = sum([(constraints%entries(rows(i)), i=1, size(rows))])
@@ -82,11 +82,11 @@ contains
     train = train(:next - 1)
   end subroutine gather_trains
 
-  !> The coefficients between trains of one lane, 0 where those of the bodies cancel.
+  !> Coefficients of the relations of one lane, [entries]; 0 where those of the bodies cancel.
   function summed(constraints, rows, entry_of, ratio, lane, entries) result(coefficient)
     type(constraints_t), intent(in) :: constraints
     integer, intent(in) :: rows(:), entry_of(:), lane, entries
-    real(wp), intent(in) :: ratio(:)   !! of each body to its lead
+    real(wp), intent(in) :: ratio(:)   !! of each body to the root of its train
     real(wp) :: coefficient(entries), bound(entries), term
     integer :: entry, i, k
 
@@ -104,7 +104,7 @@ contains
     where (abs(coefficient) <= ratio_tolerance * bound) coefficient = 0.0_wp
   end function summed
 
-  !> The coefficient of one train in a relation.
+  !> Coefficient of one train in a relation.
   pure real(wp) function coefficient_of(self, lane, relation, train) result(coefficient)
     class(train_relations_t), intent(in) :: self
     integer, intent(in) :: lane, relation, train
@@ -115,11 +115,11 @@ contains
     end do
   end function coefficient_of
 
-  !> Takes away what can be, by the coefficients of the first lane.
+  !> Eliminates leaves as long as there are any, by the coefficients of the first lane.
   function eliminate_leaves(self, takes_part, must_be_free) result(leaves)
     class(train_relations_t), intent(in) :: self
-    logical, intent(in) :: takes_part(:)   !! [relations]
-    logical, intent(in) :: must_be_free(:)    !! trains whose speeds are not to be given by others, [trains]
+    logical, intent(in) :: takes_part(:)     !! whether a relation is considered, [relations]
+    logical, intent(in) :: must_be_free(:)   !! whether the speed of a train must not be eliminated, [trains]
     type(leaf_elimination_t) :: leaves
     integer, allocatable :: first(:), of_train(:)
     integer :: uses(size(must_be_free)), queue(size(takes_part) + size(self%equations%body))
@@ -152,7 +152,7 @@ contains
     leaves%core = pack(leaves%core, is_left(leaves%core))
   end function eliminate_leaves
 
-  !> The train that only this relation has, with the largest coefficient; 0 if there is none fit to be divided by.
+  !> The train that is in this relation only, with the largest coefficient; 0 if there is none with a good pivot.
   pure integer function leaf_train(equations, relation, uses, must_be_free) result(train)
     type(constraints_t), intent(in) :: equations
     integer, intent(in) :: relation, uses(:)
@@ -172,7 +172,7 @@ contains
     end associate
   end function leaf_train
 
-  !> A relation that is taken away may leave trains that only one other relation has: that one is looked at again.
+  !> Removes an eliminated relation. Another relation that has got a leaf by this is put into the queue.
   pure subroutine drop_relation(equations, relation, first, of_train, is_left, uses, queue, last)
     type(constraints_t), intent(in) :: equations
     integer, intent(in) :: relation, first(:), of_train(:)
@@ -193,14 +193,14 @@ contains
     end do
   end subroutine drop_relation
 
-  !> The constraint rows that take part where the relations have these multipliers, ascending: those relations whose
-  !> multiplier is more than rounding, and the rows of trees that they load. In the first lane.
+  !> The constraint rows that carry load when the relations have these multipliers, ascending: relations whose multiplier is
+  !> more than rounding, and the tree rows that they load. In the first lane.
   function loaded_rows(self, constraints, trains, lambda, root) result(rows)
     class(train_relations_t), intent(in) :: self
     type(constraints_t), intent(in) :: constraints
     type(rigid_trains_t), intent(in) :: trains
-    real(wp), intent(in) :: lambda(:)   !! [relations]
-    integer, intent(in) :: root         !! whose moment is not carried further: the lead of a train; 0: none
+    real(wp), intent(in) :: lambda(:)   !! multipliers, [relations]
+    integer, intent(in) :: root         !! root of a train that carries a unit torque, 0: none
     integer, allocatable :: rows(:)
     integer, allocatable :: active(:)
     real(wp), allocatable :: sizes(:)
@@ -210,7 +210,7 @@ contains
 
     active = pack([(i, i=1, size(lambda))], abs(lambda) > 0.0_wp)
     allocate (sizes, source=row_sizes(self%equations, active))
-    associate (weight => abs(lambda(active)) * sizes)   ! a relation of size 0 says nothing between trains, but in them
+    associate (weight => abs(lambda(active)) * sizes)   ! a relation of size 0 has entries in one train only
       active = pack(active, sizes <= 0.0_wp .or. weight > ratio_tolerance * maxval(weight))
     end associate
     moment = 0.0_wp
@@ -227,7 +227,7 @@ contains
     rows = pack([(r, r=1, size(is_loaded))], is_loaded)
   end function loaded_rows
 
-  !> The largest term of each relation where the trains turn at their pace.
+  !> The largest term of each relation when the trains have their effective speeds.
   function row_sizes(equations, relations) result(sizes)
     type(constraints_t), intent(in) :: equations
     integer, intent(in) :: relations(:)
@@ -260,8 +260,8 @@ contains
     trains = pack([(t, t=1, size(is_there))], is_there)
   end function distinct_trains
 
-  !> Relations of the first lane as rows of unit length between speeds that are measured by the pace of each train, so that
-  !> metres and teeth compare and a large ratio is not taken for a lock.
+  !> Coefficients of relations in the first lane, scaled by the effective speed of each train, as rows of unit length. With this
+  !> scaling metres and teeth are comparable, and a large ratio does not look like a lock.
   function scaled_rows(equations, relations, trains) result(matrix)
     type(constraints_t), intent(in) :: equations
     integer, intent(in) :: relations(:), trains(:)
@@ -274,12 +274,13 @@ contains
     end do
   end function scaled_rows
 
-  !> Speeds that make the terms of each relation alike, carried from train to train: the measure of what is small.
+  !> Effective speeds of the trains: with them the largest terms of the relations are about equal. They are computed from train
+  !> to train and serve as the scale for rounding.
   pure function effective_speeds(equations, relations, trains) result(pace)
     type(constraints_t), intent(in) :: equations
     integer, intent(in) :: relations(:), trains(:)
     real(wp) :: pace(size(trains))
-    real(wp) :: known(equations%bodies), largest   ! 0: not known yet
+    real(wp) :: known(equations%bodies), largest   ! 0: not computed yet
     integer :: entry, i, k, unknown
 
     known = 0.0_wp
