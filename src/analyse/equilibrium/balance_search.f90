@@ -1,7 +1,7 @@
-!> Finds the speeds at which the torques on a machine balance.
+!> Search for the speeds at which the torques on a machine balance.
 !>
-!> Unknowns that no equation joins are searched for by themselves. A single speed is searched for over the whole range:
-!> every change of sign of the torque, and every pair of them that hides between two points of the scan, is refined.
+!> Unknowns without common equations are searched for separately. A single speed is searched for over its whole range: every
+!> change of sign of the torque on a grid is refined, and every pair of changes between two points of the grid.
 !> Several unknowns are searched for by Newton's method from many starts.
 module nocdyn_balance_search
   use nocdyn_kinds, only: wp
@@ -12,25 +12,25 @@ module nocdyn_balance_search
 
   public :: search_balance
 
-  integer, parameter :: decades = 6              !! speeds of the fastest body from 1e-6 to 1e6 rad/s, of either sign
+  integer, parameter :: decades = 6              ! speeds of the fastest body from 1e-6 to 1e6 rad/s, in both directions
   integer, parameter :: points_per_decade = 100
-  integer, parameter :: most_solutions = 64      !! of a machine
-  real(wp), parameter :: rounding = 8 * epsilon(1.0_wp)   !! a sum that is smaller than its terms by this is zero
-  real(wp), parameter :: same = 1.0e-7_wp        !! relative distance below which two solutions are one
+  integer, parameter :: most_solutions = 64      ! of a block
+  real(wp), parameter :: rounding = 8 * epsilon(1.0_wp)   ! a sum below this share of its terms is zero
+  real(wp), parameter :: same = 1.0e-7_wp        ! relative distance below which two solutions are one
 
-  !> All solutions of one block, and what is to be said if there is none.
+  !> All solutions of one block of unknowns, and the smallest imbalance for the message if there is none.
   type, public :: block_solutions_t
     integer, allocatable :: members(:)           !! unknowns
     real(wp), allocatable :: values(:, :)        !! [members, solutions]
-    logical, allocatable :: is_range(:)          !! whether a solution stands for a range of others, [solutions]
-    logical :: is_unloaded = .false.                 !! nothing acts: any speed is steady, and the one of the start is kept
-    real(wp) :: least_torque = huge(1.0_wp)      !! smallest imbalance that was met, with its sign [N m]
-    real(wp) :: least_speed = 0.0_wp             !! there [rad/s]
+    logical, allocatable :: is_range(:)   !! whether a solution represents a range of solutions, [solutions]
+    logical :: is_unloaded = .false.   !! no torque acts: any speed is steady, and that of the start is taken
+    real(wp) :: least_torque = huge(1.0_wp)   !! smallest imbalance found, with its sign [N m]
+    real(wp) :: least_speed = 0.0_wp   !! speed of the smallest imbalance [rad/s]
   end type block_solutions_t
 
 contains
 
-  !> The solutions of every block.
+  !> Finds the solutions of every block.
   subroutine search_balance(balance, blocks)
     type(torque_balance_t), intent(inout) :: balance
     type(block_solutions_t), allocatable, intent(out) :: blocks(:)
@@ -54,10 +54,10 @@ contains
     end do
   end subroutine search_balance
 
-  !> All speeds of a single freedom where the torque changes its sign.
+  !> Finds all speeds of a single rigid motion at which the torque changes its sign.
   subroutine scan(balance, z, block)
     type(torque_balance_t), intent(inout) :: balance
-    real(wp), intent(in) :: z(:)
+    real(wp), intent(in) :: z(:)   !! the other unknowns, [unknowns]
     type(block_solutions_t), intent(inout) :: block
     real(wp) :: grid(-2 * decades * points_per_decade - 1:2 * decades * points_per_decade + 1)
     real(wp) :: torque(lbound(grid, 1):ubound(grid, 1))
@@ -81,11 +81,11 @@ contains
     end do
   end subroutine scan
 
-  !> Speeds that grow geometrically on both sides of zero; `fastest` is the speed of the fastest body per speed of the freedom.
+  !> Speeds of a rigid motion that grow geometrically on both sides of zero.
   subroutine fill_speed_grid(balance, freedom, grid)
     type(torque_balance_t), intent(in) :: balance
     integer, intent(in) :: freedom
-    real(wp), intent(out) :: grid(-2 * decades * points_per_decade - 1:)
+    real(wp), intent(out) :: grid(-2 * decades * points_per_decade - 1:)   !! [rad/s]
     real(wp) :: unit(balance%motions%freedoms()), fastest
     integer :: i
 
@@ -99,12 +99,12 @@ contains
     end do
   end subroutine fill_speed_grid
 
-  !> The solutions between this point of the scan and the next, and in the pair of intervals around it.
+  !> Finds the solutions between a point of the grid and the next, and near a minimum at the point.
   subroutine search_interval(balance, z, grid, torque, lower, i, block)
     type(torque_balance_t), intent(inout) :: balance
-    real(wp), intent(in) :: z(:)
-    integer, intent(in) :: lower, i
-    real(wp), intent(in) :: grid(lower:), torque(lower:)
+    real(wp), intent(in) :: z(:)   !! the other unknowns, [unknowns]
+    integer, intent(in) :: lower, i   !! lower bound of the grid, point
+    real(wp), intent(in) :: grid(lower:), torque(lower:)   !! [rad/s], [N m]
     type(block_solutions_t), intent(inout) :: block
     real(wp) :: middle, top
 
@@ -128,11 +128,11 @@ contains
     end associate
   end subroutine search_interval
 
-  !> A point of the scan where the torques balance, or the speed nearest to `start` of the range that begins there.
+  !> Adds a point of the grid at which the torques balance, or, of a range that begins there, the speed nearest to `start`.
   subroutine add_range(start, grid, torque, lower, i, block)
-    real(wp), intent(in) :: start
-    integer, intent(in) :: lower, i
-    real(wp), intent(in) :: grid(lower:), torque(lower:)
+    real(wp), intent(in) :: start   !! [rad/s]
+    integer, intent(in) :: lower, i   !! lower bound of the grid, point
+    real(wp), intent(in) :: grid(lower:), torque(lower:)   !! [rad/s], [N m]
     type(block_solutions_t), intent(inout) :: block
     integer :: last
 
@@ -146,7 +146,7 @@ contains
     if (last > i) block%is_range(size(block%is_range)) = .true.
   end subroutine add_range
 
-  !> Whether the middle one of three torques of the same sign is the smallest.
+  !> Whether the middle one of three torques of equal sign is the smallest.
   pure logical function is_local_minimum(torque)
     real(wp), intent(in) :: torque(3)
 
@@ -154,12 +154,12 @@ contains
              abs(torque(2)) <= abs(torque(1)) .and. abs(torque(2)) <= abs(torque(3))
   end function is_local_minimum
 
-  !> The torque along a freedom when it has this speed; zero if it is no more than rounding.
+  !> Torque along a rigid motion at a speed; zero if it is rounding.
   function imbalance(balance, z, member, speed) result(torque)
     type(torque_balance_t), intent(inout) :: balance
-    real(wp), intent(in) :: z(:)
-    integer, intent(in) :: member
-    real(wp), intent(in) :: speed
+    real(wp), intent(in) :: z(:)   !! the other unknowns, [unknowns]
+    integer, intent(in) :: member   !! number of the rigid motion
+    real(wp), intent(in) :: speed   !! [rad/s]
     real(wp) :: torque
     real(wp) :: trial(size(z))
 
@@ -170,15 +170,15 @@ contains
     if (abs(torque) <= rounding * balance%scale(member)) torque = 0.0_wp
   end function imbalance
 
-  !> The smallest torque between two speeds, by golden sections until its sign changes or the interval is used up.
+  !> Smallest torque between two speeds, by golden sections, until its sign changes or the interval is very small.
   subroutine minimise_torque(balance, z, member, left, right, middle, torque)
     type(torque_balance_t), intent(inout) :: balance
-    real(wp), intent(in) :: z(:)
-    integer, intent(in) :: member
-    real(wp), intent(in) :: left, right
-    real(wp), intent(out) :: middle, torque
+    real(wp), intent(in) :: z(:)   !! the other unknowns, [unknowns]
+    integer, intent(in) :: member   !! number of the rigid motion
+    real(wp), intent(in) :: left, right   !! [rad/s]
+    real(wp), intent(out) :: middle, torque   !! speed [rad/s] and torque [N m] there
     real(wp), parameter :: golden = 0.6180339887498949_wp
-    integer, parameter :: sections = 40   ! beyond 37 the torque at a minimum changes by rounding alone
+    integer, parameter :: sections = 40   ! after 37 the torque at a minimum changes by rounding only
     real(wp) :: a, b, internal(2), value(2), sign_outside
     integer :: i
 
@@ -206,11 +206,11 @@ contains
     torque = value(i)
   end subroutine minimise_torque
 
-  !> The root between two speeds with torques of different sign: Newton's method, bisection where it leaves the bracket.
+  !> Adds the root between two speeds with torques of different sign: Newton's method, with bisection outside of the bracket.
   subroutine solve_bracketed(balance, z, left, right, left_torque, block)
     type(torque_balance_t), intent(inout) :: balance
-    real(wp), intent(in) :: z(:)
-    real(wp), intent(in) :: left, right, left_torque
+    real(wp), intent(in) :: z(:)   !! the other unknowns, [unknowns]
+    real(wp), intent(in) :: left, right, left_torque   !! [rad/s], torque at `left` [N m]
     type(block_solutions_t), intent(inout) :: block
     integer, parameter :: most_steps = 200
     real(wp) :: a, b, slopes(size(z), size(z)), speed, step, torque
@@ -241,7 +241,7 @@ contains
     end associate
   end subroutine solve_bracketed
 
-  !> Keeps a solution unless it is there already.
+  !> Adds a solution, unless the list has it.
   subroutine add(values, block)
     real(wp), intent(in) :: values(:)
     type(block_solutions_t), intent(inout) :: block
@@ -256,10 +256,10 @@ contains
     end if
   end subroutine add
 
-  !> Newton's method from the start of the machine and from speeds of many sizes, alone and together.
+  !> Newton's method from the start of the machine and from many speeds of single and of all rigid motions.
   subroutine search_from_starts(balance, z, block)
     type(torque_balance_t), intent(inout) :: balance
-    real(wp), intent(in) :: z(:)
+    real(wp), intent(in) :: z(:)   !! start of the machine, [unknowns]
     type(block_solutions_t), intent(inout) :: block
     real(wp), parameter :: speeds(9) = [0.0_wp, 1.0_wp, -1.0_wp, 10.0_wp, -10.0_wp, 100.0_wp, -100.0_wp, 1000.0_wp, -1000.0_wp]
     real(wp) :: trial(size(z))
@@ -280,10 +280,10 @@ contains
     end associate
   end subroutine search_from_starts
 
-  !> Newton's method with steps of least norm, halved until the residuals fall; what converges is kept.
+  !> Newton's method with steps of minimum norm, halved until the residuals fall. Adds the solution if it converges.
   subroutine newton(balance, z, block)
     type(torque_balance_t), intent(inout) :: balance
-    real(wp), intent(inout) :: z(:)
+    real(wp), intent(inout) :: z(:)   !! start, then the last iterate, [unknowns]
     type(block_solutions_t), intent(inout) :: block
     integer, parameter :: most_steps = 100
     real(wp), parameter :: singular = 1.0e-13_wp, tiny_step = 1.0e-13_wp
@@ -319,10 +319,10 @@ contains
     end associate
   end subroutine newton
 
-  !> Keeps a solution unless one is there already to which a range of others leads.
+  !> Adds a solution, unless a range of solutions leads from it to one in the list.
   subroutine add_or_join(balance, z, block)
     type(torque_balance_t), intent(inout) :: balance
-    real(wp), intent(in) :: z(:)
+    real(wp), intent(in) :: z(:)   !! [unknowns]
     type(block_solutions_t), intent(inout) :: block
     integer :: i
 
@@ -334,11 +334,11 @@ contains
     call add(z(block%members), block)
   end subroutine add_or_join
 
-  !> Whether the torques balance all the way between two solutions, at some points of it.
+  !> Whether the torques balance on the whole way between two solutions, at some points of it.
   logical function is_joined(balance, z, members, other)
     type(torque_balance_t), intent(inout) :: balance
-    real(wp), intent(in) :: z(:)
-    integer, intent(in) :: members(:)
+    real(wp), intent(in) :: z(:)   !! [unknowns]
+    integer, intent(in) :: members(:)   !! unknowns of the block
     real(wp), intent(in) :: other(:)   !! [members]
     integer, parameter :: intervals = 8
     integer :: i
@@ -352,32 +352,35 @@ contains
     is_joined = .true.
   end function is_joined
 
+  !> Whether two solutions are equal up to `same`.
   pure logical function is_same(one, other)
     real(wp), intent(in) :: one(:), other(:)
 
     is_same = all(abs(one - other) <= same * max(abs(one), abs(other), same))
   end function is_same
 
+  !> The unknowns after a step of some of them.
   pure function moved(z, members, step)
     real(wp), intent(in) :: z(:), step(:)
-    integer, intent(in) :: members(:)
+    integer, intent(in) :: members(:)   !! unknowns of the block
     real(wp) :: moved(size(z))
 
     moved = z
     moved(members) = moved(members) + step
   end function moved
 
+  !> Whether the residuals are zero up to the last bit of their terms.
   pure logical function is_balanced(balance, members)
     type(torque_balance_t), intent(in) :: balance
-    integer, intent(in) :: members(:)
+    integer, intent(in) :: members(:)   !! unknowns of the block
 
     is_balanced = all(abs(balance%residual(members)) <= epsilon(1.0_wp) * balance%scale(members))
   end function is_balanced
 
-  !> Whether Newton's method has ended at a root: the residuals are rounding, of torques or of rates.
+  !> Whether the residuals are rounding, so that Newton's method has ended at a root.
   pure logical function is_nearly_balanced(balance, members)
     type(torque_balance_t), intent(in) :: balance
-    integer, intent(in) :: members(:)
+    integer, intent(in) :: members(:)   !! unknowns of the block
     real(wp), parameter :: near = 1.0e-10_wp
     integer :: i
 

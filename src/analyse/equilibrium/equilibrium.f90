@@ -1,4 +1,4 @@
-!> How does the machine run when it has run for long: constant speeds, mean torques, constant twists.
+!> Steady states of a machine: constant speeds, mean torques, constant twists.
 module nocdyn_equilibrium
   use nocdyn_balance_search, only: block_solutions_t, search_balance
   use nocdyn_errors, only: error_t, exit_failed, raise
@@ -16,29 +16,30 @@ module nocdyn_equilibrium
 
   public :: find_equilibria, find_stability, nearest_equilibrium
 
-  real(wp), parameter, public :: t_infinity = 1.0e30_wp   !! when all that changes once has changed [s]
+  real(wp), parameter, public :: t_infinity = 1.0e30_wp   !! a time after all transients of the excitations [s]
 
-  integer, parameter :: most_combinations = 64   !! of the solutions of independent parts of a machine
-  integer, parameter :: most_states = 1000       !! whose eigenvalues are found to state the stability, in some seconds
-  integer, parameter :: most_names = 5           !! bodies that a message names
+  integer, parameter :: most_combinations = 64   ! of the solutions of independent parts of a machine
+  integer, parameter :: most_states = 1000       ! up to which eigenvalues are computed, which takes some seconds
+  integer, parameter :: most_names = 5           ! of bodies in a message
   integer, parameter :: digits = 6
 
+  !> A steady state and its stability.
   type, public :: equilibrium_t
-    real(wp), allocatable :: y(:, :)          !! state of the reduced formulation without works, [1, states]
+    real(wp), allocatable :: y(:, :)   !! state of the reduced formulation without work integrals, [1, states]
     character(len=14) :: stability = 'not determined'   !! stable, unstable, neutral, not determined
-    real(wp) :: growth = 0.0_wp               !! largest real part of the eigenvalues but those of idle motions [1/s]
-    integer :: free_modes = 0                       !! rigid motions that nothing drives or brakes
+    real(wp) :: growth = 0.0_wp   !! largest real part of the eigenvalues without those of free rigid motions [1/s]
+    integer :: free_modes = 0   !! number of rigid motions without torques, or in a range of steady speeds
   end type equilibrium_t
 
 contains
 
-  !> All steady states that were found of a machine. Its mean torques are those of `formulation`, which is made here.
+  !> Finds the steady states of a machine with mean torques.
   subroutine find_equilibria(machine, formulation, equilibria, notes, error)
-    type(machine_t), intent(in) :: machine
-    class(formulation_t), allocatable, intent(out) :: formulation
+    type(machine_t), intent(in) :: machine   !! one lane
+    class(formulation_t), allocatable, intent(out) :: formulation   !! reduced formulation of the machine with mean torques
     type(equilibrium_t), allocatable, intent(out) :: equilibria(:)
-    type(string_t), allocatable, intent(out) :: notes(:)
-    type(error_t), allocatable, intent(out) :: error               !! if there is none
+    type(string_t), allocatable, intent(out) :: notes(:)   !! remarks for the report
+    type(error_t), allocatable, intent(out) :: error   !! if no steady state was found
     type(machine_t) :: mean_machine
     type(torque_balance_t) :: balance
     type(block_solutions_t), allocatable :: blocks(:)
@@ -62,7 +63,7 @@ contains
     call combine(balance, blocks, equilibria, notes, error)
   end subroutine find_equilibria
 
-  !> States the stability of every steady state.
+  !> Determines the stability of every steady state.
   subroutine find_stability(formulation, equilibria)
     class(formulation_t), intent(inout) :: formulation
     type(equilibrium_t), intent(inout) :: equilibria(:)
@@ -73,7 +74,7 @@ contains
     end do
   end subroutine find_stability
 
-  !> Every combination of the solutions of the blocks, with its twists.
+  !> Combines the solutions of the blocks in all ways and finds the twists of each combination.
   subroutine combine(balance, blocks, equilibria, notes, error)
     type(torque_balance_t), intent(inout) :: balance
     type(block_solutions_t), intent(in) :: blocks(:)
@@ -108,12 +109,12 @@ contains
     call raise(error, exit_failed, 'there is no steady state: ' // notes(size(notes))%text)
   end subroutine combine
 
-  !> What else is steady beside a solution: other speeds, other twists.
+  !> Adds notes about other steady speeds and twists beside a solution.
   subroutine add_range_notes(balance, blocks, choice, z, notes)
-    type(torque_balance_t), intent(in) :: balance      !! at the solution, with its twists
+    type(torque_balance_t), intent(in) :: balance   !! evaluated at the solution, with its twists
     type(block_solutions_t), intent(in) :: blocks(:)
-    integer, intent(in) :: choice(:)
-    real(wp), intent(in) :: z(:)
+    integer, intent(in) :: choice(:)   !! number of the solution of each block
+    real(wp), intent(in) :: z(:)   !! the solution, [unknowns]
     type(string_t), allocatable, intent(inout) :: notes(:)
     integer, allocatable :: undetermined(:)
     type(string_t), allocatable :: names(:)
@@ -135,7 +136,7 @@ contains
                            joined(names, ', ', most_names) // ' one near the start is kept')
   end subroutine add_range_notes
 
-  !> Appends a note that is not there yet.
+  !> Appends a note, unless the list has it.
   subroutine append_new(notes, text)
     type(string_t), allocatable, intent(inout) :: notes(:)
     character(len=*), intent(in) :: text
@@ -147,10 +148,10 @@ contains
     call append(notes, text)
   end subroutine append_new
 
-  !> The next combination; false after the last.
+  !> Advances to the next combination; false after the last one.
   logical function advance(blocks, choice)
     type(block_solutions_t), intent(in) :: blocks(:)
-    integer, intent(inout) :: choice(:)
+    integer, intent(inout) :: choice(:)   !! number of the solution of each block
     integer :: i
 
     advance = .true.
@@ -162,12 +163,12 @@ contains
     advance = .false.
   end function advance
 
-  !> The state with these speeds and inner states, and with the twists that belong to them.
+  !> The state with these speeds and internal states, and with the twists that balance the torques.
   subroutine complete(balance, z, equilibrium, is_found, error)
     type(torque_balance_t), intent(inout) :: balance
-    real(wp), intent(in) :: z(:)
+    real(wp), intent(in) :: z(:)   !! [unknowns]
     type(equilibrium_t), intent(out) :: equilibrium
-    logical, intent(out) :: is_found
+    logical, intent(out) :: is_found   !! whether such twists exist
     type(error_t), allocatable, intent(out) :: error
     real(wp) :: q(balance%coordinates)
 
@@ -179,11 +180,11 @@ contains
     equilibrium%y = balance%y
   end subroutine complete
 
-  !> States the stability by the eigenvalues of the linearisation, where there are not too many.
+  !> Determines the stability by the eigenvalues of the linearised machine, unless it has too many states.
   subroutine classify(formulation, equilibrium)
     class(formulation_t), intent(inout) :: formulation
     type(equilibrium_t), intent(inout) :: equilibrium
-    real(wp), parameter :: rounding = 1.0e-10_wp   ! of the largest eigenvalue
+    real(wp), parameter :: rounding = 1.0e-10_wp   ! as a share of the largest eigenvalue
     type(linearisation_t) :: linear
     type(error_t), allocatable :: error
     complex(wp), allocatable :: values(:), vectors(:, :)
@@ -206,10 +207,10 @@ contains
     end if
   end subroutine classify
 
-  !> The largest real part of the eigenvalues, but for the smallest of them, which are those of idle motions.
+  !> The largest real part of the eigenvalues, without the smallest ones, which belong to free rigid motions.
   pure real(wp) function growth_rate(values, free_modes)
     complex(wp), intent(in) :: values(:)
-    integer, intent(in) :: free_modes   !! how many do not count
+    integer, intent(in) :: free_modes   !! number of eigenvalues that are left out
     logical :: counts(size(values))
     integer :: i
 
@@ -221,7 +222,7 @@ contains
     if (any(counts)) growth_rate = maxval(real(values, wp), mask=counts)
   end function growth_rate
 
-  !> The steady state whose kinetic energy relative to the start is the least, of the stable ones if there are any.
+  !> The steady state with the least kinetic energy relative to the start; among the stable ones, if there are any.
   function nearest_equilibrium(formulation, equilibria) result(nearest)
     class(formulation_t), intent(inout) :: formulation
     type(equilibrium_t), intent(in) :: equilibria(:)
@@ -246,7 +247,7 @@ contains
     end do
   end function nearest_equilibrium
 
-  !> Why a block has no solution.
+  !> Message about a block without solution.
   function no_balance_message(balance, block) result(sentence)
     type(torque_balance_t), intent(inout) :: balance
     type(block_solutions_t), intent(in) :: block
@@ -275,7 +276,7 @@ contains
     end associate
   end function no_balance_message
 
-  !> The body that stands for a rigid motion.
+  !> Name of the independent body of a rigid motion.
   function body_of(balance, freedom) result(name)
     type(torque_balance_t), intent(in) :: balance
     integer, intent(in) :: freedom
@@ -286,10 +287,10 @@ contains
     end associate
   end function body_of
 
-  !> The names of the bodies that turn in these rigid motions.
+  !> Names of the bodies that turn in some rigid motions.
   function moving_bodies(balance, members) result(text)
     type(torque_balance_t), intent(in) :: balance
-    integer, intent(in) :: members(:)
+    integer, intent(in) :: members(:)   !! unknowns; those that are internal states are ignored
     character(len=:), allocatable :: text
     real(wp) :: unit(balance%motions%freedoms())
     logical :: moves(balance%formulation%machine%bodies)
@@ -309,11 +310,11 @@ contains
     end associate
   end function moving_bodies
 
-  !> "12.5 rad/s of 'motor'".
+  !> Speeds of rigid motions as text, such as "12.5 rad/s of 'motor'".
   function speed_text(balance, z, members) result(text)
     type(torque_balance_t), intent(in) :: balance
-    real(wp), intent(in) :: z(:)
-    integer, intent(in) :: members(:)   !! unknowns, of which the freedoms are told
+    real(wp), intent(in) :: z(:)   !! [unknowns]
+    integer, intent(in) :: members(:)   !! unknowns; those that are internal states are ignored
     character(len=:), allocatable :: text
     integer, allocatable :: freedoms(:)
     integer :: i

@@ -1,9 +1,9 @@
-!> The twists with which the couplings of a machine in steady running carry the torques.
+!> Twists of the couplings at which they carry the torques of a steady state.
 !>
-!> They are where the potential energy of the couplings, less the work of the torques on the coordinates, is smallest:
-!> found by Newton's method with the stiffness matrix, which is raised (K. Levenberg, Quart. Appl. Math. 2 (1944) 164)
-!> where a step would not lower the energy, as inside of a gap or where a spring softens. The matrix is a band in a
-!> good order of the coordinates.
+!> They minimise the potential energy of the couplings minus the work of the other torques on the coordinates. Newton's method
+!> uses the stiffness matrix; Levenberg's damping (Quart. Appl. Math. 2 (1944) 164) is added to its diagonal where a step would
+!> not lower the energy, as inside of a gap or where a spring softens. The matrix is banded, in a good order of the
+!> coordinates.
 module nocdyn_static_twists
   use nocdyn_banded_matrix, only: half_bandwidths
   use nocdyn_errors, only: error_t, exit_input, raise
@@ -19,36 +19,36 @@ module nocdyn_static_twists
 
   public :: find_twists, undetermined_elements
 
-  integer, parameter :: largest_matrix = 6000   ! rows and columns of a dense matrix of as many entries as are allowed
-  real(wp), parameter :: balanced = 1.0e-13_wp   ! of the torques' terms: what is left is rounding
-  real(wp), parameter :: angle_rounding = 16 * epsilon(1.0_wp)   ! of the angles, of which an elastic moment tells a difference
-  real(wp), parameter :: max_twist = 1.0e8_wp     ! rad: twists beyond this carry nothing that nearer ones do not
+  integer, parameter :: largest_matrix = 6000   ! rows of a dense matrix with the largest allowed number of entries
+  real(wp), parameter :: balanced = 1.0e-13_wp   ! torques below this share of their terms are rounding
+  real(wp), parameter :: angle_rounding = 16 * epsilon(1.0_wp)   ! relative error of the angles of which a twist is the difference
+  real(wp), parameter :: max_twist = 1.0e8_wp     ! rad: the iteration diverges
 
-  !> The stiffness matrix of the coordinates that are not free, and what is solved with it.
+  !> The minimisation problem: the stiffness matrix of the coordinates that are not free, and the torques.
   type :: twist_problem_t
-    integer, allocatable :: unknown(:)       !! coordinates
-    integer, allocatable :: position(:)         !! of each coordinate in the band, 0 if it is free
-    integer :: width = 0                     !! diagonals beside the main one
+    integer, allocatable :: unknown(:)   !! coordinates in the order of the band, [unknowns]
+    integer, allocatable :: position(:)   !! position of each coordinate in the band, 0 if it is free, [coordinates]
+    integer :: width = 0   !! number of diagonals beside the main one
     real(wp), allocatable :: band(:, :)
-    real(wp), allocatable :: diagonal_scale(:)       !! what raises the diagonal: its largest elements so far, 1 before, [unknown]
-    real(wp), allocatable :: external_torque(:)        !! torques of all other elements, [coordinates]
-    real(wp), allocatable :: external_scale(:)   !! sum of their absolute terms
-    real(wp) :: floor = 0.0_wp               !! rounding of the solution where little acts [N m]
-    real(wp), allocatable :: torque(:)       !! residual, [coordinates]
-    real(wp), allocatable :: tolerance(:)    !! what may be left of it: rounding of its terms and of the angles
+    real(wp), allocatable :: diagonal_scale(:)   !! what is damped: the largest diagonal elements so far, [unknowns]
+    real(wp), allocatable :: external_torque(:)   !! torques of all other elements [N m], [coordinates]
+    real(wp), allocatable :: external_scale(:)   !! sum of their absolute terms, [coordinates]
+    real(wp) :: floor = 0.0_wp   !! smallest torque that is not rounding [N m]
+    real(wp), allocatable :: torque(:)   !! residual [N m], [coordinates]
+    real(wp), allocatable :: tolerance(:)   !! rounding of the residual, from its terms and from the angles [N m], [coordinates]
     real(wp) :: energy = 0.0_wp
   end type twist_problem_t
 
 contains
 
-  !> The angles q of the coordinates, the free ones at their start; `balance` is at the speeds, by `evaluate`.
+  !> Finds the angles q of the coordinates; free coordinates stay. `balance` is evaluated at the speeds of the steady state.
   subroutine find_twists(balance, q, is_found, error)
     type(torque_balance_t), intent(inout) :: balance
-    real(wp), intent(inout) :: q(:)      !! [coordinates], where to begin
+    real(wp), intent(inout) :: q(:)   !! start, then solution [rad], [coordinates]
     logical, intent(out) :: is_found
     type(error_t), allocatable, intent(out) :: error   !! if the stiffness matrix is too large
     integer, parameter :: most_steps = 500
-    real(wp), parameter :: stalled = 1.0e3_wp   ! what is left and falls no further is rounding that no estimate foresees
+    real(wp), parameter :: stalled = 1.0e3_wp   ! residuals up to this many tolerances are rounding if they stop falling
     type(twist_problem_t) :: self
     real(wp) :: damping, trial(size(q)), step(size(q))
     real(wp) :: energy, excess, last_excess
@@ -83,13 +83,13 @@ contains
     end do
   end subroutine find_twists
 
-  !> Elastic elements whose twists are not determined: where the machine stands, they and all others beside them have no
-  !> stiffness.
+  !> Elastic elements whose twists are not determined: at the solution, rigid motions of the elements with stiffness twist
+  !> them.
   function undetermined_elements(balance) result(undetermined)
     type(torque_balance_t), intent(in) :: balance   !! after `find_twists`
     integer, allocatable :: undetermined(:)
     type(rigid_motions_t) :: motions
-    integer, allocatable :: slack(:)
+    integer, allocatable :: slack(:)   ! elastic elements without stiffness
     integer :: i
 
     associate (stiffness => balance%formulation%machine%elements%restoring_angle(1, balance%elastic))
@@ -105,7 +105,7 @@ contains
     type(torque_balance_t), intent(in) :: balance
     type(rigid_motions_t), intent(in) :: motions
     integer, intent(in) :: element
-    real(wp), parameter :: rounding = 1.0e-10_wp   ! of the terms of the rate of twist
+    real(wp), parameter :: rounding = 1.0e-10_wp   ! as a share of the terms
     real(wp) :: rate(motions%freedoms()), scale(motions%freedoms())
     integer :: i, k
 
@@ -124,7 +124,7 @@ contains
     is_twisted = any(abs(rate) > rounding * scale)
   end function is_twisted
 
-  !> The largest of the torques that are left over, in units of what may be left.
+  !> The largest residual, in units of its tolerance.
   pure real(wp) function torque_excess(self)
     type(twist_problem_t), intent(in) :: self
 
@@ -137,11 +137,11 @@ contains
     end do
   end function torque_excess
 
-  !> Whether a step has lowered the energy, or is so small that rounding hides it.
+  !> Whether a step has lowered the energy, or changed it by rounding only.
   pure logical function lowers_energy(self, energy, step)
     type(twist_problem_t), intent(in) :: self
-    real(wp), intent(in) :: energy
-    real(wp), intent(in) :: step(:)
+    real(wp), intent(in) :: energy   !! before the step
+    real(wp), intent(in) :: step(:)   !! [rad], [coordinates]
     real(wp), parameter :: rounding = 1.0e-12_wp
     real(wp) :: turned
 
@@ -149,11 +149,11 @@ contains
     lowers_energy = self%energy <= energy + rounding * turned
   end function lowers_energy
 
-  !> The order of the coordinates and the torques of the other elements.
+  !> Sets the order of the coordinates and the torques of the other elements.
   subroutine set_up(balance, self, error)
     type(torque_balance_t), intent(in) :: balance
     type(twist_problem_t), intent(out) :: self
-    type(error_t), allocatable, intent(out) :: error
+    type(error_t), allocatable, intent(out) :: error   !! if the band is too large
     type(entries_t) :: entries
     integer :: number(balance%coordinates), order(balance%coordinates - balance%motions%freedoms())
     integer :: c, upper
@@ -181,7 +181,7 @@ contains
     if (size(self%external_torque) > 0) self%floor = max(0.01_wp * epsilon(1.0_wp) * maxval(self%external_scale), tiny(1.0_wp))
   end subroutine set_up
 
-  !> Pairs of coordinates that an elastic element joins, each once.
+  !> Pairs of coordinates that an elastic element couples.
   function joined_coordinates(balance, number) result(entries)
     type(torque_balance_t), intent(in) :: balance
     integer, intent(in) :: number(:)   !! of each coordinate in the matrix, 0 if it has none
@@ -212,7 +212,7 @@ contains
     entries%column = entries%column(:n)
   end function joined_coordinates
 
-  !> The torques of the elements that are not elastic, and of the elastic ones what does not depend on the twist.
+  !> Computes the torques of the inelastic elements, and the part of the elastic ones that does not depend on the twist.
   subroutine find_external(balance, self)
     type(torque_balance_t), intent(in) :: balance
     type(twist_problem_t), intent(inout) :: self
@@ -236,10 +236,10 @@ contains
     end associate
   end subroutine find_external
 
-  !> The elements at the angles q: residual torques and energy.
+  !> Evaluates the elements at the angles q: residual torques and energy.
   subroutine evaluate_angles(balance, q, self)
     type(torque_balance_t), intent(inout) :: balance
-    real(wp), intent(in) :: q(:)
+    real(wp), intent(in) :: q(:)   !! [rad], [coordinates]
     type(twist_problem_t), intent(inout) :: self
     integer :: c, e, i, k
     real(wp) :: rounding
@@ -266,12 +266,12 @@ contains
     end associate
   end subroutine evaluate_angles
 
-  !> Solves (K + lift * shield) step = torque at the elements of the last `evaluate_angles`.
+  !> Solves (K + damping * diagonal_scale) step = torque, after `evaluate_angles`.
   subroutine solve(balance, damping, self, step, is_singular)
     type(torque_balance_t), intent(in) :: balance
     real(wp), intent(in) :: damping
     type(twist_problem_t), intent(inout) :: self
-    real(wp), intent(out) :: step(:)
+    real(wp), intent(out) :: step(:)   !! [rad], [coordinates]
     logical, intent(out) :: is_singular
     real(wp) :: x(size(self%unknown))
     integer :: column, diagonal, e, i, k, l, pivots(size(self%unknown)), row

@@ -1,8 +1,8 @@
-!> The equations of steady running: along every rigid motion of a machine the torques balance, and the inner states of its
-!> elements rest.
+!> The equations of a steady state: the torques balance along every rigid motion of the machine, and the internal states are
+!> constant.
 !>
-!> With the rigid motions q' = N s, elements whose twists stay do not count: the torques along s are the sum of
-!> G^T M over the other elements, whose speeds are G s. The unknowns are z = (s, inner states).
+!> With the rigid motions q' = N s, elastic elements do no work, as their twists are constant. The torques along s are the sum of
+!> G^T M over the other elements, whose speeds are G s. The unknowns are z = (s, internal states).
 module nocdyn_torque_balance
   use nocdyn_element_coordinates, only: element_coordinates_t, new_element_coordinates
   use nocdyn_formulation, only: formulation_t
@@ -16,23 +16,23 @@ module nocdyn_torque_balance
   public :: new_torque_balance
 
   type, public :: torque_balance_t
-    class(formulation_t), allocatable :: formulation
+    class(formulation_t), allocatable :: formulation   !! reduced, one lane, without work integrals
     type(element_coordinates_t) :: incidence
     type(rigid_motions_t) :: motions
-    integer, allocatable :: elastic(:)            !! elements that hold the rigid motions together
+    integer, allocatable :: elastic(:)   !! elements that the rigid motions do not twist
     integer :: coordinates = 0
-    integer :: internal = 0                          !! states after the angles
-    real(wp), allocatable :: residual(:)          !! of the equations after `evaluate`: [N m], rates of the inner states
-    real(wp), allocatable :: scale(:)              !! sum of the absolute terms of each
-    ! the rest is work space
+    integer :: internal = 0   !! number of internal states
+    real(wp), allocatable :: residual(:)   !! of the equations after `evaluate`: torques [N m], rates of the internal states, [unknowns]
+    real(wp), allocatable :: scale(:)   !! sum of the absolute terms of each residual, [unknowns]
+    ! work space:
     real(wp) :: t(1) = 0.0_wp
     integer :: status(1) = 0
     integer, allocatable, private :: inelastic(:)    !! elements that are not elastic
-    integer, allocatable :: first(:)              !! [acting + 1]
-    integer, allocatable :: freedom(:)            !! [entries]
-    real(wp), allocatable, private :: ratio(:)    !! G, [entries]
+    integer, allocatable :: first(:)   !! first entry of each inelastic element, [inelastic + 1]
+    integer, allocatable :: freedom(:)   !! rigid motion, [entries]
+    real(wp), allocatable, private :: ratio(:)   !! G, [entries]
     type(pattern_t), private :: pattern
-    real(wp), allocatable :: y(:, :)              !! state after `set_state`, [1, states]
+    real(wp), allocatable :: y(:, :)   !! state after `set_state`, [1, states]
     real(wp), allocatable, private :: rate(:, :), slopes(:, :)
   contains
     procedure :: unknowns
@@ -47,10 +47,10 @@ module nocdyn_torque_balance
 
 contains
 
-  !> The equations of a machine; `formulation` is the reduced one of a settled machine, one lane, without works.
+  !> The equations of a machine with mean torques.
   function new_torque_balance(formulation, t) result(self)
-    class(formulation_t), intent(in) :: formulation
-    real(wp), intent(in) :: t
+    class(formulation_t), intent(in) :: formulation   !! reduced, one lane, without work integrals
+    real(wp), intent(in) :: t   !! [s]
     type(torque_balance_t) :: self
     logical :: is_elastic(size(formulation%machine%elements%to))
     integer :: e
@@ -74,7 +74,7 @@ contains
     allocate (self%residual(self%unknowns()), self%scale(self%unknowns()), source=0.0_wp)
   end function new_torque_balance
 
-  !> G = U N of the acting elements.
+  !> Computes G = U N of the inelastic elements.
   subroutine gather_ratios(self)
     type(torque_balance_t), intent(inout) :: self
     real(wp) :: row(self%motions%freedoms())
@@ -105,13 +105,14 @@ contains
     end associate
   end subroutine gather_ratios
 
+  !> Number of unknowns: rigid motions and internal states.
   pure integer function unknowns(self)
     class(torque_balance_t), intent(in) :: self
 
     unknowns = self%motions%freedoms() + self%internal
   end function unknowns
 
-  !> The unknowns at the start of the machine: rigid motions with the angular momenta of the start speeds.
+  !> The unknowns at the start of the machine: rigid motions with the angular momenta of the start speeds, [unknowns].
   function start(self) result(z)
     class(torque_balance_t), intent(in) :: self
     real(wp) :: z(self%unknowns())
@@ -122,10 +123,10 @@ contains
     z(self%motions%freedoms() + 1:) = y(1, 2 * self%coordinates + 1:self%formulation%states)
   end function start
 
-  !> Solves N^T M N s = N^T M q' by conjugate gradients: the matrix is well conditioned and never formed.
+  !> Solves N^T M N s = N^T M q' by conjugate gradients; the matrix is well conditioned and is not formed.
   function mean_motion(self, q_rate) result(s)
     class(torque_balance_t), intent(in) :: self
-    real(wp), intent(in) :: q_rate(:)
+    real(wp), intent(in) :: q_rate(:)   !! [rad/s], [coordinates]
     real(wp) :: s(self%motions%freedoms())
     real(wp), dimension(size(s)) :: direction, image, rest
     real(wp) :: norm, old_norm, scale
@@ -149,7 +150,7 @@ contains
     end do
   end function mean_motion
 
-  !> L_tau^T J L_tau v.
+  !> L_tau^T J L_tau v, [coordinates].
   pure function inertial_torque(self, v) result(torque)
     class(torque_balance_t), intent(in) :: self
     real(wp), intent(in) :: v(:)   !! [coordinates]
@@ -172,10 +173,10 @@ contains
     end associate
   end function inertial_torque
 
-  !> Speeds of the bodies in the rigid motions s [rad/s].
+  !> Speeds of the bodies in rigid motions [rad/s], [bodies].
   pure function body_speeds(self, s) result(omega)
     class(torque_balance_t), intent(in) :: self
-    real(wp), intent(in) :: s(:)
+    real(wp), intent(in) :: s(:)   !! speeds of the rigid motions [rad/s], [freedoms]
     real(wp) :: omega(self%formulation%machine%bodies)
     real(wp) :: v(self%coordinates)
     integer :: b, k
@@ -191,10 +192,10 @@ contains
     end associate
   end function body_speeds
 
-  !> The state y of the unknowns, at the start angles.
+  !> Sets the state y from the unknowns, at the start angles.
   subroutine set_state(self, z)
     class(torque_balance_t), intent(inout) :: self
-    real(wp), intent(in) :: z(:)
+    real(wp), intent(in) :: z(:)   !! [unknowns]
 
     associate (f => self%coordinates, s => z(:self%motions%freedoms()))
       self%y(1, :f) = self%motions%speeds(s)
@@ -203,7 +204,7 @@ contains
     end associate
   end subroutine set_state
 
-  !> Brings the elements to the state y.
+  !> Evaluates the elements at the state y.
   subroutine evaluate_state(self)
     class(torque_balance_t), intent(inout) :: self
 
@@ -211,10 +212,10 @@ contains
     call self%formulation%derivative(self%t, self%y, self%rate, self%status)
   end subroutine evaluate_state
 
-  !> The residuals of the equations.
+  !> Computes the residuals of the equations.
   subroutine evaluate(self, z)
     class(torque_balance_t), intent(inout) :: self
-    real(wp), intent(in) :: z(:)
+    real(wp), intent(in) :: z(:)   !! [unknowns]
     real(wp) :: term
     integer :: e, i, k
 
@@ -238,7 +239,7 @@ contains
     end associate
   end subroutine evaluate
 
-  !> The derivatives of the residuals by the unknowns, after `evaluate` at the same place.
+  !> Derivatives of the residuals by the unknowns, after `evaluate` with the same unknowns.
   subroutine differentiate(self, matrix)
     class(torque_balance_t), intent(inout) :: self
     real(wp), intent(out) :: matrix(:, :)   !! [unknowns, unknowns]
@@ -261,10 +262,10 @@ contains
     if (self%internal > 0) call differentiate_internal(self, matrix)
   end subroutine differentiate
 
-  !> The rows and columns of the inner states: N^T M dq''/dx, dx'/dq' N and dx'/dx.
+  !> Fills the rows and columns of the internal states x: N^T M dq''/dx, dx'/dq' N and dx'/dx.
   subroutine differentiate_internal(self, matrix)
     type(torque_balance_t), intent(in) :: self
-    real(wp), intent(inout) :: matrix(:, :)
+    real(wp), intent(inout) :: matrix(:, :)   !! [unknowns, unknowns]
     real(wp) :: accelerations(self%coordinates, self%internal)
     integer :: c, k, p, r
 
@@ -291,7 +292,7 @@ contains
     end do
   end subroutine differentiate_internal
 
-  !> Unknowns that no equation joins have different numbers: their blocks can be solved one by one.
+  !> Numbers of the blocks of unknowns, [unknowns]. Unknowns of different blocks have no common equation.
   function blocks(self) result(block_of)
     class(torque_balance_t), intent(in) :: self
     integer :: block_of(self%unknowns())

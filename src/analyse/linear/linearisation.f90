@@ -1,12 +1,12 @@
-!> A machine linearised at a state: M q'' + C q' + K q = 0 in modal coordinates, with the inner states of its elements.
+!> A machine linearised at a state: M q'' + C q' + K q = 0 in modal coordinates, and the internal states of its elements.
 !>
 !> K = U^T diag(k) U with the tangent stiffnesses k of the elements and the map U from coordinates to twists; M = R^T R.
-!> The undamped modes are the right singular vectors of diag(sqrt(k)) U R^-1, and its singular values the natural
-!> frequencies: their error is a rounding of the highest frequency, where the eigenvalues of K and M have one of its
-!> square. Only where a stiffness is negative the symmetric eigenproblem is solved.
+!> The undamped modes are the right singular vectors of diag(sqrt(k)) U R^-1; the singular values are the natural
+!> frequencies. Their error is a rounding of the highest frequency; with the eigenvalues of K and M the squares would have such an
+!> error. The symmetric eigenproblem is solved only if a stiffness is negative.
 !>
-!> The first-order states are p = rates of the modal coordinates, e = natural frequency * modal coordinate of those that
-!> are not rigid, and the inner states. Then |p|^2 and |e|^2 are twice the energies, and rigid rotation is no state.
+!> The first-order states are p, the rates of the modal coordinates; e = natural frequency * modal coordinate, for the modes that
+!> are not rigid; and the internal states. So |p|^2 and |e|^2 are twice the energies, and rigid rotation is not a state.
 module nocdyn_linearisation
   use nocdyn_element_coordinates, only: element_coordinates_t, new_element_coordinates
   use nocdyn_errors, only: error_t, exit_failed, raise
@@ -20,28 +20,28 @@ module nocdyn_linearisation
 
   public :: linearise
 
-  !> Rigid motions are modes whose natural frequency is below these shares of the highest one: rounding of the singular
-  !> values, and of the eigenvalues, which are squares.
+  !> A mode is rigid if its natural frequency is below these shares of the highest one: the rounding of singular
+  !> values and of eigenvalues, which are squares.
   real(wp), parameter :: rigid_share = 1.0e-12_wp, rigid_share_of_squares = 1.0e-13_wp
 
   type, public :: linearisation_t
-    real(wp), allocatable :: shapes(:, :)        !! modes in the coordinates q, M-normalised, [coordinates, modes]
-    real(wp), allocatable :: twists(:, :)        !! the same for the twists of all elements, [elements, modes]
-    real(wp), allocatable :: natural(:)          !! natural frequencies, negative of unstable modes [rad/s]
-    integer, allocatable :: flexible(:)          !! modes that are not rigid
-    real(wp), allocatable :: stiffness(:)        !! k of all elements [N m/rad]
-    real(wp), allocatable :: matrix(:, :)        !! of the first-order system, [modes + flexible + inner states]
+    real(wp), allocatable :: shapes(:, :)   !! modes in the coordinates q, M-normalised, [coordinates, modes]
+    real(wp), allocatable :: twists(:, :)   !! modes in the twists of all elements, [elements, modes]
+    real(wp), allocatable :: natural(:)   !! natural frequencies, negative for diverging modes [rad/s], [modes]
+    integer, allocatable :: flexible(:)   !! modes that are not rigid
+    real(wp), allocatable :: stiffness(:)   !! k of all elements [N m/rad], [elements]
+    real(wp), allocatable :: matrix(:, :)   !! matrix of the first-order system, [modes + flexible + internal states] squared
   end type linearisation_t
 
 contains
 
-  !> Linearises a formulation without works, one lane, at time t and state y.
+  !> Linearises a formulation of one lane without work integrals.
   subroutine linearise(formulation, t, y, self, error)
     class(formulation_t), intent(inout) :: formulation
-    real(wp), intent(in) :: t
+    real(wp), intent(in) :: t   !! [s]
     real(wp), contiguous, intent(in) :: y(:, :)   !! [1, states]
     type(linearisation_t), intent(out) :: self
-    type(error_t), allocatable, intent(out) :: error
+    type(error_t), allocatable, intent(out) :: error   !! if LAPACK does not converge
     type(element_coordinates_t) :: incidence
     type(pattern_t) :: pattern
     real(wp), allocatable :: slopes(:, :)
@@ -65,7 +65,7 @@ contains
     end if
   end subroutine linearise
 
-  !> The undamped modes.
+  !> Computes the undamped modes.
   subroutine find_modes(formulation, incidence, self, error)
     class(formulation_t), intent(in) :: formulation
     type(element_coordinates_t), intent(in) :: incidence
@@ -104,10 +104,10 @@ contains
 
   !> Natural frequencies, ascending, and orthonormal modes of B^T diag(sign of k) B.
   subroutine solve_undamped(b, stiffness, self, has_failed)
-    real(wp), contiguous, intent(in) :: b(:, :)         !! diag(sqrt(|k|)) U R^-1
-    real(wp), intent(in) :: stiffness(:)                !! k
+    real(wp), contiguous, intent(in) :: b(:, :)   !! B = diag(sqrt(|k|)) U R^-1, [elastic elements, coordinates]
+    real(wp), intent(in) :: stiffness(:)   !! k [N m/rad], [elastic elements]
     type(linearisation_t), intent(inout) :: self
-    logical, intent(out) :: has_failed
+    logical, intent(out) :: has_failed   !! whether LAPACK did not converge
     logical :: is_rigid(size(self%natural))
     integer :: i
 
@@ -128,7 +128,7 @@ contains
     end associate
   end subroutine solve_undamped
 
-  !> L_tau^T J L_tau.
+  !> L_tau^T J L_tau [kg m2], [coordinates, coordinates].
   function mass_matrix(formulation) result(mass)
     class(formulation_t), intent(in) :: formulation
     real(wp), allocatable :: mass(:, :)
@@ -148,7 +148,7 @@ contains
     end associate
   end function mass_matrix
 
-  !> p' = -C p - sign(natural) |natural| e, e' = |natural| p.
+  !> Fills the matrix for p' = -C p - sign(natural) |natural| e and e' = |natural| p.
   subroutine assemble(formulation, self)
     class(formulation_t), intent(in) :: formulation
     type(linearisation_t), intent(inout) :: self
@@ -175,11 +175,11 @@ contains
     end do
   end subroutine assemble
 
-  !> The rows and columns of the inner states; no inner state knows of a rigid rotation.
+  !> Fills the rows and columns of the internal states. No internal state depends on a rigid rotation.
   subroutine add_internal(formulation, pattern, slopes, self)
     class(formulation_t), intent(in) :: formulation
-    type(pattern_t), intent(in) :: pattern
-    real(wp), intent(in) :: slopes(:)
+    type(pattern_t), intent(in) :: pattern   !! positions of the Jacobian
+    real(wp), intent(in) :: slopes(:)   !! values at these positions
     type(linearisation_t), intent(inout) :: self
     real(wp), allocatable :: by_state(:, :), by_speed(:, :), by_angle(:, :)
     integer :: i, n, p, before

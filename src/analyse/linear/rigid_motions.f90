@@ -1,8 +1,8 @@
-!> The motions of a machine along which no coupling is twisted further: a basis of the null space of the map from the
-!> speeds of the coordinates to the rates of the elastic elements' twists.
+!> The rigid motions of a machine, which twist no elastic element: a basis of the null space of the map from the speeds of the
+!> coordinates to the rates of twist of the elastic elements.
 !>
-!> The rows of the map are eliminated one after the other, each at its highest coordinate, so that a coordinate is a
-!> combination of lower ones. A chain of n bodies takes time linear in n.
+!> The rows of the map are eliminated one after the other, each at its highest coordinate, which becomes a combination of lower
+!> ones. A chain of n bodies takes time linear in n.
 module nocdyn_rigid_motions
   use nocdyn_element_coordinates, only: element_coordinates_t
   use nocdyn_kinds, only: wp
@@ -11,17 +11,17 @@ module nocdyn_rigid_motions
 
   public :: new_rigid_motions
 
-  !> Speeds of coordinates that are combinations of others: q'(coordinate) = sum of ratio * q'(of).
+  !> The speed of a coordinate as a combination of others: the sum of ratio * q'(of).
   type :: linear_combination_t
     integer, allocatable :: of(:)
     real(wp), allocatable :: ratio(:)
   end type linear_combination_t
 
-  !> q'(c) is the sum of ratio * s(freedom) over the entries first(c) to first(c + 1) - 1.
+  !> q'(c) is the sum of ratio * s(freedom) over the entries first(c) to first(c + 1) - 1, with the speeds s of the rigid motions.
   type, public :: rigid_motions_t
-    integer, allocatable :: free(:)       !! coordinate whose speed is s, [freedoms]
-    integer, allocatable :: first(:)      !! [coordinates + 1]
-    integer, allocatable :: freedom(:)    !! [entries]
+    integer, allocatable :: free(:)   !! coordinate whose speed is s, [freedoms]
+    integer, allocatable :: first(:)   !! first entry of each coordinate, [coordinates + 1]
+    integer, allocatable :: freedom(:)   !! rigid motion, [entries]
     real(wp), allocatable :: ratio(:)     !! [entries]
   contains
     procedure :: freedoms
@@ -29,24 +29,24 @@ module nocdyn_rigid_motions
     procedure :: project_torques
   end type rigid_motions_t
 
-  !> A sparse row in the making.
+  !> A sparse row during the elimination.
   type :: row_t
-    integer, allocatable :: active(:)     !! coordinates with an entry, the first `used`
+    integer, allocatable :: active(:)   !! coordinates with an entry, the first `used` of them
     integer :: used = 0
     real(wp), allocatable :: value(:)     !! [coordinates]
-    real(wp), allocatable :: scale(:)      !! sum of the absolute terms of `value`
+    real(wp), allocatable :: scale(:)   !! sum of the absolute terms of `value`, [coordinates]
     logical, allocatable :: is_active(:)
   end type row_t
 
-  real(wp), parameter :: rounding = 1.0e-10_wp   ! as the rank tolerance of the constraints: below this, terms cancel
+  real(wp), parameter :: rounding = 1.0e-10_wp   ! a sum is zero below this share of its terms, as in the constraints
 
 contains
 
-  !> The rigid motions of a machine whose elements depend on its coordinates by `incidence`.
+  !> The rigid motions of a machine.
   function new_rigid_motions(freedoms, incidence, elastic) result(self)
     integer, intent(in) :: freedoms                         !! number of coordinates
-    type(element_coordinates_t), intent(in) :: incidence    !! its first lane counts
-    integer, intent(in) :: elastic(:)                       !! elements that may not be twisted further
+    type(element_coordinates_t), intent(in) :: incidence   !! twists of the elements by coordinates; the first lane is used
+    integer, intent(in) :: elastic(:)   !! elements that must not be twisted
     type(rigid_motions_t) :: self
     type(linear_combination_t) :: definition(freedoms)
     type(row_t) :: row
@@ -63,10 +63,11 @@ contains
     call express_by_free(definition, row, self)
   end function new_rigid_motions
 
+  !> Adds a term to an entry of a row.
   pure subroutine add(row, coordinate, value, size)
     type(row_t), intent(inout) :: row
     integer, intent(in) :: coordinate
-    real(wp), intent(in) :: value, size
+    real(wp), intent(in) :: value, size   !! the term, and the sum of its absolute parts
 
     if (.not. row%is_active(coordinate)) then
       row%used = row%used + 1
@@ -79,7 +80,7 @@ contains
     row%scale(coordinate) = row%scale(coordinate) + size
   end subroutine add
 
-  !> Replaces the defined coordinates of a row until none is left.
+  !> Replaces the eliminated coordinates of a row by those of their definitions.
   pure subroutine substitute(row, definition)
     type(row_t), intent(inout) :: row
     type(linear_combination_t), intent(in) :: definition(:)
@@ -105,7 +106,7 @@ contains
     end do
   end subroutine substitute
 
-  !> Solves the row for its highest coordinate, which is thereby defined; clears the row.
+  !> Solves the row for its highest coordinate and defines it by this; clears the row.
   pure subroutine eliminate(row, definition)
     type(row_t), intent(inout) :: row
     type(linear_combination_t), intent(inout) :: definition(:)
@@ -123,7 +124,7 @@ contains
     call clear(row)
   end subroutine eliminate
 
-  !> The coordinates of a row whose terms do not cancel.
+  !> The coordinates of a row whose sums are not rounding.
   pure function significant(row) result(coordinates)
     type(row_t), intent(in) :: row
     integer, allocatable :: coordinates(:)
@@ -133,6 +134,7 @@ contains
     end associate
   end function significant
 
+  !> Removes all entries of a row.
   pure subroutine clear(row)
     type(row_t), intent(inout) :: row
 
@@ -140,7 +142,7 @@ contains
     row%used = 0
   end subroutine clear
 
-  !> Every coordinate by the free ones.
+  !> Expresses every coordinate by the free ones.
   pure subroutine express_by_free(definition, row, self)
     type(linear_combination_t), intent(inout) :: definition(:)
     type(row_t), intent(inout) :: row
@@ -181,10 +183,10 @@ contains
     freedoms = size(self%free)
   end function freedoms
 
-  !> Speeds q' of all coordinates from those of the freedoms.
+  !> Speeds q' of all coordinates, [coordinates].
   pure function speeds(self, s) result(q_rate)
     class(rigid_motions_t), intent(in) :: self
-    real(wp), intent(in) :: s(:)   !! [freedoms]
+    real(wp), intent(in) :: s(:)   !! speeds of the rigid motions, [freedoms]
     real(wp) :: q_rate(size(self%first) - 1)
     integer :: c, k
 
@@ -196,10 +198,10 @@ contains
     end do
   end function speeds
 
-  !> What acts along each freedom of what acts along the coordinates: the transpose of `speeds`.
+  !> Torques along the rigid motions from torques along the coordinates: the transpose of `speeds`, [freedoms].
   pure function project_torques(self, torque) result(total)
     class(rigid_motions_t), intent(in) :: self
-    real(wp), intent(in) :: torque(:)   !! [coordinates]
+    real(wp), intent(in) :: torque(:)   !! [N m], [coordinates]
     real(wp) :: total(size(self%free))
     integer :: c, k
 

@@ -1,4 +1,4 @@
-!> The modes of a linearised machine: eigenvalues, shapes and where their energies are.
+!> Modes of a linearised machine: eigenvalues, shapes and shares in the energies.
 module nocdyn_modes
   use nocdyn_errors, only: error_t, exit_failed, raise
   use nocdyn_formulation, only: formulation_t
@@ -19,15 +19,16 @@ module nocdyn_modes
 
   character(len=*), parameter, public :: kind_names(4) = ['rigid body ', 'oscillating', 'overdamped ', 'diverging  ']
 
+  !> A mode, or a pair of conjugate complex ones.
   type, public :: mode_t
     integer :: kind = mode_oscillating
-    complex(wp) :: eigenvalue = 0.0_wp            !! with an imaginary part that is not negative [1/s]
-    real(wp) :: undamped = 0.0_wp                 !! frequency of the undamped mode that it is most like, negative if that
+    complex(wp) :: eigenvalue = 0.0_wp   !! imaginary part >= 0 [1/s]
+    real(wp) :: undamped = 0.0_wp                 !! frequency of the most similar undamped mode, negative if that
                                                   !! diverges [Hz]
-    complex(wp), allocatable :: shape(:)          !! motion of the bodies, the largest = 1
-    real(wp), allocatable :: kinetic(:)           !! share of each body in the kinetic energy
-    real(wp), allocatable :: potential(:)         !! share of each elastic element in the potential energy; negative where
-                                                  !! its stiffness is, all shares add up to 1 in absolute value
+    complex(wp), allocatable :: shape(:)   !! motion of the bodies, scaled to 1 at the largest, [bodies]
+    real(wp), allocatable :: kinetic(:)   !! share of each body in the kinetic energy, [bodies]
+    real(wp), allocatable :: potential(:)         !! share of each elastic element in the potential energy, negative if its
+                                                  !! stiffness is; the absolute shares add up to 1
   contains
     procedure :: frequency
     procedure :: damping_ratio
@@ -37,13 +38,13 @@ module nocdyn_modes
 
 contains
 
-  !> The modes: rigid bodies, oscillations by their frequencies, real eigenvalues by their size.
+  !> Computes the modes, in this order: rigid motions, oscillations by frequency, real eigenvalues by absolute value.
   subroutine find_modes(formulation, linear, elastic, modes, error)
     class(formulation_t), intent(in) :: formulation
     type(linearisation_t), intent(in) :: linear
-    integer, intent(in) :: elastic(:)                   !! elements whose shares in the potential energy are told
+    integer, intent(in) :: elastic(:)   !! elements whose shares in the potential energy are wanted
     type(mode_t), allocatable, intent(out) :: modes(:)
-    type(error_t), allocatable, intent(out) :: error
+    type(error_t), allocatable, intent(out) :: error   !! if LAPACK does not converge
     complex(wp), allocatable :: speeds(:, :), twists(:, :), values(:), vectors(:, :)
     integer, allocatable :: kept(:)
     integer :: i, states
@@ -67,7 +68,7 @@ contains
     modes = modes(order_of(modes))
   end subroutine find_modes
 
-  !> Parts of eigenvalues that are rounding of the largest one become zero.
+  !> Sets parts of eigenvalues to zero that are rounding of the largest one.
   pure subroutine clear_rounding(values)
     complex(wp), intent(inout) :: values(:)
     real(wp), parameter :: rounding = 1.0e-13_wp
@@ -82,11 +83,11 @@ contains
     end do
   end subroutine clear_rounding
 
-  !> Speeds of the coordinates and twists of the elastic elements in all modes, from the eigenvectors (p, e, inner states).
+  !> Speeds of the coordinates and twists of the elastic elements, from the eigenvectors (p, e, internal states).
   subroutine expand_vectors(linear, elastic, vectors, speeds, twists)
     type(linearisation_t), intent(in) :: linear
     integer, intent(in) :: elastic(:)
-    complex(wp), intent(in) :: vectors(:, :)
+    complex(wp), intent(in) :: vectors(:, :)   !! [first-order states, modes]
     complex(wp), allocatable, intent(out) :: speeds(:, :)   !! [coordinates, modes]
     complex(wp), allocatable, intent(out) :: twists(:, :)   !! [elastic, modes]
     real(wp), allocatable :: angles(:, :)
@@ -101,13 +102,13 @@ contains
     twists = matmul(cmplx(angles, kind=wp), vectors(n + 1:n + size(linear%flexible), :))
   end subroutine expand_vectors
 
-  !> What a mode is, and its potential energies.
+  !> Sets the kind and the potential energies of a mode.
   subroutine fill_mode(linear, elastic, eigenvalue, vector, twist, mode)
     type(linearisation_t), intent(in) :: linear
     integer, intent(in) :: elastic(:)
     complex(wp), intent(in) :: eigenvalue
-    complex(wp), intent(in) :: vector(:)
-    complex(wp), intent(in) :: twist(:)   !! of `elastic`
+    complex(wp), intent(in) :: vector(:)   !! eigenvector
+    complex(wp), intent(in) :: twist(:)   !! [elastic]
     type(mode_t), intent(inout) :: mode
     real(wp) :: rigid_part
 
@@ -129,10 +130,10 @@ contains
     end if
   end subroutine fill_mode
 
-  !> Shape and kinetic energies of the bodies from the speeds of the coordinates.
+  !> Sets shape and kinetic energies of the bodies.
   subroutine fill_bodies(formulation, speeds, mode)
     class(formulation_t), intent(in) :: formulation
-    complex(wp), intent(in) :: speeds(:)
+    complex(wp), intent(in) :: speeds(:)   !! of the coordinates
     type(mode_t), intent(inout) :: mode
     integer :: b, k
 
@@ -153,7 +154,7 @@ contains
     end associate
   end subroutine fill_bodies
 
-  !> Places of the modes in the order in which they are told.
+  !> Order in which the modes are reported.
   function order_of(modes) result(order)
     type(mode_t), intent(in) :: modes(:)
     integer :: order(size(modes))
@@ -177,20 +178,21 @@ contains
     end do
   end function order_of
 
+  !> Whether a mode is reported before another one.
   pure logical function comes_before(one, other)
-    real(wp), intent(in) :: one(2), other(2)
+    real(wp), intent(in) :: one(2), other(2)   !! kind and size
 
     comes_before = one(1) < other(1) .or. (one(1) <= other(1) .and. one(2) < other(2))
   end function comes_before
 
-  !> Of the damped oscillation [Hz].
+  !> Frequency of the damped oscillation [Hz].
   pure real(wp) function frequency(self)
     class(mode_t), intent(in) :: self
 
     frequency = aimag(self%eigenvalue) / (2.0_wp * pi)
   end function frequency
 
-  !> -Re/|.| of the eigenvalue: 1 for what decays without oscillating, negative for what grows, 0 for what does neither.
+  !> -Re/|.| of the eigenvalue: 1 if the mode decays without oscillation, negative if it grows, 0 if the eigenvalue is 0.
   pure real(wp) function damping_ratio(self)
     class(mode_t), intent(in) :: self
 
@@ -198,7 +200,7 @@ contains
     if (abs(self%eigenvalue) > 0.0_wp) damping_ratio = -real(self%eigenvalue, wp) / abs(self%eigenvalue)
   end function damping_ratio
 
-  !> In which the mode decays to its e-th part, negative if it grows; huge if it does neither [s].
+  !> Time in which the mode decays by the factor e [s], negative if it grows; huge if it does neither.
   pure real(wp) function time_constant(self)
     class(mode_t), intent(in) :: self
 
@@ -206,6 +208,7 @@ contains
     if (abs(real(self%eigenvalue, wp)) > 0.0_wp) time_constant = -1.0_wp / real(self%eigenvalue, wp)
   end function time_constant
 
+  !> Whether the mode grows.
   pure logical function is_unstable(self)
     class(mode_t), intent(in) :: self
 

@@ -1,4 +1,4 @@
-!> The state about which a machine is linearised.
+!> The state at which a machine is linearised.
 module nocdyn_operating_point
   use nocdyn_equilibrium, only: equilibrium_t, find_equilibria, find_stability, t_infinity, nearest_equilibrium
   use nocdyn_errors, only: error_t, exit_input, raise
@@ -18,21 +18,22 @@ module nocdyn_operating_point
 
   public :: find_operating_point
 
+  !> The state, and how reports call it.
   type, public :: operating_point_t
-    class(formulation_t), allocatable :: formulation   !! reduced, without works
+    class(formulation_t), allocatable :: formulation   !! reduced, one lane, without work integrals
     real(wp) :: t = 0.0_wp
     real(wp), allocatable :: y(:, :)                   !! [1, states]
-    character(len=:), allocatable :: text              !! 'the steady state', 'rest', 't = 2 s'
-    type(string_t), allocatable :: notes(:)
+    character(len=:), allocatable :: text   !! name in reports: 'the steady state', 'rest', 't = 2 s'
+    type(string_t), allocatable :: notes(:)   !! remarks for the report
   end type operating_point_t
 
 contains
 
-  !> `at` is 'equilibrium', 'rest' or a time of the run.
+  !> Finds the operating point.
   subroutine find_operating_point(input, machine, at, point, error)
     type(input_t), intent(in) :: input
     type(machine_t), intent(in) :: machine
-    character(len=*), intent(in) :: at
+    character(len=*), intent(in) :: at   !! 'equilibrium', 'rest' or a time of the run [s]
     type(operating_point_t), intent(out) :: point
     type(error_t), allocatable, intent(out) :: error
     type(group_t) :: run
@@ -60,7 +61,7 @@ contains
     end select
   end subroutine find_operating_point
 
-  !> The steady state, of several the one nearest to the start, of the stable ones if there are any.
+  !> Takes the steady state that is nearest to the start, a stable one if there is one.
   subroutine use_equilibrium(machine, point, error)
     type(machine_t), intent(in) :: machine
     type(operating_point_t), intent(inout) :: point
@@ -82,7 +83,7 @@ contains
                              ' nearest to the start: nocdyn equilibrium shows all')
   end subroutine use_equilibrium
 
-  !> The start angles without speeds; the torques are the mean ones.
+  !> Takes the start angles without speeds, and the mean torques.
   subroutine use_rest(machine, point)
     type(machine_t), intent(in) :: machine
     type(operating_point_t), intent(inout) :: point
@@ -97,11 +98,11 @@ contains
     point%text = 'rest'
   end subroutine use_rest
 
-  !> The state at a time, by the method and tolerances of the run.
+  !> Takes the state at a time of the run, by its method and tolerances.
   subroutine use_time(input, machine, time, point, error)
     type(input_t), intent(in) :: input
     type(machine_t), intent(in) :: machine
-    real(wp), intent(in) :: time
+    real(wp), intent(in) :: time   !! [s]
     type(operating_point_t), intent(inout) :: point
     type(error_t), allocatable, intent(out) :: error
     type(integration_settings_t) :: settings
