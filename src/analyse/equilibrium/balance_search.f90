@@ -20,12 +20,12 @@ module nocdyn_balance_search
 
   !> All solutions of one block of unknowns, and the smallest imbalance for the message if there is none.
   type, public :: block_solutions_t
-    integer, allocatable :: members(:)           !! unknowns
-    real(wp), allocatable :: values(:, :)        !! [members, solutions]
-    logical, allocatable :: is_range(:)   !! whether a solution represents a range of solutions, [solutions]
-    logical :: is_unloaded = .false.   !! no torque acts: any speed is steady, and that of the start is taken
+    integer, allocatable :: members(:)        !! unknowns
+    real(wp), allocatable :: values(:, :)     !! [members, solutions]
+    logical, allocatable :: is_range(:)       !! whether a solution represents a range of solutions, [solutions]
+    logical :: is_unloaded = .false.          !! no torque acts: any speed is steady, and that of the start is taken
     real(wp) :: least_torque = huge(1.0_wp)   !! smallest imbalance found, with its sign [N m]
-    real(wp) :: least_speed = 0.0_wp   !! speed of the smallest imbalance [rad/s]
+    real(wp) :: least_speed = 0.0_wp          !! speed of the smallest imbalance [rad/s]
   end type block_solutions_t
 
 contains
@@ -102,8 +102,8 @@ contains
   !> Finds the solutions between a point of the grid and the next, and near a minimum at the point.
   subroutine search_interval(balance, z, grid, torque, lower, i, block)
     type(torque_balance_t), intent(inout) :: balance
-    real(wp), intent(in) :: z(:)   !! the other unknowns, [unknowns]
-    integer, intent(in) :: lower, i   !! lower bound of the grid, point
+    real(wp), intent(in) :: z(:)                           !! the other unknowns, [unknowns]
+    integer, intent(in) :: lower, i                        !! lower bound of the grid, point
     real(wp), intent(in) :: grid(lower:), torque(lower:)   !! [rad/s], [N m]
     type(block_solutions_t), intent(inout) :: block
     real(wp) :: middle, top
@@ -130,8 +130,8 @@ contains
 
   !> Adds a point of the grid at which the torques balance, or, of a range that begins there, the speed nearest to `start`.
   subroutine add_range(start, grid, torque, lower, i, block)
-    real(wp), intent(in) :: start   !! [rad/s]
-    integer, intent(in) :: lower, i   !! lower bound of the grid, point
+    real(wp), intent(in) :: start                          !! [rad/s]
+    integer, intent(in) :: lower, i                        !! lower bound of the grid, point
     real(wp), intent(in) :: grid(lower:), torque(lower:)   !! [rad/s], [N m]
     type(block_solutions_t), intent(inout) :: block
     integer :: last
@@ -157,7 +157,7 @@ contains
   !> Torque along a rigid motion at a speed; zero if it is rounding.
   function imbalance(balance, z, member, speed) result(torque)
     type(torque_balance_t), intent(inout) :: balance
-    real(wp), intent(in) :: z(:)   !! the other unknowns, [unknowns]
+    real(wp), intent(in) :: z(:)    !! the other unknowns, [unknowns]
     integer, intent(in) :: member   !! number of the rigid motion
     real(wp), intent(in) :: speed   !! [rad/s]
     real(wp) :: torque
@@ -173,43 +173,43 @@ contains
   !> Smallest torque between two speeds, by golden sections, until its sign changes or the interval is very small.
   subroutine minimise_torque(balance, z, member, left, right, middle, torque)
     type(torque_balance_t), intent(inout) :: balance
-    real(wp), intent(in) :: z(:)   !! the other unknowns, [unknowns]
-    integer, intent(in) :: member   !! number of the rigid motion
-    real(wp), intent(in) :: left, right   !! [rad/s]
+    real(wp), intent(in) :: z(:)              !! the other unknowns, [unknowns]
+    integer, intent(in) :: member             !! number of the rigid motion
+    real(wp), intent(in) :: left, right       !! [rad/s]
     real(wp), intent(out) :: middle, torque   !! speed [rad/s] and torque [N m] there
     real(wp), parameter :: golden = 0.6180339887498949_wp
     integer, parameter :: sections = 40   ! after 37 the torque at a minimum changes by rounding only
-    real(wp) :: a, b, internal(2), value(2), sign_outside
+    real(wp) :: a, b, inside(2), value(2), sign_outside
     integer :: i
 
     a = left
     b = right
     sign_outside = imbalance(balance, z, member, left)
-    internal = [b - golden * (b - a), a + golden * (b - a)]
+    inside = [b - golden * (b - a), a + golden * (b - a)]
     do i = 1, 2
-      value(i) = imbalance(balance, z, member, internal(i))
+      value(i) = imbalance(balance, z, member, inside(i))
     end do
     do i = 1, sections
       if (any(value * sign_outside <= 0.0_wp)) exit
       if (abs(value(1)) < abs(value(2))) then
-        b = internal(2)
-        internal = [b - golden * (b - a), internal(1)]
-        value = [imbalance(balance, z, member, internal(1)), value(1)]
+        b = inside(2)
+        inside = [b - golden * (b - a), inside(1)]
+        value = [imbalance(balance, z, member, inside(1)), value(1)]
       else
-        a = internal(1)
-        internal = [internal(2), a + golden * (b - a)]
-        value = [value(2), imbalance(balance, z, member, internal(2))]
+        a = inside(1)
+        inside = [inside(2), a + golden * (b - a)]
+        value = [value(2), imbalance(balance, z, member, inside(2))]
       end if
     end do
     i = merge(1, 2, value(1) * sign_outside < value(2) * sign_outside)
-    middle = internal(i)
+    middle = inside(i)
     torque = value(i)
   end subroutine minimise_torque
 
   !> Adds the root between two speeds with torques of different sign: Newton's method, with bisection outside of the bracket.
   subroutine solve_bracketed(balance, z, left, right, left_torque, block)
     type(torque_balance_t), intent(inout) :: balance
-    real(wp), intent(in) :: z(:)   !! the other unknowns, [unknowns]
+    real(wp), intent(in) :: z(:)                       !! the other unknowns, [unknowns]
     real(wp), intent(in) :: left, right, left_torque   !! [rad/s], torque at `left` [N m]
     type(block_solutions_t), intent(inout) :: block
     integer, parameter :: most_steps = 200
@@ -337,9 +337,9 @@ contains
   !> Whether the torques balance on the whole way between two solutions, at some points of it.
   logical function is_joined(balance, z, members, other)
     type(torque_balance_t), intent(inout) :: balance
-    real(wp), intent(in) :: z(:)   !! [unknowns]
+    real(wp), intent(in) :: z(:)        !! [unknowns]
     integer, intent(in) :: members(:)   !! unknowns of the block
-    real(wp), intent(in) :: other(:)   !! [members]
+    real(wp), intent(in) :: other(:)    !! [members]
     integer, parameter :: intervals = 8
     integer :: i
 

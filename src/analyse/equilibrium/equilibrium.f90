@@ -7,14 +7,14 @@ module nocdyn_equilibrium
   use nocdyn_lapack_eigen, only: eigenvectors
   use nocdyn_linearisation, only: linearisation_t, linearise
   use nocdyn_machine, only: machine_t
-  use nocdyn_reduced, only: new_reduced
+  use nocdyn_reduced, only: reduced_t
   use nocdyn_static_twists, only: find_twists, undetermined_elements
   use nocdyn_text, only: append, joined, quoted, rounded_text, selected, string_t
-  use nocdyn_torque_balance, only: new_torque_balance, torque_balance_t
+  use nocdyn_torque_balance, only: set_up_balance, torque_balance_t
   implicit none (type, external)
   private
 
-  public :: find_equilibria, find_stability, nearest_equilibrium
+  public :: find_equilibria, find_stability, mean_formulation, nearest_equilibrium
 
   real(wp), parameter, public :: t_infinity = 1.0e30_wp   !! a time after all transients of the excitations [s]
 
@@ -35,20 +35,17 @@ contains
 
   !> Finds the steady states of a machine with mean torques.
   subroutine find_equilibria(machine, formulation, equilibria, notes, error)
-    type(machine_t), intent(in) :: machine   !! one lane
+    type(machine_t), intent(in) :: machine                          !! one lane
     class(formulation_t), allocatable, intent(out) :: formulation   !! reduced formulation of the machine with mean torques
     type(equilibrium_t), allocatable, intent(out) :: equilibria(:)
     type(string_t), allocatable, intent(out) :: notes(:)   !! remarks for the report
-    type(error_t), allocatable, intent(out) :: error   !! if no steady state was found
-    type(machine_t) :: mean_machine
+    type(error_t), allocatable, intent(out) :: error       !! if no steady state was found
     type(torque_balance_t) :: balance
     type(block_solutions_t), allocatable :: blocks(:)
     integer :: i
 
-    mean_machine = machine
-    call mean_machine%to_mean_torque()
-    allocate (formulation, source=new_reduced(mean_machine, .false.))
-    balance = new_torque_balance(formulation, t_infinity)
+    call mean_formulation(machine, formulation)
+    call set_up_balance(formulation, t_infinity, balance)
     call search_balance(balance, blocks)
     allocate (notes(0))
     do i = 1, size(blocks)
@@ -61,7 +58,21 @@ contains
                                                 ': any speed is steady, and the one of the start is kept')
     end do
     call combine(balance, blocks, equilibria, notes, error)
+    call move_alloc(balance%formulation, formulation)
   end subroutine find_equilibria
+
+  !> The reduced formulation of a machine with mean torques, without work integrals.
+  subroutine mean_formulation(machine, formulation)
+    type(machine_t), intent(in) :: machine
+    class(formulation_t), allocatable, intent(out) :: formulation
+    type(reduced_t), allocatable :: reduced
+
+    allocate (reduced)
+    reduced%machine = machine
+    call reduced%machine%to_mean_torque()
+    call reduced%formulate(.false., .false.)
+    call move_alloc(reduced, formulation)
+  end subroutine mean_formulation
 
   !> Determines the stability of every steady state.
   subroutine find_stability(formulation, equilibria)
@@ -114,7 +125,7 @@ contains
     type(torque_balance_t), intent(in) :: balance   !! evaluated at the solution, with its twists
     type(block_solutions_t), intent(in) :: blocks(:)
     integer, intent(in) :: choice(:)   !! number of the solution of each block
-    real(wp), intent(in) :: z(:)   !! the solution, [unknowns]
+    real(wp), intent(in) :: z(:)       !! the solution, [unknowns]
     type(string_t), allocatable, intent(inout) :: notes(:)
     integer, allocatable :: undetermined(:)
     type(string_t), allocatable :: names(:)
@@ -313,7 +324,7 @@ contains
   !> Speeds of rigid motions as text, such as "12.5 rad/s of 'motor'".
   function speed_text(balance, z, members) result(text)
     type(torque_balance_t), intent(in) :: balance
-    real(wp), intent(in) :: z(:)   !! [unknowns]
+    real(wp), intent(in) :: z(:)        !! [unknowns]
     integer, intent(in) :: members(:)   !! unknowns; those that are internal states are ignored
     character(len=:), allocatable :: text
     integer, allocatable :: freedoms(:)

@@ -26,9 +26,9 @@ module nocdyn_static_twists
 
   !> The minimisation problem: the stiffness matrix of the coordinates that are not free, and the torques.
   type :: twist_problem_t
-    integer, allocatable :: unknown(:)   !! coordinates in the order of the band, [unknowns]
+    integer, allocatable :: unknown(:)    !! coordinates in the order of the band, [unknowns]
     integer, allocatable :: position(:)   !! position of each coordinate in the band, 0 if it is free, [coordinates]
-    integer :: width = 0   !! number of diagonals beside the main one
+    integer :: width = 0                  !! number of diagonals beside the main one
     real(wp), allocatable :: band(:, :)
     real(wp), allocatable :: diagonal_scale(:)   !! what is damped: the largest diagonal elements so far, [unknowns]
     real(wp), allocatable :: external_torque(:)   !! torques of all other elements [N m], [coordinates]
@@ -140,7 +140,7 @@ contains
   !> Whether a step has lowered the energy, or changed it by rounding only.
   pure logical function lowers_energy(self, energy, step)
     type(twist_problem_t), intent(in) :: self
-    real(wp), intent(in) :: energy   !! before the step
+    real(wp), intent(in) :: energy    !! before the step
     real(wp), intent(in) :: step(:)   !! [rad], [coordinates]
     real(wp), parameter :: rounding = 1.0e-12_wp
     real(wp) :: turned
@@ -217,15 +217,12 @@ contains
     type(torque_balance_t), intent(in) :: balance
     type(twist_problem_t), intent(inout) :: self
     real(wp) :: moment
-    logical :: is_elastic(size(balance%formulation%machine%elements%to))
     integer :: e, k
 
-    is_elastic = .false.
-    is_elastic(balance%elastic) = .true.
     associate (elements => balance%formulation%machine%elements, incidence => balance%incidence)
-      do e = 1, size(is_elastic)
+      do e = 1, size(balance%is_elastic)
         moment = elements%applied(1, e)
-        if (.not. is_elastic(e)) moment = moment + elements%restoring(1, e)
+        if (.not. balance%is_elastic(e)) moment = moment + elements%restoring(1, e)
         do k = incidence%first(e), incidence%first(e + 1) - 1
           associate (c => incidence%coordinate(k))
             self%external_torque(c) = self%external_torque(c) + incidence%ratio(1, k) * moment

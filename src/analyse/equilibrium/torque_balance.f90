@@ -7,30 +7,31 @@ module nocdyn_torque_balance
   use nocdyn_element_coordinates, only: element_coordinates_t, new_element_coordinates
   use nocdyn_formulation, only: formulation_t
   use nocdyn_kinds, only: wp
-  use nocdyn_one_lane, only: choose_branches
   use nocdyn_rigid_motions, only: new_rigid_motions, rigid_motions_t
   use nocdyn_system, only: pattern_t
+  use nocdyn_union_find, only: find_root, join_components
   implicit none (type, external)
   private
 
-  public :: new_torque_balance
+  public :: set_up_balance
 
   type, public :: torque_balance_t
     class(formulation_t), allocatable :: formulation   !! reduced, one lane, without work integrals
     type(element_coordinates_t) :: incidence
     type(rigid_motions_t) :: motions
-    integer, allocatable :: elastic(:)   !! elements that the rigid motions do not twist
+    logical, allocatable :: is_elastic(:)   !! whether an element can have a restoring moment, [elements]
+    integer, allocatable :: elastic(:)      !! elements that the rigid motions do not twist
     integer :: coordinates = 0
-    integer :: internal = 0   !! number of internal states
-    real(wp), allocatable :: residual(:)   !! of the equations after `evaluate`: torques [N m], rates of the internal states, [unknowns]
-    real(wp), allocatable :: scale(:)   !! sum of the absolute terms of each residual, [unknowns]
+    integer :: internal = 0                !! number of internal states
+    real(wp), allocatable :: residual(:)   !! after `evaluate`: torques [N m], rates of internal states, [unknowns]
+    real(wp), allocatable :: scale(:)      !! sum of the absolute terms of each residual, [unknowns]
     ! work space:
     real(wp) :: t(1) = 0.0_wp
     integer :: status(1) = 0
-    integer, allocatable, private :: inelastic(:)    !! elements that are not elastic
-    integer, allocatable :: first(:)   !! first entry of each inelastic element, [inelastic + 1]
-    integer, allocatable :: freedom(:)   !! rigid motion, [entries]
-    real(wp), allocatable, private :: ratio(:)   !! G, [entries]
+    integer, allocatable, private :: inelastic(:)   !! elements that are not elastic
+    integer, allocatable :: first(:)                !! first entry of each inelastic element, [inelastic + 1]
+    integer, allocatable :: freedom(:)              !! rigid motion, [entries]
+    real(wp), allocatable, private :: ratio(:)      !! G, [entries]
     type(pattern_t), private :: pattern
     real(wp), allocatable :: y(:, :)   !! state after `set_state`, [1, states]
     real(wp), allocatable, private :: rate(:, :), slopes(:, :)
@@ -48,31 +49,31 @@ module nocdyn_torque_balance
 contains
 
   !> The equations of a machine with mean torques.
-  function new_torque_balance(formulation, t) result(self)
-    class(formulation_t), intent(in) :: formulation   !! reduced, one lane, without work integrals
-    real(wp), intent(in) :: t   !! [s]
-    type(torque_balance_t) :: self
-    logical :: is_elastic(size(formulation%machine%elements%to))
+  subroutine set_up_balance(formulation, t, self)
+    class(formulation_t), allocatable, intent(inout) :: formulation   !! reduced, one lane, without work integrals
+    real(wp), intent(in) :: t                                         !! [s]
+    type(torque_balance_t), intent(out) :: self
     integer :: e
 
-    allocate (self%formulation, source=formulation)
-    associate (machine => formulation%machine)
+    call move_alloc(formulation, self%formulation)
+    associate (machine => self%formulation%machine)
       self%coordinates = machine%coordinates%freedoms
-      self%internal = formulation%states - 2 * self%coordinates
+      self%internal = self%formulation%states - 2 * self%coordinates
       self%incidence = new_element_coordinates(machine%elements, machine%coordinates)
       self%elastic = machine%elastic()
-      is_elastic = .false.
-      is_elastic(self%elastic) = .true.
-      self%inelastic = pack([(e, e=1, size(is_elastic))], .not. is_elastic)
+      allocate (self%is_elastic(size(machine%elements%to)), source=.false.)
+      self%is_elastic(self%elastic) = .true.
+      self%inelastic = pack([(e, e=1, size(self%is_elastic))], .not. self%is_elastic)
       self%motions = new_rigid_motions(self%coordinates, self%incidence, self%elastic)
     end associate
     self%t = t
     call gather_ratios(self)
-    self%pattern = formulation%jacobian_pattern()
-    allocate (self%y(1, formulation%states), self%rate(1, formulation%states), self%slopes(1, size(self%pattern%row)), &
-              source=0.0_wp)
+    self%pattern = self%formulation%jacobian_pattern()
+    allocate (self%y(1, self%formulation%states), source=0.0_wp)
+    allocate (self%rate, source=self%y)
+    allocate (self%slopes(1, size(self%pattern%row)), source=0.0_wp)
     allocate (self%residual(self%unknowns()), self%scale(self%unknowns()), source=0.0_wp)
-  end function new_torque_balance
+  end subroutine set_up_balance
 
   !> Computes G = U N of the inelastic elements.
   subroutine gather_ratios(self)
@@ -208,7 +209,7 @@ contains
   subroutine evaluate_state(self)
     class(torque_balance_t), intent(inout) :: self
 
-    call choose_branches(self%formulation, self%t(1), self%y)
+    call self%formulation%start_lane(1, self%t(1), reshape(self%y, [size(self%y)]))
     call self%formulation%derivative(self%t, self%y, self%rate, self%status)
   end subroutine evaluate_state
 
@@ -296,13 +297,13 @@ contains
   function blocks(self) result(block_of)
     class(torque_balance_t), intent(in) :: self
     integer :: block_of(self%unknowns())
-    integer :: i, k, p, r
+    integer :: i, k, p, r, root
 
     r = self%motions%freedoms()
     block_of = [(i, i=1, size(block_of))]
     do i = 1, size(self%inelastic)
       do k = self%first(i) + 1, self%first(i + 1) - 1
-        call join(self%freedom(self%first(i)), self%freedom(k), block_of)
+        call join_components(self%freedom(self%first(i)), self%freedom(k), block_of)
       end do
     end do
     associate (f => self%coordinates, motions => self%motions)
@@ -310,41 +311,20 @@ contains
         associate (row => self%pattern%row(p), column => self%pattern%column(p))
           if (max(row, column) <= 2 * f) cycle
           if (min(row, column) > 2 * f) then
-            call join(r + row - 2 * f, r + column - 2 * f, block_of)
+            call join_components(r + row - 2 * f, r + column - 2 * f, block_of)
           else
             i = merge(min(row, column), min(row, column) - f, min(row, column) <= f)
             do k = motions%first(i), motions%first(i + 1) - 1
-              call join(r + max(row, column) - 2 * f, motions%freedom(k), block_of)
+              call join_components(r + max(row, column) - 2 * f, motions%freedom(k), block_of)
             end do
           end if
         end associate
       end do
     end associate
     do i = 1, size(block_of)
-      block_of(i) = root(block_of, i)
+      call find_root(block_of, i, root)
+      block_of(i) = root
     end do
   end function blocks
-
-  pure integer function root(block_of, member)
-    integer, intent(in) :: block_of(:), member
-
-    root = member
-    do while (block_of(root) /= root)
-      root = block_of(root)
-    end do
-  end function root
-
-  !> The lower root becomes that of both, so that members always point downwards.
-  pure subroutine join(one, other, block_of)
-    integer, intent(in) :: one, other
-    integer, intent(inout) :: block_of(:)
-    integer :: a, b
-
-    a = root(block_of, one)
-    b = root(block_of, other)
-    block_of(max(a, b)) = min(a, b)
-    block_of(one) = min(a, b)
-    block_of(other) = min(a, b)
-  end subroutine join
 
 end module nocdyn_torque_balance

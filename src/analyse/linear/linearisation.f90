@@ -13,7 +13,6 @@ module nocdyn_linearisation
   use nocdyn_formulation, only: formulation_t
   use nocdyn_kinds, only: wp
   use nocdyn_lapack_eigen, only: cholesky_factor, solve_left, solve_right, singular_vectors, symmetric_eigenvectors
-  use nocdyn_one_lane, only: choose_branches
   use nocdyn_system, only: pattern_t
   implicit none (type, external)
   private
@@ -27,8 +26,8 @@ module nocdyn_linearisation
   type, public :: linearisation_t
     real(wp), allocatable :: shapes(:, :)   !! modes in the coordinates q, M-normalised, [coordinates, modes]
     real(wp), allocatable :: twists(:, :)   !! modes in the twists of all elements, [elements, modes]
-    real(wp), allocatable :: natural(:)   !! natural frequencies, negative for diverging modes [rad/s], [modes]
-    integer, allocatable :: flexible(:)   !! modes that are not rigid
+    real(wp), allocatable :: natural(:)     !! natural frequencies, negative for diverging modes [rad/s], [modes]
+    integer, allocatable :: flexible(:)     !! modes that are not rigid
     real(wp), allocatable :: stiffness(:)   !! k of all elements [N m/rad], [elements]
     real(wp), allocatable :: matrix(:, :)   !! matrix of the first-order system, [modes + flexible + internal states] squared
   end type linearisation_t
@@ -38,7 +37,7 @@ contains
   !> Linearises a formulation of one lane without work integrals.
   subroutine linearise(formulation, t, y, self, error)
     class(formulation_t), intent(inout) :: formulation
-    real(wp), intent(in) :: t   !! [s]
+    real(wp), intent(in) :: t                     !! [s]
     real(wp), contiguous, intent(in) :: y(:, :)   !! [1, states]
     type(linearisation_t), intent(out) :: self
     type(error_t), allocatable, intent(out) :: error   !! if LAPACK does not converge
@@ -51,7 +50,7 @@ contains
     pattern = formulation%jacobian_pattern()
     allocate (slopes(1, size(pattern%row)))
     status = 0
-    call choose_branches(formulation, t, y)
+    call formulation%start_lane(1, t, reshape(y, [size(y)]))
     call formulation%jacobian([t], y, slopes, dfdt, status)
     incidence = new_element_coordinates(formulation%machine%elements, formulation%machine%coordinates)
     associate (elements => formulation%machine%elements)
@@ -105,7 +104,7 @@ contains
   !> Natural frequencies, ascending, and orthonormal modes of B^T diag(sign of k) B.
   subroutine solve_undamped(b, stiffness, self, has_failed)
     real(wp), contiguous, intent(in) :: b(:, :)   !! B = diag(sqrt(|k|)) U R^-1, [elastic elements, coordinates]
-    real(wp), intent(in) :: stiffness(:)   !! k [N m/rad], [elastic elements]
+    real(wp), intent(in) :: stiffness(:)          !! k [N m/rad], [elastic elements]
     type(linearisation_t), intent(inout) :: self
     logical, intent(out) :: has_failed   !! whether LAPACK did not converge
     logical :: is_rigid(size(self%natural))
@@ -152,7 +151,7 @@ contains
   subroutine assemble(formulation, self)
     class(formulation_t), intent(in) :: formulation
     type(linearisation_t), intent(inout) :: self
-    integer, allocatable :: applied(:)
+    integer, allocatable :: damped(:)   ! elements with damping
     real(wp), allocatable :: rates(:, :)
     integer :: e, i, n, states
 
@@ -160,12 +159,12 @@ contains
     states = n + size(self%flexible) + formulation%states - 2 * n
     allocate (self%matrix(states, states), source=0.0_wp)
     associate (damping => formulation%machine%elements%applied_speed(1, :))
-      applied = pack([(e, e=1, size(damping))], abs(damping) > 0.0_wp)
-      allocate (rates(size(applied), n))
+      damped = pack([(e, e=1, size(damping))], abs(damping) > 0.0_wp)
+      allocate (rates(size(damped), n))
       do i = 1, n
-        rates(:, i) = damping(applied) * self%twists(applied, i)
+        rates(:, i) = damping(damped) * self%twists(damped, i)
       end do
-      self%matrix(:n, :n) = matmul(transpose(self%twists(applied, :)), rates)
+      self%matrix(:n, :n) = matmul(transpose(self%twists(damped, :)), rates)
     end associate
     do i = 1, size(self%flexible)
       associate (natural => self%natural(self%flexible(i)))
@@ -179,7 +178,7 @@ contains
   subroutine add_internal(formulation, pattern, slopes, self)
     class(formulation_t), intent(in) :: formulation
     type(pattern_t), intent(in) :: pattern   !! positions of the Jacobian
-    real(wp), intent(in) :: slopes(:)   !! values at these positions
+    real(wp), intent(in) :: slopes(:)        !! values at these positions
     type(linearisation_t), intent(inout) :: self
     real(wp), allocatable :: by_state(:, :), by_speed(:, :), by_angle(:, :)
     integer :: i, n, p, before

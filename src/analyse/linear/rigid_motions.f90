@@ -19,10 +19,10 @@ module nocdyn_rigid_motions
 
   !> q'(c) is the sum of ratio * s(freedom) over the entries first(c) to first(c + 1) - 1, with the speeds s of the rigid motions.
   type, public :: rigid_motions_t
-    integer, allocatable :: free(:)   !! coordinate whose speed is s, [freedoms]
-    integer, allocatable :: first(:)   !! first entry of each coordinate, [coordinates + 1]
+    integer, allocatable :: free(:)      !! coordinate whose speed is s, [freedoms]
+    integer, allocatable :: first(:)     !! first entry of each coordinate, [coordinates + 1]
     integer, allocatable :: freedom(:)   !! rigid motion, [entries]
-    real(wp), allocatable :: ratio(:)     !! [entries]
+    real(wp), allocatable :: ratio(:)    !! [entries]
   contains
     procedure :: freedoms
     procedure :: speeds
@@ -33,7 +33,7 @@ module nocdyn_rigid_motions
   type :: row_t
     integer, allocatable :: active(:)   !! coordinates with an entry, the first `used` of them
     integer :: used = 0
-    real(wp), allocatable :: value(:)     !! [coordinates]
+    real(wp), allocatable :: value(:)   !! [coordinates]
     real(wp), allocatable :: scale(:)   !! sum of the absolute terms of `value`, [coordinates]
     logical, allocatable :: is_active(:)
   end type row_t
@@ -44,9 +44,9 @@ contains
 
   !> The rigid motions of a machine.
   function new_rigid_motions(freedoms, incidence, elastic) result(self)
-    integer, intent(in) :: freedoms                         !! number of coordinates
+    integer, intent(in) :: freedoms                        !! number of coordinates
     type(element_coordinates_t), intent(in) :: incidence   !! twists of the elements by coordinates; the first lane is used
-    integer, intent(in) :: elastic(:)   !! elements that must not be twisted
+    integer, intent(in) :: elastic(:)                      !! elements that must not be twisted
     type(rigid_motions_t) :: self
     type(linear_combination_t) :: definition(freedoms)
     type(row_t) :: row
@@ -64,10 +64,10 @@ contains
   end function new_rigid_motions
 
   !> Adds a term to an entry of a row.
-  pure subroutine add(row, coordinate, value, size)
+  pure subroutine add(row, coordinate, value, scale)
     type(row_t), intent(inout) :: row
     integer, intent(in) :: coordinate
-    real(wp), intent(in) :: value, size   !! the term, and the sum of its absolute parts
+    real(wp), intent(in) :: value, scale   !! the term, and the sum of its absolute parts
 
     if (.not. row%is_active(coordinate)) then
       row%used = row%used + 1
@@ -77,7 +77,7 @@ contains
       row%scale(coordinate) = 0.0_wp
     end if
     row%value(coordinate) = row%value(coordinate) + value
-    row%scale(coordinate) = row%scale(coordinate) + size
+    row%scale(coordinate) = row%scale(coordinate) + scale
   end subroutine add
 
   !> Replaces the eliminated coordinates of a row by those of their definitions.
@@ -85,7 +85,7 @@ contains
     type(row_t), intent(inout) :: row
     type(linear_combination_t), intent(in) :: definition(:)
     integer :: c, i, position
-    real(wp) :: size, value
+    real(wp) :: scale, value
 
     position = 1
     do while (position <= row%used)
@@ -95,12 +95,12 @@ contains
         cycle
       end if
       value = row%value(c)
-      size = row%scale(c)
+      scale = row%scale(c)
       row%is_active(c) = .false.
       row%active(position) = row%active(row%used)
       row%used = row%used - 1
-      do i = 1, ubound(definition(c)%of, 1)
-        call add(row, definition(c)%of(i), definition(c)%ratio(i) * value, abs(definition(c)%ratio(i)) * size)
+      do i = 1, size(definition(c)%of)
+        call add(row, definition(c)%of(i), definition(c)%ratio(i) * value, abs(definition(c)%ratio(i)) * scale)
       end do
       position = 1
     end do

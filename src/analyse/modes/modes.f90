@@ -23,11 +23,11 @@ module nocdyn_modes
   type, public :: mode_t
     integer :: kind = mode_oscillating
     complex(wp) :: eigenvalue = 0.0_wp   !! imaginary part >= 0 [1/s]
-    real(wp) :: undamped = 0.0_wp                 !! frequency of the most similar undamped mode, negative if that
+    real(wp) :: undamped = 0.0_wp        !! frequency of the most similar undamped mode, negative if that
                                                   !! diverges [Hz]
-    complex(wp), allocatable :: shape(:)   !! motion of the bodies, scaled to 1 at the largest, [bodies]
-    real(wp), allocatable :: kinetic(:)   !! share of each body in the kinetic energy, [bodies]
-    real(wp), allocatable :: potential(:)         !! share of each elastic element in the potential energy, negative if its
+    complex(wp), allocatable :: shape(:)    !! motion of the bodies, scaled to 1 at the largest, [bodies]
+    real(wp), allocatable :: kinetic(:)     !! share of each body in the kinetic energy, [bodies]
+    real(wp), allocatable :: potential(:)   !! share of each elastic element in the potential energy, negative if its
                                                   !! stiffness is; the absolute shares add up to 1
   contains
     procedure :: frequency
@@ -87,7 +87,7 @@ contains
   subroutine expand_vectors(linear, elastic, vectors, speeds, twists)
     type(linearisation_t), intent(in) :: linear
     integer, intent(in) :: elastic(:)
-    complex(wp), intent(in) :: vectors(:, :)   !! [first-order states, modes]
+    complex(wp), intent(in) :: vectors(:, :)                !! [first-order states, modes]
     complex(wp), allocatable, intent(out) :: speeds(:, :)   !! [coordinates, modes]
     complex(wp), allocatable, intent(out) :: twists(:, :)   !! [elastic, modes]
     real(wp), allocatable :: angles(:, :)
@@ -108,7 +108,7 @@ contains
     integer, intent(in) :: elastic(:)
     complex(wp), intent(in) :: eigenvalue
     complex(wp), intent(in) :: vector(:)   !! eigenvector
-    complex(wp), intent(in) :: twist(:)   !! [elastic]
+    complex(wp), intent(in) :: twist(:)    !! [elastic]
     type(mode_t), intent(inout) :: mode
     real(wp) :: rigid_part
 

@@ -1,6 +1,7 @@
 !> The state at which a machine is linearised.
 module nocdyn_operating_point
-  use nocdyn_equilibrium, only: equilibrium_t, find_equilibria, find_stability, t_infinity, nearest_equilibrium
+  use nocdyn_equilibrium, only: equilibrium_t, find_equilibria, find_stability, mean_formulation, nearest_equilibrium, &
+                                t_infinity
   use nocdyn_errors, only: error_t, exit_input, raise
   use nocdyn_formulation, only: formulation_t
   use nocdyn_input, only: group_t, input_t
@@ -22,8 +23,8 @@ module nocdyn_operating_point
   type, public :: operating_point_t
     class(formulation_t), allocatable :: formulation   !! reduced, one lane, without work integrals
     real(wp) :: t = 0.0_wp
-    real(wp), allocatable :: y(:, :)                   !! [1, states]
-    character(len=:), allocatable :: text   !! name in reports: 'the steady state', 'rest', 't = 2 s'
+    real(wp), allocatable :: y(:, :)          !! [1, states]
+    character(len=:), allocatable :: text     !! name in reports: 'the steady state', 'rest', 't = 2 s'
     type(string_t), allocatable :: notes(:)   !! remarks for the report
   end type operating_point_t
 
@@ -87,13 +88,10 @@ contains
   subroutine use_rest(machine, point)
     type(machine_t), intent(in) :: machine
     type(operating_point_t), intent(inout) :: point
-    type(machine_t) :: mean_machine
 
-    mean_machine = machine
-    call mean_machine%to_mean_torque()
-    allocate (point%formulation, source=new_reduced(mean_machine, .false.))
+    call mean_formulation(machine, point%formulation)
     point%y = point%formulation%start()
-    point%y(1, :mean_machine%coordinates%freedoms) = 0.0_wp
+    point%y(1, :machine%coordinates%freedoms) = 0.0_wp
     point%t = t_infinity
     point%text = 'rest'
   end subroutine use_rest
