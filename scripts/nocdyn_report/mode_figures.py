@@ -4,6 +4,7 @@ import argparse
 import json
 import math
 import sys
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -13,7 +14,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from .results import ResultsError
-from .style import COLOURS, REFERENCE, WIDTH, add_title, plain, save
+from .style import COLOURS, REFERENCE, WIDTH, add_format_option, add_title, plain, save, saved
 
 MOST_NAMES = 24  # bodies that are named on the axis
 MOST_LETTERS = 24  # of names that stand side by side under the narrower axes
@@ -136,7 +137,7 @@ def _name_bodies(axes: Axes, modes: Modes) -> None:
     )
 
 
-def draw_all(modes: Modes, most: int, folder: Path) -> list[str]:
+def draw_all(modes: Modes, most: int, folder: Path, formats: Sequence[str]) -> list[str]:
     """Saves figures of the first modes, a few in each, and gives their names."""
     chosen = modes.oscillating[:most]
     names = []
@@ -144,7 +145,7 @@ def draw_all(modes: Modes, most: int, folder: Path) -> list[str]:
         figure = draw_modes(modes, chosen[part * MOST_MODES : (part + 1) * MOST_MODES])
         add_title(figure, *modes.titles)
         names.append("modes" if part == 0 else f"modes_{part + 1}")
-        save(figure, folder, names[-1])
+        save(figure, folder, names[-1], formats)
     return names
 
 
@@ -158,16 +159,17 @@ def main() -> None:
         metavar="N",
         help=f"how many modes are drawn, from the lowest on ({2 * MOST_MODES})",
     )
-    parser.add_argument("--out", type=Path, metavar="DIR", help="where the figures go, as PNG, SVG and PDF (RESULTS/figures)")
+    parser.add_argument("--out", type=Path, metavar="DIR", help="where the figures go (RESULTS/figures)")
+    add_format_option(parser)
     arguments = parser.parse_args()
     if arguments.modes < 1:
         parser.error("--modes must be at least 1")
     folder = arguments.out or arguments.results / "figures"
     try:
-        names = draw_all(read_modes(arguments.results), arguments.modes, folder)
+        names = draw_all(read_modes(arguments.results), arguments.modes, folder, arguments.format)
     except ResultsError as error:
         sys.exit(f"{parser.prog}: {error}")
-    print(f"{', '.join(names)} (PNG, SVG, PDF) are in {folder}")
+    print(saved(names, arguments.format, folder))
 
 
 if __name__ == "__main__":

@@ -2,7 +2,7 @@
 
 import argparse
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 
 from .phase_planes import draw_phase_planes
 from .results import Column, Results, ResultsError, read_results
-from .style import COLOURS, WIDTH, add_title, draw_lines, save
+from .style import COLOURS, WIDTH, add_format_option, add_title, draw_lines, save, saved
 
 MOTION = {"omega": "speed", "twist": "twist"}
 TORQUES = {
@@ -68,7 +68,7 @@ def _finish_time_axis(axes: Axes, results: Results) -> None:
     axes.set_xlabel("time [s]")
 
 
-def draw_run(results: Results, folder: Path) -> list[str]:
+def draw_run(results: Results, folder: Path, formats: Sequence[str]) -> list[str]:
     """Saves the figures and gives their names."""
     figures = {
         "motion": draw_over_time(results, MOTION),
@@ -79,7 +79,7 @@ def draw_run(results: Results, folder: Path) -> list[str]:
     drawn = [name for name, figure in figures.items() if figure]
     for name in drawn:
         add_title(figures[name], results.title, results.shortfall)
-        save(figures[name], folder, name)
+        save(figures[name], folder, name, formats)
     return drawn
 
 
@@ -108,17 +108,18 @@ def _advise(results: Results) -> str:
 def main() -> None:
     parser = argparse.ArgumentParser(prog="scripts/plot", description=__doc__)
     parser.add_argument("results", type=Path, metavar="RESULTS", help="folder that 'nocdyn run' wrote")
-    parser.add_argument("--out", type=Path, metavar="DIR", help="where the figures go, as PNG, SVG and PDF (RESULTS/figures)")
+    parser.add_argument("--out", type=Path, metavar="DIR", help="where the figures go (RESULTS/figures)")
+    add_format_option(parser)
     arguments = parser.parse_args()
     folder = arguments.out or arguments.results / "figures"
     try:
         results = read_results(arguments.results)
         if results.shortfall:
             print(f"{parser.prog}: {arguments.results}: the trajectory is partial: {results.shortfall}", file=sys.stderr)
-        names = draw_run(results, folder)
+        names = draw_run(results, folder, arguments.format)
     except ResultsError as error:
         sys.exit(f"{parser.prog}: {error}")
-    print(f"{', '.join(names)} (PNG, SVG, PDF) are in {folder}")
+    print(saved(names, arguments.format, folder))
     if advice := _advise(results):
         print(advice)
 

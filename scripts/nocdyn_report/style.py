@@ -1,5 +1,6 @@
 """How all figures look, and how they are saved."""
 
+import argparse
 import textwrap
 from collections.abc import Sequence
 from pathlib import Path
@@ -76,12 +77,36 @@ def _add_colour_bar(axes: Axes, names: Sequence[str], palette: np.ndarray) -> No
     bar.ax.invert_yaxis()  # reads as the list of bodies does
 
 
-def save(figure: Figure, folder: Path, name: str, formats: Sequence[str] | None = None) -> None:
-    """Writes FOLDER/NAME in each format, in all if none is named, and frees the figure."""
+def add_format_option(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--format",
+        type=_formats,
+        default=list(FORMATS),
+        metavar="KINDS",
+        help=f"of the figures, separated by commas: some of {','.join(FORMATS)} (all)",
+    )
+
+
+def _formats(text: str) -> list[str]:
+    """The words given after --format."""
+    kinds = text.lower().split(",")
+    for kind in kinds:
+        if kind not in FORMATS:
+            raise argparse.ArgumentTypeError(f"'{kind}' is none of {', '.join(FORMATS)}")
+    return kinds
+
+
+def saved(names: Sequence[str], formats: Sequence[str], folder: Path) -> str:
+    """A line that says which figures are where."""
+    return f"{', '.join(names)} ({', '.join(kind.upper() for kind in formats)}) are in {folder}"
+
+
+def save(figure: Figure, folder: Path, name: str, formats: Sequence[str] = FORMATS) -> None:
+    """Writes FOLDER/NAME in each format and frees the figure."""
     folder.mkdir(parents=True, exist_ok=True)
     figure.draw_without_rendering()
     figure.set_layout_engine("none")  # laid out once, not for each format again
-    for kind in formats or FORMATS:
+    for kind in formats:
         undated = {"png": None, "svg": {"Date": None}, "pdf": {"CreationDate": None}}[kind]
         figure.savefig(folder / f"{name}.{kind}", metadata=undated)
     pyplot.close(figure)

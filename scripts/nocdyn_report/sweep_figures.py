@@ -11,7 +11,7 @@ from matplotlib import pyplot
 from matplotlib.figure import Figure
 
 from .results import ResultsError
-from .style import FORMATS, WIDTH, add_title, plain, save
+from .style import WIDTH, add_format_option, add_title, plain, save, saved
 from .sweep_curves import Family, add_hertz, draw_family, explain_marks, family_of
 from .sweep_influence import MOST_BARS, Influence, draw_influence
 from .sweep_panels import (
@@ -157,26 +157,11 @@ def _paged(name: str, sweep: Sweep, draw: Callable[[Sweep, Sequence[Variable]], 
         yield name if page == 1 else f"{name}_{page}", draw(sweep, sweep.results[first : first + ROWS])
 
 
-def formats(text: str) -> list[str]:
-    """Of the figures, as given after --format."""
-    kinds = text.lower().split(",")
-    for kind in kinds:
-        if kind not in FORMATS:
-            raise argparse.ArgumentTypeError(f"'{kind}' is none of {', '.join(FORMATS)}")
-    return kinds
-
-
 def main() -> None:
     parser = argparse.ArgumentParser(prog="scripts/plot_sweep", description=__doc__)
     parser.add_argument("results", type=Path, metavar="RESULTS", help="folder that 'nocdyn sweep' wrote")
     parser.add_argument("--out", type=Path, metavar="DIR", help="where the figures go (RESULTS/figures)")
-    parser.add_argument(
-        "--format",
-        type=formats,
-        default=list(FORMATS),
-        metavar="KINDS",
-        help=f"of the figures, separated by commas: some of {','.join(FORMATS)} (all)",
-    )
+    add_format_option(parser)
     arguments = parser.parse_args()
     folder = arguments.out or arguments.results / "figures"
     try:
@@ -188,8 +173,7 @@ def main() -> None:
         add_title(figure, sweep.title, sweep.remark)
         save(figure, folder, name, arguments.format)
         names.append(name)
-    kinds = ", ".join(kind.upper() for kind in arguments.format)
-    print(f"{', '.join(names)} ({kinds}) are in {folder}")
+    print(saved(names, arguments.format, folder))
 
 
 if __name__ == "__main__":
