@@ -32,7 +32,7 @@ def refusal(nocdyn, **groups):
         ),
         (
             {"vary": "&vary target = 'run.method' low = 0 high = 1 /\n"},
-            "m.nml:6: &vary: target = 'run.method': method is no number (word); allowed: t_start, t_end, rtol, atol, max_steps",
+            "m.nml:6: &vary: target = 'run.method': method is not a number (word); allowed: t_start, t_end, rtol, atol, max_steps",
         ),
         (
             {"vary": "&vary target = 'load.drag.constant_speed' low = 1 high = 2 /\n"},
@@ -120,7 +120,7 @@ def test_a_list_is_refused_with_its_own_file_and_line(nocdyn):
     message = refusal(nocdyn, sweep="&sweep design = 'list' file = 'list.csv' /\n", vary="")
     assert message == (
         "nocdyn: m.nml:5: &sweep: file: list.csv:3: 1 column in '0.5'; needed: 2, separated by blanks or a comma\n"
-        "nocdyn: m.nml:5: &sweep: file: list.csv:1: column 2, 'body.disc.name': name is no number (name); "
+        "nocdyn: m.nml:5: &sweep: file: list.csv:1: column 2, 'body.disc.name': name is not a number (name); "
         "allowed: inertia, angle, speed\n"
     )
 

@@ -1,7 +1,7 @@
-!> What is different between two inputs, in sentences. Both are texts of `input_text`, in which every key has its value.
+!> The differences between two inputs as sentences. Both inputs are texts of `input_text`, in which every key has its value.
 !>
-!> The directory of the results does not count. The title does, though it changes no number: files of a sweep carry it. The order
-!> of named groups counts: sums are formed in it, so that their last bits depend on it.
+!> The directory of the results is ignored. The title is compared, because the files of a sweep contain it. The order of named
+!> groups is compared too: sums are formed in it, and their last bits depend on it.
 module nocdyn_input_differences
   use nocdyn_diagnostics, only: diagnostics_t
   use nocdyn_namelist, only: assignment_t, namelist_t
@@ -14,21 +14,21 @@ module nocdyn_input_differences
 
   public :: find_differences
 
-  integer, parameter :: longest_shown = 5   !! values of a list that are written out
+  integer, parameter :: longest_shown = 5   !! values of a list in a sentence
 
   !> An input taken apart.
   type :: parts_t
     type(namelist_t) :: namelist
     type(string_t), allocatable :: labels(:)   !! of the groups: "&load 'work'", "&run", "&vary 2"
     integer, allocatable :: order(:)           !! of the labels, sorted
-    integer, allocatable :: name_space(:)      !! the first row of `group_rules` with the same, 0 for groups without names
+    integer, allocatable :: name_space(:)      !! first row of `group_rules` with the same name space, 0: groups without names
   end type parts_t
 
 contains
 
-  !> One sentence for each difference, in the order of the old input; none if both describe the same sweep.
+  !> One sentence for each difference, in the order of the old input; none if both describe the same computation.
   subroutine find_differences(old, new, sentences)
-    character(len=*), intent(in) :: old, new
+    character(len=*), intent(in) :: old, new   !! texts of `input_text`
     type(string_t), allocatable, intent(out) :: sentences(:)
     type(parts_t) :: before, after
     integer, allocatable :: partner(:)   ! in the new input, 0: none
@@ -53,6 +53,7 @@ contains
     call compare_order(before, partner, sentences)
   end subroutine find_differences
 
+  !> Scans an input and labels its groups.
   subroutine take_apart(text, parts)
     character(len=*), intent(in) :: text
     type(parts_t), intent(out) :: parts
@@ -77,7 +78,7 @@ contains
     call argsort(parts%labels, parts%order)
   end subroutine take_apart
 
-  !> What a group is called in both inputs.
+  !> Label of a group, the same in both inputs.
   pure function label_of(namelist, g, rule, number) result(label)
     type(namelist_t), intent(in) :: namelist
     integer, intent(in) :: g, rule
@@ -87,7 +88,7 @@ contains
 
     label = '&' // trim(group_rules(rule)%name)
     if (group_rules(rule)%name_space /= '') then
-      name = key_place(namelist, g, 'name')
+      name = find_assignment(namelist, g, 'name')
       label = label // ' ' // quoted(namelist%item_text(namelist%items(namelist%assignments(name)%first_item)))
     else if (.not. is_single(rule)) then
       label = label // ' ' // to_text(number)
@@ -95,18 +96,18 @@ contains
   end function label_of
 
   !> The assignment to a key of a group, 0 if there is none.
-  pure integer function key_place(namelist, g, key) result(place)
+  pure integer function find_assignment(namelist, g, key) result(a)
     type(namelist_t), intent(in) :: namelist
     integer, intent(in) :: g
     character(len=*), intent(in) :: key
 
-    do place = namelist%groups(g)%first_assignment, namelist%groups(g)%last_assignment
-      if (namelist%assignments(place)%key == key) return
+    do a = namelist%groups(g)%first_assignment, namelist%groups(g)%last_assignment
+      if (namelist%assignments(a)%key == key) return
     end do
-    place = 0
-  end function key_place
+    a = 0
+  end function find_assignment
 
-  !> Keys that one of two groups has alone, and keys of both with other values.
+  !> Compares two groups: keys that only one of them has, and keys with different values.
   subroutine compare_groups(before, old, after, new, sentences)
     type(parts_t), intent(in) :: before, after
     integer, intent(in) :: old, new   !! the groups
@@ -117,8 +118,8 @@ contains
     start = before%labels(old)%text // ': '
     associate (left => before%namelist, right => after%namelist)
       do a = left%groups(old)%first_assignment, left%groups(old)%last_assignment
-        if (is_unimportant(before%labels(old)%text, left%assignments(a)%key)) cycle
-        other = key_place(right, new, left%assignments(a)%key)
+        if (is_ignored(before%labels(old)%text, left%assignments(a)%key)) cycle
+        other = find_assignment(right, new, left%assignments(a)%key)
         if (other == 0) then
           call append(sentences, start // left%assignments(a)%key // ' was ' // values_of(left, left%assignments(a)) // &
                       ', is not there')
@@ -128,26 +129,26 @@ contains
         end if
       end do
       do a = right%groups(new)%first_assignment, right%groups(new)%last_assignment
-        if (key_place(left, old, right%assignments(a)%key) > 0) cycle
+        if (find_assignment(left, old, right%assignments(a)%key) > 0) cycle
         call append(sentences, start // right%assignments(a)%key // ' was not there, is ' // &
                     values_of(right, right%assignments(a)))
       end do
     end associate
   end subroutine compare_groups
 
-  pure logical function is_unimportant(label, key)
+  pure logical function is_ignored(label, key)
     character(len=*), intent(in) :: label, key
 
-    is_unimportant = label == '&output' .and. key == 'directory'
-  end function is_unimportant
+    is_ignored = label == '&output' .and. key == 'directory'
+  end function is_ignored
 
-  !> Of lists of equal length the first place that differs is told, of others their values or lengths.
+  !> Compares the values of a key: of lists of equal length the first difference, of others their values or lengths.
   subroutine compare_values(start, left, old, right, new, sentences)
     character(len=*), intent(in) :: start   !! of the sentence: group and key
     type(namelist_t), intent(in) :: left, right
     type(assignment_t), intent(in) :: old, new
     type(string_t), allocatable, intent(inout) :: sentences(:)
-    character(len=:), allocatable :: is, place, was
+    character(len=:), allocatable :: index_text, new_value, old_value
     integer :: count, i
 
     count = old%last_item - old%first_item + 1
@@ -156,17 +157,17 @@ contains
       return
     end if
     do i = 1, count
-      was = left%as_written(left%items(old%first_item + i - 1))
-      is = right%as_written(right%items(new%first_item + i - 1))
-      if (was == is) cycle
-      place = ''
-      if (count > 1) place = '(' // to_text(i) // ')'
-      call append(sentences, start // place // ' was ' // was // ', is ' // is)
+      old_value = left%as_written(left%items(old%first_item + i - 1))
+      new_value = right%as_written(right%items(new%first_item + i - 1))
+      if (old_value == new_value) cycle
+      index_text = ''
+      if (count > 1) index_text = '(' // to_text(i) // ')'
+      call append(sentences, start // index_text // ' was ' // old_value // ', is ' // new_value)
       return
     end do
   end subroutine compare_values
 
-  !> The values of a key as they are written; of long lists only how many they are.
+  !> The values of a key as they are written; of long lists only their number.
   pure function values_of(namelist, assignment) result(text)
     type(namelist_t), intent(in) :: namelist
     type(assignment_t), intent(in) :: assignment
@@ -184,7 +185,7 @@ contains
     end do
   end function values_of
 
-  !> Groups of one name space that have changed places.
+  !> Compares the order of the groups of each name space.
   subroutine compare_order(before, partner, sentences)
     type(parts_t), intent(in) :: before
     integer, intent(in) :: partner(:)   !! of each old group in the new input

@@ -1,4 +1,4 @@
-!> The complete input as it was used, in the form in which it can be read again.
+!> The complete input of a computation as a namelist that can be read again.
 module nocdyn_input_text
   use nocdyn_input, only: group_t, input_t, value_t
   use nocdyn_schema, only: first_key, key_rules
@@ -13,7 +13,7 @@ module nocdyn_input_text
 
 contains
 
-  !> A namelist with every key that has a value, defaults and overrides included; numbers read back as the same bits.
+  !> A namelist with every key that has a value, defaults and overrides included. Numbers read back as the same bits.
   function input_text(input) result(text)
     type(input_t), intent(in) :: input
     character(len=:), allocatable :: text
@@ -27,6 +27,7 @@ contains
     text = buffer%text()
   end function input_text
 
+  !> Appends one group.
   subroutine append_group(buffer, group)
     type(text_buffer_t), intent(inout) :: buffer
     type(group_t), intent(in) :: group
@@ -41,7 +42,7 @@ contains
     call buffer%append_line('/')
   end subroutine append_group
 
-  !> `key = items`, broken where the line gets long.
+  !> Appends `key = items`, on several lines if it is long.
   subroutine append_key(buffer, key, items)
     type(text_buffer_t), intent(inout) :: buffer
     character(len=*), intent(in) :: key
@@ -61,7 +62,7 @@ contains
     call buffer%append_line(line)
   end subroutine append_key
 
-  !> The values of one key as a namelist has them.
+  !> The values of one key in namelist notation.
   subroutine write_items(value, items)
     type(value_t), intent(in) :: value
     type(string_t), allocatable, intent(out) :: items(:)

@@ -1,5 +1,5 @@
-!> Values from their Fortran notation. Nothing is handed to the run-time library that it could misread: every text is
-!> checked digit by digit first, so that overflow is refused without raising a floating-point exception.
+!> Numbers and logical values from their Fortran notation. Every text is checked digit by digit before the run-time library reads
+!> it, so that malformed numbers are refused, and overflow without a floating-point exception.
 module nocdyn_literals
   use nocdyn_kinds, only: wp
   use nocdyn_text, only: lower_case
@@ -19,11 +19,11 @@ module nocdyn_literals
 
 contains
 
-  !> Decimal notation with an optional exponent by e, d or q; nan and infinity answer `literal_not_finite`.
+  !> Reads a number in decimal notation, with an optional exponent after e, d or q.
   subroutine read_real(text, value, status)
     character(len=*), intent(in) :: text
     real(wp), intent(out) :: value
-    integer, intent(out) :: status
+    integer, intent(out) :: status   !! `literal_fine` ... `literal_too_large`
 
     value = 0.0_wp
     status = literal_malformed
@@ -52,11 +52,11 @@ contains
     end select
   end function number_problem
 
-  !> Optional sign and digits.
+  !> Reads an optional sign and digits.
   subroutine read_integer(text, value, status)
     character(len=*), intent(in) :: text
     integer, intent(out) :: value
-    integer, intent(out) :: status
+    integer, intent(out) :: status   !! `literal_fine`, `literal_malformed` or `literal_too_large`
     integer :: i, digit, sign_length
 
     value = 0
@@ -74,11 +74,11 @@ contains
     status = literal_fine
   end subroutine read_integer
 
-  !> .true., .false., and what Fortran takes for short: true, false, .t., .f., t, f.
+  !> Reads .true. or .false., or one of the short forms true, false, .t., .f., t, f.
   pure subroutine read_logical(text, value, status)
     character(len=*), intent(in) :: text
     logical, intent(out) :: value
-    integer, intent(out) :: status
+    integer, intent(out) :: status   !! `literal_fine`, `literal_malformed` or `literal_too_large`
 
     select case (lower_case(text))
     case ('.true.', '.true', 'true', '.t.', '.t', 't')

@@ -1,12 +1,12 @@
-!> A namelist file as its scanner leaves it: groups, assignments and values as written, with the line of each.
+!> The contents of a namelist file: groups, assignments and values as texts, with the line of each.
 module nocdyn_namelist
   use nocdyn_text, only: lower_case
   implicit none (type, external)
   private
 
-  !> One value: a bare word, a quoted text or nothing between two commas.
+  !> One value: a bare word, a quoted text, or a null value between two commas.
   type, public :: item_t
-    integer :: first = 1, last = 0   !! in the source, quotes included
+    integer :: first = 1, last = 0   !! positions in the source, quotes included
     integer :: line = 0
     logical :: is_quoted = .false.
     logical :: is_null = .false.
@@ -19,19 +19,19 @@ module nocdyn_namelist
     integer :: first = 1
     integer :: last = 0               !! 0 if it is as far as the values go
     integer :: stride = 1
-    logical :: is_whole = .true.      !! no subscript was written
-    logical :: is_malformed = .false.   !! subscript or values could not be understood
-    integer :: first_item = 1, last_item = 0
+    logical :: is_whole = .true.      !! without a subscript
+    logical :: is_malformed = .false.   !! subscript or values cannot be read
+    integer :: first_item = 1, last_item = 0   !! indices of the values
   end type assignment_t
 
   type, public :: namelist_group_t
     character(len=:), allocatable :: name   !! in lower case
     integer :: line = 0
-    integer :: first_assignment = 1, last_assignment = 0
-    logical :: is_malformed = .false.   !! what seems to be missing may be in the part that could not be understood
+    integer :: first_assignment = 1, last_assignment = 0   !! indices
+    logical :: is_malformed = .false.   !! a part cannot be read; keys that seem to be missing may be in it
   end type namelist_group_t
 
-  !> The assignments and items of all groups stand one after the other in flat lists.
+  !> The assignments and items of all groups are consecutive in flat lists.
   type, public :: namelist_t
     character(len=:), allocatable :: source
     integer :: group_count = 0, assignment_count = 0, item_count = 0
@@ -48,6 +48,7 @@ module nocdyn_namelist
 
 contains
 
+  !> Appends a group without assignments.
   subroutine append_group(self, name, line)
     class(namelist_t), intent(inout) :: self
     character(len=*), intent(in) :: name
@@ -69,7 +70,7 @@ contains
     end associate
   end subroutine append_group
 
-  !> Appends to the last group.
+  !> Appends an assignment to the last group.
   subroutine append_assignment(self, assignment)
     class(namelist_t), intent(inout) :: self
     type(assignment_t), intent(in) :: assignment
@@ -86,6 +87,7 @@ contains
     self%groups(self%group_count)%last_assignment = self%assignment_count
   end subroutine append_assignment
 
+  !> Appends a value.
   subroutine append_item(self, item)
     class(namelist_t), intent(inout) :: self
     type(item_t), intent(in) :: item
@@ -101,7 +103,7 @@ contains
     self%items(self%item_count) = item
   end subroutine append_item
 
-  !> A quoted item with its doubled quotes undone, or a bare word as it is.
+  !> The text of a value: of a quoted one without its quotes, with doubled quotes inside reduced to one.
   pure function item_text(self, item) result(text)
     class(namelist_t), intent(in) :: self
     type(item_t), intent(in) :: item
@@ -123,7 +125,7 @@ contains
     text = text(:length)
   end function item_text
 
-  !> An item as the file has it, quotes included.
+  !> A value as written in the file, quotes included.
   pure function as_written(self, item) result(text)
     class(namelist_t), intent(in) :: self
     type(item_t), intent(in) :: item

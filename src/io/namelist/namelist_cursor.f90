@@ -1,4 +1,4 @@
-!> A place in the text of a namelist file, and the smallest pieces of its syntax.
+!> A position in the text of a namelist file, and tests for the elements of its syntax there.
 module nocdyn_namelist_cursor
   use nocdyn_text, only: lower_case, shortened
   implicit none (type, external)
@@ -13,7 +13,7 @@ module nocdyn_namelist_cursor
 
   type, public :: cursor_t
     character(len=:), allocatable :: text   !! ends with a line feed
-    integer :: at = 1                       !! next character, len(text) + 1 at the end
+    integer :: at = 1                       !! position of the next character, len(text) + 1 at the end
     integer :: line = 1
     logical :: is_override = .false.        !! the text is the value of an override: '/', '!', '&' and '=' have no meaning
     character(len=:), allocatable :: key    !! whose values are read, with ': ' for messages; '': none
@@ -51,7 +51,7 @@ contains
     if (self%at <= len(self%text)) next = self%text(self%at:self%at)
   end function next_character
 
-  !> Goes forward to a position and counts the lines on the way.
+  !> Moves forward to a position and counts the lines.
   pure subroutine move_to(self, position)
     class(cursor_t), intent(inout) :: self
     integer, intent(in) :: position
@@ -63,7 +63,7 @@ contains
     self%at = position
   end subroutine move_to
 
-  !> Goes past blanks, tabs, line ends and comments.
+  !> Skips blanks, tabs, line ends and comments.
   pure subroutine skip_blanks(self)
     class(cursor_t), intent(inout) :: self
 
@@ -78,14 +78,14 @@ contains
     end do
   end subroutine skip_blanks
 
-  !> Position of the line feed that ends the line.
+  !> Position of the line feed at the end of the line.
   pure integer function line_end(self)
     class(cursor_t), intent(in) :: self
 
     line_end = self%at + index(self%text(self%at:), line_feed) - 1
   end function line_end
 
-  !> Last position of the bare word at the cursor; before the cursor if there is none.
+  !> Last position of the bare word at the cursor; the position before the cursor if there is none.
   pure integer function token_end(self, delimiters)
     class(cursor_t), intent(in) :: self
     character(len=*), intent(in) :: delimiters   !! besides blanks
@@ -118,7 +118,7 @@ contains
     key_end = self%token_end(value_delimiters // '(')
   end function key_end
 
-  !> Position of the quote that closes the text whose opening quote is at the cursor, 0 if the line has none.
+  !> Position of the quote that closes the text at the cursor, which begins with a quote; 0 if it is not closed on its line.
   pure integer function quote_end(self)
     class(cursor_t), intent(in) :: self
     character(len=1) :: quote
@@ -137,7 +137,7 @@ contains
     quote_end = 0
   end function quote_end
 
-  !> Whether a word, perhaps with a subscript, and an equals sign stand at the cursor.
+  !> Whether there is a key at the cursor: a word, perhaps with a subscript, before an equals sign.
   pure logical function key_follows(self)
     class(cursor_t), intent(in) :: self
     integer :: i
@@ -151,8 +151,8 @@ contains
     if (i > 0) key_follows = self%text(i:i) == '='
   end function key_follows
 
-  !> Position after a subscript that stands at `start` or behind blanks there; `start` if there is no subscript, 0 if it
-  !> does not close on its line.
+  !> Position after a subscript at `start` or after blanks there; `start` if there is no subscript, 0 if it is not closed on
+  !> its line.
   pure integer function subscript_end(self, start)
     class(cursor_t), intent(in) :: self
     integer, intent(in) :: start
@@ -166,7 +166,7 @@ contains
     subscript_end = merge(open + length, 0, self%text(open + length - 1:open + length - 1) == ')')
   end function subscript_end
 
-  !> 0 if only blanks follow; otherwise the position of the first other character, at or after `start`.
+  !> Position of the first character from `start` on that is not blank, 0 if there is none.
   pure integer function position_after_blanks(text, start) result(position)
     character(len=*), intent(in) :: text
     integer, intent(in) :: start
@@ -199,7 +199,7 @@ contains
     if (scan(self%text(self%at + 4:self%at + 4), letters_and_digits) == 0) group_ends = 4
   end function group_ends
 
-  !> Whether only blanks stand before the cursor on its line.
+  !> Whether there are only blanks before the cursor on its line.
   pure logical function is_first_of_line(self)
     class(cursor_t), intent(in) :: self
     integer :: line_start
@@ -208,7 +208,7 @@ contains
     is_first_of_line = verify(self%text(line_start:self%at - 1), blanks) == 0
   end function is_first_of_line
 
-  !> The rest of the line between quotes, cut to a length that suits a message.
+  !> The rest of the line between angle brackets, shortened for a message.
   pure function excerpt(self) result(text)
     class(cursor_t), intent(in) :: self
     character(len=:), allocatable :: text

@@ -1,7 +1,7 @@
-!> Scanner for namelist files. It knows the whole syntax of namelist input and nothing of what groups and keys mean.
+!> Scanner for namelist files: the syntax of namelist input, without the meaning of groups and keys.
 !>
-!> Two habits of Fortran are mistakes here, because they hide slips: a text that goes on past the end of its line, and
-!> text behind the end of a group.
+!> Two forms that Fortran accepts are errors here, because they hide typing errors: a text in quotes that continues on the next
+!> line, and text after the end of a group.
 module nocdyn_namelist_scanner
   use nocdyn_diagnostics, only: diagnostics_t
   use nocdyn_namelist, only: assignment_t, namelist_t
@@ -15,11 +15,11 @@ module nocdyn_namelist_scanner
 
 contains
 
-  !> Scans the text of a file; mistakes carry the index of their group.
+  !> Scans the text of a file.
   subroutine scan_namelist(text, namelist, diagnostics)
     character(len=*), intent(in) :: text
     type(namelist_t), intent(out) :: namelist
-    type(diagnostics_t), intent(inout) :: diagnostics
+    type(diagnostics_t), intent(inout) :: diagnostics   !! errors are added
     type(cursor_t) :: cursor
 
     call begin(text, namelist, cursor, diagnostics)
@@ -34,7 +34,7 @@ contains
     end do
   end subroutine scan_namelist
 
-  !> Scans the VALUE of an override into the items of `namelist`; bare words may hold what would end a group in a file.
+  !> Scans the VALUE of an override into the items of `namelist`. Bare words may hold characters that end a group in a file.
   subroutine scan_value(text, namelist, diagnostics)
     character(len=*), intent(in) :: text
     type(namelist_t), intent(out) :: namelist
@@ -47,7 +47,7 @@ contains
     call scan_items(cursor, namelist, diagnostics, is_malformed)
   end subroutine scan_value
 
-  !> The text without byte-order mark, with a final line end, and with control characters refused.
+  !> Starts at the beginning of a text, without its byte-order mark, with a final line end and with control characters refused.
   subroutine begin(text, namelist, cursor, diagnostics)
     character(len=*), intent(in) :: text
     type(namelist_t), intent(inout) :: namelist
@@ -61,7 +61,7 @@ contains
     namelist%source = cursor%text
   end subroutine begin
 
-  !> Control characters become blanks; the first of each line is a mistake.
+  !> Replaces control characters by blanks; the first on each line is an error.
   subroutine blank_control_characters(text, diagnostics)
     character(len=:), allocatable, intent(inout) :: text
     type(diagnostics_t), intent(inout) :: diagnostics
@@ -80,7 +80,7 @@ contains
     end do
   end subroutine blank_control_characters
 
-  !> One mistake for all that stands between two groups.
+  !> Adds one error for all text between two groups, and skips it.
   subroutine refuse_text_outside(cursor, namelist, diagnostics)
     type(cursor_t), intent(inout) :: cursor
     type(namelist_t), intent(in) :: namelist
@@ -90,7 +90,7 @@ contains
       call diagnostics%add(cursor%line, 0, 'text outside groups: ' // cursor%excerpt() // '; a group is written &NAME ... /')
     else
       call diagnostics%add(cursor%line, namelist%group_count, &
-        'text behind the end of the group: ' // cursor%excerpt() // "; a value that holds '/' needs quotes")
+        'text after the end of the group: ' // cursor%excerpt() // "; a value that holds '/' needs quotes")
     end if
 
     do while (.not. (cursor%at_end() .or. cursor%group_begins()))
@@ -99,7 +99,7 @@ contains
     end do
   end subroutine refuse_text_outside
 
-  !> From & or $ to the end mark, or to where the end mark should have been.
+  !> Scans a group from & or $ to its end mark, or to where the end mark is missing.
   subroutine scan_group(cursor, namelist, diagnostics)
     type(cursor_t), intent(inout) :: cursor
     type(namelist_t), intent(inout) :: namelist
@@ -128,7 +128,7 @@ contains
     end if
   end subroutine scan_group
 
-  !> Nothing is said of a damaged group, whose end may be in the part that could not be understood.
+  !> Adds an error for a group without end mark, unless a part of it cannot be read: the end mark may be in that.
   subroutine refuse_unclosed(cursor, namelist, diagnostics)
     type(cursor_t), intent(in) :: cursor
     type(namelist_t), intent(in) :: namelist
@@ -145,7 +145,7 @@ contains
     end associate
   end subroutine refuse_unclosed
 
-  !> Values where a key was expected.
+  !> Adds an error for values without a key, and skips them.
   subroutine refuse_text_without_key(cursor, namelist, diagnostics)
     type(cursor_t), intent(inout) :: cursor
     type(namelist_t), intent(inout) :: namelist
@@ -166,6 +166,7 @@ contains
     call diagnostics%add(line, namelist%group_count, 'KEY = VALUE was expected, but found is ' // found)
   end subroutine refuse_text_without_key
 
+  !> Scans `KEY = VALUES`.
   subroutine scan_assignment(cursor, namelist, diagnostics)
     type(cursor_t), intent(inout) :: cursor
     type(namelist_t), intent(inout) :: namelist
@@ -183,7 +184,7 @@ contains
       subscript = trim(adjustl(cursor%text(last + 1:after - 1)))
       call read_subscript(subscript(2:len(subscript) - 1), assignment)
       if (assignment%is_malformed) call diagnostics%add(cursor%line, namelist%group_count, assignment%key // subscript // &
-        ': the subscript is neither a place such as (3) nor a section such as (1:3), from 1 to ' // to_text(longest_list))
+        ': the subscript is neither an index such as (3) nor a section such as (1:3), from 1 to ' // to_text(longest_list))
     end if
     call cursor%move_to(after)
     call cursor%move_to(cursor%at + index(cursor%text(cursor%at:), '='))

@@ -10,7 +10,7 @@ module nocdyn_namelist_values
 
   public :: scan_items, read_subscript
 
-  integer, parameter, public :: longest_list = 100000   !! values that one key can take
+  integer, parameter, public :: longest_list = 100000   !! largest number of values of a key
   character(len=*), parameter :: separators = ' ,/!' // achar(9) // achar(10)
 
 contains
@@ -19,8 +19,8 @@ contains
   subroutine scan_items(cursor, namelist, diagnostics, is_malformed)
     type(cursor_t), intent(inout) :: cursor
     type(namelist_t), intent(inout) :: namelist
-    type(diagnostics_t), intent(inout) :: diagnostics
-    logical, intent(out) :: is_malformed   !! some could not be understood
+    type(diagnostics_t), intent(inout) :: diagnostics   !! errors are added
+    logical, intent(out) :: is_malformed   !! some values cannot be read, which is reported
     logical :: is_fine, is_after_value
 
     is_malformed = .false.
@@ -43,7 +43,7 @@ contains
     if (is_malformed .and. namelist%group_count > 0) namelist%groups(namelist%group_count)%is_malformed = .true.
   end subroutine scan_items
 
-  !> One value, or several by a repeat count such as 3*0.5.
+  !> Scans one value, or several given by a repeat count such as 3*0.5.
   subroutine scan_item(cursor, namelist, diagnostics, is_fine)
     type(cursor_t), intent(inout) :: cursor
     type(namelist_t), intent(inout) :: namelist
@@ -69,10 +69,10 @@ contains
     end do
   end subroutine scan_item
 
-  !> Goes past "3*"; a count that no integer holds is answered with the largest integer.
+  !> Reads and skips a repeat count such as "3*".
   subroutine scan_repeat_count(cursor, repeats)
     type(cursor_t), intent(inout) :: cursor
-    integer, intent(out) :: repeats   !! 1 if none is written
+    integer, intent(out) :: repeats   !! 1 if there is none; the largest integer if the count is too large
     integer :: last, status
 
     repeats = 1
@@ -147,7 +147,7 @@ contains
     if (.not. is_separated) is_separated = scan(cursor%text(position:position), separators) == 1
   end function is_separated
 
-  !> With the quotes of a line out of step its rest means nothing, but a slash at its end still ends the group.
+  !> Skips the rest of a line whose quotes do not match, up to a slash at its end, which still ends the group.
   subroutine skip_broken_line(cursor)
     type(cursor_t), intent(inout) :: cursor
     character(len=:), allocatable :: rest
@@ -166,8 +166,8 @@ contains
 
   !> `(first)` or `(first:last:stride)` with any part of a section left out.
   subroutine read_subscript(text, assignment)
-    character(len=*), intent(in) :: text   !! between the parentheses
-    type(assignment_t), intent(inout) :: assignment   !! damaged if the text is neither
+    character(len=*), intent(in) :: text   !! the subscript without its parentheses
+    type(assignment_t), intent(inout) :: assignment   !! `is_malformed` if the text is neither
     character(len=:), allocatable :: rest
     integer :: bounds(3), colon, part
     logical :: is_fine
@@ -190,7 +190,7 @@ contains
     assignment%is_malformed = part > 3 .or. .not. is_fine .or. (bounds(2) > 0 .and. bounds(2) < bounds(1))
   end subroutine read_subscript
 
-  !> A bound that is left out keeps its value.
+  !> Reads one bound; an empty text leaves it as it is.
   subroutine read_bound(text, bound, is_fine)
     character(len=*), intent(in) :: text
     integer, intent(inout) :: bound

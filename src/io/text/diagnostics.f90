@@ -1,4 +1,4 @@
-!> The mistakes of an input, collected so that all are reported in one go.
+!> The errors in an input, collected so that all are reported together.
 module nocdyn_diagnostics
   use nocdyn_errors, only: exit_input
   use nocdyn_text, only: string_t
@@ -6,15 +6,15 @@ module nocdyn_diagnostics
   implicit none (type, external)
   private
 
-  integer, parameter, public :: no_line = huge(1)   !! for a mistake of the file as a whole; sorts last
+  integer, parameter, public :: no_line = huge(1)   !! of an error in the file as a whole; sorted last
 
-  !> A sentence without its place, which is put before it when the names of all groups are known.
+  !> One error. File, line and group are put before its text when the names of all groups are known.
   type, public :: diagnostic_t
     integer :: line = no_line
-    integer :: group = 0      !! index in the file, 0: outside groups
-    integer :: override = 0   !! index of the override that is wrong, 0: the file is
+    integer :: group = 0           !! index in the file, 0: outside groups
+    integer :: override = 0        !! index of the wrong override, 0: the file is wrong
     integer :: code = exit_input   !! exit code of the program
-    character(len=:), allocatable :: text
+    character(len=:), allocatable :: text   !! what is wrong, and what is allowed
   end type diagnostic_t
 
   type, public :: diagnostics_t
@@ -28,11 +28,12 @@ module nocdyn_diagnostics
 
 contains
 
+  !> Adds one error; the arguments are the components of `diagnostic_t`.
   subroutine add(self, line, group, text, override, code)
     class(diagnostics_t), intent(inout) :: self
-    integer, intent(in) :: line, group
+    integer, intent(in) :: line, group             !! line of the file or `no_line`, index of the group or 0
     character(len=*), intent(in) :: text
-    integer, optional, intent(in) :: override, code
+    integer, optional, intent(in) :: override, code   !! if absent, 0 and `exit_input`
     type(diagnostic_t), allocatable :: longer(:)
 
     if (.not. allocated(self%list)) allocate (self%list(16))
@@ -51,7 +52,7 @@ contains
     end associate
   end subroutine add
 
-  !> Positions in the list by line, mistakes of one line in the order of their discovery, those of overrides last.
+  !> Indices in the list, sorted by line; errors on one line stay in their order, those of overrides come last.
   subroutine sort_by_line(self, order)
     class(diagnostics_t), intent(in) :: self
     integer, allocatable, intent(out) :: order(:)
@@ -67,7 +68,7 @@ contains
     call argsort(keys, order)
   end subroutine sort_by_line
 
-  !> The largest exit code of all mistakes.
+  !> The largest exit code of all errors.
   pure integer function worst_code(self)
     class(diagnostics_t), intent(in) :: self
 

@@ -1,4 +1,4 @@
-!> A text that grows at its end in constant time per character.
+!> A text to which characters are appended in amortised constant time.
 module nocdyn_text_buffer
   implicit none (type, external)
   private
@@ -17,6 +17,7 @@ module nocdyn_text_buffer
 
 contains
 
+  !> Appends a text.
   subroutine append(self, text)
     class(text_buffer_t), intent(inout) :: self
     character(len=*), intent(in) :: text
@@ -32,6 +33,7 @@ contains
     self%length = self%length + len(text)
   end subroutine append
 
+  !> Appends a text and a line feed.
   subroutine append_line(self, text)
     class(text_buffer_t), intent(inout) :: self
     character(len=*), intent(in) :: text
@@ -40,6 +42,7 @@ contains
     call self%append(line_end)
   end subroutine append_line
 
+  !> The text so far.
   pure function buffer_text(self) result(text)
     class(text_buffer_t), intent(in) :: self
     character(len=:), allocatable :: text

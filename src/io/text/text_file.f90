@@ -1,4 +1,4 @@
-!> Whole text files.
+!> Reads text files as a whole.
 module nocdyn_text_file
   use, intrinsic :: iso_fortran_env, only: int64
   use nocdyn_errors, only: error_t, exit_file, raise
@@ -12,7 +12,7 @@ module nocdyn_text_file
 
 contains
 
-  !> A relative path begins in the folder.
+  !> Path of a file: a relative path begins in the folder.
   pure function path_in(folder, path) result(whole)
     character(len=*), intent(in) :: folder   !! with a slash at its end, or ''
     character(len=*), intent(in) :: path     !! not ''
@@ -22,11 +22,11 @@ contains
     if (path(1:1) == '/') whole = path
   end function path_in
 
-  !> All bytes of a file; pipes work too.
+  !> Reads all bytes of a file or a pipe.
   subroutine read_text_file(file, text, error)
     character(len=*), intent(in) :: file
     character(len=:), allocatable, intent(out) :: text
-    type(error_t), allocatable, intent(out) :: error
+    type(error_t), allocatable, intent(out) :: error   !! the file cannot be read
     character(len=reason_length) :: reason
     integer(int64) :: bytes
     integer :: status, unit
@@ -60,12 +60,12 @@ contains
     if (status /= 0) call raise(error, exit_file, file // ': cannot be read: ' // trim(reason))
   end subroutine read_text_file
 
-  !> Byte by byte, for what has no size.
+  !> Reads byte by byte what has no size, such as a pipe.
   subroutine read_to_end(unit, text, status, reason)
     integer, intent(in) :: unit
     character(len=:), allocatable, intent(out) :: text
-    integer, intent(out) :: status
-    character(len=reason_length), intent(inout) :: reason
+    integer, intent(out) :: status                          !! 0 or that of the failed `read`
+    character(len=reason_length), intent(inout) :: reason   !! of the failure
     type(text_buffer_t) :: buffer
     character(len=1) :: byte
 

@@ -1,4 +1,4 @@
-!> Sorting and searching of texts, so that names are found among thousands without comparing each with each.
+!> Sorting of texts and binary search in them.
 module nocdyn_text_sort
   use nocdyn_text, only: string_t
   implicit none (type, external)
@@ -8,10 +8,10 @@ module nocdyn_text_sort
 
 contains
 
-  !> Permutation that sorts `texts`; equal texts stay in their order. Merge sort from runs of one upwards.
+  !> Permutation that sorts `texts`, by a stable bottom-up merge sort.
   pure subroutine argsort(texts, order)
     type(string_t), intent(in) :: texts(:)
-    integer, allocatable, intent(out) :: order(:)
+    integer, allocatable, intent(out) :: order(:)   !! `texts(order)` is sorted
     integer, allocatable :: merged(:)
     integer :: first, middle, last, width
 
@@ -31,8 +31,8 @@ contains
 
   pure subroutine merge_runs(texts, left, right, merged)
     type(string_t), intent(in) :: texts(:)
-    integer, intent(in) :: left(:), right(:)   !! sorted positions in `texts`
-    integer, intent(out) :: merged(:)
+    integer, intent(in) :: left(:), right(:)   !! indices of `texts`, each list sorted
+    integer, intent(out) :: merged(:)          !! both lists, sorted
     integer :: i, l, r
 
     l = 1
@@ -57,11 +57,11 @@ contains
     takes_left = texts(left(l))%text <= texts(right(r))%text
   end function takes_left
 
-  !> Position in `texts` of the first one that equals `text`, 0 if there is none.
+  !> Index of the first of `texts` that equals `text`, 0 if there is none.
   pure integer function sorted_position(text, texts, order) result(position)
     character(len=*), intent(in) :: text
     type(string_t), intent(in) :: texts(:)
-    integer, intent(in) :: order(:)   !! of find_order
+    integer, intent(in) :: order(:)   !! of `argsort`
     integer :: low, high, middle
 
     low = 1

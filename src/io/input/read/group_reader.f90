@@ -145,7 +145,7 @@ contains
     integer :: i
 
     do i = 1, size(overrides)
-      if (.not. overrides(i)%is_fine .or. overrides(i)%group_rule /= raw%rule) cycle
+      if (.not. overrides(i)%is_valid .or. overrides(i)%group_rule /= raw%rule) cycle
       if (overrides(i)%name /= name .or. overrides(i)%number /= number) cycle
       overrides(i)%is_used = .true.
       call raw%keys(raw%position(overrides(i)%key_rule))%override_with(overrides(i)%namelist, overrides(i)%assignment, i, message)

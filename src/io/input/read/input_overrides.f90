@@ -1,4 +1,4 @@
-!> Overrides of the command line: PATH=VALUE.
+!> Overrides of the command line, PATH=VALUE.
 module nocdyn_input_overrides
   use nocdyn_key_path, only: key_path_t, read_path
   use nocdyn_diagnostics, only: diagnostics_t, no_line
@@ -15,19 +15,19 @@ module nocdyn_input_overrides
 
   !> One override; its value is the items of `namelist`.
   type, public :: override_t
-    logical :: is_fine = .false.
-    logical :: is_used = .false.                !! its group was found
-    integer :: group_rule = 0
-    integer :: key_rule = 0
-    character(len=:), allocatable :: name       !! of the element, '' for groups without names
-    integer :: number = 0                       !! among the groups without names of its kind, 0 for other groups
-    type(assignment_t) :: assignment
+    logical :: is_valid = .false.           !! path and value can be read
+    logical :: is_used = .false.            !! its group was found
+    integer :: group_rule = 0               !! row of `group_rules`
+    integer :: key_rule = 0                 !! row of `key_rules`
+    character(len=:), allocatable :: name   !! of the element, '' for groups without names
+    integer :: number = 0                   !! among the groups without names of its kind, 0 for other groups
+    type(assignment_t) :: assignment        !! key, subscript and indices of the items
     type(namelist_t) :: namelist
   end type override_t
 
 contains
 
-  !> Takes PATH=VALUE texts apart; what cannot be understood is a mistake and not `is_fine`.
+  !> Reads all overrides; errors are added for those that cannot be read.
   subroutine read_overrides(texts, overrides, diagnostics)
     type(string_t), intent(in) :: texts(:)
     type(override_t), allocatable, intent(out) :: overrides(:)
@@ -45,13 +45,14 @@ contains
         call find_key(trim(adjustl(texts(i)%text(:equals - 1))), overrides(i), message)
         if (message == '') call read_value(texts(i)%text(equals + 1:), overrides(i), message)
       end if
-      overrides(i)%is_fine = message == ''
+      overrides(i)%is_valid = message == ''
       if (message /= '') call diagnostics%add(no_line, 0, message, i)
     end do
   end subroutine read_overrides
 
+  !> Finds the key of a path.
   subroutine find_key(text, override, message)
-    character(len=*), intent(in) :: text   !! before the equals sign
+    character(len=*), intent(in) :: text   !! the path, before the equals sign
     type(override_t), intent(inout) :: override
     character(len=:), allocatable, intent(out) :: message
     type(key_rule_t) :: rule
@@ -66,7 +67,7 @@ contains
     override%key_rule = path%key_rule
     override%name = path%name
     override%number = path%number
-    override%assignment = path%place
+    override%assignment = path%target
     if (message /= '') return
     rule = key_rules(path%key_rule)
     if (rule%value_type == a_name) then
@@ -79,7 +80,7 @@ contains
     end if
   end subroutine find_key
 
-  !> A single text is taken as it stands if it has no quotes: the shell has eaten them.
+  !> Scans the value. A single text without quotes is taken unchanged: the shell has removed the quotes.
   subroutine read_value(text, override, message)
     character(len=*), intent(in) :: text
     type(override_t), intent(inout) :: override

@@ -1,4 +1,4 @@
-!> Reads an input file: scanner, schema, overrides and all checks, with every mistake in one error.
+!> Reads an input file: scanner, schema, overrides and all checks. One error reports everything that is wrong.
 module nocdyn_input_reader
   use nocdyn_diagnostics, only: diagnostics_t, no_line
   use nocdyn_errors, only: error_t, exit_input, raise
@@ -12,7 +12,7 @@ module nocdyn_input_reader
   use nocdyn_schema_relations, only: relations_of, relations_t
   use nocdyn_schema_rules, only: at_least_once, exactly_once, required
   use nocdyn_schema_text, only: group_names, occurrence_text, suggestion
-  use nocdyn_text, only: nearest_word, quoted, string_t, to_text
+  use nocdyn_text, only: nearest_word, quoted, shortened, string_t, to_text
   use nocdyn_text_file, only: read_text_file
   implicit none (type, external)
   private
@@ -21,12 +21,12 @@ module nocdyn_input_reader
 
 contains
 
-  !> Reads and checks a file; every mistake is a line of the error's message, in the order of the file.
+  !> Reads and checks a file. The message of the error has one line for each diagnostic, in the order of the file.
   subroutine read_input(file, overrides, input, error, diagnostics)
     character(len=*), intent(in) :: file
     type(string_t), intent(in) :: overrides(:)   !! PATH=VALUE
     type(input_t), intent(out) :: input
-    type(error_t), allocatable, intent(out) :: error
+    type(error_t), allocatable, intent(out) :: error            !! the file or an override is wrong
     type(diagnostics_t), intent(out), optional :: diagnostics   !! those of the error
     character(len=:), allocatable :: text
 
@@ -38,10 +38,10 @@ contains
   !> Reads and checks the text of a file.
   subroutine read_input_text(text, file, overrides, input, error, all_diagnostics)
     character(len=*), intent(in) :: text
-    character(len=*), intent(in) :: file         !! what messages call it
+    character(len=*), intent(in) :: file         !! its name in messages
     type(string_t), intent(in) :: overrides(:)   !! PATH=VALUE
     type(input_t), intent(out) :: input
-    type(error_t), allocatable, intent(out) :: error
+    type(error_t), allocatable, intent(out) :: error                !! the text or an override is wrong
     type(diagnostics_t), intent(out), optional :: all_diagnostics   !! those of the error
     type(namelist_t) :: namelist
     type(diagnostics_t) :: diagnostics
@@ -69,7 +69,7 @@ contains
     if (present(all_diagnostics)) all_diagnostics = diagnostics
   end subroutine read_input_text
 
-  !> All groups of the file, then the single groups that it lacks.
+  !> Reads all groups of the file, then the single groups that it does not have.
   subroutine read_groups(namelist, overrides, input, diagnostics)
     type(namelist_t), intent(in) :: namelist
     type(override_t), intent(inout) :: overrides(:)
@@ -108,34 +108,34 @@ contains
     end do
   end subroutine read_groups
 
-  !> Rows of the single groups that the file lacks and that have defaults or overrides.
+  !> Rows of the single groups that the file does not have, but that have only defaults or overrides.
   subroutine find_absent_groups(namelist, overrides, rules)
     type(namelist_t), intent(in) :: namelist
     type(override_t), intent(in) :: overrides(:)
     integer, allocatable, intent(out) :: rules(:)
     integer :: g, rule
-    logical :: is_there
+    logical :: exists
 
     allocate (rules(0))
     do rule = 1, size(group_rules)
-      is_there = .false.
+      exists = .false.
       do g = 1, namelist%group_count
-        is_there = is_there .or. namelist%groups(g)%name == group_rules(rule)%name
+        exists = exists .or. namelist%groups(g)%name == group_rules(rule)%name
       end do
-      if (is_there .or. .not. is_single(rule)) cycle
+      if (exists .or. .not. is_single(rule)) cycle
       if (has_required_key(rule) .and. all(overrides%group_rule /= rule)) cycle
       rules = [rules, rule]
     end do
   end subroutine find_absent_groups
 
-  !> Whether a group cannot be made of defaults.
+  !> Whether a group needs more than its defaults.
   pure logical function has_required_key(group_rule)
     integer, intent(in) :: group_rule
 
     has_required_key = any(key_rules(first_key(group_rule):last_key(group_rule))%default == required)
   end function has_required_key
 
-  !> Groups that must be there, and groups that may be there only once.
+  !> Checks how often each group occurs.
   subroutine check_occurrences(groups, diagnostics)
     type(group_t), intent(in) :: groups(:)
     type(diagnostics_t), intent(inout) :: diagnostics
@@ -165,7 +165,7 @@ contains
     end do
   end subroutine check_occurrences
 
-  !> Overrides whose element does not exist.
+  !> Refuses overrides of elements that do not exist.
   subroutine refuse_unused(groups, overrides, diagnostics)
     type(group_t), intent(in) :: groups(:)
     type(override_t), intent(in) :: overrides(:)
@@ -174,14 +174,14 @@ contains
     integer :: g, i
 
     do i = 1, size(overrides)
-      if (overrides(i)%is_used .or. .not. overrides(i)%is_fine) cycle
+      if (overrides(i)%is_used .or. .not. overrides(i)%is_valid) cycle
       if (overrides(i)%number > 0) then
         call refuse_number(groups, overrides(i), i, diagnostics)
         cycle
       end if
       call collect_names(groups, pack([(g, g=1, size(groups))], groups%rule == overrides(i)%group_rule), names)
       call diagnostics%add(no_line, 0, 'there is no &' // trim(group_rules(overrides(i)%group_rule)%name) // ' ' &
-        // quoted(overrides(i)%name) // suggestion(overrides(i)%name, names), i)
+        // quoted(shortened(overrides(i)%name)) // suggestion(overrides(i)%name, names), i)
     end do
   end subroutine refuse_unused
 
@@ -197,7 +197,7 @@ contains
                       to_text(count(groups%rule == override%group_rule)) // ' &' // kind, which)
   end subroutine refuse_number
 
-  !> False if a &body, perhaps misspelt, is there whose name could not be read.
+  !> Whether the names of all bodies are known: false if there is a &body, perhaps misspelt, whose name cannot be read.
   pure logical function bodies_are_known(groups)
     type(group_t), intent(in) :: groups(:)
     integer :: body, g

@@ -12,11 +12,11 @@ module nocdyn_name_checks
 
   public :: check_duplicate_names, check_references, collect_names
 
-  integer, parameter :: most_suggestions = 20   !! a near match is a search through all bodies
+  integer, parameter :: most_suggestions = 20   !! each is a search through all bodies
 
 contains
 
-  !> Elements of one name space must have different names.
+  !> Refuses two elements of one name space with the same name.
   subroutine check_duplicate_names(groups, diagnostics)
     type(group_t), intent(in) :: groups(:)
     type(diagnostics_t), intent(inout) :: diagnostics
@@ -75,7 +75,7 @@ contains
     end do
   end subroutine report_doubles
 
-  !> Every body that a key names must exist.
+  !> Refuses keys with names of bodies that do not exist.
   subroutine check_references(groups, bodies_are_known, diagnostics)
     type(group_t), intent(in) :: groups(:)
     logical, intent(in) :: bodies_are_known   !! .false. if the name of a &body could not be read
@@ -103,11 +103,11 @@ contains
 
   subroutine check_missing(value, group, key, bodies, order, missing, diagnostics)
     type(value_t), intent(in) :: value
-    integer, intent(in) :: group
-    character(len=*), intent(in) :: key
-    type(string_t), intent(in) :: bodies(:)
-    integer, intent(in) :: order(:)
-    integer, intent(inout) :: missing   !! how many were reported so far
+    integer, intent(in) :: group             !! index in the input
+    character(len=*), intent(in) :: key      !! name of the key
+    type(string_t), intent(in) :: bodies(:)  !! names of all bodies
+    integer, intent(in) :: order(:)          !! of `argsort`
+    integer, intent(inout) :: missing        !! number of missing bodies so far
     type(diagnostics_t), intent(inout) :: diagnostics
     character(len=:), allocatable :: hint
     integer :: i

@@ -1,4 +1,4 @@
-!> The way from a path to one number of an input, with what to say where there is none.
+!> Finds the number of an input with a given path, or says what is wrong with the path.
 module nocdyn_target_search
   use nocdyn_input, only: group_t, input_t
   use nocdyn_name_checks, only: collect_names
@@ -12,22 +12,24 @@ module nocdyn_target_search
 
   public :: search_target
 
-  !> Groups without numbers that belong to the motion.
+  !> Groups whose keys cannot vary.
   character(len=*), parameter :: fixed_groups = 'case output sweep vary record'
 
+  !> One number of an input.
   type, public :: found_t
-    integer :: group = 0   !! index in the input
-    integer :: rule = 0    !! row of `key_rules`
+    integer :: group = 0      !! index in the input
+    integer :: rule = 0       !! row of `key_rules`
     integer :: position = 1   !! in the list of the key
   end type found_t
 
 contains
 
+  !> Finds a number by its path.
   subroutine search_target(input, text, found, message)
     type(input_t), intent(in) :: input
     character(len=*), intent(in) :: text   !! a path
     type(found_t), intent(out) :: found
-    character(len=:), allocatable, intent(out) :: message   !! '' if fine, else what is wrong and allowed
+    character(len=:), allocatable, intent(out) :: message   !! what is wrong and allowed, '' if nothing is wrong
     type(key_path_t) :: path
 
     call read_path(text, '', path, message)
@@ -42,33 +44,33 @@ contains
     call find_group(input, path, found%group, message)
     if (message /= '') call suggest_path(input, text, .true., message)
     if (message == '') call check_law(input%groups(found%group), key_rules(found%rule), message)
-    if (message == '') call find_place(input%groups(found%group), text, path, found%position, message)
+    if (message == '') call find_position(input%groups(found%group), text, path, found%position, message)
   end subroutine search_target
 
-  !> Puts a path of the input in place of what a complaint suggests, if the text is one whose group is missing or another one.
+  !> Replaces the suggestion of a message by a path of the input, if only the group of the text is missing or wrong.
   subroutine suggest_path(input, text, has_group, message)
     type(input_t), intent(in) :: input
     character(len=*), intent(in) :: text     !! the path
-    logical, intent(in) :: has_group         !! there are groups of its kind; then the rest must be right
+    logical, intent(in) :: has_group         !! the text begins with a group; then its rest must be a path
     character(len=:), allocatable, intent(inout) :: message
     type(string_t), allocatable :: tails(:)
     integer, allocatable :: owners(:)
     character(len=:), allocatable :: tail
-    integer :: near, place
+    integer :: near, subscript
 
     if (index(message, '; did you mean') > 0) return   ! of the group or the key
     call list_tails(input, tails, owners)
-    place = index(text // '(', '(')
-    tail = lower_case(text(:place - 1))
+    subscript = index(text // '(', '(')
+    tail = lower_case(text(:subscript - 1))
     if (has_group) tail = tail(index(tail, '.') + 1:)
     near = nearest_word(tail, tails)
     if (near == 0) return
     if (has_group .and. tail /= lower_case(tails(near)%text)) return
     message = message(:index(message // ';', ';') - 1) // "; did you mean '" // input%groups(owners(near))%kind // '.' // &
-                tails(near)%text // text(place:) // "'?"
+                tails(near)%text // text(subscript:) // "'?"
   end subroutine suggest_path
 
-  !> The paths without their groups of all keys that can vary.
+  !> The paths of all keys that can vary, without their groups.
   subroutine list_tails(input, tails, owners)
     type(input_t), intent(in) :: input
     type(string_t), allocatable, intent(out) :: tails(:)
@@ -100,7 +102,7 @@ contains
     can_vary = .not. has_word(fixed_groups, group%kind)
   end function can_vary
 
-  !> Only numbers vary.
+  !> Refuses keys that are not numbers.
   subroutine check_kind_of_key(path, message)
     type(key_path_t), intent(in) :: path
     character(len=:), allocatable, intent(inout) :: message
@@ -112,7 +114,7 @@ contains
     do key = first_key(path%group_rule), last_key(path%group_rule)
       if (is_numeric(key_rules(key))) call append(names, trim(key_rules(key)%name))
     end do
-    message = trim(key_rules(path%key_rule)%name) // ' is no number (' // type_text(key_rules(path%key_rule)) // ')'
+    message = trim(key_rules(path%key_rule)%name) // ' is not a number (' // type_text(key_rules(path%key_rule)) // ')'
     if (size(names) > 0) message = message // '; allowed: ' // listed(names, ', ')
   end subroutine check_kind_of_key
 
@@ -122,6 +124,7 @@ contains
     is_numeric = rule%value_type == a_number .or. rule%value_type == an_integer
   end function is_numeric
 
+  !> The group with the name of the path.
   subroutine find_group(input, path, group, message)
     type(input_t), intent(in) :: input
     type(key_path_t), intent(in) :: path
@@ -138,7 +141,7 @@ contains
                 suggestion(path%name, names)
   end subroutine find_group
 
-  !> The key must be one of the law that the group follows.
+  !> Refuses a key that the kind of the group does not have.
   subroutine check_law(group, rule, message)
     type(group_t), intent(in) :: group
     type(key_rule_t), intent(in) :: rule
@@ -151,35 +154,35 @@ contains
       only_if_text(rule) // '; here ' // selector_name(group%rule) // ' = ' // quoted(law)
   end subroutine check_law
 
-  !> A list needs a place, a single value has none.
-  subroutine find_place(group, text, path, place, message)
+  !> Index of the value in the list of the key. Only a list has a subscript.
+  subroutine find_position(group, text, path, position, message)
     type(group_t), intent(in) :: group
     character(len=*), intent(in) :: text   !! the path
     type(key_path_t), intent(in) :: path
-    integer, intent(out) :: place
+    integer, intent(out) :: position
     character(len=:), allocatable, intent(inout) :: message
     integer :: count
 
-    place = path%place%first
+    position = path%target%first
     count = group%values(path%key_rule - first_key(path%group_rule) + 1)%count()
     associate (rule => key_rules(path%key_rule))
       if (rule%count == 1) then
-        if (.not. path%place%is_whole) message = trim(rule%name) // ' is a single value and takes no subscript'
+        if (.not. path%target%is_whole) message = trim(rule%name) // ' is a single value and takes no subscript'
       else if (count == 0) then
-        message = trim(rule%name) // ' has no values in the input, which one of them could vary'
-      else if (path%place%is_whole) then
-        message = trim(rule%name) // ' is a list; allowed: one of its places, ' // places(text, count)
-      else if (path%place%last /= place) then
-        message = 'several places of ' // trim(rule%name) // '; allowed: one, ' // &
-                    places(text(:index(text, '(', back=.true.) - 1), count)
-      else if (place < 1 .or. place > count) then
+        message = trim(rule%name) // ' has no values in the input'
+      else if (path%target%is_whole) then
+        message = trim(rule%name) // ' is a list; allowed: one of its values, ' // value_paths(text, count)
+      else if (path%target%last /= position) then
+        message = 'several values of ' // trim(rule%name) // '; allowed: one, ' // &
+                  value_paths(text(:index(text, '(', back=.true.) - 1), count)
+      else if (position < 1 .or. position > count) then
         message = 'the subscript of ' // trim(rule%name) // ' is out of range; allowed: 1 to ' // to_text(count)
       end if
     end associate
-  end subroutine find_place
+  end subroutine find_position
 
   !> "gear.reducer.radii(1) or gear.reducer.radii(2)", "... to ...".
-  pure function places(path, count) result(text)
+  pure function value_paths(path, count) result(text)
     character(len=*), intent(in) :: path   !! without subscript
     integer, intent(in) :: count           !! of the values
     character(len=:), allocatable :: text
@@ -187,6 +190,6 @@ contains
     text = path // '(1)'
     if (count == 2) text = text // ' or ' // path // '(2)'
     if (count > 2) text = text // ' to ' // path // '(' // to_text(count) // ')'
-  end function places
+  end function value_paths
 
 end module nocdyn_target_search
