@@ -11,6 +11,7 @@ import numpy as np
 from .chains import Scaling
 from .costs import Costs
 from .figures import draw_scaling, draw_work_precision
+from .peer_output import divert_to
 from .programs import Programs
 from .report import markdown, write_report
 from .throughput import Throughput
@@ -47,7 +48,7 @@ def main() -> None:
         type=Path,
         default=ROOT / "results" / "bench",
         metavar="DIR",
-        help="where bench.md, bench.json and the figures go (%(default)s)",
+        help="where bench.md, bench.json, peers.log and the figures go (%(default)s)",
     )
     arguments = parser.parse_args()
     names = arguments.workloads or list(WORKLOADS)
@@ -59,6 +60,7 @@ def main() -> None:
         parser.error("--rounds must be at least 1")
 
     measured = []
+    divert_to(arguments.out / "peers.log")
     with tempfile.TemporaryDirectory() as folder:
         scratch = Path(folder)
         bench = Bench(
@@ -76,7 +78,7 @@ def main() -> None:
         except (OSError, subprocess.CalledProcessError) as error:
             sys.exit(f"{parser.prog}: {error}")
         write_report(measured, arguments.out, arguments.build)
-    print(f"bench.md, bench.json and the figures are in {arguments.out}")
+    print(f"bench.md, bench.json and the figures are in {arguments.out}; what the peers printed is in peers.log there")
 
 
 def _measure(workload: Workload, rounds: int, is_quick: bool, out: Path) -> None:

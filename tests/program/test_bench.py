@@ -1,5 +1,6 @@
 """What scripts/bench concludes from what it measures."""
 
+import subprocess
 import sys
 
 import numpy as np
@@ -65,3 +66,19 @@ def test_variants_fill_their_ranges():
     found = variants.variants(1000)
     for column, (low, high) in zip(found.T, variants.RANGES):
         assert low <= column.min() < low + 0.01 * (high - low) and high - 0.01 * (high - low) < column.max() <= high
+
+
+def test_what_compiled_peers_print_goes_to_the_log(tmp_path):
+    script = """
+import ctypes, sys
+from pathlib import Path
+from nocdyn_bench.peer_output import divert_to
+divert_to(Path(sys.argv[1]) / "out" / "peers.log")
+ctypes.CDLL(None).puts(b"the problem seems to become stiff")
+print("a table")
+print("a complaint", file=sys.stderr)
+"""
+    command = [sys.executable, "-c", script, tmp_path]
+    outcome = subprocess.run(command, cwd=SOURCE / "scripts", capture_output=True, text=True, check=True)
+    assert (outcome.stdout, outcome.stderr) == ("a table\n", "a complaint\n")
+    assert (tmp_path / "out" / "peers.log").read_text(encoding="utf-8") == "the problem seems to become stiff\n"
