@@ -153,8 +153,24 @@ contains
     case default
       ! read by `is_given` and `value`
     end select
-    arguments%given = [arguments%given, given_option_t(trim(option%name), value)]
+    call append_given(arguments%given, trim(option%name), value)
   end subroutine add_option
+
+  !> Appends an option to those given, without an array constructor, in which gfortran 12 loses the lengths of the texts.
+  subroutine append_given(given, name, value)
+    type(given_option_t), allocatable, intent(inout) :: given(:)
+    character(len=*), intent(in) :: name, value
+    type(given_option_t), allocatable :: longer(:)
+    integer :: i
+
+    allocate (longer(size(given) + 1))
+    do i = 1, size(given)
+      longer(i) = given(i)
+    end do
+    longer(size(longer))%name = name
+    longer(size(longer))%value = value
+    call move_alloc(longer, given)
+  end subroutine append_given
 
   subroutine parse_threads(value, threads, error)
     character(len=*), intent(in) :: value
