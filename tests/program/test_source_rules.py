@@ -1,0 +1,86 @@
+"""Rules for the Fortran sources that CONTRIBUTING.md states: their length, their arguments, their comments."""
+
+import functools
+
+import pytest
+from conftest import SOURCE
+from fortran_sources import read_source
+
+LEAST_SOURCES, LEAST_PROCEDURES = 200, 1500  # fewer in src were not found where they are
+MOST_ARGUMENTS = 8
+FOLDERS = ("src", "tests", "bench", "docs/examples")  # files .f90; those of the tests, .pf, may be longer
+
+# arrays are arguments of their own, so that the compiler knows that they are contiguous and do not overlap
+KERNEL = "kernel"
+LAW = "constructor of a law: one argument for each of its parameters"
+
+# Procedures with more arguments, by file, and why.
+MANY_ARGUMENTS = {
+    "src/analyse/sweep/statistics/linear_statistics.f90": (KERNEL, "bound_excess", "look_inside"),
+    "src/analyse/sweep/statistics/step_strips.f90": (KERNEL, "add_integrals", "add_pair", "cut_step", "expand", "set_pair"),
+    "src/base/numerics/band_products.f90": (KERNEL, "pair_of_band", "pair_of_toeplitz"),
+    "src/base/numerics/csr_products.f90": (KERNEL, "multiply_lanes", "multiply_rows"),
+    "src/integrate/core/stage_sums.f90": (KERNEL, "sum_tiles", "sum_up_to_12", "sum_up_to_4", "sum_up_to_8"),
+    "src/integrate/core/step_control.f90": (KERNEL, "adapt_accepted_steps", "limit_by_quadratures"),
+    "src/integrate/linear_solver/stage_systems.f90": (KERNEL, "solve_quadratures"),
+    "src/integrate/steppers/taylor_stepper.f90": (KERNEL, "measure"),
+    "src/model/constraints/coordinates.f90": (
+        "constructor: what the analysis of the constraints has found, and the bodies that the user wants",
+        "build_coordinates",
+    ),
+    "src/model/elements/couplings/couplings.f90": (LAW, "new_couplings"),
+    "src/model/elements/couplings/gap_couplings.f90": (
+        f"{LAW}; index and motion of a gap and the parts of its moment",
+        "contact_moments",
+        "new_gap_couplings",
+    ),
+    "src/model/elements/couplings/saturated_couplings.f90": (LAW, "new_saturated_couplings"),
+    "src/model/elements/excitations/excitations.f90": (KERNEL, "harmonic_series"),
+    "src/model/elements/polynomial_laws.f90": (KERNEL, "moments"),
+    "src/model/formulations/kernels/lane_motion.f90": (
+        KERNEL,
+        "accelerate",
+        "find_moments",
+        "sum_angles",
+        "sum_moments",
+        "sum_speeds",
+    ),
+    "src/model/formulations/kernels/lane_series.f90": (KERNEL, "expand"),
+    "src/model/formulations/kernels/reduced_series.f90": (KERNEL, "begin_moments", "continue_moments", "expand"),
+    "src/model/formulations/kernels/series_strips.f90": (
+        KERNEL,
+        "accelerate",
+        "begin_strip",
+        "expand_strip",
+        "find_moments",
+        "gather_laws",
+    ),
+    "src/model/lanes/sparse_map.f90": (KERNEL, "pair_of_rows", "pair_on_lanes", "sum_of_rows", "sum_on_lanes"),
+}
+
+
+@functools.cache
+def sources(folder):
+    """Path from the project's folder -> what the file holds."""
+    return {path.relative_to(SOURCE).as_posix(): read_source(path) for path in sorted((SOURCE / folder).rglob("*.f90"))}
+
+
+def procedures(folder):
+    """(path, source, procedure) of all procedures that are not those of an interface."""
+    for path, source in sources(folder).items():
+        for procedure in source.procedures:
+            if not procedure.is_interface:
+                yield path, source, procedure
+
+
+def test_the_test_sees_the_sources():
+    assert len(sources("src")) >= LEAST_SOURCES
+    assert len(list(procedures("src"))) >= LEAST_PROCEDURES
+
+
+@pytest.mark.parametrize("folder", FOLDERS)
+def test_procedures_with_many_arguments_are_exceptions_with_a_reason(folder):
+    many = {(path, p.name) for path, _, p in procedures(folder) if len(p.arguments) > MOST_ARGUMENTS}
+    allowed = {(path, name) for path, (_, *names) in MANY_ARGUMENTS.items() for name in names if path.startswith(folder + "/")}
+    assert sorted(many - allowed) == [], "too many arguments"
+    assert sorted(allowed - many) == [], "these need no exception"
