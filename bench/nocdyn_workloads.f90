@@ -1,7 +1,7 @@
 !> Keeps the states at the output times in memory.
 module kept_states
   use nocdyn_kinds, only: wp
-  use nocdyn_system, only: observer_t
+  use nocdyn_observer, only: observer_t
   implicit none (type, external)
   private
 

@@ -59,7 +59,7 @@ program bouncing_ball
   use nocdyn_solver_status, only: failure_message, integration_done, integration_stopped, solver_status_t
   use nocdyn_plain_system, only: plain_system, plain_system_t
   use nocdyn_sampler, only: sampler
-  use nocdyn_system, only: event_falling
+  use nocdyn_observer, only: event_falling
   implicit none (type, external)
   real(wp), parameter :: t_end = 5.0_wp, restitution = 0.8_wp
   type(integration_settings_t), parameter :: settings = integration_settings_t(method='rk853', rtol=1.0e-10_wp, atol=1.0e-10_wp)

@@ -3,7 +3,8 @@ module swings
   use nocdyn_kinds, only: wp
   use nocdyn_solver_status, only: integration_stopped, solver_status_t
   use nocdyn_ensemble, only: ensemble_t
-  use nocdyn_system, only: event_falling, observer_t, ranges_t, system_t
+  use nocdyn_observer, only: event_falling, observer_t, ranges_t
+  use nocdyn_system, only: system_t
   use pendulum, only: pendulum_t
   implicit none (type, external)
   private

@@ -102,7 +102,7 @@ program thermostat
   use nocdyn_integration_settings, only: integration_settings_t
   use nocdyn_kinds, only: wp
   use nocdyn_solver_status, only: failure_message, integration_done, solver_status_t
-  use nocdyn_system, only: observer_t
+  use nocdyn_observer, only: observer_t
   use room, only: heated_room, heating, highest, lowest, outside, room_t, slowness
   implicit none (type, external)
   real(wp), parameter :: day = 24.0_wp, start = 15.0_wp, hot = outside + heating

@@ -1,7 +1,7 @@
 !> Counts the rows that an integrator hands out.
 module row_counter
   use nocdyn_kinds, only: wp
-  use nocdyn_system, only: observer_t
+  use nocdyn_observer, only: observer_t
   implicit none (type, external)
   private
 

@@ -9,7 +9,8 @@ module nocdyn_test_lane_copies
   use nocdyn_solver_status, only: integration_done, solver_status_t
   use nocdyn_ensemble, only: ensemble_t
   use nocdyn_reduced, only: new_reduced, reduced_t
-  use nocdyn_system, only: observer_t, system_t
+  use nocdyn_observer, only: observer_t
+  use nocdyn_system, only: system_t
   implicit none (type, external)
   private
 

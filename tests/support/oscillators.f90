@@ -1,7 +1,8 @@
 !> Harmonic oscillators x'' = -omega^2 x on lanes of different frequencies, and an observer of events and tracked functions.
 module nocdyn_oscillators
   use nocdyn_kinds, only: wp
-  use nocdyn_system, only: observer_t, ranges_t, system_t
+  use nocdyn_observer, only: observer_t, ranges_t
+  use nocdyn_system, only: system_t
   implicit none (type, external)
   private
 

@@ -1,7 +1,8 @@
 !> An observer that keeps all that it is told.
 module nocdyn_recorder
   use nocdyn_kinds, only: wp
-  use nocdyn_system, only: observer_t, system_t
+  use nocdyn_observer, only: observer_t
+  use nocdyn_system, only: system_t
   implicit none (type, external)
   private
 

@@ -8,7 +8,7 @@ module nocdyn_run_summary
   use nocdyn_machine_report, only: coordinate_names, constraint_count
   use nocdyn_solver_status, only: max_switch_times, solver_status_t
   use nocdyn_run_settings, only: put_settings
-  use nocdyn_system, only: ranges_t
+  use nocdyn_observer, only: ranges_t
   use nocdyn_text, only: append, rounded_text, string_t
   use nocdyn_version, only: compiler_text, version
   implicit none (type, external)

@@ -19,7 +19,7 @@ module nocdyn_transient
   use nocdyn_run_settings, only: settings_of
   use nocdyn_run_summary, only: check_energy_balance, run_summary_t, start_extremes, summary_json, update_extremes, widen_extremes
   use nocdyn_size_limits, only: check_size, choose_method
-  use nocdyn_system, only: observer_t, ranges_t
+  use nocdyn_observer, only: observer_t, ranges_t
   use nocdyn_text, only: string_t
   use nocdyn_trajectory_table, only: new_trajectory_table, trajectory_table_t
   implicit none (type, external)

@@ -2,7 +2,8 @@
 module nocdyn_stepper
   use nocdyn_kinds, only: wp
   use nocdyn_step_control, only: step_control_t
-  use nocdyn_system, only: observer_t, step_block_t, system_t
+  use nocdyn_observer, only: observer_t, step_block_t
+  use nocdyn_system, only: system_t
   use nocdyn_step_attempt, only: step_attempt_t
   implicit none (type, external)
   private

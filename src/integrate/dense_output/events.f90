@@ -6,7 +6,8 @@ module nocdyn_events
   use nocdyn_dense_output, only: dense_output_t
   use nocdyn_finite, only: is_finite
   use nocdyn_kinds, only: wp
-  use nocdyn_system, only: event_falling, event_rising, observer_t, system_t
+  use nocdyn_observer, only: event_falling, event_rising, observer_t
+  use nocdyn_system, only: system_t
   use nocdyn_step_attempt, only: step_attempt_t
   use nocdyn_root_functions, only: allocate_root_functions, find_root, part_bracket, scan_step, sign_of, start_root_functions, &
     root_functions_t

@@ -7,7 +7,7 @@ module nocdyn_extremes
   use nocdyn_chebyshev, only: find_maximum, lobatto_nodes, max_nodes
   use nocdyn_dense_output, only: dense_output_t, sample
   use nocdyn_kinds, only: wp
-  use nocdyn_system, only: observer_t, ranges_t
+  use nocdyn_observer, only: observer_t, ranges_t
   use nocdyn_step_attempt, only: step_attempt_t
   implicit none (type, external)
   private

@@ -6,7 +6,8 @@ module nocdyn_root_functions
   use nocdyn_dense_output, only: dense_output_t, sample
   use nocdyn_finite, only: is_finite
   use nocdyn_kinds, only: wp
-  use nocdyn_system, only: observer_t, system_t
+  use nocdyn_observer, only: observer_t
+  use nocdyn_system, only: system_t
   use nocdyn_step_attempt, only: step_attempt_t
   implicit none (type, external)
   private

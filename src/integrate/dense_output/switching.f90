@@ -4,7 +4,8 @@ module nocdyn_switching
   use nocdyn_finite, only: is_finite
   use nocdyn_kinds, only: wp
   use nocdyn_solver_status, only: integration_chattering, count_crossing, solver_status_t
-  use nocdyn_system, only: observer_t, system_t
+  use nocdyn_observer, only: observer_t
+  use nocdyn_system, only: system_t
   use nocdyn_step_attempt, only: step_attempt_t
   use nocdyn_root_functions, only: allocate_root_functions, bracket_t, evaluate, find_grazing, find_root, part_bracket, &
                                    part_end, &

@@ -11,7 +11,8 @@ module nocdyn_after_step
   use nocdyn_step_control, only: resume_control
   use nocdyn_stepper, only: stepper_t
   use nocdyn_switching, only: cross_boundaries, find_crossing
-  use nocdyn_system, only: observer_t, system_t
+  use nocdyn_observer, only: observer_t
+  use nocdyn_system, only: system_t
   implicit none (type, external)
   private
 

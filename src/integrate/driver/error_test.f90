@@ -8,7 +8,8 @@ module nocdyn_error_test
     integration_too_many_steps, count_step, solver_status_t
   use nocdyn_step_control, only: adapt_steps, shorten_step, smallest_step, measure_error
   use nocdyn_stepper, only: stepper_t
-  use nocdyn_system, only: observer_t, system_t
+  use nocdyn_observer, only: observer_t
+  use nocdyn_system, only: system_t
   use nocdyn_step_attempt, only: attempt_ok, attempt_fatal, attempt_not_finite
   implicit none (type, external)
   private

@@ -11,7 +11,8 @@ module nocdyn_integration
   use nocdyn_solver_status, only: allocate_solver_status, integration_interrupted, integration_running, solver_status_t
   use nocdyn_ensemble, only: initial_states, initial_states_t, ensemble_t
   use nocdyn_stepper, only: stepper_t
-  use nocdyn_system, only: observer_t, system_t
+  use nocdyn_observer, only: observer_t
+  use nocdyn_system, only: system_t
   use nocdyn_text, only: quoted
   implicit none (type, external)
   private

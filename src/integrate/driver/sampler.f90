@@ -1,7 +1,7 @@
 !> An observer that keeps the solution at the requested times; extensions may add events.
 module nocdyn_sampler
   use nocdyn_kinds, only: wp
-  use nocdyn_system, only: observer_t
+  use nocdyn_observer, only: observer_t
   implicit none (type, external)
   private
 

@@ -13,7 +13,8 @@ module nocdyn_time_stepping
   use nocdyn_step_control, only: propose_steps, reset_control, step_control, step_control_t
   use nocdyn_stepper, only: stepper_t
   use nocdyn_switching, only: allocate_switching, start_switching, switching_t
-  use nocdyn_system, only: observer_t, step_block_t, system_t
+  use nocdyn_observer, only: observer_t, step_block_t
+  use nocdyn_system, only: system_t
   use nocdyn_step_attempt, only: allocate_step_attempt, evaluate_start, begin_attempt, attempt_not_finite, step_attempt_t
   implicit none (type, external)
   private

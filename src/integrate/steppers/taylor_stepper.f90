@@ -12,7 +12,8 @@ module nocdyn_taylor_stepper
   use nocdyn_masks, only: all_true, any_differs
   use nocdyn_step_control, only: any_too_small, smallest_step, step_control_t
   use nocdyn_stepper, only: stepper_t
-  use nocdyn_system, only: evaluation_ok, observer_t, step_block_t, system_t
+  use nocdyn_observer, only: observer_t, step_block_t
+  use nocdyn_system, only: evaluation_ok, system_t
   use nocdyn_step_attempt, only: disable_lane, disable_non_finite_lanes, attempt_ok, attempt_not_finite, attempt_recoverable, &
                                  step_attempt_t
   use nocdyn_vector_functions, only: exp2s, log2s

@@ -12,7 +12,7 @@ module nocdyn_linear_statistics
   use nocdyn_statistics, only: statistic_final, statistic_max, statistic_max_abs, statistic_mean, statistic_min, statistic_rms, &
     statistic_t, statistic_time_of_max
   use nocdyn_step_strips, only: add_integrals, expand, exclude_monotonic, fill_chord_gaps, strip_t, cut_step
-  use nocdyn_system, only: step_block_t
+  use nocdyn_observer, only: step_block_t
   use nocdyn_trajectory_columns, only: column_t
   implicit none (type, external)
   private

@@ -13,7 +13,7 @@ module nocdyn_sampled_statistics
   use nocdyn_settling_time, only: settling_history_t
   use nocdyn_statistics, only: statistic_final, statistic_max, statistic_max_abs, statistic_mean, statistic_min, statistic_rms, &
     statistic_settling_time, statistic_t, statistic_time_of_max
-  use nocdyn_system, only: ranges_t, step_block_t
+  use nocdyn_observer, only: ranges_t, step_block_t
   use nocdyn_trajectory_columns, only: column_t
   implicit none (type, external)
   private

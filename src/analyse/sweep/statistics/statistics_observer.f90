@@ -10,7 +10,7 @@ module nocdyn_statistics_observer
   use nocdyn_sampled_statistics, only: new_sampled_statistics, sampled_statistics_t
   use nocdyn_statistics, only: find_columns, is_torque, statistic_final, statistic_max, statistic_max_abs, statistic_min, &
     statistic_settling_time, statistic_t, statistic_time_of_max, value_of_zero_column
-  use nocdyn_system, only: observer_t, step_block_t
+  use nocdyn_observer, only: observer_t, step_block_t
   use nocdyn_text, only: string_t
   use nocdyn_trajectory_columns, only: column_t, column_work_in, list_columns
   implicit none (type, external)

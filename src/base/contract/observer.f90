@@ -1,0 +1,124 @@
+!> The contract between an integrator and the user of its solution: callbacks for output times, events, extremes and steps.
+module nocdyn_observer
+  use nocdyn_kinds, only: wp
+  implicit none (type, external)
+  private
+
+  ! Changes of sign that count as an event.
+  integer, parameter, public :: event_any = 0        !! every one
+  integer, parameter, public :: event_rising = 1     !! from below zero to zero or above
+  integer, parameter, public :: event_falling = -1   !! from above zero to zero or below
+
+  !> Receives the solution at the output times, events, extremes and whole steps, and may stop the integration. By default it
+  !> receives the output times only, and ignores them.
+  !>
+  !> An event is a root of a function of time and state, found on the dense output of the steps. The extremes of the tracked
+  !> functions are those in continuous time, between the steps too.
+  type, public :: observer_t
+    integer, allocatable :: directions(:)   !! event_... of each event function; not allocated: there are none
+    integer :: tracked = 0                  !! number of tracked functions
+    logical :: wants_steps = .false.        !! whether `on_steps` is called
+    integer :: first_read = 1               !! components whose polynomials `on_steps` reads; may change from variant to variant
+    integer :: last_read = huge(0)
+  contains
+    procedure :: on_output
+    procedure :: wants_stop
+    procedure :: event_values
+    procedure :: on_event
+    procedure :: tracked_values
+    procedure :: on_extremes
+    procedure :: on_steps
+  end type observer_t
+
+  !> The steps that the lanes of a block have taken together; [lanes].
+  type, public :: step_block_t
+    logical :: are_all_taken = .false.      !! whether all lanes have taken a step
+    logical :: may_be_cut = .false.         !! whether `theta_end` may be less than 1
+    logical, allocatable :: taken(:)        !! whether the lane has taken a step; only then it has dense output
+    logical, allocatable :: crosses(:)      !! whether the step ends where the system changes its branch
+    real(wp), allocatable :: t(:)           !! start [s]
+    real(wp), allocatable :: h(:)           !! step size [s]: theta = (time - t) / h
+    real(wp), allocatable :: scale(:)       !! the solution is a polynomial in scale * theta: scale is 1 or h
+    real(wp), allocatable :: theta_end(:)   !! end: 1, or less where the step was cut
+    real(wp), allocatable :: t_new(:)       !! end [s]
+  end type step_block_t
+
+  !> Smallest and largest values of the tracked functions so far, with their times [s]; [functions].
+  type, public :: ranges_t
+    real(wp), allocatable :: lowest(:), lowest_time(:), highest(:), highest_time(:)
+  end type ranges_t
+
+contains
+
+  !> One output time of one lane; the calls of a lane come in the order of the times.
+  subroutine on_output(self, lane, t, y)
+    class(observer_t), intent(inout) :: self
+    integer, intent(in) :: lane
+    real(wp), intent(in) :: t
+    real(wp), contiguous, intent(in) :: y(:)   !! [states + quadratures]
+  end subroutine on_output
+
+  !> Asked after every step attempt while a lane is running: true ends the integration of all lanes.
+  function wants_stop(self, t)
+    class(observer_t), intent(inout) :: self
+    real(wp), intent(in) :: t   !! time that the slowest lane has reached
+    logical :: wants_stop
+
+    wants_stop = .false.
+  end function wants_stop
+
+  !> The event functions g(t, y) of one lane.
+  subroutine event_values(self, lane, t, y, g)
+    class(observer_t), intent(inout) :: self
+    integer, intent(in) :: lane
+    real(wp), intent(in) :: t
+    real(wp), contiguous, intent(in) :: y(:)      !! [states + quadratures]
+    real(wp), contiguous, intent(inout) :: g(:)   !! [size(directions)]
+
+    error stop 'nocdyn_observer: an observer with events overrides event_values'
+  end subroutine event_values
+
+  !> An event of one lane. Events and output times of a lane come in the order of the times.
+  subroutine on_event(self, lane, event, t, y, is_terminal)
+    class(observer_t), intent(inout) :: self
+    integer, intent(in) :: lane
+    integer, intent(in) :: event                !! index of the event function
+    real(wp), intent(in) :: t
+    real(wp), contiguous, intent(in) :: y(:)    !! state at the event
+    logical, intent(out) :: is_terminal         !! true ends the integration of this lane here
+
+    is_terminal = .false.
+  end subroutine on_event
+
+  !> The tracked functions of one lane.
+  subroutine tracked_values(self, lane, t, y, values)
+    class(observer_t), intent(inout) :: self
+    integer, intent(in) :: lane
+    real(wp), intent(in) :: t
+    real(wp), contiguous, intent(in) :: y(:)           !! [states + quadratures]
+    real(wp), contiguous, intent(inout) :: values(:)   !! [tracked]
+
+    error stop 'nocdyn_observer: an observer with tracked functions overrides tracked_values'
+  end subroutine tracked_values
+
+  !> The ranges of the tracked functions when a lane has ended.
+  subroutine on_extremes(self, lane, ranges)
+    class(observer_t), intent(inout) :: self
+    integer, intent(in) :: lane
+    type(ranges_t), intent(in) :: ranges
+
+    error stop 'nocdyn_observer: an observer with tracked functions overrides on_extremes'
+  end subroutine on_extremes
+
+  !> The last steps of the lanes, after their output times and events: y + sum over p of c(:, :, p) (scale theta)^p.
+  subroutine on_steps(self, steps, y, y_new, c)
+    class(observer_t), intent(inout) :: self
+    type(step_block_t), intent(in) :: steps
+    real(wp), contiguous, intent(in) :: y(:, :)       !! at the starts, [lanes, padded columns]
+    real(wp), contiguous, intent(in) :: y_new(:, :)   !! at the ends
+    real(wp), contiguous, intent(in) :: c(:, :, :)    !! [lanes, padded columns, degree]; only columns first_read to last_read
+
+    error stop 'nocdyn_observer: an observer that wants steps overrides on_steps'
+  end subroutine on_steps
+
+end module nocdyn_observer
