@@ -1,4 +1,4 @@
-!> Numbers and texts as the bytes that they are in memory, one behind the other.
+!> Packing of numbers and texts into bytes and unpacking, in the representation that they have in memory.
 module nocdyn_bytes
   use, intrinsic :: iso_c_binding, only: c_char, c_ptr, c_size_t
   use, intrinsic :: iso_fortran_env, only: int32
@@ -10,7 +10,8 @@ module nocdyn_bytes
 
   integer, parameter, public :: integer_bytes = 4, real_bytes = 8
 
-  !> Takes back what was put, in the same order. Asking for more than is there sets `is_short` and gives zeros or ''.
+  !> Unpacks values in the order in which they were packed. Where too few bytes are left, it sets `is_short` and returns zeros or
+  !> ''.
   type, public :: byte_reader_t
     integer :: next = 1            !! position of the next byte
     logical :: is_short = .false.
@@ -39,10 +40,10 @@ module nocdyn_bytes
 
 contains
 
-  !> Four bytes each.
+  !> Packs integers, four bytes each.
   subroutine put_integers(bytes, used, values)
-    character(len=*), intent(inout) :: bytes    !! long enough
-    integer, intent(inout) :: used              !! bytes in use, before and after
+    character(len=*), intent(inout) :: bytes    !! buffer, long enough
+    integer, intent(inout) :: used              !! number of bytes in use
     integer(int32), contiguous, intent(in) :: values(:)
     type(c_ptr) :: same
 
@@ -50,7 +51,7 @@ contains
     used = used + integer_bytes * size(values)
   end subroutine put_integers
 
-  !> Eight bytes each.
+  !> Packs reals, eight bytes each.
   subroutine put_reals(bytes, used, values)
     character(len=*), intent(inout) :: bytes
     integer, intent(inout) :: used
@@ -61,7 +62,7 @@ contains
     used = used + real_bytes * size(values)
   end subroutine put_reals
 
-  !> Its length, then its characters.
+  !> Packs the length of a text, then its characters.
   subroutine put_text(bytes, used, text)
     character(len=*), intent(inout) :: bytes
     integer, intent(inout) :: used
@@ -72,6 +73,7 @@ contains
     used = used + len(text)
   end subroutine put_text
 
+  !> Unpacks integers.
   subroutine take_integers(self, bytes, values)
     class(byte_reader_t), intent(inout) :: self
     character(len=*), intent(in) :: bytes
@@ -84,6 +86,7 @@ contains
     self%next = self%next + integer_bytes * size(values)
   end subroutine take_integers
 
+  !> Unpacks reals.
   subroutine take_reals(self, bytes, values)
     class(byte_reader_t), intent(inout) :: self
     character(len=*), intent(in) :: bytes
@@ -98,6 +101,7 @@ contains
     self%next = self%next + real_bytes * size(values)
   end subroutine take_reals
 
+  !> Unpacks a text.
   subroutine take_text(self, bytes, text)
     class(byte_reader_t), intent(inout) :: self
     character(len=*), intent(in) :: bytes
@@ -111,7 +115,7 @@ contains
     self%next = self%next + length(1)
   end subroutine take_text
 
-  !> Whether `count` things of `each` bytes are left.
+  !> Whether `count` values of `each` bytes are left; if not, sets `is_short`.
   logical function has(self, bytes, each, count)
     class(byte_reader_t), intent(inout) :: self
     character(len=*), intent(in) :: bytes

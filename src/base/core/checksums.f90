@@ -1,5 +1,5 @@
-!> CRC-32C (Castagnoli), the checksum of iSCSI, ext4 and LevelDB: it finds every damage within 32 neighbouring bits, and
-!> others but for one in 4e9. Eight bytes at a time by eight tables (Kounavis and Berry, ISCC 2005), about one cycle per byte.
+!> CRC-32C (Castagnoli), the checksum of iSCSI, ext4 and LevelDB: it detects all errors within 32 neighbouring bits, and all but
+!> one in 4e9 of the others. Eight tables process eight bytes at a time (Kounavis and Berry, ISCC 2005), about one cycle per byte.
 module nocdyn_checksums
   use, intrinsic :: iso_fortran_env, only: int32
   implicit none (type, external)
@@ -18,7 +18,7 @@ module nocdyn_checksums
 
 contains
 
-  !> The tables, in some microseconds.
+  !> Computes the tables, in some microseconds.
   pure subroutine make_checksum_table(table)
     type(checksum_table_t), intent(out) :: table
     integer(int32) :: value
@@ -39,7 +39,7 @@ contains
     end do
   end subroutine make_checksum_table
 
-  !> CRC-32C of the bytes; 'E3069283' for '123456789' (RFC 3720, B.4, has more).
+  !> CRC-32C of the bytes: 'E3069283' for '123456789' (RFC 3720, B.4, has more examples).
   pure integer(int32) function checksum(self, bytes)
     class(checksum_table_t), intent(in) :: self
     character(len=*), intent(in) :: bytes
@@ -72,7 +72,7 @@ contains
     write (digits, '(z8.8)') table%checksum(text)
   end function checksum_digits
 
-  !> 0 to 255.
+  !> The value of a byte, 0 to 255.
   elemental integer(int32) function code(byte)
     character(len=1), intent(in) :: byte
 

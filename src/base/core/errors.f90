@@ -1,27 +1,27 @@
-!> Failures that are the input's or the numbers' fault: an exit code and a sentence for the person at the keyboard.
+!> Errors caused by the input or by the computation: an exit code and a message to the user.
 module nocdyn_errors
   implicit none (type, external)
   private
 
   public :: raise
 
-  integer, parameter, public :: exit_done = 0     !! all asked for was done
+  integer, parameter, public :: exit_done = 0     !! success
   integer, parameter, public :: exit_failed = 1   !! the computation failed
   integer, parameter, public :: exit_input = 2    !! wrong usage or wrong input
   integer, parameter, public :: exit_file = 3     !! a file cannot be read or written
 
-  !> Passed as an allocatable last argument: allocated means failed.
+  !> The last argument of procedures that can fail; allocated means failed.
   type, public :: error_t
-    integer :: code = exit_failed              !! the exit code of the program if nobody handles this
-    character(len=:), allocatable :: message   !! what, where, what is allowed; several mistakes on several lines
+    integer :: code = exit_failed              !! exit code of the program, unless the error is handled
+    character(len=:), allocatable :: message   !! what, where, what is allowed; one line for each error
   end type error_t
 
 contains
 
-  !> Allocates `error`; an error already there is replaced.
+  !> Allocates `error`; replaces an error that is already allocated.
   subroutine raise(error, code, message)
     type(error_t), allocatable, intent(out) :: error
-    integer, intent(in) :: code
+    integer, intent(in) :: code   !! exit_...
     character(len=*), intent(in) :: message
 
     allocate (error)

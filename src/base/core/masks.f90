@@ -1,4 +1,4 @@
-!> Questions about all lanes of a block, answered without a branch for each.
+!> Tests over all lanes of a block, in loops without a branch.
 module nocdyn_masks
   implicit none (type, external)
   private
@@ -7,6 +7,7 @@ module nocdyn_masks
 
 contains
 
+  !> Whether all elements are true.
   pure logical function all_true(n, mask)
     integer, intent(in) :: n
     logical, intent(in) :: mask(n)
@@ -14,6 +15,7 @@ contains
     all_true = count_true(n, mask) == n
   end function all_true
 
+  !> Whether any element is true.
   pure logical function any_true(n, mask)
     integer, intent(in) :: n
     logical, intent(in) :: mask(n)

@@ -1,4 +1,4 @@
-!> Text that people and programs read: numbers that round-trip, names that nearly match.
+!> Texts: numbers that read back as the same value, lists of texts, near matches of names.
 module nocdyn_text
   use, intrinsic :: iso_c_binding, only: c_char, c_double, c_int, c_size_t
   use nocdyn_kinds, only: wp
@@ -9,8 +9,11 @@ module nocdyn_text
 
   integer, parameter, public :: number_width = 32   !! no number of `write_number` is longer
 
-  !> A text of any length, for arrays of texts. gfortran 12 never frees the texts of an array constructor with `string_t(...)`
-  !> nor those of an argument with a vector subscript; `strings`, `append` and `selected` do without.
+  !> A text of any length, for arrays of texts. gfortran 12 never frees the texts of an array constructor with `string_t(...)`,
+  !> nor those of an argument with a vector subscript; `strings`, `append` and `selected` avoid both.
+  !>
+  !> gfortran 12 keeps the length of an allocatable text that a function returns in static memory of the caller, which all threads
+  !> share: threads call such functions only inside `!$omp critical (texts)`.
   type, public :: string_t
     character(len=:), allocatable :: text
   end type string_t
@@ -22,7 +25,7 @@ module nocdyn_text
   end interface to_text
 
   interface
-    !> Shortest round-trip decimal of `value` by std::to_chars (number_text.cpp); returns the length written.
+    !> Writes the shortest decimal that reads back as `value`, by std::to_chars (number_text.cpp); returns its length.
     function shortest_decimal(value, buffer, capacity) result(length) bind(c, name='nocdyn_shortest_decimal')
       import :: c_char, c_double, c_int, c_size_t
       real(c_double), value, intent(in) :: value
@@ -44,7 +47,7 @@ module nocdyn_text
 
 contains
 
-  !> Writes `value` at the start of `buffer`, left-justified; `length` characters are used.
+  !> Writes `value` to the first `length` characters of `buffer`.
   subroutine write_number(value, buffer, length)
     real(wp), intent(in) :: value
     character(len=*), intent(inout) :: buffer   !! at least `number_width` long
@@ -64,7 +67,7 @@ contains
     text = buffer(:length)
   end function real_to_text
 
-  !> The value to `digits` significant digits, for people: without an exponent from 0.0001 to below 1e9, with one elsewhere.
+  !> The value rounded to `digits` significant digits: without an exponent from 0.0001 to below 1e9, with one elsewhere.
   function rounded_text(value, digits) result(text)
     real(wp), intent(in) :: value
     integer, intent(in) :: digits   !! 1 to 17
@@ -93,7 +96,7 @@ contains
     text = trim(buffer)
   end function integer_to_text
 
-  !> ASCII letters in lower case, everything else as it is.
+  !> The text with its ASCII letters in lower case.
   elemental function lower_case(text) result(lower)
     character(len=*), intent(in) :: text
     character(len=len(text)) :: lower
@@ -105,7 +108,7 @@ contains
     end do
   end function lower_case
 
-  !> The text between single quotes, for messages.
+  !> The text in single quotes, for messages.
   pure function quoted(text)
     character(len=*), intent(in) :: text
     character(len=:), allocatable :: quoted
@@ -134,7 +137,7 @@ contains
     short = text(:last) // ' ...'
   end function shortened
 
-  !> The texts in quotes, separated by `separator`; of more than `most` the first ones "and N more".
+  !> The texts in quotes, separated by `separator`; of more than `most`, the first `most` "and N more".
   pure function joined(texts, separator, most)
     type(string_t), intent(in) :: texts(:)
     character(len=*), intent(in) :: separator
@@ -164,7 +167,7 @@ contains
     end do
   end function strings
 
-  !> The texts with these indices, in their order.
+  !> The texts with these indices, in the order of the indices.
   pure function selected(texts, indices) result(list)
     type(string_t), intent(in) :: texts(:)
     integer, intent(in) :: indices(:)
@@ -177,7 +180,7 @@ contains
     end do
   end function selected
 
-  !> Lengthens the list by one text, kept as it is.
+  !> Appends a text to a list, trailing blanks included.
   pure subroutine append(list, text)
     type(string_t), allocatable, intent(inout) :: list(:)
     character(len=*), intent(in) :: text
@@ -192,7 +195,7 @@ contains
     call move_alloc(longer, list)
   end subroutine append
 
-  !> Index of the candidate that `word` was probably meant to be, 0 if none is near.
+  !> Index of the candidate nearest to a misspelt `word`, 0 if none is near.
   pure function nearest_word(word, candidates) result(nearest)
     character(len=*), intent(in) :: word
     type(string_t), intent(in) :: candidates(:)
@@ -210,7 +213,7 @@ contains
     end do
   end function nearest_word
 
-  !> Optimal string alignment distance: insertions, deletions, substitutions, swaps of neighbours.
+  !> Optimal string alignment distance, which counts insertions, deletions, substitutions and swaps of neighbours.
   pure function edit_distance(a, b) result(distance)
     character(len=*), intent(in) :: a, b
     integer :: distance

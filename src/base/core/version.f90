@@ -1,4 +1,4 @@
-!> Which nocdyn this is, and what built it.
+!> The version of nocdyn and of the compiler that built it.
 module nocdyn_version
   use, intrinsic :: iso_fortran_env, only: compiler_version
   implicit none (type, external)
@@ -10,7 +10,7 @@ module nocdyn_version
 
 contains
 
-  !> Name and version of the compiler, as it calls itself.
+  !> Name and version of the compiler.
   function compiler_text() result(text)
     character(len=:), allocatable :: text
 

@@ -1,6 +1,6 @@
-!> The dense linear algebra of the constraint analysis, by LAPACK.
+!> Dense linear algebra by LAPACK: rank, inverse, positive definite systems, pseudo-inverse.
 !>
-!> Arrays are allocated with `source=`: gfortran 12 takes the descriptor that an assignment allocates for uninitialised.
+!> Arrays are allocated with `source=`: gfortran 12 warns of uninitialised descriptors where an assignment allocates.
 module nocdyn_lapack
   use nocdyn_kinds, only: wp
   use nocdyn_lapack_lu, only: lu_factor

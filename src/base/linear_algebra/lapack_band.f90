@@ -31,9 +31,9 @@ module nocdyn_lapack_band
 
 contains
 
-  !> P A = L U with row interchanges.
+  !> Factors P A = L U with row interchanges.
   subroutine band_factor(lower, upper, band, pivots, singular)
-    integer, intent(in) :: lower, upper
+    integer, intent(in) :: lower, upper                  !! numbers of diagonals below and above the main one
     real(wp), contiguous, intent(inout) :: band(:, :)    !! A, on return L and U; shape [2 lower + upper + 1, n], n > 0
     integer, contiguous, intent(inout) :: pivots(:)      !! row interchanges, shape [n]
     logical, intent(out) :: singular                     !! a pivot is exactly zero: the factors cannot be used
@@ -47,7 +47,7 @@ contains
 
   !> Solves A x = b with the factors of `band_factor`.
   subroutine band_solve(lower, upper, factors, pivots, x)
-    integer, intent(in) :: lower, upper
+    integer, intent(in) :: lower, upper                  !! numbers of diagonals below and above the main one
     real(wp), contiguous, intent(in) :: factors(:, :)
     integer, contiguous, intent(in) :: pivots(:)
     real(wp), contiguous, intent(inout) :: x(:)          !! b, on return x; shape [n]

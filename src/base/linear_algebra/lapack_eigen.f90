@@ -53,17 +53,17 @@ module nocdyn_lapack_eigen
 
 contains
 
-  !> A = R^T R by DPOTRF: R takes the place of the upper triangle of A.
+  !> Cholesky factor R of A = R^T R (DPOTRF), in the upper triangle of `matrix`.
   subroutine cholesky_factor(matrix, is_indefinite)
-    real(wp), contiguous, intent(inout) :: matrix(:, :)
-    logical, intent(out) :: is_indefinite
+    real(wp), contiguous, intent(inout) :: matrix(:, :)   !! A, symmetric
+    logical, intent(out) :: is_indefinite                 !! whether A is not positive definite
     integer :: info
 
     call dpotrf('U', size(matrix, 1), matrix, max(1, size(matrix, 1)), info)
     is_indefinite = info /= 0
   end subroutine cholesky_factor
 
-  !> B becomes R^-1 B.
+  !> Replaces B by R^-1 B (DTRSM).
   subroutine solve_left(factor, matrix)
     real(wp), contiguous, intent(in) :: factor(:, :)      !! of `cholesky_factor`
     real(wp), contiguous, intent(inout) :: matrix(:, :)
@@ -72,7 +72,7 @@ contains
                matrix, max(1, size(matrix, 1)))
   end subroutine solve_left
 
-  !> B becomes B R^-1.
+  !> Replaces B by B R^-1 (DTRSM).
   subroutine solve_right(factor, matrix)
     real(wp), contiguous, intent(in) :: factor(:, :)      !! of `cholesky_factor`
     real(wp), contiguous, intent(inout) :: matrix(:, :)
@@ -91,7 +91,7 @@ contains
     real(wp) :: none(1, 1), room(1)
     integer :: info, m, n
 
-    m = max(1, size(matrix, 1))   ! a row of zeros for none: DGESVD leaves the vectors of no rows as they are
+    m = max(1, size(matrix, 1))   ! one row of zeros where there is none: without rows DGESVD sets no vectors
     n = size(matrix, 2)
     values = 0.0_wp
     allocate (a(m, n), source=0.0_wp)
@@ -120,7 +120,7 @@ contains
     has_failed = info /= 0
   end subroutine symmetric_eigenvectors
 
-  !> Eigenvalues of a matrix, those of a pair one after the other, and right eigenvectors (DGEEV).
+  !> Eigenvalues of a real matrix and right eigenvectors; conjugate pairs follow each other (DGEEV).
   subroutine eigenvectors(matrix, values, vectors, has_failed)
     real(wp), intent(in) :: matrix(:, :)
     complex(wp), intent(out) :: values(:)

@@ -1,8 +1,8 @@
 !> LU factors of a square matrix and solutions with them, by LAPACK.
 !>
-!> Small matrices are what an integrator solves with most. For them the calls inside of LAPACK cost more than the numbers.
-!> With the reference LAPACK and gfortran 12, at order 4 (12), the unblocked DGETF2 takes a third (two fifths) of the
-!> time of DGETRF, and a plain loop over the factors a quarter (three fifths) of that of DGETRS.
+!> Integrators mostly solve small systems, for which the calls inside LAPACK cost more than the arithmetic. With the reference
+!> LAPACK and gfortran 12, at order 4 (12), the unblocked DGETF2 takes a third (two fifths) of the time of DGETRF, and a plain
+!> loop over the factors a quarter (three fifths) of that of DGETRS.
 module nocdyn_lapack_lu
   use nocdyn_kinds, only: wp
   implicit none (type, external)
@@ -10,7 +10,7 @@ module nocdyn_lapack_lu
 
   public :: lu_factor, lu_solve
 
-  integer, parameter :: small_order = 64   ! from here on blocks pay, where an optimised LAPACK is linked
+  integer, parameter :: small_order = 64   ! above it blocks pay if an optimised LAPACK is linked
 
   interface
     subroutine dgetrf(m, n, a, lda, ipiv, info)
@@ -42,7 +42,7 @@ module nocdyn_lapack_lu
 
 contains
 
-  !> P A = L U with row interchanges.
+  !> Factors P A = L U with row interchanges.
   subroutine lu_factor(matrix, pivots, singular)
     real(wp), contiguous, intent(inout) :: matrix(:, :)  !! A, on return L (unit diagonal) and U; shape [n, n], n > 0
     integer, contiguous, intent(inout) :: pivots(:)      !! row interchanges, shape [n]
@@ -75,7 +75,7 @@ contains
     end if
   end subroutine lu_solve
 
-  !> What DGETRS does. Vectors of so few elements cost gfortran 12 more than they save.
+  !> Forward and backward substitution, as DGETRS. For so few elements the vector loops of gfortran 12 are slower.
   pure subroutine substitute(n, factors, pivots, x)
     integer, intent(in) :: n
     real(wp), intent(in) :: factors(n, n)

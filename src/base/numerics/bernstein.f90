@@ -1,8 +1,8 @@
-!> The largest value of a polynomial on [0, 1], which none of its maxima escapes.
+!> The largest value of a polynomial on [0, 1]; no maximum is missed.
 !>
-!> In Bernstein form a polynomial lies below the largest of its coefficients, and its derivative has as many roots as the
-!> differences of the coefficients have changes of sign, or fewer by an even number (R. T. Farouki, V. T. Rajan, CAGD 4 (1987)
-!> 191-216; 5 (1988) 1-26). Parts of the interval that can hold more than one root are halved.
+!> In Bernstein form a polynomial is at most as large as the largest coefficient. Its derivative has as many roots as there are
+!> sign changes in the differences of the coefficients, or fewer by an even number (R. T. Farouki, V. T. Rajan, CAGD 4 (1987)
+!> 191-216; 5 (1988) 1-26). Parts of the interval with more than one sign change are halved.
 module nocdyn_bernstein
   use nocdyn_kinds, only: wp
   implicit none (type, external)
@@ -11,14 +11,14 @@ module nocdyn_bernstein
   public :: make_bernstein_matrix, raise_to_maximum, shift_origin
 
   integer, parameter, public :: max_degree = 39
-  integer, parameter :: rows = 4                    !! of the matrix that are multiplied together; they divide 1 + most_degrees
+  integer, parameter :: rows = 4                    !! of the matrix that are multiplied together; divides 1 + max_degree
   integer, parameter :: max_halvings = 40
   integer, parameter :: max_newton_steps = 60      !! bisection alone would need as many
-  real(wp), parameter :: last_change = 1.0e-8_wp    !! of a place by Newton's method, which then leaves its square
+  real(wp), parameter :: last_change = 1.0e-8_wp    !! of Newton's method; the error is its square
 
 contains
 
-  !> The matrix that makes Bernstein coefficients of those of powers: binomial(i, k) / binomial(n, k), k <= i.
+  !> The matrix from coefficients of powers to Bernstein coefficients: binomial(i, k) / binomial(n, k), k <= i.
   pure subroutine make_bernstein_matrix(n, matrix)
     integer, intent(in) :: n
     real(wp), intent(out) :: matrix(0:max_degree, 0:n)   !! [Bernstein coefficients and padding, powers]
@@ -33,7 +33,7 @@ contains
     end do
   end subroutine make_bernstein_matrix
 
-  !> Raises `highest` to the largest value of c_0 + c_1 s + ... between s = 0 and 1 if that is larger; the ends are not looked at.
+  !> Raises `highest` to the largest value of c_0 + c_1 s + ... inside 0 < s < 1, if that is larger. The ends are not checked.
   pure subroutine raise_to_maximum(n, matrix, c, highest, position, found)
     integer, intent(in) :: n         !! degree, 1 to `max_degree`
     real(wp), intent(in) :: matrix(0:max_degree, 0:n)   !! of `make_bernstein_matrix`
@@ -41,7 +41,7 @@ contains
     real(wp), intent(inout) :: highest
     real(wp), intent(out) :: position   !! of the maximum
     logical, intent(out) :: found    !! whether `highest` has been raised by more than rounding
-    real(wp) :: b(0:max_degree, max_halvings + 2)   ! of the parts that are left; the last of them is next
+    real(wp) :: b(0:max_degree, max_halvings + 2)   ! of the parts that are left; the last one is next
     real(wp) :: left(max_halvings + 2), length(max_halvings + 2)
     integer :: parts, changes
 
@@ -75,7 +75,7 @@ contains
     end do
   end subroutine raise_to_maximum
 
-  !> Whether the largest coefficient is higher by more than rounding.
+  !> Whether the largest coefficient exceeds `highest` by more than rounding.
   pure logical function can_exceed(n, b, highest)
     integer, intent(in) :: n
     real(wp), intent(in) :: b(0:n), highest
@@ -91,7 +91,7 @@ contains
     can_exceed = largest - n * epsilon(size) * size > highest
   end function can_exceed
 
-  !> b = matrix * c, a few rows at a time; what is above the diagonal is zero.
+  !> b = matrix * c, `rows` rows at a time; the matrix is lower triangular.
   pure subroutine multiply(n, matrix, c, b)
     integer, intent(in) :: n
     real(wp), intent(in) :: matrix(0:max_degree, 0:n), c(0:n)
@@ -108,7 +108,7 @@ contains
     end do
   end subroutine multiply
 
-  !> Changes of sign of the differences of the coefficients, which bound the roots of the derivative.
+  !> The number of sign changes of the differences of the coefficients, which bounds the number of roots of the derivative.
   pure integer function sign_changes(n, b)
     integer, intent(in) :: n
     real(wp), intent(in) :: b(0:n)
@@ -125,7 +125,7 @@ contains
     end do
   end function sign_changes
 
-  !> de Casteljau's algorithm: b becomes that of the right half.
+  !> Coefficients of both halves, by de Casteljau's algorithm; b becomes those of the right half.
   pure subroutine halve(n, b, left)
     integer, intent(in) :: n
     real(wp), intent(inout) :: b(0:n)
@@ -181,7 +181,7 @@ contains
     found = .true.
   end subroutine refine_maximum
 
-  !> A polynomial and its derivative.
+  !> The value and the slope of a polynomial at s.
   pure subroutine differentiate(n, c, s, value, slope)
     integer, intent(in) :: n
     real(wp), intent(in) :: c(0:n), s
@@ -196,7 +196,7 @@ contains
     end do
   end subroutine differentiate
 
-  !> The polynomial on [start, until] becomes one on [0, 1].
+  !> Replaces a polynomial on [start, until] by the same polynomial on [0, 1].
   pure subroutine shift_origin(n, c, start, until)
     integer, intent(in) :: n
     real(wp), intent(inout) :: c(0:n)

@@ -1,5 +1,5 @@
-!> Polynomials on [-1, 1] as sums of Chebyshev polynomials c_1 T_0 + c_2 T_1 + ..., which are well-conditioned at any degree,
-!> and through their values at the Chebyshev-Lobatto places.
+!> Polynomials on [-1, 1]: as sums of Chebyshev polynomials c_1 T_0 + c_2 T_1 + ..., which are well-conditioned at any degree,
+!> and by their values at the Chebyshev-Lobatto nodes.
 module nocdyn_chebyshev
   use nocdyn_kinds, only: wp
   implicit none (type, external)
@@ -12,7 +12,7 @@ module nocdyn_chebyshev
 
 contains
 
-  !> The places -cos(pi i / degree), and the matrix that makes coefficients of the values there.
+  !> The nodes -cos(pi i / degree), and the matrix from values there to coefficients.
   pure subroutine lobatto_nodes(degree, nodes, to_series)
     integer, intent(in) :: degree
     real(wp), intent(out) :: nodes(0:degree)
@@ -29,15 +29,15 @@ contains
     end do
   end subroutine lobatto_nodes
 
-  !> 1/2 for the first and the last term of the sums that interpolate at Chebyshev-Lobatto places.
+  !> The weight of a term in interpolation at Chebyshev-Lobatto nodes: 1/2 for the first and last one, else 1.
   pure real(wp) function end_weight(i, last)
     integer, intent(in) :: i, last
 
     end_weight = merge(0.5_wp, 1.0_wp, i == 0 .or. i == last)
   end function end_weight
 
-  !> The largest value of the polynomial through `values` and its place, by Newton's method on the derivative with
-  !> bisection as safeguard, between the neighbours of the largest of the values.
+  !> The largest value of the polynomial through `values` and its argument, by Newton's method on the derivative, safeguarded by
+  !> bisection, between the neighbours of the largest value.
   pure subroutine find_maximum(n, nodes, to_series, values, node, peak)
     integer, intent(in) :: n
     real(wp), intent(in) :: nodes(n), to_series(n, n), values(n)
@@ -77,7 +77,7 @@ contains
     peak = max(peak, series_value(n, c, node))
   end subroutine find_maximum
 
-  !> The coefficients of the derivative of a sum of Chebyshev polynomials: d_(k-1) = d_(k+1) + 2 k c_k, the first halved.
+  !> The coefficients of the derivative of a sum of Chebyshev polynomials: d_(k-1) = d_(k+1) + 2 k c_k, with d_0 halved.
   pure subroutine differentiate(n, c, d)
     integer, intent(in) :: n
     real(wp), intent(in) :: c(n)   !! of T_0 to T_(n-1)

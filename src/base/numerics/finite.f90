@@ -1,4 +1,4 @@
-!> Tests for infinities and NaNs that raise no floating-point exception and cost no change of the floating-point state.
+!> Tests for infinities and NaNs that raise no floating-point exception and do not change the floating-point state.
 module nocdyn_finite
   use, intrinsic :: iso_fortran_env, only: int64
   use nocdyn_kinds, only: wp
@@ -16,13 +16,13 @@ module nocdyn_finite
 
 contains
 
-  !> Whether no element is infinite or NaN: the sum of their sizes is then neither, unless it overflows.
+  !> Whether no element is infinite or NaN, by the sum of the absolute values. False too if that sum overflows.
   pure function all_finite(n, x)
     integer, intent(in) :: n
     real(wp), intent(in) :: x(n)
     logical :: all_finite
     real(wp) :: total(4)          ! four sums, as a vector
-    real(wp) :: totals(several)   ! sums that need not wait for each other
+    real(wp) :: totals(several)   ! independent sums
     integer :: i, whole
 
     total = 0.0_wp

@@ -1,8 +1,8 @@
-!> Sine, cosine and hyperbolic tangent of many arguments, by the same operations wherever an argument stands.
+!> Sine, cosine and hyperbolic tangent of arrays, by the same operations for every element.
 !>
-!> A compiler's vector sine differs from its scalar one in the last bits, so that a lane's result would depend on its
-!> place in the block. Here every argument goes through the same additions and multiplications, which IEEE arithmetic
-!> rounds alike in a vector and alone; the loops have no branch, so that compilers make vector code of them.
+!> A compiler's vector sine differs from its scalar sine in the last bits, so that the result of a lane would depend on its
+!> index in the block. Here every argument goes through the same additions and multiplications, which IEEE arithmetic rounds
+!> alike in vectors and scalars. The loops have no branch, so that compilers vectorise them.
 !>
 !> sin x = (-1)^k sin r with r = x - k pi in [-pi/2, pi/2]; pi is in three parts (W. J. Cody, W. Waite, Software Manual
 !> for the Elementary Functions, 1980), the first two so short that their products with k are exact. The Taylor series
@@ -27,7 +27,7 @@ module nocdyn_vector_functions
   real(wp), parameter :: pi_low = 2.1125998133974855e-23_wp
   real(wp), parameter :: inverse_pi = 0.31830988618379067_wp
   real(wp), parameter :: to_whole = 1.5_wp * 2.0_wp**52   ! adding and subtracting it rounds to a whole number
-  real(wp), parameter :: largest = 4.0e5_wp   ! keeps k below 2^17; larger arguments go, one by one, to the intrinsic functions
+  real(wp), parameter :: largest = 4.0e5_wp   ! keeps k below 2^17; larger arguments use the intrinsic functions
 
   real(wp), parameter :: ln2_high = 0.693147180369123816490_wp   ! 32 bits, as in fdlibm
   real(wp), parameter :: ln2_low = 1.90821492927058770002e-10_wp
@@ -120,10 +120,10 @@ contains
     cosine = signed_sine(x, k - 0.5_wp, k)
   end function cosine
 
-  !> (-1)^k sin(x - turns pi); the terms of the series are added in pairs, which need not wait for each other.
+  !> (-1)^k sin(x - turns pi); the terms of the series are added in independent pairs.
   pure real(wp) function signed_sine(x, turns, k)
     real(wp), intent(in) :: x
-    real(wp), intent(in) :: turns   !! multiple of 1/2 that brings x to [-pi/2, pi/2]
+    real(wp), intent(in) :: turns   !! multiple of 1/2 with x - turns pi in [-pi/2, pi/2]
     real(wp), intent(in) :: k       !! whole number
     real(wp), parameter :: a3 = -1.0_wp / 6.0_wp, a5 = -a3 / 20.0_wp, a7 = -a5 / 42.0_wp, a9 = -a7 / 72.0_wp
     real(wp), parameter :: a11 = -a9 / 110.0_wp, a13 = -a11 / 156.0_wp, a15 = -a13 / 210.0_wp
@@ -200,7 +200,7 @@ contains
     log2_of = (k + 0.5_wp) + s * ((c1 + c3 * s2) + ((c5 + c7 * s2) + c9 * s4) * s4)
   end function log2_of
 
-  !> Replaces each x by 2^x with a relative error below 1e-8; beyond 1000 and -1000 it is taken for these.
+  !> Replaces each x by 2^x with a relative error below 1e-8; x is limited to -1000 to 1000.
   pure subroutine exp2s(n, x)
     integer, intent(in) :: n
     real(wp), intent(inout) :: x(n)

@@ -1,4 +1,4 @@
-!> What is in a folder, and folders with nothing in them.
+!> The names in a folder, and removal of empty folders.
 module nocdyn_folders
   use, intrinsic :: iso_c_binding, only: c_char, c_int, c_null_char, c_size_t
   use nocdyn_text, only: append, string_t
@@ -8,7 +8,7 @@ module nocdyn_folders
   public :: folder_names, remove_empty_folder
 
   interface
-    !> Names with a null character after each (folder_names.cpp); returns the length of all.
+    !> Writes the names, each followed by a null character (folder_names.cpp); returns the length of all.
     function c_folder_names(path, names, capacity) result(length) bind(c, name='nocdyn_folder_names')
       import :: c_char, c_size_t
       character(kind=c_char), intent(in) :: path(*)
@@ -25,7 +25,7 @@ module nocdyn_folders
 
 contains
 
-  !> The names of files and folders in a folder, in no order; none if it cannot be read.
+  !> The names of files and folders in a folder, in no particular order; none if it cannot be read.
   function folder_names(folder) result(names)
     character(len=*), intent(in) :: folder
     type(string_t), allocatable :: names(:)
@@ -34,7 +34,7 @@ contains
     integer :: first, last
 
     length = 0
-    do   ! a file may have come since it was asked how long the list is
+    do   ! files may appear between the two calls
       allocate (character(len=length) :: bytes)
       length = c_folder_names(folder // c_null_char, bytes, int(len(bytes), c_size_t))
       if (length <= len(bytes)) exit
@@ -49,7 +49,7 @@ contains
     end do
   end function folder_names
 
-  !> Removes a folder if nothing is in it.
+  !> Removes a folder if it is empty.
   subroutine remove_empty_folder(path)
     character(len=*), intent(in) :: path
     integer(c_int) :: status

@@ -1,8 +1,8 @@
-!> The few services of the operating system that Fortran lacks: folders, renaming, terminals, interrupts; and writing,
-!> because gfortran's `write`, `flush` and `close` report no error when a disk is full.
+!> Services of the operating system that Fortran lacks: folders, renaming, terminals, signals; and writing, because gfortran's
+!> `write`, `flush` and `close` report no error when a disk is full.
 module nocdyn_posix
-  use, intrinsic :: iso_c_binding, only: c_char, c_f_pointer, c_funloc, c_funptr, c_int, c_intptr_t, c_long, &
-    c_null_char, c_null_funptr, c_null_ptr, c_ptr, c_size_t
+  use, intrinsic :: iso_c_binding, only: c_char, c_f_pointer, c_funloc, c_funptr, c_int, c_intptr_t, c_long, c_null_char, &
+    c_null_funptr, c_null_ptr, c_ptr, c_size_t
   implicit none (type, external)
   private
 
@@ -14,7 +14,7 @@ module nocdyn_posix
 
   integer(c_int), parameter :: everything_allowed = int(o'777', c_int), reading_writing = int(o'666', c_int)   ! less the umask
   integer(c_int), parameter :: hang_up_signal = 1, interrupt_signal = 2, termination_signal = 15, file_size_signal = 25
-  integer(c_long), parameter :: echo = 1   ! seconds in which a second signal is the first one again, sent to the whole group
+  integer(c_long), parameter :: echo = 1   ! [s]; within it a second signal is a copy of the first, sent to the process group
   integer(c_intptr_t), parameter :: ignored = 1   ! SIG_IGN
   integer(c_int), parameter :: interrupted_call = 4, exists_already = 17   ! EINTR, EEXIST
 
@@ -98,10 +98,10 @@ module nocdyn_posix
 
 contains
 
-  !> Makes a folder and those above it; folders that exist are fine.
+  !> Creates a folder and its parents where they do not exist.
   subroutine make_folders(path, failure)
     character(len=*), intent(in) :: path
-    character(len=:), allocatable, intent(out) :: failure   !! why it could not be done
+    character(len=:), allocatable, intent(out) :: failure   !! reason, allocated if that failed
     integer :: i
 
     do i = 2, len(path) + 1
@@ -115,7 +115,7 @@ contains
     end do
   end subroutine make_folders
 
-  !> Renames a file in one go, replacing the target.
+  !> Renames a file atomically and replaces the target.
   subroutine rename_file(from, to, is_done)
     character(len=*), intent(in) :: from, to
     logical, intent(out) :: is_done
@@ -123,7 +123,7 @@ contains
     is_done = c_rename(from // c_null_char, to // c_null_char) == 0
   end subroutine rename_file
 
-  !> Removes a file if it is there.
+  !> Removes a file if it exists.
   subroutine remove_file(path)
     character(len=*), intent(in) :: path
     integer(c_int) :: status
@@ -131,14 +131,14 @@ contains
     status = c_unlink(path // c_null_char)
   end subroutine remove_file
 
-  !> Makes a file, or empties the one that is there; the descriptor to write to, negative on failure.
+  !> Creates a file, or empties an existing one; the descriptor to write to, negative on failure.
   integer function create_file(path)
     character(len=*), intent(in) :: path
 
     create_file = int(c_creat(path // c_null_char, reading_writing))
   end function create_file
 
-  !> Writes all bytes, in as many goes as it takes.
+  !> Writes all bytes, by several calls if necessary.
   subroutine write_bytes(descriptor, bytes, is_done)
     integer, intent(in) :: descriptor
     character(len=*), intent(in) :: bytes
@@ -158,7 +158,7 @@ contains
     is_done = next > len(bytes)
   end subroutine write_bytes
 
-  !> Closes a descriptor; not done means that what was written may be lost.
+  !> Closes a descriptor. If `is_done` is false, written data may be lost.
   subroutine close_file(descriptor, is_done)
     integer, intent(in) :: descriptor
     logical, intent(out) :: is_done
@@ -166,7 +166,7 @@ contains
     is_done = c_close(int(descriptor, c_int)) == 0
   end subroutine close_file
 
-  !> Why the call before this one failed, e.g. "No space left on device".
+  !> The reason why the last call of the operating system failed, e.g. "No space left on device".
   function last_failure() result(reason)
     character(len=:), allocatable :: reason
     character(kind=c_char), pointer :: characters(:)
@@ -186,32 +186,32 @@ contains
     failure_number = int(c_errno())
   end function failure_number
 
-  !> Whether the call before this one did nothing because a signal came.
+  !> Whether the last call of the operating system was interrupted by a signal before it did anything.
   logical function is_interrupted_call()
     is_interrupted_call = c_errno() == interrupted_call
   end function is_interrupted_call
 
-  !> Number of this process, for names that no other process uses.
+  !> Number of this process, for unique names.
   integer function process_id()
     process_id = int(c_getpid())
   end function process_id
 
-  !> Whether a file descriptor (1 standard output, 2 standard error) shows on a terminal.
+  !> Whether a file descriptor (1 standard output, 2 standard error) is a terminal.
   logical function is_terminal(descriptor)
     integer, intent(in) :: descriptor
 
     is_terminal = c_isatty(int(descriptor, c_int)) == 1
   end function is_terminal
 
-  !> From here on Ctrl-C, termination and the end of the terminal do not end the program but show in `is_interrupted`;
-  !> a second one, more than a second later, ends it.
+  !> Catches Ctrl-C, termination and hang-up: the first signal only sets `is_interrupted`, a second one more than a second later
+  !> ends the program.
   subroutine catch_interrupts()
     call watch(interrupt_signal)
     call watch(termination_signal)
     call watch(hang_up_signal)
   end subroutine catch_interrupts
 
-  !> A signal that is ignored (nohup, a background job of a script) stays ignored.
+  !> Catches a signal, unless it is ignored already (nohup, a background job of a script).
   subroutine watch(signal)
     integer(c_int), intent(in) :: signal
     type(c_funptr) :: previous
@@ -220,16 +220,16 @@ contains
     if (transfer(previous, ignored) == ignored) previous = c_signal(signal, previous)
   end subroutine watch
 
-  !> From here on a file that would grow beyond the limit of the shell is a write that fails, not the end of the program.
+  !> Ignores the signal for files that exceed the size limit of the shell: the write fails instead, and the program goes on.
   subroutine ignore_file_size_signal()
     type(c_funptr) :: previous
 
     previous = c_signal(file_size_signal, transfer(ignored, c_null_funptr))
   end subroutine ignore_file_size_signal
 
+  !> The signal handler.
   subroutine note_signal(signal) bind(c)
     integer(c_int), value, intent(in) :: signal
-
     integer(c_long) :: now
 
     now = c_time(c_null_ptr)
@@ -238,7 +238,7 @@ contains
     received_signal = signal
   end subroutine note_signal
 
-  !> The interruption asked for since `catch_interrupts`.
+  !> Whether a signal has been caught since `catch_interrupts`.
   logical function is_interrupted()
     is_interrupted = received_signal /= 0
   end function is_interrupted

@@ -1,4 +1,4 @@
-!> Files that are read at any place and grow at their end, as descriptors of the operating system.
+!> Files as descriptors of the operating system: read at any offset, written at the end, truncated, locked.
 module nocdyn_posix_files
   use, intrinsic :: iso_c_binding, only: c_char, c_int, c_int64_t, c_intptr_t, c_null_char, c_size_t
   use, intrinsic :: iso_fortran_env, only: int64
@@ -65,29 +65,29 @@ module nocdyn_posix_files
 
 contains
 
-  !> Makes a file to read and write; its descriptor, negative on failure or if there is a file of that name.
+  !> Creates a file to read and write; its descriptor, negative on failure or if a file of that name exists.
   integer function open_new(path)
     character(len=*), intent(in) :: path
 
     open_new = int(c_open_new(path // c_null_char))
   end function open_new
 
-  !> Opens a file that is there; its descriptor, negative on failure.
+  !> Opens an existing file; its descriptor, negative on failure.
   integer function open_existing(path, is_to_change)
     character(len=*), intent(in) :: path
-    logical, intent(in) :: is_to_change   !! else it is read only
+    logical, intent(in) :: is_to_change   !! opens it for writing too
 
     open_existing = int(c_open_existing(path // c_null_char, merge(1_c_int, 0_c_int, is_to_change)))
   end function open_existing
 
-  !> Bytes in the file, negative on failure.
+  !> Size of a file [bytes], negative on failure.
   integer(int64) function file_size(descriptor)
     integer, intent(in) :: descriptor
 
     file_size = c_lseek(int(descriptor, c_int), 0_c_int64_t, from_end)
   end function file_size
 
-  !> Fills `bytes` from the file, `offset` bytes behind its start; not done: a failure or the end of the file.
+  !> Fills `bytes` from the file, from an offset on. `is_done` is false after a failure or at the end of the file.
   subroutine read_at(descriptor, offset, bytes, is_done)
     integer, intent(in) :: descriptor
     integer(int64), intent(in) :: offset
@@ -108,7 +108,7 @@ contains
     is_done = next > len(bytes)
   end subroutine read_at
 
-  !> Cuts the file off behind `length` bytes, where writing goes on.
+  !> Truncates the file to `length` bytes and continues writing there.
   subroutine truncate_file(descriptor, length, is_done)
     integer, intent(in) :: descriptor
     integer(int64), intent(in) :: length
@@ -118,7 +118,7 @@ contains
     if (is_done) is_done = c_lseek(int(descriptor, c_int), length, from_start) == length
   end subroutine truncate_file
 
-  !> What was written is on the disk when this returns.
+  !> Waits until the data written to a file are on the disk.
   subroutine sync_file(descriptor, is_done)
     integer, intent(in) :: descriptor
     logical, intent(out) :: is_done
@@ -126,7 +126,7 @@ contains
     is_done = c_fdatasync(int(descriptor, c_int)) == 0
   end subroutine sync_file
 
-  !> The same for a file or folder that others have written.
+  !> The same for a file or folder by its path.
   subroutine sync_path(path, is_done)
     character(len=*), intent(in) :: path
     logical, intent(out) :: is_done
@@ -140,8 +140,8 @@ contains
     call close_file(descriptor, is_closed)
   end subroutine sync_path
 
-  !> Takes the file for this process, until it is closed; not done: another process has it. A file system without locks locks
-  !> nothing, and that is no failure.
+  !> Locks the file for this process, until it is closed. `is_done` is false if another process holds the lock; on file systems
+  !> without locks it is true.
   subroutine lock_file(descriptor, is_done)
     integer, intent(in) :: descriptor
     logical, intent(out) :: is_done
@@ -150,7 +150,7 @@ contains
     if (.not. is_done) is_done = failure_number() /= would_block
   end subroutine lock_file
 
-  !> What the disk has against it, if that is why a library's call before this one failed; else empty.
+  !> The reason if the last call of a library failed because of the disk, else empty.
   function disk_failure() result(reason)
     character(len=:), allocatable :: reason
 

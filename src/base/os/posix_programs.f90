@@ -1,4 +1,4 @@
-!> The programs of this installation, where they are and one becoming another; and what their libraries hold.
+!> The folder of the running program, execution of another program, and procedures of loaded shared libraries.
 module nocdyn_posix_programs
   use, intrinsic :: iso_c_binding, only: c_char, c_funptr, c_int, c_intptr_t, c_loc, c_null_char, c_null_ptr, c_ptr, c_size_t
   use nocdyn_posix, only: last_failure
@@ -33,7 +33,7 @@ module nocdyn_posix_programs
 
 contains
 
-  !> The folder of the running program's file, with its last slash; empty if the system does not tell.
+  !> The folder of the running program's file, with a final slash; empty if it cannot be found.
   function program_folder() result(folder)
     character(len=:), allocatable :: folder
     character(len=longest_path) :: path
@@ -44,11 +44,11 @@ contains
     folder = path(:index(path(:max(length, 0)), '/', back=.true.))
   end function program_folder
 
-  !> Another program takes the place of this one; returns only if that failed.
+  !> Replaces this process by another program; returns only if that failed.
   subroutine exec_program(program, words, failure)
     character(len=*), intent(in) :: program                  !! path of its file
     type(string_t), intent(in) :: words(:)                   !! its arguments
-    character(len=:), allocatable, intent(out) :: failure    !! why it could not be done
+    character(len=:), allocatable, intent(out) :: failure    !! reason
     type(c_ptr), allocatable :: addresses(:)
     character(len=:), allocatable, target :: texts
     integer(c_int) :: status
@@ -69,7 +69,7 @@ contains
     failure = last_failure()
   end subroutine exec_program
 
-  !> A procedure of the shared libraries that this program has loaded, null if none has it.
+  !> The address of a procedure of the shared libraries that this program has loaded, null if none has it.
   type(c_funptr) function find_library_procedure(name)
     character(len=*), intent(in) :: name
 

@@ -1,4 +1,4 @@
-!> Distributions of a random number, by their quantiles; normal ones may be truncated.
+!> Probability distributions by their quantiles: uniform, normal and lognormal; the last two may be truncated.
 module nocdyn_distributions
   use nocdyn_kinds, only: wp
   use nocdyn_normal_quantiles, only: normal_probability, normal_quantile
@@ -8,16 +8,16 @@ module nocdyn_distributions
   public :: uniform_distribution, normal_distribution, lognormal_distribution
 
   integer, parameter :: shape_uniform = 1, shape_normal = 2, shape_lognormal = 3
-  !> Deviations from the middle: the probability beyond is 0 in double precision.
+  !> In standard deviations from the mean: the probability beyond it is 0 in double precision.
   real(wp), parameter, public :: tail_end = 40.0_wp
 
   type, public :: distribution_t
     private
-    real(wp), public :: probability   !! of low to high without truncation; nothing can be drawn if it is 0
+    real(wp), public :: probability   !! of low to high without truncation; no number can be drawn if it is 0
     integer :: shape
-    real(wp) :: low, high             !! ends
+    real(wp) :: low, high             !! ends of the range
     real(wp) :: middle                !! mean or median
-    real(wp) :: deviation             !! of the number or of its natural logarithm
+    real(wp) :: deviation             !! standard deviation of the number or of its natural logarithm
     real(wp) :: below, above          !! probabilities outside low to high without truncation
   contains
     procedure :: quantile
@@ -25,6 +25,7 @@ module nocdyn_distributions
 
 contains
 
+  !> The uniform distribution from low to high.
   pure function uniform_distribution(low, high) result(distribution)
     real(wp), intent(in) :: low, high
     type(distribution_t) :: distribution
@@ -33,10 +34,11 @@ contains
                                   middle=0.5_wp * low + 0.5_wp * high, deviation=0.0_wp, below=0.0_wp, above=0.0_wp)
   end function uniform_distribution
 
+  !> The normal distribution, truncated to low to high.
   pure function normal_distribution(mean, deviation, low, high) result(distribution)
     real(wp), intent(in) :: mean
-    real(wp), intent(in) :: deviation   !! above 0
-    real(wp), intent(in) :: low, high   !! numbers outside do not occur; -huge and huge: all do
+    real(wp), intent(in) :: deviation   !! standard deviation, above 0
+    real(wp), intent(in) :: low, high   !! range of the numbers; -huge to huge: no truncation
     type(distribution_t) :: distribution
     real(wp) :: ends(2)
 
@@ -49,6 +51,7 @@ contains
     distribution = truncated(shape_normal, mean, deviation, low, high, ends)
   end function normal_distribution
 
+  !> The lognormal distribution, truncated to low to high.
   pure function lognormal_distribution(median, log_deviation, low, high) result(distribution)
     real(wp), intent(in) :: median          !! above 0
     real(wp), intent(in) :: log_deviation   !! of the natural logarithm, above 0 and at most 10
@@ -61,14 +64,15 @@ contains
     distribution = truncated(shape_lognormal, median, log_deviation, low, high, ends)
   end function lognormal_distribution
 
+  !> A truncated distribution.
   pure function truncated(shape, middle, deviation, low, high, ends) result(distribution)
     integer, intent(in) :: shape
     real(wp), intent(in) :: middle, deviation, low, high
-    real(wp), intent(in) :: ends(2)   !! low and high in deviations from the middle
+    real(wp), intent(in) :: ends(2)   !! low and high, in standard deviations from the middle
     type(distribution_t) :: distribution
     real(wp) :: probability
 
-    if (ends(1) > 0.0_wp) then   ! in the upper tail the complements have more digits
+    if (ends(1) > 0.0_wp) then   ! in the upper tail the complementary probabilities have more digits
       probability = normal_probability(-ends(1)) - normal_probability(-ends(2))
     else
       probability = normal_probability(ends(2)) - normal_probability(ends(1))
@@ -77,7 +81,7 @@ contains
                                   deviation=deviation, below=normal_probability(ends(1)), above=normal_probability(-ends(2)))
   end function truncated
 
-  !> The number below which the probability is u; never outside low to high.
+  !> The quantile of u: the number below which the probability is u, within low to high.
   pure real(wp) function quantile(self, u) result(x)
     class(distribution_t), intent(in) :: self
     real(wp), intent(in) :: u   !! above 0 and below 1
@@ -93,7 +97,7 @@ contains
     x = max(self%low, min(x, self%high))
   end function quantile
 
-  !> In deviations from the middle, from the tail that u is in.
+  !> The quantile in standard deviations from the middle, computed from the nearer tail.
   pure real(wp) function standard_quantile(self, u) result(z)
     class(distribution_t), intent(in) :: self
     real(wp), intent(in) :: u

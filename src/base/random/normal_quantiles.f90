@@ -37,7 +37,7 @@ contains
 
   !> The value below which the probability is p: PPND16 of M. J. Wichura, Algorithm AS 241, Appl. Statist. 37 (1988) 477-484.
   !>
-  !> Exact to about 1e-16 of the value. Above 1/2, where p itself has lost digits, -normal_quantile(1 - p) is as exact as 1 - p.
+  !> The relative error is about 1e-16. Above 1/2, where p itself has lost digits, -normal_quantile(1 - p) is as exact as 1 - p.
   pure real(wp) function normal_quantile(p) result(x)
     real(wp), intent(in) :: p   !! above 0 and below 1
     real(wp) :: q, r

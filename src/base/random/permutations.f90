@@ -1,8 +1,8 @@
-!> Pseudo-random permutations of 0 .. n - 1, of which one place can be evaluated without the others.
+!> Pseudo-random permutations of 0 .. n - 1 whose elements can be computed one by one.
 !>
 !> A Feistel network on pairs of digits (J. Black, P. Rogaway, Ciphers with arbitrary finite domains, CT-RSA 2002): a number
-!> below s^2 >= n is left s + right, and a round makes (right, left + f(right) modulo s) of it, which can be undone whatever f
-!> is. A result that is not below n goes through the network again until it is; as s^2 is hardly more than n, that is rare.
+!> below s^2 >= n is left s + right, and a round replaces it by (right, left + f(right) modulo s), which is invertible for any f.
+!> The network is repeated while the result is not below n; this is rare, as s^2 is hardly more than n.
 module nocdyn_permutations
   use, intrinsic :: iso_fortran_env, only: int64
   use nocdyn_random_numbers, only: largest_word, random_words, stream_permutations, word_bits
@@ -11,7 +11,7 @@ module nocdyn_permutations
 
   public :: random_permutation
 
-  ! Four are enough if f is random (M. Luby, C. Rackoff, SIAM J. Comput. 17 (1988) 373-386); this f is not quite.
+  ! Four are enough for a random f (M. Luby, C. Rackoff, SIAM J. Comput. 17 (1988) 373-386); this f is not quite random.
   integer, parameter :: rounds = 8
   integer(int64), parameter :: multiplier = int(z'045D9F3B', int64)
 
@@ -26,7 +26,7 @@ module nocdyn_permutations
 
 contains
 
-  !> Permutations of different seeds or items have nothing in common.
+  !> The permutation of a seed and an item; permutations of other seeds or items are independent of it.
   pure function random_permutation(length, seed, item) result(permutation)
     integer, intent(in) :: length   !! at least 1
     integer, intent(in) :: seed     !! at least 0
@@ -47,7 +47,7 @@ contains
     end do
   end function random_permutation
 
-  !> Where the permutation puts a place.
+  !> The image of a position under the permutation.
   pure integer function image(self, position)
     class(permutation_t), intent(in) :: self
     integer, intent(in) :: position   !! 0 to length - 1
@@ -68,7 +68,7 @@ contains
     end do
   end function image
 
-  !> A word each of whose bits depends on every bit of another one.
+  !> A hash of a word: each bit depends on every bit of the word.
   pure integer(int64) function mixed(word)
     integer(int64), intent(in) :: word
 

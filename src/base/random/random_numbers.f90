@@ -1,4 +1,5 @@
-!> Random numbers that have an address: each is a function of its place alone, whoever asks for it and in whatever order.
+!> Counter-based random numbers: each is a function of its seed, stream, item and index alone, so that the order of the calls does
+!> not matter.
 !>
 !> Philox4x32-10 of J. K. Salmon, M. A. Moraes, R. O. Dror, D. E. Shaw, Parallel random numbers: as easy as 1, 2, 3, SC '11:
 !> ten rounds of products and exclusive-ors make 128 random bits of a 128-bit counter and a 64-bit key. Words of 32 bits are
@@ -11,7 +12,7 @@ module nocdyn_random_numbers
 
   public :: philox_4x32, random_words, random_number_at
 
-  ! What the numbers are for: streams of one seed have nothing in common.
+  ! The uses of the numbers; the streams of one seed are independent.
   integer, parameter, public :: stream_values = 0         !! of variants
   integer, parameter, public :: stream_offsets = 1        !! inside strata
   integer, parameter, public :: stream_permutations = 2

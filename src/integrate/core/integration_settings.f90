@@ -1,4 +1,4 @@
-!> What a user of the integrators may choose.
+!> The settings of an integration.
 module nocdyn_integration_settings
   use nocdyn_errors, only: error_t, exit_input, raise
   use nocdyn_kinds, only: wp
@@ -8,23 +8,23 @@ module nocdyn_integration_settings
 
   public :: check_settings
 
-  integer, parameter :: most_steps = 100000000   !! so that the count of evaluations fits a default integer
+  integer, parameter :: most_steps = 100000000   !! so that the number of evaluations fits a default integer
 
   type, public :: integration_settings_t
     character(len=16) :: method = 'auto'            !! one of `method_names`
-    real(wp) :: rtol = 1.0e-6_wp                    !! relative tolerance, at least the spacing of numbers
+    real(wp) :: rtol = 1.0e-6_wp                    !! relative tolerance, at least epsilon(1.0_wp), below 1
     real(wp) :: atol = 1.0e-9_wp                    !! absolute tolerance, positive
     real(wp) :: first_step = 0.0_wp                 !! 0 if it is to be found automatically
     real(wp) :: longest_step = huge(1.0_wp)
-    integer :: max_steps = 1000000                  !! attempts of a lane, accepted or rejected
+    integer :: max_steps = 1000000                  !! step attempts of a lane, accepted or rejected
   end type integration_settings_t
 
 contains
 
-  !> Refuses values outside their ranges, the first of them by name.
+  !> Checks the ranges of the values; the error names the first value outside its range.
   subroutine check_settings(settings, error)
     type(integration_settings_t), intent(in) :: settings
-    type(error_t), allocatable, intent(out) :: error   !! allocated if a value is out of its range
+    type(error_t), allocatable, intent(out) :: error   !! allocated if a value is outside its range
 
     if (.not. (settings%rtol >= epsilon(1.0_wp) .and. settings%rtol < 1)) then
       call refuse('rtol', to_text(settings%rtol), 'at least ' // to_text(epsilon(1.0_wp)) // ' and less than 1', error)

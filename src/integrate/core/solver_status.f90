@@ -1,4 +1,4 @@
-!> How an integration ended, lane by lane, and the sentence that says why.
+!> Status and statistics of an integration, lane by lane, and messages about failures.
 module nocdyn_solver_status
   use nocdyn_kinds, only: wp
   use nocdyn_system, only: system_t
@@ -16,18 +16,17 @@ module nocdyn_solver_status
   integer, parameter, public :: integration_rhs_failed = 4      !! the system said that no shorter step will help
   integer, parameter, public :: integration_interrupted = 5  !! by the observer
   integer, parameter, public :: integration_stopped = 6      !! by a terminal event
-
-  integer, parameter, public :: integration_idle = 7         !! the lane has not been given anything
-  integer, parameter, public :: integration_chattering = 8   !! the system changes its branches without end at one time
+  integer, parameter, public :: integration_idle = 7         !! the lane holds no variant
+  integer, parameter, public :: integration_chattering = 8   !! the system changes its branches endlessly at one time
 
   integer, parameter, public :: max_switch_times = 32           !! whose times are kept
 
   !> Every array has one element per lane.
   type, public :: solver_status_t
     integer, allocatable :: code(:)           !! integration_...
-    real(wp), allocatable :: t(:)               !! time reached
-    real(wp), allocatable :: h(:)               !! size of the last attempt
-    integer, allocatable :: component(:)        !! that is to blame for a failure, 0 if none is
+    real(wp), allocatable :: t(:)               !! time reached [s]
+    real(wp), allocatable :: h(:)               !! step size of the last attempt [s]
+    integer, allocatable :: component(:)        !! that caused a failure, 0 if none did
     integer, allocatable :: steps(:)            !! attempts, accepted or rejected
     integer, allocatable :: accepted(:)
     integer, allocatable :: rejected(:)
@@ -35,18 +34,18 @@ module nocdyn_solver_status
     integer, allocatable :: jacobians(:)
     integer, allocatable :: factorisations(:)
     integer, allocatable :: implicit_steps(:)   !! accepted steps of an implicit method
-    integer, allocatable :: switches(:)         !! between explicit and implicit method
-    real(wp), allocatable :: switch_times(:, :) !! of the first switches, [most_switches, lanes]
+    integer, allocatable :: switches(:)         !! changes between explicit and implicit method
+    real(wp), allocatable :: switch_times(:, :) !! times of the first such changes [s], [max_switch_times, lanes]
     logical, allocatable :: implicit(:)         !! whether the last accepted step was an implicit method's
-    integer, allocatable :: crossings(:)        !! changes of branches of the system
-    integer, allocatable :: last_crossing(:)     !! number of the system's switch, 0 if there was none
+    integer, allocatable :: crossings(:)        !! changes of the system's branches
+    integer, allocatable :: last_crossing(:)    !! index of the switch of the last such change, 0 if there was none
   end type solver_status_t
 
   integer, parameter :: digits = 6   ! of the numbers in messages
 
 contains
 
-  !> No lane has been given anything.
+  !> Allocates the status of lanes that hold no variant.
   pure subroutine allocate_solver_status(solver_status, lanes)
     type(solver_status_t), intent(out) :: solver_status
     integer, intent(in) :: lanes
@@ -54,15 +53,15 @@ contains
     allocate (solver_status%code(lanes), source=integration_idle)
     allocate (solver_status%t(lanes), solver_status%h(lanes), source=0.0_wp)
     allocate (solver_status%component(lanes), solver_status%steps(lanes), solver_status%accepted(lanes), &
-              solver_status%rejected(lanes), &
-              solver_status%evaluations(lanes), solver_status%jacobians(lanes), solver_status%factorisations(lanes), &
+              solver_status%rejected(lanes), solver_status%evaluations(lanes), solver_status%jacobians(lanes), &
+              solver_status%factorisations(lanes), &
               solver_status%implicit_steps(lanes), solver_status%switches(lanes), solver_status%crossings(lanes), &
               solver_status%last_crossing(lanes), source=0)
     allocate (solver_status%switch_times(max_switch_times, lanes), source=0.0_wp)
     allocate (solver_status%implicit(lanes), source=.false.)
   end subroutine allocate_solver_status
 
-  !> A lane is running and nothing has been counted in it.
+  !> Sets the status of a lane that starts: running, all counts zero.
   pure subroutine reset_solver_status(solver_status, lane)
     type(solver_status_t), intent(inout) :: solver_status
     integer, intent(in) :: lane
@@ -81,12 +80,12 @@ contains
     solver_status%last_crossing(lane) = 0
   end subroutine reset_solver_status
 
-  !> Counts an accepted step, and a switch if its method is of the other kind than that of the step before.
+  !> Counts an accepted step, and a change of method if the step before was of the other kind.
   pure subroutine count_step(solver_status, lane, t, implicit)
     type(solver_status_t), intent(inout) :: solver_status
     integer, intent(in) :: lane
-    real(wp), intent(in) :: t        !! start of the step
-    logical, intent(in) :: implicit
+    real(wp), intent(in) :: t        !! start of the step [s]
+    logical, intent(in) :: implicit  !! whether an implicit method took the step
 
     solver_status%accepted(lane) = solver_status%accepted(lane) + 1
     if (implicit) solver_status%implicit_steps(lane) = solver_status%implicit_steps(lane) + 1
@@ -97,17 +96,17 @@ contains
     solver_status%implicit(lane) = implicit
   end subroutine count_step
 
-  !> Counts a change of a branch.
+  !> Counts a change of branch.
   pure subroutine count_crossing(solver_status, lane, which)
     type(solver_status_t), intent(inout) :: solver_status
     integer, intent(in) :: lane
-    integer, intent(in) :: which   !! number of the system's switch
+    integer, intent(in) :: which   !! index of the system's switch
 
     solver_status%crossings(lane) = solver_status%crossings(lane) + 1
     solver_status%last_crossing(lane) = which
   end subroutine count_crossing
 
-  !> What happened to a lane, when, to which state, and what to try; for the person at the keyboard.
+  !> The message to the user about a lane: what happened, when, to which component, and what to try.
   function failure_message(solver_status, lane, system, rtol, atol) result(sentence)
     type(solver_status_t), intent(in) :: solver_status
     integer, intent(in) :: lane

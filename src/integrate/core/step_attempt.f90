@@ -1,55 +1,56 @@
-!> One attempted step of every lane of a block: what the steppers read and what they leave.
+!> The step attempt of a block: the workspace that steppers read and write, one step per lane.
 module nocdyn_step_attempt
-  use nocdyn_stage_sums, only: padded_columns, large_tile
   use nocdyn_finite, only: all_finite, is_finite
   use nocdyn_kinds, only: wp
   use nocdyn_masks, only: all_true, any_differs
-  use nocdyn_system, only: evaluation_ok, evaluation_fatal, evaluation_recoverable, system_t
+  use nocdyn_stage_sums, only: large_tile, padded_columns
+  use nocdyn_system, only: evaluation_fatal, evaluation_ok, evaluation_recoverable, system_t
   implicit none (type, external)
   private
 
   public :: allocate_step_attempt, begin_attempt, spread_steps, evaluate, evaluate_finite, evaluate_start, count_evaluations
   public :: disable_lane, disable_non_finite_lanes
 
+  ! Status of a lane's step attempt.
   integer, parameter, public :: attempt_ok = evaluation_ok
-  integer, parameter, public :: attempt_recoverable = evaluation_recoverable
-  integer, parameter, public :: attempt_fatal = evaluation_fatal
-  integer, parameter, public :: attempt_not_finite = 3
+  integer, parameter, public :: attempt_recoverable = evaluation_recoverable   !! repeat with a shorter step
+  integer, parameter, public :: attempt_fatal = evaluation_fatal               !! no shorter step will help
+  integer, parameter, public :: attempt_not_finite = 3                         !! a value is infinite or NaN
 
-  !> A lane that fails is parked: its step becomes zero, so that it stays at its good state y while the others go on.
+  !> A lane that fails is disabled: its step size becomes zero, so that it keeps its state y while the other lanes go on.
   type, public :: step_attempt_t
     integer :: lanes
     integer :: states
-    integer :: components                          !! states and quadratures
-    integer :: length                              !! of the state arrays: whole vectors, the rest after the components is 0
-    integer :: h_length                            !! of h_spread: the same, of one lane a strip at most
-    real(wp), allocatable :: t(:)                  !! start of the step
-    real(wp), allocatable :: h(:)                  !! size of the step, 0 for a lane that is not working
-    real(wp), allocatable :: h_spread(:, :)        !! h of each lane, repeated
-    real(wp), allocatable :: y(:, :)               !! state at t, shape [lanes, padded columns] as all these
-    real(wp), allocatable :: y_new(:, :)           !! state at t + h
+    integer :: components                               !! states and quadratures
+    integer :: length                                   !! of a state array: whole vectors, with zeros after the components
+    integer :: h_length                                 !! of h_spread: `length`, of one lane at most `large_tile`
+    real(wp), allocatable :: t(:)                       !! start of the step [s]
+    real(wp), allocatable :: h(:)                       !! step size [s], 0 for a lane that is not active
+    real(wp), allocatable :: h_spread(:, :)             !! h of each lane, repeated for every component
+    real(wp), allocatable :: y(:, :)                    !! state at t, [lanes, padded columns] as are the following arrays
+    real(wp), allocatable :: y_new(:, :)                !! state at t + h
     real(wp), allocatable :: error_estimate(:, :)       !! y_new minus the embedded solution
-    real(wp), allocatable :: low_order_estimate(:, :)   !! the same of a coarser one, for methods with two estimates
-    real(wp), allocatable :: slope(:, :)           !! f(t, y) when a lane was last started
-    integer :: first_dense, last_dense           !! columns of the state whose course inside the step is of interest
-    logical, allocatable :: active(:)             !! lanes that take part and have not failed
+    real(wp), allocatable :: low_order_estimate(:, :)   !! y_new minus a solution of lower order, for methods with two estimates
+    real(wp), allocatable :: slope(:, :)                !! f(t, y) where a lane was last started
+    integer :: first_dense, last_dense                  !! columns of the state whose dense output is needed
+    logical, allocatable :: active(:)                   !! lanes that take part and have not failed
     logical :: has_low_order_estimate = .false.
-    real(wp), allocatable :: scratch(:)            !! work space, shape [lanes]
-    logical, allocatable :: implicit(:)            !! lanes that an implicit method moves
-    integer, allocatable :: error_order(:)         !! of the method that moves the lane
-    real(wp), allocatable :: max_growth(:)        !! of its step size
-    integer, allocatable :: step_status(:)             !! trial_... of each lane
-    integer, allocatable :: component(:)             !! component that is not finite, 0 if there is none
-    integer, allocatable :: rhs_status(:)              !! answers to the last evaluation; evaluation_fine between evaluations
-    integer :: uncounted = 0                            !! evaluations that have not been counted yet
-    integer, allocatable :: evaluations(:)         !! counts of the whole integration
+    real(wp), allocatable :: scratch(:)                 !! work space, [lanes]
+    logical, allocatable :: implicit(:)                 !! whether an implicit method takes the lane's step
+    integer, allocatable :: error_order(:)              !! of the method that takes the lane's step
+    real(wp), allocatable :: max_growth(:)              !! of the step size, by that method
+    integer, allocatable :: step_status(:)              !! attempt_... of each lane
+    integer, allocatable :: component(:)                !! component that is not finite, 0 if there is none
+    integer, allocatable :: rhs_status(:)               !! status of the last evaluation; `evaluation_ok` between evaluations
+    integer :: uncounted = 0                            !! evaluations not yet added to `evaluations`
+    integer, allocatable :: evaluations(:)              !! counts over the whole integration, [lanes]
     integer, allocatable :: jacobians(:)
     integer, allocatable :: factorisations(:)
   end type step_attempt_t
 
 contains
 
-  !> Room for one attempted step of every lane of the system.
+  !> Allocates the arrays for the lanes of a system.
   subroutine allocate_step_attempt(attempt, system)
     type(step_attempt_t), intent(out) :: attempt
     class(system_t), intent(in) :: system
@@ -75,7 +76,7 @@ contains
     end associate
   end subroutine allocate_step_attempt
 
-  !> A new attempt of the lanes that are `active`, with the step sizes `h`.
+  !> Starts an attempt of the lanes that are `active`, with the step sizes `h`.
   pure subroutine begin_attempt(attempt)
     type(step_attempt_t), intent(inout) :: attempt
 
@@ -97,7 +98,8 @@ contains
     end if
   end subroutine spread_steps
 
-  !> dydt = f(t, y) within the step; lanes that cannot go on are parked. Values that are not finite are left to the caller.
+  !> dydt = f(t, y) within the step. Disables lanes whose status is not `evaluation_ok`; does not look for values that are not
+  !> finite.
   subroutine evaluate(attempt, system, t, y, dydt)
     type(step_attempt_t), intent(inout) :: attempt
     class(system_t), intent(inout) :: system
@@ -114,7 +116,7 @@ contains
     end if
   end subroutine evaluate
 
-  !> The same, and lanes whose values are not finite are parked too.
+  !> The same, and disables lanes whose values are not finite.
   subroutine evaluate_finite(attempt, system, t, y, dydt)
     type(step_attempt_t), intent(inout) :: attempt
     class(system_t), intent(inout) :: system
@@ -126,11 +128,11 @@ contains
     if (.not. all_finite(attempt%length, dydt)) call disable_non_finite_lanes(attempt, dydt)
   end subroutine evaluate_finite
 
-  !> slope = f(t, y) at the start of the step, new only for the lanes that moved since the last call.
+  !> slope = f(t, y) at the start of the step; counted only for the lanes in `moved`.
   subroutine evaluate_start(attempt, system, moved, slope)
     type(step_attempt_t), intent(inout) :: attempt
     class(system_t), intent(inout) :: system
-    logical, intent(in) :: moved(:)
+    logical, intent(in) :: moved(:)   !! lanes whose state has changed since the last call
     real(wp), intent(inout) :: slope(attempt%length)
     integer :: lane
 
@@ -142,7 +144,7 @@ contains
     if (.not. all_finite(attempt%length, slope)) call disable_non_finite_lanes(attempt, slope)
   end subroutine evaluate_start
 
-  !> Counts the evaluations made for the lanes that are still working.
+  !> Adds the evaluations since the last call to the counts of the active lanes.
   pure subroutine count_evaluations(attempt)
     type(step_attempt_t), intent(inout) :: attempt
     integer :: lane
@@ -159,7 +161,7 @@ contains
     attempt%uncounted = 0
   end subroutine count_evaluations
 
-  !> Parks the lanes whose status is not fine, and clears their values and the status.
+  !> Disables the lanes whose last evaluation failed, and clears their values and that status.
   pure subroutine disable_failed_lanes(attempt, values)
     type(step_attempt_t), intent(inout) :: attempt
     real(wp), intent(inout) :: values(attempt%lanes, attempt%components)
@@ -173,7 +175,7 @@ contains
     end do
   end subroutine disable_failed_lanes
 
-  !> Parks the lanes with values that are not finite, and clears these values.
+  !> Disables the lanes with values that are not finite, and clears these values.
   pure subroutine disable_non_finite_lanes(attempt, values)
     type(step_attempt_t), intent(inout) :: attempt
     real(wp), intent(inout) :: values(attempt%lanes, attempt%components)
@@ -189,12 +191,12 @@ contains
     end do
   end subroutine disable_non_finite_lanes
 
-  !> Takes a lane out of this step; the first verdict on it stands.
+  !> Takes a lane out of this attempt. The first status of a lane is kept: later calls do nothing.
   pure subroutine disable_lane(attempt, lane, step_status, component)
     type(step_attempt_t), intent(inout) :: attempt
     integer, intent(in) :: lane
-    integer, intent(in) :: step_status   !! trial_shorten, trial_give_up or trial_not_finite
-    integer, intent(in) :: component
+    integer, intent(in) :: step_status   !! attempt_recoverable, attempt_fatal or attempt_not_finite
+    integer, intent(in) :: component     !! that is not finite, 0 if that is not why
 
     if (.not. attempt%active(lane)) return
     attempt%active(lane) = .false.

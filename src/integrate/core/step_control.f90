@@ -1,4 +1,4 @@
-!> How long the next step of each lane is.
+!> Step-size control: the weighted error norm of a step attempt and the next step size, for each lane.
 module nocdyn_step_control
   use nocdyn_kinds, only: wp
   use nocdyn_masks, only: all_true, any_true
@@ -11,38 +11,38 @@ module nocdyn_step_control
     smallest_step, any_too_small
 
   ! The constants of Hairer's DOPRI5, for any order of the error estimate.
-  real(wp), parameter :: beta = 0.04_wp            !! weight of the last error in the PI controller
-  real(wp), parameter :: pi_correction = 0.75_wp   !! what beta takes from the exponent of the present error
+  real(wp), parameter :: beta = 0.04_wp             !! exponent of the previous error in the PI controller
+  real(wp), parameter :: pi_correction = 0.75_wp    !! times beta: reduction of the exponent of the present error
   real(wp), parameter :: safety = 0.9_wp
-  real(wp), parameter :: min_factor = 0.2_wp
-  real(wp), parameter :: final_stretch = 1.01_wp     !! a step is stretched by up to 1 % to end on the final time
+  real(wp), parameter :: min_factor = 0.2_wp        !! smallest ratio of a step size to the last one
+  real(wp), parameter :: final_stretch = 1.01_wp    !! a step is stretched by up to 1 % to end on the final time
   real(wp), parameter :: min_log_error = -13.287712379549449_wp   !! log2 of 1e-4
-  real(wp), parameter :: low_order_share = 0.01_wp    !! of a coarse error estimate in the combination of Hairer's DOP853
-  real(wp), parameter :: quadrature_leniency = 1000.0_wp      !! errors of quadratures may be so much larger than those of states
+  real(wp), parameter :: low_order_share = 0.01_wp  !! weight of the second estimate in the error norm of Hairer's DOP853
+  real(wp), parameter :: quadrature_leniency = 1000.0_wp   !! ratio of the errors allowed in quadratures to those in states
 
-  real(wp), parameter :: no_error = 1.0e-30_wp         !! stands for an error of zero under the logarithm
+  real(wp), parameter :: no_error = 1.0e-30_wp         !! replaces an error of zero, whose logarithm is infinite
   real(wp), parameter :: largest_ratio = 1.0e100_wp    !! keeps the square of an error ratio finite
 
   type, public :: step_control_t
     real(wp) :: rtol, atol
-    real(wp) :: t_end
-    real(wp) :: longest
-    real(wp), allocatable :: h(:)                      !! next step size of each lane
-    real(wp), allocatable :: log_error(:)              !! logarithm to base 2 of the error of the last accepted step
-    logical, allocatable :: was_rejected(:)
-    logical, allocatable :: ends_at_t_end(:)             !! the present step ends on t_end
-    real(wp), allocatable :: mean_square(:)            !! mean squared error ratio of the present step, 1 at the tolerance
+    real(wp) :: t_end                                  !! final time [s]
+    real(wp) :: longest                                !! largest step size [s]
+    real(wp), allocatable :: h(:)                      !! next step size of each lane [s]
+    real(wp), allocatable :: log_error(:)              !! logarithm to base 2 of the error norm of the last accepted step
+    logical, allocatable :: was_rejected(:)            !! whether the last attempt was rejected
+    logical, allocatable :: ends_at_t_end(:)           !! whether the present attempt ends on t_end
+    real(wp), allocatable :: mean_square(:)            !! square of the error norm of the present attempt, 1 at the tolerance
     real(wp), allocatable :: log_ratio(:), factor(:)   !! work space
   end type step_control_t
 
 contains
 
-  !> A controller for a block of lanes; the first step sizes are still to be set.
+  !> A controller for a block of lanes; the caller sets the first step sizes `h`.
   pure function step_control(lanes, rtol, atol, t_end, longest) result(control)
     integer, intent(in) :: lanes
     real(wp), intent(in) :: rtol, atol
-    real(wp), intent(in) :: t_end
-    real(wp), intent(in) :: longest
+    real(wp), intent(in) :: t_end     !! final time [s]
+    real(wp), intent(in) :: longest   !! largest step size [s]
     type(step_control_t) :: control
 
     control%rtol = rtol
@@ -54,7 +54,7 @@ contains
     allocate (control%was_rejected(lanes), control%ends_at_t_end(lanes), source=.false.)
   end function step_control
 
-  !> Forgets the past of a lane.
+  !> Clears the history of a lane.
   pure subroutine reset_control(control, lane)
     type(step_control_t), intent(inout) :: control
     integer, intent(in) :: lane
@@ -63,17 +63,17 @@ contains
     control%was_rejected(lane) = .false.
   end subroutine reset_control
 
-  !> A lane goes on within a step of size h, with other equations: what is known of the errors is forgotten, the size is not.
+  !> Clears the history of a lane whose equations have changed within a step. The next step is not longer than that one.
   pure subroutine resume_control(control, lane, h)
     type(step_control_t), intent(inout) :: control
     integer, intent(in) :: lane
-    real(wp), intent(in) :: h
+    real(wp), intent(in) :: h   !! size of that step [s]
 
     call reset_control(control, lane)
     control%h(lane) = min(control%h(lane), h)
   end subroutine resume_control
 
-  !> No step can be shorter: ten times what rounding makes of t.
+  !> Smallest step size at the time t: ten times the rounding error of t.
   elemental function smallest_step(t)
     real(wp), intent(in) :: t
     real(wp) :: smallest_step
@@ -81,7 +81,7 @@ contains
     smallest_step = 10 * max(epsilon(t) * abs(t), tiny(t))
   end function smallest_step
 
-  !> Whether the step of a lane is no longer than that.
+  !> Whether the step size of any lane is at most `smallest_step`.
   pure logical function any_too_small(lanes, t, h)
     integer, intent(in) :: lanes
     real(wp), intent(in) :: t(lanes), h(lanes)
@@ -94,42 +94,43 @@ contains
     any_too_small = small > 0
   end function any_too_small
 
-  !> Sets the sizes of the next attempts and where they end, so that no sliver is left before the final time.
+  !> Sets the sizes and ends of the next attempts. A step that would leave a tiny rest before the final time is stretched.
   pure subroutine propose_steps(control, lanes, t, h, t_new)
     type(step_control_t), intent(inout) :: control
     integer, intent(in) :: lanes
     real(wp), intent(in) :: t(lanes)
-    real(wp), intent(inout) :: h(lanes), t_new(lanes)
-
+    real(wp), intent(inout) :: h(lanes)       !! step sizes [s]
+    real(wp), intent(inout) :: t_new(lanes)   !! ends of the steps [s]
     integer :: lane
 
     if (lanes == 1) then
       call propose_one(control%longest, control%t_end, t(1), control%h(1), h(1), t_new(1))
       control%ends_at_t_end(1) = t_new(1) >= control%t_end
     else
-      associate (longest => control%longest, t_end => control%t_end, wish => control%h)
+      associate (longest => control%longest, t_end => control%t_end, wanted => control%h)
         do lane = 1, lanes
-          call propose_one(longest, t_end, t(lane), wish(lane), h(lane), t_new(lane))
+          call propose_one(longest, t_end, t(lane), wanted(lane), h(lane), t_new(lane))
         end do
         control%ends_at_t_end(:) = t_new >= t_end
       end associate
     end if
   end subroutine propose_steps
 
-  pure subroutine propose_one(longest, t_end, t, wish, h, t_new)
-    real(wp), intent(in) :: longest, t_end, t, wish
+  !> The step of one lane, whose controller wants the size `wanted`.
+  pure subroutine propose_one(longest, t_end, t, wanted, h, t_new)
+    real(wp), intent(in) :: longest, t_end, t, wanted
     real(wp), intent(out) :: h, t_new
     real(wp) :: overshoot, rest, step
 
     rest = t_end - t
-    step = max(min(wish, longest), smallest_step(t))
+    step = max(min(wanted, longest), smallest_step(t))
     overshoot = min((t + final_stretch * step) - t_end, longest - rest)
     h = merge(rest, step, overshoot >= 0)
     t_new = merge(t_end, t + step, overshoot >= 0)
   end subroutine propose_one
 
-  !> The mean over the states of (deviation / (atol + rtol max(|y|, |y_new|)))^2; leaves each term in `error_estimate`.
-  !> A coarse estimate joins in as in DOP853: E5^2 / (E5 + 0.01 E3), sums of squares of the two estimates.
+  !> Sets `mean_square`, the mean over the states of (error / (atol + rtol max(|y|, |y_new|)))^2. Each term replaces the error
+  !> in `error_estimate`. Two estimates are combined as in DOP853: E5^2 / (E5 + 0.01 E3), where E5 and E3 are sums of such terms.
   pure subroutine measure_error(control, attempt)
     type(step_control_t), intent(inout) :: control
     type(step_attempt_t), intent(inout) :: attempt
@@ -149,14 +150,13 @@ contains
     control%mean_square(:) = control%mean_square / max(attempt%states, 1)
     if (attempt%components > attempt%states) then
       call limit_by_quadratures(attempt%lanes, attempt%states, attempt%components, attempt%y, attempt%y_new, &
-                                attempt%error_estimate, &
-                            attempt%has_low_order_estimate, attempt%low_order_estimate, control)
+                                attempt%error_estimate, attempt%has_low_order_estimate, attempt%low_order_estimate, control)
     end if
   end subroutine measure_error
 
-  !> Quadratures shorten a step only if the error of one is far out of proportion to the largest of them: where the states
-  !> are followed without error, as polynomials of the time are, nothing else would limit it. A coarse estimate joins in as
-  !> for the states.
+  !> Raises `mean_square` where the error of a quadrature exceeds `quadrature_leniency` times the tolerance, relative to the
+  !> largest quadrature. Nothing else limits steps over which the states have no error, e.g. polynomials of the time. Two
+  !> estimates are combined as for the states.
   pure subroutine limit_by_quadratures(lanes, states, components, y, y_new, error_estimate, has_low_order, low_order_estimate, &
                                        control)
     integer, intent(in) :: lanes, states, components
@@ -183,6 +183,7 @@ contains
     end do
   end subroutine limit_by_quadratures
 
+  !> Replaces each error by (error / (atol + rtol max(|y|, |y_new|)))^2.
   pure subroutine square_scaled_errors(n, control, y, y_new, error_estimate)
     integer, intent(in) :: n   !! lanes * states
     type(step_control_t), intent(in) :: control
@@ -198,7 +199,7 @@ contains
     end do
   end subroutine square_scaled_errors
 
-  !> Sums over the states, of every fourth state first: the additions need not wait for one another.
+  !> Sums over the states. Four partial sums, each over every fourth state, keep the additions independent of one another.
   pure subroutine sum_over_states(lanes, states, squares, total)
     integer, intent(in) :: lanes, states
     real(wp), intent(in) :: squares(lanes, states)
@@ -227,12 +228,12 @@ contains
     end do
   end subroutine sum_over_states
 
-  !> The next steps of lanes after attempts of size h: PI control where these were accepted, shorter ones where the error was
-  !> too large. Both logarithms are to base 2.
+  !> The next step sizes of lanes after attempts of size h: PI control where the attempt was accepted, a shorter step where it was
+  !> rejected. All logarithms are to base 2.
   pure subroutine adapt_steps(control, lanes, accepted, rejected, error_order, max_growth, h)
     type(step_control_t), intent(inout) :: control
     integer, intent(in) :: lanes
-    logical, intent(in) :: accepted(lanes), rejected(lanes)
+    logical, intent(in) :: accepted(lanes), rejected(lanes)   !! both false: the lane keeps its step size
     integer, intent(in) :: error_order(lanes)    !! the error falls as h^(error_order + 1)
     real(wp), intent(in) :: max_growth(lanes)
     real(wp), intent(in) :: h(lanes)
@@ -258,13 +259,13 @@ contains
     end do
   end subroutine adapt_steps
 
-  !> The next steps of lanes that have been accepted twice: the same without a question about any lane.
+  !> The same where all lanes have been accepted twice, in loops without a branch.
   pure subroutine adapt_accepted_steps(lanes, error_order, max_growth, h, mean_square, log_error, log_ratio, factor, next)
     integer, intent(in) :: lanes
     integer, intent(in) :: error_order(lanes)
     real(wp), intent(in) :: max_growth(lanes), h(lanes), mean_square(lanes)
     real(wp), intent(inout) :: log_error(lanes), log_ratio(lanes), factor(lanes)
-    real(wp), intent(inout) :: next(lanes)   !! sizes of the steps
+    real(wp), intent(inout) :: next(lanes)   !! next step sizes [s]
     integer :: lane
 
     do lane = 1, lanes
@@ -282,7 +283,7 @@ contains
     end do
   end subroutine adapt_accepted_steps
 
-  !> The logarithms of the errors, and of what the steps are to be multiplied by.
+  !> The logarithms of the error norms and of the factors of the step sizes.
   pure subroutine find_step_factors(lanes, accepted, error_order, log_error, log_ratio, factor)
     integer, intent(in) :: lanes
     logical, intent(in) :: accepted(lanes)
@@ -300,6 +301,7 @@ contains
     end do
   end subroutine find_step_factors
 
+  !> Multiplies the step size h of a lane by its factor, within the limits; no growth right after a rejection.
   pure subroutine set_next_step(control, lane, is_accepted, max_growth, h)
     type(step_control_t), intent(inout) :: control
     integer, intent(in) :: lane
@@ -314,7 +316,7 @@ contains
     if (is_accepted) control%log_error(lane) = max(control%log_ratio(lane), min_log_error)
   end subroutine set_next_step
 
-  !> After an attempt of size h that could not be completed.
+  !> Sets a shorter step after an attempt of size h that failed before its error was known.
   pure subroutine shorten_step(control, lane, h)
     type(step_control_t), intent(inout) :: control
     integer, intent(in) :: lane

@@ -1,23 +1,22 @@
-!> What the march asks of every one-step method.
+!> The interface of a one-step method.
 module nocdyn_stepper
   use nocdyn_kinds, only: wp
-  use nocdyn_step_control, only: step_control_t
   use nocdyn_observer, only: observer_t, step_block_t
-  use nocdyn_system, only: system_t
   use nocdyn_step_attempt, only: step_attempt_t
+  use nocdyn_step_control, only: step_control_t
+  use nocdyn_system, only: system_t
   implicit none (type, external)
   private
 
   type, abstract, public :: stepper_t
     integer :: order = 0         !! of y_new
     integer :: error_order = 0   !! the error estimate falls as h^(error_order + 1)
-    real(wp) :: max_growth = 6.0_wp   !! of the step size from one step to the next
-    integer :: degree = 0        !! of the polynomials inside a step
+    integer :: degree = 0        !! of the polynomials of the dense output
+    real(wp) :: max_growth = 6.0_wp            !! largest ratio of a step size to the last one
     logical :: has_low_order_error = .false.   !! whether there are two error estimates
-    logical :: needs_series = .false.       !! whether the system must have a Taylor series
-    logical :: chooses_steps = .false.        !! whether `choose_steps` chooses the sizes of the steps, which then have no error
-                                              !! estimate
-    logical :: passes_series = .false.          !! whether `pass_steps` does without the coefficients of `interpolate`
+    logical :: needs_series = .false.          !! whether the system must have a Taylor series
+    logical :: chooses_steps = .false.         !! whether `choose_steps` sets the step sizes; there is no error estimate then
+    logical :: passes_series = .false.         !! whether `pass_steps` does not need the coefficients of `interpolate`
   contains
     procedure :: choose_steps
     procedure(prepare_interface), deferred :: prepare
@@ -31,14 +30,14 @@ module nocdyn_stepper
 
   abstract interface
 
-    !> Allocates all memory that the steps will need.
+    !> Allocates all memory that the steps need.
     subroutine prepare_interface(self, system)
       import :: stepper_t, system_t
       class(stepper_t), intent(inout) :: self
       class(system_t), intent(in) :: system
     end subroutine prepare_interface
 
-    !> Takes over trial%slope = f(t, y) of lanes that start.
+    !> Starts lanes at attempt%y, where attempt%slope = f(t, y) has been evaluated.
     subroutine start_interface(self, attempt, starting)
       import :: stepper_t, step_attempt_t
       class(stepper_t), intent(inout) :: self
@@ -46,7 +45,7 @@ module nocdyn_stepper
       logical, intent(in) :: starting(:)
     end subroutine start_interface
 
-    !> One step of size h from (t, y): y_new and the deviations, or a verdict on the lanes that failed.
+    !> One step of size h from (t, y) in each active lane: sets y_new and the error estimates, and disables the lanes that fail.
     subroutine take_step_interface(self, system, attempt)
       import :: stepper_t, system_t, step_attempt_t
       class(stepper_t), intent(inout) :: self
@@ -54,8 +53,8 @@ module nocdyn_stepper
       type(step_attempt_t), intent(inout) :: attempt
     end subroutine take_step_interface
 
-    !> The solution inside the last step, y + sum over p of coefficients(:, :, p) theta^p with theta = (time - t) / h,
-    !> of the lanes in `wanted`, or a verdict on those where it could not be had.
+    !> Dense output of the last step in the lanes `wanted`: y + sum over p of coefficients(:, :, p) theta^p with
+    !> theta = (time - t) / h. Disables the lanes where its evaluations fail.
     subroutine interpolate_interface(self, system, attempt, wanted, coefficients)
       import :: stepper_t, system_t, step_attempt_t, wp
       class(stepper_t), intent(inout) :: self
@@ -65,7 +64,7 @@ module nocdyn_stepper
       real(wp), contiguous, intent(inout) :: coefficients(:, :, :)   !! shape [lanes, padded columns, degree]
     end subroutine interpolate_interface
 
-    !> The next attempt of these lanes starts where this one ended; the other lanes start again where they did.
+    !> Tells which attempts have been accepted: the next one starts at their ends. The other lanes repeat their steps.
     subroutine accept_interface(self, accepted)
       import :: stepper_t
       class(stepper_t), intent(inout) :: self
@@ -76,17 +75,17 @@ module nocdyn_stepper
 
 contains
 
-  !> Sets control%h of the lanes that are working and have moved since the last call.
+  !> Sets control%h of the active lanes that have been accepted since the last call.
   subroutine choose_steps(self, system, attempt, control)
     class(stepper_t), intent(inout) :: self
     class(system_t), intent(inout) :: system
     type(step_attempt_t), intent(inout) :: attempt
     type(step_control_t), intent(inout) :: control
 
-    error stop 'nocdyn_stepper: a stepper that plans its steps overrides plan'
+    error stop 'nocdyn_stepper: a stepper that chooses its steps overrides plan'
   end subroutine choose_steps
 
-  !> Takes over trial%slope = f(t, y) of lanes whose equations have changed where they are, after `accept`.
+  !> Restarts lanes whose equations have changed at their present state, after `accept`, with attempt%slope = f(t, y).
   subroutine resume(self, attempt, resuming)
     class(stepper_t), intent(inout) :: self
     type(step_attempt_t), intent(inout) :: attempt
@@ -95,12 +94,12 @@ contains
     call self%start(attempt, resuming)
   end subroutine resume
 
-  !> Shows an observer the last steps of all lanes.
+  !> Passes the last steps of all lanes to an observer.
   subroutine pass_steps(self, steps, attempt, coefficients, observer)
     class(stepper_t), intent(in) :: self
     type(step_block_t), intent(inout) :: steps
     type(step_attempt_t), intent(in) :: attempt
-    real(wp), contiguous, intent(in) :: coefficients(:, :, :)   !! of `interpolate`, unless `passes_series`
+    real(wp), contiguous, intent(in) :: coefficients(:, :, :)   !! of `interpolate`; not used if `passes_series`
     class(observer_t), intent(inout) :: observer
 
     steps%scale(:) = 1.0_wp

@@ -1,27 +1,27 @@
-!> The solution of one lane inside its last step: polynomials in theta = (time - t) / h.
+!> Dense output of one lane: the solution inside its last step as polynomials in theta = (time - t) / h.
 module nocdyn_dense_output
-  use nocdyn_stage_sums, only: width
   use nocdyn_kinds, only: wp
+  use nocdyn_stage_sums, only: width
   use nocdyn_step_attempt, only: step_attempt_t
   implicit none (type, external)
   private
 
   public :: allocate_dense_output, take_lane, sample, sample_batch
 
-  integer, parameter, public :: batch = 8   !! places that are looked at together, so that their sums need not wait for each other
+  integer, parameter, public :: batch = 8   !! values of theta evaluated together: their sums are independent
 
   !> y(t + theta h) = sum over p = 0 to degree of c(:, p) theta^p.
   type, public :: dense_output_t
-    integer :: lane = 0                         !! that the polynomials belong to
-    real(wp) :: t = 0.0_wp, h = 0.0_wp          !! its last step
-    real(wp), allocatable :: states(:, :)       !! of the last batch, [whole vectors of components, batch]
+    integer :: lane = 0                         !! lane of the polynomials
+    real(wp) :: t = 0.0_wp, h = 0.0_wp          !! start and size of its last step [s]
+    real(wp), allocatable :: states(:, :)       !! results of `sample_batch`, [whole vectors of components, batch]
     real(wp), allocatable, private :: c(:, :)   !! [whole vectors of components, 0:degree]
     real(wp), allocatable, private :: y(:)      !! [whole vectors of components]
   end type dense_output_t
 
 contains
 
-  !> Room for the polynomials of one lane.
+  !> Allocates the polynomials of one lane.
   subroutine allocate_dense_output(dense, components, degree)
     type(dense_output_t), intent(out) :: dense
     integer, intent(in) :: components
@@ -32,7 +32,7 @@ contains
     allocate (dense%c(length, 0:degree), dense%y(length), dense%states(length, batch), source=0.0_wp)
   end subroutine allocate_dense_output
 
-  !> Takes over the polynomials of one lane of a block.
+  !> Copies the polynomials of one lane of a block.
   pure subroutine take_lane(dense, attempt, coefficients, lane)
     type(dense_output_t), intent(inout) :: dense
     type(step_attempt_t), intent(in) :: attempt
@@ -61,7 +61,7 @@ contains
     y(:) = dense%y(:size(y))
   end subroutine sample
 
-  !> The states at t + theta h of several places, the same to the last bit as those of `sample`.
+  !> Sets `states` to the states at t + theta h for several theta, with the same bits as `sample`.
   pure subroutine sample_batch(dense, theta)
     type(dense_output_t), intent(inout) :: dense
     real(wp), intent(in) :: theta(batch)   !! 0 to 1
@@ -92,7 +92,7 @@ contains
     end do
   end subroutine evaluate_batch
 
-  !> Written out for the degrees of the methods, so that the loop over the components is the innermost.
+  !> Horner's scheme, written out for the degrees of the methods so that the innermost loop is over the components.
   pure subroutine evaluate(n, degree, x, c, y)
     integer, intent(in) :: n, degree
     real(wp), intent(in) :: x

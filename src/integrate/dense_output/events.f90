@@ -1,36 +1,35 @@
-!> Events of an observer: roots of its functions g(t, y) on the solution inside the steps.
+!> Events of an observer: roots of its functions g(t, y) on the dense output.
 !>
-!> Reaching zero counts as an event, leaving it does not, so that a function that is zero at the start, or stays zero for
-!> a while, makes none by that.
+!> Reaching zero is an event, leaving it is not: a function that is zero at the start, or stays zero for a while, causes no event
+!> by leaving zero.
 module nocdyn_events
   use nocdyn_dense_output, only: dense_output_t
   use nocdyn_finite, only: is_finite
   use nocdyn_kinds, only: wp
   use nocdyn_observer, only: event_falling, event_rising, observer_t
-  use nocdyn_system, only: system_t
+  use nocdyn_root_functions, only: allocate_root_functions, find_root, part_bracket, root_functions_t, scan_step, sign_of
   use nocdyn_step_attempt, only: step_attempt_t
-  use nocdyn_root_functions, only: allocate_root_functions, find_root, part_bracket, scan_step, sign_of, start_root_functions, &
-    root_functions_t
+  use nocdyn_system, only: system_t
   implicit none (type, external)
   private
 
-  public :: allocate_events, start_events, find_events
+  public :: allocate_events, find_events
 
   type, public :: events_t
-    integer :: found = 0                    !! events in the last step of the lane that was searched
-    integer, allocatable :: which(:)        !! event functions, in the order of their times
-    real(wp), allocatable :: theta(:)       !! places in the step
+    integer :: found = 0                    !! number of events in the last step of the lane that was searched
+    integer, allocatable :: which(:)        !! index of the event function of each event, in the order of the times
+    real(wp), allocatable :: theta(:)       !! of each event
     integer, allocatable, private :: directions(:)
-    type(root_functions_t), private :: roots
+    type(root_functions_t) :: roots
   end type events_t
 
 contains
 
-  !> Room for the event functions of an observer.
+  !> Allocates the data of the event functions of an observer.
   subroutine allocate_events(events, observer, degree, attempt)
     type(events_t), intent(out) :: events
     class(observer_t), intent(in) :: observer   !! with `directions`
-    integer, intent(in) :: degree               !! of the solution inside the step
+    integer, intent(in) :: degree               !! of the dense output
     type(step_attempt_t), intent(in) :: attempt
 
     allocate (events%directions, source=observer%directions)
@@ -41,24 +40,13 @@ contains
     end associate
   end subroutine allocate_events
 
-  !> Takes the signs at the start of a lane.
-  subroutine start_events(events, system, observer, attempt, lane)
-    type(events_t), intent(inout) :: events
-    class(system_t), intent(inout) :: system
-    class(observer_t), intent(inout) :: observer
-    type(step_attempt_t), intent(in) :: attempt
-    integer, intent(in) :: lane
-
-    call start_root_functions(events%roots, system, observer, attempt, lane)
-  end subroutine start_events
-
-  !> Finds the events of a lane in its last step and puts them into order.
+  !> Finds the events of a lane in its last step, in the order of their times.
   subroutine find_events(events, system, observer, dense, theta_end)
     type(events_t), intent(inout) :: events
     class(system_t), intent(inout) :: system
     class(observer_t), intent(inout) :: observer
     type(dense_output_t), intent(inout) :: dense   !! of the lane
-    real(wp), intent(in) :: theta_end                  !! end of the step, 1 if it has not been cut
+    real(wp), intent(in) :: theta_end              !! end of the step: 1, or less where it has been cut
     real(wp) :: root
     integer :: function, part
 
@@ -79,7 +67,7 @@ contains
     end do
   end subroutine find_events
 
-  !> Whether a function that was on `side` has come to zero or passed it, in the direction that counts.
+  !> Whether a function with the sign `side` has reached or passed zero in the direction that counts.
   pure logical function is_event(side, g, direction)
     integer, intent(in) :: side, direction
     real(wp), intent(in) :: g
@@ -89,7 +77,7 @@ contains
     if (direction == event_falling) is_event = is_event .and. side > 0
   end function is_event
 
-  !> Puts an event behind those that happen before it.
+  !> Inserts an event after those that happen before it.
   pure subroutine insert(events, function, theta)
     type(events_t), intent(inout) :: events
     integer, intent(in) :: function

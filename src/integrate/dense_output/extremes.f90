@@ -1,8 +1,9 @@
 !> Extremes in continuous time of functions of the solution, such as moments and reactions.
 !>
-!> In every step each function is replaced by the polynomial through its values at a few places of the solution inside the
-!> step (Chebyshev-Lobatto places, as many as that solution has coefficients: a linear function of the state is met
-!> exactly). Its critical points are found to machine precision wherever they can exceed the extremes so far.
+!> In every step each function is replaced by the polynomial through its values at Chebyshev-Lobatto nodes, as many as the dense
+!> output has coefficients: a linear function of the state is represented exactly. The maximum of the polynomial is found to
+!> machine precision wherever it can exceed the extremes so far. In sweeps, quantities that are linear in the state need no
+!> samples: `nocdyn_bernstein` finds their extremes from the coefficients themselves.
 module nocdyn_extremes
   use nocdyn_chebyshev, only: find_maximum, lobatto_nodes, max_nodes
   use nocdyn_dense_output, only: dense_output_t, sample
@@ -15,25 +16,25 @@ module nocdyn_extremes
   public :: allocate_extremes, start_extremes, restart_extremes, update_extremes
   public :: allocate_ranges, start_ranges, widen_ranges
 
-  real(wp), parameter :: overshoot = 0.25_wp   !! of the spread of the values: no polynomial is expected to pass them by more
-  real(wp), parameter, public :: before_jump = 64.0_wp   !! spacings of the times: an observer may allow for fewer of them
+  real(wp), parameter :: overshoot = 0.25_wp   !! of the spread of the values: largest expected excess of the polynomial over them
+  real(wp), parameter, public :: before_jump = 64.0_wp   !! spacings of the time between the last node and a jump
 
   type, public :: extremes_t
     type(ranges_t), allocatable :: ranges(:)               !! [lanes]
-    real(wp), allocatable, private :: last(:, :)           !! values at the end of the last step, [functions, lanes]
-    real(wp), allocatable, private :: nodes(:)            !! in the step, -1 to 1, [places]
-    real(wp), allocatable, private :: to_series(:, :)      !! from values to the coefficients of T_0, T_1, ...
-    real(wp), allocatable, private :: values(:, :)         !! [functions, places]
+    real(wp), allocatable, private :: last(:, :)           !! values at the ends of the last steps, [functions, lanes]
+    real(wp), allocatable, private :: nodes(:)            !! in the step, -1 to 1, [nodes]
+    real(wp), allocatable, private :: to_series(:, :)      !! matrix from values to coefficients of T_0, T_1, ...
+    real(wp), allocatable, private :: values(:, :)         !! [functions, nodes]
     real(wp), allocatable, private :: y(:)                 !! [components]
   end type extremes_t
 
 contains
 
-  !> Room for the tracked functions of an observer, on solutions of a degree inside the step.
+  !> Allocates the data of the tracked functions of an observer.
   subroutine allocate_extremes(extremes, functions, degree, attempt)
     type(extremes_t), intent(out) :: extremes
     integer, intent(in) :: functions
-    integer, intent(in) :: degree
+    integer, intent(in) :: degree   !! of the dense output
     type(step_attempt_t), intent(in) :: attempt
     integer :: lane
 
@@ -47,6 +48,7 @@ contains
               source=0.0_wp)
   end subroutine allocate_extremes
 
+  !> Allocates the ranges of some functions.
   pure subroutine allocate_ranges(ranges, functions)
     type(ranges_t), intent(out) :: ranges
     integer, intent(in) :: functions
@@ -55,7 +57,7 @@ contains
               ranges%highest_time(functions), source=0.0_wp)
   end subroutine allocate_ranges
 
-  !> The ranges of a lane at its start.
+  !> Sets the ranges of a lane at its start.
   subroutine start_extremes(extremes, observer, attempt, lane)
     type(extremes_t), intent(inout) :: extremes
     class(observer_t), intent(inout) :: observer
@@ -66,7 +68,7 @@ contains
     call start_ranges(extremes%ranges(lane), extremes%last(:, lane), attempt%t(lane))
   end subroutine start_extremes
 
-  !> Ranges that hold the values of a single time.
+  !> Sets the ranges to the values of a single time.
   pure subroutine start_ranges(ranges, values, t)
     type(ranges_t), intent(inout) :: ranges
     real(wp), contiguous, intent(in) :: values(:)   !! [functions]
@@ -78,7 +80,7 @@ contains
     ranges%highest_time(:) = t
   end subroutine start_ranges
 
-  !> Takes the tracked functions anew where a lane is: they may have jumped.
+  !> Evaluates the tracked functions at the present state of a lane, after a jump.
   subroutine restart_extremes(extremes, observer, attempt, lane)
     type(extremes_t), intent(inout) :: extremes
     class(observer_t), intent(inout) :: observer
@@ -89,8 +91,8 @@ contains
     call observer%tracked_values(lane, attempt%t(lane), extremes%y, extremes%last(:, lane))
   end subroutine restart_extremes
 
-  !> Widens the ranges of a lane by its last step, up to t_end. A function that jumps at a crossing there is taken right before:
-  !> a jump is no part of the step, and would spoil the polynomial.
+  !> Widens the ranges of a lane by its last step, up to t_end. If the step ends at a crossing, the last node is just before it:
+  !> a function may jump there, which would spoil the polynomial.
   subroutine update_extremes(extremes, observer, dense, t_end, ends_at_crossing)
     type(extremes_t), intent(inout) :: extremes
     class(observer_t), intent(inout) :: observer
@@ -114,11 +116,11 @@ contains
     call widen_ranges(last, extremes%nodes, extremes%to_series, extremes%values, extremes%ranges(dense%lane), dense%t, t_end)
   end subroutine update_extremes
 
-  !> Widens the ranges by the polynomials through `values_of`, over the times from t_start to t_end.
+  !> Widens the ranges by the maxima and minima of the polynomials through `values_of`, over the times from t_start to t_end.
   pure subroutine widen_ranges(n, nodes, to_series, values_of, ranges, t_start, t_end)
-    integer, intent(in) :: n   !! places
+    integer, intent(in) :: n   !! number of nodes
     real(wp), intent(in) :: nodes(n), to_series(n, n)
-    real(wp), contiguous, intent(in) :: values_of(:, :)   !! [functions, places]
+    real(wp), contiguous, intent(in) :: values_of(:, :)   !! [functions, nodes]
     type(ranges_t), intent(inout) :: ranges
     real(wp), intent(in) :: t_start, t_end
     real(wp) :: values(max_nodes), lowest, highest, indicator

@@ -1,50 +1,50 @@
-!> Functions g(t, y) whose signs are followed on the solution inside the steps: an observer's events, a system's switches.
+!> Roots of functions g(t, y) on the dense output: the event functions of an observer, the indicator functions of a system.
 !>
-!> Their values are taken at the ends of a few equal parts of every step; a change of sign between two of them is followed to
-!> the last bits of the time.
+!> The functions are evaluated at the ends of a few equal parts of every step. A change of sign between two of them is a bracket,
+!> in which the root is found to the last bits of the time.
 module nocdyn_root_functions
   use nocdyn_dense_output, only: dense_output_t, sample
   use nocdyn_finite, only: is_finite
   use nocdyn_kinds, only: wp
   use nocdyn_observer, only: observer_t
-  use nocdyn_system, only: system_t
   use nocdyn_step_attempt, only: step_attempt_t
+  use nocdyn_system, only: system_t
   implicit none (type, external)
   private
 
   public :: allocate_root_functions, start_root_functions, scan_step, evaluate, part_end, part_bracket, find_root, &
     find_grazing, sign_of
 
-  integer, parameter :: least_parts = 4                 !! of a step; more for solutions of higher degree, whose steps are longer
+  integer, parameter :: least_parts = 4   !! of a step; more for dense output of higher degree, whose steps are longer
   integer, parameter :: max_grazing_steps = 10
-  real(wp), parameter :: promising = 0.5_wp             ! a parabola that goes no lower than this share says that there is no dip
-  real(wp), parameter :: least_distance = 1.0e-8_wp     ! of places in a dip: closer ones say nothing about the curvature
+  real(wp), parameter :: promising = 0.5_wp             ! of the least value: a parabola with a higher minimum predicts no root
+  real(wp), parameter :: least_distance = 1.0e-8_wp     ! in theta, of points on a parabola: rounding spoils that of closer points
 
   type, public :: root_functions_t
-    logical :: of_system = .false.                      !! switches of the system, else events of the observer
-    integer :: parts = least_parts                      !! of a step
+    logical :: of_system = .false.                      !! indicator functions of the system, else events of the observer
+    integer :: parts = least_parts                      !! number of parts of a step
     integer, allocatable :: side(:, :)                  !! sign of the last value, 0 after a zero; [lanes, functions]
     real(wp), allocatable :: values(:, :)               !! at the ends of the parts of the last step; [functions, 0:parts]
-    real(wp), allocatable, private :: last(:, :)        !! at the end of the last step; [functions, lanes]
+    real(wp), allocatable, private :: last(:, :)        !! values at the end of the last step; [functions, lanes]
     real(wp), allocatable, private :: g(:)
-    real(wp), allocatable, private :: y(:)              !! state at which the functions are taken
+    real(wp), allocatable, private :: y(:)              !! state at which the functions are evaluated
   end type root_functions_t
 
-  !> Two places in a step between which a function changes its sign.
+  !> Two values of theta between which a function changes its sign.
   type, public :: bracket_t
     integer :: function = 0
     real(wp) :: before = 0.0_wp, after = 0.0_wp
-    real(wp) :: g_before = 0.0_wp, g_after = 0.0_wp     !! values there
+    real(wp) :: g_before = 0.0_wp, g_after = 0.0_wp     !! values of the function there
   end type bracket_t
 
 contains
 
-  !> Room for the functions of an observer or a system.
+  !> Allocates the data of the functions of an observer or a system.
   subroutine allocate_root_functions(roots, functions, of_system, degree, attempt)
     type(root_functions_t), intent(out) :: roots
     integer, intent(in) :: functions
     logical, intent(in) :: of_system
-    integer, intent(in) :: degree   !! of the solution inside the step
+    integer, intent(in) :: degree   !! of the dense output
     type(step_attempt_t), intent(in) :: attempt
 
     roots%of_system = of_system
@@ -54,7 +54,7 @@ contains
               roots%y(attempt%components), source=0.0_wp)
   end subroutine allocate_root_functions
 
-  !> Takes the signs where a lane starts.
+  !> Evaluates the functions and their signs at the present state of a lane.
   subroutine start_root_functions(roots, system, observer, attempt, lane)
     type(root_functions_t), intent(inout) :: roots
     class(system_t), intent(inout) :: system
@@ -71,13 +71,13 @@ contains
     roots%side(lane, :) = sign_of(roots%last(:, lane))
   end subroutine start_root_functions
 
-  !> Takes the values at the ends of the parts of a lane's last step.
+  !> Evaluates the functions at the ends of the parts of a lane's last step.
   subroutine scan_step(roots, system, observer, dense, theta_end)
     type(root_functions_t), intent(inout) :: roots
     class(system_t), intent(inout) :: system
     class(observer_t), intent(inout) :: observer
     type(dense_output_t), intent(inout) :: dense   !! of the lane
-    real(wp), intent(in) :: theta_end                  !! end of the step, 1 if it has not been cut
+    real(wp), intent(in) :: theta_end              !! end of the step: 1, or less where it has been cut
     integer :: part
 
     roots%values(:, 0) = roots%last(:, dense%lane)
@@ -88,7 +88,7 @@ contains
     roots%last(:, dense%lane) = roots%values(:, roots%parts)
   end subroutine scan_step
 
-  !> Place of the end of a part in a step.
+  !> Theta at the end of a part of a step.
   pure real(wp) function part_end(roots, part, theta_end)
     type(root_functions_t), intent(in) :: roots
     integer, intent(in) :: part
@@ -110,7 +110,7 @@ contains
     part_bracket%g_after = roots%values(function, part)
   end function part_bracket
 
-  !> 0 also for what is not finite.
+  !> The sign of a value: -1, 0 or 1; 0 also for a value that is not finite.
   elemental integer function sign_of(g)
     real(wp), intent(in) :: g
 
@@ -118,14 +118,14 @@ contains
     if (is_finite(g)) sign_of = merge(1, 0, g > 0) - merge(1, 0, g < 0)
   end function sign_of
 
-  !> The functions at a place in the step.
+  !> Evaluates the functions at theta.
   subroutine evaluate(of_system, system, observer, dense, theta, y, g)
     logical, intent(in) :: of_system
     class(system_t), intent(inout) :: system
     class(observer_t), intent(inout) :: observer
     type(dense_output_t), intent(inout) :: dense
     real(wp), intent(in) :: theta
-    real(wp), contiguous, intent(inout) :: y(:)   !! the state there
+    real(wp), contiguous, intent(inout) :: y(:)   !! state there
     real(wp), contiguous, intent(inout) :: g(:)
 
     call sample(dense, theta, y)
@@ -136,8 +136,8 @@ contains
     end if
   end subroutine evaluate
 
-  !> Root of one function in a bracket, to the spacing of the times there: the place where it is zero, or the first one
-  !> found beyond its change of sign. T. R. Chandrupatla, Adv. Eng. Software 28 (1997) 145-149.
+  !> The root of one function in a bracket, to the spacing of the times there: the theta where the function is zero, or the end
+  !> of the last bracket, just beyond the change of sign. T. R. Chandrupatla, Adv. Eng. Software 28 (1997) 145-149.
   subroutine find_root(roots, system, observer, dense, bracket, root)
     type(root_functions_t), intent(inout) :: roots
     class(system_t), intent(inout) :: system
@@ -145,7 +145,7 @@ contains
     type(dense_output_t), intent(inout) :: dense
     type(bracket_t), intent(in) :: bracket
     real(wp), intent(out) :: root
-    real(wp) :: a, b, c, ga, gb, gc   ! the newest place, the best one of the other sign, the one that they have replaced
+    real(wp) :: a, b, c, ga, gb, gc   ! newest point, best point of the other sign, the point that they replaced
     real(wp) :: fraction, least, tolerance, x
 
     tolerance = max(spacing(abs(dense%t) + dense%h) / dense%h, epsilon(a))
@@ -175,28 +175,28 @@ contains
     if (abs(ga) > 0) root = max(a, b)
   end subroutine find_root
 
-  !> Where to look next between a (0) and b (1): inverse quadratic interpolation where it can be trusted, else the middle.
+  !> The next point as a fraction from a to b: inverse quadratic interpolation where it converges, else the middle.
   pure real(wp) function next_fraction(a, b, c, ga, gb, gc)
     real(wp), intent(in) :: a, b, c, ga, gb, gc   !! ga and gc differ from gb in sign, or a is the root
-    real(wp) :: part_end, share
+    real(wp) :: position, share
 
     next_fraction = 0.5_wp
-    part_end = (a - b) / (c - b)
+    position = (a - b) / (c - b)
     share = (ga - gb) / (gc - gb)
-    if (share**2 >= part_end .or. (1 - share)**2 >= 1 - part_end) return
+    if (share**2 >= position .or. (1 - share)**2 >= 1 - position) return
     next_fraction = ga / (gb - ga) * (gc / (gb - gc)) + (c - a) / (b - a) * (ga / (gc - ga)) * (gb / (gc - gb))
   end function next_fraction
 
-  !> Looks between three ends of parts, at which a function is positive, for a place where it is not: by parabolas through the
-  !> three places around the lowest value, as long as these promise one.
+  !> Searches between three ends of parts, at which a function is positive, for a theta where it is not: by minima of parabolas
+  !> through the three lowest points, as long as these predict one.
   subroutine find_grazing(roots, system, observer, dense, function, middle, bracket, found)
     type(root_functions_t), intent(inout) :: roots
     class(system_t), intent(inout) :: system
     class(observer_t), intent(inout) :: observer
     type(dense_output_t), intent(inout) :: dense
     integer, intent(in) :: function
-    integer, intent(in) :: middle               !! part whose end is between the other two
-    type(bracket_t), intent(inout) :: bracket   !! of the function's fall, if there is one
+    integer, intent(in) :: middle               !! index of the part that ends at the middle point
+    type(bracket_t), intent(inout) :: bracket   !! of the fall through zero, set if it is found
     logical, intent(out) :: found
     real(wp) :: x(3), g(3), lowest
     logical :: is_promising
@@ -222,7 +222,7 @@ contains
   pure subroutine guess_minimum(x, g, vertex, is_promising)
     real(wp), intent(in) :: x(3), g(3)     !! x ascending, g positive
     real(wp), intent(out) :: vertex
-    logical, intent(out) :: is_promising   !! it is a minimum between the points and far below them
+    logical, intent(out) :: is_promising   !! whether it is a minimum between the points and far below them
     real(wp) :: curvature, slope
 
     vertex = x(2)
@@ -237,7 +237,7 @@ contains
     is_promising = vertex > x(1) .and. vertex < x(3) .and. minval(abs(vertex - x)) > least_distance
   end subroutine guess_minimum
 
-  !> Adds a point behind number `left` and keeps the three around the lowest.
+  !> Inserts a point after point `left` and keeps the three points around the lowest.
   pure subroutine keep_lowest_three(x, g, left, x_new, g_new)
     real(wp), intent(inout) :: x(3), g(3)
     integer, intent(in) :: left

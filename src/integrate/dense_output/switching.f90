@@ -1,43 +1,42 @@
-!> Steps that end where a system changes its branch, and the change.
+!> Switching: steps end where an indicator function falls through zero; there the system changes its branch.
 module nocdyn_switching
   use nocdyn_dense_output, only: dense_output_t
   use nocdyn_finite, only: is_finite
   use nocdyn_kinds, only: wp
-  use nocdyn_solver_status, only: integration_chattering, count_crossing, solver_status_t
   use nocdyn_observer, only: observer_t
-  use nocdyn_system, only: system_t
-  use nocdyn_step_attempt, only: step_attempt_t
   use nocdyn_root_functions, only: allocate_root_functions, bracket_t, evaluate, find_grazing, find_root, part_bracket, &
-                                   part_end, &
-    scan_step, sign_of, start_root_functions, root_functions_t
+    part_end, root_functions_t, scan_step, sign_of, start_root_functions
+  use nocdyn_solver_status, only: count_crossing, integration_chattering, solver_status_t
+  use nocdyn_step_attempt, only: step_attempt_t
+  use nocdyn_system, only: system_t
   implicit none (type, external)
   private
 
   public :: allocate_switching, start_switching, find_crossing, cross_boundaries
 
-  integer, parameter, public :: max_repeats = 100        !! crossings of one function while its lane makes no progress
-  real(wp), parameter :: negligible = 1.0e-10_wp          ! of the whole time: no progress from one crossing to the next
+  integer, parameter, public :: max_repeats = 100   !! crossings of one boundary without progress in time; more are chattering
+  real(wp), parameter :: negligible = 1.0e-10_wp          ! of the duration: a shorter time between crossings is no progress
   real(wp), parameter :: no_time = -huge(1.0_wp)
 
   type, public :: switching_t
-    integer, allocatable :: pending(:)                         !! function that ended the last step of each lane, 0 if none did
+    integer, allocatable :: pending(:)                     !! indicator that ended the last step of each lane, 0 if none did
     real(wp), private :: least_progress
-    real(wp), allocatable, private :: last_time(:)         !! of a crossing of each lane
+    real(wp), allocatable, private :: last_time(:)         !! of the last crossing of each lane [s]
     integer, allocatable, private :: repeats(:, :)         !! crossings since the lane made progress, [lanes, functions]
     type(root_functions_t), private :: roots
-    real(wp), allocatable, private :: g(:)                 !! functions where a lane crosses, or at the first fall found so far
+    real(wp), allocatable, private :: g(:)   !! indicators where a lane crosses, or at the first crossing so far
     real(wp), allocatable, private :: y(:)
   end type switching_t
 
 contains
 
-  !> Room for the switches of a system.
+  !> Allocates the data of the indicator functions of a system.
   subroutine allocate_switching(switching, system, degree, attempt, duration)
     type(switching_t), intent(out) :: switching
     class(system_t), intent(in) :: system
-    integer, intent(in) :: degree      !! of the solution inside the step
+    integer, intent(in) :: degree      !! of the dense output
     type(step_attempt_t), intent(in) :: attempt
-    real(wp), intent(in) :: duration   !! of the whole integration
+    real(wp), intent(in) :: duration   !! of the integration [s]
 
     switching%least_progress = negligible * duration
     allocate (switching%pending(attempt%lanes), source=0)
@@ -47,7 +46,7 @@ contains
     call allocate_root_functions(switching%roots, system%switches, .true., degree, attempt)
   end subroutine allocate_switching
 
-  !> A lane starts on the branches that it has entered; those that do not hold there are left at once.
+  !> Starts a lane on the branches that the system has chosen; branches that do not hold there change at once.
   subroutine start_switching(switching, system, observer, attempt, lane, solver_status)
     type(switching_t), intent(inout) :: switching
     class(system_t), intent(inout) :: system
@@ -61,14 +60,14 @@ contains
     call cross_boundaries(switching, system, observer, attempt, lane, solver_status)
   end subroutine start_switching
 
-  !> The first place in the last step of a lane where a function falls through zero. A function that is zero at the start and
-  !> then negative has never been on its branch: it falls at the start.
+  !> Finds the first crossing in the last step of a lane: the theta where an indicator falls through zero. An indicator that is
+  !> zero at the start and then negative crosses at the start.
   subroutine find_crossing(switching, system, observer, dense, theta)
-    type(switching_t), intent(inout) :: switching   !! `pending` is the function, 0 if none falls
+    type(switching_t), intent(inout) :: switching   !! sets `pending` to the indicator, 0 if there is no crossing
     class(system_t), intent(inout) :: system
     class(observer_t), intent(inout) :: observer
     type(dense_output_t), intent(inout) :: dense    !! of the lane
-    real(wp), intent(out) :: theta                  !! 1 if none falls
+    real(wp), intent(out) :: theta                  !! of the crossing, 1 if there is none
     integer :: function, part
 
     theta = 1.0_wp
@@ -92,8 +91,8 @@ contains
     call find_grazing_crossings(switching, system, observer, dense, theta)
   end subroutine find_crossing
 
-  !> The fall of one function in a bracket, if it comes before that at theta. Of many functions that fall in one part of a step
-  !> only few are followed to their roots: most are seen to be positive at the first fall known so far.
+  !> Replaces the crossing at theta by that of one indicator in a bracket, if that is earlier. Of many indicators with a crossing
+  !> in one part of a step, most are still positive at the first crossing so far, so that few roots have to be found.
   subroutine find_earlier_crossing(switching, system, observer, dense, whole, theta)
     type(switching_t), intent(inout) :: switching
     class(system_t), intent(inout) :: system
@@ -120,7 +119,7 @@ contains
     end if
   end subroutine find_earlier_crossing
 
-  !> The same for falls from which a function comes back before the end of a part, as at a grazing contact.
+  !> The same for crossings from which an indicator returns before the end of a part, as at a grazing contact.
   subroutine find_grazing_crossings(switching, system, observer, dense, theta)
     type(switching_t), intent(inout) :: switching
     class(system_t), intent(inout) :: system
@@ -154,6 +153,7 @@ contains
     if (may_graze) may_graze = abs(after - before) < 2 * ((after - middle) - (middle - before))
   end function may_graze
 
+  !> Replaces the crossing at theta by one at `root`, if that is earlier.
   pure subroutine keep_first(switching, lane, function, root, theta)
     type(switching_t), intent(inout) :: switching
     integer, intent(in) :: lane, function
@@ -165,8 +165,8 @@ contains
     theta = root
   end subroutine keep_first
 
-  !> Crosses the border that is due, and all others at which a lane is or beyond which it is found then; ends the lane if there
-  !> is no end to it.
+  !> Changes the branch at the pending boundary, then at all other boundaries that the lane has reached or passed, until there are
+  !> none. Ends the lane with `integration_chattering` if that does not end.
   subroutine cross_boundaries(switching, system, observer, attempt, lane, solver_status)
     type(switching_t), intent(inout) :: switching
     class(system_t), intent(inout) :: system
@@ -190,14 +190,14 @@ contains
       if (.not. crossed .or. any(switching%repeats(lane, :) >= max_repeats)) exit
       switching%last_time(lane) = attempt%t(lane)
       call system%indicator_values(lane, attempt%t(lane), switching%y, switching%g)
-      limit = -tiny(limit)   ! a function that is zero now may be at the beginning of its branch
+      limit = -tiny(limit)   ! an indicator that is zero now may be at the start of its branch
     end do
     if (crossed) solver_status%code(lane) = integration_chattering
     switching%pending(lane) = 0
     call start_root_functions(switching%roots, system, observer, attempt, lane)
   end subroutine cross_boundaries
 
-  !> Crosses the borders of all functions that are not above a limit.
+  !> Changes the branches of all indicators that are not above a limit.
   subroutine cross_reached(switching, system, t, lane, limit, crossed, solver_status)
     type(switching_t), intent(inout) :: switching
     class(system_t), intent(inout) :: system

@@ -1,18 +1,18 @@
-!> What happens inside the accepted steps of the lanes: requested times, events, extremes, crossings from branch to branch.
+!> Processing of accepted steps: output times, events, extremes, changes of branches, and the observer of whole steps.
 module nocdyn_after_step
   use nocdyn_dense_output, only: batch, sample, sample_batch, take_lane
   use nocdyn_events, only: find_events
-  use nocdyn_extremes, only: update_extremes, restart_extremes
+  use nocdyn_extremes, only: restart_extremes, update_extremes
   use nocdyn_kinds, only: wp
   use nocdyn_masks, only: all_true
-  use nocdyn_time_stepping, only: integrator_t, evaluate_starts
+  use nocdyn_observer, only: observer_t
   use nocdyn_solver_status, only: integration_done, integration_running, integration_stopped, integration_too_many_steps, &
-                                  solver_status_t
+    solver_status_t
   use nocdyn_step_control, only: resume_control
   use nocdyn_stepper, only: stepper_t
   use nocdyn_switching, only: cross_boundaries, find_crossing
-  use nocdyn_observer, only: observer_t
   use nocdyn_system, only: system_t
+  use nocdyn_time_stepping, only: evaluate_starts, integrator_t
   implicit none (type, external)
   private
 
@@ -20,7 +20,8 @@ module nocdyn_after_step
 
 contains
 
-  !> Tells the observer what lies in the accepted steps: requested times, events, extremes.
+  !> Finds what lies in the accepted steps, ends steps at changes of branches and terminal events, and informs the observer of
+  !> output times, events and extremes.
   subroutine process_steps(integrator, system, times, observer, solver_status)
     type(integrator_t), intent(inout) :: integrator
     class(system_t), intent(inout) :: system
@@ -40,9 +41,9 @@ contains
           call end_at_crossing(integrator, system, observer, lane, solver_status, steps%theta_end(lane))
           steps%crosses(lane) = integrator%switching%pending(lane) > 0
         end if
-        if (integrator%has_events) call pass_events(integrator, system, lane, steps%theta_end(lane), times, observer, &
+        if (integrator%has_events) call process_events(integrator, system, lane, steps%theta_end(lane), times, observer, &
                                                     solver_status)
-        if (integrator%next_time(lane) <= integrator%t_new(lane)) call record_until(integrator, lane, integrator%t_new(lane), &
+        if (integrator%next_time(lane) <= integrator%t_new(lane)) call output_until(integrator, lane, integrator%t_new(lane), &
                                                                                     times, observer)
         if (integrator%has_extremes) then
           call update_extremes(integrator%extremes, observer, integrator%dense, integrator%t_new(lane), steps%crosses(lane))
@@ -51,7 +52,7 @@ contains
     end associate
   end subroutine process_steps
 
-  !> Hands an observer that follows the steps those of the whole block, after `process_steps`.
+  !> Passes the steps of the whole block to an observer that wants them, after `process_steps`.
   subroutine observe_steps(integrator, stepper, observer)
     type(integrator_t), intent(inout) :: integrator
     class(stepper_t), intent(in) :: stepper
@@ -68,14 +69,14 @@ contains
     end associate
   end subroutine observe_steps
 
-  !> Cuts the step of a lane where a branch of the system ends.
+  !> Cuts the step of a lane at the boundary of its branch.
   subroutine end_at_crossing(integrator, system, observer, lane, solver_status, theta_end)
     type(integrator_t), intent(inout) :: integrator
     class(system_t), intent(inout) :: system
     class(observer_t), intent(inout) :: observer
     integer, intent(in) :: lane
     type(solver_status_t), intent(inout) :: solver_status
-    real(wp), intent(out) :: theta_end   !! place of the cut in the step, 1 if there is none
+    real(wp), intent(out) :: theta_end   !! theta of the cut, 1 if there is none
     real(wp) :: t
 
     call find_crossing(integrator%switching, system, observer, integrator%dense, theta_end)
@@ -93,12 +94,13 @@ contains
                                      solver_status%steps(lane) >= integrator%max_steps)
   end subroutine end_at_crossing
 
-  !> The events of a lane in their order, with the requested times between them; a terminal event ends the step and the lane.
-  subroutine pass_events(integrator, system, lane, theta_end, times, observer, solver_status)
+  !> Passes the events of a lane to the observer in their order, with the output times between them. A terminal event ends the
+  !> step and the lane.
+  subroutine process_events(integrator, system, lane, theta_end, times, observer, solver_status)
     type(integrator_t), intent(inout) :: integrator
     class(system_t), intent(inout) :: system
     integer, intent(in) :: lane
-    real(wp), intent(inout) :: theta_end   !! end of the step, 1 if it has not been cut
+    real(wp), intent(inout) :: theta_end   !! end of the step: 1, or less where it has been cut
     real(wp), contiguous, intent(in) :: times(:)
     class(observer_t), intent(inout) :: observer
     type(solver_status_t), intent(inout) :: solver_status
@@ -109,7 +111,7 @@ contains
     call find_events(integrator%events, system, observer, integrator%dense, theta_end)
     do i = 1, integrator%events%found
       t = min(integrator%attempt%t(lane) + integrator%events%theta(i) * integrator%attempt%h(lane), integrator%t_new(lane))
-      call record_until(integrator, lane, t, times, observer)
+      call output_until(integrator, lane, t, times, observer)
       call sample(integrator%dense, integrator%events%theta(i), integrator%sample)
       call observer%on_event(lane, integrator%events%which(i), t, integrator%sample, is_terminal)
       if (.not. is_terminal) cycle
@@ -119,10 +121,10 @@ contains
       integrator%attempt%y_new(lane, :integrator%attempt%components) = integrator%sample
       exit
     end do
-  end subroutine pass_events
+  end subroutine process_events
 
-  !> Records the requested times up to t that have not been recorded yet.
-  subroutine record_until(integrator, lane, t, times, observer)
+  !> Passes the output times up to t that are due to the observer.
+  subroutine output_until(integrator, lane, t, times, observer)
     type(integrator_t), intent(inout) :: integrator
     integer, intent(in) :: lane
     real(wp), intent(in) :: t
@@ -153,9 +155,9 @@ contains
       call observer%on_output(lane, times(next), integrator%sample)
       next = next + 1
     end associate
-  end subroutine record_until
+  end subroutine output_until
 
-  !> The lanes that have moved to the end of a branch, and go on, change to the next one and start again there.
+  !> Lanes whose step ended at the boundary of a branch change to the next branch and restart there.
   subroutine change_branches(integrator, stepper, system, observer, solver_status)
     type(integrator_t), intent(inout) :: integrator
     class(stepper_t), intent(inout) :: stepper

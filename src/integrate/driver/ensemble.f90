@@ -1,4 +1,4 @@
-!> What the lanes of a block work through: one variant after the other.
+!> An ensemble of variants of a system, which the lanes of a block integrate one after the other.
 module nocdyn_ensemble
   use nocdyn_kinds, only: wp
   use nocdyn_solver_status, only: solver_status_t
@@ -8,8 +8,8 @@ module nocdyn_ensemble
 
   public :: initial_states
 
-  !> A lane that has ended is given the next variant at once. The order in which variants end depends on the block; the
-  !> result of each does not.
+  !> A lane that has ended takes the next variant at once. The order in which variants end depends on the number of lanes; the
+  !> result of a variant does not.
   type, abstract, public :: ensemble_t
   contains
     procedure(next_interface), deferred :: next
@@ -18,31 +18,31 @@ module nocdyn_ensemble
 
   abstract interface
 
-    !> Puts the numbers of the next variant into a lane of the system, and its start into y.
+    !> Sets the parameters of the next variant in a lane of the system, and its initial state y.
     subroutine next_interface(self, system, lane, t, y, found)
       import :: ensemble_t, system_t, wp
       class(ensemble_t), intent(inout) :: self
       class(system_t), intent(inout) :: system
       integer, intent(in) :: lane
-      real(wp), intent(inout) :: t                  !! the first requested time; may be set to a later start
+      real(wp), intent(inout) :: t                  !! the first output time; may be set to a later start [s]
       real(wp), contiguous, intent(inout) :: y(:)   !! [states + quadratures]
       logical, intent(out) :: found                 !! .false. if no variant is left; then none is asked for again
     end subroutine next_interface
 
-    !> Takes the end of the variant in a lane: done, stopped by an event, failed or interrupted.
+    !> Receives the last state of the variant in a lane: done, stopped by an event, failed or interrupted.
     subroutine finish_interface(self, lane, y, solver_status)
       import :: solver_status_t, ensemble_t, wp
       class(ensemble_t), intent(inout) :: self
       integer, intent(in) :: lane
       real(wp), contiguous, intent(in) :: y(:)      !! last state, at the time outcome%t(lane)
-      type(solver_status_t), intent(in) :: solver_status        !! only the elements of this lane are settled
+      type(solver_status_t), intent(in) :: solver_status        !! only the elements of this lane are final
     end subroutine finish_interface
 
   end interface
 
-  !> One variant for each lane, whose numbers are in the system already.
+  !> One variant for each lane, whose parameters the system holds already.
   type, extends(ensemble_t), public :: initial_states_t
-    real(wp), allocatable :: y(:, :)        !! [lanes, components]: starts, and ends once they are reached
+    real(wp), allocatable :: y(:, :)        !! [lanes, components]: initial states, replaced by the last states
     type(solver_status_t) :: solver_status
     logical, allocatable :: begun(:)
   contains
@@ -52,7 +52,7 @@ module nocdyn_ensemble
 
 contains
 
-  !> The queue of the lanes that start at the rows of y.
+  !> The ensemble of one variant for each lane, with the rows of y as initial states.
   pure function initial_states(y) result(ensemble)
     real(wp), intent(in) :: y(:, :)   !! [lanes, components]
     type(initial_states_t) :: ensemble

@@ -1,16 +1,16 @@
-!> What becomes of the attempts of the lanes: steps, shorter attempts, or ends.
+!> The error test: accepts or rejects the step attempts of the lanes, and ends lanes that are done or have failed.
 module nocdyn_error_test
-  use nocdyn_stage_sums, only: width
   use nocdyn_kinds, only: wp
-  use nocdyn_time_stepping, only: integrator_t
   use nocdyn_masks, only: all_true, any_true
-  use nocdyn_solver_status, only: integration_done, integration_rhs_failed, integration_not_finite, integration_step_too_small, &
-    integration_too_many_steps, count_step, solver_status_t
-  use nocdyn_step_control, only: adapt_steps, shorten_step, smallest_step, measure_error
-  use nocdyn_stepper, only: stepper_t
   use nocdyn_observer, only: observer_t
+  use nocdyn_solver_status, only: count_step, integration_done, integration_not_finite, integration_rhs_failed, &
+    integration_step_too_small, integration_too_many_steps, solver_status_t
+  use nocdyn_stage_sums, only: width
+  use nocdyn_step_attempt, only: attempt_fatal, attempt_not_finite, attempt_ok
+  use nocdyn_step_control, only: adapt_steps, measure_error, shorten_step, smallest_step
+  use nocdyn_stepper, only: stepper_t
   use nocdyn_system, only: system_t
-  use nocdyn_step_attempt, only: attempt_ok, attempt_fatal, attempt_not_finite
+  use nocdyn_time_stepping, only: integrator_t
   implicit none (type, external)
   private
 
@@ -18,7 +18,7 @@ module nocdyn_error_test
 
 contains
 
-  !> Accepts or rejects the last attempt of each lane, and ends the lanes that cannot go on.
+  !> Accepts or rejects the last attempt of each lane, sets the next step sizes, and ends the lanes that cannot continue.
   subroutine test_errors(integrator, stepper, system, observer, solver_status)
     type(integrator_t), intent(inout) :: integrator
     class(stepper_t), intent(inout) :: stepper
@@ -26,7 +26,7 @@ contains
     class(observer_t), intent(in) :: observer
     type(solver_status_t), intent(inout) :: solver_status
     integer :: failed, lane, wanted
-    logical :: is_plain   ! whether all lanes have taken steps that have only to be counted
+    logical :: is_plain   ! whether the steps of all lanes have only to be counted
 
     if (.not. stepper%chooses_steps) call measure_error(integrator%control, integrator%attempt)
     integrator%inspects = integrator%has_events .or. integrator%has_extremes .or. integrator%has_switches
@@ -52,8 +52,7 @@ contains
     end if
     if (.not. stepper%chooses_steps) then
       call adapt_steps(integrator%control, integrator%attempt%lanes, integrator%accepted, integrator%rejected, &
-                       integrator%attempt%error_order, &
-                 integrator%attempt%max_growth, solver_status%h)
+                       integrator%attempt%error_order, integrator%attempt%max_growth, solver_status%h)
     end if
     if (failed == 0) return
     do lane = 1, integrator%attempt%lanes
@@ -61,8 +60,8 @@ contains
     end do
   end subroutine test_errors
 
-  !> Whether all lanes have taken explicit steps within the tolerances, in which no requested time lies but at their end: nothing
-  !> has to be decided for one of them then. The answer is no too if they do not make whole vectors.
+  !> Whether all lanes have taken explicit steps within the tolerances, without an output time before their ends: then no lane
+  !> needs a decision of its own. False if the lanes are not whole vectors.
   pure logical function is_plain_step(integrator, solver_status)
     type(integrator_t), intent(in) :: integrator
     type(solver_status_t), intent(in) :: solver_status
@@ -77,7 +76,7 @@ contains
     end associate
   end function is_plain_step
 
-  !> The largest error beyond the tolerances or time beyond the next requested one; whole vectors.
+  !> The largest excess over the lanes: of the squared error norm over 1, or of the time over the next output time.
   pure real(wp) function largest_excess(lanes, mean_square, t_new, next_time) result(excess)
     integer, intent(in) :: lanes
     real(wp), intent(in), dimension(lanes) :: mean_square, t_new, next_time
@@ -114,7 +113,7 @@ contains
     end do
   end subroutine end_lanes
 
-  !> Whether a lane has passed a time.
+  !> Whether any lane has reached its `time`.
   pure logical function has_passed(lanes, time, t)
     integer, intent(in) :: lanes
     real(wp), intent(in) :: time(lanes), t(lanes)
@@ -139,7 +138,7 @@ contains
     wanted = merge(integrator%attempt%lanes, 0, integrator%wants_dense_steps)
   end subroutine accept_all
 
-  !> The lanes whose error is within the tolerances, and those of them whose solution inside the step is wanted.
+  !> Finds the lanes whose errors are within the tolerances, and those of them whose dense output is needed.
   pure subroutine find_wanted(integrator, wanted)
     type(integrator_t), intent(inout) :: integrator
     integer, intent(out) :: wanted   !! how many
@@ -155,8 +154,7 @@ contains
     end do
   end subroutine find_wanted
 
-  !> The columns of the state whose course is of interest: those that the observer follows, or all for the lanes that are
-  !> looked at on their own.
+  !> Chooses the columns of the state whose dense output is needed: those that the observer reads, or all if a lane is inspected.
   pure subroutine choose_columns(integrator, observer)
     type(integrator_t), intent(inout) :: integrator
     class(observer_t), intent(in) :: observer
@@ -170,11 +168,11 @@ contains
     end associate
   end subroutine choose_columns
 
-  !> Counts the accepted steps and ends the lanes that have reached the final time or may take no more steps.
+  !> Counts the accepted steps, and ends the lanes that have reached the final time or the largest number of steps.
   pure subroutine finish_steps(integrator, solver_status, failed)
     type(integrator_t), intent(inout) :: integrator
     type(solver_status_t), intent(inout) :: solver_status
-    integer, intent(out) :: failed   !! attempts that were not accepted
+    integer, intent(out) :: failed   !! number of attempts that were not accepted
     logical :: is_fine
     integer :: lane
 

@@ -1,33 +1,33 @@
-!> The size of the very first step.
+!> The automatic choice of the first step size.
 module nocdyn_first_step
   use nocdyn_kinds, only: wp
+  use nocdyn_step_attempt, only: begin_attempt, count_evaluations, evaluate_finite, step_attempt_t
   use nocdyn_step_control, only: smallest_step, step_control_t
   use nocdyn_system, only: system_t
-  use nocdyn_step_attempt, only: count_evaluations, evaluate_finite, begin_attempt, step_attempt_t
   implicit none (type, external)
   private
 
   public :: guess_first_steps
 
   ! The constants of HINIT in Hairer's DOPRI5.
-  real(wp), parameter :: negligible = 1.0e-5_wp      !! sizes that say nothing about the scale of time
+  real(wp), parameter :: negligible = 1.0e-5_wp      !! norms below it do not define a time scale
   real(wp), parameter :: no_curvature = 1.0e-15_wp
   real(wp), parameter :: small_step = 1.0e-6_wp
   real(wp), parameter :: small_change = 0.01_wp
   real(wp), parameter :: max_growth = 100.0_wp
-  real(wp), parameter :: retreat = 0.01_wp           !! after a small step that cannot be evaluated
+  real(wp), parameter :: retreat = 0.01_wp           !! factor of a small step that cannot be evaluated
 
   real(wp), parameter :: largest_ratio = 1.0e100_wp  !! keeps squares finite
 
 contains
 
-  !> Sets the first step sizes of the lanes that are `active` by comparing the slopes at both ends of a small Euler step:
+  !> Sets the first step sizes of the active lanes from the slopes at both ends of a small Euler step:
   !> Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I, 2nd ed. (1993), II.4.
   subroutine guess_first_steps(control, order, system, attempt)
     type(step_control_t), intent(inout) :: control
     integer, intent(in) :: order
     class(system_t), intent(inout) :: system
-    type(step_attempt_t), intent(inout) :: attempt   !! t, y, slope and the lanes at work; h, y_new and deviation are scratch
+    type(step_attempt_t), intent(inout) :: attempt   !! reads t, y, slope and active; overwrites h, y_new and error_estimate
     real(wp) :: slope, steepest, longer
     integer :: component, lane
 

@@ -1,19 +1,19 @@
-!> Integration of a block of lanes from the first to the last requested time.
+!> Integration of a block of lanes from the first to the last output time.
 module nocdyn_integration
-  use nocdyn_errors, only: error_t, exit_input, raise
-  use nocdyn_after_step, only: change_branches, process_steps, observe_steps
-  use nocdyn_integration_settings, only: check_settings, integration_settings_t
+  use nocdyn_after_step, only: change_branches, observe_steps, process_steps
+  use nocdyn_ensemble, only: ensemble_t, initial_states, initial_states_t
   use nocdyn_error_test, only: test_errors
+  use nocdyn_errors, only: error_t, exit_input, raise
+  use nocdyn_integration_settings, only: check_settings, integration_settings_t
   use nocdyn_kinds, only: wp
   use nocdyn_masks, only: any_differs, any_true
-  use nocdyn_time_stepping, only: advance_lanes, release_lanes, fill_lanes, integrator_t, prepare_integrator, begin_attempts
   use nocdyn_methods, only: select_method
-  use nocdyn_solver_status, only: allocate_solver_status, integration_interrupted, integration_running, solver_status_t
-  use nocdyn_ensemble, only: initial_states, initial_states_t, ensemble_t
-  use nocdyn_stepper, only: stepper_t
   use nocdyn_observer, only: observer_t
+  use nocdyn_solver_status, only: allocate_solver_status, integration_interrupted, integration_running, solver_status_t
+  use nocdyn_stepper, only: stepper_t
   use nocdyn_system, only: system_t
   use nocdyn_text, only: quoted
+  use nocdyn_time_stepping, only: advance_lanes, begin_attempts, fill_lanes, integrator_t, prepare_integrator, release_lanes
   implicit none (type, external)
   private
 
@@ -21,12 +21,12 @@ module nocdyn_integration
 
 contains
 
-  !> Solves y' = f(t, y) once in each lane, with the method that `settings` names.
+  !> Solves y' = f(t, y) once in each lane, by the method in `settings`.
   subroutine integrate(system, settings, times, y, observer, solver_status, error)
     class(system_t), intent(inout) :: system
     type(integration_settings_t), intent(in) :: settings
-    real(wp), contiguous, intent(in) :: times(:)       !! ascending; the first is the start, the last is the end
-    real(wp), contiguous, intent(inout) :: y(:, :)     !! [lanes, components]: the start, on return where each lane stopped
+    real(wp), contiguous, intent(in) :: times(:)       !! output times [s], ascending, from the start to the end
+    real(wp), contiguous, intent(inout) :: y(:, :)     !! [lanes, components]: initial states, on return the last states
     class(observer_t), intent(inout) :: observer
     type(solver_status_t), intent(out) :: solver_status            !! says which lanes failed
     type(error_t), allocatable, intent(out) :: error   !! allocated if a setting is refused
@@ -40,11 +40,11 @@ contains
     y = ensemble%y
   end subroutine integrate
 
-  !> Solves y' = f(t, y) for all variants of a queue; a lane that has ended takes the next variant.
+  !> Solves y' = f(t, y) for all variants of an ensemble; a lane that has ended takes the next variant.
   subroutine integrate_ensemble(system, settings, times, ensemble, observer, solver_status, error)
     class(system_t), intent(inout) :: system
     type(integration_settings_t), intent(in) :: settings
-    real(wp), contiguous, intent(in) :: times(:)       !! of every variant
+    real(wp), contiguous, intent(in) :: times(:)       !! output times of every variant [s], ascending
     class(ensemble_t), intent(inout) :: ensemble             !! hands out the variants and takes their ends
     class(observer_t), intent(inout) :: observer
     type(solver_status_t), intent(out) :: solver_status            !! of the last variant in each lane
@@ -59,7 +59,7 @@ contains
     call integrate_with(stepper, system, settings, times, ensemble, observer, solver_status)
   end subroutine integrate_ensemble
 
-  !> A method that is made of Taylor series needs a system that has them.
+  !> Raises an error if the method needs Taylor series and the system has none.
   subroutine refuse_missing_series(stepper, system, settings, error)
     class(stepper_t), intent(in) :: stepper
     class(system_t), intent(in) :: system
@@ -73,7 +73,7 @@ contains
     call raise(error, exit_input, 'method ' // quoted(trim(settings%method)) // ' cannot be used: ' // obstacle)
   end subroutine refuse_missing_series
 
-  !> The same with any stepper and with settings that have been checked.
+  !> The same with a given stepper and with settings that have been checked.
   subroutine integrate_with(stepper, system, settings, times, ensemble, observer, solver_status)
     class(stepper_t), intent(inout) :: stepper
     class(system_t), intent(inout) :: system
@@ -110,7 +110,7 @@ contains
     end do
   end subroutine integrate_with
 
-  !> Ends the lanes that are running if the observer wants to stop at the time of the slowest.
+  !> Ends all running lanes if the observer wants to stop at the time that the slowest lane has reached.
   subroutine interrupt_if_asked(integrator, observer, solver_status, is_interrupted)
     type(integrator_t), intent(in) :: integrator
     class(observer_t), intent(inout) :: observer

@@ -1,4 +1,4 @@
-!> The methods by the names that people give them.
+!> The integration methods by their names.
 module nocdyn_methods
   use nocdyn_auto_stepper, only: auto_stepper
   use nocdyn_errors, only: error_t, exit_input, raise
@@ -15,13 +15,13 @@ module nocdyn_methods
 
   public :: select_method
 
-  !> All names that `select_method` knows; 'rosenbrock' is another name of 'rodas4'.
+  !> The names that `select_method` accepts; 'rosenbrock' is another name of 'rodas4'.
   character(len=10), parameter, public :: method_names(7) = &
     [character(len=10) :: 'auto', 'rk45', 'rk853', 'rosenbrock', 'rodas4', 'rodas5p', 'taylor']
 
 contains
 
-  !> The stepper of the method that the settings name, one of `method_names`.
+  !> The stepper of the method in the settings, one of `method_names`.
   subroutine select_method(settings, stepper, error)
     type(integration_settings_t), intent(in) :: settings
     class(stepper_t), allocatable, intent(out) :: stepper

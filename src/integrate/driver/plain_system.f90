@@ -28,8 +28,8 @@ module nocdyn_plain_system
 
   end interface
 
-  !> Without a Jacobian of its own it takes differences, as Hairer's RODAS does: one evaluation of f for each state and two
-  !> more, which are not counted in the outcome.
+  !> Without `f_jacobian` the Jacobian is a forward difference, as in Hairer's RODAS: one evaluation of f for each state and two
+  !> more, which the solver status does not count.
   type, extends(system_t), public :: plain_system_t
     procedure(plain_derivative_interface), pointer, nopass :: f => null()
     procedure(plain_jacobian_interface), pointer, nopass :: f_jacobian => null()
@@ -84,7 +84,7 @@ contains
     end do
   end subroutine jacobian
 
-  !> Forward differences over the square root of the precision.
+  !> Sets dfdy and dfdt by forward differences; the shift of an argument is `step_of` it.
   subroutine take_differences(self, t, y, dfdt)
     type(plain_system_t), intent(inout) :: self
     real(wp), intent(in) :: t
@@ -106,9 +106,10 @@ contains
     dfdt(:) = (self%shifted_dydt - self%dydt) / shift
   end subroutine take_differences
 
+  !> The shift of an argument x: the square root of its rounding error.
   elemental real(wp) function step_of(x)
     real(wp), intent(in) :: x
-    real(wp), parameter :: smallest = 1.0e-5_wp   !! size that any smaller one is taken for
+    real(wp), parameter :: smallest = 1.0e-5_wp   !! replaces smaller sizes
 
     step_of = sqrt(epsilon(x) * max(smallest, abs(x)))
   end function step_of

@@ -1,4 +1,4 @@
-!> An observer that keeps the solution at the requested times; extensions may add events.
+!> An observer that stores the solution at the output times; extensions may add events.
 module nocdyn_sampler
   use nocdyn_kinds, only: wp
   use nocdyn_observer, only: observer_t
@@ -8,7 +8,7 @@ module nocdyn_sampler
   public :: sampler
 
   type, extends(observer_t), public :: sampler_t
-    integer, allocatable :: count(:)       !! times recorded so far, [lanes]
+    integer, allocatable :: count(:)       !! output times so far, [lanes]
     real(wp), allocatable :: t(:, :)       !! [times, lanes]
     real(wp), allocatable :: y(:, :, :)    !! [components, times, lanes]
   contains
@@ -17,7 +17,7 @@ module nocdyn_sampler
 
 contains
 
-  !> A sampler with room for the solution of every lane at `times` times.
+  !> A sampler for `times` output times in every lane.
   pure function sampler(lanes, components, times)
     integer, intent(in) :: lanes, components, times
     type(sampler_t) :: sampler

@@ -1,11 +1,11 @@
-!> The shortest way to a solution: an ordinary subroutine, times, and an array for the states there.
+!> Integration with one call: from a system and output times to the array of the states there.
 module nocdyn_solve
   use nocdyn_errors, only: error_t, exit_failed, raise
   use nocdyn_integration, only: integrate
   use nocdyn_integration_settings, only: integration_settings_t
   use nocdyn_kinds, only: wp
-  use nocdyn_solver_status, only: failure_message, integration_done, solver_status_t
   use nocdyn_sampler, only: sampler, sampler_t
+  use nocdyn_solver_status, only: failure_message, integration_done, solver_status_t
   use nocdyn_system, only: system_t
   implicit none (type, external)
   private
@@ -14,12 +14,12 @@ module nocdyn_solve
 
 contains
 
-  !> y(:, i) is the state at times(i); y(:, 1) is the start, and given.
+  !> Sets y(:, i) to the state at times(i); y(:, 1) is the initial state.
   subroutine solve(system, times, settings, y, error)
     class(system_t), intent(inout) :: system               !! of one lane
-    real(wp), contiguous, intent(in) :: times(:)           !! ascending
+    real(wp), contiguous, intent(in) :: times(:)           !! output times [s], ascending
     type(integration_settings_t), intent(in) :: settings
-    real(wp), contiguous, intent(inout) :: y(:, :)         !! [components, times]; as far as the integration came
+    real(wp), contiguous, intent(inout) :: y(:, :)         !! [components, times]; set as far as the integration came
     type(error_t), allocatable, intent(out) :: error       !! allocated if a setting is refused or the end is not reached
     type(sampler_t) :: samples
     type(solver_status_t) :: solver_status

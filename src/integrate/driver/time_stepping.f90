@@ -1,21 +1,22 @@
-!> The march of a block of lanes through time: each lane at its own pace, all of them in one loop.
+!> The parts of the time-stepping loop of a block: all lanes take a step together, each with its own time and step size.
 module nocdyn_time_stepping
   use nocdyn_dense_output, only: allocate_dense_output, dense_output_t
-  use nocdyn_events, only: allocate_events, events_t, start_events
+  use nocdyn_ensemble, only: ensemble_t
+  use nocdyn_events, only: allocate_events, events_t
   use nocdyn_extremes, only: allocate_extremes, extremes_t, start_extremes
   use nocdyn_first_step, only: guess_first_steps
   use nocdyn_integration_settings, only: integration_settings_t
   use nocdyn_kinds, only: wp
   use nocdyn_masks, only: all_true, any_differs
-  use nocdyn_solver_status, only: integration_rhs_failed, integration_not_finite, integration_running, solver_status_t, &
-                                  reset_solver_status
-  use nocdyn_ensemble, only: ensemble_t
+  use nocdyn_observer, only: observer_t, step_block_t
+  use nocdyn_root_functions, only: start_root_functions
+  use nocdyn_solver_status, only: integration_not_finite, integration_rhs_failed, integration_running, reset_solver_status, &
+    solver_status_t
+  use nocdyn_step_attempt, only: allocate_step_attempt, attempt_not_finite, begin_attempt, evaluate_start, step_attempt_t
   use nocdyn_step_control, only: propose_steps, reset_control, step_control, step_control_t
   use nocdyn_stepper, only: stepper_t
   use nocdyn_switching, only: allocate_switching, start_switching, switching_t
-  use nocdyn_observer, only: observer_t, step_block_t
   use nocdyn_system, only: system_t
-  use nocdyn_step_attempt, only: allocate_step_attempt, evaluate_start, begin_attempt, attempt_not_finite, step_attempt_t
   implicit none (type, external)
   private
 
@@ -24,44 +25,44 @@ module nocdyn_time_stepping
   type, public :: integrator_t
     type(step_attempt_t) :: attempt
     type(step_control_t) :: control
-    type(dense_output_t) :: dense                    !! the lane that is looked at
+    type(dense_output_t) :: dense                    !! of the lane that is inspected
     type(events_t) :: events
     type(extremes_t) :: extremes
     type(switching_t) :: switching
-    real(wp) :: first_step                           !! 0 if it is to be found
+    real(wp) :: first_step                           !! [s]; it is chosen automatically if this is 0
     integer :: max_steps
     logical :: has_events = .false.
     logical :: has_extremes = .false.
     logical :: has_switches = .false.
-    logical :: wants_steps = .false.                 !! whether the observer is handed the solution inside all steps
-    logical :: wants_dense_steps = .false.                   !! whether it is that of `interpolate`
-    logical :: is_exhausted = .false.                !! the queue has no variant left
-    integer :: free = 0                              !! lanes that hold no variant
-    logical :: inspects = .false.                      !! whether the accepted steps are looked at lane by lane
+    logical :: wants_steps = .false.                 !! whether the observer receives the dense output of all steps
+    logical :: wants_dense_steps = .false.           !! whether that is the result of `interpolate`
+    logical :: is_exhausted = .false.                !! the ensemble has no variant left
+    integer :: free = 0                              !! number of lanes that hold no variant
+    logical :: inspects = .false.                    !! whether the accepted steps are inspected lane by lane
     logical, allocatable :: occupied(:)              !! lanes that hold a variant
     logical, allocatable :: running(:)               !! lanes that took part in the last attempt
-    logical, allocatable :: rejected(:)              !! lanes whose last attempt was finished, but not accepted
-    logical, allocatable :: starting(:)              !! lanes that have just been given one, or go on from branch to branch
+    logical, allocatable :: rejected(:)              !! lanes whose last attempt was complete, but with too large an error
+    logical, allocatable :: starting(:)              !! lanes that start a variant, or restart on a new branch
     logical, allocatable :: accepted(:)              !! lanes whose last attempt was accepted
-    logical, allocatable :: wanted(:)                !! lanes whose solution inside the last step is wanted
-    logical, allocatable :: inspected(:)             !! lanes whose solution there is looked at on its own
-    type(step_block_t) :: steps                           !! as the observer is told of them
-    real(wp), allocatable :: t_new(:)                !! end of the last attempt of each lane
-    real(wp), allocatable :: next_time(:)            !! first requested time of each lane that is not recorded yet; or never
-    integer, allocatable :: next(:)                  !! number of the first requested time of each lane that is not recorded yet
-    real(wp), allocatable :: sample(:)               !! one lane's state at a requested time
-    real(wp), allocatable :: coefficients(:, :, :)   !! of the solution inside the last step
+    logical, allocatable :: wanted(:)                !! lanes whose dense output of the last step is needed
+    logical, allocatable :: inspected(:)             !! lanes whose dense output is evaluated lane by lane
+    type(step_block_t) :: steps                      !! the last steps, for the observer
+    real(wp), allocatable :: t_new(:)                !! end of the last attempt of each lane [s]
+    real(wp), allocatable :: next_time(:)            !! next output time of each lane [s], huge if none is left
+    integer, allocatable :: next(:)                  !! index of the next output time of each lane
+    real(wp), allocatable :: sample(:)               !! state of one lane, [components]
+    real(wp), allocatable :: coefficients(:, :, :)   !! of the dense output of the last step, [lanes, padded columns, degree]
   end type integrator_t
 
 contains
 
-  !> Allocates all that the march needs; nothing is allocated later.
+  !> Allocates all memory of the time stepping; the loop itself allocates nothing.
   subroutine prepare_integrator(integrator, stepper, system, settings, times, observer)
     type(integrator_t), intent(out) :: integrator
     class(stepper_t), intent(inout) :: stepper
     class(system_t), intent(in) :: system
     type(integration_settings_t), intent(in) :: settings
-    real(wp), intent(in) :: times(:)
+    real(wp), intent(in) :: times(:)   !! output times [s], ascending
     class(observer_t), intent(in) :: observer
 
     call stepper%prepare(system)
@@ -88,7 +89,7 @@ contains
     if (integrator%has_events) call allocate_events(integrator%events, observer, stepper%degree, integrator%attempt)
   end subroutine prepare_integrator
 
-  !> What is known of each lane; none holds a variant.
+  !> Allocates the data of each lane; no lane holds a variant.
   pure subroutine allocate_lanes(integrator, lanes, components, degree, t_start)
     type(integrator_t), intent(inout) :: integrator
     integer, intent(in) :: lanes, components, degree
@@ -107,7 +108,7 @@ contains
     allocate (integrator%coefficients(lanes, size(integrator%attempt%y, 2), degree), source=0.0_wp)
   end subroutine allocate_lanes
 
-  !> Gives the free lanes their next variants and starts them.
+  !> Fills the free lanes with the next variants of the ensemble and starts them.
   subroutine fill_lanes(integrator, stepper, system, ensemble, times, observer, solver_status)
     type(integrator_t), intent(inout) :: integrator
     class(stepper_t), intent(inout) :: stepper
@@ -134,7 +135,7 @@ contains
     if (any(integrator%starting)) call start_lanes(integrator, stepper, system, times, observer, solver_status)
   end subroutine fill_lanes
 
-  !> Puts the state in `sample` at the start of a lane that has done nothing yet.
+  !> Sets the start of a lane: the state in `sample` at the time t, all counts zero.
   subroutine set_start(integrator, lane, t, times, solver_status)
     type(integrator_t), intent(inout) :: integrator
     integer, intent(in) :: lane
@@ -162,7 +163,8 @@ contains
     call reset_solver_status(solver_status, lane)
   end subroutine set_start
 
-  !> Records the start if it is a requested time, evaluates the slope there and chooses the first step of the lanes in `starting`.
+  !> Starts the lanes in `starting`: evaluates the slope, passes the start to the observer if it is an output time, and chooses
+  !> the first step.
   subroutine start_lanes(integrator, stepper, system, times, observer, solver_status)
     type(integrator_t), intent(inout) :: integrator
     class(stepper_t), intent(inout) :: stepper
@@ -184,7 +186,7 @@ contains
         if (times(integrator%next(lane) - 1) >= attempt%t(lane)) call observer%on_output(lane, attempt%t(lane), integrator%sample)
         integrator%control%h(lane) = integrator%first_step
         if (.not. attempt%active(lane)) cycle
-        if (integrator%has_events) call start_events(integrator%events, system, observer, attempt, lane)
+        if (integrator%has_events) call start_root_functions(integrator%events%roots, system, observer, attempt, lane)
         if (integrator%has_extremes) call start_extremes(integrator%extremes, observer, attempt, lane)
       end do
       if (integrator%first_step > 0 .or. stepper%chooses_steps) return
@@ -192,6 +194,7 @@ contains
     end associate
   end subroutine start_lanes
 
+  !> Lets the system choose the branches of a lane at its start.
   subroutine choose_branches(integrator, system, observer, lane, solver_status)
     type(integrator_t), intent(inout) :: integrator
     class(system_t), intent(inout) :: system
@@ -206,7 +209,7 @@ contains
     end associate
   end subroutine choose_branches
 
-  !> Evaluates the slope where the lanes in `starting` are, and ends those where that fails.
+  !> Evaluates the slope at the states of the lanes in `starting`, and ends those where that fails.
   subroutine evaluate_starts(integrator, system, solver_status)
     type(integrator_t), intent(inout) :: integrator
     class(system_t), intent(inout) :: system
@@ -226,7 +229,7 @@ contains
     end associate
   end subroutine evaluate_starts
 
-  !> The next attempt of the lanes that are still running.
+  !> Begins the next attempt of the lanes that are still running.
   subroutine begin_attempts(integrator, stepper, system, solver_status)
     type(integrator_t), intent(inout) :: integrator
     class(stepper_t), intent(inout) :: stepper
@@ -252,22 +255,22 @@ contains
     running = merge(occupied, .false., status == integration_running)
   end subroutine find_running
 
-  !> Notes and counts the attempts of the running lanes; the others get steps of zero.
-  pure subroutine count_attempts(lanes, running, h, h_noted, steps)
+  !> Counts the attempts of the running lanes and stores their sizes; the other lanes get the step size 0.
+  pure subroutine count_attempts(lanes, running, h, h_stored, steps)
     integer, intent(in) :: lanes
     logical, intent(in) :: running(lanes)
-    real(wp), intent(inout) :: h(lanes), h_noted(lanes)
+    real(wp), intent(inout) :: h(lanes), h_stored(lanes)
     integer, intent(inout) :: steps(lanes)
     integer :: lane
 
     do lane = 1, lanes
-      h_noted(lane) = merge(h(lane), h_noted(lane), running(lane))
+      h_stored(lane) = merge(h(lane), h_stored(lane), running(lane))
       h(lane) = merge(h(lane), 0.0_wp, running(lane))
       steps(lane) = steps(lane) + merge(1, 0, running(lane))
     end do
   end subroutine count_attempts
 
-  !> Lets the stepper choose the steps; the first is not longer than the one that was asked for.
+  !> Lets the stepper choose the step sizes; the first step is at most as long as the setting says.
   subroutine choose_step_sizes(integrator, stepper, system, solver_status)
     type(integrator_t), intent(inout) :: integrator
     class(stepper_t), intent(inout) :: stepper
@@ -282,7 +285,7 @@ contains
     end do
   end subroutine choose_step_sizes
 
-  !> The accepted lanes move to the end of their step.
+  !> Moves the accepted lanes to the ends of their steps.
   subroutine advance_lanes(integrator, times)
     type(integrator_t), intent(inout) :: integrator
     real(wp), contiguous, intent(in) :: times(:)
@@ -290,7 +293,7 @@ contains
     integer :: component, lane
 
     associate (attempt => integrator%attempt, accepted => integrator%accepted)
-      if (all_true(attempt%lanes, accepted)) then   ! the arrays change their names: nothing asks for y_new any more
+      if (all_true(attempt%lanes, accepted)) then   ! swaps the arrays: y_new is not read any more
         attempt%t(:) = integrator%t_new
         call move_alloc(attempt%y, spare)
         call move_alloc(attempt%y_new, attempt%y)
@@ -320,7 +323,7 @@ contains
     old = merge(new, old, accepted)
   end subroutine copy_accepted
 
-  !> Hands the lanes that have ended to the queue and frees them.
+  !> Passes the lanes that have ended to the ensemble and frees them.
   subroutine release_lanes(integrator, ensemble, observer, solver_status)
     type(integrator_t), intent(inout) :: integrator
     class(ensemble_t), intent(inout) :: ensemble

@@ -1,4 +1,4 @@
-!> Stage matrices stored as a band, in an order that makes it narrow, with LU factors of LAPACK.
+!> Banded stage matrices, with the states in an order that makes the band narrow, factored by LAPACK.
 module nocdyn_banded_matrix
   use nocdyn_kinds, only: wp
   use nocdyn_lapack_band, only: band_factor, band_solve
@@ -12,14 +12,14 @@ module nocdyn_banded_matrix
   type, extends(stage_matrix_t), public :: banded_matrix_t
     private
     integer :: states
-    integer :: lower, upper                  !! diagonals beside the main one
-    integer, allocatable :: order(:)         !! state at each place
-    integer, allocatable :: position(:)      !! of the Jacobian's entries in the rows of states
+    integer :: lower, upper                  !! numbers of diagonals below and above the main one
+    integer, allocatable :: order(:)         !! state of each row of the band
+    integer, allocatable :: position(:)      !! of the entries in the rows of states, among the values of the Jacobian
     integer, allocatable :: row(:)           !! their rows in the band
     integer, allocatable :: column(:)        !! their columns
     real(wp), allocatable :: band(:, :, :)   !! shape [2 lower + upper + 1, states, lanes]
     integer, allocatable :: pivots(:, :)     !! shape [states, lanes]
-    real(wp), allocatable :: x(:)            !! right-hand side and solution of one lane
+    real(wp), allocatable :: x(:)            !! right-hand side, then solution, of one lane
   contains
     procedure :: factor
     procedure :: solve
@@ -27,10 +27,10 @@ module nocdyn_banded_matrix
 
 contains
 
-  !> Room for the factors of every lane.
+  !> Allocates the factors of every lane.
   pure subroutine allocate_banded(matrix, order, entries, lanes)
     type(banded_matrix_t), intent(out) :: matrix
-    integer, intent(in) :: order(:)          !! state at each place
+    integer, intent(in) :: order(:)          !! state of each row of the band
     type(entries_t), intent(in) :: entries   !! in the rows of states
     integer, intent(in) :: lanes
     integer :: index_of(size(order))
@@ -48,7 +48,7 @@ contains
     allocate (matrix%x(matrix%states), source=0.0_wp)
   end subroutine allocate_banded
 
-  !> Diagonals beside the main one that have entries when the states are in this order.
+  !> Numbers of diagonals below and above the main one that have entries, with the states in an order.
   pure subroutine half_bandwidths(order, entries, lower, upper)
     integer, intent(in) :: order(:)
     type(entries_t), intent(in) :: entries

@@ -1,4 +1,4 @@
-!> Stage matrices stored whole, with LU factors of LAPACK.
+!> Dense stage matrices, factored by LAPACK.
 module nocdyn_dense_matrix
   use nocdyn_kinds, only: wp
   use nocdyn_lapack_lu, only: lu_factor, lu_solve
@@ -12,10 +12,10 @@ module nocdyn_dense_matrix
   type, extends(stage_matrix_t), public :: dense_matrix_t
     private
     integer :: states
-    type(entries_t) :: entries                !! of the Jacobian, in the rows of states
+    type(entries_t) :: entries                !! of the Jacobian in the rows of states
     real(wp), allocatable :: factors(:, :, :) !! shape [states, states, lanes]
     integer, allocatable :: pivots(:, :)      !! shape [states, lanes]
-    real(wp), allocatable :: x(:)             !! right-hand side and solution of one lane
+    real(wp), allocatable :: x(:)             !! right-hand side, then solution, of one lane
   contains
     procedure :: factor
     procedure :: solve
@@ -23,7 +23,7 @@ module nocdyn_dense_matrix
 
 contains
 
-  !> Room for the factors of every lane.
+  !> Allocates the factors of every lane.
   pure subroutine allocate_dense(matrix, entries, lanes, states)
     type(dense_matrix_t), intent(out) :: matrix
     type(entries_t), intent(in) :: entries   !! in the rows of states

@@ -1,4 +1,4 @@
-!> Numbers in groups, one group after the other: the rows in a sparse matrix's columns, the neighbours of the nodes of a graph.
+!> Groups of integers in compressed storage: the rows in the columns of a sparse matrix, the neighbours of the nodes of a graph.
 module nocdyn_grouping
   implicit none (type, external)
   private
@@ -7,15 +7,15 @@ module nocdyn_grouping
 
   !> Group g has the members member(start(g):start(g + 1) - 1).
   type, public :: groups_t
-    integer, allocatable :: start(:)    !! shape [groups + 1]
+    integer, allocatable :: start(:)    !! [groups + 1]
     integer, allocatable :: member(:)
   end type groups_t
 
 contains
 
-  !> Members in their groups, in the order in which they come; in linear time.
+  !> Sorts members into groups, in linear time; members of a group keep their order.
   pure function grouped(groups, group, member)
-    integer, intent(in) :: groups
+    integer, intent(in) :: groups      !! number of groups
     integer, intent(in) :: group(:)    !! group of each member, 1 to groups
     integer, intent(in) :: member(:)
     type(groups_t) :: grouped

@@ -1,4 +1,4 @@
-!> Orderings that gather the entries of a sparse matrix near its diagonal, by reverse Cuthill-McKee.
+!> Orderings that reduce the bandwidth of a sparse matrix, by the reverse Cuthill-McKee algorithm.
 !>
 !> E. Cuthill and J. McKee, Proc. 24th National Conference of the ACM (1969) 157-172; reversed by A. George (Stanford
 !> STAN-CS-71-208, 1971); start nodes by A. George and J. W. H. Liu, ACM Trans. Math. Softw. 5 (1979) 284-295.
@@ -9,23 +9,23 @@ module nocdyn_ordering
 
   public :: reverse_cuthill_mckee
 
-  !> A search through one connected part of a graph, level by level.
+  !> A breadth-first search through one connected component of a graph.
   type :: search_t
-    integer, allocatable :: reached_in(:)   !! last search that reached each node, 0 for none
+    integer, allocatable :: reached_in(:)   !! index of the last search that reached each node, 0 for none
     integer, allocatable :: reached(:)      !! nodes in the order in which they were reached
-    integer :: searches = 0                 !! made so far
-    integer :: first = 1                    !! place of the root in `reached`
-    integer :: last_level = 1               !! place of the first node of the last level
-    integer :: last = 0                     !! place of the last node
+    integer :: searches = 0                 !! number of searches so far
+    integer :: first = 1                    !! index of the root in `reached`
+    integer :: last_level = 1               !! index in `reached` of the first node of the last level
+    integer :: last = 0                     !! index in `reached` of the last node
     integer :: levels = 0
   end type search_t
 
 contains
 
-  !> Node at each new place, for a small bandwidth of the matrix with entries at these positions.
+  !> The node at each new index, for a small bandwidth of the matrix with entries at these positions.
   pure function reverse_cuthill_mckee(nodes, row, column) result(order)
-    integer, intent(in) :: nodes                !! order of the matrix
-    integer, intent(in) :: row(:), column(:)    !! entries, each at most once, in no special order
+    integer, intent(in) :: nodes                !! rows of the matrix
+    integer, intent(in) :: row(:), column(:)    !! of the entries, each at most once, in any order
     integer :: order(nodes)
     type(groups_t) :: graph, by_degree
     type(search_t) :: search
@@ -43,7 +43,7 @@ contains
     order = search%reached(nodes:1:-1)
   end function reverse_cuthill_mckee
 
-  !> The graph of A + A^T without its diagonal, each neighbour once.
+  !> The graph of A + A^T without its diagonal; each neighbour occurs once.
   pure function neighbours(nodes, row, column) result(graph)
     integer, intent(in) :: nodes
     integer, intent(in) :: row(:), column(:)
@@ -78,7 +78,7 @@ contains
     by_degree = grouped(nodes, graph%start(2:) - graph%start(:nodes) + 1, [(node, node=1, nodes)])
   end function nodes_by_degree
 
-  !> The same graph, the neighbours of each node in the order of `nodes`.
+  !> The same graph, with the neighbours of each node in the order of `nodes`.
   pure function sorted_neighbours(graph, nodes) result(sorted)
     type(groups_t), intent(in) :: graph
     integer, intent(in) :: nodes(:)
@@ -98,8 +98,8 @@ contains
     sorted = grouped(size(nodes), node, neighbour)
   end function sorted_neighbours
 
-  !> Searches from nodes ever farther out, as George and Liu do: from the node with the fewest neighbours in the last
-  !> level of the search before, until that brings no more levels.
+  !> Repeats the search from the node with the fewest neighbours in the last level, until the number of levels no longer grows:
+  !> the pseudo-peripheral nodes of George and Liu.
   pure subroutine search_from_periphery(graph, start, search)
     type(groups_t), intent(in) :: graph
     integer, intent(in) :: start
@@ -122,7 +122,7 @@ contains
     node = nodes(minloc(graph%start(nodes + 1) - graph%start(nodes), 1))
   end function fewest_neighbours
 
-  !> The order of Cuthill and McKee from this root: the neighbours of each node follow, those with fewest of them first.
+  !> The Cuthill-McKee order from a root: each node is followed by its neighbours, those with the fewest neighbours first.
   pure subroutine search_levels(graph, root, search)
     type(groups_t), intent(in) :: graph   !! neighbours sorted by their degree
     integer, intent(in) :: root

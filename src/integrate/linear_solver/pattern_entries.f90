@@ -1,4 +1,4 @@
-!> The entries of a Jacobian's pattern, apart for the rows of states and of quadratures.
+!> The entries of a Jacobian's pattern in the rows of the states and in those of the quadratures, and checks of a pattern.
 module nocdyn_pattern_entries
   use nocdyn_grouping, only: grouped, groups_t
   use nocdyn_system, only: pattern_t
@@ -7,19 +7,20 @@ module nocdyn_pattern_entries
 
   public :: pattern_error, state_entries, quadrature_entries
 
-  !> Of a text that is not allocatable: gfortran 12 keeps the lengths of those that functions return where all threads write.
+  !> Length of the messages. They are not allocatable: gfortran 12 keeps the length of an allocatable function result in static
+  !> memory, which all threads share.
   integer, parameter, public :: message_length = 50
 
   !> Some entries of a pattern.
   type, public :: entries_t
-    integer, allocatable :: position(:)   !! where the pattern has them
+    integer, allocatable :: position(:)   !! indices in the pattern
     integer, allocatable :: row(:)
     integer, allocatable :: column(:)
   end type entries_t
 
 contains
 
-  !> The rule of the contract that a pattern breaks; empty if it is a good one.
+  !> The rule of the contract that a pattern breaks; empty if it breaks none.
   pure function pattern_error(pattern, states, quadratures) result(pattern_message)
     type(pattern_t), intent(in) :: pattern
     integer, intent(in) :: states, quadratures

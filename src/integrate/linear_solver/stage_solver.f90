@@ -1,4 +1,4 @@
-!> Which solver suits the Jacobian of a system.
+!> Choice between dense and banded stage matrices.
 module nocdyn_stage_solver
   use nocdyn_banded_matrix, only: allocate_banded, banded_matrix_t, half_bandwidths
   use nocdyn_dense_matrix, only: allocate_dense, dense_matrix_t
@@ -11,15 +11,15 @@ module nocdyn_stage_solver
 
   public :: choose_stage_matrix, dense_cost, banded_cost
 
-  real(wp), parameter :: solutions = 6   ! with one set of factors: the stages of RODAS
-  ! Calls of the BLAS for each column, inside of DGBTRF and DGBTRS, take the time of so many operations: 15 to 20 ns beside
-  ! 2 to 4 operations per ns, measured with the reference LAPACK at orders 4 to 200 and bandwidths 1 to 16.
+  real(wp), parameter :: solutions = 6   ! with one factorisation: the stages of RODAS
+  ! Operations that take as long as the BLAS calls for one column inside DGBTRF and DGBTRS: 15 to 20 ns at 2 to 4 operations per
+  ! ns, measured with the reference LAPACK at orders 4 to 200 and bandwidths 1 to 16.
   real(wp), parameter :: column_cost = 40
 
 contains
 
-  !> The matrices of every lane, dense or banded, whichever makes a step cheaper by the counts below. Up to about a dozen
-  !> states that is always the dense one.
+  !> Allocates the matrices of every lane, dense or banded, whichever needs fewer operations in a step. Up to about a dozen
+  !> states this is always the dense one.
   subroutine choose_stage_matrix(entries, lanes, states, matrix)
     type(entries_t), intent(in) :: entries   !! in the rows of states
     integer, intent(in) :: lanes, states
@@ -43,7 +43,7 @@ contains
     end if
   end subroutine choose_stage_matrix
 
-  !> Operations of a step: 2/3 n^3 for the factors, 2 n^2 for each solution.
+  !> Operations of a step with a dense matrix: 2/3 n^3 for the factorisation, 2 n^2 for each solution.
   elemental function dense_cost(states) result(cost)
     integer, intent(in) :: states
     real(wp) :: cost
@@ -53,10 +53,11 @@ contains
     end associate
   end function dense_cost
 
-  !> Operations of a step with `lower` and `upper` diagonals beside the main one. Interchanges lengthen the rows of U to
-  !> lower + upper: a column costs 2 lower (lower + upper) for its factors and 2 (2 lower + upper) in each solution.
+  !> Operations of a step with a banded matrix. Row interchanges widen U to lower + upper diagonals: a column costs
+  !> 2 lower (lower + upper) in the factorisation and 2 (2 lower + upper) in each solution.
   elemental function banded_cost(states, lower, upper) result(cost)
-    integer, intent(in) :: states, lower, upper
+    integer, intent(in) :: states
+    integer, intent(in) :: lower, upper   !! numbers of diagonals below and above the main one
     real(wp) :: cost
 
     associate (n => real(states, wp), l => real(lower, wp), u => real(upper, wp))

@@ -1,29 +1,29 @@
-!> The linear systems of the stages of a Rosenbrock step, one per lane: (1/gamma - h J) k = r.
+!> The linear systems of the stages of a Rosenbrock step, one in each lane: (1/gamma - h J) k = r.
 module nocdyn_stage_systems
   use nocdyn_finite, only: all_finite, is_finite
   use nocdyn_kinds, only: wp
   use nocdyn_pattern_entries, only: entries_t, message_length, pattern_error, quadrature_entries, state_entries
   use nocdyn_stage_matrix, only: stage_matrix_t
   use nocdyn_stage_solver, only: choose_stage_matrix
+  use nocdyn_step_attempt, only: attempt_not_finite, attempt_recoverable, disable_lane, step_attempt_t
   use nocdyn_system, only: evaluation_ok, pattern_t, system_t
-  use nocdyn_step_attempt, only: disable_lane, attempt_not_finite, attempt_recoverable, step_attempt_t
   implicit none (type, external)
   private
 
   public :: allocate_stage_system, renew_jacobian, factor, solve
 
-  !> Quadratures drive nothing, so J is block triangular: the factors are those of the states alone, and the rows of the
+  !> Nothing depends on the quadratures, so J is block triangular: only the block of the states is factored, and the rows of the
   !> quadratures follow from the solution for the states.
   type, public :: stage_system_t
-    real(wp), allocatable :: dfdt(:, :)                     !! shape [lanes, components]
-    real(wp), allocatable :: dfdy(:, :)                     !! shape [lanes, positions]
-    class(stage_matrix_t), allocatable, private :: matrix   !! absent if there are no states
+    real(wp), allocatable :: dfdt(:, :)                     !! [lanes, components]
+    real(wp), allocatable :: dfdy(:, :)                     !! [lanes, positions]
+    class(stage_matrix_t), allocatable, private :: matrix   !! not allocated if there are no states
     type(entries_t), private :: quadratures                 !! entries of the Jacobian in the rows of quadratures
   end type stage_system_t
 
 contains
 
-  !> Room for the Jacobian and the factors of every lane.
+  !> Allocates the Jacobian and the factors of every lane. Stops if the system's pattern is wrong.
   subroutine allocate_stage_system(stage_system, system)
     type(stage_system_t), intent(out) :: stage_system
     class(system_t), intent(in) :: system
@@ -41,7 +41,7 @@ contains
     end associate
   end subroutine allocate_stage_system
 
-  !> The derivatives at the start of the step; lanes where they fail are parked.
+  !> Evaluates the Jacobian and df/dt at the start of the step. Disables lanes where that fails.
   subroutine renew_jacobian(stage_system, system, attempt)
     type(stage_system_t), intent(inout) :: stage_system
     class(system_t), intent(inout) :: system
@@ -65,11 +65,11 @@ contains
     end associate
   end subroutine renew_jacobian
 
-  !> Factors for the step sizes of this attempt; a lane whose matrix is singular is parked, to take a shorter step.
+  !> Factors the matrices for the step sizes of this attempt. Disables lanes with a singular matrix: they take a shorter step.
   subroutine factor(stage_system, attempt, gamma)
     type(stage_system_t), intent(inout) :: stage_system
     type(step_attempt_t), intent(inout) :: attempt
-    real(wp), intent(in) :: gamma
+    real(wp), intent(in) :: gamma   !! of the tableau
     logical :: singular
     integer :: lane
 
@@ -82,13 +82,13 @@ contains
     end do
   end subroutine factor
 
-  !> k from r; zero for the lanes that are not working.
+  !> Solves for k; sets it to zero in the lanes that are not active.
   subroutine solve(stage_system, attempt, gamma, r, k)
     type(stage_system_t), intent(inout) :: stage_system
     type(step_attempt_t), intent(in) :: attempt
     real(wp), intent(in) :: gamma
-    real(wp), contiguous, intent(in) :: r(:, :)      !! shape [lanes, components]
-    real(wp), contiguous, intent(inout) :: k(:, :)   !! shape [lanes, components]
+    real(wp), contiguous, intent(in) :: r(:, :)      !! [lanes, components]
+    real(wp), contiguous, intent(inout) :: k(:, :)   !! [lanes, components]
     integer :: lane
 
     if (attempt%states > 0) then
@@ -105,7 +105,7 @@ contains
     end do
   end subroutine solve
 
-  !> The rows k_w / gamma - h dfw/dy k_y = r_w.
+  !> Solves the rows of the quadratures: k_w / gamma - h dfw/dy k_y = r_w.
   pure subroutine solve_quadratures(lanes, states, components, entries, dfdy, gamma, h, r, k)
     integer, intent(in) :: lanes, states, components
     type(entries_t), intent(in) :: entries

@@ -1,39 +1,38 @@
-!> A method that changes its kind: explicit steps where they are stable, Rosenbrock steps where stability would limit them.
+!> Automatic switching: explicit steps where they are stable, Rosenbrock steps where stability would limit the step size.
 !>
-!> Each lane goes its own way. An explicit lane is stiff when |h lambda| of its accepted steps keeps to the border of the
-!> stability domain, as in Hairer's DOPRI5; an implicit lane has ceased to be stiff when explicit steps of its size have
-!> been stable for a while.
+!> Each lane switches by itself. A lane with explicit steps is stiff when |h lambda| of its accepted steps stays at the limit of
+!> the stability domain, as in Hairer's DOPRI5. A lane with implicit steps is no longer stiff when explicit steps of its size
+!> would have been stable for several steps.
 module nocdyn_auto_stepper
-  use nocdyn_stage_sums, only: padded_columns
   use nocdyn_explicit_stepper, only: explicit_stepper, explicit_stepper_t
   use nocdyn_explicit_tables, only: explicit_table_t
   use nocdyn_kinds, only: wp
   use nocdyn_rosenbrock_stepper, only: rosenbrock_stepper, rosenbrock_stepper_t
   use nocdyn_rosenbrock_tables, only: rosenbrock_table_t
+  use nocdyn_stage_sums, only: padded_columns
+  use nocdyn_step_attempt, only: spread_steps, step_attempt_t
   use nocdyn_stepper, only: stepper_t
   use nocdyn_system, only: system_t
-  use nocdyn_step_attempt, only: spread_steps, step_attempt_t
   implicit none (type, external)
   private
 
   public :: auto_stepper
 
-  integer, parameter :: max_stiff_steps = 15         !! accepted steps on the border of stability that make a lane stiff
-  integer, parameter :: nonstiff_steps = 6         !! successive steps off the border that make the earlier ones forgotten
-  real(wp), parameter :: stability_margin = 0.8_wp      !! of the border: below it explicit steps are stable
+  integer, parameter :: max_stiff_steps = 15   !! accepted steps beyond the stability limit that make a lane stiff
+  integer, parameter :: nonstiff_steps = 6     !! successive steps within the limit that reset that count, or end stiffness
+  real(wp), parameter :: stability_margin = 0.8_wp   !! of the stability limit: below it explicit steps are stable
 
   type, extends(stepper_t), public :: auto_stepper_t
     private
     type(explicit_stepper_t) :: explicit
     type(rosenbrock_stepper_t) :: implicit
-    real(wp) :: stability_limit                              !! of the explicit method's stability domain on the negative real
-                                                             !! axis
+    real(wp) :: stability_limit                     !! of |h lambda| of the explicit method, on the negative real axis
     logical, allocatable :: is_implicit(:)          !! lanes that take Rosenbrock steps
-    integer, allocatable :: evidence(:)                 !! steps of the lane that spoke for the other kind
-    integer, allocatable :: nonstiff(:)                 !! successive steps of an explicit lane that did not
+    integer, allocatable :: evidence(:)             !! steps of the lane that speak for the other kind
+    integer, allocatable :: nonstiff(:)             !! successive steps of an explicit lane that do not
     real(wp), allocatable :: stiffness(:)           !! |h lambda| of the last attempt
     logical, allocatable :: mask(:)
-    logical, allocatable :: active(:)              !! at the beginning of the attempt, then at the end of the explicit ones
+    logical, allocatable :: active(:)               !! lanes at the start of the attempt
     real(wp), allocatable :: h(:)
     integer, allocatable :: step_status(:)
     real(wp), allocatable :: y_new(:, :), error_estimate(:, :), low_order_estimate(:, :)   !! of the explicit lanes
@@ -49,7 +48,7 @@ module nocdyn_auto_stepper
 
 contains
 
-  !> The stepper of an explicit and an implicit table.
+  !> The stepper of an explicit and a Rosenbrock tableau.
   pure function auto_stepper(explicit_table, rosenbrock_table) result(stepper)
     type(explicit_table_t), intent(in) :: explicit_table       !! whose last stage is f(t + h, y_new)
     type(rosenbrock_table_t), intent(in) :: rosenbrock_table
@@ -130,7 +129,7 @@ contains
     end do
   end subroutine take_step
 
-  !> The explicit lanes first, then the others; each time the rest is parked.
+  !> Attempts the steps of the explicit lanes, then those of the implicit lanes; the other lanes are not active meanwhile.
   subroutine attempt_both(self, system, attempt)
     class(auto_stepper_t), intent(inout) :: self
     class(system_t), intent(inout) :: system
@@ -150,7 +149,7 @@ contains
     call merge_kinds(self, attempt)
   end subroutine attempt_both
 
-  !> Only the lanes of one kind take part.
+  !> Activates only the lanes of one kind.
   subroutine select_kind(self, attempt, implicit)
     type(auto_stepper_t), intent(in) :: self
     type(step_attempt_t), intent(inout) :: attempt
@@ -164,7 +163,7 @@ contains
     call spread_steps(attempt)
   end subroutine select_kind
 
-  !> Puts the results of the explicit lanes beside those of the implicit ones.
+  !> Merges the results of the explicit lanes with those of the implicit lanes.
   subroutine merge_kinds(self, attempt)
     type(auto_stepper_t), intent(in) :: self
     type(step_attempt_t), intent(inout) :: attempt
@@ -236,7 +235,7 @@ contains
     call self%implicit%reset_spectra(self%mask)
   end subroutine accept
 
-  !> Each lane goes on with its kind of method and with what it knows of its stiffness.
+  !> Restarts lanes with the kind of method that they have; the counts of stiff steps are kept.
   subroutine resume(self, attempt, resuming)
     class(auto_stepper_t), intent(inout) :: self
     type(step_attempt_t), intent(inout) :: attempt
@@ -248,11 +247,11 @@ contains
     if (any(self%mask)) call self%implicit%start(attempt, self%mask)
   end subroutine resume
 
-  !> Counts what an accepted step says about the stiffness of its lane.
+  !> Counts whether an accepted step of a lane was stiff.
   pure subroutine count_stiffness(self, lane, switches)
     type(auto_stepper_t), intent(inout) :: self
     integer, intent(in) :: lane
-    logical, intent(out) :: switches   !! the lane goes on with the other kind
+    logical, intent(out) :: switches   !! whether the lane continues with the other kind
 
     associate (evidence => self%evidence(lane), nonstiff => self%nonstiff(lane))
       if (self%is_implicit(lane)) then

@@ -1,15 +1,14 @@
-!> Steps of any explicit Runge-Kutta method.
+!> Explicit Runge-Kutta steps, of any tableau.
 module nocdyn_explicit_stepper
-  use nocdyn_stage_sums, only: stage_sum
   use nocdyn_explicit_tables, only: explicit_table_t
   use nocdyn_kinds, only: wp
   use nocdyn_masks, only: all_true, any_true
-  use nocdyn_stages, only: allocate_stages, estimate_error, form_dense_output, stage_state, set_tableau, share_storage, &
-                           stages_t, &
-    update_state
+  use nocdyn_stage_sums, only: stage_sum
+  use nocdyn_stages, only: allocate_stages, estimate_error, form_dense_output, set_tableau, share_storage, stage_state, &
+    stages_t, update_state
+  use nocdyn_step_attempt, only: count_evaluations, evaluate, evaluate_finite, evaluate_start, step_attempt_t
   use nocdyn_stepper, only: stepper_t
   use nocdyn_system, only: system_t
-  use nocdyn_step_attempt, only: count_evaluations, evaluate, evaluate_finite, evaluate_start, step_attempt_t
   implicit none (type, external)
   private
 
@@ -19,10 +18,10 @@ module nocdyn_explicit_stepper
     private
     type(stages_t) :: stages
     logical :: first_same_as_last
-    real(wp), allocatable :: c(:)                !! places of the stages in the step
+    real(wp), allocatable :: c(:)                !! nodes of the tableau: theta of the stages
     real(wp), allocatable :: t_stage(:)
-    real(wp), allocatable :: y_stage(:, :)       !! in the columns of a stage
-    logical, allocatable :: moved(:)             !! lanes whose first stage is not known yet
+    real(wp), allocatable :: y_stage(:, :)       !! state of a stage, [lanes, padded columns]
+    logical, allocatable :: moved(:)             !! lanes whose first stage must be evaluated
   contains
     procedure :: prepare
     procedure :: start
@@ -35,7 +34,7 @@ module nocdyn_explicit_stepper
 
 contains
 
-  !> The stepper of a table.
+  !> The stepper of a tableau.
   pure function explicit_stepper(table) result(stepper)
     type(explicit_table_t), intent(in) :: table
     type(explicit_stepper_t) :: stepper
@@ -102,7 +101,7 @@ contains
     call count_evaluations(attempt)
   end subroutine take_step
 
-  !> Times of a stage.
+  !> The times of a stage: t + c h.
   pure subroutine set_stage_time(lanes, t, h, c, t_stage)
     integer, intent(in) :: lanes
     real(wp), intent(in) :: t(lanes), h(lanes), c
@@ -115,6 +114,7 @@ contains
     end if
   end subroutine set_stage_time
 
+  !> Evaluates the first stage of the active lanes that have moved.
   subroutine renew_first_stage(self, system, attempt)
     class(explicit_stepper_t), intent(inout) :: self
     class(system_t), intent(inout) :: system
@@ -124,7 +124,7 @@ contains
     self%moved(:) = self%moved .and. .not. attempt%active
   end subroutine renew_first_stage
 
-  !> Evaluates the stages that only the solution inside the step needs, then the polynomials.
+  !> Evaluates the stages that only the dense output needs, then its polynomials.
   subroutine interpolate(self, system, attempt, wanted, coefficients)
     class(explicit_stepper_t), intent(inout) :: self
     class(system_t), intent(inout) :: system
@@ -168,7 +168,7 @@ contains
     end associate
   end subroutine accept
 
-  !> Forgets the first stage of lanes that another method has moved.
+  !> Has the first stage evaluated again for lanes that another method has moved.
   pure subroutine invalidate_first_stage(self, moved)
     class(explicit_stepper_t), intent(inout) :: self
     logical, intent(in) :: moved(:)
@@ -176,8 +176,8 @@ contains
     self%moved(:) = self%moved .or. moved
   end subroutine invalidate_first_stage
 
-  !> |h lambda| of the dominant eigenvalue, from the last two stages at t + h: Hairer, Wanner, Solving Ordinary
-  !> Differential Equations II, (IV.2.6), for methods whose last stage is f(t + h, y_new).
+  !> |h lambda| of the dominant eigenvalue of the Jacobian, estimated from the last two stages at t + h: Hairer, Wanner, Solving
+  !> Ordinary Differential Equations II, (IV.2.6), for methods whose last stage is f(t + h, y_new).
   pure function stiffness(self, attempt, lane) result(ratio)
     class(explicit_stepper_t), intent(in) :: self
     type(step_attempt_t), intent(in) :: attempt

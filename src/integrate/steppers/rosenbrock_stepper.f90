@@ -1,14 +1,15 @@
-!> Steps of any Rosenbrock method with the exact Jacobian.
+!> Rosenbrock steps with the exact Jacobian, of any tableau.
 module nocdyn_rosenbrock_stepper
-  use nocdyn_stage_sums, only: stage_sum, stage_sum_t, sum_stages, set_offsets
   use nocdyn_kinds, only: wp
   use nocdyn_rosenbrock_tables, only: rosenbrock_table_t
-  use nocdyn_spectral_radius, only: allocate_spectral_radius, estimate_spectral_radius, restart_power_iteration, spectral_radius_t
+  use nocdyn_spectral_radius, only: allocate_spectral_radius, estimate_spectral_radius, restart_power_iteration, &
+    spectral_radius_t
+  use nocdyn_stage_sums, only: set_offsets, stage_sum, stage_sum_t, sum_stages
   use nocdyn_stage_systems, only: allocate_stage_system, factor, renew_jacobian, solve, stage_system_t
-  use nocdyn_stages, only: allocate_stages, estimate_error, form_dense_output, stage_state, set_tableau, stages_t, update_state
+  use nocdyn_stages, only: allocate_stages, estimate_error, form_dense_output, set_tableau, stage_state, stages_t, update_state
+  use nocdyn_step_attempt, only: count_evaluations, evaluate_finite, evaluate_start, step_attempt_t
   use nocdyn_stepper, only: stepper_t
   use nocdyn_system, only: system_t
-  use nocdyn_step_attempt, only: count_evaluations, evaluate_finite, evaluate_start, step_attempt_t
   implicit none (type, external)
   private
 
@@ -18,19 +19,19 @@ module nocdyn_rosenbrock_stepper
     private
     type(stages_t) :: stages
     real(wp) :: gamma
-    real(wp), allocatable :: alpha(:)                 !! places of the stages in the step
+    real(wp), allocatable :: alpha(:)                 !! theta of the stages
     real(wp), allocatable :: gamma_sum(:)             !! factors of h df/dt
-    type(stage_sum_t), allocatable :: coupling(:)   !! rows of c_ij
+    type(stage_sum_t), allocatable :: coupling(:)     !! rows of c_ij
     type(stage_system_t) :: stage_system
     type(spectral_radius_t) :: spectrum
     real(wp), allocatable :: t_stage(:)
     real(wp), allocatable :: y_stage(:, :)
     real(wp), allocatable :: f(:, :)
-    real(wp), allocatable :: r(:, :)                  !! right-hand side of the stage
-    real(wp), allocatable :: one(:)                   !! ones for any strip
+    real(wp), allocatable :: r(:, :)                  !! right-hand side of the stage's linear system
+    real(wp), allocatable :: one(:)                   !! ones, as long as a stage or a large tile
     real(wp), allocatable :: slope(:, :)              !! f(t, y) at the start of the step
-    logical, allocatable :: no_slope(:)               !! lanes that moved since it was evaluated
-    logical, allocatable :: no_jacobian(:)            !! lanes that moved since the Jacobian was evaluated
+    logical, allocatable :: no_slope(:)               !! lanes whose slope must be evaluated
+    logical, allocatable :: no_jacobian(:)            !! lanes whose Jacobian must be evaluated
   contains
     procedure :: prepare
     procedure :: start
@@ -43,7 +44,7 @@ module nocdyn_rosenbrock_stepper
 
 contains
 
-  !> The stepper of a table.
+  !> The stepper of a tableau.
   pure function rosenbrock_stepper(table) result(stepper)
     type(rosenbrock_table_t), intent(in) :: table
     type(rosenbrock_stepper_t) :: stepper
@@ -116,7 +117,7 @@ contains
     call count_evaluations(attempt)
   end subroutine take_step
 
-  !> f and its derivatives at the start of the step; a rejected step keeps them.
+  !> Evaluates f and its derivatives at the start of the step; after a rejected step they are kept.
   subroutine renew_derivatives(self, system, attempt)
     class(rosenbrock_stepper_t), intent(inout) :: self
     class(system_t), intent(inout) :: system
@@ -136,7 +137,7 @@ contains
     end if
   end subroutine renew_derivatives
 
-  !> (1/gamma - h J) k_i = f_i + sum c_ij k_j + gamma_i h df/dt.
+  !> Solves (1/gamma - h J) k_i = f_i + sum c_ij k_j + gamma_i h df/dt.
   subroutine solve_stage(self, attempt, stage, f)
     class(rosenbrock_stepper_t), intent(inout) :: self
     type(step_attempt_t), intent(in) :: attempt
@@ -152,6 +153,7 @@ contains
     call solve(self%stage_system, attempt, self%gamma, self%r, self%stages%k(:, :, stage))
   end subroutine solve_stage
 
+  !> r = r + gamma_sum h df/dt.
   pure subroutine add_time_derivative(lanes, components, gamma_sum, h, dfdt, r)
     integer, intent(in) :: lanes, components
     real(wp), intent(in) :: gamma_sum
@@ -174,7 +176,7 @@ contains
     call form_dense_output(self%stages, attempt, coefficients)
   end subroutine interpolate
 
-  !> Each lane that moved needs new derivatives.
+  !> Lanes whose step has been accepted need new derivatives.
   subroutine accept(self, accepted)
     class(rosenbrock_stepper_t), intent(inout) :: self
     logical, intent(in) :: accepted(:)
@@ -183,7 +185,7 @@ contains
     self%no_jacobian(:) = self%no_jacobian .or. accepted
   end subroutine accept
 
-  !> Forgets the spectra of lanes that start or begin to take these steps.
+  !> Restarts the eigenvalue estimates of lanes that start or change to this method.
   pure subroutine reset_spectra(self, starting)
     class(rosenbrock_stepper_t), intent(inout) :: self
     logical, intent(in) :: starting(:)
@@ -194,7 +196,7 @@ contains
     end do
   end subroutine reset_spectra
 
-  !> |h lambda| of the dominant eigenvalue of the Jacobian at the start of the step.
+  !> |h lambda| of the dominant eigenvalue of the Jacobian at the start of the step, by power iteration.
   function stiffness(self, attempt, lane) result(ratio)
     class(rosenbrock_stepper_t), intent(inout) :: self
     type(step_attempt_t), intent(in) :: attempt

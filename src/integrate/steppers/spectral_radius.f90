@@ -1,4 +1,4 @@
-!> Estimates of the dominant eigenvalue of the Jacobian of each lane.
+!> Estimates of the spectral radius of the Jacobian of each lane, by power iteration.
 module nocdyn_spectral_radius
   use nocdyn_kinds, only: wp
   use nocdyn_system, only: pattern_t, system_t
@@ -7,21 +7,21 @@ module nocdyn_spectral_radius
 
   public :: allocate_spectral_radius, restart_power_iteration, estimate_spectral_radius
 
-  real(wp), parameter :: start_share = 1.0e-3_wp   !! of the start in the vector: another eigenvalue may come to dominate
+  real(wp), parameter :: start_share = 1.0e-3_wp   !! of the start vector, added so that another eigenvalue can become dominant
 
-  !> A power iteration that goes on from step to step.
+  !> A power iteration that continues from step to step.
   type, public :: spectral_radius_t
-    integer, allocatable, private :: position(:)   !! of the Jacobian's entries in the rows of states
+    integer, allocatable, private :: position(:)   !! of the entries in the rows of states, among the values of the Jacobian
     integer, allocatable, private :: row(:)
     integer, allocatable, private :: column(:)
-    real(wp), allocatable, private :: vector(:, :) !! of unit length, shape [states, lanes]
-    real(wp), allocatable, private :: start(:)     !! of every iteration, of unit length, shape [states]
-    real(wp), allocatable, private :: image(:)     !! shape [states]
+    real(wp), allocatable, private :: vector(:, :) !! of unit length, [states, lanes]
+    real(wp), allocatable, private :: start(:)     !! start vector, of unit length, [states]
+    real(wp), allocatable, private :: image(:)     !! Jacobian times vector, [states]
   end type spectral_radius_t
 
 contains
 
-  !> Room for one vector of each lane.
+  !> Allocates one vector for each lane.
   subroutine allocate_spectral_radius(spectrum, system)
     type(spectral_radius_t), intent(out) :: spectrum
     class(system_t), intent(in) :: system
@@ -42,7 +42,7 @@ contains
     end do
   end subroutine allocate_spectral_radius
 
-  !> Forgets what has been found in a lane.
+  !> Restarts the iteration of a lane.
   pure subroutine restart_power_iteration(spectrum, lane)
     type(spectral_radius_t), intent(inout) :: spectrum
     integer, intent(in) :: lane
@@ -50,8 +50,8 @@ contains
     spectrum%vector(:, lane) = spectrum%start
   end subroutine restart_power_iteration
 
-  !> Size of the dominant eigenvalue, by two steps of the iteration: the mean growth over both also measures a pair of
-  !> conjugate eigenvalues.
+  !> The spectral radius by two steps of the iteration; the geometric mean of both growths is right for a pair of conjugate
+  !> eigenvalues too.
   pure subroutine estimate_spectral_radius(spectrum, lane, dfdy, size_of_eigenvalue)
     type(spectral_radius_t), intent(inout) :: spectrum
     integer, intent(in) :: lane

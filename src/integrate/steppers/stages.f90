@@ -1,32 +1,32 @@
-!> The stages of a one-step method on a block of lanes, and the sums that are formed of them.
+!> The stages of a Runge-Kutta or Rosenbrock method on a block of lanes, and their weighted sums.
 module nocdyn_stages
-  use nocdyn_stage_sums, only: stage_sum, stage_sum_t, sum_stages, padded_columns, set_offsets, large_tile
   use nocdyn_finite, only: is_finite
   use nocdyn_kinds, only: wp
+  use nocdyn_stage_sums, only: large_tile, padded_columns, set_offsets, stage_sum, stage_sum_t, sum_stages
+  use nocdyn_step_attempt, only: attempt_not_finite, disable_lane, disable_non_finite_lanes, step_attempt_t
   use nocdyn_system, only: system_t
-  use nocdyn_step_attempt, only: disable_lane, disable_non_finite_lanes, attempt_not_finite, step_attempt_t
   implicit none (type, external)
   private
 
   public :: set_tableau, share_storage, allocate_stages, stage_state, update_state, estimate_error, form_dense_output
 
   type, public :: stages_t
-    integer :: step = 0                                !! stages that a step needs
-    integer :: all = 0                                 !! those and the ones that only the solution inside the step needs
-    type(stage_sum_t), allocatable :: internal(:)       !! states that the stages are taken at, row by row
-    type(stage_sum_t) :: update                      !! weights of y_new
-    type(stage_sum_t) :: error                       !! weights of the deviation
-    type(stage_sum_t) :: low_order_error                !! weights of the coarse deviation; no terms: there is none
-    type(stage_sum_t), allocatable :: dense(:)       !! weights of each power of theta = (time - t) / h
-    integer :: k_count = 0                              !! for stages in `k`
-    integer, allocatable :: k_index(:)                   !! of each stage in `k`, [all]
-    real(wp), allocatable :: k(:, :, :)                !! the stages, shape [lanes, padded columns, places]
-    real(wp), allocatable :: zero(:)                   !! zeros for any strip
+    integer :: step = 0                            !! number of stages of a step
+    integer :: all = 0                             !! the same with the stages that only the dense output needs
+    type(stage_sum_t), allocatable :: internal(:)  !! rows of the tableau: states at which the stages are evaluated
+    type(stage_sum_t) :: update                    !! weights of y_new
+    type(stage_sum_t) :: error                     !! weights of the error estimate
+    type(stage_sum_t) :: low_order_error           !! weights of the second error estimate; no terms: there is none
+    type(stage_sum_t), allocatable :: dense(:)     !! weights of each power of theta = (time - t) / h
+    integer :: k_count = 0                         !! number of stages that `k` has room for
+    integer, allocatable :: k_index(:)             !! index in `k` of each stage, [all]
+    real(wp), allocatable :: k(:, :, :)            !! the stages, [lanes, padded columns, k_count]
+    real(wp), allocatable :: zero(:)               !! zeros, as long as a stage or a large tile
   end type stages_t
 
 contains
 
-  !> Takes over the rows of a table, without their zeros.
+  !> Sets the sums from the rows of a tableau, without the zeros.
   pure subroutine set_tableau(self, internal, update, error, dense)
     type(stages_t), intent(inout) :: self
     real(wp), intent(in) :: internal(:, :)   !! shape [all, all]
@@ -50,12 +50,12 @@ contains
     end do
   end subroutine set_tableau
 
-  !> Lets every stage take the place of one that nothing reads any more, once all weights are there: stage i is written
-  !> after its state has been formed. The first stage and the last two of the step keep their places throughout.
+  !> Lets stages share memory once all weights are set: a stage overwrites one that no later sum reads. Stage i is written after
+  !> its state has been formed. The first stage and the last two stages of a step are never overwritten.
   pure subroutine share_storage(self)
     type(stages_t), intent(inout) :: self
     integer :: last_read(self%all)   ! first stage that may overwrite each stage
-    integer :: owner(self%all)       ! stage in each place
+    integer :: owner(self%all)       ! stage at each index of `k`
     integer :: i, k_index, stage
 
     last_read = 0
@@ -89,7 +89,7 @@ contains
     end do
   end subroutine share_storage
 
-  !> Has a combination read its stages at their places.
+  !> Replaces the stages of a sum by their indices in `k`.
   pure subroutine relocate(stage_sum, k_index)
     type(stage_sum_t), intent(inout) :: stage_sum
     integer, intent(in) :: k_index(:)   !! of each stage
@@ -99,6 +99,7 @@ contains
     end associate
   end subroutine relocate
 
+  !> Raises `last_read` of the stages that a sum reads.
   pure subroutine note_reads(stage_sum, stage, last_read)
     type(stage_sum_t), intent(in) :: stage_sum
     integer, intent(in) :: stage
@@ -109,7 +110,7 @@ contains
     end associate
   end subroutine note_reads
 
-  !> Room for the stages of every lane.
+  !> Allocates the stages of every lane.
   subroutine allocate_stages(self, system)
     type(stages_t), intent(inout) :: self
     class(system_t), intent(in) :: system
@@ -127,7 +128,7 @@ contains
     end associate
   end subroutine allocate_stages
 
-  !> The state that a stage is taken at, from the stages before it; a lane where it overflows is parked.
+  !> The state at which a stage is evaluated, from the stages before it. Disables lanes where it is not finite.
   pure subroutine stage_state(self, attempt, stage, y)
     type(stages_t), intent(inout) :: self
     type(step_attempt_t), intent(inout) :: attempt
@@ -139,7 +140,7 @@ contains
     if (.not. all_finite) call disable_overflowed_lanes(self, attempt, y)
   end subroutine stage_state
 
-  !> Parks the lanes where y is not finite, at their start and with nothing in the stages that led there.
+  !> Disables the lanes where y is not finite: resets y to the start of the step and clears their stages.
   pure subroutine disable_overflowed_lanes(self, attempt, y)
     type(stages_t), intent(inout) :: self
     type(step_attempt_t), intent(inout) :: attempt
@@ -154,7 +155,7 @@ contains
     end do
   end subroutine disable_overflowed_lanes
 
-  !> y_new, once its stages are known; a lane where it overflows is parked.
+  !> Sets y_new once its stages are known. Disables lanes where it is not finite.
   pure subroutine update_state(self, attempt)
     type(stages_t), intent(in) :: self
     type(step_attempt_t), intent(inout) :: attempt
@@ -164,7 +165,7 @@ contains
     if (.not. all_finite) call disable_non_finite_lanes(attempt, attempt%y_new)
   end subroutine update_state
 
-  !> h times a sum of stages.
+  !> y = h times a sum of stages.
   pure subroutine scaled_sum(stage_sum, self, attempt, y, all_finite)
     type(stage_sum_t), intent(in) :: stage_sum
     type(stages_t), intent(in) :: self
@@ -175,8 +176,7 @@ contains
     call sum_stages(stage_sum, self%k, size(self%zero), self%zero, attempt%h_length, attempt%h_spread, y, all_finite)
   end subroutine scaled_sum
 
-  !> The deviations of y_new from the embedded solutions, once all stages of the step are known; a lane where one overflows
-  !> is parked.
+  !> Sets the error estimates once all stages of the step are known. Disables lanes where one is not finite.
   pure subroutine estimate_error(self, attempt)
     type(stages_t), intent(in) :: self
     type(step_attempt_t), intent(inout) :: attempt
@@ -189,7 +189,7 @@ contains
     if (.not. all_finite) call disable_non_finite_lanes(attempt, attempt%low_order_estimate)
   end subroutine estimate_error
 
-  !> The solution inside the last step: y + sum over p of coefficients(:, :, p) theta^p, in the columns that are of interest.
+  !> Dense output of the last step: y + sum over p of coefficients(:, :, p) theta^p, in the columns first_dense to last_dense.
   pure subroutine form_dense_output(self, attempt, coefficients)
     type(stages_t), intent(in) :: self
     type(step_attempt_t), intent(in) :: attempt

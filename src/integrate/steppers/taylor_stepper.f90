@@ -1,39 +1,39 @@
-!> Steps along the Taylor series of the solution, of one order throughout.
+!> Steps by the Taylor series of the solution, of a constant order p.
 !>
-!> A step is as long as the last two coefficients allow: h is the smaller of ||y_j||^(-1/j), j = p - 1 and p, with the
-!> largest |y_j| / (atol + rtol |y|) of the states as norm: the terms h^j y_j do not exceed the tolerance. No step is judged
-!> after it has been taken. With p = 1 - ln(tol) / 2 that is the step rho / e^2 of A. Jorba, M. Zou, A software package for
-!> the numerical integration of ODEs by means of high-order Taylor methods, Experimental Mathematics 14 (2005) 99-117,
-!> who take the work for proportional to p^2. Here it grows more slowly, as long as p is small, and the order is higher.
+!> The last two coefficients limit the step size: h is the smaller of ||y_j||^(-1/j), j = p - 1 and p, where the norm is the
+!> largest |y_j| / (atol + rtol |y|) of the states. The terms h^j y_j are then within the tolerance, and there is no error test
+!> after a step. With p = 1 - ln(tol) / 2 this is the step rho / e^2 of A. Jorba, M. Zou, A software package for the numerical
+!> integration of ODEs by means of high-order Taylor methods, Experimental Mathematics 14 (2005) 99-117. They assume that the
+!> work grows as p^2. Here it grows more slowly at small p, and the order is higher.
 module nocdyn_taylor_stepper
-  use nocdyn_stage_sums, only: padded_columns, width
   use nocdyn_finite, only: all_finite, is_finite
   use nocdyn_kinds, only: wp
   use nocdyn_masks, only: all_true, any_differs
+  use nocdyn_observer, only: observer_t, step_block_t
+  use nocdyn_stage_sums, only: padded_columns, width
+  use nocdyn_step_attempt, only: attempt_not_finite, attempt_ok, attempt_recoverable, disable_lane, disable_non_finite_lanes, &
+    step_attempt_t
   use nocdyn_step_control, only: any_too_small, smallest_step, step_control_t
   use nocdyn_stepper, only: stepper_t
-  use nocdyn_observer, only: observer_t, step_block_t
   use nocdyn_system, only: evaluation_ok, system_t
-  use nocdyn_step_attempt, only: disable_lane, disable_non_finite_lanes, attempt_ok, attempt_not_finite, attempt_recoverable, &
-                                 step_attempt_t
   use nocdyn_vector_functions, only: exp2s, log2s
   implicit none (type, external)
   private
 
   public :: taylor_stepper
 
-  real(wp), parameter :: order_offset = 3.0_wp, order_slope = 0.7_wp   !! of the order over -ln(tolerance), by measurement
+  real(wp), parameter :: order_offset = 3.0_wp, order_slope = 0.7_wp   !! order as a function of -ln(rtol), measured
 
-  integer, parameter :: long = 32   !! numbers that are added up together in blocks of many lanes
+  integer, parameter :: long = 32   !! numbers summed together in blocks of many lanes
 
   type, extends(stepper_t), public :: taylor_stepper_t
     private
     real(wp), allocatable :: series(:, :, :)   !! y_0, y_1, ... of each lane, [lanes, padded columns, 0:order]
-    real(wp), allocatable :: last_norm(:)           !! norms of the last coefficients and then their steps, [lanes]
+    real(wp), allocatable :: last_norm(:)      !! norms of the last coefficients, then the step sizes, [lanes]
     real(wp), allocatable :: previous_norm(:)
-    logical, allocatable :: moved(:)           !! lanes that have moved since they were expanded
-    integer, allocatable :: step_status(:)         !! trial_... on the series of each lane
-    integer, allocatable :: component(:)         !! component that the verdict is due to, 0 if there is none
+    logical, allocatable :: moved(:)           !! lanes that need a new series
+    integer, allocatable :: step_status(:)     !! attempt_... of the series of each lane
+    integer, allocatable :: component(:)       !! component that caused the status, 0 if none did
     integer, allocatable :: infinite(:)        !! first component whose new series is not finite, 0 if all are
   contains
     procedure :: choose_steps
@@ -47,7 +47,7 @@ module nocdyn_taylor_stepper
 
 contains
 
-  !> The stepper whose order suits a tolerance, or of a given order.
+  !> The stepper with the best order for a tolerance, or with a given order.
   pure function taylor_stepper(rtol, order) result(stepper)
     real(wp), intent(in) :: rtol
     integer, intent(in), optional :: order   !! at least 2
@@ -86,7 +86,7 @@ contains
     call mark_moved(size(starting), starting, self%moved)
   end subroutine start
 
-  !> Expands the lanes that have moved and sets their steps; a lane that cannot be expanded is parked by `attempt`.
+  !> Computes the series of the lanes that have moved, and their step sizes. `take_step` disables the lanes where that fails.
   subroutine choose_steps(self, system, attempt, control)
     class(taylor_stepper_t), intent(inout) :: self
     class(system_t), intent(inout) :: system
@@ -100,7 +100,7 @@ contains
     end if
     self%series(:, :, 0) = attempt%y
     call system%series(self%order, size(self%series, 2), attempt%t, self%series, attempt%rhs_status)
-    ! what is infinite between these coefficients alone shows up in y_new
+    ! infinities in the other coefficients alone are found in y_new
     are_finite = all_finite(2 * attempt%length, self%series) .and. all_finite(2 * attempt%length, self%series(1, 1, &
                                                                                                               self%order - 1))
     if (.not. are_finite) call clear_infinities(self)
@@ -118,7 +118,7 @@ contains
     attempt%rhs_status(:) = evaluation_ok
   end subroutine choose_steps
 
-  !> Where all lanes have moved and have good series.
+  !> Sets the step sizes where all lanes have moved and have finite series.
   pure subroutine take_all_steps(lanes, steps, moved, step_status, component, evaluations, h)
     integer, intent(in) :: lanes
     real(wp), intent(in) :: steps(lanes)
@@ -133,7 +133,7 @@ contains
     h = steps
   end subroutine take_all_steps
 
-  !> The verdicts on the lanes that have moved, and the steps of those with good series.
+  !> Sets the status of the lanes that have moved, and the step sizes of those with finite series.
   subroutine take_steps(self, attempt, control)
     class(taylor_stepper_t), intent(inout) :: self
     type(step_attempt_t), intent(inout) :: attempt
@@ -162,7 +162,7 @@ contains
     self%infinite(:) = 0
   end subroutine take_steps
 
-  !> Clears series that are not finite, and notes the first component that is to blame for it.
+  !> Clears series that are not finite, and stores the first component that is not.
   subroutine clear_infinities(self)
     class(taylor_stepper_t), intent(inout) :: self
     integer :: component, lane
@@ -177,8 +177,8 @@ contains
     end do
   end subroutine clear_infinities
 
-  !> Largest |y_j| / (atol + rtol |y|) of the states of each lane, for the last two coefficients; no less than a number whose
-  !> logarithm is finite.
+  !> The norm of the last two coefficients of each lane: the largest |y_j| / (atol + rtol |y|) of the states, at least 1e-300 so
+  !> that its logarithm is finite.
   pure subroutine measure(lanes, states, columns, rtol, atol, y, y_j, last_norm, previous_norm)
     integer, intent(in) :: lanes, states, columns
     real(wp), intent(in) :: rtol, atol
@@ -207,7 +207,7 @@ contains
     end if
   end subroutine measure
 
-  !> Replaces the norms of the last coefficients by the steps that both pairs allow.
+  !> Replaces the norms `last_norm` by the step sizes that both norms allow.
   pure subroutine find_steps(lanes, order, last_norm, previous_norm)
     integer, intent(in) :: lanes, order
     real(wp), intent(inout) :: last_norm(lanes), previous_norm(lanes)
@@ -224,7 +224,7 @@ contains
     call exp2s(lanes, last_norm)
   end subroutine find_steps
 
-  !> The sum of the series at the end of the step.
+  !> Sums the series at the end of the step.
   subroutine take_step(self, system, attempt)
     class(taylor_stepper_t), intent(inout) :: self
     class(system_t), intent(inout) :: system
@@ -244,7 +244,7 @@ contains
   pure subroutine sum_series(n, order, series, h_length, h, y)
     integer, intent(in) :: n          !! whole vectors
     integer, intent(in) :: order
-    integer, intent(in) :: h_length   !! n, or less if h serves all vectors alike
+    integer, intent(in) :: h_length   !! n, or less if all vectors have the same h
     real(wp), intent(in) :: series(n, 0:order), h(h_length)
     real(wp), intent(inout) :: y(n)
     real(wp) :: sum(width)
@@ -264,7 +264,7 @@ contains
     end do
   end subroutine sum_series
 
-  !> The same, for so many numbers at a time that a processor need not wait for a sum.
+  !> The same for `long` numbers at a time, so that the processor does not wait for a sum.
   pure subroutine sum_long_vectors(n, order, series, h, y)
     integer, intent(in) :: n   !! a multiple of `long`
     integer, intent(in) :: order
@@ -282,7 +282,7 @@ contains
     end do
   end subroutine sum_long_vectors
 
-  !> The series itself, in powers of theta.
+  !> Dense output: the series in powers of theta.
   subroutine interpolate(self, system, attempt, wanted, coefficients)
     class(taylor_stepper_t), intent(inout) :: self
     class(system_t), intent(inout) :: system
@@ -297,7 +297,7 @@ contains
   pure subroutine scale_series(n, order, series, h_length, h, c)
     integer, intent(in) :: n          !! whole vectors
     integer, intent(in) :: order
-    integer, intent(in) :: h_length   !! n, or less if h serves all vectors alike
+    integer, intent(in) :: h_length   !! n, or less if all vectors have the same h
     real(wp), intent(in) :: series(n, 0:order), h(h_length)
     real(wp), intent(inout) :: c(n, order)
     real(wp) :: power(width)
@@ -320,6 +320,7 @@ contains
     call mark_moved(size(accepted), accepted, self%moved)
   end subroutine accept
 
+  !> Marks the lanes in `moving` as moved.
   pure subroutine mark_moved(lanes, moving, moved)
     integer, intent(in) :: lanes
     logical, intent(in) :: moving(lanes)
@@ -328,7 +329,7 @@ contains
     moved = merge(.true., moved, moving)
   end subroutine mark_moved
 
-  !> The series as it is, in powers of the time.
+  !> Passes the series itself, in powers of the time, to the observer.
   subroutine pass_steps(self, steps, attempt, coefficients, observer)
     class(taylor_stepper_t), intent(in) :: self
     type(step_block_t), intent(inout) :: steps
