@@ -39,7 +39,7 @@ module nocdyn_observer
     real(wp), allocatable :: t(:)           !! start [s]
     real(wp), allocatable :: h(:)           !! step size [s]: theta = (time - t) / h
     real(wp), allocatable :: scale(:)       !! the solution is a polynomial in scale * theta: scale is 1 or h
-    real(wp), allocatable :: theta_end(:)   !! end: 1, or less where the step was cut
+    real(wp), allocatable :: theta_end(:)   !! end of the step: 1, or less where it was cut
     real(wp), allocatable :: t_new(:)       !! end [s]
   end type step_block_t
 

@@ -1,4 +1,4 @@
-!> Switching: steps end where an indicator function falls through zero; there the system changes its branch.
+!> Switching of branches. Steps end where an indicator function falls through zero; there the system changes its branch.
 module nocdyn_switching
   use nocdyn_dense_output, only: dense_output_t
   use nocdyn_finite, only: is_finite

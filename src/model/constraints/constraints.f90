@@ -85,7 +85,7 @@ contains
   !> Coefficients of a body and of the other body, in a row of two bodies.
   pure subroutine pair_coefficients(self, lane, row, body, own, other)
     class(constraints_t), intent(in) :: self
-    integer, intent(in) :: lane, row, body   !! body: one of the two
+    integer, intent(in) :: lane, row, body   !! `body` is one of the two
     real(wp), intent(out) :: own, other      !! coefficients of `body` and of the other body
 
     associate (first => self%first(row))

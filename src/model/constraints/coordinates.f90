@@ -119,7 +119,7 @@ contains
   !> Allocates the entries: every body has one for each coordinate of its group.
   subroutine lay_out_entries(groups, coordinate_of, bodies, lanes, self)
     type(geared_group_t), intent(in) :: groups(:)
-    integer, intent(in) :: coordinate_of(:), bodies, lanes   !! coordinate_of: as in `number_coordinates`
+    integer, intent(in) :: coordinate_of(:), bodies, lanes   !! `coordinate_of` as in `number_coordinates`
     type(coordinates_t), intent(inout) :: self
     integer :: group_of(bodies)
     integer :: b, g

@@ -136,7 +136,7 @@ contains
   !> Sets the inverse of the core of a group.
   pure subroutine set_core(self, group, lane, dual)
     class(reaction_solver_t), intent(inout) :: self
-    integer, intent(in) :: group, lane   !! group: number in the machine
+    integer, intent(in) :: group, lane   !! `group` is its number in the machine
     real(wp), intent(in) :: dual(:, :)   !! D of the core, [core_trains, core]
 
     if (self%group_index(group) > 0) self%groups(self%group_index(group))%dual(:, :, lane) = dual

@@ -374,7 +374,7 @@ contains
     end associate
   end subroutine jacobian
 
-  !> Positions: those of the coordinates and work integrals, then those of the internal states.
+  !> Positions, those of the coordinates and work integrals, then those of the internal states.
   function jacobian_pattern(self) result(pattern)
     class(reduced_t), intent(in) :: self
     type(pattern_t) :: pattern

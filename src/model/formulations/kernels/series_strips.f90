@@ -54,7 +54,7 @@ contains
   !> Computes u' and w = u - rest of the elements at the start.
   pure subroutine begin_strip(l, lanes, freedoms, elements, order, entries, first, column, ratio, q_rate, q, start_twist, rest, &
                               speed, angle)
-    integer, intent(in) :: l, lanes, freedoms, elements, order, entries   !! l: first lane of the strip
+    integer, intent(in) :: l, lanes, freedoms, elements, order, entries   !! `l` is the first lane of the strip
     integer, intent(in) :: first(elements + 1), column(entries)   !! first entry of each element and coordinate of each entry of U
     real(wp), intent(in) :: ratio(strip, entries)   !! of the entries of U
     real(wp), intent(in) :: q_rate(strip, freedoms), q(lanes, freedoms)   !! q', q
@@ -85,7 +85,7 @@ contains
   pure subroutine expand_strip(l, lanes, freedoms, elements, order, is_time_only, has_angle, has_cubic, has_square, entries, &
                                first, column, ratio, responses, first_response, element, response, law, external, speed, &
                                angle, square, restoring, moment, q, columns, y)
-    integer, intent(in) :: l, lanes, freedoms, elements, order   !! l: first lane of the strip
+    integer, intent(in) :: l, lanes, freedoms, elements, order   !! `l` is the first lane of the strip
     logical, intent(in), dimension(elements) :: is_time_only, has_angle, has_cubic, has_square   !! as in `lane_terms_t`
     integer, intent(in) :: entries, first(elements + 1), column(entries)   !! of U
     real(wp), intent(in) :: ratio(strip, entries)   !! of the entries of U
