@@ -59,7 +59,7 @@ contains
     do k = 1, size(equilibria)
       y = [equilibria(k)%y(1, :), (0.0_wp, i=1, size(self%work_elements))]
       call table%fill(t_infinity, y, row)
-      call table%formulation%machine%power(watts)
+      call table%columns%formulation%machine%power(watts)
       self%values(:, k) = row(reported)
       self%power(:, k) = watts(1, :)
     end do

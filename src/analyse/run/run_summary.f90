@@ -5,7 +5,7 @@ module nocdyn_run_summary
   use nocdyn_json, only: json_t
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
-  use nocdyn_machine_report, only: coordinate_names, constraint_count
+  use nocdyn_machine_report, only: coordinate_names, constraint_count, machine_notes
   use nocdyn_solver_status, only: max_switch_times, solver_status_t
   use nocdyn_run_settings, only: put_settings
   use nocdyn_observer, only: ranges_t
@@ -14,7 +14,7 @@ module nocdyn_run_summary
   implicit none (type, external)
   private
 
-  public :: start_extremes, update_extremes, widen_extremes, check_energy_balance, summary_json
+  public :: start_extremes, update_extremes, widen_extremes, describe_machine, check_energy_balance, summary_json
 
   !> A note is made of an energy residual above this share of the energy turned over: the motion is then not to be trusted.
   real(wp), parameter :: energy_error_limit = 0.01_wp
@@ -32,9 +32,12 @@ module nocdyn_run_summary
   end type extremes_t
 
   type, public :: run_summary_t
+    logical :: has_run = .false.                    !! whether the input was integrated
     character(len=11) :: status = 'done'            !! done, failed, interrupted
     character(len=:), allocatable :: message        !! why, if it is not done
-    type(string_t), allocatable :: notes(:)         !! what is worth knowing of the machine
+    integer :: bodies = 0, gears = 0, constraints = 0, freedoms = 0   !! of the machine
+    type(string_t), allocatable :: coordinates(:)   !! names of the independent bodies
+    type(string_t), allocatable :: notes(:)         !! on the machine and the run, one sentence each
     type(string_t), allocatable :: labels(:)        !! of the columns
     type(extremes_t) :: extremes
     character(len=:), allocatable :: method         !! that integrated
@@ -96,6 +99,19 @@ contains
     extremes%are_continuous = .true.
   end subroutine widen_extremes
 
+  !> Takes what the summary says of the machine.
+  subroutine describe_machine(machine, summary)
+    type(machine_t), intent(in) :: machine
+    type(run_summary_t), intent(inout) :: summary
+
+    summary%bodies = machine%bodies
+    summary%gears = constraint_count(machine, 'gear')
+    summary%constraints = machine%constraints%rows()
+    summary%freedoms = machine%coordinates%freedoms
+    allocate (summary%coordinates, source=coordinate_names(machine))
+    allocate (summary%notes, source=machine_notes(machine))
+  end subroutine describe_machine
+
   !> Adds a note if the energy audit does not close. The last five columns are the energies, the residual last.
   subroutine check_energy_balance(extremes, notes)
     type(extremes_t), intent(in) :: extremes
@@ -111,10 +127,9 @@ contains
                        ' J where at most ' // rounded_text(turned_over, 3) // ' J were turned over; tighten rtol and atol')
   end subroutine check_energy_balance
 
-  !> The text of summary.json; `input` and `machine` are those of the run.
-  function summary_json(input, machine, summary) result(text)
+  !> The text of summary.json.
+  function summary_json(input, summary) result(text)
     type(input_t), intent(in) :: input
-    type(machine_t), intent(in) :: machine
     type(run_summary_t), intent(in) :: summary
     character(len=:), allocatable :: text
     type(json_t) :: json
@@ -129,7 +144,7 @@ contains
     call json%put('input', input%file)
     about = input%single('case')
     call json%put('title', about%text('title'))
-    call put_machine(json, machine, summary)
+    call put_machine(json, summary)
     call put_settings(json, input%single('run'))
     call put_counts(json, summary)
     call put_method(json, summary)
@@ -139,17 +154,16 @@ contains
     text = json%text()
   end function summary_json
 
-  subroutine put_machine(json, machine, summary)
+  subroutine put_machine(json, summary)
     type(json_t), intent(inout) :: json
-    type(machine_t), intent(in) :: machine
     type(run_summary_t), intent(in) :: summary
 
     call json%open('machine')
-    call json%put('bodies', machine%bodies)
-    call json%put('gears', constraint_count(machine, 'gear'))
-    call json%put('constraints', machine%constraints%rows())
-    call json%put('degrees_of_freedom', machine%coordinates%freedoms)
-    call json%put('independent', coordinate_names(machine))
+    call json%put('bodies', summary%bodies)
+    call json%put('gears', summary%gears)
+    call json%put('constraints', summary%constraints)
+    call json%put('degrees_of_freedom', summary%freedoms)
+    call json%put('independent', summary%coordinates)
     call json%put('notes', summary%notes)
     call json%close()
   end subroutine put_machine

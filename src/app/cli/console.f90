@@ -5,7 +5,6 @@ module nocdyn_console
   use nocdyn_kinds, only: wp
   use nocdyn_posix, only: is_terminal, standard_error, standard_output, write_bytes
   use nocdyn_text, only: to_text
-  use nocdyn_transient, only: progress_t
   implicit none (type, external)
   private
 
@@ -31,7 +30,7 @@ module nocdyn_console
   end type status_line_t
 
   !> How far a run has come.
-  type, extends(progress_t), public :: console_progress_t
+  type, public :: console_progress_t
     character(len=:), allocatable, private :: title
     type(status_line_t), private :: line
   contains

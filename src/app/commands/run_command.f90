@@ -1,16 +1,16 @@
 !> nocdyn run: integrates machines and writes their results. Files with errors do not stop the others.
 module nocdyn_run_command
   use nocdyn_arguments, only: arguments_t
-  use nocdyn_console, only: report_error, console_progress_t, new_console_progress, print_text
+  use nocdyn_console, only: print_text, report_error
   use nocdyn_errors, only: error_t, exit_done, exit_failed, raise
   use nocdyn_input, only: input_t
   use nocdyn_input_reader, only: read_input
   use nocdyn_posix, only: is_interrupted, catch_interrupts
   use nocdyn_result_folders, only: refuse_shared_folders, refuse_sweep_folder, result_folder
+  use nocdyn_run_files, only: partial_file, run_to_files
   use nocdyn_run_summary, only: run_summary_t
   use nocdyn_summary_table, only: method_line, summary_line, summary_table
   use nocdyn_text, only: string_t, to_text
-  use nocdyn_transient, only: partial_file, run_transient
   implicit none (type, external)
   private
 
@@ -62,14 +62,11 @@ contains
     type(input_t), intent(in) :: input
     character(len=*), intent(in) :: folder
     integer, intent(inout) :: code
-    type(console_progress_t) :: progress
     type(run_summary_t) :: summary
     type(error_t), allocatable :: error
     integer :: i
 
-    progress = new_console_progress(input%file, arguments%is_given('--quiet'))
-    call run_transient(input, folder, progress, summary, error)
-    call progress%clear()
+    call run_to_files(input, folder, input%file, arguments%is_given('--quiet'), summary, error)
     if (allocated(error)) then
       if (error%code == exit_failed) error%message = input%file // ': ' // error%message // '; the rows up to there are in ' // &
                                                      folder // '/' // partial_file

@@ -1,7 +1,7 @@
 !> The files that a finished sweep leaves, and what is printed of it.
 module nocdyn_sweep_results
   use, intrinsic :: iso_fortran_env, only: int64
-  use nocdyn_console, only: report_error, console_progress_t, new_console_progress, print_text
+  use nocdyn_console, only: print_text, report_error
   use nocdyn_errors, only: error_t, exit_done, exit_failed, raise
   use nocdyn_folders, only: folder_names, remove_empty_folder
   use nocdyn_input, only: input_t
@@ -11,6 +11,7 @@ module nocdyn_sweep_results
   use nocdyn_order_statistics, only: find_order_statistics
   use nocdyn_output_file, only: write_file
   use nocdyn_posix, only: is_interrupted, remove_file
+  use nocdyn_run_files, only: input_file, partial_file, run_to_files, summary_file, trajectory_file
   use nocdyn_run_summary, only: run_summary_t
   use nocdyn_sweep_chunk, only: chunk_t, status_refused
   use nocdyn_sweep_netcdf, only: write_sweep_netcdf
@@ -21,7 +22,6 @@ module nocdyn_sweep_results
   use nocdyn_sweep_csv, only: sweep_csv_name, write_sweep_csv
   use nocdyn_targets, only: set_targets
   use nocdyn_text, only: string_t, to_text
-  use nocdyn_transient, only: input_file, partial_file, run_transient, summary_file, trajectory_file
   implicit none (type, external)
   private
 
@@ -168,7 +168,8 @@ contains
           refused = [refused, variant]
           cycle
         end if
-        call run_variant(without_sweep(input), folder // '/' // variant_folder // to_text(variant), options, summary, error)
+        call run_to_files(without_sweep(input), folder // '/' // variant_folder // to_text(variant), &
+                          folder // '/' // variant_folder // to_text(variant), options%is_quiet, summary, error)
       end associate
       if (is_interrupted()) then
         call raise(error, exit_failed, plan%input%file // ': interrupted while trajectories were written; --resume goes on')
@@ -201,18 +202,5 @@ contains
     end do
     error stop 'nocdyn_sweep_results: the trajectory of a variant is asked for that no journal holds'
   end subroutine find_values
-
-  subroutine run_variant(input, folder, options, summary, error)
-    type(input_t), intent(in) :: input
-    character(len=*), intent(in) :: folder
-    type(results_options_t), intent(in) :: options
-    type(run_summary_t), intent(out) :: summary
-    type(error_t), allocatable, intent(out) :: error
-    type(console_progress_t), target :: progress
-
-    progress = new_console_progress(folder, options%is_quiet)
-    call run_transient(input, folder, progress, summary, error)
-    call progress%clear()
-  end subroutine run_variant
 
 end module nocdyn_sweep_results

@@ -1,4 +1,4 @@
-!> Some columns of the trajectory table, for all lanes of a block.
+!> The values of columns of the trajectory table, for all lanes of a block.
 module nocdyn_recorded_columns
   use nocdyn_formulation, only: formulation_t
   use nocdyn_kinds, only: wp
@@ -11,15 +11,15 @@ module nocdyn_recorded_columns
 
   public :: new_recorded_columns
 
-  !> Keeps a formulation of its own, so that a running integration is not disturbed. Once a lane has been copied into it, it
-  !> must stay where it is.
+  !> Evaluates a copy of the formulation, because `observe` chooses branches: those of the integration must not change. After
+  !> `copy_lane` it must not be moved in memory.
   type, public :: recorded_columns_t
     class(formulation_t), allocatable :: formulation
     type(column_t), allocatable, private :: columns(:)
-    type(lane_parameters_t), private :: parameters             !! of `formulation`, once a lane has been copied
+    type(lane_parameters_t), private :: parameters       !! of `formulation`; empty before `copy_lane`
     logical, private :: have_reactions = .false., have_energies = .false.
-    real(wp), allocatable, private :: values(:)          !! of one quantity of a bank, work space
-    real(wp), allocatable, private :: lambda(:)          !! multipliers, work space
+    real(wp), allocatable, private :: values(:)          !! of one quantity of a bank; work space
+    real(wp), allocatable, private :: lambda(:)          !! multipliers of the constraint rows; work space
     logical, allocatable, private :: is_source(:)        !! whether a work counts as put in, [quadratures]
     real(wp), allocatable, private :: start_energy(:)    !! [J], [lanes]
   contains
@@ -27,12 +27,13 @@ module nocdyn_recorded_columns
     procedure :: start_lane
     procedure :: observe
     procedure :: fill_row
+    procedure :: kinetic_energy
   end type recorded_columns_t
 
 contains
 
   function new_recorded_columns(formulation, columns) result(self)
-    class(formulation_t), intent(in) :: formulation   !! audited if there are works among the columns
+    class(formulation_t), intent(in) :: formulation   !! with work integrals if a column needs them
     type(column_t), intent(in) :: columns(:)
     type(recorded_columns_t) :: self
     integer :: i
@@ -52,11 +53,11 @@ contains
     allocate (self%start_energy(formulation%lanes), source=0.0_wp)
   end function new_recorded_columns
 
-  !> Gives a lane the numbers that it has in the formulation which is integrated.
+  !> Copies the parameters of a lane from the formulation that is integrated.
   subroutine copy_lane(self, lane, parameters)
     class(recorded_columns_t), target, intent(inout) :: self
     integer, intent(in) :: lane
-    type(lane_parameters_t), intent(in) :: parameters
+    type(lane_parameters_t), intent(in) :: parameters   !! of that formulation
 
     select type (formulation => self%formulation)
     class is (reduced_t)
@@ -66,18 +67,18 @@ contains
     call self%formulation%refresh_lane(lane)
   end subroutine copy_lane
 
-  !> Takes the energy of a lane at its start, after `observe`.
+  !> Stores the energy of a lane at its start, after `observe` there.
   subroutine start_lane(self, lane)
     class(recorded_columns_t), intent(inout) :: self
     integer, intent(in) :: lane
 
-    if (self%have_energies) self%start_energy(lane) = kinetic_energy(self, lane) + elastic_energy(self, lane)
+    if (self%have_energies) self%start_energy(lane) = self%kinetic_energy(lane) + elastic_energy(self, lane)
   end subroutine start_lane
 
-  !> Brings all lanes to a time and state.
+  !> Evaluates the machine of all lanes at a time and state.
   subroutine observe(self, t, y)
     class(recorded_columns_t), intent(inout) :: self
-    real(wp), contiguous, intent(in) :: t(:)
+    real(wp), contiguous, intent(in) :: t(:)      !! [s], [lanes]
     real(wp), contiguous, intent(in) :: y(:, :)   !! [lanes, states + quadratures]
 
     call self%formulation%observe(t, y)
@@ -88,9 +89,9 @@ contains
   subroutine fill_row(self, lane, t, y, row)
     class(recorded_columns_t), intent(inout) :: self
     integer, intent(in) :: lane
-    real(wp), contiguous, intent(in) :: t(:)
-    real(wp), contiguous, intent(in) :: y(:, :)
-    real(wp), intent(inout) :: row(:)   !! [columns]
+    real(wp), contiguous, intent(in) :: t(:)      !! [s], [lanes]
+    real(wp), contiguous, intent(in) :: y(:, :)   !! [lanes, states + quadratures]
+    real(wp), intent(inout) :: row(:)             !! [columns]
     integer :: bank, i, quantity
 
     if (self%have_reactions) call self%formulation%reactions(lane, self%lambda)
@@ -127,7 +128,7 @@ contains
     end associate
   end subroutine fill_row
 
-  !> Of a column of the whole machine [J].
+  !> The value of an energy or work column of one lane [J].
   real(wp) function energy(self, lane, kind, y)
     type(recorded_columns_t), intent(in) :: self
     integer, intent(in) :: lane, kind
@@ -136,37 +137,39 @@ contains
     energy = 0.0_wp
     select case (kind)
     case (column_kinetic)
-      energy = kinetic_energy(self, lane)
+      energy = self%kinetic_energy(lane)
     case (column_elastic)
       energy = elastic_energy(self, lane)
     case (column_work_in)
       energy = work(self, lane, .true., y)
     case (column_work_out)
-      energy = -work(self, lane, .false., y)
+      energy = 0.0_wp - work(self, lane, .false., y)   ! not -0 without any work
     case (column_residual)
-      energy = (kinetic_energy(self, lane) + elastic_energy(self, lane) - self%start_energy(lane)) &
+      energy = (self%kinetic_energy(lane) + elastic_energy(self, lane) - self%start_energy(lane)) &
                - (work(self, lane, .true., y) + work(self, lane, .false., y))
     case default
       error stop 'nocdyn_recorded_columns: there is no such column'
     end select
   end function energy
 
-  real(wp) function kinetic_energy(self, lane)
-    type(recorded_columns_t), intent(in) :: self
+  !> The kinetic energy of a lane after `observe` [J].
+  pure real(wp) function kinetic_energy(self, lane)
+    class(recorded_columns_t), intent(in) :: self
     integer, intent(in) :: lane
 
     kinetic_energy = self%formulation%machine%kinetic_energy(lane, self%formulation%omega(lane, 1:))
   end function kinetic_energy
 
-  real(wp) function elastic_energy(self, lane)
+  !> The potential energy of a lane [J].
+  pure real(wp) function elastic_energy(self, lane)
     type(recorded_columns_t), intent(in) :: self
     integer, intent(in) :: lane
 
     elastic_energy = sum(self%formulation%machine%elements%stored(lane, :))
   end function elastic_energy
 
-  !> Of the sources or of the others, positive into the machine.
-  real(wp) function work(self, lane, of_sources, y)
+  !> The integrated work of the sources, or of all other elements, positive into the machine [J].
+  pure real(wp) function work(self, lane, of_sources, y)
     type(recorded_columns_t), intent(in) :: self
     integer, intent(in) :: lane
     logical, intent(in) :: of_sources

@@ -1,0 +1,128 @@
+!> The files that a run leaves: trajectory.csv, summary.json and input.nml.
+module nocdyn_run_files
+  use nocdyn_console, only: console_progress_t, new_console_progress
+  use nocdyn_csv, only: write_header, write_row
+  use nocdyn_errors, only: error_t
+  use nocdyn_input, only: input_t
+  use nocdyn_input_text, only: input_text
+  use nocdyn_kinds, only: wp
+  use nocdyn_output_file, only: output_file_t
+  use nocdyn_posix, only: is_interrupted, remove_file
+  use nocdyn_run_output, only: run_output_t
+  use nocdyn_run_summary, only: run_summary_t, summary_json
+  use nocdyn_text, only: string_t
+  use nocdyn_transient, only: run_transient
+  implicit none (type, external)
+  private
+
+  public :: run_to_files
+
+  character(len=*), parameter, public :: trajectory_file = 'trajectory.csv', partial_file = 'trajectory.partial.csv'
+  character(len=*), parameter, public :: summary_file = 'summary.json', input_file = 'input.nml'
+
+  !> Writes the rows while the run is integrated.
+  type, extends(run_output_t) :: trajectory_writer_t
+    character(len=:), allocatable :: folder
+    type(output_file_t) :: file
+    type(console_progress_t) :: progress
+    logical :: has_started = .false.   !! whether there is a file
+  contains
+    procedure :: start
+    procedure :: write_row => write_trajectory_row
+    procedure :: wants_stop
+  end type trajectory_writer_t
+
+contains
+
+  !> Runs an input and writes its results to `folder`. A run that fails leaves trajectory.partial.csv instead of trajectory.csv.
+  subroutine run_to_files(input, folder, title, is_quiet, summary, error)
+    type(input_t), intent(in) :: input
+    character(len=*), intent(in) :: folder
+    character(len=*), intent(in) :: title         !! of the progress line
+    logical, intent(in) :: is_quiet               !! whether there is no progress line
+    type(run_summary_t), intent(out) :: summary
+    type(error_t), allocatable, intent(out) :: error
+    type(trajectory_writer_t), target :: writer
+    type(error_t), allocatable :: write_error
+
+    writer%folder = folder
+    writer%progress = new_console_progress(title, is_quiet)
+    call run_transient(input, writer, summary, error)
+    if (summary%has_run) then
+      call write_results(input, summary, writer, write_error)
+      if (allocated(write_error)) call move_alloc(write_error, error)
+    else if (writer%has_started) then
+      call writer%file%discard()
+    end if
+    call writer%progress%clear()
+  end subroutine run_to_files
+
+  !> Gives the three files their names once all are written: if the disk is full, the results of an earlier run stay.
+  subroutine write_results(input, summary, writer, error)
+    type(input_t), intent(in) :: input
+    type(run_summary_t), intent(in) :: summary
+    type(trajectory_writer_t), intent(inout) :: writer
+    type(error_t), allocatable, intent(out) :: error
+    type(output_file_t) :: input_copy, report
+
+    call input_copy%open(writer%folder, input_file)
+    call input_copy%put(input_text(input))
+    call report%open(writer%folder, summary_file)
+    call report%put(summary_json(input, summary))
+    call writer%file%complete(trajectory_file, error)
+    if (.not. allocated(error)) call input_copy%complete(input_file, error)
+    if (.not. allocated(error)) call report%complete(summary_file, error)
+    if (.not. allocated(error)) call name_files(writer, summary%status == 'done', input_copy, report, error)
+    if (.not. allocated(error)) return
+    call writer%file%discard()
+    call input_copy%discard()
+    call report%discard()
+  end subroutine write_results
+
+  !> Removes the trajectory of an earlier run that ended otherwise. summary.json goes first and comes last: without it there are
+  !> no results, if a file in between cannot take its name.
+  subroutine name_files(writer, is_done, input_copy, report, error)
+    type(trajectory_writer_t), intent(inout) :: writer
+    logical, intent(in) :: is_done   !! whether the run has reached its end
+    type(output_file_t), intent(inout) :: input_copy, report
+    type(error_t), allocatable, intent(out) :: error
+
+    call remove_file(writer%folder // '/' // summary_file)
+    if (is_done) then
+      call remove_file(writer%folder // '/' // partial_file)
+      call writer%file%finish(trajectory_file, error)
+    else
+      call remove_file(writer%folder // '/' // trajectory_file)
+      call writer%file%finish(partial_file, error)
+    end if
+    if (.not. allocated(error)) call input_copy%finish(input_file, error)
+    if (.not. allocated(error)) call report%finish(summary_file, error)
+  end subroutine name_files
+
+  subroutine start(self, labels)
+    class(trajectory_writer_t), intent(inout) :: self
+    type(string_t), intent(in) :: labels(:)
+
+    call self%file%open(self%folder, trajectory_file)
+    call write_header(self%file, labels)
+    self%has_started = .true.
+  end subroutine start
+
+  subroutine write_trajectory_row(self, row)
+    class(trajectory_writer_t), intent(inout) :: self
+    real(wp), intent(in) :: row(:)
+
+    call write_row(self%file, row)
+  end subroutine write_trajectory_row
+
+  !> On Ctrl-C, and when the file cannot be written.
+  function wants_stop(self, fraction)
+    class(trajectory_writer_t), intent(inout) :: self
+    real(wp), intent(in) :: fraction
+    logical :: wants_stop
+
+    call self%progress%update(fraction)
+    wants_stop = is_interrupted() .or. self%file%has_failed
+  end function wants_stop
+
+end module nocdyn_run_files
