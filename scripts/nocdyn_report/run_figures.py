@@ -47,7 +47,7 @@ def draw_over_time(results: Results, captions: dict[str, str]) -> Figure | None:
 
 
 def draw_energy(results: Results) -> Figure:
-    """Energies and works, and below them what does not add up."""
+    """Energies and works, and below them the energy balance error."""
     figure, (energies, residual) = pyplot.subplots(2, 1, sharex=True, figsize=(WIDTH, 6.0), height_ratios=(2, 1))
     draw_lines(energies, list(ENERGIES), [(results.time, results.values(label)) for label in ENERGIES.values()])
     energies.set_ylabel("energy [J]")

@@ -44,7 +44,7 @@ def test_the_printed_lists_are_sorted_and_their_shares_are_of_all_that_was_put_i
     account = nocdyn.summary("results/case2")["energy_account"]
     _, table = text.split("energy came from [J]\n")
     sources, rest = table.split("and went to [J]\n")
-    sinks, rest = rest.split("what does not add up ")
+    sinks, rest = rest.split("energy balance error ")
     put_in = account["work_in_J"]["motor drive"] + account["work_in_J"]["excitation shaker"]
     expected = {
         "motor drive": account["work_in_J"]["motor drive"],
@@ -77,7 +77,7 @@ def test_of_many_entries_the_smallest_are_one(nocdyn):
     _, table = text.split("and went to [J]\n")
     lines = table.splitlines()
     energies = [float(line.split()[-3]) for line in lines[:10]]
-    assert lines[9].startswith("  6 others ") and lines[10].startswith("what does not add up")
+    assert lines[9].startswith("  6 others ") and lines[10].startswith("energy balance error")
     assert energies[:9] == sorted(energies[:9], reverse=True)
     works = nocdyn.summary("results/many")["energy_account"]["work_in_J"]
     assert sum(energies) == pytest.approx(-sum(works.values()), rel=1e-6)
@@ -155,7 +155,7 @@ LISTS = {
 def test_every_entry_stands_on_its_side_and_both_sides_add_up(nocdyn, machine):
     text, sources, sinks = LISTS[machine]
     _, table = nocdyn("run", nocdyn.write("machine.nml", text)).stdout.split("energy came from [J]\n")
-    sides = table.split("what does not add up")[0].split("and went to [J]\n")
+    sides = table.split("energy balance error")[0].split("and went to [J]\n")
     entries = [
         {name.strip(): float(energy) for name, energy, *_ in (line.rsplit(maxsplit=3) for line in side.splitlines())}
         for side in sides

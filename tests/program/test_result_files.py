@@ -397,7 +397,7 @@ def test_a_motion_that_the_energy_audit_refutes_is_noted(nocdyn):
     )
     outcome = nocdyn("run", "coarse.nml", "--out", "out")
     assert outcome.returncode == 0
-    assert "coarse.nml: note: the energy does not add up: energy_residual reaches " in outcome.stdout
+    assert "coarse.nml: note: large energy balance error: energy_residual reaches " in outcome.stdout
     assert "tighten rtol and atol" in nocdyn.summary("out")["machine"]["notes"][0]
 
 

@@ -10,7 +10,7 @@ module nocdyn_equilibrium_report
   use nocdyn_machine, only: machine_t
   use nocdyn_machine_report, only: coordinate_names
   use nocdyn_reduced, only: new_reduced
-  use nocdyn_table_text, only: cell, cell_digits, padded, text_width
+  use nocdyn_table_text, only: append_table, cell, cell_digits, padded
   use nocdyn_text, only: rounded_text, selected, string_t, to_text
   use nocdyn_text_buffer, only: text_buffer_t
   use nocdyn_trajectory_table, only: new_trajectory_table, trajectory_table_t
@@ -20,10 +20,10 @@ module nocdyn_equilibrium_report
 
   public :: equilibrium_json, equilibrium_text, new_equilibrium_report
 
-  integer, parameter :: most_rows = 60      ! a larger machine has its table in equilibrium.json
-  integer, parameter :: trailing = 3        ! columns of works and the residual, which a steady state has none of
+  integer, parameter :: trailing = 3        ! last columns: works and their residual, of which a steady state has none
+  character(len=1), parameter :: no_headings(0) = [character(len=1) ::]
 
-  !> Everything that is told, one column per steady state.
+  !> The contents of the printed report and of equilibrium.json.
   type, public :: equilibrium_report_t
     type(equilibrium_t), allocatable :: equilibria(:)
     type(string_t), allocatable :: notes(:)
@@ -105,7 +105,7 @@ contains
         call report%append_line(file // ': steady state ' // to_text(k) // ' of ' // to_text(size(self%equilibria)) // &
                                 ', ' // stability_text(self%equilibria(k)))
       end if
-      call put_rows(self%labels, self%values(:, k), report)
+      call append_table(report, self%labels, self%values(:, k:k), '', no_headings, 2, 'more values in equilibrium.json')
       call put_power(self%work_elements, self%power(:, k), report)
     end do
     text = report%text()
@@ -128,37 +128,16 @@ contains
     end select
   end function stability_text
 
-  subroutine put_rows(labels, values, report)
-    type(string_t), intent(in) :: labels(:)
-    real(wp), intent(in) :: values(:)
-    type(text_buffer_t), intent(inout) :: report
-    integer :: i, rows, width
-
-    rows = min(size(labels), most_rows)
-    width = maxval([(text_width(labels(i)%text), i=1, rows)])
-    do i = 1, rows
-      call report%append_line('  ' // padded(labels(i)%text, width) // cell(values(i)))
-    end do
-    if (rows < size(labels)) call report%append_line('  (' // to_text(size(labels) - rows) // ' more values in equilibrium.json)')
-  end subroutine put_rows
-
-  !> Who puts power in, who takes it out, and what does not add up.
+  !> The power of every element, and the sum of all, which is zero but for rounding.
   subroutine put_power(work_elements, power, report)
-    type(string_t), intent(in) :: work_elements(:)
-    real(wp), intent(in) :: power(:)
+    type(string_t), intent(in) :: work_elements(:)   !! names
+    real(wp), intent(in) :: power(:)                 !! into the machine [W]
     type(text_buffer_t), intent(inout) :: report
-    integer :: i, rows, width
+    integer :: width
 
     if (size(work_elements) == 0) return
-    rows = min(size(work_elements), most_rows)
-    width = max(len('power into the machine [W]'), maxval([(text_width(work_elements(i)%text), i=1, rows)]))
-    call report%append_line('  power into the machine [W]')
-    do i = 1, rows
-      call report%append_line('  ' // padded(work_elements(i)%text, width) // cell(power(i)))
-    end do
-    if (rows < size(work_elements)) then
-      call report%append_line('  (' // to_text(size(work_elements) - rows) // ' more in equilibrium.json)')
-    end if
+    call append_table(report, work_elements, reshape(power, [size(power), 1]), 'power into the machine [W]', no_headings, 2, &
+                      'more in equilibrium.json', width)
     call report%append_line('  ' // padded('in all', width) // cell(sum(power)) // ', of ' // &
                             rounded_text(sum(max(power, 0.0_wp)), cell_digits) // ' put in')
   end subroutine put_power

@@ -6,7 +6,7 @@ module nocdyn_modes_report
   use nocdyn_machine, only: machine_t
   use nocdyn_modes, only: find_modes, kind_names, mode_diverging, mode_oscillating, mode_overdamped, mode_rigid, mode_t
   use nocdyn_operating_point, only: operating_point_t
-  use nocdyn_table_text, only: cell, cell_width, padded, right, text_width
+  use nocdyn_table_text, only: cell, cell_width, padded, text_width
   use nocdyn_text, only: append, rounded_text, string_t, to_text
   use nocdyn_text_buffer, only: text_buffer_t
   implicit none (type, external)
@@ -99,8 +99,8 @@ contains
       number = number + 1
       width = max(width, text_width(kinetic_text(self, self%modes(i))))
     end do
-    call report%append_line('  mode' // right('frequency [Hz]') // right('undamped [Hz]') // right('damping ratio') // &
-                            right('decay time [s]') // '  ' // padded('kinetic energy in', width) // '  potential energy in')
+    call report%append_line('  mode' // cell('frequency [Hz]') // cell('undamped [Hz]') // cell('damping ratio') // &
+                            cell('decay time [s]') // '  ' // padded('kinetic energy in', width) // '  potential energy in')
     number = 0
     do i = 1, size(self%modes)
       if (self%modes(i)%kind /= mode_oscillating) cycle
@@ -120,7 +120,7 @@ contains
     type(mode_t), intent(in) :: mode
     character(len=cell_width) :: text
 
-    text = right('none')
+    text = cell('none')
     if (mode%time_constant() < huge(1.0_wp)) text = cell(mode%time_constant())
   end function time_cell
 
@@ -226,13 +226,13 @@ contains
       last = min(first + shapes_per_row - 1, size(chosen))
       line = '  ' // padded('shape of mode', width)
       do i = first, last
-        line = line // right(to_text(i))
+        line = line // cell(to_text(i))
       end do
       call report%append_line(line)
       do b = 1, self%machine%bodies
         line = '  ' // padded(self%machine%names(b)%text, width)
         do i = first, last
-          line = line // right(rounded_text(real(self%modes(chosen(i))%shape(b), wp), 5))
+          line = line // cell(rounded_text(real(self%modes(chosen(i))%shape(b), wp), 5))
         end do
         call report%append_line(line)
       end do

@@ -10,9 +10,9 @@ module nocdyn_energy_balance
   implicit none (type, external)
   private
 
-  public :: work_element_names, put_energy_balance, energy_balance_text
+  public :: work_element_names, put_energy_balance, append_energy_balance
 
-  integer, parameter :: most_lines = 10   ! of each side that are printed
+  integer, parameter :: max_lines = 10   ! of each list
 
   type, public :: energy_balance_t
     type(string_t), allocatable :: work_elements(:)      !! elements whose work is integrated, with their kind
@@ -79,29 +79,27 @@ contains
     call json%close()
   end subroutine put_energy_balance
 
-  !> Who put energy in and where it went, in shares of all that was put in; the largest of each, and the others together.
-  !> Empty if no energy was turned over.
-  function energy_balance_text(self) result(text)
+  !> Appends two lists, where energy came from and where it went, with the shares of all that came; the largest entries of each
+  !> and the sum of the others. Nothing is appended if there is no energy.
+  subroutine append_energy_balance(report, self)
+    type(text_buffer_t), intent(inout) :: report
     type(energy_balance_t), intent(in) :: self
-    character(len=:), allocatable :: text
+    character(len=*), parameter :: last_line = 'energy balance error'
     type(entry_t), allocatable :: entries(:)
-    type(text_buffer_t) :: report
     integer :: i, width
 
-    text = ''
     allocate (entries, source=all_entries(self))
     if (all(abs(entries%energy) <= 0.0_wp)) return
-    width = len('what does not add up')
+    width = len(last_line)
     do i = 1, size(entries)
       if (abs(entries(i)%energy) > 0.0_wp) width = max(width, text_width(entries(i)%name) + 2)
     end do
-    call report%append('energy came from [J]')
-    call put_side(entries, 1.0_wp, width, report)
-    call report%append(new_line('a') // 'and went to [J]')
-    call put_side(entries, -1.0_wp, width, report)
-    call report%append(new_line('a') // padded('what does not add up', width) // cell(self%residual()))
-    text = report%text()
-  end function energy_balance_text
+    call report%append_line('energy came from [J]')
+    call append_side(entries, 1.0_wp, width, report)
+    call report%append_line('and went to [J]')
+    call append_side(entries, -1.0_wp, width, report)
+    call report%append_line(padded(last_line, width) // cell(self%residual()))
+  end subroutine append_energy_balance
 
   !> Works, and what the stores have released.
   function all_entries(self) result(entries)
@@ -124,35 +122,38 @@ contains
   end function all_entries
 
   !> The entries of one side, the largest first.
-  subroutine put_side(entries, sign, width, report)
+  subroutine append_side(entries, sign, width, report)
     type(entry_t), intent(in) :: entries(:)
-    real(wp), intent(in) :: sign              !! of their energies
-    integer, intent(in) :: width
+    real(wp), intent(in) :: sign              !! of their energies: 1 or -1
+    integer, intent(in) :: width              !! of the names
     type(text_buffer_t), intent(inout) :: report
-    real(wp) :: left(size(entries)), turned_over
-    integer :: i, lines, others, largest
+    real(wp) :: left(size(entries)), total
+    integer :: i, largest, lines, others
 
     left = max(sign * entries%energy, 0.0_wp)
-    turned_over = sum(max(entries%energy, 0.0_wp))
+    total = sum(max(entries%energy, 0.0_wp))
     others = count(left > 0.0_wp)
-    lines = merge(others, most_lines - 1, others <= most_lines)
+    lines = merge(others, max_lines - 1, others <= max_lines)
     do i = 1, lines
       largest = maxloc(left, dim=1)
-      call report%append(new_line('a') // line(entries(largest)%name, left(largest), turned_over, width))
+      call append_entry(report, entries(largest)%name, left(largest), total, width)
       left(largest) = 0.0_wp
     end do
     others = others - lines
-    if (others > 0) call report%append(new_line('a') // line(to_text(others) // ' others', sum(left), turned_over, width))
-  end subroutine put_side
+    if (others > 0) call append_entry(report, to_text(others) // ' others', sum(left), total, width)
+  end subroutine append_side
 
-  function line(name, energy, turned_over, width) result(text)
+  subroutine append_entry(report, name, energy, total, width)
+    type(text_buffer_t), intent(inout) :: report
     character(len=*), intent(in) :: name
-    real(wp), intent(in) :: energy, turned_over
+    real(wp), intent(in) :: energy   !! [J]
+    real(wp), intent(in) :: total    !! of which the share is printed [J]
     integer, intent(in) :: width
-    character(len=:), allocatable :: text
+    character(len=:), allocatable :: line
 
-    text = padded('  ' // name, width) // cell(energy)
-    if (turned_over > 0.0_wp) text = text // '  ' // rounded_text(100.0_wp * energy / turned_over, 3) // ' %'
-  end function line
+    line = padded('  ' // name, width) // cell(energy)
+    if (total > 0.0_wp) line = line // '  ' // rounded_text(100.0_wp * energy / total, 3) // ' %'
+    call report%append_line(line)
+  end subroutine append_entry
 
 end module nocdyn_energy_balance

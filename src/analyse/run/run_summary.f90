@@ -1,4 +1,4 @@
-!> The summary of a run: what summary.json and the printed table tell.
+!> The summary of a run: the contents of summary.json and of the printed table.
 module nocdyn_run_summary
   use nocdyn_energy_balance, only: energy_balance_t, put_energy_balance
   use nocdyn_input, only: group_t, input_t
@@ -16,18 +16,17 @@ module nocdyn_run_summary
 
   public :: start_extremes, update_extremes, widen_extremes, describe_machine, check_energy_balance, summary_json
 
-  !> A note is made of an energy residual above this share of the energy turned over: the motion is then not to be trusted.
+  !> The summary notes an energy residual above this share of the largest energy or work: such a motion is not to be trusted.
   real(wp), parameter :: energy_error_limit = 0.01_wp
 
-  !> An extreme beyond that of the rows by this share of the largest value or less is rounding: a machine at rest at the
-  !> start has its smallest energy there.
+  !> An extreme between the rows counts if it exceeds that of the rows by more than this share of the largest value. A smaller
+  !> excess is rounding: a machine that starts at rest has its smallest energy at the start.
   real(wp), parameter :: rounding_limit = 16 * epsilon(1.0_wp)
 
-  !> Smallest and largest values of the columns of the table, with their times: of the rows, after `widen_extremes` of the
-  !> motion between them too.
+  !> Smallest and largest values of the columns with their times: of the rows; after `widen_extremes`, of the whole motion.
   type, public :: extremes_t
     integer :: rows = 0
-    logical :: are_continuous = .false.   !! whether the motion between the rows is accounted for
+    logical :: are_continuous = .false.   !! whether the motion between the rows is included
     real(wp), allocatable :: lowest(:), lowest_time(:), highest(:), highest_time(:), last(:)   !! [columns]
   end type extremes_t
 
@@ -40,7 +39,7 @@ module nocdyn_run_summary
     type(string_t), allocatable :: notes(:)         !! on the machine and the run, one sentence each
     type(string_t), allocatable :: labels(:)        !! of the columns
     type(extremes_t) :: extremes
-    character(len=:), allocatable :: method         !! that integrated
+    character(len=:), allocatable :: method         !! of integration
     type(solver_status_t) :: solver_status
     type(energy_balance_t), allocatable :: energy_balance  !! from the start to the last row; not allocated if there are no rows
     real(wp) :: wall_time = 0.0_wp                  !! of integration and writing of the trajectory [s]
@@ -58,7 +57,7 @@ contains
     allocate (extremes%lowest_time(columns), extremes%highest_time(columns), extremes%last(columns), source=0.0_wp)
   end subroutine start_extremes
 
-  !> Takes in one row; its first value is the time.
+  !> Includes one row, whose first value is the time.
   pure subroutine update_extremes(extremes, row)
     type(extremes_t), intent(inout) :: extremes
     real(wp), intent(in) :: row(:)
@@ -78,7 +77,7 @@ contains
     extremes%rows = extremes%rows + 1
   end subroutine update_extremes
 
-  !> Takes in the extremes of the motion where they lie beyond those of the rows by more than rounding.
+  !> Includes the extremes of the motion where they exceed those of the rows by more than rounding.
   pure subroutine widen_extremes(extremes, ranges)
     type(extremes_t), intent(inout) :: extremes
     type(ranges_t), intent(in) :: ranges   !! of the columns
@@ -112,19 +111,19 @@ contains
     allocate (summary%notes, source=machine_notes(machine))
   end subroutine describe_machine
 
-  !> Adds a note if the energy audit does not close. The last five columns are the energies, the residual last.
+  !> Adds a note on a large energy balance error. The last five columns are the energies and works; the last one is the error.
   subroutine check_energy_balance(extremes, notes)
     type(extremes_t), intent(in) :: extremes
     type(string_t), allocatable, intent(inout) :: notes(:)
-    real(wp) :: residual, turned_over
+    real(wp) :: residual, largest
     integer :: columns
 
     columns = size(extremes%last)
     residual = max(abs(extremes%lowest(columns)), abs(extremes%highest(columns)))
-    turned_over = maxval(max(abs(extremes%lowest(columns - 4:columns - 1)), abs(extremes%highest(columns - 4:columns - 1))))
-    if (extremes%rows == 0 .or. residual <= energy_error_limit * turned_over) return
-    call append(notes, 'the energy does not add up: energy_residual reaches ' // rounded_text(residual, 3) // &
-                       ' J where at most ' // rounded_text(turned_over, 3) // ' J were turned over; tighten rtol and atol')
+    largest = maxval(max(abs(extremes%lowest(columns - 4:columns - 1)), abs(extremes%highest(columns - 4:columns - 1))))
+    if (extremes%rows == 0 .or. residual <= energy_error_limit * largest) return
+    call append(notes, 'large energy balance error: energy_residual reaches ' // rounded_text(residual, 3) // &
+                       ' J; the largest energy or work is ' // rounded_text(largest, 3) // ' J; tighten rtol and atol')
   end subroutine check_energy_balance
 
   !> The text of summary.json.
@@ -187,7 +186,7 @@ contains
     call json%put('wall_time_s', summary%wall_time)
   end subroutine put_counts
 
-  !> The method that integrated, its steps of either kind, and the first of its switches.
+  !> The method of integration, its explicit and implicit steps, and the first switches between them.
   subroutine put_method(json, summary)
     type(json_t), intent(inout) :: json
     type(run_summary_t), intent(in) :: summary

@@ -1,21 +1,20 @@
 !> The summary of a run as a person reads it.
 module nocdyn_summary_table
-  use nocdyn_energy_balance, only: energy_balance_text
+  use nocdyn_energy_balance, only: append_energy_balance
   use nocdyn_input, only: group_t, input_t
   use nocdyn_kinds, only: wp
   use nocdyn_run_summary, only: run_summary_t
-  use nocdyn_table_text, only: cell, cell_digits, padded, right
+  use nocdyn_table_text, only: append_table, cell_digits
   use nocdyn_text, only: rounded_text, to_text
+  use nocdyn_text_buffer, only: text_buffer_t
   implicit none (type, external)
   private
 
   public :: summary_line, summary_table, method_line
 
-  integer, parameter :: most_rows = 60    ! a larger machine has its table in summary.json
-
 contains
 
-  !> One line: what was done, and where the results are.
+  !> One line with the counts of the integration and the folder of the results.
   function summary_line(input, summary, folder) result(text)
     type(input_t), intent(in) :: input
     type(run_summary_t), intent(in) :: summary
@@ -48,37 +47,27 @@ contains
     end associate
   end function method_line
 
-  !> Title, and last, smallest and largest value of every column with the times of the extremes; then where the
-  !> energy came from and went to.
+  !> The title; for every column the last value and the extremes with their times; then the energy balance.
   function summary_table(input, summary) result(text)
     type(input_t), intent(in) :: input
     type(run_summary_t), intent(in) :: summary
     character(len=:), allocatable :: text
+    character(len=*), parameter :: headings(*) = [character(len=8) :: 'the last', 'smallest', 'at t [s]', 'largest', 'at t [s]']
     type(group_t) :: about
-    character(len=:), allocatable :: energy_balance, heading
-    integer :: i, label_width, rows
+    type(text_buffer_t) :: report
+    character(len=:), allocatable :: heading
 
     about = input%single('case')
-    text = about%text('title')
-    if (len(text) > 0) text = text // new_line('a')
-    rows = min(size(summary%labels), most_rows)
+    if (about%text('title') /= '') call report%append_line(about%text('title'))
     heading = 'of ' // to_text(summary%extremes%rows) // ' rows:'
     if (summary%extremes%are_continuous) heading = 'of the motion:'
-    label_width = max(len(heading), maxval([(len(summary%labels(i)%text), i=2, rows)]))
-    text = text // padded(heading, label_width) // right('the last') // &
-           right('smallest') // right('at t [s]') // right('largest') // right('at t [s]')
-    associate (extremes => summary%extremes)
-      do i = 2, rows
-        text = text // new_line('a') // padded(summary%labels(i)%text, label_width) // cell(extremes%last(i)) // &
-               cell(extremes%lowest(i)) // cell(extremes%lowest_time(i)) // cell(extremes%highest(i)) // &
-               cell(extremes%highest_time(i))
-      end do
+    associate (extremes => summary%extremes, n => size(summary%labels))
+      call append_table(report, summary%labels(2:), reshape([extremes%last(2:), extremes%lowest(2:), extremes%lowest_time(2:), &
+                                                             extremes%highest(2:), extremes%highest_time(2:)], [n - 1, 5]), &
+                        heading, headings, 0, 'more columns in summary.json')
     end associate
-    if (rows < size(summary%labels)) text = text // new_line('a') // '(' // to_text(size(summary%labels) - rows) // &
-                                            ' more columns in summary.json)'
-    if (.not. allocated(summary%energy_balance)) return
-    energy_balance = energy_balance_text(summary%energy_balance)
-    if (len(energy_balance) > 0) text = text // new_line('a') // energy_balance
+    if (allocated(summary%energy_balance)) call append_energy_balance(report, summary%energy_balance)
+    text = report%text()
   end function summary_table
 
 end module nocdyn_summary_table

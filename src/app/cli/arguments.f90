@@ -1,13 +1,8 @@
 !> What a command line says: the command, its operands and its options.
 module nocdyn_arguments
-  use nocdyn_text, only: string_t
+  use nocdyn_text, only: append, string_t
   implicit none (type, external)
   private
-
-  type, public :: given_option_t
-    character(len=:), allocatable :: name    !! long name
-    character(len=:), allocatable :: value   !! '' if the option takes none
-  end type given_option_t
 
   type, public :: arguments_t
     character(len=:), allocatable :: command
@@ -15,13 +10,25 @@ module nocdyn_arguments
     type(string_t), allocatable :: overrides(:)      !! PATH=VALUE of every --set
     integer :: threads = 0                           !! of --threads, 0 without it
     integer :: shard = 0, shards = 0                 !! of --shard, 0 without it
-    type(given_option_t), allocatable :: given(:)    !! every option, in the order of the command line
+    type(string_t), allocatable :: names(:)          !! long names of all options, in the order of the command line
+    type(string_t), allocatable :: values(:)         !! of these options, '' if an option takes none
   contains
+    procedure :: add
     procedure :: is_given
     procedure :: value
   end type arguments_t
 
 contains
+
+  !> Adds an option.
+  subroutine add(self, name, value)
+    class(arguments_t), intent(inout) :: self
+    character(len=*), intent(in) :: name    !! long name
+    character(len=*), intent(in) :: value   !! '' if the option takes none
+
+    call append(self%names, name)
+    call append(self%values, value)
+  end subroutine add
 
   !> Whether an option is on the command line.
   pure logical function is_given(self, name)
@@ -30,8 +37,8 @@ contains
     integer :: i
 
     is_given = .false.
-    do i = 1, size(self%given)
-      if (self%given(i)%name == name) is_given = .true.
+    do i = 1, size(self%names)
+      if (self%names(i)%text == name) is_given = .true.
     end do
   end function is_given
 
@@ -43,8 +50,8 @@ contains
     integer :: i
 
     value = ''
-    do i = 1, size(self%given)
-      if (self%given(i)%name == name) value = self%given(i)%value
+    do i = 1, size(self%names)
+      if (self%names(i)%text == name) value = self%values(i)%text
     end do
   end function value
 

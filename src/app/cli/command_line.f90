@@ -1,6 +1,6 @@
 !> Parses the command line by the tables of commands and options.
 module nocdyn_command_line
-  use nocdyn_arguments, only: arguments_t, given_option_t
+  use nocdyn_arguments, only: arguments_t
   use nocdyn_commands, only: command_index, command_names, command_t, commands_with_option
   use nocdyn_errors, only: error_t, exit_input, raise
   use nocdyn_options, only: option_index, option_t, options
@@ -36,7 +36,7 @@ contains
     integer :: i
     logical :: takes_options
 
-    allocate (arguments%operands(0), arguments%overrides(0), arguments%given(0))
+    allocate (arguments%operands(0), arguments%overrides(0), arguments%names(0), arguments%values(0))
     call parse_command(words, commands, arguments, error)
     takes_options = .true.
     i = 2
@@ -153,24 +153,8 @@ contains
     case default
       ! read by `is_given` and `value`
     end select
-    call append_given(arguments%given, trim(option%name), value)
+    call arguments%add(trim(option%name), value)
   end subroutine add_option
-
-  !> Appends an option to those given, without an array constructor, in which gfortran 12 loses the lengths of the texts.
-  subroutine append_given(given, name, value)
-    type(given_option_t), allocatable, intent(inout) :: given(:)
-    character(len=*), intent(in) :: name, value
-    type(given_option_t), allocatable :: longer(:)
-    integer :: i
-
-    allocate (longer(size(given) + 1))
-    do i = 1, size(given)
-      longer(i) = given(i)
-    end do
-    longer(size(longer))%name = name
-    longer(size(longer))%value = value
-    call move_alloc(longer, given)
-  end subroutine append_given
 
   subroutine parse_threads(value, threads, error)
     character(len=*), intent(in) :: value
@@ -238,8 +222,8 @@ contains
     integer :: i, row
 
     row = command_index(commands, arguments%command)
-    do i = 1, size(arguments%given)
-      associate (name => arguments%given(i)%name)
+    do i = 1, size(arguments%names)
+      associate (name => arguments%names(i)%text)
         if (row > 0) then
           if (commands(row)%takes(name)) cycle
         end if

@@ -6,15 +6,14 @@ module nocdyn_sweep_summary
   use nocdyn_sweep_header, only: sweep_header_t
   use nocdyn_order_statistics, only: order_statistics_t
   use nocdyn_run_settings, only: put_settings
-  use nocdyn_table_text, only: cell, padded, right
-  use nocdyn_text, only: rounded_text, to_text
+  use nocdyn_table_text, only: append_table
+  use nocdyn_text, only: rounded_text, string_t, to_text
+  use nocdyn_text_buffer, only: text_buffer_t
   use nocdyn_version, only: compiler_text, version
   implicit none (type, external)
   private
 
   public :: sweep_json, sweep_line, sweep_note, sweep_table
-
-  integer, parameter :: most_rows = 60    ! a longer table is in summary.json only
 
   !> What it took, this time.
   type, public :: sweep_effort_t
@@ -126,30 +125,30 @@ contains
     call json%close()
   end subroutine put_statistics
 
-  !> Title, and how the results are distributed over the variants that are done.
+  !> The title, and the distribution of the results over the variants that are done.
   function sweep_table(header, summary) result(text)
     type(sweep_header_t), intent(in) :: header
     type(sweep_summary_t), intent(in) :: summary
     character(len=:), allocatable :: text
-    character(len=:), allocatable :: heading
-    integer :: i, label_width, rows
+    character(len=*), parameter :: headings(*) = &
+      [character(len=14) :: 'min', '5 %', 'median', '95 %', 'max', 'variant of min', 'variant of max']
+    type(text_buffer_t) :: report
+    type(string_t) :: labels(size(header%results))
+    real(wp) :: values(size(labels), size(headings))
+    integer :: i
 
-    text = header%title
-    if (len(text) > 0) text = text // new_line('a')
-    heading = 'of ' // to_text(summary%done) // trim(merge(' variant ', ' variants', summary%done == 1)) // ' done:'
-    rows = min(size(header%results), most_rows)
-    label_width = max(len(heading), maxval([(len(label(header, i)), i=1, rows)]))
-    text = text // padded(heading, label_width) // right('min') // right('5 %') // right('median') // right('95 %') // &
-           right('max') // ' ' // right('variant of min') // ' ' // right('variant of max')
-    do i = 1, rows
+    if (header%title /= '') call report%append_line(header%title)
+    do i = 1, size(labels)
+      labels(i)%text = label(header, i)
       associate (found => summary%statistics(i))
-        text = text // new_line('a') // padded(label(header, i), label_width) // cell(found%minimum) // cell(found%low) // &
-               cell(found%median) // cell(found%high) // cell(found%maximum) // &
-               ' ' // right(to_text(found%variant_of_minimum)) // ' ' // right(to_text(found%variant_of_maximum))
+        values(i, :) = [found%minimum, found%low, found%median, found%high, found%maximum, &
+                        real(found%variant_of_minimum, wp), real(found%variant_of_maximum, wp)]
       end associate
     end do
-    if (rows < size(header%results)) text = text // new_line('a') // '(' // to_text(size(header%results) - rows) // &
-                                            ' more results in summary.json)'
+    call append_table(report, labels, values, 'of ' // to_text(summary%done) // &
+                      trim(merge(' variant ', ' variants', summary%done == 1)) // ' done:', headings, 0, &
+                      'more results in summary.json')
+    text = report%text()
   end function sweep_table
 
   !> "moment_shaft_max_abs [N m]"
