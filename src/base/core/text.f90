@@ -1,4 +1,4 @@
-!> Texts, that is numbers that read back as the same value, lists of texts, near matches of names.
+!> Numbers as texts that read back as the same value, lists of texts, near matches of names.
 module nocdyn_text
   use, intrinsic :: iso_c_binding, only: c_char, c_double, c_int, c_size_t
   use nocdyn_kinds, only: wp
