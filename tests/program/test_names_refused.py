@@ -8,7 +8,7 @@ from conftest import SPINNER
     ("name", "complaint"),
     [
         ("", "'' is an empty name"),
-        ("ground", "'ground' is not allowed as a name: it stands for what does not turn"),
+        ("ground", "'ground' is not allowed as a name: it is the body that does not turn"),
         ("n" * 200, "is too long for a name; allowed: "),
         (" disc", "' disc' is a name with a blank at its beginning or end"),
         ("a,b", "'a,b' is a name with a comma, semicolon, equals sign, quote or tab, which is not allowed"),

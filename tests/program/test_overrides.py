@@ -49,7 +49,7 @@ def test_an_override_applies_to_every_file(nocdyn, spinner):
     [
         ("run.rtol", "there is no = in it; write PATH=VALUE"),
         ("run.rtol=", "there is no value after the ="),
-        ("=1e-3", "there is nothing before the =; write GROUP.KEY=VALUE or GROUP.NAME.KEY=VALUE"),
+        ("=1e-3", "there is no path before the =; write GROUP.KEY=VALUE or GROUP.NAME.KEY=VALUE"),
         ("body.motor.name=rotor", "a name cannot be overridden: other groups refer to it"),
         ("run.max_steps=100000001", "max_steps = 100000001 is out of range; allowed: 1 to 1e+08"),
         ("rtol=1e-3", "there is no dot in rtol; write GROUP.KEY=VALUE or GROUP.NAME.KEY=VALUE"),

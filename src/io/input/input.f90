@@ -1,4 +1,4 @@
-!> A checked input: groups in the order of the file, every key of the schema with its value or default.
+!> A checked input: the groups in the order of the file, every key of the schema with its value or default.
 module nocdyn_input
   use nocdyn_diagnostics, only: diagnostics_t, no_line
   use nocdyn_kinds, only: wp
@@ -8,11 +8,11 @@ module nocdyn_input
   implicit none (type, external)
   private
 
-  !> The value of one key. Of the four arrays the one of the key's kind is allocated; none if the key is unset.
+  !> The value of one key. One of the four arrays is allocated, that of the type of the key; none if the key has no value.
   type, public :: value_t
     logical :: is_given = .false.   !! by the file or by an override, not by default
     integer :: line = 0             !! of the key in the file
-    integer :: override = 0         !! which override set it, 0: none
+    integer :: override = 0         !! index of the override that sets it, 0: none
     real(wp), allocatable :: numbers(:)
     integer, allocatable :: whole_numbers(:)
     logical, allocatable :: flags(:)
@@ -23,7 +23,7 @@ module nocdyn_input
     procedure :: number_at
   end type value_t
 
-  !> One group of the file. Asking for a key that the schema lacks, or with another type, is an error of the program.
+  !> One group of the file. To ask for a key that the schema does not have, or for another type, is an error of the program.
   type, public :: group_t
     character(len=:), allocatable :: kind   !! 'body', 'gear' ...
     character(len=:), allocatable :: name   !! of the element, '' where the kind has no names
@@ -47,13 +47,13 @@ module nocdyn_input
   type, public :: input_t
     character(len=:), allocatable :: file
     type(string_t), allocatable :: overrides(:)   !! PATH=VALUE, as given
-    type(group_t), allocatable :: groups(:)       !! single groups that the file lacks stand at the end
+    type(group_t), allocatable :: groups(:)       !! single groups that the file does not have come last
   contains
-    procedure :: groups_named   !! indices of the groups of one kind, perhaps only of one law
+    procedure :: groups_named   !! indices of the groups with a name, perhaps only those of one law
     procedure :: single         !! the one group of a kind that occurs once
     procedure :: label          !! "&gear 'reducer'"
+    procedure :: location       !! where a group or a key comes from, to begin a message with
     procedure :: diagnostics_text   !! all messages with their locations
-    procedure :: location          !! where a group or a key comes from, to begin a message with
   end type input_t
 
 contains
@@ -88,10 +88,11 @@ contains
     end if
   end function number_at
 
+  !> The single value of a key.
   pure real(wp) function number(self, key, absent)
     class(group_t), intent(in) :: self
     character(len=*), intent(in) :: key
-    real(wp), optional, intent(in) :: absent   !! answer if the key is unset
+    real(wp), optional, intent(in) :: absent   !! result if the key has no value
     integer :: k
 
     k = self%key_position(key)
@@ -104,6 +105,7 @@ contains
     end if
   end function number
 
+  !> The single value of a key of whole numbers, which must have one.
   pure integer function whole_number(self, key)
     class(group_t), intent(in) :: self
     character(len=*), intent(in) :: key
@@ -114,6 +116,7 @@ contains
     whole_number = self%values(k)%whole_numbers(1)
   end function whole_number
 
+  !> The single value of a logical key, which must have one.
   pure logical function flag(self, key)
     class(group_t), intent(in) :: self
     character(len=*), intent(in) :: key
@@ -124,6 +127,7 @@ contains
     flag = self%values(k)%flags(1)
   end function flag
 
+  !> The single value of a key of texts, which must have one.
   pure function text(self, key)
     class(group_t), intent(in) :: self
     character(len=*), intent(in) :: key
@@ -135,6 +139,7 @@ contains
     text = self%values(k)%texts(1)%text
   end function text
 
+  !> All values of a key, none if it has no value.
   pure function numbers(self, key)
     class(group_t), intent(in) :: self
     character(len=*), intent(in) :: key
@@ -149,6 +154,7 @@ contains
     end associate
   end function numbers
 
+  !> All values of a key, none if it has no value.
   pure function whole_numbers(self, key)
     class(group_t), intent(in) :: self
     character(len=*), intent(in) :: key
@@ -163,6 +169,7 @@ contains
     end associate
   end function whole_numbers
 
+  !> All values of a key, none if it has no value.
   pure function texts(self, key)
     class(group_t), intent(in) :: self
     character(len=*), intent(in) :: key
@@ -177,6 +184,7 @@ contains
     end associate
   end function texts
 
+  !> Whether the user sets the key.
   pure logical function is_given(self, key)
     class(group_t), intent(in) :: self
     character(len=*), intent(in) :: key
@@ -184,6 +192,7 @@ contains
     is_given = self%values(self%key_position(key))%is_given
   end function is_given
 
+  !> Whether the key has a value, set by the user or by default.
   pure logical function has_value(self, key)
     class(group_t), intent(in) :: self
     character(len=*), intent(in) :: key
@@ -191,6 +200,7 @@ contains
     has_value = self%values(self%key_position(key))%has_any()
   end function has_value
 
+  !> Index of a key in `values`.
   pure integer function key_position(self, key)
     class(group_t), intent(in) :: self
     character(len=*), intent(in) :: key
@@ -198,12 +208,13 @@ contains
 
     first = first_key(self%rule) - 1
     do key_position = 1, size(self%values)
-      if (key_rules(first + key_position)%name(1:1) /= key(1:1)) cycle   ! quicker than to compare the names
+      if (key_rules(first + key_position)%name(1:1) /= key(1:1)) cycle   ! faster than a comparison of the names
       if (key_rules(first + key_position)%name == key) return
     end do
-    error stop 'nocdyn_input: a key was asked for that the schema does not have'
+    error stop 'nocdyn_input: the schema has no such key'
   end function key_position
 
+  !> Indices of the groups of one kind.
   pure function groups_named(self, kind, law) result(indices)
     class(input_t), intent(in) :: self
     character(len=*), intent(in) :: kind
@@ -212,7 +223,7 @@ contains
     logical :: is_wanted(size(self%groups))
     integer :: i
 
-    if (all(group_rules%name /= kind)) error stop 'nocdyn_input: a group was asked for that the schema does not have'
+    if (all(group_rules%name /= kind)) error stop 'nocdyn_input: the schema has no such group'
     do i = 1, size(self%groups)
       is_wanted(i) = self%groups(i)%kind == kind
       if (is_wanted(i) .and. present(law)) is_wanted(i) = self%groups(i)%text('kind') == law
@@ -221,6 +232,7 @@ contains
     indices = pack([(i, i=1, size(is_wanted))], is_wanted)
   end function groups_named
 
+  !> The group of a kind that occurs once.
   pure function single(self, kind) result(group)
     class(input_t), intent(in) :: self
     character(len=*), intent(in) :: kind
@@ -293,6 +305,7 @@ contains
     text = buffer%text()
   end function diagnostics_text
 
+  !> "&gear 'reducer'", for messages.
   pure function label(self, index) result(text)
     class(input_t), intent(in) :: self
     integer, intent(in) :: index   !! of the group

@@ -198,7 +198,7 @@ contains
       if (partner(g) == 0 .or. before%name_space(g) == 0) cycle
       associate (earlier => last(before%name_space(g)))
         if (earlier > 0) then
-          if (partner(earlier) > partner(g)) call append(sentences, before%labels(g)%text // ' was behind ' // &
+          if (partner(earlier) > partner(g)) call append(sentences, before%labels(g)%text // ' was after ' // &
                                                          before%labels(earlier)%text // ', is before it')
         end if
         earlier = g

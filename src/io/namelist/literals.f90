@@ -15,7 +15,7 @@ module nocdyn_literals
   !> and round down to it are refused too.
   character(len=*), parameter :: largest_digits = '17976931348623157'
   integer, parameter :: largest_exponent = 308
-  integer, parameter :: exponent_limit = 99999999   !! longer exponents say no more
+  integer, parameter :: exponent_limit = 99999999   !! larger exponents are cut to it
 
 contains
 

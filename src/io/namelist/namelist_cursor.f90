@@ -177,7 +177,7 @@ contains
     position = 0
   end function position_after_blanks
 
-  !> Whether & or $ and the first letter of a name stand at the cursor.
+  !> Whether a group begins at the cursor: & or $ and the first letter of a name.
   pure logical function group_begins(self)
     class(cursor_t), intent(in) :: self
 

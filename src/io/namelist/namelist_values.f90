@@ -131,7 +131,7 @@ contains
       call diagnostics%add(cursor%line, group, cursor%key // "'=' without a key before it: " // cursor%excerpt())
       call cursor%move_to(cursor%at + 1)
     else
-      call diagnostics%add(cursor%line, group, cursor%key // 'a quote stands inside ' // &
+      call diagnostics%add(cursor%line, group, cursor%key // 'there is a quote inside ' // &
                            shortened(cursor%text(item%first:last + 1)) // '; a text begins and ends with a quote')
       call skip_broken_line(cursor)
     end if

@@ -1,4 +1,4 @@
-!> Tables as comma-separated values: one header line, numbers that read back as the same values.
+!> Tables of comma-separated values: a header line, then rows of numbers that read back as the same values.
 module nocdyn_csv
   use nocdyn_kinds, only: wp
   use nocdyn_output_file, only: output_file_t
@@ -10,7 +10,7 @@ module nocdyn_csv
 
 contains
 
-  !> The header line.
+  !> Writes the header line.
   subroutine write_header(file, labels)
     type(output_file_t), intent(inout) :: file
     type(string_t), intent(in) :: labels(:)   !! without commas and quotes
@@ -23,7 +23,7 @@ contains
     call file%put(new_line('a'))
   end subroutine write_header
 
-  !> One row of the table.
+  !> Writes one row.
   subroutine write_row(file, values)
     type(output_file_t), intent(inout) :: file
     real(wp), intent(in) :: values(:)

@@ -1,4 +1,4 @@
-!> A JSON text, built key by key.
+!> A JSON text that is built key by key.
 module nocdyn_json
   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
   use nocdyn_kinds, only: wp
@@ -9,11 +9,11 @@ module nocdyn_json
 
   public :: has_utf_8
 
-  !> Nested objects, two blanks per level, in the order of the calls.
+  !> Nested objects and lists in the order of the calls, indented by two blanks per level.
   type, public :: json_t
     type(text_buffer_t), private :: buffer
-    integer, private :: depth = 0
-    logical, private :: is_first = .true.
+    integer, private :: depth = 0           !! number of open objects and lists
+    logical, private :: is_first = .true.   !! the next member or item is the first one
   contains
     procedure :: open => open_object
     procedure :: close => close_object
@@ -28,7 +28,7 @@ module nocdyn_json
 
 contains
 
-  !> Begins an object; the outermost one and those of a list have no key.
+  !> Begins an object. The outermost object and the objects in a list have no key.
   subroutine open_object(self, key)
     class(json_t), intent(inout) :: self
     character(len=*), intent(in), optional :: key
@@ -53,7 +53,7 @@ contains
     self%is_first = .false.
   end subroutine close_object
 
-  !> Begins a list, of objects.
+  !> Begins a list of objects.
   subroutine open_list(self, key)
     class(json_t), intent(inout) :: self
     character(len=*), intent(in) :: key
@@ -73,7 +73,7 @@ contains
     self%is_first = .false.
   end subroutine close_list
 
-  !> All that was put so far.
+  !> The text so far.
   pure function text(self)
     class(json_t), intent(in) :: self
     character(len=:), allocatable :: text
@@ -89,29 +89,44 @@ contains
     call self%buffer%append(escaped(value))
   end subroutine put_text
 
+  !> A list of texts, on one line.
   subroutine put_texts(self, key, values)
     class(json_t), intent(inout) :: self
     character(len=*), intent(in) :: key
     type(string_t), intent(in) :: values(:)
+    type(string_t) :: items(size(values))
+    integer :: i
+
+    do i = 1, size(values)
+      items(i)%text = escaped(values(i)%text)
+    end do
+    call put_list(self, key, items)
+  end subroutine put_texts
+
+  !> Items that are JSON already, on one line.
+  subroutine put_list(self, key, items)
+    class(json_t), intent(inout) :: self
+    character(len=*), intent(in) :: key
+    type(string_t), intent(in) :: items(:)
     integer :: i
 
     call self%begin_member(key)
     call self%buffer%append('[')
-    do i = 1, size(values)
+    do i = 1, size(items)
       if (i > 1) call self%buffer%append(', ')
-      call self%buffer%append(escaped(values(i)%text))
+      call self%buffer%append(items(i)%text)
     end do
     call self%buffer%append(']')
-  end subroutine put_texts
+  end subroutine put_list
 
-  !> A number; JSON has none that is not finite, these become null.
+  !> A number, null if it is not finite: JSON has no such numbers.
   subroutine put_number(self, key, value)
     class(json_t), intent(inout) :: self
     character(len=*), intent(in) :: key
     real(wp), intent(in) :: value
 
     call self%begin_member(key)
-    call append_number(self%buffer, value)
+    call self%buffer%append(number_text(value))
   end subroutine put_number
 
   !> A list of numbers, on one line.
@@ -119,27 +134,22 @@ contains
     class(json_t), intent(inout) :: self
     character(len=*), intent(in) :: key
     real(wp), intent(in) :: values(:)
+    type(string_t) :: items(size(values))
     integer :: i
 
-    call self%begin_member(key)
-    call self%buffer%append('[')
     do i = 1, size(values)
-      if (i > 1) call self%buffer%append(', ')
-      call append_number(self%buffer, values(i))
+      items(i)%text = number_text(values(i))
     end do
-    call self%buffer%append(']')
+    call put_list(self, key, items)
   end subroutine put_numbers
 
-  subroutine append_number(buffer, value)
-    type(text_buffer_t), intent(inout) :: buffer
+  function number_text(value) result(text)
     real(wp), intent(in) :: value
+    character(len=:), allocatable :: text
 
-    if (ieee_is_finite(value)) then
-      call buffer%append(to_text(value))
-    else
-      call buffer%append('null')
-    end if
-  end subroutine append_number
+    text = 'null'
+    if (ieee_is_finite(value)) text = to_text(value)
+  end function number_text
 
   subroutine put_integer(self, key, value)
     class(json_t), intent(inout) :: self
@@ -155,15 +165,13 @@ contains
     class(json_t), intent(inout) :: self
     character(len=*), intent(in) :: key
     integer, intent(in) :: values(:)
+    type(string_t) :: items(size(values))
     integer :: i
 
-    call self%begin_member(key)
-    call self%buffer%append('[')
     do i = 1, size(values)
-      if (i > 1) call self%buffer%append(', ')
-      call self%buffer%append(to_text(values(i)))
+      items(i)%text = to_text(values(i))
     end do
-    call self%buffer%append(']')
+    call put_list(self, key, items)
   end subroutine put_integers
 
   subroutine begin_member(self, key)
@@ -174,7 +182,7 @@ contains
     call self%buffer%append(escaped(key) // ': ')
   end subroutine begin_member
 
-  !> A line of its own, after a comma if it is not the first.
+  !> Begins a line, after a comma if the member or item is not the first.
   subroutine begin_item(self)
     class(json_t), intent(inout) :: self
 
@@ -183,7 +191,7 @@ contains
     self%is_first = .false.
   end subroutine begin_item
 
-  !> A JSON string with its quotes; control characters, which no input has, become blanks.
+  !> A JSON string with its quotes. Control characters, which no input contains, become blanks.
   pure function escaped(text)
     character(len=*), intent(in) :: text
     character(len=:), allocatable :: escaped
@@ -209,7 +217,7 @@ contains
     escaped = escaped // '"'
   end function escaped
 
-  !> Whether a text is UTF-8 throughout, with characters beyond ASCII.
+  !> Whether a text is valid UTF-8 and has characters that are not ASCII.
   pure logical function has_utf_8(text)
     character(len=*), intent(in) :: text
     integer :: i, length
@@ -225,7 +233,7 @@ contains
     has_utf_8 = has_utf_8 .and. i > len(text)
   end function has_utf_8
 
-  !> Bytes of the UTF-8 character that begins at `first`, 0 if none does.
+  !> Number of bytes of the UTF-8 character at position `first`, 0 if there is none.
   pure integer function utf_8_length(text, first) result(length)
     character(len=*), intent(in) :: text
     integer, intent(in) :: first
@@ -245,7 +253,7 @@ contains
         .or. (head == 244 .and. second > 143)) length = 0
   end function utf_8_length
 
-  !> A byte that is no UTF-8, taken for Latin-1.
+  !> Escape sequence of a byte that is not UTF-8, read as Latin-1.
   pure function latin_1(byte) result(escape)
     character(len=1), intent(in) :: byte
     character(len=6) :: escape

@@ -22,7 +22,7 @@ contains
 
     call buffer%append_line('# Input reference')
     call buffer%append_line('')
-    call buffer%append_line('An input file is a Fortran namelist in SI units. Groups stand in any order.')
+    call buffer%append_line('An input file is a Fortran namelist in SI units. Groups may be in any order.')
     do rule = 1, size(group_rules)
       call append_group(buffer, rule)
     end do

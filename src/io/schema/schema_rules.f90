@@ -26,7 +26,7 @@ module nocdyn_schema_rules
 
   integer, parameter, public :: any_number = 0   !! as `count`: a list of any length, possibly empty
   character(len=*), parameter, public :: required = '<required>', unset = '<unset>'   !! in place of a default
-  character(len=*), parameter, public :: ground = 'ground'   !! stands for a body that does not turn
+  character(len=*), parameter, public :: ground = 'ground'   !! the name of the body that does not turn
   integer, parameter, public :: longest_name = 63   !! bytes of an element's name
   integer, parameter, public :: longest_path = 4000, longest_file_name = 255   !! bytes, as Linux allows, less names of files
 

@@ -72,7 +72,7 @@ contains
         if (message == '') cycle
         key = key_without_equals(namelist, assignment, raw%rule)
         if (key > 0) then
-          message = message // "; is '=' missing behind " // trim(key_rules(key)%name) // '?'
+          message = message // "; is '=' missing after " // trim(key_rules(key)%name) // '?'
           raw%keys(raw%position(key))%may_be_missing = .true.
         end if
         call diagnostics%add(assignment%line, raw%index, message)

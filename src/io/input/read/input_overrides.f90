@@ -59,7 +59,7 @@ contains
     type(key_path_t) :: path
 
     if (text == '') then
-      message = 'there is nothing before the =; write GROUP.KEY=VALUE or GROUP.NAME.KEY=VALUE'
+      message = 'there is no path before the =; write GROUP.KEY=VALUE or GROUP.NAME.KEY=VALUE'
       return
     end if
     call read_path(text, '=VALUE', path, message)

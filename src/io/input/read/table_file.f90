@@ -1,5 +1,5 @@
-!> Tables in files: columns of numbers, separated by blanks, tabs or a comma; # and ! begin comments. The table of an element
-!> has two columns, of which the first ascends; a list has a first line with the names of its columns, separated by commas.
+!> Tables in files: columns of numbers, separated by blanks, tabs or a comma; # and ! begin comments. The table of an element has
+!> two columns, of which the first ascends. A list of variants begins with the names of its columns, separated by commas.
 module nocdyn_table_file
   use nocdyn_errors, only: error_t, exit_file, exit_input
   use nocdyn_kinds, only: wp
@@ -11,31 +11,31 @@ module nocdyn_table_file
 
   public :: read_table_file, read_table_text, read_list_text
 
-  integer, parameter :: most_messages = 5   !! a file of another form has as many mistakes as lines
+  integer, parameter :: most_messages = 5   !! a file of another format has as many errors as lines
   character(len=*), parameter :: line_end = achar(10), tab = achar(9), carriage_return = achar(13)
   character(len=*), parameter :: byte_order_mark = char(239) // char(187) // char(191)
   character(len=*), parameter :: blanks = ' ' // tab, comments = '#!', quotes = '"' // "'"
 
-  !> What is known while the lines of a table go by.
-  type :: reading_t
-    character(len=:), allocatable :: file
+  !> The state of reading a table line by line.
+  type :: table_reader_t
+    character(len=:), allocatable :: file        !! its name in messages
     integer :: columns = 2
-    logical :: is_list = .false.        !! a list, else the table of an element
-    integer :: line = 0
-    integer :: last_good = 0            !! line of the last row
-    integer :: wrong = 0                !! lines with a mistake
-    logical :: is_other = .false.       !! the file has another form altogether, which was reported
-    type(string_t), allocatable :: messages(:)
-  end type reading_t
+    logical :: is_list = .false.                 !! a list of variants, else the table of an element
+    integer :: line = 0                          !! of the text that is being read
+    integer :: last_row_line = 0                 !! line of the last row
+    integer :: errors = 0                        !! number of wrong lines
+    logical :: has_other_format = .false.        !! which is reported; the rest of the file is not read
+    type(string_t), allocatable :: messages(:)   !! at most `most_messages`
+  end type table_reader_t
 
 contains
 
-  !> Reads a file of which the first column ascends and which has two rows at least.
+  !> Reads the file of a table: two columns, of which the first ascends, and two rows at least.
   subroutine read_table_file(file, first, second, messages, code)
-    character(len=*), intent(in) :: file
-    real(wp), allocatable, intent(out) :: first(:), second(:)
-    type(string_t), allocatable, intent(out) :: messages(:)   !! sentences that begin with file and line; empty: all is well
-    integer, intent(out) :: code                                !! exit code of the complaints
+    character(len=*), intent(in) :: file                      !! path
+    real(wp), allocatable, intent(out) :: first(:), second(:)   !! the columns, [rows]
+    type(string_t), allocatable, intent(out) :: messages(:)   !! sentences that begin with file and line; empty: the file is valid
+    integer, intent(out) :: code                              !! exit code of the messages
     type(error_t), allocatable :: error
     character(len=:), allocatable :: text
 
@@ -50,34 +50,34 @@ contains
     call append(messages, error%message)
   end subroutine read_table_file
 
-  !> Two columns of numbers, the first ascending; without complaints there are at least two rows.
+  !> Reads the text of a table: two columns, of which the first ascends, and two rows at least.
   subroutine read_table_text(text, file, first, second, messages)
     character(len=*), intent(in) :: text
-    character(len=*), intent(in) :: file   !! what complaints call it
-    real(wp), allocatable, intent(out) :: first(:), second(:)
-    type(string_t), allocatable, intent(out) :: messages(:)
-    type(reading_t) :: reading
+    character(len=*), intent(in) :: file   !! its name in messages
+    real(wp), allocatable, intent(out) :: first(:), second(:)   !! the columns, [rows]
+    type(string_t), allocatable, intent(out) :: messages(:)     !! empty if the text is valid
+    type(table_reader_t) :: reading
     real(wp), allocatable :: values(:, :)
     integer :: rows
 
     allocate (reading%messages(0))
     reading%file = file
     call read_rows(text, first_position(text), reading, values, rows)
-    call conclude(reading, rows, least=2, is_binary=index(text, achar(0)) > 0)
+    call check_whole(reading, rows, least=2, is_binary=index(text, achar(0)) > 0)
     first = values(1, :rows)
     second = values(2, :rows)
     call move_alloc(reading%messages, messages)
   end subroutine read_table_text
 
-  !> A list: the names of the columns in the first line that is no comment, then rows of as many numbers, one at least.
+  !> Reads the text of a list: a line with the names of the columns, then rows of as many numbers, one at least.
   subroutine read_list_text(text, file, names, line, values, messages)
     character(len=*), intent(in) :: text
-    character(len=*), intent(in) :: file   !! what complaints call it
+    character(len=*), intent(in) :: file   !! its name in messages
     type(string_t), allocatable, intent(out) :: names(:)
-    integer, intent(out) :: line                                !! of the names
-    real(wp), allocatable, intent(out) :: values(:, :)          !! [names, rows]
-    type(string_t), allocatable, intent(out) :: messages(:)   !! sentences that begin with file and line; empty: all is well
-    type(reading_t) :: reading
+    integer, intent(out) :: line                              !! of the names
+    real(wp), allocatable, intent(out) :: values(:, :)        !! [names, rows]
+    type(string_t), allocatable, intent(out) :: messages(:)   !! sentences that begin with file and line; empty: the file is valid
+    type(table_reader_t) :: reading
     real(wp), allocatable :: lines(:, :)
     integer :: rows, start
 
@@ -87,16 +87,16 @@ contains
     start = first_position(text)
     call read_names(text, start, reading, names)
     line = reading%line
-    call judge_names(reading, names)
+    call check_names(reading, names)
     reading%columns = size(names)
     call read_rows(text, start, reading, lines, rows)
-    call conclude(reading, rows, least=1, is_binary=index(text, achar(0)) > 0)
+    call check_whole(reading, rows, least=1, is_binary=index(text, achar(0)) > 0)
     allocate (values(size(names), rows))
     values = lines(:, :rows)
     call move_alloc(reading%messages, messages)
   end subroutine read_list_text
 
-  !> Behind the byte order mark, if there is one.
+  !> Position after the byte-order mark, if there is one.
   pure integer function first_position(text)
     character(len=*), intent(in) :: text
 
@@ -113,11 +113,11 @@ contains
     if (line_last < start - 1) line_last = len(text)
   end function line_last
 
-  !> The names of the columns of a list, with or without quotes; none if there is no line but comments.
+  !> Reads the names of the columns of a list, with or without quotes; none if all lines are comments.
   subroutine read_names(text, start, reading, names)
     character(len=*), intent(in) :: text
-    integer, intent(inout) :: start   !! of the first line; at the end, of the line behind that with the names
-    type(reading_t), intent(inout) :: reading
+    integer, intent(inout) :: start   !! position of the first line; on return, of the line after the names
+    type(table_reader_t), intent(inout) :: reading
     type(string_t), allocatable, intent(out) :: names(:)
     character(len=:), allocatable :: rest
     integer :: comma, last
@@ -137,9 +137,9 @@ contains
     end do
   end subroutine read_names
 
-  !> Drops names that a file of another form has.
-  subroutine judge_names(reading, names)
-    type(reading_t), intent(inout) :: reading
+  !> Refuses names of a file with another format; then there are none.
+  subroutine check_names(reading, names)
+    type(table_reader_t), intent(inout) :: reading
     type(string_t), allocatable, intent(inout) :: names(:)
     character(len=:), allocatable :: message
     integer :: i
@@ -151,19 +151,19 @@ contains
       else if (index(names(i)%text, tab) > 0) then
         message = 'the names of the columns are separated by tabs; needed: commas'
       else if (names(i)%text == 'variant') then
-        message = "'variant' is a column of a sweep.csv; needed: the columns of the numbers that vary alone"
+        message = "'variant' is a column of a sweep.csv; needed: only columns of numbers that vary"
       else if (names(i)%text == '') then
         message = 'column ' // to_text(i) // ' has no name; needed: the path of a number'
-        if (i == 1) message = message // ', and no numbers of rows (pandas: to_csv(FILE, index=False))'
+        if (i == 1) message = message // ', without numbers of rows (pandas: to_csv(FILE, index=False))'
       end if
       if (message /= '') exit
     end do
     if (message == '') return
-    reading%is_other = .true.
+    reading%has_other_format = .true.
     call add_error(reading, ':' // to_text(reading%line) // ': ' // message)
     deallocate (names)
     allocate (names(0))
-  end subroutine judge_names
+  end subroutine check_names
 
   pure function without_quotes(text) result(name)
     character(len=*), intent(in) :: text
@@ -172,11 +172,11 @@ contains
     name = text(verify(text // '.', blanks // quotes):verify(text, blanks // quotes // carriage_return, back=.true.))
   end function without_quotes
 
-  !> The rows of all lines from position `first` on.
+  !> Reads the rows of all lines from position `first` on.
   subroutine read_rows(text, first, reading, values, rows)
     character(len=*), intent(in) :: text
     integer, intent(in) :: first
-    type(reading_t), intent(inout) :: reading
+    type(table_reader_t), intent(inout) :: reading
     real(wp), allocatable, intent(out) :: values(:, :)   !! [columns, lines], the first `rows` are in use
     integer, intent(out) :: rows
     integer :: last, start
@@ -184,7 +184,7 @@ contains
     allocate (values(reading%columns, lines_of(text)))
     rows = 0
     start = first
-    do while (start <= len(text) .and. .not. reading%is_other)
+    do while (start <= len(text) .and. .not. reading%has_other_format)
       last = line_last(text, start)
       reading%line = reading%line + 1
       call read_line(text(start:content_end(text, start, last)), reading, values, rows)
@@ -202,7 +202,7 @@ contains
     end do
   end function lines_of
 
-  !> Last position of a line without its comment, blanks at its end, and the carriage return of other systems.
+  !> Last position of a line without its comment, its trailing blanks and carriage returns.
   pure integer function content_end(text, first, last)
     character(len=*), intent(in) :: text
     integer, intent(in) :: first, last
@@ -214,10 +214,10 @@ contains
     content_end = first - 1 + verify(text(first:content_end), blanks // carriage_return, back=.true.)
   end function content_end
 
-  !> Takes one line over as the next row, or complains.
+  !> Reads one line as the next row, or adds an error.
   subroutine read_line(content, reading, values, rows)
     character(len=*), intent(in) :: content
-    type(reading_t), intent(inout) :: reading
+    type(table_reader_t), intent(inout) :: reading
     real(wp), intent(inout) :: values(:, :)   !! [columns, lines]
     integer, intent(inout) :: rows
     integer :: begins(reading%columns), ends(reading%columns), column, found
@@ -225,7 +225,7 @@ contains
 
     if (content == '') return
     if (reading%is_list .and. scan(content, quotes) > 0) then
-      reading%is_other = .true.
+      reading%has_other_format = .true.
       call add_error(reading, ':' // to_text(reading%line) // ': quotes in ' // excerpt(content) // '; needed: plain numbers')
       return
     end if
@@ -240,18 +240,18 @@ contains
       end do
     end if
     if (.not. reading%is_list) then
-      if (message /= '' .and. rows == 0 .and. reading%wrong == 0) message = message // header_hint(content)
-      if (message == '' .and. rows > 0) call check_ascent(values(1, rows), values(1, rows + 1), reading%last_good, message)
+      if (message /= '' .and. rows == 0 .and. reading%errors == 0) message = message // header_hint(content)
+      if (message == '' .and. rows > 0) call check_ascent(values(1, rows), values(1, rows + 1), reading%last_row_line, message)
     end if
     if (message /= '') then
       call add_error(reading, ':' // to_text(reading%line) // ': ' // message)
     else
       rows = rows + 1
-      reading%last_good = reading%line
+      reading%last_row_line = reading%line
     end if
   end subroutine read_line
 
-  !> Where the columns stand, and how many there are; a comma without a value before it counts as a column.
+  !> Positions of the columns and their number; a comma without a value before it counts as a column.
   pure subroutine split(content, begins, ends, found)
     character(len=*), intent(in) :: content   !! without blanks at its end
     integer, intent(out) :: begins(:), ends(:)
@@ -272,7 +272,7 @@ contains
       first = last + verify(content(last + 1:) // '.', blanks)
       if (first > len(content)) return
       if (content(first:first) == ',') first = first + verify(content(first + 1:) // '.', blanks)
-      if (first > len(content)) found = found + 1   ! nothing behind the last comma
+      if (first > len(content)) found = found + 1   ! an empty column after the last comma
     end do
   end subroutine split
 
@@ -288,7 +288,7 @@ contains
     if (message /= '') message = 'column ' // to_text(column) // ', ' // excerpt(text) // ',' // message
   end subroutine read_column
 
-  !> A first line without any digit names the columns.
+  !> A hint for a first line without digits, which probably has the names of the columns.
   pure function header_hint(content) result(hint)
     character(len=*), intent(in) :: content
     character(len=:), allocatable :: hint
@@ -314,32 +314,33 @@ contains
     excerpt = quoted(shortened(text, most))
   end function excerpt
 
+  !> Counts an error; the first ones are kept as messages.
   subroutine add_error(reading, text)
-    type(reading_t), intent(inout) :: reading
+    type(table_reader_t), intent(inout) :: reading
     character(len=*), intent(in) :: text
 
-    reading%wrong = reading%wrong + 1
-    if (reading%wrong <= most_messages) call append(reading%messages, reading%file // text)
+    reading%errors = reading%errors + 1
+    if (reading%errors <= most_messages) call append(reading%messages, reading%file // text)
   end subroutine add_error
 
-  !> Complaints about the file as a whole.
-  subroutine conclude(reading, rows, least, is_binary)
-    type(reading_t), intent(inout) :: reading
+  !> Adds the messages on the file as a whole.
+  subroutine check_whole(reading, rows, least, is_binary)
+    type(table_reader_t), intent(inout) :: reading
     integer, intent(in) :: rows
-    integer, intent(in) :: least   !! rows
+    integer, intent(in) :: least   !! number of rows needed
     logical, intent(in) :: is_binary
 
     if (is_binary) then
       deallocate (reading%messages)
       allocate (reading%messages(0))
       call append(reading%messages, reading%file // ': not a text file')
-    else if (reading%wrong > most_messages) then
-      call append(reading%messages, reading%file // ': ' // to_text(reading%wrong - most_messages) // &
+    else if (reading%errors > most_messages) then
+      call append(reading%messages, reading%file // ': ' // to_text(reading%errors - most_messages) // &
                   ' more lines are wrong')
-    else if (reading%wrong == 0 .and. rows < least) then
+    else if (reading%errors == 0 .and. rows < least) then
       call add_error(reading, ': ' // to_text(rows) // trim(merge(' row ', ' rows', rows == 1)) // '; needed: at least ' // &
                     to_text(least))
     end if
-  end subroutine conclude
+  end subroutine check_whole
 
 end module nocdyn_table_file

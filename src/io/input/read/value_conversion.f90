@@ -118,7 +118,7 @@ contains
     logical, intent(in) :: may_be_bare                      !! texts need no quotes: the shell has removed them
     integer, intent(in) :: i                                !! index of the value
     type(value_t), intent(inout) :: value
-    character(len=:), allocatable, intent(out) :: message   !! behind 'KEY = VALUE'; '': the value is valid
+    character(len=:), allocatable, intent(out) :: message   !! text after 'KEY = VALUE'; '': the value is valid
 
     message = ''
     if (holds_texts(rule%value_type)) then
@@ -231,7 +231,7 @@ contains
     if (len_trim(name) == 0) then
       message = ' is an empty name'
     else if (name == ground) then
-      message = ' is not allowed as a name: it stands for what does not turn'
+      message = ' is not allowed as a name: it is the body that does not turn'
     else if (len(name) > longest_name) then
       message = ' is too long for a name; allowed: ' // to_text(longest_name) // ' bytes'
     else if (name(1:1) == ' ' .or. name(len(name):) == ' ') then

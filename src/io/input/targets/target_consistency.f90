@@ -14,12 +14,12 @@ module nocdyn_target_consistency
 
 contains
 
-  !> The targets of several paths, and what is wrong with each of them.
+  !> Finds the targets of several paths and checks that they are consistent.
   subroutine find_targets(input, paths, targets, messages)
     type(input_t), intent(in) :: input
     type(string_t), intent(in) :: paths(:)
-    type(target_t), allocatable, intent(out) :: targets(:)        !! [paths]; those with a complaint are of no use
-    type(string_t), allocatable, intent(out) :: messages(:)     !! [paths], '' if fine
+    type(target_t), allocatable, intent(out) :: targets(:)        !! [paths]; those with a message are not valid
+    type(string_t), allocatable, intent(out) :: messages(:)       !! [paths], '' if nothing is wrong
     integer :: earlier, i
 
     allocate (targets(size(paths)), messages(size(paths)))
@@ -34,7 +34,7 @@ contains
     end do
   end subroutine find_targets
 
-  !> Which of several targets a path leads to, 0 if none.
+  !> Index of the target with a path, 0 if there is none.
   integer function target_at(input, targets, path)
     type(input_t), intent(in) :: input
     type(target_t), intent(in) :: targets(:)
@@ -47,7 +47,7 @@ contains
     if (message == '') target_at = same_target(targets, target)
   end function target_at
 
-  !> The first of the targets that is the same number as `target`, 0 if none is.
+  !> Index of the first of the targets that is the same number as `target`, 0 if there is none.
   pure integer function same_target(targets, target) result(same)
     type(target_t), intent(in) :: targets(:), target
 
