@@ -7,7 +7,7 @@ module ball
 
   public :: fall
 
-  !> A sampler that also watches the height and ends the flight where it comes down to zero.
+  !> A sampler with an event: the height falls to zero, which ends the flight.
   type, extends(sampler_t), public :: ground_t
   contains
     procedure :: event_values
@@ -49,7 +49,7 @@ contains
 
 end module ball
 
-!> Prints when and how fast the ball hits the ground within five seconds.
+!> Prints the times and speeds at which the ball hits the ground within five seconds.
 program bouncing_ball
   use ball, only: fall, ground_t
   use nocdyn_errors, only: error_t

@@ -1,4 +1,4 @@
-!> Rods without friction that swing about their ends, one in each lane: phi'' = -omega_0^2 sin(phi).
+!> Pendulums without friction, one in each lane: phi'' = -omega_0^2 sin(phi).
 module pendulum
   use nocdyn_kinds, only: wp
   use nocdyn_system, only: evaluation_fatal, pattern_t, system_t
@@ -10,7 +10,7 @@ module pendulum
 
   !> States: angle phi [rad], speed omega [rad/s]. Quadrature: the integral of omega^2 over the time [rad2/s].
   type, extends(system_t), public :: pendulum_t
-    real(wp), allocatable :: omega_0(:)          !! of small swings [rad/s], [lanes]
+    real(wp), allocatable :: omega_0(:)          !! frequency of small swings [rad/s], [lanes]
     real(wp), allocatable, private :: x(:)       !! work space, [lanes]
   contains
     procedure :: derivative
@@ -73,7 +73,7 @@ contains
     pattern = pattern_t(row=[2, 1, 3], column=[1, 2, 2])
   end function jacobian_pattern
 
-  !> For the sentences about failures.
+  !> Names in messages about failures.
   function component_name(self, index) result(name)
     class(pendulum_t), intent(in) :: self
     integer, intent(in) :: index

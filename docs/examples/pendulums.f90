@@ -1,4 +1,4 @@
-!> Periods of 179 pendulums, worked off by a block of eight lanes, beside their exact values.
+!> Periods of 179 pendulums, integrated by a block of eight lanes, beside their exact values.
 program pendulums
   use nocdyn_errors, only: error_t
   use nocdyn_integration, only: integrate_ensemble

@@ -1,4 +1,4 @@
-!> One swing of each pendulum, forth and back: how long it takes and how fast it gets.
+!> One swing of each pendulum, forth and back: its period and its highest speed.
 module swings
   use nocdyn_kinds, only: wp
   use nocdyn_solver_status, only: integration_stopped, solver_status_t
@@ -11,7 +11,7 @@ module swings
 
   public :: swing_watcher, swing_queue
 
-  !> Ends a lane where the speed falls through zero, and follows the speed for its extremes.
+  !> Ends a lane where the speed falls through zero, and tracks the speed for its extremes.
   type, extends(observer_t), public :: swing_watcher_t
     type(ranges_t), allocatable :: ranges(:)   !! of the last variant in each lane
   contains
@@ -22,13 +22,13 @@ module swings
     procedure :: on_extremes
   end type swing_watcher_t
 
-  !> Variant i starts at rest. What is not found stays 0.
+  !> Variant i starts at rest. Results that are not found stay 0.
   type, extends(ensemble_t), public :: swing_queue_t
     real(wp), allocatable :: amplitude(:)      !! [rad], [variants]
     real(wp), allocatable :: omega_0(:)
     real(wp), allocatable :: period(:), highest_speed(:), integral(:)
     type(swing_watcher_t), pointer, private :: watcher => null()
-    integer, allocatable, private :: variant(:)   !! in each lane
+    integer, allocatable, private :: variant(:)   !! number of the variant in each lane
     integer, private :: begun = 0
   contains
     procedure :: next

@@ -10,7 +10,7 @@ module room
   real(wp), parameter, public :: lowest = 19.0_wp, highest = 21.0_wp
   real(wp), parameter, public :: outside = 5.0_wp, heating = 30.0_wp, slowness = 3.0_wp   !! [C], [C], [h]
 
-  !> Branches: the heater is on or off, in each lane.
+  !> A system with two branches in each lane: the heater is on or off.
   type, extends(system_t), public :: room_t
     logical, allocatable :: is_on(:)
   contains
