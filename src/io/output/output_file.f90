@@ -19,7 +19,7 @@ module nocdyn_output_file
     character(len=:), allocatable, private :: reason        !! of the first failure
     character(len=:), allocatable, private :: buffer
     integer, private :: used = 0                            !! bytes of the buffer
-    integer, private :: descriptor = -1                     !! -1: the file is not open
+    integer, private :: descriptor = -1                     !! -1 if the file is not open
   contains
     procedure :: open => open_hidden
     procedure :: put
@@ -36,7 +36,7 @@ contains
 
   !> Writes a file with a text.
   subroutine write_file(folder, name, text, error)
-    character(len=*), intent(in) :: folder, name, text   !! name: of the file in the folder
+    character(len=*), intent(in) :: folder, name, text   !! `name` of the file in the folder
     type(error_t), allocatable, intent(out) :: error     !! there is no file
     type(output_file_t) :: file
 
