@@ -173,9 +173,10 @@ def chunk_costs(sweeping: Sweeping, case: Case, has_mpi: bool, rounds: int) -> l
     return [
         *table(head, rows),
         "",
-        f"`{case.method}`, {costs[0].lanes} lanes, one thread. Start and end: what the lanes that begin together and run empty "
-        "one by one cost, beside the fastest chunk. Hand-out: lock and books. Journal: packing, checksum, one write. Messages: "
-        "request, answer, results and time between two ranks on this machine, without the work of either.",
+        f"`{case.method}`, {costs[0].lanes} lanes, one thread. Start and end: cost of filling the lanes at the "
+        "start and of idle lanes at the end, compared with the fastest chunk. Hand-out: lock and scheduler. Journal: "
+        "packing, checksum, one write. Messages: request, answer, results and time between two ranks on this machine, without "
+        "the work of either.",
         "",
         scaling_out(costs[-1], messages[-1], fastest),
     ]
@@ -185,16 +186,16 @@ def scaling_out(cost: Cost, message: float | None, rate: float) -> str:
     """What the largest chunk says of many workers."""
     journal = cost.journal / cost.variants
     text = (
-        f"A chunk is made to take {CHUNK_SECONDS} s, which are {CHUNK_SECONDS * rate:.0f} variants here, but has at most "
-        f"{MOST_AT_ONCE}. In the journal a variant takes {1e6 * journal:.2g} us, beside {1e6 / rate:.3g} us for its integration"
+        f"The size of a chunk is chosen for {CHUNK_SECONDS} s of work, {CHUNK_SECONDS * rate:.0f} variants here, with a limit of "
+        f"{MOST_AT_ONCE}. A variant takes {1e6 * journal:.2g} us in the journal and {1e6 / rate:.3g} us for its integration"
     )
     if message is not None:
         both = journal + message / cost.chunk
         text += (
-            f", and {1e6 * message / cost.chunk:.2g} us in messages. Rank 0, which does both for all others, has nothing but "
-            f"that to do at about {1 / (rate * both):.0f} ranks of one thread"
+            f", and {1e6 * message / cost.chunk:.2g} us in messages. Rank 0 does both for all others, and is busy "
+            f"with it at about {1 / (rate * both):.0f} ranks of one thread"
         )
-    return text + ". Variants that take longer move that limit out in proportion."
+    return text + ". With longer variants the limit grows in proportion."
 
 
 @dataclass(frozen=True)

@@ -38,7 +38,7 @@ class Programs:
         return [
             Contestant(
                 f"nocdyn {method}",
-                "the machine from its input file, reduced formulation, energy audit off",
+                "the machine from its input file, reduced formulation, energy balance off",
                 self._solve(problem, ["nocdyn_workloads", self.inputs[problem], method], []),
                 is_nocdyn=True,
             )

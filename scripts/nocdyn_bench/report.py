@@ -56,9 +56,9 @@ def write_report(measured: list, folder: Path, build: Path) -> None:
     sections = [
         "# Benchmarks",
         "\n".join(f"- {name}: {text}" for name, text in machine.items()),
-        "Times are the shortest of all rounds, taken in turns, in process unless the title says otherwise: start-up and "
-        "compilation do not count, nor does nocdyn's energy audit, which the others have not. Ratios "
-        "travel to other machines, milliseconds do not.",
+        "Times are the shortest of all rounds, measured in turns, in process unless the title says otherwise. Start-up and "
+        "compilation are not included, nor is nocdyn's energy balance, because the others have none. Ratios "
+        "are similar on other computers, milliseconds are not.",
     ]
     reached = [f"- {verdict}" for workload in measured for verdict in verdicts(workload)]
     if reached:
