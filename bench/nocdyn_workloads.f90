@@ -41,7 +41,8 @@ end module kept_states
 !> nocdyn_workloads INPUT METHOD RTOL ATOL REPETITIONS STATES_FILE, or nocdyn_workloads methods.
 !>
 !> Integrates the machine of a namelist file as `nocdyn run` does, without its files and its energy balance, because the other
-!> programs do not integrate the works. Writes omega and phi of all bodies at the output times to STATES_FILE. `methods` prints the names of the methods.
+!> programs do not integrate the works. Writes omega and phi of all bodies at the output times to STATES_FILE. `methods` prints
+!> the names of the methods.
 program nocdyn_workloads
   use contest, only: number_argument, print_report, seconds_now, text_argument, whole_argument, write_states
   use kept_states, only: keeper_t
