@@ -7,7 +7,7 @@ module nocdyn_operating_point
   use nocdyn_input, only: group_t, input_t
   use nocdyn_integration_settings, only: integration_settings_t
   use nocdyn_kinds, only: wp
-  use nocdyn_literals, only: literal_fine, read_real
+  use nocdyn_literals, only: literal_ok, read_real
   use nocdyn_machine, only: machine_t
   use nocdyn_reduced, only: new_reduced
   use nocdyn_run_settings, only: settings_of
@@ -51,7 +51,7 @@ contains
       call use_rest(machine, point)
     case default
       call read_real(at, time, status)
-      if (status /= literal_fine) then
+      if (status /= literal_ok) then
         call raise(error, exit_input, '--at ' // at // ': allowed: equilibrium, rest or a time of the run [s]')
       else if (time < run%number('t_start') .or. time > run%number('t_end')) then
         call raise(error, exit_input, input%file // ': --at ' // at // ' is no time of the run; allowed: ' // &

@@ -81,7 +81,7 @@ contains
   !> Label of a group, the same in both inputs.
   pure function label_of(namelist, g, rule, number) result(label)
     type(namelist_t), intent(in) :: namelist
-    integer, intent(in) :: g, rule
+    integer, intent(in) :: g, rule   !! index of the group, row of `group_rules`
     integer, intent(in) :: number   !! among the groups of its kind
     character(len=:), allocatable :: label
     integer :: name
@@ -98,7 +98,7 @@ contains
   !> The assignment to a key of a group, 0 if there is none.
   pure integer function find_assignment(namelist, g, key) result(a)
     type(namelist_t), intent(in) :: namelist
-    integer, intent(in) :: g
+    integer, intent(in) :: g   !! index of the group
     character(len=*), intent(in) :: key
 
     do a = namelist%groups(g)%first_assignment, namelist%groups(g)%last_assignment
@@ -136,6 +136,7 @@ contains
     end associate
   end subroutine compare_groups
 
+  !> Whether a key is not compared.
   pure logical function is_ignored(label, key)
     character(len=*), intent(in) :: label, key
 

@@ -1,7 +1,7 @@
 !> Paths of keys: GROUP.KEY in a group that occurs once, GROUP.NAME.KEY in a named group, GROUP(NUMBER).KEY in others. A subscript
 !> after the key selects values of a list.
 module nocdyn_key_path
-  use nocdyn_literals, only: literal_fine, read_integer
+  use nocdyn_literals, only: literal_ok, read_integer
   use nocdyn_namelist, only: assignment_t
   use nocdyn_namelist_values, only: read_subscript
   use nocdyn_schema, only: group_rule_index, group_rules, is_single, key_rule_index
@@ -47,6 +47,7 @@ contains
     if (message == '') call check_form(path, key // ending, last_dot > first_dot, message)
   end subroutine read_path
 
+  !> Reads GROUP or GROUP(NUMBER).
   subroutine read_group(text, path, message)
     character(len=*), intent(in) :: text   !! GROUP or GROUP(NUMBER)
     type(key_path_t), intent(inout) :: path
@@ -69,6 +70,7 @@ contains
     end if
   end subroutine read_group
 
+  !> Reads KEY or KEY(SUBSCRIPT).
   subroutine read_key(text, path, key, message)
     character(len=*), intent(in) :: text   !! KEY or KEY(SUBSCRIPT)
     type(key_path_t), intent(inout) :: path
@@ -97,14 +99,14 @@ contains
     integer :: number, status
 
     call read_integer(trim(adjustl(text)), number, status)
-    is_whole_number = status == literal_fine
+    is_whole_number = status == literal_ok
   end function is_whole_number
 
   !> Checks that the path has a name or a number if and only if its group needs one.
   subroutine check_form(path, ending, has_name, message)
     type(key_path_t), intent(in) :: path
     character(len=*), intent(in) :: ending   !! of the path: key and text after it, for the message
-    logical, intent(in) :: has_name
+    logical, intent(in) :: has_name   !! the path has a text between group and key
     character(len=:), allocatable, intent(inout) :: message
     character(len=:), allocatable :: group
 

@@ -8,7 +8,7 @@ module nocdyn_literals
 
   public :: read_real, read_integer, read_logical, number_problem, digits_end
 
-  integer, parameter, public :: literal_fine = 0, literal_malformed = 1, literal_not_finite = 2, literal_too_large = 3
+  integer, parameter, public :: literal_ok = 0, literal_malformed = 1, literal_not_finite = 2, literal_too_large = 3
 
   character(len=*), parameter :: digits = '0123456789'
   !> Digits and decimal exponent of the largest double: 1.7976931348623157e308. Longer texts that begin with these digits
@@ -22,16 +22,16 @@ contains
   !> Reads a number in decimal notation, with an optional exponent after e, d or q.
   subroutine read_real(text, value, status)
     character(len=*), intent(in) :: text
-    real(wp), intent(out) :: value
-    integer, intent(out) :: status   !! `literal_fine` ... `literal_too_large`
+    real(wp), intent(out) :: value   !! 0 if the text is not a number
+    integer, intent(out) :: status   !! `literal_ok` ... `literal_too_large`
 
     value = 0.0_wp
     status = literal_malformed
     if (is_not_finite(text)) then
       status = literal_not_finite
     else if (is_decimal(text)) then
-      status = merge(literal_too_large, literal_fine, overflows(text))
-      if (status == literal_fine) read (text, *) value
+      status = merge(literal_too_large, literal_ok, overflows(text))
+      if (status == literal_ok) read (text, *) value
     end if
   end subroutine read_real
 
@@ -41,7 +41,7 @@ contains
     character(len=:), allocatable :: text
 
     select case (status)
-    case (literal_fine)
+    case (literal_ok)
       text = ''
     case (literal_not_finite)
       text = ' is not a finite number'
@@ -56,7 +56,7 @@ contains
   subroutine read_integer(text, value, status)
     character(len=*), intent(in) :: text
     integer, intent(out) :: value
-    integer, intent(out) :: status   !! `literal_fine`, `literal_malformed` or `literal_too_large`
+    integer, intent(out) :: status   !! `literal_ok`, `literal_malformed` or `literal_too_large`
     integer :: i, digit, sign_length
 
     value = 0
@@ -71,22 +71,22 @@ contains
       value = 10 * value + digit
     end do
     if (text(1:1) == '-') value = -value
-    status = literal_fine
+    status = literal_ok
   end subroutine read_integer
 
   !> Reads .true. or .false., or one of the short forms true, false, .t., .f., t, f.
   pure subroutine read_logical(text, value, status)
     character(len=*), intent(in) :: text
     logical, intent(out) :: value
-    integer, intent(out) :: status   !! `literal_fine`, `literal_malformed` or `literal_too_large`
+    integer, intent(out) :: status   !! `literal_ok`, `literal_malformed` or `literal_too_large`
 
     select case (lower_case(text))
     case ('.true.', '.true', 'true', '.t.', '.t', 't')
       value = .true.
-      status = literal_fine
+      status = literal_ok
     case ('.false.', '.false', 'false', '.f.', '.f', 'f')
       value = .false.
-      status = literal_fine
+      status = literal_ok
     case default
       value = .false.
       status = literal_malformed
@@ -96,7 +96,7 @@ contains
   !> Last position of the digits that follow position `start`; `start` if there are none.
   pure integer function digits_end(text, start)
     character(len=*), intent(in) :: text
-    integer, intent(in) :: start
+    integer, intent(in) :: start   !! position before the digits
     integer :: length
 
     length = verify(text(start + 1:), digits) - 1

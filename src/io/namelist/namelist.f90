@@ -52,7 +52,7 @@ contains
   subroutine append_group(self, name, line)
     class(namelist_t), intent(inout) :: self
     character(len=*), intent(in) :: name
-    integer, intent(in) :: line
+    integer, intent(in) :: line   !! where it begins
     type(namelist_group_t), allocatable :: longer(:)
 
     if (.not. allocated(self%groups)) allocate (self%groups(64))

@@ -54,7 +54,7 @@ contains
   !> Moves forward to a position and counts the lines.
   pure subroutine move_to(self, position)
     class(cursor_t), intent(inout) :: self
-    integer, intent(in) :: position
+    integer, intent(in) :: position   !! at or after the cursor
     integer :: i
 
     do i = self%at, min(position - 1, len(self%text))
@@ -155,7 +155,7 @@ contains
   !> its line.
   pure integer function subscript_end(self, start)
     class(cursor_t), intent(in) :: self
-    integer, intent(in) :: start
+    integer, intent(in) :: start   !! position after the key
     integer :: open, length
 
     subscript_end = start

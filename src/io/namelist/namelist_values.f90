@@ -1,6 +1,6 @@
 !> The right-hand side of a namelist assignment, and the subscript of its left-hand side.
 module nocdyn_namelist_values
-  use nocdyn_literals, only: digits_end, literal_fine, read_integer
+  use nocdyn_literals, only: digits_end, literal_ok, read_integer
   use nocdyn_diagnostics, only: diagnostics_t
   use nocdyn_namelist, only: assignment_t, item_t, namelist_t
   use nocdyn_namelist_cursor, only: cursor_t
@@ -21,7 +21,7 @@ contains
     type(namelist_t), intent(inout) :: namelist
     type(diagnostics_t), intent(inout) :: diagnostics   !! errors are added
     logical, intent(out) :: is_malformed   !! some values cannot be read, which is reported
-    logical :: is_fine, is_after_value
+    logical :: is_valid, is_after_value
 
     is_malformed = .false.
     is_after_value = .false.
@@ -35,8 +35,8 @@ contains
       else if (cursor%key_follows()) then
         exit
       else
-        call scan_item(cursor, namelist, diagnostics, is_fine)
-        is_malformed = is_malformed .or. .not. is_fine
+        call scan_item(cursor, namelist, diagnostics, is_valid)
+        is_malformed = is_malformed .or. .not. is_valid
         is_after_value = .true.
       end if
     end do
@@ -44,26 +44,26 @@ contains
   end subroutine scan_items
 
   !> Scans one value, or several given by a repeat count such as 3*0.5.
-  subroutine scan_item(cursor, namelist, diagnostics, is_fine)
+  subroutine scan_item(cursor, namelist, diagnostics, is_valid)
     type(cursor_t), intent(inout) :: cursor
     type(namelist_t), intent(inout) :: namelist
     type(diagnostics_t), intent(inout) :: diagnostics
-    logical, intent(out) :: is_fine
+    logical, intent(out) :: is_valid   !! false: the value cannot be read, which is reported
     type(item_t) :: item
     integer :: i, repeats
 
     call scan_repeat_count(cursor, repeats)
     item%line = cursor%line
-    is_fine = repeats >= 1 .and. repeats <= longest_list
-    if (.not. is_fine) call diagnostics%add(cursor%line, namelist%group_count, cursor%key // &
+    is_valid = repeats >= 1 .and. repeats <= longest_list
+    if (.not. is_valid) call diagnostics%add(cursor%line, namelist%group_count, cursor%key // &
       'a repeat count such as 3*0.5 must be from 1 to ' // to_text(longest_list))
 
     if (scan(cursor%next(), '''"') == 1) then
-      call scan_quoted(cursor, namelist%group_count, diagnostics, item, is_fine)
+      call scan_quoted(cursor, namelist%group_count, diagnostics, item, is_valid)
     else
-      call scan_bare(cursor, namelist%group_count, diagnostics, item, is_fine)
+      call scan_bare(cursor, namelist%group_count, diagnostics, item, is_valid)
     end if
-    if (.not. is_fine) return
+    if (.not. is_valid) return
     do i = 1, repeats
       call namelist%append_item(item)
     end do
@@ -80,16 +80,17 @@ contains
     if (last < cursor%at) return
     if (cursor%text(last + 1:last + 1) /= '*') return
     call read_integer(cursor%text(cursor%at:last), repeats, status)
-    if (status /= literal_fine) repeats = huge(repeats)
+    if (status /= literal_ok) repeats = huge(repeats)
     call cursor%move_to(last + 2)
   end subroutine scan_repeat_count
 
-  subroutine scan_quoted(cursor, group, diagnostics, item, is_fine)
+  !> Scans a text in quotes.
+  subroutine scan_quoted(cursor, group, diagnostics, item, is_valid)
     type(cursor_t), intent(inout) :: cursor
-    integer, intent(in) :: group
+    integer, intent(in) :: group   !! index of the group, for the diagnostics
     type(diagnostics_t), intent(inout) :: diagnostics
     type(item_t), intent(inout) :: item
-    logical, intent(inout) :: is_fine
+    logical, intent(inout) :: is_valid   !! becomes false if the text cannot be read
     integer :: last
 
     last = cursor%quote_end()
@@ -109,15 +110,16 @@ contains
                            cursor%text(last + 1:last + 1))
       call skip_broken_line(cursor)
     end if
-    is_fine = .false.
+    is_valid = .false.
   end subroutine scan_quoted
 
-  subroutine scan_bare(cursor, group, diagnostics, item, is_fine)
+  !> Scans a bare word.
+  subroutine scan_bare(cursor, group, diagnostics, item, is_valid)
     type(cursor_t), intent(inout) :: cursor
-    integer, intent(in) :: group
+    integer, intent(in) :: group   !! index of the group, for the diagnostics
     type(diagnostics_t), intent(inout) :: diagnostics
     type(item_t), intent(inout) :: item
-    logical, intent(inout) :: is_fine
+    logical, intent(inout) :: is_valid   !! becomes false if the word cannot be read
     integer :: last
 
     last = cursor%value_end()
@@ -135,7 +137,7 @@ contains
                            shortened(cursor%text(item%first:last + 1)) // '; a text begins and ends with a quote')
       call skip_broken_line(cursor)
     end if
-    is_fine = .false.
+    is_valid = .false.
   end subroutine scan_bare
 
   !> Whether a value may end before a position.
@@ -170,15 +172,15 @@ contains
     type(assignment_t), intent(inout) :: assignment   !! `is_malformed` if the text is neither
     character(len=:), allocatable :: rest
     integer :: bounds(3), colon, part
-    logical :: is_fine
+    logical :: is_valid
 
     assignment%is_whole = .false.
     bounds = [1, 0, 1]
-    is_fine = len_trim(text) > 0
+    is_valid = len_trim(text) > 0
     rest = text
     do part = 1, 3
       colon = index(rest // ':', ':')
-      call read_bound(rest(:colon - 1), bounds(part), is_fine)
+      call read_bound(rest(:colon - 1), bounds(part), is_valid)
       if (colon > len(rest)) exit
       rest = rest(colon + 1:)
     end do
@@ -187,19 +189,19 @@ contains
     assignment%first = bounds(1)
     assignment%last = bounds(2)
     assignment%stride = bounds(3)
-    assignment%is_malformed = part > 3 .or. .not. is_fine .or. (bounds(2) > 0 .and. bounds(2) < bounds(1))
+    assignment%is_malformed = part > 3 .or. .not. is_valid .or. (bounds(2) > 0 .and. bounds(2) < bounds(1))
   end subroutine read_subscript
 
   !> Reads one bound; an empty text leaves it as it is.
-  subroutine read_bound(text, bound, is_fine)
+  subroutine read_bound(text, bound, is_valid)
     character(len=*), intent(in) :: text
     integer, intent(inout) :: bound
-    logical, intent(inout) :: is_fine
+    logical, intent(inout) :: is_valid   !! becomes false if the text is not a bound
     integer :: status
 
     if (len_trim(text) == 0) return
     call read_integer(trim(adjustl(text)), bound, status)
-    is_fine = is_fine .and. status == literal_fine .and. bound >= 1 .and. bound <= longest_list
+    is_valid = is_valid .and. status == literal_ok .and. bound >= 1 .and. bound <= longest_list
   end subroutine read_bound
 
 end module nocdyn_namelist_values

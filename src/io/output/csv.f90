@@ -26,7 +26,7 @@ contains
   !> Writes one row.
   subroutine write_row(file, values)
     type(output_file_t), intent(inout) :: file
-    real(wp), intent(in) :: values(:)
+    real(wp), intent(in) :: values(:)   !! [columns]
     character(len=number_width) :: number
     integer :: i, length
 

@@ -43,6 +43,7 @@ contains
     self%is_first = .true.
   end subroutine open_object
 
+  !> Ends the object that was opened last.
   subroutine close_object(self)
     class(json_t), intent(inout) :: self
 
@@ -64,6 +65,7 @@ contains
     self%is_first = .true.
   end subroutine open_list
 
+  !> Ends the list that was opened last.
   subroutine close_list(self)
     class(json_t), intent(inout) :: self
 
@@ -81,6 +83,7 @@ contains
     text = self%buffer%text()
   end function text
 
+  !> A text.
   subroutine put_text(self, key, value)
     class(json_t), intent(inout) :: self
     character(len=*), intent(in) :: key, value
@@ -151,6 +154,7 @@ contains
     if (ieee_is_finite(value)) text = to_text(value)
   end function number_text
 
+  !> A whole number.
   subroutine put_integer(self, key, value)
     class(json_t), intent(inout) :: self
     character(len=*), intent(in) :: key
@@ -174,6 +178,7 @@ contains
     call put_list(self, key, items)
   end subroutine put_integers
 
+  !> Begins a member of an object.
   subroutine begin_member(self, key)
     class(json_t), intent(inout) :: self
     character(len=*), intent(in) :: key

@@ -42,7 +42,7 @@ contains
 
   !> Positions of keys in their group.
   pure function positions(group_rule, keys)
-    integer, intent(in) :: group_rule
+    integer, intent(in) :: group_rule   !! row of `group_rules`
     character(len=*), intent(in) :: keys   !! separated by blanks
     integer, allocatable :: positions(:)
     type(string_t), allocatable :: names(:)

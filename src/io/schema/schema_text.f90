@@ -149,7 +149,7 @@ contains
 
   !> How often a group may occur, in words.
   pure function occurrence_text(occurrence) result(text)
-    integer, intent(in) :: occurrence
+    integer, intent(in) :: occurrence   !! `exactly_once` ... `any_times`
     character(len=:), allocatable :: text
 
     select case (occurrence)

@@ -55,7 +55,7 @@ contains
   !> Indices in the list, sorted by line; errors on one line stay in their order, those of overrides come last.
   subroutine sort_by_line(self, order)
     class(diagnostics_t), intent(in) :: self
-    integer, allocatable, intent(out) :: order(:)
+    integer, allocatable, intent(out) :: order(:)   !! indices of `list`
     type(string_t), allocatable :: keys(:)
     character(len=24) :: key
     integer :: i

@@ -29,6 +29,7 @@ contains
     end do
   end subroutine argsort
 
+  !> Merges two sorted lists.
   pure subroutine merge_runs(texts, left, right, merged)
     type(string_t), intent(in) :: texts(:)
     integer, intent(in) :: left(:), right(:)   !! indices of `texts`, each list sorted
@@ -48,9 +49,10 @@ contains
     end do
   end subroutine merge_runs
 
+  !> Whether the next item comes from the left list.
   pure logical function takes_left(texts, left, right, l, r)
     type(string_t), intent(in) :: texts(:)
-    integer, intent(in) :: left(:), right(:), l, r
+    integer, intent(in) :: left(:), right(:), l, r   !! lists as in `merge_runs`, index of the next item of each
 
     takes_left = r > size(right)
     if (takes_left .or. l > size(left)) return

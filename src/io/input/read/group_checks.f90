@@ -43,6 +43,7 @@ contains
     call check_different_bodies(raw, group, diagnostics)
   end subroutine check_group
 
+  !> Checks the values of an ascending list.
   subroutine check_ascending(raw, group, position, diagnostics)
     type(raw_group_t), intent(in) :: raw
     type(group_t), intent(in) :: group

@@ -26,7 +26,7 @@ contains
   subroutine read_group(namelist, source, index, overrides, folder, relations, group, diagnostics)
     type(namelist_t), intent(in) :: namelist
     type(namelist_group_t), intent(in) :: source   !! empty for a single group that the file does not have
-    integer, intent(in) :: index
+    integer, intent(in) :: index   !! of the group in the input
     type(override_t), intent(inout) :: overrides(:)
     character(len=*), intent(in) :: folder         !! of the input file, with a slash at its end, or ''
     type(relations_t), intent(in) :: relations     !! of the keys of this group
@@ -53,6 +53,7 @@ contains
     call check_group(raw, relations, group, diagnostics)
   end subroutine read_group
 
+  !> Takes over the assignments of the file.
   subroutine take_assignments(namelist, source, raw, diagnostics)
     type(namelist_t), intent(in) :: namelist
     type(namelist_group_t), intent(in) :: source
@@ -135,6 +136,7 @@ contains
     number = count([(namelist%groups(g)%name == group_rules(rule)%name, g=1, index)])
   end function number_of
 
+  !> Takes over the overrides of the group, and marks them as used.
   subroutine take_overrides(name, number, overrides, raw, diagnostics)
     character(len=*), intent(in) :: name   !! of the element, '' for groups without names
     integer, intent(in) :: number          !! among the groups without names

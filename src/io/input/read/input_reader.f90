@@ -112,7 +112,7 @@ contains
   subroutine find_absent_groups(namelist, overrides, rules)
     type(namelist_t), intent(in) :: namelist
     type(override_t), intent(in) :: overrides(:)
-    integer, allocatable, intent(out) :: rules(:)
+    integer, allocatable, intent(out) :: rules(:)   !! rows of `group_rules`
     integer :: g, rule
     logical :: exists
 
@@ -130,7 +130,7 @@ contains
 
   !> Whether a group needs more than its defaults.
   pure logical function has_required_key(group_rule)
-    integer, intent(in) :: group_rule
+    integer, intent(in) :: group_rule   !! row of `group_rules`
 
     has_required_key = any(key_rules(first_key(group_rule):last_key(group_rule))%default == required)
   end function has_required_key

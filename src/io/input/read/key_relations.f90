@@ -3,7 +3,7 @@
 module nocdyn_key_relations
   use nocdyn_diagnostics, only: diagnostics_t
   use nocdyn_kinds, only: wp
-  use nocdyn_literals, only: literal_fine, read_real
+  use nocdyn_literals, only: literal_ok, read_real
   use nocdyn_raw_group, only: raw_group_t, raw_key_t
   use nocdyn_schema, only: has_word, key_rules, words_of
   use nocdyn_schema_relations, only: relation_t, relations_t
@@ -91,6 +91,7 @@ contains
     end do
   end subroutine find_words
 
+  !> Whether a list has one of some words.
   pure logical function has_any_word(list, words)
     character(len=*), intent(in) :: list   !! separated by blanks
     type(string_t), intent(in) :: words(:)
@@ -153,6 +154,7 @@ contains
     end if
   end subroutine choose
 
+  !> Adds an error for two keys that exclude each other, unless an override decides between them.
   subroutine refuse_both(group, one, other, diagnostics)
     type(raw_group_t), intent(in) :: group
     integer, intent(in) :: one, other   !! positions of two keys that are both given
@@ -163,9 +165,10 @@ contains
                       ' are both given; allowed: one of them', diagnostics)
   end subroutine refuse_both
 
+  !> Excludes keys because another set is given.
   subroutine supersede(group, positions)
     type(raw_group_t), intent(inout) :: group
-    integer, intent(in) :: positions(:)
+    integer, intent(in) :: positions(:)   !! of the keys
     integer :: i
 
     do i = 1, size(positions)
@@ -197,6 +200,7 @@ contains
     end do
   end subroutine check_requirement
 
+  !> Whether the key has one value, the number 0.
   logical function is_zero(key)
     type(raw_key_t), intent(in) :: key
     real(wp) :: value
@@ -205,7 +209,7 @@ contains
     is_zero = .false.
     if (key%is_malformed .or. key%count_given() /= 1 .or. size(key%values) /= 1) return
     call read_real(key%values(1)%text, value, status)
-    is_zero = status == literal_fine .and. abs(value) <= 0.0_wp
+    is_zero = status == literal_ok .and. abs(value) <= 0.0_wp
   end function is_zero
 
   !> A list with its default becomes as long as the first list of the relation.

@@ -31,10 +31,11 @@ contains
       members = pack([(i, i=1, size(groups))], [(is_member(groups(i), name_space), i=1, size(groups))])
       call collect_names(groups, members, names)
       call argsort(names, order)
-      call report_doubles(groups, members(order), diagnostics)
+      call report_duplicates(groups, members(order), diagnostics)
     end do
   end subroutine check_duplicate_names
 
+  !> Whether a group has a name in a name space.
   pure logical function is_member(group, name_space)
     type(group_t), intent(in) :: group
     character(len=*), intent(in) :: name_space
@@ -46,7 +47,7 @@ contains
   !> Names of the groups `members`.
   subroutine collect_names(groups, members, names)
     type(group_t), intent(in) :: groups(:)
-    integer, intent(in) :: members(:)
+    integer, intent(in) :: members(:)   !! indices of groups
     type(string_t), allocatable, intent(out) :: names(:)
     integer :: i
 
@@ -56,7 +57,7 @@ contains
     end do
   end subroutine collect_names
 
-  subroutine report_doubles(groups, sorted, diagnostics)
+  subroutine report_duplicates(groups, sorted, diagnostics)
     type(group_t), intent(in) :: groups(:)
     integer, intent(in) :: sorted(:)   !! groups in the order of their names
     type(diagnostics_t), intent(inout) :: diagnostics
@@ -73,7 +74,7 @@ contains
         end if
       end associate
     end do
-  end subroutine report_doubles
+  end subroutine report_duplicates
 
   !> Refuses keys with names of bodies that do not exist.
   subroutine check_references(groups, bodies_are_known, diagnostics)
@@ -101,6 +102,7 @@ contains
     end do
   end subroutine check_references
 
+  !> Adds an error for each body of a key that does not exist.
   subroutine check_missing(value, group, key, bodies, order, missing, diagnostics)
     type(value_t), intent(in) :: value
     integer, intent(in) :: group             !! index in the input

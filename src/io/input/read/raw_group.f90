@@ -60,7 +60,7 @@ contains
 
   !> A group without values.
   pure function new_raw_group(index, rule, line, is_malformed) result(group)
-    integer, intent(in) :: index, rule, line
+    integer, intent(in) :: index, rule, line   !! as in `raw_group_t`
     logical, intent(in) :: is_malformed   !! parts of the group cannot be read, which is reported
     type(raw_group_t) :: group
     integer :: i
@@ -85,6 +85,7 @@ contains
     key%is_required = key_rules(rule)%default == required
   end function new_raw_key
 
+  !> Name of the key.
   pure function name(self)
     class(raw_key_t), intent(in) :: self
     character(len=:), allocatable :: name
@@ -154,7 +155,7 @@ contains
     type(namelist_t), intent(in) :: namelist
     type(assignment_t), intent(in) :: assignment
     type(key_rule_t), intent(in) :: rule
-    integer, intent(out) :: last
+    integer, intent(out) :: last   !! if the message is empty
     character(len=:), allocatable, intent(out) :: message   !! '': the assignment fits the key
     integer :: items
 
@@ -203,6 +204,7 @@ contains
     call move_alloc(longer, key%values)
   end subroutine lengthen
 
+  !> Takes over the values of an assignment.
   subroutine take_items(key, namelist, assignment, last)
     type(raw_key_t), intent(inout) :: key
     type(namelist_t), intent(in) :: namelist
@@ -285,7 +287,7 @@ contains
   !> Position of the key with this row of `key_rules`.
   pure integer function position(self, rule)
     class(raw_group_t), intent(in) :: self
-    integer, intent(in) :: rule
+    integer, intent(in) :: rule   !! row of `key_rules`
 
     position = rule - first_key(self%rule) + 1
   end function position
@@ -293,7 +295,7 @@ contains
   !> The first of these positions whose key is given, 0 if none is; keys of overrides come before those of the file.
   pure integer function first_given(self, positions) result(given)
     class(raw_group_t), intent(in) :: self
-    integer, intent(in) :: positions(:)
+    integer, intent(in) :: positions(:)   !! of the keys
     integer :: i
 
     given = 0

@@ -107,7 +107,7 @@ contains
   !> Last position of the line that begins at `start`.
   pure integer function line_last(text, start)
     character(len=*), intent(in) :: text
-    integer, intent(in) :: start
+    integer, intent(in) :: start   !! position of its first character
 
     line_last = start - 2 + index(text(start:), line_end)
     if (line_last < start - 1) line_last = len(text)
@@ -175,7 +175,7 @@ contains
   !> Reads the rows of all lines from position `first` on.
   subroutine read_rows(text, first, reading, values, rows)
     character(len=*), intent(in) :: text
-    integer, intent(in) :: first
+    integer, intent(in) :: first   !! position of the first line
     type(table_reader_t), intent(inout) :: reading
     real(wp), allocatable, intent(out) :: values(:, :)   !! [columns, lines], the first `rows` are in use
     integer, intent(out) :: rows
@@ -205,7 +205,7 @@ contains
   !> Last position of a line without its comment, its trailing blanks and carriage returns.
   pure integer function content_end(text, first, last)
     character(len=*), intent(in) :: text
-    integer, intent(in) :: first, last
+    integer, intent(in) :: first, last   !! positions of the line
     integer :: comment
 
     comment = scan(text(first:last), comments)
@@ -219,7 +219,7 @@ contains
     character(len=*), intent(in) :: content
     type(table_reader_t), intent(inout) :: reading
     real(wp), intent(inout) :: values(:, :)   !! [columns, lines]
-    integer, intent(inout) :: rows
+    integer, intent(inout) :: rows   !! number of rows so far
     integer :: begins(reading%columns), ends(reading%columns), column, found
     character(len=:), allocatable :: message
 
@@ -254,8 +254,8 @@ contains
   !> Positions of the columns and their number; a comma without a value before it counts as a column.
   pure subroutine split(content, begins, ends, found)
     character(len=*), intent(in) :: content   !! without blanks at its end
-    integer, intent(out) :: begins(:), ends(:)
-    integer, intent(out) :: found
+    integer, intent(out) :: begins(:), ends(:)   !! positions of the first columns, [columns]
+    integer, intent(out) :: found   !! number of columns
     integer :: first, last
 
     found = 0
@@ -276,9 +276,10 @@ contains
     end do
   end subroutine split
 
+  !> Reads one number.
   subroutine read_column(text, column, value, message)
     character(len=*), intent(in) :: text
-    integer, intent(in) :: column
+    integer, intent(in) :: column   !! index, for the message
     real(wp), intent(out) :: value
     character(len=:), allocatable, intent(out) :: message
     integer :: status
@@ -297,6 +298,7 @@ contains
     if (scan(content, '0123456789') == 0) hint = '; a line with names of columns must begin with #'
   end function header_hint
 
+  !> Checks that the first column ascends.
   subroutine check_ascent(last, this, line, message)
     real(wp), intent(in) :: last, this   !! first column of the last row and of this one
     integer, intent(in) :: line          !! of the last row

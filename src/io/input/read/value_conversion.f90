@@ -3,7 +3,7 @@ module nocdyn_value_conversion
   use nocdyn_diagnostics, only: diagnostics_t
   use nocdyn_input, only: value_t
   use nocdyn_kinds, only: wp
-  use nocdyn_literals, only: literal_fine, literal_too_large, number_problem, read_integer, read_logical, read_real
+  use nocdyn_literals, only: literal_ok, literal_too_large, number_problem, read_integer, read_logical, read_real
   use nocdyn_raw_group, only: new_raw_key, raw_group_t, raw_key_t, raw_value_t
   use nocdyn_schema, only: holds_texts, key_rules, words_of
   use nocdyn_schema_rules, only: a_body, a_file, a_flag, a_folder, a_name, a_number, a_selector, a_word, an_integer, &
@@ -71,6 +71,7 @@ contains
     call convert_values(key, 0, value, none)
   end function default_value
 
+  !> Converts all values of a key.
   subroutine convert_values(key, group, value, diagnostics)
     type(raw_key_t), intent(in) :: key     !! with all values given
     integer, intent(in) :: group           !! index of the group, for the diagnostics
@@ -97,7 +98,7 @@ contains
   end subroutine convert_values
 
   subroutine allocate_values(value_type, count, value)
-    integer, intent(in) :: value_type, count
+    integer, intent(in) :: value_type, count   !! type of the key, number of values
     type(value_t), intent(inout) :: value
 
     select case (value_type)
@@ -112,6 +113,7 @@ contains
     end select
   end subroutine allocate_values
 
+  !> Converts one value and checks it.
   subroutine convert_value(raw, rule, may_be_bare, i, value, message)
     type(raw_value_t), intent(in) :: raw
     type(key_rule_t), intent(in) :: rule
@@ -164,7 +166,7 @@ contains
 
     call read_integer(text, value, status)
     select case (status)
-    case (literal_fine)
+    case (literal_ok)
       if (is_out_of_range(real(value, wp), rule%allowed)) message = ' is out of range'
     case (literal_too_large)
       message = ' is too large; at most ' // to_text(huge(value))
@@ -180,9 +182,10 @@ contains
     integer :: status
 
     call read_logical(text, value, status)
-    if (status /= literal_fine) message = ' is neither true nor false'
+    if (status /= literal_ok) message = ' is neither true nor false'
   end subroutine convert_flag
 
+  !> Checks the text of a name, a body, a word, a file or a folder.
   subroutine check_text(rule, value, message)
     type(key_rule_t), intent(in) :: rule
     type(string_t), intent(inout) :: value   !! a word becomes that of the schema
@@ -204,6 +207,7 @@ contains
     end select
   end subroutine check_text
 
+  !> Checks a word; on success it becomes the word of the schema.
   subroutine check_word(words, value, message)
     type(string_t), intent(in) :: words(:)   !! that are allowed
     type(string_t), intent(inout) :: value   !! in any case; becomes the word of the schema

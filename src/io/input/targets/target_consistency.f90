@@ -97,11 +97,12 @@ contains
     end subroutine refuse_beside
   end subroutine check_consistency
 
+  !> The keys of a group that the input or a target sets.
   subroutine find_given(input, targets, group, is_given)
     type(input_t), intent(in) :: input
     type(target_t), intent(in) :: targets(:)
-    integer, intent(in) :: group
-    logical, allocatable, intent(out) :: is_given(:)
+    integer, intent(in) :: group   !! index in the input
+    logical, allocatable, intent(out) :: is_given(:)   !! [keys of the group]
     integer :: t
 
     allocate (is_given(size(input%groups(group)%values)))

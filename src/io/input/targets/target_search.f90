@@ -96,6 +96,7 @@ contains
     end do
   end subroutine list_tails
 
+  !> Whether keys of a group can vary.
   pure logical function can_vary(group)
     type(group_t), intent(in) :: group
 
@@ -128,7 +129,7 @@ contains
   subroutine find_group(input, path, group, message)
     type(input_t), intent(in) :: input
     type(key_path_t), intent(in) :: path
-    integer, intent(out) :: group
+    integer, intent(out) :: group   !! index in the input, if the message is empty
     character(len=:), allocatable, intent(inout) :: message
     type(string_t), allocatable :: names(:)
 
@@ -159,7 +160,7 @@ contains
     type(group_t), intent(in) :: group
     character(len=*), intent(in) :: text   !! the path
     type(key_path_t), intent(in) :: path
-    integer, intent(out) :: position
+    integer, intent(out) :: position   !! if the message is empty
     character(len=:), allocatable, intent(inout) :: message
     integer :: count
 

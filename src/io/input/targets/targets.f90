@@ -69,7 +69,7 @@ contains
   subroutine set_target(input, target, value, message)
     type(input_t), intent(inout) :: input
     type(target_t), intent(in) :: target
-    real(wp), intent(in) :: value
+    real(wp), intent(in) :: value   !! in the unit of the key; rounded if the key has integers
     character(len=:), allocatable, intent(out) :: message   !! what is wrong and allowed, '' if nothing is wrong
 
     call set_value(input%groups(target%group), target, value, message)
@@ -95,10 +95,11 @@ contains
     end do
   end subroutine set_targets
 
+  !> Sets one number if it is in its range.
   subroutine set_value(group, target, value, message)
     type(group_t), intent(inout) :: group
     type(target_t), intent(in) :: target
-    real(wp), intent(in) :: value
+    real(wp), intent(in) :: value   !! in the unit of the key; rounded if the key has integers
     character(len=:), allocatable, intent(out) :: message
     real(wp) :: number
 
