@@ -63,7 +63,7 @@ def test_long_reports_stay_readable(nocdyn):
     lines = nocdyn("check", "train.nml").stdout.splitlines()
     assert len(lines) < 80 and max(map(len, lines)) < 250
     assert lines[1] == "  1 degree of freedom"
-    assert "  and 1960 more speeds that follow" in lines
+    assert "  and 1960 more dependent speeds" in lines
     assert "  note: 1988 more constraints repeat others" in lines
 
 

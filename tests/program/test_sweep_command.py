@@ -177,7 +177,7 @@ def test_a_sweep_without_a_variant_that_is_done_fails(nocdyn, discs):
     assert "the most that max_steps allows" in reason
     assert (
         outcome.stderr
-        == f"nocdyn: {discs}: no variant can be computed, the first one because: {reason}; all reasons are in out/sweep.nc\n"
+        == f"nocdyn: {discs}: no variant can be computed; reason of the first one: {reason}; all reasons are in out/sweep.nc\n"
     )
     assert nocdyn.summary("out")["status"] == "failed"
     assert nocdyn.files("out") == ["input.nml", "summary.json", "sweep.nc"]
@@ -209,7 +209,7 @@ def test_a_run_does_not_go_to_the_folder_of_a_sweep(nocdyn, discs, spinner):
     outcome = nocdyn("run", discs, spinner, "--out", "out", "-q")
     assert (outcome.returncode, outcome.stdout) == (2, "")
     assert outcome.stderr == (
-        f"nocdyn: {discs}: out/discs holds the results of a sweep; choose another folder by --out, or remove sweep.nc\n"
+        f"nocdyn: {discs}: out/discs holds the results of a sweep; choose another folder with --out, or remove sweep.nc\n"
     )
     assert {name: (nocdyn.folder / "out/discs" / name).read_bytes() for name in nocdyn.files("out/discs")} == before
     assert nocdyn.files("out/spinner") == ["input.nml", "summary.json", "trajectory.csv"]
@@ -221,7 +221,7 @@ def test_a_run_does_not_go_to_the_folder_of_a_sweep_that_is_not_finished(nocdyn,
     outcome = nocdyn("run", discs, "--out", "out")
     assert (outcome.returncode, outcome.stdout) == (2, "")
     assert outcome.stderr == (
-        f"nocdyn: {discs}: out holds a sweep that is not finished; choose another folder by --out, or remove '{name}'\n"
+        f"nocdyn: {discs}: out holds an unfinished sweep; choose another folder with --out, or remove '{name}'\n"
     )
     assert nocdyn.files("out") == [name]
 
@@ -264,7 +264,7 @@ def test_run_takes_no_notice_of_the_groups_of_a_sweep(nocdyn, discs):
 def test_shards_are_merged(nocdyn, discs):
     for part in (1, 2, 3):
         outcome = nocdyn("sweep", discs, "--out", "out", "--shard", f"{part}/3")
-        assert outcome.stdout == f"{discs}: part {part} of 3 done, 20 variants; once all parts are there: nocdyn merge out\n"
+        assert outcome.stdout == f"{discs}: part {part} of 3 done, 20 variants; when all parts are done: nocdyn merge out\n"
     assert nocdyn.files("out") == [f"sweep.{part}-of-3.journal" for part in (1, 2, 3)]
     outcome = nocdyn("merge", "out", "--csv")
     assert (outcome.returncode, outcome.stderr) == (0, "")
@@ -320,7 +320,7 @@ def test_parts_of_different_sweeps_are_not_merged(nocdyn, discs):
     ("operand", "complaint"),
     [
         ("nope", "nope: there is no such folder"),
-        ("discs.nml", "discs.nml: is no folder; nocdyn merge needs that of the journals"),
+        ("discs.nml", "discs.nml: is not a folder; nocdyn merge needs the folder of the journals"),
     ],
 )
 def test_a_merge_of_no_folder_is_refused_with_code_3(nocdyn, discs, operand, complaint):
@@ -333,7 +333,7 @@ def test_a_merge_of_no_folder_is_refused_with_code_3(nocdyn, discs, operand, com
     [
         (["sweep"], "exactly one file is needed: nocdyn sweep FILE"),
         (["merge"], "exactly one folder is needed: nocdyn merge DIR"),
-        (["merge", "."], ".: no journal of a sweep is there; nocdyn sweep FILE --shard K/N leaves them"),
+        (["merge", "."], ".: the folder holds no journal of a sweep; nocdyn sweep FILE --shard K/N writes them"),
         (["sweep", "discs.nml", "--threads", "0"], "--threads 0: allowed: a number from 1 to 4096"),
         (["sweep", "discs.nml", "--threads=2", "--threads=2"], "--threads is given twice"),
         (["sweep", "discs.nml", "--shard", "3/2"], "--shard 3/2: allowed: K/N, the part K of N, with K from 1 to N"),
@@ -365,7 +365,7 @@ def test_threads_beyond_what_processors_can_use_are_not_started(nocdyn, discs, w
     outcome = nocdyn("sweep", discs, "--out", "out", *words, env=environment)
     most = 8 * len(os.sched_getaffinity(0))
     assert (outcome.returncode, outcome.stderr) == (0, "")
-    note = f"note: {most} threads instead of 4096, which is more than 8 for each processor that may be used"
+    note = f"note: {most} threads instead of 4096: at most 8 for each available processor"
     assert outcome.stdout.startswith(f"{discs}: {note}\n")
     assert nocdyn.summary("out")["threads"] == most
 
@@ -377,7 +377,7 @@ def test_a_process_of_an_mpi_job_does_not_compute_what_the_others_do(nocdyn, dis
     assert (outcome.returncode, outcome.stdout) == (2, "")
     assert outcome.stderr == (
         f"nocdyn: this is one of 2 processes of an MPI job ({name}), which would all compute the same sweep; "
-        "nocdyn-mpi sweep shares it among them\n"
+        "nocdyn-mpi sweep distributes it among them\n"
     )
     assert not (nocdyn.folder / "out").exists()
     assert nocdyn("sweep", discs, "--out", "out", "--shard", "1/2", env=environment).returncode == 0

@@ -22,7 +22,7 @@ LONG = ("--set", f"sweep.samples={SAMPLES}", "--set", "run.t_end=20")
 ENDLESS = ("--set", "sweep.samples=100000000", "--set", "run.t_end=20")
 INTERRUPTED = (
     r"nocdyn: .*discs\.nml: interrupted with (\d+) of 100000000 variants done; "
-    r"the same command with --resume goes on from there\n"
+    r"repeat the command with --resume to continue\n"
 )
 
 
@@ -81,8 +81,8 @@ def test_an_interrupted_sweep_keeps_its_journal(nocdyn, discs, number):
     outcome = nocdyn("sweep", discs, "--out", "out", *ENDLESS)
     assert (outcome.returncode, outcome.stdout) == (2, "")
     assert outcome.stderr == (
-        f"nocdyn: out/sweep.journal holds {found[1]} of 100000000 variants of a sweep that was not finished; "
-        "go on with it by --resume, or remove it\n"
+        f"nocdyn: out/sweep.journal holds {found[1]} of 100000000 variants of an unfinished sweep; "
+        "continue it with --resume, or remove it\n"
     )
 
 
@@ -93,7 +93,7 @@ def test_what_is_done_is_not_done_again(nocdyn, discs):
     assert 0 < done < SAMPLES
     outcome = nocdyn("sweep", discs, "--out", "out", "--resume", *LONG)
     assert outcome.returncode == 0
-    assert outcome.stdout.startswith(f"{discs}: taking over {done} of {SAMPLES} variants from out/sweep.journal\n")
+    assert outcome.stdout.startswith(f"{discs}: reusing {done} of {SAMPLES} variants from out/sweep.journal\n")
     assert nocdyn.summary("out")["variants_computed"] == SAMPLES - done
     assert nocdyn.summary("out")["counts"]["done"] == SAMPLES
 
@@ -119,8 +119,8 @@ def test_a_sweep_with_another_input_is_not_gone_on_with(nocdyn, discs, words, di
     before = journal(nocdyn).read_bytes()
     outcome = nocdyn("sweep", discs, "--out", "out", "--resume", *ENDLESS, *words)
     assert (outcome.returncode, outcome.stdout) == (2, "")
-    remedy = "remove it, or choose another folder by --out"
-    assert outcome.stderr == f"nocdyn: out/sweep.journal is not of this sweep: {difference}; {remedy}\n"
+    remedy = "remove it, or choose another folder with --out"
+    assert outcome.stderr == f"nocdyn: out/sweep.journal belongs to another sweep: {difference}; {remedy}\n"
     assert nocdyn("sweep", discs, "--out", "out", *ENDLESS, *words).stderr == outcome.stderr
     assert journal(nocdyn).read_bytes() == before
 
@@ -143,7 +143,7 @@ def test_a_journal_of_another_version_is_not_gone_on_with(nocdyn, discs):
     outcome = nocdyn("sweep", discs, "--out", "out", "--resume")
     assert (outcome.returncode, outcome.stdout) == (2, "")
     this = re.escape(nocdyn("--version").stdout.strip())
-    complaint = f"nocdyn: out/sweep\\.journal is not of this sweep: it was begun by nocdyn 9, this is {this}; remove it, .*\n"
+    complaint = f"nocdyn: out/sweep\\.journal belongs to another sweep: it was started by nocdyn 9, this is {this}; remove it, .*\n"
     assert re.fullmatch(complaint, outcome.stderr)
     assert journal(nocdyn).read_bytes() == before
 
@@ -164,8 +164,8 @@ def test_a_list_that_has_changed_is_not_gone_on_with(nocdyn):
     write_list(nocdyn, ["21", *rows[1:]])
     outcome = nocdyn("sweep", discs, "--out", "out", "--set", "run.t_end=20", "--resume")
     assert (outcome.returncode, outcome.stdout) == (2, "")
-    complaint = "the file of &sweep with the variants has changed; remove it, or choose another folder by --out"
-    assert outcome.stderr == f"nocdyn: out/sweep.journal is not of this sweep: {complaint}\n"
+    complaint = "the file of &sweep with the variants has changed; remove it, or choose another folder with --out"
+    assert outcome.stderr == f"nocdyn: out/sweep.journal belongs to another sweep: {complaint}\n"
 
 
 def test_results_of_a_list_that_has_changed_are_not_taken_for_those_of_the_new_one(nocdyn):
@@ -188,7 +188,7 @@ def test_results_of_another_version_are_not_taken_for_those_of_this_one(nocdyn, 
         file.attrs["source"] = numpy.bytes_("nocdyn 9")
     outcome = nocdyn("sweep", discs, "--out", "out", "--resume")
     assert (outcome.returncode, outcome.stdout) == (2, "")
-    assert outcome.stderr.startswith("nocdyn: out holds the results of another sweep: it was begun by nocdyn 9, this is nocdyn ")
+    assert outcome.stderr.startswith("nocdyn: out holds the results of another sweep: it was started by nocdyn 9, this is nocdyn ")
 
 
 def test_results_that_cannot_be_read_are_not_taken_for_finished(nocdyn, discs):
@@ -201,7 +201,7 @@ def test_results_that_cannot_be_read_are_not_taken_for_finished(nocdyn, discs):
 def test_nothing_to_go_on_with_is_said(nocdyn, discs):
     outcome = nocdyn("sweep", discs, "--out", "out", "--resume")
     assert outcome.returncode == 0
-    assert outcome.stdout.startswith(f"{discs}: there is nothing to go on with in out; the sweep starts from its beginning\n")
+    assert outcome.stdout.startswith(f"{discs}: out holds nothing to resume; the sweep starts from the beginning\n")
 
 
 def test_a_sweep_that_is_done_stays_as_it_is(nocdyn, discs):
@@ -241,8 +241,8 @@ def test_a_part_does_not_go_to_the_folder_of_a_whole_sweep(nocdyn, discs, words)
     outcome = nocdyn("sweep", discs, "--out", "out", "--shard", "1/2", *words, *ENDLESS)
     assert (outcome.returncode, outcome.stdout) == (2, "")
     assert outcome.stderr == (
-        "nocdyn: out holds the journal of a whole sweep, sweep.journal; go on with it by --resume without --shard, remove it, "
-        "or choose another folder by --out\n"
+        "nocdyn: out holds the journal of a whole sweep, sweep.journal; continue it with --resume and without --shard, remove it, "
+        "or choose another folder with --out\n"
     )
     assert nocdyn.files("out") == ["sweep.journal"]
 
@@ -255,8 +255,8 @@ def test_a_whole_sweep_does_not_go_to_the_folder_of_parts(nocdyn, discs, words):
     outcome = nocdyn("sweep", discs, "--out", "out", *words)
     assert (outcome.returncode, outcome.stdout) == (2, "")
     assert outcome.stderr == (
-        f"nocdyn: out holds journals of parts of a sweep: '{journals[0]}', '{journals[1]}'; go on with them by --shard, "
-        "remove them, or choose another folder by --out\n"
+        f"nocdyn: out holds journals of parts of a sweep: '{journals[0]}', '{journals[1]}'; continue them with --shard, "
+        "remove them, or choose another folder with --out\n"
     )
     assert nocdyn.files("out") == journals
 
@@ -277,8 +277,8 @@ def test_a_damaged_journal_is_told_and_made_good(nocdyn, discs):
     journal(nocdyn).write_bytes(content[:-10])
     outcome = nocdyn("sweep", discs, "--out", "out", "--resume", *LONG)
     assert (outcome.returncode, outcome.stderr) == (0, "")
-    note = "note: out/sweep.journal has damaged records; their variants are computed again"
-    assert outcome.stdout.startswith(f"{discs}: {note}\n{discs}: taking over ")
+    note = "note: out/sweep.journal has damaged entries; their variants are computed again"
+    assert outcome.stdout.startswith(f"{discs}: {note}\n{discs}: reusing ")
     assert nocdyn.summary("out")["counts"]["done"] == SAMPLES
 
 
@@ -303,7 +303,7 @@ def test_a_table_of_results_that_are_done_already_is_refused(nocdyn, discs):
     outcome = nocdyn("sweep", discs, "--out", "out", "--resume", "--csv")
     assert (outcome.returncode, outcome.stdout) == (2, "")
     assert outcome.stderr == (
-        f"nocdyn: {discs}: all 60 variants are done already; results in out, without sweep.csv; to have it, leave out --resume\n"
+        f"nocdyn: {discs}: all 60 variants are done already; results in out, without sweep.csv; run without --resume to write it\n"
     )
     nocdyn("sweep", discs, "--out", "out", "--csv")
     assert nocdyn("sweep", discs, "--out", "out", "--resume", "--csv").returncode == 0
@@ -322,14 +322,14 @@ def test_a_part_that_waits_for_the_others_is_not_called_unfinished(nocdyn, discs
     outcome = nocdyn("sweep", discs, "--out", "out", "--shard", "1/2")
     assert (outcome.returncode, outcome.stdout) == (2, "")
     assert outcome.stderr == (
-        "nocdyn: out/sweep.1-of-2.journal holds all 30 variants of this part: nocdyn merge takes them from there; "
+        "nocdyn: out/sweep.1-of-2.journal holds all 30 variants of this part, which nocdyn merge uses; "
         "to compute them again, remove it\n"
     )
     outcome = nocdyn("sweep", discs, "--out", "out", "--shard", "1/2", "--resume")
     assert (outcome.returncode, outcome.stderr) == (0, "")
     taken, done = outcome.stdout.splitlines()
-    assert taken == f"{discs}: taking over 30 of 30 variants from out/sweep.1-of-2.journal"
-    assert done == f"{discs}: part 1 of 2 done, 30 variants; once all parts are there: nocdyn merge out"
+    assert taken == f"{discs}: reusing 30 of 30 variants from out/sweep.1-of-2.journal"
+    assert done == f"{discs}: part 1 of 2 done, 30 variants; when all parts are done: nocdyn merge out"
 
 
 @pytest.mark.parametrize("size", [0, 3000, 30000])
@@ -338,7 +338,7 @@ def test_a_full_disk_ends_a_sweep_that_can_be_gone_on_with(nocdyn, discs, size, 
     samples = ("--set", "sweep.samples=1000")
     outcome = nocdyn("sweep", discs, "--out", "out", "--threads", threads, *samples, preexec_fn=limited_to(size))
     assert (outcome.returncode, outcome.stdout) == (3, "")
-    remedy = "" if size == 0 else "; once it can be written, the same command with --resume goes on from there"
+    remedy = "" if size == 0 else "; when it can be written, repeat the command with --resume to continue"
     assert outcome.stderr == f"nocdyn: cannot write 'out/sweep.journal': File too large{remedy}\n"
     outcome = nocdyn("sweep", discs, "--out", "out", "--resume", *samples)
     assert outcome.returncode == 0
@@ -349,7 +349,7 @@ def test_a_disk_without_room_for_the_results_keeps_the_journal(nocdyn, discs):
     # more than the journal of 60 variants needs, less than sweep.nc does
     outcome = nocdyn("sweep", discs, "--out", "out", preexec_fn=limited_to(10000))
     assert (outcome.returncode, outcome.stdout) == (3, "")
-    assert "sweep.nc" in outcome.stderr and "the same command with --resume goes on from there\n" in outcome.stderr
+    assert "sweep.nc" in outcome.stderr and "repeat the command with --resume to continue\n" in outcome.stderr
     assert nocdyn.files("out") == ["sweep.journal"]
     outcome = nocdyn("sweep", discs, "--out", "out", "--resume")
     assert outcome.returncode == 0
@@ -389,7 +389,7 @@ def test_a_full_disk_ends_all_ranks(nocdyn, discs):
     command = ["mpirun", "-n", "2", "sh", "-c", limited]
     outcome = subprocess.run(command, cwd=nocdyn.folder, env=environment, check=False, capture_output=True, text=True, timeout=60)
     assert outcome.returncode == 3
-    assert "nocdyn: cannot write 'out/sweep.journal': File too large; once" in outcome.stderr
+    assert "nocdyn: cannot write 'out/sweep.journal': File too large; when" in outcome.stderr
     assert nocdyn.files("out") == ["sweep.journal"]
 
 
@@ -397,7 +397,7 @@ def test_a_full_disk_ends_all_ranks(nocdyn, discs):
 @pytest.mark.parametrize(
     ("rows", "complaint"),
     [
-        ("0.2\n0.4\n", "discs.nml: the file of &sweep with the variants is not that of rank 0"),
+        ("0.2\n0.4\n", "discs.nml: the file of &sweep with the variants differs from that of rank 0"),
         (None, "list.csv: cannot be read: there is no such file"),
     ],
 )

@@ -1,4 +1,4 @@
-!> What can be said of a machine before it moves: bodies, gears, coordinates, redundancies.
+!> The report of `nocdyn check` on a machine: bodies, gears, coordinates, redundant constraints.
 module nocdyn_machine_report
   use nocdyn_bank, only: role_coupling, role_excitation, role_load, role_motor, role_names
   use nocdyn_kinds, only: wp
@@ -17,7 +17,7 @@ module nocdyn_machine_report
 
 contains
 
-  !> The independent bodies in the order of the coordinates.
+  !> The names of the independent bodies in the order of the coordinates.
   function coordinate_names(machine) result(names)
     type(machine_t), intent(in) :: machine
     type(string_t), allocatable :: names(:)
@@ -25,7 +25,7 @@ contains
     allocate (names, source=selected(machine%names, machine%coordinates%body))
   end function coordinate_names
 
-  !> What is worth knowing before the machine moves: redundant constraints, and what projected start speeds cost.
+  !> Notes on redundant constraints, and on start speeds that were projected onto the constraints.
   function machine_notes(machine) result(notes)
     type(machine_t), intent(in) :: machine
     type(string_t), allocatable :: notes(:)
@@ -35,7 +35,7 @@ contains
     if (allocated(machine%start_impulse)) call add_impulse_note(machine, notes)
   end function machine_notes
 
-  !> One sentence for every redundant constraint.
+  !> Appends a sentence for every redundant constraint.
   subroutine add_redundancy_notes(machine, notes)
     type(machine_t), intent(in) :: machine
     type(string_t), allocatable, intent(inout) :: notes(:)
@@ -57,7 +57,7 @@ contains
     if (found > most_notes) call append(notes, to_text(found - most_notes) // ' more constraints repeat others')
   end subroutine add_redundancy_notes
 
-  !> What the multiplier of a row is, with its verb.
+  !> The name of the multiplier of a row, with its verb.
   function reaction_word(machine, row) result(word)
     type(machine_t), intent(in) :: machine
     integer, intent(in) :: row
@@ -101,7 +101,7 @@ contains
     label = machine%constraints%kinds(row)%text // ' ' // quoted(machine%constraints%names(row)%text)
   end function label
 
-  !> What `nocdyn check` prints: counts, bodies geared together, coordinates, ratios of geared bodies, notes.
+  !> The report: counts, bodies geared together, coordinates, ratios of geared bodies, notes.
   function machine_report(file, machine) result(text)
     character(len=*), intent(in) :: file
     type(machine_t), intent(in) :: machine
@@ -127,7 +127,7 @@ contains
     text = report%text()
   end function machine_report
 
-  !> Elements of all banks of one role.
+  !> The number of elements of one role.
   pure integer function elements_of(machine, role)
     type(machine_t), intent(in) :: machine
     integer, intent(in) :: role
@@ -161,7 +161,7 @@ contains
     if (number > 0) text = text // ', ' // counted(number, 'constraint', 'constraints')
   end function counted_constraints
 
-  !> Rows of one kind.
+  !> The number of constraint rows of one kind.
   integer function constraint_count(machine, kind) result(number)
     type(machine_t), intent(in) :: machine
     character(len=*), intent(in) :: kind
@@ -173,7 +173,7 @@ contains
     end do
   end function constraint_count
 
-  !> Which bodies are geared together.
+  !> Appends the groups of bodies that are geared together.
   subroutine put_groups(report, machine)
     type(text_buffer_t), intent(inout) :: report
     type(machine_t), intent(in) :: machine
@@ -199,7 +199,7 @@ contains
                   ' others; ratios count as equal within 1e-9 of their size')
   end subroutine put_groups
 
-  !> The speeds of the bodies that are no coordinates.
+  !> Appends the speeds of the dependent bodies in terms of the independent ones.
   subroutine put_relations(report, machine)
     type(text_buffer_t), intent(inout) :: report
     type(machine_t), intent(in) :: machine
@@ -214,7 +214,7 @@ contains
       found = found + 1
       if (found <= most_lines) call put_line(report, speed_relation(machine, b))
     end do
-    if (found > most_lines) call put_line(report, 'and ' // to_text(found - most_lines) // ' more speeds that follow')
+    if (found > most_lines) call put_line(report, 'and ' // to_text(found - most_lines) // ' more dependent speeds')
   end subroutine put_relations
 
   !> "1 gear", "2 gears".
@@ -227,7 +227,7 @@ contains
     if (number == 1) text = to_text(number) // ' ' // singular
   end function counted
 
-  !> "speed of 'machine' = -0.6666667 * speed of 'pinion'", for a body that is no coordinate.
+  !> "speed of 'machine' = -0.6666667 * speed of 'pinion'", for a dependent body.
   function speed_relation(machine, body) result(text)
     type(machine_t), intent(in) :: machine
     integer, intent(in) :: body
@@ -255,7 +255,7 @@ contains
     end associate
   end function speed_relation
 
-  !> How far an independent body itself turns with its coordinate: 1 with the natural complement.
+  !> The ratio of an independent body's speed to its coordinate: 1 with the natural complement.
   pure function own_ratio(machine, body) result(ratio)
     type(machine_t), intent(in) :: machine
     integer, intent(in) :: body

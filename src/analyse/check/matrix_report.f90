@@ -19,7 +19,7 @@ module nocdyn_matrix_report
 
   integer, parameter :: digits = 7   ! significant digits printed
 
-  !> What later equations need of earlier ones: matrices of n bodies, then those of the first-order systems.
+  !> Quantities that later equations take from earlier ones: of n bodies, then of the first-order systems.
   type :: equations_t
     type(machine_t) :: machine
     type(text_buffer_t) :: report
@@ -35,10 +35,10 @@ module nocdyn_matrix_report
 
 contains
 
-  !> The report as lines of text; the machine is at its start angles and speeds, the time is `t_start`.
+  !> The report as lines of text, for the machine at its start angles and speeds.
   function matrix_report(machine, t_start) result(text)
     type(machine_t), intent(in) :: machine
-    real(wp), intent(in) :: t_start   !! [s]
+    real(wp), intent(in) :: t_start   !! time [s]
     character(len=:), allocatable :: text
     type(equations_t) :: equations
 
@@ -57,7 +57,7 @@ contains
     text = equations%report%text()
   end function matrix_report
 
-  !> What the matrices mean for elements whose laws are not those of the paper.
+  !> Lists the elements whose laws are not those of the paper, and says what the matrices contain for them.
   subroutine report_other_laws(equations)
     type(equations_t), intent(inout) :: equations
     type(string_t), allocatable :: names(:)
@@ -67,10 +67,11 @@ contains
     do role = 1, size(role_names)
       call collect_other_laws(equations%machine, role, names)
       if (size(names) == 0) cycle
-      call equations%report%append_line('Not by the laws of the paper: ' // trim(role_names(role)) // ' ' // joined(names, ', '))
+      call equations%report%append_line('Other laws than those of the paper: ' // trim(role_names(role)) // ' ' // &
+                                        joined(names, ', '))
     end do
-    call equations%report%append_line('Of these K has the elastic moment over the twist, K_4 its slope, C what is viscous,')
-    call equations%report%append_line('Q the rest of the moment, all at the start; currents and governors are not in beta.')
+    call equations%report%append_line('For these K holds the elastic moment divided by the twist, K_4 its derivative, C the')
+    call equations%report%append_line('viscous part, Q the rest, all at the start. Currents and governors are not in beta.')
   end subroutine report_other_laws
 
   subroutine collect_other_laws(machine, role, names)
@@ -90,7 +91,7 @@ contains
     end do
   end subroutine collect_other_laws
 
-  !> Brings all elements of the machine to the start.
+  !> Evaluates all elements at the start.
   subroutine set_start_state(machine, t_start)
     type(machine_t), intent(inout) :: machine
     real(wp), intent(in) :: t_start
@@ -134,7 +135,7 @@ contains
     end associate
   end subroutine report_free_bodies
 
-  !> L_lambda and how the complement comes from it: eqs. (23), (31), (73)-(83).
+  !> L_lambda and the complement that follows from it: eqs. (23), (31), (73)-(83).
   subroutine report_constraints(equations)
     type(equations_t), intent(inout) :: equations
     real(wp) :: coordinate_speed(equations%machine%coordinates%freedoms)
@@ -268,7 +269,7 @@ contains
     call self%put_matrix(label // ', transposed', reshape(vector, [1, size(vector)]))
   end subroutine put_vector
 
-  !> A blank line, the label with the shape, and the rows with their columns aligned.
+  !> Appends a blank line, the label with the shape, and the rows with aligned columns.
   subroutine put_matrix(self, label, matrix)
     class(equations_t), intent(inout) :: self
     character(len=*), intent(in) :: label

@@ -1,4 +1,4 @@
-!> The steady states of a machine as a person and as a program read them.
+!> The reports on the steady states of a machine: printed and equilibrium.json.
 module nocdyn_equilibrium_report
   use nocdyn_bank, only: role_coupling
   use nocdyn_energy_balance, only: work_element_names
@@ -29,8 +29,8 @@ module nocdyn_equilibrium_report
     type(string_t), allocatable :: notes(:)
     type(string_t), allocatable :: labels(:)       !! as in trajectory.csv: speeds, twists, moments, torques, reactions, energies
     real(wp), allocatable :: values(:, :)          !! [labels, equilibria]
-    type(string_t), allocatable :: work_elements(:)      !! elements whose power counts, with their kind
-    real(wp), allocatable :: power(:, :)           !! into the machine [W], [workers, equilibria]
+    type(string_t), allocatable :: work_elements(:)      !! names of the elements with power, with their role
+    real(wp), allocatable :: power(:, :)           !! into the machine [W], [work_elements, equilibria]
     type(string_t), allocatable :: coordinates(:)
   end type equilibrium_report_t
 
@@ -65,7 +65,7 @@ contains
     end do
   end function new_equilibrium_report
 
-  !> The columns that do not change in steady running: no angles, and no twists of couplings that slip.
+  !> The columns that are constant in a steady state: no angles, and no twists of couplings that slip.
   function steady_columns(table, machine) result(columns)
     type(trajectory_table_t), intent(in) :: table
     type(machine_t), intent(in) :: machine
@@ -87,7 +87,7 @@ contains
     columns = pack([(c, c=1, size(is_steady))], is_steady)
   end function steady_columns
 
-  !> A table for every steady state.
+  !> The printed report: a table for every steady state.
   function equilibrium_text(file, self) result(text)
     character(len=*), intent(in) :: file
     type(equilibrium_report_t), intent(in) :: self
@@ -128,7 +128,7 @@ contains
     end select
   end function stability_text
 
-  !> The power of every element, and the sum of all, which is zero but for rounding.
+  !> The power of every element and their sum, which is zero but for rounding.
   subroutine put_power(work_elements, power, report)
     type(string_t), intent(in) :: work_elements(:)   !! names
     real(wp), intent(in) :: power(:)                 !! into the machine [W]

@@ -1,4 +1,4 @@
-!> The modes of a machine as a program reads them: modes.csv and modes.json.
+!> The files on the modes of a machine: modes.csv and modes.json.
 module nocdyn_modes_files
   use nocdyn_equilibrium, only: t_infinity
   use nocdyn_input, only: group_t, input_t
@@ -58,7 +58,7 @@ contains
   subroutine put_row(mode, number, has_shape, table)
     type(mode_t), intent(in) :: mode
     integer, intent(in) :: number
-    logical, intent(in) :: has_shape   !! the cells of the shape and of the shares are empty otherwise
+    logical, intent(in) :: has_shape   !! whether there are a shape and shares; else their cells are empty
     type(text_buffer_t), intent(inout) :: table
 
     if (mode%kind == mode_oscillating) call table%append(to_text(number))
@@ -87,7 +87,7 @@ contains
     end do
   end subroutine put_values
 
-  !> Before the largest motion [deg], -180 to 180; 0 of a body that does not move.
+  !> The phase lead to the largest motion [deg], -180 to 180; 0 for a body that does not move.
   pure elemental real(wp) function phases(motion)
     complex(wp), intent(in) :: motion
 
@@ -95,7 +95,7 @@ contains
     if (abs(motion) > 0.0_wp) phases = atan2(aimag(motion), real(motion, wp)) / degree
   end function phases
 
-  !> The text of modes.json: the train, the operating point and the modes; lists are in the order of the bodies, of the couplings.
+  !> The text of modes.json: drivetrain, operating point and modes; lists are in the order of the bodies or of the couplings.
   function modes_json(input, self) result(text)
     type(input_t), intent(in) :: input
     type(modes_report_t), intent(in) :: self
@@ -126,7 +126,7 @@ contains
     text = json%text()
   end function modes_json
 
-  !> What is joined to what: bodies, elastic couplings, and gears with the speed of the second body at 1 of the first.
+  !> The topology: bodies, elastic couplings, and gears with the ratio of the second body's speed to the first one's.
   subroutine put_drivetrain(json, self)
     type(json_t), intent(inout) :: json
     type(modes_report_t), intent(in) :: self

@@ -1,4 +1,4 @@
-!> The modes of a machine as a person reads them.
+!> The printed report on the modes of a machine.
 module nocdyn_modes_report
   use nocdyn_errors, only: error_t
   use nocdyn_kinds, only: wp
@@ -15,17 +15,17 @@ module nocdyn_modes_report
   public :: new_modes_report, modes_text
 
   integer, parameter :: most_modes = 40          ! of each kind that are printed; all are in modes.csv
-  integer, parameter :: most_shapes = 12         ! bodies and modes of which the shapes are printed
+  integer, parameter :: most_shapes = 12         ! a machine with more bodies or modes has its shapes in the files only
   integer, parameter :: shapes_per_row = 6
-  integer, parameter :: most_shares = 3          ! bodies or couplings that are named for a mode
-  integer, parameter :: most_values = 1000000    ! of shapes and shares in a file
-  real(wp), parameter :: least_share = 0.02_wp   ! of an energy that is named
+  integer, parameter :: most_shares = 3          ! of bodies or couplings that are printed for a mode
+  integer, parameter :: most_values = 1000000    ! shapes and shares in a file
+  real(wp), parameter :: least_share = 0.02_wp   ! of an energy that is printed
 
   type, public :: modes_report_t
     type(machine_t) :: machine
     type(mode_t), allocatable :: modes(:)
-    integer :: shapes = 0                         !! modes whose shapes and shares the files tell, the first ones
-    integer, allocatable :: elastic(:)            !! elements whose potential energies are told
+    integer :: shapes = 0                         !! number of modes, from the first, whose shapes and shares are in the files
+    integer, allocatable :: elastic(:)            !! elements whose potential energies are reported
     real(wp), allocatable :: stiffness(:)         !! tangent stiffness of `elastic` [N m/rad]
     real(wp), allocatable :: omega(:)             !! speeds of the bodies at the operating point [rad/s]
     real(wp) :: t = 0.0_wp
@@ -83,7 +83,7 @@ contains
     text = report%text()
   end function modes_text
 
-  !> A line for every oscillating mode.
+  !> Appends a line for every oscillating mode.
   subroutine put_oscillations(self, report)
     type(modes_report_t), intent(in) :: self
     type(text_buffer_t), intent(inout) :: report
@@ -124,7 +124,7 @@ contains
     if (mode%time_constant() < huge(1.0_wp)) text = cell(mode%time_constant())
   end function time_cell
 
-  !> A line for every mode of a kind that does not oscillate.
+  !> Appends a line for every mode of a kind that does not oscillate.
   subroutine put_real(self, kind, report)
     type(modes_report_t), intent(in) :: self
     integer, intent(in) :: kind
@@ -184,7 +184,7 @@ contains
     end do
   end function potential_text
 
-  !> Places of the shares that are named, the largest first: one at least, if any is not zero.
+  !> Indices of the shares that are printed, the largest first: at least one, if any is not zero.
   pure subroutine find_largest(share, largest, shares)
     real(wp), intent(in) :: share(:)
     integer, intent(out) :: largest(most_shares), shares
@@ -212,7 +212,7 @@ contains
     if (abs(share) > 0.995_wp) text = to_text(nint(100.0_wp * share)) // ' %'
   end function percent
 
-  !> The shapes as columns: the part in phase with the largest motion.
+  !> Appends the shapes as columns: the part in phase with the largest motion.
   subroutine put_shapes(self, report)
     type(modes_report_t), intent(in) :: self
     type(text_buffer_t), intent(inout) :: report

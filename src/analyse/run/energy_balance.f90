@@ -1,4 +1,4 @@
-!> Where the energy of a machine came from over a run, and where it went.
+!> The energy balance of a run: the work of every element, and the energies at the start and at the end.
 module nocdyn_energy_balance
   use nocdyn_bank, only: role_names
   use nocdyn_json, only: json_t
@@ -15,10 +15,10 @@ module nocdyn_energy_balance
   integer, parameter :: max_lines = 10   ! of each list
 
   type, public :: energy_balance_t
-    type(string_t), allocatable :: work_elements(:)      !! elements whose work is integrated, with their kind
+    type(string_t), allocatable :: work_elements(:)      !! "load work": elements whose work is integrated, with their role
     real(wp), allocatable :: work(:)               !! into the machine [J]
-    type(string_t), allocatable :: elastic_elements(:)       !! elastic couplings
-    real(wp), allocatable :: stored_start(:), stored_end(:)   !! [J]
+    type(string_t), allocatable :: elastic_elements(:)       !! names of the elastic couplings
+    real(wp), allocatable :: stored_start(:), stored_end(:)   !! of these [J]
     real(wp) :: kinetic_start = 0.0_wp, kinetic_end = 0.0_wp  !! [J]
   contains
     procedure :: residual
@@ -27,12 +27,12 @@ module nocdyn_energy_balance
   !> One line of the printed table.
   type :: entry_t
     character(len=:), allocatable :: name
-    real(wp) :: energy = 0.0_wp   !! put in, negative if taken out [J]
+    real(wp) :: energy = 0.0_wp   !! into the machine, negative if out of it [J]
   end type entry_t
 
 contains
 
-  !> "motor drive": the elements whose work is integrated, in the order of the works.
+  !> The elements whose work is integrated, with their role, e.g. "motor drive", in the order of the quadratures.
   function work_element_names(machine) result(names)
     type(machine_t), intent(in) :: machine
     type(string_t), allocatable :: names(:)
@@ -50,14 +50,14 @@ contains
     end do
   end function work_element_names
 
-  !> What the energies have grown by, less the works [J].
+  !> The energy balance error [J]: the increase of the stored energies, less the works.
   pure real(wp) function residual(self)
     class(energy_balance_t), intent(in) :: self
 
     residual = (self%kinetic_end + sum(self%stored_end) - (self%kinetic_start + sum(self%stored_start))) - sum(self%work)
   end function residual
 
-  !> Every entry, for summary.json.
+  !> Writes all entries to summary.json.
   subroutine put_energy_balance(json, self)
     type(json_t), intent(inout) :: json
     type(energy_balance_t), intent(in) :: self
@@ -101,7 +101,7 @@ contains
     call report%append_line(padded(last_line, width) // cell(self%residual()))
   end subroutine append_energy_balance
 
-  !> Works, and what the stores have released.
+  !> The works, and the energies that couplings and bodies have released.
   function all_entries(self) result(entries)
     type(energy_balance_t), intent(in) :: self
     type(entry_t), allocatable :: entries(:)

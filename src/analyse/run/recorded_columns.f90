@@ -92,11 +92,10 @@ contains
     real(wp), contiguous, intent(in) :: t(:)      !! [s], [lanes]
     real(wp), contiguous, intent(in) :: y(:, :)   !! [lanes, states + quadratures]
     real(wp), intent(inout) :: row(:)             !! [columns]
-    integer :: bank, i, quantity
+    integer :: i, observed(2)   ! bank and quantity whose values are there
 
     if (self%have_reactions) call self%formulation%reactions(lane, self%lambda)
-    bank = 0
-    quantity = 0
+    observed = 0
     associate (machine => self%formulation%machine)
       do i = 1, size(self%columns)
         associate (column => self%columns(i))
@@ -108,11 +107,10 @@ contains
           case (column_speed)
             row(i) = self%formulation%omega(lane, column%index)
           case (column_element)
-            if (column%bank /= bank .or. column%quantity /= quantity) then
-              bank = column%bank
-              quantity = column%quantity
-              call machine%banks(bank)%bank%observe(machine%elements, quantity, lane, &
-                                                    self%values(:size(machine%banks(bank)%bank%to)))
+            if (any(observed /= [column%bank, column%quantity])) then
+              observed = [column%bank, column%quantity]
+              call machine%banks(column%bank)%bank%observe(machine%elements, column%quantity, lane, &
+                                                           self%values(:size(machine%banks(column%bank)%bank%to)))
             end if
             row(i) = self%values(column%index)
           case (column_reaction)

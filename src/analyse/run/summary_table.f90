@@ -1,4 +1,4 @@
-!> The summary of a run as a person reads it.
+!> The printed summary of a run.
 module nocdyn_summary_table
   use nocdyn_energy_balance, only: append_energy_balance
   use nocdyn_input, only: group_t, input_t
@@ -31,7 +31,7 @@ contains
            ' ms; results in ' // folder
   end function summary_line
 
-  !> One line on what 'auto' did; empty if it never switched.
+  !> One line on the switches of the method 'auto'; empty if there are none.
   function method_line(input, summary) result(text)
     type(input_t), intent(in) :: input
     type(run_summary_t), intent(in) :: summary

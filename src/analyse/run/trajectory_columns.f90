@@ -1,4 +1,4 @@
-!> The columns of trajectory.csv: what each of them is, and its label.
+!> The list of the columns of trajectory.csv with their labels.
 module nocdyn_trajectory_columns
   use nocdyn_bank, only: quantity_t
   use nocdyn_constraints, only: constraints_t
@@ -15,7 +15,7 @@ module nocdyn_trajectory_columns
   integer, parameter, public :: column_element = 4      !! a quantity of an element of a bank
   integer, parameter, public :: column_reaction = 5     !! multiplier of a constraint row
   integer, parameter, public :: column_member = 6       !! torque of a row on one of its members
-  integer, parameter, public :: column_kinetic = 7      !! energies and works of the machine
+  integer, parameter, public :: column_kinetic = 7      !! this and the following: energies and works of the machine
   integer, parameter, public :: column_elastic = 8
   integer, parameter, public :: column_work_in = 9
   integer, parameter, public :: column_work_out = 10
@@ -27,8 +27,8 @@ module nocdyn_trajectory_columns
   type, public :: column_t
     integer :: kind = column_time   !! column_...
     integer :: bank = 0             !! of an element
-    integer :: quantity = 0         !! number of it in `quantities` of the bank
-    integer :: index = 0            !! body, element within its bank, row, or member
+    integer :: quantity = 0         !! of the bank: index in `quantities`
+    integer :: index = 0            !! of the body, of the element within its bank, of the row or of the member
   end type column_t
 
 contains
@@ -92,7 +92,7 @@ contains
     end do
   end subroutine add_bank
 
-  !> Each row's multiplier, then the torques on those of its members that have a column.
+  !> The multiplier of each row, followed by the torques on those of its members that have a column.
   subroutine add_reactions(constraints, columns, labels, count)
     type(constraints_t), intent(in) :: constraints
     type(column_t), intent(inout) :: columns(:)

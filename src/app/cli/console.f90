@@ -1,4 +1,4 @@
-!> What the person at the keyboard sees: messages and progress.
+!> Standard output, error messages and the progress line.
 module nocdyn_console
   use, intrinsic :: iso_fortran_env, only: error_unit, int64
   use nocdyn_errors, only: error_t
@@ -10,13 +10,13 @@ module nocdyn_console
 
   public :: print_text, report_error, new_console_progress, new_status_line
 
-  logical, protected, public :: output_is_lost = .false.   !! some of standard output could not be written
+  logical, protected, public :: output_is_lost = .false.   !! whether a write to standard output has failed
 
-  real(wp), parameter :: first_shown_after = 1.0_wp    ! a run shorter than this shows no progress [s]
-  real(wp), parameter :: refresh_interval = 0.2_wp     ! time between two updates of the line [s]
-  real(wp), parameter :: first_log_interval = 10.0_wp, longest_log_interval = 600.0_wp   ! of lines in a log [s]
+  real(wp), parameter :: first_shown_after = 1.0_wp    ! on a terminal [s]
+  real(wp), parameter :: refresh_interval = 0.2_wp     ! of the line on a terminal [s]
+  real(wp), parameter :: first_log_interval = 10.0_wp, longest_log_interval = 600.0_wp   ! between lines of a log [s]
 
-  !> How things stand: one line on a terminal, rewritten in place; in a log a new line each time, ever farther apart.
+  !> A line with the progress. A terminal shows it in place; a log gets new lines at increasing intervals.
   type, public :: status_line_t
     logical, private :: is_wanted = .false.
     logical, private :: is_in_place = .false.
@@ -29,7 +29,7 @@ module nocdyn_console
     procedure :: clear => clear_line
   end type status_line_t
 
-  !> How far a run has come.
+  !> The progress of a run.
   type, public :: console_progress_t
     character(len=:), allocatable, private :: title
     type(status_line_t), private :: line
@@ -40,7 +40,7 @@ module nocdyn_console
 
 contains
 
-  !> A line, or several, on standard output; the last one may have its end already.
+  !> Prints one or several lines to standard output. A line end is added if there is none.
   subroutine print_text(text)
     character(len=*), intent(in) :: text
     logical :: is_done
@@ -68,9 +68,10 @@ contains
     code = max(code, error%code)
   end subroutine report_error
 
-  !> A line that shows after a second of work if standard error is a terminal, after longer if it is a log.
+  !> A status line on standard error, which appears some time after this call.
   function new_status_line(is_quiet, shows_in_logs) result(line)
-    logical, intent(in) :: is_quiet, shows_in_logs
+    logical, intent(in) :: is_quiet        !! whether it never appears
+    logical, intent(in) :: shows_in_logs   !! whether it appears if standard error is no terminal
     type(status_line_t) :: line
 
     line%is_in_place = is_terminal(standard_error)
@@ -79,7 +80,7 @@ contains
     line%next = line%began + int(merge(first_shown_after, first_log_interval, line%is_in_place) * real(line%rate, wp), int64)
   end function new_status_line
 
-  !> Whether it is time to show how things stand. In a log that is when the work has taken twice as long as the last time.
+  !> Whether it is time to show the line again. The interval in a log grows with the elapsed time.
   logical function is_due(self)
     class(status_line_t), intent(inout) :: self
     integer(int64) :: now
@@ -94,7 +95,7 @@ contains
     self%next = now + int(interval * real(self%rate, wp), int64)
   end function is_due
 
-  !> Time since the work began [s].
+  !> Time since `new_status_line` [s].
   function elapsed(self)
     class(status_line_t), intent(in) :: self
     real(wp) :: elapsed
@@ -117,7 +118,7 @@ contains
     flush (error_unit)
   end subroutine show
 
-  !> Takes the line away.
+  !> Removes the line from a terminal.
   subroutine clear_line(self)
     class(status_line_t), intent(inout) :: self
 

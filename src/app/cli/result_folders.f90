@@ -1,4 +1,4 @@
-!> The folders that results go to.
+!> The folders of results.
 module nocdyn_result_folders
   use nocdyn_arguments, only: arguments_t
   use nocdyn_errors, only: error_t, exit_input, raise
@@ -15,7 +15,7 @@ module nocdyn_result_folders
 
 contains
 
-  !> The path without "." parts, doubled slashes and a last slash, so that equal folders have equal names.
+  !> The path without "." parts, doubled slashes and a trailing slash: two spellings of a folder become equal.
   pure function normalised_path(path) result(plain)
     character(len=*), intent(in) :: path
     character(len=:), allocatable :: plain
@@ -32,7 +32,7 @@ contains
     if (plain == '') plain = merge('/', '.', index(path, '/') == 1)
   end function normalised_path
 
-  !> The folder of --out, if there are several input files the folder of one of them in it; '' without --out.
+  !> The folder of --out or, with several input files, the folder of one of them in it; '' without --out.
   function out_folder(arguments, file) result(folder)
     type(arguments_t), intent(in) :: arguments
     character(len=*), intent(in) :: file   !! path of the input
@@ -91,10 +91,11 @@ contains
     end do
   end subroutine refuse_shared_folders
 
-  !> A run would take the name of a summary.json that belongs to a sweep, which may be the work of many hours; a sweep that is
-  !> not finished would remove the results of the run at its end.
+  !> Refuses a folder with a sweep for the results of a run: the run would overwrite summary.json of a finished sweep, and an
+  !> unfinished sweep would remove the results of the run at its end.
   subroutine refuse_sweep_folder(file, folder, error)
-    character(len=*), intent(in) :: file, folder
+    character(len=*), intent(in) :: file     !! path of the input, for the message
+    character(len=*), intent(in) :: folder   !! of the results
     type(error_t), allocatable, intent(out) :: error
     type(string_t), allocatable :: names(:)
     logical :: is_there
@@ -102,11 +103,11 @@ contains
     inquire (file=folder // '/' // sweep_netcdf_name, exist=is_there)
     allocate (names, source=journal_names(folder))
     if (is_there) then
-      call raise(error, exit_input, file // ': ' // folder // ' holds the results of a sweep; choose another folder by ' // &
+      call raise(error, exit_input, file // ': ' // folder // ' holds the results of a sweep; choose another folder with ' // &
                  '--out, or remove ' // sweep_netcdf_name)
     else if (size(names) > 0) then
-      call raise(error, exit_input, file // ': ' // folder // ' holds a sweep that is not finished; choose another folder ' // &
-                 'by --out, or remove ' // joined(names, ', ', max_listed))
+      call raise(error, exit_input, file // ': ' // folder // ' holds an unfinished sweep; choose another folder ' // &
+                 'with --out, or remove ' // joined(names, ', ', max_listed))
     end if
   end subroutine refuse_sweep_folder
 

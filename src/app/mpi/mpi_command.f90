@@ -1,4 +1,4 @@
-!> nocdyn-mpi sweep: the variants of a machine on all ranks of an MPI job.
+!> nocdyn-mpi sweep: computes the variants of a machine on all ranks of an MPI job.
 module nocdyn_mpi_command
   use mpi_f08, only: mpi_abort, mpi_comm_rank, mpi_comm_size, mpi_comm_world, mpi_query_thread, mpi_thread_serialized
   use nocdyn_arguments, only: arguments_t
@@ -45,7 +45,7 @@ contains
     end if
   end subroutine mpi_command
 
-  !> Refuses what only one process can do, and more threads than the MPI library allows.
+  !> Refuses --shard, and threads that the MPI library does not support.
   subroutine check_arguments(arguments, error)
     type(arguments_t), intent(in) :: arguments
     type(error_t), allocatable, intent(out) :: error
@@ -59,7 +59,7 @@ contains
     end if
   end subroutine check_arguments
 
-  !> Rank 0's part.
+  !> Rank 0: reads the input, computes like the other ranks, collects the results and writes them.
   subroutine run_root(arguments, threads, code)
     type(arguments_t), intent(in) :: arguments
     integer, intent(in) :: threads   !! of each rank
@@ -88,7 +88,7 @@ contains
     call finish_job(job, scheduler, threads, ranks, code)
   end subroutine run_root
 
-  !> The part of the other ranks: their input is the text that rank 0 has read; the file of a list they read themselves.
+  !> Other ranks: they compute with the input that rank 0 broadcasts. The file of a list they read themselves.
   subroutine run_worker(threads, code)
     integer, intent(in) :: threads
     integer, intent(out) :: code
@@ -108,7 +108,7 @@ contains
     if (.not. allocated(error)) call make_plan(input, plan, error)
     if (.not. allocated(error)) call prepare_sweep(plan, setup, error)
     if (.not. allocated(error) .and. plan%list_checksum /= checksum) then
-      call raise(error, exit_input, file // ': the file of &sweep with the variants is not that of rank 0')
+      call raise(error, exit_input, file // ': the file of &sweep with the variants differs from that of rank 0')
     end if
     if (allocated(error)) then
       call report_error(error, code)

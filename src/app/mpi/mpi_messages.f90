@@ -1,4 +1,4 @@
-!> What the ranks of a sweep tell each other. Rank 0 keeps the books; the others ask it for variants and send it results.
+!> Messages between the ranks of a sweep: the workers request variants from rank 0 and send it the results.
 module nocdyn_mpi_messages
   use mpi_f08, only: mpi_any_source, mpi_any_tag, mpi_bcast, mpi_byte, mpi_character, mpi_comm_world, mpi_double_precision, &
     mpi_get_count, mpi_integer, mpi_iprobe, mpi_probe, mpi_recv, mpi_send, mpi_status, mpi_status_ignore
@@ -13,25 +13,28 @@ module nocdyn_mpi_messages
 
   integer, parameter, public :: root = 0
 
-  integer, parameter, public :: tag_request = 1    !! to rank 0: which variants next?
-  integer, parameter :: tag_assignment = 2     !! from rank 0: these
-  integer, parameter, public :: tag_results = 3    !! to rank 0: a chunk that has been computed
-  integer, parameter :: tag_seconds = 4    !! to rank 0: the time that it took
-  integer, parameter, public :: tag_stop = 5       !! from rank 0: leave off
-  integer, parameter, public :: tag_done = 6    !! to rank 0: nothing more comes; from rank 0: the same
+  integer, parameter, public :: tag_request = 1    !! to rank 0: request for variants
+  integer, parameter :: tag_assignment = 2     !! from rank 0: first variant and their number
+  integer, parameter, public :: tag_results = 3    !! to rank 0: a chunk of results
+  integer, parameter :: tag_seconds = 4    !! to rank 0: the time to compute it [s]
+  integer, parameter, public :: tag_stop = 5       !! from rank 0: stop computing
+  integer, parameter, public :: tag_done = 6    !! last message of a worker, and of rank 0 to it
 
 contains
 
+  !> Asks rank 0 for variants.
   subroutine send_request()
     call send_tag(root, tag_request)
   end subroutine send_request
 
+  !> Assigns the variants first to first + count - 1 to a rank; count = 0: there are no more.
   subroutine send_assignment(rank, first, count)
     integer, intent(in) :: rank, first, count
 
     call mpi_send([first, count], 2, mpi_integer, rank, tag_assignment, mpi_comm_world)
   end subroutine send_assignment
 
+  !> Waits for the answer to `send_request`.
   subroutine receive_assignment(first, count)
     integer, intent(out) :: first, count
     integer :: numbers(2)
@@ -41,9 +44,10 @@ contains
     count = numbers(2)
   end subroutine receive_assignment
 
+  !> Sends results to rank 0.
   subroutine send_results(chunk, seconds)
     type(chunk_t), intent(in) :: chunk
-    real(wp), intent(in) :: seconds
+    real(wp), intent(in) :: seconds   !! to compute them [s]
     character(len=:), allocatable :: bytes
 
     call pack_chunk(chunk, bytes)
@@ -51,11 +55,11 @@ contains
     call mpi_send(seconds, 1, mpi_double_precision, root, tag_seconds, mpi_comm_world)
   end subroutine send_results
 
-  !> The results that `probe_message` has found.
+  !> Receives the results that `probe_message` has found.
   subroutine receive_results(rank, chunk, seconds)
     integer, intent(in) :: rank
     type(chunk_t), intent(out) :: chunk
-    real(wp), intent(out) :: seconds
+    real(wp), intent(out) :: seconds   !! to compute them [s]
     type(mpi_status) :: status
     character(len=:), allocatable :: bytes
     integer :: length
@@ -68,13 +72,14 @@ contains
     call unpack_chunk(bytes, chunk)
   end subroutine receive_results
 
-  !> A message that says nothing but its word.
+  !> Sends a message without content.
   subroutine send_tag(rank, tag)
     integer, intent(in) :: rank, tag
 
     call mpi_send([tag], 1, mpi_integer, rank, tag, mpi_comm_world)
   end subroutine send_tag
 
+  !> Receives a message without content.
   subroutine receive_tag(rank, tag)
     integer, intent(in) :: rank, tag
     integer :: received(1)
@@ -82,7 +87,7 @@ contains
     call mpi_recv(received, 1, mpi_integer, rank, tag, mpi_comm_world, mpi_status_ignore)
   end subroutine receive_tag
 
-  !> The message that is to be received next, if there is one; word 0 if there is none.
+  !> Rank and tag of the message to receive next; tag 0 if there is none.
   subroutine probe_message(rank, tag)
     integer, intent(out) :: rank, tag
     type(mpi_status) :: status
@@ -96,7 +101,7 @@ contains
     tag = status%mpi_tag
   end subroutine probe_message
 
-  !> The same from rank 0, however long it takes.
+  !> Waits for a message of rank 0.
   subroutine wait_for_message(tag)
     integer, intent(out) :: tag
     type(mpi_status) :: status
@@ -105,7 +110,7 @@ contains
     tag = status%mpi_tag
   end subroutine wait_for_message
 
-  !> All ranks have rank 0's text then.
+  !> Copies a text of rank 0 to all ranks. Called by all ranks.
   subroutine broadcast_text(text)
     character(len=:), allocatable, intent(inout) :: text
     integer :: length

@@ -1,4 +1,4 @@
-!> Rank 0 of a sweep: computes as the others do, and between its steps keeps the books for all of them.
+!> Scheduler of rank 0, which computes like the other ranks and serves their messages between its steps.
 module nocdyn_mpi_root
   use, intrinsic :: iso_c_binding, only: c_int
   use nocdyn_kinds, only: wp
@@ -10,7 +10,7 @@ module nocdyn_mpi_root
   implicit none (type, external)
   private
 
-  integer(c_int), parameter :: poll_interval = 200   ! while the others are waited for [microseconds]
+  integer(c_int), parameter :: poll_interval = 200   ! while rank 0 waits for the other ranks [microseconds]
 
   interface
     integer(c_int) function c_usleep(microseconds) bind(c, name='usleep')
@@ -20,9 +20,9 @@ module nocdyn_mpi_root
   end interface
 
   type, extends(journal_scheduler_t), public :: mpi_root_t
-    integer :: other_ranks = 0                       !! ranks besides this one
-    integer, private :: finished_ranks = 0           !! of ranks from which nothing more comes
-    logical, private :: has_stopped = .false.   !! the others have been told to leave off
+    integer :: other_ranks = 0                       !! number of ranks besides this one
+    integer, private :: finished_ranks = 0           !! number of ranks that have sent their last message
+    logical, private :: has_stopped = .false.   !! whether the other ranks have been told to stop
   contains
     procedure :: poll
     procedure :: finalise
@@ -49,7 +49,7 @@ contains
     end do
   end subroutine poll
 
-  !> Does what a message asks for.
+  !> Answers a message of another rank.
   subroutine handle_message(self, rank, tag)
     class(mpi_root_t), intent(inout) :: self
     integer, intent(in) :: rank, tag
@@ -69,11 +69,11 @@ contains
       call receive_tag(rank, tag)
       self%finished_ranks = self%finished_ranks + 1
     case default
-      error stop 'nocdyn_mpi_root: a message that rank 0 does not know'
+      error stop 'nocdyn_mpi_root: rank 0 received a message with an unknown tag'
     end select
   end subroutine handle_message
 
-  !> Waits until the others have nothing more to send, and lets them go.
+  !> Receives the last messages of all ranks, and confirms them.
   subroutine finalise(self)
     class(mpi_root_t), intent(inout) :: self
     integer(c_int) :: status

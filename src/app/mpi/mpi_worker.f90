@@ -1,4 +1,4 @@
-!> The ranks of a sweep but the first: they ask rank 0 for variants and send it the results.
+!> Scheduler of the ranks above 0: it requests variants from rank 0 and sends it the results.
 module nocdyn_mpi_worker
   use nocdyn_scheduler, only: scheduler_t
   use nocdyn_kinds, only: wp
@@ -11,8 +11,8 @@ module nocdyn_mpi_worker
   private
 
   type, extends(scheduler_t), public :: mpi_worker_t
-    logical, private :: is_exhausted = .false.   !! rank 0 has nothing left
-    logical, private :: is_stopped = .false.     !! by rank 0
+    logical, private :: is_exhausted = .false.   !! whether rank 0 has no more variants
+    logical, private :: is_stopped = .false.     !! whether rank 0 has told this rank to stop
   contains
     procedure :: next_chunk
     procedure :: submit
@@ -55,7 +55,7 @@ contains
     self%is_stopped = .true.
   end subroutine poll
 
-  !> Takes leave of rank 0; a late word to stop is received on the way.
+  !> Sends the last message and waits for that of rank 0. A message to stop may arrive before it.
   subroutine finalise(self)
     class(mpi_worker_t), intent(inout) :: self
     integer :: tag

@@ -1,4 +1,4 @@
-!> nocdyn merge: one result of the parts of a sweep.
+!> nocdyn merge: combines the parts of a sweep.
 module nocdyn_merge_command
   use nocdyn_arguments, only: arguments_t
   use nocdyn_console, only: report_error
@@ -22,6 +22,7 @@ module nocdyn_merge_command
 
 contains
 
+  !> Merges the folder that is the operand.
   subroutine merge_command(arguments, code)
     type(arguments_t), intent(in) :: arguments
     integer, intent(out) :: code
@@ -35,13 +36,14 @@ contains
     call report_error(error, code)
   end subroutine merge_command
 
+  !> Writes and prints the results of all journals of a folder.
   subroutine merge_folder(folder, options, code, error)
     character(len=*), intent(in) :: folder
     type(results_options_t), intent(in) :: options
     integer, intent(inout) :: code
     type(error_t), allocatable, intent(out) :: error
     type(sweep_journal_t), allocatable :: journals(:)
-    type(sweep_plan_t) :: plan   ! as far as results need it; a design has served
+    type(sweep_plan_t) :: plan   ! without a design, which the results do not need
     type(string_t), allocatable :: messages(:)
     type(sweep_summary_t) :: summary
 
@@ -69,7 +71,7 @@ contains
     end do
   end function labels_of
 
-  !> All journals of a folder.
+  !> Opens all journals of a folder.
   subroutine open_journals(folder, journals, error)
     character(len=*), intent(in) :: folder
     type(sweep_journal_t), allocatable, intent(out) :: journals(:)
@@ -84,9 +86,10 @@ contains
     if (.not. is_there) then
       call raise(error, exit_file, folder // ': there is no such folder')
     else if (.not. is_folder) then
-      call raise(error, exit_file, folder // ': is no folder; nocdyn merge needs that of the journals')
+      call raise(error, exit_file, folder // ': is not a folder; nocdyn merge needs the folder of the journals')
     else if (size(names) == 0) then
-      call raise(error, exit_input, folder // ': no journal of a sweep is there; nocdyn sweep FILE --shard K/N leaves them')
+      call raise(error, exit_input, folder // ': the folder holds no journal of a sweep; ' // &
+                 'nocdyn sweep FILE --shard K/N writes them')
     end if
     if (allocated(error)) return
     allocate (journals(size(names)))

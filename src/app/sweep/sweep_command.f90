@@ -1,4 +1,4 @@
-!> nocdyn sweep: all variants of a machine, on one computer.
+!> nocdyn sweep: computes all variants of a machine in one process.
 module nocdyn_sweep_command
   use nocdyn_arguments, only: arguments_t
   use nocdyn_console, only: report_error
@@ -16,6 +16,7 @@ module nocdyn_sweep_command
 
 contains
 
+  !> Computes the missing variants of a sweep and writes its results.
   subroutine sweep_command(arguments, code)
     type(arguments_t), intent(in) :: arguments
     integer, intent(out) :: code
@@ -40,7 +41,7 @@ contains
     call finish_job(job, scheduler, threads, 1, code)
   end subroutine sweep_command
 
-  !> That are asked for: --threads, else what OMP_NUM_THREADS says, else the cores that the process may use.
+  !> The number of threads: of --threads, else of OMP_NUM_THREADS, else the number of cores that the process may use.
   integer function thread_count(arguments)
     type(arguments_t), intent(in) :: arguments
 

@@ -1,4 +1,4 @@
-!> A sweep from its command line to its results: what is the same on one machine and on many.
+!> A sweep from its command line to its results: the steps that nocdyn-sweep and nocdyn-mpi have in common.
 module nocdyn_sweep_job
   use, intrinsic :: iso_fortran_env, only: int64
   use nocdyn_arguments, only: arguments_t
@@ -32,12 +32,12 @@ module nocdyn_sweep_job
     type(sweep_setup_t) :: setup
     type(sweep_journal_t) :: journals(1)
     type(console_sweep_progress_t) :: progress
-    logical :: is_done = .false.   !! nothing is to be computed or written
+    logical :: is_done = .false.   !! whether there is nothing to compute or write
   end type sweep_job_t
 
 contains
 
-  !> Reads the input, and makes the journal or opens the one to go on with.
+  !> Reads the input, plans the sweep, and creates the journal or opens one to resume.
   subroutine start_job(arguments, job, error)
     type(arguments_t), intent(in) :: arguments
     type(sweep_job_t), intent(out) :: job
@@ -70,7 +70,7 @@ contains
     job%progress%line = new_status_line(arguments%is_given('--quiet'), shows_in_logs=.true.)
   end subroutine start_job
 
-  !> Opens the journal that is there, or makes one if the sweep is not done already.
+  !> Opens the journal of the folder if there is one; else creates it, unless the sweep is done already.
   subroutine prepare_journal(job, header, error)
     type(sweep_job_t), intent(inout) :: job
     type(sweep_header_t), intent(in) :: header
@@ -91,14 +91,14 @@ contains
       call refuse_other_journals(job%folder, job%arguments%shards, error)
       if (allocated(error)) return
       if (job%arguments%is_given('--resume') .and. .not. job%arguments%is_given('--quiet')) then
-        call print_text(job%plan%input%file // ': there is nothing to go on with in ' // job%folder // &
-                 '; the sweep starts from its beginning')
+        call print_text(job%plan%input%file // ': ' // job%folder // ' holds nothing to resume; ' // &
+                        'the sweep starts from the beginning')
       end if
       call create_journal(job%folder, name, header, job%journals(1), error)
     end if
   end subroutine prepare_journal
 
-  !> There is no journal to go on with, but all may be done already.
+  !> Without a journal to resume: sets `is_done` if the folder holds the results of this sweep.
   subroutine check_finished_results(job, header, error)
     type(sweep_job_t), intent(inout) :: job
     type(sweep_header_t), intent(in) :: header
@@ -115,31 +115,32 @@ contains
               job%folder
     inquire (file=job%folder // '/' // sweep_csv_name, exist=has_table)
     if (job%arguments%is_given('--csv') .and. .not. has_table) then
-      call raise(error, exit_input, message // ', without ' // sweep_csv_name // '; to have it, leave out --resume')
+      call raise(error, exit_input, message // ', without ' // sweep_csv_name // '; run without --resume to write it')
     else if (.not. job%arguments%is_given('--quiet')) then
       call print_text(message)
     end if
   end subroutine check_finished_results
 
-  !> What is in the journal that is gone on with. A record that a kill has cut short, or a disk has spoilt, costs the variants
-  !> in it.
+  !> Prints how many variants of a resumed journal are reused. Those of an entry that was not completely written, or is
+  !> damaged, are computed again.
   subroutine print_journal_state(job)
     type(sweep_job_t), intent(in) :: job
 
     if (job%arguments%is_given('--quiet')) return
     associate (file => job%plan%input%file, journal => job%journals(1))
-      if (journal%damaged_bytes > 0) call print_text(file // ': note: ' // journal%path() // ' has damaged records; ' // &
+      if (journal%damaged_bytes > 0) call print_text(file // ': note: ' // journal%path() // ' has damaged entries; ' // &
                                               'their variants are computed again')
-      call print_text(file // ': taking over ' // to_text(journal%done + journal%refused + journal%failed) // ' of ' // &
+      call print_text(file // ': reusing ' // to_text(journal%done + journal%refused + journal%failed) // ' of ' // &
                to_text(journal%header%last - journal%header%first + 1) // ' variants from ' // journal%path())
     end associate
   end subroutine print_journal_state
 
-  !> Writes what has come out, and tells it.
+  !> Writes and prints the results, or says why there are none.
   subroutine finish_job(job, scheduler, threads, ranks, code)
     type(sweep_job_t), intent(inout) :: job
     class(journal_scheduler_t), intent(in) :: scheduler
-    integer, intent(in) :: threads, ranks
+    integer, intent(in) :: threads   !! of each rank
+    integer, intent(in) :: ranks     !! processes
     integer, intent(out) :: code
     type(sweep_summary_t) :: summary
     type(results_options_t) :: options
@@ -158,14 +159,14 @@ contains
       options = results_options_t(job%arguments%is_given('--csv'), job%arguments%is_given('--quiet'))
       call write_results(job%plan, job%folder, job%journals, options, summary, error)
       if (.not. allocated(error)) then
-        call job%journals(1)%remove()   ! first: a reader of the output who is gone ends the program
+        call job%journals(1)%remove()   ! before printing: if the reader of the output is gone, printing ends the program
         call print_results(job%plan, job%folder, job%journals(1)%header, options, summary, code)
       end if
     end if
     call job%journals(1)%close()
     if (.not. allocated(error)) return
-    if (error%code == exit_file) error%message = error%message // '; once it can be written, the same command with ' // &
-                                                 '--resume goes on from there'
+    if (error%code == exit_file) error%message = error%message // '; when it can be written, repeat the ' // &
+                                                 'command with --resume to continue'
     call report_error(error, code)
   end subroutine finish_job
 
@@ -176,7 +177,7 @@ contains
 
     associate (counts => scheduler%counts)
       text = job%plan%input%file // ': interrupted with ' // to_text(counts%done + counts%refused + counts%failed) // ' of ' // &
-             to_text(counts%total) // ' variants done; the same command with --resume goes on from there'
+             to_text(counts%total) // ' variants done; repeat the command with --resume to continue'
     end associate
   end function interruption_text
 
@@ -186,7 +187,7 @@ contains
     character(len=:), allocatable :: text
 
     text = job%plan%input%file // ': part ' // to_text(job%arguments%shard) // ' of ' // to_text(job%arguments%shards) // &
-           ' done, ' // to_text(scheduler%counts%total) // ' variants; once all parts are there: nocdyn merge ' // job%folder
+           ' done, ' // to_text(scheduler%counts%total) // ' variants; when all parts are done: nocdyn merge ' // job%folder
   end function part_text
 
 end module nocdyn_sweep_job

@@ -1,4 +1,4 @@
-!> How far a sweep has come.
+!> The progress line of a sweep.
 module nocdyn_sweep_progress
   use nocdyn_console, only: status_line_t
   use nocdyn_kinds, only: wp

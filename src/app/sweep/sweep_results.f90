@@ -1,4 +1,4 @@
-!> The files that a finished sweep leaves, and what is printed of it.
+!> Writes the files of a finished sweep, and prints its summary.
 module nocdyn_sweep_results
   use, intrinsic :: iso_fortran_env, only: int64
   use nocdyn_console, only: print_text, report_error
@@ -29,7 +29,7 @@ module nocdyn_sweep_results
 
   character(len=*), parameter :: variant_folder = 'variant-'
 
-  !> What is to be done besides sweep.nc.
+  !> What the command line asks for besides sweep.nc.
   type, public :: results_options_t
     logical :: wants_csv = .false.
     logical :: is_quiet = .false.
@@ -37,14 +37,14 @@ module nocdyn_sweep_results
 
 contains
 
-  !> Writes everything of a sweep whose variants are all in the journals. Once its sweep.nc is there, what an earlier sweep or
-  !> run has left in the folder goes.
+  !> Writes all files of a sweep whose variants are all in the journals. Once sweep.nc is written, files of an earlier sweep or
+  !> run in the folder are removed.
   subroutine write_results(plan, folder, journals, options, summary, error)
     type(sweep_plan_t), intent(in) :: plan
     character(len=*), intent(in) :: folder
     type(sweep_journal_t), intent(inout) :: journals(:)
     type(results_options_t), intent(in) :: options
-    type(sweep_summary_t), intent(inout) :: summary   !! with the effort, if there was one
+    type(sweep_summary_t), intent(inout) :: summary   !! with the effort, but for a merge
     type(error_t), allocatable, intent(out) :: error
     integer(int64) :: began, now, rate
 
@@ -67,10 +67,10 @@ contains
     if (summary%done == 0 .and. .not. allocated(error)) call find_first_reason(journals, summary%first_reason, error)
   end subroutine write_results
 
-  !> Nothing stale is to look finished. Files of the user's own stay, and the folders that they are in.
+  !> Removes results of an earlier sweep or run. Other files stay, and so do the folders with other files.
   subroutine remove_other_results(folder, keeps_table)
     character(len=*), intent(in) :: folder
-    logical, intent(in) :: keeps_table   !! sweep.csv is about to be replaced
+    logical, intent(in) :: keeps_table   !! whether sweep.csv stays, because it is replaced next
     type(string_t), allocatable :: names(:)
     integer :: i
 
@@ -87,15 +87,15 @@ contains
     end do
   end subroutine remove_other_results
 
-  !> 'variant-17'
+  !> Whether a name is that of a folder of a variant, e.g. 'variant-17'.
   pure logical function is_of_variant(name)
-    character(len=*), intent(in) :: name   !! in the folder of a sweep
+    character(len=*), intent(in) :: name   !! of a file or folder
 
     is_of_variant = index(name, variant_folder) == 1 .and. len(name) > len(variant_folder)
     if (is_of_variant) is_of_variant = verify(name(len(variant_folder) + 1:), '0123456789') == 0
   end function is_of_variant
 
-  !> What makes the results of a run.
+  !> Removes the results of a run, but for input.nml.
   subroutine remove_run(folder)
     character(len=*), intent(in) :: folder
 
@@ -104,13 +104,13 @@ contains
     call remove_file(folder // '/' // partial_file)
   end subroutine remove_run
 
-  !> Prints what has come out.
+  !> Prints the summary. A sweep without any variant done is a failure.
   subroutine print_results(plan, folder, header, options, summary, code)
     type(sweep_plan_t), intent(in) :: plan
     character(len=*), intent(in) :: folder
     type(sweep_header_t), intent(in) :: header
     type(results_options_t), intent(in) :: options
-    type(sweep_summary_t), intent(in) :: summary   !! of `write_results`
+    type(sweep_summary_t), intent(in) :: summary   !! from `write_results`
     integer, intent(out) :: code                   !! 1 if no variant is done
     type(error_t), allocatable :: error
     character(len=:), allocatable :: note
@@ -123,12 +123,12 @@ contains
       call print_text(sweep_line(plan%input, summary, folder))
     end if
     if (summary%done > 0) return
-    call raise(error, exit_failed, plan%input%file // ': no variant can be computed, the first one because: ' // &
+    call raise(error, exit_failed, plan%input%file // ': no variant can be computed; reason of the first one: ' // &
                summary%first_reason // '; all reasons are in ' // folder // '/' // sweep_netcdf_name)
     call report_error(error, code)
   end subroutine print_results
 
-  !> Why the first variant of a sweep is not done.
+  !> The reason why the first variant of a sweep is not done.
   subroutine find_first_reason(journals, reason, error)
     type(sweep_journal_t), intent(inout) :: journals(:)
     character(len=:), allocatable, intent(out) :: reason
@@ -142,14 +142,14 @@ contains
     if (.not. allocated(error)) reason = chunk%reasons(1)%text
   end subroutine find_first_reason
 
-  !> The chosen variants run once more with the numbers that the journals have of them, as `nocdyn run` would do it. One that
-  !> fails leaves what it has, one that is refused has nothing.
+  !> Runs the chosen variants again as `nocdyn run` does, with the values from the journals. A variant that fails leaves a partial
+  !> trajectory; a refused one leaves none.
   subroutine write_trajectories(plan, folder, journals, options, refused, error)
     type(sweep_plan_t), intent(in) :: plan
     character(len=*), intent(in) :: folder
     type(sweep_journal_t), intent(inout) :: journals(:)
     type(results_options_t), intent(in) :: options
-    integer, allocatable, intent(out) :: refused(:)   !! variants
+    integer, allocatable, intent(out) :: refused(:)   !! variants without a trajectory
     type(error_t), allocatable, intent(out) :: error
     type(input_t) :: input
     type(run_summary_t) :: summary
@@ -172,17 +172,18 @@ contains
                           folder // '/' // variant_folder // to_text(variant), options%is_quiet, summary, error)
       end associate
       if (is_interrupted()) then
-        call raise(error, exit_failed, plan%input%file // ': interrupted while trajectories were written; --resume goes on')
+        call raise(error, exit_failed, plan%input%file // ': interrupted while trajectories were written; ' // &
+                   'repeat the command with --resume to continue')
       else if (allocated(error)) then
-        if (error%code == exit_failed) deallocate (error)   ! its reason is in sweep.nc
+        if (error%code == exit_failed) deallocate (error)   ! the reason is in sweep.nc
       end if
       if (allocated(error)) return
     end do
   end subroutine write_trajectories
 
-  !> What the varied numbers of one variant are, and what has become of it.
+  !> The varied numbers of one variant and its status.
   subroutine find_values(journals, variant, values, status, error)
-    type(sweep_journal_t), intent(inout) :: journals(:)   !! one of which holds it
+    type(sweep_journal_t), intent(inout) :: journals(:)   !! of which one holds the variant
     integer, intent(in) :: variant
     real(wp), allocatable, intent(out) :: values(:)
     integer, intent(out) :: status   !! status_...

@@ -1,4 +1,4 @@
-!> With how many threads and processes a sweep is computed.
+!> Limits on the threads and processes of a sweep.
 module nocdyn_sweep_threads
   use nocdyn_arguments, only: arguments_t
   use nocdyn_console, only: print_text
@@ -10,28 +10,28 @@ module nocdyn_sweep_threads
 
   public :: usable_threads, print_thread_note, refuse_ranks
 
-  integer, parameter :: most_per_processor = 8   ! a few share one without harm, hundreds cost the time to begin and memory
+  integer, parameter :: most_per_processor = 8   ! threads; many more would cost start-up time and memory
 
 contains
 
-  !> As many threads as are wanted and make sense.
+  !> The requested number of threads, limited by the number of processors.
   integer function usable_threads(wanted)
     integer, intent(in) :: wanted
 
     usable_threads = min(wanted, most_per_processor * omp_get_num_procs())
   end function usable_threads
 
-  !> Says so if that is fewer than were wanted.
+  !> Prints a note if fewer threads are used than requested.
   subroutine print_thread_note(file, wanted)
     character(len=*), intent(in) :: file   !! of the input
     integer, intent(in) :: wanted
 
     if (usable_threads(wanted) == wanted) return
     call print_text(file // ': note: ' // to_text(usable_threads(wanted)) // ' threads instead of ' // to_text(wanted) // &
-             ', which is more than ' // to_text(most_per_processor) // ' for each processor that may be used')
+                    ': at most ' // to_text(most_per_processor) // ' for each available processor')
   end subroutine print_thread_note
 
-  !> Each process of an MPI job would compute the same sweep, unless it has a shard of its own.
+  !> Refuses several processes of an MPI job without --shard: each of them would compute the whole sweep.
   subroutine refuse_ranks(arguments, error)
     type(arguments_t), intent(in) :: arguments
     type(error_t), allocatable, intent(out) :: error
@@ -46,7 +46,7 @@ contains
       read (value, *, iostat=status) ranks
       if (status /= 0 .or. ranks <= 1) cycle
       call raise(error, exit_input, 'this is one of ' // to_text(ranks) // ' processes of an MPI job (' // trim(names(i)) // &
-                 '), which would all compute the same sweep; nocdyn-mpi sweep shares it among them')
+                 '), which would all compute the same sweep; nocdyn-mpi sweep distributes it among them')
       return
     end do
   end subroutine refuse_ranks
