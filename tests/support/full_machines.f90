@@ -1,6 +1,7 @@
 !> Machines with elements of every kind.
 module nocdyn_test_full_machines
-  use nocdyn_bank, only: append_bank
+  use nocdyn_bank, only: append_bank, role_excitation
+  use nocdyn_couplings, only: coupling_common_t, new_table_couplings
   use nocdyn_curve_motors, only: new_curve_motors
   use nocdyn_curves, only: curve_t, extrapolation_constant, extrapolation_linear, interpolation_cubic, interpolation_linear, &
                            new_curve
@@ -13,13 +14,11 @@ module nocdyn_test_full_machines
   use nocdyn_nonlinear_loads, only: new_nonlinear_loads
   use nocdyn_polynomial_couplings, only: new_polynomial_couplings
   use nocdyn_saturated_couplings, only: new_saturated_couplings
-  use nocdyn_table_couplings, only: new_table_couplings
-  use nocdyn_table_excitations, only: new_table_excitations
-  use nocdyn_table_loads, only: new_table_loads
+  use nocdyn_table_laws, only: new_table_laws, over_time
   use nocdyn_test_machines, only: finish, numbered_names
   use nocdyn_test_random_machines, only: random_machine
   use nocdyn_timed_excitations, only: new_timed_excitations, shape_pulse, shape_ramp, shape_step
-  use nocdyn_torque_curves, only: induction_curve_t, quadratic_curve_t, table_curve_t
+  use nocdyn_torque_curves, only: induction_curve_t, quadratic_curve_t
   use nocdyn_wave_excitations, only: new_wave_excitations
   implicit none (type, external)
   private
@@ -82,18 +81,18 @@ contains
     associate (one => lane_values(1.0_wp, variants, 2), friction => lane_values(4.0_wp, variants, 2), &
                friction_speed => lane_values(0.5_wp, variants, 2))
       call append_bank(machine%banks, &
-                       new_polynomial_couplings(numbered_names('polynomial', 2), [0, 1], [1, bodies], coefficient, one, &
-                                                0.1_wp * one, friction, friction_speed))
+                       new_polynomial_couplings(coupling_common_t(numbered_names('polynomial', 2), [0, 1], [1, bodies], one, &
+                                                                  0.1_wp * one, friction, friction_speed), coefficient))
       call append_bank(machine%banks, &
-                       new_gap_couplings(numbered_names('gap', 2), [bodies, 0], [1, 2], coefficient, 4.0_wp * one, &
-                                         0.1_wp * one, 0.3_wp * one))
+                       new_gap_couplings(coupling_common_t(numbered_names('gap', 2), [bodies, 0], [1, 2], 4.0_wp * one, &
+                                                           0.1_wp * one), coefficient, 0.3_wp * one))
       call append_bank(machine%banks, &
-                       new_saturated_couplings(numbered_names('clutch', 2), [1, 2], [2, 0], 80.0_wp * one, 20.0_wp * one, &
-                                               0.0_wp * one, 0.1_wp * one, friction, friction_speed))
+                       new_saturated_couplings(coupling_common_t(numbered_names('clutch', 2), [1, 2], [2, 0], 0.0_wp * one, &
+                                                                 0.1_wp * one, friction, friction_speed), 80.0_wp * one, &
+                                               20.0_wp * one))
       call append_bank(machine%banks, &
-                       new_table_couplings(numbered_names('rubber', 2), [0, 1], [2, 2], &
-                                           curves(twist, moment, interpolation_cubic, extrapolation_linear, variants, 2), &
-                                           one, 0.1_wp * one))
+                       new_table_couplings(coupling_common_t(numbered_names('rubber', 2), [0, 1], [2, 2], one, 0.1_wp * one), &
+                                           curves(twist, moment, interpolation_cubic, extrapolation_linear, variants, 2)))
     end associate
   end subroutine add_couplings
 
@@ -103,13 +102,13 @@ contains
     type(governor_t) :: governor
     type(induction_curve_t) :: induction
     type(quadratic_curve_t) :: quadratic
-    type(table_curve_t) :: table
+    type(curve_t) :: table(size(variants), 1)
 
     allocate (induction%breakdown_torque, source=lane_values(60.0_wp, variants, 1))
     allocate (induction%breakdown_slip, source=lane_values(0.3_wp, variants, 1))
     allocate (induction%synchronous_speed, source=lane_values(10.0_wp, variants, 1))
-    allocate (table%curve, source=curves([-4.0_wp, 0.0_wp, 1.0_wp, 4.0_wp], [50.0_wp, 60.0_wp, 40.0_wp, -30.0_wp], &
-                                         interpolation_linear, extrapolation_linear, variants, 1))
+    table = curves([-4.0_wp, 0.0_wp, 1.0_wp, 4.0_wp], [50.0_wp, 60.0_wp, 40.0_wp, -30.0_wp], &
+                   interpolation_linear, extrapolation_linear, variants, 1)
     allocate (quadratic%a, source=lane_values(30.0_wp, variants, 1))
     allocate (quadratic%b, source=lane_values(3.0_wp, variants, 1))
     allocate (quadratic%c, source=lane_values(0.1_wp, variants, 1))
@@ -121,11 +120,11 @@ contains
       call append_bank(machine%banks, &
                        new_curve_motors(numbered_names('induction', 1), [1], size(variants), induction))
       call append_bank(machine%banks, &
-                       new_curve_motors(numbered_names('table', 1), [bodies], size(variants), table))
+                       new_curve_motors(numbered_names('table', 1), [bodies], size(variants), curve=table))
       call append_bank(machine%banks, &
-                       new_governed_motors(numbered_names('governed', 1), [2], quadratic, governor, 2.0_wp * one))
+                       new_governed_motors(numbered_names('governed', 1), [2], governor, 2.0_wp * one, law=quadratic))
       call append_bank(machine%banks, &
-                       new_governed_motors(numbered_names('throttled', 1), [1], table, governor, 0.0_wp * one))
+                       new_governed_motors(numbered_names('throttled', 1), [1], governor, 0.0_wp * one, curve=table))
       call append_bank(machine%banks, &
                        new_dc_motors(numbered_names('dc', 1), [2], 24.0_wp * one, 2.0_wp * one, 1.5_wp * one, &
                                      0.5_wp * one))
@@ -144,9 +143,9 @@ contains
                        new_nonlinear_loads(numbered_names('fan', 2), [1, bodies], one, 0.5_wp * one, &
                                            5.0_wp * one, 0.7_wp * one))
       call append_bank(machine%banks, &
-                       new_table_loads(numbered_names('mill', 2), [2, 2], one, 0.5_wp * one, 0.0_wp * one, one, &
-                                       curves([-2.0_wp, 0.0_wp, 2.5_wp], [-10.0_wp, 0.0_wp, 30.0_wp], &
-                                              interpolation_cubic, extrapolation_constant, variants, 2)))
+                       new_nonlinear_loads(numbered_names('mill', 2), [2, 2], one, 0.5_wp * one, 0.0_wp * one, one, &
+                                           curves([-2.0_wp, 0.0_wp, 2.5_wp], [-10.0_wp, 0.0_wp, 30.0_wp], interpolation_cubic, &
+                                                  extrapolation_constant, variants, 2)))
     end associate
   end subroutine add_loads
 
@@ -164,9 +163,9 @@ contains
                                              [shape_step, shape_ramp, shape_pulse], 12.0_wp * one, &
                                              0.35_wp * one, 0.2_wp * one))
       call append_bank(machine%banks, &
-                       new_table_excitations(numbered_names('record', 1), [2], &
-                                             curves([0.1_wp, 0.3_wp, 0.6_wp], [0.0_wp, 20.0_wp, -10.0_wp], &
-                                                    interpolation_linear, extrapolation_constant, variants, 1)))
+                       new_table_laws(role_excitation, numbered_names('record', 1), [2], over_time, &
+                                      curves([0.1_wp, 0.3_wp, 0.6_wp], [0.0_wp, 20.0_wp, -10.0_wp], interpolation_linear, &
+                                             extrapolation_constant, variants, 1)))
     end associate
   end subroutine add_excitations
 

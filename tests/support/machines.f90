@@ -4,7 +4,7 @@ module nocdyn_test_machines
   use nocdyn_constraint_analysis, only: analyse_constraints
   use nocdyn_constraints, only: constraints_t, new_constraints
   use nocdyn_coordinates, only: build_coordinates
-  use nocdyn_couplings, only: new_couplings
+  use nocdyn_couplings, only: coupling_common_t, new_couplings
   use nocdyn_errors, only: error_t
   use nocdyn_excitations, only: new_excitations
   use nocdyn_kinds, only: wp
@@ -28,8 +28,8 @@ contains
 
     machine = machine_of_bodies(row([10.0_wp, 5.0_wp, 5.0_wp]))
     machine%names = strings([character(len=7) :: 'motor', 'pinion', 'machine'])
-    call install(machine%banks, new_couplings(strings(['coupling']), [1], [2], row([100.0_wp]), row([10.0_wp]), &
-                                              row([0.0_wp]), row([0.0_wp])))
+    call install(machine%banks, new_couplings(coupling_common_t(strings(['coupling']), [1], [2], row([0.0_wp]), &
+                                                                row([0.0_wp])), row([100.0_wp]), row([10.0_wp])))
     call install(machine%banks, new_motors(strings(['drive']), [1], row([200.0_wp]), row([10.0_wp]), row([1.0_wp])))
     call install(machine%banks, new_loads(strings(['work']), [3], row([100.0_wp])))
     if (abs(amplitude) > 0.0_wp) then
@@ -46,11 +46,11 @@ contains
     type(machine_t) :: machine
 
     machine = machine_of_bodies(row([4.0_wp, 2.0_wp, 1.0_wp, 3.0_wp]))
-    call install(machine%banks, new_couplings(numbered_names('spring', 5), [0, 1, 2, 3, 4], [1, 2, 3, 4, 0], &
+    call install(machine%banks, new_couplings(coupling_common_t(numbered_names('spring', 5), [0, 1, 2, 3, 4], [1, 2, 3, 4, 0], &
+                                                                row([0.7_wp, 3.0_wp, 0.0_wp, 1.5_wp, 0.0_wp]), &
+                                                                row([0.3_wp, 0.2_wp, 0.0_wp, -0.1_wp, 0.4_wp])), &
                                               row([30.0_wp, 100.0_wp, 80.0_wp, 50.0_wp, 20.0_wp]), &
-                                              row([5.0_wp, 10.0_wp, -4.0_wp, 0.0_wp, 0.0_wp]), &
-                                              row([0.7_wp, 3.0_wp, 0.0_wp, 1.5_wp, 0.0_wp]), &
-                                              row([0.3_wp, 0.2_wp, 0.0_wp, -0.1_wp, 0.4_wp])))
+                                              row([5.0_wp, 10.0_wp, -4.0_wp, 0.0_wp, 0.0_wp])))
     call install(machine%banks, new_motors(numbered_names('motor', 1), [1], row([90.0_wp]), row([6.0_wp]), &
                                            row([0.5_wp])))
     call install(machine%banks, new_loads(numbered_names('load', 1), [3], row([12.0_wp])))
@@ -69,9 +69,9 @@ contains
 
     machine = machine_of_bodies(row([(1.0_wp, i=1, bodies)]))
     associate (stiffness => row([(1.0e4_wp, i=1, bodies - 1)]))
-      call install(machine%banks, new_couplings(numbered_names('shaft', bodies - 1), [(i, i=1, bodies - 1)], &
-                                                [(i + 1, i=1, bodies - 1)], stiffness, 10.0_wp * stiffness, &
-                                                1.0e-4_wp * stiffness, 0.0_wp * stiffness))
+      call install(machine%banks, new_couplings(coupling_common_t(numbered_names('shaft', bodies - 1), [(i, i=1, bodies - 1)], &
+                                                                  [(i + 1, i=1, bodies - 1)], 1.0e-4_wp * stiffness, &
+                                                                  0.0_wp * stiffness), stiffness, 10.0_wp * stiffness))
     end associate
     call install(machine%banks, new_motors(numbered_names('motor', 1), [1], row([100.0_wp]), row([0.0_wp]), &
                                            row([0.0_wp])))
@@ -85,11 +85,11 @@ contains
     type(machine_t) :: machine
 
     machine = machine_of_bodies(row([4.0_wp, 2.0_wp, 6.0_wp, 1.0_wp, 3.0_wp, 2.5_wp, 8.0_wp]))
-    call install(machine%banks, new_couplings(numbered_names('shaft', 4), [4, 3, 6, 0], [5, 5, 7, 7], &
+    call install(machine%banks, new_couplings(coupling_common_t(numbered_names('shaft', 4), [4, 3, 6, 0], [5, 5, 7, 7], &
+                                                                row([0.5_wp, 0.0_wp, 1.0_wp, 0.2_wp]), &
+                                                                row([0.0_wp, 0.1_wp, -0.2_wp, 0.0_wp])), &
                                               row([60.0_wp, 40.0_wp, 90.0_wp, 10.0_wp]), &
-                                              row([4.0_wp, 0.0_wp, 7.0_wp, 0.0_wp]), &
-                                              row([0.5_wp, 0.0_wp, 1.0_wp, 0.2_wp]), &
-                                              row([0.0_wp, 0.1_wp, -0.2_wp, 0.0_wp])))
+                                              row([4.0_wp, 0.0_wp, 7.0_wp, 0.0_wp])))
     call install(machine%banks, new_motors(numbered_names('motor', 1), [1], row([150.0_wp]), row([8.0_wp]), &
                                            row([0.3_wp])))
     call install(machine%banks, new_loads(numbered_names('load', 2), [3, 7], row([5.0_wp, 20.0_wp])))
@@ -103,8 +103,8 @@ contains
     type(machine_t) :: machine
 
     machine = machine_of_bodies(row([4.0_wp, 2.0_wp, 6.0_wp, 1.0_wp, 3.0_wp]))
-    call install(machine%banks, new_couplings(numbered_names('shaft', 1), [3], [5], row([60.0_wp]), row([4.0_wp]), &
-                                              row([0.5_wp]), row([0.0_wp])))
+    call install(machine%banks, new_couplings(coupling_common_t(numbered_names('shaft', 1), [3], [5], row([0.5_wp]), &
+                                                                row([0.0_wp])), row([60.0_wp]), row([4.0_wp])))
     call install(machine%banks, new_motors(numbered_names('motor', 1), [1], row([150.0_wp]), row([8.0_wp]), &
                                            row([0.3_wp])))
     call install(machine%banks, new_loads(numbered_names('load', 2), [4, 5], row([5.0_wp, 20.0_wp])))
@@ -135,7 +135,7 @@ contains
     real(wp) :: none(lanes, 0)
 
     allocate (banks(4))
-    call install(banks, new_couplings(names, [integer ::], [integer ::], none, none, none, none))
+    call install(banks, new_couplings(coupling_common_t(names, [integer ::], [integer ::], none, none), none, none))
     call install(banks, new_motors(names, [integer ::], none, none, none))
     call install(banks, new_loads(names, [integer ::], none))
     call install(banks, new_excitations(names, [integer ::], none, none, none))

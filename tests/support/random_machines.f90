@@ -1,7 +1,7 @@
 !> Machines of any size that are different with every seed, alone or in blocks of lanes.
 module nocdyn_test_random_machines
   use nocdyn_constraints, only: constraints_t
-  use nocdyn_couplings, only: new_couplings
+  use nocdyn_couplings, only: coupling_common_t, new_couplings
   use nocdyn_excitations, only: new_excitations
   use nocdyn_kinds, only: wp
   use nocdyn_loads, only: new_loads
@@ -94,7 +94,7 @@ contains
     type(random_stream_t), intent(inout) :: layout, lanes(:)
     type(machine_t), intent(inout) :: machine
     integer :: from(machine%bodies), to(machine%bodies)
-    real(wp) :: damping(size(lanes), machine%bodies)
+    real(wp), dimension(size(lanes), machine%bodies) :: cubic, damping, stiffness
     integer :: i
 
     do i = 1, machine%bodies
@@ -103,10 +103,10 @@ contains
     end do
     damping = drawn(lanes, 0.5_wp, 3.0_wp, machine%bodies)
     damping(:, 3::3) = 0.0_wp
-    call install(machine%banks, new_couplings(numbered_names('shaft', machine%bodies), from, to, &
-                                              drawn(lanes, 50.0_wp, 150.0_wp, machine%bodies), &
-                                              drawn(lanes, -10.0_wp, 10.0_wp, machine%bodies), damping, &
-                                              drawn(lanes, -0.3_wp, 0.3_wp, machine%bodies)))
+    stiffness = drawn(lanes, 50.0_wp, 150.0_wp, machine%bodies)
+    cubic = drawn(lanes, -10.0_wp, 10.0_wp, machine%bodies)
+    call install(machine%banks, new_couplings(coupling_common_t(numbered_names('shaft', machine%bodies), from, to, damping, &
+                                                                drawn(lanes, -0.3_wp, 0.3_wp, machine%bodies)), stiffness, cubic))
   end subroutine add_couplings
 
   !> Two motors, three loads, two excitations, which may share bodies.

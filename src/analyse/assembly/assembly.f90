@@ -6,7 +6,7 @@ module nocdyn_assembly
   use nocdyn_constraint_assembly, only: assemble_constraints, constraint_groups
   use nocdyn_coordinates, only: build_coordinates
   use nocdyn_coupling_assembly, only: add_couplings, check_couplings
-  use nocdyn_element_parameters, only: names_of, values_of
+  use nocdyn_element_groups, only: element_groups_t, new_element_groups
   use nocdyn_errors, only: error_t, exit_input, raise
   use nocdyn_formulation, only: formulation_t
   use nocdyn_input, only: group_t, input_t
@@ -31,30 +31,30 @@ contains
   !> Builds the machine of a checked input, the same in every lane; constraints that lock or that the start speeds violate are
   !> errors.
   subroutine assemble_machine(input, machine, error, lanes)
-    type(input_t), intent(in) :: input
+    type(input_t), target, intent(in) :: input
     type(machine_t), intent(out) :: machine
     type(error_t), allocatable, intent(out) :: error
     integer, intent(in), optional :: lanes   !! 1 if absent
-    type(body_index_t) :: body_index
+    type(body_index_t), target :: body_index
+    type(element_groups_t) :: bodies
 
     if (present(lanes)) machine%lanes = lanes
-    associate (bodies => input%groups_named('body'))
-      machine%names = names_of(input, bodies)
-      machine%bodies = size(bodies)
-      machine%inertia = values_of(input, bodies, machine%lanes, 'inertia')
-      machine%start_angle = values_of(input, bodies, machine%lanes, 'angle')
-      machine%start_speed = values_of(input, bodies, machine%lanes, 'speed')
-    end associate
+    bodies = new_element_groups(input, 'body', machine%lanes)
+    machine%bodies = size(bodies%names)
+    machine%names = bodies%names
+    machine%inertia = bodies%values('inertia')
+    machine%start_angle = bodies%values('angle')
+    machine%start_speed = bodies%values('speed')
     body_index = new_body_index(machine%names)
     call assemble_constraints(input, body_index, machine%lanes, machine%constraints, error)
     if (.not. allocated(error)) call check_couplings(input, error)
     if (.not. allocated(error)) call check_motors(input, error)
     if (allocated(error)) return
     allocate (machine%banks(0))
-    call add_couplings(input, body_index, machine%lanes, machine%banks)
-    call add_motors(input, body_index, machine%lanes, machine%banks)
-    call add_loads(input, body_index, machine%lanes, machine%banks)
-    call add_excitations(input, body_index, machine%lanes, machine%banks)
+    call add_couplings(new_element_groups(input, 'coupling', machine%lanes, body_index), machine%banks)
+    call add_motors(new_element_groups(input, 'motor', machine%lanes, body_index), machine%banks)
+    call add_loads(new_element_groups(input, 'load', machine%lanes, body_index), machine%banks)
+    call add_excitations(new_element_groups(input, 'excitation', machine%lanes, body_index), machine%banks)
     call machine%number_elements()
     call analyse_machine_constraints(input, body_index, machine, error)
   end subroutine assemble_machine

@@ -1,24 +1,25 @@
 !> The banks of motors of an input: one for each form of their laws that it has.
 module nocdyn_motor_assembly
   use nocdyn_bank, only: append_bank, bank_slot_t
-  use nocdyn_body_index, only: body_index_t
   use nocdyn_curve_motors, only: new_curve_motors
+  use nocdyn_curves, only: curve_t
   use nocdyn_dc_motors, only: new_dc_motors
-  use nocdyn_element_parameters, only: curves_of, ends_of, names_of, values_of
+  use nocdyn_element_groups, only: add_banks, element_groups_t
   use nocdyn_errors, only: error_t, exit_input, raise
   use nocdyn_governed_motors, only: new_governed_motors
   use nocdyn_governors, only: governor_t
   use nocdyn_input, only: group_t, input_t
   use nocdyn_kinds, only: wp
   use nocdyn_motors, only: new_motors
-  use nocdyn_text, only: string_t, to_text
-  use nocdyn_torque_curves, only: induction_curve_t, quadratic_curve_t, table_curve_t, torque_curve_t
+  use nocdyn_text, only: to_text
+  use nocdyn_torque_curves, only: induction_curve_t, quadratic_curve_t, torque_curve_t
   implicit none (type, external)
   private
 
   public :: add_motors, check_motors
 
-  integer, parameter :: quadratic = 1, induction = 2, table = 3, inductive = 4   ! forms
+  ! forms; a motor with a governor has the next one
+  integer, parameter :: quadratic = 1, induction = 3, table = 5, inductive = 7
 
 contains
 
@@ -32,7 +33,7 @@ contains
     allocate (indices, source=input%groups_named('motor'))
     do i = 1, size(indices)
       associate (group => input%groups(indices(i)))
-        if (form_of(group) /= induction) cycle
+        if (group%text('kind') /= 'induction') cycle
         associate (torque => group%number('breakdown_torque'), speed => group%number('synchronous_speed'))
           if ((torque > 0 .and. speed > 0) .or. (torque < 0 .and. speed < 0)) cycle
           call raise(error, exit_input, input%location(indices(i), 'breakdown_torque') // ': breakdown_torque = ' // &
@@ -57,138 +58,103 @@ contains
     case default
       form_of = quadratic
     end select
+    if (group%has_value('governor_speed')) form_of = form_of + 1
   end function form_of
 
   !> A bank of quadratic motors without governors in any case, the others where there are such motors.
-  subroutine add_motors(input, body_index, lanes, banks)
-    type(input_t), intent(in) :: input
-    type(body_index_t), intent(in) :: body_index
-    integer, intent(in) :: lanes
+  subroutine add_motors(groups, banks)
+    type(element_groups_t), intent(in) :: groups   !! all of them
     type(bank_slot_t), allocatable, intent(inout) :: banks(:)
-    integer, allocatable :: free(:), governed(:), indices(:), some(:)
-    integer :: form, i
 
-    allocate (indices, source=input%groups_named('motor'))
-    do form = quadratic, inductive
-      some = pack(indices, [(form_of(input%groups(indices(i))) == form, i=1, size(indices))])
-      free = pack(some, [(.not. input%groups(some(i))%has_value('governor_speed'), i=1, size(some))])
-      governed = pack(some, [(input%groups(some(i))%has_value('governor_speed'), i=1, size(some))])
-      if (form == quadratic .or. size(free) > 0) call add_free(input, free, lanes, form, body_index, banks)
-      if (size(governed) > 0) call add_governed(input, governed, lanes, form, body_index, banks)
-    end do
+    call add_banks(groups, inductive + 1, form_of, add_form, banks)
   end subroutine add_motors
 
-  subroutine add_free(input, indices, lanes, form, body_index, banks)
-    type(input_t), intent(in) :: input
-    integer, intent(in) :: indices(:)
-    integer, intent(in) :: lanes, form
-    type(body_index_t), intent(in) :: body_index
+  subroutine add_form(groups, form, banks)
+    type(element_groups_t), intent(in) :: groups
+    integer, intent(in) :: form
     type(bank_slot_t), allocatable, intent(inout) :: banks(:)
-    type(string_t), allocatable :: names(:)
-    class(torque_curve_t), allocatable :: curve
-    integer :: body(size(indices))
+    class(torque_curve_t), allocatable :: law
+    type(curve_t), allocatable :: curve(:, :)
+    integer :: body(size(groups%indices))
 
-    allocate (names, source=names_of(input, indices))
-    body = ends_of(input, indices, 'body', 1, body_index)
+    body = groups%bodies('body', 1)
     select case (form)
     case (quadratic)
-      call append_bank(banks, new_motors(names, body, standstill_torques(input, indices, lanes), &
-                                         values_of(input, indices, lanes, 'b') + drags(input, indices, lanes), &
-                                         values_of(input, indices, lanes, 'c')))
+      call append_bank(banks, new_motors(groups%names, body, standstill_torques(groups), groups%values('b') + drags(groups), &
+                                         groups%values('c')))
     case (inductive)
-      call add_inductive(input, indices, lanes, names, body, banks)
+      call add_inductive(groups, body, banks)
+    case (inductive + 1)
+      call add_inductive(groups, body, banks, governor_of(groups))
+    case (induction, table)
+      call make_law(groups, form, law, curve)
+      call append_bank(banks, new_curve_motors(groups%names, body, groups%lanes, law, curve))
     case default
-      call make_curve(input, indices, lanes, form, curve)
-      call append_bank(banks, new_curve_motors(names, body, lanes, curve))
+      call make_law(groups, form - 1, law, curve)
+      call append_bank(banks, new_governed_motors(groups%names, body, governor_of(groups), drags(groups), law, curve))
     end select
-  end subroutine add_free
+  end subroutine add_form
 
-  subroutine add_governed(input, indices, lanes, form, body_index, banks)
-    type(input_t), intent(in) :: input
-    integer, intent(in) :: indices(:)
-    integer, intent(in) :: lanes, form
-    type(body_index_t), intent(in) :: body_index
-    type(bank_slot_t), allocatable, intent(inout) :: banks(:)
-    type(string_t), allocatable :: names(:)
-    class(torque_curve_t), allocatable :: curve
+  function governor_of(groups) result(governor)
+    type(element_groups_t), intent(in) :: groups
     type(governor_t) :: governor
-    integer :: body(size(indices))
 
-    allocate (names, source=names_of(input, indices))
-    body = ends_of(input, indices, 'body', 1, body_index)
-    allocate (governor%set_speed, source=values_of(input, indices, lanes, 'governor_speed'))
-    allocate (governor%gain, source=values_of(input, indices, lanes, 'governor_gain'))
-    allocate (governor%time, source=values_of(input, indices, lanes, 'governor_time'))
-    allocate (governor%start, source=values_of(input, indices, lanes, 'governor_start'))
-    if (form == inductive) then
-      call add_inductive(input, indices, lanes, names, body, banks, governor)
-    else
-      call make_curve(input, indices, lanes, form, curve)
-      call append_bank(banks, new_governed_motors(names, body, curve, governor, drags(input, indices, lanes)))
-    end if
-  end subroutine add_governed
+    allocate (governor%set_speed, source=groups%values('governor_speed'))
+    allocate (governor%gain, source=groups%values('governor_gain'))
+    allocate (governor%time, source=groups%values('governor_time'))
+    allocate (governor%start, source=groups%values('governor_start'))
+  end function governor_of
 
-  subroutine add_inductive(input, indices, lanes, names, body, banks, governor)
-    type(input_t), intent(in) :: input
-    integer, intent(in) :: indices(:)
-    integer, intent(in) :: lanes
-    type(string_t), intent(in) :: names(:)
+  subroutine add_inductive(groups, body, banks, governor)
+    type(element_groups_t), intent(in) :: groups
     integer, intent(in) :: body(:)
     type(bank_slot_t), allocatable, intent(inout) :: banks(:)
-    type(governor_t), intent(in), optional :: governor   !! no motor has one if absent
+    type(governor_t), intent(in), optional :: governor   !! absent: no motor has one
 
-    call append_bank(banks, new_dc_motors(names, body, values_of(input, indices, lanes, 'voltage'), &
-                                          values_of(input, indices, lanes, 'resistance'), &
-                                          values_of(input, indices, lanes, 'flux_constant'), &
-                                          values_of(input, indices, lanes, 'inductance'), governor))
+    call append_bank(banks, new_dc_motors(groups%names, body, groups%values('voltage'), groups%values('resistance'), &
+                                          groups%values('flux_constant'), groups%values('inductance'), governor))
   end subroutine add_inductive
 
-  subroutine make_curve(input, indices, lanes, form, curve)
-    type(input_t), intent(in) :: input
-    integer, intent(in) :: indices(:)
-    integer, intent(in) :: lanes, form
-    class(torque_curve_t), allocatable, intent(out) :: curve
+  !> The torque over the speed, either as a law or as tables.
+  subroutine make_law(groups, form, law, curve)
+    type(element_groups_t), intent(in) :: groups
+    integer, intent(in) :: form
+    class(torque_curve_t), allocatable, intent(out) :: law
+    type(curve_t), allocatable, intent(out) :: curve(:, :)
     type(induction_curve_t) :: kloss
     type(quadratic_curve_t) :: parabola
-    type(table_curve_t) :: points
 
     select case (form)
     case (quadratic)
-      allocate (parabola%a, source=standstill_torques(input, indices, lanes))
-      allocate (parabola%b, source=values_of(input, indices, lanes, 'b'))
-      allocate (parabola%c, source=values_of(input, indices, lanes, 'c'))
-      allocate (curve, source=parabola)
+      allocate (parabola%a, source=standstill_torques(groups))
+      allocate (parabola%b, source=groups%values('b'))
+      allocate (parabola%c, source=groups%values('c'))
+      allocate (law, source=parabola)
     case (induction)
-      allocate (kloss%breakdown_torque, source=values_of(input, indices, lanes, 'breakdown_torque'))
-      allocate (kloss%breakdown_slip, source=values_of(input, indices, lanes, 'breakdown_slip'))
-      allocate (kloss%synchronous_speed, source=values_of(input, indices, lanes, 'synchronous_speed'))
-      allocate (curve, source=kloss)
+      allocate (kloss%breakdown_torque, source=groups%values('breakdown_torque'))
+      allocate (kloss%breakdown_slip, source=groups%values('breakdown_slip'))
+      allocate (kloss%synchronous_speed, source=groups%values('synchronous_speed'))
+      allocate (law, source=kloss)
     case default
-      allocate (points%curve, source=curves_of(input, indices, lanes, 'table_speed', 'table_torque'))
-      allocate (curve, source=points)
+      allocate (curve, source=groups%curves('table_speed', 'table_torque'))
     end select
-  end subroutine make_curve
+  end subroutine make_law
 
   !> a of quadratic motors, the torque of constant ones, k voltage / resistance of dc motors without inductance.
-  function standstill_torques(input, indices, lanes) result(torques)
-    type(input_t), intent(in) :: input
-    integer, intent(in) :: indices(:)
-    integer, intent(in) :: lanes
-    real(wp) :: torques(lanes, size(indices))
+  function standstill_torques(groups) result(torques)
+    type(element_groups_t), intent(in) :: groups
+    real(wp) :: torques(groups%lanes, size(groups%indices))
 
-    torques = values_of(input, indices, lanes, 'a') + values_of(input, indices, lanes, 'torque') &
-              + values_of(input, indices, lanes, 'flux_constant') * values_of(input, indices, lanes, 'voltage') &
-              / values_of(input, indices, lanes, 'resistance', absent=1.0_wp)
+    torques = groups%values('a') + groups%values('torque') &
+              + groups%values('flux_constant') * groups%values('voltage') / groups%values('resistance', absent=1.0_wp)
   end function standstill_torques
 
   !> k^2 / resistance of dc motors without inductance, which no throttle changes [N m s/rad].
-  function drags(input, indices, lanes)
-    type(input_t), intent(in) :: input
-    integer, intent(in) :: indices(:)
-    integer, intent(in) :: lanes
-    real(wp) :: drags(lanes, size(indices))
+  function drags(groups)
+    type(element_groups_t), intent(in) :: groups
+    real(wp) :: drags(groups%lanes, size(groups%indices))
 
-    drags = values_of(input, indices, lanes, 'flux_constant')**2 / values_of(input, indices, lanes, 'resistance', absent=1.0_wp)
+    drags = groups%values('flux_constant')**2 / groups%values('resistance', absent=1.0_wp)
   end function drags
 
 end module nocdyn_motor_assembly

@@ -1,16 +1,13 @@
 !> The banks of loads and excitations of an input: one for each form of their laws that it has.
 module nocdyn_torque_assembly
-  use nocdyn_bank, only: append_bank, bank_slot_t
-  use nocdyn_body_index, only: body_index_t
-  use nocdyn_element_parameters, only: curves_of, ends_of, names_of, values_of
+  use nocdyn_bank, only: append_bank, bank_slot_t, role_excitation
+  use nocdyn_element_groups, only: add_banks, element_groups_t
   use nocdyn_excitations, only: new_excitations
-  use nocdyn_input, only: group_t, input_t
+  use nocdyn_input, only: group_t
   use nocdyn_kinds, only: wp
   use nocdyn_loads, only: new_loads
   use nocdyn_nonlinear_loads, only: new_nonlinear_loads
-  use nocdyn_table_excitations, only: new_table_excitations
-  use nocdyn_table_loads, only: new_table_loads
-  use nocdyn_text, only: string_t
+  use nocdyn_table_laws, only: new_table_laws, over_time
   use nocdyn_timed_excitations, only: new_timed_excitations, shape_pulse, shape_ramp, shape_step
   use nocdyn_wave_excitations, only: new_wave_excitations
   implicit none (type, external)
@@ -32,45 +29,33 @@ contains
   end function load_form
 
   !> A bank of viscous loads in any case, the others where there are such loads.
-  subroutine add_loads(input, body_index, lanes, banks)
-    type(input_t), intent(in) :: input
-    type(body_index_t), intent(in) :: body_index
-    integer, intent(in) :: lanes
+  subroutine add_loads(groups, banks)
+    type(element_groups_t), intent(in) :: groups   !! all of them
     type(bank_slot_t), allocatable, intent(inout) :: banks(:)
-    integer, allocatable :: indices(:), some(:)
-    integer :: form, i
 
-    allocate (indices, source=input%groups_named('load'))
-    do form = viscous, table
-      some = pack(indices, [(load_form(input%groups(indices(i))) == form, i=1, size(indices))])
-      if (form == viscous .or. size(some) > 0) call add_load_form(input, some, lanes, form, body_index, banks)
-    end do
+    call add_banks(groups, table, load_form, add_load_form, banks)
   end subroutine add_loads
 
-  subroutine add_load_form(input, indices, lanes, form, body_index, banks)
-    type(input_t), intent(in) :: input
-    integer, intent(in) :: indices(:)
-    integer, intent(in) :: lanes, form
-    type(body_index_t), intent(in) :: body_index
+  subroutine add_load_form(groups, form, banks)
+    type(element_groups_t), intent(in) :: groups
+    integer, intent(in) :: form
     type(bank_slot_t), allocatable, intent(inout) :: banks(:)
-    type(string_t), allocatable :: names(:)
-    integer :: body(size(indices))
-    real(wp), dimension(lanes, size(indices)) :: constant, constant_speed, quadratic, slope
+    integer :: body(size(groups%indices))
+    real(wp), dimension(groups%lanes, size(groups%indices)) :: constant, constant_speed, quadratic, slope
 
-    allocate (names, source=names_of(input, indices))
-    body = ends_of(input, indices, 'body', 1, body_index)
-    slope = values_of(input, indices, lanes, 'viscous')
-    quadratic = values_of(input, indices, lanes, 'quadratic')
-    constant = values_of(input, indices, lanes, 'constant')
-    constant_speed = values_of(input, indices, lanes, 'constant_speed', absent=1.0_wp)
+    body = groups%bodies('body', 1)
+    slope = groups%values('viscous')
+    quadratic = groups%values('quadratic')
+    constant = groups%values('constant')
+    constant_speed = groups%values('constant_speed', absent=1.0_wp)
     select case (form)
     case (viscous)
-      call append_bank(banks, new_loads(names, body, slope))
+      call append_bank(banks, new_loads(groups%names, body, slope))
     case (nonlinear)
-      call append_bank(banks, new_nonlinear_loads(names, body, slope, quadratic, constant, constant_speed))
+      call append_bank(banks, new_nonlinear_loads(groups%names, body, slope, quadratic, constant, constant_speed))
     case default
-      call append_bank(banks, new_table_loads(names, body, slope, quadratic, constant, constant_speed, &
-                                              curves_of(input, indices, lanes, 'table_speed', 'table_torque')))
+      call append_bank(banks, new_nonlinear_loads(groups%names, body, slope, quadratic, constant, constant_speed, &
+                                                  groups%curves('table_speed', 'table_torque')))
     end select
   end subroutine add_load_form
 
@@ -90,47 +75,34 @@ contains
   end function excitation_form
 
   !> A bank of harmonic excitations in any case, the others where there are such excitations.
-  subroutine add_excitations(input, body_index, lanes, banks)
-    type(input_t), intent(in) :: input
-    type(body_index_t), intent(in) :: body_index
-    integer, intent(in) :: lanes
+  subroutine add_excitations(groups, banks)
+    type(element_groups_t), intent(in) :: groups   !! all of them
     type(bank_slot_t), allocatable, intent(inout) :: banks(:)
-    integer, allocatable :: indices(:), some(:)
-    integer :: form, i
 
-    allocate (indices, source=input%groups_named('excitation'))
-    do form = harmonic, timed
-      some = pack(indices, [(excitation_form(input%groups(indices(i))) == form, i=1, size(indices))])
-      if (form == harmonic .or. size(some) > 0) call add_excitation_form(input, some, lanes, form, body_index, banks)
-    end do
+    call add_banks(groups, timed, excitation_form, add_excitation_form, banks)
   end subroutine add_excitations
 
-  subroutine add_excitation_form(input, indices, lanes, form, body_index, banks)
-    type(input_t), intent(in) :: input
-    integer, intent(in) :: indices(:)
-    integer, intent(in) :: lanes, form
-    type(body_index_t), intent(in) :: body_index
+  subroutine add_excitation_form(groups, form, banks)
+    type(element_groups_t), intent(in) :: groups
+    integer, intent(in) :: form
     type(bank_slot_t), allocatable, intent(inout) :: banks(:)
-    type(string_t), allocatable :: names(:)
-    integer :: body(size(indices)), i
+    integer :: body(size(groups%indices)), i
 
-    allocate (names, source=names_of(input, indices))
-    body = ends_of(input, indices, 'body', 1, body_index)
+    body = groups%bodies('body', 1)
     select case (form)
     case (harmonic)
-      call append_bank(banks, new_excitations(names, body, values_of(input, indices, lanes, 'amplitude'), &
-                                              values_of(input, indices, lanes, 'frequency'), &
-                                              values_of(input, indices, lanes, 'phase')))
+      call append_bank(banks, new_excitations(groups%names, body, groups%values('amplitude'), groups%values('frequency'), &
+                                              groups%values('phase')))
     case (waves)
-      call add_waves(input, indices, lanes, names, body, banks)
+      call add_waves(groups, body, banks)
     case (table)
-      call append_bank(banks, new_table_excitations(names, body, curves_of(input, indices, lanes, 'table_time', 'table_torque', &
-                                                                           extrapolation='constant')))
+      call append_bank(banks, new_table_laws(role_excitation, groups%names, body, over_time, &
+                                             groups%curves('table_time', 'table_torque', extrapolation='constant')))
     case default
-      call append_bank(banks, new_timed_excitations(names, body, [(shape_of(input%groups(indices(i))), i=1, size(indices))], &
-                                                    values_of(input, indices, lanes, 'amplitude'), &
-                                                    values_of(input, indices, lanes, 'time'), &
-                                                    values_of(input, indices, lanes, 'duration', absent=1.0_wp)))
+      call append_bank(banks, new_timed_excitations(groups%names, body, [(shape_of(groups%input%groups(groups%indices(i))), &
+                                                                          i=1, size(body))], &
+                                                    groups%values('amplitude'), groups%values('time'), &
+                                                    groups%values('duration', absent=1.0_wp)))
     end select
   end subroutine add_excitation_form
 
@@ -148,11 +120,8 @@ contains
   end function shape_of
 
   !> Every order is a term; so is amplitude sin(2 (frequency t - pole_pairs phi) + phase).
-  subroutine add_waves(input, indices, lanes, names, body, banks)
-    type(input_t), intent(in) :: input
-    integer, intent(in) :: indices(:)
-    integer, intent(in) :: lanes
-    type(string_t), intent(in) :: names(:)
+  subroutine add_waves(groups, body, banks)
+    type(element_groups_t), intent(in) :: groups
     integer, intent(in) :: body(:)
     type(bank_slot_t), allocatable, intent(inout) :: banks(:)
     real(wp), allocatable :: amplitude(:), frequency(:), order(:), phase(:)
@@ -160,8 +129,8 @@ contains
     integer :: i
 
     allocate (owner(0), amplitude(0), frequency(0), order(0), phase(0))
-    do i = 1, size(indices)
-      associate (group => input%groups(indices(i)))
+    do i = 1, size(body)
+      associate (group => groups%input%groups(groups%indices(i)))
         if (group%text('kind') == 'startup') then
           amplitude = [amplitude, group%number('amplitude')]
           frequency = [frequency, 2.0_wp * group%number('frequency')]
@@ -177,9 +146,11 @@ contains
         owner = [owner, spread(i, 1, size(order) - size(owner))]
       end associate
     end do
-    call append_bank(banks, new_wave_excitations(names, body, owner, spread(amplitude, 1, lanes), &
-                                                 spread(frequency, 1, lanes), spread(order, 1, lanes), &
-                                                 spread(phase, 1, lanes)))
+    associate (lanes => groups%lanes)
+      call append_bank(banks, new_wave_excitations(groups%names, body, owner, spread(amplitude, 1, lanes), &
+                                                   spread(frequency, 1, lanes), spread(order, 1, lanes), &
+                                                   spread(phase, 1, lanes)))
+    end associate
   end subroutine add_waves
 
 end module nocdyn_torque_assembly

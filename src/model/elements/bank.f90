@@ -51,6 +51,7 @@ module nocdyn_bank
     integer :: values = 0                    !! lanes * elements
     integer :: first_value = 1               !! the place of lane 1 of `first` in the values of the machine
     logical :: is_polynomial = .true.        !! whether `polynomials` says all of its law
+    logical :: has_polynomial_potential = .true.   !! whether `polynomials` gives all of its restoring moment
     logical :: is_time_only = .false.         !! whether the rest of its law depends on the time alone
     logical :: has_paper_law = .true.          !! whether its law is that of eqs. (3), (5), (17) or (20)
     integer :: states = 0                     !! inner states of each element

@@ -5,7 +5,6 @@
 !> coupling is (linear + cubic x^2) x, where x is counted from the twist at rest.
 module nocdyn_linear_columns
   use nocdyn_bank, only: bank_t
-  use nocdyn_couplings, only: couplings_t
   use nocdyn_coordinates, only: coordinates_t
   use nocdyn_formulation, only: formulation_t
   use nocdyn_kinds, only: wp
@@ -72,10 +71,9 @@ contains
 
     has_law = .false.
     if (column%kind /= column_element) return
-    select type (bank => machine%banks(column%bank)%bank)
-    type is (couplings_t)
-      has_law = is_quantity(bank, column%quantity, 'moment')
-    end select
+    associate (bank => machine%banks(column%bank)%bank)
+      has_law = bank%has_polynomial_potential .and. is_quantity(bank, column%quantity, 'moment')
+    end associate
   end function has_law
 
   logical function is_quantity(bank, quantity, name)

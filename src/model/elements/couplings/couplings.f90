@@ -2,24 +2,40 @@
 !>
 !> A slipping clutch beside the spring resists with friction tanh(u' / friction_speed). Its work and the damping's are one.
 module nocdyn_couplings
-  use nocdyn_bank, only: bank_t, quantity_t, role_coupling
+  use nocdyn_bank, only: quantity_t, role_coupling
+  use nocdyn_curves, only: curve_t
   use nocdyn_elements, only: elements_t
   use nocdyn_kinds, only: wp
   use nocdyn_lane_parameters, only: lane_parameters_t
   use nocdyn_polynomial_laws, only: polynomial_laws_t
+  use nocdyn_table_laws, only: over_twist, table_laws_t
   use nocdyn_text, only: string_t
   use nocdyn_vector_functions, only: tanh_of
   implicit none (type, external)
   private
 
-  public :: new_couplings
+  public :: new_couplings, new_table_couplings
 
-  !> M_el = -(K1 + k1 w^2) w on the second body, w = u - rest_twist; damping moment -d u'.
-  type, extends(bank_t), public :: couplings_t
+  !> What couplings have whatever their elastic moment is; all parameters have the shape [lanes, couplings].
+  type, public :: coupling_common_t
+    type(string_t), allocatable :: names(:)
+    integer, allocatable :: from(:), to(:)          !! bodies, 0 = ground
+    real(wp), allocatable :: damping(:, :)          !! [N m s/rad]
+    real(wp), allocatable :: rest_twist(:, :)       !! [rad]
+    real(wp), allocatable :: friction(:, :)         !! [N m]; not allocated: none
+    real(wp), allocatable :: friction_speed(:, :)   !! [rad/s], positive
+  end type coupling_common_t
+
+  ! gfortran 12 loses components of a structure constructor's value that is an argument
+  interface coupling_common_t
+    procedure :: new_common
+  end interface coupling_common_t
+
+  !> M_el = -(K1 + k1 w^2) w on the second body, w = u - rest_twist, or that of a table; damping moment -d u'.
+  type, extends(table_laws_t), public :: couplings_t
     real(wp), allocatable :: stiffness(:, :)         !! K1 [N m/rad], shape [lanes, couplings] as all parameters
     real(wp), allocatable :: cubic_stiffness(:, :)   !! k1 [N m/rad3], of either sign
     real(wp), allocatable :: damping(:, :)           !! d [N m s/rad]
-    real(wp), allocatable :: rest_twist(:, :)        !! [rad]
     real(wp), allocatable :: friction(:, :)          !! [N m]; not allocated: none
     real(wp), allocatable :: friction_speed(:, :)    !! [rad/s]
   contains
@@ -35,36 +51,62 @@ module nocdyn_couplings
 
 contains
 
-  !> A bank of couplings; those without damping and friction in any lane are not accounted.
-  function new_couplings(names, from, to, stiffness, cubic_stiffness, damping, rest_twist, friction, friction_speed) result(bank)
+  function new_common(names, from, to, damping, rest_twist, friction, friction_speed) result(common)
     type(string_t), intent(in) :: names(:)
-    integer, intent(in) :: from(:), to(:)              !! bodies, 0 = ground
-    real(wp), intent(in) :: stiffness(:, :)            !! [N m/rad], shape [lanes, couplings] as all parameters
-    real(wp), intent(in) :: cubic_stiffness(:, :)      !! [N m/rad3]
-    real(wp), intent(in) :: damping(:, :)              !! [N m s/rad]
-    real(wp), intent(in) :: rest_twist(:, :)           !! [rad]
+    integer, intent(in) :: from(:), to(:)                    !! bodies, 0 = ground
+    real(wp), intent(in) :: damping(:, :)                    !! [N m s/rad], shape [lanes, couplings] as all that follow
+    real(wp), intent(in) :: rest_twist(:, :)                 !! [rad]
     real(wp), intent(in), optional :: friction(:, :)         !! [N m]; absent: none
-    real(wp), intent(in), optional :: friction_speed(:, :)   !! [rad/s], positive
+    real(wp), intent(in), optional :: friction_speed(:, :)   !! [rad/s], positive; present with `friction`
+    type(coupling_common_t) :: common
+
+    allocate (common%names, source=names)
+    allocate (common%from, source=from)
+    allocate (common%to, source=to)
+    allocate (common%damping, source=damping)
+    allocate (common%rest_twist, source=rest_twist)
+    if (.not. present(friction)) return
+    allocate (common%friction, source=friction)
+    allocate (common%friction_speed, source=friction_speed)
+  end function new_common
+
+  !> Couplings by eq. (3); the work of those without damping and friction in any lane is not integrated.
+  function new_couplings(common, stiffness, cubic_stiffness) result(bank)
+    type(coupling_common_t), intent(in) :: common
+    real(wp), intent(in) :: stiffness(:, :)            !! K1 [N m/rad], shape [lanes, couplings]
+    real(wp), intent(in) :: cubic_stiffness(:, :)      !! k1 [N m/rad3]
     type(couplings_t) :: bank
     integer :: e
-    logical :: is_dissipative(size(to))
+    logical :: is_dissipative(size(common%to))
 
-    call bank%connect(role_coupling, size(stiffness, 1), names, from, to)
+    call bank%connect(role_coupling, size(common%damping, 1), common%names, common%from, common%to)
     bank%stiffness = stiffness
     bank%cubic_stiffness = cubic_stiffness
-    bank%damping = damping
-    bank%rest_twist = rest_twist
-    is_dissipative = any(abs(damping) > 0.0_wp, dim=1)
-    if (present(friction)) then
+    bank%damping = common%damping
+    bank%rest_twist = common%rest_twist
+    is_dissipative = any(abs(common%damping) > 0.0_wp, dim=1)
+    if (allocated(common%friction)) then
       bank%is_polynomial = .false.
       bank%has_paper_law = .false.
-      allocate (bank%friction, source=friction)
-      allocate (bank%friction_speed, source=friction_speed)
-      is_dissipative = is_dissipative .or. any(abs(friction) > 0.0_wp, dim=1)
+      allocate (bank%friction, source=common%friction)
+      allocate (bank%friction_speed, source=common%friction_speed)
+      is_dissipative = is_dissipative .or. any(abs(common%friction) > 0.0_wp, dim=1)
     end if
-    bank%with_work = pack([(e, e=1, size(to))], is_dissipative)
-    bank%elastic = pack([(e, e=1, size(to))], any(abs(stiffness) > 0.0_wp .or. abs(cubic_stiffness) > 0.0_wp, dim=1))
+    bank%with_work = pack([(e, e=1, size(common%to))], is_dissipative)
+    bank%elastic = pack([(e, e=1, size(common%to))], any(abs(stiffness) > 0.0_wp .or. abs(cubic_stiffness) > 0.0_wp, dim=1))
   end function new_couplings
+
+  !> Couplings with the elastic moment of a curve over the twist.
+  function new_table_couplings(common, curve) result(bank)
+    type(coupling_common_t), intent(in) :: common
+    type(curve_t), intent(in) :: curve(:, :)   !! [N m] over [rad], shape [lanes, couplings]
+    type(couplings_t) :: bank
+    integer :: e
+
+    bank = new_couplings(common, 0.0_wp * common%damping, 0.0_wp * common%damping)
+    call bank%set_curves(over_twist, curve)
+    bank%elastic = [(e, e=1, size(common%to))]
+  end function new_table_couplings
 
   subroutine polynomials(self, laws)
     class(couplings_t), intent(in) :: self
@@ -84,6 +126,7 @@ contains
     real(wp), intent(in) :: time(self%lanes), angle(self%values), speed(self%values)
     real(wp), intent(inout) :: restoring(self%values), applied(self%values)
 
+    call self%table_laws_t%evaluate(time, angle, speed, restoring, applied)
     if (allocated(self%friction)) call add_friction(self%values, self%friction, self%friction_speed, speed, applied)
   end subroutine evaluate
 
@@ -103,6 +146,7 @@ contains
     type(elements_t), intent(inout) :: elements
     integer :: e, l
 
+    call self%table_laws_t%differentiate(elements)
     if (.not. allocated(self%friction)) return
     do e = 1, size(self%to)
       do l = 1, self%lanes
@@ -147,6 +191,7 @@ contains
     class(couplings_t), target, intent(inout) :: self
     type(lane_parameters_t), intent(inout) :: parameters
 
+    call self%table_laws_t%list_parameters(parameters)
     call parameters%add('stiffness', self%stiffness)
     call parameters%add('cubic_stiffness', self%cubic_stiffness)
     call parameters%add('damping', self%damping)

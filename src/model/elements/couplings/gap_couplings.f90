@@ -6,13 +6,13 @@
 !> opposite of the elastic moment, and takes the energy that the contact still stores.
 module nocdyn_gap_couplings
   use nocdyn_bank, only: boundary_width
+  use nocdyn_couplings, only: coupling_common_t
   use nocdyn_elements, only: elements_t
   use nocdyn_kinds, only: wp
   use nocdyn_lane_parameters, only: lane_parameters_t
   use nocdyn_polynomial_couplings, only: elastic_curvature, elastic_energy, elastic_moment, elastic_slope, &
                                          new_polynomial_couplings, polynomial_couplings_t
   use nocdyn_polynomial_laws, only: polynomial_laws_t
-  use nocdyn_text, only: string_t
   implicit none (type, external)
   private
 
@@ -41,32 +41,28 @@ module nocdyn_gap_couplings
 
 contains
 
-  !> Couplings with play, the elastic moment being sum p_k x^k of the penetration x.
-  function new_gap_couplings(names, from, to, coefficient, damping, rest_twist, gap, friction, friction_speed) result(bank)
-    type(string_t), intent(in) :: names(:)
-    integer, intent(in) :: from(:), to(:)              !! bodies, 0 = ground
+  !> Couplings with play, the elastic moment being sum p_k x^k of the penetration x. The damping is that in contact, the rest
+  !> twist is at the middle of the gap, the friction acts in the gap and in contact.
+  function new_gap_couplings(common, coefficient, gap) result(bank)
+    type(coupling_common_t), intent(in) :: common
     real(wp), intent(in) :: coefficient(:, :, :)       !! p_k [N m/rad^k], shape [order, lanes, couplings], some not zero
-    real(wp), intent(in) :: damping(:, :)              !! in contact [N m s/rad], shape [lanes, couplings] as all that follow
-    real(wp), intent(in) :: rest_twist(:, :)           !! at the middle of the gap [rad]
-    real(wp), intent(in) :: gap(:, :)                  !! total play [rad], positive
-    real(wp), intent(in), optional :: friction(:, :), friction_speed(:, :)   !! [N m], [rad/s]; absent: none
+    real(wp), intent(in) :: gap(:, :)                  !! [rad], positive, shape [lanes, couplings]
     type(gap_couplings_t) :: bank
     integer :: e, k, l
 
-    bank%polynomial_couplings_t = new_polynomial_couplings(names, from, to, coefficient, damping, rest_twist, &
-                                                           friction, friction_speed)
+    bank%polynomial_couplings_t = new_polynomial_couplings(common, coefficient)
     allocate (bank%gap, source=gap)
     allocate (bank%boundary_shift, bank%scale, source=0.0_wp * gap)
-    do e = 1, size(to)
+    do e = 1, size(bank%to)
       do l = 1, size(gap, 1)
         bank%scale(l, e) = sum([(abs(coefficient(k, l, e)) * gap(l, e)**(k - 1), k=1, size(coefficient, 1))])
       end do
     end do
     if (any(bank%gap <= 0) .or. any(bank%scale <= 0)) error stop 'nocdyn_gap_couplings: gaps have widths and edges stiffness'
     bank%boundary_shift = boundary_width * bank%scale * bank%gap
-    bank%with_work = pack([(e, e=1, size(to))], [(any(bank%with_work == e) .or. can_pull(coefficient(:, :, e)), &
-                                                  e=1, size(to))])
-    call bank%set_switches([(e, e=1, size(to))])
+    bank%with_work = pack([(e, e=1, size(bank%to))], [(any(bank%with_work == e) .or. can_pull(coefficient(:, :, e)), &
+                                                  e=1, size(bank%to))])
+    call bank%set_switches([(e, e=1, size(bank%to))])
   end function new_gap_couplings
 
   !> Whether the elastic moment of a contact can change its sign. A contact that would pull gives up what it stores, which is

@@ -1,10 +1,9 @@
 !> Couplings whose elastic moment is a polynomial of any order of the twist.
 module nocdyn_polynomial_couplings
-  use nocdyn_couplings, only: couplings_t, new_couplings
+  use nocdyn_couplings, only: coupling_common_t, couplings_t, new_couplings
   use nocdyn_elements, only: elements_t
   use nocdyn_kinds, only: wp
   use nocdyn_lane_parameters, only: lane_parameters_t
-  use nocdyn_text, only: string_t
   implicit none (type, external)
   private
 
@@ -25,23 +24,19 @@ module nocdyn_polynomial_couplings
 contains
 
   !> Couplings with the elastic moment sum p_k w^k.
-  function new_polynomial_couplings(names, from, to, coefficient, damping, rest_twist, friction, friction_speed) result(bank)
-    type(string_t), intent(in) :: names(:)
-    integer, intent(in) :: from(:), to(:)              !! bodies, 0 = ground
+  function new_polynomial_couplings(common, coefficient) result(bank)
+    type(coupling_common_t), intent(in) :: common
     real(wp), intent(in) :: coefficient(:, :, :)       !! p_k [N m/rad^k], shape [order, lanes, couplings]
-    real(wp), intent(in) :: damping(:, :)              !! [N m s/rad], shape [lanes, couplings] as all that follow
-    real(wp), intent(in) :: rest_twist(:, :)           !! [rad]
-    real(wp), intent(in), optional :: friction(:, :), friction_speed(:, :)   !! [N m], [rad/s]; absent: none
     type(polynomial_couplings_t) :: bank
     integer :: e
 
-    bank%couplings_t = new_couplings(names, from, to, 0.0_wp * damping, 0.0_wp * damping, damping, rest_twist, &
-                                     friction, friction_speed)
+    bank%couplings_t = new_couplings(common, 0.0_wp * common%damping, 0.0_wp * common%damping)
     bank%is_polynomial = .false.
+    bank%has_polynomial_potential = .false.
     bank%has_paper_law = .false.
     bank%order = size(coefficient, 1)
     allocate (bank%coefficient, source=coefficient)
-    bank%elastic = pack([(e, e=1, size(to))], [(any(abs(coefficient(:, :, e)) > 0.0_wp), e=1, size(to))])
+    bank%elastic = pack([(e, e=1, size(bank%to))], [(any(abs(coefficient(:, :, e)) > 0.0_wp), e=1, size(bank%to))])
   end function new_polynomial_couplings
 
   !> p_1, p_2, ... of stiffnesses and further terms, of order 3 at least.

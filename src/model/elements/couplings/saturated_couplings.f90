@@ -1,10 +1,9 @@
 !> Couplings whose elastic moment cannot exceed a limit: S tanh(K1 w / S) with w = u - rest_twist.
 module nocdyn_saturated_couplings
-  use nocdyn_couplings, only: couplings_t, new_couplings
+  use nocdyn_couplings, only: coupling_common_t, couplings_t, new_couplings
   use nocdyn_elements, only: elements_t
   use nocdyn_kinds, only: wp
   use nocdyn_lane_parameters, only: lane_parameters_t
-  use nocdyn_text, only: string_t
   use nocdyn_vector_functions, only: tanh_of
   implicit none (type, external)
   private
@@ -24,25 +23,20 @@ module nocdyn_saturated_couplings
 contains
 
   !> Couplings with the elastic moment saturation * tanh(stiffness * w / saturation).
-  function new_saturated_couplings(names, from, to, stiffness, saturation, damping, rest_twist, friction, friction_speed) &
-    result(bank)
-    type(string_t), intent(in) :: names(:)
-    integer, intent(in) :: from(:), to(:)              !! bodies, 0 = ground
-    real(wp), intent(in) :: stiffness(:, :)            !! [N m/rad], positive, shape [lanes, couplings] as all parameters
-    real(wp), intent(in) :: saturation(:, :)           !! [N m], positive
-    real(wp), intent(in) :: damping(:, :)              !! [N m s/rad]
-    real(wp), intent(in) :: rest_twist(:, :)           !! [rad]
-    real(wp), intent(in), optional :: friction(:, :), friction_speed(:, :)   !! [N m], [rad/s]; absent: none
+  function new_saturated_couplings(common, stiffness, saturation) result(bank)
+    type(coupling_common_t), intent(in) :: common
+    real(wp), intent(in) :: stiffness(:, :)            !! K1 [N m/rad], positive, shape [lanes, couplings]
+    real(wp), intent(in) :: saturation(:, :)           !! S [N m], positive, shape [lanes, couplings]
     type(saturated_couplings_t) :: bank
     integer :: e
 
-    bank%couplings_t = new_couplings(names, from, to, 0.0_wp * stiffness, 0.0_wp * stiffness, damping, rest_twist, &
-                                     friction, friction_speed)
+    bank%couplings_t = new_couplings(common, 0.0_wp * stiffness, 0.0_wp * stiffness)
     bank%is_polynomial = .false.
+    bank%has_polynomial_potential = .false.
     bank%has_paper_law = .false.
     allocate (bank%initial_stiffness, source=stiffness)
     allocate (bank%saturation, source=saturation)
-    bank%elastic = [(e, e=1, size(to))]
+    bank%elastic = [(e, e=1, size(bank%to))]
   end function new_saturated_couplings
 
   subroutine evaluate(self, time, angle, speed, restoring, applied)

@@ -1,16 +1,17 @@
 !> Loads with the viscous resistance of eq. (5), M_r = -c omega.
 module nocdyn_loads
-  use nocdyn_bank, only: bank_t, role_load
+  use nocdyn_bank, only: role_load
   use nocdyn_kinds, only: wp
   use nocdyn_lane_parameters, only: lane_parameters_t
   use nocdyn_polynomial_laws, only: polynomial_laws_t
+  use nocdyn_table_laws, only: table_laws_t
   use nocdyn_text, only: string_t
   implicit none (type, external)
   private
 
   public :: new_loads
 
-  type, extends(bank_t), public :: loads_t
+  type, extends(table_laws_t), public :: loads_t
     real(wp), allocatable :: viscous(:, :)   !! c [N m s/rad], shape [lanes, loads]
   contains
     procedure :: list_parameters
@@ -44,6 +45,7 @@ contains
     class(loads_t), target, intent(inout) :: self
     type(lane_parameters_t), intent(inout) :: parameters
 
+    call self%table_laws_t%list_parameters(parameters)
     call parameters%add('viscous', self%viscous)
   end subroutine list_parameters
 

@@ -1,10 +1,12 @@
-!> Loads that resist with c omega + quadratic |omega| omega + constant tanh(omega / constant_speed): fans and propellers, Coulomb
-!> friction made smooth.
+!> Loads that resist with c omega + quadratic |omega| omega + constant tanh(omega / constant_speed) + table(omega): fans and
+!> propellers, Coulomb friction made smooth.
 module nocdyn_nonlinear_loads
+  use nocdyn_curves, only: curve_t
   use nocdyn_elements, only: elements_t
   use nocdyn_kinds, only: wp
   use nocdyn_lane_parameters, only: lane_parameters_t
   use nocdyn_loads, only: loads_t, new_loads
+  use nocdyn_table_laws, only: over_speed
   use nocdyn_text, only: string_t
   use nocdyn_vector_functions, only: tanh_of
   implicit none (type, external)
@@ -25,10 +27,11 @@ module nocdyn_nonlinear_loads
 contains
 
   !> A bank of loads, each on one body.
-  function new_nonlinear_loads(names, body, viscous, quadratic, constant, constant_speed) result(bank)
+  function new_nonlinear_loads(names, body, viscous, quadratic, constant, constant_speed, curve) result(bank)
     type(string_t), intent(in) :: names(:)
     integer, intent(in) :: body(:)
     real(wp), intent(in) :: viscous(:, :), quadratic(:, :), constant(:, :), constant_speed(:, :)   !! [lanes, loads]
+    type(curve_t), intent(in), optional :: curve(:, :)   !! resisting torque [N m] over speed [rad/s], [lanes, loads]; absent: 0
     type(nonlinear_loads_t) :: bank
 
     bank%loads_t = new_loads(names, body, viscous)
@@ -37,6 +40,7 @@ contains
     allocate (bank%quadratic, source=quadratic)
     allocate (bank%constant, source=constant)
     allocate (bank%constant_speed, source=constant_speed)
+    if (present(curve)) call bank%set_curves(over_speed, curve)
   end function new_nonlinear_loads
 
   subroutine evaluate(self, time, angle, speed, restoring, applied)
@@ -45,6 +49,7 @@ contains
     real(wp), intent(inout) :: restoring(self%values), applied(self%values)
 
     call resist(self%values, self%quadratic, self%constant, self%constant_speed, speed, applied)
+    call self%loads_t%evaluate(time, angle, speed, restoring, applied)
   end subroutine evaluate
 
   pure subroutine resist(n, quadratic, constant, constant_speed, speed, applied)
@@ -72,6 +77,7 @@ contains
         end associate
       end do
     end do
+    call self%loads_t%differentiate(elements)
   end subroutine differentiate
 
   subroutine list_parameters(self, parameters)

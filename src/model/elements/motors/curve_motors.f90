@@ -1,9 +1,11 @@
-!> Motors whose torque is a curve over their speed.
+!> Motors whose torque is a function of their speed.
 module nocdyn_curve_motors
-  use nocdyn_bank, only: bank_t, role_motor
+  use nocdyn_bank, only: role_motor
+  use nocdyn_curves, only: curve_t
   use nocdyn_elements, only: elements_t
   use nocdyn_kinds, only: wp
   use nocdyn_lane_parameters, only: lane_parameters_t
+  use nocdyn_table_laws, only: over_speed, table_laws_t
   use nocdyn_text, only: string_t
   use nocdyn_torque_curves, only: torque_curve_t
   implicit none (type, external)
@@ -11,45 +13,62 @@ module nocdyn_curve_motors
 
   public :: new_curve_motors
 
-  !> The branches are the segments of the curves, where these have some.
-  type, extends(bank_t), public :: curve_motors_t
-    class(torque_curve_t), allocatable :: curve
+  !> M = law(omega), or that of tables.
+  type, extends(table_laws_t), public :: curve_motors_t
+    class(torque_curve_t), allocatable :: law   !! of all motors; not allocated: they have tables
   contains
     procedure :: list_parameters
     procedure :: evaluate
     procedure :: differentiate
-    procedure :: choose
-    procedure :: indicator
-    procedure :: switch_name
-    procedure :: segment
+    procedure :: torque
+    procedure :: slope
   end type curve_motors_t
 
 contains
 
-  !> A bank of motors, each on one body.
-  function new_curve_motors(names, body, lanes, curve) result(bank)
+  !> A bank of motors, each on one body, either with a law or with tables.
+  function new_curve_motors(names, body, lanes, law, curve) result(bank)
     type(string_t), intent(in) :: names(:)
     integer, intent(in) :: body(:)
     integer, intent(in) :: lanes
-    class(torque_curve_t), intent(in) :: curve   !! of all motors
+    class(torque_curve_t), intent(in), optional :: law   !! of all motors
+    type(curve_t), intent(in), optional :: curve(:, :)   !! [N m] over [rad/s], shape [lanes, motors]
     type(curve_motors_t) :: bank
     integer :: e
 
+    if (present(law) .eqv. present(curve)) error stop 'nocdyn_curve_motors: motors have either a law or tables'
     bank%is_polynomial = .false.
     bank%has_paper_law = .false.
     call bank%connect(role_motor, lanes, names, [(0, e=1, size(body))], body)
-    allocate (bank%curve, source=curve)
-    if (curve%has_segments()) call bank%set_switches([(e, e=1, size(body))])
+    if (present(law)) allocate (bank%law, source=law)
+    if (present(curve)) call bank%set_curves(over_speed, curve)
   end function new_curve_motors
 
-  !> The present segment of the curve of a motor.
-  pure integer function segment(self, lane, motor)
+  !> Torque of a motor at full throttle [N m].
+  pure real(wp) function torque(self, lane, motor, speed)
     class(curve_motors_t), intent(in) :: self
     integer, intent(in) :: lane, motor
+    real(wp), intent(in) :: speed   !! [rad/s]
 
-    segment = 0
-    if (self%curve%has_segments()) segment = self%branch(lane, motor)
-  end function segment
+    if (allocated(self%law)) then
+      torque = self%law%torque(lane, motor, speed)
+    else
+      torque = self%curve(lane, motor)%value(self%branch(lane, motor), speed)
+    end if
+  end function torque
+
+  !> Derivative of `torque` by the speed [N m s/rad].
+  pure real(wp) function slope(self, lane, motor, speed)
+    class(curve_motors_t), intent(in) :: self
+    integer, intent(in) :: lane, motor
+    real(wp), intent(in) :: speed   !! [rad/s]
+
+    if (allocated(self%law)) then
+      slope = self%law%slope(lane, motor, speed)
+    else
+      slope = self%curve(lane, motor)%slope(self%branch(lane, motor), speed)
+    end if
+  end function slope
 
   subroutine evaluate(self, time, angle, speed, restoring, applied)
     class(curve_motors_t), intent(in) :: self
@@ -61,7 +80,7 @@ contains
     do e = 1, size(self%to)
       do l = 1, self%lanes
         i = i + 1
-        applied(i) = applied(i) + self%curve%torque(l, e, self%segment(l, e), speed(i))
+        applied(i) = applied(i) + self%torque(l, e, speed(i))
       end do
     end do
   end subroutine evaluate
@@ -74,44 +93,17 @@ contains
     do e = 1, size(self%to)
       i = self%first + e - 1
       do l = 1, self%lanes
-        elements%applied_speed(l, i) = elements%applied_speed(l, i) &
-                                       + self%curve%slope(l, e, self%segment(l, e), elements%speed(l, i))
+        elements%applied_speed(l, i) = elements%applied_speed(l, i) + self%slope(l, e, elements%speed(l, i))
       end do
     end do
   end subroutine differentiate
-
-  subroutine choose(self, switch, lane, t, angle, speed, internal)
-    class(curve_motors_t), intent(inout) :: self
-    integer, intent(in) :: switch, lane
-    real(wp), intent(in) :: t, angle, speed
-    real(wp), intent(in) :: internal(:)
-
-    self%branch(lane, switch) = self%curve%segment(lane, switch, speed)
-  end subroutine choose
-
-  pure function indicator(self, switch, lane, t, angle, speed, internal)
-    class(curve_motors_t), intent(in) :: self
-    integer, intent(in) :: switch, lane
-    real(wp), intent(in) :: t, angle, speed
-    real(wp), intent(in) :: internal(:)
-    real(wp) :: indicator
-
-    indicator = self%curve%indicator(lane, switch, self%branch(lane, switch), speed)
-  end function indicator
-
-  function switch_name(self, switch) result(name)
-    class(curve_motors_t), intent(in) :: self
-    integer, intent(in) :: switch
-    character(len=:), allocatable :: name
-
-    name = 'point in the table'
-  end function switch_name
 
   subroutine list_parameters(self, parameters)
     class(curve_motors_t), target, intent(inout) :: self
     type(lane_parameters_t), intent(inout) :: parameters
 
-    call self%curve%list_parameters(parameters)
+    call self%table_laws_t%list_parameters(parameters)
+    if (allocated(self%law)) call self%law%list_parameters(parameters)
   end subroutine list_parameters
 
 end module nocdyn_curve_motors

@@ -2,6 +2,7 @@
 module nocdyn_governed_motors
   use nocdyn_bank, only: quantity_t
   use nocdyn_curve_motors, only: curve_motors_t, new_curve_motors
+  use nocdyn_curves, only: curve_t
   use nocdyn_elements, only: elements_t
   use nocdyn_governors, only: governor_t
   use nocdyn_kinds, only: wp
@@ -37,17 +38,18 @@ module nocdyn_governed_motors
 
 contains
 
-  !> A bank of motors, each on one body.
-  function new_governed_motors(names, body, curve, governor, drag) result(bank)
+  !> A bank of motors, each on one body, either with a law or with tables.
+  function new_governed_motors(names, body, governor, drag, law, curve) result(bank)
     type(string_t), intent(in) :: names(:)
     integer, intent(in) :: body(:)
-    class(torque_curve_t), intent(in) :: curve      !! of all motors
-    type(governor_t), intent(in) :: governor        !! of all motors
-    real(wp), intent(in) :: drag(:, :)              !! [N m s/rad], shape [lanes, motors]
+    type(governor_t), intent(in) :: governor             !! of all motors
+    real(wp), intent(in) :: drag(:, :)                   !! [N m s/rad], shape [lanes, motors]
+    class(torque_curve_t), intent(in), optional :: law   !! of all motors
+    type(curve_t), intent(in), optional :: curve(:, :)   !! [N m] over [rad/s], shape [lanes, motors]
     type(governed_motors_t) :: bank
     integer :: e
 
-    bank%curve_motors_t = new_curve_motors(names, body, size(drag, 1), curve)
+    bank%curve_motors_t = new_curve_motors(names, body, size(drag, 1), law, curve)
     bank%governor = governor
     allocate (bank%drag, source=drag)
     bank%states = 1
@@ -105,7 +107,7 @@ contains
       do l = 1, self%lanes
         i = i + 1
         throttle = self%governor%throttle(l, e, self%branch(l, self%first_governor() + e), internal(i), speed(i))
-        applied(i) = applied(i) + throttle * self%curve%torque(l, e, self%segment(l, e), speed(i))
+        applied(i) = applied(i) + throttle * self%torque(l, e, speed(i))
         rate(i) = self%governor%rate(l, e, throttle, internal(i))
       end do
     end do
@@ -125,8 +127,8 @@ contains
         throttle = self%governor%throttle(l, e, branch, elements%internal%value(l, s), elements%speed(l, i))
         call self%governor%slopes(l, e, branch, by_integral, by_speed, elements%internal%rate_internal(l, 1, s), &
                                   elements%internal%rate_speed(l, s))
-        torque = self%curve%torque(l, e, self%segment(l, e), elements%speed(l, i))
-        slope = self%curve%slope(l, e, self%segment(l, e), elements%speed(l, i))
+        torque = self%torque(l, e, elements%speed(l, i))
+        slope = self%slope(l, e, elements%speed(l, i))
         elements%applied_speed(l, i) = elements%applied_speed(l, i) + (throttle * slope + by_speed * torque)
         elements%internal%applied(l, s) = by_integral * torque
       end do

@@ -1,7 +1,5 @@
 !> Torques of motors over their speed.
 module nocdyn_torque_curves
-  use nocdyn_bank, only: boundary_width
-  use nocdyn_curves, only: curve_t
   use nocdyn_kinds, only: wp
   use nocdyn_lane_parameters, only: lane_parameters_t
   implicit none (type, external)
@@ -13,17 +11,13 @@ module nocdyn_torque_curves
     procedure(torque_interface), deferred :: torque   !! [N m]
     procedure(torque_interface), deferred :: slope    !! by the speed [N m s/rad]
     procedure(list_interface), deferred :: list_parameters
-    procedure :: has_segments
-    procedure :: segment
-    procedure :: indicator
   end type torque_curve_t
 
   abstract interface
-    pure function torque_interface(self, lane, motor, segment, speed) result(value)
+    pure function torque_interface(self, lane, motor, speed) result(value)
       import :: torque_curve_t, wp
       class(torque_curve_t), intent(in) :: self
       integer, intent(in) :: lane, motor
-      integer, intent(in) :: segment   !! of a curve that has some
       real(wp), intent(in) :: speed    !! [rad/s]
       real(wp) :: value
     end function torque_interface
@@ -55,66 +49,29 @@ module nocdyn_torque_curves
     procedure :: list_parameters => list_induction
   end type induction_curve_t
 
-  type, extends(torque_curve_t), public :: table_curve_t
-    type(curve_t), allocatable :: curve(:, :)   !! [N m] over [rad/s], shape [lanes, motors]
-  contains
-    procedure :: torque => table_torque
-    procedure :: slope => table_slope
-    procedure :: list_parameters => list_table
-    procedure :: has_segments => table_has_segments
-    procedure :: segment => table_segment
-    procedure :: indicator => table_margin
-  end type table_curve_t
-
 contains
 
-  !> Whether the formulas of the curves change from segment to segment.
-  pure logical function has_segments(self)
-    class(torque_curve_t), intent(in) :: self
-
-    has_segments = .false.
-  end function has_segments
-
-  !> The segment in which a speed is.
-  pure integer function segment(self, lane, motor, speed)
-    class(torque_curve_t), intent(in) :: self
-    integer, intent(in) :: lane, motor
-    real(wp), intent(in) :: speed
-
-    segment = 0
-  end function segment
-
-  !> How far a speed is inside a segment.
-  pure function indicator(self, lane, motor, segment, speed)
-    class(torque_curve_t), intent(in) :: self
-    integer, intent(in) :: lane, motor, segment
-    real(wp), intent(in) :: speed
-    real(wp) :: indicator
-
-    indicator = huge(indicator)
-  end function indicator
-
-  pure function quadratic_torque(self, lane, motor, segment, speed) result(value)
+  pure function quadratic_torque(self, lane, motor, speed) result(value)
     class(quadratic_curve_t), intent(in) :: self
-    integer, intent(in) :: lane, motor, segment
+    integer, intent(in) :: lane, motor
     real(wp), intent(in) :: speed
     real(wp) :: value
 
     value = self%a(lane, motor) - (self%b(lane, motor) + self%c(lane, motor) * speed) * speed
   end function quadratic_torque
 
-  pure function quadratic_slope(self, lane, motor, segment, speed) result(value)
+  pure function quadratic_slope(self, lane, motor, speed) result(value)
     class(quadratic_curve_t), intent(in) :: self
-    integer, intent(in) :: lane, motor, segment
+    integer, intent(in) :: lane, motor
     real(wp), intent(in) :: speed
     real(wp) :: value
 
     value = -(self%b(lane, motor) + 2.0_wp * self%c(lane, motor) * speed)
   end function quadratic_slope
 
-  pure function induction_torque(self, lane, motor, segment, speed) result(value)
+  pure function induction_torque(self, lane, motor, speed) result(value)
     class(induction_curve_t), intent(in) :: self
-    integer, intent(in) :: lane, motor, segment
+    integer, intent(in) :: lane, motor
     real(wp), intent(in) :: speed
     real(wp) :: slip, value
 
@@ -124,9 +81,9 @@ contains
     end associate
   end function induction_torque
 
-  pure function induction_slope(self, lane, motor, segment, speed) result(value)
+  pure function induction_slope(self, lane, motor, speed) result(value)
     class(induction_curve_t), intent(in) :: self
-    integer, intent(in) :: lane, motor, segment
+    integer, intent(in) :: lane, motor
     real(wp), intent(in) :: speed
     real(wp) :: slip, value
 
@@ -136,47 +93,6 @@ contains
               / self%synchronous_speed(lane, motor)
     end associate
   end function induction_slope
-
-  pure function table_torque(self, lane, motor, segment, speed) result(value)
-    class(table_curve_t), intent(in) :: self
-    integer, intent(in) :: lane, motor, segment
-    real(wp), intent(in) :: speed
-    real(wp) :: value
-
-    value = self%curve(lane, motor)%value(segment, speed)
-  end function table_torque
-
-  pure function table_slope(self, lane, motor, segment, speed) result(value)
-    class(table_curve_t), intent(in) :: self
-    integer, intent(in) :: lane, motor, segment
-    real(wp), intent(in) :: speed
-    real(wp) :: value
-
-    value = self%curve(lane, motor)%slope(segment, speed)
-  end function table_slope
-
-  pure logical function table_has_segments(self)
-    class(table_curve_t), intent(in) :: self
-
-    table_has_segments = .true.
-  end function table_has_segments
-
-  pure integer function table_segment(self, lane, motor, speed)
-    class(table_curve_t), intent(in) :: self
-    integer, intent(in) :: lane, motor
-    real(wp), intent(in) :: speed
-
-    table_segment = self%curve(lane, motor)%segment(speed)
-  end function table_segment
-
-  pure function table_margin(self, lane, motor, segment, speed) result(indicator)
-    class(table_curve_t), intent(in) :: self
-    integer, intent(in) :: lane, motor, segment
-    real(wp), intent(in) :: speed
-    real(wp) :: indicator
-
-    indicator = self%curve(lane, motor)%inset(segment, speed, boundary_width)
-  end function table_margin
 
   subroutine list_quadratic(self, parameters)
     class(quadratic_curve_t), target, intent(inout) :: self
@@ -195,12 +111,5 @@ contains
     call parameters%add('breakdown_slip', self%breakdown_slip)
     call parameters%add('synchronous_speed', self%synchronous_speed)
   end subroutine list_induction
-
-  subroutine list_table(self, parameters)
-    class(table_curve_t), target, intent(inout) :: self
-    type(lane_parameters_t), intent(inout) :: parameters
-
-    call parameters%add_curves(self%curve)
-  end subroutine list_table
 
 end module nocdyn_torque_curves

@@ -1,0 +1,160 @@
+!> The groups of one kind of an input, sorted into banks by the form of their laws; their values as the constructors of banks
+!> take them, the same in every lane.
+module nocdyn_element_groups
+  use nocdyn_bank, only: bank_slot_t
+  use nocdyn_body_index, only: bodies_of, body_index_t
+  use nocdyn_curves, only: curve_t, extrapolation_constant, extrapolation_linear, interpolation_cubic, interpolation_linear, &
+                           new_curve
+  use nocdyn_input, only: group_t, input_t
+  use nocdyn_kinds, only: wp
+  use nocdyn_text, only: string_t
+  implicit none (type, external)
+  private
+
+  public :: new_element_groups, add_banks
+
+  !> Some groups of an input. It points to the input and the index of its bodies, which have to outlive it.
+  type, public :: element_groups_t
+    integer :: lanes = 1
+    type(string_t), allocatable :: names(:)
+    integer, allocatable :: indices(:)                      !! of the groups in the input
+    type(input_t), pointer :: input => null()
+    type(body_index_t), pointer, private :: body_index => null()
+  contains
+    procedure :: values
+    procedure :: curves
+    procedure :: bodies
+    procedure, private :: selected
+  end type element_groups_t
+
+  abstract interface
+    !> The form of the law of a group, 1 to the number of forms.
+    pure integer function form_interface(group)
+      import :: group_t
+      type(group_t), intent(in) :: group
+    end function form_interface
+
+    !> Adds the bank of some groups, whose laws have one form.
+    subroutine add_interface(groups, form, banks)
+      import :: bank_slot_t, element_groups_t
+      type(element_groups_t), intent(in) :: groups
+      integer, intent(in) :: form
+      type(bank_slot_t), allocatable, intent(inout) :: banks(:)
+    end subroutine add_interface
+  end interface
+
+contains
+
+  !> All groups of one kind.
+  function new_element_groups(input, kind, lanes, body_index) result(groups)
+    type(input_t), target, intent(in) :: input
+    character(len=*), intent(in) :: kind   !! 'coupling', 'motor' ...
+    integer, intent(in) :: lanes
+    type(body_index_t), target, intent(in), optional :: body_index   !! for `bodies`
+    type(element_groups_t) :: groups
+    integer :: i
+
+    groups%lanes = lanes
+    groups%input => input
+    if (present(body_index)) groups%body_index => body_index
+    allocate (groups%indices, source=input%groups_named(kind))
+    allocate (groups%names(size(groups%indices)))
+    do i = 1, size(groups%indices)
+      groups%names(i)%text = input%groups(groups%indices(i))%name
+    end do
+  end function new_element_groups
+
+  !> A bank of form 1 in any case, one of each other form that some groups have.
+  subroutine add_banks(groups, forms, form_of, add_form, banks)
+    type(element_groups_t), intent(in) :: groups
+    integer, intent(in) :: forms
+    procedure(form_interface) :: form_of
+    procedure(add_interface) :: add_form
+    type(bank_slot_t), allocatable, intent(inout) :: banks(:)
+    integer :: form, form_of_group(size(groups%indices)), i
+
+    form_of_group = [(form_of(groups%input%groups(groups%indices(i))), i=1, size(groups%indices))]
+    do form = 1, forms
+      if (form > 1 .and. .not. any(form_of_group == form)) cycle
+      call add_form(groups%selected(form_of_group == form), form, banks)
+    end do
+  end subroutine add_banks
+
+  function selected(self, mask) result(some)
+    class(element_groups_t), intent(in) :: self
+    logical, intent(in) :: mask(:)   !! [groups]
+    type(element_groups_t) :: some
+    integer :: i, next
+
+    some%lanes = self%lanes
+    some%input => self%input
+    some%body_index => self%body_index
+    allocate (some%indices, source=pack(self%indices, mask))
+    allocate (some%names(size(some%indices)))
+    next = 0
+    do i = 1, size(mask)
+      if (.not. mask(i)) cycle
+      next = next + 1
+      some%names(next)%text = self%names(i)%text
+    end do
+  end function selected
+
+  !> One number of each group, [lanes, groups].
+  function values(self, key, absent)
+    class(element_groups_t), intent(in) :: self
+    character(len=*), intent(in) :: key
+    real(wp), intent(in), optional :: absent   !! where it is unset; absent: 0
+    real(wp) :: values(self%lanes, size(self%indices))
+    real(wp) :: default_value
+    integer :: i
+
+    default_value = 0.0_wp
+    if (present(absent)) default_value = absent
+    do i = 1, size(self%indices)
+      values(:, i) = self%input%groups(self%indices(i))%number(key, absent=default_value)
+    end do
+  end function values
+
+  !> Body number `which` of those that each group names under a key, 0 for the ground.
+  function bodies(self, key, which)
+    class(element_groups_t), intent(in) :: self
+    character(len=*), intent(in) :: key
+    integer, intent(in) :: which
+    integer :: bodies(size(self%indices))
+    integer, allocatable :: named(:)
+    integer :: i
+
+    do i = 1, size(self%indices)
+      named = bodies_of(self%input%groups(self%indices(i)), key, self%body_index)
+      bodies(i) = named(which)
+    end do
+  end function bodies
+
+  !> The table of each group, [lanes, groups].
+  function curves(self, x, y, extrapolation)
+    class(element_groups_t), intent(in) :: self
+    character(len=*), intent(in) :: x, y                      !! keys of the lists
+    character(len=*), intent(in), optional :: extrapolation   !! absent: that of the group
+    type(curve_t), allocatable :: curves(:, :)
+    character(len=:), allocatable :: beyond
+    integer :: i, inside, lane, outside
+
+    allocate (curves(self%lanes, size(self%indices)))
+    do i = 1, size(self%indices)
+      associate (group => self%input%groups(self%indices(i)))
+        if (present(extrapolation)) then
+          beyond = extrapolation
+        else
+          beyond = group%text('extrapolation')
+        end if
+        inside = merge(interpolation_cubic, interpolation_linear, group%text('interpolation') == 'cubic')
+        outside = merge(extrapolation_constant, extrapolation_linear, beyond == 'constant')
+        curves(1, i) = new_curve(group%numbers(x), group%numbers(y), inside, outside)
+        do lane = 2, self%lanes
+          curves(lane, i) = curves(1, i)
+        end do
+      end associate
+    end do
+  end function curves
+
+end module nocdyn_element_groups
