@@ -96,7 +96,8 @@ def test_dense_matrices_too_large_for_memory_are_refused(nocdyn, bodies, overrid
     nocdyn.write("large.nml", "\n".join([*lines, "&run t_end = 1.0 /", "&output points = 2 /\n"]))
     outcome = nocdyn("run", "large.nml", "--set", f"run.{override}")
     assert outcome.returncode == 2
-    assert outcome.stderr.startswith(f"nocdyn: large.nml: this machine needs dense matrices of {rows} rows, at most 6000")
+    assert outcome.stderr.startswith(f"nocdyn: --set run.{override}: &run: formulation = '")
+    assert f"needs dense matrices of {rows} rows for this machine; at most 6000" in outcome.stderr
     assert nocdyn("run", "large.nml").returncode == 0
 
 

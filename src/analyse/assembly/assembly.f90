@@ -1,4 +1,4 @@
-!> From the input to the model: bodies, banks, constraints and coordinates.
+!> From an input to a machine and its formulation: bodies, banks, constraints and coordinates.
 module nocdyn_assembly
   use nocdyn_body_index, only: bodies_of, body_index_t, new_body_index
   use nocdyn_complement, only: complement_natural, complement_negated, complement_scaled
@@ -28,8 +28,8 @@ module nocdyn_assembly
 
 contains
 
-  !> Builds the machine of a checked input, the same in every lane; constraints that lock or that the start speeds violate are
-  !> errors.
+  !> Builds the machine of a checked input, with the same parameters in every lane. Bodies without inertia that move alone,
+  !> constraints that lock, and start speeds that violate constraints are errors that name file, line, group and key.
   subroutine assemble_machine(input, machine, error, lanes)
     type(input_t), target, intent(in) :: input
     type(machine_t), intent(out) :: machine
@@ -59,14 +59,14 @@ contains
     call analyse_machine_constraints(input, body_index, machine, error)
   end subroutine assemble_machine
 
-  !> Analyses the constraints, and chooses the coordinates and the speeds of the start.
+  !> Analyses the constraints, chooses the coordinates and makes the start speeds consistent.
   subroutine analyse_machine_constraints(input, body_index, machine, error)
     type(input_t), intent(in) :: input
     type(body_index_t), intent(in) :: body_index
     type(machine_t), intent(inout) :: machine
     type(error_t), allocatable, intent(out) :: error
     type(group_t) :: run
-    integer, allocatable :: wanted(:)
+    integer, allocatable :: wanted(:)   ! bodies that are to be the coordinates
     integer :: offending_row
 
     run = input%single('run')
@@ -82,7 +82,7 @@ contains
     if (allocated(error)) call add_location(input, offending_row, error)
   end subroutine analyse_machine_constraints
 
-  !> Refuses bodies without inertia that nothing with inertia moves along with: the reduced mass matrix has no inverse.
+  !> Refuses bodies that can move while all bodies with inertia stand still: the reduced mass matrix is singular.
   subroutine refuse_massless_motion(input, machine, error)
     type(input_t), intent(in) :: input
     type(machine_t), intent(in) :: machine   !! its constraints are analysed
@@ -97,12 +97,12 @@ contains
                'stands still; allowed: > 0 [kg m2], or 0 where a body with an inertia is geared to it')
   end subroutine refuse_massless_motion
 
-  !> The system that an integrator solves, by the word of the input.
+  !> The equations of motion of a machine, a system for an integrator.
   subroutine new_formulation(word, machine, formulation, with_energy_balance)
-    character(len=*), intent(in) :: word
+    character(len=*), intent(in) :: word   !! 'reduced', 'paper' or 'multiplier'
     type(machine_t), intent(in) :: machine
     class(formulation_t), allocatable, intent(out) :: formulation
-    logical, intent(in), optional :: with_energy_balance   !! whether the works of the elements are integrated; absent: they are
+    logical, intent(in), optional :: with_energy_balance   !! whether the work of the elements is integrated; absent: .true.
     logical :: has_work_integrals
 
     has_work_integrals = .true.
@@ -115,10 +115,11 @@ contains
     case ('multiplier')
       allocate (formulation, source=new_multiplier(machine, has_work_integrals))
     case default
-      error stop 'nocdyn_assembly: the schema allows a formulation that is not there'
+      error stop 'nocdyn_assembly: the schema allows an unknown formulation'
     end select
   end subroutine new_formulation
 
+  !> The constant complement_... of a word of the key `complement`.
   pure integer function complement_choice(word)
     character(len=*), intent(in) :: word
 
@@ -130,11 +131,11 @@ contains
     case ('negated')
       complement_choice = complement_negated
     case default
-      error stop 'nocdyn_assembly: the schema allows a complement that is not there'
+      error stop 'nocdyn_assembly: the schema allows an unknown complement'
     end select
   end function complement_choice
 
-  !> Begins the message with file, line and group: of the constraint number `offending_row`, of `independent` if that is 0.
+  !> Puts file, line and group before the message: those of a constraint row, or of `independent` if the row is 0.
   subroutine add_location(input, offending_row, error)
     type(input_t), intent(in) :: input
     integer, intent(in) :: offending_row

@@ -1,4 +1,4 @@
-!> The bodies of an input by name.
+!> Finds the bodies of an input by name.
 module nocdyn_body_index
   use nocdyn_input, only: group_t
   use nocdyn_schema_rules, only: ground
@@ -10,15 +10,15 @@ module nocdyn_body_index
   public :: new_body_index, bodies_of
 
   type, public :: body_index_t
-    type(string_t), allocatable :: names(:)
-    integer, allocatable :: order(:)
+    type(string_t), allocatable :: names(:)   !! of the bodies
+    integer, allocatable :: order(:)          !! bodies in the order of their names
   contains
     procedure :: body
   end type body_index_t
 
 contains
 
-  !> The places of these bodies, sorted by name.
+  !> The index of the bodies with these names.
   function new_body_index(names) result(body_index)
     type(string_t), intent(in) :: names(:)
     type(body_index_t) :: body_index
@@ -27,7 +27,7 @@ contains
     call argsort(body_index%names, body_index%order)
   end function new_body_index
 
-  !> Body by name, 0 for the ground.
+  !> Number of a body, 0 for the ground.
   pure integer function body(self, name)
     class(body_index_t), intent(in) :: self
     character(len=*), intent(in) :: name
@@ -36,7 +36,7 @@ contains
     if (name /= ground) body = sorted_position(name, self%names, self%order)
   end function body
 
-  !> The bodies that one group names under a key, in the order of its values.
+  !> Numbers of the bodies that a group names under a key, in the order of its values, 0 for the ground.
   function bodies_of(group, key, body_index) result(bodies)
     type(group_t), intent(in) :: group
     character(len=*), intent(in) :: key

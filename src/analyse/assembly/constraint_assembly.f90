@@ -1,4 +1,4 @@
-!> From the rigid joints of an input to constraint rows, in the order of the file.
+!> From the rigid joints of an input (gears, planetary sets, differentials, constraints) to constraint rows.
 module nocdyn_constraint_assembly
   use nocdyn_body_index, only: bodies_of, body_index_t
   use nocdyn_constraints, only: constraints_t, member_torques_t, new_constraints
@@ -12,17 +12,17 @@ module nocdyn_constraint_assembly
 
   public :: assemble_constraints, constraint_groups
 
-  !> One row before the ground is dropped; `members` names those members whose torque has a column of its own.
+  !> One constraint row, with the ground still in it.
   type :: joint_t
     integer, allocatable :: bodies(:)             !! 0 is the ground
-    real(wp), allocatable :: coefficients(:)
-    character(len=3) :: unit = 'N m'
-    character(len=7), allocatable :: members(:)   !! of each body, '' without a column
+    real(wp), allocatable :: coefficients(:)      !! of their speeds
+    character(len=3) :: unit = 'N m'              !! of the multiplier
+    character(len=7), allocatable :: members(:)   !! name of each body's torque column in the results, '' if it has none
   end type joint_t
 
 contains
 
-  !> The groups of the input that are rows, in the order of the file.
+  !> Indices of the groups that are constraint rows, in the order of the file.
   function constraint_groups(input) result(indices)
     type(input_t), intent(in) :: input
     integer, allocatable :: indices(:)
@@ -32,7 +32,7 @@ contains
     indices = pack([(i, i=1, size(input%groups))], [(any(kinds == input%groups(i)%kind), i=1, size(input%groups))])
   end function constraint_groups
 
-  !> All rows; two columns of the results with one name are an error.
+  !> All rows in the order of the file. Two columns of the results with the same name are an error.
   subroutine assemble_constraints(input, body_index, lanes, constraints, error)
     type(input_t), intent(in) :: input
     type(body_index_t), intent(in) :: body_index
@@ -52,6 +52,7 @@ contains
     call refuse_equal_columns(input, indices, constraints, error)
   end subroutine assemble_constraints
 
+  !> The row of one group.
   subroutine read_joint(group, body_index, joint)
     type(group_t), intent(in) :: group
     type(body_index_t), intent(in) :: body_index
@@ -78,7 +79,7 @@ contains
 
   !> Eq. (8): R1 omega_1 + R2 omega_2 = 0, a minus for an internal gear.
   !>
-  !> With radii the multiplier is the tooth force [N]; with teeth the row is scaled so that it is the torque on the
+  !> With radii the multiplier is the tooth force [N]. With teeth the row is scaled so that the multiplier is the torque on the
   !> first body [N m].
   subroutine read_gear(gear, body_index, joint)
     type(group_t), intent(in) :: gear
@@ -111,7 +112,7 @@ contains
     joint%members = [character(len=7) :: '', 'ring', 'carrier']
   end subroutine read_planetary
 
-  !> Rows without the ground, which has no speed; its torque may still have a column.
+  !> Drops the ground, which has no speed, from the rows. Its torque may still have a column.
   subroutine form_rows(input, indices, joints, bodies, lanes, constraints)
     type(input_t), intent(in) :: input
     integer, intent(in) :: indices(:)   !! groups of the rows
@@ -119,18 +120,14 @@ contains
     integer, intent(in) :: bodies, lanes
     type(constraints_t), intent(out) :: constraints
     type(string_t), allocatable :: kinds(:), names(:), units(:)
-    type(member_torques_t) :: members
     integer, allocatable :: body(:), first(:)
     real(wp), allocatable :: coefficient(:, :)
-    integer :: i, k, m, next
+    integer :: i, k, next
 
-    associate (entries => sum([(count(joints(i)%bodies > 0), i=1, size(joints))]), &
-               columns => sum([(count(joints(i)%members /= ''), i=1, size(joints))]))
+    associate (entries => sum([(count(joints(i)%bodies > 0), i=1, size(joints))]))
       allocate (body(entries), coefficient(lanes, entries), first(size(joints) + 1))
-      allocate (members%names(columns), members%row(columns), members%factor(lanes, columns))
     end associate
     allocate (kinds(size(joints)), names(size(joints)), units(size(joints)))
-    m = 0
     next = 1
     do i = 1, size(joints)
       kinds(i)%text = input%groups(indices(i))%kind
@@ -138,12 +135,6 @@ contains
       units(i)%text = trim(joints(i)%unit)
       first(i) = next
       do k = 1, size(joints(i)%bodies)
-        if (joints(i)%members(k) /= '') then
-          m = m + 1
-          members%names(m)%text = trim(joints(i)%members(k))
-          members%row(m) = i
-          members%factor(:, m) = joints(i)%coefficients(k)
-        end if
         if (joints(i)%bodies(k) == 0) cycle
         body(next) = joints(i)%bodies(k)
         coefficient(:, next) = joints(i)%coefficients(k)
@@ -151,10 +142,32 @@ contains
       end do
     end do
     first(size(first)) = next
-    constraints = new_constraints(bodies, names, units, first, body, coefficient, kinds, members)
+    constraints = new_constraints(bodies, names, units, first, body, coefficient, kinds, member_torques(joints, lanes))
   end subroutine form_rows
 
-  !> reaction_NAME_MEMBER must not be reaction_NAME of another constraint.
+  !> The torques of members that have columns of their own.
+  function member_torques(joints, lanes) result(members)
+    type(joint_t), intent(in) :: joints(:)
+    integer, intent(in) :: lanes
+    type(member_torques_t) :: members
+    integer :: i, k, m
+
+    associate (columns => sum([(count(joints(i)%members /= ''), i=1, size(joints))]))
+      allocate (members%names(columns), members%row(columns), members%factor(lanes, columns))
+    end associate
+    m = 0
+    do i = 1, size(joints)
+      do k = 1, size(joints(i)%members)
+        if (joints(i)%members(k) == '') cycle
+        m = m + 1
+        members%names(m)%text = trim(joints(i)%members(k))
+        members%row(m) = i
+        members%factor(:, m) = joints(i)%coefficients(k)
+      end do
+    end do
+  end function member_torques
+
+  !> Refuses a column reaction_NAME_MEMBER that has the name of the column reaction_NAME of another constraint.
   subroutine refuse_equal_columns(input, indices, constraints, error)
     type(input_t), intent(in) :: input
     integer, intent(in) :: indices(:)

@@ -45,6 +45,7 @@ contains
     end do
   end subroutine check_couplings
 
+  !> Form of the elastic moment of a group &coupling.
   pure integer function form_of(group)
     type(group_t), intent(in) :: group
 
@@ -63,6 +64,7 @@ contains
     end if
   end function form_of
 
+  !> p_1, p_2, ... [N m/rad^k] of a group &coupling.
   pure function coefficients_of(group) result(coefficients)
     type(group_t), intent(in) :: group
     real(wp), allocatable :: coefficients(:)
@@ -71,7 +73,7 @@ contains
               group%number('cubic_stiffness', absent=0.0_wp), group%numbers('polynomial')))
   end function coefficients_of
 
-  !> A bank of cubic couplings in any case, the others where there are such couplings.
+  !> Adds a bank of cubic couplings, perhaps empty, and one of each other form that occurs.
   subroutine add_couplings(groups, banks)
     type(element_groups_t), intent(in) :: groups   !! all of them
     type(bank_slot_t), allocatable, intent(inout) :: banks(:)
@@ -101,6 +103,7 @@ contains
     end select
   end subroutine add_form
 
+  !> What the constructors of all forms take.
   function common_of(groups) result(common)
     type(element_groups_t), intent(in) :: groups
     type(coupling_common_t) :: common

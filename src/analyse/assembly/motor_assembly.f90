@@ -23,7 +23,7 @@ module nocdyn_motor_assembly
 
 contains
 
-  !> Refuses induction motors that would drive away from their synchronous speed.
+  !> Refuses induction motors whose breakdown torque and synchronous speed have different signs.
   subroutine check_motors(input, error)
     type(input_t), intent(in) :: input
     type(error_t), allocatable, intent(out) :: error
@@ -44,7 +44,7 @@ contains
     end do
   end subroutine check_motors
 
-  !> A motor with constant torque is a quadratic one, and so is a dc motor without inductance.
+  !> Form of the law of a group &motor. A motor with constant torque is quadratic, and so is a dc motor without inductance.
   pure integer function form_of(group)
     type(group_t), intent(in) :: group
 
@@ -61,7 +61,7 @@ contains
     if (group%has_value('governor_speed')) form_of = form_of + 1
   end function form_of
 
-  !> A bank of quadratic motors without governors in any case, the others where there are such motors.
+  !> Adds a bank of quadratic motors without governors, perhaps empty, and one of each other form that occurs.
   subroutine add_motors(groups, banks)
     type(element_groups_t), intent(in) :: groups   !! all of them
     type(bank_slot_t), allocatable, intent(inout) :: banks(:)
@@ -69,6 +69,7 @@ contains
     call add_banks(groups, inductive + 1, form_of, add_form, banks)
   end subroutine add_motors
 
+  !> Adds the bank of the motors of one form.
   subroutine add_form(groups, form, banks)
     type(element_groups_t), intent(in) :: groups
     integer, intent(in) :: form
@@ -115,10 +116,10 @@ contains
                                           groups%values('flux_constant'), groups%values('inductance'), governor))
   end subroutine add_inductive
 
-  !> The torque over the speed, either as a law or as tables.
+  !> The torque at full throttle over the speed, either as a law or as tables; the other one is not allocated.
   subroutine make_law(groups, form, law, curve)
     type(element_groups_t), intent(in) :: groups
-    integer, intent(in) :: form
+    integer, intent(in) :: form   !! quadratic, induction or table
     class(torque_curve_t), allocatable, intent(out) :: law
     type(curve_t), allocatable, intent(out) :: curve(:, :)
     type(induction_curve_t) :: kloss
@@ -140,7 +141,7 @@ contains
     end select
   end subroutine make_law
 
-  !> a of quadratic motors, the torque of constant ones, k voltage / resistance of dc motors without inductance.
+  !> Torques at standstill [N m]: `a` of quadratic motors, `torque` of constant ones, k voltage / resistance of dc motors.
   function standstill_torques(groups) result(torques)
     type(element_groups_t), intent(in) :: groups
     real(wp) :: torques(groups%lanes, size(groups%indices))
@@ -149,7 +150,7 @@ contains
               + groups%values('flux_constant') * groups%values('voltage') / groups%values('resistance', absent=1.0_wp)
   end function standstill_torques
 
-  !> k^2 / resistance of dc motors without inductance, which no throttle changes [N m s/rad].
+  !> Drags k^2 / resistance of dc motors without inductance, which are not throttled [N m s/rad].
   function drags(groups)
     type(element_groups_t), intent(in) :: groups
     real(wp) :: drags(groups%lanes, size(groups%indices))

@@ -1,4 +1,4 @@
-!> The times at which a run is written.
+!> The times of the rows in the table of results.
 module nocdyn_output_times
   use nocdyn_errors, only: error_t, exit_input, raise
   use nocdyn_input, only: group_t, input_t
@@ -13,9 +13,9 @@ module nocdyn_output_times
 
 contains
 
-  !> Refuses more than `most_rows` rows, and rows whose times would differ by no more than rounding.
+  !> Refuses more than `most_rows` rows, and intervals that are so short that rounding makes their times equal.
   subroutine check_output_times(input, error)
-    type(input_t), intent(in) :: input   !! read without mistakes
+    type(input_t), intent(in) :: input   !! checked
     type(error_t), allocatable, intent(out) :: error
     type(group_t) :: output, run
     real(wp) :: rounding, span, step
@@ -46,6 +46,7 @@ contains
     call raise(error, exit_input, output_location(input, key) // ': ' // message)
   end subroutine check_output_times
 
+  !> File, line and group, to begin a message with.
   function output_location(input, key) result(place)
     type(input_t), intent(in) :: input
     character(len=*), intent(in) :: key
@@ -58,10 +59,10 @@ contains
 
   !> The requested times: a row at t_start, one every `interval`, and one at t_end; or `points` rows evenly spaced.
   pure function output_times(input) result(times)
-    type(input_t), intent(in) :: input   !! with output times that have been checked
+    type(input_t), intent(in) :: input   !! that `check_output_times` accepts
     real(wp), allocatable :: times(:)
     type(group_t) :: output, run
-    real(wp), parameter :: sliver = 1.0e-9_wp   ! of an interval: a last row nearer to t_end than that is t_end
+    real(wp), parameter :: sliver = 1.0e-9_wp   ! of an interval: a last row closer to t_end than this is moved to t_end
     integer :: i, intervals
 
     output = input%single('output')

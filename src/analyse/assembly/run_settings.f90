@@ -1,4 +1,4 @@
-!> What &run says of an integration, for the integrator and for summaries.
+!> The keys of &run, as settings of the integrator and in summaries.
 module nocdyn_run_settings
   use nocdyn_input, only: group_t, input_t
   use nocdyn_integration_settings, only: integration_settings_t
@@ -10,10 +10,10 @@ module nocdyn_run_settings
 
 contains
 
-  !> The settings of a run with a method, which is that of the input or what 'auto' has become.
+  !> The settings of an integration with a method.
   pure function settings_of(input, method) result(settings)
     type(input_t), intent(in) :: input
-    character(len=*), intent(in) :: method
+    character(len=*), intent(in) :: method   !! of `choose_method`
     type(integration_settings_t) :: settings
     type(group_t) :: run
 
@@ -24,7 +24,7 @@ contains
     settings%max_steps = run%whole_number('max_steps')
   end function settings_of
 
-  !> How the motion is integrated: keys of &run with their values.
+  !> Writes the keys of &run that describe the integration, with their values.
   subroutine put_settings(json, run)
     type(json_t), intent(inout) :: json
     type(group_t), intent(in) :: run

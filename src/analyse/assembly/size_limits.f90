@@ -1,4 +1,4 @@
-!> Which machines are too large for a formulation or a method, or have no Taylor series, and what then.
+!> Limits on the size of dense matrices; the method that a machine can be integrated with.
 module nocdyn_size_limits
   use nocdyn_banded_matrix, only: half_bandwidths
   use nocdyn_errors, only: error_t, exit_input, raise
@@ -14,17 +14,18 @@ module nocdyn_size_limits
 
   public :: check_size, check_dense_size, choose_method
 
-  integer, parameter :: largest_matrix = 6000   ! rows: 0.3 GB each, and there are several
-  integer, parameter :: largest_problem = 3000  ! states of an eigenvalue problem: some minutes
+  integer, parameter :: largest_matrix = 6000   ! rows; 0.3 GB each, and there are several
+  integer, parameter :: largest_problem = 3000  ! states of an eigenvalue problem; it takes some minutes
 
 contains
 
-  !> Refuses machines for whose dense matrices two formulations have no memory.
+  !> Refuses machines that are too large for the dense matrices of the formulations `paper` and `multiplier`.
   subroutine check_size(input, machine, error)
     type(input_t), intent(in) :: input
     type(machine_t), intent(in) :: machine
     type(error_t), allocatable, intent(out) :: error
     type(group_t) :: run
+    integer, allocatable :: indices(:)
     integer :: order
 
     run = input%single('run')
@@ -37,12 +38,14 @@ contains
       order = 0
     end select
     if (order <= largest_matrix) return
-    call raise(error, exit_input, input%file // ': this machine needs dense matrices of ' // to_text(order) // &
-               ' rows, at most ' // to_text(largest_matrix) // ' are allowed; formulation = ' // &
-               quoted('reduced') // ' needs none')
+    allocate (indices, source=input%groups_named('run'))
+    call raise(error, exit_input, input%location(indices(1), 'formulation') // ': formulation = ' // &
+               quoted(run%text('formulation')) // ' needs dense matrices of ' // to_text(order) // &
+               ' rows for this machine; at most ' // to_text(largest_matrix) // ' are allowed; ' // &
+               'formulation = ' // quoted('reduced') // ' needs none')
   end subroutine check_size
 
-  !> Refuses machines whose eigenvalues would take too long.
+  !> Refuses machines with too many states for a dense eigenvalue problem.
   subroutine check_dense_size(input, machine, error)
     type(input_t), intent(in) :: input
     type(machine_t), intent(in) :: machine
@@ -53,9 +56,8 @@ contains
                to_text(2 * machine%coordinates%freedoms) // ' states; at most ' // to_text(largest_problem) // ' are allowed')
   end subroutine check_dense_size
 
-  !> The method that is integrated with: the one of the input, but the explicit part of 'auto' alone, with a note, where
-  !> the stage matrix of its implicit part would be too large. An implicit method is refused there, and 'taylor' where
-  !> something has no Taylor series.
+  !> The method to integrate with: that of the input. Where the stage matrix would be too large, implicit methods are refused,
+  !> and 'auto' becomes its explicit method, with a note. 'taylor' is refused where an element has no Taylor series.
   subroutine choose_method(input, formulation, method, notes, error)
     type(input_t), intent(in) :: input
     class(formulation_t), intent(in) :: formulation
@@ -90,7 +92,7 @@ contains
     end if
   end subroutine choose_method
 
-  !> Method 'taylor' needs the Taylor series of every element in the equations that are integrated.
+  !> Refuses the method 'taylor' for formulations without Taylor series.
   subroutine refuse_missing_series(input, formulation, error)
     type(input_t), intent(in) :: input
     class(formulation_t), intent(in) :: formulation
@@ -105,8 +107,7 @@ contains
                ' cannot be used: ' // obstacle)
   end subroutine refuse_missing_series
 
-  !> Rows in which the factors of a stage matrix are stored: those of its band with the fill-in of the interchanges, at
-  !> most all.
+  !> Stored rows of the factors of a stage matrix: its band with the fill-in of pivoting, at most all rows.
   function stage_matrix_rows(formulation) result(rows)
     class(formulation_t), intent(in) :: formulation
     integer :: rows

@@ -1,7 +1,7 @@
-!> Start speeds that violate constraints: refused, or replaced by the nearest ones that do not.
+!> Consistent start speeds: those that violate constraints are refused, or replaced by the nearest that satisfy them.
 !>
-!> Nearest is by the inertias: omega* = L_tau (L_tau^T J L_tau)^-1 L_tau^T J omega has the smallest kinetic energy of
-!> the difference, and is what the bodies have after the impulses of a shock in the constraints.
+!> omega* = L_tau (L_tau^T J L_tau)^-1 L_tau^T J omega minimises the kinetic energy of the difference. These are the speeds
+!> after an impact, in which impulses of the constraints act.
 module nocdyn_start_speeds
   use nocdyn_errors, only: error_t, exit_input, raise
   use nocdyn_kinds, only: wp
@@ -12,20 +12,20 @@ module nocdyn_start_speeds
 
   public :: fit_start_speeds
 
-  !> Start speeds violate a row when its sum exceeds this times the sum of its absolute terms.
+  !> Start speeds violate a row if the sum of its terms exceeds this times the sum of their absolute values.
   real(wp), parameter, public :: speed_tolerance = 1.0e-9_wp
 
-  real(wp), parameter :: least_impulse = 1.0e-12_wp   ! of the largest one; smaller ones are rounding
-  integer, parameter :: most_bodies = 12   ! in a message
-  integer, parameter :: digits = 15        ! of the nearest speeds, which fit when written back
+  real(wp), parameter :: least_impulse = 1.0e-12_wp   ! relative to the largest one; smaller ones are rounding errors
+  integer, parameter :: most_bodies = 12   ! that a message names
+  integer, parameter :: digits = 15        ! of the nearest speeds, enough to satisfy the constraints as input
 
 contains
 
-  !> Checks the speeds, and projects those of the groups concerned if they may be.
+  !> Checks the start speeds of a machine. If they may be projected, projects those of the groups with violated rows.
   subroutine fit_start_speeds(machine, may_project, offending_row, error)
     type(machine_t), intent(inout) :: machine
     logical, intent(in) :: may_project
-    integer, intent(out) :: offending_row   !! first row that is violated
+    integer, intent(out) :: offending_row   !! first violated row, 0 if there is no error
     type(error_t), allocatable, intent(out) :: error
     real(wp) :: nearest(machine%bodies)
     integer, allocatable :: violated(:)
@@ -43,6 +43,7 @@ contains
     end if
   end subroutine fit_start_speeds
 
+  !> Whether the start speeds violate a row.
   logical function is_violated(machine, row)
     type(machine_t), intent(in) :: machine
     integer, intent(in) :: row
@@ -52,10 +53,10 @@ contains
     is_violated = abs(residual) > speed_tolerance * scale
   end function is_violated
 
-  !> The start speeds, projected in the groups of the violated rows.
+  !> The start speeds, projected in the groups of the violated rows [rad/s].
   function nearest_speeds(machine, violated) result(omega)
     type(machine_t), intent(in) :: machine
-    integer, intent(in) :: violated(:)
+    integer, intent(in) :: violated(:)   !! rows
     real(wp) :: omega(machine%bodies)
     real(wp) :: speed(machine%coordinates%freedoms)
     integer :: b, g, i, k
@@ -77,9 +78,9 @@ contains
     end do
   end function nearest_speeds
 
-  !> Takes the nearest speeds and keeps the impulses, L_lambda^T Lambda = J (omega* - omega), and the energy lost.
+  !> Sets the start speeds to the nearest ones; stores the impulses, L_lambda^T Lambda = J (omega* - omega), and the energy lost.
   subroutine project_start(nearest, machine)
-    real(wp), intent(in) :: nearest(:)
+    real(wp), intent(in) :: nearest(:)   !! [bodies] [rad/s]
     type(machine_t), intent(inout) :: machine
     real(wp) :: lambda(machine%constraints%rows()), change(machine%bodies)
     integer :: row

@@ -20,6 +20,7 @@ module nocdyn_torque_assembly
 
 contains
 
+  !> Form of the law of a group &load.
   pure integer function load_form(group)
     type(group_t), intent(in) :: group
 
@@ -28,7 +29,7 @@ contains
     if (group%has_value('table_speed')) load_form = table
   end function load_form
 
-  !> A bank of viscous loads in any case, the others where there are such loads.
+  !> Adds a bank of viscous loads, perhaps empty, and one of each other form that occurs.
   subroutine add_loads(groups, banks)
     type(element_groups_t), intent(in) :: groups   !! all of them
     type(bank_slot_t), allocatable, intent(inout) :: banks(:)
@@ -59,6 +60,7 @@ contains
     end select
   end subroutine add_load_form
 
+  !> Form of the law of a group &excitation.
   pure integer function excitation_form(group)
     type(group_t), intent(in) :: group
 
@@ -74,7 +76,7 @@ contains
     end select
   end function excitation_form
 
-  !> A bank of harmonic excitations in any case, the others where there are such excitations.
+  !> Adds a bank of harmonic excitations, perhaps empty, and one of each other form that occurs.
   subroutine add_excitations(groups, banks)
     type(element_groups_t), intent(in) :: groups   !! all of them
     type(bank_slot_t), allocatable, intent(inout) :: banks(:)
@@ -119,7 +121,7 @@ contains
     end select
   end function shape_of
 
-  !> Every order is a term; so is amplitude sin(2 (frequency t - pole_pairs phi) + phase).
+  !> Adds a bank of waves: every order is a term, and so is amplitude sin(2 (frequency t - pole_pairs phi) + phase).
   subroutine add_waves(groups, body, banks)
     type(element_groups_t), intent(in) :: groups
     integer, intent(in) :: body(:)

@@ -1,7 +1,7 @@
-!> The vector loops of a sparse map over rows whose columns all advance by one from row to row.
+!> Products of band matrices with vectors: rows whose columns all advance by one from row to row.
 !>
-!> `multiply`: u = map x; `pair`: u = offset + map x and v = map y; `sum`: u = map (x + y). A stretch is given diagonal by
-!> diagonal, an even one, whose rows all have the same coefficients, by its first row. The terms of a row are added one
+!> `multiply`: u = A x; `pair`: u = offset + A x and v = A y; `sum`: u = A (x + y). A band is stored diagonal by diagonal; of a
+!> Toeplitz band, whose rows all have the same coefficients, only the first row is stored. The terms of a row are added one
 !> after the other.
 module nocdyn_band_products
   use nocdyn_kinds, only: wp
@@ -10,7 +10,7 @@ module nocdyn_band_products
 
   public :: multiply_band, multiply_toeplitz, pair_of_band, pair_of_toeplitz, sum_of_band, sum_of_toeplitz
 
-  integer, parameter :: strip = 256   !! rows that stay in the first cache from diagonal to diagonal
+  integer, parameter :: strip = 256   !! rows whose results stay in the first-level cache from diagonal to diagonal
 
 contains
 
@@ -92,7 +92,7 @@ contains
     real(wp) :: a, b
     integer :: begin, c, d, i, k
 
-    if (width == 2) then   ! a chain's: nothing is read twice
+    if (width == 2) then   ! of a chain: nothing is read twice
       a = coefficient(1)
       b = coefficient(2)
       c = column(1) - 1
@@ -157,7 +157,7 @@ contains
     real(wp) :: a, b
     integer :: begin, c, d, i, k
 
-    if (width == 2) then   ! a chain's: nothing is read twice
+    if (width == 2) then   ! of a chain: nothing is read twice
       a = coefficient(1)
       b = coefficient(2)
       c = column(1) - 1

@@ -1,4 +1,4 @@
-!> Products of sparse matrices with vectors, on blocks of lanes: the loops of `sparse_map_t`.
+!> Products of sparse matrices in CSR form with vectors, on blocks of lanes: loops of `sparse_map_t`.
 module nocdyn_csr_products
   use nocdyn_kinds, only: wp
   implicit none (type, external)
@@ -8,7 +8,7 @@ module nocdyn_csr_products
 
 contains
 
-  !> u = map x in some rows, whose entries are stored row by row.
+  !> u = map x in some rows of the matrix, one lane.
   pure subroutine multiply_rows(rows, all_rows, columns, entries, row, first, column, coefficient, x, u)
     integer, intent(in) :: rows, all_rows, columns, entries
     integer, intent(in) :: row(rows), first(rows + 1), column(entries)

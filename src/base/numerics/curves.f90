@@ -1,8 +1,8 @@
-!> Functions given by points: piecewise linear, or piecewise cubic without overshoot.
+!> Interpolation of points: piecewise linear, or piecewise cubic without overshoot (monotone).
 !>
-!> The cubic takes its slopes from F. N. Fritsch, J. Butland, SIAM J. Sci. Stat. Comput. 5 (1984) 300-304: between points
+!> The cubic has the slopes of F. N. Fritsch, J. Butland, SIAM J. Sci. Stat. Comput. 5 (1984) 300-304: between points
 !> it is monotone wherever the points are, by the criterion of F. N. Fritsch, R. E. Carlson, SIAM J. Numer. Anal. 17 (1980)
-!> 238-246. At the ends it takes their three-point formula, limited likewise, as PCHIM of SLATEC and SciPy do.
+!> 238-246. At the ends the three-point formula is limited likewise, as in PCHIM of SLATEC and in SciPy.
 module nocdyn_curves
   use nocdyn_kinds, only: wp
   implicit none (type, external)
@@ -11,11 +11,11 @@ module nocdyn_curves
   public :: new_curve
 
   integer, parameter, public :: interpolation_linear = 1, interpolation_cubic = 2
-  integer, parameter, public :: extrapolation_linear = 1     !! the end slope goes on
-  integer, parameter, public :: extrapolation_constant = 2   !! the end value holds
+  integer, parameter, public :: extrapolation_linear = 1     !! with the slope at the end
+  integer, parameter, public :: extrapolation_constant = 2   !! with the value at the end
 
-  !> Segment s lies between points s and s + 1; segment 0 before the first point, the last one behind the last point. The
-  !> formula of a segment may be evaluated anywhere.
+  !> Segment s lies between points s and s + 1, segment 0 before the first point, segment `points` behind the last one. The
+  !> polynomial of a segment may be evaluated anywhere.
   type, public :: curve_t
     real(wp), allocatable, private :: knot(:)            !! ascending, at least 2
     real(wp), allocatable, private :: origin(:)          !! where the polynomial of each segment begins, [0:points]
@@ -35,10 +35,10 @@ module nocdyn_curves
 
 contains
 
-  !> The curve through points (x, y); two of them make a straight line, however they are joined.
+  !> The curve through points (x, y). Two points give a straight line with either interpolation.
   function new_curve(x, y, interpolation, extrapolation) result(self)
     real(wp), intent(in) :: x(:)             !! ascending, at least 2
-    real(wp), intent(in) :: y(:)
+    real(wp), intent(in) :: y(:)             !! [points]
     integer, intent(in) :: interpolation     !! interpolation_...
     integer, intent(in) :: extrapolation     !! extrapolation_...
     type(curve_t) :: self
@@ -70,9 +70,9 @@ contains
     end do
   end function new_curve
 
-  !> Slopes at the points: weighted harmonic means of the secants beside them, 0 at extremes.
+  !> Slopes at the points: weighted harmonic means of the adjacent secants, 0 at extremes.
   pure function monotone_slopes(h, secant) result(slope)
-    real(wp), intent(in) :: h(:), secant(:)   !! [points - 1], at least 2
+    real(wp), intent(in) :: h(:), secant(:)   !! widths and slopes of the segments, [points - 1], at least 2
     real(wp) :: slope(size(h) + 1)
     real(wp) :: after, before
     integer :: i, n
@@ -110,13 +110,14 @@ contains
     have_same_sign = (a > 0 .and. b > 0) .or. (a < 0 .and. b < 0)
   end function have_same_sign
 
+  !> Number of points.
   pure integer function points(self)
     class(curve_t), intent(in) :: self
 
     points = size(self%knot)
   end function points
 
-  !> Whether two curves of as many points are the same: no number of one is above that of the other.
+  !> Whether two curves with the same number of points are equal.
   pure logical function is_same(self, other)
     class(curve_t), intent(in) :: self
     type(curve_t), intent(in) :: other
@@ -142,12 +143,12 @@ contains
     end do
   end function segment
 
-  !> How far x is inside a segment whose ends are moved outwards, in units of x.
+  !> Distance of x from the nearer end of a segment, whose ends are shifted outwards: negative outside, in the unit of x.
   pure function inset(self, segment, x, width)
     class(curve_t), intent(in) :: self
     integer, intent(in) :: segment
     real(wp), intent(in) :: x
-    real(wp), intent(in) :: width   !! by which the ends are moved, relative to the largest point
+    real(wp), intent(in) :: width   !! shift of the ends, relative to the largest |x| of the points
     real(wp) :: inset
 
     inset = self%distance_to_end(segment, x)
@@ -155,7 +156,7 @@ contains
     inset = inset + width * max(abs(self%knot(1)), abs(self%knot(size(self%knot))))
   end function inset
 
-  !> How far x is below the upper end of a segment.
+  !> Distance of x from the upper end of a segment, huge in the last one.
   pure function distance_to_end(self, segment, x) result(distance)
     class(curve_t), intent(in) :: self
     integer, intent(in) :: segment
@@ -166,6 +167,7 @@ contains
     if (segment < size(self%knot)) distance = self%knot(segment + 1) - x
   end function distance_to_end
 
+  !> Value of the polynomial of a segment.
   pure function value(self, segment, x)
     class(curve_t), intent(in) :: self
     integer, intent(in) :: segment
@@ -178,6 +180,7 @@ contains
     end associate
   end function value
 
+  !> First derivative.
   pure function slope(self, segment, x)
     class(curve_t), intent(in) :: self
     integer, intent(in) :: segment
@@ -190,6 +193,7 @@ contains
     end associate
   end function slope
 
+  !> Second derivative.
   pure function curvature(self, segment, x)
     class(curve_t), intent(in) :: self
     integer, intent(in) :: segment
@@ -204,7 +208,7 @@ contains
   !> The integral from the first point to x.
   pure function integral(self, segment, x)
     class(curve_t), intent(in) :: self
-    integer, intent(in) :: segment   !! in which x lies
+    integer, intent(in) :: segment   !! that contains x
     real(wp), intent(in) :: x
     real(wp) :: d, integral
 

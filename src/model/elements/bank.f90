@@ -1,17 +1,17 @@
-!> Elements of one kind, evaluated together on a block of lanes.
+!> A bank: elements with the same form of law, evaluated together on a block of lanes.
 !>
-!> The values of all elements of a machine are numbered through (`elements_t`); a bank works on its own contiguous
-!> part of them, from its element `first` on. What of its law is a polynomial it hands over as coefficients, so that the
-!> elements of all banks are evaluated in one loop (`polynomial_laws_t`); what is not, it adds by procedures of its own.
-!> A new kind of element extends `bank_t` by either or both.
+!> The elements of a machine are numbered consecutively, bank after bank (`elements_t`). A bank owns the contiguous part that
+!> begins with its element `first`. The polynomial part of its law is given as coefficients, which one loop evaluates for all
+!> banks (`polynomial_laws_t`); the rest is added by procedures of the bank. A new kind of element extends `bank_t` and
+!> overrides the procedures that its law needs.
 !>
-!> An element may have states of its own, its *inner states* (the integral of a governor, an armature current), whose rates
-!> depend on its speed and on its inner states alone; all elements of a bank have as many.
+!> An element may have *internal states*, for instance the integral of a governor or an armature current. Their rates depend
+!> on the speed of the element and on its internal states only. All elements of a bank have the same number of them.
 !>
-!> A law with kinks is evaluated on a *branch* that only `choose` changes: one formula, extended smoothly beyond its
-!> borders. The branches part the plane of the law's variables and are chosen by where these are, so that a law has no
-!> memory. Each border of a branch is moved outwards by a tiny part `boundary_width` of the law's scale: a lane that has just
-!> crossed it is well inside its new branch.
+!> A law with kinks or jumps has *branches*: on each branch it is one smooth formula that may be evaluated anywhere. Only
+!> `choose` changes the branch. The branches divide the plane of the law's variables, so the branch follows from the state
+!> and a law has no memory. Every boundary of a branch is shifted outwards by `boundary_width`, relative to the scale of the
+!> law: a lane that has just crossed it is well inside its new branch.
 module nocdyn_bank
   use nocdyn_elements, only: elements_t
   use nocdyn_text, only: string_t
@@ -28,38 +28,38 @@ module nocdyn_bank
   integer, parameter, public :: role_motor = 3        !! in Q_m of eq. (18); puts energy in
   integer, parameter, public :: role_excitation = 4   !! in Q_0 of eq. (17); puts energy in
 
-  real(wp), parameter, public :: boundary_width = 1.0e-10_wp   !! of borders of branches, relative to the scale of a law
+  real(wp), parameter, public :: boundary_width = 1.0e-10_wp   !! shift of branch boundaries, relative to the scale of a law
 
   character(len=*), parameter, public :: role_names(4) = ['coupling  ', 'load      ', 'motor     ', 'excitation']
 
-  !> What a bank puts into the table of results for each of its elements.
+  !> One quantity that a bank writes to the table of results.
   type, public :: quantity_t
-    character(len=16) :: name          !! first part of the column's name, e.g. 'torque'
-    character(len=8) :: unit
-    integer, allocatable :: elements(:) !! those that have it, numbered within the bank
+    character(len=16) :: name            !! first part of the column's name, e.g. 'torque'
+    character(len=8) :: unit             !! e.g. 'N m'
+    integer, allocatable :: elements(:)  !! elements that have a column, numbered within the bank
   end type quantity_t
 
   type, abstract, public :: bank_t
-    type(string_t), allocatable :: names(:)
-    integer, allocatable :: from(:)          !! body, 0 = ground
-    integer, allocatable :: to(:)            !! body, 0 = ground
-    integer, allocatable :: with_work(:)     !! elements whose power is integrated, numbered within the bank
-    integer, allocatable :: elastic(:)       !! elements that can have a restoring moment, numbered within the bank
-    integer :: role = role_coupling          !! role_...: which term of eq. (12) the bank belongs to
+    type(string_t), allocatable :: names(:)       !! of the elements
+    integer, allocatable :: from(:)               !! body of each element, 0 = ground
+    integer, allocatable :: to(:)                 !! body of each element, 0 = ground; M acts on it, -M on `from`
+    integer, allocatable :: with_work(:)          !! elements whose work is integrated, numbered within the bank
+    integer, allocatable :: elastic(:)            !! elements that can have a restoring moment, numbered within the bank
+    integer :: role = role_coupling               !! role_...: term of eq. (12) to which the bank belongs
     integer :: lanes = 1
-    integer :: first = 1                     !! number of its first element in the machine
-    integer :: values = 0                    !! lanes * elements
-    integer :: first_value = 1               !! the place of lane 1 of `first` in the values of the machine
-    logical :: is_polynomial = .true.        !! whether `polynomials` says all of its law
-    logical :: has_polynomial_potential = .true.   !! whether `polynomials` gives all of its restoring moment
-    logical :: is_time_only = .false.         !! whether the rest of its law depends on the time alone
-    logical :: has_paper_law = .true.          !! whether its law is that of eqs. (3), (5), (17) or (20)
-    integer :: states = 0                     !! inner states of each element
-    integer :: first_internal = 1               !! number of the first inner state of `first` in the machine
-    integer :: internal_values = 0              !! lanes * inner * elements
-    integer :: first_internal_value = 1         !! the place of lane 1 of `first_internal`
+    integer :: first = 1                          !! number of its first element in the machine
+    integer :: values = 0                         !! lanes * elements
+    integer :: first_value = 1                    !! index of lane 1 of `first` in the flat arrays of the machine
+    logical :: is_polynomial = .true.             !! whether `polynomials` gives its whole law
+    logical :: has_polynomial_potential = .true.  !! whether `polynomials` gives its whole restoring moment
+    logical :: is_time_only = .false.             !! whether the rest of its law depends on the time only
+    logical :: has_paper_law = .true.             !! whether its law is that of eqs. (3), (5), (17) or (20)
+    integer :: states = 0                         !! internal states of each element
+    integer :: first_internal = 1                 !! number of the first internal state of `first` in the machine
+    integer :: internal_values = 0                !! lanes * states * elements
+    integer :: first_internal_value = 1           !! index of lane 1 of `first_internal` in the flat arrays of the machine
     integer, allocatable :: switch_element(:)     !! element of each switch, numbered within the bank
-    integer, allocatable :: branch(:, :)     !! present branch of each switch, [lanes, switches]
+    integer, allocatable :: branch(:, :)          !! present branch of each switch, [lanes, switches]
   contains
     procedure :: polynomials
     procedure :: evaluate
@@ -85,14 +85,14 @@ module nocdyn_bank
     procedure :: observe
   end type bank_t
 
-  !> One bank of whatever kind, so that a machine can hold a list of them.
+  !> One bank of any type, so that a machine can hold a list of them.
   type, public :: bank_slot_t
     class(bank_t), allocatable :: bank
   end type bank_slot_t
 
 contains
 
-  !> Adds a bank behind the others.
+  !> Appends a copy of a bank.
   subroutine append_bank(banks, bank)
     type(bank_slot_t), allocatable, intent(inout) :: banks(:)
     class(bank_t), intent(in) :: bank
@@ -108,21 +108,21 @@ contains
     call move_alloc(longer, banks)
   end subroutine append_bank
 
-  !> A time as it is compared with those at which a law changes: the end of a step may miss them by rounding.
+  !> The time to compare with the times at which a law changes: later by some roundings, by which a step may end too early.
   pure function time_reached(t)
-    real(wp), intent(in) :: t
-    real(wp) :: time_reached
+    real(wp), intent(in) :: t   !! [s]
+    real(wp) :: time_reached    !! [s]
 
     time_reached = t + 8.0_wp * spacing(t)
   end function time_reached
 
-  !> Sets the connectivity; every extension's constructor calls it, with `internal` set where its elements have inner states.
+  !> Sets the connectivity. Every constructor calls it, after setting `states` where its elements have internal states.
   subroutine connect(self, role, lanes, names, from, to)
     class(bank_t), intent(inout) :: self
-    integer, intent(in) :: role
+    integer, intent(in) :: role              !! role_...
     integer, intent(in) :: lanes
-    type(string_t), intent(in) :: names(:)
-    integer, intent(in) :: from(:), to(:)
+    type(string_t), intent(in) :: names(:)   !! [elements]
+    integer, intent(in) :: from(:), to(:)    !! bodies, 0 = ground, [elements]
     integer :: e
 
     self%role = role
@@ -137,17 +137,17 @@ contains
     call self%set_switches([integer ::])
   end subroutine connect
 
-  !> Gives elements one switch each; the branches are 0 until they are chosen.
+  !> Gives elements one switch each. The branches are 0 until `choose` sets them.
   subroutine set_switches(self, elements)
     class(bank_t), intent(inout) :: self
-    integer, intent(in) :: elements(:)   !! numbered within the bank
+    integer, intent(in) :: elements(:)   !! with a switch, numbered within the bank
 
     self%switch_element = elements
     if (allocated(self%branch)) deallocate (self%branch)
     allocate (self%branch(self%lanes, size(elements)), source=0)
   end subroutine set_switches
 
-  !> Notes which elements the bank has, and what they do.
+  !> Adds to the structure of a list which elements the bank has, and of what kind they are.
   subroutine list_structure(self, parameters)
     class(bank_t), intent(in) :: self
     type(lane_parameters_t), intent(inout) :: parameters
@@ -161,7 +161,7 @@ contains
     call parameters%add_structure(self%switch_element)
   end subroutine list_structure
 
-  !> Lists the parameters of its elements: those that stand in the input as they are by the name that they have there.
+  !> Lists the parameter arrays of its elements. An array that holds the values of a key unchanged has the name of the key.
   subroutine list_parameters(self, parameters)
     class(bank_t), target, intent(inout) :: self
     type(lane_parameters_t), intent(inout) :: parameters
@@ -181,14 +181,14 @@ contains
     is_source = self%role == role_motor .or. self%role == role_excitation
   end function is_source
 
-  !> Puts the coefficients of its elements into those of the machine, which are zero before: by default there are none.
+  !> Sets the coefficients of its elements among those of the machine, which are zero before. By default there are none.
   subroutine polynomials(self, laws)
     class(bank_t), intent(in) :: self
     type(polynomial_laws_t), intent(inout) :: laws   !! of the machine
   end subroutine polynomials
 
-  !> Adds what is not polynomial to the moments of the bank's elements. All arrays but `time` are flat: the lanes of its
-  !> first element, then those of its second, and so on.
+  !> Adds the part of the law that is not polynomial to the moments of the bank's elements. All arrays but `time` are flat:
+  !> the lanes of its first element, then those of its second, and so on.
   subroutine evaluate(self, time, angle, speed, restoring, applied)
     class(bank_t), intent(in) :: self
     real(wp), intent(in) :: time(self%lanes)                                  !! t [s]
@@ -196,117 +196,119 @@ contains
     real(wp), intent(inout) :: restoring(self%values), applied(self%values)   !! [N m]
   end subroutine evaluate
 
-  !> Adds the derivatives of what `evaluate` adds.
+  !> Adds the derivatives of the moments that `evaluate` adds, and sets those of the internal states.
   subroutine differentiate(self, elements)
     class(bank_t), intent(in) :: self
     type(elements_t), intent(inout) :: elements   !! of the machine
   end subroutine differentiate
 
-  !> Adds the potential energies, secant stiffnesses and dampings of what `evaluate` adds.
+  !> Adds the potential energies, secant stiffnesses and dampings of the moments that `evaluate` adds.
   subroutine evaluate_energies(self, elements)
     class(bank_t), intent(in) :: self
     type(elements_t), intent(inout) :: elements   !! of the machine
   end subroutine evaluate_energies
 
-  !> Whether the moments have a Taylor series: that of `polynomials`, and that of `evaluate` by `forcing_series` and `series`.
+  !> Whether the moments have a Taylor series; `forcing_series` and `series` give that of the moments that `evaluate` adds.
   pure logical function has_series(self)
     class(bank_t), intent(in) :: self
 
     has_series = self%is_polynomial
   end function has_series
 
-  !> Sets the Taylor coefficients, number 0 to last, of what of `applied` depends on the time alone. Here and in `series`
-  !> the arrays begin with the bank's first value, and column k holds the coefficients number k.
+  !> Sets the Taylor coefficients 0 to `last` of the applied moments that depend on the time only. Here and in `series` the
+  !> arrays begin with the bank's first value, and column k holds the coefficients number k.
   subroutine forcing_series(self, last, stride, time, applied)
     class(bank_t), intent(in) :: self
-    integer, intent(in) :: last
-    integer, intent(in) :: stride   !! from column to column
-    real(wp), intent(in) :: time(self%lanes)
-    real(wp), intent(inout) :: applied(stride, 0:last)
+    integer, intent(in) :: last     !! number of the last coefficient
+    integer, intent(in) :: stride   !! from column to column, at least `values`
+    real(wp), intent(in) :: time(self%lanes)             !! t [s]
+    real(wp), intent(inout) :: applied(stride, 0:last)   !! [N m / s^k]
   end subroutine forcing_series
 
-  !> Adds the Taylor coefficients number k of the rest of what `evaluate` adds. Those of the angles, which are counted from
-  !> the rest in `polynomials`, and speeds are known up to k, those of the moments up to k - 1.
+  !> Adds the Taylor coefficients number k of the other moments that `evaluate` adds. The coefficients of angles and speeds
+  !> are known up to number k, those of the moments up to k - 1. Angles are counted from the rest angle in `polynomials`.
   subroutine series(self, k, stride, time, angle, speed, restoring, applied)
     class(bank_t), intent(in) :: self
-    integer, intent(in) :: k
-    integer, intent(in) :: stride
-    real(wp), intent(in) :: time(self%lanes)
-    real(wp), intent(in) :: angle(stride, 0:k), speed(stride, 0:k)
-    real(wp), intent(inout) :: restoring(stride, 0:k), applied(stride, 0:k)
+    integer, intent(in) :: k        !! number of the coefficient
+    integer, intent(in) :: stride   !! from column to column, at least `values`
+    real(wp), intent(in) :: time(self%lanes)                                  !! t [s]
+    real(wp), intent(in) :: angle(stride, 0:k), speed(stride, 0:k)            !! [rad / s^k], [rad/s / s^k]
+    real(wp), intent(inout) :: restoring(stride, 0:k), applied(stride, 0:k)   !! [N m / s^k]
   end subroutine series
 
-  !> Replaces torques that go on changing, with the time or with the angle of a body that turns, by their means: by default
-  !> there are none. What comes to an end, as a step does, is found by evaluating at a late time.
+  !> Replaces torques that keep changing, with the time or with the angle of a turning body, by their means. By default there
+  !> are none. Changes that end, such as a ramp, stay as they are: evaluate at a late time.
   subroutine to_mean_torque(self)
     class(bank_t), intent(inout) :: self
   end subroutine to_mean_torque
 
-  !> The inner states at the start, 0 by default.
+  !> The internal states at the start, 0 by default.
   subroutine start_internal(self, speed, internal)
     class(bank_t), intent(in) :: self
     real(wp), intent(in) :: speed(self%values)             !! u' at the start [rad/s]
-    real(wp), intent(inout) :: internal(self%internal_values)    !! [lanes, inner, elements]
+    real(wp), intent(inout) :: internal(self%internal_values)    !! [lanes, states, elements]
 
     internal = 0.0_wp
   end subroutine start_internal
 
-  !> Brings the inner states into `applied`, which holds what `evaluate` and the polynomials gave, and sets their rates.
+  !> Adds the moments that depend on internal states to those of `evaluate` and of the polynomials, and sets the rates.
   subroutine evaluate_internal(self, speed, internal, applied, rate)
     class(bank_t), intent(in) :: self
     real(wp), intent(in) :: speed(self%values)             !! u' [rad/s]
-    real(wp), intent(in) :: internal(self%internal_values)       !! [lanes, inner, elements]
+    real(wp), intent(in) :: internal(self%internal_values)       !! [lanes, states, elements]
     real(wp), intent(inout) :: applied(self%values)        !! [N m]
-    real(wp), intent(inout) :: rate(self%internal_values)     !! [lanes, inner, elements]
+    real(wp), intent(inout) :: rate(self%internal_values)     !! [lanes, states, elements]
 
-    error stop 'nocdyn_bank: a bank with inner states overrides evaluate_inner'
+    error stop 'nocdyn_bank: a bank with internal states overrides evaluate_internal'
   end subroutine evaluate_internal
 
-  !> What an inner state is, e.g. 'armature current'.
+  !> Name of an internal state, e.g. 'armature current'.
   function internal_name(self, index) result(name)
     class(bank_t), intent(in) :: self
-    integer, intent(in) :: index   !! 1 to inner
+    integer, intent(in) :: index   !! 1 to `states`
     character(len=:), allocatable :: name
 
     name = ''
-    error stop 'nocdyn_bank: a bank with inner states overrides inner_name'
+    error stop 'nocdyn_bank: a bank with internal states overrides internal_name'
   end function internal_name
 
-  !> Chooses the branch of a switch in which a lane is.
+  !> Sets the branch of a switch in one lane to the one that contains the state.
   subroutine choose(self, switch, lane, t, angle, speed, internal)
     class(bank_t), intent(inout) :: self
-    integer, intent(in) :: switch, lane
+    integer, intent(in) :: switch          !! numbered within the bank
+    integer, intent(in) :: lane
     real(wp), intent(in) :: t              !! [s]
     real(wp), intent(in) :: angle, speed   !! u [rad], u' [rad/s] of the switching element
-    real(wp), intent(in) :: internal(:)       !! its inner states
+    real(wp), intent(in) :: internal(:)       !! its internal states
 
     error stop 'nocdyn_bank: a bank with switches overrides choose'
   end subroutine choose
 
-  !> How far a lane is from the nearest border of its present branch: negative beyond it, continuous.
+  !> Distance of a lane from the nearest boundary of its present branch, in a unit of the law: continuous, negative beyond.
   pure function indicator(self, switch, lane, t, angle, speed, internal)
     class(bank_t), intent(in) :: self
-    integer, intent(in) :: switch, lane
+    integer, intent(in) :: switch          !! numbered within the bank
+    integer, intent(in) :: lane
     real(wp), intent(in) :: t              !! [s]
     real(wp), intent(in) :: angle, speed   !! u [rad], u' [rad/s] of the switching element
-    real(wp), intent(in) :: internal(:)       !! its inner states
+    real(wp), intent(in) :: internal(:)       !! its internal states
     real(wp) :: indicator
 
     indicator = 0.0_wp
-    error stop 'nocdyn_bank: a bank with switches overrides margin'
+    error stop 'nocdyn_bank: a bank with switches overrides indicator'
   end function indicator
 
-  !> What the borders of a switch are, e.g. 'edge of the gap'.
+  !> Name of the boundaries of a switch, e.g. 'edge of the gap'.
   function switch_name(self, switch) result(name)
     class(bank_t), intent(in) :: self
-    integer, intent(in) :: switch
+    integer, intent(in) :: switch   !! numbered within the bank
     character(len=:), allocatable :: name
 
     name = ''
     error stop 'nocdyn_bank: a bank with switches overrides switch_name'
   end function switch_name
 
-  !> The columns of the bank in the table of results: by default the torque of each element.
+  !> The columns of the bank in the table of results, by default the torque of each element.
   function quantities(self) result(columns)
     class(bank_t), intent(in) :: self
     type(quantity_t), allocatable :: columns(:)
@@ -318,13 +320,13 @@ contains
     columns(1)%elements = [(e, e=1, size(self%to))]
   end function quantities
 
-  !> Values of the quantity number `quantity` of all elements of the bank after `evaluate`.
+  !> Values of one quantity of all elements of the bank, after `evaluate`.
   pure subroutine observe(self, elements, quantity, lane, values)
     class(bank_t), intent(in) :: self
     type(elements_t), intent(in) :: elements   !! of the machine
-    integer, intent(in) :: quantity
+    integer, intent(in) :: quantity   !! index in `quantities`
     integer, intent(in) :: lane
-    real(wp), intent(out) :: values(:)   !! [elements of the bank]
+    real(wp), intent(out) :: values(:)   !! [elements of the bank], in the unit of the quantity
 
     values = elements%restoring(lane, self%first:self%last()) + elements%applied(lane, self%first:self%last())
     if (quantity /= 1) error stop 'nocdyn_bank: a bank with several quantities overrides observe'

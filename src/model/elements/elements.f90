@@ -1,4 +1,4 @@
-!> The elements of a machine, of all banks numbered through: what they join and their values, on a block of lanes.
+!> The elements of a machine, numbered consecutively over all banks: the bodies they join and their values on a block of lanes.
 module nocdyn_elements
   use nocdyn_internal_states, only: internal_states_t, new_internal_states
   use nocdyn_kinds, only: wp
@@ -7,15 +7,15 @@ module nocdyn_elements
 
   public :: new_elements
 
-  !> Every element acts between two bodies along its relative angle u = phi_to - phi_from. Its bank finds its moment
-  !> M(t, u, u') = restoring + working, which acts on `to`, and -M on `from`; body 0 is the ground.
+  !> Every element acts between two bodies along its relative angle u = phi_to - phi_from. Its moment
+  !> M(t, u, u') = restoring + applied acts on `to`, and -M on `from`. Body 0 is the ground.
   type, public :: elements_t
     integer, allocatable :: from(:), to(:)         !! bodies, [elements]
     real(wp), allocatable :: time(:)               !! t of the derivatives [s], [lanes]
     real(wp), allocatable :: angle(:, :)           !! u [rad], shape [lanes, elements] as all that follow
     real(wp), allocatable :: speed(:, :)           !! u' [rad/s]
     ! by `evaluate` of the banks:
-    real(wp), allocatable :: restoring(:, :)       !! part of M with a potential, a function of u alone [N m]
+    real(wp), allocatable :: restoring(:, :)       !! conservative part of M, a function of u only [N m]
     real(wp), allocatable :: applied(:, :)         !! the rest of M, whose power enters or leaves the machine [N m]
     ! by `differentiate`:
     real(wp), allocatable :: restoring_angle(:, :)       !! derivative of `restoring` by u
@@ -25,8 +25,8 @@ module nocdyn_elements
     real(wp), allocatable :: applied_time(:, :)          !! derivative of `applied` by t
     ! by `evaluate_energies`:
     real(wp), allocatable :: stored(:, :)          !! potential energy of `restoring` [J]
-    real(wp), allocatable :: secant(:, :)          !! secant stiffness K12 of eq. (3), the -K12 u in `restoring` [N m/rad]
-    real(wp), allocatable :: damping(:, :)         !! c, the -c u' in `applied` [N m s/rad]
+    real(wp), allocatable :: secant(:, :)          !! secant stiffness K12 of eq. (3): -K12 u is a part of `restoring` [N m/rad]
+    real(wp), allocatable :: damping(:, :)         !! viscous c: -c u' is a part of `applied` [N m s/rad]
     type(internal_states_t) :: internal
   contains
     procedure :: gather
@@ -38,8 +38,8 @@ contains
   !> Elements between the given bodies, at rest and without moments.
   function new_elements(lanes, from, to, internal) result(self)
     integer, intent(in) :: lanes
-    integer, intent(in) :: from(:), to(:)
-    integer, intent(in) :: internal(:)   !! inner states of each
+    integer, intent(in) :: from(:), to(:)   !! bodies, 0 = ground, [elements]
+    integer, intent(in) :: internal(:)      !! internal states of each element, [elements]
     type(elements_t) :: self
 
     allocate (self%from, source=from)
@@ -57,7 +57,7 @@ contains
   subroutine gather(self, phi, omega)
     class(elements_t), intent(inout) :: self
     real(wp), contiguous, intent(in) :: phi(:, 0:)     !! [lanes, ground and bodies] [rad]
-    real(wp), contiguous, intent(in) :: omega(:, 0:)   !! [rad/s]
+    real(wp), contiguous, intent(in) :: omega(:, 0:)   !! [lanes, ground and bodies] [rad/s]
     integer :: e, l
 
     do e = 1, size(self%to)
@@ -68,7 +68,7 @@ contains
     end do
   end subroutine gather
 
-  !> The torques of the elements on the bodies, and on the ground.
+  !> Sums the moments of the elements on the bodies and on the ground.
   subroutine scatter(self, torque)
     class(elements_t), intent(in) :: self
     real(wp), contiguous, intent(inout) :: torque(:, 0:)   !! [lanes, ground and bodies] [N m]

@@ -1,4 +1,4 @@
-!> The inner states of the elements of a machine, of all banks numbered through, on a block of lanes.
+!> The internal states of the elements of a machine, numbered consecutively over all banks, on a block of lanes.
 module nocdyn_internal_states
   use nocdyn_kinds, only: wp
   implicit none (type, external)
@@ -8,23 +8,23 @@ module nocdyn_internal_states
 
   type, public :: internal_states_t
     integer :: count = 0
-    integer, allocatable :: element(:)             !! to which each belongs, numbered in the machine, [states]
+    integer, allocatable :: element(:)             !! element of each state, numbered in the machine, [states]
     integer, allocatable :: first(:)               !! the first state of that element, [states]
-    integer, allocatable :: members(:)             !! how many that element has, [states]
-    real(wp), allocatable :: value(:, :)           !! [lanes, states] as all that follow
+    integer, allocatable :: members(:)             !! number of states of that element, [states]
+    real(wp), allocatable :: value(:, :)           !! [lanes, states] as `rate`, `applied` and `rate_speed`
     real(wp), allocatable :: rate(:, :)            !! by `evaluate_internal` of the banks
     ! by `differentiate`:
-    real(wp), allocatable :: applied(:, :)         !! derivative of the element's `applied` by the state
+    real(wp), allocatable :: applied(:, :)         !! derivative of the element's `applied` moment by the state
     real(wp), allocatable :: rate_speed(:, :)      !! derivative of the rate by the element's speed
     real(wp), allocatable :: rate_internal(:, :, :)   !! derivatives of the rate by the element's states, [lanes, members, states]
   end type internal_states_t
 
 contains
 
-  !> States of value 0.
+  !> States with the value 0.
   function new_internal_states(lanes, members) result(self)
     integer, intent(in) :: lanes
-    integer, intent(in) :: members(:)   !! states of each element of the machine
+    integer, intent(in) :: members(:)   !! number of states of each element of the machine, [elements]
     type(internal_states_t) :: self
     integer :: e, next
 

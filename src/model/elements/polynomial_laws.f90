@@ -1,9 +1,9 @@
-!> Laws of elements that are polynomials, in vector loops over the elements of all banks.
+!> The polynomial parts of the laws of all elements, evaluated in vector loops over all banks.
 !>
-!> restoring = -(linear + cubic w^2) w with w = u - rest, working = constant + (by_speed + by_speed_squared u') u'.
+!> restoring = -(linear + cubic w^2) w with w = u - rest, applied = constant + (by_speed + by_speed_squared u') u'.
 !>
-!> What a large machine spends on them is the time to read their coefficients. Those of a bare element, as a coupling that
-!> rests at no twist is, are linear, cubic and by_speed alone, and of long runs of such elements no others are read.
+!> Large machines spend their time on reading the coefficients. A plain spring, which has no rest angle, constant or
+!> by_speed_squared, needs linear, cubic and by_speed only: in long runs of plain springs no other coefficients are read.
 module nocdyn_polynomial_laws
   use nocdyn_elements, only: elements_t
   use nocdyn_kinds, only: wp
@@ -21,12 +21,12 @@ module nocdyn_polynomial_laws
     real(wp), allocatable :: constant(:, :)           !! [N m]
     real(wp), allocatable :: by_speed(:, :)           !! [N m s/rad]
     real(wp), allocatable :: by_speed_squared(:, :)   !! [N m s2/rad2]
-    real(wp), allocatable :: damping(:, :)            !! what of -by_speed is in C, eq. (22) [N m s/rad]
+    real(wp), allocatable :: damping(:, :)            !! part of -by_speed that is in C, eq. (22) [N m s/rad]
     integer, private :: values = 0                    !! lanes * elements
-    logical, private :: is_divided = .false.          !! into parts that are evaluated one after the other
+    logical, private :: is_divided = .false.          !! whether some parts are plain springs
     integer, private :: parts = 0
-    integer, allocatable, private :: first(:)         !! element of each part, [parts + 1]
-    logical, allocatable, private :: is_plain(:)       !! of each part: whether all its elements are
+    integer, allocatable, private :: first(:)         !! first element of each part, [parts + 1]
+    logical, allocatable, private :: is_plain(:)       !! whether all elements of a part are plain springs
   contains
     procedure :: find_plain_parts
     procedure :: refresh_lane
@@ -36,7 +36,7 @@ module nocdyn_polynomial_laws
     procedure :: evaluate_energies
   end type polynomial_laws_t
 
-  integer, parameter :: short = 64   ! values [lanes, elements] that are not worth a loop of their own
+  integer, parameter :: short = 64   ! fewer values [lanes, elements] are not worth a loop of their own
 
 contains
 
@@ -52,7 +52,7 @@ contains
     allocate (self%is_plain(elements), source=.false.)
   end function new_polynomial_laws
 
-  !> Tells the long runs of bare elements from the others, once the coefficients are set.
+  !> Divides the elements into long runs of plain springs and the others. To be called when the coefficients are set.
   subroutine find_plain_parts(self)
     class(polynomial_laws_t), intent(inout) :: self
     integer :: e, run
@@ -83,10 +83,10 @@ contains
 
   end subroutine find_plain_parts
 
-  !> Divides anew if an element of a bare run is not bare any more in a lane that has new numbers.
+  !> Divides the elements again if a lane has new parameters by which an element of a plain part is no plain spring any more.
   subroutine refresh_lane(self, lane)
     class(polynomial_laws_t), intent(inout) :: self
-    integer, intent(in) :: lane
+    integer, intent(in) :: lane   !! that has new parameters
     integer :: e, part
 
     if (.not. self%is_divided) return
@@ -100,6 +100,7 @@ contains
     end do
   end subroutine refresh_lane
 
+  !> Whether an element is a plain spring in one lane.
   pure logical function is_plain_in(self, lane, element)
     type(polynomial_laws_t), intent(in) :: self
     integer, intent(in) :: lane, element
@@ -121,7 +122,7 @@ contains
     call parameters%add('laws: damping', self%damping)
   end subroutine list_parameters
 
-  !> How many elements from `first` on are bare in all lanes.
+  !> Number of consecutive elements from `first` on that are plain springs in all lanes.
   pure integer function plain_run(self, first)
     type(polynomial_laws_t), intent(in) :: self
     integer, intent(in) :: first
@@ -136,10 +137,10 @@ contains
     end do
   end function plain_run
 
-  !> Eqs. (3), (49), (50) in the restoring sense; eqs. (5) and (20). Sets the moments of all elements.
+  !> Sets the moments of all elements: eqs. (3), (49), (50) as restoring moments; eqs. (5) and (20) as applied ones.
   subroutine evaluate(self, elements)
     class(polynomial_laws_t), intent(in) :: self
-    type(elements_t), intent(inout) :: elements
+    type(elements_t), intent(inout) :: elements   !! angles and speeds are set
 
     if (self%is_divided) then
       call evaluate_parts(self, elements)
@@ -182,7 +183,7 @@ contains
     end do
   end subroutine moments
 
-  !> The same for bare elements, to the last bit: the zero keeps the sign of a zero.
+  !> The same for plain springs, with the same bits: the added zero makes -0 a +0, as the constant does in `moments`.
   pure subroutine plain_moments(n, linear, cubic, by_speed, angle, speed, restoring, applied)
     integer, intent(in) :: n   !! values of the part
     real(wp), intent(in), dimension(n) :: linear, cubic, by_speed, angle, speed
@@ -195,7 +196,7 @@ contains
     end do
   end subroutine plain_moments
 
-  !> Sets the derivatives of the moments: the tangent stiffness K1 + 3 k1 w^2 of eqs. (64)-(68), negative, and the others.
+  !> Sets the derivatives of the moments; `restoring_angle` is minus the tangent stiffness K1 + 3 k1 w^2 of eqs. (64)-(68).
   subroutine differentiate(self, elements)
     class(polynomial_laws_t), intent(in) :: self
     type(elements_t), intent(inout) :: elements

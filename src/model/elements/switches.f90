@@ -1,4 +1,4 @@
-!> The switches of a machine, of all banks numbered through.
+!> The switches of a machine, numbered consecutively over all banks. A switch selects the branch of an element's law.
 module nocdyn_switches
   use nocdyn_bank, only: bank_slot_t, role_names
   use nocdyn_kinds, only: wp
@@ -10,11 +10,11 @@ module nocdyn_switches
 
   type, public :: switches_t
     integer :: count = 0
-    integer, allocatable :: element(:)       !! whose branch each changes, [switches]
-    integer, allocatable :: first_internal(:)   !! the inner states of that element
-    integer, allocatable :: last_internal(:)
-    integer, allocatable, private :: bank(:)
-    integer, allocatable, private :: number(:)   !! in its bank
+    integer, allocatable :: element(:)       !! element of each switch, numbered in the machine, [switches]
+    integer, allocatable :: first_internal(:)   !! first internal state of that element, numbered in the machine, [switches]
+    integer, allocatable :: last_internal(:)    !! last internal state of that element, [switches]
+    integer, allocatable, private :: bank(:)     !! [switches]
+    integer, allocatable, private :: number(:)   !! of the switch in its bank, [switches]
   contains
     procedure :: choose
     procedure :: indicator
@@ -47,24 +47,24 @@ contains
     end do
   end function new_switches
 
-  !> Chooses the branch of a switch in which a lane is.
+  !> Sets the branch of a switch in one lane to the one that contains the state.
   subroutine choose(self, banks, switch, lane, t, angle, speed, internal)
     class(switches_t), intent(in) :: self
     type(bank_slot_t), intent(inout) :: banks(:)
     integer, intent(in) :: switch, lane
-    real(wp), intent(in) :: t, angle, speed   !! of the switching element
-    real(wp), intent(in) :: internal(:)          !! its inner states
+    real(wp), intent(in) :: t, angle, speed   !! [s]; of the element of the switch [rad], [rad/s]
+    real(wp), intent(in) :: internal(:)          !! its internal states
 
     call banks(self%bank(switch))%bank%choose(self%number(switch), lane, t, angle, speed, internal)
   end subroutine choose
 
-  !> How far a lane is from the nearest border of the present branch of a switch.
+  !> Distance of a lane from the nearest boundary of the present branch of a switch, negative beyond it.
   pure function indicator(self, banks, switch, lane, t, angle, speed, internal)
     class(switches_t), intent(in) :: self
     type(bank_slot_t), intent(in) :: banks(:)
     integer, intent(in) :: switch, lane
-    real(wp), intent(in) :: t, angle, speed   !! of the switching element
-    real(wp), intent(in) :: internal(:)          !! its inner states
+    real(wp), intent(in) :: t, angle, speed   !! [s]; of the element of the switch [rad], [rad/s]
+    real(wp), intent(in) :: internal(:)          !! its internal states
     real(wp) :: indicator
 
     indicator = banks(self%bank(switch))%bank%indicator(self%number(switch), lane, t, angle, speed, internal)

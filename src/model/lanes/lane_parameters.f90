@@ -1,8 +1,8 @@
-!> The numbers of the lanes of one formulation: all that may differ between variants of a machine, wherever it is held.
+!> The parameters of the lanes of one formulation: all numbers that may differ between the variants of a machine.
 !>
-!> A formulation lists its arrays in a fixed order, its own and those that it has derived from them, and notes beside them
-!> what its layout depends on: which elements are in which bank, which entries the maps have. Where two lists have the same
-!> layout, a lane of one is made that of the other by copying numbers.
+!> A formulation lists its parameter arrays in a fixed order, those of the machine and those derived from them. It also adds
+!> the integers that describe its structure: which elements are in which bank, which entries the sparse maps have. Two lists
+!> with the same structure differ in numbers only, so copying the numbers of a lane makes it the same variant.
 module nocdyn_lane_parameters
   use, intrinsic :: iso_fortran_env, only: int64
   use nocdyn_curves, only: curve_t
@@ -16,12 +16,13 @@ module nocdyn_lane_parameters
   !> One array; its lanes are the second dimension.
   type, public :: parameter_array_t
     character(len=longest) :: name
-    real(wp), pointer, contiguous :: value(:, :, :) => null()   !! [numbers, lanes, numbers]
+    real(wp), pointer, contiguous :: value(:, :, :) => null()   !! [rows, lanes, columns]
   end type parameter_array_t
 
-  !> Where a number is in a list.
+  !> Position of a parameter in a list.
   type, public :: parameter_index_t
-    integer :: array, row, column
+    integer :: array         !! in the order of listing
+    integer :: row, column   !! in that array
   end type parameter_index_t
 
   !> The curves of some elements.
@@ -29,14 +30,14 @@ module nocdyn_lane_parameters
     type(curve_t), pointer :: curve(:, :) => null()   !! [lanes, elements]
   end type curve_array_t
 
-  !> What is listed must have the attribute `target` and stay where it is as long as the list is used.
+  !> A list points to the arrays in it: they must be targets, and must not be reallocated or moved while it is in use.
   type, public :: lane_parameters_t
     integer :: arrays = 0
-    type(parameter_array_t), allocatable :: array(:)                        !! [slabs], and room
+    type(parameter_array_t), allocatable :: array(:)              !! the first `arrays` are in use
     integer, private :: curve_arrays = 0
-    type(curve_array_t), allocatable, private :: curve_array(:)   !! [curve_slabs], and room
-    integer, private :: notes = 0
-    integer, allocatable, private :: note(:)                    !! [notes], and room: of the layout
+    type(curve_array_t), allocatable, private :: curve_array(:)   !! the first `curve_arrays` are in use
+    integer, private :: structure_size = 0
+    integer, allocatable, private :: structure(:)                 !! the first `structure_size` are in use
   contains
     procedure :: clear
     generic :: add => add_matrix, add_stack
@@ -57,27 +58,27 @@ module nocdyn_lane_parameters
 
 contains
 
-  !> Empties the list; the room stays.
+  !> Empties the list and keeps its memory.
   subroutine clear(self)
     class(lane_parameters_t), intent(inout) :: self
 
-    if (.not. allocated(self%array)) allocate (self%array(64), self%curve_array(4), self%note(256))
+    if (.not. allocated(self%array)) allocate (self%array(64), self%curve_array(4), self%structure(256))
     self%arrays = 0
     self%curve_arrays = 0
-    self%notes = 0
+    self%structure_size = 0
   end subroutine clear
 
-  !> Lists an array [lanes, numbers].
+  !> Lists an array [lanes, columns].
   subroutine add_matrix(self, name, value)
     class(lane_parameters_t), intent(inout) :: self
-    character(len=*), intent(in) :: name   !! of a bank's parameter: the key of the input whose values stand there as they are
+    character(len=*), intent(in) :: name   !! the name of a key if the array holds its values unchanged
     real(wp), contiguous, target, intent(inout) :: value(:, :)
 
     call self%next_array(name)
     self%array(self%arrays)%value(1:1, 1:size(value, 1), 1:size(value, 2)) => value
   end subroutine add_matrix
 
-  !> Lists an array [numbers, lanes, numbers].
+  !> Lists an array [rows, lanes, columns].
   subroutine add_stack(self, name, value)
     class(lane_parameters_t), intent(inout) :: self
     character(len=*), intent(in) :: name
@@ -87,7 +88,7 @@ contains
     self%array(self%arrays)%value => value
   end subroutine add_stack
 
-  !> Lists an array [numbers, numbers, lanes].
+  !> Lists an array [rows, columns, lanes].
   subroutine add_blocks(self, name, value)
     class(lane_parameters_t), intent(inout) :: self
     character(len=*), intent(in) :: name
@@ -98,7 +99,7 @@ contains
     call self%add_structure(shape(value))
   end subroutine add_blocks
 
-  !> Makes room for one more array.
+  !> Adds an array that is not yet associated.
   subroutine next_array(self, name)
     class(lane_parameters_t), intent(inout) :: self
     character(len=*), intent(in) :: name
@@ -130,34 +131,36 @@ contains
     call self%add_structure([(curve(1, e)%points(), e=1, size(curve, 2))])
   end subroutine add_curves
 
-  subroutine add_integer(self, note)
+  subroutine add_integer(self, part)
     class(lane_parameters_t), intent(inout) :: self
-    integer, intent(in) :: note
+    integer, intent(in) :: part
 
-    call self%add_structure([note])
+    call self%add_structure([part])
   end subroutine add_integer
 
-  !> Notes what the layout depends on; how many notes there are is one of them.
-  subroutine add_integers(self, notes)
+  !> Adds integers that describe the structure, preceded by their number.
+  subroutine add_integers(self, parts)
     class(lane_parameters_t), intent(inout) :: self
-    integer, intent(in) :: notes(:)
+    integer, intent(in) :: parts(:)
     integer, allocatable :: longer(:)
 
-    if (self%notes + size(notes) + 1 > size(self%note)) then
-      allocate (longer(2 * (self%notes + size(notes) + 1)))
-      longer(:self%notes) = self%note(:self%notes)
-      call move_alloc(longer, self%note)
-    end if
-    self%note(self%notes + 1) = size(notes)
-    self%note(self%notes + 2:self%notes + 1 + size(notes)) = notes
-    self%notes = self%notes + 1 + size(notes)
+    associate (used => self%structure_size, added => size(parts) + 1)
+      if (used + added > size(self%structure)) then
+        allocate (longer(2 * (used + added)))
+        longer(:used) = self%structure(:used)
+        call move_alloc(longer, self%structure)
+      end if
+      self%structure(used + 1) = size(parts)
+      self%structure(used + 2:used + added) = parts
+      used = used + added
+    end associate
   end subroutine add_integers
 
-  subroutine add_flag(self, note)
+  subroutine add_flag(self, flag)
     class(lane_parameters_t), intent(inout) :: self
-    logical, intent(in) :: note
+    logical, intent(in) :: flag
 
-    call self%add_structure([merge(1, 0, note)])
+    call self%add_structure([merge(1, 0, flag)])
   end subroutine add_flag
 
   subroutine add_names(self, names)
@@ -170,16 +173,17 @@ contains
     end do
   end subroutine add_names
 
-  !> Whether two lists have the same layout, but for the number of lanes.
+  !> Whether two lists have the same structure, names and shapes; the number of lanes may differ.
   pure logical function has_same_structure(self, other)
     class(lane_parameters_t), intent(in) :: self
     type(lane_parameters_t), intent(in) :: other
     integer :: i
 
     has_same_structure = .false.
-    if (self%arrays /= other%arrays .or. self%curve_arrays /= other%curve_arrays .or. self%notes /= other%notes) return
-    do i = 1, self%notes
-      if (self%note(i) /= other%note(i)) return
+    if (self%arrays /= other%arrays .or. self%curve_arrays /= other%curve_arrays) return
+    if (self%structure_size /= other%structure_size) return
+    do i = 1, self%structure_size
+      if (self%structure(i) /= other%structure(i)) return
     end do
     do i = 1, self%arrays
       associate (here => self%array(i), there => other%array(i))
@@ -190,7 +194,7 @@ contains
     has_same_structure = .true.
   end function has_same_structure
 
-  !> Makes a lane that of another list, which is congruent.
+  !> Copies the parameters and curves of a lane of another list, which has the same structure.
   subroutine copy_lane(self, lane, from, from_lane)
     class(lane_parameters_t), intent(inout) :: self
     integer, intent(in) :: lane
@@ -216,7 +220,8 @@ contains
     end do
   end subroutine copy_lane
 
-  !> Where a lane differs from that of another list, which is congruent, in a single bit; curves are left out.
+  !> Positions of the parameters in which a lane differs, in any bit, from a lane of another list with the same structure.
+  !> Curves are not compared.
   pure function differences(self, lane, other, other_lane) result(indices)
     class(lane_parameters_t), intent(in) :: self
     integer, intent(in) :: lane
@@ -226,7 +231,7 @@ contains
     type(parameter_index_t) :: index
     integer :: found, i, k, pass, s
 
-    do pass = 1, 2   ! to count, and to write down
+    do pass = 1, 2   ! the first pass counts, the second one stores
       found = 0
       do s = 1, self%arrays
         do k = 1, size(self%array(s)%value, 3)
@@ -248,7 +253,7 @@ contains
     have_same_bits = transfer(a, 0_int64) == transfer(b, 0_int64)
   end function have_same_bits
 
-  !> Whether a lane has the curves of another list, which is congruent.
+  !> Whether a lane has the same curves as a lane of another list, which has the same structure.
   pure logical function has_same_curves(self, lane, other, other_lane)
     class(lane_parameters_t), intent(in) :: self
     integer, intent(in) :: lane
@@ -282,7 +287,7 @@ contains
     self%array(index%array)%value(index%row, lane, index%column) = value
   end subroutine set_value
 
-  !> Under which name the array of a number is listed.
+  !> Name of the array that holds a parameter.
   pure function name_at(self, index) result(name)
     class(lane_parameters_t), intent(in) :: self
     type(parameter_index_t), intent(in) :: index

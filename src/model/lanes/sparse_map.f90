@@ -1,7 +1,7 @@
-!> Sparse linear maps on blocks of lanes, applied row by row: every result is a sum of its own, and nothing is scattered.
+!> Sparse matrices applied to blocks of lanes, row by row: every result is one sum, and nothing is scattered.
 !>
-!> The terms of a row are added in the order of its entries, in every lane and in each of the loops below alike, so
-!> that a lane's result is the same to the last bit in a block of any size.
+!> The terms of a row are added in the order of its entries, in every lane and in each of the loops below, so that the result
+!> of a lane has the same bits in a block of any size.
 module nocdyn_sparse_map
   use nocdyn_kinds, only: wp
   use nocdyn_lane_parameters, only: lane_parameters_t
@@ -13,25 +13,24 @@ module nocdyn_sparse_map
 
   public :: new_sparse_map, transposed_order
 
-  !> With one lane, many consecutive rows whose columns all advance by one from row to row, as those of a chain do, make
-  !> a stretch: its entries are stored diagonal by diagonal, and the loop over its rows is a vector loop without indices.
-  !> A stretch with the same coefficients in all rows is even, and only the entries of its first row are stored.
-  !> All other rows are loose, their entries stored row by row; with many lanes all rows are, and the loops over the
-  !> lanes are the vector loops.
+  !> With one lane, consecutive rows whose columns all advance by one from row to row, as those of a chain do, form a band:
+  !> its entries are stored diagonal by diagonal, and the loop over its rows is a vector loop without indices. A band whose
+  !> rows all have the same coefficients is Toeplitz, and only the entries of its first row are stored. All other rows are
+  !> stored row by row (CSR). With several lanes all rows are, and the loops over the lanes are the vector loops.
   type, public :: sparse_map_t
     integer, private :: lanes = 1
     integer, private :: all_rows = 0
-    integer, private :: columns = 0                      !! the last that has an entry
+    integer, private :: columns = 0                      !! number of the last column that has an entry
     integer, private :: csr_rows = 0
     integer, private :: bands = 0
-    logical, private :: without_offset = .false.         !! in even stretches offsets need not be read
-    integer, allocatable, private :: row(:)              !! each loose row
-    integer, allocatable :: first(:)            !! its first entry, [loose_rows + 1]
-    integer, allocatable, private :: first_row(:)        !! of each stretch
-    integer, allocatable, private :: rows(:)             !! of each stretch
-    integer, allocatable, private :: width(:)            !! entries of each of its rows, at least 1
-    logical, allocatable, private :: is_toeplitz(:)          !! of each stretch
-    integer, allocatable, private :: first_entry(:)      !! of each stretch
+    logical, private :: without_offset = .false.         !! whether Toeplitz bands do not read offsets, which are zero
+    integer, allocatable, private :: row(:)              !! row of the matrix of each CSR row, [csr_rows]
+    integer, allocatable :: first(:)                     !! first entry of each CSR row, [csr_rows + 1]
+    integer, allocatable, private :: first_row(:)        !! of each band
+    integer, allocatable, private :: rows(:)             !! number of rows of each band
+    integer, allocatable, private :: width(:)            !! entries of each row of a band, at least 1
+    logical, allocatable, private :: is_toeplitz(:)      !! of each band
+    integer, allocatable, private :: first_entry(:)      !! of each band
     integer, allocatable :: column(:)                    !! [entries]
     real(wp), allocatable :: coefficient(:, :)           !! [lanes, entries]
   contains
@@ -46,17 +45,17 @@ module nocdyn_sparse_map
 
 contains
 
-  !> A map from its rows: row r has the entries first(r) to first(r + 1) - 1.
+  !> A map from rows in CSR form: row r has the entries first(r) to first(r + 1) - 1.
   function new_sparse_map(first, column, coefficient, without_offset, without_bands) result(self)
     integer, intent(in) :: first(:)               !! [rows + 1]
     integer, intent(in) :: column(:)              !! [entries]
     real(wp), intent(in) :: coefficient(:, :)     !! [lanes, entries]
-    logical, intent(in), optional :: without_offset   !! whether all offsets handed to `multiply_pair` will be zero: .false.
-    logical, intent(in), optional :: without_bands         !! whether there are to be no stretches: .false.
+    logical, intent(in), optional :: without_offset   !! whether all offsets of `multiply_pair` will be zero; absent: .false.
+    logical, intent(in), optional :: without_bands    !! whether all rows are stored as CSR; absent: .false.
     type(sparse_map_t) :: self
     logical :: has_bands
-    integer :: order(size(column)), band_rows(size(first) - 1)
-    integer :: begin, entries, rows, width
+    integer :: order(size(column))
+    integer :: entries, rows
 
     rows = size(first) - 1
     self%lanes = size(coefficient, 1)
@@ -69,9 +68,25 @@ contains
     allocate (self%first_row(rows / short), self%first_entry(rows / short))
     allocate (self%rows(rows / short), self%width(rows / short), self%is_toeplitz(rows / short))
     self%first(1) = 1
+    call append_rows(first, column, coefficient, has_bands, order, self)
+    call append_bands(first, order, entries, self)
+    allocate (self%column(entries), self%coefficient(self%lanes, entries))
+    self%column(:) = column(order(:entries))
+    self%coefficient(:, :) = coefficient(:, order(:entries))
+  end function new_sparse_map
+
+  !> Sorts the rows into bands and CSR rows.
+  subroutine append_rows(first, column, coefficient, has_bands, order, self)
+    integer, intent(in) :: first(:), column(:)
+    real(wp), intent(in) :: coefficient(:, :)
+    logical, intent(in) :: has_bands      !! whether bands are allowed
+    integer, intent(inout) :: order(:)    !! of the entries of the CSR rows
+    type(sparse_map_t), intent(inout) :: self
+    integer :: band_rows(size(first) - 1), begin, width
+
     band_rows = band_lengths(first, column)
     begin = 1
-    do while (begin <= rows)
+    do while (begin <= self%all_rows)
       width = first(begin + 1) - first(begin)
       if (has_bands .and. width > 0 .and. band_rows(begin) >= short) then
         self%bands = self%bands + 1
@@ -84,13 +99,9 @@ contains
       end if
       begin = begin + band_rows(begin)
     end do
-    call append_bands(first, order, entries, self)
-    allocate (self%column(entries), self%coefficient(self%lanes, entries))
-    self%column(:) = column(order(:entries))
-    self%coefficient(:, :) = coefficient(:, order(:entries))
-  end function new_sparse_map
+  end subroutine append_rows
 
-  !> How many rows from each row on have columns that advance by one from row to row.
+  !> Number of consecutive rows from each row on whose columns advance by one from row to row.
   pure function band_lengths(first, column) result(band_rows)
     integer, intent(in) :: first(:), column(:)
     integer :: band_rows(size(first) - 1)
@@ -106,9 +117,11 @@ contains
     end do
   end function band_lengths
 
+  !> Whether consecutive rows of equal width have equal coefficients in all lanes.
   pure logical function has_constant_diagonals(first, width, rows, coefficient)
-    integer, intent(in) :: first   !! entry of the first of these rows
-    integer, intent(in) :: width, rows
+    integer, intent(in) :: first   !! first entry of the first row
+    integer, intent(in) :: width   !! entries of each row
+    integer, intent(in) :: rows
     real(wp), intent(in) :: coefficient(:, :)   !! [lanes, entries]
     integer :: k
 
@@ -135,11 +148,11 @@ contains
     end do
   end subroutine append_csr_rows
 
-  !> The entries of the stretches follow those of the loose rows.
+  !> The entries of the bands follow those of the CSR rows.
   subroutine append_bands(first, order, entries, self)
     integer, intent(in) :: first(:)
     integer, intent(inout) :: order(:)
-    integer, intent(out) :: entries   !! that are stored
+    integer, intent(out) :: entries   !! number of entries that are stored
     type(sparse_map_t), intent(inout) :: self
     integer :: i, j, rows, s
 
@@ -154,7 +167,7 @@ contains
     end do
   end subroutine append_bands
 
-  !> Order of the entries of some rows in which they are sorted by their columns, and where those begin in it.
+  !> The transposed structure: the order of entries sorted by column, and the first entry of each column in that order.
   pure subroutine transposed_order(column, columns, order, first)
     integer, intent(in) :: column(:)     !! [entries]
     integer, intent(in) :: columns
@@ -351,12 +364,12 @@ contains
     end do
   end subroutine sum_on_lanes
 
-  !> New numbers of one lane of a map without stretches: of entry i that in column order(i).
+  !> Sets the coefficients of one lane of a map without bands: entry i becomes coefficient(lane, order(i)).
   subroutine set_lane(self, lane, coefficient, order)
     class(sparse_map_t), intent(inout) :: self
     integer, intent(in) :: lane
-    real(wp), intent(in) :: coefficient(:, :)   !! [lanes, columns]
-    integer, intent(in) :: order(:)
+    real(wp), intent(in) :: coefficient(:, :)   !! [lanes, numbers]
+    integer, intent(in) :: order(:)             !! [entries]
     integer :: i
 
     do i = 1, size(self%column)
@@ -364,12 +377,12 @@ contains
     end do
   end subroutine set_lane
 
-  !> A map of many lanes, or one without stretches.
+  !> Lists the coefficients; only for a map without bands.
   subroutine list_parameters(self, parameters)
     class(sparse_map_t), target, intent(inout) :: self
     type(lane_parameters_t), intent(inout) :: parameters
 
-    if (self%bands > 0) error stop 'nocdyn_sparse_map: the numbers in stretches are not those of lanes'
+    if (self%bands > 0) error stop 'nocdyn_sparse_map: parameters in bands cannot be listed'
     call parameters%add_structure(self%first(:self%csr_rows + 1))
     call parameters%add_structure(self%column)
     call parameters%add('map: coefficient', self%coefficient)

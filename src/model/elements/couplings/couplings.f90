@@ -1,6 +1,7 @@
-!> Elastic couplings: the nonlinear spring of eqs. (2), (3) with viscous damping and a twist at which it rests.
+!> Elastic couplings: the nonlinear spring of eqs. (2), (3), or a table, with viscous damping and a rest twist.
 !>
-!> A slipping clutch beside the spring resists with friction tanh(u' / friction_speed). Its work and the damping's are one.
+!> Friction in parallel with the spring resists with friction tanh(u' / friction_speed), as a slipping clutch does. Damping and
+!> friction have one work integral.
 module nocdyn_couplings
   use nocdyn_bank, only: quantity_t, role_coupling
   use nocdyn_curves, only: curve_t
@@ -16,7 +17,7 @@ module nocdyn_couplings
 
   public :: new_couplings, new_table_couplings
 
-  !> What couplings have whatever their elastic moment is; all parameters have the shape [lanes, couplings].
+  !> What couplings of every elastic law have in common. Parameters have the shape [lanes, couplings].
   type, public :: coupling_common_t
     type(string_t), allocatable :: names(:)
     integer, allocatable :: from(:), to(:)          !! bodies, 0 = ground
@@ -70,7 +71,7 @@ contains
     allocate (common%friction_speed, source=friction_speed)
   end function new_common
 
-  !> Couplings by eq. (3); the work of those without damping and friction in any lane is not integrated.
+  !> Couplings by eq. (3). Those without damping and friction in all lanes have no work integral.
   function new_couplings(common, stiffness, cubic_stiffness) result(bank)
     type(coupling_common_t), intent(in) :: common
     real(wp), intent(in) :: stiffness(:, :)            !! K1 [N m/rad], shape [lanes, couplings]
@@ -169,11 +170,11 @@ contains
     columns(damping_moment) = quantity_t('damping', 'N m', self%with_work)
   end function quantities
 
-  !> Twist, and the moments that act on the first body: F1 of the paper and the damping moment.
+  !> Twist [rad], and the moments on the first body [N m]: the elastic one, F1 of the paper, and that of damping and friction.
   pure subroutine observe(self, elements, quantity, lane, values)
     class(couplings_t), intent(in) :: self
     type(elements_t), intent(in) :: elements
-    integer, intent(in) :: quantity
+    integer, intent(in) :: quantity   !! twist, moment or damping_moment
     integer, intent(in) :: lane
     real(wp), intent(out) :: values(:)
 

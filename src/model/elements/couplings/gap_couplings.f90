@@ -1,9 +1,9 @@
 !> Couplings with backlash: no moment in a gap, contact beyond its edges.
 !>
-!> In contact the elastic moment M is that of the penetration of the edge, and the damping moment is d u', limited to the size
-!> of M: contact never pulls, and its moment begins at zero. It is the law of `ElastoBacklash` of the Modelica Standard
-!> Library. What the limited damping does is work; while the bodies separate faster than the contact can follow, it is the
-!> opposite of the elastic moment, and takes the energy that the contact still stores.
+!> In contact the elastic moment M is a function of the penetration of the edge. The damping moment is d u', limited to the
+!> size of M: the contact never pulls, and its moment starts at zero. It is the law of `ElastoBacklash` of the Modelica
+!> Standard Library. The damping moment does work. While the bodies separate faster than the contact can follow, it is the
+!> opposite of the elastic moment and dissipates the energy that the contact still stores.
 module nocdyn_gap_couplings
   use nocdyn_bank, only: boundary_width
   use nocdyn_couplings, only: coupling_common_t
@@ -20,8 +20,8 @@ module nocdyn_gap_couplings
 
   type, extends(polynomial_couplings_t), public :: gap_couplings_t
     real(wp), allocatable :: gap(:, :)      !! total play [rad], positive, shape [lanes, couplings] as all that follow
-    real(wp), allocatable :: boundary_shift(:, :)   !! by which borders are moved, as moment [N m]
-    real(wp), allocatable :: scale(:, :)    !! stiffness that makes a moment of a penetration [N m/rad]
+    real(wp), allocatable :: boundary_shift(:, :)   !! of the branches, as a moment [N m]
+    real(wp), allocatable :: scale(:, :)    !! stiffness that converts a penetration to a moment [N m/rad]
   contains
     procedure :: list_parameters
     procedure :: polynomials
@@ -33,11 +33,11 @@ module nocdyn_gap_couplings
     procedure :: switch_name
   end type gap_couplings_t
 
-  ! the branches; negative ones are at the edge -gap / 2
+  ! the branches; the negative of each is that at the edge -gap / 2
   integer, parameter :: free = 0
-  integer, parameter :: contact = 1      ! damping of d u'
-  integer, parameter :: closing = 2      ! it would be larger than the elastic moment, and is equal to it
-  integer, parameter :: separating = 3   ! the contact would pull; it has no moment
+  integer, parameter :: contact = 1      ! the damping moment is d u'
+  integer, parameter :: closing = 2      ! d u' is above the elastic moment; the damping moment is equal to that
+  integer, parameter :: separating = 3   ! d u' would make the contact pull; the moments cancel
 
 contains
 
@@ -65,21 +65,21 @@ contains
     call bank%set_switches([(e, e=1, size(bank%to))])
   end function new_gap_couplings
 
-  !> Whether the elastic moment of a contact can change its sign. A contact that would pull gives up what it stores, which is
-  !> work even without damping.
+  !> Whether the elastic moment of a contact can change its sign. A contact that would pull dissipates its stored energy, even
+  !> without damping.
   pure logical function can_pull(coefficient)
     real(wp), intent(in) :: coefficient(:, :)   !! p_k, shape [order, lanes]
 
     can_pull = any(coefficient(1::2, :) < 0) .or. any(abs(coefficient(2::2, :)) > 0)
   end function can_pull
 
-  !> Nothing is polynomial across an edge.
+  !> None: no polynomial holds on both sides of an edge.
   subroutine polynomials(self, laws)
     class(gap_couplings_t), intent(in) :: self
     type(polynomial_laws_t), intent(inout) :: laws
   end subroutine polynomials
 
-  !> Penetration of the edge at which a lane is, negative at the lower one.
+  !> Penetration of the edge of a branch [rad], negative at the lower edge.
   pure function penetration(self, branch, lane, coupling, angle) result(x)
     class(gap_couplings_t), intent(in) :: self
     integer, intent(in) :: branch, lane, coupling
@@ -111,6 +111,7 @@ contains
     call self%couplings_t%evaluate(time, angle, speed, restoring, applied)
   end subroutine evaluate
 
+  !> Damping moment of a branch [N m], or a derivative of it from those of M and d u'.
   pure function damping_moment(branch, elastic, viscous) result(moment)
     integer, intent(in) :: branch
     real(wp), intent(in) :: elastic, viscous   !! M, d u'
@@ -170,14 +171,14 @@ contains
     end do
   end subroutine evaluate_energies
 
-  !> The elastic and the viscous moment, both positive where they push.
+  !> Depth of the penetration, and the elastic and viscous moments, positive where they push the bodies apart.
   pure subroutine contact_moments(self, side, lane, coupling, angle, speed, depth, elastic, viscous)
     class(gap_couplings_t), intent(in) :: self
-    integer, intent(in) :: side             !! 1 or -1
+    integer, intent(in) :: side             !! 1: upper edge, -1: lower edge
     integer, intent(in) :: lane, coupling
     real(wp), intent(in) :: angle, speed
-    real(wp), intent(out) :: depth          !! of the penetration [rad]
-    real(wp), intent(out) :: elastic, viscous
+    real(wp), intent(out) :: depth          !! [rad]
+    real(wp), intent(out) :: elastic, viscous   !! M, d u' [N m]
     real(wp) :: x
 
     x = penetration(self, side, lane, coupling, angle)

@@ -1,4 +1,4 @@
-!> Couplings whose elastic moment is a polynomial of any order of the twist.
+!> Couplings whose elastic moment is a polynomial of the twist, of any order.
 module nocdyn_polynomial_couplings
   use nocdyn_couplings, only: coupling_common_t, couplings_t, new_couplings
   use nocdyn_elements, only: elements_t
@@ -39,7 +39,7 @@ contains
     bank%elastic = pack([(e, e=1, size(bank%to))], [(any(abs(coefficient(:, :, e)) > 0.0_wp), e=1, size(bank%to))])
   end function new_polynomial_couplings
 
-  !> p_1, p_2, ... of stiffnesses and further terms, of order 3 at least.
+  !> p_1, p_2, ...: the sum of both stiffnesses and of further coefficients, of order 3 at least.
   pure function elastic_coefficients(stiffness, cubic_stiffness, further) result(coefficient)
     real(wp), intent(in) :: stiffness, cubic_stiffness   !! [N m/rad], [N m/rad3]
     real(wp), intent(in) :: further(:)                   !! [N m/rad^k]
@@ -107,7 +107,7 @@ contains
 
   !> p_1 w + p_2 w^2 + ...
   pure function elastic_moment(p, w) result(moment)
-    real(wp), intent(in) :: p(:), w
+    real(wp), intent(in) :: p(:), w   !! [N m/rad^k], [rad]
     real(wp) :: moment
     integer :: k
 
@@ -119,7 +119,7 @@ contains
 
   !> d/dw of sum p_k w^k.
   pure function elastic_slope(p, w) result(slope)
-    real(wp), intent(in) :: p(:), w
+    real(wp), intent(in) :: p(:), w   !! [N m/rad^k], [rad]
     real(wp) :: slope
     integer :: k
 
@@ -131,7 +131,7 @@ contains
 
   !> d2/dw2 of sum p_k w^k.
   pure function elastic_curvature(p, w) result(curvature)
-    real(wp), intent(in) :: p(:), w
+    real(wp), intent(in) :: p(:), w   !! [N m/rad^k], [rad]
     real(wp) :: curvature
     integer :: k
 
@@ -143,7 +143,7 @@ contains
 
   !> sum p_k w^(k+1) / (k + 1).
   pure function elastic_energy(p, w) result(energy)
-    real(wp), intent(in) :: p(:), w
+    real(wp), intent(in) :: p(:), w   !! [N m/rad^k], [rad]
     real(wp) :: energy
     integer :: k
 

@@ -100,7 +100,7 @@ contains
     end do
   end subroutine evaluate_energies
 
-  !> ln cosh x for x >= 0, where it would lose digits by its series x^2 / 2 - x^4 / 12 + x^6 / 45.
+  !> ln cosh x for x >= 0; for small x by its series, x^2 / 2 - x^4 / 12 + x^6 / 45 - ..., as the formula would lose digits.
   pure real(wp) function log_cosh(x)
     real(wp), intent(in) :: x
 

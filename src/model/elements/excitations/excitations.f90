@@ -24,7 +24,7 @@ module nocdyn_excitations
     procedure :: to_mean_torque
   end type excitations_t
 
-  integer, parameter :: strip = 64   ! arguments whose sines are taken at a time
+  integer, parameter :: strip = 64   ! sines that are computed at a time
 
 contains
 
@@ -32,7 +32,7 @@ contains
   function new_excitations(names, body, amplitude, frequency, phase) result(bank)
     type(string_t), intent(in) :: names(:)
     integer, intent(in) :: body(:)
-    real(wp), intent(in) :: amplitude(:, :), frequency(:, :), phase(:, :)   !! [lanes, excitations]
+    real(wp), intent(in) :: amplitude(:, :), frequency(:, :), phase(:, :)   !! [N m], [rad/s], [rad], shape [lanes, excitations]
     type(excitations_t) :: bank
     integer :: e
 
@@ -100,7 +100,7 @@ contains
     call harmonic_series(self%lanes, self%values, last, stride, self%amplitude, self%frequency, self%phase, time, applied)
   end subroutine forcing_series
 
-  !> M'' = -omega_p^2 M, from M and M' at the given time.
+  !> Taylor coefficients from M and M' at the given time, by M'' = -omega_p^2 M.
   pure subroutine harmonic_series(lanes, n, last, stride, amplitude, frequency, phase, time, applied)
     integer, intent(in) :: lanes, n, last, stride
     real(wp), intent(in) :: amplitude(n), frequency(n), phase(n), time(lanes)
@@ -146,7 +146,7 @@ contains
     end associate
   end subroutine differentiate
 
-  !> The mean of a sine is zero; without a frequency it is a constant.
+  !> The mean of a sine is zero; with the frequency 0 it is a constant.
   subroutine to_mean_torque(self)
     class(excitations_t), intent(inout) :: self
 

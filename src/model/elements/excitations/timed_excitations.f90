@@ -1,4 +1,4 @@
-!> Excitations that begin and end: steps, ramps and half-sine pulses.
+!> Excitations that change during a limited time: steps, ramps and half-sine pulses.
 module nocdyn_timed_excitations
   use nocdyn_bank, only: bank_t, role_excitation, time_reached
   use nocdyn_elements, only: elements_t
@@ -12,14 +12,14 @@ module nocdyn_timed_excitations
   public :: new_timed_excitations
 
   integer, parameter, public :: shape_step = 1    !! 0, then the amplitude
-  integer, parameter, public :: shape_ramp = 2    !! linear from 0 to the amplitude, which then holds
-  integer, parameter, public :: shape_pulse = 3   !! half a sine with the amplitude, then 0 again
+  integer, parameter, public :: shape_ramp = 2    !! linear from 0 to the amplitude, then constant
+  integer, parameter, public :: shape_pulse = 3   !! half a sine wave with the amplitude, then 0
 
   type, extends(bank_t), public :: timed_excitations_t
     integer, allocatable :: shape(:)           !! shape_... of each
     real(wp), allocatable :: amplitude(:, :)   !! [N m], shape [lanes, excitations] as all that follow
     real(wp), allocatable :: begin(:, :)       !! [s]
-    real(wp), allocatable :: duration(:, :)    !! [s], positive; of no meaning for steps
+    real(wp), allocatable :: duration(:, :)    !! [s], positive; not used by steps
   contains
     procedure :: list_parameters
     procedure :: evaluate
@@ -39,7 +39,7 @@ contains
     type(string_t), intent(in) :: names(:)
     integer, intent(in) :: body(:)
     integer, intent(in) :: shape(:)   !! shape_... of each
-    real(wp), intent(in) :: amplitude(:, :), begin(:, :), duration(:, :)   !! [lanes, excitations]
+    real(wp), intent(in) :: amplitude(:, :), begin(:, :), duration(:, :)   !! [N m], [s], [s], shape [lanes, excitations]
     type(timed_excitations_t) :: bank
     integer :: e
 
@@ -68,6 +68,7 @@ contains
     end do
   end subroutine evaluate
 
+  !> Torque as a part of the amplitude.
   pure function part_of_amplitude(self, lane, excitation, time) result(part)
     class(timed_excitations_t), intent(in) :: self
     integer, intent(in) :: lane, excitation
@@ -107,7 +108,7 @@ contains
     end do
   end subroutine differentiate
 
-  !> When the change ends.
+  !> Time at which the change ends [s].
   pure function end_of_change(self, lane, excitation) result(time)
     class(timed_excitations_t), intent(in) :: self
     integer, intent(in) :: lane, excitation
@@ -132,7 +133,7 @@ contains
     end if
   end subroutine choose
 
-  !> In seconds; a lane that has passed a border does not come back.
+  !> In seconds, without a shift: time does not go back across a boundary.
   pure function indicator(self, switch, lane, t, angle, speed, internal)
     class(timed_excitations_t), intent(in) :: self
     integer, intent(in) :: switch, lane

@@ -1,7 +1,7 @@
-!> Excitations that are sums of sines of the time and of the angle of their body: sum of A sin(f t + order u + phase).
+!> Excitations that are sums of sines of the time and of the angle u of their body: sum of A sin(f t + order u + phase).
 !>
-!> Engine orders have f = 0. The pulsation of a synchronous motor with p pole pairs during its start, at twice the slip
-!> frequency, has f = 2 omega_mains and the order -2 p.
+!> Engine orders have f = 0. A synchronous motor with p pole pairs pulsates during its start at twice the slip frequency:
+!> f = 2 omega_mains, order = -2 p.
 module nocdyn_wave_excitations
   use nocdyn_bank, only: bank_t, role_excitation
   use nocdyn_elements, only: elements_t
@@ -34,7 +34,8 @@ contains
     type(string_t), intent(in) :: names(:)
     integer, intent(in) :: body(:)
     integer, intent(in) :: owner(:)   !! excitation of each term
-    real(wp), intent(in) :: amplitude(:, :), frequency(:, :), order(:, :), phase(:, :)   !! [lanes, terms]
+    real(wp), intent(in) :: amplitude(:, :), frequency(:, :)   !! [N m], [rad/s], shape [lanes, terms]
+    real(wp), intent(in) :: order(:, :), phase(:, :)           !! [1], [rad], shape [lanes, terms]
     type(wave_excitations_t) :: bank
     integer :: e
 

@@ -32,7 +32,7 @@ contains
     bank%viscous = viscous
   end function new_loads
 
-  !> The coefficients c are those of C, eq. (22).
+  !> The coefficients c are in C, eq. (22).
   subroutine polynomials(self, laws)
     class(loads_t), intent(in) :: self
     type(polynomial_laws_t), intent(inout) :: laws

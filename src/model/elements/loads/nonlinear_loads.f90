@@ -30,7 +30,8 @@ contains
   function new_nonlinear_loads(names, body, viscous, quadratic, constant, constant_speed, curve) result(bank)
     type(string_t), intent(in) :: names(:)
     integer, intent(in) :: body(:)
-    real(wp), intent(in) :: viscous(:, :), quadratic(:, :), constant(:, :), constant_speed(:, :)   !! [lanes, loads]
+    real(wp), intent(in) :: viscous(:, :), quadratic(:, :)         !! [N m s/rad], [N m s2/rad2], shape [lanes, loads]
+    real(wp), intent(in) :: constant(:, :), constant_speed(:, :)   !! [N m], [rad/s], shape [lanes, loads]
     type(curve_t), intent(in), optional :: curve(:, :)   !! resisting torque [N m] over speed [rad/s], [lanes, loads]; absent: 0
     type(nonlinear_loads_t) :: bank
 

@@ -11,7 +11,7 @@ module nocdyn_dc_motors
 
   public :: new_dc_motors
 
-  !> The inner states of a motor are its armature current i and, where a governor throttles the voltage, its integral.
+  !> The internal states of a motor are its armature current i [A] and, where a governor throttles the voltage, its integral.
   type, extends(bank_t), public :: dc_motors_t
     real(wp), allocatable :: voltage(:, :)         !! [V], shape [lanes, motors] as all parameters
     real(wp), allocatable :: resistance(:, :)      !! [Ohm]
@@ -37,7 +37,8 @@ contains
   function new_dc_motors(names, body, voltage, resistance, flux_constant, inductance, governor) result(bank)
     type(string_t), intent(in) :: names(:)
     integer, intent(in) :: body(:)
-    real(wp), intent(in) :: voltage(:, :), resistance(:, :), flux_constant(:, :), inductance(:, :)   !! [lanes, motors]
+    real(wp), intent(in) :: voltage(:, :), resistance(:, :)         !! [V], [Ohm], shape [lanes, motors]
+    real(wp), intent(in) :: flux_constant(:, :), inductance(:, :)   !! [V s/rad], [H], shape [lanes, motors]
     type(governor_t), intent(in), optional :: governor   !! no motor has one if absent
     type(dc_motors_t) :: bank
     integer :: e
@@ -160,7 +161,7 @@ contains
     name = 'limit of the governor'
   end function switch_name
 
-  !> Torque, current and, with a governor, throttle.
+  !> Torque, armature current and, with a governor, throttle.
   function quantities(self) result(columns)
     class(dc_motors_t), intent(in) :: self
     type(quantity_t), allocatable :: columns(:)

@@ -15,11 +15,11 @@ module nocdyn_governed_motors
 
   public :: new_governed_motors
 
-  !> y curve(omega) - drag omega, y the throttle, whose integral is an inner state. The switches of the governors follow those
-  !> of the curves.
+  !> M = y torque(omega) - drag omega with the throttle y of a governor, whose integral is an internal state. The switches of
+  !> the governors follow those of the tables.
   type, extends(curve_motors_t), public :: governed_motors_t
     type(governor_t) :: governor
-    real(wp), allocatable :: drag(:, :)   !! what no throttle changes [N m s/rad], shape [lanes, motors]
+    real(wp), allocatable :: drag(:, :)   !! not throttled [N m s/rad], shape [lanes, motors]
   contains
     procedure :: list_parameters
     procedure :: polynomials
@@ -64,14 +64,14 @@ contains
     laws%by_speed(:, self%first:self%last()) = -self%drag
   end subroutine polynomials
 
-  !> Number of the switch before the governors'.
+  !> Number of switches before those of the governors.
   pure integer function first_governor(self)
     class(governed_motors_t), intent(in) :: self
 
     first_governor = size(self%switch_element) - size(self%to)
   end function first_governor
 
-  !> All of it needs the throttle.
+  !> Adds nothing: the whole torque depends on the throttle, an internal state.
   subroutine evaluate(self, time, angle, speed, restoring, applied)
     class(governed_motors_t), intent(in) :: self
     real(wp), intent(in) :: time(self%lanes), angle(self%values), speed(self%values)

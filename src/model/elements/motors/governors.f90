@@ -1,8 +1,8 @@
 !> PI governors: the throttle y = clip(z + gain (set_speed - omega)) between 0 and 1, z' = (y - z) / time.
 !>
-!> Between its limits z' = gain (set_speed - omega) / time, the integral of a PI controller. At a limit z goes to the limit
-!> instead of away from it; a governor that stops integrating there would have to slide along the limit while it leaves it.
-!> (K. J. Astrom, T. Hagglund, PID Controllers, 2nd ed. 1995, section 3.5: tracking with the integral time.)
+!> Between the limits z' = gain (set_speed - omega) / time, the integral of a PI controller. At a limit z tends to the limit.
+!> Stopping the integration there (clamping) would make the state slide along the limit when the governor leaves it.
+!> (K. J. Astrom, T. Hagglund, PID Controllers, 2nd ed. 1995, section 3.5: anti-windup by tracking, with the integral time.)
 module nocdyn_governors
   use nocdyn_bank, only: boundary_width
   use nocdyn_kinds, only: wp
@@ -15,7 +15,7 @@ module nocdyn_governors
     real(wp), allocatable :: set_speed(:, :)   !! [rad/s]
     real(wp), allocatable :: gain(:, :)        !! [s/rad], not zero
     real(wp), allocatable :: time(:, :)        !! integral time [s], positive
-    real(wp), allocatable :: start(:, :)       !! throttle at the start, 0 to 1
+    real(wp), allocatable :: start(:, :)       !! throttle y at the start, 0 to 1
   contains
     procedure :: list_parameters
     procedure :: start_integral
@@ -30,20 +30,22 @@ module nocdyn_governors
 
 contains
 
-  !> z with which the throttle has its value at the start.
+  !> The integral z with which the throttle has its value at the start.
   pure function start_integral(self, lane, motor, speed) result(z)
     class(governor_t), intent(in) :: self
     integer, intent(in) :: lane, motor
-    real(wp), intent(in) :: speed
+    real(wp), intent(in) :: speed   !! [rad/s]
     real(wp) :: z
 
     z = self%start(lane, motor) - self%gain(lane, motor) * (self%set_speed(lane, motor) - speed)
   end function start_integral
 
+  !> Throttle y on a branch.
   pure function throttle(self, lane, motor, branch, z, speed) result(y)
     class(governor_t), intent(in) :: self
-    integer, intent(in) :: lane, motor, branch
-    real(wp), intent(in) :: z, speed
+    integer, intent(in) :: lane, motor
+    integer, intent(in) :: branch   !! closed, governing or open
+    real(wp), intent(in) :: z, speed   !! integral, speed of the motor [rad/s]
     real(wp) :: y
 
     select case (branch)
@@ -56,7 +58,7 @@ contains
     end select
   end function throttle
 
-  !> z'.
+  !> Rate z' of the integral [1/s].
   pure function rate(self, lane, motor, throttle, z)
     class(governor_t), intent(in) :: self
     integer, intent(in) :: lane, motor
@@ -69,7 +71,8 @@ contains
   !> Derivatives of the throttle and of z' by z and by the speed.
   pure subroutine slopes(self, lane, motor, branch, by_integral, by_speed, rate_by_integral, rate_by_speed)
     class(governor_t), intent(in) :: self
-    integer, intent(in) :: lane, motor, branch
+    integer, intent(in) :: lane, motor
+    integer, intent(in) :: branch   !! closed, governing or open
     real(wp), intent(out) :: by_integral, by_speed             !! of the throttle
     real(wp), intent(out) :: rate_by_integral, rate_by_speed   !! of z'
 
@@ -79,11 +82,11 @@ contains
     rate_by_speed = by_speed / self%time(lane, motor)
   end subroutine slopes
 
-  !> The branch in which the throttle is.
+  !> The branch that contains the state.
   pure integer function branch(self, lane, motor, z, speed)
     class(governor_t), intent(in) :: self
     integer, intent(in) :: lane, motor
-    real(wp), intent(in) :: z, speed
+    real(wp), intent(in) :: z, speed   !! integral, speed of the motor [rad/s]
 
     branch = governing
     associate (y => self%throttle(lane, motor, governing, z, speed))
@@ -92,11 +95,12 @@ contains
     end associate
   end function branch
 
-  !> How far the throttle is inside a branch.
+  !> Distance of the throttle from the nearest boundary of a branch, negative beyond it.
   pure function indicator(self, lane, motor, branch, z, speed)
     class(governor_t), intent(in) :: self
-    integer, intent(in) :: lane, motor, branch
-    real(wp), intent(in) :: z, speed
+    integer, intent(in) :: lane, motor
+    integer, intent(in) :: branch   !! closed, governing or open
+    real(wp), intent(in) :: z, speed   !! integral, speed of the motor [rad/s]
     real(wp) :: indicator
 
     associate (y => self%throttle(lane, motor, governing, z, speed))

@@ -25,7 +25,7 @@ contains
   function new_motors(names, body, a, b, c) result(bank)
     type(string_t), intent(in) :: names(:)
     integer, intent(in) :: body(:)
-    real(wp), intent(in) :: a(:, :), b(:, :), c(:, :)   !! [lanes, motors]
+    real(wp), intent(in) :: a(:, :), b(:, :), c(:, :)   !! [N m], [N m s/rad], [N m s2/rad2], shape [lanes, motors]
     type(motors_t) :: bank
     integer :: e
 

@@ -1,11 +1,11 @@
-!> Torques of motors over their speed.
+!> Torque-speed laws of motors that are smooth.
 module nocdyn_torque_curves
   use nocdyn_kinds, only: wp
   use nocdyn_lane_parameters, only: lane_parameters_t
   implicit none (type, external)
   private
 
-  !> The curves of the motors of a bank.
+  !> The laws of the motors of a bank.
   type, abstract, public :: torque_curve_t
   contains
     procedure(torque_interface), deferred :: torque   !! [N m]
