@@ -96,9 +96,9 @@ def test_matrices_name_the_laws_that_are_not_those_of_the_paper(nocdyn):
     [
         (
             "gap = 0.1 polynomial = 0, 0",
-            "gap needs an elastic moment at its edges: stiffness, cubic_stiffness or polynomial that is not 0",
+            "gap = 0.1 needs an elastic moment at its edges: stiffness, cubic_stiffness or polynomial that is not 0",
         ),
-        ("stiffness = 0 saturation = 5", "saturation needs a stiffness that is not 0"),
+        ("stiffness = 0 saturation = 5", "saturation = 5 needs stiffness > 0 [N m/rad]"),
     ],
 )
 def test_edges_and_limits_without_stiffness_are_refused(nocdyn, law, complaint):

@@ -1,4 +1,4 @@
-!> Machines with elements of every kind.
+!> Machines with elements of every kind, for the tests that compare formulations, Jacobians and lanes.
 module nocdyn_test_full_machines
   use nocdyn_bank, only: append_bank, role_excitation
   use nocdyn_couplings, only: coupling_common_t, new_table_couplings
@@ -27,7 +27,7 @@ module nocdyn_test_full_machines
 
 contains
 
-  !> A random machine with further elements of every kind; the numbers of a lane depend on its variant.
+  !> A random machine with further elements of every kind; the parameters of a lane depend on its variant.
   function full_machine(seed, bodies, variants, wanted, choice) result(machine)
     integer, intent(in) :: seed
     integer, intent(in) :: bodies        !! at least 2
@@ -44,7 +44,7 @@ contains
     call finish(machine, wanted, choice)
   end function full_machine
 
-  !> The same number for every element, a little different in every lane.
+  !> A parameter with the same value for every element, a little different in every lane, [lanes, elements].
   pure function lane_values(value, variants, count)
     real(wp), intent(in) :: value
     integer, intent(in) :: variants(:), count
@@ -53,7 +53,7 @@ contains
     lane_values = spread(value * (1.0_wp + 0.03_wp * variants), 2, count)
   end function lane_values
 
-  !> A curve that is a little different in every lane.
+  !> A curve for every element, a little different in every lane, [lanes, elements].
   function curves(x, y, interpolation, extrapolation, variants, count) result(all_curves)
     real(wp), intent(in) :: x(:), y(:)
     integer, intent(in) :: interpolation, extrapolation

@@ -1,4 +1,4 @@
-!> Runs of variants one after the other in the lanes of a block, whose numbers are copied.
+!> Runs of variants one after the other in the lanes of a block, into which their parameters are copied.
 module nocdyn_test_lane_copies
   use nocdyn_errors, only: error_t
   use nocdyn_integration, only: integrate_ensemble
@@ -16,10 +16,10 @@ module nocdyn_test_lane_copies
 
   public :: run_alone, run_copied
 
-  !> Copies the lanes of a source, in their order, into whatever lane is free.
+  !> Copies the lanes of a source, in their order, into the lanes that become free.
   type, extends(ensemble_t) :: copies_t
     type(lane_parameters_t) :: block, source
-    real(wp), allocatable :: y(:, :)     !! [variants, components]: starts, and then ends
+    real(wp), allocatable :: y(:, :)     !! [variants, components]: start states, then end states
     integer, allocatable :: variant(:)   !! in each lane
     integer :: next_variant = 1
     integer :: done = 0
@@ -30,9 +30,9 @@ module nocdyn_test_lane_copies
 
 contains
 
-  !> Ends of the lanes of a machine, each run in a block of its own.
+  !> End states of machines, each run in a block of its own.
   subroutine run_alone(machines, method, times, y)
-    type(machine_t), intent(in) :: machines(:)   !! of one lane each
+    type(machine_t), intent(in) :: machines(:)   !! with one lane each
     character(len=*), intent(in) :: method
     real(wp), contiguous, intent(in) :: times(:)
     real(wp), allocatable, intent(out) :: y(:, :)   !! [machines, components]
@@ -52,12 +52,12 @@ contains
     end do
   end subroutine run_alone
 
-  !> Ends of the lanes of a source, copied into those of a block that holds other numbers.
+  !> End states of the lanes of a source, copied into the lanes of a block with other parameters.
   subroutine run_copied(source, block, method, times, y)
     type(reduced_t), target, intent(inout) :: source, block
     character(len=*), intent(in) :: method
     real(wp), contiguous, intent(in) :: times(:)
-    real(wp), allocatable, intent(out) :: y(:, :)   !! [lanes of the source, components]; not allocated: the layouts differ
+    real(wp), allocatable, intent(out) :: y(:, :)   !! [lanes of the source, components]; not allocated: the structures differ
     type(copies_t) :: ensemble
 
     call source%list_parameters(ensemble%source)

@@ -1,4 +1,4 @@
-!> How well the derivatives and energies of a bank of one element and lane fit its law.
+!> Errors of the analytic derivatives and of the energy of a bank with one element and one lane.
 module nocdyn_test_law_checks
   use nocdyn_bank, only: bank_t
   use nocdyn_elements, only: elements_t
@@ -10,16 +10,16 @@ module nocdyn_test_law_checks
 
   public :: law_error, energy_error
 
-  real(wp), parameter :: step = 1.0e-3_wp   !! leaves step^4 / 30 of a fifth derivative, and rounding of 1e-13
+  real(wp), parameter :: step = 1.0e-3_wp   !! the error is step^4 / 30 times the fifth derivative, and rounding of 1e-13
 
 contains
 
   !> The largest difference between a derivative and its finite difference, relative to the largest derivative or 1.
   function law_error(bank, angle, speed, time, internal) result(error)
-    class(bank_t), intent(inout) :: bank   !! its branches are chosen
-    real(wp), intent(in) :: angle, speed
-    real(wp), intent(in), optional :: time
-    real(wp), intent(in), optional :: internal(:)
+    class(bank_t), intent(inout) :: bank   !! its branches are set here
+    real(wp), intent(in) :: angle, speed            !! u [rad], u' [rad/s]
+    real(wp), intent(in), optional :: time          !! [s]; absent: 0
+    real(wp), intent(in), optional :: internal(:)   !! internal states; absent: 0
     real(wp) :: error
     type(elements_t) :: elements
     type(law_slopes_t) :: slopes
@@ -57,11 +57,11 @@ contains
     misfit = maxval([0.0_wp, abs(expected - found)]) / max(1.0_wp, maxval([0.0_wp, abs(expected)]))
   end function misfit
 
-  !> The difference between the growth of the stored energy and the integral of the restoring moment by the trapezoidal rule,
-  !> relative to the largest energy; the angle passes through all branches on the way.
+  !> The difference between the increase of the stored energy and the integral of the restoring moment (trapezoidal rule),
+  !> relative to the largest energy. The range of angles should contain all branches.
   function energy_error(bank, low, high) result(error)
     class(bank_t), intent(inout) :: bank
-    real(wp), intent(in) :: low, high   !! angles
+    real(wp), intent(in) :: low, high   !! ends of the range of angles [rad]
     real(wp) :: error
     type(elements_t) :: elements
     integer, parameter :: steps = 20000

@@ -1,7 +1,7 @@
-!> Derivatives of the laws of banks by central differences of fourth order, against which the analytic ones are checked.
+!> Derivatives of the laws of banks by central differences of fourth order, to check the analytic ones.
 !>
 !> They are exact for polynomials of degree four, for which a large step is best: only rounding remains. The branches of a
-!> bank stay as they are.
+!> bank do not change.
 module nocdyn_test_law_differences
   use nocdyn_bank, only: bank_t
   use nocdyn_elements, only: elements_t, new_elements
@@ -13,33 +13,32 @@ module nocdyn_test_law_differences
   public :: difference_laws, elements_of, evaluate_all, choose_branches, indicators_of
 
   integer, parameter, public :: by_angle = 1, by_speed = 2, by_time = 3
-  integer, parameter, public :: by_state = 3   !! + number of the inner state of each element
+  integer, parameter, public :: by_state = 3   !! + number of the internal state of each element
 
   real(wp), parameter :: offset(4) = [-2.0_wp, -1.0_wp, 1.0_wp, 2.0_wp]
   real(wp), parameter :: weight(4) = [1.0_wp, -8.0_wp, 8.0_wp, -1.0_wp] / 12.0_wp
   real(wp), parameter :: state_step = 0.1_wp
   real(wp), parameter :: time_step = 1.0e-3_wp
 
-  !> Derivatives of what a bank computes, [lanes, elements].
+  !> Derivatives of the moments and energies of a bank, [lanes, elements].
   type, public :: law_slopes_t
     real(wp), allocatable :: restoring(:, :), applied(:, :), stored(:, :)
-    real(wp), allocatable :: tangent(:, :)   !! of `restoring_angle`
-    real(wp), allocatable :: rate(:, :)      !! of the inner states, [lanes, inner states]
+    real(wp), allocatable :: tangent(:, :)   !! derivative of `restoring_angle`
+    real(wp), allocatable :: rate(:, :)      !! derivatives of the rates of the internal states, [lanes, internal states]
   end type law_slopes_t
 
 contains
 
-  !> The elements of a bank that is alone, at rest.
+  !> The elements of a machine with one bank, at rest.
   function elements_of(bank) result(elements)
     class(bank_t), intent(in) :: bank
     type(elements_t) :: elements
-
     integer :: e
 
     elements = new_elements(bank%lanes, bank%from, bank%to, [(bank%states, e=1, size(bank%to))])
   end function elements_of
 
-  !> All that a bank finds for its elements at their angles, speeds and time.
+  !> Sets moments, derivatives, energies and rates of the elements from their angles, speeds, internal states and time.
   subroutine evaluate_all(bank, elements)
     class(bank_t), intent(in) :: bank
     type(elements_t), intent(inout) :: elements
@@ -58,7 +57,7 @@ contains
     call bank%evaluate_energies(elements)
   end subroutine evaluate_all
 
-  !> Puts every lane of a bank on the branches in which its elements are.
+  !> Sets the branches of all lanes of a bank to those that contain the states of its elements.
   subroutine choose_branches(bank, elements)
     class(bank_t), intent(inout) :: bank
     type(elements_t), intent(in) :: elements
@@ -73,7 +72,7 @@ contains
     end do
   end subroutine choose_branches
 
-  !> How far the lanes are from the borders of their branches, [lanes, switches].
+  !> Distances of the lanes from the boundaries of their branches, [lanes, switches].
   function indicators_of(bank, elements) result(indicators)
     class(bank_t), intent(in) :: bank
     type(elements_t), intent(in) :: elements
@@ -99,7 +98,7 @@ contains
     internal = elements%internal%value(lane, (element - 1) * bank%states + 1:element * bank%states)
   end function states_of
 
-  !> Derivatives of the laws of a bank by its angles, its speeds, the time or an inner state.
+  !> Derivatives of the laws of a bank by its angles, its speeds, the time or an internal state.
   function difference_laws(bank, elements, variable, by) result(slopes)
     class(bank_t), intent(in) :: bank
     type(elements_t), intent(in) :: elements

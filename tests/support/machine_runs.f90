@@ -18,7 +18,7 @@ module nocdyn_test_machine_runs
   type, public :: machine_run_t
     real(wp), allocatable :: phi(:, :), omega(:, :)   !! [bodies, times]
     real(wp), allocatable :: energy(:)                !! kinetic and stored [J]
-    real(wp), allocatable :: work(:)                  !! of all accounted elements [J]
+    real(wp), allocatable :: work(:)                  !! sum over all elements with a work integral [J]
     real(wp) :: effort = 0.0_wp                       !! the largest sum of absolute works [J]
     type(solver_status_t) :: solver_status
   end type machine_run_t

@@ -1,4 +1,4 @@
-!> Machines to test with.
+!> Machines for tests.
 module nocdyn_test_machines
   use nocdyn_bank, only: bank_slot_t, bank_t
   use nocdyn_constraint_analysis, only: analyse_constraints
@@ -61,7 +61,7 @@ contains
     call finish(machine, [integer ::], 1)
   end function damped_chain
 
-  !> Rotors of 1 kg m2 in a row, driven at the first and braked at the last.
+  !> Rotors of 1 kg m2 in a row, driven at the first one and braked at the last one.
   function long_chain(bodies) result(machine)
     integer, intent(in) :: bodies
     type(machine_t) :: machine
@@ -98,7 +98,7 @@ contains
     call finish(machine, [integer ::], choice)
   end function branched_train
 
-  !> Four wheels in a ring, the last gear of which repeats the others, and a fifth body on a coupling.
+  !> Four wheels in a ring, whose last gear is redundant, and a fifth body on a coupling.
   function gear_loop() result(machine)
     type(machine_t) :: machine
 
@@ -113,7 +113,7 @@ contains
     call finish(machine, [integer ::], 1)
   end function gear_loop
 
-  !> Bodies at rest that nothing joins or drives.
+  !> Bodies at rest without elements and constraints.
   function machine_of_bodies(inertia) result(machine)
     real(wp), intent(in) :: inertia(:, :)   !! [lanes, bodies] [kg m2]
     type(machine_t) :: machine
@@ -127,7 +127,7 @@ contains
     machine%constraints = gear_rows(machine%bodies, reshape([integer ::], [2, 0]), inertia(:, :0))
   end function machine_of_bodies
 
-  !> One bank of every kind in the order of the roles, without elements.
+  !> One empty bank of each role, in the order of the roles.
   function element_banks(lanes) result(banks)
     integer, intent(in) :: lanes
     type(bank_slot_t), allocatable :: banks(:)
@@ -141,7 +141,7 @@ contains
     call install(banks, new_excitations(names, [integer ::], none, none, none))
   end function element_banks
 
-  !> Puts a bank into the place of its role; what was there is dropped.
+  !> Replaces the bank of the same role.
   subroutine install(banks, bank)
     type(bank_slot_t), intent(inout) :: banks(:)
     class(bank_t), intent(in) :: bank
@@ -156,7 +156,7 @@ contains
   function gear_rows(bodies, wheels, coefficients) result(constraints)
     integer, intent(in) :: bodies
     integer, intent(in) :: wheels(:, :)          !! [2, gears]
-    real(wp), intent(in) :: coefficients(:, :)   !! radii, negative for the second of an internal gear, [lanes, 2 gears]
+    real(wp), intent(in) :: coefficients(:, :)   !! radii [m], negative for the second of an internal gear, [lanes, 2 gears]
     type(constraints_t) :: constraints
     integer :: i
 
@@ -169,17 +169,17 @@ contains
   !> Numbers the elements and analyses the gears of a machine that has everything else.
   subroutine finish(machine, wanted, choice)
     type(machine_t), intent(inout) :: machine
-    integer, intent(in) :: wanted(:)   !! bodies that are to be the coordinates, none to have them found
+    integer, intent(in) :: wanted(:)   !! bodies that become the coordinates; empty: they are found
     integer, intent(in) :: choice      !! complement_...
     type(error_t), allocatable :: error
     integer :: offending_row
 
     call machine%number_elements()
     call analyse_constraints(machine%constraints, machine%names, wanted, machine%trains, machine%groups, offending_row, error)
-    if (allocated(error)) error stop 'nocdyn_test_machines: a machine to test with has gears that lock'
+    if (allocated(error)) error stop 'nocdyn_test_machines: a machine for tests has gears that lock'
     call build_coordinates(machine%constraints, machine%names, machine%trains, machine%groups, machine%inertia, wanted, choice, &
                            machine%coordinates, error)
-    if (allocated(error)) error stop 'nocdyn_test_machines: a machine to test with has gears that are too steep'
+    if (allocated(error)) error stop 'nocdyn_test_machines: the ratios of a machine for tests are too large'
   end subroutine finish
 
   function numbered_names(stem, count) result(names)
@@ -193,7 +193,7 @@ contains
     end do
   end function numbered_names
 
-  !> The numbers of a single lane.
+  !> The parameters of a single lane, [1, elements].
   pure function row(values)
     real(wp), intent(in) :: values(:)
     real(wp) :: row(1, size(values))

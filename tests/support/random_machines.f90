@@ -1,4 +1,4 @@
-!> Machines of any size that are different with every seed, alone or in blocks of lanes.
+!> Random machines of any size, different with every seed, of one lane or several.
 module nocdyn_test_random_machines
   use nocdyn_constraints, only: constraints_t
   use nocdyn_couplings, only: coupling_common_t, new_couplings
@@ -17,17 +17,17 @@ module nocdyn_test_random_machines
 
 contains
 
-  !> A forest of gears, external and internal, with gears that repeat others, and elements of all kinds.
+  !> Trees of gears, external and internal, with redundant gears, and polynomial elements of all roles.
   !>
-  !> What is joined to what depends on `seed`; the numbers of a lane on `seed` and on the variant of that lane.
+  !> The structure depends on `seed`, the parameters of a lane on `seed` and on the variant of the lane.
   function random_machine(seed, bodies, variants, wanted, choice) result(machine)
     integer, intent(in) :: seed, bodies
     integer, intent(in) :: variants(:)   !! of each lane
-    integer, intent(in) :: wanted(:)     !! bodies that are to be the coordinates, none to have them found
+    integer, intent(in) :: wanted(:)     !! bodies that become the coordinates; empty: they are found
     integer, intent(in) :: choice        !! complement_...
     type(machine_t) :: machine
     type(random_stream_t) :: layout, lanes(size(variants))
-    real(wp) :: speed(size(variants), bodies)   ! with which all gears of the machine can run together
+    real(wp) :: speed(size(variants), bodies)   ! speeds that satisfy all gears
     integer :: b, l
 
     layout = random_stream(seed)
@@ -47,7 +47,7 @@ contains
     call finish(machine, wanted, choice)
   end function random_machine
 
-  !> Gears that fit the speeds: m speed(b) * omega(a) - m speed(a) * omega(b) = 0.
+  !> Gears that the speeds satisfy: m speed(b) * omega(a) - m speed(a) * omega(b) = 0.
   function random_gears(layout, lanes, speed) result(constraints)
     type(random_stream_t), intent(inout) :: layout, lanes(:)
     real(wp), intent(in) :: speed(:, :)   !! [lanes, bodies]
@@ -66,7 +66,7 @@ contains
     constraints = gear_rows(size(speed, 2), wheels, coefficients)
   end function random_gears
 
-  !> Most bodies mesh with an earlier one; then some more gears within the groups.
+  !> Most bodies mesh with an earlier one; then some redundant gears within the groups.
   function random_wheels(layout, bodies) result(wheels)
     type(random_stream_t), intent(inout) :: layout
     integer, intent(in) :: bodies
@@ -126,7 +126,7 @@ contains
                                                 drawn(lanes, -3.0_wp, 3.0_wp, 2)))
   end subroutine add_torques
 
-  !> Numbers of every lane from its own stream, [lanes, count].
+  !> Random numbers of every lane from its own stream, [lanes, count].
   function drawn(lanes, low, high, count) result(values)
     type(random_stream_t), intent(inout) :: lanes(:)
     real(wp), intent(in) :: low, high

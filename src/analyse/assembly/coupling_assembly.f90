@@ -9,6 +9,7 @@ module nocdyn_coupling_assembly
   use nocdyn_kinds, only: wp
   use nocdyn_polynomial_couplings, only: elastic_coefficients, new_polynomial_couplings
   use nocdyn_saturated_couplings, only: new_saturated_couplings
+  use nocdyn_text, only: to_text
   implicit none (type, external)
   private
 
@@ -31,12 +32,12 @@ contains
         select case (form_of(group))
         case (gap)
           if (any(abs(coefficients_of(group)) > 0)) cycle
-          call raise(error, exit_input, input%location(indices(i), 'gap') // ': gap needs an elastic moment at its edges: ' // &
-                     'stiffness, cubic_stiffness or polynomial that is not 0')
+          call raise(error, exit_input, input%location(indices(i), 'gap') // ': gap = ' // to_text(group%number('gap')) // &
+                     ' needs an elastic moment at its edges: stiffness, cubic_stiffness or polynomial that is not 0')
         case (saturated)
           if (group%number('stiffness') > 0) cycle
-          call raise(error, exit_input, &
-                     input%location(indices(i), 'saturation') // ': saturation needs a stiffness that is not 0')
+          call raise(error, exit_input, input%location(indices(i), 'saturation') // ': saturation = ' // &
+                     to_text(group%number('saturation')) // ' needs stiffness > 0 [N m/rad]')
         case default
           cycle
         end select

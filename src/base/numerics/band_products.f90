@@ -89,25 +89,10 @@ contains
     logical, intent(in) :: without_offset   !! whether `offset` is zero
     real(wp), intent(in) :: coefficient(width), offset(rows), x(columns), y(columns)
     real(wp), intent(inout) :: u(rows), v(rows)
-    real(wp) :: a, b
-    integer :: begin, c, d, i, k
+    integer :: begin, c, i, k
 
-    if (width == 2) then   ! of a chain: nothing is read twice
-      a = coefficient(1)
-      b = coefficient(2)
-      c = column(1) - 1
-      d = column(2) - 1
-      if (without_offset) then
-        do i = 1, rows
-          u(i) = (0.0_wp + a * x(c + i)) + b * x(d + i)
-          v(i) = (0.0_wp + a * y(c + i)) + b * y(d + i)
-        end do
-      else
-        do i = 1, rows
-          u(i) = (offset(i) + a * x(c + i)) + b * x(d + i)
-          v(i) = (0.0_wp + a * y(c + i)) + b * y(d + i)
-        end do
-      end if
+    if (width == 2) then
+      call pair_of_chain(rows, columns, column, coefficient, without_offset, offset, x, y, u, v)
       return
     end if
     do begin = 1, rows, strip
@@ -125,6 +110,33 @@ contains
       end do
     end do
   end subroutine pair_of_toeplitz
+
+  !> The same for two diagonals, as those of a chain: nothing is read twice.
+  pure subroutine pair_of_chain(rows, columns, column, coefficient, without_offset, offset, x, y, u, v)
+    integer, intent(in) :: rows, columns
+    integer, intent(in) :: column(2)
+    logical, intent(in) :: without_offset   !! whether `offset` is zero
+    real(wp), intent(in) :: coefficient(2), offset(rows), x(columns), y(columns)
+    real(wp), intent(inout) :: u(rows), v(rows)
+    real(wp) :: a, b
+    integer :: c, d, i
+
+    a = coefficient(1)
+    b = coefficient(2)
+    c = column(1) - 1
+    d = column(2) - 1
+    if (without_offset) then
+      do i = 1, rows
+        u(i) = (0.0_wp + a * x(c + i)) + b * x(d + i)
+        v(i) = (0.0_wp + a * y(c + i)) + b * y(d + i)
+      end do
+    else
+      do i = 1, rows
+        u(i) = (offset(i) + a * x(c + i)) + b * x(d + i)
+        v(i) = (0.0_wp + a * y(c + i)) + b * y(d + i)
+      end do
+    end if
+  end subroutine pair_of_chain
 
   !> u = A (x + y).
   pure subroutine sum_of_band(rows, width, columns, column, coefficient, x, y, u)

@@ -251,7 +251,7 @@ contains
 
     call self%polynomial_couplings_t%list_parameters(parameters)
     call parameters%add('gap', self%gap)
-    call parameters%add('border', self%boundary_shift)
+    call parameters%add('boundary_shift', self%boundary_shift)
     call parameters%add('scale', self%scale)
   end subroutine list_parameters
 
