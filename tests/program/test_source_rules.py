@@ -12,13 +12,12 @@ FOLDERS = ("src", "tests", "bench", "docs/examples")  # files .f90; those of the
 
 # arrays are arguments of their own, so that the compiler knows that they are contiguous and do not overlap
 KERNEL = "kernel"
-LAW = "constructor of a law: one argument for each of its parameters"
 
 # Procedures with more arguments, by file, and why.
 MANY_ARGUMENTS = {
     "src/analyse/sweep/statistics/linear_statistics.f90": (KERNEL, "bound_excess", "look_inside"),
     "src/analyse/sweep/statistics/step_strips.f90": (KERNEL, "add_integrals", "add_pair", "cut_step", "expand", "set_pair"),
-    "src/base/numerics/band_products.f90": (KERNEL, "pair_of_band", "pair_of_toeplitz"),
+    "src/base/numerics/band_products.f90": (KERNEL, "pair_of_band", "pair_of_chain", "pair_of_toeplitz"),
     "src/base/numerics/csr_products.f90": (KERNEL, "multiply_lanes", "multiply_rows"),
     "src/integrate/core/stage_sums.f90": (KERNEL, "sum_tiles", "sum_up_to_12", "sum_up_to_4", "sum_up_to_8"),
     "src/integrate/core/step_control.f90": (KERNEL, "adapt_accepted_steps", "limit_by_quadratures"),
@@ -28,13 +27,7 @@ MANY_ARGUMENTS = {
         "constructor: what the analysis of the constraints has found, and the bodies that the user wants",
         "build_coordinates",
     ),
-    "src/model/elements/couplings/couplings.f90": (LAW, "new_couplings"),
-    "src/model/elements/couplings/gap_couplings.f90": (
-        f"{LAW}; index and motion of a gap and the parts of its moment",
-        "contact_moments",
-        "new_gap_couplings",
-    ),
-    "src/model/elements/couplings/saturated_couplings.f90": (LAW, "new_saturated_couplings"),
+    "src/model/elements/couplings/gap_couplings.f90": ("index and motion of a gap, and its moments", "contact_moments"),
     "src/model/elements/excitations/excitations.f90": (KERNEL, "harmonic_series"),
     "src/model/elements/polynomial_laws.f90": (KERNEL, "moments"),
     "src/model/formulations/kernels/lane_motion.f90": (
