@@ -1,4 +1,4 @@
-!> Systems that give the Taylor series of their solutions.
+!> Systems with Taylor series of their solutions.
 module nocdyn_series_problems
   use nocdyn_kinds, only: wp
   use nocdyn_oscillators, only: oscillators_t
@@ -28,7 +28,7 @@ module nocdyn_series_problems
     procedure :: series => oscillator_series
   end type oscillator_series_t
 
-  !> u' = u^2, whose solution u = u0 / (1 - u0 t) ends at t = 1 / u0; beyond u = limit the answer is `answer`.
+  !> u' = u^2, whose solution u = u0 / (1 - u0 t) has a pole at t = 1 / u0; beyond u = limit the evaluation returns `answer`.
   type, extends(system_t), public :: burst_t
     real(wp), allocatable :: limit(:)
     integer, allocatable :: answer(:)    !! evaluation_... or answer_nan
@@ -43,12 +43,12 @@ module nocdyn_series_problems
 
 contains
 
-  function duffing_obstacle(self) result(obstacle)
+  subroutine duffing_obstacle(self, obstacle)
     class(duffing_series_t), intent(in) :: self
-    character(len=:), allocatable :: obstacle
+    character(len=:), allocatable, intent(out) :: obstacle
 
     obstacle = ''
-  end function duffing_obstacle
+  end subroutine duffing_obstacle
 
   subroutine prepare_duffing(self, order)
     class(duffing_series_t), intent(inout) :: self
@@ -89,12 +89,12 @@ contains
     end do
   end subroutine duffing_series
 
-  function oscillator_obstacle(self) result(obstacle)
+  subroutine oscillator_obstacle(self, obstacle)
     class(oscillator_series_t), intent(in) :: self
-    character(len=:), allocatable :: obstacle
+    character(len=:), allocatable, intent(out) :: obstacle
 
     obstacle = ''
-  end function oscillator_obstacle
+  end subroutine oscillator_obstacle
 
   subroutine prepare_oscillators(self, order)
     class(oscillator_series_t), intent(inout) :: self
@@ -154,12 +154,12 @@ contains
     where (y(:, 1) > self%limit) status = max(evaluation_ok, self%answer)
   end subroutine burst_jacobian
 
-  function burst_obstacle(self) result(obstacle)
+  subroutine burst_obstacle(self, obstacle)
     class(burst_t), intent(in) :: self
-    character(len=:), allocatable :: obstacle
+    character(len=:), allocatable, intent(out) :: obstacle
 
     obstacle = ''
-  end function burst_obstacle
+  end subroutine burst_obstacle
 
   subroutine prepare_burst(self, order)
     class(burst_t), intent(inout) :: self
@@ -191,7 +191,7 @@ contains
     end where
   end subroutine burst_series
 
-  !> NaN that raises no exception when it is made or copied.
+  !> A NaN whose creation and copies raise no exception.
   pure function quiet_nan() result(nan)
     use, intrinsic :: iso_fortran_env, only: int64
     real(wp) :: nan

@@ -100,7 +100,7 @@ contains
     integer, allocatable :: indices(:)
     character(len=:), allocatable :: obstacle
 
-    obstacle = formulation%series_obstacle()
+    call formulation%series_obstacle(obstacle)
     if (len(obstacle) == 0) return
     allocate (indices, source=input%groups_named('run'))
     call raise(error, exit_input, input%location(indices(1), 'method') // ': method = ' // quoted('taylor') // &

@@ -103,13 +103,14 @@ contains
     if (index > self%states) name = 'quadrature ' // to_text(index - self%states)
   end function component_name
 
-  !> The reason why the solution has no Taylor series, e.g. "coupling 'x' has no Taylor series"; empty if it has one.
-  function series_obstacle(self) result(obstacle)
+  !> The reason why the solution has no Taylor series, e.g. "coupling 'x' has no Taylor series"; empty if it has one. No function,
+  !> because threads call it (`string_t` says more).
+  subroutine series_obstacle(self, obstacle)
     class(system_t), intent(in) :: self
-    character(len=:), allocatable :: obstacle
+    character(len=:), allocatable, intent(out) :: obstacle
 
     obstacle = 'the system has no Taylor series'
-  end function series_obstacle
+  end subroutine series_obstacle
 
   !> Allocates what `series` needs for an order; called once, before the integration.
   subroutine prepare_series(self, order)

@@ -68,7 +68,7 @@ contains
     character(len=:), allocatable :: obstacle
 
     if (.not. stepper%needs_series) return
-    obstacle = system%series_obstacle()
+    call system%series_obstacle(obstacle)
     if (len(obstacle) == 0) return
     call raise(error, exit_input, 'method ' // quoted(trim(settings%method)) // ' cannot be used: ' // obstacle)
   end subroutine refuse_missing_series
@@ -78,7 +78,7 @@ contains
     class(stepper_t), intent(inout) :: stepper
     class(system_t), intent(inout) :: system
     type(integration_settings_t), intent(in) :: settings
-    real(wp), contiguous, intent(in) :: times(:)
+    real(wp), contiguous, intent(in) :: times(:)   !! output times [s], ascending, at least 2
     class(ensemble_t), intent(inout) :: ensemble
     class(observer_t), intent(inout) :: observer
     type(solver_status_t), intent(out) :: solver_status

@@ -256,11 +256,11 @@ contains
   end function component_name
 
   !> Only the reduced formulation has a Taylor series.
-  function series_obstacle(self) result(obstacle)
+  subroutine series_obstacle(self, obstacle)
     class(body_formulation_t), intent(in) :: self
-    character(len=:), allocatable :: obstacle
+    character(len=:), allocatable, intent(out) :: obstacle
 
     obstacle = 'formulation ' // quoted(trim(self%word)) // " has no Taylor series; 'reduced' has one"
-  end function series_obstacle
+  end subroutine series_obstacle
 
 end module nocdyn_body_formulation

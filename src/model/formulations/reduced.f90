@@ -286,12 +286,12 @@ contains
   end subroutine evaluate_at
 
   !> Why the machine has no Taylor series, empty if it has one.
-  function series_obstacle(self) result(obstacle)
+  subroutine series_obstacle(self, obstacle)
     class(reduced_t), intent(in) :: self
-    character(len=:), allocatable :: obstacle
+    character(len=:), allocatable, intent(out) :: obstacle
 
-    obstacle = self%machine%series_obstacle()
-  end function series_obstacle
+    call self%machine%series_obstacle(obstacle)
+  end subroutine series_obstacle
 
   !> Allocates the recurrence for series up to an order.
   subroutine prepare_series(self, order)

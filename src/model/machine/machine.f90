@@ -326,9 +326,9 @@ contains
   end subroutine evaluate_energies
 
   !> Sentence about the first element without a Taylor series; empty if every element has one.
-  function series_obstacle(self) result(obstacle)
+  subroutine series_obstacle(self, obstacle)
     class(machine_t), intent(in) :: self
-    character(len=:), allocatable :: obstacle
+    character(len=:), allocatable, intent(out) :: obstacle
     integer :: i
 
     obstacle = ''
@@ -339,7 +339,7 @@ contains
         return
       end associate
     end do
-  end function series_obstacle
+  end subroutine series_obstacle
 
   !> Powers of the elements `with_work` after `evaluate`, positive into the machine.
   subroutine power(self, watts)
