@@ -20,7 +20,7 @@ module nocdyn_vector_functions
   implicit none (type, external)
   private
 
-  public :: sine_of, sines, cosines, tanh_of, tanhs, log2s, exp2s
+  public :: sine_of, sines, cosines, tanh_of, log2s, exp2s
 
   real(wp), parameter :: pi_high = 3.1415926535846666_wp         ! 35 bits
   real(wp), parameter :: pi_middle = 5.1266883031679116e-12_wp   ! the next 35 bits
@@ -138,18 +138,7 @@ contains
     signed_sine = (r + r * (r2 * series)) * real(1 - 2 * iand(int(k), 1), wp)
   end function signed_sine
 
-  !> Replaces each x by tanh(x).
-  pure subroutine tanhs(n, x)
-    integer, intent(in) :: n
-    real(wp), intent(inout) :: x(n)
-    integer :: i
-
-    do i = 1, n
-      x(i) = tanh_of(x(i))
-    end do
-  end subroutine tanhs
-
-  !> tanh(x), with the bits that `tanhs` gives.
+  !> tanh(x).
   pure real(wp) function tanh_of(x)
     real(wp), intent(in) :: x
     real(wp), parameter :: b2 = 1.0_wp / 2.0_wp, b3 = b2 / 3.0_wp, b4 = b3 / 4.0_wp, b5 = b4 / 5.0_wp, b6 = b5 / 6.0_wp
