@@ -84,7 +84,7 @@ contains
   !> Whether the step size of any lane is at most `smallest_step`.
   pure logical function any_too_small(lanes, t, h)
     integer, intent(in) :: lanes
-    real(wp), intent(in) :: t(lanes), h(lanes)
+    real(wp), intent(in) :: t(lanes), h(lanes)   !! times and step sizes [s]
     integer :: lane, small
 
     small = 0
@@ -98,7 +98,7 @@ contains
   pure subroutine propose_steps(control, lanes, t, h, t_new)
     type(step_control_t), intent(inout) :: control
     integer, intent(in) :: lanes
-    real(wp), intent(in) :: t(lanes)
+    real(wp), intent(in) :: t(lanes)   !! present times [s]
     real(wp), intent(inout) :: h(lanes)       !! step sizes [s]
     real(wp), intent(inout) :: t_new(lanes)   !! ends of the steps [s]
     integer :: lane
@@ -149,30 +149,27 @@ contains
     end if
     control%mean_square(:) = control%mean_square / max(attempt%states, 1)
     if (attempt%components > attempt%states) then
-      call limit_by_quadratures(attempt%lanes, attempt%states, attempt%components, attempt%y, attempt%y_new, &
-                                attempt%error_estimate, attempt%has_low_order_estimate, attempt%low_order_estimate, control)
+      call limit_by_quadratures(attempt, attempt%y, attempt%y_new, attempt%error_estimate, attempt%low_order_estimate, control)
     end if
   end subroutine measure_error
 
   !> Raises `mean_square` where the error of a quadrature exceeds `quadrature_leniency` times the tolerance, relative to the
   !> largest quadrature. Nothing else limits steps over which the states have no error, e.g. polynomials of the time. Two
   !> estimates are combined as for the states.
-  pure subroutine limit_by_quadratures(lanes, states, components, y, y_new, error_estimate, has_low_order, low_order_estimate, &
-                                       control)
-    integer, intent(in) :: lanes, states, components
-    real(wp), intent(in), dimension(lanes, components) :: y, y_new, error_estimate, low_order_estimate
-    logical, intent(in) :: has_low_order
+  pure subroutine limit_by_quadratures(attempt, y, y_new, error_estimate, low_order_estimate, control)
+    type(step_attempt_t), intent(in) :: attempt
+    real(wp), intent(in), dimension(attempt%lanes, attempt%components) :: y, y_new, error_estimate, low_order_estimate
     type(step_control_t), intent(inout) :: control
     real(wp) :: low_order, error, largest
     integer :: i, lane
 
-    do lane = 1, lanes
+    do lane = 1, attempt%lanes
       error = 0.0_wp
       low_order = 0.0_wp
       largest = 0.0_wp
-      do i = states + 1, components
+      do i = attempt%states + 1, attempt%components
         error = max(error, abs(error_estimate(lane, i)))
-        if (has_low_order) low_order = max(low_order, abs(low_order_estimate(lane, i)))
+        if (attempt%has_low_order_estimate) low_order = max(low_order, abs(low_order_estimate(lane, i)))
         largest = max(largest, abs(y(lane, i)), abs(y_new(lane, i)))
       end do
       error = min(error, largest_ratio)
@@ -235,8 +232,8 @@ contains
     integer, intent(in) :: lanes
     logical, intent(in) :: accepted(lanes), rejected(lanes)   !! both false: the lane keeps its step size
     integer, intent(in) :: error_order(lanes)    !! the error falls as h^(error_order + 1)
-    real(wp), intent(in) :: max_growth(lanes)
-    real(wp), intent(in) :: h(lanes)
+    real(wp), intent(in) :: max_growth(lanes)   !! largest ratio of the next step size to h
+    real(wp), intent(in) :: h(lanes)   !! sizes of the attempts [s]
 
     integer :: lane
 
@@ -320,7 +317,7 @@ contains
   pure subroutine shorten_step(control, lane, h)
     type(step_control_t), intent(inout) :: control
     integer, intent(in) :: lane
-    real(wp), intent(in) :: h
+    real(wp), intent(in) :: h   !! [s]
 
     control%was_rejected(lane) = .true.
     control%h(lane) = min_factor * h

@@ -86,7 +86,7 @@ contains
   subroutine solve(stage_system, attempt, gamma, r, k)
     type(stage_system_t), intent(inout) :: stage_system
     type(step_attempt_t), intent(in) :: attempt
-    real(wp), intent(in) :: gamma
+    real(wp), intent(in) :: gamma   !! of the tableau
     real(wp), contiguous, intent(in) :: r(:, :)      !! [lanes, components]
     real(wp), contiguous, intent(inout) :: k(:, :)   !! [lanes, components]
     integer :: lane
@@ -97,8 +97,7 @@ contains
       end do
     end if
     if (attempt%components > attempt%states) then
-      call solve_quadratures(attempt%lanes, attempt%states, attempt%components, stage_system%quadratures, stage_system%dfdy, &
-                             gamma, attempt%h, r, k)
+      call solve_quadratures(stage_system%quadratures, stage_system%dfdy, attempt, gamma, r, k)
     end if
     do lane = 1, attempt%lanes
       if (.not. attempt%active(lane)) k(lane, :) = 0.0_wp
@@ -106,28 +105,28 @@ contains
   end subroutine solve
 
   !> Solves the rows of the quadratures: k_w / gamma - h dfw/dy k_y = r_w.
-  pure subroutine solve_quadratures(lanes, states, components, entries, dfdy, gamma, h, r, k)
-    integer, intent(in) :: lanes, states, components
+  pure subroutine solve_quadratures(entries, dfdy, attempt, gamma, r, k)
     type(entries_t), intent(in) :: entries
     real(wp), contiguous, intent(in) :: dfdy(:, :)
+    type(step_attempt_t), intent(in) :: attempt
     real(wp), intent(in) :: gamma
-    real(wp), intent(in) :: h(lanes), r(lanes, components)
-    real(wp), intent(inout) :: k(lanes, components)
+    real(wp), intent(in) :: r(attempt%lanes, attempt%components)
+    real(wp), intent(inout) :: k(attempt%lanes, attempt%components)
     integer :: lane, p, w
 
-    do w = states + 1, components
-      do lane = 1, lanes
+    do w = attempt%states + 1, attempt%components
+      do lane = 1, attempt%lanes
         k(lane, w) = 0.0_wp
       end do
     end do
     do p = 1, size(entries%position)
-      do lane = 1, lanes
+      do lane = 1, attempt%lanes
         k(lane, entries%row(p)) = k(lane, entries%row(p)) + dfdy(lane, entries%position(p)) * k(lane, entries%column(p))
       end do
     end do
-    do w = states + 1, components
-      do lane = 1, lanes
-        k(lane, w) = gamma * (r(lane, w) + h(lane) * k(lane, w))
+    do w = attempt%states + 1, attempt%components
+      do lane = 1, attempt%lanes
+        k(lane, w) = gamma * (r(lane, w) + attempt%h(lane) * k(lane, w))
       end do
     end do
   end subroutine solve_quadratures

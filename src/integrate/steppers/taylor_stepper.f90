@@ -49,7 +49,7 @@ contains
 
   !> The stepper with the best order for a tolerance, or with a given order.
   pure function taylor_stepper(rtol, order) result(stepper)
-    real(wp), intent(in) :: rtol
+    real(wp), intent(in) :: rtol   !! relative tolerance
     integer, intent(in), optional :: order   !! at least 2
     type(taylor_stepper_t) :: stepper
 
@@ -104,8 +104,8 @@ contains
     are_finite = all_finite(2 * attempt%length, self%series) .and. all_finite(2 * attempt%length, self%series(1, 1, &
                                                                                                               self%order - 1))
     if (.not. are_finite) call clear_infinities(self)
-    call measure(attempt%lanes, attempt%states, size(self%series, 2), control%rtol, control%atol, self%series, &
-                 self%series(1, 1, self%order - 1), self%last_norm, self%previous_norm)
+    call measure_norms(attempt%lanes, attempt%states, size(self%series, 2), control, self%series, &
+                       self%series(1, 1, self%order - 1), self%last_norm, self%previous_norm)
     call find_steps(attempt%lanes, self%order, self%last_norm, self%previous_norm)
     if (have_all_moved .and. are_finite .and. .not. any_differs(attempt%lanes, attempt%rhs_status, evaluation_ok)) then
       if (.not. any_too_small(attempt%lanes, attempt%t, self%last_norm)) then
@@ -179,15 +179,17 @@ contains
 
   !> The norm of the last two coefficients of each lane: the largest |y_j| / (atol + rtol |y|) of the states, at least 1e-300 so
   !> that its logarithm is finite.
-  pure subroutine measure(lanes, states, columns, rtol, atol, y, y_j, last_norm, previous_norm)
+  pure subroutine measure_norms(lanes, states, columns, control, y, y_j, last_norm, previous_norm)
     integer, intent(in) :: lanes, states, columns
-    real(wp), intent(in) :: rtol, atol
+    type(step_control_t), intent(in) :: control
     real(wp), intent(in) :: y(lanes, states), y_j(lanes, columns, 2)   !! y_j of the orders p - 1 and p
     real(wp), intent(inout) :: last_norm(lanes), previous_norm(lanes)
     real(wp), parameter :: smallest = 1.0e-300_wp
-    real(wp) :: weight
+    real(wp) :: atol, rtol, weight
     integer :: i, lane
 
+    atol = control%atol
+    rtol = control%rtol
     last_norm = smallest
     previous_norm = smallest
     if (lanes == 1) then
@@ -205,7 +207,7 @@ contains
         end do
       end do
     end if
-  end subroutine measure
+  end subroutine measure_norms
 
   !> Replaces the norms `last_norm` by the step sizes that both norms allow.
   pure subroutine find_steps(lanes, order, last_norm, previous_norm)
