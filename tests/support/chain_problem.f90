@@ -1,4 +1,4 @@
-!> A stiff chain of rotors, sparse, that can also pretend to be full.
+!> A stiff chain of rotors with a sparse Jacobian pattern, or with the full one.
 module nocdyn_chain_problem
   use nocdyn_kinds, only: wp
   use nocdyn_system, only: evaluation_ok, pattern_t, system_t
@@ -27,7 +27,7 @@ contains
   pure function chain_problem(rotors, stiffness, is_whole) result(problem)
     integer, intent(in) :: rotors
     real(wp), intent(in) :: stiffness(:)
-    logical, intent(in) :: is_whole   !! names all positions of the Jacobian
+    logical, intent(in) :: is_whole   !! whether the pattern has all positions of the Jacobian
     type(chain_t) :: problem
 
     problem%lanes = size(stiffness)

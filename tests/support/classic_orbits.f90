@@ -1,7 +1,7 @@
 !> Classic orbits: Kepler's ellipse, Arenstorf's closed orbit about earth and moon, the seven stars of the Pleiades.
 !>
-!> The states are the positions of the bodies in a plane, x before y, and then their velocities. A source draws a body
-!> with the acceleration mass (source - body) / distance^3.
+!> The states are the positions of the bodies in a plane, x before y, then their velocities. A source attracts a body with the
+!> acceleration mass (source - body) / distance^3.
 module nocdyn_classic_orbits
   use nocdyn_classic_problem, only: allocate_ends, classic_problem_t
   use nocdyn_kinds, only: wp
@@ -97,7 +97,7 @@ contains
     dfdy(1, 13:16) = [0.0_wp, 1.0_wp, 0.0_wp, 0.0_wp]
   end subroutine kepler_tangent
 
-  !> One period: the orbit closes. It starts close to the moon, and comes near to it again, so that errors grow.
+  !> One period of the closed orbit. It starts close to the moon and approaches it again, so that errors grow.
   function arenstorf_problem() result(problem)
     type(arenstorf_t) :: problem
 

@@ -167,7 +167,7 @@ contains
     dfdy(1, 3:4) = [y(1)**2, -y(1)**2]
   end subroutine brusselator_tangent
 
-  !> A short piece of the chaotic path.
+  !> A short part of the chaotic trajectory.
   function lorenz_problem() result(problem)
     type(lorenz_t) :: problem
 

@@ -1,11 +1,10 @@
-!> What the classic test problems of the literature have in common: one lane, no explicit time, a known end.
+!> The common type of the classic test problems of the literature: one lane, autonomous, with a known final state.
 !>
-!> The error of an integration is measured as in the Test Set for IVP Solvers: relative to the end value, but to the
-!> ratio of absolute to relative tolerance for the components that are smaller than it ("mixed error significant
-!> correct digits").
+!> The error of an integration is measured as in the Test Set for IVP Solvers: relative to the final value, or to the ratio of
+!> absolute to relative tolerance for components smaller than that ratio ("mixed error significant correct digits").
 !>
-!> The ends are computed anew, in quadruple precision by Radau IIA collocation of 7 stages, 20 digits or more, in agreement
-!> with that of 5 stages; the published ones serve as a check.
+!> The final states were computed in quadruple precision by Radau IIA collocation with 7 stages, to 20 digits or more, in
+!> agreement with 5 stages; the published final states are a check.
 module nocdyn_classic_problem
   use nocdyn_kinds, only: wp
   use nocdyn_system, only: evaluation_recoverable, system_t
@@ -14,22 +13,22 @@ module nocdyn_classic_problem
 
   public :: allocate_ends, end_error, mixed_error
 
-  real(wp), parameter :: most = 1.0e60_wp   ! of a state: what an unstable step makes of it must not overflow in f
+  real(wp), parameter :: most = 1.0e60_wp   ! size of a state: f must not overflow after an unstable step
 
   !> y' = f(y) from t = 0 and `y_start` to `t_end`.
   type, abstract, extends(system_t), public :: classic_problem_t
     character(len=:), allocatable :: name
-    character(len=:), allocatable :: source     !! of the equations and of the published end
+    character(len=:), allocatable :: source     !! of the equations and of the published final state
     logical :: is_stiff = .false.
     real(wp) :: t_end = 0.0_wp
     real(wp), allocatable :: y_start(:)         !! [states]
-    integer, allocatable :: compared(:)         !! components whose end is known
+    integer, allocatable :: compared(:)         !! components whose final value is known
     real(wp), allocatable :: y_end(:)           !! of the problem with all its constants rounded to `wp`; [size(compared)]
     real(wp), allocatable :: published(:)       !! y_end as the source has it; not allocated: it has none
-    real(wp) :: published_error = 5.0e-15_wp    !! by which it differs, in the measure of `end_error`
+    real(wp) :: published_error = 5.0e-15_wp    !! difference from y_end, measured by `end_error`
     real(wp) :: error_factor = 10.0_wp          !! bound of the error of all suitable methods, in units of the tolerance
     real(wp) :: rounding = 1.0e-13_wp           !! error below which the rounding of double precision may show
-    real(wp) :: least_gain = 0.6_wp             !! digits that a decade of the tolerance gains on average
+    real(wp) :: least_gain = 0.6_wp             !! mean number of digits gained by a decade of the tolerance
     integer :: rodas_steps = 0                  !! that Hairer's RODAS takes at rtol = 1e-5; 0 if not known
     integer :: finest = 12                      !! the tests go down to the tolerance 10**(-finest)
     real(wp) :: atol_ratio = 1.0_wp             !! absolute tolerance over relative tolerance, for all components
@@ -62,7 +61,7 @@ module nocdyn_classic_problem
 
 contains
 
-  !> Room for the start and the end of a problem, all components compared.
+  !> Allocates the initial and final states of a problem, with all components compared.
   pure subroutine allocate_ends(problem, states)
     class(classic_problem_t), intent(inout) :: problem
     integer, intent(in) :: states

@@ -9,7 +9,7 @@ module nocdyn_classic_reactions
 
   integer, parameter :: most_species = 4   ! on one side of a reaction
 
-  !> rate times the concentrations of the reactants; a species that occurs twice stands there twice, 0 is none.
+  !> A reaction: its rate is the constant times the concentrations of the reactants. A species may be listed twice; 0 is none.
   type :: reaction_t
     real(wp) :: rate
     integer :: reactants(2)
@@ -78,7 +78,7 @@ contains
     end do
   end subroutine tangent
 
-  !> What a reaction takes from its reactants it gives to its products.
+  !> Adds the rate of each reaction to its products and subtracts it from its reactants.
   pure subroutine balance(reaction, speed, total)
     type(reaction_t), intent(in) :: reaction
     real(wp), intent(in) :: speed
@@ -117,7 +117,7 @@ contains
     problem%y_end = [2.08334014970129414e-8_wp, 8.33336077033478323e-14_wp, 0.999999979166515169_wp]
   end function robertson_problem
 
-  !> Pyrolysis; the early part of an integration that goes on to 1e13, where only absolute zero is left.
+  !> Pyrolysis; the first part of an integration to 1e13, at whose end all concentrations are zero.
   function e5_problem() result(problem)
     type(reactions_t) :: problem
 

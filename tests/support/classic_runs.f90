@@ -1,4 +1,4 @@
-!> Integrations of the classic problems, and which methods suit them.
+!> Integrations of the classic problems, and the methods suitable for each.
 module nocdyn_classic_runs
   use nocdyn_classic_problem, only: classic_problem_t, end_error
   use nocdyn_errors, only: error_t

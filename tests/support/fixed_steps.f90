@@ -1,4 +1,4 @@
-!> Steps of a size that no error control changes, to measure orders with.
+!> Steps of constant size, for the measurement of orders.
 module nocdyn_fixed_steps
   use nocdyn_kinds, only: wp
   use nocdyn_stepper, only: stepper_t
@@ -33,13 +33,13 @@ contains
     y = attempt%y(1, :attempt%components)
   end subroutine take_steps
 
-  !> One step of size h: its result, its deviation from the embedded solution, and the solution inside it at `theta`.
+  !> One step of size h: its result, its error estimate, and its dense output at `theta`.
   subroutine one_step(stepper, system, t, h, theta, y)
     class(stepper_t), intent(inout) :: stepper
     class(system_t), intent(inout) :: system
     real(wp), intent(in) :: t, h
     real(wp), intent(in) :: theta
-    real(wp), intent(inout) :: y(:, :)   !! first column: start; on return the columns y_new, deviation, y(t + theta h)
+    real(wp), intent(inout) :: y(:, :)   !! first column: initial state; on return y_new, error estimate, y(t + theta h)
     type(step_attempt_t) :: attempt
     real(wp), allocatable :: coefficients(:, :, :)
     logical, parameter :: wanted(1) = .true.
@@ -75,7 +75,7 @@ contains
     call stepper%start(attempt, attempt%active)
   end subroutine prepare_attempt
 
-  !> The exponent p of errors that fall as h^p when h is halved.
+  !> The order p of errors that fall as h^p, from the errors at h and h / 2.
   elemental function measured_order(error, error_of_half) result(order)
     real(wp), intent(in) :: error, error_of_half
     real(wp) :: order

@@ -17,7 +17,8 @@ module nocdyn_oscillators
     procedure :: jacobian
   end type oscillators_t
 
-  !> Events: x = level(i) for each level; tracked: x, x', x^3. An event whose number is `terminal` ends its lane.
+  !> The events are x = level(i) for each level, the tracked functions x, x', x^3. The event with the index `terminal` ends its
+  !> lane.
   type, extends(observer_t), public :: watcher_t
     real(wp), allocatable :: level(:)
     integer :: terminal = 0
@@ -25,9 +26,9 @@ module nocdyn_oscillators
     integer, allocatable :: event(:, :)      !! [most_events, lanes]
     real(wp), allocatable :: time(:, :)      !! of the events
     real(wp), allocatable :: x(:, :)         !! at the events
-    integer, allocatable :: records(:)       !! of each lane
-    real(wp), allocatable :: last_time(:)    !! of a record or an event of each lane
-    logical :: in_order = .true.             !! whether records and events came in the order of their times
+    integer, allocatable :: records(:)       !! number of output times of each lane
+    real(wp), allocatable :: last_time(:)    !! of an output or an event of each lane
+    logical :: in_order = .true.             !! whether outputs and events came in the order of their times
     type(ranges_t), allocatable :: ranges(:) !! of each lane
   contains
     procedure :: on_output
@@ -73,7 +74,7 @@ contains
     dfdt(:, :) = 0.0_wp
   end subroutine jacobian
 
-  !> A watcher of the crossings of `level`, in the given directions, and of the tracked functions.
+  !> An observer of the crossings of `level` in the given directions and of the tracked functions.
   pure function watcher(lanes, level, directions)
     integer, intent(in) :: lanes
     real(wp), intent(in) :: level(:)

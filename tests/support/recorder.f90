@@ -1,4 +1,4 @@
-!> An observer that keeps all that it is told.
+!> An observer that stores all output times and states.
 module nocdyn_recorder
   use nocdyn_kinds, only: wp
   use nocdyn_observer, only: observer_t
@@ -9,10 +9,10 @@ module nocdyn_recorder
   public :: recorder
 
   type, extends(observer_t), public :: recorder_t
-    integer, allocatable :: count(:)         !! records of each lane
+    integer, allocatable :: count(:)         !! output times of each lane
     real(wp), allocatable :: t(:, :)         !! [lanes, times]
     real(wp), allocatable :: y(:, :, :)      !! [lanes, times, components]
-    real(wp) :: stop_time = huge(1.0_wp)     !! asks to stop once the slowest lane is there
+    real(wp) :: stop_time = huge(1.0_wp)     !! stops the integration once the slowest lane has reached it
     integer :: questions = 0                 !! calls of `wants_stop`
   contains
     procedure :: on_output

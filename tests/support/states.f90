@@ -1,4 +1,4 @@
-!> States of a machine that its gears allow, and the same state as each formulation writes it.
+!> States of a machine that satisfy its gear constraints, and the same states in each formulation.
 module nocdyn_test_states
   use nocdyn_body_formulation, only: body_formulation_t
   use nocdyn_formulation, only: formulation_t
@@ -14,7 +14,7 @@ module nocdyn_test_states
 
   public :: draw_state, state_of, bring_to, enter_all, formulate
 
-  !> What `formulate` knows, to loop over.
+  !> The formulations of `formulate`, for loops.
   integer, parameter, public :: reduced = 1, paper = 2, multiplier = 3
 
 contains
@@ -38,7 +38,7 @@ contains
     end select
   end subroutine formulate
 
-  !> Random angles and speeds that obey the gears, [lanes, ground and bodies].
+  !> Random angles and speeds that satisfy the gear constraints, [lanes, ground and bodies].
   subroutine draw_state(machine, seed, phi, omega)
     type(machine_t), intent(in) :: machine
     integer, intent(in) :: seed
@@ -113,7 +113,7 @@ contains
     end do
   end subroutine place_moments
 
-  !> Puts all lanes on the branches in which they are.
+  !> Chooses the branches of all lanes at their states.
   subroutine enter_all(formulation, t, y)
     class(formulation_t), intent(inout) :: formulation
     real(wp), intent(in) :: t(:)
@@ -127,7 +127,7 @@ contains
     end do
   end subroutine enter_all
 
-  !> Brings the elements to a state, with all that the paper's matrices are read from.
+  !> Sets the elements to a state and evaluates all that the paper's matrices need.
   subroutine bring_to(machine, t, phi, omega)
     type(machine_t), intent(inout) :: machine
     real(wp), contiguous, intent(in) :: t(:)

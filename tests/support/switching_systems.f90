@@ -1,4 +1,4 @@
-!> Systems that change their branches, with solutions in closed form: an oscillator with play, switches at given times, a relay.
+!> Systems with branches and solutions in closed form: an oscillator with play, switches at given times, a relay.
 module nocdyn_switching_systems
   use nocdyn_kinds, only: wp
   use nocdyn_system, only: evaluation_fatal, system_t
@@ -22,13 +22,13 @@ module nocdyn_switching_systems
     procedure :: switch_name => play_name
   end type play_t
 
-  !> x' = n - rate x, where n is the number of the times of the lane that have passed; one switch for each.
+  !> x' = n - rate x, where n is the number of switching times of the lane before t; one switch for each.
   type, extends(system_t), public :: clock_t
     real(wp), allocatable :: time(:, :)       !! [switches, lanes]
     real(wp) :: rate = 0.0_wp
-    integer :: refused = huge(1)              !! so many passed times, and the slope cannot be evaluated
+    integer :: refused = huge(1)              !! after so many switching times the evaluation fails
     logical, allocatable :: passed(:, :)
-    integer, allocatable :: calls(:)          !! of `change_branch`, by the switches
+    integer, allocatable :: calls(:)          !! calls of `change_branch`, [switches]
     integer :: looks = 0                      !! calls of `indicator_values`
   contains
     procedure :: derivative => clock_derivative
@@ -38,7 +38,7 @@ module nocdyn_switching_systems
     procedure :: change_branch => clock_cross
   end type clock_t
 
-  !> x' = -1 above zero, 1 below: at zero it has nowhere to go.
+  !> x' = -1 above zero, 1 below: at zero the solution cannot continue.
   type, extends(system_t), public :: relay_t
     real(wp) :: overlap = 0.0_wp              !! of the branches
     real(wp), allocatable :: side(:)
@@ -68,8 +68,8 @@ contains
     allocate (problem%branch(size(edge)), source=0)
   end function play_problem
 
-  !> x(t) and x'(t) from x = 0 with the velocity v: an odd function of the period 4 q, symmetric about q, pieced together of the
-  !> free motion and of the contact.
+  !> x(t) and x'(t) from x = 0 with the velocity v: an odd function of period 4 q, symmetric about q, composed of the free motion
+  !> and of the contact.
   elemental subroutine play_solution(ground, contact, edge, v, t, x, x_dot)
     real(wp), intent(in) :: ground, contact, edge, v, t
     real(wp), intent(out) :: x, x_dot

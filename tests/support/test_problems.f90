@@ -1,7 +1,7 @@
-!> Systems of equations that the integrators are tested on.
+!> Systems of equations for tests of the integrators.
 !>
-!> gfortran -O3 takes sines and cosines of whole loops from glibc's libmvec, whose last bits are not those of the scalar
-!> functions, so that a lane would depend on its place in the block: loops with such calls are marked `novector`.
+!> gfortran -O3 vectorises sines and cosines by glibc's libmvec, whose last bits differ from the scalar functions, so that a lane
+!> would depend on its index in the block: loops with such calls are marked `novector`.
 module nocdyn_test_problems
   use nocdyn_kinds, only: wp
   use nocdyn_system, only: evaluation_ok, evaluation_fatal, evaluation_recoverable, pattern_t, system_t
@@ -11,7 +11,7 @@ module nocdyn_test_problems
 
   public :: smooth_problem, smooth_solution, smooth_quadrature, stiff_problem, duffing_problem, wall_problem, rest_problem
 
-  !> What a `wall_t` does on its far side.
+  !> What a `wall_t` returns beyond the wall.
   integer, parameter, public :: wall_absent = 0
   integer, parameter, public :: wall_not_finite = 1
   integer, parameter, public :: wall_shorten = 2
@@ -55,7 +55,7 @@ module nocdyn_test_problems
     procedure :: component_name => wall_name
   end type wall_t
 
-  !> Nothing moves; the quadratures, if there are any, grow with the slope 1.
+  !> The states are constant; the quadratures, if there are any, grow with the slope 1.
   type, extends(system_t), public :: rest_t
   contains
     procedure :: derivative => rest_derivative
@@ -319,7 +319,7 @@ contains
     if (index > self%states) error stop 'nocdyn_test_problems: the wall has no quadratures'
   end function wall_name
 
-  !> NaN that raises no exception when it is made or copied.
+  !> A NaN whose creation and copies raise no exception.
   pure function quiet_nan() result(nan)
     use, intrinsic :: iso_fortran_env, only: int64
     real(wp) :: nan

@@ -55,7 +55,7 @@ contains
   subroutine put_reals(bytes, used, values)
     character(len=*), intent(inout) :: bytes
     integer, intent(inout) :: used
-    real(wp), contiguous, intent(in) :: values(:, :)
+    real(wp), contiguous, intent(in) :: values(:, :)   !! in array element order
     type(c_ptr) :: same
 
     if (size(values) > 0) same = c_copy_in(bytes(used + 1:), values, int(real_bytes * size(values), c_size_t))

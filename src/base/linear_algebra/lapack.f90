@@ -51,7 +51,7 @@ contains
 
   !> Numerical rank by QR with column pivoting (DGEQP3): the diagonal elements of R above `tolerance` times the first.
   subroutine pivoted_rank(matrix, tolerance, rank, pivots)
-    real(wp), intent(in) :: matrix(:, :)
+    real(wp), intent(in) :: matrix(:, :)   !! [rows, columns]
     real(wp), intent(in) :: tolerance      !! relative to the largest column
     integer, intent(out) :: rank
     integer, intent(out) :: pivots(:)      !! columns in the order of pivoting, shape [columns]; the first `rank` are independent
@@ -77,7 +77,7 @@ contains
   !> The inverse by LU (DGETRF, DGETRI), and the logarithm of |determinant|.
   subroutine invert(matrix, inverse, log_determinant, is_singular)
     real(wp), intent(in) :: matrix(:, :)             !! square
-    real(wp), allocatable, intent(out) :: inverse(:, :)
+    real(wp), allocatable, intent(out) :: inverse(:, :)   !! not the inverse if singular
     real(wp), intent(out) :: log_determinant         !! meaningless if singular
     logical, intent(out) :: is_singular              !! a pivot is exactly zero
     real(wp), allocatable :: work(:)
@@ -98,10 +98,10 @@ contains
 
   !> Solves matrix * x = rhs by Cholesky (DPOSV).
   subroutine solve_positive_definite(matrix, rhs, solution, is_indefinite)
-    real(wp), intent(in) :: matrix(:, :)
-    real(wp), intent(in) :: rhs(:, :)
-    real(wp), allocatable, intent(out) :: solution(:, :)
-    logical, intent(out) :: is_indefinite
+    real(wp), intent(in) :: matrix(:, :)   !! symmetric, [n, n]
+    real(wp), intent(in) :: rhs(:, :)   !! right-hand sides as columns, [n, m]
+    real(wp), allocatable, intent(out) :: solution(:, :)   !! [n, m]
+    logical, intent(out) :: is_indefinite   !! the matrix is not positive definite: no solution
     real(wp), allocatable :: a(:, :)
     integer :: info, n
 
@@ -114,7 +114,7 @@ contains
 
   !> Moore-Penrose inverse: the least-squares solutions of smallest norm for the unit vectors (DGELSY).
   function pseudo_inverse(matrix, tolerance) result(inverse)
-    real(wp), intent(in) :: matrix(:, :)
+    real(wp), intent(in) :: matrix(:, :)   !! [rows, columns]
     real(wp), intent(in) :: tolerance          !! singular below this times the largest, as in `pivoted_rank`
     real(wp) :: inverse(size(matrix, 2), size(matrix, 1))
     real(wp), allocatable :: a(:, :), b(:, :), work(:)

@@ -66,7 +66,7 @@ contains
   !> Replaces B by R^-1 B (DTRSM).
   subroutine solve_left(factor, matrix)
     real(wp), contiguous, intent(in) :: factor(:, :)      !! of `cholesky_factor`
-    real(wp), contiguous, intent(inout) :: matrix(:, :)
+    real(wp), contiguous, intent(inout) :: matrix(:, :)   !! B
 
     call dtrsm('L', 'U', 'N', 'N', size(matrix, 1), size(matrix, 2), 1.0_wp, factor, max(1, size(factor, 1)), &
                matrix, max(1, size(matrix, 1)))
@@ -75,7 +75,7 @@ contains
   !> Replaces B by B R^-1 (DTRSM).
   subroutine solve_right(factor, matrix)
     real(wp), contiguous, intent(in) :: factor(:, :)      !! of `cholesky_factor`
-    real(wp), contiguous, intent(inout) :: matrix(:, :)
+    real(wp), contiguous, intent(inout) :: matrix(:, :)   !! B
 
     call dtrsm('R', 'U', 'N', 'N', size(matrix, 1), size(matrix, 2), 1.0_wp, factor, max(1, size(factor, 1)), &
                matrix, max(1, size(matrix, 1)))
@@ -106,8 +106,8 @@ contains
 
   !> Eigenvalues of a symmetric matrix, ascending, and orthonormal eigenvectors (DSYEV).
   subroutine symmetric_eigenvectors(matrix, values, vectors, has_failed)
-    real(wp), intent(in) :: matrix(:, :)
-    real(wp), intent(out) :: values(:)
+    real(wp), intent(in) :: matrix(:, :)   !! symmetric, [n, n]
+    real(wp), intent(out) :: values(:)   !! [n]
     real(wp), contiguous, intent(out) :: vectors(:, :)    !! as columns
     logical, intent(out) :: has_failed
     real(wp), allocatable :: work(:)
@@ -122,8 +122,8 @@ contains
 
   !> Eigenvalues of a real matrix and right eigenvectors; conjugate pairs follow each other (DGEEV).
   subroutine eigenvectors(matrix, values, vectors, has_failed)
-    real(wp), intent(in) :: matrix(:, :)
-    complex(wp), intent(out) :: values(:)
+    real(wp), intent(in) :: matrix(:, :)   !! [n, n]
+    complex(wp), intent(out) :: values(:)   !! [n]
     complex(wp), intent(out) :: vectors(:, :)             !! as columns
     logical, intent(out) :: has_failed
     real(wp), allocatable :: a(:, :), imaginary(:), right(:, :), work(:)

@@ -61,8 +61,8 @@ contains
 
   !> Solves A x = b with the factors of `lu_factor`.
   subroutine lu_solve(factors, pivots, x)
-    real(wp), contiguous, intent(in) :: factors(:, :)
-    integer, contiguous, intent(in) :: pivots(:)
+    real(wp), contiguous, intent(in) :: factors(:, :)   !! of `lu_factor`
+    integer, contiguous, intent(in) :: pivots(:)   !! of `lu_factor`
     real(wp), contiguous, intent(inout) :: x(:)          !! b, on return x; shape [n]
     integer :: n, info
 

@@ -37,8 +37,8 @@ contains
   pure subroutine raise_to_maximum(n, matrix, c, highest, position, found)
     integer, intent(in) :: n         !! degree, 1 to `max_degree`
     real(wp), intent(in) :: matrix(0:max_degree, 0:n)   !! of `make_bernstein_matrix`
-    real(wp), intent(in) :: c(0:n)
-    real(wp), intent(inout) :: highest
+    real(wp), intent(in) :: c(0:n)   !! coefficients of powers of s
+    real(wp), intent(inout) :: highest   !! largest value so far
     real(wp), intent(out) :: position   !! of the maximum
     logical, intent(out) :: found    !! whether `highest` has been raised by more than rounding
     real(wp) :: b(0:max_degree, max_halvings + 2)   ! of the parts that are left; the last one is next
@@ -199,7 +199,7 @@ contains
   !> Replaces a polynomial on [start, until] by the same polynomial on [0, 1].
   pure subroutine shift_origin(n, c, start, until)
     integer, intent(in) :: n
-    real(wp), intent(inout) :: c(0:n)
+    real(wp), intent(inout) :: c(0:n)   !! coefficients of powers
     real(wp), intent(in) :: start, until
     real(wp) :: power
     integer :: i, k

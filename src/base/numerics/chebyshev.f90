@@ -15,7 +15,7 @@ contains
   !> The nodes -cos(pi i / degree), and the matrix from values there to coefficients.
   pure subroutine lobatto_nodes(degree, nodes, to_series)
     integer, intent(in) :: degree
-    real(wp), intent(out) :: nodes(0:degree)
+    real(wp), intent(out) :: nodes(0:degree)   !! ascending, -1 to 1
     real(wp), intent(out) :: to_series(0:degree, 0:degree)   !! [coefficients, places]
     real(wp), parameter :: pi = acos(-1.0_wp)
     integer :: i, k
@@ -40,8 +40,8 @@ contains
   !> bisection, between the neighbours of the largest value.
   pure subroutine find_maximum(n, nodes, to_series, values, node, peak)
     integer, intent(in) :: n
-    real(wp), intent(in) :: nodes(n), to_series(n, n), values(n)
-    real(wp), intent(out) :: node, peak
+    real(wp), intent(in) :: nodes(n), to_series(n, n), values(n)   !! of `lobatto_nodes`, and the values there
+    real(wp), intent(out) :: node, peak   !! argument, -1 to 1, and value of the maximum
     real(wp), dimension(max_nodes) :: c, slopes, curvatures   ! coefficients of the polynomial and of its derivatives
     real(wp) :: below, above, candidate, slope, curvature
     integer :: i, step
@@ -81,7 +81,7 @@ contains
   pure subroutine differentiate(n, c, d)
     integer, intent(in) :: n
     real(wp), intent(in) :: c(n)   !! of T_0 to T_(n-1)
-    real(wp), intent(inout) :: d(n)
+    real(wp), intent(inout) :: d(n)   !! of the derivative; the last one is 0
     real(wp) :: after(max_nodes + 2)
     integer :: k
 
@@ -96,7 +96,7 @@ contains
   !> The sum of Chebyshev polynomials at x, by Clenshaw's recurrence.
   pure real(wp) function series_value(n, c, x)
     integer, intent(in) :: n
-    real(wp), intent(in) :: c(n), x
+    real(wp), intent(in) :: c(n), x   !! coefficients of T_0 to T_(n-1), and the argument, -1 to 1
     real(wp) :: last, last_but_one, next
     integer :: k
 

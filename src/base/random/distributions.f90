@@ -27,7 +27,7 @@ contains
 
   !> The uniform distribution from low to high.
   pure function uniform_distribution(low, high) result(distribution)
-    real(wp), intent(in) :: low, high
+    real(wp), intent(in) :: low, high   !! ends of the range
     type(distribution_t) :: distribution
 
     distribution = distribution_t(probability=1.0_wp, shape=shape_uniform, low=low, high=high, &

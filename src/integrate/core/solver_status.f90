@@ -111,7 +111,7 @@ contains
     type(solver_status_t), intent(in) :: solver_status
     integer, intent(in) :: lane
     class(system_t), intent(in) :: system
-    real(wp), intent(in) :: rtol, atol
+    real(wp), intent(in) :: rtol, atol   !! tolerances of the integration
     character(len=:), allocatable :: sentence
     character(len=:), allocatable :: when
 

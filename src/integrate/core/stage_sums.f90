@@ -74,7 +74,7 @@ contains
     type(stage_sum_t), intent(in) :: stage_sum       !! after `set_offsets`
     real(wp), intent(in) :: k(stage_sum%extent)      !! the stages, one after the other
     integer, intent(in) :: x_length, h_length        !! the length of a stage, or `large_tile` if that is less
-    real(wp), intent(in) :: x(x_length), h(h_length)
+    real(wp), intent(in) :: x(x_length), h(h_length)   !! start of the step and step size [s] of each element of y
     real(wp), intent(inout) :: y(stage_sum%length)
     logical, intent(out), optional :: all_finite     !! whether no element of y is infinite or NaN
     real(wp) :: total(width)   ! sum of the absolute values, finite if they all are

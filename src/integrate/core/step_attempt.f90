@@ -103,9 +103,9 @@ contains
   subroutine evaluate(attempt, system, t, y, dydt)
     type(step_attempt_t), intent(inout) :: attempt
     class(system_t), intent(inout) :: system
-    real(wp), intent(in) :: t(attempt%lanes)
-    real(wp), intent(in) :: y(attempt%length)
-    real(wp), intent(inout) :: dydt(attempt%length)
+    real(wp), intent(in) :: t(attempt%lanes)   !! time of each lane [s]
+    real(wp), intent(in) :: y(attempt%length)   !! [lanes, padded columns]
+    real(wp), intent(inout) :: dydt(attempt%length)   !! [lanes, padded columns]
 
     attempt%uncounted = attempt%uncounted + 1
     call system%derivative(t, y, dydt, attempt%rhs_status)
@@ -120,9 +120,9 @@ contains
   subroutine evaluate_finite(attempt, system, t, y, dydt)
     type(step_attempt_t), intent(inout) :: attempt
     class(system_t), intent(inout) :: system
-    real(wp), intent(in) :: t(attempt%lanes)
-    real(wp), intent(in) :: y(attempt%length)
-    real(wp), intent(inout) :: dydt(attempt%length)
+    real(wp), intent(in) :: t(attempt%lanes)   !! time of each lane [s]
+    real(wp), intent(in) :: y(attempt%length)   !! [lanes, padded columns]
+    real(wp), intent(inout) :: dydt(attempt%length)   !! [lanes, padded columns]
 
     call evaluate(attempt, system, t, y, dydt)
     if (.not. all_finite(attempt%length, dydt)) call disable_non_finite_lanes(attempt, dydt)
@@ -133,7 +133,7 @@ contains
     type(step_attempt_t), intent(inout) :: attempt
     class(system_t), intent(inout) :: system
     logical, intent(in) :: moved(:)   !! lanes whose state has changed since the last call
-    real(wp), intent(inout) :: slope(attempt%length)
+    real(wp), intent(inout) :: slope(attempt%length)   !! [lanes, padded columns]
     integer :: lane
 
     do lane = 1, attempt%lanes

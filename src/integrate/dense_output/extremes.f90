@@ -97,7 +97,7 @@ contains
     type(extremes_t), intent(inout) :: extremes
     class(observer_t), intent(inout) :: observer
     type(dense_output_t), intent(inout) :: dense   !! of the lane
-    real(wp), intent(in) :: t_end
+    real(wp), intent(in) :: t_end   !! end of the step [s]
     logical, intent(in) :: ends_at_crossing
     real(wp) :: t, half, middle
     integer :: i, last
@@ -119,10 +119,10 @@ contains
   !> Widens the ranges by the maxima and minima of the polynomials through `values_of`, over the times from t_start to t_end.
   pure subroutine widen_ranges(n, nodes, to_series, values_of, ranges, t_start, t_end)
     integer, intent(in) :: n   !! number of nodes
-    real(wp), intent(in) :: nodes(n), to_series(n, n)
+    real(wp), intent(in) :: nodes(n), to_series(n, n)   !! of `lobatto_nodes`
     real(wp), contiguous, intent(in) :: values_of(:, :)   !! [functions, nodes]
     type(ranges_t), intent(inout) :: ranges
-    real(wp), intent(in) :: t_start, t_end
+    real(wp), intent(in) :: t_start, t_end   !! [s]
     real(wp) :: values(max_nodes), lowest, highest, indicator
     integer :: function
 

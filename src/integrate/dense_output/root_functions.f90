@@ -92,7 +92,7 @@ contains
   pure real(wp) function part_end(roots, part, theta_end)
     type(root_functions_t), intent(in) :: roots
     integer, intent(in) :: part
-    real(wp), intent(in) :: theta_end
+    real(wp), intent(in) :: theta_end   !! end of the step
 
     part_end = theta_end * part / roots%parts
   end function part_end
@@ -101,7 +101,7 @@ contains
   pure type(bracket_t) function part_bracket(roots, function, part, theta_end)
     type(root_functions_t), intent(in) :: roots
     integer, intent(in) :: function, part
-    real(wp), intent(in) :: theta_end
+    real(wp), intent(in) :: theta_end   !! end of the step
 
     part_bracket%function = function
     part_bracket%before = part_end(roots, part - 1, theta_end)
@@ -126,7 +126,7 @@ contains
     type(dense_output_t), intent(inout) :: dense
     real(wp), intent(in) :: theta
     real(wp), contiguous, intent(inout) :: y(:)   !! state there
-    real(wp), contiguous, intent(inout) :: g(:)
+    real(wp), contiguous, intent(inout) :: g(:)   !! [functions]
 
     call sample(dense, theta, y)
     if (of_system) then
@@ -144,7 +144,7 @@ contains
     class(observer_t), intent(inout) :: observer
     type(dense_output_t), intent(inout) :: dense
     type(bracket_t), intent(in) :: bracket
-    real(wp), intent(out) :: root
+    real(wp), intent(out) :: root   !! theta
     real(wp) :: a, b, c, ga, gb, gc   ! newest point, best point of the other sign, the point that they replaced
     real(wp) :: fraction, least, tolerance, x
 

@@ -14,7 +14,7 @@ module nocdyn_switching
 
   public :: allocate_switching, start_switching, find_crossing, cross_boundaries
 
-  integer, parameter, public :: max_repeats = 100   !! crossings of one boundary without progress in time; more are chattering
+  integer, parameter :: max_repeats = 100   ! crossings of one boundary without progress in time; more are chattering
   real(wp), parameter :: negligible = 1.0e-10_wp          ! of the duration: a shorter time between crossings is no progress
   real(wp), parameter :: no_time = -huge(1.0_wp)
 

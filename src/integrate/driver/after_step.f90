@@ -25,7 +25,7 @@ contains
   subroutine process_steps(integrator, system, times, observer, solver_status)
     type(integrator_t), intent(inout) :: integrator
     class(system_t), intent(inout) :: system
-    real(wp), contiguous, intent(in) :: times(:)
+    real(wp), contiguous, intent(in) :: times(:)   !! output times [s]
     class(observer_t), intent(inout) :: observer
     type(solver_status_t), intent(inout) :: solver_status
     integer :: lane

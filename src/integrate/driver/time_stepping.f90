@@ -114,7 +114,7 @@ contains
     class(stepper_t), intent(inout) :: stepper
     class(system_t), intent(inout) :: system
     class(ensemble_t), intent(inout) :: ensemble
-    real(wp), contiguous, intent(in) :: times(:)
+    real(wp), contiguous, intent(in) :: times(:)   !! output times [s]
     class(observer_t), intent(inout) :: observer
     type(solver_status_t), intent(inout) :: solver_status
     real(wp) :: t
@@ -288,7 +288,7 @@ contains
   !> Moves the accepted lanes to the ends of their steps.
   subroutine advance_lanes(integrator, times)
     type(integrator_t), intent(inout) :: integrator
-    real(wp), contiguous, intent(in) :: times(:)
+    real(wp), contiguous, intent(in) :: times(:)   !! output times [s]
     real(wp), allocatable :: spare(:, :)
     integer :: component, lane
 

@@ -9,7 +9,7 @@ module nocdyn_stage_solver
   implicit none (type, external)
   private
 
-  public :: choose_stage_matrix, dense_cost, banded_cost
+  public :: choose_stage_matrix
 
   real(wp), parameter :: solutions = 6   ! with one factorisation: the stages of RODAS
   ! Operations that take as long as the BLAS calls for one column inside DGBTRF and DGBTRS: 15 to 20 ns at 2 to 4 operations per

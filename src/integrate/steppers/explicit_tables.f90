@@ -1,4 +1,4 @@
-!> Explicit Runge-Kutta methods as tables of numbers.
+!> Tableaux of explicit Runge-Kutta methods.
 module nocdyn_explicit_tables
   use nocdyn_kinds, only: wp
   implicit none (type, external)
@@ -8,31 +8,31 @@ module nocdyn_explicit_tables
 
   !> y_new = y + h sum b_i k_i with k_i = f(t + c_i h, y + h sum a_ij k_j).
   !>
-  !> With one embedded method the estimated error is e = h sum error_i k_i, and `error_order` is the order of that method.
-  !> With two it is Hairer's e^2 / sqrt(e^2 + 0.01 e_coarse^2), e_coarse = h sum coarse_error_i k_i: methods of the
-  !> orders p and q make it fall as h^(2 p - q + 1), and `error_order` is 2 p - q.
+  !> With one embedded method the error estimate is e = h sum error_i k_i, and `error_order` is the order of that method. With two
+  !> it is Hairer's e^2 / sqrt(e^2 + 0.01 e_low^2), e_low = h sum low_order_error_i k_i: with embedded methods of the orders p and
+  !> q it falls as h^(2 p - q + 1), and `error_order` is 2 p - q.
   type, public :: explicit_table_t
     character(len=:), allocatable :: name
     character(len=:), allocatable :: reference
     integer :: stages                        !! of the step
-    integer :: dense_stages = 0              !! further ones that only the solution inside the step needs
+    integer :: dense_stages = 0              !! further stages, for the dense output only
     integer :: order                         !! of y_new
-    integer :: error_order                   !! the estimated error of a step falls as h^(error_order + 1)
-    integer :: dense_order                   !! of the solution inside a step
+    integer :: error_order                   !! the error estimate falls as h^(error_order + 1)
+    integer :: dense_order                   !! of the dense output
     logical :: first_same_as_last            !! the last stage is f(t + h, y_new), the first stage of the next step
-    real(wp) :: max_growth = 6.0_wp         !! of the step size, in the authors' code
-    real(wp) :: stability_limit = 0.0_wp    !! just within the stability domain on the negative real axis
-    real(wp), allocatable :: a(:, :)         !! strictly lower triangular, shape [all stages, all stages]
-    real(wp), allocatable :: b(:)            !! shape [stages]
-    real(wp), allocatable :: c(:)            !! shape [all stages]
-    real(wp), allocatable :: error(:)        !! b minus the embedded weights, shape [stages]
-    real(wp), allocatable :: low_order_error(:) !! the same of a second embedded method of lower order, if there is one
-    real(wp), allocatable :: dense(:, :)     !! b_i(theta) = sum_p dense(i, p) theta^p, shape [all stages, degree]
+    real(wp) :: max_growth = 6.0_wp          !! largest ratio of step sizes, as in the authors' code
+    real(wp) :: stability_limit = 0.0_wp     !! of |h lambda|, just inside the stability domain on the negative real axis
+    real(wp), allocatable :: a(:, :)         !! strictly lower triangular, [all stages, all stages]
+    real(wp), allocatable :: b(:)            !! [stages]
+    real(wp), allocatable :: c(:)            !! [all stages]
+    real(wp), allocatable :: error(:)        !! b minus the embedded weights, [stages]
+    real(wp), allocatable :: low_order_error(:)   !! the same of a second embedded method of lower order, if there is one
+    real(wp), allocatable :: dense(:, :)     !! b_i(theta) = sum_p dense(i, p) theta^p, [all stages, degree]
   end type explicit_table_t
 
 contains
 
-  !> DOPRI5, the pair RK5(4)7M with the fourth-order dense output of its authors' and Hairer's code.
+  !> DOPRI5, the pair RK5(4)7M with the dense output of order 4 of its authors and of Hairer's code.
   function dormand_prince_5() result(table)
     type(explicit_table_t) :: table
 
@@ -60,7 +60,7 @@ contains
     table%dense(:, :) = dormand_prince_5_dense(table%b)
   end function dormand_prince_5
 
-  !> CONTD5 of DOPRI5, the nest of `expand` with dy = y_new - y:
+  !> The dense output CONTD5 of DOPRI5, in the form of `expand` with dy = y_new - y:
   !> r = dy, h k_1 - dy, 2 dy - h k_1 - h k_7, h sum d_i k_i.
   pure function dormand_prince_5_dense(b) result(dense)
     real(wp), intent(in) :: b(7)
@@ -113,7 +113,7 @@ contains
     table%dense(:, :) = dormand_prince_8_dense(table%b)
   end function dormand_prince_8
 
-  !> The rows of a that belong to the first twelve stages.
+  !> The rows of a for the first twelve stages.
   pure function dormand_prince_8_stages() result(a)
     real(wp) :: a(12, 16)
 
@@ -145,7 +145,7 @@ contains
       0.643392746015763530355970484046_wp]
   end function dormand_prince_8_stages
 
-  !> The rows of a that belong to the last three stages.
+  !> The rows of a for the last three stages.
   pure function dormand_prince_8_dense_stages() result(a)
     real(wp) :: a(14:16, 16)
 
@@ -163,7 +163,7 @@ contains
       -1.39902416515901462129418009734e-3_wp, 2.9475147891527723389556272149_wp, -9.15095847217987001081870187138_wp]
   end function dormand_prince_8_dense_stages
 
-  !> CONTD8 of DOP853, the nest of `expand` with dy = y_new - y:
+  !> The dense output CONTD8 of DOP853, in the form of `expand` with dy = y_new - y:
   !> r = dy, h k_1 - dy, 2 dy - h k_1 - h k_13, and h sum d_ji k_i with j = 4 to 7.
   pure function dormand_prince_8_dense(b) result(dense)
     real(wp), intent(in) :: b(13)
@@ -197,9 +197,9 @@ contains
     call expand(dense)
   end function dormand_prince_8_dense
 
-  !> Hairer's nest theta (r_1 + (1 - theta) (r_2 + theta (r_3 + (1 - theta) (r_4 + ...)))) in powers of theta.
+  !> Expands Hairer's form theta (r_1 + (1 - theta) (r_2 + theta (r_3 + (1 - theta) (r_4 + ...)))) in powers of theta.
   pure subroutine expand(dense)
-    real(wp), intent(inout) :: dense(:, :)   !! columns r_1, r_2 ...; on return the factors of theta, theta^2 ...
+    real(wp), intent(inout) :: dense(:, :)   !! columns r_1, r_2 ...; on return coefficients of theta, theta^2 ...
     real(wp) :: nest(size(dense, 1), 0:size(dense, 2))
     integer :: i
 
@@ -212,7 +212,7 @@ contains
     dense = nest(:, 1:)
   end subroutine expand
 
-  !> The weights that make a sum over the stages the stage `stage` alone.
+  !> The weights of a sum over the stages that is equal to one stage.
   pure function stage_weights(stage, stages) result(weights)
     integer, intent(in) :: stage, stages
     real(wp) :: weights(stages)

@@ -1,4 +1,4 @@
-!> Rosenbrock methods as tables of numbers.
+!> Tableaux of Rosenbrock methods.
 module nocdyn_rosenbrock_tables
   use nocdyn_kinds, only: wp
   implicit none (type, external)
@@ -14,16 +14,16 @@ module nocdyn_rosenbrock_tables
     character(len=:), allocatable :: reference
     integer :: stages
     integer :: order                         !! of y_new
-    integer :: error_order                   !! of the embedded solution that y_new is compared with
-    integer :: dense_order                   !! of the solution inside a step
+    integer :: error_order                   !! of the embedded solution
+    integer :: dense_order                   !! of the dense output
     real(wp) :: gamma
-    real(wp), allocatable :: a(:, :)         !! strictly lower triangular, shape [stages, stages]
-    real(wp), allocatable :: c(:, :)         !! strictly lower triangular, shape [stages, stages]
-    real(wp), allocatable :: alpha(:)        !! places of the stages in the step
+    real(wp), allocatable :: a(:, :)         !! strictly lower triangular, [stages, stages]
+    real(wp), allocatable :: c(:, :)         !! strictly lower triangular, [stages, stages]
+    real(wp), allocatable :: alpha(:)        !! theta of the stages
     real(wp), allocatable :: gamma_sum(:)    !! gamma_i, the factors of df/dt
     real(wp), allocatable :: m(:)
     real(wp), allocatable :: error(:)        !! m minus the embedded weights
-    real(wp), allocatable :: dense(:, :)     !! m_i(theta) = sum_p dense(i, p) theta^p, shape [stages, degree]
+    real(wp), allocatable :: dense(:, :)     !! m_i(theta) = sum_p dense(i, p) theta^p, [stages, degree]
   end type rosenbrock_table_t
 
 contains
@@ -60,7 +60,7 @@ contains
     table%dense(:, :) = rodas_dense(table%m)
   end function rodas4
 
-  !> CONTRO of RODAS, expanded in powers of theta: y (1 - theta) + theta (y_new + (1 - theta) (r + theta s)), where r and s
+  !> The dense output CONTRO of RODAS in powers of theta: y (1 - theta) + theta (y_new + (1 - theta) (r + theta s)), where r and s
   !> are sums of the stages with the weights D2i and D3i.
   pure function rodas_dense(m) result(dense)
     real(wp), intent(in) :: m(6)
@@ -118,8 +118,8 @@ contains
   end function rodas5p
 
   !> Steinebach's y (1 - theta) + theta (y_new + (1 - theta) (r + theta (s + theta q))), expanded in powers of theta, where
-  !> r, s and q are sums of the stages. No condition of order 4 sees the factors of the last stage, which is y_new minus the
-  !> embedded solution.
+  !> r, s and q are sums of the stages. The conditions of order 4 do not contain the weights of the last stage, which is y_new
+  !> minus the embedded solution.
   pure function rodas5p_dense(m) result(dense)
     real(wp), intent(in) :: m(8)
     real(wp) :: dense(8, 4)

@@ -56,7 +56,7 @@ contains
     type(spectral_radius_t), intent(inout) :: spectrum
     integer, intent(in) :: lane
     real(wp), contiguous, intent(in) :: dfdy(:, :)   !! shape [lanes, positions]
-    real(wp), intent(out) :: size_of_eigenvalue
+    real(wp), intent(out) :: size_of_eigenvalue   !! [1/s]
     real(wp) :: growth(2)
     integer :: i
 
