@@ -136,7 +136,7 @@ contains
     case (integration_interrupted)
       sentence = 'the integration was interrupted at ' // when
     case default
-      error stop 'nocdyn_solver_status: an integration that is running has no outcome'
+      error stop 'nocdyn_solver_status: an integration that is running has no failure message'
     end select
   end function failure_message
 

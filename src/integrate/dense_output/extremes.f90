@@ -2,8 +2,8 @@
 !>
 !> In every step each function is replaced by the polynomial through its values at Chebyshev-Lobatto nodes, as many as the dense
 !> output has coefficients: a linear function of the state is represented exactly. The maximum of the polynomial is found to
-!> machine precision wherever it can exceed the extremes so far. In sweeps, quantities that are linear in the state need no
-!> samples: `nocdyn_bernstein` finds their extremes from the coefficients themselves.
+!> machine precision wherever it can exceed the extremes so far. In sweeps, the extremes of quantities that are linear in
+!> the state come from their coefficients, without samples (`nocdyn_bernstein`).
 module nocdyn_extremes
   use nocdyn_chebyshev, only: find_maximum, lobatto_nodes, max_nodes
   use nocdyn_dense_output, only: dense_output_t, sample

@@ -34,7 +34,7 @@ module nocdyn_ensemble
       import :: solver_status_t, ensemble_t, wp
       class(ensemble_t), intent(inout) :: self
       integer, intent(in) :: lane
-      real(wp), contiguous, intent(in) :: y(:)      !! last state, at the time outcome%t(lane)
+      real(wp), contiguous, intent(in) :: y(:)      !! last state, at the time solver_status%t(lane)
       type(solver_status_t), intent(in) :: solver_status        !! only the elements of this lane are final
     end subroutine finish_interface
 
