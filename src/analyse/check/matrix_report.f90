@@ -261,6 +261,7 @@ contains
     end associate
   end subroutine report_derivatives
 
+  !> Appends a vector as a row.
   subroutine put_vector(self, label, vector)
     class(equations_t), intent(inout) :: self
     character(len=*), intent(in) :: label

@@ -31,7 +31,7 @@ contains
     call put_names('phase_', ' [deg]')
     call put_names('kinetic_', ' [1]')
     do i = 1, size(self%elastic)
-      call table%append(',potential_' // self%machine%element_name(self%elastic(i)) // ' [1]')
+      call table%append(',potential_' // self%elastic_names(i)%text // ' [1]')
     end do
     call table%append(new_line('a'))
     number = 0
@@ -139,7 +139,7 @@ contains
     do i = 1, size(self%elastic)
       e = self%elastic(i)
       call json%open()
-      call json%put('name', self%machine%element_name(e))
+      call json%put('name', self%elastic_names(i)%text)
       call json%put('bodies', [self%machine%elements%from(e), self%machine%elements%to(e)])
       call json%put('stiffness_N_m_rad', self%stiffness(i))
       call json%close()

@@ -1,5 +1,6 @@
 !> The printed report on the modes of a machine.
 module nocdyn_modes_report
+  use nocdyn_energy_balance, only: elastic_element_names
   use nocdyn_errors, only: error_t
   use nocdyn_kinds, only: wp
   use nocdyn_linearisation, only: linearisation_t, linearise
@@ -26,6 +27,7 @@ module nocdyn_modes_report
     type(mode_t), allocatable :: modes(:)
     integer :: shapes = 0                         !! number of modes, from the first, whose shapes and shares are in the files
     integer, allocatable :: elastic(:)            !! elements whose potential energies are reported
+    type(string_t), allocatable :: elastic_names(:)
     real(wp), allocatable :: stiffness(:)         !! tangent stiffness of `elastic` [N m/rad]
     real(wp), allocatable :: omega(:)             !! speeds of the bodies at the operating point [rad/s]
     real(wp) :: t = 0.0_wp
@@ -46,6 +48,7 @@ contains
     if (allocated(error)) return
     self%machine = point%formulation%machine
     allocate (self%elastic, source=self%machine%elastic())
+    allocate (self%elastic_names, source=elastic_element_names(self%machine))
     call find_modes(point%formulation, linear, self%elastic, self%modes, error)
     if (allocated(error)) return
     call point%formulation%set_state(point%y)
@@ -97,7 +100,7 @@ contains
     do i = 1, size(self%modes)
       if (self%modes(i)%kind /= mode_oscillating .or. number == most_modes) cycle
       number = number + 1
-      width = max(width, text_width(kinetic_text(self, self%modes(i))))
+      width = max(width, text_width(shares_text(self%modes(i)%kinetic, self%machine%names)))
     end do
     call report%append_line('  mode' // cell('frequency [Hz]') // cell('undamped [Hz]') // cell('damping ratio') // &
                             cell('decay time [s]') // '  ' // padded('kinetic energy in', width) // '  potential energy in')
@@ -109,7 +112,8 @@ contains
       associate (mode => self%modes(i))
         call report%append_line(repeat(' ', number_width - len(to_text(number))) // to_text(number) // cell(mode%frequency()) // &
                                 cell(mode%undamped) // cell(mode%damping_ratio()) // time_cell(mode) // '  ' // &
-                                padded(kinetic_text(self, mode), width) // '  ' // potential_text(self, mode) // &
+                                padded(shares_text(mode%kinetic, self%machine%names), width) // '  ' // &
+                                shares_text(mode%potential, self%elastic_names) // &
                                 trim(merge(', unstable', '          ', mode%is_unstable())))
       end associate
     end do
@@ -137,7 +141,7 @@ contains
       number = number + 1
       if (number > most_modes) cycle
       call report%append_line('  ' // trim(kind_names(kind)) // ': ' // rate_text(self%modes(i)) // &
-                              '; kinetic energy in ' // kinetic_text(self, self%modes(i)))
+                              '; kinetic energy in ' // shares_text(self%modes(i)%kinetic, self%machine%names))
     end do
     if (number > most_modes) call report%append_line('  (' // to_text(number - most_modes) // ' more in modes.csv)')
   end subroutine put_real
@@ -155,54 +159,24 @@ contains
     end if
   end function rate_text
 
-  !> "motor 62 %, wheel 30 %".
-  function kinetic_text(self, mode) result(text)
-    type(modes_report_t), intent(in) :: self
-    type(mode_t), intent(in) :: mode
+  !> The largest shares with their names, e.g. "motor 62 %, wheel 30 %": at least one, if any is not zero.
+  function shares_text(share, names) result(text)
+    real(wp), intent(in) :: share(:)         !! of an energy, 0 to 1
+    type(string_t), intent(in) :: names(:)   !! of bodies or couplings
     character(len=:), allocatable :: text
-    integer :: k, largest(most_shares), shares
-
-    text = ''
-    call find_largest(mode%kinetic, largest, shares)
-    do k = 1, shares
-      if (k > 1) text = text // ', '
-      text = text // self%machine%names(largest(k))%text // ' ' // percent(mode%kinetic(largest(k)))
-    end do
-  end function kinetic_text
-
-  function potential_text(self, mode) result(text)
-    type(modes_report_t), intent(in) :: self
-    type(mode_t), intent(in) :: mode
-    character(len=:), allocatable :: text
-    integer :: k, largest(most_shares), shares
-
-    text = ''
-    call find_largest(mode%potential, largest, shares)
-    do k = 1, shares
-      if (k > 1) text = text // ', '
-      text = text // self%machine%element_name(self%elastic(largest(k))) // ' ' // percent(mode%potential(largest(k)))
-    end do
-  end function potential_text
-
-  !> Indices of the shares that are printed, the largest first: at least one, if any is not zero.
-  pure subroutine find_largest(share, largest, shares)
-    real(wp), intent(in) :: share(:)
-    integer, intent(out) :: largest(most_shares), shares
     real(wp) :: left(size(share))
-    integer :: k
+    integer :: k, largest
 
+    text = ''
     left = abs(share)
-    shares = 0
-    largest = 0
     do k = 1, min(most_shares, size(share))
-      associate (place => maxloc(left, dim=1))
-        if (left(place) < merge(least_share, tiny(1.0_wp), k > 1)) return
-        largest(k) = place
-        shares = k
-        left(place) = 0.0_wp
-      end associate
+      largest = maxloc(left, dim=1)
+      if (left(largest) < merge(least_share, tiny(1.0_wp), k > 1)) return
+      if (k > 1) text = text // ', '
+      text = text // names(largest)%text // ' ' // percent(share(largest))
+      left(largest) = 0.0_wp
     end do
-  end subroutine find_largest
+  end function shares_text
 
   function percent(share) result(text)
     real(wp), intent(in) :: share

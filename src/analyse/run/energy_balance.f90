@@ -10,7 +10,7 @@ module nocdyn_energy_balance
   implicit none (type, external)
   private
 
-  public :: work_element_names, put_energy_balance, append_energy_balance
+  public :: work_element_names, elastic_element_names, put_energy_balance, append_energy_balance
 
   integer, parameter :: max_lines = 10   ! of each list
 
@@ -49,6 +49,20 @@ contains
       end associate
     end do
   end function work_element_names
+
+  !> The names of the elements that can store energy, in the order of `elastic` of the machine.
+  function elastic_element_names(machine) result(names)
+    type(machine_t), intent(in) :: machine
+    type(string_t), allocatable :: names(:)
+    integer :: i
+
+    associate (elastic => machine%elastic())
+      allocate (names(size(elastic)))
+      do i = 1, size(elastic)
+        names(i)%text = machine%element_name(elastic(i))
+      end do
+    end associate
+  end function elastic_element_names
 
   !> The energy balance error [J]: the increase of the stored energies, less the works.
   pure real(wp) function residual(self)

@@ -32,6 +32,7 @@ module nocdyn_recorded_columns
 
 contains
 
+  !> An evaluator of some columns.
   function new_recorded_columns(formulation, columns) result(self)
     class(formulation_t), intent(in) :: formulation   !! with work integrals if a column needs them
     type(column_t), intent(in) :: columns(:)

@@ -50,7 +50,7 @@ contains
   !> No rows yet; the first row sets everything.
   subroutine start_extremes(extremes, columns)
     type(extremes_t), intent(out) :: extremes
-    integer, intent(in) :: columns
+    integer, intent(in) :: columns   !! their number
 
     allocate (extremes%lowest(columns), source=huge(1.0_wp))
     allocate (extremes%highest(columns), source=-huge(1.0_wp))
@@ -60,7 +60,7 @@ contains
   !> Includes one row, whose first value is the time.
   pure subroutine update_extremes(extremes, row)
     type(extremes_t), intent(inout) :: extremes
-    real(wp), intent(in) :: row(:)
+    real(wp), intent(in) :: row(:)   !! [columns]
     integer :: i
 
     do i = 1, size(row)

@@ -77,7 +77,7 @@ contains
   !> Text followed by blanks; the bytes of a character in UTF-8 count as one.
   pure function padded(text, length)
     character(len=*), intent(in) :: text
-    integer, intent(in) :: length
+    integer, intent(in) :: length   !! characters of the result, at least
     character(len=:), allocatable :: padded
 
     padded = text // repeat(' ', max(0, length - text_width(text)))

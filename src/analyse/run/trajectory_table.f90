@@ -1,6 +1,6 @@
 !> The rows of trajectory.csv: all columns of a machine of one lane at a time and state.
 module nocdyn_trajectory_table
-  use nocdyn_energy_balance, only: energy_balance_t, work_element_names
+  use nocdyn_energy_balance, only: elastic_element_names, energy_balance_t, work_element_names
   use nocdyn_formulation, only: formulation_t
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
@@ -62,19 +62,14 @@ contains
     real(wp), intent(in) :: t                  !! [s]
     real(wp), contiguous, intent(in) :: y(:)   !! [states + quadratures]
     type(energy_balance_t), intent(out) :: balance
-    integer :: e
 
     self%t(1) = t
     self%y(1, :) = y
     call self%columns%observe(self%t, self%y)
-    associate (formulation => self%columns%formulation, machine => self%columns%formulation%machine, &
-               elastic => self%columns%formulation%machine%elastic())
+    associate (formulation => self%columns%formulation, machine => self%columns%formulation%machine)
       allocate (balance%work_elements, source=work_element_names(machine))
       allocate (balance%work, source=y(formulation%states + 1:))
-      allocate (balance%elastic_elements(size(elastic)))
-      do e = 1, size(elastic)
-        balance%elastic_elements(e)%text = machine%element_name(elastic(e))
-      end do
+      allocate (balance%elastic_elements, source=elastic_element_names(machine))
       allocate (balance%stored_start, source=self%start_stored)
       allocate (balance%stored_end, source=stored_energies(machine))
     end associate

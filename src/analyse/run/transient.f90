@@ -149,8 +149,8 @@ contains
   subroutine on_output(self, lane, t, y)
     class(run_observer_t), intent(inout) :: self
     integer, intent(in) :: lane
-    real(wp), intent(in) :: t
-    real(wp), contiguous, intent(in) :: y(:)
+    real(wp), intent(in) :: t                  !! [s]
+    real(wp), contiguous, intent(in) :: y(:)   !! [states + quadratures]
 
     if (lane /= 1) error stop 'nocdyn_transient: a run is one lane'
     call self%table%fill(t, y, self%row)
@@ -164,9 +164,9 @@ contains
   subroutine tracked_values(self, lane, t, y, values)
     class(run_observer_t), intent(inout) :: self
     integer, intent(in) :: lane
-    real(wp), intent(in) :: t
-    real(wp), contiguous, intent(in) :: y(:)
-    real(wp), contiguous, intent(inout) :: values(:)
+    real(wp), intent(in) :: t                  !! [s]
+    real(wp), contiguous, intent(in) :: y(:)   !! [states + quadratures]
+    real(wp), contiguous, intent(inout) :: values(:)   !! [columns]
 
     if (lane /= 1) error stop 'nocdyn_transient: a run is one lane'
     call self%table%fill(t, y, values)
@@ -177,15 +177,16 @@ contains
   subroutine on_extremes(self, lane, ranges)
     class(run_observer_t), intent(inout) :: self
     integer, intent(in) :: lane
-    type(ranges_t), intent(in) :: ranges
+    type(ranges_t), intent(in) :: ranges   !! of the columns
 
     if (lane /= 1) error stop 'nocdyn_transient: a run is one lane'
     if (self%has_ranges) call widen_extremes(self%extremes, ranges)
   end subroutine on_extremes
 
+  !> Whether the caller wants the run to end.
   function wants_stop(self, t)
     class(run_observer_t), intent(inout) :: self
-    real(wp), intent(in) :: t
+    real(wp), intent(in) :: t   !! time reached [s]
     logical :: wants_stop
 
     wants_stop = self%output%wants_stop((t - self%t_start) / (self%t_end - self%t_start))

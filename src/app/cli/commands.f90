@@ -34,8 +34,8 @@ contains
   !> Appends a row.
   subroutine add_command(commands, name, operands, options, summary, help, run)
     type(command_t), allocatable, intent(inout) :: commands(:)
-    character(len=*), intent(in) :: name, operands, options, summary, help
-    procedure(command_interface), optional :: run
+    character(len=*), intent(in) :: name, operands, options, summary, help   !! as in `command_t`
+    procedure(command_interface), optional :: run   !! without it, the program itself does the command
     type(command_t), allocatable :: longer(:)
     integer :: i
 
@@ -65,6 +65,7 @@ contains
     end do
   end subroutine remove_procedures
 
+  !> Sets the procedure of a command.
   subroutine set_procedure(commands, name, run)
     type(command_t), intent(inout) :: commands(:)
     character(len=*), intent(in) :: name   !! of a command in the table
@@ -83,6 +84,7 @@ contains
     end do
   end function command_index
 
+  !> The names of all commands.
   pure function command_names(commands) result(names)
     type(command_t), intent(in) :: commands(:)
     type(string_t), allocatable :: names(:)

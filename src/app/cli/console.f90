@@ -4,11 +4,10 @@ module nocdyn_console
   use nocdyn_errors, only: error_t
   use nocdyn_kinds, only: wp
   use nocdyn_posix, only: is_terminal, standard_error, standard_output, write_bytes
-  use nocdyn_text, only: to_text
   implicit none (type, external)
   private
 
-  public :: print_text, report_error, new_console_progress, new_status_line
+  public :: print_text, report_error, new_status_line
 
   logical, protected, public :: output_is_lost = .false.   !! whether a write to standard output has failed
 
@@ -28,15 +27,6 @@ module nocdyn_console
     procedure :: show
     procedure :: clear => clear_line
   end type status_line_t
-
-  !> The progress of a run.
-  type, public :: console_progress_t
-    character(len=:), allocatable, private :: title
-    type(status_line_t), private :: line
-  contains
-    procedure :: update
-    procedure :: clear
-  end type console_progress_t
 
 contains
 
@@ -105,6 +95,7 @@ contains
     elapsed = real(now - self%began, wp) / real(self%rate, wp)
   end function elapsed
 
+  !> Shows the line with a new text.
   subroutine show(self, text)
     class(status_line_t), intent(inout) :: self
     character(len=*), intent(in) :: text
@@ -125,31 +116,5 @@ contains
     if (self%is_shown) write (error_unit, '(a)', advance='no') achar(13) // achar(27) // '[K'
     self%is_shown = .false.
   end subroutine clear_line
-
-  function new_console_progress(title, is_quiet) result(progress)
-    character(len=*), intent(in) :: title
-    logical, intent(in) :: is_quiet
-    type(console_progress_t) :: progress
-
-    progress%title = title
-    progress%line = new_status_line(is_quiet, shows_in_logs=.false.)
-  end function new_console_progress
-
-  subroutine update(self, fraction)
-    class(console_progress_t), intent(inout) :: self
-    real(wp), intent(in) :: fraction
-    real(wp) :: left
-
-    if (.not. self%line%is_due()) return
-    left = self%line%elapsed() * (1.0_wp - fraction) / max(fraction, epsilon(fraction))
-    call self%line%show(self%title // ': ' // to_text(int(100.0_wp * fraction)) // ' %, ' // &
-                        to_text(int(min(left, 1.0e8_wp)) + 1) // ' s left')
-  end subroutine update
-
-  subroutine clear(self)
-    class(console_progress_t), intent(inout) :: self
-
-    call self%line%clear()
-  end subroutine clear
 
 end module nocdyn_console

@@ -1,6 +1,6 @@
 !> The files that a run leaves: trajectory.csv, summary.json and input.nml.
 module nocdyn_run_files
-  use nocdyn_console, only: console_progress_t, new_console_progress
+  use nocdyn_console, only: new_status_line, status_line_t
   use nocdyn_csv, only: write_header, write_row
   use nocdyn_errors, only: error_t
   use nocdyn_input, only: input_t
@@ -10,7 +10,7 @@ module nocdyn_run_files
   use nocdyn_posix, only: is_interrupted, remove_file
   use nocdyn_run_output, only: run_output_t
   use nocdyn_run_summary, only: run_summary_t, summary_json
-  use nocdyn_text, only: string_t
+  use nocdyn_text, only: string_t, to_text
   use nocdyn_transient, only: run_transient
   implicit none (type, external)
   private
@@ -20,12 +20,13 @@ module nocdyn_run_files
   character(len=*), parameter, public :: trajectory_file = 'trajectory.csv', partial_file = 'trajectory.partial.csv'
   character(len=*), parameter, public :: summary_file = 'summary.json', input_file = 'input.nml'
 
-  !> Writes the rows while the run is integrated.
+  !> Writes the rows and shows the progress while the run is integrated.
   type, extends(run_output_t) :: trajectory_writer_t
     character(len=:), allocatable :: folder
     type(output_file_t) :: file
-    type(console_progress_t) :: progress
-    logical :: has_started = .false.   !! whether there is a file
+    character(len=:), allocatable :: title   !! of the progress line
+    type(status_line_t) :: line
+    logical :: has_started = .false.         !! whether there is a file
   contains
     procedure :: start
     procedure :: write_row => write_trajectory_row
@@ -46,7 +47,8 @@ contains
     type(error_t), allocatable :: write_error
 
     writer%folder = folder
-    writer%progress = new_console_progress(title, is_quiet)
+    writer%title = title
+    writer%line = new_status_line(is_quiet, shows_in_logs=.false.)
     call run_transient(input, writer, summary, error)
     if (summary%has_run) then
       call write_results(input, summary, writer, write_error)
@@ -54,7 +56,7 @@ contains
     else if (writer%has_started) then
       call writer%file%discard()
     end if
-    call writer%progress%clear()
+    call writer%line%clear()
   end subroutine run_to_files
 
   !> Gives the three files their names once all are written: if the disk is full, the results of an earlier run stay.
@@ -99,29 +101,36 @@ contains
     if (.not. allocated(error)) call report%finish(summary_file, error)
   end subroutine name_files
 
+  !> Opens the file and writes its header.
   subroutine start(self, labels)
     class(trajectory_writer_t), intent(inout) :: self
-    type(string_t), intent(in) :: labels(:)
+    type(string_t), intent(in) :: labels(:)   !! of the columns
 
     call self%file%open(self%folder, trajectory_file)
     call write_header(self%file, labels)
     self%has_started = .true.
   end subroutine start
 
+  !> Writes a row.
   subroutine write_trajectory_row(self, row)
     class(trajectory_writer_t), intent(inout) :: self
-    real(wp), intent(in) :: row(:)
+    real(wp), intent(in) :: row(:)   !! [columns]
 
     call write_row(self%file, row)
   end subroutine write_trajectory_row
 
-  !> On Ctrl-C, and when the file cannot be written.
+  !> Shows the progress. The run stops after Ctrl-C, and if the file cannot be written.
   function wants_stop(self, fraction)
     class(trajectory_writer_t), intent(inout) :: self
-    real(wp), intent(in) :: fraction
+    real(wp), intent(in) :: fraction   !! of the time span, 0 to 1
     logical :: wants_stop
+    real(wp) :: left   ! [s]
 
-    call self%progress%update(fraction)
+    if (self%line%is_due()) then
+      left = self%line%elapsed() * (1.0_wp - fraction) / max(fraction, epsilon(fraction))
+      call self%line%show(self%title // ': ' // to_text(int(100.0_wp * fraction)) // ' %, ' // &
+                          to_text(int(min(left, 1.0e8_wp)) + 1) // ' s left')
+    end if
     wants_stop = is_interrupted() .or. self%file%has_failed
   end function wants_stop
 

@@ -27,16 +27,19 @@ contains
     call send_tag(root, tag_request)
   end subroutine send_request
 
-  !> Assigns the variants first to first + count - 1 to a rank; count = 0: there are no more.
+  !> Assigns consecutive variants to a rank, none if there are no more.
   subroutine send_assignment(rank, first, count)
-    integer, intent(in) :: rank, first, count
+    integer, intent(in) :: rank    !! of the receiver
+    integer, intent(in) :: first   !! variant
+    integer, intent(in) :: count   !! number of variants
 
     call mpi_send([first, count], 2, mpi_integer, rank, tag_assignment, mpi_comm_world)
   end subroutine send_assignment
 
   !> Waits for the answer to `send_request`.
   subroutine receive_assignment(first, count)
-    integer, intent(out) :: first, count
+    integer, intent(out) :: first   !! variant
+    integer, intent(out) :: count   !! number of variants, 0: there are no more
     integer :: numbers(2)
 
     call mpi_recv(numbers, 2, mpi_integer, root, tag_assignment, mpi_comm_world, mpi_status_ignore)
@@ -57,7 +60,7 @@ contains
 
   !> Receives the results that `probe_message` has found.
   subroutine receive_results(rank, chunk, seconds)
-    integer, intent(in) :: rank
+    integer, intent(in) :: rank        !! of the sender
     type(chunk_t), intent(out) :: chunk
     real(wp), intent(out) :: seconds   !! to compute them [s]
     type(mpi_status) :: status

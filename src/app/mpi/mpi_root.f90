@@ -31,6 +31,7 @@ module nocdyn_mpi_root
 
 contains
 
+  !> Shows the progress and answers all waiting messages. If the sweep is cancelled, tells the other ranks to stop.
   subroutine poll(self)
     class(mpi_root_t), intent(inout) :: self
     integer :: rank, tag

@@ -23,9 +23,11 @@ module nocdyn_mpi_worker
 
 contains
 
+  !> Requests the next variants from rank 0.
   subroutine next_chunk(self, first, count)
     class(mpi_worker_t), intent(inout) :: self
-    integer, intent(out) :: first, count
+    integer, intent(out) :: first   !! variant
+    integer, intent(out) :: count   !! number of variants, 0: there are no more
 
     first = 0
     count = 0
@@ -36,14 +38,16 @@ contains
     self%is_exhausted = count == 0
   end subroutine next_chunk
 
+  !> Sends results to rank 0.
   subroutine submit(self, chunk, seconds)
     class(mpi_worker_t), intent(inout) :: self
     type(chunk_t), intent(in) :: chunk
-    real(wp), intent(in) :: seconds
+    real(wp), intent(in) :: seconds   !! to compute the chunk [s]
 
     call send_results(chunk, seconds)
   end subroutine submit
 
+  !> Receives a message to stop, if there is one.
   subroutine poll(self)
     class(mpi_worker_t), intent(inout) :: self
     integer :: rank, tag
@@ -68,6 +72,7 @@ contains
     end do
   end subroutine finalise
 
+  !> After such a message, and after Ctrl-C.
   function is_cancelled(self)
     class(mpi_worker_t), intent(in) :: self
     logical :: is_cancelled

@@ -17,6 +17,7 @@ module nocdyn_sweep_progress
 
 contains
 
+  !> Shows the line if it is due.
   subroutine update(self, counts)
     class(console_sweep_progress_t), intent(inout) :: self
     type(sweep_counts_t), intent(in) :: counts

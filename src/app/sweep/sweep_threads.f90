@@ -16,7 +16,7 @@ contains
 
   !> The requested number of threads, limited by the number of processors.
   integer function usable_threads(wanted)
-    integer, intent(in) :: wanted
+    integer, intent(in) :: wanted   !! threads
 
     usable_threads = min(wanted, most_per_processor * omp_get_num_procs())
   end function usable_threads
@@ -24,7 +24,7 @@ contains
   !> Prints a note if fewer threads are used than requested.
   subroutine print_thread_note(file, wanted)
     character(len=*), intent(in) :: file   !! of the input
-    integer, intent(in) :: wanted
+    integer, intent(in) :: wanted          !! threads
 
     if (usable_threads(wanted) == wanted) return
     call print_text(file // ': note: ' // to_text(usable_threads(wanted)) // ' threads instead of ' // to_text(wanted) // &
