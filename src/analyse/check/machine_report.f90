@@ -6,10 +6,11 @@ module nocdyn_machine_report
   use nocdyn_rigid_trains, only: ratio_tolerance
   use nocdyn_text, only: append, joined, quoted, rounded_text, selected, string_t, to_text
   use nocdyn_text_buffer, only: text_buffer_t
+  use nocdyn_text_phrases, only: counted
   implicit none (type, external)
   private
 
-  public :: coordinate_names, counted, machine_report, machine_notes, constraint_count
+  public :: coordinate_names, machine_report, machine_notes, constraint_count
 
   integer, parameter :: most_names = 12    ! in a line
   integer, parameter :: most_lines = 40    ! of one sort in a report
@@ -216,16 +217,6 @@ contains
     end do
     if (found > most_lines) call put_line(report, 'and ' // to_text(found - most_lines) // ' more dependent speeds')
   end subroutine put_relations
-
-  !> "1 gear", "2 gears".
-  function counted(number, singular, plural) result(text)
-    integer, intent(in) :: number
-    character(len=*), intent(in) :: singular, plural
-    character(len=:), allocatable :: text
-
-    text = to_text(number) // ' ' // plural
-    if (number == 1) text = to_text(number) // ' ' // singular
-  end function counted
 
   !> "speed of 'machine' = -0.6666667 * speed of 'pinion'", for a dependent body.
   function speed_relation(machine, body) result(text)

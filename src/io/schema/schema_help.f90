@@ -5,9 +5,10 @@ module nocdyn_schema_help
     selector_name, selector_rule
   use nocdyn_schema_rules, only: a_flag, a_number, a_selector, a_word, an_integer, body_or_ground, example_t, key_rule_t
   use nocdyn_schema_sentences, only: default_text, sentences_on
-  use nocdyn_schema_text, only: allowed_text, group_names, listed, occurrence_text, suggestion, type_text
+  use nocdyn_schema_text, only: allowed_text, group_names, occurrence_text, suggestion, type_text
   use nocdyn_text, only: append, lower_case, quoted, string_t
   use nocdyn_text_buffer, only: text_buffer_t
+  use nocdyn_text_phrases, only: listed
   implicit none (type, external)
   private
 

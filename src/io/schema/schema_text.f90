@@ -5,10 +5,11 @@ module nocdyn_schema_text
   use nocdyn_schema_rules, only: a_body, a_file, a_flag, a_folder, a_name, a_number, a_selector, a_text, a_word, allowed_t, &
     an_integer, any_number, at_least_once, at_most_once, body_or_ground, exactly_once, key_rule_t
   use nocdyn_text, only: append, joined, nearest_word, quoted, string_t, to_text
+  use nocdyn_text_phrases, only: listed
   implicit none (type, external)
   private
 
-  public :: allowed_text, type_text, only_if_text, listed, listed_keys, occurrence_text, group_names, key_names, similar_keys, &
+  public :: allowed_text, type_text, only_if_text, listed_keys, occurrence_text, group_names, key_names, similar_keys, &
     key_suggestion, suggestion
 
 contains
@@ -113,23 +114,6 @@ contains
     end do
     text = listed(words, ' or ')
   end function only_if_text
-
-  !> "a, b or c".
-  pure function listed(texts, conjunction) result(text)
-    type(string_t), intent(in) :: texts(:)
-    character(len=*), intent(in) :: conjunction   !! ' or ', ' and '
-    character(len=:), allocatable :: text
-    integer :: i
-
-    text = texts(1)%text
-    do i = 2, size(texts)
-      if (i < size(texts)) then
-        text = text // ', ' // texts(i)%text
-      else
-        text = text // conjunction // texts(i)%text
-      end if
-    end do
-  end function listed
 
   !> Names of keys of a group: "a, b or c".
   pure function listed_keys(group_rule, positions, conjunction) result(text)

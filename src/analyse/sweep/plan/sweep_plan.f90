@@ -6,7 +6,6 @@ module nocdyn_sweep_plan
   use nocdyn_input, only: group_t, input_t
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
-  use nocdyn_machine_report, only: counted
   use nocdyn_diagnostics, only: diagnostics_t
   use nocdyn_output_times, only: check_output_times
   use nocdyn_schema, only: has_word
@@ -17,6 +16,7 @@ module nocdyn_sweep_plan
   use nocdyn_recorded_quantities, only: check_quantities, read_recorded_quantities, time_span_t, wanted_trajectories
   use nocdyn_targets, only: target_t
   use nocdyn_text, only: string_t
+  use nocdyn_text_phrases, only: counted
   use nocdyn_trajectory_columns, only: column_t, list_columns
   use nocdyn_variant_columns, only: add_variant_columns
   implicit none (type, external)

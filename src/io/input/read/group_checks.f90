@@ -8,6 +8,7 @@ module nocdyn_group_checks
   use nocdyn_schema_relations, only: relation_t, relations_t
   use nocdyn_schema_rules, only: a_body, body_or_ground, equal_lengths, less_than, unset
   use nocdyn_text, only: quoted, string_t, to_text
+  use nocdyn_text_phrases, only: counted
   use nocdyn_text_sort, only: argsort
   implicit none (type, external)
   private
@@ -118,12 +119,13 @@ contains
         associate (key => raw%keys(lists(i)), value => group%values(lists(i)))
           if (value%has_any()) then
             if (value%count() == first_value%count()) cycle
-            call raw%report(lists([first, i]), key%name() // ' has ' // counted(value%count()) // ' and ' // &
-                            first_key%name() // ' has ' // counted(first_value%count()) // &
+            call raw%report(lists([first, i]), key%name() // ' has ' // counted(value%count(), 'value', 'values') // ' and ' // &
+                            first_key%name() // ' has ' // counted(first_value%count(), 'value', 'values') // &
                             '; needed: as many of each', diagnostics)
           else if (key_rules(key%rule)%default == unset .and. .not. (key%may_be_missing .or. key%is_given())) then
-            call raw%report(lists([first]), key%name() // ' is missing; needed: ' // counted(first_value%count()) // &
-                            ', one for each of ' // first_key%name(), diagnostics)
+            call raw%report(lists([first]), key%name() // ' is missing; needed: ' // &
+                            counted(first_value%count(), 'value', 'values') // ', one for each of ' // &
+                            first_key%name(), diagnostics)
           end if
         end associate
       end do
@@ -180,13 +182,5 @@ contains
       end do
     end do
   end subroutine collect_bodies
-
-  !> "1 value", "2 values".
-  pure function counted(values) result(text)
-    integer, intent(in) :: values
-    character(len=:), allocatable :: text
-
-    text = to_text(values) // trim(merge(' value ', ' values', values == 1))
-  end function counted
 
 end module nocdyn_group_checks

@@ -6,6 +6,7 @@ module nocdyn_table_file
   use nocdyn_literals, only: number_problem, read_real
   use nocdyn_text, only: append, quoted, shortened, string_t, to_text
   use nocdyn_text_file, only: read_text_file
+  use nocdyn_text_phrases, only: counted
   implicit none (type, external)
   private
 
@@ -231,7 +232,7 @@ contains
     end if
     call split(content, begins, ends, found)
     if (found /= reading%columns) then
-      message = to_text(found) // trim(merge(' column ', ' columns', found == 1)) // ' in ' // excerpt(content) // &
+      message = counted(found, 'column', 'columns') // ' in ' // excerpt(content) // &
                   '; needed: ' // to_text(reading%columns) // ', separated by blanks or a comma'
     else
       message = ''
@@ -340,7 +341,7 @@ contains
       call append(reading%messages, reading%file // ': ' // to_text(reading%errors - most_messages) // &
                   ' more lines are wrong')
     else if (reading%errors == 0 .and. rows < least) then
-      call add_error(reading, ': ' // to_text(rows) // trim(merge(' row ', ' rows', rows == 1)) // '; needed: at least ' // &
+      call add_error(reading, ': ' // counted(rows, 'row', 'rows') // '; needed: at least ' // &
                     to_text(least))
     end if
   end subroutine check_whole

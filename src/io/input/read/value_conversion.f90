@@ -10,6 +10,7 @@ module nocdyn_value_conversion
     ground, is_out_of_range, key_rule_t, longest_file_name, longest_name, longest_path, unset
   use nocdyn_schema_text, only: allowed_text
   use nocdyn_text, only: joined, lower_case, nearest_word, quoted, shortened, string_t, to_text
+  use nocdyn_text_phrases, only: counted
   implicit none (type, external)
   private
 
@@ -40,9 +41,9 @@ contains
       if (known == 0) then
         message = trim(merge(' has no value', ' is missing  ', key%is_written)) // '; needed: ' // allowed_text(rule)
       else if (known < size(key%values)) then
-        message = ' has ' // counted(given) // '; needed: ' // to_text(size(key%values))
+        message = ' has ' // counted(given, 'value', 'values') // '; needed: ' // to_text(size(key%values))
       else if (known < rule%fewest) then
-        message = ' has ' // counted(known) // '; needed: at least ' // to_text(rule%fewest)
+        message = ' has ' // counted(known, 'value', 'values') // '; needed: at least ' // to_text(rule%fewest)
       else
         call convert_values(key, group%index, value, diagnostics)
         return
@@ -50,14 +51,6 @@ contains
       call group%report([position], key%name() // message, diagnostics)
     end associate
   end subroutine convert_key
-
-  !> "1 value", "2 values".
-  pure function counted(values) result(text)
-    integer, intent(in) :: values
-    character(len=:), allocatable :: text
-
-    text = to_text(values) // trim(merge(' value ', ' values', values == 1))
-  end function counted
 
   !> The default of a key.
   function default_value(rule) result(value)

@@ -5,8 +5,9 @@ module nocdyn_target_search
   use nocdyn_key_path, only: key_path_t, read_path
   use nocdyn_schema, only: first_key, group_rules, has_word, key_rules, selector_name, selector_rule, last_key
   use nocdyn_schema_rules, only: a_number, an_integer, key_rule_t
-  use nocdyn_schema_text, only: type_text, only_if_text, listed, suggestion
+  use nocdyn_schema_text, only: only_if_text, suggestion, type_text
   use nocdyn_text, only: append, lower_case, nearest_word, quoted, string_t, to_text
+  use nocdyn_text_phrases, only: listed
   implicit none (type, external)
   private
 
