@@ -158,32 +158,16 @@ contains
   function order_of(modes) result(order)
     type(mode_t), intent(in) :: modes(:)
     integer :: order(size(modes))
-    real(wp) :: key(2, size(modes))
-    integer :: i, k, moved
+    real(wp) :: value(size(modes))
+    integer :: i, rank
 
+    value = merge(aimag(modes%eigenvalue), abs(modes%eigenvalue), modes%kind == mode_oscillating)
     do i = 1, size(modes)
-      key(1, i) = real(modes(i)%kind, wp)
-      key(2, i) = merge(aimag(modes(i)%eigenvalue), abs(modes(i)%eigenvalue), modes(i)%kind == mode_oscillating)
-    end do
-    order = [(i, i=1, size(modes))]
-    do i = 2, size(modes)
-      moved = order(i)
-      k = i - 1
-      do while (k >= 1)
-        if (.not. comes_before(key(:, moved), key(:, order(k)))) exit
-        order(k + 1) = order(k)
-        k = k - 1
-      end do
-      order(k + 1) = moved
+      rank = 1 + count(modes%kind < modes(i)%kind) + count(modes%kind == modes(i)%kind .and. value < value(i)) &
+             + count(modes(:i - 1)%kind == modes(i)%kind .and. abs(value(:i - 1) - value(i)) <= 0.0_wp)
+      order(rank) = i
     end do
   end function order_of
-
-  !> Whether a mode is reported before another one.
-  pure logical function comes_before(one, other)
-    real(wp), intent(in) :: one(2), other(2)   !! kind and size
-
-    comes_before = one(1) < other(1) .or. (one(1) <= other(1) .and. one(2) < other(2))
-  end function comes_before
 
   !> Frequency of the damped oscillation [Hz].
   pure real(wp) function frequency(self)

@@ -38,7 +38,7 @@ contains
     type(string_t), allocatable :: names(:)
     integer :: e, i, next
 
-    allocate (names(machine%work_count()))
+    allocate (names(size(machine%with_work)))
     next = 1
     do i = 1, size(machine%banks)
       associate (bank => machine%banks(i)%bank)

@@ -84,7 +84,7 @@ contains
       self%switches = machine%switches%count
       self%lanes = machine%lanes
       self%has_energy_balance = with_energy_balance
-      self%quadratures = merge(machine%work_count(), 0, with_energy_balance)
+      self%quadratures = merge(size(machine%with_work), 0, with_energy_balance)
       if (allocated(self%phi)) deallocate (self%phi, self%omega, self%torque)
       allocate (self%phi(machine%lanes, 0:machine%bodies), source=0.0_wp)
       allocate (self%omega, self%torque, source=self%phi)

@@ -29,6 +29,7 @@ module nocdyn_paper
     real(wp), allocatable, private :: complement(:, :, :)      !! L_tau, [n, freedoms, lanes]
     real(wp), allocatable, private :: factors(:, :, :)         !! LU of J_3, [3n, 3n, lanes]
     integer, allocatable, private :: pivots(:, :)              !! [3n, lanes]
+    integer, allocatable, private :: couplings(:)                 !! elements of the role coupling
     real(wp), allocatable, private :: moment_of_bodies(:, :)   !! coupling moments from body moments, [couplings, n]
     type(matrices_t), private :: work
   contains
@@ -46,7 +47,7 @@ contains
     type(machine_t), intent(in) :: machine
     logical, intent(in) :: with_energy_balance   !! whether the powers of the elements `machine%with_work` are integrated
     type(paper_t) :: self
-    integer :: b, g, l, n
+    integer :: b, g, i, l, n
     logical :: is_singular
     real(wp) :: inertia(machine%bodies, machine%bodies), inertia_of_1(machine%bodies, machine%bodies)
     real(wp) :: inertia_of_2(2 * machine%bodies, 2 * machine%bodies)
@@ -67,7 +68,13 @@ contains
       call lu_factor(self%factors(:, :, l), self%pivots(:, l), is_singular)
       if (is_singular) error stop 'nocdyn_paper: the mass matrix must be positive definite and the kept rows independent'
     end do
-    self%moment_of_bodies = pseudo_inverse(coupling_incidence(machine), 1.0e-10_wp)
+    self%couplings = [integer ::]
+    do i = 1, size(machine%banks)
+      associate (bank => machine%banks(i)%bank)
+        if (bank%role == role_coupling) self%couplings = [self%couplings, [(b, b=bank%first, bank%last())]]
+      end associate
+    end do
+    self%moment_of_bodies = pseudo_inverse(coupling_incidence(machine, self%couplings), 1.0e-10_wp)
   end function new_paper
 
   !> Allocates the work space.
@@ -82,34 +89,17 @@ contains
   end subroutine allocate_matrices
 
   !> Matrix that gives the moments on the bodies from the restoring moments of the couplings, [n, couplings].
-  function coupling_incidence(machine) result(incidence)
+  function coupling_incidence(machine, couplings) result(incidence)
     type(machine_t), intent(in) :: machine
-    real(wp), allocatable :: incidence(:, :)
-    integer :: column, e, i
-
-    allocate (incidence(machine%bodies, coupling_count(machine)), source=0.0_wp)
-    column = 0
-    do i = 1, size(machine%banks)
-      associate (bank => machine%banks(i)%bank)
-        if (bank%role /= role_coupling) cycle
-        do e = 1, size(bank%to)
-          column = column + 1
-          call add_moment(bank%from(e), bank%to(e), 1.0_wp, incidence(:, column))
-        end do
-      end associate
-    end do
-  end function coupling_incidence
-
-  !> Number of couplings of a machine.
-  pure integer function coupling_count(machine)
-    type(machine_t), intent(in) :: machine
+    integer, intent(in) :: couplings(:)   !! numbers of the elements
+    real(wp) :: incidence(machine%bodies, size(couplings))
     integer :: i
 
-    coupling_count = 0
-    do i = 1, size(machine%banks)
-      if (machine%banks(i)%bank%role == role_coupling) coupling_count = coupling_count + size(machine%banks(i)%bank%to)
+    incidence = 0.0_wp
+    do i = 1, size(couplings)
+      call add_moment(machine%elements%from(couplings(i)), machine%elements%to(couplings(i)), 1.0_wp, incidence(:, i))
     end do
-  end function coupling_count
+  end function coupling_incidence
 
   !> beta at the start. F are the elastic moments at the start angles, eqs. (48)-(51).
   function start(self) result(y)
@@ -246,23 +236,18 @@ contains
     class(paper_t), intent(inout) :: self
     real(wp), contiguous, intent(in) :: t(:)
     real(wp), contiguous, intent(in) :: y(:, :)
-    integer :: b, column, e, i, l, n
+    integer :: b, i, l, n
 
     n = self%machine%bodies
     call observe_bodies(self, t, y)
     do l = 1, self%lanes
       call elastic_moments(self%machine, l, self%work%term)
-      column = 0
-      do i = 1, size(self%machine%banks)
-        if (self%machine%banks(i)%bank%role /= role_coupling) cycle
-        do e = self%machine%banks(i)%bank%first, self%machine%banks(i)%bank%last()
-          column = column + 1
-          associate (moment => self%machine%elements%restoring(l, e))
-            do b = 1, n
-              moment = moment + self%moment_of_bodies(column, b) * (y(l, 2 * n + b) - self%work%term(b))
-            end do
-          end associate
-        end do
+      do i = 1, size(self%couplings)
+        associate (moment => self%machine%elements%restoring(l, self%couplings(i)))
+          do b = 1, n
+            moment = moment + self%moment_of_bodies(i, b) * (y(l, 2 * n + b) - self%work%term(b))
+          end do
+        end associate
       end do
     end do
   end subroutine observe

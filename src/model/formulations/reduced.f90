@@ -406,7 +406,7 @@ contains
       else if (index <= self%states) then
         name = self%machine%internal_name(index - self%mechanical)
       else
-        name = 'work of ' // quoted(self%machine%work_element_name(index - self%states))
+        name = 'work of ' // quoted(self%machine%element_name(self%machine%with_work(index - self%states)))
       end if
     end associate
   end function component_name

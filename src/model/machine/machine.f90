@@ -35,7 +35,7 @@ module nocdyn_machine
     integer, allocatable :: general_banks(:)    !! banks with laws that are not polynomials
     integer, allocatable :: internal_banks(:)   !! banks with internal states
     type(switches_t) :: switches                !! switches of all banks, after `number_elements`
-    integer, allocatable :: with_work(:)        !! elements whose power may be integrated, [work_count]
+    integer, allocatable :: with_work(:)        !! elements whose power may be integrated, ascending
     type(constraints_t) :: constraints
     type(rigid_trains_t) :: trains
     type(geared_group_t), allocatable :: groups(:)
@@ -49,8 +49,6 @@ module nocdyn_machine
     procedure :: start_internal
     procedure :: internal_name
     procedure :: choose_branches
-    procedure :: work_count
-    procedure :: work_element_name
     procedure :: evaluate
     procedure :: evaluate_elements
     procedure :: differentiate
@@ -194,22 +192,6 @@ contains
       end do
     end associate
   end subroutine choose_branches
-
-  !> Number of elements whose power may be integrated.
-  pure integer function work_count(self)
-    class(machine_t), intent(in) :: self
-
-    work_count = size(self%with_work)
-  end function work_count
-
-  !> Name of the element whose power is work integral number `index`.
-  pure function work_element_name(self, index) result(name)
-    class(machine_t), intent(in) :: self
-    integer, intent(in) :: index   !! 1 to work_count
-    character(len=:), allocatable :: name
-
-    name = self%element_name(self%with_work(index))
-  end function work_element_name
 
   !> Name of an element.
   pure function element_name(self, element) result(name)

@@ -61,7 +61,7 @@ contains
 
     self%order = order
     self%lanes = machine%lanes
-    self%has_energy_balance = with_energy_balance .and. machine%work_count() > 0
+    self%has_energy_balance = with_energy_balance .and. size(machine%with_work) > 0
     self%stride = whole_vectors(size(machine%laws%rest))
     allocate (self%angle(self%stride, 0:order), source=0.0_wp)
     allocate (self%speed, self%restoring, self%applied, self%external, self%square, source=self%angle)

@@ -157,8 +157,7 @@ contains
     integer, intent(in) :: freedoms, entries, begin, end
     integer, intent(in) :: column(entries)                      !! of the entries of U
     real(wp), intent(in) :: ratio(strip, entries)               !! of the entries of U
-    real(wp), intent(in) :: q(strip, freedoms)                  !! coefficients of q' number k
-    real(wp), intent(in) :: by_speed(strip), restoring(strip)   !! of the element
+    real(wp), intent(in) :: q(strip, freedoms), by_speed(strip), restoring(strip)   !! q' number k; of the element
     real(wp), intent(inout) :: speed(strip), moment(strip)
     real(wp) :: v
     integer :: c, d, i, k
