@@ -1,6 +1,6 @@
 !> Derivatives by central differences of fourth order, against which the analytic ones are checked.
 !>
-!> They are exact for polynomials of degree four, for which a large step is best: only rounding remains.
+!> They are exact for polynomials of degree four. For these a large step is best, as only rounding remains.
 module nocdyn_test_differences
   use nocdyn_kinds, only: wp
   use nocdyn_system, only: evaluation_ok, pattern_t, system_t
@@ -44,7 +44,7 @@ contains
     end do
   end subroutine difference_system
 
-  !> A system's own derivatives in the shapes of `difference_system`: zero where its pattern has no position.
+  !> The Jacobian of a system as a dense array; zero at positions that are not in its pattern.
   subroutine whole_jacobian(system, t, y, dfdy, dfdt, status)
     class(system_t), intent(inout) :: system
     real(wp), contiguous, intent(in) :: t(:)

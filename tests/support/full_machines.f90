@@ -32,7 +32,7 @@ contains
     integer, intent(in) :: seed
     integer, intent(in) :: bodies        !! at least 2
     integer, intent(in) :: variants(:)   !! of each lane
-    integer, intent(in) :: wanted(:)     !! bodies that are to be the coordinates, none to have them found
+    integer, intent(in) :: wanted(:)     !! bodies chosen as coordinates; empty: they are chosen by the analysis
     integer, intent(in) :: choice        !! complement_...
     type(machine_t) :: machine
 

@@ -166,7 +166,7 @@ contains
     end associate
   end function gear_rows
 
-  !> Numbers the elements and analyses the gears of a machine that has everything else.
+  !> Numbers the elements and analyses the constraints, once all banks and rows are set.
   subroutine finish(machine, wanted, choice)
     type(machine_t), intent(inout) :: machine
     integer, intent(in) :: wanted(:)   !! bodies that become the coordinates; empty: they are found

@@ -1,8 +1,8 @@
-!> Machines whose bodies any rigid joints tie: gears, planetary sets, differentials, general rows, some on the ground, in
-!> loops, some of them redundant.
+!> Random machines with all kinds of rigid joints: gears, planetary sets, differentials and general rows, some on the ground, in
+!> loops or redundant.
 !>
-!> The motions that the rows leave are carried along as the columns of a dense matrix, from which each row takes one away;
-!> a row that would leave a body hardly any motion is not taken, so that no machine locks.
+!> The columns of a dense matrix span the motions that the rows allow. Each independent row removes one of them. A row that would
+!> leave a body hardly any motion is dropped, so that no machine locks.
 module nocdyn_test_random_trains
   use nocdyn_complement, only: complement_natural
   use nocdyn_constraints, only: new_constraints
@@ -16,10 +16,10 @@ module nocdyn_test_random_trains
 
   public :: draw_train
 
-  real(wp), parameter :: slowest = 0.05_wp, fastest = 20.0_wp   !! motion that a row must leave each body
-  real(wp), parameter :: rounding = 1.0e-10_wp                  !! below it a row takes no motion away
+  real(wp), parameter :: slowest = 0.05_wp, fastest = 20.0_wp   !! limits of the motion of each body
+  real(wp), parameter :: rounding = 1.0e-10_wp                  !! a row that changes the motions by less is redundant
 
-  !> Dense rows and the motions that they leave.
+  !> Dense rows and the motions that they allow.
   type :: growth_t
     integer :: rows = 0
     real(wp), allocatable :: row(:, :)       !! [bodies, rows]
@@ -34,7 +34,7 @@ contains
   subroutine draw_train(seed, bodies, lanes, machine, is_independent)
     integer, intent(in) :: seed, bodies, lanes
     type(machine_t), intent(out) :: machine
-    logical, allocatable, intent(out) :: is_independent(:)   !! whether a row takes motion away after those before it
+    logical, allocatable, intent(out) :: is_independent(:)   !! whether a row is independent of those before it
     type(random_stream_t) :: layout, numbers(lanes)
     type(growth_t) :: growth
     integer :: i, l
@@ -71,7 +71,7 @@ contains
     end do
   end subroutine start_growth
 
-  !> Ties a body to earlier ones, or leaves it free.
+  !> Joins a body to earlier ones, or leaves it free.
   subroutine add_joint(layout, body, growth)
     type(random_stream_t), intent(inout) :: layout
     integer, intent(in) :: body
@@ -108,7 +108,7 @@ contains
     call take_row(row, .true., growth)
   end subroutine add_joint
 
-  !> A further row between any bodies, if it locks none.
+  !> Adds a row between any bodies, unless it locks one.
   subroutine close_loop(layout, growth)
     type(random_stream_t), intent(inout) :: layout
     type(growth_t), intent(inout) :: growth
@@ -122,7 +122,7 @@ contains
     call take_row(row, .true., growth)
   end subroutine close_loop
 
-  !> A row that says what one or two others say.
+  !> Adds a row that is a combination of one or two others.
   subroutine repeat_rows(layout, growth)
     type(random_stream_t), intent(inout) :: layout
     type(growth_t), intent(inout) :: growth
@@ -135,10 +135,10 @@ contains
     call take_row(row, .false., growth)
   end subroutine repeat_rows
 
-  !> Takes a row that relates two bodies at least, unless it leaves some body too little motion.
+  !> Adds a row that relates at least two bodies, unless it leaves a body too little motion.
   subroutine take_row(row, must_bind, growth)
     real(wp), intent(in) :: row(:)
-    logical, intent(in) :: must_bind   !! whether it must not be redundant
+    logical, intent(in) :: must_bind   !! whether the row must be independent; otherwise it must be redundant
     type(growth_t), intent(inout) :: growth
     real(wp) :: left(size(row), size(growth%motion, 2)), lost(size(growth%motion, 2))
     integer :: j, pivot

@@ -23,7 +23,7 @@ contains
     type(machine_t), intent(in) :: machine
     integer, intent(in) :: which   !! `reduced`, `paper` or `multiplier`
     class(formulation_t), allocatable, intent(out) :: formulation
-    logical, intent(in), optional :: with_energy_balance   !! whether the works are integrated; absent: they are
+    logical, intent(in), optional :: with_energy_balance   !! whether work is integrated; absent: yes
     logical :: has_works
 
     has_works = .true.
@@ -59,8 +59,8 @@ contains
     end do
   end subroutine draw_state
 
-  !> The state vector of a formulation for given angles and speeds, without works, [lanes, states + quadratures]. The inner
-  !> states are between 0.2 and 0.8.
+  !> The state vector of a formulation for given angles and speeds, with work integrals of zero, [lanes, states + quadratures].
+  !> The internal states are between 0.2 and 0.8.
   function state_of(formulation, phi, omega) result(y)
     class(formulation_t), intent(in) :: formulation
     real(wp), contiguous, intent(in) :: phi(:, 0:), omega(:, 0:)   !! [lanes, ground and bodies]
