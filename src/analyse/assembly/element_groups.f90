@@ -38,7 +38,7 @@ module nocdyn_element_groups
     subroutine add_interface(groups, form, banks)
       import :: bank_slot_t, element_groups_t
       type(element_groups_t), intent(in) :: groups
-      integer, intent(in) :: form
+      integer, intent(in) :: form   !! 1 to the number of forms
       type(bank_slot_t), allocatable, intent(inout) :: banks(:)
     end subroutine add_interface
   end interface
@@ -67,7 +67,7 @@ contains
   !> A bank of form 1 in any case, one of each other form that some groups have.
   subroutine add_banks(groups, forms, form_of, add_form, banks)
     type(element_groups_t), intent(in) :: groups
-    integer, intent(in) :: forms
+    integer, intent(in) :: forms   !! number of forms
     procedure(form_interface) :: form_of
     procedure(add_interface) :: add_form
     type(bank_slot_t), allocatable, intent(inout) :: banks(:)
@@ -80,6 +80,7 @@ contains
     end do
   end subroutine add_banks
 
+  !> Those of the groups that a mask selects.
   function selected(self, mask) result(some)
     class(element_groups_t), intent(in) :: self
     logical, intent(in) :: mask(:)   !! [groups]
@@ -102,7 +103,7 @@ contains
   !> One number of each group, [lanes, groups].
   function values(self, key, absent)
     class(element_groups_t), intent(in) :: self
-    character(len=*), intent(in) :: key
+    character(len=*), intent(in) :: key   !! of numbers
     real(wp), intent(in), optional :: absent   !! where it is unset; absent: 0
     real(wp) :: values(self%lanes, size(self%indices))
     real(wp) :: default_value
@@ -118,8 +119,8 @@ contains
   !> Body number `which` of those that each group names under a key, 0 for the ground.
   function bodies(self, key, which)
     class(element_groups_t), intent(in) :: self
-    character(len=*), intent(in) :: key
-    integer, intent(in) :: which
+    character(len=*), intent(in) :: key   !! of names of bodies
+    integer, intent(in) :: which          !! 1 or more
     integer :: bodies(size(self%indices))
     integer, allocatable :: named(:)
     integer :: i

@@ -49,7 +49,7 @@ contains
   !> File, line and group, to begin a message with.
   function output_location(input, key) result(place)
     type(input_t), intent(in) :: input
-    character(len=*), intent(in) :: key
+    character(len=*), intent(in) :: key   !! of &output
     character(len=:), allocatable :: place
     integer, allocatable :: indices(:)
 

@@ -61,8 +61,8 @@ contains
   subroutine choose_method(input, formulation, method, notes, error)
     type(input_t), intent(in) :: input
     class(formulation_t), intent(in) :: formulation
-    character(len=:), allocatable, intent(out) :: method
-    type(string_t), allocatable, intent(out) :: notes(:)
+    character(len=:), allocatable, intent(out) :: method   !! the one of the input, or the explicit part of 'auto'
+    type(string_t), allocatable, intent(out) :: notes(:)   !! for the user; empty if the method is that of the input
     type(error_t), allocatable, intent(out) :: error
     type(group_t) :: run
     integer, allocatable :: indices(:)

@@ -24,7 +24,7 @@ contains
   !> Checks the start speeds of a machine. If they may be projected, projects those of the groups with violated rows.
   subroutine fit_start_speeds(machine, may_project, offending_row, error)
     type(machine_t), intent(inout) :: machine
-    logical, intent(in) :: may_project
+    logical, intent(in) :: may_project      !! whether violations are repaired; they are errors otherwise
     integer, intent(out) :: offending_row   !! first violated row, 0 if there is no error
     type(error_t), allocatable, intent(out) :: error
     real(wp) :: nearest(machine%bodies)
@@ -97,8 +97,8 @@ contains
   !> "the start speeds violate this gear: 2 * 1 rad/s ('pinion') + ... = 2, which must be 0; nearest speeds that ...".
   function violation_message(machine, violated, nearest) result(text)
     type(machine_t), intent(in) :: machine
-    integer, intent(in) :: violated(:)
-    real(wp), intent(in) :: nearest(:)
+    integer, intent(in) :: violated(:)   !! rows
+    real(wp), intent(in) :: nearest(:)   !! [bodies] [rad/s]
     character(len=:), allocatable :: text
     real(wp) :: residual, scale
     integer :: b, named, others

@@ -146,8 +146,8 @@ contains
   !> Distance of x from the nearer end of a segment, whose ends are shifted outwards: negative outside, in the unit of x.
   pure function inset(self, segment, x, width)
     class(curve_t), intent(in) :: self
-    integer, intent(in) :: segment
-    real(wp), intent(in) :: x
+    integer, intent(in) :: segment   !! 0 to points
+    real(wp), intent(in) :: x        !! anywhere
     real(wp), intent(in) :: width   !! shift of the ends, relative to the largest |x| of the points
     real(wp) :: inset
 
@@ -159,8 +159,8 @@ contains
   !> Distance of x from the upper end of a segment, huge in the last one.
   pure function distance_to_end(self, segment, x) result(distance)
     class(curve_t), intent(in) :: self
-    integer, intent(in) :: segment
-    real(wp), intent(in) :: x
+    integer, intent(in) :: segment   !! 0 to points
+    real(wp), intent(in) :: x        !! anywhere
     real(wp) :: distance
 
     distance = huge(distance)
@@ -170,8 +170,8 @@ contains
   !> Value of the polynomial of a segment.
   pure function value(self, segment, x)
     class(curve_t), intent(in) :: self
-    integer, intent(in) :: segment
-    real(wp), intent(in) :: x
+    integer, intent(in) :: segment   !! 0 to points
+    real(wp), intent(in) :: x        !! anywhere
     real(wp) :: d, value
 
     d = x - self%origin(segment)
@@ -183,8 +183,8 @@ contains
   !> First derivative.
   pure function slope(self, segment, x)
     class(curve_t), intent(in) :: self
-    integer, intent(in) :: segment
-    real(wp), intent(in) :: x
+    integer, intent(in) :: segment   !! 0 to points
+    real(wp), intent(in) :: x        !! anywhere
     real(wp) :: d, slope
 
     d = x - self%origin(segment)
@@ -196,8 +196,8 @@ contains
   !> Second derivative.
   pure function curvature(self, segment, x)
     class(curve_t), intent(in) :: self
-    integer, intent(in) :: segment
-    real(wp), intent(in) :: x
+    integer, intent(in) :: segment   !! 0 to points
+    real(wp), intent(in) :: x        !! anywhere
     real(wp) :: curvature
 
     associate (c => self%coefficient(:, segment))

@@ -125,7 +125,7 @@ contains
   !> Number of consecutive elements from `first` on that are plain springs in all lanes.
   pure integer function plain_run(self, first)
     type(polynomial_laws_t), intent(in) :: self
-    integer, intent(in) :: first
+    integer, intent(in) :: first   !! element
     integer :: e, l
 
     plain_run = 0

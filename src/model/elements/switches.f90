@@ -51,7 +51,7 @@ contains
   subroutine choose(self, banks, switch, lane, t, angle, speed, internal)
     class(switches_t), intent(in) :: self
     type(bank_slot_t), intent(inout) :: banks(:)
-    integer, intent(in) :: switch, lane
+    integer, intent(in) :: switch, lane   !! switch numbered in the machine
     real(wp), intent(in) :: t, angle, speed   !! [s]; of the element of the switch [rad], [rad/s]
     real(wp), intent(in) :: internal(:)          !! its internal states
 
@@ -62,7 +62,7 @@ contains
   pure function indicator(self, banks, switch, lane, t, angle, speed, internal)
     class(switches_t), intent(in) :: self
     type(bank_slot_t), intent(in) :: banks(:)
-    integer, intent(in) :: switch, lane
+    integer, intent(in) :: switch, lane   !! switch numbered in the machine
     real(wp), intent(in) :: t, angle, speed   !! [s]; of the element of the switch [rad], [rad/s]
     real(wp), intent(in) :: internal(:)          !! its internal states
     real(wp) :: indicator
@@ -74,7 +74,7 @@ contains
   function name(self, banks, switch)
     class(switches_t), intent(in) :: self
     type(bank_slot_t), intent(in) :: banks(:)
-    integer, intent(in) :: switch
+    integer, intent(in) :: switch   !! numbered in the machine
     character(len=:), allocatable :: name
 
     associate (bank => banks(self%bank(switch))%bank, number => self%number(switch))

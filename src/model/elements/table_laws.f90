@@ -68,8 +68,8 @@ contains
 
   subroutine evaluate(self, time, angle, speed, restoring, applied)
     class(table_laws_t), intent(in) :: self
-    real(wp), intent(in) :: time(self%lanes), angle(self%values), speed(self%values)
-    real(wp), intent(inout) :: restoring(self%values), applied(self%values)
+    real(wp), intent(in) :: time(self%lanes), angle(self%values), speed(self%values)   !! t [s], u [rad], u' [rad/s]
+    real(wp), intent(inout) :: restoring(self%values), applied(self%values)   !! [N m]
     integer :: e, i, l
     logical :: is_source
 
@@ -162,9 +162,9 @@ contains
 
   subroutine choose(self, switch, lane, t, angle, speed, internal)
     class(table_laws_t), intent(inout) :: self
-    integer, intent(in) :: switch, lane
-    real(wp), intent(in) :: t, angle, speed
-    real(wp), intent(in) :: internal(:)
+    integer, intent(in) :: switch, lane   !! switch numbered within the bank
+    real(wp), intent(in) :: t, angle, speed   !! t [s], u [rad], u' [rad/s]
+    real(wp), intent(in) :: internal(:)   !! internal states of the element
 
     self%branch(lane, switch) = self%curve(lane, switch)%segment(self%argument_of(lane, switch, time_reached(t), angle, speed))
   end subroutine choose
@@ -172,9 +172,9 @@ contains
   !> Of a curve over the time in seconds: time does not go back across a boundary.
   pure function indicator(self, switch, lane, t, angle, speed, internal)
     class(table_laws_t), intent(in) :: self
-    integer, intent(in) :: switch, lane
-    real(wp), intent(in) :: t, angle, speed
-    real(wp), intent(in) :: internal(:)
+    integer, intent(in) :: switch, lane   !! switch numbered within the bank
+    real(wp), intent(in) :: t, angle, speed   !! t [s], u [rad], u' [rad/s]
+    real(wp), intent(in) :: internal(:)   !! internal states of the element
     real(wp) :: indicator
 
     associate (curve => self%curve(lane, switch), segment => self%branch(lane, switch))
@@ -188,7 +188,7 @@ contains
 
   function switch_name(self, switch) result(name)
     class(table_laws_t), intent(in) :: self
-    integer, intent(in) :: switch
+    integer, intent(in) :: switch   !! numbered within the bank
     character(len=:), allocatable :: name
 
     name = 'point in the table'

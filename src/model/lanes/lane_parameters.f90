@@ -81,7 +81,7 @@ contains
   !> Lists an array [rows, lanes, columns].
   subroutine add_stack(self, name, value)
     class(lane_parameters_t), intent(inout) :: self
-    character(len=*), intent(in) :: name
+    character(len=*), intent(in) :: name   !! for comparisons of structures
     real(wp), contiguous, target, intent(inout) :: value(:, :, :)
 
     call self%next_array(name)
@@ -91,7 +91,7 @@ contains
   !> Lists an array [rows, columns, lanes].
   subroutine add_blocks(self, name, value)
     class(lane_parameters_t), intent(inout) :: self
-    character(len=*), intent(in) :: name
+    character(len=*), intent(in) :: name   !! for comparisons of structures
     real(wp), contiguous, target, intent(inout) :: value(:, :, :)
 
     call self%next_array(name)
@@ -198,8 +198,8 @@ contains
   subroutine copy_lane(self, lane, from, from_lane)
     class(lane_parameters_t), intent(inout) :: self
     integer, intent(in) :: lane
-    type(lane_parameters_t), intent(in) :: from
-    integer, intent(in) :: from_lane
+    type(lane_parameters_t), intent(in) :: from   !! with the same structure
+    integer, intent(in) :: from_lane              !! lane of `from`
     integer :: e, i, k, s
 
     do s = 1, self%arrays
@@ -225,8 +225,8 @@ contains
   pure function differences(self, lane, other, other_lane) result(indices)
     class(lane_parameters_t), intent(in) :: self
     integer, intent(in) :: lane
-    type(lane_parameters_t), intent(in) :: other
-    integer, intent(in) :: other_lane
+    type(lane_parameters_t), intent(in) :: other   !! with the same structure
+    integer, intent(in) :: other_lane              !! lane of `other`
     type(parameter_index_t), allocatable :: indices(:)
     type(parameter_index_t) :: index
     integer :: found, i, k, pass, s
@@ -257,8 +257,8 @@ contains
   pure logical function has_same_curves(self, lane, other, other_lane)
     class(lane_parameters_t), intent(in) :: self
     integer, intent(in) :: lane
-    type(lane_parameters_t), intent(in) :: other
-    integer, intent(in) :: other_lane
+    type(lane_parameters_t), intent(in) :: other   !! with the same structure
+    integer, intent(in) :: other_lane              !! lane of `other`
     integer :: e, s
 
     has_same_curves = .false.
@@ -270,6 +270,7 @@ contains
     has_same_curves = .true.
   end function has_same_curves
 
+  !> The parameter at a position in one lane.
   pure real(wp) function value(self, index, lane)
     class(lane_parameters_t), intent(in) :: self
     type(parameter_index_t), intent(in) :: index
@@ -278,6 +279,7 @@ contains
     value = self%array(index%array)%value(index%row, lane, index%column)
   end function value
 
+  !> Sets the parameter at a position in one lane.
   subroutine set_value(self, index, lane, value)
     class(lane_parameters_t), intent(inout) :: self
     type(parameter_index_t), intent(in) :: index

@@ -73,7 +73,7 @@ contains
 
   !> Couplings by eq. (3). Those without damping and friction in all lanes have no work integral.
   function new_couplings(common, stiffness, cubic_stiffness) result(bank)
-    type(coupling_common_t), intent(in) :: common
+    type(coupling_common_t), intent(in) :: common   !! names, bodies, damping, rest twists, friction
     real(wp), intent(in) :: stiffness(:, :)            !! K1 [N m/rad], shape [lanes, couplings]
     real(wp), intent(in) :: cubic_stiffness(:, :)      !! k1 [N m/rad3]
     type(couplings_t) :: bank
@@ -99,7 +99,7 @@ contains
 
   !> Couplings with the elastic moment of a curve over the twist.
   function new_table_couplings(common, curve) result(bank)
-    type(coupling_common_t), intent(in) :: common
+    type(coupling_common_t), intent(in) :: common   !! names, bodies, damping, rest twists, friction
     type(curve_t), intent(in) :: curve(:, :)   !! [N m] over [rad], shape [lanes, couplings]
     type(couplings_t) :: bank
     integer :: e
@@ -124,8 +124,8 @@ contains
 
   subroutine evaluate(self, time, angle, speed, restoring, applied)
     class(couplings_t), intent(in) :: self
-    real(wp), intent(in) :: time(self%lanes), angle(self%values), speed(self%values)
-    real(wp), intent(inout) :: restoring(self%values), applied(self%values)
+    real(wp), intent(in) :: time(self%lanes), angle(self%values), speed(self%values)   !! t [s], u [rad], u' [rad/s]
+    real(wp), intent(inout) :: restoring(self%values), applied(self%values)   !! [N m]
 
     call self%table_laws_t%evaluate(time, angle, speed, restoring, applied)
     if (allocated(self%friction)) call add_friction(self%values, self%friction, self%friction_speed, speed, applied)
@@ -176,7 +176,7 @@ contains
     type(elements_t), intent(in) :: elements
     integer, intent(in) :: quantity   !! twist, moment or damping_moment
     integer, intent(in) :: lane
-    real(wp), intent(out) :: values(:)
+    real(wp), intent(out) :: values(:)   !! [elements of the bank]
 
     select case (quantity)
     case (twist)

@@ -44,7 +44,7 @@ contains
   !> Couplings with play, the elastic moment being sum p_k x^k of the penetration x. The damping is that in contact, the rest
   !> twist is at the middle of the gap, the friction acts in the gap and in contact.
   function new_gap_couplings(common, coefficient, gap) result(bank)
-    type(coupling_common_t), intent(in) :: common
+    type(coupling_common_t), intent(in) :: common   !! names, bodies, damping, rest twists, friction
     real(wp), intent(in) :: coefficient(:, :, :)       !! p_k [N m/rad^k], shape [order, lanes, couplings], some not zero
     real(wp), intent(in) :: gap(:, :)                  !! [rad], positive, shape [lanes, couplings]
     type(gap_couplings_t) :: bank
@@ -83,7 +83,7 @@ contains
   pure function penetration(self, branch, lane, coupling, angle) result(x)
     class(gap_couplings_t), intent(in) :: self
     integer, intent(in) :: branch, lane, coupling
-    real(wp), intent(in) :: angle
+    real(wp), intent(in) :: angle   !! u [rad]
     real(wp) :: x
 
     x = (angle - self%rest_twist(lane, coupling)) - sign(0.5_wp * self%gap(lane, coupling), real(branch, wp))
@@ -91,8 +91,8 @@ contains
 
   subroutine evaluate(self, time, angle, speed, restoring, applied)
     class(gap_couplings_t), intent(in) :: self
-    real(wp), intent(in) :: time(self%lanes), angle(self%values), speed(self%values)
-    real(wp), intent(inout) :: restoring(self%values), applied(self%values)
+    real(wp), intent(in) :: time(self%lanes), angle(self%values), speed(self%values)   !! t [s], u [rad], u' [rad/s]
+    real(wp), intent(inout) :: restoring(self%values), applied(self%values)   !! [N m]
     real(wp) :: moment
     integer :: e, i, l
 
@@ -176,7 +176,7 @@ contains
     class(gap_couplings_t), intent(in) :: self
     integer, intent(in) :: side             !! 1: upper edge, -1: lower edge
     integer, intent(in) :: lane, coupling
-    real(wp), intent(in) :: angle, speed
+    real(wp), intent(in) :: angle, speed    !! u [rad], u' [rad/s]
     real(wp), intent(out) :: depth          !! [rad]
     real(wp), intent(out) :: elastic, viscous   !! M, d u' [N m]
     real(wp) :: x
@@ -189,9 +189,9 @@ contains
 
   subroutine choose(self, switch, lane, t, angle, speed, internal)
     class(gap_couplings_t), intent(inout) :: self
-    integer, intent(in) :: switch, lane
-    real(wp), intent(in) :: t, angle, speed
-    real(wp), intent(in) :: internal(:)
+    integer, intent(in) :: switch, lane   !! switch numbered within the bank
+    real(wp), intent(in) :: t, angle, speed   !! t [s], u [rad], u' [rad/s]
+    real(wp), intent(in) :: internal(:)   !! internal states of the element
     real(wp) :: depth, elastic, viscous
     integer :: side
 
@@ -212,9 +212,9 @@ contains
 
   pure function indicator(self, switch, lane, t, angle, speed, internal)
     class(gap_couplings_t), intent(in) :: self
-    integer, intent(in) :: switch, lane
-    real(wp), intent(in) :: t, angle, speed
-    real(wp), intent(in) :: internal(:)
+    integer, intent(in) :: switch, lane   !! switch numbered within the bank
+    real(wp), intent(in) :: t, angle, speed   !! t [s], u [rad], u' [rad/s]
+    real(wp), intent(in) :: internal(:)   !! internal states of the element
     real(wp) :: indicator
     real(wp) :: depth, elastic, viscous
     integer :: side
@@ -239,7 +239,7 @@ contains
 
   function switch_name(self, switch) result(name)
     class(gap_couplings_t), intent(in) :: self
-    integer, intent(in) :: switch
+    integer, intent(in) :: switch   !! numbered within the bank
     character(len=:), allocatable :: name
 
     name = 'edge of the gap'

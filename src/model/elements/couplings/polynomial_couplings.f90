@@ -25,7 +25,7 @@ contains
 
   !> Couplings with the elastic moment sum p_k w^k.
   function new_polynomial_couplings(common, coefficient) result(bank)
-    type(coupling_common_t), intent(in) :: common
+    type(coupling_common_t), intent(in) :: common   !! names, bodies, damping, rest twists, friction
     real(wp), intent(in) :: coefficient(:, :, :)       !! p_k [N m/rad^k], shape [order, lanes, couplings]
     type(polynomial_couplings_t) :: bank
     integer :: e
@@ -53,8 +53,8 @@ contains
 
   subroutine evaluate(self, time, angle, speed, restoring, applied)
     class(polynomial_couplings_t), intent(in) :: self
-    real(wp), intent(in) :: time(self%lanes), angle(self%values), speed(self%values)
-    real(wp), intent(inout) :: restoring(self%values), applied(self%values)
+    real(wp), intent(in) :: time(self%lanes), angle(self%values), speed(self%values)   !! t [s], u [rad], u' [rad/s]
+    real(wp), intent(inout) :: restoring(self%values), applied(self%values)   !! [N m]
 
     call add_terms(self%values, self%order, self%coefficient, self%rest_twist, angle, restoring)
     call self%couplings_t%evaluate(time, angle, speed, restoring, applied)

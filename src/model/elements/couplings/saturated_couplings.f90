@@ -24,7 +24,7 @@ contains
 
   !> Couplings with the elastic moment saturation * tanh(stiffness * w / saturation).
   function new_saturated_couplings(common, stiffness, saturation) result(bank)
-    type(coupling_common_t), intent(in) :: common
+    type(coupling_common_t), intent(in) :: common   !! names, bodies, damping, rest twists, friction
     real(wp), intent(in) :: stiffness(:, :)            !! K1 [N m/rad], positive, shape [lanes, couplings]
     real(wp), intent(in) :: saturation(:, :)           !! S [N m], positive, shape [lanes, couplings]
     type(saturated_couplings_t) :: bank
@@ -41,8 +41,8 @@ contains
 
   subroutine evaluate(self, time, angle, speed, restoring, applied)
     class(saturated_couplings_t), intent(in) :: self
-    real(wp), intent(in) :: time(self%lanes), angle(self%values), speed(self%values)
-    real(wp), intent(inout) :: restoring(self%values), applied(self%values)
+    real(wp), intent(in) :: time(self%lanes), angle(self%values), speed(self%values)   !! t [s], u [rad], u' [rad/s]
+    real(wp), intent(inout) :: restoring(self%values), applied(self%values)   !! [N m]
 
     call add_moments(self%values, self%initial_stiffness, self%saturation, self%rest_twist, angle, restoring)
     call self%couplings_t%evaluate(time, angle, speed, restoring, applied)

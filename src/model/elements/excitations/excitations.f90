@@ -46,8 +46,8 @@ contains
 
   subroutine evaluate(self, time, angle, speed, restoring, applied)
     class(excitations_t), intent(in) :: self
-    real(wp), intent(in) :: time(self%lanes), angle(self%values), speed(self%values)
-    real(wp), intent(inout) :: restoring(self%values), applied(self%values)
+    real(wp), intent(in) :: time(self%lanes), angle(self%values), speed(self%values)   !! t [s], u [rad], u' [rad/s]
+    real(wp), intent(inout) :: restoring(self%values), applied(self%values)   !! [N m]
 
     call harmonic_torques(self%lanes, self%values, self%amplitude, self%frequency, self%phase, time, applied)
   end subroutine evaluate
@@ -93,9 +93,9 @@ contains
 
   subroutine forcing_series(self, last, stride, time, applied)
     class(excitations_t), intent(in) :: self
-    integer, intent(in) :: last, stride
-    real(wp), intent(in) :: time(self%lanes)
-    real(wp), intent(inout) :: applied(stride, 0:last)
+    integer, intent(in) :: last, stride                  !! number of the last coefficient; from column to column
+    real(wp), intent(in) :: time(self%lanes)             !! t [s]
+    real(wp), intent(inout) :: applied(stride, 0:last)   !! [N m / s^k]
 
     call harmonic_series(self%lanes, self%values, last, stride, self%amplitude, self%frequency, self%phase, time, applied)
   end subroutine forcing_series

@@ -55,8 +55,8 @@ contains
 
   subroutine evaluate(self, time, angle, speed, restoring, applied)
     class(timed_excitations_t), intent(in) :: self
-    real(wp), intent(in) :: time(self%lanes), angle(self%values), speed(self%values)
-    real(wp), intent(inout) :: restoring(self%values), applied(self%values)
+    real(wp), intent(in) :: time(self%lanes), angle(self%values), speed(self%values)   !! t [s], u [rad], u' [rad/s]
+    real(wp), intent(inout) :: restoring(self%values), applied(self%values)   !! [N m]
     integer :: e, i, l
 
     i = 0
@@ -72,7 +72,7 @@ contains
   pure function part_of_amplitude(self, lane, excitation, time) result(part)
     class(timed_excitations_t), intent(in) :: self
     integer, intent(in) :: lane, excitation
-    real(wp), intent(in) :: time
+    real(wp), intent(in) :: time   !! [s]
     real(wp) :: part
 
     select case (self%branch(lane, excitation))
@@ -120,9 +120,9 @@ contains
 
   subroutine choose(self, switch, lane, t, angle, speed, internal)
     class(timed_excitations_t), intent(inout) :: self
-    integer, intent(in) :: switch, lane
-    real(wp), intent(in) :: t, angle, speed
-    real(wp), intent(in) :: internal(:)
+    integer, intent(in) :: switch, lane   !! switch numbered within the bank
+    real(wp), intent(in) :: t, angle, speed   !! t [s], u [rad], u' [rad/s]
+    real(wp), intent(in) :: internal(:)   !! internal states of the element
 
     if (time_reached(t) < self%begin(lane, switch)) then
       self%branch(lane, switch) = before
@@ -136,9 +136,9 @@ contains
   !> In seconds, without a shift: time does not go back across a boundary.
   pure function indicator(self, switch, lane, t, angle, speed, internal)
     class(timed_excitations_t), intent(in) :: self
-    integer, intent(in) :: switch, lane
-    real(wp), intent(in) :: t, angle, speed
-    real(wp), intent(in) :: internal(:)
+    integer, intent(in) :: switch, lane   !! switch numbered within the bank
+    real(wp), intent(in) :: t, angle, speed   !! t [s], u [rad], u' [rad/s]
+    real(wp), intent(in) :: internal(:)   !! internal states of the element
     real(wp) :: indicator
 
     select case (self%branch(lane, switch))
@@ -153,7 +153,7 @@ contains
 
   function switch_name(self, switch) result(name)
     class(timed_excitations_t), intent(in) :: self
-    integer, intent(in) :: switch
+    integer, intent(in) :: switch   !! numbered within the bank
     character(len=:), allocatable :: name
 
     select case (self%shape(self%switch_element(switch)))

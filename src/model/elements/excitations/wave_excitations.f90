@@ -51,8 +51,8 @@ contains
 
   subroutine evaluate(self, time, angle, speed, restoring, applied)
     class(wave_excitations_t), intent(in) :: self
-    real(wp), intent(in) :: time(self%lanes), angle(self%values), speed(self%values)
-    real(wp), intent(inout) :: restoring(self%values), applied(self%values)
+    real(wp), intent(in) :: time(self%lanes), angle(self%values), speed(self%values)   !! t [s], u [rad], u' [rad/s]
+    real(wp), intent(inout) :: restoring(self%values), applied(self%values)   !! [N m]
     integer :: i, k, l
 
     do k = 1, size(self%owner)

@@ -46,8 +46,8 @@ contains
 
   subroutine evaluate(self, time, angle, speed, restoring, applied)
     class(nonlinear_loads_t), intent(in) :: self
-    real(wp), intent(in) :: time(self%lanes), angle(self%values), speed(self%values)
-    real(wp), intent(inout) :: restoring(self%values), applied(self%values)
+    real(wp), intent(in) :: time(self%lanes), angle(self%values), speed(self%values)   !! t [s], u [rad], u' [rad/s]
+    real(wp), intent(inout) :: restoring(self%values), applied(self%values)   !! [N m]
 
     call resist(self%values, self%quadratic, self%constant, self%constant_speed, speed, applied)
     call self%loads_t%evaluate(time, angle, speed, restoring, applied)

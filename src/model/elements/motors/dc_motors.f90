@@ -59,8 +59,8 @@ contains
 
   subroutine start_internal(self, speed, internal)
     class(dc_motors_t), intent(in) :: self
-    real(wp), intent(in) :: speed(self%values)
-    real(wp), intent(inout) :: internal(self%internal_values)
+    real(wp), intent(in) :: speed(self%values)   !! u' [rad/s]
+    real(wp), intent(inout) :: internal(self%internal_values)   !! [lanes, states, motors]
     integer :: e, l
 
     internal = 0.0_wp
@@ -74,10 +74,10 @@ contains
 
   subroutine evaluate_internal(self, speed, internal, applied, rate)
     class(dc_motors_t), intent(in) :: self
-    real(wp), intent(in) :: speed(self%values)
-    real(wp), intent(in) :: internal(self%internal_values)
-    real(wp), intent(inout) :: applied(self%values)
-    real(wp), intent(inout) :: rate(self%internal_values)
+    real(wp), intent(in) :: speed(self%values)   !! u' [rad/s]
+    real(wp), intent(in) :: internal(self%internal_values)   !! [lanes, states, motors]
+    real(wp), intent(inout) :: applied(self%values)   !! [N m]
+    real(wp), intent(inout) :: rate(self%internal_values)   !! [lanes, states, motors]
     real(wp) :: throttle
     integer :: current, e, i, l
 
@@ -127,7 +127,7 @@ contains
 
   function internal_name(self, index) result(name)
     class(dc_motors_t), intent(in) :: self
-    integer, intent(in) :: index
+    integer, intent(in) :: index   !! of the internal state, 1 to `states`
     character(len=:), allocatable :: name
 
     name = 'armature current'
@@ -136,18 +136,18 @@ contains
 
   subroutine choose(self, switch, lane, t, angle, speed, internal)
     class(dc_motors_t), intent(inout) :: self
-    integer, intent(in) :: switch, lane
-    real(wp), intent(in) :: t, angle, speed
-    real(wp), intent(in) :: internal(:)
+    integer, intent(in) :: switch, lane   !! switch numbered within the bank
+    real(wp), intent(in) :: t, angle, speed   !! t [s], u [rad], u' [rad/s]
+    real(wp), intent(in) :: internal(:)   !! internal states of the element
 
     self%branch(lane, switch) = self%governor%branch(lane, switch, internal(2), speed)
   end subroutine choose
 
   pure function indicator(self, switch, lane, t, angle, speed, internal)
     class(dc_motors_t), intent(in) :: self
-    integer, intent(in) :: switch, lane
-    real(wp), intent(in) :: t, angle, speed
-    real(wp), intent(in) :: internal(:)
+    integer, intent(in) :: switch, lane   !! switch numbered within the bank
+    real(wp), intent(in) :: t, angle, speed   !! t [s], u [rad], u' [rad/s]
+    real(wp), intent(in) :: internal(:)   !! internal states of the element
     real(wp) :: indicator
 
     indicator = self%governor%indicator(lane, switch, self%branch(lane, switch), internal(2), speed)
@@ -155,7 +155,7 @@ contains
 
   function switch_name(self, switch) result(name)
     class(dc_motors_t), intent(in) :: self
-    integer, intent(in) :: switch
+    integer, intent(in) :: switch   !! numbered within the bank
     character(len=:), allocatable :: name
 
     name = 'limit of the governor'
@@ -176,9 +176,9 @@ contains
   pure subroutine observe(self, elements, quantity, lane, values)
     class(dc_motors_t), intent(in) :: self
     type(elements_t), intent(in) :: elements
-    integer, intent(in) :: quantity
+    integer, intent(in) :: quantity   !! index in `quantities`
     integer, intent(in) :: lane
-    real(wp), intent(out) :: values(:)
+    real(wp), intent(out) :: values(:)   !! [elements of the bank]
     integer :: e
 
     do e = 1, size(self%to)

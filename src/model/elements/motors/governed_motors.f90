@@ -74,14 +74,14 @@ contains
   !> Adds nothing: the whole torque depends on the throttle, an internal state.
   subroutine evaluate(self, time, angle, speed, restoring, applied)
     class(governed_motors_t), intent(in) :: self
-    real(wp), intent(in) :: time(self%lanes), angle(self%values), speed(self%values)
-    real(wp), intent(inout) :: restoring(self%values), applied(self%values)
+    real(wp), intent(in) :: time(self%lanes), angle(self%values), speed(self%values)   !! t [s], u [rad], u' [rad/s]
+    real(wp), intent(inout) :: restoring(self%values), applied(self%values)   !! [N m]
   end subroutine evaluate
 
   subroutine start_internal(self, speed, internal)
     class(governed_motors_t), intent(in) :: self
-    real(wp), intent(in) :: speed(self%values)
-    real(wp), intent(inout) :: internal(self%internal_values)
+    real(wp), intent(in) :: speed(self%values)   !! u' [rad/s]
+    real(wp), intent(inout) :: internal(self%internal_values)   !! [lanes, states, motors]
     integer :: e, i, l
 
     i = 0
@@ -95,10 +95,10 @@ contains
 
   subroutine evaluate_internal(self, speed, internal, applied, rate)
     class(governed_motors_t), intent(in) :: self
-    real(wp), intent(in) :: speed(self%values)
-    real(wp), intent(in) :: internal(self%internal_values)
-    real(wp), intent(inout) :: applied(self%values)
-    real(wp), intent(inout) :: rate(self%internal_values)
+    real(wp), intent(in) :: speed(self%values)   !! u' [rad/s]
+    real(wp), intent(in) :: internal(self%internal_values)   !! [lanes, states, motors]
+    real(wp), intent(inout) :: applied(self%values)   !! [N m]
+    real(wp), intent(inout) :: rate(self%internal_values)   !! [lanes, states, motors]
     real(wp) :: throttle
     integer :: e, i, l
 
@@ -137,7 +137,7 @@ contains
 
   function internal_name(self, index) result(name)
     class(governed_motors_t), intent(in) :: self
-    integer, intent(in) :: index
+    integer, intent(in) :: index   !! of the internal state, 1 to `states`
     character(len=:), allocatable :: name
 
     name = 'governor integral'
@@ -145,9 +145,9 @@ contains
 
   subroutine choose(self, switch, lane, t, angle, speed, internal)
     class(governed_motors_t), intent(inout) :: self
-    integer, intent(in) :: switch, lane
-    real(wp), intent(in) :: t, angle, speed
-    real(wp), intent(in) :: internal(:)
+    integer, intent(in) :: switch, lane   !! switch numbered within the bank
+    real(wp), intent(in) :: t, angle, speed   !! t [s], u [rad], u' [rad/s]
+    real(wp), intent(in) :: internal(:)   !! internal states of the element
 
     associate (motor => switch - self%first_governor())
       if (motor > 0) then
@@ -160,9 +160,9 @@ contains
 
   pure function indicator(self, switch, lane, t, angle, speed, internal)
     class(governed_motors_t), intent(in) :: self
-    integer, intent(in) :: switch, lane
-    real(wp), intent(in) :: t, angle, speed
-    real(wp), intent(in) :: internal(:)
+    integer, intent(in) :: switch, lane   !! switch numbered within the bank
+    real(wp), intent(in) :: t, angle, speed   !! t [s], u [rad], u' [rad/s]
+    real(wp), intent(in) :: internal(:)   !! internal states of the element
     real(wp) :: indicator
 
     associate (motor => switch - self%first_governor())
@@ -176,7 +176,7 @@ contains
 
   function switch_name(self, switch) result(name)
     class(governed_motors_t), intent(in) :: self
-    integer, intent(in) :: switch
+    integer, intent(in) :: switch   !! numbered within the bank
     character(len=:), allocatable :: name
 
     name = 'point in the table'
@@ -197,9 +197,9 @@ contains
   pure subroutine observe(self, elements, quantity, lane, values)
     class(governed_motors_t), intent(in) :: self
     type(elements_t), intent(in) :: elements
-    integer, intent(in) :: quantity
+    integer, intent(in) :: quantity   !! index in `quantities`
     integer, intent(in) :: lane
-    real(wp), intent(out) :: values(:)
+    real(wp), intent(out) :: values(:)   !! [elements of the bank]
     integer :: e
 
     if (quantity == 1) then

@@ -54,7 +54,7 @@ contains
   pure function quadratic_torque(self, lane, motor, speed) result(value)
     class(quadratic_curve_t), intent(in) :: self
     integer, intent(in) :: lane, motor
-    real(wp), intent(in) :: speed
+    real(wp), intent(in) :: speed   !! [rad/s]
     real(wp) :: value
 
     value = self%a(lane, motor) - (self%b(lane, motor) + self%c(lane, motor) * speed) * speed
@@ -63,7 +63,7 @@ contains
   pure function quadratic_slope(self, lane, motor, speed) result(value)
     class(quadratic_curve_t), intent(in) :: self
     integer, intent(in) :: lane, motor
-    real(wp), intent(in) :: speed
+    real(wp), intent(in) :: speed   !! [rad/s]
     real(wp) :: value
 
     value = -(self%b(lane, motor) + 2.0_wp * self%c(lane, motor) * speed)
@@ -72,7 +72,7 @@ contains
   pure function induction_torque(self, lane, motor, speed) result(value)
     class(induction_curve_t), intent(in) :: self
     integer, intent(in) :: lane, motor
-    real(wp), intent(in) :: speed
+    real(wp), intent(in) :: speed   !! [rad/s]
     real(wp) :: slip, value
 
     slip = 1.0_wp - speed / self%synchronous_speed(lane, motor)
@@ -84,7 +84,7 @@ contains
   pure function induction_slope(self, lane, motor, speed) result(value)
     class(induction_curve_t), intent(in) :: self
     integer, intent(in) :: lane, motor
-    real(wp), intent(in) :: speed
+    real(wp), intent(in) :: speed   !! [rad/s]
     real(wp) :: slip, value
 
     slip = 1.0_wp - speed / self%synchronous_speed(lane, motor)
