@@ -13,17 +13,17 @@ module nocdyn_solver_status
   integer, parameter, public :: integration_step_too_small = 1
   integer, parameter, public :: integration_too_many_steps = 2
   integer, parameter, public :: integration_not_finite = 3
-  integer, parameter, public :: integration_rhs_failed = 4      !! the system said that no shorter step will help
-  integer, parameter, public :: integration_interrupted = 5  !! by the observer
-  integer, parameter, public :: integration_stopped = 6      !! by a terminal event
-  integer, parameter, public :: integration_idle = 7         !! the lane holds no variant
-  integer, parameter, public :: integration_chattering = 8   !! the system changes its branches endlessly at one time
+  integer, parameter, public :: integration_rhs_failed = 4    !! the system said that no shorter step will help
+  integer, parameter, public :: integration_interrupted = 5   !! by the observer
+  integer, parameter, public :: integration_stopped = 6       !! by a terminal event
+  integer, parameter, public :: integration_idle = 7          !! the lane holds no variant
+  integer, parameter, public :: integration_chattering = 8    !! the system changes its branches endlessly at one time
 
   integer, parameter, public :: max_switch_times = 32           !! whose times are kept
 
   !> Every array has one element per lane.
   type, public :: solver_status_t
-    integer, allocatable :: code(:)           !! integration_...
+    integer, allocatable :: code(:)             !! integration_...
     real(wp), allocatable :: t(:)               !! time reached [s]
     real(wp), allocatable :: h(:)               !! step size of the last attempt [s]
     integer, allocatable :: component(:)        !! that caused a failure, 0 if none did
@@ -54,9 +54,8 @@ contains
     allocate (solver_status%t(lanes), solver_status%h(lanes), source=0.0_wp)
     allocate (solver_status%component(lanes), solver_status%steps(lanes), solver_status%accepted(lanes), &
               solver_status%rejected(lanes), solver_status%evaluations(lanes), solver_status%jacobians(lanes), &
-              solver_status%factorisations(lanes), &
-              solver_status%implicit_steps(lanes), solver_status%switches(lanes), solver_status%crossings(lanes), &
-              solver_status%last_crossing(lanes), source=0)
+              solver_status%factorisations(lanes), solver_status%implicit_steps(lanes), solver_status%switches(lanes), &
+              solver_status%crossings(lanes), solver_status%last_crossing(lanes), source=0)
     allocate (solver_status%switch_times(max_switch_times, lanes), source=0.0_wp)
     allocate (solver_status%implicit(lanes), source=.false.)
   end subroutine allocate_solver_status
@@ -124,11 +123,15 @@ contains
     case (integration_too_many_steps)
       sentence = too_many_sentence(solver_status, lane, system, when)
     case (integration_chattering)
-      sentence = chattering_sentence(system%switch_name(solver_status%last_crossing(lane)), solver_status%crossings(lane), when)
+      sentence = 'the solution chatters at ' // when // ', at the ' // system%switch_name(solver_status%last_crossing(lane)) // &
+        ' (' // to_text(solver_status%crossings(lane)) // ' changes of branches so far): the equations on both sides of the ' // &
+        'boundary drive it back; make the change smooth'
     case (integration_not_finite)
       sentence = not_finite_sentence(solver_status, lane, system, when)
     case (integration_rhs_failed)
-      sentence = gave_up_sentence(solver_status%steps(lane) == 0, when)
+      sentence = 'the equations cannot be evaluated beyond ' // when // ', and a shorter step does not help'
+      if (solver_status%steps(lane) == 0) sentence = 'the equations cannot be evaluated at the start, ' // when
+      sentence = sentence // ': check the start values and the parameters'
     case (integration_idle)
       sentence = 'nothing has been integrated'
     case (integration_stopped)
@@ -140,6 +143,7 @@ contains
     end select
   end function failure_message
 
+  !> The message about a lane that has taken `max_steps` steps.
   function too_many_sentence(solver_status, lane, system, when) result(sentence)
     type(solver_status_t), intent(in) :: solver_status
     integer, intent(in) :: lane
@@ -150,24 +154,14 @@ contains
     sentence = 'the integration stopped at ' // when // ' after ' // to_text(solver_status%steps(lane)) // &
       ' steps, the most that max_steps allows (last step ' // rounded_text(solver_status%h(lane), digits) // ' s): '
     if (2 * solver_status%crossings(lane) > solver_status%steps(lane)) then
-      sentence = sentence // to_text(solver_status%crossings(lane)) // &
-                 ' changes of branches have ended steps, the last at the ' // &
-        system%switch_name(solver_status%last_crossing(lane)) // '; '
+      sentence = sentence // to_text(solver_status%crossings(lane)) // ' changes of branches have ended steps, ' // &
+        'the last at the ' // system%switch_name(solver_status%last_crossing(lane)) // '; '
     end if
     sentence = sentence // 'raise max_steps, or loosen rtol and atol'
     if (solver_status%jacobians(lane) == 0) sentence = sentence // ', or, if the system is stiff, take an implicit method'
   end function too_many_sentence
 
-  function chattering_sentence(name, crossings, when) result(sentence)
-    character(len=*), intent(in) :: name
-    integer, intent(in) :: crossings
-    character(len=*), intent(in) :: when
-    character(len=:), allocatable :: sentence
-
-    sentence = 'the equations change to and fro without end at ' // when // ', at the ' // name // ' (' // to_text(crossings) // &
-      ' changes of branches so far): both sides drive the solution back to the border between them; make the change smooth'
-  end function chattering_sentence
-
+  !> The message about a lane whose step size has become too small.
   function too_small_sentence(solver_status, lane, system, rtol, atol, when) result(sentence)
     type(solver_status_t), intent(in) :: solver_status
     integer, intent(in) :: lane
@@ -182,10 +176,11 @@ contains
         ' cannot be kept within rtol = ' // rounded_text(rtol, digits) // ', atol = ' // rounded_text(atol, digits) // &
         '; loosen the tolerances, or look for a jump or a singularity there'
     else
-      sentence = sentence // 'the equations refuse to be evaluated beyond this time; look for a limit that is reached there'
+      sentence = sentence // 'the equations cannot be evaluated beyond this time; look for a limit that is reached there'
     end if
   end function too_small_sentence
 
+  !> The message about a lane with a value that is not finite.
   function not_finite_sentence(solver_status, lane, system, when) result(sentence)
     type(solver_status_t), intent(in) :: solver_status
     integer, intent(in) :: lane
@@ -204,18 +199,5 @@ contains
         ', however short the step (h = ' // rounded_text(solver_status%h(lane), digits) // ' s): look for a singularity there'
     end if
   end function not_finite_sentence
-
-  pure function gave_up_sentence(at_start, when) result(sentence)
-    logical, intent(in) :: at_start
-    character(len=*), intent(in) :: when
-    character(len=:), allocatable :: sentence
-
-    if (at_start) then
-      sentence = 'the equations cannot be evaluated at the start, ' // when
-    else
-      sentence = 'the equations cannot be evaluated beyond ' // when // ', and a shorter step does not help'
-    end if
-    sentence = sentence // ': check the start values and the parameters'
-  end function gave_up_sentence
 
 end module nocdyn_solver_status
