@@ -76,10 +76,10 @@ contains
 
   !> The inverse by LU (DGETRF, DGETRI), and the logarithm of |determinant|.
   subroutine invert(matrix, inverse, log_determinant, is_singular)
-    real(wp), intent(in) :: matrix(:, :)             !! square
+    real(wp), intent(in) :: matrix(:, :)                  !! square
     real(wp), allocatable, intent(out) :: inverse(:, :)   !! not the inverse if singular
-    real(wp), intent(out) :: log_determinant         !! meaningless if singular
-    logical, intent(out) :: is_singular              !! a pivot is exactly zero
+    real(wp), intent(out) :: log_determinant              !! meaningless if singular
+    logical, intent(out) :: is_singular                   !! a pivot is exactly zero
     real(wp), allocatable :: work(:)
     integer, allocatable :: ipiv(:)
     integer :: info, k, n

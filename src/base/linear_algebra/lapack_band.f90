@@ -48,8 +48,8 @@ contains
   !> Solves A x = b with the factors of `band_factor`.
   subroutine band_solve(lower, upper, factors, pivots, x)
     integer, intent(in) :: lower, upper                  !! numbers of diagonals below and above the main one
-    real(wp), contiguous, intent(in) :: factors(:, :)   !! of `band_factor`
-    integer, contiguous, intent(in) :: pivots(:)   !! of `band_factor`
+    real(wp), contiguous, intent(in) :: factors(:, :)    !! of `band_factor`
+    integer, contiguous, intent(in) :: pivots(:)         !! of `band_factor`
     real(wp), contiguous, intent(inout) :: x(:)          !! b, on return x; shape [n]
     integer :: n, info
 

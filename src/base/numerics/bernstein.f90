@@ -35,12 +35,12 @@ contains
 
   !> Raises `highest` to the largest value of c_0 + c_1 s + ... inside 0 < s < 1, if that is larger. The ends are not checked.
   pure subroutine raise_to_maximum(n, matrix, c, highest, position, found)
-    integer, intent(in) :: n         !! degree, 1 to `max_degree`
+    integer, intent(in) :: n                            !! degree, 1 to `max_degree`
     real(wp), intent(in) :: matrix(0:max_degree, 0:n)   !! of `make_bernstein_matrix`
-    real(wp), intent(in) :: c(0:n)   !! coefficients of powers of s
-    real(wp), intent(inout) :: highest   !! largest value so far
-    real(wp), intent(out) :: position   !! of the maximum
-    logical, intent(out) :: found    !! whether `highest` has been raised by more than rounding
+    real(wp), intent(in) :: c(0:n)                      !! coefficients of powers of s
+    real(wp), intent(inout) :: highest                  !! largest value so far
+    real(wp), intent(out) :: position                   !! of the maximum
+    logical, intent(out) :: found                       !! whether `highest` has been raised by more than rounding
     real(wp) :: b(0:max_degree, max_halvings + 2)   ! of the parts that are left; the last one is next
     real(wp) :: left(max_halvings + 2), length(max_halvings + 2)
     integer :: parts, changes

@@ -13,9 +13,9 @@ module nocdyn_stage_sums
 
   integer, parameter :: max_terms = 12      !! of a row of any tableau
   integer(int64), parameter :: exponent_mask = shiftl(2047_int64, 52)   ! all ones in a number that is not finite
-  integer, parameter, public :: width = 4   !! length of the vectors; all arrays here consist of whole vectors
-  integer, parameter :: few = 16            !! up to so many numbers a plain loop over vectors finds infinities soonest
-  integer, parameter :: tile = 32           !! numbers of each stage in one pass over the terms
+  integer, parameter, public :: width = 4          !! length of the vectors; all arrays here consist of whole vectors
+  integer, parameter :: few = 16                   !! up to so many numbers a plain loop over vectors finds infinities soonest
+  integer, parameter :: tile = 32                  !! numbers of each stage in one pass over the terms
   integer, parameter, public :: large_tile = 256   !! numbers of each stage that are summed and checked before the next ones
 
   !> The non-zero weights of a row of a tableau, and the positions of their stages.
@@ -71,9 +71,9 @@ contains
   !>
   !> x and h may be shorter than a stage: with the length `large_tile` they are used again for every large tile.
   pure recursive subroutine sum_stages(stage_sum, k, x_length, x, h_length, h, y, all_finite)
-    type(stage_sum_t), intent(in) :: stage_sum       !! after `set_offsets`
-    real(wp), intent(in) :: k(stage_sum%extent)      !! the stages, one after the other
-    integer, intent(in) :: x_length, h_length        !! the length of a stage, or `large_tile` if that is less
+    type(stage_sum_t), intent(in) :: stage_sum         !! after `set_offsets`
+    real(wp), intent(in) :: k(stage_sum%extent)        !! the stages, one after the other
+    integer, intent(in) :: x_length, h_length          !! the length of a stage, or `large_tile` if that is less
     real(wp), intent(in) :: x(x_length), h(h_length)   !! start of the step and step size [s] of each element of y
     real(wp), intent(inout) :: y(stage_sum%length)
     logical, intent(out), optional :: all_finite     !! whether no element of y is infinite or NaN

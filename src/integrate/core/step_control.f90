@@ -98,7 +98,7 @@ contains
   pure subroutine propose_steps(control, lanes, t, h, t_new)
     type(step_control_t), intent(inout) :: control
     integer, intent(in) :: lanes
-    real(wp), intent(in) :: t(lanes)   !! present times [s]
+    real(wp), intent(in) :: t(lanes)          !! present times [s]
     real(wp), intent(inout) :: h(lanes)       !! step sizes [s]
     real(wp), intent(inout) :: t_new(lanes)   !! ends of the steps [s]
     integer :: lane

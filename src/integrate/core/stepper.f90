@@ -9,9 +9,9 @@ module nocdyn_stepper
   private
 
   type, abstract, public :: stepper_t
-    integer :: order = 0         !! of y_new
-    integer :: error_order = 0   !! the error estimate falls as h^(error_order + 1)
-    integer :: degree = 0        !! of the polynomials of the dense output
+    integer :: order = 0                       !! of y_new
+    integer :: error_order = 0                 !! the error estimate falls as h^(error_order + 1)
+    integer :: degree = 0                      !! of the polynomials of the dense output
     real(wp) :: max_growth = 6.0_wp            !! largest ratio of a step size to the last one
     logical :: has_low_order_error = .false.   !! whether there are two error estimates
     logical :: needs_series = .false.          !! whether the system must have a Taylor series

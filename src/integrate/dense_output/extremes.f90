@@ -22,7 +22,7 @@ module nocdyn_extremes
   type, public :: extremes_t
     type(ranges_t), allocatable :: ranges(:)               !! [lanes]
     real(wp), allocatable, private :: last(:, :)           !! values at the ends of the last steps, [functions, lanes]
-    real(wp), allocatable, private :: nodes(:)            !! in the step, -1 to 1, [nodes]
+    real(wp), allocatable, private :: nodes(:)             !! in the step, -1 to 1, [nodes]
     real(wp), allocatable, private :: to_series(:, :)      !! matrix from values to coefficients of T_0, T_1, ...
     real(wp), allocatable, private :: values(:, :)         !! [functions, nodes]
     real(wp), allocatable, private :: y(:)                 !! [components]

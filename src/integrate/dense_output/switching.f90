@@ -78,8 +78,8 @@ contains
         associate (side => switching%roots%side(dense%lane, function), g => switching%roots%values(function, part))
           if (.not. is_finite(g)) cycle
           if (side > 0 .and. g <= 0) then
-            call find_earlier_crossing(switching, system, observer, dense, part_bracket(switching%roots, function, part, &
-                                                                                        1.0_wp), theta)
+            call find_earlier_crossing(switching, system, observer, dense, &
+                                       part_bracket(switching%roots, function, part, 1.0_wp), theta)
           else if (side == 0 .and. g < 0) then
             call keep_first(switching, dense%lane, function, part_end(switching%roots, part - 1, 1.0_wp), theta)
           end if

@@ -41,10 +41,12 @@ contains
           call end_at_crossing(integrator, system, observer, lane, solver_status, steps%theta_end(lane))
           steps%crosses(lane) = integrator%switching%pending(lane) > 0
         end if
-        if (integrator%has_events) call process_events(integrator, system, lane, steps%theta_end(lane), times, observer, &
-                                                    solver_status)
-        if (integrator%next_time(lane) <= integrator%t_new(lane)) call output_until(integrator, lane, integrator%t_new(lane), &
-                                                                                    times, observer)
+        if (integrator%has_events) then
+          call process_events(integrator, system, lane, steps%theta_end(lane), times, observer, solver_status)
+        end if
+        if (integrator%next_time(lane) <= integrator%t_new(lane)) then
+          call output_until(integrator, lane, integrator%t_new(lane), times, observer)
+        end if
         if (integrator%has_extremes) then
           call update_extremes(integrator%extremes, observer, integrator%dense, integrator%t_new(lane), steps%crosses(lane))
         end if

@@ -147,8 +147,8 @@ contains
     wanted = 0
     do lane = 1, integrator%attempt%lanes
       integrator%accepted(lane) = integrator%attempt%active(lane) .and. integrator%control%mean_square(lane) <= 1
-      integrator%inspected(lane) = integrator%accepted(lane) .and. (integrator%inspects .or. &
-                                                                      integrator%next_time(lane) < integrator%t_new(lane))
+      integrator%inspected(lane) = integrator%accepted(lane) &
+                                   .and. (integrator%inspects .or. integrator%next_time(lane) < integrator%t_new(lane))
       integrator%wanted(lane) = integrator%inspected(lane) .or. (integrator%accepted(lane) .and. integrator%wants_dense_steps)
       if (integrator%wanted(lane)) wanted = wanted + 1
     end do

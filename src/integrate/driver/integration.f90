@@ -97,8 +97,9 @@ contains
       call stepper%take_step(system, integrator%attempt)
       call test_errors(integrator, stepper, system, observer, solver_status)
       if (any_true(system%lanes, integrator%accepted)) then
-        if (integrator%inspects .or. integrator%wants_steps) call process_steps(integrator, system, times, observer, &
-                                                                                solver_status)
+        if (integrator%inspects .or. integrator%wants_steps) then
+          call process_steps(integrator, system, times, observer, solver_status)
+        end if
         if (integrator%wants_steps) call observe_steps(integrator, stepper, observer)
         call advance_lanes(integrator, times)
         call stepper%accept(integrator%accepted)

@@ -101,8 +101,7 @@ contains
               integrator%steps%crosses(lanes), source=.false.)
     allocate (integrator%t_new(lanes), integrator%next_time(lanes), source=t_start)
     allocate (integrator%steps%t(lanes), integrator%steps%h(lanes), integrator%steps%scale(lanes), &
-              integrator%steps%theta_end(lanes), &
-              integrator%steps%t_new(lanes), source=0.0_wp)
+              integrator%steps%theta_end(lanes), integrator%steps%t_new(lanes), source=0.0_wp)
     allocate (integrator%next(lanes), source=2)
     allocate (integrator%sample(components), source=0.0_wp)
     allocate (integrator%coefficients(lanes, size(integrator%attempt%y, 2), degree), source=0.0_wp)
@@ -340,8 +339,9 @@ contains
       solver_status%evaluations(lane) = integrator%attempt%evaluations(lane)
       solver_status%jacobians(lane) = integrator%attempt%jacobians(lane)
       solver_status%factorisations(lane) = integrator%attempt%factorisations(lane)
-      if (integrator%has_extremes .and. solver_status%steps(lane) > 0) call observer%on_extremes(lane, &
-                                                                                                 integrator%extremes%ranges(lane))
+      if (integrator%has_extremes .and. solver_status%steps(lane) > 0) then
+        call observer%on_extremes(lane, integrator%extremes%ranges(lane))
+      end if
       integrator%sample(:) = integrator%attempt%y(lane, :integrator%attempt%components)
       call ensemble%finish(lane, integrator%sample, solver_status)
     end do

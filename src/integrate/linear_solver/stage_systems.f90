@@ -86,7 +86,7 @@ contains
   subroutine solve(stage_system, attempt, gamma, r, k)
     type(stage_system_t), intent(inout) :: stage_system
     type(step_attempt_t), intent(in) :: attempt
-    real(wp), intent(in) :: gamma   !! of the tableau
+    real(wp), intent(in) :: gamma                    !! of the tableau
     real(wp), contiguous, intent(in) :: r(:, :)      !! [lanes, components]
     real(wp), contiguous, intent(inout) :: k(:, :)   !! [lanes, components]
     integer :: lane

@@ -18,8 +18,8 @@ module nocdyn_auto_stepper
 
   public :: auto_stepper
 
-  integer, parameter :: max_stiff_steps = 15   !! accepted steps beyond the stability limit that make a lane stiff
-  integer, parameter :: nonstiff_steps = 6     !! successive steps within the limit that reset that count, or end stiffness
+  integer, parameter :: max_stiff_steps = 15         !! accepted steps beyond the stability limit that make a lane stiff
+  integer, parameter :: nonstiff_steps = 6           !! successive steps within the limit that reset that count, or end stiffness
   real(wp), parameter :: stability_margin = 0.8_wp   !! of the stability limit: below it explicit steps are stable
 
   type, extends(stepper_t), public :: auto_stepper_t
@@ -72,9 +72,8 @@ contains
     call self%explicit%prepare(system)
     call self%implicit%prepare(system)
     if (allocated(self%evidence)) deallocate (self%is_implicit, self%evidence, self%nonstiff, self%stiffness, self%mask, &
-                                              self%active, &
-                                          self%h, self%step_status, self%y_new, self%error_estimate, self%low_order_estimate, &
-                                          self%coefficients)
+                                              self%active, self%h, self%step_status, self%y_new, self%error_estimate, &
+                                              self%low_order_estimate, self%coefficients)
     columns = padded_columns(system%lanes, system%states + system%quadratures)
     associate (lanes => system%lanes)
       allocate (self%is_implicit(lanes), self%mask(lanes), self%active(lanes), source=.false.)

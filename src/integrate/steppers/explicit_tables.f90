@@ -14,20 +14,20 @@ module nocdyn_explicit_tables
   type, public :: explicit_table_t
     character(len=:), allocatable :: name
     character(len=:), allocatable :: reference
-    integer :: stages                        !! of the step
-    integer :: dense_stages = 0              !! further stages, for the dense output only
-    integer :: order                         !! of y_new
-    integer :: error_order                   !! the error estimate falls as h^(error_order + 1)
-    integer :: dense_order                   !! of the dense output
-    logical :: first_same_as_last            !! the last stage is f(t + h, y_new), the first stage of the next step
-    real(wp) :: max_growth = 6.0_wp          !! largest ratio of step sizes, as in the authors' code
-    real(wp) :: stability_limit = 0.0_wp     !! of |h lambda|, just inside the stability domain on the negative real axis
-    real(wp), allocatable :: a(:, :)         !! strictly lower triangular, [all stages, all stages]
-    real(wp), allocatable :: b(:)            !! [stages]
-    real(wp), allocatable :: c(:)            !! [all stages]
-    real(wp), allocatable :: error(:)        !! b minus the embedded weights, [stages]
+    integer :: stages                             !! of the step
+    integer :: dense_stages = 0                   !! further stages, for the dense output only
+    integer :: order                              !! of y_new
+    integer :: error_order                        !! the error estimate falls as h^(error_order + 1)
+    integer :: dense_order                        !! of the dense output
+    logical :: first_same_as_last                 !! the last stage is f(t + h, y_new), the first stage of the next step
+    real(wp) :: max_growth = 6.0_wp               !! largest ratio of step sizes, as in the authors' code
+    real(wp) :: stability_limit = 0.0_wp          !! of |h lambda|, just inside the stability domain on the negative real axis
+    real(wp), allocatable :: a(:, :)              !! strictly lower triangular, [all stages, all stages]
+    real(wp), allocatable :: b(:)                 !! [stages]
+    real(wp), allocatable :: c(:)                 !! [all stages]
+    real(wp), allocatable :: error(:)             !! b minus the embedded weights, [stages]
     real(wp), allocatable :: low_order_error(:)   !! the same of a second embedded method of lower order, if there is one
-    real(wp), allocatable :: dense(:, :)     !! b_i(theta) = sum_p dense(i, p) theta^p, [all stages, degree]
+    real(wp), allocatable :: dense(:, :)          !! b_i(theta) = sum_p dense(i, p) theta^p, [all stages, degree]
   end type explicit_table_t
 
 contains

@@ -30,9 +30,9 @@ contains
   pure subroutine set_tableau(self, internal, update, error, dense)
     type(stages_t), intent(inout) :: self
     real(wp), intent(in) :: internal(:, :)   !! shape [all, all]
-    real(wp), intent(in) :: update(:)     !! shape [step]
-    real(wp), intent(in) :: error(:)      !! shape [step]
-    real(wp), intent(in) :: dense(:, :)   !! shape [all, degree]
+    real(wp), intent(in) :: update(:)        !! shape [step]
+    real(wp), intent(in) :: error(:)         !! shape [step]
+    real(wp), intent(in) :: dense(:, :)      !! shape [all, degree]
     integer :: i
 
     self%step = size(update)

@@ -67,8 +67,7 @@ contains
     class(system_t), intent(in) :: system
 
     if (allocated(self%series)) deallocate (self%series, self%last_norm, self%previous_norm, self%moved, self%step_status, &
-                                            self%component, &
-                                             self%infinite)
+                                            self%component, self%infinite)
     associate (lanes => system%lanes)
       allocate (self%series(lanes, padded_columns(lanes, system%states + system%quadratures), 0:self%order), source=0.0_wp)
       allocate (self%last_norm(lanes), self%previous_norm(lanes), source=0.0_wp)
