@@ -20,9 +20,7 @@ MANY_ARGUMENTS = {
     "src/base/numerics/band_products.f90": (KERNEL, "pair_of_band", "pair_of_chain", "pair_of_toeplitz"),
     "src/base/numerics/csr_products.f90": (KERNEL, "multiply_lanes", "multiply_rows"),
     "src/integrate/core/stage_sums.f90": (KERNEL, "sum_tiles", "sum_up_to_12", "sum_up_to_4", "sum_up_to_8"),
-    "src/integrate/core/step_control.f90": (KERNEL, "adapt_accepted_steps", "limit_by_quadratures"),
-    "src/integrate/linear_solver/stage_systems.f90": (KERNEL, "solve_quadratures"),
-    "src/integrate/steppers/taylor_stepper.f90": (KERNEL, "measure"),
+    "src/integrate/core/step_control.f90": (KERNEL, "adapt_accepted_steps"),
     "src/model/constraints/coordinates.f90": (
         "constructor: what the analysis of the constraints has found, and the bodies that the user wants",
         "build_coordinates",
