@@ -7,7 +7,7 @@ import select
 import signal
 import time
 
-from conftest import CASE_2
+from conftest import CASE_2, wait_for
 from sweep_inputs import SWEEP, TWO_DISCS, needs_sweeps
 
 PROGRESS = re.compile(r"\r[^\r]*case2\.nml: \d+ %, \d+ s left\x1b\[K")
@@ -73,12 +73,17 @@ def test_a_long_sweep_shows_how_many_variants_are_done(nocdyn):
 @needs_sweeps
 def test_a_long_sweep_tells_a_log_now_and_then_how_many_variants_are_done(nocdyn):
     nocdyn.write("discs.nml", TWO_DISCS + SWEEP)
-    endless = ("--set", "sweep.samples=100000000", "--set", "run.t_end=20", "--threads", 1)
+    endless = ("--set", "sweep.samples=100000000", "--threads", 1)
     processes = [nocdyn.start("sweep", "discs.nml", "--out", out, *endless, *words) for out, words in (("a", ()), ("b", ("-q",)))]
-    # longer than the ten seconds after which a log gets its first line, shorter than the twenty until the second
-    time.sleep(12)
-    for process in processes:
-        process.send_signal(signal.SIGINT)
+    # together longer than the ten seconds after which a log gets its first line, shorter than the twenty until the second;
+    # stopped in between, as they would keep two processors busy
+    wait_for(lambda: (nocdyn.folder / "a/sweep.journal").is_file())
+    size = (nocdyn.folder / "a/sweep.journal").stat().st_size
+    wait_for(lambda: (nocdyn.folder / "a/sweep.journal").stat().st_size > size)
+    for number, seconds in ((signal.SIGSTOP, 10), (signal.SIGCONT, 2), (signal.SIGINT, 0)):
+        for process in processes:
+            process.send_signal(number)
+        time.sleep(seconds)
     logged, quiet = (process.communicate(timeout=30)[1] for process in processes)
     assert LOGGED.fullmatch(logged)
     assert quiet.startswith("nocdyn: ") and quiet.count("\n") == 1
