@@ -71,7 +71,7 @@ def test_formulations_agree_on_joints_of_every_kind(nocdyn, formulation):
 
 
 @pytest.mark.parametrize(
-    ("group", "complaint"),
+    ("group", "message"),
     [
         (
             "&planetary name = 'p' sun = 'a' ring = 'a' carrier = 'b' teeth = 20, 70 /",
@@ -106,20 +106,20 @@ def test_formulations_agree_on_joints_of_every_kind(nocdyn, formulation):
     ],
 )
 @pytest.mark.parametrize("command", ["run", "check"])
-def test_joints_that_cannot_be_are_refused(nocdyn, command, group, complaint):
-    assert refusal(nocdyn, command, group + "\n" + THREE).startswith("nocdyn: pair.nml:1: " + complaint)
+def test_joints_that_cannot_be_are_refused(nocdyn, command, group, message):
+    assert refusal(nocdyn, command, group + "\n" + THREE).startswith("nocdyn: pair.nml:1: " + message)
 
 
 def test_joints_of_all_kinds_share_one_name_space(nocdyn):
     gear = "&gear name = 'x' bodies = 'a', 'b' teeth = 1, 2 /\n"
-    complaint = refusal(nocdyn, "check", gear + "&constraint name = 'x' bodies = 'b', 'c' coefficients = 1, 2 /\n" + THREE)
-    assert complaint == "nocdyn: pair.nml:2: &constraint 'x': the name 'x' is taken by &gear on line 1\n"
+    message = refusal(nocdyn, "check", gear + "&constraint name = 'x' bodies = 'b', 'c' coefficients = 1, 2 /\n" + THREE)
+    assert message == "nocdyn: pair.nml:2: &constraint 'x': the name 'x' is taken by &gear on line 1\n"
 
 
 def test_two_columns_of_one_name_are_refused(nocdyn):
     planetary = "&planetary name = 'p' sun = 'a' ring = 'b' carrier = 'c' teeth = 20, 70 /\n"
-    complaint = refusal(nocdyn, "check", planetary + "&gear name = 'p_ring' bodies = 'a', 'b' teeth = 1, 2 /\n" + THREE)
-    assert complaint.startswith("nocdyn: pair.nml:1: &planetary 'p': its column reaction_p_ring would have the name of that of ")
+    message = refusal(nocdyn, "check", planetary + "&gear name = 'p_ring' bodies = 'a', 'b' teeth = 1, 2 /\n" + THREE)
+    assert message.startswith("nocdyn: pair.nml:1: &planetary 'p': its column reaction_p_ring would have the name of that of ")
 
 
 @pytest.mark.parametrize("command", ["run", "check"])
@@ -129,8 +129,8 @@ def test_a_loop_that_locks_is_refused_with_both_ways_and_ratios(nocdyn, command)
         f"&gear name = 'g{i}' bodies = 'body{a}', 'body{b}' radii = {r}, {-s} /\n"
         for i, (a, b, r, s) in enumerate(pairs, start=1)
     ]
-    complaint = refusal(nocdyn, command, "".join(gears) + FOUR)
-    assert complaint == (
+    message = refusal(nocdyn, command, "".join(gears) + FOUR)
+    assert message == (
         "nocdyn: pair.nml:4: &gear 'g4': locks 'body1', 'body2', 'body3', 'body4': "
         "'g1', 'g2' and 'g3', 'g4' drive 'body4' at 2 and 2.2 times 'body1'\n"
     )
@@ -142,8 +142,8 @@ def test_joints_of_three_bodies_that_lock_are_refused_with_the_rows_involved(noc
         "&gear name = 'g' bodies = 'a', 'b' teeth = 20, 30 /\n",
         "&gear name = 'h' bodies = 'a', 'c' teeth = 20, 30 /\n",
     ]
-    complaint = refusal(nocdyn, "check", "".join(joints) + THREE)
-    assert complaint == (
+    message = refusal(nocdyn, "check", "".join(joints) + THREE)
+    assert message == (
         "nocdyn: pair.nml:1: &planetary 'p': locks 'a', 'b', 'c': together with 'g', 'h' it leaves no speed but 0\n"
     )
 
@@ -175,8 +175,8 @@ PAIR = """\
 
 @pytest.mark.parametrize("command", ["run", "check"])
 def test_start_speeds_that_violate_a_joint_are_refused_with_the_nearest_that_do_not(nocdyn, command):
-    complaint = refusal(nocdyn, command, PAIR.format(a=1.0, b=1.0, start=""))
-    assert complaint == (
+    message = refusal(nocdyn, command, PAIR.format(a=1.0, b=1.0, start=""))
+    assert message == (
         "nocdyn: pair.nml:3: &gear 'g': the start speeds violate it: 0.5 * 1 rad/s ('a') + 0.5 * 1 rad/s ('b') = 1, "
         "which must be 0; nearest speeds that fit: -0.5 ('a'), 0.5 ('b'); &run start = 'projected' takes them\n"
     )

@@ -23,10 +23,10 @@ def refusal(nocdyn, command, text):
 
 
 @pytest.mark.parametrize("command", ["run", "check", "matrices"])
-def test_gears_that_lock_are_refused_by_place_and_name(nocdyn, command):
-    complaint = refusal(nocdyn, command, PAIR.format(a=0, b=0, radius=2.0))
-    assert complaint.startswith("nocdyn: pair.nml:4: &gear 'second': locks 'a', 'b': ")
-    assert complaint.endswith(": 'first' and 'second' drive 'b' at -1 and -0.5 times 'a'\n")
+def test_gears_that_lock_are_refused_by_location_and_name(nocdyn, command):
+    message = refusal(nocdyn, command, PAIR.format(a=0, b=0, radius=2.0))
+    assert message.startswith("nocdyn: pair.nml:4: &gear 'second': locks 'a', 'b': ")
+    assert message.endswith(": 'first' and 'second' drive 'b' at -1 and -0.5 times 'a'\n")
 
 
 def test_coordinates_that_cannot_be_independent_are_refused(nocdyn):
@@ -43,7 +43,7 @@ def test_a_redundant_gear_is_a_note_and_no_failure(nocdyn, command):
     assert NOTE in outcome.stdout
 
 
-def test_the_note_on_a_redundant_gear_stands_in_the_summary(nocdyn):
+def test_the_note_on_a_redundant_gear_is_in_the_summary(nocdyn):
     nocdyn.write("pair.nml", PAIR.format(a=1.0, b=-1.0, radius=1.0))
     nocdyn("run", "pair.nml", "--out", "out")
     machine = nocdyn.summary("out")["machine"]
@@ -51,13 +51,13 @@ def test_the_note_on_a_redundant_gear_stands_in_the_summary(nocdyn):
     assert machine["notes"] == [NOTE]
 
 
-def test_all_mistakes_of_a_file_come_in_one_go_each_with_its_line(nocdyn):
-    complaint = refusal(
+def test_all_errors_of_a_file_are_reported_together_each_with_its_line(nocdyn):
+    message = refusal(
         nocdyn,
         "run",
         "&body name = 'a' inertia = -1 /\n&gera name = 'g' /\n&load name = 'l' body = 'b' viscous = 1e999 /\n&run t_end = 1 /\n",
     )
-    assert [line.removeprefix("nocdyn: ").split(": ")[0] for line in complaint.splitlines()] == [
+    assert [line.removeprefix("nocdyn: ").split(": ")[0] for line in message.splitlines()] == [
         "pair.nml:1",
         "pair.nml:2",
         "pair.nml:3",
@@ -66,7 +66,7 @@ def test_all_mistakes_of_a_file_come_in_one_go_each_with_its_line(nocdyn):
 
 
 @pytest.mark.parametrize(
-    ("override", "complaint"),
+    ("override", "message"),
     [
         ("output.interval=1e-9", "interval = 1e-09 asks for too many rows; allowed: at most 10000000"),
         ("output.interval=1e-300", "interval = 1e-300 asks for too many rows"),
@@ -74,9 +74,9 @@ def test_all_mistakes_of_a_file_come_in_one_go_each_with_its_line(nocdyn):
     ],
 )
 @pytest.mark.parametrize("command", ["run", "check"])
-def test_more_rows_than_anyone_can_read_are_refused(nocdyn, command, override, complaint):
+def test_more_rows_than_anyone_can_read_are_refused(nocdyn, command, override, message):
     outcome = nocdyn(command, CASE_2, "--set", override)
-    assert outcome.returncode == 2 and complaint in outcome.stderr
+    assert outcome.returncode == 2 and message in outcome.stderr
     assert list(nocdyn.folder.iterdir()) == []
 
 

@@ -5,7 +5,7 @@ from conftest import SPINNER
 
 
 @pytest.mark.parametrize(
-    ("name", "complaint"),
+    ("name", "message"),
     [
         ("", "'' is an empty name"),
         ("ground", "'ground' is not allowed as a name: it is the body that does not turn"),
@@ -15,7 +15,7 @@ from conftest import SPINNER
         ("a=b", "'a=b' is a name with a comma, semicolon, equals sign, quote or tab, which is not allowed"),
     ],
 )
-def test_names_that_a_table_cannot_hold_are_refused(nocdyn, name, complaint):
+def test_names_that_a_table_cannot_hold_are_refused(nocdyn, name, message):
     outcome = nocdyn("check", nocdyn.write("named.nml", SPINNER.replace("name = 'disc'", f"name = '{name}'")))
     assert (outcome.returncode, outcome.stdout) == (2, "")
-    assert "named.nml:1: &body" in outcome.stderr and complaint in outcome.stderr
+    assert "named.nml:1: &body" in outcome.stderr and message in outcome.stderr

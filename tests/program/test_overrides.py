@@ -28,7 +28,7 @@ def test_texts_are_set_with_and_without_quotes(nocdyn):
     assert used(nocdyn, "case.title='soft shaft'")["case"]["title"] == "soft shaft"
 
 
-def test_a_key_that_the_file_lacks_is_set(nocdyn):
+def test_a_key_that_the_file_does_not_have_is_set(nocdyn):
     assert used(nocdyn, "run.complement=scaled")["run"]["complement"] == "scaled"
 
 
@@ -45,7 +45,7 @@ def test_an_override_applies_to_every_file(nocdyn, spinner):
 
 
 @pytest.mark.parametrize(
-    ("override", "complaint"),
+    ("override", "message"),
     [
         ("run.rtol", "there is no = in it; write PATH=VALUE"),
         ("run.rtol=", "there is no value after the ="),
@@ -65,15 +65,15 @@ def test_an_override_applies_to_every_file(nocdyn, spinner):
         ("motor.drive.body=moter", "there is no &body 'moter'; did you mean 'motor'?"),
     ],
 )
-def test_a_wrong_override_is_refused_by_what_was_typed(nocdyn, override, complaint):
+def test_a_wrong_override_is_refused_by_what_was_typed(nocdyn, override, message):
     outcome = nocdyn("run", CASE_2, "--set", override)
     assert (outcome.returncode, outcome.stdout) == (2, "")
     assert outcome.stderr.startswith(f"nocdyn: --set {override}: ")
-    assert complaint in outcome.stderr
+    assert message in outcome.stderr
     assert list(nocdyn.folder.iterdir()) == []
 
 
-def test_all_wrong_overrides_are_told_in_one_go(nocdyn):
+def test_all_wrong_overrides_are_reported_together(nocdyn):
     outcome = nocdyn("check", CASE_2, "--set", "runn.rtol=1", "--set", "run.rtol=x", "--set", "load.work.viscous=-1")
     assert outcome.returncode == 2
     assert outcome.stderr.count("--set ") == 3

@@ -36,7 +36,7 @@ def test_a_long_table_is_read_back_by_f90nml(nocdyn):
     assert list(zip(load["table_speed"], load["table_torque"])) == rows
 
 
-def test_mistakes_in_a_file_are_told_with_its_line(nocdyn):
+def test_errors_in_a_table_file_are_reported_with_its_line(nocdyn):
     path = write(nocdyn, b"0 1\n1 x\n")
     outcome = nocdyn("check", path)
     assert outcome.returncode == 2

@@ -70,7 +70,7 @@ def mutated(text, rng):
 
 
 @pytest.mark.parametrize("part", range(5))
-def test_damaged_inputs_are_read_or_refused_but_never_crash(nocdyn, part):
+def test_malformed_inputs_are_read_or_refused_but_never_crash(nocdyn, part):
     original = CASE_2.read_bytes()
     codes = set()
     for seed in range(100 * part, 100 * part + 100):
@@ -97,7 +97,7 @@ DISC = """\
 
 
 @pytest.mark.parametrize(
-    ("key", "value", "place", "complaint"),
+    ("key", "value", "place", "message"),
     [
         ("body", "'" + "\u00e4" * 5000 + "'", "3: &load 'l': body: there is no &body", "; allowed: 'disc'"),
         ("rtol", "1" * 5000 + "x", "5: &run: rtol = 111", " is not a number; allowed: 1e-14 to 0.1"),
@@ -116,13 +116,13 @@ DISC = """\
         ("rtol", "2" * 5000 + "*1", "5: &run: rtol: ", "a repeat count such as 3*0.5 must be from 1 to 100000"),
     ],
 )
-def test_messages_name_file_line_and_key_and_cut_long_values(nocdyn, key, value, place, complaint):
+def test_messages_name_file_line_and_key_and_cut_long_values(nocdyn, key, value, place, message):
     values = {"body": "'disc'", "rtol": "1e-6", "directory": "'out'"} | {key: value}
     nocdyn.write("long.nml", DISC.format(**values))
     outcome = nocdyn("run", "long.nml")
     assert (outcome.returncode, outcome.stdout) == (2, "")
     assert outcome.stderr.startswith(f"nocdyn: long.nml:{place}")
-    assert outcome.stderr.endswith(complaint + "\n")
+    assert outcome.stderr.endswith(message + "\n")
     assert len(outcome.stderr.encode()) < 300
 
 
