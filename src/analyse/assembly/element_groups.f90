@@ -135,7 +135,7 @@ contains
   function curves(self, x, y, extrapolation)
     class(element_groups_t), intent(in) :: self
     character(len=*), intent(in) :: x, y                      !! keys of the lists
-    character(len=*), intent(in), optional :: extrapolation   !! absent: that of the group
+    character(len=*), intent(in), optional :: extrapolation   !! that of the group if absent
     type(curve_t), allocatable :: curves(:, :)
     character(len=:), allocatable :: beyond
     integer :: i, inside, lane, outside

@@ -110,7 +110,7 @@ contains
     type(element_groups_t), intent(in) :: groups
     integer, intent(in) :: body(:)
     type(bank_slot_t), allocatable, intent(inout) :: banks(:)
-    type(governor_t), intent(in), optional :: governor   !! absent: no motor has one
+    type(governor_t), intent(in), optional :: governor   !! no motor has one if absent
 
     call append_bank(banks, new_dc_motors(groups%names, body, groups%values('voltage'), groups%values('resistance'), &
                                           groups%values('flux_constant'), groups%values('inductance'), governor))

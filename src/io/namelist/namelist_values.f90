@@ -48,7 +48,7 @@ contains
     type(cursor_t), intent(inout) :: cursor
     type(namelist_t), intent(inout) :: namelist
     type(diagnostics_t), intent(inout) :: diagnostics
-    logical, intent(out) :: is_valid   !! false: the value cannot be read, which is reported
+    logical, intent(out) :: is_valid   !! .false. if the value cannot be read, which is reported
     type(item_t) :: item
     integer :: i, repeats
 

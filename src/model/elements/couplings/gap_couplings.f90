@@ -73,7 +73,7 @@ contains
     can_pull = any(coefficient(1::2, :) < 0) .or. any(abs(coefficient(2::2, :)) > 0)
   end function can_pull
 
-  !> None: no polynomial holds on both sides of an edge.
+  !> Sets no coefficients, because no polynomial holds on both sides of an edge.
   subroutine polynomials(self, laws)
     class(gap_couplings_t), intent(in) :: self
     type(polynomial_laws_t), intent(inout) :: laws
@@ -174,7 +174,7 @@ contains
   !> Depth of the penetration, and the elastic and viscous moments, positive where they push the bodies apart.
   pure subroutine contact_moments(self, side, lane, coupling, angle, speed, depth, elastic, viscous)
     class(gap_couplings_t), intent(in) :: self
-    integer, intent(in) :: side             !! 1: upper edge, -1: lower edge
+    integer, intent(in) :: side             !! 1 for the upper edge, -1 for the lower edge
     integer, intent(in) :: lane, coupling
     real(wp), intent(in) :: angle, speed    !! u [rad], u' [rad/s]
     real(wp), intent(out) :: depth          !! [rad]
