@@ -12,9 +12,9 @@ module nocdyn_machine_report
 
   public :: coordinate_names, machine_report, machine_notes, constraint_count
 
-  integer, parameter :: most_names = 12    ! in a line
-  integer, parameter :: most_lines = 40    ! of one sort in a report
-  integer, parameter :: most_notes = 12    ! of one sort
+  integer, parameter :: max_names = 12    ! in a line
+  integer, parameter :: max_lines = 40    ! of one sort in a report
+  integer, parameter :: max_notes = 12    ! of one sort
 
 contains
 
@@ -46,16 +46,16 @@ contains
     do g = 1, size(machine%groups)
       do r = 1, size(machine%groups(g)%redundancies)
         found = found + 1
-        if (found > most_notes) cycle
+        if (found > max_notes) cycle
         associate (redundancy => machine%groups(g)%redundancies(r), constraints => machine%constraints)
           call append(notes, label(machine, redundancy%row) // ' repeats what ' // &
-                             joined(selected(constraints%names, redundancy%repeats), ', ', most_names) // ' already ' // &
+                             joined(selected(constraints%names, redundancy%repeats), ', ', max_names) // ' already ' // &
                              trim(merge('fixes', 'fix  ', size(redundancy%repeats) == 1)) // '; its ' // &
                              reaction_word(machine, redundancy%row) // ' not unique, the smallest-norm share is reported')
         end associate
       end do
     end do
-    if (found > most_notes) call append(notes, to_text(found - most_notes) // ' more constraints repeat others')
+    if (found > max_notes) call append(notes, to_text(found - max_notes) // ' more constraints repeat others')
   end subroutine add_redundancy_notes
 
   !> The name of the multiplier of a row, with its verb.
@@ -83,12 +83,12 @@ contains
 
     text = 'the start speeds were projected onto the constraints: impulse'
     associate (impulse => machine%start_impulse)
-      do i = 1, min(size(impulse%row), most_names)
+      do i = 1, min(size(impulse%row), max_names)
         if (i > 1) text = text // ','
         text = text // ' ' // rounded_text(impulse%impulse(i), 7) // ' ' // machine%constraints%units(impulse%row(i))%text // &
                ' s in ' // label(machine, impulse%row(i))
       end do
-      if (size(impulse%row) > most_names) text = text // ' and ' // to_text(size(impulse%row) - most_names) // ' more'
+      if (size(impulse%row) > max_names) text = text // ' and ' // to_text(size(impulse%row) - max_names) // ' more'
       call append(notes, text // '; kinetic energy lost: ' // rounded_text(impulse%energy_lost, 7) // ' J')
     end associate
   end subroutine add_impulse_note
@@ -119,7 +119,7 @@ contains
     end do
     call put_line(report, counted(machine%coordinates%freedoms, 'degree', 'degrees') // ' of freedom')
     call put_groups(report, machine)
-    call put_line(report, 'coordinates: ' // joined(coordinate_names(machine), ', ', most_lines))
+    call put_line(report, 'coordinates: ' // joined(coordinate_names(machine), ', ', max_lines))
     call put_relations(report, machine)
     allocate (notes, source=machine_notes(machine))
     do i = 1, size(notes)
@@ -187,14 +187,14 @@ contains
       if (size(machine%groups(g)%rows) == 0) cycle
       found = found + 1
       redundant = redundant + size(machine%groups(g)%redundancies)
-      if (found > most_lines) cycle
-      text = 'geared together: ' // joined(selected(machine%names, machine%groups(g)%bodies), ', ', most_names)
+      if (found > max_lines) cycle
+      text = 'geared together: ' // joined(selected(machine%names, machine%groups(g)%bodies), ', ', max_names)
       if (size(machine%groups(g)%independent) > 1) then
         text = text // ' with ' // to_text(size(machine%groups(g)%independent)) // ' degrees of freedom'
       end if
       call put_line(report, text)
     end do
-    if (found > most_lines) call put_line(report, 'and ' // to_text(found - most_lines) // ' more groups of geared bodies')
+    if (found > max_lines) call put_line(report, 'and ' // to_text(found - max_lines) // ' more groups of geared bodies')
     if (redundant == 0) return
     call put_line(report, counted(redundant, 'constraint repeats', 'constraints repeat') // &
                   ' others; ratios count as equal within 1e-9 of their size')
@@ -213,9 +213,9 @@ contains
     do b = 1, machine%bodies
       if (is_coordinate(b)) cycle
       found = found + 1
-      if (found <= most_lines) call put_line(report, speed_relation(machine, b))
+      if (found <= max_lines) call put_line(report, speed_relation(machine, b))
     end do
-    if (found > most_lines) call put_line(report, 'and ' // to_text(found - most_lines) // ' more dependent speeds')
+    if (found > max_lines) call put_line(report, 'and ' // to_text(found - max_lines) // ' more dependent speeds')
   end subroutine put_relations
 
   !> "speed of 'machine' = -0.6666667 * speed of 'pinion'", for a dependent body.
@@ -233,7 +233,7 @@ contains
       do entry = first, last
         if (abs(machine%coordinates%ratio(1, entry)) <= ratio_tolerance * largest) cycle
         terms = terms + 1
-        if (terms > most_names) cycle
+        if (terms > max_names) cycle
         associate (independent => machine%coordinates%body(machine%coordinates%coordinate(entry)))
           factor = machine%coordinates%ratio(1, entry) / own_ratio(machine, independent)
           if (terms > 1) text = text // trim(merge(' -', ' +', factor < 0.0_wp))
@@ -241,7 +241,7 @@ contains
           text = text // ' ' // rounded_text(factor, 7) // ' * speed of ' // quoted(machine%names(independent)%text)
         end associate
       end do
-      if (terms > most_names) text = text // ' + ' // to_text(terms - most_names) // ' more terms'
+      if (terms > max_names) text = text // ' + ' // to_text(terms - max_names) // ' more terms'
       if (terms == 0) text = text // ' 0'
     end associate
   end function speed_relation

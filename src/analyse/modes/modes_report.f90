@@ -15,12 +15,12 @@ module nocdyn_modes_report
 
   public :: new_modes_report, modes_text
 
-  integer, parameter :: most_modes = 40          ! of each kind that are printed; all are in modes.csv
-  integer, parameter :: most_shapes = 12         ! a machine with more bodies or modes has its shapes in the files only
+  integer, parameter :: max_modes = 40          ! of each kind that are printed; all are in modes.csv
+  integer, parameter :: max_shapes = 12         ! a machine with more bodies or modes has its shapes in the files only
   integer, parameter :: shapes_per_row = 6
-  integer, parameter :: most_shares = 3          ! of bodies or couplings that are printed for a mode
-  integer, parameter :: most_values = 1000000    ! shapes and shares in a file
-  real(wp), parameter :: least_share = 0.02_wp   ! of an energy that is printed
+  integer, parameter :: max_shares = 3          ! of bodies or couplings that are printed for a mode
+  integer, parameter :: max_values = 1000000    ! shapes and shares in a file
+  real(wp), parameter :: min_share = 0.02_wp   ! of an energy that is printed
 
   type, public :: modes_report_t
     type(machine_t) :: machine
@@ -57,7 +57,7 @@ contains
     self%t = point%t
     self%point = point%text
     allocate (self%notes, source=point%notes)
-    self%shapes = min(size(self%modes), most_values / (3 * self%machine%bodies + size(self%elastic)))
+    self%shapes = min(size(self%modes), max_values / (3 * self%machine%bodies + size(self%elastic)))
     if (self%shapes < size(self%modes)) then
       call append(self%notes, 'of the ' // to_text(size(self%modes)) // ' modes, modes.csv and modes.json have the ' // &
                               'shapes and energies of the first ' // to_text(self%shapes))
@@ -80,7 +80,7 @@ contains
     call put_real(self, mode_rigid, report)
     call put_real(self, mode_overdamped, report)
     call put_real(self, mode_diverging, report)
-    if (count(self%modes%kind == mode_oscillating) <= most_shapes .and. self%machine%bodies <= most_shapes) then
+    if (count(self%modes%kind == mode_oscillating) <= max_shapes .and. self%machine%bodies <= max_shapes) then
       call put_shapes(self, report)
     end if
     text = report%text()
@@ -98,7 +98,7 @@ contains
     number = 0
     width = len('kinetic energy in')
     do i = 1, size(self%modes)
-      if (self%modes(i)%kind /= mode_oscillating .or. number == most_modes) cycle
+      if (self%modes(i)%kind /= mode_oscillating .or. number == max_modes) cycle
       number = number + 1
       width = max(width, text_width(shares_text(self%modes(i)%kinetic, self%machine%names)))
     end do
@@ -108,7 +108,7 @@ contains
     do i = 1, size(self%modes)
       if (self%modes(i)%kind /= mode_oscillating) cycle
       number = number + 1
-      if (number > most_modes) cycle
+      if (number > max_modes) cycle
       associate (mode => self%modes(i))
         call report%append_line(repeat(' ', number_width - len(to_text(number))) // to_text(number) // cell(mode%frequency()) // &
                                 cell(mode%undamped) // cell(mode%damping_ratio()) // time_cell(mode) // '  ' // &
@@ -117,7 +117,7 @@ contains
                                 trim(merge(', unstable', '          ', mode%is_unstable())))
       end associate
     end do
-    if (total > most_modes) call report%append_line('  (' // to_text(total - most_modes) // ' more in modes.csv)')
+    if (total > max_modes) call report%append_line('  (' // to_text(total - max_modes) // ' more in modes.csv)')
   end subroutine put_oscillations
 
   function time_cell(mode) result(text)
@@ -139,11 +139,11 @@ contains
     do i = 1, size(self%modes)
       if (self%modes(i)%kind /= kind) cycle
       number = number + 1
-      if (number > most_modes) cycle
+      if (number > max_modes) cycle
       call report%append_line('  ' // trim(kind_names(kind)) // ': ' // rate_text(self%modes(i)) // &
                               '; kinetic energy in ' // shares_text(self%modes(i)%kinetic, self%machine%names))
     end do
-    if (number > most_modes) call report%append_line('  (' // to_text(number - most_modes) // ' more in modes.csv)')
+    if (number > max_modes) call report%append_line('  (' // to_text(number - max_modes) // ' more in modes.csv)')
   end subroutine put_real
 
   function rate_text(mode) result(text)
@@ -169,9 +169,9 @@ contains
 
     text = ''
     left = abs(share)
-    do k = 1, min(most_shares, size(share))
+    do k = 1, min(max_shares, size(share))
       largest = maxloc(left, dim=1)
-      if (left(largest) < merge(least_share, tiny(1.0_wp), k > 1)) return
+      if (left(largest) < merge(min_share, tiny(1.0_wp), k > 1)) return
       if (k > 1) text = text // ', '
       text = text // names(largest)%text // ' ' // percent(share(largest))
       left(largest) = 0.0_wp

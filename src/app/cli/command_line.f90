@@ -4,7 +4,7 @@ module nocdyn_command_line
   use nocdyn_commands, only: command_index, command_names, command_t, commands_with_option
   use nocdyn_errors, only: error_t, exit_input, raise
   use nocdyn_options, only: option_index, option_t, options
-  use nocdyn_text, only: append, joined, nearest_word, quoted, string_t, to_text
+  use nocdyn_text, only: append, joined, nearest_word, quoted, shortened, string_t, to_text
   implicit none (type, external)
   private
 
@@ -208,7 +208,7 @@ contains
     character(len=:), allocatable :: message
     integer :: nearest
 
-    message = quoted(word) // ' is not ' // what // ';'
+    message = quoted(shortened(word)) // ' is not ' // what // ';'
     nearest = nearest_word(word, known)
     if (nearest > 0) message = message // ' did you mean ' // quoted(known(nearest)%text) // '?'
     message = message // ' allowed: ' // joined(known, ', ')

@@ -128,10 +128,11 @@ contains
 
     if (job%arguments%is_given('--quiet')) return
     associate (file => job%plan%input%file, journal => job%journals(1))
-      if (journal%damaged_bytes > 0) call print_text(file // ': note: ' // journal%path() // ' has damaged entries; ' // &
-                                              'their variants are computed again')
+      if (journal%damaged_bytes > 0) then
+        call print_text(file // ': note: ' // journal%path() // ' has damaged entries; their variants are computed again')
+      end if
       call print_text(file // ': reusing ' // to_text(journal%done + journal%refused + journal%failed) // ' of ' // &
-               to_text(journal%header%last - journal%header%first + 1) // ' variants from ' // journal%path())
+                      to_text(journal%header%last - journal%header%first + 1) // ' variants from ' // journal%path())
     end associate
   end subroutine print_journal_state
 

@@ -10,7 +10,7 @@ module nocdyn_sweep_threads
 
   public :: usable_threads, print_thread_note, refuse_ranks
 
-  integer, parameter :: most_per_processor = 8   ! threads; many more would cost start-up time and memory
+  integer, parameter :: max_per_processor = 8   ! threads; many more would cost start-up time and memory
 
 contains
 
@@ -18,7 +18,7 @@ contains
   integer function usable_threads(wanted)
     integer, intent(in) :: wanted   !! threads
 
-    usable_threads = min(wanted, most_per_processor * omp_get_num_procs())
+    usable_threads = min(wanted, max_per_processor * omp_get_num_procs())
   end function usable_threads
 
   !> Prints a note if fewer threads are used than requested.
@@ -28,7 +28,7 @@ contains
 
     if (usable_threads(wanted) == wanted) return
     call print_text(file // ': note: ' // to_text(usable_threads(wanted)) // ' threads instead of ' // to_text(wanted) // &
-                    ': at most ' // to_text(most_per_processor) // ' for each available processor')
+                    ': at most ' // to_text(max_per_processor) // ' for each available processor')
   end subroutine print_thread_note
 
   !> Refuses several processes of an MPI job without --shard: each of them would compute the whole sweep.
