@@ -148,7 +148,7 @@ contains
 
   !> Whether the middle one of three torques of equal sign is the smallest.
   pure logical function is_local_minimum(torque)
-    real(wp), intent(in) :: torque(3)
+    real(wp), intent(in) :: torque(3)   !! [N m]
 
     is_local_minimum = torque(1) * torque(2) > 0.0_wp .and. torque(3) * torque(2) > 0.0_wp .and. &
              abs(torque(2)) <= abs(torque(1)) .and. abs(torque(2)) <= abs(torque(3))
@@ -243,7 +243,7 @@ contains
 
   !> Adds a solution, unless the list has it.
   subroutine add(values, block)
-    real(wp), intent(in) :: values(:)
+    real(wp), intent(in) :: values(:)   !! [members of the block]
     type(block_solutions_t), intent(inout) :: block
     integer :: i
 
@@ -354,15 +354,15 @@ contains
 
   !> Whether two solutions are equal up to `same`.
   pure logical function is_same(one, other)
-    real(wp), intent(in) :: one(:), other(:)
+    real(wp), intent(in) :: one(:), other(:)   !! [members of the block]
 
     is_same = all(abs(one - other) <= same * max(abs(one), abs(other), same))
   end function is_same
 
   !> The unknowns after a step of some of them.
   pure function moved(z, members, step)
-    real(wp), intent(in) :: z(:), step(:)
-    integer, intent(in) :: members(:)   !! unknowns of the block
+    real(wp), intent(in) :: z(:), step(:)   !! [unknowns], [members]
+    integer, intent(in) :: members(:)       !! unknowns of the block
     real(wp) :: moved(size(z))
 
     moved = z

@@ -220,8 +220,8 @@ contains
 
   !> The largest real part of the eigenvalues, without the smallest ones, which belong to free rigid motions.
   pure real(wp) function growth_rate(values, free_modes)
-    complex(wp), intent(in) :: values(:)
-    integer, intent(in) :: free_modes   !! number of eigenvalues that are left out
+    complex(wp), intent(in) :: values(:)   !! eigenvalues [1/s]
+    integer, intent(in) :: free_modes      !! number of eigenvalues that are left out
     logical :: counts(size(values))
     integer :: i
 

@@ -266,7 +266,7 @@ contains
   !> Solves (K + damping * diagonal_scale) step = torque, after `evaluate_angles`.
   subroutine solve(balance, damping, self, step, is_singular)
     type(torque_balance_t), intent(in) :: balance
-    real(wp), intent(in) :: damping
+    real(wp), intent(in) :: damping   !! Levenberg parameter, 0: a Newton step
     type(twist_problem_t), intent(inout) :: self
     real(wp), intent(out) :: step(:)   !! [rad], [coordinates]
     logical, intent(out) :: is_singular

@@ -70,7 +70,7 @@ contains
 
   !> Sets parts of eigenvalues to zero that are rounding of the largest one.
   pure subroutine clear_rounding(values)
-    complex(wp), intent(inout) :: values(:)
+    complex(wp), intent(inout) :: values(:)   !! eigenvalues [1/s]
     real(wp), parameter :: rounding = 1.0e-13_wp
     real(wp) :: least, parts(2)
     integer :: i
@@ -106,9 +106,9 @@ contains
   subroutine fill_mode(linear, elastic, eigenvalue, vector, twist, mode)
     type(linearisation_t), intent(in) :: linear
     integer, intent(in) :: elastic(:)
-    complex(wp), intent(in) :: eigenvalue
-    complex(wp), intent(in) :: vector(:)   !! eigenvector
-    complex(wp), intent(in) :: twist(:)    !! [elastic]
+    complex(wp), intent(in) :: eigenvalue   !! [1/s]
+    complex(wp), intent(in) :: vector(:)    !! eigenvector
+    complex(wp), intent(in) :: twist(:)     !! [elastic]
     type(mode_t), intent(inout) :: mode
     real(wp) :: rigid_part
 

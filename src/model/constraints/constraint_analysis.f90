@@ -142,7 +142,7 @@ contains
 
   !> Which rows of unit length are independent of those before them: Gram-Schmidt, twice per row.
   function independent_rows(rows) result(adds)
-    real(wp), intent(in) :: rows(:, :)
+    real(wp), intent(in) :: rows(:, :)   !! [rows, trains]
     logical :: adds(size(rows, 1))
     real(wp) :: basis(size(rows, 2), size(rows, 1)), part(size(rows, 2))   ! the basis is orthonormal
     integer :: i, k, n, pass
@@ -164,7 +164,7 @@ contains
 
   !> Rank by column-pivoted QR.
   integer function rank_of(rows)
-    real(wp), intent(in) :: rows(:, :)
+    real(wp), intent(in) :: rows(:, :)   !! [rows, trains]
     integer :: pivots(size(rows, 2))
 
     rank_of = 0

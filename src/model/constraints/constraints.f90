@@ -43,7 +43,7 @@ contains
     integer, intent(in) :: bodies   !! bodies of the machine
     type(string_t), intent(in) :: names(:), units(:)
     integer, intent(in) :: first(:), body(:)
-    real(wp), intent(in) :: coefficient(:, :)
+    real(wp), intent(in) :: coefficient(:, :)                 !! [lanes, entries]
     type(string_t), intent(in), optional :: kinds(:)          !! all are 'constraint' if absent
     type(member_torques_t), intent(in), optional :: members   !! none if absent
     type(constraints_t) :: constraints
@@ -156,6 +156,7 @@ contains
     end do
   end subroutine residual
 
+  !> Registers the arrays whose values may differ from variant to variant.
   subroutine list_parameters(self, parameters)
     class(constraints_t), target, intent(inout) :: self
     type(lane_parameters_t), intent(inout) :: parameters

@@ -99,7 +99,7 @@ contains
 
   !> The rows of a matrix, scaled to unit length.
   pure function unit_rows(matrix) result(scaled)
-    real(wp), intent(in) :: matrix(:, :)
+    real(wp), intent(in) :: matrix(:, :)   !! without rows of zeros
     real(wp) :: scaled(size(matrix, 1), size(matrix, 2))
     integer :: i
 

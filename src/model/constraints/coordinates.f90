@@ -333,6 +333,7 @@ contains
     call self%reactions%find_reactions(lane, self%imbalance, lambda)
   end subroutine reactions_of_imbalances
 
+  !> Registers the arrays whose values may differ from variant to variant.
   subroutine list_parameters(self, parameters)
     class(coordinates_t), target, intent(inout) :: self
     type(lane_parameters_t), intent(inout) :: parameters

@@ -145,6 +145,7 @@ contains
     end do
   end subroutine minimise_norm
 
+  !> Registers the arrays whose values may differ from variant to variant.
   subroutine list_parameters(self, parameters)
     class(load_sharing_t), target, intent(inout) :: self
     type(lane_parameters_t), intent(inout) :: parameters

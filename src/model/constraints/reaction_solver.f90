@@ -254,6 +254,7 @@ contains
     end do
   end subroutine solve_relations
 
+  !> Registers the arrays whose values may differ from variant to variant.
   subroutine list_parameters(self, parameters)
     class(reaction_solver_t), target, intent(inout) :: self
     type(lane_parameters_t), intent(inout) :: parameters

@@ -166,7 +166,7 @@ contains
 
   !> |omega(a)| / |omega(b)|, limited to the exponents -max_exponent to max_exponent.
   pure real(wp) function quotient_of(fractions, exponents, a, b) result(quotient)
-    real(wp), intent(in) :: fractions(:)
+    real(wp), intent(in) :: fractions(:)   !! by `scaled_ratios`, [bodies]
     integer, intent(in) :: exponents(:), a, b
 
     quotient = scale(abs(fractions(a) / fractions(b)), max(-max_exponent, min(max_exponent, exponents(a) - exponents(b))))

@@ -88,7 +88,7 @@ contains
   pure subroutine find_loads(relations, elimination, dual, lane, moment, lambda)
     type(train_relations_t), intent(in) :: relations
     type(elimination_t), intent(in) :: elimination
-    real(wp), intent(in) :: dual(:, :)
+    real(wp), intent(in) :: dual(:, :)   !! D of the core, [core_trains, core]
     integer, intent(in) :: lane
     real(wp), intent(inout) :: moment(:)   !! [N m], [trains]; on return without the moments of the eliminated relations
     real(wp), intent(inout) :: lambda(:)   !! [relations]; those of the elimination are set
@@ -112,6 +112,7 @@ contains
     end do
   end subroutine find_loads
 
+  !> Registers the integers on which the layout depends.
   subroutine list_structure(self, parameters)
     class(elimination_t), intent(in) :: self
     type(lane_parameters_t), intent(inout) :: parameters

@@ -71,7 +71,7 @@ contains
   !> Copies the speeds and angles of the bodies from the state.
   subroutine set_state(self, y)
     class(body_formulation_t), intent(inout) :: self
-    real(wp), contiguous, intent(in) :: y(:, :)
+    real(wp), contiguous, intent(in) :: y(:, :)   !! state, [lanes, states], at least
     integer :: b
 
     do b = 1, self%machine%bodies
@@ -83,8 +83,8 @@ contains
   !> Evaluates the right-hand side at a state and keeps it in `slope`.
   subroutine observe_bodies(self, t, y)
     class(body_formulation_t), intent(inout) :: self
-    real(wp), contiguous, intent(in) :: t(:)
-    real(wp), contiguous, intent(in) :: y(:, :)
+    real(wp), contiguous, intent(in) :: t(:)      !! [s], [lanes]
+    real(wp), contiguous, intent(in) :: y(:, :)   !! state, [lanes, states], at least
 
     call self%set_state(y)
     if (self%switches > 0) call self%choose_all_branches(t, y)
@@ -95,8 +95,8 @@ contains
   pure subroutine switch_motion(self, lane, switch, y, angle, speed)
     class(body_formulation_t), intent(in) :: self
     integer, intent(in) :: lane, switch
-    real(wp), contiguous, intent(in) :: y(:)
-    real(wp), intent(out) :: angle, speed
+    real(wp), contiguous, intent(in) :: y(:)   !! state, [states + quadratures]
+    real(wp), intent(out) :: angle, speed      !! [rad], [rad/s]
 
     angle = 0.0_wp
     speed = 0.0_wp
@@ -118,10 +118,10 @@ contains
   !> are left zero; the extension fills them.
   subroutine jacobian_of_bodies(self, t, y, dfdy, dfdt, status)
     class(body_formulation_t), intent(inout) :: self
-    real(wp), intent(in) :: t(self%lanes)
-    real(wp), intent(in) :: y(self%lanes, self%states + self%quadratures)
-    real(wp), contiguous, intent(inout) :: dfdy(:, :)
-    real(wp), intent(inout) :: dfdt(self%lanes, self%states + self%quadratures)
+    real(wp), intent(in) :: t(self%lanes)                                         !! [s]
+    real(wp), intent(in) :: y(self%lanes, self%states + self%quadratures)         !! state
+    real(wp), contiguous, intent(inout) :: dfdy(:, :)                             !! [lanes, positions]
+    real(wp), intent(inout) :: dfdt(self%lanes, self%states + self%quadratures)   !! derivative by the time
     integer, intent(inout) :: status(self%lanes)
 
     call fill_of_bodies(self, t, y, size(dfdt, 2), dfdy, dfdt)
@@ -130,11 +130,11 @@ contains
   !> The Jacobian as a dense array, as `jacobian_pattern` names all positions.
   subroutine fill_of_bodies(self, t, y, components, dfdy, dfdt)
     class(body_formulation_t), intent(inout) :: self
-    real(wp), contiguous, intent(in) :: t(:)
-    real(wp), contiguous, intent(in) :: y(:, :)
-    integer, intent(in) :: components   !! states + quadratures
-    real(wp), intent(inout) :: dfdy(self%lanes, components, self%states)
-    real(wp), intent(inout) :: dfdt(self%lanes, components)
+    real(wp), contiguous, intent(in) :: t(:)                               !! [s], [lanes]
+    real(wp), contiguous, intent(in) :: y(:, :)                            !! state, [lanes, states], at least
+    integer, intent(in) :: components                                      !! states + quadratures
+    real(wp), intent(inout) :: dfdy(self%lanes, components, self%states)   !! derivative by the states
+    real(wp), intent(inout) :: dfdt(self%lanes, components)                !! derivative by the time
     integer :: b, l, n
 
     n = self%machine%bodies

@@ -133,8 +133,8 @@ contains
   subroutine start_lane(self, lane, t, y)
     class(formulation_t), intent(inout) :: self
     integer, intent(in) :: lane
-    real(wp), intent(in) :: t
-    real(wp), contiguous, intent(in) :: y(:)
+    real(wp), intent(in) :: t                  !! [s]
+    real(wp), contiguous, intent(in) :: y(:)   !! state, [states + quadratures]
     integer :: switch
 
     call self%refresh_lane(lane)
@@ -147,9 +147,9 @@ contains
   subroutine indicator_values(self, lane, t, y, g)
     class(formulation_t), intent(inout) :: self
     integer, intent(in) :: lane
-    real(wp), intent(in) :: t
-    real(wp), contiguous, intent(in) :: y(:)
-    real(wp), contiguous, intent(inout) :: g(:)
+    real(wp), intent(in) :: t                     !! [s]
+    real(wp), contiguous, intent(in) :: y(:)      !! state, [states + quadratures]
+    real(wp), contiguous, intent(inout) :: g(:)   !! [switches]
     real(wp) :: angle, speed
     integer :: switch
 
@@ -168,9 +168,9 @@ contains
   subroutine change_branch(self, lane, which, t, y)
     class(formulation_t), intent(inout) :: self
     integer, intent(in) :: lane
-    integer, intent(in) :: which   !! switch, 1 to `switches`
-    real(wp), intent(in) :: t
-    real(wp), contiguous, intent(in) :: y(:)
+    integer, intent(in) :: which               !! switch, 1 to `switches`
+    real(wp), intent(in) :: t                  !! [s]
+    real(wp), contiguous, intent(in) :: y(:)   !! state, [states + quadratures]
     real(wp) :: angle, speed
 
     associate (switches => self%machine%switches)

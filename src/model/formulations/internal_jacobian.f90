@@ -111,6 +111,7 @@ contains
     call self%incidence%refresh_selected(lane, incidence, internal%element, with_ratio_only=.false.)
   end subroutine refresh_lane
 
+  !> Registers the arrays whose values may differ from variant to variant.
   subroutine list_parameters(self, parameters)
     class(internal_jacobian_t), target, intent(inout) :: self
     type(lane_parameters_t), intent(inout) :: parameters

@@ -50,9 +50,9 @@ contains
   !> Solves for omega' and the multipliers.
   subroutine derivative(self, t, y, dydt, status)
     class(multiplier_t), intent(inout) :: self
-    real(wp), intent(in) :: t(self%lanes)
-    real(wp), intent(in) :: y(self%lanes, self%states + self%quadratures)
-    real(wp), intent(inout) :: dydt(self%lanes, self%states + self%quadratures)
+    real(wp), intent(in) :: t(self%lanes)                                         !! [s]
+    real(wp), intent(in) :: y(self%lanes, self%states + self%quadratures)         !! state
+    real(wp), intent(inout) :: dydt(self%lanes, self%states + self%quadratures)   !! its derivative
     integer, intent(inout) :: status(self%lanes)
     integer :: l, n
 

@@ -29,7 +29,7 @@ module nocdyn_paper
     real(wp), allocatable, private :: complement(:, :, :)      !! L_tau, [n, freedoms, lanes]
     real(wp), allocatable, private :: factors(:, :, :)         !! LU of J_3, [3n, 3n, lanes]
     integer, allocatable, private :: pivots(:, :)              !! [3n, lanes]
-    integer, allocatable, private :: couplings(:)                 !! elements of the role coupling
+    integer, allocatable, private :: couplings(:)              !! elements of the role coupling
     real(wp), allocatable, private :: moment_of_bodies(:, :)   !! coupling moments from body moments, [couplings, n]
     type(matrices_t), private :: work
   contains
@@ -129,9 +129,9 @@ contains
   !> Assembles and solves eq. (43) for beta'.
   subroutine derivative(self, t, y, dydt, status)
     class(paper_t), intent(inout) :: self
-    real(wp), intent(in) :: t(self%lanes)
-    real(wp), intent(in) :: y(self%lanes, self%states + self%quadratures)
-    real(wp), intent(inout) :: dydt(self%lanes, self%states + self%quadratures)
+    real(wp), intent(in) :: t(self%lanes)                                         !! [s]
+    real(wp), intent(in) :: y(self%lanes, self%states + self%quadratures)         !! state
+    real(wp), intent(inout) :: dydt(self%lanes, self%states + self%quadratures)   !! its derivative
     integer, intent(inout) :: status(self%lanes)
     integer :: l, n
 
@@ -196,10 +196,10 @@ contains
   !> The Jacobian of the bodies and the rows of F' = K_4 omega.
   subroutine jacobian(self, t, y, dfdy, dfdt, status)
     class(paper_t), intent(inout) :: self
-    real(wp), intent(in) :: t(self%lanes)
-    real(wp), intent(in) :: y(self%lanes, self%states + self%quadratures)
-    real(wp), contiguous, intent(inout) :: dfdy(:, :)
-    real(wp), intent(inout) :: dfdt(self%lanes, self%states + self%quadratures)
+    real(wp), intent(in) :: t(self%lanes)                                         !! [s]
+    real(wp), intent(in) :: y(self%lanes, self%states + self%quadratures)         !! state
+    real(wp), contiguous, intent(inout) :: dfdy(:, :)                             !! [lanes, positions]
+    real(wp), intent(inout) :: dfdt(self%lanes, self%states + self%quadratures)   !! derivative by the time
     integer, intent(inout) :: status(self%lanes)
 
     call jacobian_of_bodies(self, t, y, dfdy, dfdt, status)
@@ -209,8 +209,8 @@ contains
   !> The derivatives of F' = K_4 omega by omega and phi.
   subroutine fill_moment_rows(self, components, dfdy)
     type(paper_t), intent(inout) :: self
-    integer, intent(in) :: components   !! states + quadratures
-    real(wp), intent(inout) :: dfdy(self%lanes, components, self%states)
+    integer, intent(in) :: components                                      !! states + quadratures
+    real(wp), intent(inout) :: dfdy(self%lanes, components, self%states)   !! derivative by the states
     integer :: e, l, n
 
     n = self%machine%bodies
@@ -234,8 +234,8 @@ contains
   !> that add up to F on the bodies.
   subroutine observe(self, t, y)
     class(paper_t), intent(inout) :: self
-    real(wp), contiguous, intent(in) :: t(:)
-    real(wp), contiguous, intent(in) :: y(:, :)
+    real(wp), contiguous, intent(in) :: t(:)      !! [s], [lanes]
+    real(wp), contiguous, intent(in) :: y(:, :)   !! state, [lanes, states], at least
     integer :: b, i, l, n
 
     n = self%machine%bodies

@@ -21,7 +21,7 @@ contains
   subroutine inertia_matrix(machine, lane, inertia)
     type(machine_t), intent(in) :: machine
     integer, intent(in) :: lane
-    real(wp), intent(inout) :: inertia(:, :)
+    real(wp), intent(inout) :: inertia(:, :)   !! J [kg m2]
     integer :: b
 
     inertia = 0.0_wp
@@ -35,8 +35,8 @@ contains
   subroutine torque_vector(machine, lane, role, torque)
     type(machine_t), intent(in) :: machine
     integer, intent(in) :: lane
-    integer, intent(in) :: role   !! role_... of nocdyn_bank
-    real(wp), intent(inout) :: torque(:)
+    integer, intent(in) :: role            !! role_... of nocdyn_bank
+    real(wp), intent(inout) :: torque(:)   !! [N m]
     integer :: e, i
 
     torque = 0.0_wp
@@ -56,7 +56,7 @@ contains
   subroutine stiffness_matrix(machine, lane, stiffness)
     type(machine_t), intent(in) :: machine
     integer, intent(in) :: lane
-    real(wp), intent(inout) :: stiffness(:, :)
+    real(wp), intent(inout) :: stiffness(:, :)   !! K [N m/rad]
 
     stiffness = 0.0_wp
     call add_coefficients(machine%elements%from, machine%elements%to, 1.0_wp, machine%elements%secant(lane, :), stiffness)
@@ -66,7 +66,7 @@ contains
   subroutine damping_matrix(machine, lane, damping)
     type(machine_t), intent(in) :: machine
     integer, intent(in) :: lane
-    real(wp), intent(inout) :: damping(:, :)
+    real(wp), intent(inout) :: damping(:, :)   !! C [N m s/rad]
 
     damping = 0.0_wp
     call add_coefficients(machine%elements%from, machine%elements%to, 1.0_wp, machine%elements%damping(lane, :), damping)
@@ -77,7 +77,7 @@ contains
   subroutine tangent_matrix(machine, lane, tangent)
     type(machine_t), intent(in) :: machine
     integer, intent(in) :: lane
-    real(wp), intent(inout) :: tangent(:, :)
+    real(wp), intent(inout) :: tangent(:, :)   !! K_4 [N m/rad]
 
     tangent = 0.0_wp
     call add_coefficients(machine%elements%from, machine%elements%to, -1.0_wp, machine%elements%restoring_angle(lane, :), tangent)
@@ -87,7 +87,7 @@ contains
   subroutine elastic_moments(machine, lane, moments)
     type(machine_t), intent(in) :: machine
     integer, intent(in) :: lane
-    real(wp), intent(inout) :: moments(:)
+    real(wp), intent(inout) :: moments(:)   !! F [N m]
     integer :: e
 
     moments = 0.0_wp
@@ -101,8 +101,8 @@ contains
   !> F' of eqs. (47), (52)-(57): K_4 omega, [n].
   subroutine elastic_rates(tangent, omega, rates)
     real(wp), intent(in) :: tangent(:, :)   !! K_4, [n, n]
-    real(wp), intent(in) :: omega(:)         !! [rad/s], [n]
-    real(wp), intent(inout) :: rates(:)
+    real(wp), intent(in) :: omega(:)        !! [rad/s], [n]
+    real(wp), intent(inout) :: rates(:)     !! F' [N m/s]
     integer :: j
 
     rates = 0.0_wp
@@ -113,10 +113,10 @@ contains
 
   !> J_1 of eq. (25): [L_tau^T J; L_lambda], [n, n].
   subroutine constrained_inertia(complement, inertia, constraint, inertia_1)
-    real(wp), intent(in) :: complement(:, :)   !! L_tau, [n, freedoms]
-    real(wp), intent(in) :: inertia(:, :)      !! J, [n, n]
-    real(wp), intent(in) :: constraint(:, :)   !! L_lambda, [n - freedoms, n]
-    real(wp), intent(inout) :: inertia_1(:, :)
+    real(wp), intent(in) :: complement(:, :)     !! L_tau, [n, freedoms]
+    real(wp), intent(in) :: inertia(:, :)        !! J, [n, n]
+    real(wp), intent(in) :: constraint(:, :)     !! L_lambda, [n - freedoms, n]
+    real(wp), intent(inout) :: inertia_1(:, :)   !! J_1
 
     call constrained_matrix(complement, inertia, inertia_1)
     inertia_1(size(complement, 2) + 1:, :) = constraint
@@ -124,9 +124,9 @@ contains
 
   !> C_1 of eq. (29) and K_1 of eq. (30): [L_tau^T M; 0], [n, n].
   subroutine constrained_matrix(complement, matrix, matrix_1)
-    real(wp), intent(in) :: complement(:, :)      !! L_tau, [n, freedoms]
-    real(wp), intent(in) :: matrix(:, :)          !! C or K, [n, n]
-    real(wp), intent(inout) :: matrix_1(:, :)
+    real(wp), intent(in) :: complement(:, :)    !! L_tau, [n, freedoms]
+    real(wp), intent(in) :: matrix(:, :)        !! C or K, [n, n]
+    real(wp), intent(inout) :: matrix_1(:, :)   !! C_1 or K_1
     integer :: j
 
     do j = 1, size(matrix, 2)
@@ -136,9 +136,9 @@ contains
 
   !> Q_1, Q_0^1, Q_m^1 of eqs. (26)-(28): [L_tau^T Q; 0], [n].
   subroutine constrained_vector(complement, vector, vector_1)
-    real(wp), intent(in) :: complement(:, :)      !! L_tau, [n, freedoms]
-    real(wp), intent(in) :: vector(:)             !! Q, Q_0 or Q_m [N m], [n]
-    real(wp), intent(inout) :: vector_1(:)
+    real(wp), intent(in) :: complement(:, :)   !! L_tau, [n, freedoms]
+    real(wp), intent(in) :: vector(:)          !! Q, Q_0 or Q_m [N m], [n]
+    real(wp), intent(inout) :: vector_1(:)     !! Q_1, Q_0^1 or Q_m^1 [N m]
     integer :: i
 
     vector_1 = 0.0_wp
@@ -162,7 +162,7 @@ contains
   !> beta' = [alpha'; F'] of eq. (45), [3n]. With phi' = omega, eqs. (32), (33).
   subroutine stack(upper, lower, vector)
     real(wp), intent(in) :: upper(:), lower(:)
-    real(wp), intent(inout) :: vector(:)         !! [upper + lower]
+    real(wp), intent(inout) :: vector(:)   !! [upper + lower]
 
     vector(:size(upper)) = upper
     vector(size(upper) + 1:) = lower
@@ -170,7 +170,7 @@ contains
 
   !> diag(block, I): J_2 = diag(J_1, I) of eq. (35), [2n, 2n], and J_3 = diag(J_2, I) of eq. (44), [3n, 3n].
   pure subroutine extend_by_unit(block, matrix)
-    real(wp), intent(in) :: block(:, :)         !! J_1 or J_2
+    real(wp), intent(in) :: block(:, :)   !! J_1 or J_2
     real(wp), intent(inout) :: matrix(:, :)
     integer :: i
 
@@ -182,7 +182,7 @@ contains
 
   !> diag(block, 0) with the zero matrix of eq. (37): C_2 of eq. (38), [2n, 2n], and C_3 of eq. (60), [3n, 3n].
   pure subroutine extend_by_zero(block, matrix)
-    real(wp), intent(in) :: block(:, :)         !! C_1 or C_2
+    real(wp), intent(in) :: block(:, :)   !! C_1 or C_2
     real(wp), intent(inout) :: matrix(:, :)
 
     matrix = 0.0_wp
@@ -191,7 +191,7 @@ contains
 
   !> [upper; 0] with the zero vector of eq. (59): Q_2 of eq. (40), [2n], and Q_3 of eq. (58), [3n].
   pure subroutine append_zeros(upper, vector)
-    real(wp), intent(in) :: upper(:)         !! Q_1 or Q_2
+    real(wp), intent(in) :: upper(:)   !! Q_1 or Q_2
     real(wp), intent(inout) :: vector(:)
 
     vector = 0.0_wp

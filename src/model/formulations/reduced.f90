@@ -215,7 +215,7 @@ contains
   !> omega = L_tau q', eq. (82) of section 5, and phi = start_angle + L_tau q.
   subroutine set_state(self, y)
     class(reduced_t), intent(inout) :: self
-    real(wp), contiguous, intent(in) :: y(:, :)
+    real(wp), contiguous, intent(in) :: y(:, :)   !! state, [lanes, states], at least
     integer :: b, c, f, k, l
 
     f = self%machine%coordinates%freedoms
@@ -237,9 +237,9 @@ contains
   !> q'' = R M, and the derivatives of internal states and work integrals.
   subroutine derivative(self, t, y, dydt, status)
     class(reduced_t), intent(inout) :: self
-    real(wp), intent(in) :: t(self%lanes)
-    real(wp), intent(in) :: y(self%lanes, self%states + self%quadratures)
-    real(wp), intent(inout) :: dydt(self%lanes, self%states + self%quadratures)
+    real(wp), intent(in) :: t(self%lanes)                                         !! [s]
+    real(wp), intent(in) :: y(self%lanes, self%states + self%quadratures)         !! state
+    real(wp), intent(inout) :: dydt(self%lanes, self%states + self%quadratures)   !! its derivative
     integer, intent(inout) :: status(self%lanes)
 
     call fill_derivative(self, self%lanes * self%machine%coordinates%freedoms, self%lanes * self%internal, self%quadratures, &
@@ -250,12 +250,12 @@ contains
   !> work integrals follow one another.
   subroutine fill_derivative(self, n, internal, quadratures, t, y, dydt)
     type(reduced_t), intent(inout) :: self
-    integer, intent(in) :: n             !! lanes * freedoms
-    integer, intent(in) :: internal      !! lanes * internal states
-    integer, intent(in) :: quadratures   !! number of work integrals
-    real(wp), intent(in) :: t(self%lanes)
-    real(wp), intent(in) :: y(2 * n + internal)
-    real(wp), intent(inout) :: dydt(2 * n + internal + self%lanes * quadratures)
+    integer, intent(in) :: n                                                       !! lanes * freedoms
+    integer, intent(in) :: internal                                                !! lanes * internal states
+    integer, intent(in) :: quadratures                                             !! number of work integrals
+    real(wp), intent(in) :: t(self%lanes)                                          !! [s]
+    real(wp), intent(in) :: y(2 * n + internal)                                    !! state
+    real(wp), intent(inout) :: dydt(2 * n + internal + self%lanes * quadratures)   !! its derivative
     integer :: i
 
     if (allocated(self%lane_motion)) then
@@ -275,10 +275,10 @@ contains
   !> Evaluates the elements at a state.
   subroutine evaluate_at(self, n, internal, t, y)
     type(reduced_t), intent(inout) :: self
-    integer, intent(in) :: n          !! lanes * freedoms
-    integer, intent(in) :: internal   !! lanes * internal states
-    real(wp), intent(in) :: t(self%lanes)
-    real(wp), intent(in) :: y(2 * n + internal)
+    integer, intent(in) :: n                      !! lanes * freedoms
+    integer, intent(in) :: internal               !! lanes * internal states
+    real(wp), intent(in) :: t(self%lanes)         !! [s]
+    real(wp), intent(in) :: y(2 * n + internal)   !! state
 
     call self%twists%multiply_pair(self%start_twist, y(n + 1), y(1), self%machine%elements%angle, self%machine%elements%speed)
     if (internal > 0) call copy(internal, y(2 * n + 1), self%machine%elements%internal%value)
@@ -310,8 +310,8 @@ contains
   subroutine series(self, order, columns, t, y, status)
     class(reduced_t), intent(inout) :: self
     integer, intent(in) :: order, columns
-    real(wp), intent(in) :: t(self%lanes)
-    real(wp), intent(inout) :: y(self%lanes, columns, 0:order)
+    real(wp), intent(in) :: t(self%lanes)                        !! [s]
+    real(wp), intent(inout) :: y(self%lanes, columns, 0:order)   !! coefficients; number 0 is given
     integer, intent(inout) :: status(self%lanes)
 
     if (allocated(self%lane_series)) then
@@ -335,8 +335,8 @@ contains
   pure subroutine switch_motion(self, lane, switch, y, angle, speed)
     class(reduced_t), intent(in) :: self
     integer, intent(in) :: lane, switch
-    real(wp), contiguous, intent(in) :: y(:)
-    real(wp), intent(out) :: angle, speed
+    real(wp), contiguous, intent(in) :: y(:)   !! state, [states + quadratures]
+    real(wp), intent(out) :: angle, speed      !! [rad], [rad/s]
     integer :: k
 
     angle = self%start_twist(lane, self%machine%switches%element(switch))
@@ -352,10 +352,10 @@ contains
   !> Values of the Jacobian at the positions of `jacobian_pattern`.
   subroutine jacobian(self, t, y, dfdy, dfdt, status)
     class(reduced_t), intent(inout) :: self
-    real(wp), intent(in) :: t(self%lanes)
-    real(wp), intent(in) :: y(self%lanes, self%states + self%quadratures)
-    real(wp), contiguous, intent(inout) :: dfdy(:, :)
-    real(wp), intent(inout) :: dfdt(self%lanes, self%states + self%quadratures)
+    real(wp), intent(in) :: t(self%lanes)                                         !! [s]
+    real(wp), intent(in) :: y(self%lanes, self%states + self%quadratures)         !! state
+    real(wp), contiguous, intent(inout) :: dfdy(:, :)                             !! [lanes, positions]
+    real(wp), intent(inout) :: dfdt(self%lanes, self%states + self%quadratures)   !! derivative by the time
     integer, intent(inout) :: status(self%lanes)
     integer :: e, f, k
 

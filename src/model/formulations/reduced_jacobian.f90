@@ -189,6 +189,7 @@ contains
     end do
   end subroutine refresh_lane
 
+  !> Registers the arrays whose values may differ from variant to variant.
   subroutine list_parameters(self, parameters)
     class(reduced_jacobian_t), target, intent(inout) :: self
     type(lane_parameters_t), intent(inout) :: parameters

@@ -195,6 +195,7 @@ contains
     end do
   end subroutine sort_entries
 
+  !> Registers the arrays whose values may differ from variant to variant.
   subroutine list_parameters(self, parameters)
     class(element_coordinates_t), target, intent(inout) :: self
     type(lane_parameters_t), intent(inout) :: parameters

@@ -34,8 +34,8 @@ contains
 
   !> Adds the pattern of eq. (21) for many elements, with k = factor * coefficient.
   pure subroutine add_coefficients(from, to, factor, coefficient, matrix)
-    integer, intent(in) :: from(:), to(:)   !! [elements]
-    real(wp), intent(in) :: factor
+    integer, intent(in) :: from(:), to(:)     !! [elements]
+    real(wp), intent(in) :: factor            !! common factor of all elements
     real(wp), intent(in) :: coefficient(:)    !! [elements]
     real(wp), intent(inout) :: matrix(:, :)   !! [bodies, bodies]
     integer :: e

@@ -21,9 +21,9 @@ module nocdyn_lane_motion
   type, public :: lane_motion_t
     private
     real(wp), allocatable :: angle(:), speed(:)   !! u - rest [rad], u' [rad/s] of one element, [strip]
-    real(wp), allocatable :: moment(:, :)   !! [N m], [lanes, elements]; values of the time-only elements hold at `time`
-    real(wp), allocatable :: time(:)   !! [s], [lanes]
-    real(wp), allocatable :: zeros(:, :)   !! for the restoring moments that time-only banks do not have, [lanes, elements]
+    real(wp), allocatable :: moment(:, :)         !! [N m], [lanes, elements]; values of the time-only elements hold at `time`
+    real(wp), allocatable :: time(:)              !! [s], [lanes]
+    real(wp), allocatable :: zeros(:, :)          !! for the restoring moments that time-only banks do not have, [lanes, elements]
   contains
     procedure :: invalidate
     procedure :: accelerate
@@ -204,8 +204,8 @@ contains
   !> Moment of the terms that depend on the speed v, and of the constant.
   pure subroutine find_applied(has_square, constant, by_speed, by_speed_squared, v, moment)
     logical, intent(in) :: has_square
-    real(wp), intent(in), dimension(strip) :: constant, by_speed, by_speed_squared, v
-    real(wp), intent(inout) :: moment(strip)
+    real(wp), intent(in), dimension(strip) :: constant, by_speed, by_speed_squared, v   !! coefficients of the law, u'
+    real(wp), intent(inout) :: moment(strip)                                            !! [N m]
 
     if (has_square) then
       moment = constant + (by_speed + by_speed_squared * v) * v
@@ -217,8 +217,8 @@ contains
   !> Adds the moment of the terms that depend on w = u - rest.
   pure subroutine add_restoring(has_cubic, linear, cubic, w, moment)
     logical, intent(in) :: has_cubic
-    real(wp), intent(in), dimension(strip) :: linear, cubic, w
-    real(wp), intent(inout) :: moment(strip)
+    real(wp), intent(in), dimension(strip) :: linear, cubic, w   !! coefficients of the law, u - rest
+    real(wp), intent(inout) :: moment(strip)                     !! [N m]
 
     if (has_cubic) then
       moment = moment - (linear + cubic * w * w) * w
@@ -231,8 +231,8 @@ contains
   pure subroutine sum_moments(lanes, at, elements, freedoms, entries, first, element, response, moment, acceleration)
     integer, intent(in) :: lanes, at, elements, freedoms, entries
     integer, intent(in) :: first(freedoms + 1), element(entries)   !! first entry of each coordinate, element of each entry of R
-    real(wp), intent(in) :: response(lanes, entries), moment(lanes, elements)
-    real(wp), intent(inout) :: acceleration(lanes, freedoms)
+    real(wp), intent(in) :: response(lanes, entries), moment(lanes, elements)   !! of the entries of R; moments [N m]
+    real(wp), intent(inout) :: acceleration(lanes, freedoms)   !! q'' [rad/s2]
     integer :: a, b, i, k, l, m, n
 
     b = at + strip - 1

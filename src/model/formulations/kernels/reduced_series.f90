@@ -38,10 +38,10 @@ module nocdyn_reduced_series
     real(wp), allocatable :: acceleration(:)   !! present coefficients of q'', [lanes * freedoms in whole vectors]
     real(wp), allocatable :: inverse(:)        !! 1 / k, [order]
     type(series_laws_t) :: laws
-    real(wp), allocatable :: twists(:, :)       !! U, [stride, freedoms], if dense
-    real(wp), allocatable :: responses(:, :)    !! R, [freedoms in whole vectors, elements], if dense
-    integer, allocatable :: series_banks(:)   !! banks whose laws are neither polynomials nor dependent on the time alone
-    real(wp), allocatable :: square(:, :)       !! (u - rest)^2 in the `cubic_vectors` of the laws
+    real(wp), allocatable :: twists(:, :)      !! U, [stride, freedoms], if dense
+    real(wp), allocatable :: responses(:, :)   !! R, [freedoms in whole vectors, elements], if dense
+    integer, allocatable :: series_banks(:)    !! banks whose laws are neither polynomials nor dependent on the time alone
+    real(wp), allocatable :: square(:, :)      !! (u - rest)^2 in the `cubic_vectors` of the laws
   contains
     procedure :: expand
     procedure :: refresh_lane
@@ -239,10 +239,10 @@ contains
 
   !> Moments at the start of the step, without the terms of higher degree.
   pure subroutine begin_moments(n, rest, linear, by_speed, external, angle, speed, restoring, applied)
-    integer, intent(in) :: n   !! stride
-    real(wp), intent(in), dimension(n) :: rest, linear, by_speed, external, speed
-    real(wp), intent(inout) :: angle(n)   !! u; on return u - rest
-    real(wp), intent(inout) :: restoring(n), applied(n)
+    integer, intent(in) :: n                                                        !! stride
+    real(wp), intent(in), dimension(n) :: rest, linear, by_speed, external, speed   !! laws, time-only torques, u'
+    real(wp), intent(inout) :: angle(n)                                             !! u; on return u - rest
+    real(wp), intent(inout) :: restoring(n), applied(n)                             !! moments number 0
 
     angle = angle - rest
     restoring = -linear * angle
@@ -270,9 +270,9 @@ contains
   !> Computes u_k and the moments number k, without the terms of higher degree.
   pure subroutine continue_moments(n, k, inverse, linear, by_speed, external, speed, angle, restoring, applied)
     integer, intent(in) :: n, k
-    real(wp), intent(in) :: inverse   !! 1 / k
-    real(wp), intent(in) :: linear(n), by_speed(n), external(n, 0:k), speed(n, 0:k)
-    real(wp), intent(inout) :: angle(n, 0:k), restoring(n, 0:k), applied(n, 0:k)
+    real(wp), intent(in) :: inverse                                                   !! 1 / k
+    real(wp), intent(in) :: linear(n), by_speed(n), external(n, 0:k), speed(n, 0:k)   !! laws, time-only torques, u'
+    real(wp), intent(inout) :: angle(n, 0:k), restoring(n, 0:k), applied(n, 0:k)      !! column k is set
     integer :: i
 
     do i = 1, n, width

@@ -23,9 +23,9 @@ contains
 
   !> Copies the columns of a strip of lanes.
   pure subroutine gather(lanes, l, columns, x, y)
-    integer, intent(in) :: lanes, l, columns   !! lanes of the block, first lane of the strip
-    real(wp), intent(in) :: x(lanes, columns)
-    real(wp), intent(inout) :: y(strip, columns)
+    integer, intent(in) :: lanes, l, columns       !! lanes of the block, first lane of the strip
+    real(wp), intent(in) :: x(lanes, columns)      !! all lanes of the block
+    real(wp), intent(inout) :: y(strip, columns)   !! the strip
     integer :: c
 
     do c = 1, columns
@@ -36,8 +36,8 @@ contains
   !> Copies the laws of a strip of lanes.
   pure subroutine gather_laws(lanes, l, elements, constants, by_speeds, by_speeds_squared, linears, cubics, law)
     integer, intent(in) :: lanes, l, elements   !! lanes of the block, first lane of the strip
-    real(wp), intent(in), dimension(lanes, elements) :: constants, by_speeds, by_speeds_squared, linears, cubics
-    real(wp), intent(inout) :: law(strip, 5, elements)
+    real(wp), intent(in), dimension(lanes, elements) :: constants, by_speeds, by_speeds_squared, linears, cubics   !! of all lanes
+    real(wp), intent(inout) :: law(strip, 5, elements)   !! of the strip
     integer :: e
 
     do e = 1, elements
@@ -97,7 +97,7 @@ contains
     real(wp), intent(inout), dimension(strip, elements) :: restoring, moment   !! present coefficients; zero at the start
     real(wp), intent(inout) :: q(strip, freedoms, 0:order)   !! q'
     integer, intent(in) :: columns   !! components of the state
-    real(wp), intent(inout) :: y(lanes, columns, 0:order)
+    real(wp), intent(inout) :: y(lanes, columns, 0:order)   !! coefficients of the state
     real(wp) :: inverse
     integer :: e, i, k
 
@@ -155,8 +155,8 @@ contains
   !> the square of the speed.
   pure subroutine find_moments(freedoms, entries, begin, end, column, ratio, q, by_speed, restoring, speed, moment)
     integer, intent(in) :: freedoms, entries, begin, end
-    integer, intent(in) :: column(entries)                      !! of the entries of U
-    real(wp), intent(in) :: ratio(strip, entries)               !! of the entries of U
+    integer, intent(in) :: column(entries)                                          !! of the entries of U
+    real(wp), intent(in) :: ratio(strip, entries)                                   !! of the entries of U
     real(wp), intent(in) :: q(strip, freedoms), by_speed(strip), restoring(strip)   !! q' number k; of the element
     real(wp), intent(inout) :: speed(strip), moment(strip)
     real(wp) :: v
@@ -275,10 +275,10 @@ contains
   pure subroutine accelerate(elements, entries, begin, end, element, response, inverse, moment, speed, next_speed, y_speed, &
                              y_angle)
     integer, intent(in) :: elements, entries, begin, end
-    integer, intent(in) :: element(entries)   !! of the entries of R
-    real(wp), intent(in) :: response(strip, entries)   !! of the entries of R
-    real(wp), intent(in) :: inverse   !! 1 / (k + 1)
-    real(wp), intent(in) :: moment(strip, elements), speed(strip)   !! moments and q' number k
+    integer, intent(in) :: element(entries)                                     !! of the entries of R
+    real(wp), intent(in) :: response(strip, entries)                            !! of the entries of R
+    real(wp), intent(in) :: inverse                                             !! 1 / (k + 1)
+    real(wp), intent(in) :: moment(strip, elements), speed(strip)               !! moments and q' number k
     real(wp), intent(inout), dimension(strip) :: next_speed, y_speed, y_angle   !! number k + 1: q'; q' and q in y
     real(wp) :: v
     integer :: a, b, c, i, k
