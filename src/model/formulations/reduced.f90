@@ -68,30 +68,30 @@ contains
     logical, intent(in) :: with_energy_balance   !! whether the powers of the elements `machine%with_work` are integrated
     logical, intent(in), optional :: as_block    !! whether a single lane gets the layout of a block; absent: no
     type(reduced_t) :: self
-    logical :: is_block
 
-    is_block = .false.
-    if (present(as_block)) is_block = as_block
     self%machine = machine
-    call self%formulate(with_energy_balance, is_block)
+    call self%formulate(with_energy_balance, as_block)
   end function new_reduced
 
   !> Forms the equations of `machine`, after any change of its structure.
   subroutine formulate(self, with_energy_balance, as_block)
     class(reduced_t), intent(inout) :: self
     logical, intent(in) :: with_energy_balance   !! as in `new_reduced`
-    logical, intent(in) :: as_block              !! as in `new_reduced`
+    logical, intent(in), optional :: as_block    !! as in `new_reduced`
+    logical :: is_block
 
+    is_block = .false.
+    if (present(as_block)) is_block = as_block
     call self%allocate_state(2 * self%machine%coordinates%freedoms, with_energy_balance)
     self%incidence = new_element_coordinates(self%machine%elements, self%machine%coordinates)
     associate (machine => self%machine, incidence => self%incidence, freedoms => self%machine%coordinates%freedoms)
-      call form_responses(freedoms, as_block, self)
+      call form_responses(freedoms, is_block, self)
       self%element_jacobian = new_reduced_jacobian(freedoms, incidence, machine%with_work(:self%quadratures), self%internal)
       self%internal_rows = new_internal_jacobian(freedoms, incidence, machine%with_work(:self%quadratures), &
                                                  machine%elements%internal, size(self%element_jacobian%pattern%row))
       self%switching = incidence%selected(machine%switches%element, with_ratio_only=.true.)
-      call find_start_twists(self)
-      self%twists = twist_map(incidence, without_offset=.not. any(abs(self%start_twist) > 0), without_bands=as_block)
+      self%start_twist = machine%start_twist()
+      self%twists = twist_map(incidence, without_offset=.not. any(abs(self%start_twist) > 0), without_bands=is_block)
       self%zeros = 0.0_wp * self%start_twist
       if (allocated(self%terms)) deallocate (self%terms)
       if (allocated(self%lane_motion)) deallocate (self%lane_motion)
@@ -104,28 +104,15 @@ contains
     end associate
   end subroutine formulate
 
-  !> Twists of the elements at the start angles.
-  subroutine find_start_twists(self)
-    type(reduced_t), intent(inout) :: self
-    real(wp) :: angle(self%lanes, 0:self%machine%bodies)
-
-    angle(:, 0) = 0.0_wp
-    angle(:, 1:) = self%machine%start_angle
-    self%start_twist = angle(:, self%machine%elements%to) - angle(:, self%machine%elements%from)
-  end subroutine find_start_twists
-
   !> The map R from moments to accelerations; its rows are the coordinates.
   subroutine form_responses(freedoms, without_bands, self)
     integer, intent(in) :: freedoms
     logical, intent(in) :: without_bands   !! whether the map is stored by rows only
     type(reduced_t), intent(inout) :: self
     integer :: element_of(size(self%incidence%coordinate)), first(freedoms + 1)
-    integer :: e
 
+    element_of = self%incidence%entry_elements()
     associate (incidence => self%incidence)
-      do e = 1, size(incidence%first) - 1
-        element_of(incidence%first(e):incidence%first(e + 1) - 1) = e
-      end do
       if (allocated(self%response_entry)) deallocate (self%response_entry)
       allocate (self%response_entry(size(incidence%coordinate)))
       call transposed_order(incidence%coordinate, freedoms, self%response_entry, first)
@@ -159,8 +146,8 @@ contains
     call self%switching%refresh_selected(lane, self%incidence, self%machine%switches%element, with_ratio_only=.true.)
   end subroutine update_inertia
 
-  !> Registers all arrays whose values may differ from variant to variant. The parameters of the series are not among them:
-  !> `refresh_lane` updates those. The formulation must be a block, or laid out as one.
+  !> Registers the arrays that may differ from variant to variant, without those that `refresh_lane` updates. The formulation must
+  !> be a block, or laid out as one.
   subroutine list_parameters(self, parameters)
     class(reduced_t), target, intent(inout) :: self
     type(lane_parameters_t), intent(inout) :: parameters
@@ -246,8 +233,7 @@ contains
                          t, y, dydt)
   end subroutine derivative
 
-  !> The same with arrays of one dimension: derivatives of the coordinates' speeds, their angles, the internal states and the
-  !> work integrals follow one another.
+  !> The same with arrays of one dimension: speeds, angles, internal states and work integrals follow one another.
   subroutine fill_derivative(self, n, internal, quadratures, t, y, dydt)
     type(reduced_t), intent(inout) :: self
     integer, intent(in) :: n                                                       !! lanes * freedoms

@@ -84,9 +84,7 @@ contains
     integer :: position(freedoms)   ! position of each row in the present column, if not below `begin`
     integer :: a, b, begin, e, i, n, q
 
-    do e = 1, size(incidence%first) - 1
-      element_of(incidence%first(e):incidence%first(e + 1) - 1) = e
-    end do
+    element_of = incidence%entry_elements()
     call transposed_order(incidence%coordinate, freedoms, order, first)
     position = 0
     n = 0

@@ -22,6 +22,7 @@ module nocdyn_element_coordinates
     procedure :: refresh_responses
     procedure :: refresh_selected
     procedure :: has_ratio
+    procedure :: entry_elements
     procedure :: list_parameters
   end type element_coordinates_t
 
@@ -144,6 +145,17 @@ contains
 
     has_ratio = any(abs(self%ratio(:, entry)) > 0.0_wp)
   end function has_ratio
+
+  !> Element of each entry, [entries].
+  pure function entry_elements(self) result(element)
+    class(element_coordinates_t), intent(in) :: self
+    integer :: element(size(self%coordinate))
+    integer :: e
+
+    do e = 1, size(self%first) - 1
+      element(self%first(e):self%first(e + 1) - 1) = e
+    end do
+  end function entry_elements
 
   !> Number of coordinates of a body.
   pure integer function body_entries(coordinates, body)

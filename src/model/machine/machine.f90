@@ -46,6 +46,7 @@ module nocdyn_machine
     procedure :: to_mean_torque
     procedure :: elastic
     procedure :: element_name
+    procedure :: start_twist
     procedure :: start_internal
     procedure :: internal_name
     procedure :: choose_branches
@@ -133,6 +134,17 @@ contains
 
     elements = [(self%banks(i)%bank%first - 1 + self%banks(i)%bank%elastic, i=1, size(self%banks))]
   end function elastic
+
+  !> Twists of the elements at the start [rad], [lanes, elements].
+  pure function start_twist(self) result(twist)
+    class(machine_t), intent(in) :: self
+    real(wp) :: twist(self%lanes, size(self%elements%to))
+    real(wp) :: angle(self%lanes, 0:self%bodies)
+
+    angle(:, 0) = 0.0_wp
+    angle(:, 1:) = self%start_angle
+    twist = angle(:, self%elements%to) - angle(:, self%elements%from)
+  end function start_twist
 
   !> Internal states at the start, [lanes, internal states].
   function start_internal(self) result(internal)
