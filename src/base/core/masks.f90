@@ -23,6 +23,7 @@ contains
     any_true = count_true(n, mask) > 0
   end function any_true
 
+  !> The number of true elements.
   pure integer function count_true(n, mask) result(trues)
     integer, intent(in) :: n
     logical, intent(in) :: mask(n)

@@ -55,6 +55,7 @@ contains
     end if
   end function normal_quantile
 
+  !> The quotient of two polynomials of degree 7 at x.
   pure real(wp) function quotient(x, top, bottom)
     real(wp), intent(in) :: x, top(8), bottom(8)
     real(wp) :: denominator, numerator

@@ -39,6 +39,7 @@ contains
     end if
   end subroutine check_settings
 
+  !> Raises the error about one value.
   subroutine refuse(name, value, allowed, error)
     character(len=*), intent(in) :: name, value, allowed
     type(error_t), allocatable, intent(out) :: error

@@ -69,6 +69,7 @@ contains
     call evaluate_batch(size(dense%y), ubound(dense%c, 2), theta, dense%c, dense%states)
   end subroutine sample_batch
 
+  !> Horner's scheme for several arguments x.
   pure subroutine evaluate_batch(n, degree, x, c, y)
     integer, intent(in) :: n, degree
     real(wp), intent(in) :: x(batch)

@@ -90,6 +90,7 @@ contains
     excess = max(max(most(1), most(2)), max(most(3), most(4)))
   end function largest_excess
 
+  !> The largest of some counts.
   pure integer function largest_count(lanes, counts) result(largest)
     integer, intent(in) :: lanes
     integer, intent(in) :: counts(lanes)

@@ -45,6 +45,7 @@ contains
     end select
   end subroutine select_method
 
+  !> The message about an unknown name of a method.
   function unknown_method(name) result(message)
     character(len=*), intent(in) :: name
     character(len=:), allocatable :: message

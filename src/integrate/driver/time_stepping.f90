@@ -245,6 +245,7 @@ contains
     end associate
   end subroutine begin_attempts
 
+  !> Finds the lanes that hold a variant and are not done.
   pure subroutine find_running(lanes, occupied, status, running)
     integer, intent(in) :: lanes
     logical, intent(in) :: occupied(lanes)
@@ -313,6 +314,7 @@ contains
     end associate
   end subroutine advance_lanes
 
+  !> Copies one component of the accepted lanes.
   pure subroutine copy_accepted(lanes, accepted, new, old)
     integer, intent(in) :: lanes
     logical, intent(in) :: accepted(lanes)

@@ -65,6 +65,7 @@ contains
     end do
   end subroutine half_bandwidths
 
+  !> The inverse of a permutation.
   pure function inverse(order) result(index_of)
     integer, intent(in) :: order(:)
     integer :: index_of(size(order))

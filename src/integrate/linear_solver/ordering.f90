@@ -114,6 +114,7 @@ contains
     end do
   end subroutine search_from_periphery
 
+  !> The node with the fewest neighbours among some nodes.
   pure function fewest_neighbours(graph, nodes) result(node)
     type(groups_t), intent(in) :: graph
     integer, intent(in) :: nodes(:)

@@ -38,6 +38,7 @@ contains
     end if
   end function pattern_error
 
+  !> Whether a pattern has a position more than once.
   pure function has_duplicates(pattern, columns, rows)
     type(pattern_t), intent(in) :: pattern
     integer, intent(in) :: columns, rows
@@ -75,6 +76,7 @@ contains
     entries = chosen_entries(pattern, pattern%row > states)
   end function quadrature_entries
 
+  !> The entries of a pattern that are chosen by a mask.
   pure function chosen_entries(pattern, is_chosen) result(entries)
     type(pattern_t), intent(in) :: pattern
     logical, intent(in) :: is_chosen(:)

@@ -76,6 +76,7 @@ contains
     end if
   end subroutine estimate_spectral_radius
 
+  !> Multiplies a vector by the Jacobian of a lane.
   pure subroutine multiply(position, row, column, dfdy, lane, vector, image)
     integer, intent(in) :: position(:), row(:), column(:)
     real(wp), contiguous, intent(in) :: dfdy(:, :)
