@@ -4,8 +4,7 @@ usage: sessions.py NOCDYN PAGE...
 
 In a block of code, a line that begins with '$ ' is a command; the lines up to the next one are its output. The commands of
 a page run in the order of the page, in a new folder that has the project's folders docs, input and scripts in it. This script
-runs them with the program NOCDYN and writes their output into the pages. Exit code 1: a command failed that had not failed
-before.
+runs them with the program NOCDYN and writes their output into the pages.
 """
 
 import os
@@ -20,6 +19,7 @@ BLOCK = re.compile(r"^```(?:text)?\n(\$ .*?)^```$", re.MULTILINE | re.DOTALL)
 COMMAND = re.compile(r"^\$ ((?:.*\\\n)*.*)\n((?:(?!\$ ).*\n)*)", re.MULTILINE)
 TIME = re.compile(r"[\d.e+-]+(?= (?:ms|s|per second)\b)")
 NUMBER = re.compile(r"[+-]?\d[\d.]*(?:[eE][+-]?\d+)?")
+PROGRESS = re.compile(r"^.* variants, .* left\n", re.MULTILINE)  # lines of a sweep that takes more than 10 s
 SAME = {"relative": 1e-4, "absolute": 1e-8}  # the output has seven digits; sums that should be 0 are rounding errors
 
 
@@ -43,7 +43,7 @@ def make_folder(folder, nocdyn):
 
 def output_of(command, folder, environment):
     """What a command prints, on both streams."""
-    return subprocess.run(
+    done = subprocess.run(
         ["bash", "-c", command],
         cwd=folder,
         env=environment,
@@ -52,7 +52,8 @@ def output_of(command, folder, environment):
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
         stdin=subprocess.DEVNULL,
-    ).stdout
+    )
+    return PROGRESS.sub("", done.stdout)
 
 
 def is_same(shown, seen):
