@@ -249,7 +249,7 @@ contains
     factors = inertia
     slope = right_hand_side
     call lu_factor(factors, pivots, is_singular)
-    if (is_singular) error stop 'nocdyn_matrix_report: inertias must be positive and the rows independent'
+    if (is_singular) error stop 'nocdyn_matrix_report: the reduced mass matrix must be positive definite and the rows independent'
     call lu_solve(factors, pivots, slope)
     associate (n => equations%n)
       call equations%put_vector("(14) omega' [rad/s2]", slope(:n))

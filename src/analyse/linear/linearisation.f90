@@ -78,7 +78,7 @@ contains
                                                                               abs(self%stiffness) > 0.0_wp))
       factor = mass_matrix(formulation)
       call cholesky_factor(factor, has_failed)
-      if (has_failed) error stop 'nocdyn_linearisation: inertias must be positive'
+      if (has_failed) error stop 'nocdyn_linearisation: the mass matrix must be positive definite'
       allocate (flexibility(size(elastic), f), self%shapes(f, f), self%natural(f), source=0.0_wp)
       do i = 1, size(elastic)
         do e = incidence%first(elastic(i)), incidence%first(elastic(i) + 1) - 1
