@@ -16,6 +16,7 @@ module nocdyn_lane_parameters
   !> One array; its lanes are the second dimension.
   type, public :: parameter_array_t
     character(len=longest) :: name
+    integer, allocatable :: element(:)   !! of the machine, in each column of a key's values; not allocated: no key's
     real(wp), pointer, contiguous :: value(:, :, :) => null()   !! [rows, lanes, columns]
   end type parameter_array_t
 
@@ -33,6 +34,7 @@ module nocdyn_lane_parameters
   !> A list points to the arrays in it: they must be targets, and must not be reallocated or moved while it is in use.
   type, public :: lane_parameters_t
     integer :: arrays = 0
+    integer :: first_element = 1                                  !! in the machine, of the bank that lists its arrays
     type(parameter_array_t), allocatable :: array(:)              !! the first `arrays` are in use
     integer, private :: curve_arrays = 0
     type(curve_array_t), allocatable, private :: curve_array(:)   !! the first `curve_arrays` are in use
@@ -41,6 +43,7 @@ module nocdyn_lane_parameters
   contains
     procedure :: clear
     generic :: add => add_matrix, add_stack
+    procedure :: add_key
     procedure :: add_blocks
     procedure :: add_curves
     generic :: add_structure => add_integer, add_integers, add_flag, add_names
@@ -48,9 +51,9 @@ module nocdyn_lane_parameters
     procedure :: copy_lane
     procedure :: differences
     procedure :: has_same_curves
+    procedure :: index_of_key
     procedure :: value
     procedure :: set_value
-    procedure :: name_at
     procedure, private :: add_matrix, add_stack
     procedure, private :: add_integer, add_integers, add_flag, add_names
     procedure, private :: next_array
@@ -71,12 +74,29 @@ contains
   !> Lists an array [lanes, columns].
   subroutine add_matrix(self, name, value)
     class(lane_parameters_t), intent(inout) :: self
-    character(len=*), intent(in) :: name   !! the name of a key if the array holds its values unchanged
+    character(len=*), intent(in) :: name
     real(wp), contiguous, target, intent(inout) :: value(:, :)
 
     call self%next_array(name)
     self%array(self%arrays)%value(1:1, 1:size(value, 1), 1:size(value, 2)) => value
   end subroutine add_matrix
+
+  !> Lists an array [lanes, columns] of a bank that holds the values of a key of the input as they are. A variant is set by
+  !> writing such a value: the laws of the bank follow by `polynomials`, and assembly asks nothing but its sign.
+  subroutine add_key(self, key, value, element)
+    class(lane_parameters_t), intent(inout) :: self
+    character(len=*), intent(in) :: key
+    real(wp), contiguous, target, intent(inout) :: value(:, :)
+    integer, intent(in), optional :: element(:)   !! of the bank in each column; absent: column k is that of element k
+    integer :: k
+
+    call self%add_matrix(key, value)
+    if (present(element)) then
+      self%array(self%arrays)%element = self%first_element - 1 + element
+    else
+      self%array(self%arrays)%element = [(self%first_element - 1 + k, k=1, size(value, 2))]
+    end if
+  end subroutine add_key
 
   !> Lists an array [rows, lanes, columns].
   subroutine add_stack(self, name, value)
@@ -112,6 +132,7 @@ contains
     end if
     self%arrays = self%arrays + 1
     self%array(self%arrays)%name = name
+    if (allocated(self%array(self%arrays)%element)) deallocate (self%array(self%arrays)%element)
   end subroutine next_array
 
   !> Lists curves [lanes, elements].
@@ -270,6 +291,22 @@ contains
     has_same_curves = .true.
   end function has_same_curves
 
+  !> Where the value of a key of an element is; `array` is 0 if no array holds the values of that key as they are.
+  pure function index_of_key(self, key, element) result(index)
+    class(lane_parameters_t), intent(in) :: self
+    character(len=*), intent(in) :: key
+    integer, intent(in) :: element   !! number in the machine
+    type(parameter_index_t) :: index
+    integer :: column, i
+
+    index = parameter_index_t(0, 1, 0)
+    do i = 1, self%arrays
+      if (.not. allocated(self%array(i)%element) .or. self%array(i)%name /= key) cycle
+      column = findloc(self%array(i)%element, element, dim=1)
+      if (column > 0) index = parameter_index_t(i, 1, column)
+    end do
+  end function index_of_key
+
   !> The parameter at a position in one lane.
   pure real(wp) function value(self, index, lane)
     class(lane_parameters_t), intent(in) :: self
@@ -288,14 +325,5 @@ contains
 
     self%array(index%array)%value(index%row, lane, index%column) = value
   end subroutine set_value
-
-  !> Name of the array that holds a parameter.
-  pure function name_at(self, index) result(name)
-    class(lane_parameters_t), intent(in) :: self
-    type(parameter_index_t), intent(in) :: index
-    character(len=longest) :: name
-
-    name = self%array(index%array)%name
-  end function name_at
 
 end module nocdyn_lane_parameters

@@ -106,6 +106,7 @@ contains
     call parameters%add('machine: start_angle', self%start_angle)
     call parameters%add('machine: start_speed', self%start_speed)
     do i = 1, size(self%banks)
+      parameters%first_element = self%banks(i)%bank%first
       call self%banks(i)%bank%list_structure(parameters)
       call self%banks(i)%bank%list_parameters(parameters)
     end do

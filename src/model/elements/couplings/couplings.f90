@@ -41,6 +41,7 @@ module nocdyn_couplings
     real(wp), allocatable :: friction_speed(:, :)    !! [rad/s]
   contains
     procedure :: list_parameters
+    procedure :: list_common
     procedure :: polynomials
     procedure :: evaluate
     procedure :: differentiate
@@ -192,15 +193,23 @@ contains
     class(couplings_t), target, intent(inout) :: self
     type(lane_parameters_t), intent(inout) :: parameters
 
+    call parameters%add_key('stiffness', self%stiffness)
+    call parameters%add_key('cubic_stiffness', self%cubic_stiffness)
+    call self%list_common(parameters)
+  end subroutine list_parameters
+
+  !> Lists what couplings with another elastic moment have too.
+  subroutine list_common(self, parameters)
+    class(couplings_t), target, intent(inout) :: self
+    type(lane_parameters_t), intent(inout) :: parameters
+
     call self%table_laws_t%list_parameters(parameters)
-    call parameters%add('stiffness', self%stiffness)
-    call parameters%add('cubic_stiffness', self%cubic_stiffness)
-    call parameters%add('damping', self%damping)
-    call parameters%add('rest_twist', self%rest_twist)
+    call parameters%add_key('damping', self%damping)
+    call parameters%add_key('rest_twist', self%rest_twist)
     call parameters%add_structure(allocated(self%friction))
     if (.not. allocated(self%friction)) return
-    call parameters%add('friction', self%friction)
-    call parameters%add('friction_speed', self%friction_speed)
-  end subroutine list_parameters
+    call parameters%add_key('friction', self%friction)
+    call parameters%add_key('friction_speed', self%friction_speed)
+  end subroutine list_common
 
 end module nocdyn_couplings

@@ -158,7 +158,7 @@ contains
     class(polynomial_couplings_t), target, intent(inout) :: self
     type(lane_parameters_t), intent(inout) :: parameters
 
-    call self%couplings_t%list_parameters(parameters)
+    call self%list_common(parameters)
     call parameters%add('coefficient', self%coefficient)
   end subroutine list_parameters
 

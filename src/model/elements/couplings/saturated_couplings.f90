@@ -115,9 +115,9 @@ contains
     class(saturated_couplings_t), target, intent(inout) :: self
     type(lane_parameters_t), intent(inout) :: parameters
 
-    call self%couplings_t%list_parameters(parameters)
-    call parameters%add('stiffness', self%initial_stiffness)
-    call parameters%add('saturation', self%saturation)
+    call self%list_common(parameters)
+    call parameters%add_key('stiffness', self%initial_stiffness)
+    call parameters%add_key('saturation', self%saturation)
   end subroutine list_parameters
 
 end module nocdyn_saturated_couplings

@@ -158,9 +158,9 @@ contains
     class(excitations_t), target, intent(inout) :: self
     type(lane_parameters_t), intent(inout) :: parameters
 
-    call parameters%add('amplitude', self%amplitude)
-    call parameters%add('frequency', self%frequency)
-    call parameters%add('phase', self%phase)
+    call parameters%add_key('amplitude', self%amplitude)
+    call parameters%add_key('frequency', self%frequency)
+    call parameters%add_key('phase', self%phase)
   end subroutine list_parameters
 
 end module nocdyn_excitations

@@ -171,9 +171,9 @@ contains
     type(lane_parameters_t), intent(inout) :: parameters
 
     call parameters%add_structure(self%shape)
-    call parameters%add('amplitude', self%amplitude)
-    call parameters%add('time', self%begin)
-    call parameters%add('duration', self%duration)
+    call parameters%add_key('amplitude', self%amplitude)
+    call parameters%add_key('time', self%begin)
+    call parameters%add_key('duration', self%duration)
   end subroutine list_parameters
 
 end module nocdyn_timed_excitations

@@ -95,10 +95,10 @@ contains
     type(lane_parameters_t), intent(inout) :: parameters
 
     call parameters%add_structure(self%owner)
-    call parameters%add('amplitude', self%amplitude)
+    call parameters%add_key('amplitude', self%amplitude, self%owner)
     call parameters%add('frequency', self%frequency)
     call parameters%add('order', self%order)
-    call parameters%add('phase', self%phase)
+    call parameters%add_key('phase', self%phase, self%owner)
   end subroutine list_parameters
 
 end module nocdyn_wave_excitations

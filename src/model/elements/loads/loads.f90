@@ -46,7 +46,7 @@ contains
     type(lane_parameters_t), intent(inout) :: parameters
 
     call self%table_laws_t%list_parameters(parameters)
-    call parameters%add('viscous', self%viscous)
+    call parameters%add_key('viscous', self%viscous)
   end subroutine list_parameters
 
 end module nocdyn_loads

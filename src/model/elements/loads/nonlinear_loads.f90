@@ -86,9 +86,9 @@ contains
     type(lane_parameters_t), intent(inout) :: parameters
 
     call self%loads_t%list_parameters(parameters)
-    call parameters%add('quadratic', self%quadratic)
-    call parameters%add('constant', self%constant)
-    call parameters%add('constant_speed', self%constant_speed)
+    call parameters%add_key('quadratic', self%quadratic)
+    call parameters%add_key('constant', self%constant)
+    call parameters%add_key('constant_speed', self%constant_speed)
   end subroutine list_parameters
 
 end module nocdyn_nonlinear_loads

@@ -200,10 +200,10 @@ contains
     class(dc_motors_t), target, intent(inout) :: self
     type(lane_parameters_t), intent(inout) :: parameters
 
-    call parameters%add('voltage', self%voltage)
-    call parameters%add('resistance', self%resistance)
-    call parameters%add('flux_constant', self%flux_constant)
-    call parameters%add('inductance', self%inductance)
+    call parameters%add_key('voltage', self%voltage)
+    call parameters%add_key('resistance', self%resistance)
+    call parameters%add_key('flux_constant', self%flux_constant)
+    call parameters%add_key('inductance', self%inductance)
     if (allocated(self%governor)) call self%governor%list_parameters(parameters)
   end subroutine list_parameters
 

@@ -122,7 +122,7 @@ contains
 
     call parameters%add('governor_speed', self%set_speed)
     call parameters%add('governor_gain', self%gain)
-    call parameters%add('governor_time', self%time)
+    call parameters%add_key('governor_time', self%time)
     call parameters%add('governor_start', self%start)
   end subroutine list_parameters
 

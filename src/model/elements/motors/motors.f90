@@ -50,9 +50,9 @@ contains
     class(motors_t), target, intent(inout) :: self
     type(lane_parameters_t), intent(inout) :: parameters
 
-    call parameters%add('a', self%a)
-    call parameters%add('b', self%b)
-    call parameters%add('c', self%c)
+    call parameters%add_key('a', self%a)
+    call parameters%add_key('b', self%b)
+    call parameters%add_key('c', self%c)
   end subroutine list_parameters
 
 end module nocdyn_motors

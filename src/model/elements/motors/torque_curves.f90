@@ -98,18 +98,18 @@ contains
     class(quadratic_curve_t), target, intent(inout) :: self
     type(lane_parameters_t), intent(inout) :: parameters
 
-    call parameters%add('a', self%a)
-    call parameters%add('b', self%b)
-    call parameters%add('c', self%c)
+    call parameters%add_key('a', self%a)
+    call parameters%add_key('b', self%b)
+    call parameters%add_key('c', self%c)
   end subroutine list_quadratic
 
   subroutine list_induction(self, parameters)
     class(induction_curve_t), target, intent(inout) :: self
     type(lane_parameters_t), intent(inout) :: parameters
 
-    call parameters%add('breakdown_torque', self%breakdown_torque)
-    call parameters%add('breakdown_slip', self%breakdown_slip)
-    call parameters%add('synchronous_speed', self%synchronous_speed)
+    call parameters%add_key('breakdown_torque', self%breakdown_torque)
+    call parameters%add_key('breakdown_slip', self%breakdown_slip)
+    call parameters%add_key('synchronous_speed', self%synchronous_speed)
   end subroutine list_induction
 
 end module nocdyn_torque_curves
