@@ -116,7 +116,7 @@ contains
 
     call self%next_array(name)
     self%array(self%arrays)%value(1:size(value, 1) * size(value, 2), 1:size(value, 3), 1:1) => value
-    call self%add_structure(shape(value))
+    call self%add_structure([size(value, 1), size(value, 2)])
   end subroutine add_blocks
 
   !> Adds an array that is not yet associated.
