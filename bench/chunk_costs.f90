@@ -111,10 +111,8 @@ contains
     scheduler%size = whole_argument(3)
     call scheduler%create_lock()
     allocate (block)
-    call new_sweep_block(plan, setup, scheduler, block, error)
-    if (.not. allocated(error)) then
-      call create_journal(text_argument(4), 'sweep.journal', new_sweep_header(plan, 1, 1), journal, error)
-    end if
+    call new_sweep_block(plan, setup, scheduler, block)
+    call create_journal(text_argument(4), 'sweep.journal', new_sweep_header(plan, 1, 1), journal, error)
     if (allocated(error)) call give_up(error%message)
   end subroutine set_up
 

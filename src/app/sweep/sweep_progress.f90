@@ -2,7 +2,7 @@
 module nocdyn_sweep_progress
   use nocdyn_console, only: status_line_t
   use nocdyn_kinds, only: wp
-  use nocdyn_journal_scheduler, only: sweep_counts_t, sweep_progress_t
+  use nocdyn_scheduler, only: sweep_counts_t, sweep_progress_t
   use nocdyn_text, only: rounded_text, to_text
   implicit none (type, external)
   private

@@ -13,7 +13,7 @@ module nocdyn_text
   !> nor those of an argument with a vector subscript; `strings`, `append` and `selected` avoid both.
   !>
   !> gfortran 12 keeps the length of an allocatable text that a function returns in static memory of the caller, which all threads
-  !> share. Threads therefore call such functions only inside `!$omp critical (texts)`.
+  !> share. Threads of a sweep therefore call them in `nocdyn_serial_work` only.
   type, public :: string_t
     character(len=:), allocatable :: text
   end type string_t

@@ -1,233 +1,216 @@
-!> Targets of a sweep whose values stand in the numbers of a lane as they are, so that a variant is set by writing them there.
+!> Targets of a sweep whose values stand in the parameters of a lane as they are, so that a variant is set by writing them there.
 !>
-!> Two things must come together. Banks list an array by the name of the key whose values they take for it as they are, laws
-!> are copies of such numbers or of their negatives, and what else an assembly asks of such a value is its sign. And this is
-!> tried for the machine at hand: with two values of each sign, and with zero, a target must move the same numbers, all of them
-!> in such arrays and each the value or its negative, and nothing else, the start included. Signs with which it does otherwise
-!> or changes the layout are left to assembly; so are all variants if two targets move one number.
+!> Banks declare the arrays that hold the values of a key (`lane_parameters_t%add_key`): the laws follow from them by
+!> `polynomials`, and assembly asks for nothing but their signs. The inertia of a body is direct too: the constraints do not
+!> depend on it, so that only the responses to moments follow. A variant is written into a lane if every target is
+!> direct and one with the same signs of all values has been assembled and had the structure of the block.
 module nocdyn_direct_parameters
-  use, intrinsic :: iso_fortran_env, only: int64
+  use nocdyn_bank, only: role_names
+  use nocdyn_input, only: input_t
   use nocdyn_kinds, only: wp
   use nocdyn_lane_parameters, only: lane_parameters_t, parameter_index_t
+  use nocdyn_machine, only: machine_t
+  use nocdyn_reduced, only: reduced_t
+  use nocdyn_schema, only: first_key, key_rules
+  use nocdyn_targets, only: target_t
   implicit none (type, external)
   private
 
-  public :: new_direct_parameters, trial_value
+  public :: new_direct_parameters
 
-  integer, parameter, public :: trials = 5   !! of each target
-  real(wp), parameter :: trial_factors(trials) = [1.37_wp, 0.61_wp, -1.37_wp, -0.61_wp, 0.0_wp]   ! of the size of a value
-  integer, parameter :: trials_of_sign(-1:1) = [2, 1, 2]
-
-  type :: direct_parameter_t
-    character(len=:), allocatable :: key
-    logical :: is_exempt = .false.                 !! somebody else sets it
-    integer :: passed(-1:1) = 0                    !! trials of each sign
-    logical :: may_be(-1:1) = .false.              !! whether values of each sign are plain
-    logical :: is_zero_at_origin = .false.
-    real(wp) :: lowest, highest                    !! allowed values, as far as they are known
-    type(parameter_index_t), allocatable :: place(:)         !! not allocated: no trial has passed
-    logical, allocatable :: is_negative(:)         !! whether the number there is the negative of the value
-  end type direct_parameter_t
+  integer, parameter :: most_patterns = 1000   ! of signs: a search through more costs as much as an assembly
+  integer, parameter :: negative_zero = 2      ! the sign of a value that is never direct: a sum with 0 is not -0.0
 
   type, public :: direct_parameters_t
-    logical :: are_direct = .false.                 !! after `conclude`: whether values of some signs are, for every target
-    type(direct_parameter_t), allocatable, private :: target(:)
+    logical :: are_direct = .false.                               !! whether all targets are
+    integer, allocatable, private :: target(:)                    !! targets whose values are in arrays of banks ...
+    type(parameter_index_t), allocatable, private :: index(:)     !! ... and where each of them is
+    integer, allocatable, private :: banks(:)                     !! with such arrays
+    integer, allocatable, private :: inertia_target(:)            !! targets that are inertias ...
+    integer, allocatable, private :: body(:)                      !! ... and the body of each
+    integer, allocatable, private :: groups(:)                    !! of geared bodies, in which these are
+    integer, allocatable, private :: signs(:, :)                  !! accepted patterns of signs, [targets, patterns]
+    real(wp), allocatable, private :: lowest(:), highest(:)       !! values known to be allowed, [targets]
   contains
-    procedure :: exempt
-    procedure :: judge
-    procedure :: conclude
-    procedure :: may_take
-    procedure :: have_seen
-    procedure :: see
+    procedure :: accept
+    procedure :: are_accepted
+    procedure :: allow
+    procedure :: are_allowed
     procedure :: write_values
   end type direct_parameters_t
 
 contains
 
-  !> Targets that have been tried with nothing but the values `reference`.
-  function new_direct_parameters(reference) result(self)
-    real(wp), intent(in) :: reference(:)
+  !> Finds the targets in the machine of a block.
+  function new_direct_parameters(input, targets, machine, parameters) result(self)
+    type(input_t), intent(in) :: input
+    type(target_t), intent(in) :: targets(:)
+    type(machine_t), intent(in) :: machine
+    type(lane_parameters_t), intent(in) :: parameters   !! of the block
     type(direct_parameters_t) :: self
+    integer :: g, i
 
-    allocate (self%target(size(reference)))
-    self%target%lowest = reference
-    self%target%highest = reference
-    self%target%is_zero_at_origin = .not. abs(reference) > 0
+    allocate (self%target(0), self%index(0), self%banks(0), self%inertia_target(0), self%body(0))
+    allocate (self%signs(size(targets), 0))
+    allocate (self%lowest(size(targets)), source=huge(1.0_wp))
+    allocate (self%highest(size(targets)), source=-huge(1.0_wp))
+    self%are_direct = .true.
+    do i = 1, size(targets)
+      if (input%groups(targets(i)%group)%kind == 'body') then
+        call add_inertia(self, i, input, targets(i), machine)
+      else
+        call add_element_value(self, i, input, targets(i), machine, parameters)
+      end if
+      if (.not. self%are_direct) return
+    end do
+    self%groups = pack([(g, g=1, size(machine%groups))], &
+                       [(have_common_member(machine%groups(g)%bodies, self%body), g=1, size(machine%groups))])
   end function new_direct_parameters
 
-  !> Leaves a target, of positive values, to somebody else, who sets other numbers than plain ones.
-  subroutine exempt(self, target)
-    class(direct_parameters_t), intent(inout) :: self
-    integer, intent(in) :: target
+  !> An inertia, unless the start speeds were projected with it.
+  subroutine add_inertia(self, number, input, target, machine)
+    type(direct_parameters_t), intent(inout) :: self
+    integer, intent(in) :: number   !! of the target
+    type(input_t), intent(in) :: input
+    type(target_t), intent(in) :: target
+    type(machine_t), intent(in) :: machine
 
-    associate (one => self%target(target))
-      one%is_exempt = .true.
-      one%may_be = [.false., .false., .true.]
-      allocate (one%place(0), one%is_negative(0))
+    self%are_direct = key_of(input, target) == 'inertia' .and. .not. allocated(machine%start_impulse)
+    self%inertia_target = [self%inertia_target, number]
+    self%body = [self%body, findloc(input%groups_named('body'), target%group, dim=1)]
+  end subroutine add_inertia
+
+  !> A value of an element, if its bank declares where it stands.
+  subroutine add_element_value(self, number, input, target, machine, parameters)
+    type(direct_parameters_t), intent(inout) :: self
+    integer, intent(in) :: number   !! of the target
+    type(input_t), intent(in) :: input
+    type(target_t), intent(in) :: target
+    type(machine_t), intent(in) :: machine
+    type(lane_parameters_t), intent(in) :: parameters
+    type(parameter_index_t) :: index
+    integer :: b, e
+
+    self%are_direct = .false.
+    associate (group => input%groups(target%group))
+      do b = 1, size(machine%banks)
+        associate (bank => machine%banks(b)%bank)
+          if (role_names(bank%role) /= group%kind) cycle
+          do e = 1, size(bank%names)
+            if (bank%names(e)%text /= group%name) cycle
+            index = parameters%index_of_key(trim(key_of(input, target)), bank%first - 1 + e)
+            if (index%array == 0) cycle
+            self%are_direct = .true.
+            self%target = [self%target, number]
+            self%index = [self%index, index]
+            if (all(self%banks /= b)) self%banks = [self%banks, b]
+          end do
+        end associate
+      end do
     end associate
-  end subroutine exempt
+  end subroutine add_element_value
 
-  !> The value of trial number 1 to `trials` of a target.
-  pure real(wp) function trial_value(reference, number) result(value)
-    real(wp), intent(in) :: reference
-    integer, intent(in) :: number
+  pure function key_of(input, target) result(key)
+    type(input_t), intent(in) :: input
+    type(target_t), intent(in) :: target
+    character(len=len(key_rules%name)) :: key
 
-    value = trial_factors(number) * merge(abs(reference), 1.0_wp, abs(reference) > 0)
-  end function trial_value
+    key = key_rules(first_key(input%groups(target%group)%rule) + target%key - 1)%name
+  end function key_of
 
-  !> Judges a trial of one target, whose numbers are congruent with those of the origin.
-  subroutine judge(self, target, key, value, reference, tried)
-    class(direct_parameters_t), intent(inout) :: self
-    integer, intent(in) :: target
-    character(len=*), intent(in) :: key                 !! of the target
-    real(wp), intent(in) :: value
-    type(lane_parameters_t), intent(in) :: reference, tried   !! of one lane
-    type(parameter_index_t), allocatable :: places(:)
-    logical, allocatable :: negative(:)
+  pure logical function have_common_member(list, members)
+    integer, intent(in) :: list(:), members(:)
     integer :: i
 
-    if (.not. tried%has_same_curves(1, reference, 1)) return
-    allocate (places, source=tried%differences(1, reference, 1))
-    allocate (negative, source=[(.not. same_bits(tried%value(places(i), 1), value), i=1, size(places))])
-    do i = 1, size(places)
-      if (.not. same_bits(tried%value(places(i), 1), signed(value, negative(i)))) return
-      if (.not. is_copied(tried%name_at(places(i)), key)) return
-    end do
-    associate (one => self%target(target))
-      if (.not. allocated(one%place)) then
-        one%place = places
-        one%is_negative = negative
-      else if (abs(value) > 0 .or. size(places) > 0) then   ! a zero moves nothing from a zero
-        if (.not. are_same(one%place, places)) return
-        if (any(one%is_negative .neqv. negative)) return
-      end if
-      one%passed(sign_of(value)) = one%passed(sign_of(value)) + 1
+    have_common_member = any([(any(list == members(i)), i=1, size(members))])
+  end function have_common_member
+
+  !> Takes the values of a variant that has been assembled and has the structure of the block.
+  subroutine accept(self, values)
+    class(direct_parameters_t), intent(inout) :: self
+    real(wp), intent(in) :: values(:)   !! [targets]
+
+    if (.not. self%are_direct) return
+    call self%allow(values)
+    associate (patterns => size(self%signs, 2), pattern => sign_of(values))
+      if (self%are_accepted(values) .or. patterns == most_patterns .or. any(pattern == negative_zero)) return
+      self%signs = reshape([self%signs, pattern], [size(values), patterns + 1])
     end associate
-  end subroutine judge
+  end subroutine accept
 
-  !> Whether the numbers of an array are values of a key as they are, or their negatives.
-  pure logical function is_copied(name, key)
-    character(len=*), intent(in) :: name, key
+  !> Whether a variant of these values can be set by writing them.
+  pure logical function are_accepted(self, values)
+    class(direct_parameters_t), intent(in) :: self
+    real(wp), intent(in) :: values(:)   !! [targets]
+    integer :: i, pattern
 
-    is_copied = name == key .or. index(name, 'laws: ') == 1
-  end function is_copied
+    are_accepted = .false.
+    if (.not. self%are_direct) return
+    do pattern = 1, size(self%signs, 2)
+      do i = 1, size(values)
+        if (sign_of(values(i)) /= self%signs(i, pattern)) exit
+      end do
+      are_accepted = i > size(values)
+      if (are_accepted) return
+    end do
+  end function are_accepted
 
-  pure logical function same_bits(a, b)
-    real(wp), intent(in) :: a, b
-
-    same_bits = transfer(a, 0_int64) == transfer(b, 0_int64)
-  end function same_bits
-
-  pure real(wp) function signed(value, is_negative)
-    real(wp), intent(in) :: value
-    logical, intent(in) :: is_negative
-
-    signed = value
-    if (is_negative) signed = -value
-  end function signed
-
-  pure integer function sign_of(value)
+  !> -1, 0, 1, or `negative_zero`.
+  elemental integer function sign_of(value)
     real(wp), intent(in) :: value
 
-    sign_of = 0
-    if (abs(value) > 0) sign_of = nint(sign(1.0_wp, value))
+    if (abs(value) > 0) then
+      sign_of = nint(sign(1.0_wp, value))
+    else
+      sign_of = merge(0, negative_zero, sign(1.0_wp, value) > 0)
+    end if
   end function sign_of
 
-  pure logical function are_same(a, b)
-    type(parameter_index_t), intent(in) :: a(:), b(:)
-
-    are_same = size(a) == size(b)
-    if (are_same) are_same = all(a%array == b%array .and. a%row == b%row .and. a%column == b%column)
-  end function are_same
-
-  !> Which signs are plain, once all trials have been judged.
-  subroutine conclude(self)
+  !> Takes values that have been found to be allowed.
+  subroutine allow(self, values)
     class(direct_parameters_t), intent(inout) :: self
-    integer :: i, j, k
+    real(wp), intent(in) :: values(:)   !! [targets]
 
-    self%are_direct = .true.
-    do i = 1, size(self%target)
-      associate (one => self%target(i))
-        if (one%is_exempt) cycle
-        one%may_be = one%passed == trials_of_sign
-        self%are_direct = self%are_direct .and. any(one%may_be)
-        if (.not. self%are_direct) return
-        do j = 1, i - 1
-          do k = 1, size(one%place)
-            if (any(are_at(self%target(j)%place, one%place(k)))) self%are_direct = .false.
-          end do
-        end do
-      end associate
-    end do
-  end subroutine conclude
+    self%lowest = min(self%lowest, values)
+    self%highest = max(self%highest, values)
+  end subroutine allow
 
-  elemental logical function are_at(a, b)
-    type(parameter_index_t), intent(in) :: a, b
-
-    are_at = a%array == b%array .and. a%row == b%row .and. a%column == b%column
-  end function are_at
-
-  !> Whether values are plain by their signs; the zeros of arithmetic, not its negative ones. Only single zeros have been tried:
-  !> of two, e.g. the last terms of a law, each may be plain where both are not.
-  pure logical function may_take(self, values)
+  !> Whether values are between some that are allowed. The range of a key has no hole but zero, which is a sign of its own here.
+  pure logical function are_allowed(self, values)
     class(direct_parameters_t), intent(in) :: self
-    real(wp), contiguous, intent(in) :: values(:)
-    integer :: i, zeros
-
-    may_take = .false.
-    zeros = 0
-    do i = 1, size(self%target)
-      if (.not. abs(values(i)) > 0 .and. .not. self%target(i)%is_zero_at_origin) zeros = zeros + 1
-      if (zeros > 1) return
-      if (values(i) > 0) then
-        if (.not. self%target(i)%may_be(1)) return
-      else if (values(i) < 0) then
-        if (.not. self%target(i)%may_be(-1)) return
-      else
-        if (.not. self%target(i)%may_be(0) .or. .not. same_bits(values(i), 0.0_wp)) return
-      end if
-    end do
-    may_take = .true.
-  end function may_take
-
-  !> Whether values are between those that are known to be allowed. Ranges of keys have no holes but zero, which has a sign of
-  !> its own here.
-  pure logical function have_seen(self, values)
-    class(direct_parameters_t), intent(in) :: self
-    real(wp), contiguous, intent(in) :: values(:)
+    real(wp), intent(in) :: values(:)   !! [targets]
     integer :: i
 
-    have_seen = .false.
-    do i = 1, size(self%target)
-      if (.not. (values(i) >= self%target(i)%lowest .and. values(i) <= self%target(i)%highest)) return
+    are_allowed = .false.
+    do i = 1, size(values)
+      if (.not. (values(i) >= self%lowest(i) .and. values(i) <= self%highest(i))) return
     end do
-    have_seen = .true.
-  end function have_seen
+    are_allowed = .true.
+  end function are_allowed
 
-  !> Takes values that have been found to be allowed.
-  subroutine see(self, values)
-    class(direct_parameters_t), intent(inout) :: self
-    real(wp), contiguous, intent(in) :: values(:)
-
-    self%target%lowest = min(self%target%lowest, values)
-    self%target%highest = max(self%target%highest, values)
-  end subroutine see
-
-  !> Writes values into a lane that has the numbers of the origin elsewhere.
-  subroutine write_values(self, values, lane, parameters)
+  !> Makes a lane that of a variant. What the lane holds beside the values must be that of another variant.
+  subroutine write_values(self, values, lane, parameters, block, y, is_set)
     class(direct_parameters_t), intent(in) :: self
-    real(wp), contiguous, intent(in) :: values(:)
+    real(wp), contiguous, intent(in) :: values(:)          !! [targets]
     integer, intent(in) :: lane
-    type(lane_parameters_t), intent(inout) :: parameters
-    integer :: i, k
+    type(lane_parameters_t), intent(inout) :: parameters   !! of the block
+    type(reduced_t), intent(inout) :: block
+    real(wp), contiguous, intent(inout) :: y(:)            !! the start of another variant, then that of this one
+    logical, intent(out) :: is_set                         !! not if rounding makes the mass matrix indefinite
+    integer :: i
+    logical :: is_indefinite
 
     do i = 1, size(self%target)
-      associate (one => self%target(i))
-        do k = 1, size(one%place)
-          call parameters%set_value(one%place(k), lane, signed(values(i), one%is_negative(k)))
-        end do
-      end associate
+      call parameters%set_value(self%index(i), lane, values(self%target(i)))
     end do
+    do i = 1, size(self%banks)
+      call block%machine%banks(self%banks(i))%bank%polynomials(block%machine%laws)
+    end do
+    is_set = .true.
+    if (size(self%inertia_target) == 0) return
+    call block%update_inertia(lane, self%body, values(self%inertia_target), self%groups, is_indefinite)
+    is_set = .not. is_indefinite
+    if (is_set) call block%project_start_speeds(lane, y)
   end subroutine write_values
 
 end module nocdyn_direct_parameters

@@ -1,9 +1,10 @@
-!> The books of a sweep: which variants are missing, how many are handed out at once, what has become of them.
+!> The scheduler of a sweep that keeps a journal: it hands out the variants that the journal lacks and appends their results.
 module nocdyn_journal_scheduler
-  use nocdyn_scheduler, only: scheduler_t
   use nocdyn_errors, only: error_t
   use nocdyn_kinds, only: wp
   use nocdyn_posix, only: is_interrupted
+  use nocdyn_scheduler, only: scheduler_t, sweep_counts_t, sweep_progress_t
+  use nocdyn_serial_work, only: append_chunk, update_progress
   use nocdyn_sweep_chunk, only: chunk_t, status_refused
   use nocdyn_sweep_journal, only: sweep_journal_t
   implicit none (type, external)
@@ -11,33 +12,10 @@ module nocdyn_journal_scheduler
 
   public :: initialise_scheduler, chunk_size
 
-  real(wp), parameter :: chunk_seconds = 0.2_wp   !! aimed at: long beside a message, short beside a person's patience
-  integer, parameter :: most_at_once = 8192       !! variants, and ...
-  integer, parameter :: most_numbers = 2**22      !! ... numbers: keep chunks small enough to be held by the dozen
-  integer, parameter :: growth = 8                !! of a chunk over the one before, at most
-
-  !> Numbers of variants.
-  type, public :: sweep_counts_t
-    integer :: total = 0
-    integer :: done = 0      !! without failures
-    integer :: refused = 0
-    integer :: failed = 0
-    integer :: new = 0       !! computed by this process and those that report to it, failures included
-  end type sweep_counts_t
-
-  !> Told how far a sweep has come, often.
-  type, abstract, public :: sweep_progress_t
-  contains
-    procedure(update_interface), deferred :: update
-  end type sweep_progress_t
-
-  abstract interface
-    subroutine update_interface(self, counts)
-      import :: sweep_counts_t, sweep_progress_t
-      class(sweep_progress_t), intent(inout) :: self
-      type(sweep_counts_t), intent(in) :: counts
-    end subroutine update_interface
-  end interface
+  real(wp), parameter :: chunk_seconds = 0.2_wp   ! time for a chunk: long for a message, short for a person who waits
+  integer, parameter :: max_variants = 8192       ! of a chunk
+  integer, parameter :: max_numbers = 2**22       ! of a chunk: dozens of chunks fit into memory
+  integer, parameter :: max_growth = 8            ! of a chunk over the one before
 
   !> Hands out the missing variants in their order and writes the results to the journal.
   type, extends(scheduler_t), public :: journal_scheduler_t
@@ -80,7 +58,7 @@ contains
     scheduler%lanes = lanes
     call journal%missing(scheduler%first, scheduler%count)
     scheduler%left = sum(scheduler%count)
-    scheduler%most = max(1, most_numbers / (size(journal%header%parameters) + size(journal%header%results)))
+    scheduler%most = max(1, max_numbers / (size(journal%header%parameters) + size(journal%header%results)))
     scheduler%counts%total = journal%header%last - journal%header%first + 1
     scheduler%counts%done = journal%done
     scheduler%counts%refused = journal%refused
@@ -116,8 +94,8 @@ contains
     integer :: share
 
     chunk_size = lanes
-    if (pace > 0) chunk_size = int(min(chunk_seconds / pace, real(most_at_once, wp)))
-    chunk_size = max(lanes, min(chunk_size, growth * max(last_size, lanes)))
+    if (pace > 0) chunk_size = int(min(chunk_seconds / pace, real(max_variants, wp)))
+    chunk_size = max(lanes, min(chunk_size, max_growth * max(last_size, lanes)))
     share = (left - 1) / workers + 1
     if (workers > 1) share = max((share + 1) / 2, min(share, lanes))
     chunk_size = max(1, min(chunk_size, share))
@@ -139,9 +117,7 @@ contains
     real(wp), intent(in) :: seconds
 
     if (allocated(self%error)) return
-    !$omp critical (texts)
-    call self%journal%append(chunk, self%error)
-    !$omp end critical (texts)
+    call append_chunk(self%journal, chunk, self%error)
     if (allocated(self%error)) then
       !$omp atomic write
       self%has_failed = .true.
@@ -157,9 +133,7 @@ contains
   subroutine poll(self)
     class(journal_scheduler_t), intent(inout) :: self
 
-    !$omp critical (texts)
-    call self%progress%update(self%counts)
-    !$omp end critical (texts)
+    call update_progress(self%progress, self%counts)
   end subroutine poll
 
   !> All variants have been computed here.

@@ -1,4 +1,5 @@
-!> Who hands out the variants of a sweep to those that compute them, and takes the results: in one process or across many.
+!> The contract of a scheduler, which hands out the variants of a sweep to threads and takes their results: in one process or
+!> across many; and of what shows the progress of a sweep.
 module nocdyn_scheduler
   use nocdyn_kinds, only: wp
   use nocdyn_sweep_chunk, only: chunk_t
@@ -6,7 +7,7 @@ module nocdyn_scheduler
   implicit none (type, external)
   private
 
-  !> Threads call its procedures between `lock` and `unlock`, one at a time; only `is_cancelled` may be called as it is.
+  !> Threads call its procedures between `lock` and `unlock`; only `is_cancelled` may be called without.
   type, abstract, public :: scheduler_t
     integer(omp_lock_kind), private :: omp_lock
   contains
@@ -22,30 +23,52 @@ module nocdyn_scheduler
     procedure :: try_lock
   end type scheduler_t
 
+  !> Numbers of variants.
+  type, public :: sweep_counts_t
+    integer :: total = 0
+    integer :: done = 0      !! without failures
+    integer :: refused = 0
+    integer :: failed = 0
+    integer :: new = 0       !! computed by this process and those that send it results, failures included
+  end type sweep_counts_t
+
+  !> Shows how far a sweep has come.
+  type, abstract, public :: sweep_progress_t
+  contains
+    procedure(update_interface), deferred :: update
+  end type sweep_progress_t
+
   abstract interface
 
-    !> The next variants to compute, consecutive ones; none if `count` is 0.
+    !> Called often.
+    subroutine update_interface(self, counts)
+      import :: sweep_counts_t, sweep_progress_t
+      class(sweep_progress_t), intent(inout) :: self
+      type(sweep_counts_t), intent(in) :: counts
+    end subroutine update_interface
+
+    !> The next variants to compute: `count` consecutive ones from `first` on. None are left if `count` is 0.
     subroutine next_chunk_interface(self, first, count)
       import :: scheduler_t
       class(scheduler_t), intent(inout) :: self
       integer, intent(out) :: first, count
     end subroutine next_chunk_interface
 
-    !> Variants that have been computed, in `seconds`.
+    !> Takes the results of a chunk.
     subroutine submit_interface(self, chunk, seconds)
       import :: chunk_t, scheduler_t, wp
       class(scheduler_t), intent(inout) :: self
       type(chunk_t), intent(in) :: chunk
-      real(wp), intent(in) :: seconds
+      real(wp), intent(in) :: seconds   !! that its computation took
     end subroutine submit_interface
 
-    !> `poll` is called often while variants are computed, `finalise` once, when nothing is left to compute here.
+    !> `poll` is called often while variants are computed, `finalise` once after the threads have ended.
     subroutine poll_interface(self)
       import :: scheduler_t
       class(scheduler_t), intent(inout) :: self
     end subroutine poll_interface
 
-    !> Whether those that compute are to leave off where they are.
+    !> Whether the threads are to stop where they are.
     function is_cancelled_interface(self) result(is_cancelled)
       import :: scheduler_t
       class(scheduler_t), intent(in) :: self
@@ -70,7 +93,7 @@ contains
     call omp_destroy_lock(self%omp_lock)
   end subroutine destroy_lock
 
-  !> Waits until no other thread is inside.
+  !> Waits until no other thread has the lock.
   subroutine lock(self)
     class(scheduler_t), intent(inout) :: self
 
@@ -83,7 +106,7 @@ contains
     call omp_unset_lock(self%omp_lock)
   end subroutine unlock
 
-  !> Enters if no other thread is inside.
+  !> Takes the lock if no other thread has it.
   logical function try_lock(self)
     class(scheduler_t), intent(inout) :: self
 

@@ -1,8 +1,7 @@
-!> What do many variants of a machine do: threads that take chunks of variants until none are left.
+!> The threads of a sweep: each takes chunks of variants from a scheduler until none are left.
 module nocdyn_sweep
   use, intrinsic :: iso_fortran_env, only: int64
   use nocdyn_scheduler, only: scheduler_t
-  use nocdyn_errors, only: error_t
   use nocdyn_kinds, only: wp
   use nocdyn_sweep_block, only: new_sweep_block, sweep_block_t
   use nocdyn_sweep_chunk, only: chunk_t
@@ -15,12 +14,12 @@ module nocdyn_sweep
 
 contains
 
-  !> Computes what `scheduler` hands out with so many threads, each with a block of its own.
+  !> Computes the variants that `scheduler` hands out, by threads with a block of lanes each.
   subroutine compute_variants(plan, setup, threads, scheduler)
-    type(sweep_plan_t), intent(in) :: plan
+    type(sweep_plan_t), target, intent(in) :: plan
     type(sweep_setup_t), intent(in) :: setup   !! of the plan
     integer, intent(in) :: threads
-    class(scheduler_t), intent(inout) :: scheduler
+    class(scheduler_t), target, intent(inout) :: scheduler
 
     call scheduler%create_lock()
     !$omp parallel num_threads(threads) default(shared)
@@ -32,19 +31,17 @@ contains
 
   !> One thread's work.
   subroutine compute_chunks(plan, setup, scheduler)
-    type(sweep_plan_t), intent(in) :: plan
+    type(sweep_plan_t), target, intent(in) :: plan
     type(sweep_setup_t), intent(in) :: setup
-    class(scheduler_t), intent(inout) :: scheduler
+    class(scheduler_t), target, intent(inout) :: scheduler
     type(sweep_block_t), allocatable, target :: block
-    type(chunk_t) :: chunk
-    type(error_t), allocatable :: error
+    type(chunk_t), target :: chunk
     real(wp) :: seconds
     integer :: count, first
     logical :: is_complete
 
     allocate (block)
-    call new_sweep_block(plan, setup, scheduler, block, error)
-    if (allocated(error)) error stop 'nocdyn_sweep: the base machine has been assembled before'
+    call new_sweep_block(plan, setup, scheduler, block)
     do
       call scheduler%lock()
       call scheduler%next_chunk(first, count)

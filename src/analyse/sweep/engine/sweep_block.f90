@@ -1,33 +1,30 @@
 !> One thread's share of a sweep: a block of lanes that works through consecutive variants.
 module nocdyn_sweep_block
   use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
-  use nocdyn_scheduler, only: scheduler_t
-  use nocdyn_errors, only: error_t, exit_input, raise
+  use nocdyn_ensemble, only: ensemble_t, initial_states, initial_states_t
   use nocdyn_formulation, only: formulation_t
   use nocdyn_integration, only: integrate_with
-  use nocdyn_integration_settings, only: check_settings, integration_settings_t
+  use nocdyn_integration_settings, only: integration_settings_t
   use nocdyn_kinds, only: wp
-  use nocdyn_methods, only: select_method
-  use nocdyn_solver_status, only: failure_message, integration_done, integration_interrupted, solver_status_t
-  use nocdyn_ensemble, only: initial_states, initial_states_t, ensemble_t
-  use nocdyn_statistics, only: statistic_t
-  use nocdyn_statistics_observer, only: new_statistics_observer, statistics_observer_t
+  use nocdyn_scheduler, only: scheduler_t
+  use nocdyn_serial_work, only: explain_failure, prepare_integration
+  use nocdyn_solver_status, only: integration_done, integration_interrupted, solver_status_t
+  use nocdyn_statistics_observer, only: statistics_observer_t
   use nocdyn_stepper, only: stepper_t
   use nocdyn_sweep_chunk, only: allocate_chunk, chunk_t, status_done, status_failed, status_refused
   use nocdyn_sweep_plan, only: sweep_plan_t
-  use nocdyn_recorded_quantities, only: restrict_statistics
-  use nocdyn_sweep_setup, only: sweep_setup_t, read_settings
+  use nocdyn_sweep_setup, only: sweep_setup_t
   use nocdyn_system, only: system_t
-  use nocdyn_variant_machines, only: new_variant_machines, variant_needs_own_block, variant_machines_t, variant_refused
+  use nocdyn_variant_machines, only: new_variant_machines, variant_machines_t, variant_needs_own_block, variant_refused
   implicit none (type, external)
   private
 
   public :: new_sweep_block
 
-  integer, parameter :: poll_interval = 16    ! steps between two looks at the rest of the world
-  integer, parameter :: not_computed = -1
+  integer, parameter :: poll_interval = 16   ! steps between two calls of the scheduler
+  integer, parameter :: not_computed = -1    ! status of a variant until it has been computed
 
-  !> The statistics of the lanes; between the steps it looks after the dispatcher.
+  !> The statistics of the lanes. Between the steps it polls the scheduler.
   type, extends(statistics_observer_t) :: block_observer_t
     class(scheduler_t), pointer :: scheduler => null()
     integer :: steps = 0
@@ -36,27 +33,25 @@ module nocdyn_sweep_block
   end type block_observer_t
 
   !> The variants of a chunk, for the lanes.
-  type, extends(ensemble_t) :: chunk_queue_t
+  type, extends(ensemble_t) :: chunk_ensemble_t
     type(sweep_block_t), pointer :: block => null()
     type(chunk_t), pointer :: chunk => null()
-    integer :: next_index = 1               !! in the chunk
-    integer, allocatable :: index(:)        !! of the variant in each lane
-    logical, allocatable :: needs_own_block(:)     !! variants left over for a formulation of their own
+    integer :: next_index = 1                    !! in the chunk
+    integer, allocatable :: index(:)             !! in the chunk, of the variant in each lane
+    logical, allocatable :: needs_own_block(:)   !! variants that do not fit the lanes, [variants of the chunk]
   contains
     procedure :: next
     procedure :: finish
-  end type chunk_queue_t
+  end type chunk_ensemble_t
 
-  !> gfortran 12 keeps the lengths of texts that functions return in static memory, of all threads: texts are made by one thread
-  !> at a time, in the critical section `texts`.
   type, public :: sweep_block_t
     type(sweep_plan_t), pointer :: plan => null()
     class(scheduler_t), pointer :: scheduler => null()
     type(variant_machines_t) :: machines
     type(block_observer_t) :: observer
-    class(stepper_t), allocatable :: stepper   !! as it is before an integration
+    class(stepper_t), allocatable :: stepper            !! as it is before an integration
     type(integration_settings_t) :: settings
-    real(wp) :: times(2) = 0.0_wp              !! start and end [s]
+    real(wp) :: times(2) = 0.0_wp                       !! start and end [s]
     character(len=:), allocatable, private :: message   !! why the variants that fit the lanes are refused; '': they are not
   contains
     procedure :: compute
@@ -67,29 +62,20 @@ module nocdyn_sweep_block
 contains
 
   !> A block of lanes of the base machine, which stays where it is. To be given up by `release`.
-  subroutine new_sweep_block(plan, setup, scheduler, block, error)
+  subroutine new_sweep_block(plan, setup, scheduler, block)
     type(sweep_plan_t), target, intent(in) :: plan
-    type(sweep_setup_t), intent(in) :: setup
+    type(sweep_setup_t), intent(in) :: setup   !! of the plan
     class(scheduler_t), target, intent(inout) :: scheduler
     type(sweep_block_t), target, intent(out) :: block
-    type(error_t), allocatable, intent(out) :: error
     real(wp) :: typical(plan%design%varied)
 
     block%plan => plan
     block%scheduler => scheduler
+    block%observer%scheduler => scheduler
     call plan%values(1, typical)
-    call new_variant_machines(plan%input, plan%targets, setup%lanes, setup%has_energy_balance, block%machines, error, typical)
-    if (allocated(error)) return
-    !$omp critical (texts)
-    call read_settings(plan%input, block%machines%formulation, block%settings, block%times, error)
-    if (.not. allocated(error)) call select_method(block%settings, block%stepper, error)
-    if (.not. allocated(error)) then
-      call new_block_observer(block%machines%formulation, plan, block%times, scheduler, block%observer, error)
-    end if
-    block%message = ''
-    if (allocated(error)) call move_alloc(error%message, block%message)
-    !$omp end critical (texts)
-    if (allocated(error)) deallocate (error)
+    call new_variant_machines(plan%input, plan%targets, setup%lanes, setup%has_energy_balance, block%machines, typical)
+    call prepare_integration(plan%input, block%machines%formulation, plan%statistics, block%settings, block%times, &
+                             block%stepper, block%observer%statistics_observer_t, block%message)
   end subroutine new_sweep_block
 
   subroutine release(self)
@@ -98,34 +84,13 @@ contains
     call self%machines%release()
   end subroutine release
 
-  !> The statistics of variants that run through these times; if some begin outside of them, or have nothing to look at, that is
-  !> an error.
-  subroutine new_block_observer(formulation, plan, times, scheduler, observer, error)
-    class(formulation_t), target, intent(inout) :: formulation   !! stays where it is, as the observer does
-    type(sweep_plan_t), intent(in) :: plan
-    real(wp), intent(in) :: times(2)
-    class(scheduler_t), target, intent(inout) :: scheduler
-    type(block_observer_t), intent(out) :: observer
-    type(error_t), allocatable, intent(out) :: error
-    type(statistic_t), allocatable :: statistics(:)
-    character(len=:), allocatable :: message
-
-    call restrict_statistics(plan%statistics, times(1), times(2), statistics, message)
-    observer%statistics_observer_t = new_statistics_observer(formulation, statistics, times(1), times(2))
-    observer%scheduler => scheduler
-    if (message == '' .and. observer%missing /= '') then
-      message = observer%missing // ' is recorded, but this machine has no such column'
-    end if
-    if (message /= '') call raise(error, exit_input, message)
-  end subroutine new_block_observer
-
-  !> The variants `first`, `first` + 1, ... Those that are interrupted do not count: `is_complete` is false then.
+  !> Computes the variants `first`, `first` + 1, ...
   subroutine compute(self, first, count, chunk, is_complete)
     class(sweep_block_t), target, intent(inout) :: self
     integer, intent(in) :: first, count
     type(chunk_t), target, intent(out) :: chunk
-    logical, intent(out) :: is_complete
-    type(chunk_queue_t) :: ensemble
+    logical, intent(out) :: is_complete   !! false if the computation was interrupted: the chunk is of no use
+    type(chunk_ensemble_t) :: ensemble
     class(stepper_t), allocatable :: stepper
     type(solver_status_t) :: solver_status
     integer :: i
@@ -151,10 +116,10 @@ contains
     is_complete = all(chunk%status /= not_computed)
   end subroutine compute
 
-  !> Goes through a queue whose variants are refused or left over.
+  !> Goes through a chunk of which no variant is run in the lanes: each is refused or needs a block of its own.
   subroutine refuse_all(formulation, ensemble)
     class(formulation_t), intent(inout) :: formulation
-    type(chunk_queue_t), intent(inout) :: ensemble
+    type(chunk_ensemble_t), intent(inout) :: ensemble
     real(wp), allocatable :: y(:)
     real(wp) :: t
     logical :: found
@@ -162,12 +127,12 @@ contains
     allocate (y(formulation%states + formulation%quadratures), source=0.0_wp)
     t = 0.0_wp
     call ensemble%next(formulation, 1, t, y, found)
-    if (found) error stop 'nocdyn_sweep_block: a variant has been put into a lane that does not run'
+    if (found) error stop 'nocdyn_sweep_block: a variant is set in a lane that does not run'
   end subroutine refuse_all
 
-  !> Puts the numbers of the next variant that a lane can hold into one.
+  !> Sets the next variant that fits the lanes in one of them.
   subroutine next(self, system, lane, t, y, found)
-    class(chunk_queue_t), intent(inout) :: self
+    class(chunk_ensemble_t), intent(inout) :: self
     class(system_t), intent(inout) :: system
     integer, intent(in) :: lane
     real(wp), intent(inout) :: t
@@ -207,16 +172,16 @@ contains
   end subroutine refuse
 
   subroutine finish(self, lane, y, solver_status)
-    class(chunk_queue_t), intent(inout) :: self
+    class(chunk_ensemble_t), intent(inout) :: self
     integer, intent(in) :: lane
     real(wp), contiguous, intent(in) :: y(:)
     type(solver_status_t), intent(in) :: solver_status
 
     call store_result(self%chunk, self%index(lane), lane, solver_status, self%block%machines%formulation, self%block%settings, &
-                  self%block%observer)
+                      self%block%observer)
   end subroutine finish
 
-  !> What has become of the variant in a lane.
+  !> Takes the results of the variant in a lane, or why it failed.
   subroutine store_result(chunk, index, lane, solver_status, formulation, settings, observer)
     type(chunk_t), intent(inout) :: chunk
     integer, intent(in) :: index, lane
@@ -232,13 +197,11 @@ contains
       call observer%results(lane, chunk%results(:, index))
     else
       chunk%status(index) = status_failed
-      !$omp critical (texts)
-      chunk%reasons(index)%text = failure_message(solver_status, lane, formulation, settings%rtol, settings%atol)
-      !$omp end critical (texts)
+      call explain_failure(solver_status, lane, formulation, settings, chunk%reasons(index)%text)
     end if
   end subroutine store_result
 
-  !> A variant that no lane of the block can hold: a formulation of one lane, made for it.
+  !> Computes a variant that does not fit the lanes with a formulation of one lane.
   subroutine compute_in_own_block(self, chunk, index)
     class(sweep_block_t), intent(inout) :: self
     type(chunk_t), intent(inout) :: chunk
@@ -249,19 +212,18 @@ contains
     type(integration_settings_t) :: settings
     type(initial_states_t) :: ensemble
     type(solver_status_t) :: solver_status
-    type(error_t), allocatable :: error
+    character(len=:), allocatable :: message
     real(wp), allocatable :: start(:)
     real(wp) :: times(2)
 
     call self%machines%own_formulation(chunk%parameters(:, index), formulation)
-    !$omp critical (texts)
-    call read_settings(self%machines%input, formulation, settings, times, error)
-    if (.not. allocated(error)) call check_settings(settings, error)
-    if (.not. allocated(error)) call select_method(settings, stepper, error)
-    if (.not. allocated(error)) call new_block_observer(formulation, self%plan, times, self%scheduler, observer, error)
-    if (allocated(error)) call refuse(chunk, index, error%message)
-    !$omp end critical (texts)
-    if (allocated(error)) return
+    observer%scheduler => self%scheduler
+    call prepare_integration(self%machines%input, formulation, self%plan%statistics, settings, times, stepper, &
+                             observer%statistics_observer_t, message)
+    if (message /= '') then
+      call refuse(chunk, index, message)
+      return
+    end if
     ensemble = initial_states(formulation%start())
     allocate (start, source=ensemble%y(1, :))
     call observer%start_lane(1, start)
@@ -269,7 +231,7 @@ contains
     call store_result(chunk, index, 1, solver_status, formulation, settings, observer)
   end subroutine compute_in_own_block
 
-  !> Looks after the dispatcher now and then, unless another thread does.
+  !> Polls the scheduler every `poll_interval` steps, unless another thread does.
   function wants_stop(self, t)
     class(block_observer_t), intent(inout) :: self
     real(wp), intent(in) :: t
