@@ -1,8 +1,8 @@
-!> Statistics of any columns, from their values at places of the solution inside the steps.
+!> Statistics of any columns of the trajectory table, from samples of the solution inside the steps.
 !>
-!> In every step, or what of it lies after `from`, a column is taken for the polynomial through its values at the
-!> Chebyshev-Lobatto places, as many as the solution has coefficients there. Integrals are taken by as many Gauss nodes: a
-!> linear function of the state and its square are integrated exactly.
+!> In every step, or in the part of it after `from`, a column is replaced by the polynomial through its values at the
+!> Chebyshev-Lobatto nodes; there are as many as the solution has coefficients in a step. Integrals use as many Gauss nodes: they
+!> are exact for a linear function of the state and for its square.
 module nocdyn_sampled_statistics
   use nocdyn_chebyshev, only: lobatto_nodes
   use nocdyn_extremes, only: allocate_ranges, start_ranges, before_jump, widen_ranges
@@ -20,39 +20,39 @@ module nocdyn_sampled_statistics
 
   public :: new_sampled_statistics
 
-  !> What is kept from a time on. A column is of no use here unless a statistic asks for it.
+  !> What is accumulated from a time on, for the columns with statistics that need it.
   type :: window_t
     real(wp) :: from = 0.0_wp                              !! [s]
-    integer, allocatable :: ranged(:)                      !! columns whose extremes are wanted
-    integer, allocatable :: summed(:)                      !! whose integrals are
-    integer, allocatable :: settled(:)                     !! whose last exit from a band is
-    logical, allocatable :: has_started(:)                       !! whether a lane has passed `from`, [lanes]
+    integer, allocatable :: ranged(:)                      !! columns with extremes
+    integer, allocatable :: summed(:)                      !! columns with integrals
+    integer, allocatable :: settled(:)                     !! columns with a settling time
+    logical, allocatable :: has_started(:)                 !! whether a lane has passed `from`, [lanes]
     type(ranges_t), allocatable :: ranges(:)               !! of `ranged`, [lanes]
-    real(wp), allocatable :: integral(:, :), square(:, :)  !! over time, [summed, lanes]
+    real(wp), allocatable :: integral(:, :), square(:, :)  !! of the columns and of their squares over time, [summed, lanes]
     real(wp), allocatable :: first(:, :)                   !! values at `from`, [settled, lanes]
-    type(settling_history_t), allocatable :: kept(:)               !! [lanes]
-    real(wp), allocatable :: sample(:, :)                  !! of `ranged`, [ranged, places]
+    type(settling_history_t), allocatable :: history(:)    !! of `settled`, [lanes]
+    real(wp), allocatable :: sample(:, :)                  !! of one lane, work space, [ranged, nodes]
   end type window_t
 
   type, public :: sampled_statistics_t
-    type(recorded_columns_t) :: recorded
-    real(wp), private :: t_end = 0.0_wp
+    type(recorded_columns_t) :: recorded                          !! the columns with statistics
+    real(wp), private :: t_end = 0.0_wp                           !! of every variant [s]
     type(statistic_t), allocatable, private :: statistics(:)
-    integer, allocatable, private :: column(:)      !! of each statistic among the recorded
-    integer, allocatable, private :: window(:)        !! of each statistic
-    integer, allocatable, private :: position(:)       !! of its column in the list of the span
+    integer, allocatable, private :: column(:)                    !! among the recorded ones, [statistics]
+    integer, allocatable, private :: window(:)                    !! number in `windows`, 0 for values at the end; [statistics]
+    integer, allocatable, private :: position(:)                  !! of the column in the list of the window, [statistics]
     type(window_t), allocatable, private :: windows(:)
-    logical, private :: has_places = .false., has_nodes = .false.
-    real(wp), allocatable, private :: places(:)     !! of Chebyshev and Lobatto, -1 to 1
-    real(wp), allocatable, private :: to_series(:, :)
-    real(wp), allocatable, private :: nodes(:), weights(:)        !! of Gauss, 0 to 1
-    logical, allocatable, private :: active(:)                    !! lanes whose step is looked at
-    real(wp), allocatable, private :: start(:), sampled_start(:)  !! of the part of the step [s]
-    real(wp), allocatable, private :: values(:, :, :)             !! [places, columns, lanes]
-    real(wp), allocatable, private :: at_nodes(:, :, :)           !! [columns, nodes, lanes]
-    real(wp), allocatable, private :: final(:, :)                 !! [columns, lanes]
-    real(wp), allocatable, private :: row(:)                      !! [columns]
-    real(wp), allocatable, private :: t(:), theta(:), y(:, :)     !! where the lanes are looked at
+    logical, private :: has_ranges = .false., has_sums = .false.  !! of any window
+    real(wp), allocatable, private :: lobatto(:)                  !! nodes, -1 to 1
+    real(wp), allocatable, private :: to_series(:, :)             !! from values at them to Chebyshev coefficients
+    real(wp), allocatable, private :: gauss(:), weights(:)        !! nodes, 0 to 1
+    logical, allocatable, private :: active(:)                    !! lanes whose step is sampled
+    real(wp), allocatable, private :: start(:), sampled_start(:)  !! of the part of the step [s], [lanes]
+    real(wp), allocatable, private :: at_lobatto(:, :, :)         !! [columns, nodes, lanes]
+    real(wp), allocatable, private :: at_gauss(:, :, :)           !! [columns, nodes, lanes]
+    real(wp), allocatable, private :: final(:, :)                 !! values at the end, [columns, lanes]
+    real(wp), allocatable, private :: rows(:, :)                  !! values at the times `t`, [columns, lanes]
+    real(wp), allocatable, private :: t(:), theta(:), y(:, :)     !! of the sample, [lanes], [lanes, states + quadratures]
   contains
     procedure :: start_lane
     procedure :: add_steps
@@ -62,14 +62,16 @@ module nocdyn_sampled_statistics
 
 contains
 
+  !> Statistics of the variants that pass through the lanes of a formulation.
   function new_sampled_statistics(formulation, columns, statistics, t_end) result(self)
     class(formulation_t), intent(in) :: formulation
     type(column_t), intent(in) :: columns(:)         !! of the trajectory table
-    type(statistic_t), intent(in) :: statistics(:)
-    real(wp), intent(in) :: t_end                    !! [s]
+    type(statistic_t), intent(in) :: statistics(:)   !! each of a column
+    real(wp), intent(in) :: t_end                    !! of every variant [s]
     type(sampled_statistics_t) :: self
     integer, allocatable :: column_numbers(:), wanted(:)
 
+    if (size(statistics) == 0) return   ! without a copy of the formulation
     self%t_end = t_end
     allocate (self%statistics, source=statistics)
     allocate (column_numbers(size(statistics)), source=statistics%column)
@@ -80,8 +82,8 @@ contains
     associate (lanes => formulation%lanes)
       allocate (self%active(lanes), source=.false.)
       allocate (self%start(lanes), self%sampled_start(lanes), self%t(lanes), self%theta(lanes), source=0.0_wp)
-      allocate (self%y(lanes, formulation%states + formulation%quadratures), self%final(size(wanted), lanes), &
-                self%row(size(wanted)), source=0.0_wp)
+      allocate (self%y(lanes, formulation%states + formulation%quadratures), source=0.0_wp)
+      allocate (self%final(size(wanted), lanes), self%rows(size(wanted), lanes), source=0.0_wp)
     end associate
   end function new_sampled_statistics
 
@@ -94,16 +96,16 @@ contains
     distinct = pack([(i, i=1, maxval([0, list]))], [(any(list == i), i=1, maxval([0, list]))])
   end function distinct
 
-  !> Where the numbers of a list stand in another, 0 if they do not.
-  pure function positions_in(list, numbers) result(places)
+  !> The positions of numbers in a list, 0 for those that it does not have.
+  pure function positions_in(list, numbers) result(positions)
     integer, intent(in) :: list(:), numbers(:)
-    integer :: places(size(numbers))
+    integer :: positions(size(numbers))
     integer :: i
 
-    places = [(findloc(list, numbers(i), dim=1), i=1, size(numbers))]
+    positions = [(findloc(list, numbers(i), dim=1), i=1, size(numbers))]
   end function positions_in
 
-  !> One span for each `from`.
+  !> One window for each `from`.
   subroutine make_windows(self, lanes)
     type(sampled_statistics_t), intent(inout) :: self
     integer, intent(in) :: lanes
@@ -126,10 +128,11 @@ contains
     do i = 1, windows
       call fill_window(self, i, lanes)
     end do
-    self%has_places = any([(size(self%windows(i)%ranged) + size(self%windows(i)%settled) > 0, i=1, windows)])
-    self%has_nodes = any([(size(self%windows(i)%summed) > 0, i=1, windows)])
+    self%has_ranges = any([(size(self%windows(i)%ranged) + size(self%windows(i)%settled) > 0, i=1, windows)])
+    self%has_sums = any([(size(self%windows(i)%summed) > 0, i=1, windows)])
   end subroutine make_windows
 
+  !> Sorts the columns of a window by what their statistics need, and allocates that.
   subroutine fill_window(self, number, lanes)
     type(sampled_statistics_t), intent(inout) :: self
     integer, intent(in) :: number, lanes
@@ -149,19 +152,19 @@ contains
       allocate (window%has_started(lanes), source=.false.)
       allocate (window%integral(size(window%summed), lanes), window%square(size(window%summed), lanes), &
                 window%first(size(window%settled), lanes), source=0.0_wp)
-      allocate (window%kept(lanes), window%ranges(lanes))
+      allocate (window%history(lanes), window%ranges(lanes))
       do lane = 1, lanes
         call allocate_ranges(window%ranges(lane), size(window%ranged))
       end do
     end associate
   end subroutine fill_window
 
-  !> A lane starts anew; the numbers of its machine are in `recorded` already.
+  !> Starts a variant in a lane of which `recorded` has the parameters.
   subroutine start_lane(self, lane, t, y)
     class(sampled_statistics_t), intent(inout) :: self
     integer, intent(in) :: lane
-    real(wp), intent(in) :: t
-    real(wp), contiguous, intent(in) :: y(:)   !! [states + quadratures]
+    real(wp), intent(in) :: t                  !! [s]
+    real(wp), contiguous, intent(in) :: y(:)   !! the start, [states + quadratures]
     integer :: i
 
     call observe_lane(self, lane, t, y)
@@ -171,12 +174,12 @@ contains
         window%has_started(lane) = .false.
         window%integral(:, lane) = 0.0_wp
         window%square(:, lane) = 0.0_wp
-        call window%kept(lane)%clear()
+        call window%history(lane)%clear()
       end associate
     end do
   end subroutine start_lane
 
-  !> Brings one lane to a time and state, and leaves the others where they are.
+  !> Brings one lane to a time and state; the others stay where they are.
   subroutine observe_lane(self, lane, t, y)
     type(sampled_statistics_t), intent(inout) :: self
     integer, intent(in) :: lane
@@ -188,25 +191,24 @@ contains
     call self%recorded%observe(self%t, self%y)
   end subroutine observe_lane
 
-  !> The end of a lane.
+  !> Takes the end of a variant.
   subroutine finish_lane(self, lane, t, y)
     class(sampled_statistics_t), intent(inout) :: self
     integer, intent(in) :: lane
-    real(wp), intent(in) :: t
-    real(wp), contiguous, intent(in) :: y(:)
+    real(wp), intent(in) :: t                  !! [s]
+    real(wp), contiguous, intent(in) :: y(:)   !! the state there, [states + quadratures]
 
     call observe_lane(self, lane, t, y)
-    call self%recorded%fill_row(lane, self%t, self%y, self%row)
-    self%final(:, lane) = self%row
+    call self%recorded%fill_row(lane, self%t, self%y, self%final(:, lane))
   end subroutine finish_lane
 
-  !> The steps of a block.
+  !> Adds the last steps of the lanes.
   subroutine add_steps(self, steps, chosen, y, c)
     class(sampled_statistics_t), intent(inout) :: self
     type(step_block_t), intent(in) :: steps
-    logical, intent(in) :: chosen(:)                 !! lanes that are wanted
-    real(wp), contiguous, intent(in) :: y(:, :)      !! [lanes, padded columns]
-    real(wp), contiguous, intent(in) :: c(:, :, :)   !! [lanes, padded columns, degree]
+    logical, intent(in) :: chosen(:)                 !! lanes that are to be sampled, [lanes]
+    real(wp), contiguous, intent(in) :: y(:, :)      !! starts of the steps, [lanes, padded components]
+    real(wp), contiguous, intent(in) :: c(:, :, :)   !! coefficients of the steps, [lanes, padded components, degree]
     integer :: i, lane
 
     if (size(self%windows) == 0) return
@@ -225,29 +227,29 @@ contains
     end do
   end subroutine add_steps
 
-  !> Places and nodes for a degree of the solution inside the steps.
+  !> Nodes and work space for a degree of the solution inside the steps.
   subroutine allocate_work(self, degree)
     type(sampled_statistics_t), intent(inout) :: self
     integer, intent(in) :: degree
     integer :: i
 
-    if (allocated(self%places)) then
-      if (size(self%places) /= degree + 1) error stop 'nocdyn_sampled_statistics: the method must remain the same'
-      return
-    end if
-    allocate (self%places(degree + 1), self%to_series(degree + 1, degree + 1), self%nodes(degree + 1), self%weights(degree + 1))
-    call lobatto_nodes(degree, self%places, self%to_series)
-    call gauss_legendre_rule(degree + 1, self%nodes, self%weights)
-    associate (columns => size(self%row), lanes => size(self%active))
-      allocate (self%values(degree + 1, columns, lanes), self%at_nodes(columns, degree + 1, lanes), source=0.0_wp)
+    associate (nodes => degree + 1, columns => size(self%rows, 1), lanes => size(self%active))
+      if (allocated(self%lobatto)) then
+        if (size(self%lobatto) /= nodes) error stop 'nocdyn_sampled_statistics: the method must remain the same'
+        return
+      end if
+      allocate (self%lobatto(nodes), self%to_series(nodes, nodes), self%gauss(nodes), self%weights(nodes))
+      call lobatto_nodes(degree, self%lobatto, self%to_series)
+      call gauss_legendre_rule(nodes, self%gauss, self%weights)
+      allocate (self%at_lobatto(columns, nodes, lanes), self%at_gauss(columns, nodes, lanes), source=0.0_wp)
+      do i = 1, size(self%windows)
+        allocate (self%windows(i)%sample(size(self%windows(i)%ranged), nodes), source=0.0_wp)
+      end do
     end associate
-    do i = 1, size(self%windows)
-      allocate (self%windows(i)%sample(size(self%windows(i)%ranged), degree + 1), source=0.0_wp)
-    end do
   end subroutine allocate_work
 
-  !> The columns at the places and nodes of the parts of the steps of the active lanes. A column that jumps at a crossing where
-  !> the step ends is taken right before: a jump is no part of the step.
+  !> Samples the columns in the parts of the steps of the active lanes. A column that jumps at a crossing where the step ends is
+  !> sampled right before it: the jump is no part of the step.
   subroutine sample_parts(self, steps, y, c)
     type(sampled_statistics_t), intent(inout) :: self
     type(step_block_t), intent(in) :: steps
@@ -256,40 +258,32 @@ contains
     integer :: i, lane, last
 
     self%sampled_start(:) = self%start
-    last = merge(size(self%places), 0, self%has_places)
+    last = merge(size(self%lobatto), 0, self%has_ranges)
     do i = 1, last
       self%t(:) = steps%t
       do lane = 1, size(self%active)
         if (.not. self%active(lane)) cycle
         half = 0.5_wp * (steps%t_new(lane) - self%start(lane))
-        self%t(lane) = self%start(lane) + half + self%places(i) * half
+        self%t(lane) = self%start(lane) + half + self%lobatto(i) * half
         if (i == last .and. steps%crosses(lane)) then
           self%t(lane) = max(self%start(lane), steps%t_new(lane) - before_jump * spacing(steps%t_new(lane)))
         end if
       end do
-      call sample_states(self, steps, y, c)
-      do lane = 1, size(self%active)
-        if (.not. self%active(lane)) cycle
-        call self%recorded%fill_row(lane, self%t, self%y, self%row)
-        self%values(i, :, lane) = self%row
-      end do
+      call sample_rows(self, steps, y, c)
+      self%at_lobatto(:, i, :) = self%rows
     end do
-    do i = 1, merge(size(self%nodes), 0, self%has_nodes)
+    do i = 1, merge(size(self%gauss), 0, self%has_sums)
       self%t(:) = steps%t
       do lane = 1, size(self%active)
-        if (self%active(lane)) self%t(lane) = self%start(lane) + self%nodes(i) * (steps%t_new(lane) - self%start(lane))
+        if (self%active(lane)) self%t(lane) = self%start(lane) + self%gauss(i) * (steps%t_new(lane) - self%start(lane))
       end do
-      call sample_states(self, steps, y, c)
-      do lane = 1, size(self%active)
-        if (.not. self%active(lane)) cycle
-        call self%recorded%fill_row(lane, self%t, self%y, self%row)
-        self%at_nodes(:, i, lane) = self%row
-      end do
+      call sample_rows(self, steps, y, c)
+      self%at_gauss(:, i, :) = self%rows
     end do
   end subroutine sample_parts
 
-  !> Observes the active lanes at the times t, and the others where their steps start.
-  subroutine sample_states(self, steps, y, c)
+  !> Takes the rows of the active lanes at the times `t`; the other lanes are observed where their steps start.
+  subroutine sample_rows(self, steps, y, c)
     type(sampled_statistics_t), intent(inout) :: self
     type(step_block_t), intent(in) :: steps
     real(wp), contiguous, intent(in) :: y(:, :), c(:, :, :)
@@ -310,9 +304,12 @@ contains
       end associate
     end do
     call self%recorded%observe(self%t, self%y)
-  end subroutine sample_states
+    do lane = 1, size(self%active)
+      if (self%active(lane)) call self%recorded%fill_row(lane, self%t, self%y, self%rows(:, lane))
+    end do
+  end subroutine sample_rows
 
-  !> Takes part of a lane's step into what is kept of a span.
+  !> Adds the part of a lane's step to what a window accumulates.
   subroutine accumulate(self, window, lane, t_end)
     type(sampled_statistics_t), intent(in) :: self
     type(window_t), intent(inout) :: window
@@ -322,23 +319,25 @@ contains
 
     associate (duration => t_end - self%start(lane))
       do i = 1, size(window%ranged)
-        window%sample(i, :) = self%values(:, window%ranged(i), lane)
+        window%sample(i, :) = self%at_lobatto(window%ranged(i), :, lane)
       end do
       if (.not. window%has_started(lane)) then
         call start_ranges(window%ranges(lane), window%sample(:, 1), self%start(lane))
         do i = 1, size(window%settled)
-          window%first(i, lane) = self%values(1, window%settled(i), lane)
+          window%first(i, lane) = self%at_lobatto(window%settled(i), 1, lane)
         end do
       end if
       window%has_started(lane) = .true.
       if (size(window%ranged) > 0) then
-        call widen_ranges(size(self%places), self%places, self%to_series, window%sample, window%ranges(lane), self%start(lane), &
-                          t_end)
+        call widen_ranges(size(self%lobatto), self%lobatto, self%to_series, window%sample, window%ranges(lane), &
+                          self%start(lane), t_end)
       end if
-      if (size(window%settled) > 0) call window%kept(lane)%add(self%start(lane), t_end, window%settled, self%values(:, :, lane))
+      if (size(window%settled) > 0) then
+        call window%history(lane)%add(self%start(lane), t_end, window%settled, self%at_lobatto(:, :, lane))
+      end if
       do i = 1, size(window%summed)
-        do k = 1, size(self%nodes)
-          associate (x => self%at_nodes(window%summed(i), k, lane))
+        do k = 1, size(self%gauss)
+          associate (x => self%at_gauss(window%summed(i), k, lane))
             window%integral(i, lane) = window%integral(i, lane) + duration * self%weights(k) * x
             window%square(i, lane) = window%square(i, lane) + duration * self%weights(k) * x**2
           end associate
@@ -347,7 +346,7 @@ contains
     end associate
   end subroutine accumulate
 
-  !> A statistic of a lane that has reached its end.
+  !> The value of a statistic in a lane that has reached its end.
   real(wp) function value(self, number, lane)
     class(sampled_statistics_t), intent(in) :: self
     integer, intent(in) :: number   !! of the statistic
@@ -374,9 +373,8 @@ contains
           value = sqrt(window%square(i, lane) / (self%t_end - window%from))
         case (statistic_settling_time)
           associate (end_value => self%final(self%column(number), lane))
-            value = window%kept(lane)%last_exit(self%to_series, i, end_value, &
-                                              statistic%band * abs(window%first(i, lane) - end_value)) &
-                    - window%from
+            value = window%history(lane)%last_exit(self%to_series, i, end_value, &
+                                                   statistic%band * abs(window%first(i, lane) - end_value)) - window%from
           end associate
         case default
           error stop 'nocdyn_sampled_statistics: there is no such statistic'

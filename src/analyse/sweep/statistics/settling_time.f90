@@ -1,19 +1,20 @@
-!> Columns kept over the steps of a lane, to find once their ends are known when they last left a band around them.
+!> Settling times. A settling time is the last time at which a column leaves a band around its end value. That value is known
+!> at the end only, so that the course of the column is stored until then.
 module nocdyn_settling_time
   use nocdyn_chebyshev, only: differentiate, max_nodes, series_value
   use nocdyn_kinds, only: wp
   implicit none (type, external)
   private
 
-  integer, parameter :: first_room = 64          !! steps
-  real(wp), parameter :: largest_ratio = 4.0_wp  !! of a polynomial to its values at up to 40 Chebyshev-Lobatto places
-  integer, parameter :: max_halvings = 50       !! of a step
+  integer, parameter :: first_room = 64          ! steps
+  real(wp), parameter :: largest_ratio = 4.0_wp  ! of a polynomial to its values at up to 40 Chebyshev-Lobatto nodes
+  integer, parameter :: max_halvings = 50        ! of a step
 
-  !> The values at the Chebyshev-Lobatto places of every step. The room stays from one variant to the next.
+  !> The values of some columns at the Chebyshev-Lobatto nodes of every step of a lane. The memory is kept for the next variant.
   type, public :: settling_history_t
     integer, private :: steps = 0
-    real(wp), allocatable, private :: t(:, :)           !! start and end, [2, room]
-    real(wp), allocatable, private :: values(:, :, :)   !! [places, columns, room]
+    real(wp), allocatable, private :: t(:, :)           !! start and end of each step [s], [2, room]
+    real(wp), allocatable, private :: values(:, :, :)   !! [nodes, columns, room]
   contains
     procedure :: clear
     procedure :: add
@@ -22,28 +23,30 @@ module nocdyn_settling_time
 
 contains
 
+  !> Forgets the steps.
   subroutine clear(self)
     class(settling_history_t), intent(inout) :: self
 
     self%steps = 0
   end subroutine clear
 
+  !> Adds a step.
   subroutine add(self, t_start, t_end, columns, values)
     class(settling_history_t), intent(inout) :: self
-    real(wp), intent(in) :: t_start, t_end
-    integer, intent(in) :: columns(:)                  !! those that are kept
-    real(wp), contiguous, intent(in) :: values(:, :)   !! [places, all columns]
+    real(wp), intent(in) :: t_start, t_end             !! [s]
+    integer, intent(in) :: columns(:)                  !! that are stored
+    real(wp), contiguous, intent(in) :: values(:, :)   !! [all columns, nodes]
     integer :: i
 
     if (.not. allocated(self%t)) then
-      allocate (self%t(2, first_room), self%values(size(values, 1), size(columns), first_room))
+      allocate (self%t(2, first_room), self%values(size(values, 2), size(columns), first_room))
     else if (self%steps == size(self%t, 2)) then
       call grow(self)
     end if
     self%steps = self%steps + 1
     self%t(:, self%steps) = [t_start, t_end]
     do i = 1, size(columns)
-      self%values(:, i, self%steps) = values(:, columns(i))
+      self%values(:, i, self%steps) = values(columns(i), :)
     end do
   end subroutine add
 
@@ -58,13 +61,15 @@ contains
     call move_alloc(values, self%values)
   end subroutine grow
 
-  !> The last time at which a column is farther from `end_value` than `tolerance`; the start of the steps if it never is.
+  !> The last time [s] at which a column differs from `end_value` by more than `tolerance`, the start of the steps if there is
+  !> none.
   pure real(wp) function last_exit(self, to_series, column, end_value, tolerance)
     class(settling_history_t), intent(in) :: self
     real(wp), intent(in) :: to_series(:, :)   !! of `lobatto_nodes`
-    integer, intent(in) :: column
-    real(wp), intent(in) :: end_value, tolerance
-    real(wp) :: deviations(max_nodes), c(max_nodes), place
+    integer, intent(in) :: column             !! number among the stored ones
+    real(wp), intent(in) :: end_value         !! of the column
+    real(wp), intent(in) :: tolerance         !! half the width of the band
+    real(wp) :: deviations(max_nodes), c(max_nodes), position
     logical :: found
     integer :: i, n, step
 
@@ -77,23 +82,23 @@ contains
       do i = 1, n
         c(:n) = c(:n) + to_series(:, i) * deviations(i)
       end do
-      call find_exit(n, c, tolerance, place, found)
+      call find_exit(n, c, tolerance, position, found)
       if (.not. found) cycle
-      last_exit = self%t(1, step) + 0.5_wp * (1 + place) * (self%t(2, step) - self%t(1, step))
-      if (place >= 1) last_exit = self%t(2, step)
+      last_exit = self%t(1, step) + 0.5_wp * (1 + position) * (self%t(2, step) - self%t(1, step))
+      if (position >= 1) last_exit = self%t(2, step)
       return
     end do
   end function last_exit
 
-  !> The last place in [-1, 1] at which |p| > tolerance. A part of the step is halved until a bound says that p stays in the band
-  !> or does not turn.
-  pure subroutine find_exit(n, c, tolerance, place, found)
+  !> The last position in [-1, 1] at which |p| > tolerance. Parts of the step are halved until a bound shows that p stays in the
+  !> band or is monotonic.
+  pure subroutine find_exit(n, c, tolerance, position, found)
     integer, intent(in) :: n
     real(wp), intent(in) :: c(n)   !! of p, as a sum of Chebyshev polynomials
     real(wp), intent(in) :: tolerance
-    real(wp), intent(out) :: place
+    real(wp), intent(out) :: position
     logical, intent(out) :: found
-    real(wp) :: left(max_halvings + 2), right(max_halvings + 2)   ! parts that are left, the last of them is next
+    real(wp) :: left(max_halvings + 2), right(max_halvings + 2)   ! parts to be searched, the last one first
     real(wp) :: slopes(n), bend, half, middle, slope
     integer :: parts
 
@@ -108,21 +113,20 @@ contains
       half = 0.5_wp * (right(parts) - left(parts))
       middle = left(parts) + half
       slope = series_value(n, slopes, middle)
-      place = right(parts)
-      if (abs(series_value(n, c, place)) > tolerance) return
+      position = right(parts)
+      if (abs(series_value(n, c, position)) > tolerance) return
       if (abs(series_value(n, c, middle)) + half * (abs(slope) + 0.5_wp * half * bend) <= tolerance &
           .or. parts > max_halvings) then
         parts = parts - 1
       else if (abs(slope) > half * bend) then
         if (abs(series_value(n, c, left(parts))) > tolerance) then
-          call find_band_boundary(n, c, slopes, tolerance, left(parts), right(parts), place)
+          call find_band_boundary(n, c, slopes, tolerance, left(parts), right(parts), position)
           return
         end if
         parts = parts - 1
       else
         left(parts + 1) = middle
-        right(parts + 1) = right(parts)
-        right(parts) = middle
+        right(parts:parts + 1) = [middle, right(parts)]
         parts = parts + 1
       end if
     end do
@@ -141,32 +145,32 @@ contains
     end do
   end function largest_curvature
 
-  !> Where |p| = tolerance between a place outside the band and one inside, p not turning between them: Newton's method with
-  !> bisection as safeguard.
-  pure subroutine find_band_boundary(n, c, slopes, tolerance, outside, inside, place)
+  !> The position at which |p| = tolerance between one outside the band and one inside. p must be monotonic between them. Newton's
+  !> method, safeguarded by bisection.
+  pure subroutine find_band_boundary(n, c, slopes, tolerance, outside, inside, position)
     integer, intent(in) :: n
-    real(wp), intent(in) :: c(n), slopes(n)
+    real(wp), intent(in) :: c(n), slopes(n)        ! of p and of p'
     real(wp), intent(in) :: tolerance
-    real(wp), intent(in) :: outside, inside
-    real(wp), intent(out) :: place
+    real(wp), intent(in) :: outside, inside        ! positions
+    real(wp), intent(out) :: position
     real(wp) :: boundary, change, excess, last, next
     integer :: step
 
     last = outside
     next = inside
     boundary = sign(tolerance, series_value(n, c, outside))
-    place = 0.5_wp * (last + next)
+    position = 0.5_wp * (last + next)
     do step = 1, 2 * max_halvings
-      excess = series_value(n, c, place) - boundary
+      excess = series_value(n, c, position) - boundary
       if (excess * boundary > 0) then
-        last = place
+        last = position
       else
-        next = place
+        next = position
       end if
-      change = -excess / series_value(n, slopes, place)
-      if (place + change <= last .or. place + change >= next) change = 0.5_wp * (last + next) - place
-      place = place + change
-      if (abs(change) <= epsilon(place)) exit
+      change = -excess / series_value(n, slopes, position)
+      if (position + change <= last .or. position + change >= next) change = 0.5_wp * (last + next) - position
+      position = position + change
+      if (abs(change) <= epsilon(position)) exit
     end do
   end subroutine find_band_boundary
 

@@ -1,4 +1,4 @@
-!> Takes the statistics of a sweep from the variants that pass through the lanes of a block.
+!> Computes the statistics of a sweep while its variants are integrated in the lanes of a block.
 module nocdyn_statistics_observer
   use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
   use nocdyn_formulation, only: formulation_t
@@ -18,26 +18,28 @@ module nocdyn_statistics_observer
 
   public :: new_statistics_observer, needs_work_integrals
 
-  !> The times that are requested must be, or contain, the start and the end of the variants. After the first `start_lane` it must
-  !> stay where it is.
+  !> The requested times must be, or contain, the start and the end of the variants. After the first `start_lane` the observer
+  !> must stay where it is.
   !>
-  !> A statistic is taken by `linear` if its column allows, else by `sampled`. That of an extremum of an elastic moment is taken
-  !> by `spare` in the lanes where the moment does not rise with the twist. That of a torque of which the block has no column is
-  !> that of 0.
+  !> A statistic is computed by `linear` if its column allows it, else by `sampled`. An extremum of an elastic moment is computed
+  !> by `fallback` in the lanes where the moment does not increase with the twist. A torque that the machine of the block does not
+  !> have is 0 at all times.
   type, extends(observer_t), public :: statistics_observer_t
-    character(len=:), allocatable :: missing                  !! a quantity that the block lacks and that is no torque; '': none
+    character(len=:), allocatable :: missing                  !! a quantity without a column that is no torque, '' if none
     class(formulation_t), pointer, private :: block => null()
-    real(wp), private :: t_start = 0.0_wp, t_end = 0.0_wp     !! [s]
-    type(lane_parameters_t), private :: parameters                  !! of the block; none if its lanes keep the numbers that they
-                                                                    !! have
+    real(wp), private :: t_start = 0.0_wp, t_end = 0.0_wp     !! of every variant [s]
+    type(lane_parameters_t), private :: parameters            !! of the block; none if its lanes cannot change them
     type(linear_statistics_t), private :: linear
-    type(sampled_statistics_t), private :: sampled, spare
-    integer, allocatable, private :: in_linear(:), in_sampled(:), in_spare(:)   !! places of the statistics there, or 0
-    real(wp), allocatable, private :: otherwise(:)            !! values of the statistics that are neither there nor there
-    logical, private :: has_sampled = .false., has_spared = .false.   !! whether `sampled` is used, whether `spare` is now
-    integer, private :: first_component = 1, last_component = huge(1)   !! of the state, that `linear` follows inside steps
+    type(sampled_statistics_t), private :: sampled, fallback
+    integer, allocatable, private :: linear_index(:)          !! of each statistic in `linear`, or 0; [statistics]
+    integer, allocatable, private :: sampled_index(:)         !! in `sampled`, or 0
+    integer, allocatable, private :: fallback_index(:)        !! in `fallback`, or 0
+    real(wp), allocatable, private :: default_value(:)        !! where a statistic has no column, [statistics]
+    logical, private :: uses_sampled = .false.                !! whether `sampled` has statistics
+    logical, private :: uses_fallback = .false.               !! whether some lane needs `fallback` now
+    integer, private :: first_component = 1, last_component = huge(1)   !! of the state, that `linear` reads inside steps
     logical, allocatable, private :: all_lanes(:)             !! true
-    logical, allocatable, private :: is_spared(:)             !! lanes in which `spare` is used
+    logical, allocatable, private :: needs_fallback(:)        !! [lanes]
     logical, allocatable, private :: is_complete(:)           !! lanes that have reached the end
   contains
     procedure :: start_lane
@@ -48,7 +50,7 @@ module nocdyn_statistics_observer
 
 contains
 
-  !> Whether a statistic is of a column that is, or comes from, an integrated work.
+  !> Whether a statistic is of a work, or of the energy balance, and so needs the work integrals.
   logical function needs_work_integrals(formulation, statistics)
     class(formulation_t), intent(in) :: formulation
     type(statistic_t), intent(in) :: statistics(:)
@@ -66,17 +68,15 @@ contains
     end do
   end function needs_work_integrals
 
-  !> An observer of a block, which stays where it is. Only the reduced formulation may change the numbers of its lanes.
+  !> An observer of a block, which stays where it is. Only the reduced formulation may change the parameters of its lanes.
   function new_statistics_observer(block, statistics, t_start, t_end) result(self)
-    class(formulation_t), target, intent(inout) :: block   !! audited if `needs_work_integrals`
+    class(formulation_t), target, intent(inout) :: block   !! with work integrals if `needs_work_integrals`
     type(statistic_t), intent(in) :: statistics(:)         !! each with t_start <= from < t_end
     real(wp), intent(in) :: t_start, t_end                 !! of every variant [s]
     type(statistics_observer_t) :: self
-    logical, dimension(size(statistics)) :: has_extremum, linear, sampled
     type(statistic_t), allocatable :: found(:)
     type(column_t), allocatable :: columns(:)
     type(string_t), allocatable :: labels(:)
-    integer :: i
 
     self%block => block
     self%t_start = t_start
@@ -86,52 +86,62 @@ contains
     allocate (found, source=statistics)
     call find_columns(labels, found)
     self%missing = missing_quantity(found)
-    allocate (self%otherwise, source=value_of_zero_column(found))
-    has_extremum = .false.
-    linear = .false.
-    sampled = .false.
-    do i = 1, size(found)
-      if (found(i)%column == 0) cycle
-      associate (column => columns(found(i)%column), kind => found(i)%kind)
-        linear(i) = is_linear(block, column) .and. kind /= statistic_settling_time
-        sampled(i) = .not. linear(i)
-        if (sampled(i)) cycle
-        if (any(kind == [statistic_max, statistic_min, statistic_max_abs, statistic_time_of_max])) then
-          has_extremum(i) = has_law(block%machine, column)
-        end if
-      end associate
-    end do
-    allocate (self%in_linear, source=indices_among(linear))
-    allocate (self%in_sampled, source=indices_among(sampled))
-    allocate (self%in_spare, source=indices_among(has_extremum))
-    self%has_sampled = any(sampled)
-    call find_components(self, block, columns(pack([(found(i)%column, i=1, size(found))], &
-                                                   linear .and. [(found(i)%kind /= statistic_final, i=1, size(found))])))
-    self%linear = new_linear_statistics(block, columns, pack(found, linear), t_start, t_end)
-    self%sampled = new_sampled_statistics(block, columns, pack(found, sampled), t_end)
-    self%spare = new_sampled_statistics(block, columns, pack(found, has_extremum), t_end)
+    allocate (self%default_value, source=value_of_zero_column(found))
+    call distribute(self, found, columns)
     allocate (self%all_lanes(block%lanes), source=.true.)
-    allocate (self%is_spared(block%lanes), self%is_complete(block%lanes), source=.false.)
+    allocate (self%needs_fallback(block%lanes), self%is_complete(block%lanes), source=.false.)
     select type (block)
     class is (reduced_t)
       call block%list_parameters(self%parameters)
     end select
   end function new_statistics_observer
 
-  !> The components of the state whose course inside the steps matters to linear columns.
-  subroutine find_components(self, block, columns)
+  !> Chooses how each statistic is computed.
+  subroutine distribute(self, statistics, columns)
     type(statistics_observer_t), intent(inout) :: self
-    class(formulation_t), intent(in) :: block
-    type(column_t), intent(in) :: columns(:)
-    type(linear_columns_t) :: followed
+    type(statistic_t), intent(in) :: statistics(:)
+    type(column_t), intent(in) :: columns(:)   !! of the trajectory table
+    logical, dimension(size(statistics)) :: has_fallback, is_of_linear, is_of_steps
+    integer :: i
 
-    followed = new_linear_columns(block, columns)
-    if (size(followed%component) == 0) return
-    self%first_component = minval(followed%component)
-    self%last_component = maxval(followed%component)
+    has_fallback = .false.
+    is_of_linear = .false.
+    do i = 1, size(statistics)
+      if (statistics(i)%column == 0 .or. statistics(i)%kind == statistic_settling_time) cycle
+      associate (column => columns(statistics(i)%column), kind => statistics(i)%kind)
+        is_of_linear(i) = is_linear(self%block, column)
+        if (.not. is_of_linear(i)) cycle
+        if (any(kind == [statistic_max, statistic_min, statistic_max_abs, statistic_time_of_max])) then
+          has_fallback(i) = has_law(self%block%machine, column)
+        end if
+      end associate
+    end do
+    associate (is_of_sampled => statistics%column > 0 .and. .not. is_of_linear)
+      self%uses_sampled = any(is_of_sampled)
+      allocate (self%linear_index, source=indices_among(is_of_linear))
+      allocate (self%sampled_index, source=indices_among(is_of_sampled))
+      allocate (self%fallback_index, source=indices_among(has_fallback))
+      self%linear = new_linear_statistics(self%block, columns, pack(statistics, is_of_linear), self%t_start, self%t_end)
+      self%sampled = new_sampled_statistics(self%block, columns, pack(statistics, is_of_sampled), self%t_end)
+      self%fallback = new_sampled_statistics(self%block, columns, pack(statistics, has_fallback), self%t_end)
+    end associate
+    is_of_steps = is_of_linear .and. statistics%kind /= statistic_final
+    call find_components(self, columns(pack(statistics%column, is_of_steps)))
+  end subroutine distribute
+
+  !> Finds the components of the state that linear columns read inside the steps.
+  subroutine find_components(self, columns)
+    type(statistics_observer_t), intent(inout) :: self
+    type(column_t), intent(in) :: columns(:)   !! those with statistics of the steps
+    type(linear_columns_t) :: linear
+
+    linear = new_linear_columns(self%block, columns)
+    if (size(linear%component) == 0) return
+    self%first_component = minval(linear%component)
+    self%last_component = maxval(linear%component)
   end subroutine find_components
 
-  !> The first quantity without a column that is not 0 for want of it; '' if there is none.
+  !> The first quantity without a column that is no torque, '' if there is none.
   pure function missing_quantity(found) result(quantity)
     type(statistic_t), intent(in) :: found(:)
     character(len=:), allocatable :: quantity
@@ -143,38 +153,38 @@ contains
     end do
   end function missing_quantity
 
-  !> The numbers of the true ones among themselves, 0 for the others.
-  pure function indices_among(mask) result(places)
+  !> Numbers the true elements of a mask from 1 on; 0 for the others.
+  pure function indices_among(mask) result(indices)
     logical, intent(in) :: mask(:)
-    integer :: places(size(mask))
+    integer :: indices(size(mask))
     integer :: i
 
-    places = [(merge(count(mask(:i)), 0, mask(i)), i=1, size(mask))]
+    indices = [(merge(count(mask(:i)), 0, mask(i)), i=1, size(mask))]
   end function indices_among
 
-  !> A lane of the block has been given a variant that starts at y.
+  !> Starts the statistics of a variant that has been set in a lane of the block.
   subroutine start_lane(self, lane, y)
-    class(statistics_observer_t), intent(inout) :: self
+    class(statistics_observer_t), target, intent(inout) :: self
     integer, intent(in) :: lane
-    real(wp), contiguous, intent(in) :: y(:)   !! [states + quadratures]
+    real(wp), contiguous, intent(in) :: y(:)   !! the start, [states + quadratures]
     integer :: i
 
     self%is_complete(lane) = .false.
-    self%is_spared(lane) = .false.
+    self%needs_fallback(lane) = .false.
     call self%linear%start_lane(self%block, lane, y)
-    do i = 1, size(self%in_spare)
-      if (self%in_spare(i) == 0) cycle
-      if (.not. self%linear%is_increasing(self%in_linear(i), lane)) self%is_spared(lane) = .true.
+    do i = 1, size(self%fallback_index)
+      if (self%fallback_index(i) == 0) cycle
+      if (.not. self%linear%is_increasing(self%linear_index(i), lane)) self%needs_fallback(lane) = .true.
     end do
-    self%has_spared = any(self%is_spared)
+    self%uses_fallback = any(self%needs_fallback)
     self%first_read = 1
     self%last_read = huge(1)
-    if (.not. (self%has_sampled .or. self%has_spared)) then
+    if (.not. (self%uses_sampled .or. self%uses_fallback)) then
       self%first_read = self%first_component
       self%last_read = self%last_component
     end if
-    if (self%has_sampled) call start_sampled(self, self%sampled, lane, y)
-    if (self%is_spared(lane)) call start_sampled(self, self%spare, lane, y)
+    if (self%uses_sampled) call start_sampled(self, self%sampled, lane, y)
+    if (self%needs_fallback(lane)) call start_sampled(self, self%fallback, lane, y)
   end subroutine start_lane
 
   subroutine start_sampled(self, sampled, lane, y)
@@ -197,19 +207,21 @@ contains
     values(:) = ieee_value(1.0_wp, ieee_quiet_nan)
     if (.not. self%is_complete(lane)) return
     do i = 1, size(values)
-      if (self%in_sampled(i) > 0) then
-        values(i) = self%sampled%value(self%in_sampled(i), lane)
-        cycle
-      end if
-      values(i) = self%otherwise(i)
-      if (self%in_linear(i) == 0) cycle
-      values(i) = self%linear%value(self%in_linear(i), lane)
-      if (self%in_spare(i) == 0) cycle
-      if (.not. self%linear%is_increasing(self%in_linear(i), lane)) values(i) = self%spare%value(self%in_spare(i), lane)
+      associate (linear => self%linear_index(i), sampled => self%sampled_index(i), fallback => self%fallback_index(i))
+        if (sampled > 0) then
+          values(i) = self%sampled%value(sampled, lane)
+        else if (linear == 0) then
+          values(i) = self%default_value(i)
+        else if (fallback == 0 .or. self%linear%is_increasing(linear, lane)) then
+          values(i) = self%linear%value(linear, lane)
+        else
+          values(i) = self%fallback%value(fallback, lane)
+        end if
+      end associate
     end do
   end subroutine results
 
-  !> Only the end is of interest.
+  !> Takes the end of a lane.
   subroutine on_output(self, lane, t, y)
     class(statistics_observer_t), intent(inout) :: self
     integer, intent(in) :: lane
@@ -219,7 +231,7 @@ contains
     if (t < self%t_end) return
     self%is_complete(lane) = .true.
     call self%linear%finish_lane(lane, y)
-    if (self%has_sampled) call self%sampled%finish_lane(lane, t, y)
+    if (self%uses_sampled) call self%sampled%finish_lane(lane, t, y)
   end subroutine on_output
 
   subroutine on_steps(self, steps, y, y_new, c)
@@ -228,8 +240,8 @@ contains
     real(wp), contiguous, intent(in) :: y(:, :), y_new(:, :), c(:, :, :)
 
     call self%linear%add_steps(steps, y, y_new, c)
-    if (self%has_sampled) call self%sampled%add_steps(steps, self%all_lanes, y, c)
-    if (self%has_spared) call self%spare%add_steps(steps, self%is_spared, y, c)
+    if (self%uses_sampled) call self%sampled%add_steps(steps, self%all_lanes, y, c)
+    if (self%uses_fallback) call self%fallback%add_steps(steps, self%needs_fallback, y, c)
   end subroutine on_steps
 
 end module nocdyn_statistics_observer
