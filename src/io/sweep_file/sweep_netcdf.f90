@@ -1,7 +1,7 @@
-!> sweep.nc: the results of a sweep as NetCDF-4, made of its journals chunk by chunk.
+!> The file sweep.nc: the results of a sweep as NetCDF-4, copied from its journals chunk by chunk.
 !>
-!> The file depends on the results alone, byte for byte: no time, no host, and NetCDF keeps HDF5 from noting when an object
-!> was made. Numbers are not compressed: the last digits of what was computed are noise.
+!> Its bytes depend on the results alone: it holds neither time nor host, and NetCDF tells HDF5 not to store when an object was
+!> created. Numbers are not compressed: the last digits of computed numbers are noise.
 module nocdyn_sweep_netcdf
   use, intrinsic :: iso_c_binding, only: c_associated, c_char, c_f_procpointer, c_funptr, c_int, c_loc, &
     c_null_char, c_null_ptr
@@ -28,22 +28,22 @@ module nocdyn_sweep_netcdf
 
   character(len=14), parameter :: own_names(5) = &
     [character(len=14) :: 'variant', 'status', 'steps', 'failed_variant', 'reason']
-  integer, parameter :: block_variants = 16384   !! written at once, so that a variable is touched rarely
+  integer, parameter :: block_variants = 16384   ! of one write to each variable
   integer, parameter :: chunk_failures = 4096
-  integer, parameter :: megabyte = 2**20      !! the library's unit for caches
+  integer, parameter :: megabyte = 2**20      ! the library's unit for the size of caches
 
-  !> The file on its way. After the first failure nothing more is done.
+  !> The file while it is written. After the first failure nothing more is written.
   type :: netcdf_file_t
     integer :: id = -1
     integer :: variant_dimension = 0, failure_dimension = 0, reason_dimension = 0
-    integer :: variant = 0, status = 0, steps = 0, failed_variant = 0, reason = 0   ! variables
+    integer :: variant = 0, status = 0, steps = 0, failed_variant = 0, reason = 0   ! numbers of variables
     integer, allocatable :: parameters(:), results(:)
     type(string_t), allocatable :: names(:)                                          ! of the variables, so far
     character(len=:), allocatable :: failure
     integer :: written = 0, failures = 0                                             ! rows
   end type netcdf_file_t
 
-  !> Rows that wait to be written.
+  !> Rows that are not yet written.
   type :: rows_t
     integer :: count = 0
     real(wp), allocatable :: parameters(:, :), results(:, :)   ! [rows, columns]
@@ -59,7 +59,7 @@ module nocdyn_sweep_netcdf
 
 contains
 
-  !> Writes sweep.nc of a whole sweep into `folder`, all of it or nothing.
+  !> Writes sweep.nc of a whole sweep into `folder`: the complete file or none.
   subroutine write_sweep_netcdf(folder, journals, error)
     character(len=*), intent(in) :: folder
     type(sweep_journal_t), intent(inout) :: journals(:)   !! of all shards
@@ -90,10 +90,10 @@ contains
     if (allocated(file%failure)) call raise(error, exit_file, 'cannot write ' // quoted(path) // ': ' // file%failure)
   end subroutine write_sweep_netcdf
 
-  !> Keeps the reason of the first failure; that of the disk is clearer than the library's.
+  !> Keeps the reason of the first failure. The reason that the disk gives is clearer than that of the library.
   subroutine check(file, status)
     type(netcdf_file_t), intent(inout) :: file
-    integer, intent(in) :: status               !! that the library answered
+    integer, intent(in) :: status               !! of a call of the library
 
     if (status == nf90_noerr .or. allocated(file%failure)) return
     if (status == nf90_ehdferr .or. status > 0) file%failure = disk_failure()
@@ -103,7 +103,7 @@ contains
     file%failure = trim(nf90_strerror(status))
   end subroutine check
 
-  !> HDF5 1.10 crashes at the end of a program one of whose files the disk had no room for: let it do nothing there.
+  !> Tells HDF5 to do nothing when the program ends: HDF5 1.10 crashes there if the disk was full while a file was written.
   subroutine keep_library_from_crashing()
     procedure(setting_interface), pointer :: keep_silent
     type(c_funptr) :: address
@@ -115,7 +115,7 @@ contains
     status = keep_silent()
   end subroutine keep_library_from_crashing
 
-  !> Makes the file with its dimensions, variables and attributes.
+  !> Creates the file with its dimensions, variables and attributes.
   subroutine create_file(file, path, journals)
     type(netcdf_file_t), intent(inout) :: file
     character(len=*), intent(in) :: path
@@ -140,7 +140,7 @@ contains
     if (.not. allocated(file%failure)) call check(file, nf90_enddef(file%id))
   end subroutine create_file
 
-  !> What the header says of the sweep as a whole.
+  !> Writes the global attributes.
   subroutine put_attributes(file, header)
     type(netcdf_file_t), intent(inout) :: file
     type(sweep_header_t), intent(in) :: header
@@ -154,13 +154,13 @@ contains
     if (header%list_checksum /= '') call put_text(file, nf90_global, 'list_checksum', header%list_checksum)
   end subroutine put_attributes
 
-  !> The library marks characters as ASCII; only strings are UTF-8.
+  !> Writes an attribute. The library declares characters as ASCII, so that other texts are written as strings, in UTF-8.
   subroutine put_text(file, variable, name, text)
     type(netcdf_file_t), intent(inout) :: file
     integer, intent(in) :: variable
     character(len=*), intent(in) :: name, text
     character(kind=c_char), allocatable, target :: string(:)
-    character(len=storage_size(c_null_ptr) / storage_size('c')) :: address   ! of the string: what the library copies from
+    character(len=storage_size(c_null_ptr) / storage_size('c')) :: address   ! of the string, from which the library copies
 
     if (has_utf_8(text)) then
       allocate (string, source=transfer(text // c_null_char, [c_null_char]))
@@ -171,7 +171,7 @@ contains
     end if
   end subroutine put_text
 
-  !> A variable over one dimension.
+  !> Defines a variable over one dimension.
   subroutine define(file, name, kind, dimension, long_name, variable)
     type(netcdf_file_t), intent(inout) :: file
     character(len=*), intent(in) :: name, long_name
@@ -182,16 +182,16 @@ contains
 
     possible = name
     status = nf90_def_var(file%id, possible, kind, [dimension], variable)
-    if (status == nf90_ebadname) then   ! Latin-1, say: names must be UTF-8
+    if (status == nf90_ebadname) then   ! names must be UTF-8; this is Latin-1, for example
       possible = ascii(name)
       status = nf90_def_var(file%id, possible, kind, [dimension], variable)
     end if
-    do while (status == nf90_enameinuse)   ! two names in which only such letters differ
+    do while (status == nf90_enameinuse)   ! only such letters differ
       possible = possible // '_'
       status = nf90_def_var(file%id, possible, kind, [dimension], variable)
     end do
     call check(file, status)
-    ! every variant is written: filling before that would be the same work again
+    ! every variant is written, so that filling the variable before would double the work
     if (dimension == file%variant_dimension) call check(file, nf90_def_var_fill(file%id, variable, 1, 0))
     call put_text(file, variable, 'long_name', long_name)
   end subroutine define
@@ -207,7 +207,7 @@ contains
     end do
   end function ascii
 
-  !> One variable per quantity, named by its label as far as NetCDF lets it; the attribute `label` has it as it is.
+  !> Defines a variable for each quantity. Its name is the label as far as NetCDF allows; the attribute `label` has all of it.
   subroutine define_quantities(file, quantities, role, variables)
     type(netcdf_file_t), intent(inout) :: file
     type(quantity_t), intent(in) :: quantities(:)
@@ -226,7 +226,7 @@ contains
     end do
   end subroutine define_quantities
 
-  !> The label without slashes, which NetCDF has for groups, not too long and not yet in use.
+  !> The label without slashes, which separate groups in NetCDF; shortened, and made different from the names in use.
   function new_name(file, label) result(name)
     type(netcdf_file_t), intent(inout) :: file
     character(len=*), intent(in) :: label
@@ -243,10 +243,10 @@ contains
     call append(file%names, name)
   end function new_name
 
-  !> How the variants ended, and why some did not.
+  !> Defines the variables for the status of the variants and for the reasons of those that are not done.
   subroutine define_status_variables(file, longest)
     type(netcdf_file_t), intent(inout) :: file
-    integer, intent(in) :: longest   !! reason [characters]
+    integer, intent(in) :: longest   !! length of a reason [characters]
 
     call define(file, 'status', nf90_byte, file%variant_dimension, 'how the variant ended', file%status)
     call check(file, nf90_put_att(file%id, file%status, 'flag_values', [integer(int8) :: 0, 1, 2]))
@@ -255,7 +255,7 @@ contains
     call define(file, 'steps', nf90_int, file%variant_dimension, 'steps of the integration', file%steps)
     call define(file, 'failed_variant', nf90_int, file%failure_dimension, 'number of a variant that is not done', &
                 file%failed_variant)
-    ! the cache of the library would keep many chunks that are never looked at again
+    ! by default the cache of the library would hold many chunks that are never read again
     call check(file, nf90_def_var(file%id, 'reason', nf90_char, [file%reason_dimension, file%failure_dimension], file%reason, &
                                  chunksizes=[longest, chunk_failures], deflate_level=1, &
                                  cache_size=1 + longest * chunk_failures / megabyte))
@@ -264,7 +264,7 @@ contains
     call check(file, nf90_def_var_chunking(file%id, file%failed_variant, nf90_chunked, [chunk_failures]))
   end subroutine define_status_variables
 
-  !> Copies the journals into the file.
+  !> Copies the chunks of the journals into the file.
   subroutine write_rows(file, journals, error)
     type(netcdf_file_t), intent(inout) :: file
     type(sweep_journal_t), intent(inout) :: journals(:)
@@ -330,7 +330,7 @@ contains
   subroutine write_failures(file, chunk)
     type(netcdf_file_t), intent(inout) :: file
     type(chunk_t), intent(in) :: chunk
-    integer, allocatable :: positions(:)   ! in the chunk
+    integer, allocatable :: positions(:)   ! of these variants in the chunk
     integer :: i
 
     allocate (positions(count(chunk%status /= status_done)))
@@ -357,7 +357,7 @@ contains
     call check(file, nf90_put_var(file%id, file%reason, reasons, [1, file%failures + 1], [longest, size(positions)]))
   end subroutine write_reasons
 
-  !> What the library still holds goes to the disk here.
+  !> Closes the file; the library writes what it still holds.
   subroutine close_file(file)
     type(netcdf_file_t), intent(inout) :: file
     integer :: status

@@ -1,4 +1,4 @@
-!> Of which sweep a sweep.nc is.
+!> Which program and input a sweep.nc is of.
 module nocdyn_sweep_provenance
   use netcdf, only: nf90_close, nf90_ehdferr, nf90_enotatt, nf90_get_att, nf90_global, nf90_inquire_attribute, nf90_noerr, &
     nf90_nowrite, nf90_open, nf90_strerror
@@ -12,7 +12,7 @@ module nocdyn_sweep_provenance
 
 contains
 
-  !> Source, input and the checksum of a list, nothing else of a header.
+  !> Reads the source, the input and the checksum of a list, and nothing else of a header.
   subroutine read_provenance(folder, header, error)
     character(len=*), intent(in) :: folder
     type(sweep_header_t), intent(out) :: header
@@ -30,12 +30,12 @@ contains
                                          trim(nf90_strerror(status)))
   end subroutine read_provenance
 
-  !> A text of the file as a whole; '' if it does not have it.
+  !> A global attribute that is a text; '' if the file does not have it.
   subroutine read_text(id, name, text, status)
     integer, intent(in) :: id                              !! of the file
     character(len=*), intent(in) :: name
     character(len=:), allocatable, intent(out) :: text
-    integer, intent(out) :: status                         !! that the library answered
+    integer, intent(out) :: status                         !! of the library
     integer :: length
 
     status = nf90_inquire_attribute(id, nf90_global, name, len=length)

@@ -12,11 +12,11 @@ module nocdyn_journal_chunks
 
   public :: check_sweep
 
-  integer, parameter :: max_listed = 3   !! of equal things in a message
+  integer, parameter :: max_listed = 3   ! ranges or names in a message
 
-  !> Where the next chunk is; to begin again, begin again.
+  !> The position of the next chunk. `rewind_to_start` goes to the first one.
   type, public :: chunk_cursor_t
-    integer, allocatable, private :: journal(:), entry(:)   !! in the order of the variants
+    integer, allocatable, private :: journal(:), entry(:)   !! of each chunk, in the order of the variants
     integer, private :: next = 1
   contains
     procedure :: rewind_to_start
@@ -25,6 +25,7 @@ module nocdyn_journal_chunks
 
 contains
 
+  !> Goes to the first chunk.
   subroutine rewind_to_start(self, journals)
     class(chunk_cursor_t), intent(inout) :: self
     type(sweep_journal_t), intent(in) :: journals(:)
@@ -39,10 +40,11 @@ contains
     self%next = 1
   end subroutine rewind_to_start
 
+  !> The variants of the entries of all journals.
   pure subroutine list_entries(journals, ranges, journal, entry)
     type(sweep_journal_t), intent(in) :: journals(:)
     type(range_t), allocatable, intent(out) :: ranges(:)
-    integer, allocatable, intent(out) :: journal(:), entry(:)   !! where each is from
+    integer, allocatable, intent(out) :: journal(:), entry(:)   !! number of the journal, and of the entry in it
     integer :: i, last, k
 
     allocate (ranges(sum(journals%entries)), journal(sum(journals%entries)), entry(sum(journals%entries)))
@@ -57,12 +59,12 @@ contains
     end do
   end subroutine list_entries
 
-  !> The next chunk, as long as there is one.
+  !> Reads the next chunk.
   subroutine next_chunk(self, journals, chunk, is_there, error)
     class(chunk_cursor_t), intent(inout) :: self
-    type(sweep_journal_t), intent(inout) :: journals(:)   !! those of `rewind_to_start`
+    type(sweep_journal_t), intent(inout) :: journals(:)   !! those given to `rewind_to_start`
     type(chunk_t), intent(inout) :: chunk
-    logical, intent(out) :: is_there
+    logical, intent(out) :: is_there   !! false after the last chunk
     type(error_t), allocatable, intent(out) :: error
 
     is_there = self%next <= size(self%entry)
@@ -71,9 +73,9 @@ contains
     self%next = self%next + 1
   end subroutine next_chunk
 
-  !> Whether the journals are of one sweep and hold every variant of it once.
+  !> Checks that the journals are of one sweep and hold every variant of it once.
   subroutine check_sweep(journals, error)
-    type(sweep_journal_t), intent(in) :: journals(:)     !! one at least
+    type(sweep_journal_t), intent(in) :: journals(:)     !! at least one
     type(error_t), allocatable, intent(out) :: error
     type(range_t), allocatable :: ranges(:), open_ranges(:)
     integer, allocatable :: journal(:), entry(:), order(:)
@@ -95,7 +97,7 @@ contains
                                           ranges_text(open_ranges) // ' of ' // to_text(journals(1)%header%variants))
   end subroutine check_sweep
 
-  !> 'sweep.2-of-5.journal is not there: ', as far as the names of the others tell.
+  !> E.g. 'sweep.2-of-5.journal is not there: ', as far as it follows from the names of the others; '' if no name is absent.
   function absent_shards(journals) result(text)
     type(sweep_journal_t), intent(in) :: journals(:)
     character(len=:), allocatable :: text, name
@@ -126,7 +128,7 @@ contains
     name = path(index(path, '/', back=.true.) + 1:)
   end function file_name
 
-  !> 5 for '.../sweep.2-of-5.journal', 0 if the name is another.
+  !> 5 for '.../sweep.2-of-5.journal', 0 for other names.
   pure integer function shards_of(path) result(shards)
     character(len=*), intent(in) :: path
     integer :: first, last, status
@@ -139,6 +141,7 @@ contains
     if (status /= 0) shards = 0
   end function shards_of
 
+  !> Checks that all journals are of one sweep.
   subroutine check_headers(journals, error)
     type(sweep_journal_t), intent(in) :: journals(:)
     type(error_t), allocatable, intent(out) :: error
@@ -154,7 +157,7 @@ contains
     end do
   end subroutine check_headers
 
-  !> In what the headers of two shards differ; empty if they are of one sweep.
+  !> In what the headers of two shards differ; '' if they are of one sweep.
   function header_difference(first, second) result(text)
     type(sweep_header_t), intent(in) :: first, second
     character(len=:), allocatable :: text
@@ -172,7 +175,7 @@ contains
     end if
   end function header_difference
 
-  !> Names every journal that lacks variants of its own shard.
+  !> Refuses journals that lack variants of their shards, by their names.
   subroutine check_wholeness(journals, error)
     type(sweep_journal_t), intent(in) :: journals(:)
     type(error_t), allocatable, intent(out) :: error
@@ -193,7 +196,7 @@ contains
     if (message /= '') call raise(error, exit_input, message)
   end subroutine check_wholeness
 
-  !> 'variants 3 to 5, 8 and 2 more ranges'.
+  !> E.g. 'variants 3 to 5, 8 and 2 more ranges'.
   pure function ranges_text(ranges) result(text)
     type(range_t), intent(in) :: ranges(:)
     character(len=:), allocatable :: text

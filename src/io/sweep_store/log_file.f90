@@ -1,9 +1,9 @@
-!> Files that only grow, by checksummed records, so that nothing written is ever lost.
+!> Append-only files of checksummed entries.
 !>
-!> Such a file begins with a line of text, the format's version and a mark of the byte order. A record is [checksum, mark,
-!> length] in four bytes each, then that many bytes; the checksum covers all behind it. A record is one `write`: the death of
-!> the process at any moment leaves whole records and at most a piece of one. For the death of the machine the file is flushed
-!> to the disk every few seconds.
+!> A file begins with a line of text, the version of the format and a number that shows the byte order. An entry is [checksum,
+!> tag, length] in four bytes each, then `length` bytes; the checksum covers all that follows it. Each entry is written by one
+!> system call: a process that is killed leaves whole entries and at most a part of one. The file is flushed to the disk every
+!> few seconds, so that a power failure costs the work of these seconds.
 module nocdyn_log_file
   use, intrinsic :: iso_fortran_env, only: int32, int64
   use nocdyn_bytes, only: byte_reader_t, integer_bytes, put_integers
@@ -19,16 +19,16 @@ module nocdyn_log_file
   integer(int32), parameter :: format_version = 1, byte_order = int(z'01020304', int32)
   integer, parameter :: start_bytes = len(first_line) + 2 * integer_bytes
   integer, parameter :: initial_buffer = 65536
-  real, parameter :: flush_interval = 5.0   ! [s]: the work that a failure of the power can cost
+  real, parameter :: flush_interval = 5.0   ! [s]
 
   integer, parameter, public :: frame_bytes = 3 * integer_bytes
 
   type, public :: log_file_t
     character(len=:), allocatable :: path
-    integer(int64) :: end = 0                      !! bytes up to the end of the last whole record
-    character(len=:), allocatable :: buffer        !! holds what `read` found, behind `frame_bytes`
+    integer(int64) :: end = 0                      !! bytes up to the end of the last whole entry
+    character(len=:), allocatable :: buffer        !! the entry that `read` found; its bytes follow those of the frame
     type(checksum_table_t), private :: table
-    integer(int64), private :: flushed = 0         !! count of the clock at the last flush
+    integer(int64), private :: flushed = 0         !! count of the system clock at the last flush
     integer, private :: descriptor = -1
   contains
     procedure :: create
@@ -49,8 +49,8 @@ module nocdyn_log_file
 
 contains
 
-  !> Begins a file in `folder`, which is made if need be; a file of that name must not be there, unless it is empty: a process
-  !> was killed before its first record.
+  !> Creates a file in `folder`, and the folder if needed. A file of that name is refused unless it is empty: a process that was
+  !> killed before its first entry leaves such a file.
   subroutine create(self, folder, name, error)
     class(log_file_t), intent(inout) :: self
     character(len=*), intent(in) :: folder, name
@@ -73,7 +73,7 @@ contains
     if (allocated(error)) call self%close()
   end subroutine create
 
-  !> Opens a file that is there, to read it and to write on once `end` is set.
+  !> Opens an existing file to read it, and to append to it once `end` is set.
   subroutine open_file(self, folder, name, error)
     class(log_file_t), intent(inout) :: self
     character(len=*), intent(in) :: folder, name
@@ -110,7 +110,7 @@ contains
     if (.not. is_done) call raise(error, exit_input, self%path // ': another process is at work on this sweep')
   end subroutine lock
 
-  !> What stands before the records.
+  !> Reads and checks what precedes the entries.
   subroutine read_start(self, error)
     class(log_file_t), intent(inout) :: self
     type(error_t), allocatable, intent(out) :: error
@@ -136,10 +136,10 @@ contains
     self%end = start_bytes
   end subroutine read_start
 
-  !> Adds a record in one `write`. After an error the file is as it was before, if the disk lets it be.
-  subroutine write_entry(self, mark, bytes, error)
+  !> Appends an entry. After an error the file is cut to what it was before, if the disk allows it.
+  subroutine write_entry(self, tag, bytes, error)
     class(log_file_t), intent(inout) :: self
-    integer(int32), intent(in) :: mark         !! the kind of record
+    integer(int32), intent(in) :: tag         !! what kind of entry it is
     character(len=*), intent(in) :: bytes
     type(error_t), allocatable, intent(out) :: error
     integer :: begins, length, used
@@ -154,7 +154,7 @@ contains
     end if
     begins = used
     used = begins + integer_bytes
-    call put_integers(self%buffer, used, [mark, len(bytes)])
+    call put_integers(self%buffer, used, [tag, len(bytes)])
     length = used + len(bytes)
     self%buffer(used + 1:length) = bytes
     call put_integers(self%buffer, begins, [self%table%checksum(self%buffer(begins + integer_bytes + 1:length))])
@@ -180,14 +180,14 @@ contains
     self%flushed = now
   end subroutine flush_if_due
 
-  !> Reads the record at `offset` into the buffer, frame included.
-  subroutine read_entry(self, offset, mark, length, is_there, is_good)
+  !> Reads the entry at `offset` into the buffer, frame included.
+  subroutine read_entry(self, offset, tag, length, is_there, is_good)
     class(log_file_t), intent(inout) :: self
     integer(int64), intent(in) :: offset
-    integer(int32), intent(in) :: mark       !! that it must have
-    integer, intent(out) :: length           !! of its bytes behind the frame
-    logical, intent(out) :: is_there         !! there is a frame, and as many bytes as it says
-    logical, intent(out) :: is_good          !! and they are as they were written
+    integer(int32), intent(in) :: tag       !! expected
+    integer, intent(out) :: length           !! of the entry without its frame [bytes]
+    logical, intent(out) :: is_there         !! whether there are a frame with that tag and as many bytes as it says
+    logical, intent(out) :: is_good          !! whether, besides, the checksum is right
     type(byte_reader_t) :: reader
     integer(int32) :: numbers(3)
 
@@ -196,7 +196,7 @@ contains
     call read_at(self%descriptor, offset, self%buffer(:frame_bytes), is_there)
     if (.not. is_there) return
     call reader%take_integers(self%buffer(:frame_bytes), numbers)
-    is_there = numbers(2) == mark .and. numbers(3) > 0
+    is_there = numbers(2) == tag .and. numbers(3) > 0
     if (is_there) is_there = numbers(3) <= self%size() - offset - frame_bytes
     if (.not. is_there) return
     length = numbers(3)
@@ -220,7 +220,7 @@ contains
     bytes_in_file = file_size(self%descriptor)
   end function bytes_in_file
 
-  !> Removes what stands behind `end`, where writing goes on.
+  !> Removes what follows `end`, where the next entry will be written.
   subroutine cut(self, error)
     class(log_file_t), intent(in) :: self
     type(error_t), allocatable, intent(out) :: error
@@ -238,7 +238,7 @@ contains
     call raise(error, exit_file, 'cannot write ' // quoted(self%path) // ': ' // reason)
   end subroutine raise_write_error
 
-  !> Ends the work on the file, which stays.
+  !> Closes the file.
   subroutine close_log_file(self)
     class(log_file_t), intent(inout) :: self
     logical :: is_done
@@ -249,7 +249,7 @@ contains
     self%descriptor = -1
   end subroutine close_log_file
 
-  !> Ends the work and leaves no file.
+  !> Closes and removes the file.
   subroutine remove(self)
     class(log_file_t), intent(inout) :: self
     logical :: is_done

@@ -1,4 +1,4 @@
-!> Ranges of whole numbers, in any order: sorting them, and what they leave out.
+!> Ranges of integers: their order and the gaps between them.
 module nocdyn_number_ranges
   implicit none (type, external)
   private
@@ -12,7 +12,7 @@ module nocdyn_number_ranges
 
 contains
 
-  !> Permutation that sorts `ranges` by their first numbers. Merge sort from runs of one upwards.
+  !> The permutation that sorts `ranges` by their first numbers, by merge sort.
   pure subroutine ascending_order(ranges, order)
     type(range_t), intent(in) :: ranges(:)
     integer, allocatable, intent(out) :: order(:)
@@ -35,7 +35,7 @@ contains
 
   pure subroutine merge_runs(ranges, left, right, merged)
     type(range_t), intent(in) :: ranges(:)
-    integer, intent(in) :: left(:), right(:)   !! sorted positions in `ranges`
+    integer, intent(in) :: left(:), right(:)   !! sorted indices into `ranges`
     integer, intent(out) :: merged(:)
     integer :: i, l, r
     logical :: takes_left
@@ -55,7 +55,7 @@ contains
     end do
   end subroutine merge_runs
 
-  !> The ranges of `whole` that none of `ranges` covers, ascending.
+  !> The parts of `whole` that none of `ranges` covers, in ascending order.
   pure subroutine gaps(ranges, whole, open_ranges)
     type(range_t), intent(in) :: ranges(:)
     type(range_t), intent(in) :: whole

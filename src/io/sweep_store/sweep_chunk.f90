@@ -9,22 +9,22 @@ module nocdyn_sweep_chunk
 
   public :: allocate_chunk, pack_chunk, unpack_chunk, read_summary
 
-  integer, parameter, public :: status_done = 0      !! all results are there
-  integer, parameter, public :: status_refused = 1   !! a value out of range, or a machine that cannot be
+  integer, parameter, public :: status_done = 0      !! it has all results
+  integer, parameter, public :: status_refused = 1   !! a value is out of range, or there is no such machine
   integer, parameter, public :: status_failed = 2    !! the integration failed
   character(len=7), parameter, public :: status_words(0:2) = ['done   ', 'refused', 'failed ']
 
   type, public :: chunk_t
-    integer :: first = 1                        !! number of the first variant
-    integer :: count = 0                        !! of variants
-    real(wp), allocatable :: parameters(:, :)   !! [varied, count]
+    integer :: first = 1                        !! variant
+    integer :: count = 0                        !! variants
+    real(wp), allocatable :: parameters(:, :)   !! values of the targets, [varied, count]
     real(wp), allocatable :: results(:, :)      !! [statistics, count], NaN unless the variant is done
     integer, allocatable :: status(:)           !! status_...; [count]
     integer, allocatable :: steps(:)            !! of the integration; [count]
-    type(string_t), allocatable :: reasons(:)   !! one sentence, unless the variant is done; [count]
+    type(string_t), allocatable :: reasons(:)   !! why the variant is not done, in one sentence; [count]
   end type chunk_t
 
-  !> What a chunk holds, at the head of its bytes.
+  !> The first bytes of a packed chunk: its sizes, and what became of its variants.
   type, public :: chunk_summary_t
     integer :: first = 0, count = 0, varied = 0, statistics = 0
     integer :: refused = 0, failed = 0
@@ -35,10 +35,11 @@ module nocdyn_sweep_chunk
 
 contains
 
+  !> A chunk of variants that are done, with parameters and results of 0.
   subroutine allocate_chunk(chunk, first, count, varied, statistics)
     type(chunk_t), intent(out) :: chunk
     integer, intent(in) :: first, count
-    integer, intent(in) :: varied, statistics   !! values of a variant
+    integer, intent(in) :: varied, statistics   !! numbers of targets and of results
 
     chunk%first = first
     chunk%count = count
@@ -48,7 +49,7 @@ contains
     allocate (chunk%reasons(count))
   end subroutine allocate_chunk
 
-  !> The chunk as bytes, which `unpack_chunk` takes back.
+  !> Packs a chunk into bytes, which `unpack_chunk` reads.
   subroutine pack_chunk(chunk, bytes)
     type(chunk_t), intent(in) :: chunk
     character(len=:), allocatable, intent(out) :: bytes
@@ -75,10 +76,10 @@ contains
     end do
   end subroutine pack_chunk
 
-  !> Bytes that are none of a chunk are the fault of the program: checksums have been compared before.
+  !> Unpacks a chunk. Bytes that are not those of a chunk are a fault of the program: checksums have been compared before.
   subroutine unpack_chunk(bytes, chunk)
     character(len=*), intent(in) :: bytes
-    type(chunk_t), intent(inout) :: chunk        !! its arrays are used again if they fit
+    type(chunk_t), intent(inout) :: chunk        !! arrays of the right shape are reused
     type(chunk_summary_t) :: summary
     type(byte_reader_t) :: reader
     logical :: is_whole
@@ -117,11 +118,11 @@ contains
     end if
   end subroutine prepare
 
-  !> The head of a chunk's bytes.
+  !> Reads the first bytes of a packed chunk.
   subroutine read_summary(bytes, summary, is_whole)
     character(len=*), intent(in) :: bytes
     type(chunk_summary_t), intent(out) :: summary
-    logical, intent(out) :: is_whole               !! else there are too few bytes for what the head says
+    logical, intent(out) :: is_whole               !! whether there are as many bytes as these sizes need
     type(byte_reader_t) :: reader
     integer :: numbers(summary_numbers)
     integer(int64) :: needed

@@ -1,4 +1,4 @@
-!> sweep.csv: the same numbers as sweep.nc, as text.
+!> The file sweep.csv: the numbers of sweep.nc as text.
 module nocdyn_sweep_csv
   use nocdyn_csv, only: write_header
   use nocdyn_errors, only: error_t
@@ -18,7 +18,7 @@ module nocdyn_sweep_csv
 
 contains
 
-  !> One row per variant; the results of one that is not done are empty.
+  !> Writes sweep.csv of a whole sweep into `folder`: one row per variant. A variant that is not done has no results.
   subroutine write_sweep_csv(folder, journals, error)
     character(len=*), intent(in) :: folder
     type(sweep_journal_t), intent(inout) :: journals(:)   !! of all shards
@@ -94,7 +94,7 @@ contains
     call file%put(new_line('a'))
   end subroutine write_variant
 
-  !> A comma before each.
+  !> Writes numbers with a comma before each.
   subroutine write_numbers(file, values)
     type(output_file_t), intent(inout) :: file
     real(wp), intent(in) :: values(:)
@@ -108,7 +108,7 @@ contains
     end do
   end subroutine write_numbers
 
-  !> Between double quotes, those inside doubled.
+  !> Writes a text between double quotes; double quotes in it are doubled.
   subroutine write_quoted(file, text)
     type(output_file_t), intent(inout) :: file
     character(len=*), intent(in) :: text

@@ -1,4 +1,4 @@
-!> What tells the inputs of two sweeps apart, in a sentence.
+!> The differences between the inputs of two sweeps, in a sentence.
 module nocdyn_sweep_differences
   use nocdyn_input_differences, only: find_differences
   use nocdyn_text, only: string_t, to_text
@@ -11,9 +11,9 @@ module nocdyn_sweep_differences
 
 contains
 
-  !> Empty if nothing that counts differs.
+  !> The first differences that change results; '' if there are none.
   function input_difference(old, new) result(text)
-    character(len=*), intent(in) :: old, new   !! of `input_text`
+    character(len=*), intent(in) :: old, new   !! as `input_text` writes them
     character(len=:), allocatable :: text
     type(string_t), allocatable :: changes(:)
     integer :: i

@@ -1,4 +1,4 @@
-!> What the files of a sweep say about it: what was asked for, by which program, and the names of what comes out.
+!> The description of a sweep in its files: input, program, and the names of parameters and results.
 module nocdyn_sweep_header
   use nocdyn_bytes, only: byte_reader_t, integer_bytes, put_integers, put_text
   implicit none (type, external)
@@ -8,30 +8,30 @@ module nocdyn_sweep_header
 
   character(len=*), parameter, public :: sweep_netcdf_name = 'sweep.nc'
 
-  !> One varied number or one result.
+  !> A target or a result.
   type, public :: quantity_t
     character(len=:), allocatable :: label       !! 'load.work.viscous', 'omega_motor_final'
-    character(len=:), allocatable :: unit        !! '' for numbers without
+    character(len=:), allocatable :: unit        !! '' if it has none
     character(len=:), allocatable :: long_name
   end type quantity_t
 
   type, public :: sweep_header_t
     character(len=:), allocatable :: title
-    character(len=:), allocatable :: source             !! program, version, compiler
-    character(len=:), allocatable :: design             !! 'random'
-    character(len=:), allocatable :: input_file         !! as the command line has it
-    character(len=:), allocatable :: input_text         !! the whole canonical input
-    character(len=:), allocatable :: list_checksum      !! of the file of a list, '' without one
+    character(len=:), allocatable :: source             !! program, version and compiler
+    character(len=:), allocatable :: design             !! e.g. 'random'
+    character(len=:), allocatable :: input_file         !! as given on the command line
+    character(len=:), allocatable :: input_text         !! the complete input in its normal form
+    character(len=:), allocatable :: list_checksum      !! of the file with the list of variants, '' if there is none
     integer :: seed = 0
     integer :: variants = 0                             !! of the whole sweep
-    integer :: first = 1, last = 0                      !! of this shard
+    integer :: first = 1, last = 0                      !! variants of this shard
     type(quantity_t), allocatable :: parameters(:)
     type(quantity_t), allocatable :: results(:)
   end type sweep_header_t
 
 contains
 
-  !> The header as bytes, which `unpack_header` takes back.
+  !> Packs a header into bytes, which `unpack_header` reads.
   subroutine pack_header(header, bytes)
     type(sweep_header_t), intent(in) :: header
     character(len=:), allocatable, intent(out) :: bytes
@@ -83,10 +83,11 @@ contains
     end do
   end subroutine put_quantities
 
+  !> Unpacks a header.
   subroutine unpack_header(bytes, header, is_whole)
     character(len=*), intent(in) :: bytes
     type(sweep_header_t), intent(out) :: header
-    logical, intent(out) :: is_whole              !! else the bytes are not those of a header
+    logical, intent(out) :: is_whole              !! whether the bytes are those of a header
     type(byte_reader_t) :: reader
     integer :: numbers(6)
 
@@ -113,7 +114,7 @@ contains
     type(quantity_t), allocatable, intent(out) :: quantities(:)
     integer :: i
 
-    ! no more than the bytes can hold, whatever they say
+    ! damaged bytes can give any count: no more than they can hold
     allocate (quantities(max(0, min(count, len(bytes) / (3 * integer_bytes)))))
     do i = 1, size(quantities)
       call reader%take_text(bytes, quantities(i)%label)

@@ -1,4 +1,4 @@
-!> The journal of a sweep, or of a shard of one: its header, then one record per chunk in any order.
+!> The journal of a sweep or of a shard: a log file with a header and one entry per chunk, in any order.
 module nocdyn_sweep_journal
   use, intrinsic :: iso_fortran_env, only: int32, int64
   use nocdyn_errors, only: error_t, exit_file, exit_input, raise
@@ -14,11 +14,11 @@ module nocdyn_sweep_journal
 
   public :: journal_name, journal_names, create_journal, open_journal
 
-  integer(int32), parameter :: header_mark = int(z'64616568', int32), chunk_mark = int(z'6B6E6863', int32)   ! 'head', 'chnk'
+  integer(int32), parameter :: header_tag = int(z'64616568', int32), chunk_tag = int(z'6B6E6863', int32)   ! 'head', 'chnk'
 
-  !> Where a chunk stands.
+  !> Where the entry of a chunk is, and its variants.
   type :: log_entry_t
-    integer(int64) :: offset = 0   !! of its frame
+    integer(int64) :: offset = 0   !! of its frame in the file [bytes]
     integer :: first = 1, count = 0
   end type log_entry_t
 
@@ -27,7 +27,7 @@ module nocdyn_sweep_journal
     integer :: done = 0, refused = 0, failed = 0   !! variants in it
     integer :: entries = 0                         !! chunks in it
     integer :: longest_reason = 0                  !! [characters]
-    integer(int64) :: damaged_bytes = 0            !! left out by `open_journal`
+    integer(int64) :: damaged_bytes = 0            !! ignored by `open_journal`
     type(log_file_t), private :: file
     type(log_entry_t), allocatable, private :: index(:)
   contains
@@ -46,9 +46,9 @@ module nocdyn_sweep_journal
 
 contains
 
-  !> Name of the file.
+  !> The name of the file.
   function journal_name(shard, shards) result(name)
-    integer, intent(in) :: shard, shards   !! 1, 1: the whole sweep
+    integer, intent(in) :: shard, shards   !! 1 of 1 is the whole sweep
     character(len=:), allocatable :: name
 
     name = 'sweep.journal'
@@ -75,7 +75,7 @@ contains
     end do
   end function journal_names
 
-  !> Begins a journal in `folder`, which is made if need be; a file of that name must not be there.
+  !> Creates a journal in `folder`, and the folder if needed. An existing journal of that name is refused.
   subroutine create_journal(folder, name, header, journal, error)
     character(len=*), intent(in) :: folder, name
     type(sweep_header_t), intent(in) :: header
@@ -88,11 +88,11 @@ contains
     call journal%file%create(folder, name, error)
     if (allocated(error)) return
     call pack_header(header, bytes)
-    call journal%file%write(header_mark, bytes, error)
+    call journal%file%write(header_tag, bytes, error)
     if (allocated(error)) call journal%remove()
   end subroutine create_journal
 
-  !> Opens a journal that is there, to go on with it or to read it. A record that was not written whole is cut off.
+  !> Opens an existing journal to read it or to resume the sweep. An entry that was not written as a whole is removed.
   subroutine open_journal(folder, name, journal, error)
     character(len=*), intent(in) :: folder, name
     type(sweep_journal_t), intent(out) :: journal
@@ -103,7 +103,7 @@ contains
     allocate (journal%index(1))
     call journal%file%open(folder, name, error)
     if (allocated(error)) return
-    call journal%file%read(journal%file%end, header_mark, length, is_there, is_good)
+    call journal%file%read(journal%file%end, header_tag, length, is_there, is_good)
     if (is_good) call unpack_header(journal%file%buffer(frame_bytes + 1:frame_bytes + length), journal%header, is_good)
     if (is_good) then
       journal%file%end = journal%file%end + frame_bytes + length
@@ -115,7 +115,7 @@ contains
     if (allocated(error)) call journal%close()
   end subroutine open_journal
 
-  !> Finds the records. One that is damaged is left out, and what is no record any more ends the journal.
+  !> Finds the entries of chunks. A damaged one is ignored; the first bytes that are no entry end the journal.
   subroutine read_chunks(self)
     class(sweep_journal_t), intent(inout) :: self
     type(chunk_summary_t) :: summary
@@ -125,7 +125,7 @@ contains
 
     offset = self%file%end
     do
-      call self%file%read(offset, chunk_mark, length, is_there, is_good)
+      call self%file%read(offset, chunk_tag, length, is_there, is_good)
       if (.not. is_there) exit
       if (is_good) call read_summary(self%file%buffer(frame_bytes + 1:frame_bytes + length), summary, is_good)
       if (is_good) is_good = belongs(summary, self%header)
@@ -147,6 +147,7 @@ contains
               summary%first >= header%first .and. summary%count <= header%last - summary%first + 1
   end function belongs
 
+  !> Takes an entry into the index and its variants into the counts.
   subroutine add_entry(self, offset, summary)
     class(sweep_journal_t), intent(inout) :: self
     integer(int64), intent(in) :: offset
@@ -166,7 +167,7 @@ contains
     self%longest_reason = max(self%longest_reason, summary%longest_reason)
   end subroutine add_entry
 
-  !> Adds a chunk. After an error the journal is as it was before, if the disk lets it be.
+  !> Appends a chunk. After an error the journal is what it was before, if the disk allows it.
   subroutine append(self, chunk, error)
     class(sweep_journal_t), intent(inout) :: self
     type(chunk_t), intent(in) :: chunk
@@ -177,7 +178,7 @@ contains
     call self%append_packed(bytes, error)
   end subroutine append
 
-  !> The same with the bytes of a chunk by `pack_chunk`.
+  !> Appends a chunk that `pack_chunk` has packed.
   subroutine append_packed(self, bytes, error)
     class(sweep_journal_t), intent(inout) :: self
     character(len=*), intent(in) :: bytes
@@ -190,7 +191,7 @@ contains
     if (is_whole) is_whole = belongs(summary, self%header)
     if (.not. is_whole) error stop 'nocdyn_sweep_journal: append_packed needs a chunk of this sweep'
     offset = self%file%end
-    call self%file%write(chunk_mark, bytes, error)
+    call self%file%write(chunk_tag, bytes, error)
     if (.not. allocated(error)) call self%add_entry(offset, summary)
   end subroutine append_packed
 
@@ -201,7 +202,7 @@ contains
     path = self%file%path
   end function path
 
-  !> The variants of each record.
+  !> The range of variants of each entry.
   pure function ranges(self)
     class(sweep_journal_t), intent(in) :: self
     type(range_t), allocatable :: ranges(:)
@@ -213,10 +214,10 @@ contains
     end do
   end function ranges
 
-  !> The variants from `header%first` to `header%last` that the journal does not hold, in ascending ranges.
+  !> The variants of this shard that the journal does not hold, as ascending ranges.
   pure subroutine missing(self, first, count)
     class(sweep_journal_t), intent(in) :: self
-    integer, allocatable, intent(out) :: first(:), count(:)   !! of each range
+    integer, allocatable, intent(out) :: first(:), count(:)   !! first variant and number of variants of each range
     type(range_t), allocatable :: open_ranges(:)
 
     call gaps(self%ranges(), range_t(self%header%first, self%header%last), open_ranges)
@@ -225,7 +226,7 @@ contains
     count = open_ranges%last - open_ranges%first + 1
   end subroutine missing
 
-  !> The number of the record that holds a variant, 0 if none does.
+  !> The number of the entry that holds a variant, 0 if there is none.
   pure integer function entry_of(self, variant) result(number)
     class(sweep_journal_t), intent(in) :: self
     integer, intent(in) :: variant
@@ -235,7 +236,7 @@ contains
     end do
   end function entry_of
 
-  !> The chunk of record `number`, 1 to `entries`.
+  !> Reads the chunk of entry `number`, 1 to `entries`.
   subroutine read_entry(self, number, chunk, error)
     class(sweep_journal_t), intent(inout) :: self
     integer, intent(in) :: number
@@ -244,7 +245,7 @@ contains
     integer :: length
     logical :: is_good, is_there
 
-    call self%file%read(self%index(number)%offset, chunk_mark, length, is_there, is_good)
+    call self%file%read(self%index(number)%offset, chunk_tag, length, is_there, is_good)
     if (is_good) then
       call unpack_chunk(self%file%buffer(frame_bytes + 1:frame_bytes + length), chunk)
     else
@@ -252,14 +253,14 @@ contains
     end if
   end subroutine read_entry
 
-  !> Ends the work on the journal, which stays.
+  !> Closes the journal.
   subroutine close_journal(self)
     class(sweep_journal_t), intent(inout) :: self
 
     call self%file%close()
   end subroutine close_journal
 
-  !> Ends the work and removes the file.
+  !> Closes and removes the journal.
   subroutine remove_journal(self)
     class(sweep_journal_t), intent(inout) :: self
 

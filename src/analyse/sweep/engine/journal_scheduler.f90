@@ -17,22 +17,22 @@ module nocdyn_journal_scheduler
   integer, parameter :: max_numbers = 2**22       ! of a chunk: dozens of chunks fit into memory
   integer, parameter :: max_growth = 8            ! of a chunk over the one before
 
-  !> Hands out the missing variants in their order and writes the results to the journal.
+  !> Hands out the missing variants in ascending order and appends the results to the journal.
   type, extends(scheduler_t), public :: journal_scheduler_t
     type(sweep_journal_t), pointer :: journal => null()
     class(sweep_progress_t), pointer :: progress => null()
     type(sweep_counts_t) :: counts
     integer :: workers = 1                       !! threads of all processes
     integer :: lanes = 1                         !! of a worker
-    type(error_t), allocatable :: error          !! of the journal; nothing is handed out then
-    integer, allocatable, private :: first(:)    !! missing variants: ranges ...
-    integer, allocatable, private :: count(:)    !! ... and their lengths
-    integer, private :: range = 1                !! from which is handed out
-    integer, private :: left = 0                 !! variants not handed out
-    integer, private :: most = 1                 !! variants to hand out at once
-    integer, private :: last_size = 0            !! of the chunk last handed out
-    real(wp), private :: pace = 0.0_wp           !! seconds that a worker needs for a variant, 0: not known yet
-    logical, private :: has_failed = .false.      !! `error` as other threads see it
+    type(error_t), allocatable :: error          !! the journal cannot be written: no more chunks are handed out
+    integer, allocatable, private :: first(:)    !! first variant of each range that is missing ...
+    integer, allocatable, private :: count(:)    !! ... and the number of its variants
+    integer, private :: range = 1                !! index of the range that is handed out
+    integer, private :: left = 0                 !! variants that are not yet handed out
+    integer, private :: max_size = 1                 !! variants of a chunk
+    integer, private :: last_size = 0            !! of the last chunk
+    real(wp), private :: variant_time = 0.0_wp   !! of a worker [s], 0 if it is not known yet
+    logical, private :: has_failed = .false.     !! whether `error` is allocated; other threads read this
   contains
     procedure :: next_chunk
     procedure :: submit
@@ -45,12 +45,13 @@ module nocdyn_journal_scheduler
 
 contains
 
-  !> The books of the variants that the journal does not hold.
+  !> A scheduler of the variants that the journal does not hold.
   subroutine initialise_scheduler(scheduler, journal, progress, workers, lanes)
     class(journal_scheduler_t), intent(inout) :: scheduler
     type(sweep_journal_t), target, intent(inout) :: journal
     class(sweep_progress_t), target, intent(inout) :: progress
-    integer, intent(in) :: workers, lanes
+    integer, intent(in) :: workers   !! threads of all processes
+    integer, intent(in) :: lanes     !! of a worker
 
     scheduler%journal => journal
     scheduler%progress => progress
@@ -58,7 +59,7 @@ contains
     scheduler%lanes = lanes
     call journal%missing(scheduler%first, scheduler%count)
     scheduler%left = sum(scheduler%count)
-    scheduler%most = max(1, max_numbers / (size(journal%header%parameters) + size(journal%header%results)))
+    scheduler%max_size = max(1, max_numbers / (size(journal%header%parameters) + size(journal%header%results)))
     scheduler%counts%total = journal%header%last - journal%header%first + 1
     scheduler%counts%done = journal%done
     scheduler%counts%refused = journal%refused
@@ -74,7 +75,8 @@ contains
     if (self%left == 0) return
     if (self%is_cancelled()) return
     associate (r => self%range)
-      count = min(self%count(r), self%most, chunk_size(self%left, self%workers, self%lanes, self%pace, self%last_size))
+      count = chunk_size(self%left, self%workers, self%lanes, self%variant_time, self%last_size)
+      count = min(count, self%count(r), self%max_size)
       first = self%first(r)
       self%first(r) = first + count
       self%count(r) = self%count(r) - count
@@ -84,17 +86,18 @@ contains
     self%last_size = count
   end subroutine next_chunk
 
-  !> Variants to hand out at once: one for each lane at first, then what takes `chunk_seconds`; at the end, when `left`
-  !> variants are shared by several workers, less, so that these come to their ends together.
-  pure integer function chunk_size(left, workers, lanes, pace, last_size)
-    integer, intent(in) :: left        !! at least 1
-    integer, intent(in) :: workers, lanes
-    real(wp), intent(in) :: pace       !! seconds for a variant, 0 if it is not known
-    integer, intent(in) :: last_size   !! of the chunk before, 0 if there was none
+  !> The number of variants of the next chunk: at first one for each lane, then as many as take `chunk_seconds`. When few are left
+  !> and there are several workers, chunks are smaller, so that all workers end at about the same time.
+  pure integer function chunk_size(left, workers, lanes, variant_time, last_size)
+    integer, intent(in) :: left             !! variants that are not yet handed out, at least 1
+    integer, intent(in) :: workers          !! threads of all processes
+    integer, intent(in) :: lanes            !! of a worker
+    real(wp), intent(in) :: variant_time    !! of a worker [s], 0 if it is not known
+    integer, intent(in) :: last_size        !! of the chunk before, 0 if there was none
     integer :: share
 
     chunk_size = lanes
-    if (pace > 0) chunk_size = int(min(chunk_seconds / pace, real(max_variants, wp)))
+    if (variant_time > 0) chunk_size = int(min(chunk_seconds / variant_time, real(max_variants, wp)))
     chunk_size = max(lanes, min(chunk_size, max_growth * max(last_size, lanes)))
     share = (left - 1) / workers + 1
     if (workers > 1) share = max((share + 1) / 2, min(share, lanes))
@@ -110,7 +113,7 @@ contains
     call self%poll()
   end subroutine submit
 
-  !> Writes the results to the journal.
+  !> Appends the results of a chunk to the journal and updates the counts.
   subroutine commit(self, chunk, seconds)
     class(journal_scheduler_t), intent(inout) :: self
     type(chunk_t), intent(in) :: chunk
@@ -123,7 +126,7 @@ contains
       self%has_failed = .true.
       return
     end if
-    if (any(chunk%status /= status_refused)) self%pace = seconds / count(chunk%status /= status_refused)
+    if (any(chunk%status /= status_refused)) self%variant_time = seconds / count(chunk%status /= status_refused)
     self%counts%done = self%journal%done
     self%counts%refused = self%journal%refused
     self%counts%failed = self%journal%failed
@@ -136,12 +139,12 @@ contains
     call update_progress(self%progress, self%counts)
   end subroutine poll
 
-  !> All variants have been computed here.
+  !> There is nothing to do: the journal holds all results.
   subroutine finalise(self)
     class(journal_scheduler_t), intent(inout) :: self
   end subroutine finalise
 
-  !> After Ctrl-C, and when the journal cannot be written.
+  !> True after Ctrl-C, and when the journal cannot be written.
   function is_cancelled(self)
     class(journal_scheduler_t), intent(in) :: self
     logical :: is_cancelled

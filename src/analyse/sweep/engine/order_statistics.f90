@@ -1,8 +1,8 @@
-!> Smallest and largest values, median, 5 % and 95 % of every result of a sweep, in memory that does not grow with it.
+!> Minimum, maximum, median, 5 % and 95 % quantiles of every result of a sweep, in memory that does not grow with the sweep.
 !>
-!> Radix selection: the bits of a number, rearranged so that they sort as whole numbers do, are settled from the top by a few
-!> passes over the journals that count which of them begin how. The quantile p of n values is the value at (n - 1) p, counted
-!> from 0 in ascending order and interpolated between neighbours, as numpy.quantile has it.
+!> Radix selection: the bits of a number are rearranged so that they sort like unsigned integers. A few passes over the
+!> journals find these bits digit by digit, from the leading one, by histograms of the next digit. The quantile p of n values is
+!> the value at (n - 1) p, counted from 0 in ascending order and interpolated between neighbours, as in numpy.quantile.
 module nocdyn_order_statistics
   use, intrinsic :: ieee_arithmetic, only: ieee_is_nan, ieee_quiet_nan, ieee_value
   use, intrinsic :: iso_fortran_env, only: int64
@@ -15,24 +15,24 @@ module nocdyn_order_statistics
 
   public :: find_order_statistics
 
-  !> Of one result; NaN and 0 if no variant is done.
+  !> Of one result; NaN, and 0 for the variants, if no variant has it.
   type, public :: order_statistics_t
     integer :: count = 0   !! variants that have the result
     real(wp) :: minimum = 0.0_wp, low = 0.0_wp, median = 0.0_wp, high = 0.0_wp, maximum = 0.0_wp
-    integer :: variant_of_minimum = 0, variant_of_maximum = 0   !! the first of several
+    integer :: variant_of_minimum = 0, variant_of_maximum = 0   !! the lowest number of several
   end type order_statistics_t
 
   real(wp), parameter :: quantiles(3) = [0.05_wp, 0.5_wp, 0.95_wp]
-  integer, parameter :: wanted = 2 * size(quantiles)   ! the neighbours of each
+  integer, parameter :: wanted = 2 * size(quantiles)   ! both neighbours of each quantile
 
-  ! the bits of a number in five digits, the first of 12 bits
+  ! the 64 bits of a number in five digits, the first of which has 12 bits
   integer, parameter :: digit_bits = 13, passes = 5, values_of_digit = 2**digit_bits
 
   !> The selection for one result.
   type :: selection_t
-    integer(int64) :: prefix(wanted) = 0         ! the leading bits of each wanted value, as far as known
-    integer :: rank(wanted) = 0                  ! its place among the values with these bits, from 0
-    integer :: group(wanted) = 1                 ! the number of its prefix among the different ones
+    integer(int64) :: prefix(wanted) = 0         ! the bits of each wanted value that are known, leading ones
+    integer :: rank(wanted) = 0                  ! of each wanted value among those with these bits, from 0
+    integer :: group(wanted) = 1                 ! number of its prefix among the different ones
     integer :: groups = 1
     integer(int64) :: prefix_of_group(wanted) = 0
     integer, allocatable :: histogram(:, :)      ! [value of the digit, groups]
@@ -40,8 +40,9 @@ module nocdyn_order_statistics
 
 contains
 
+  !> Computes the order statistics of each result over the variants that are done.
   subroutine find_order_statistics(journals, statistics, error)
-    type(sweep_journal_t), intent(inout) :: journals(:)   !! with the same results, at least one journal
+    type(sweep_journal_t), intent(inout) :: journals(:)   !! at least one; all with the same results
     type(order_statistics_t), allocatable, intent(out) :: statistics(:)
     type(error_t), allocatable, intent(out) :: error
     type(selection_t), allocatable :: selections(:)
@@ -64,12 +65,12 @@ contains
     end do
   end subroutine find_order_statistics
 
-  !> One pass over the journals.
+  !> One pass over the journals: histograms of one digit; the first pass also counts and finds extremes.
   subroutine count_digits(journals, pass, selections, statistics, error)
     type(sweep_journal_t), intent(inout) :: journals(:)
     integer, intent(in) :: pass
     type(selection_t), intent(inout) :: selections(:)
-    type(order_statistics_t), intent(inout) :: statistics(:)   !! counts and extremes, by the first pass
+    type(order_statistics_t), intent(inout) :: statistics(:)   !! counts and extremes
     type(error_t), allocatable, intent(out) :: error
     type(chunk_t) :: chunk
     integer :: i, j, k
@@ -89,6 +90,7 @@ contains
     end do
   end subroutine count_digits
 
+  !> Takes the values of a chunk into count and extremes.
   pure subroutine update_extremes(chunk, result, statistics)
     type(chunk_t), intent(in) :: chunk
     integer, intent(in) :: result                            !! its number
@@ -112,18 +114,20 @@ contains
     end do
   end subroutine update_extremes
 
+  !> Whether a value is smaller than the smallest so far, or equal and of a lower variant.
   pure logical function precedes(value, variant, best, variant_of_best)
     real(wp), intent(in) :: value, best
-    integer, intent(in) :: variant, variant_of_best   !! 0 if there is no best one yet
+    integer, intent(in) :: variant, variant_of_best   !! 0 if there is no value yet
 
     precedes = variant_of_best == 0 .or. value < best .or. &
                   (value <= best .and. variant < variant_of_best)
   end function precedes
 
+  !> Takes the digits of a chunk's values into the histograms of their prefixes.
   pure subroutine count_chunk(chunk, result, shift, selection)
     type(chunk_t), intent(in) :: chunk
     integer, intent(in) :: result
-    integer, intent(in) :: shift                      !! bits behind the digit
+    integer, intent(in) :: shift                      !! number of bits below the digit
     type(selection_t), intent(inout) :: selection
     integer(int64) :: bits, prefix
     integer :: digit, group, i
@@ -141,7 +145,7 @@ contains
     end do
   end subroutine count_chunk
 
-  !> The bits of a number such that, without a sign, they sort as the numbers do.
+  !> The bits of a number, rearranged so that they sort like unsigned integers.
   pure integer(int64) function sortable_bits(value) result(bits)
     real(wp), intent(in) :: value
 
@@ -153,6 +157,7 @@ contains
     end if
   end function sortable_bits
 
+  !> The inverse of `sortable_bits`.
   pure real(wp) function number_of(bits)
     integer(int64), intent(in) :: bits   !! of `sortable_bits`
 
@@ -163,7 +168,7 @@ contains
     end if
   end function number_of
 
-  !> The places of both neighbours of every quantile, from 0.
+  !> The ranks of both neighbours of every quantile, from 0.
   pure subroutine choose_ranks(n, rank)
     integer, intent(in) :: n
     integer, intent(out) :: rank(wanted)
@@ -175,7 +180,7 @@ contains
     end do
   end subroutine choose_ranks
 
-  !> One more digit of every wanted value, from the histograms.
+  !> Finds one more digit of every wanted value from the histograms.
   pure subroutine resolve_digit(selection)
     type(selection_t), intent(inout) :: selection
     integer :: digit, i, j
@@ -200,6 +205,7 @@ contains
     end do
   end subroutine resolve_digit
 
+  !> Interpolates between the neighbours of every quantile.
   pure subroutine interpolate_quantiles(selection, statistics)
     type(selection_t), intent(in) :: selection
     type(order_statistics_t), intent(inout) :: statistics
@@ -224,7 +230,7 @@ contains
   !> Linear interpolation from the nearer end.
   pure real(wp) function between(a, b, position)
     real(wp), intent(in) :: a, b
-    real(wp), intent(in) :: position   !! of which the fraction counts
+    real(wp), intent(in) :: position   !! its fraction is that between a and b
     real(wp) :: fraction
 
     fraction = position - int(position)

@@ -1,4 +1,4 @@
-!> What the blocks of a sweep have in common, and whether its base machine can be run at all.
+!> The settings that all blocks of a sweep share, and the check that its base machine can be run.
 module nocdyn_sweep_setup
   use nocdyn_assembly, only: assemble_machine, new_formulation
   use nocdyn_block_sizes, only: lanes_for
@@ -20,12 +20,12 @@ module nocdyn_sweep_setup
 
   type, public :: sweep_setup_t
     integer :: lanes = 1               !! of a block
-    logical :: has_energy_balance = .false.    !! whether a recorded column needs the works
+    logical :: has_energy_balance = .false.    !! whether a recorded column needs the work integrals
   end type sweep_setup_t
 
 contains
 
-  !> Refuses a base machine that `nocdyn run` would refuse.
+  !> Finds the settings; refuses a base machine that `nocdyn run` would refuse.
   subroutine prepare_sweep(plan, setup, error)
     type(sweep_plan_t), intent(in) :: plan
     type(sweep_setup_t), intent(out) :: setup
@@ -47,7 +47,7 @@ contains
     setup%lanes = lanes_for(formulation%states)
   end subroutine prepare_sweep
 
-  !> What &run says of the integration.
+  !> The integration settings and the times of &run.
   subroutine read_settings(input, formulation, settings, times, error)
     type(input_t), intent(in) :: input
     class(formulation_t), intent(in) :: formulation

@@ -1,4 +1,4 @@
-!> The summary of a sweep: what summary.json and the printed table tell.
+!> The summary of a sweep: the text of summary.json, and the printed table.
 module nocdyn_sweep_summary
   use nocdyn_input, only: input_t
   use nocdyn_json, only: json_t
@@ -15,22 +15,22 @@ module nocdyn_sweep_summary
 
   public :: sweep_json, sweep_line, sweep_note, sweep_table
 
-  !> What it took, this time.
+  !> What the computation took.
   type, public :: sweep_effort_t
-    integer :: variants = 0              !! computed; those of a journal that was gone on with do not count
+    integer :: variants = 0              !! computed, without those of a journal that was resumed
     integer :: threads = 1               !! of each process
     integer :: ranks = 1                 !! processes
     integer :: lanes = 1                 !! of a block
-    real(wp) :: wall_time = 0.0_wp       !! of computing and of writing the journal [s]
-    real(wp) :: writing_time = 0.0_wp    !! of making the other files of it [s]
+    real(wp) :: wall_time = 0.0_wp       !! of the computation and of writing the journal [s]
+    real(wp) :: writing_time = 0.0_wp    !! of writing the other files [s]
   end type sweep_effort_t
 
   type, public :: sweep_summary_t
     integer :: done = 0, refused = 0, failed = 0   !! variants
     type(order_statistics_t), allocatable :: statistics(:)   !! of each result, over the variants that are done
     type(sweep_effort_t), allocatable :: effort              !! not allocated after a merge
-    character(len=:), allocatable :: first_reason            !! why the first variant is not done; if none is
-    integer, allocatable :: without_trajectory(:)            !! variants of which one is asked for, but that are refused
+    character(len=:), allocatable :: first_reason            !! why the first variant is not done; if no variant is
+    integer, allocatable :: without_trajectory(:)            !! refused variants of which trajectories were requested
   end type sweep_summary_t
 
 contains
@@ -64,6 +64,7 @@ contains
     text = json%text()
   end function sweep_json
 
+  !> The design and the units of the targets.
   subroutine put_design(json, header)
     type(json_t), intent(inout) :: json
     type(sweep_header_t), intent(in) :: header
@@ -80,6 +81,7 @@ contains
     call json%close()
   end subroutine put_design
 
+  !> What the computation took.
   subroutine put_effort(json, effort)
     type(json_t), intent(inout) :: json
     type(sweep_effort_t), intent(in) :: effort
@@ -93,6 +95,7 @@ contains
     call json%put('lanes', effort%lanes)
   end subroutine put_effort
 
+  !> Variants per second.
   pure real(wp) function rate(effort)
     type(sweep_effort_t), intent(in) :: effort
 
@@ -100,7 +103,7 @@ contains
     if (effort%wall_time > 0) rate = effort%variants / effort%wall_time
   end function rate
 
-  !> Of every result; without a variant that is done there are none.
+  !> The order statistics of every result; none if no variant is done.
   subroutine put_statistics(json, header, summary)
     type(json_t), intent(inout) :: json
     type(sweep_header_t), intent(in) :: header
@@ -151,7 +154,7 @@ contains
     text = report%text()
   end function sweep_table
 
-  !> "moment_shaft_max_abs [N m]"
+  !> E.g. "moment_shaft_max_abs [N m]".
   pure function label(header, result_number) result(text)
     type(sweep_header_t), intent(in) :: header
     integer, intent(in) :: result_number
@@ -163,7 +166,7 @@ contains
     end associate
   end function label
 
-  !> One line on the trajectories that are asked for and cannot be, '' if there are none.
+  !> A line on the variants that have no trajectory though it was requested, '' if there are none.
   function sweep_note(input, summary) result(text)
     type(input_t), intent(in) :: input
     type(sweep_summary_t), intent(in) :: summary
@@ -186,7 +189,7 @@ contains
     end associate
   end function sweep_note
 
-  !> One line: what was done, and where the results are.
+  !> A line on what was done and where the results are.
   function sweep_line(input, summary, folder) result(text)
     type(input_t), intent(in) :: input
     type(sweep_summary_t), intent(in) :: summary

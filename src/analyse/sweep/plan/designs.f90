@@ -1,7 +1,7 @@
-!> Designs of a sweep: which values the varied numbers have in each variant.
+!> Designs of experiments: the values of the factors in each variant.
 !>
-!> Everything about a variant follows from its number: variants can be asked for in any order, by any thread, again and again.
-!> Only a list holds anything as long as the number of variants.
+!> The values of a variant are a function of its number, so that threads can compute them in any order. Only a list stores
+!> values for each variant.
 module nocdyn_designs
   use, intrinsic :: iso_fortran_env, only: int64
   use nocdyn_distributions, only: distribution_t, tail_end, lognormal_distribution, normal_distribution, uniform_distribution
@@ -17,30 +17,30 @@ module nocdyn_designs
 
   integer, parameter, public :: max_variants = 2000000000
 
-  real(wp), parameter :: last_offset = 1.0_wp - 2.0_wp**(-20)   ! so that no rounding moves a value into the next stratum
+  real(wp), parameter :: last_offset = 1.0_wp - 2.0_wp**(-20)   ! in a stratum: rounding must not leave it
 
-  !> One varied number.
+  !> A factor: a number that varies, and its distribution.
   type, public :: factor_t
     character(len=10) :: distribution = 'uniform'           !! 'uniform', 'normal', 'lognormal'
-    real(wp) :: low = -huge(1.0_wp), high = huge(1.0_wp)   !! a uniform factor needs both, the others are truncated by them
-    real(wp) :: mean = 0.0_wp, deviation = 1.0_wp          !! normal; the deviation is above 0
-    real(wp) :: median = 1.0_wp, log_deviation = 1.0_wp    !! lognormal, both above 0: deviation of the natural logarithm
-    integer :: count = 1                                   !! grid only, at least 1
+    real(wp) :: low = -huge(1.0_wp), high = huge(1.0_wp)   !! both are needed if uniform; other distributions are truncated there
+    real(wp) :: mean = 0.0_wp, deviation = 1.0_wp          !! if normal; the deviation is positive
+    real(wp) :: median = 1.0_wp, log_deviation = 1.0_wp    !! if lognormal; of the natural logarithm, positive
+    integer :: count = 1                                   !! values of a grid, at least 1
   end type factor_t
 
   type, abstract, public :: design_t
     integer :: variants   !! numbered from 1
-    integer :: varied     !! numbers
+    integer :: varied     !! number of factors
   contains
     procedure(values_interface), deferred :: values
   end type design_t
 
   abstract interface
-    !> The varied numbers of one variant.
+    !> The values of the factors in a variant.
     pure subroutine values_interface(self, variant, x)
       import :: design_t, wp
       class(design_t), intent(in) :: self
-      integer, intent(in) :: variant   !! 1 to variants
+      integer, intent(in) :: variant   !! 1 to `variants`
       real(wp), intent(out) :: x(:)    !! [varied]
     end subroutine values_interface
   end interface
@@ -86,10 +86,10 @@ module nocdyn_designs
 
 contains
 
-  !> Every combination of `count` equally spaced values from `low` to `high` each (`low` alone if there is one); the last
-  !> factor runs fastest. The distributions do not matter.
+  !> All combinations of `count` equidistant values from `low` to `high` of each factor (`low` alone if `count` is 1). The last
+  !> factor varies fastest. The distributions do not matter.
   function grid_design(factors) result(design)
-    type(factor_t), intent(in) :: factors(:)   !! `grid_size` at most `max_variants`
+    type(factor_t), intent(in) :: factors(:)   !! with `grid_size` at most `max_variants`
     type(grid_design_t) :: design
 
     if (grid_size(factors) > max_variants) error stop 'nocdyn_designs: the grid has too many variants'
@@ -98,7 +98,7 @@ contains
     allocate (design%factors, source=factors)
   end function grid_design
 
-  !> Points of a grid; more than `max_variants` are `max_variants` + 1.
+  !> Number of points of a grid, at most `max_variants` + 1.
   pure integer(int64) function grid_size(factors)
     type(factor_t), intent(in) :: factors(:)
     integer :: i
@@ -152,8 +152,8 @@ contains
     end do
   end subroutine random_values
 
-  !> Latin hypercube (M. D. McKay, R. J. Beckman, W. J. Conover, Technometrics 21 (1979) 239-245): the range of each factor
-  !> falls into as many equally probable strata as there are samples, and each stratum has one value, anywhere inside it.
+  !> Latin hypercube (M. D. McKay, R. J. Beckman, W. J. Conover, Technometrics 21 (1979) 239-245): the range of each factor is
+  !> divided into as many equally probable strata as there are samples, with one random value in each stratum.
   function latin_design(factors, samples, seed) result(design)
     type(factor_t), intent(in) :: factors(:)
     integer, intent(in) :: samples   !! at least 1
@@ -181,7 +181,7 @@ contains
     end do
   end subroutine latin_values
 
-  !> Sobol points, the first of them for variant 1; a seed other than 0 shifts them all.
+  !> Sobol points from the first one on; a seed other than 0 shifts all of them.
   function sobol_design(factors, samples, seed) result(design)
     type(factor_t), intent(in) :: factors(:)   !! at most `max_dimensions`
     integer, intent(in) :: samples             !! at least 1
@@ -203,7 +203,7 @@ contains
     end do
   end subroutine sobol_values
 
-  !> The given values.
+  !> A list of values.
   function list_design(values) result(design)
     real(wp), intent(in) :: values(:, :)   !! [varied, variants]
     type(list_design_t) :: design
@@ -221,6 +221,7 @@ contains
     x = self%list(:, variant)
   end subroutine list_values
 
+  !> What all random designs need.
   subroutine initialise(design, factors, samples, seed)
     class(sampled_design_t), intent(inout) :: design
     type(factor_t), intent(in) :: factors(:)
@@ -236,7 +237,7 @@ contains
     end do
   end subroutine initialise
 
-  !> How probable `low` to `high` is if nothing is truncated. Nothing can be drawn from a range of probability 0.
+  !> The probability of the range from `low` to `high` without truncation. No value can be drawn if it is 0.
   pure real(wp) function probability_between(factor)
     type(factor_t), intent(in) :: factor
     type(distribution_t) :: distribution
@@ -245,10 +246,10 @@ contains
     probability_between = distribution%probability
   end function probability_between
 
-  !> Whether the width of a uniform factor, or a value of another one, can be above the largest number.
+  !> Whether the width of a uniform factor, or a value of another one, can exceed the largest number.
   pure logical function can_overflow(factor)
     type(factor_t), intent(in) :: factor
-    real(wp), parameter :: part = 0.01_wp   ! of each number: sums of such parts do not overflow
+    real(wp), parameter :: part = 0.01_wp   ! sums of such parts of numbers do not overflow
 
     select case (factor%distribution)
     case ('uniform')

@@ -1,4 +1,4 @@
-!> What the files of a sweep say about it, from its plan.
+!> The header of the files of a sweep, from its plan.
 module nocdyn_plan_header
   use nocdyn_input, only: group_t
   use nocdyn_input_text, only: input_text
@@ -12,10 +12,10 @@ module nocdyn_plan_header
 
 contains
 
-  !> Of one of so many shards.
+  !> The header of a shard.
   function new_sweep_header(plan, shard, shards) result(header)
     type(sweep_plan_t), intent(in) :: plan
-    integer, intent(in) :: shard, shards   !! 1, 1: the whole sweep
+    integer, intent(in) :: shard, shards   !! 1 of 1 is the whole sweep
     type(sweep_header_t) :: header
     type(group_t) :: group
 
@@ -34,7 +34,7 @@ contains
     call name_quantities(plan, header)
   end function new_sweep_header
 
-  !> Equal parts; the first ones are longer by one variant if there is a remainder.
+  !> The first variant of a shard. Shards are equal, but for one variant more in the first ones if there is a remainder.
   pure integer function first_of_shard(variants, shard, shards) result(first)
     integer, intent(in) :: variants, shard, shards
 

@@ -1,4 +1,4 @@
-!> What a sweep keeps of each variant: &record, resolved against the columns of trajectory.csv.
+!> The recorded quantities of a sweep: the statistics and trajectories that the groups &record ask for.
 module nocdyn_recorded_quantities
   use nocdyn_input, only: input_t
   use nocdyn_kinds, only: wp
@@ -11,21 +11,21 @@ module nocdyn_recorded_quantities
 
   public :: read_recorded_quantities, check_quantities, restrict_statistics, wanted_trajectories
 
-  real(wp), parameter :: unknown_start = -huge(1.0_wp)   !! in place of `from` where t_start varies and `from` is not given
+  real(wp), parameter :: unknown_start = -huge(1.0_wp)   ! stands for `from` if t_start varies and `from` is not given
 
-  !> The time in which statistics can be taken; an end that varies is not known.
+  !> The time span of all variants. An end that varies is not known and has its default here.
   type, public :: time_span_t
     real(wp) :: t_start = unknown_start, t_end = huge(1.0_wp)   !! [s]
   end type time_span_t
 
 contains
 
-  !> Statistics in the order of the file.
+  !> Reads the statistics, in the order of the file.
   subroutine read_recorded_quantities(input, labels, span, variants, statistics, diagnostics)
     type(input_t), intent(in) :: input
-    type(string_t), intent(in) :: labels(:)   !! of the columns
+    type(string_t), intent(in) :: labels(:)   !! of the columns of trajectory.csv
     type(time_span_t), intent(in) :: span
-    integer, intent(in) :: variants           !! huge if that is not known
+    integer, intent(in) :: variants           !! number of variants, huge if it is not known
     type(statistic_t), allocatable, intent(out) :: statistics(:)
     type(diagnostics_t), intent(inout) :: diagnostics
     type(string_t), allocatable :: names(:)
@@ -47,10 +47,10 @@ contains
     end associate
   end subroutine read_recorded_quantities
 
-  !> The quantities alone, as far as an input with mistakes has them.
+  !> Checks the quantities only, as far as an input with errors has them.
   subroutine check_quantities(input, labels, diagnostics)
     type(input_t), intent(in) :: input
-    type(string_t), intent(in) :: labels(:)   !! of the columns
+    type(string_t), intent(in) :: labels(:)   !! of the columns of trajectory.csv
     type(diagnostics_t), intent(inout) :: diagnostics
     type(string_t), allocatable :: names(:)
     integer :: column, i
@@ -64,13 +64,13 @@ contains
     end associate
   end subroutine check_quantities
 
-  !> The statistics of a variant that runs from `t_start` to `t_end` [s]. If they have no time left in it, a complaint says so,
-  !> and they begin at `t_start`.
+  !> The statistics of a variant that runs from `t_start` to `t_end` [s]. Those that would begin outside of these times begin at
+  !> `t_start`, and `message` reports the first of them.
   subroutine restrict_statistics(statistics, t_start, t_end, fitted, message)
     type(statistic_t), intent(in) :: statistics(:)   !! of the plan
     real(wp), intent(in) :: t_start, t_end
     type(statistic_t), allocatable, intent(out) :: fitted(:)
-    character(len=:), allocatable, intent(out) :: message   !! '' if all is well
+    character(len=:), allocatable, intent(out) :: message   !! '' if all begin within the times
     integer :: i
 
     message = ''
@@ -84,6 +84,7 @@ contains
     end do
   end subroutine restrict_statistics
 
+  !> The labels without their units.
   subroutine remove_units(labels, names)
     type(string_t), intent(in) :: labels(:)
     type(string_t), allocatable, intent(out) :: names(:)
@@ -95,9 +96,10 @@ contains
     end do
   end subroutine remove_units
 
+  !> Adds the statistics of one &record.
   subroutine add_statistics(input, record, labels, names, span, statistics, diagnostics)
     type(input_t), intent(in) :: input
-    integer, intent(in) :: record   !! index of the group
+    integer, intent(in) :: record   !! index of the &record
     type(string_t), intent(in) :: labels(:), names(:)   !! with and without units
     type(time_span_t), intent(in) :: span
     type(statistic_t), allocatable, intent(inout) :: statistics(:)
@@ -146,7 +148,7 @@ contains
     error stop 'nocdyn_recorded_quantities: the schema allows a statistic that is not there'
   end function kind_of
 
-  !> The column of a quantity, which is written with its unit or without; 0 if there is none.
+  !> The column of the quantity of a &record, with or without its unit; 0 if there is none.
   subroutine find_column(input, record, labels, names, column, diagnostics)
     type(input_t), intent(in) :: input
     integer, intent(in) :: record
@@ -170,7 +172,7 @@ contains
                      diagnostics)
   end subroutine find_column
 
-  !> "; did you mean 'omega_motor'?", '' if nothing is near.
+  !> E.g. "; did you mean 'omega_motor'?", '' if no name is similar.
   pure function near_match(quantity, candidates) result(text)
     character(len=*), intent(in) :: quantity
     type(string_t), intent(in) :: candidates(:)
@@ -182,7 +184,7 @@ contains
     if (nearest > 0) text = '; did you mean ' // quoted(candidates(nearest)%text) // '?'
   end function near_match
 
-  !> The columns of the element or of the kind that a quantity seems to name; the first of all columns if there are none.
+  !> The columns of the element or of the kind that a quantity may mean; if there are none, the first ones of all columns.
   pure function related_names(quantity, names) result(text)
     character(len=*), intent(in) :: quantity
     type(string_t), intent(in) :: names(:)   !! without units
@@ -244,7 +246,7 @@ contains
     call move_alloc(longer, statistics)
   end subroutine append_statistic
 
-  !> The variants of which trajectories are wanted, ascending, each once.
+  !> The variants whose trajectories are to be written, ascending, each once.
   pure function wanted_trajectories(input) result(wanted)
     type(input_t), intent(in) :: input
     integer, allocatable :: wanted(:)

@@ -1,4 +1,4 @@
-!> What a sweep varies, and the values of each variant: &sweep and &vary, or the file of a list.
+!> The targets and the design of a sweep, from &sweep and &vary or from the file of a list.
 module nocdyn_sweep_design
   use nocdyn_checksums, only: checksum_digits
   use nocdyn_designs, only: design_t, factor_t, grid_design, grid_size, latin_design, can_overflow, list_design, &
@@ -21,13 +21,13 @@ module nocdyn_sweep_design
 
 contains
 
-  !> Targets and design; the design is allocated if there is no mistake.
+  !> Reads targets and design. The design is allocated if there is no error.
   subroutine read_design(input, sweep, targets, design, list_checksum, diagnostics)
     type(input_t), intent(in) :: input
     integer, intent(in) :: sweep   !! index of &sweep
     type(target_t), allocatable, intent(out) :: targets(:)
     class(design_t), allocatable, intent(out) :: design
-    character(len=:), allocatable, intent(out) :: list_checksum   !! of the file's bytes; '' without a list
+    character(len=:), allocatable, intent(out) :: list_checksum   !! of the bytes of the file of a list, '' if there is none
     type(diagnostics_t), intent(inout) :: diagnostics
     type(factor_t), allocatable :: factors(:)
     real(wp), allocatable :: values(:, :)
@@ -49,7 +49,7 @@ contains
     end associate
   end subroutine read_design
 
-  !> The design of &vary.
+  !> The design whose factors are the groups &vary.
   subroutine make_design(group, factors, design)
     type(group_t), intent(in) :: group   !! &sweep
     type(factor_t), intent(in) :: factors(:)
@@ -74,7 +74,7 @@ contains
     end select
   end subroutine make_design
 
-  !> The targets in the first line of a file, and the values in the others.
+  !> Reads the file of a list: targets in its first line, values in the others.
   subroutine read_list(input, sweep, targets, values, list_checksum, diagnostics)
     type(input_t), intent(in) :: input
     integer, intent(in) :: sweep
@@ -112,10 +112,10 @@ contains
     end do
   end subroutine read_list
 
-  !> "load.work.viscous [N m s/rad]", as sweep.csv has it.
+  !> Splits names such as "load.work.viscous [N m s/rad]", the form of sweep.csv.
   subroutine split_units(names, paths, units)
     type(string_t), intent(in) :: names(:)
-    type(string_t), allocatable, intent(out) :: paths(:), units(:)   !! '' where there is no unit
+    type(string_t), allocatable, intent(out) :: paths(:), units(:)   !! units are '' where there is none
     integer :: bracket, i
 
     allocate (paths(size(names)), units(size(names)))
@@ -129,6 +129,7 @@ contains
     end do
   end subroutine split_units
 
+  !> Refuses &vary beside a list.
   subroutine refuse_varied(input, varied, diagnostics)
     type(input_t), intent(in) :: input
     integer, intent(in) :: varied(:)
@@ -141,10 +142,10 @@ contains
     end do
   end subroutine refuse_varied
 
-  !> An override of a number that varies would be without effect.
+  !> Refuses overrides of numbers that vary: they would have no effect.
   subroutine refuse_overrides(input, varied, targets, diagnostics)
     type(input_t), intent(in) :: input
-    integer, intent(in) :: varied(:)   !! the &vary of each target; none if these are those of a list
+    integer, intent(in) :: varied(:)   !! index of the &vary of each target; empty if the targets are those of a list
     type(target_t), intent(in) :: targets(:)
     type(diagnostics_t), intent(inout) :: diagnostics
     character(len=:), allocatable :: source
@@ -165,7 +166,7 @@ contains
     end do
   end subroutine refuse_overrides
 
-  !> The targets and factors of all &vary.
+  !> Reads the targets and factors of all &vary.
   subroutine read_varied(input, sweep, varied, targets, factors, diagnostics)
     type(input_t), intent(in) :: input
     integer, intent(in) :: sweep, varied(:)
@@ -195,7 +196,7 @@ contains
     end if
   end subroutine read_varied
 
-  !> The targets of all &vary, as far as they are there.
+  !> The targets of all &vary, as far as they exist.
   subroutine find_varied(input, varied, targets, diagnostics)
     type(input_t), intent(in) :: input
     integer, intent(in) :: varied(:)
@@ -230,7 +231,7 @@ contains
     if (group%has_value('count')) factor%count = group%whole_number('count')
   end function factor_of
 
-  !> What the design asks of a factor, and the distribution of its ends.
+  !> Checks what the design requires of a factor, and that its distribution fits its ends.
   subroutine check_factor(input, varied, design, factor, diagnostics)
     type(input_t), intent(in) :: input
     integer, intent(in) :: varied   !! index of the &vary
@@ -270,6 +271,7 @@ contains
     end if
   end subroutine check_factor
 
+  !> Refuses a factor whose values can exceed the largest number.
   subroutine refuse_overflow(input, varied, factor, diagnostics)
     type(input_t), intent(in) :: input
     integer, intent(in) :: varied   !! index of the &vary
@@ -293,7 +295,7 @@ contains
     end select
   end subroutine refuse_overflow
 
-  !> Values of a whole number must not round to the same one.
+  !> Refuses a grid of integers of which some would be rounded to the same one.
   subroutine check_whole_grid(input, varied, target, factor, diagnostics)
     type(input_t), intent(in) :: input
     integer, intent(in) :: varied   !! index of the &vary

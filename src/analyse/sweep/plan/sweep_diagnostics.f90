@@ -1,4 +1,4 @@
-!> Mistakes that show when the groups of a sweep are put together.
+!> Diagnostics on keys of the groups of a sweep.
 module nocdyn_sweep_diagnostics
   use nocdyn_input, only: input_t
   use nocdyn_diagnostics, only: diagnostics_t
@@ -9,13 +9,13 @@ module nocdyn_sweep_diagnostics
 
 contains
 
-  !> A mistake at a key of a group, with the line of the key if it has one.
+  !> Adds a diagnostic on a key of a group, with the line of the key if it is given.
   subroutine report(input, group, key, text, diagnostics, code)
     type(input_t), intent(in) :: input
-    integer, intent(in) :: group   !! index
+    integer, intent(in) :: group   !! index in the input
     character(len=*), intent(in) :: key, text
     type(diagnostics_t), intent(inout) :: diagnostics
-    integer, intent(in), optional :: code   !! exit code
+    integer, intent(in), optional :: code   !! exit code; exit_input if absent
 
     associate (value => input%groups(group)%values(input%groups(group)%key_position(key)))
       call diagnostics%add(max(value%line, input%groups(group)%line), group, text, value%override, code)

@@ -1,4 +1,5 @@
-!> A sweep as its input describes it: what varies, how, and what is kept, with every mistake of its groups in one error.
+!> The plan of a sweep: targets, design and recorded quantities, as its input describes them. All errors in the groups of the
+!> sweep are reported at once.
 module nocdyn_sweep_plan
   use nocdyn_assembly, only: assemble_machine
   use nocdyn_designs, only: design_t
@@ -24,15 +25,15 @@ module nocdyn_sweep_plan
 
   public :: make_plan, add_plan_diagnostics, has_sweep, without_sweep
 
-  character(len=*), parameter :: kinds = 'sweep vary record'   !! of the groups of a sweep
+  character(len=*), parameter :: kinds = 'sweep vary record'   ! of the groups of a sweep
 
   type, public :: sweep_plan_t
-    type(input_t) :: input                            !! of the base machine, with the groups of the sweep
+    type(input_t) :: input                            !! of the base machine and the sweep
     class(design_t), allocatable :: design
-    type(target_t), allocatable :: targets(:)         !! as many as the design varies
+    type(target_t), allocatable :: targets(:)         !! of the factors of the design
     type(statistic_t), allocatable :: statistics(:)
-    integer, allocatable :: trajectories(:)           !! variants that are written like runs, ascending
-    character(len=:), allocatable :: list_checksum   !! of the file of a list, '' without one
+    integer, allocatable :: trajectories(:)           !! variants whose trajectories are written, ascending
+    character(len=:), allocatable :: list_checksum    !! of the file of a list, '' if there is none
   contains
     procedure :: values
     procedure :: summary
@@ -40,9 +41,9 @@ module nocdyn_sweep_plan
 
 contains
 
-  !> Reads the groups of the sweep; the base machine must be one that `nocdyn run` accepts.
+  !> Makes the plan from the groups of the sweep. `nocdyn run` must accept the base machine.
   subroutine make_plan(input, plan, error)
-    type(input_t), intent(in) :: input   !! read without mistakes
+    type(input_t), intent(in) :: input   !! read without errors
     type(sweep_plan_t), intent(out) :: plan
     type(error_t), allocatable, intent(out) :: error
     type(diagnostics_t) :: diagnostics
@@ -72,8 +73,8 @@ contains
     call merge_errors(input, diagnostics, failure, error)
   end subroutine make_plan
 
-  !> Adds wrong targets and quantities to the error of an input with mistakes, if all of these are in groups of the sweep and
-  !> it is known what varies: columns can depend on that.
+  !> Adds wrong targets and quantities to the error of an input that cannot be read, if all its errors are in groups of the sweep
+  !> and there are targets: the columns can depend on them.
   subroutine add_plan_diagnostics(input, diagnostics, error)
     type(input_t), intent(in) :: input
     type(diagnostics_t), intent(inout) :: diagnostics   !! of reading the input
@@ -99,7 +100,7 @@ contains
     call merge_errors(input, diagnostics, failure, error)
   end subroutine add_plan_diagnostics
 
-  !> The numbers of one variant as they are used: those of the design, whole ones rounded to the nearest.
+  !> The values of the targets in a variant: those of the design, rounded where the target is an integer.
   pure subroutine values(self, variant, x)
     class(sweep_plan_t), intent(in) :: self
     integer, intent(in) :: variant   !! 1 to `design%variants`
@@ -109,7 +110,7 @@ contains
     where (self%targets%is_integer) x = anint(x)
   end subroutine values
 
-  !> 'random, 100000 variants that differ in 2 numbers, 7 results'
+  !> E.g. 'random, 100000 variants that differ in 2 numbers, 7 results'.
   function summary(self) result(text)
     class(sweep_plan_t), intent(in) :: self
     character(len=:), allocatable :: text
@@ -122,7 +123,7 @@ contains
     if (size(self%trajectories) > 0) text = text // ', ' // counted(size(self%trajectories), 'trajectory', 'trajectories')
   end function summary
 
-  !> Labels of the columns of trajectory.csv of the base machine.
+  !> The labels of the columns of trajectory.csv of the base machine.
   subroutine label_columns(input, labels, error)
     type(input_t), intent(in) :: input
     type(string_t), allocatable, intent(out) :: labels(:)
@@ -135,7 +136,7 @@ contains
     if (.not. allocated(error)) call list_columns(machine, columns, labels)
   end subroutine label_columns
 
-  !> Start and end of the base machine, as far as they do not vary.
+  !> The time span of the base machine, as far as it does not vary.
   pure function fixed_span(input, targets) result(span)
     type(input_t), intent(in) :: input
     type(target_t), intent(in) :: targets(:)
@@ -149,7 +150,7 @@ contains
     if (.not. any(targets%group == runs(1) .and. targets%key == run%key_position('t_end'))) span%t_end = run%number('t_end')
   end function fixed_span
 
-  !> One error of the mistakes in the sweep and of what is wrong with the base machine.
+  !> Makes one error of the diagnostics on the sweep and of a failure of the base machine.
   subroutine merge_errors(input, diagnostics, failure, error)
     type(input_t), intent(in) :: input
     type(diagnostics_t), intent(in) :: diagnostics
@@ -174,7 +175,7 @@ contains
     has_sweep = any([(has_word(kinds, input%groups(i)%kind), i=1, size(input%groups))])
   end function has_sweep
 
-  !> The input of a machine alone, e.g. of one variant.
+  !> The input without the groups of the sweep.
   pure function without_sweep(input) result(machine_input)
     type(input_t), intent(in) :: input
     type(input_t) :: machine_input

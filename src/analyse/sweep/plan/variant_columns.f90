@@ -1,7 +1,7 @@
-!> Columns of trajectory.csv that variants of a machine can have though it has none of them itself.
+!> Columns of trajectory.csv that variants can have though the base machine does not have them.
 !>
-!> The damping moment of a coupling, the current and the throttle of a motor have columns where the numbers that they come
-!> from are given and are not 0.
+!> The damping moment of a coupling, the current and the throttle of a motor have columns only if the numbers that cause them are
+!> given and not 0.
 module nocdyn_variant_columns
   use nocdyn_assembly, only: assemble_machine
   use nocdyn_errors, only: error_t
@@ -17,29 +17,29 @@ module nocdyn_variant_columns
 
   public :: add_variant_columns
 
-  real(wp), parameter :: nonzero_value = 1.0_wp   ! in place of 0 or nothing
+  real(wp), parameter :: nonzero_value = 1.0_wp   ! instead of 0 or of no value
 
 contains
 
-  !> Appends the columns that there are only where varied numbers that are 0 or not given in the input are not 0.
+  !> Appends the labels of columns that exist only if targets which are 0 or not given in the input are not 0.
   subroutine add_variant_columns(input, targets, labels)
-    type(input_t), intent(in) :: input            !! of a machine that can be
-    type(target_t), intent(in) :: targets(:)      !! those with group 0 were not found
+    type(input_t), intent(in) :: input            !! of a valid machine
+    type(target_t), intent(in) :: targets(:)      !! group 0 marks one that was not found
     type(string_t), allocatable, intent(inout) :: labels(:)
     type(target_t), allocatable :: hidden(:)
-    logical :: can_be
+    logical :: is_valid
     integer :: i
 
     allocate (hidden, source=pack(targets, [(hides_column(input, targets(i)), i=1, size(targets))]))
     if (size(hidden) == 0) return
-    call add_columns(input, hidden, labels, can_be)
-    if (can_be) return
+    call add_columns(input, hidden, labels, is_valid)
+    if (is_valid) return
     do i = 1, size(hidden)
-      call add_columns(input, hidden(i:i), labels, can_be)
+      call add_columns(input, hidden(i:i), labels, is_valid)
     end do
   end subroutine add_variant_columns
 
-  !> Whether a number is 0 or not given, and the columns of its element may depend on that.
+  !> Whether a target is 0 or not given, and the columns of its element may depend on it.
   logical function hides_column(input, target)
     type(input_t), intent(in) :: input
     type(target_t), intent(in) :: target
@@ -53,12 +53,12 @@ contains
     end associate
   end function hides_column
 
-  !> Appends the columns of the machine in which some numbers are something, as far as that is allowed.
-  subroutine add_columns(input, hidden, labels, can_be)
+  !> Appends the labels of the columns of the machine in which some targets are not 0, as far as that is allowed.
+  subroutine add_columns(input, hidden, labels, is_valid)
     type(input_t), intent(in) :: input
     type(target_t), intent(in) :: hidden(:)
     type(string_t), allocatable, intent(inout) :: labels(:)
-    logical, intent(out) :: can_be   !! whether there is such a machine
+    logical, intent(out) :: is_valid   !! whether such a machine is valid
     type(input_t) :: changed, before
     type(machine_t) :: machine
     type(error_t), allocatable :: error
@@ -74,8 +74,8 @@ contains
       if (message /= '') changed = before
     end do
     call assemble_machine(changed, machine, error)
-    can_be = .not. allocated(error)
-    if (.not. can_be) return
+    is_valid = .not. allocated(error)
+    if (.not. is_valid) return
     call list_columns(machine, columns, others)
     do i = 1, size(others)
       if (.not. is_among(others(i)%text, labels)) call append(labels, others(i)%text)

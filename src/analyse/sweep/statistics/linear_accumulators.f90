@@ -1,4 +1,4 @@
-!> What is kept of linear functions x of the state along the variants in the lanes of a block.
+!> Extremes and integrals of linear functions x of the state, accumulated over the steps of the variants in a block.
 module nocdyn_linear_accumulators
   use nocdyn_kinds, only: wp
   use nocdyn_linear_columns, only: strip_of, width
@@ -9,28 +9,28 @@ module nocdyn_linear_accumulators
 
   public :: new_accumulators, start_range
 
-  !> What is kept of one x from a time on; [width, strips] of the lanes.
+  !> The extremes and integrals of one x from a time on. The shape of all arrays is [width, strips].
   type, public :: accumulator_t
-    integer :: column = 0                    !! among the linear ones
+    integer :: column = 0                    !! number among the linear columns
     real(wp) :: from = 0.0_wp                !! [s]
-    logical :: has_range = .false.           !! whether extremes are wanted:
-    logical :: has_max = .false., has_min = .false., has_size = .false.   !! largest, smallest, largest absolute value
-    logical :: has_time = .false.            !! of the largest
-    logical :: has_sums = .false.
-    real(wp), allocatable :: highest(:, :), lowest(:, :), highest_time(:, :)   !! of x
-    real(wp), allocatable :: bound(:, :)                                        !! huge before `from`, -huge after it
-    real(wp), allocatable :: integral(:, :), square(:, :)                      !! of the column over time
+    logical :: has_range = .false.           !! whether extremes are needed:
+    logical :: has_max = .false., has_min = .false., has_max_abs = .false.
+    logical :: has_time = .false.            !! whether the time of the largest value is needed
+    logical :: has_sums = .false.            !! whether integrals are needed
+    real(wp), allocatable :: highest(:, :), lowest(:, :), highest_time(:, :)   !! of x; time [s]
+    real(wp), allocatable :: bound(:, :)                    !! huge before `from`: x is not of interest; -huge after it
+    real(wp), allocatable :: integral(:, :), square(:, :)   !! of the column and of its square over time
   end type accumulator_t
 
 contains
 
-  !> One track for each column and `from`, in the order of the columns.
+  !> One accumulator for each column and `from`, in the order of the columns.
   pure subroutine new_accumulators(statistics, column, lanes, accumulators, acc)
     type(statistic_t), intent(in) :: statistics(:)
-    integer, intent(in) :: column(:)                         !! of each statistic
+    integer, intent(in) :: column(:)                         !! linear column of each statistic
     integer, intent(in) :: lanes
     type(accumulator_t), allocatable, intent(out) :: accumulators(:)
-    integer, allocatable, intent(out) :: acc(:)            !! of each statistic, 0 for those of the end
+    integer, allocatable, intent(out) :: acc(:)                 !! number in `accumulators`, 0 for values at the end; [statistics]
     integer :: c, i, k
 
     allocate (accumulators(0))
@@ -47,7 +47,7 @@ contains
       end do
     end do
     do k = 1, size(accumulators)
-      accumulators(k)%has_range = accumulators(k)%has_max .or. accumulators(k)%has_min .or. accumulators(k)%has_size
+      accumulators(k)%has_range = accumulators(k)%has_max .or. accumulators(k)%has_min .or. accumulators(k)%has_max_abs
       call allocate_accumulator(accumulators(k), strip_of(lanes))
     end do
   end subroutine new_accumulators
@@ -63,7 +63,7 @@ contains
     case (statistic_min)
       acc%has_min = .true.
     case (statistic_max_abs)
-      acc%has_size = .true.
+      acc%has_max_abs = .true.
     case default
       acc%has_sums = .true.
     end select
@@ -78,7 +78,7 @@ contains
     allocate (acc%bound, source=acc%highest - huge(0.0_wp))
   end subroutine allocate_accumulator
 
-  !> The range of a lane begins with a value.
+  !> Starts the range of a lane with a value at a time [s].
   pure subroutine start_range(acc, at, strip, x, t)
     type(accumulator_t), intent(inout) :: acc
     integer, intent(in) :: at, strip

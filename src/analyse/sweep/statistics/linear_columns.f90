@@ -1,8 +1,8 @@
-!> Columns of the trajectory table that are linear functions of the state of the reduced formulation, or the elastic moments of
-!> couplings that are polynomials of one; for all lanes of a block.
+!> Columns of the trajectory table that are a linear function x of the state of the reduced formulation, or the elastic moment
+!> of a coupling that is an odd cubic polynomial of x; for all lanes of a block.
 !>
-!> x = offset + sum of factor * y(component). An angle or a speed of a body is x, a twist is x, and the elastic moment of a
-!> coupling is (linear + cubic x^2) x, where x is counted from the twist at rest.
+!> x = offset + sum of factor * y(component). An angle, a speed or a twist is x. An elastic moment is (linear + cubic x^2) x,
+!> where x is the twist minus that at rest.
 module nocdyn_linear_columns
   use nocdyn_bank, only: bank_t
   use nocdyn_coordinates, only: coordinates_t
@@ -16,21 +16,21 @@ module nocdyn_linear_columns
 
   public :: is_linear, has_law, new_linear_columns, strip_of, lane_in_strip
 
-  integer, parameter, public :: width = 8   !! lanes of a strip, which are looked at together
+  integer, parameter, public :: width = 8   !! lanes of a strip, which are evaluated together
 
   type, public :: linear_columns_t
     integer :: count = 0
-    integer, allocatable :: first(:)          !! of the entries of each column, [count + 1]; they come in pairs
-    integer, allocatable :: component(:)      !! of the state, [entries]
+    integer, allocatable :: first(:)          !! entry of each column, [count + 1]; the number of its entries is even
+    integer, allocatable :: component(:)      !! of the state, which the factor multiplies, [entries]
     real(wp), allocatable :: factor(:, :, :)  !! [width, entries, strips of lanes]
-    real(wp), allocatable :: offset(:, :, :)  !! [width, columns, strips], as the next two
-    real(wp), allocatable :: linear(:, :, :)  !! 1 of a column that is x itself
+    real(wp), allocatable :: offset(:, :, :)  !! shape [width, columns, strips], as the next two
+    real(wp), allocatable :: linear(:, :, :)  !! 1 if the column is x itself
     real(wp), allocatable :: cubic(:, :, :)
-    integer, allocatable, private :: ratio(:)       !! of the coordinates, [entries], 0 of one that only makes up a pair
-    logical, allocatable, private :: is_minus(:)    !! whether the factor is its negative, [entries]
+    integer, allocatable, private :: ratio(:)       !! entry of the coordinates, 0 if it only completes a pair; [entries]
+    logical, allocatable, private :: is_minus(:)    !! whether the factor is the negative of that ratio, [entries]
     logical, allocatable, private :: is_speed(:)    !! [columns]
-    integer, allocatable, private :: element(:)     !! that has the law, 0 if none has
-    integer, allocatable, private :: from(:), to(:) !! bodies, 0 is the ground
+    integer, allocatable, private :: element(:)     !! whose moment the column is, 0 if it is none; [columns]
+    integer, allocatable, private :: from(:), to(:) !! bodies of the angle or twist, 0 is the ground; [columns]
   contains
     procedure :: copy_lane
     procedure :: is_increasing
@@ -40,7 +40,7 @@ module nocdyn_linear_columns
 
 contains
 
-  !> Whether a column is of this kind.
+  !> Whether a column is a linear function of the state or such a moment.
   logical function is_linear(block, column)
     class(formulation_t), intent(in) :: block
     type(column_t), intent(in) :: column
@@ -64,7 +64,7 @@ contains
     if (column%kind == column_element) is_twist = is_quantity(machine%banks(column%bank)%bank, column%quantity, 'twist')
   end function is_twist
 
-  !> Whether a column is the elastic moment of a coupling whose law is that of eq. (3).
+  !> Whether a column is the elastic moment of a coupling with the law of eq. (3).
   logical function has_law(machine, column)
     type(machine_t), intent(in) :: machine
     type(column_t), intent(in) :: column
@@ -86,7 +86,7 @@ contains
     end associate
   end function is_quantity
 
-  !> The given columns, each `is_linear`; the numbers of the lanes come by `copy_lane`.
+  !> The given columns, each `is_linear`. `copy_lane` sets the parameters of a lane.
   function new_linear_columns(block, columns) result(self)
     class(formulation_t), intent(in) :: block
     type(column_t), intent(in) :: columns(:)
@@ -146,7 +146,7 @@ contains
     self%first(number + 1) = size(self%ratio) + 1
   end subroutine add_entries
 
-  !> Takes over the numbers of a lane.
+  !> Copies the parameters of a lane of the block.
   pure subroutine copy_lane(self, block, lane)
     class(linear_columns_t), intent(inout) :: self
     class(formulation_t), intent(in) :: block
@@ -175,20 +175,21 @@ contains
     end associate
   end subroutine copy_lane
 
+  !> The number of the strip in which a lane is.
   elemental integer function strip_of(lane)
     integer, intent(in) :: lane
 
     strip_of = (lane - 1) / width + 1
   end function strip_of
 
-  !> Place of a lane in its strip.
+  !> The number of a lane in its strip.
   elemental integer function lane_in_strip(lane)
     integer, intent(in) :: lane
 
     lane_in_strip = modulo(lane - 1, width) + 1
   end function lane_in_strip
 
-  !> Whether a column rises with x.
+  !> Whether a column increases with x.
   pure logical function is_increasing(self, number, lane)
     class(linear_columns_t), intent(in) :: self
     integer, intent(in) :: number, lane
@@ -199,7 +200,7 @@ contains
     end associate
   end function is_increasing
 
-  !> x of a state of a lane.
+  !> x at a state of a lane.
   pure real(wp) function argument(self, number, lane, y) result(x)
     class(linear_columns_t), intent(in) :: self
     integer, intent(in) :: number, lane
@@ -214,7 +215,7 @@ contains
     end associate
   end function argument
 
-  !> The column at x.
+  !> The value of the column at x.
   pure real(wp) function law(self, number, lane, x)
     class(linear_columns_t), intent(in) :: self
     integer, intent(in) :: number, lane

@@ -1,7 +1,8 @@
-!> Statistics of columns that are functions of a linear function x of the state, straight from the polynomials of the steps.
+!> Statistics of columns that are functions of a linear function x of the state, directly from the polynomials of the steps.
 !>
-!> The elastic moment of a coupling that stiffens rises with its twist: its extremes are where those of the twist are. Bounds
-!> from the coefficients of x, in vector loops over the lanes, say in which steps an extremum may pass those before.
+!> The elastic moment of a stiffening coupling increases with its twist, so that it has its extremes where the twist has them.
+!> Bounds on x, computed from its coefficients in vector loops over the lanes, tell in which steps x may exceed the extremes so
+!> far; only these steps are searched.
 module nocdyn_linear_statistics
   use nocdyn_bernstein, only: make_bernstein_matrix, max_degree, raise_to_maximum
   use nocdyn_formulation, only: formulation_t
@@ -23,15 +24,15 @@ module nocdyn_linear_statistics
     type(linear_columns_t) :: columns
     real(wp), private :: t_end = 0.0_wp
     type(statistic_t), allocatable, private :: statistics(:)
-    integer, allocatable, private :: column(:)                !! of each statistic among the linear ones
-    integer, allocatable, private :: acc(:)                 !! of each statistic, 0 for those of the end
-    type(accumulator_t), allocatable, private :: accumulators(:)          !! in the order of their columns
+    integer, allocatable, private :: column(:)                !! among the linear ones, [statistics]
+    integer, allocatable, private :: acc(:)                   !! number of the accumulator, 0 for values at the end; [statistics]
+    type(accumulator_t), allocatable, private :: accumulators(:)          !! in the order of the columns
     real(wp), allocatable, private :: nodes(:), weights(:)    !! of Gauss, 0 to 1
-    real(wp), allocatable, private :: chord_gap(:)                !! largest value of s - s^p between s = 0 and 1, [degree]
+    real(wp), allocatable, private :: chord_gap(:)   !! largest value of s - s^p for s from 0 to 1, p = 1 to degree
     real(wp), allocatable, private :: to_bernstein(:, :)
     real(wp), private :: t_start = 0.0_wp
     real(wp), allocatable, private :: x_end(:, :)             !! [lanes, columns]
-    real(wp), allocatable, private :: y_last(:, :), y_new_last(:, :), c_last(:, :, :)   !! of the last lanes, with padding
+    real(wp), allocatable, private :: y_last(:, :), y_new_last(:, :), c_last(:, :, :)   !! of an incomplete last strip, padded
     type(strip_t), private :: strip, cut
   contains
     procedure :: start_lane
@@ -43,11 +44,12 @@ module nocdyn_linear_statistics
 
 contains
 
+  !> Statistics of the variants that pass through the lanes of a block.
   function new_linear_statistics(block, columns, statistics, t_start, t_end) result(self)
     class(formulation_t), intent(in) :: block
     type(column_t), intent(in) :: columns(:)         !! of the trajectory table
-    type(statistic_t), intent(in) :: statistics(:)   !! of columns that are linear
-    real(wp), intent(in) :: t_start, t_end           !! [s]
+    type(statistic_t), intent(in) :: statistics(:)   !! each of a column that `is_linear`
+    real(wp), intent(in) :: t_start, t_end           !! of every variant [s]
     type(linear_statistics_t) :: self
     integer, allocatable :: wanted(:)
     integer :: i
@@ -62,7 +64,7 @@ contains
     call new_accumulators(statistics, self%column, block%lanes, self%accumulators, self%acc)
   end function new_linear_statistics
 
-  !> A lane of the block starts anew at y.
+  !> Starts a variant in a lane of the block.
   subroutine start_lane(self, block, lane, y)
     class(linear_statistics_t), intent(inout) :: self
     class(formulation_t), intent(in) :: block
@@ -84,7 +86,7 @@ contains
     end do
   end subroutine start_lane
 
-  !> Whether the column of a statistic rises with x in a lane.
+  !> Whether the column of a statistic increases with x in a lane.
   pure logical function is_increasing(self, number, lane)
     class(linear_statistics_t), intent(in) :: self
     integer, intent(in) :: number   !! of the statistic
@@ -93,7 +95,7 @@ contains
     is_increasing = self%columns%is_increasing(self%column(number), lane)
   end function is_increasing
 
-  !> The end of a lane.
+  !> Takes the end of a variant.
   subroutine finish_lane(self, lane, y)
     class(linear_statistics_t), intent(inout) :: self
     integer, intent(in) :: lane
@@ -105,12 +107,12 @@ contains
     end do
   end subroutine finish_lane
 
-  !> The steps of a block.
+  !> Adds the last steps of the lanes.
   subroutine add_steps(self, steps, y, y_new, c)
     class(linear_statistics_t), intent(inout) :: self
     type(step_block_t), intent(in) :: steps
-    real(wp), contiguous, intent(in) :: y(:, :), y_new(:, :)   !! [lanes, padded columns]
-    real(wp), contiguous, intent(in) :: c(:, :, :)             !! [lanes, padded columns, degree]
+    real(wp), contiguous, intent(in) :: y(:, :), y_new(:, :)   !! starts and ends of the steps, [lanes, padded components]
+    real(wp), contiguous, intent(in) :: c(:, :, :)             !! coefficients of the steps, [lanes, padded components, degree]
     integer :: column, i, number
 
     if (size(self%accumulators) == 0) return
@@ -129,10 +131,10 @@ contains
     end do
   end subroutine add_steps
 
-  !> Room and nodes for a degree of the solution inside the steps.
+  !> Nodes and work space for a degree of the solution inside the steps.
   subroutine allocate_work(self, columns, degree)
     type(linear_statistics_t), intent(inout) :: self
-    integer, intent(in) :: columns   !! of the states
+    integer, intent(in) :: columns   !! padded components of the state
     integer, intent(in) :: degree
 
     if (degree > max_degree) error stop 'nocdyn_linear_statistics: the solution inside the step has too many coefficients'
@@ -145,7 +147,7 @@ contains
     allocate (self%y_last(width, columns), self%y_new_last(width, columns), self%c_last(width, columns, degree), source=0.0_wp)
   end subroutine allocate_work
 
-  !> The steps of the lanes of a strip. Those of the last one, if it is not full, are copied to where there is room beside them.
+  !> Loads the steps of the lanes of a strip. Those of an incomplete last strip are copied to padded arrays.
   subroutine load_strip(self, number, steps, y, y_new, c)
     type(linear_statistics_t), intent(inout) :: self
     integer, intent(in) :: number
@@ -173,7 +175,7 @@ contains
     end associate
   end subroutine load_strip
 
-  !> x of a column in the steps of the strip.
+  !> Computes x of a column in the steps of the strip.
   subroutine expand_strip(self, column, number, y, y_new, c)
     type(linear_statistics_t), intent(inout) :: self
     integer, intent(in) :: column, number
@@ -206,7 +208,7 @@ contains
     integer, intent(in) :: number
     type(step_block_t), intent(in) :: steps
     integer, intent(in) :: degree
-    real(wp) :: rise(width), fall(width)   ! of x beyond what is of interest, at most
+    real(wp) :: rise(width), fall(width)   ! bounds: how far x and -x exceed the extremes so far
     integer :: i
 
     associate (strip => self%strip)
@@ -220,7 +222,7 @@ contains
       end if
       do i = 1, strip%lanes
         associate (lane => strip%before + i)
-          if (steps%theta_end(lane) < 1 .or. acc%bound(i, number) > 0) then   ! the bounds do not hold
+          if (steps%theta_end(lane) < 1 .or. acc%bound(i, number) > 0) then   ! the bounds are not valid
             rise(i) = 1.0_wp
             fall(i) = 1.0_wp
           end if
@@ -232,7 +234,7 @@ contains
     end associate
   end subroutine widen_strip
 
-  !> By x at the ends of the steps of the lanes that have passed `from`.
+  !> Widens the range of x by its values at the ends of the steps, in the lanes that have passed `from`.
   pure subroutine widen_by_ends(has_time, t_end, x_end, bound, highest, lowest, highest_time)
     logical, intent(in) :: has_time
     real(wp), intent(in) :: t_end(width), x_end(width), bound(width)
@@ -252,7 +254,7 @@ contains
     end do
   end subroutine widen_by_ends
 
-  !> How far x and -x can pass what they must exceed to be of interest.
+  !> Bounds on how far x and -x exceed the extremes so far.
   pure subroutine bound_excess(acc, x_start, x_end, above, below, bound, highest, lowest, rise, fall)
     type(accumulator_t), intent(in) :: acc
     real(wp), intent(in), dimension(width) :: x_start, x_end, above, below, bound, highest, lowest
@@ -261,7 +263,7 @@ contains
 
     rise = huge(0.0_wp)
     fall = huge(0.0_wp)
-    if (acc%has_size) then
+    if (acc%has_max_abs) then
       do i = 1, width
         rise(i) = max(highest(i), -lowest(i))
       end do
@@ -288,34 +290,34 @@ contains
     any_positive = positive > 0
   end function any_positive
 
-  !> Widens the range by the extremes of a step, or of what of it lies after `from` and before its cut.
-  pure subroutine look_inside(self, acc, i, number, t, h, until, degree, rise, fall)
+  !> Widens the range of x by its extremes in the part of a step after `from` and before its end.
+  pure subroutine look_inside(self, acc, i, number, t, h, theta_end, degree, rise, fall)
     type(linear_statistics_t), intent(in) :: self
     type(accumulator_t), intent(inout) :: acc
     integer, intent(in) :: i, number
-    real(wp), intent(in) :: t, h, until   !! the step
+    real(wp), intent(in) :: t, h, theta_end   !! start [s], size [s], end relative to the size
     integer, intent(in) :: degree
-    real(wp), intent(in) :: rise, fall   !! positive if x, if -x can be of interest
+    real(wp), intent(in) :: rise, fall        !! positive if x, or -x, may exceed the extremes so far
     real(wp) :: bar, c(0:max_degree), place, t_start
     logical :: found
 
     associate (highest => acc%highest(i, number), lowest => acc%lowest(i, number), time => acc%highest_time(i, number), &
                x_end => self%strip%x_end(i), t_end => self%strip%t_end(i))
-      call cut_step(self%strip, i, acc%from, t, h, until, degree, c, t_start)
+      call cut_step(self%strip, i, acc%from, t, h, theta_end, degree, c, t_start)
       if (acc%bound(i, number) > 0) then
         call start_range(acc, i, number, c(0), t_start)
         if (x_end > highest) time = t_end
         highest = max(highest, x_end)
         lowest = min(lowest, x_end)
       end if
-      if (rise > 0 .and. (acc%has_max .or. acc%has_size)) then
+      if (rise > 0 .and. (acc%has_max .or. acc%has_max_abs)) then
         bar = highest
         if (.not. acc%has_max) bar = max(highest, -lowest)
         call raise_to_maximum(degree, self%to_bernstein, c, bar, place, found)
         if (found) highest = bar
         if (found) time = t_start + place * (t_end - t_start)
       end if
-      if (fall > 0 .and. (acc%has_min .or. acc%has_size)) then
+      if (fall > 0 .and. (acc%has_min .or. acc%has_max_abs)) then
         bar = -lowest
         if (.not. acc%has_min) bar = max(highest, -lowest)
         c(:degree) = -c(:degree)
@@ -325,7 +327,7 @@ contains
     end associate
   end subroutine look_inside
 
-  !> Adds the integrals of a column and of its square over what of the steps lies after `from`.
+  !> Adds the integrals of a column and of its square over the parts of the steps after `from`.
   subroutine integrate_strip(self, acc, number, steps, degree)
     type(linear_statistics_t), intent(inout) :: self
     type(accumulator_t), intent(inout) :: acc
@@ -361,7 +363,7 @@ contains
     end if
   end subroutine integrate_strip
 
-  !> A statistic of a lane that has reached its end. Those of extremes are good where the column rises with x.
+  !> The value of a statistic in a lane that has reached its end. Extremes are valid if the column increases with x.
   real(wp) function value(self, number, lane)
     class(linear_statistics_t), intent(in) :: self
     integer, intent(in) :: number   !! of the statistic

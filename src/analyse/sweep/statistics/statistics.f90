@@ -1,4 +1,4 @@
-!> What a sweep keeps of a column of trajectory.csv: the words for it, and the labels of the results.
+!> Statistics of columns of trajectory.csv: their kinds, and the labels of the results of a sweep.
 module nocdyn_statistics
   use nocdyn_kinds, only: wp
   use nocdyn_text, only: string_t, to_text
@@ -8,12 +8,12 @@ module nocdyn_statistics
   public :: new_statistic, find_columns, is_torque, value_of_zero_column
 
   integer, parameter, public :: statistic_final = 1           !! at the end
-  integer, parameter, public :: statistic_max = 2             !! in continuous time, as all of them are
+  integer, parameter, public :: statistic_max = 2             !! in continuous time, as all statistics
   integer, parameter, public :: statistic_min = 3
   integer, parameter, public :: statistic_max_abs = 4
-  integer, parameter, public :: statistic_mean = 5            !! integral over the time, divided by its length
+  integer, parameter, public :: statistic_mean = 5            !! over time
   integer, parameter, public :: statistic_rms = 6             !! root of the mean square
-  integer, parameter, public :: statistic_time_of_max = 7     !! when the largest value is reached first
+  integer, parameter, public :: statistic_time_of_max = 7     !! when the largest value is first reached
   integer, parameter, public :: statistic_settling_time = 8   !! until the last exit from the band, counted from `from`
 
   character(len=*), parameter, public :: statistic_names(8) = [character(len=13) :: 'final', 'max', 'min', 'max_abs', 'mean', &
@@ -23,17 +23,17 @@ module nocdyn_statistics
   character(len=*), parameter :: descriptions(8) = [character(len=30) :: 'at the end', 'largest value', 'smallest value', &
     'largest absolute value', 'mean over time', 'root mean square over time', 'time of the largest value', 'settling time']
 
-  !> One result of each variant. The column x counts from the time `from` on; it has settled once
-  !> |x - x_end| <= band |x(from) - x_end| for good. Variants of another structure have other columns, in another order.
+  !> A result of each variant: a statistic of a column x from the time `from` on. The settling time ends when
+  !> |x - x_end| <= band |x(from) - x_end| from then on. Variants of another structure have other columns, in another order.
   type, public :: statistic_t
     character(len=:), allocatable :: quantity        !! label of the column, e.g. 'moment_shaft [N m]'
-    integer :: column = 0                            !! of one machine's trajectory table; 0: it has none
+    integer :: column = 0                            !! in the trajectory table of one machine, 0 if that has none
     integer :: kind = statistic_final                !! statistic_...
     real(wp) :: from = 0.0_wp                        !! [s]
     real(wp) :: band = default_band                  !! for settling_time only
     character(len=:), allocatable :: label           !! e.g. 'moment_shaft_max_abs_from_2'
     character(len=:), allocatable :: unit            !! e.g. 'N m'
-    character(len=:), allocatable :: long_name       !! for people
+    character(len=:), allocatable :: long_name       !! a description
   end type statistic_t
 
 contains
@@ -43,7 +43,7 @@ contains
     type(string_t), intent(in) :: labels(:)     !! of the trajectory table
     integer, intent(in) :: column, kind
     real(wp), intent(in) :: t_start             !! [s]
-    real(wp), intent(in), optional :: from      !! [s]; absent: t_start
+    real(wp), intent(in), optional :: from      !! [s]; t_start if absent
     real(wp), intent(in), optional :: band
     type(statistic_t) :: self
     integer :: bracket
@@ -66,7 +66,7 @@ contains
     self%long_name = self%long_name // ' from ' // to_text(from) // ' s'
   end function new_statistic
 
-  !> Looks the columns of statistics up among those of a machine.
+  !> Finds the columns of statistics in the trajectory table of a machine.
   subroutine find_columns(labels, statistics)
     type(string_t), intent(in) :: labels(:)   !! of the machine's trajectory table
     type(statistic_t), intent(inout) :: statistics(:)
@@ -85,14 +85,14 @@ contains
     end do
   end subroutine find_columns
 
-  !> Whether the column is a torque: 0 in a machine that has no such column, as there is no such torque.
+  !> Whether the column is a torque. In a machine without such a column the torque is 0.
   pure logical function is_torque(statistic)
     type(statistic_t), intent(in) :: statistic
 
     is_torque = index(statistic%quantity, ' [N m]') > 0
   end function is_torque
 
-  !> The statistic of a column that is 0 all the time.
+  !> The statistic of a column that is 0 at all times.
   elemental real(wp) function value_of_zero_column(statistic) result(value)
     type(statistic_t), intent(in) :: statistic
 

@@ -126,7 +126,7 @@ contains
       self%fallback = new_sampled_statistics(self%block, columns, pack(statistics, has_fallback), self%t_end)
     end associate
     is_of_steps = is_of_linear .and. statistics%kind /= statistic_final
-    call find_components(self, columns(pack(statistics%column, is_of_steps)))
+    call find_components(self, columns(pack([(statistics(i)%column, i=1, size(statistics))], is_of_steps)))
   end subroutine distribute
 
   !> Finds the components of the state that linear columns read inside the steps.

@@ -1,4 +1,4 @@
-!> A linear function x of the state in the last steps of some lanes: a polynomial in each, in vector loops over the lanes.
+!> A linear function x of the state in the last steps of a strip of lanes: a polynomial in each, in vector loops over the lanes.
 module nocdyn_step_strips
   use nocdyn_bernstein, only: max_degree, shift_origin
   use nocdyn_kinds, only: wp
@@ -8,23 +8,23 @@ module nocdyn_step_strips
 
   public :: fill_chord_gaps, expand, exclude_monotonic, cut_step, add_integrals
 
-  !> The steps of some lanes that are looked at together, and x in them.
+  !> The last steps of the lanes of a strip, and x in them.
   type, public :: strip_t
     integer :: lanes = 0
-    integer :: before = 0                             !! lanes of the strips before it
-    logical :: is_complete = .false.                  !! whether there are `width` lanes, and all have taken a step
+    integer :: before = 0                             !! number of lanes in the strips before
+    logical :: is_complete = .false.                  !! whether it has `width` lanes, and all have taken a step
     real(wp), dimension(width) :: t_end = 0.0_wp
-    real(wp), dimension(width) :: scale = 0.0_wp      !! 0 in lanes that have not taken a step: x stands still there
+    real(wp), dimension(width) :: scale = 0.0_wp      !! 0 in lanes that have not taken a step: x is constant there
     real(wp), dimension(width) :: x_start = 0.0_wp, x_end = 0.0_wp
-    real(wp) :: c(width, max_degree) = 0.0_wp       !! x = x_start + sum of c_p (scale * place)^p
-    real(wp), dimension(width) :: above = 0.0_wp, below = 0.0_wp   !! that x can leave the range of its ends by, at most
+    real(wp) :: c(width, max_degree) = 0.0_wp         !! x = x_start + sum of c_p (scale s)^p, s from 0 to 1
+    real(wp), dimension(width) :: above = 0.0_wp, below = 0.0_wp   !! bounds: how far x leaves the range of its ends
   end type strip_t
 
 contains
 
-  !> The largest values of s - s^p between s = 0 and 1.
+  !> The largest values of s - s^p for s from 0 to 1.
   pure subroutine fill_chord_gaps(chord_gap)
-    real(wp), intent(out) :: chord_gap(:)   !! of p = 1, 2, ...
+    real(wp), intent(out) :: chord_gap(:)   !! for p = 1, 2, ...
     integer :: p
 
     chord_gap(1) = 0.0_wp
@@ -33,11 +33,11 @@ contains
     end do
   end subroutine fill_chord_gaps
 
-  !> x = offset + sum of factor * y, and its coefficients, in the lanes from `at` on.
+  !> Computes x = offset + sum of factor * y at the ends of the steps, and its coefficients, in the lanes from `at` on.
   pure subroutine expand(lanes, states, degree, at, chord_gap, entries, component, factor, offset, y, y_new, c, strip)
     integer, intent(in) :: lanes, states, degree, at
     real(wp), intent(in) :: chord_gap(degree)
-    integer, intent(in) :: entries   !! an even number
+    integer, intent(in) :: entries   !! even
     integer, intent(in) :: component(entries)
     real(wp), intent(in) :: factor(width, entries), offset(width)
     real(wp), intent(in) :: y(lanes, states), y_new(lanes, states), c(lanes, states, degree)
@@ -79,7 +79,7 @@ contains
     end do
   end subroutine add_pair
 
-  !> How far x can leave the range of its ends: x(s) = (1 - s) x(0) + s x(1) - sum of c_p scale^p (s - s^p).
+  !> Bounds how far x leaves the range of its ends: x(s) = (1 - s) x(0) + s x(1) - sum of c_p scale^p (s - s^p).
   pure subroutine bound_excursions(degree, chord_gap, scale, c, above, below)
     integer, intent(in) :: degree
     real(wp), intent(in) :: chord_gap(degree), scale(width), c(width, degree)
@@ -104,7 +104,7 @@ contains
     end do
   end subroutine bound_excursions
 
-  !> Nothing is of interest inside the steps in which x only rises or only falls:
+  !> Excludes the steps in which x is monotonic, because its extremes are at their ends:
   !> x' = (1 - s) x'(0) + s x'(1) - sum of p c_p scale^p (s - s^(p-1)).
   pure subroutine exclude_monotonic(degree, chord_gap, scale, c, rise, fall)
     integer, intent(in) :: degree
@@ -136,12 +136,12 @@ contains
     end do
   end subroutine exclude_monotonic
 
-  !> x in what of a step lies after `from` and before its cut, as a polynomial in the place there, 0 to 1.
-  pure subroutine cut_step(strip, i, from, t, h, until, degree, c, t_start)
+  !> The coefficients of x in the part of a step after `from` and before its end, as a polynomial of s from 0 to 1 in that part.
+  pure subroutine cut_step(strip, i, from, t, h, theta_end, degree, c, t_start)
     type(strip_t), intent(in) :: strip
     integer, intent(in) :: i
     real(wp), intent(in) :: from
-    real(wp), intent(in) :: t, h, until   !! the step
+    real(wp), intent(in) :: t, h, theta_end   !! start [s], size [s], end relative to the size
     integer, intent(in) :: degree
     real(wp), intent(inout) :: c(0:degree)
     real(wp), intent(out) :: t_start
@@ -155,11 +155,12 @@ contains
       c(p) = power * strip%c(i, p)
     end do
     t_start = max(t, from)
-    if (t_start <= t .and. until >= 1) return
-    call shift_origin(degree, c, (t_start - t) / h, until)
+    if (t_start <= t .and. theta_end >= 1) return
+    call shift_origin(degree, c, (t_start - t) / h, theta_end)
   end subroutine cut_step
 
-  !> By Gauss's rule with as many nodes as x has coefficients: x and its square are integrated exactly.
+  !> Adds the integrals of a column and of its square by a Gauss rule with as many nodes as x has coefficients: it is exact for x
+  !> and for its square.
   pure subroutine add_integrals(strip, degree, nodes, weights, duration, linear, cubic, integral, square)
     type(strip_t), intent(in) :: strip
     integer, intent(in) :: degree
