@@ -6,6 +6,7 @@ module nocdyn_mpi_command
   use nocdyn_errors, only: error_t, exit_done, exit_input, raise
   use nocdyn_input, only: input_t
   use nocdyn_input_reader, only: read_input_text
+  use nocdyn_input_sources, only: pack_sources, unpack_sources
   use nocdyn_input_text, only: input_text
   use nocdyn_mpi_messages, only: root, broadcast_text
   use nocdyn_mpi_root, only: mpi_root_t
@@ -67,7 +68,7 @@ contains
     type(sweep_job_t), target :: job
     type(mpi_root_t) :: scheduler
     type(error_t), allocatable :: error
-    character(len=:), allocatable :: file, text
+    character(len=:), allocatable :: file, sources, text
     integer :: ranks
 
     code = exit_done
@@ -79,7 +80,9 @@ contains
     if (text == '') return
     file = job%plan%input%file
     if (.not. arguments%is_given('--quiet')) call print_thread_note(file, max(1, arguments%threads))
+    call pack_sources(job%plan%input, sources)
     call broadcast_text(file)
+    call broadcast_text(sources)
     call broadcast_text(job%plan%list_checksum)
     call mpi_comm_size(mpi_comm_world, ranks)
     scheduler%other_ranks = ranks - 1
@@ -97,15 +100,19 @@ contains
     type(sweep_setup_t) :: setup
     type(mpi_worker_t) :: worker
     type(error_t), allocatable :: error
-    character(len=:), allocatable :: checksum, file, text
+    character(len=:), allocatable :: checksum, file, sources, text
 
     code = exit_done
     call broadcast_text(text)
     if (text == '') return
     call broadcast_text(file)
+    call broadcast_text(sources)
     call broadcast_text(checksum)
     call read_input_text(text, file, strings([character(len=1) ::]), input, error)
-    if (.not. allocated(error)) call make_plan(input, plan, error)
+    if (.not. allocated(error)) then
+      call unpack_sources(sources, input)
+      call make_plan(input, plan, error)
+    end if
     if (.not. allocated(error)) call prepare_sweep(plan, setup, error)
     if (.not. allocated(error) .and. plan%list_checksum /= checksum) then
       call raise(error, exit_input, file // ': the file of &sweep with the variants differs from that of rank 0')
