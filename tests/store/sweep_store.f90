@@ -1,6 +1,7 @@
-!> sweep_store FOLDER VARIANTS CHUNK: a sweep whose results need no computation, kept as a sweep is. Goes on with the journal in
-!> FOLDER or begins one, with sample variants in chunks of CHUNK; then writes sweep.nc and sweep.csv, prints the order statistics
-!> of each result on a line and removes the journal. Exit codes and messages are those of the errors.
+!> Stores a sweep of sample variants, whose results need no integration. Command line: sweep_store FOLDER VARIANTS CHUNK. It
+!> resumes or creates the journal in FOLDER and appends the missing variants in chunks of CHUNK; then it writes sweep.nc and
+!> sweep.csv, prints the order statistics of each result on a line and removes the journal. Exit codes and
+!> messages are those of the errors.
 program sweep_store
   use, intrinsic :: iso_fortran_env, only: error_unit, output_unit
   use nocdyn_errors, only: error_t
@@ -64,7 +65,7 @@ contains
     flush (output_unit)
   end subroutine begin
 
-  !> What the journal lacks.
+  !> Appends the variants that the journal lacks.
   subroutine compute()
     type(error_t), allocatable :: error
     integer, allocatable :: first(:), count(:)

@@ -1,4 +1,4 @@
-!> Sweeps with results that depend on the number of the variant alone.
+!> Sweeps whose results are functions of the number of the variant.
 module sample_sweeps
   use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
   use nocdyn_kinds, only: wp
@@ -46,7 +46,7 @@ contains
     quantity%long_name = long_name
   end subroutine name_quantity
 
-  !> Result `k` of a variant, scattered over both signs and many powers of ten.
+  !> Result `k` of a variant, of either sign and of very different sizes.
   pure real(wp) function sample_result(variant, k)
     integer, intent(in) :: variant, k
 

@@ -1,4 +1,4 @@
-!> Statistics of machines: as a block takes them, and from the rows of a dense trajectory.
+!> Statistics of machines: computed by a block of lanes, and from the rows of a dense trajectory.
 module nocdyn_test_sweep_blocks
   use nocdyn_assembly, only: new_formulation
   use nocdyn_errors, only: error_t
@@ -24,7 +24,7 @@ module nocdyn_test_sweep_blocks
 
   public :: all_statistics, run_block, run_copied_variants, run_densely, sampled_statistic, column_named
 
-  !> Copies the lanes of a source into whatever lane is free, and takes their statistics.
+  !> Copies the lanes of a source into lanes that are free and stores their statistics.
   type, extends(ensemble_t) :: measured_copies_t
     type(lane_parameters_t) :: block, source
     type(statistics_observer_t), pointer :: observer => null()
@@ -45,7 +45,7 @@ contains
     character(len=*), intent(in) :: method
     real(wp), intent(in) :: tolerance, t_end
     type(statistic_t), intent(in) :: statistics(:)
-    real(wp), allocatable, intent(out) :: values(:, :)   !! [statistics, variants]; not allocated: the layouts differ
+    real(wp), allocatable, intent(out) :: values(:, :)   !! [statistics, variants]; not allocated if the structures differ
     type(reduced_t), target :: block, source
     type(statistics_observer_t), target :: observer
     type(measured_copies_t) :: ensemble
@@ -115,7 +115,7 @@ contains
     end do
   end function all_statistics
 
-  !> Number of the column whose label begins with a name, 0 if there is none.
+  !> The number of the column whose label begins with a name, 0 if there is none.
   integer function column_named(machine, name)
     type(machine_t), intent(in) :: machine
     character(len=*), intent(in) :: name
@@ -194,7 +194,7 @@ contains
     end do
   end subroutine run_densely
 
-  !> The same from equidistant samples: extremes among them, integrals by the trapezoidal rule, the last sample out of the band.
+  !> A statistic of equidistant samples: extremes among them, integrals by the trapezoidal rule, the last one outside the band.
   pure real(wp) function sampled_statistic(statistic, times, x) result(value)
     type(statistic_t), intent(in) :: statistic
     real(wp), intent(in) :: times(:), x(:)

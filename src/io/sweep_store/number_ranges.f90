@@ -1,5 +1,7 @@
 !> Ranges of integers: their order and the gaps between them.
 module nocdyn_number_ranges
+  use nocdyn_text, only: string_t
+  use nocdyn_text_sort, only: argsort
   implicit none (type, external)
   private
 
@@ -12,48 +14,21 @@ module nocdyn_number_ranges
 
 contains
 
-  !> The permutation that sorts `ranges` by their first numbers, by merge sort.
+  !> The permutation that sorts `ranges` by their first numbers.
   pure subroutine ascending_order(ranges, order)
-    type(range_t), intent(in) :: ranges(:)
+    type(range_t), intent(in) :: ranges(:)   !! of numbers that are not negative
     integer, allocatable, intent(out) :: order(:)
-    integer, allocatable :: merged(:)
-    integer :: first, last, middle, width
+    type(string_t), allocatable :: keys(:)
+    character(len=10) :: digits
+    integer :: i
 
-    allocate (order(size(ranges)), merged(size(ranges)))
-    order = [(first, first=1, size(ranges))]
-    width = 1
-    do while (width < size(ranges))
-      do first = 1, size(ranges), 2 * width
-        middle = min(first + width - 1, size(ranges))
-        last = min(first + 2 * width - 1, size(ranges))
-        call merge_runs(ranges, order(first:middle), order(middle + 1:last), merged(first:last))
-      end do
-      order = merged
-      width = 2 * width
+    allocate (keys(size(ranges)))
+    do i = 1, size(ranges)
+      write (digits, '(i10.10)') ranges(i)%first
+      keys(i)%text = digits
     end do
+    call argsort(keys, order)
   end subroutine ascending_order
-
-  pure subroutine merge_runs(ranges, left, right, merged)
-    type(range_t), intent(in) :: ranges(:)
-    integer, intent(in) :: left(:), right(:)   !! sorted indices into `ranges`
-    integer, intent(out) :: merged(:)
-    integer :: i, l, r
-    logical :: takes_left
-
-    l = 1
-    r = 1
-    do i = 1, size(merged)
-      takes_left = r > size(right)
-      if (.not. takes_left .and. l <= size(left)) takes_left = ranges(left(l))%first <= ranges(right(r))%first
-      if (takes_left) then
-        merged(i) = left(l)
-        l = l + 1
-      else
-        merged(i) = right(r)
-        r = r + 1
-      end if
-    end do
-  end subroutine merge_runs
 
   !> The parts of `whole` that none of `ranges` covers, in ascending order.
   pure subroutine gaps(ranges, whole, open_ranges)
