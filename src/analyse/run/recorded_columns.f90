@@ -11,11 +11,17 @@ module nocdyn_recorded_columns
 
   public :: new_recorded_columns
 
+  !> Columns one after the other whose indices are consecutive.
+  type, extends(column_t) :: segment_t
+    integer :: first = 1, last = 1     !! columns; `index` is that of the first
+    logical :: has_new_values = .true. !! whether the segment before is of another bank or quantity
+  end type segment_t
+
   !> Evaluates a copy of the formulation, because `observe` chooses branches: those of the integration must not change. After
   !> `copy_lane` it must not be moved in memory.
   type, public :: recorded_columns_t
     class(formulation_t), allocatable :: formulation
-    type(column_t), allocatable, private :: columns(:)
+    type(segment_t), allocatable, private :: segments(:)
     type(lane_parameters_t), private :: parameters       !! of `formulation`; empty before `copy_lane`
     logical, private :: have_reactions = .false., have_energies = .false.
     real(wp), allocatable, private :: values(:)          !! of one quantity of a bank; work space
@@ -43,7 +49,7 @@ contains
       error stop 'nocdyn_recorded_columns: works need a formulation that is audited'
     end if
     allocate (self%formulation, source=formulation)
-    allocate (self%columns, source=columns)
+    allocate (self%segments, source=segments_of(columns))
     self%have_reactions = any(columns%kind == column_reaction .or. columns%kind == column_member)
     self%have_energies = any(columns%kind == column_elastic .or. columns%kind == column_residual)
     associate (banks => formulation%machine%banks)
@@ -53,6 +59,31 @@ contains
     allocate (self%lambda(formulation%machine%constraints%rows()), source=0.0_wp)
     allocate (self%start_energy(formulation%lanes), source=0.0_wp)
   end function new_recorded_columns
+
+  !> The columns as few segments.
+  pure function segments_of(columns) result(segments)
+    type(column_t), intent(in) :: columns(:)
+    type(segment_t), allocatable :: segments(:)
+    type(segment_t) :: all(size(columns))
+    logical :: is_of_same
+    integer :: i, n
+
+    n = 0
+    do i = 1, size(columns)
+      is_of_same = .false.
+      if (n > 0) is_of_same = columns(i)%kind == all(n)%kind .and. columns(i)%bank == all(n)%bank .and. &
+                              columns(i)%quantity == all(n)%quantity
+      if (is_of_same) then
+        if (columns(i)%index == all(n)%index + i - all(n)%first) then
+          all(n)%last = i
+          cycle
+        end if
+      end if
+      n = n + 1
+      all(n) = segment_t(columns(i)%kind, columns(i)%bank, columns(i)%quantity, columns(i)%index, i, i, .not. is_of_same)
+    end do
+    segments = all(:n)
+  end function segments_of
 
   !> Copies the parameters of a lane from the formulation that is integrated.
   subroutine copy_lane(self, lane, parameters)
@@ -93,34 +124,32 @@ contains
     real(wp), contiguous, intent(in) :: t(:)      !! [s], [lanes]
     real(wp), contiguous, intent(in) :: y(:, :)   !! [lanes, states + quadratures]
     real(wp), intent(inout) :: row(:)             !! [columns]
-    integer :: i, observed(2)   ! bank and quantity whose values are there
+    integer :: k
 
     if (self%have_reactions) call self%formulation%reactions(lane, self%lambda)
-    observed = 0
-    associate (machine => self%formulation%machine)
-      do i = 1, size(self%columns)
-        associate (column => self%columns(i))
-          select case (column%kind)
+    associate (machine => self%formulation%machine, members => self%formulation%machine%constraints%members)
+      do k = 1, size(self%segments)
+        associate (segment => self%segments(k), first => self%segments(k)%first, last => self%segments(k)%last, &
+                   i => self%segments(k)%index, j => self%segments(k)%index + self%segments(k)%last - self%segments(k)%first)
+          select case (segment%kind)
           case (column_time)
-            row(i) = t(lane)
+            row(first) = t(lane)
           case (column_angle)
-            row(i) = self%formulation%phi(lane, column%index)
+            row(first:last) = self%formulation%phi(lane, i:j)
           case (column_speed)
-            row(i) = self%formulation%omega(lane, column%index)
+            row(first:last) = self%formulation%omega(lane, i:j)
           case (column_element)
-            if (any(observed /= [column%bank, column%quantity])) then
-              observed = [column%bank, column%quantity]
-              call machine%banks(column%bank)%bank%observe(machine%elements, column%quantity, lane, &
-                                                           self%values(:size(machine%banks(column%bank)%bank%to)))
+            if (segment%has_new_values) then
+              call machine%banks(segment%bank)%bank%observe(machine%elements, segment%quantity, lane, &
+                                                            self%values(:size(machine%banks(segment%bank)%bank%to)))
             end if
-            row(i) = self%values(column%index)
+            row(first:last) = self%values(i:j)
           case (column_reaction)
-            row(i) = self%lambda(column%index)
+            row(first:last) = self%lambda(i:j)
           case (column_member)
-            row(i) = machine%constraints%members%factor(lane, column%index) &
-                     * self%lambda(machine%constraints%members%row(column%index))
+            row(first:last) = members%factor(lane, i:j) * self%lambda(members%row(i:j))
           case default
-            row(i) = energy(self, lane, column%kind, y)
+            row(first) = energy(self, lane, segment%kind, y)
           end select
         end associate
       end do
