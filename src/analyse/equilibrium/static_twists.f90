@@ -189,11 +189,7 @@ contains
     integer :: e, i, k, n
 
     associate (first => balance%incidence%first, coordinate => balance%incidence%coordinate)
-      n = 0
-      do i = 1, size(balance%elastic)
-        e = balance%elastic(i)
-        n = n + (first(e + 1) - first(e))**2
-      end do
+      n = sum((first(balance%elastic + 1) - first(balance%elastic))**2)
       allocate (entries%row(n), entries%column(n))
       n = 0
       do i = 1, size(balance%elastic)

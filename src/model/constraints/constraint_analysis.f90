@@ -112,38 +112,38 @@ contains
     type(train_relations_t), intent(in) :: relations
     integer, intent(in) :: core(:)         !! relations, ascending
     logical, intent(inout) :: is_kept(:)   !! [rows]
-    integer, allocatable :: left(:)
+    integer, allocatable :: remaining(:)
     real(wp), allocatable :: rows(:, :)
-    integer :: dependent, fine, i, middle
-    logical :: adds(size(core))
+    integer :: dependent, independent, i, middle   ! bisection: the first `independent` rows are, the first `dependent` are not
+    logical :: is_new(size(core))
 
     allocate (rows, source=scaled_rows(relations%equations, core, distinct_trains(relations%equations, core)))
-    adds = independent_rows(rows)
-    is_kept(relations%row(pack(core, .not. adds))) = .false.
-    left = pack(core, adds)
-    rows(:size(left), :) = rows(pack([(i, i=1, size(core))], adds), :)
-    fine = 0
+    is_new = independent_rows(rows)
+    is_kept(relations%row(pack(core, .not. is_new))) = .false.
+    remaining = pack(core, is_new)
+    rows(:size(remaining), :) = rows(pack([(i, i=1, size(core))], is_new), :)
+    independent = 0
     do
-      dependent = size(left) + 1
-      if (rank_of(rows(:size(left), :)) == size(left)) exit
-      do while (dependent - fine > 1)
-        middle = (fine + dependent) / 2
+      dependent = size(remaining) + 1
+      if (rank_of(rows(:size(remaining), :)) == size(remaining)) exit
+      do while (dependent - independent > 1)
+        middle = (independent + dependent) / 2
         if (rank_of(rows(:middle, :)) == middle) then
-          fine = middle
+          independent = middle
         else
           dependent = middle
         end if
       end do
-      is_kept(relations%row(left(dependent))) = .false.
-      rows(dependent:size(left) - 1, :) = rows(dependent + 1:size(left), :)
-      left = [left(:dependent - 1), left(dependent + 1:)]
+      is_kept(relations%row(remaining(dependent))) = .false.
+      rows(dependent:size(remaining) - 1, :) = rows(dependent + 1:size(remaining), :)
+      remaining = [remaining(:dependent - 1), remaining(dependent + 1:)]
     end do
   end subroutine find_independent_core
 
   !> Which rows of unit length are independent of those before them: Gram-Schmidt, twice per row.
-  function independent_rows(rows) result(adds)
+  function independent_rows(rows) result(is_new)
     real(wp), intent(in) :: rows(:, :)   !! [rows, trains]
-    logical :: adds(size(rows, 1))
+    logical :: is_new(size(rows, 1))
     real(wp) :: basis(size(rows, 2), size(rows, 1)), part(size(rows, 2))   ! the basis is orthonormal
     integer :: i, k, n, pass
 
@@ -155,8 +155,8 @@ contains
           part = part - dot_product(basis(:, k), part) * basis(:, k)
         end do
       end do
-      adds(i) = norm2(part) > ratio_tolerance
-      if (.not. adds(i)) cycle
+      is_new(i) = norm2(part) > ratio_tolerance
+      if (.not. is_new(i)) cycle
       n = n + 1
       basis(:, n) = part / norm2(part)
     end do

@@ -27,31 +27,31 @@ contains
     type(rigid_trains_t), intent(in) :: trains
     integer, intent(in) :: row
     type(error_t), allocatable, intent(out) :: error
-    integer, allocatable :: bodies(:), rows(:), bodies_of_tree(:), bodies_of_row(:), way(:), other_way(:)
-    integer :: at, last
+    integer, allocatable :: bodies(:), rows(:), bodies_of_tree(:), bodies_of_row(:), tree_rows(:), other_rows(:)
+    integer :: first_body, last
 
     associate (first => constraints%first(row))
       call trains%find_path(constraints%body(first), constraints%body(first + 1), bodies, rows)
     end associate
     last = size(bodies)
-    at = minloc(bodies, dim=1)
-    if (at < last) then
-      bodies_of_tree = bodies(at:)
-      way = rows(at:)
-      bodies_of_row = [bodies(at:1:-1), bodies(last)]
-      other_way = [rows(at - 1:1:-1), row]
+    first_body = minloc(bodies, dim=1)
+    if (first_body < last) then
+      bodies_of_tree = bodies(first_body:)
+      tree_rows = rows(first_body:)
+      bodies_of_row = [bodies(first_body:1:-1), bodies(last)]
+      other_rows = [rows(first_body - 1:1:-1), row]
     else
       bodies_of_tree = bodies(last:1:-1)
-      way = rows(last - 1:1:-1)
+      tree_rows = rows(last - 1:1:-1)
       bodies_of_row = [bodies(last), bodies(1)]
-      other_way = [row]
+      other_rows = [row]
     end if
     call raise(error, exit_input, 'locks ' // locked_names(body_names, trains, [trains%train(bodies(1))]) // ': ' // &
-               joined(selected(constraints%names, way), ', ', most_names) // ' and ' // &
-               joined(selected(constraints%names, other_way), ', ', most_names) // ' drive ' // &
+               joined(selected(constraints%names, tree_rows), ', ', most_names) // ' and ' // &
+               joined(selected(constraints%names, other_rows), ', ', most_names) // ' drive ' // &
                quoted(body_names(bodies_of_tree(size(bodies_of_tree)))%text) // ' at ' // &
-               rounded_text(ratio_along(constraints, bodies_of_tree, way), ratio_digits) // ' and ' // &
-               rounded_text(ratio_along(constraints, bodies_of_row, other_way), ratio_digits) // ' times ' // &
+               rounded_text(ratio_along(constraints, bodies_of_tree, tree_rows), ratio_digits) // ' and ' // &
+               rounded_text(ratio_along(constraints, bodies_of_row, other_rows), ratio_digits) // ' times ' // &
                quoted(body_names(bodies_of_tree(1))%text))
   end subroutine raise_loop_conflict
 
@@ -146,24 +146,24 @@ contains
     type(error_t), allocatable, intent(out) :: error
     type(elimination_t) :: elimination
     logical :: is_member(size(relations%row)), is_locked(size(trains%root))
-    integer, allocatable :: inputs(:), rows(:)
-    integer :: fine, i, lock, middle
+    integer, allocatable :: ascending(:), rows(:)
+    integer :: free, i, lock, middle
 
     is_member = .false.
     is_member(members) = .true.
-    inputs = pack([(i, i=1, size(is_member))], is_member)
-    fine = 0
-    lock = size(inputs)
-    do while (lock - fine > 1)
-      middle = (fine + lock) / 2
-      if (any(locked_trains(relations, partial_elimination(relations, inputs(:middle))))) then
+    ascending = pack([(i, i=1, size(is_member))], is_member)
+    free = 0
+    lock = size(ascending)
+    do while (lock - free > 1)
+      middle = (free + lock) / 2
+      if (any(locked_trains(relations, partial_elimination(relations, ascending(:middle))))) then
         lock = middle
       else
-        fine = middle
+        free = middle
       end if
     end do
-    offending_row = relations%row(inputs(lock))
-    elimination = partial_elimination(relations, inputs(:lock))
+    offending_row = relations%row(ascending(lock))
+    elimination = partial_elimination(relations, ascending(:lock))
     is_locked = locked_trains(relations, elimination)
     rows = locking_rows(constraints, trains, relations, elimination, findloc(is_locked, .true., dim=1))
     rows = pack(rows, rows /= offending_row)

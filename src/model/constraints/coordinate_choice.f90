@@ -9,7 +9,8 @@ module nocdyn_coordinate_choice
   use nocdyn_sparse_map, only: transposed_order
   use nocdyn_text, only: joined, quoted, selected, string_t, to_text
   use nocdyn_train_motion, only: elimination_t
-  use nocdyn_train_relations, only: distinct_trains, new_relations, scaled_rows, leaf_elimination_t, train_relations_t
+  use nocdyn_train_relations, only: distinct_trains, leaf_elimination_t, new_relations, scaled_rows, train_relations_t, &
+                                    unit_rows
   implicit none (type, external)
   private
 
@@ -96,17 +97,6 @@ contains
     is_given(elimination%core_trains(pivots(:size(core)))) = .true.
     allocate (elimination%free, source=pack(trains, .not. is_given(trains)))
   end function pivoted_elimination
-
-  !> The rows of a matrix, scaled to unit length.
-  pure function unit_rows(matrix) result(scaled)
-    real(wp), intent(in) :: matrix(:, :)   !! without rows of zeros
-    real(wp) :: scaled(size(matrix, 1), size(matrix, 2))
-    integer :: i
-
-    do i = 1, size(matrix, 1)
-      scaled(i, :) = matrix(i, :) / norm2(matrix(i, :))
-    end do
-  end function unit_rows
 
   !> Makes the wanted bodies the coordinates, if there are any. It is an error if they cannot be.
   subroutine choose_coordinates(constraints, body_names, wanted, group_of, is_kept, trains, groups, error)

@@ -10,7 +10,7 @@ module nocdyn_train_relations
   implicit none (type, external)
   private
 
-  public :: new_relations, scaled_rows, distinct_trains
+  public :: new_relations, scaled_rows, unit_rows, distinct_trains
 
   type, public :: train_relations_t
     integer, allocatable :: row(:)     !! constraint row of each relation
@@ -266,13 +266,22 @@ contains
     type(constraints_t), intent(in) :: equations
     integer, intent(in) :: relations(:), trains(:)
     real(wp) :: matrix(size(relations), size(trains))
+
+    matrix = unit_rows(equations%block(1, relations, trains) &
+                       * spread(effective_speeds(equations, relations, trains), 1, size(relations)))
+  end function scaled_rows
+
+  !> The rows of a matrix, scaled to unit length; zero rows stay.
+  pure function unit_rows(matrix) result(scaled)
+    real(wp), intent(in) :: matrix(:, :)
+    real(wp) :: scaled(size(matrix, 1), size(matrix, 2))
     integer :: i
 
-    matrix = equations%block(1, relations, trains) * spread(effective_speeds(equations, relations, trains), 1, size(relations))
+    scaled = matrix
     do i = 1, size(matrix, 1)
-      if (norm2(matrix(i, :)) > 0.0_wp) matrix(i, :) = matrix(i, :) / norm2(matrix(i, :))
+      if (norm2(matrix(i, :)) > 0.0_wp) scaled(i, :) = matrix(i, :) / norm2(matrix(i, :))
     end do
-  end function scaled_rows
+  end function unit_rows
 
   !> Effective speeds of the trains: with them the largest terms of the relations are about equal. They are computed from train
   !> to train and serve as the scale for rounding.

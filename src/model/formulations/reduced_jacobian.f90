@@ -124,10 +124,7 @@ contains
     integer, allocatable :: row(:), column(:), entry(:)
     integer :: i, k, n
 
-    n = 0
-    do k = 1, size(with_work)
-      n = n + incidence%first(with_work(k) + 1) - incidence%first(with_work(k))
-    end do
+    n = sum(incidence%first(with_work + 1) - incidence%first(with_work))
     allocate (row(2 * n), column(2 * n), entry(n))
     n = 0
     do k = 1, size(with_work)
