@@ -6,7 +6,7 @@ module nocdyn_dense_output
   implicit none (type, external)
   private
 
-  public :: allocate_dense_output, take_lane, sample, sample_batch
+  public :: allocate_dense_output, load_lane, sample, sample_batch
 
   integer, parameter, public :: batch = 8   !! values of theta evaluated together: their sums are independent
 
@@ -33,7 +33,7 @@ contains
   end subroutine allocate_dense_output
 
   !> Copies the polynomials of one lane of a block.
-  pure subroutine take_lane(dense, attempt, coefficients, lane)
+  pure subroutine load_lane(dense, attempt, coefficients, lane)
     type(dense_output_t), intent(inout) :: dense
     type(step_attempt_t), intent(in) :: attempt
     real(wp), contiguous, intent(in) :: coefficients(:, :, :)   !! of the powers 1 to degree, [lanes, padded columns, degree]
@@ -49,7 +49,7 @@ contains
         dense%c(:n, power) = coefficients(lane, :n, power)
       end do
     end associate
-  end subroutine take_lane
+  end subroutine load_lane
 
   !> The state at t + theta h, 0 <= theta <= 1.
   pure subroutine sample(dense, theta, y)

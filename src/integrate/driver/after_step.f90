@@ -1,6 +1,6 @@
 !> Processing of accepted steps: output times, events, extremes, changes of branches, and the observer of whole steps.
 module nocdyn_after_step
-  use nocdyn_dense_output, only: batch, sample, sample_batch, take_lane
+  use nocdyn_dense_output, only: batch, load_lane, sample, sample_batch
   use nocdyn_events, only: find_events
   use nocdyn_extremes, only: restart_extremes, update_extremes
   use nocdyn_kinds, only: wp
@@ -36,7 +36,7 @@ contains
       if (.not. integrator%inspects) return
       do lane = 1, integrator%attempt%lanes
         if (.not. integrator%accepted(lane)) cycle
-        if (integrator%inspected(lane)) call take_lane(integrator%dense, integrator%attempt, integrator%coefficients, lane)
+        if (integrator%inspected(lane)) call load_lane(integrator%dense, integrator%attempt, integrator%coefficients, lane)
         if (integrator%has_switches) then
           call end_at_crossing(integrator, system, observer, lane, solver_status, steps%theta_end(lane))
           steps%crosses(lane) = integrator%switching%pending(lane) > 0
