@@ -1,9 +1,9 @@
 !> Finds the number of an input with a given path, or says what is wrong with the path.
 module nocdyn_target_search
   use nocdyn_input, only: group_t, input_t
-  use nocdyn_name_checks, only: collect_names
   use nocdyn_key_path, only: key_path_t, read_path
-  use nocdyn_schema, only: first_key, group_rules, has_word, key_rules, selector_name, selector_rule, last_key
+  use nocdyn_name_checks, only: collect_names
+  use nocdyn_schema, only: first_key, group_rules, has_word, key_rules, last_key, selector_name, selector_rule
   use nocdyn_schema_rules, only: a_number, an_integer, key_rule_t
   use nocdyn_schema_text, only: only_if_text, suggestion, type_text
   use nocdyn_text, only: append, lower_case, nearest_word, quoted, string_t, to_text
@@ -16,24 +16,22 @@ module nocdyn_target_search
   !> Groups whose keys cannot vary.
   character(len=*), parameter :: fixed_groups = 'case output sweep vary record'
 
-  !> One number of an input.
-  type, public :: found_t
-    integer :: group = 0      !! index in the input
-    integer :: rule = 0       !! row of `key_rules`
-    integer :: position = 1   !! in the list of the key
-  end type found_t
-
 contains
 
   !> Finds a number by its path.
-  subroutine search_target(input, text, found, message)
+  subroutine search_target(input, text, group, rule, position, message)
     type(input_t), intent(in) :: input
     character(len=*), intent(in) :: text   !! a path
-    type(found_t), intent(out) :: found
+    integer, intent(out) :: group      !! index in the input, 0: not found
+    integer, intent(out) :: rule       !! row of `key_rules`
+    integer, intent(out) :: position   !! in the list of the key
     character(len=:), allocatable, intent(out) :: message   !! what is wrong and allowed, '' if nothing is wrong
     type(key_path_t) :: path
 
+    group = 0
+    position = 1
     call read_path(text, '', path, message)
+    rule = path%key_rule
     if (path%key_rule == 0) call suggest_path(input, text, path%group_rule > 0, message)
     if (path%group_rule > 0) then
       if (has_word(fixed_groups, group_rules(path%group_rule)%name)) message = 'the keys of &' // &
@@ -41,11 +39,10 @@ contains
     end if
     if (message == '') call check_kind_of_key(path, message)
     if (message /= '') return
-    found%rule = path%key_rule
-    call find_group(input, path, found%group, message)
+    call find_group(input, path, group, message)
     if (message /= '') call suggest_path(input, text, .true., message)
-    if (message == '') call check_law(input%groups(found%group), key_rules(found%rule), message)
-    if (message == '') call find_position(input%groups(found%group), text, path, found%position, message)
+    if (message == '') call check_law(input%groups(group), key_rules(rule), message)
+    if (message == '') call find_position(input%groups(group), text, path, position, message)
   end subroutine search_target
 
   !> Replaces the suggestion of a message by a path of the input, if only the group of the text is missing or wrong.

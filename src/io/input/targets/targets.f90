@@ -9,7 +9,7 @@ module nocdyn_targets
   use nocdyn_schema_rules, only: allowed_t, an_integer, at_most_one, exactly_one, is_out_of_range, less_than, &
     required, requires, unset
   use nocdyn_schema_text, only: allowed_text
-  use nocdyn_target_search, only: found_t, search_target
+  use nocdyn_target_search, only: search_target
   use nocdyn_text, only: to_text
   use nocdyn_value_conversion, only: default_value
   implicit none (type, external)
@@ -39,26 +39,24 @@ contains
     character(len=*), intent(in) :: path
     type(target_t), intent(out) :: target
     character(len=:), allocatable, intent(out) :: message   !! what is wrong and allowed, '' if nothing is wrong
-    type(found_t) :: found
     type(relations_t) :: relations
-    integer :: i
+    integer :: group, i
 
     target%path = trim(adjustl(path))
     target%unit = ''
     target%long_name = ''
-    call search_target(input, target%path, found, message)
+    call search_target(input, target%path, group, target%rule, target%position, message)
     if (message /= '') return
-    target%group = found%group
-    target%key = found%rule - first_key(input%groups(found%group)%rule) + 1
-    target%position = found%position
-    target%rule = found%rule
-    target%unit = trim(key_rules(found%rule)%unit)
-    target%long_name = trim(key_rules(found%rule)%name) // ' of ' // input%label(found%group) // ': ' // &
-                       trim(key_rules(found%rule)%help)
-    target%is_integer = key_rules(found%rule)%value_type == an_integer
-    target%allowed = key_rules(found%rule)%allowed
+    target%group = group
+    target%key = target%rule - first_key(input%groups(group)%rule) + 1
+    associate (rule => key_rules(target%rule))
+      target%unit = trim(rule%unit)
+      target%long_name = trim(rule%name) // ' of ' // input%label(group) // ': ' // trim(rule%help)
+      target%is_integer = rule%value_type == an_integer
+      target%allowed = rule%allowed
+    end associate
     if (target%is_integer) target%allowed%high = min(target%allowed%high, real(huge(0), wp))
-    relations = relations_of(input%groups(found%group)%rule)
+    relations = relations_of(input%groups(group)%rule)
     do i = 1, size(relations%list)
       if (relations%list(i)%form /= less_than) cycle
       if (any([relations%list(i)%first, relations%list(i)%second] == target%key)) target%less_than = relations%list(i)
