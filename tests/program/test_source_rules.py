@@ -7,6 +7,8 @@ from conftest import SOURCE
 from fortran_sources import read_source
 
 LEAST_SOURCES, LEAST_PROCEDURES = 200, 1500  # fewer in src were not found where they are
+MOST_LINES_OF_A_FILE = 400
+MOST_LINES_OF_A_PROCEDURE = 40
 MOST_ARGUMENTS = 8
 FOLDERS = ("src", "tests", "bench", "docs/examples")  # files .f90; those of the tests, .pf, may be longer
 
@@ -49,6 +51,16 @@ MANY_ARGUMENTS = {
     "src/model/lanes/sparse_map.f90": (KERNEL, "pair_of_rows", "pair_on_lanes", "sum_of_rows", "sum_on_lanes"),
 }
 
+# Longer procedures, by file, and why.
+LONG_PROCEDURES = {
+    "src/integrate/core/stage_sums.f90": ("kernel: a sum for each number of stages, in one loop", "sum_up_to_12"),
+    "src/model/formulations/kernels/series_strips.f90": (
+        "kernel: what a loop keeps in registers cannot be shared with another procedure",
+        "accelerate",
+        "expand_strip",
+    ),
+}
+
 
 @functools.cache
 def sources(folder):
@@ -64,6 +76,11 @@ def procedures(folder):
                 yield path, source, procedure
 
 
+def exceptions(table, folder):
+    """(path, name) of the procedures of a folder that the table excepts."""
+    return {(path, name) for path, (_, *names) in table.items() for name in names if path.startswith(folder + "/")}
+
+
 def test_the_test_sees_the_sources():
     assert len(sources("src")) >= LEAST_SOURCES
     assert len(list(procedures("src"))) >= LEAST_PROCEDURES
@@ -72,6 +89,29 @@ def test_the_test_sees_the_sources():
 @pytest.mark.parametrize("folder", FOLDERS)
 def test_procedures_with_many_arguments_are_exceptions_with_a_reason(folder):
     many = {(path, p.name) for path, _, p in procedures(folder) if len(p.arguments) > MOST_ARGUMENTS}
-    allowed = {(path, name) for path, (_, *names) in MANY_ARGUMENTS.items() for name in names if path.startswith(folder + "/")}
+    allowed = exceptions(MANY_ARGUMENTS, folder)
     assert sorted(many - allowed) == [], "too many arguments"
     assert sorted(allowed - many) == [], "these need no exception"
+
+
+@pytest.mark.parametrize("folder", FOLDERS)
+def test_no_file_is_too_long(folder):
+    lengths = {path: len(source.lines) for path, source in sources(folder).items()}
+    assert {path: length for path, length in lengths.items() if length > MOST_LINES_OF_A_FILE} == {}
+
+
+@pytest.mark.parametrize("folder", FOLDERS)
+def test_long_procedures_are_exceptions_with_a_reason(folder):
+    long = {(path, p.name) for path, _, p in procedures(folder) if p.lines > MOST_LINES_OF_A_PROCEDURE}
+    allowed = exceptions(LONG_PROCEDURES, folder)
+    assert sorted(long - allowed) == [], "too long"
+    assert sorted(allowed - long) == [], "these need no exception"
+
+
+def test_public_procedures_have_a_doc_comment():
+    bare = [
+        f"{path}: {procedure.name}"
+        for path, source, procedure in procedures("src")
+        if procedure.host is None and procedure.name.lower() in source.public and not procedure.doc
+    ]
+    assert not bare, "\n".join(bare)
