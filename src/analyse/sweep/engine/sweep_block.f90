@@ -61,7 +61,7 @@ module nocdyn_sweep_block
 
 contains
 
-  !> A block of lanes of the base machine, which stays where it is. To be given up by `release`.
+  !> A block of lanes of the base machine, which must not be moved. `release` frees it.
   subroutine new_sweep_block(plan, setup, scheduler, block)
     type(sweep_plan_t), target, intent(in) :: plan
     type(sweep_setup_t), intent(in) :: setup   !! of the plan
@@ -78,6 +78,7 @@ contains
                              block%stepper, block%observer%statistics_observer_t, block%message)
   end subroutine new_sweep_block
 
+  !> Frees the lanes.
   subroutine release(self)
     class(sweep_block_t), intent(inout) :: self
 

@@ -48,8 +48,8 @@ module nocdyn_variant_machines
 
 contains
 
-  !> A block of lanes for the variants of an input, which can be assembled; laid out as a typical variant. To be given up by
-  !> `release`.
+  !> A block of lanes for the variants of an input, which can be assembled; laid out as a typical variant. `release` frees
+  !> it.
   subroutine new_variant_machines(input, targets, lanes, with_energy_balance, self, typical)
     type(input_t), intent(in) :: input
     type(target_t), intent(in) :: targets(:)
@@ -207,7 +207,7 @@ contains
     call new_own_formulation(self%input, machine, self%has_energy_balance, formulation)
   end subroutine own_formulation
 
-  !> Gives up the block.
+  !> Frees the block.
   subroutine release(self)
     class(variant_machines_t), intent(inout) :: self
 

@@ -298,7 +298,7 @@ contains
     real(wp), intent(in) :: t, h, theta_end   !! start [s], size [s], end relative to the size
     integer, intent(in) :: degree
     real(wp), intent(in) :: rise, fall        !! positive if x, or -x, may exceed the extremes so far
-    real(wp) :: bar, c(0:max_degree), place, t_start
+    real(wp) :: level, c(0:max_degree), position, t_start
     logical :: found
 
     associate (highest => acc%highest(i, number), lowest => acc%lowest(i, number), time => acc%highest_time(i, number), &
@@ -311,18 +311,18 @@ contains
         lowest = min(lowest, x_end)
       end if
       if (rise > 0 .and. (acc%has_max .or. acc%has_max_abs)) then
-        bar = highest
-        if (.not. acc%has_max) bar = max(highest, -lowest)
-        call raise_to_maximum(degree, self%to_bernstein, c, bar, place, found)
-        if (found) highest = bar
-        if (found) time = t_start + place * (t_end - t_start)
+        level = highest
+        if (.not. acc%has_max) level = max(highest, -lowest)
+        call raise_to_maximum(degree, self%to_bernstein, c, level, position, found)
+        if (found) highest = level
+        if (found) time = t_start + position * (t_end - t_start)
       end if
       if (fall > 0 .and. (acc%has_min .or. acc%has_max_abs)) then
-        bar = -lowest
-        if (.not. acc%has_min) bar = max(highest, -lowest)
+        level = -lowest
+        if (.not. acc%has_min) level = max(highest, -lowest)
         c(:degree) = -c(:degree)
-        call raise_to_maximum(degree, self%to_bernstein, c, bar, place, found)
-        if (found) lowest = -bar
+        call raise_to_maximum(degree, self%to_bernstein, c, level, position, found)
+        if (found) lowest = -level
       end if
     end associate
   end subroutine look_inside

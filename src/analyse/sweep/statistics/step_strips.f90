@@ -166,16 +166,16 @@ contains
     integer, intent(in) :: degree
     real(wp), intent(in) :: nodes(degree + 1), weights(degree + 1), duration(width), linear(width), cubic(width)
     real(wp), intent(inout) :: integral(width), square(width)
-    real(wp) :: place(width), x(width)
+    real(wp) :: s(width), x(width)
     integer :: node, p
 
     do node = 1, degree + 1
-      place = strip%scale * nodes(node)
+      s = strip%scale * nodes(node)
       x = strip%c(:, degree)
       do p = degree - 1, 1, -1
-        x = strip%c(:, p) + place * x
+        x = strip%c(:, p) + s * x
       end do
-      x = strip%x_start + place * x
+      x = strip%x_start + s * x
       x = (linear + cubic * x * x) * x
       integral = integral + duration * weights(node) * x
       square = square + duration * weights(node) * (x * x)
