@@ -233,14 +233,14 @@ contains
     integer, intent(in) :: relations(:)
     real(wp) :: sizes(size(relations))
     integer, allocatable :: trains(:)
-    real(wp) :: pace(equations%bodies)
+    real(wp) :: speed(equations%bodies)
     integer :: i
 
     allocate (trains, source=distinct_trains(equations, relations))
-    pace(trains) = effective_speeds(equations, relations, trains)
+    speed(trains) = effective_speeds(equations, relations, trains)
     do i = 1, size(relations)
       associate (first => equations%first(relations(i)), last => equations%first(relations(i) + 1) - 1)
-        sizes(i) = maxval(abs(equations%coefficient(1, first:last)) * pace(equations%body(first:last)))
+        sizes(i) = maxval(abs(equations%coefficient(1, first:last)) * speed(equations%body(first:last)))
       end associate
     end do
   end function row_sizes
@@ -273,7 +273,7 @@ contains
 
   !> The rows of a matrix, scaled to unit length; zero rows stay.
   pure function unit_rows(matrix) result(scaled)
-    real(wp), intent(in) :: matrix(:, :)
+    real(wp), intent(in) :: matrix(:, :)   !! [relations, trains]
     real(wp) :: scaled(size(matrix, 1), size(matrix, 2))
     integer :: i
 
@@ -285,10 +285,10 @@ contains
 
   !> Effective speeds of the trains: with them the largest terms of the relations are about equal. They are computed from train
   !> to train and serve as the scale for rounding.
-  pure function effective_speeds(equations, relations, trains) result(pace)
+  pure function effective_speeds(equations, relations, trains) result(speeds)
     type(constraints_t), intent(in) :: equations
     integer, intent(in) :: relations(:), trains(:)
-    real(wp) :: pace(size(trains))
+    real(wp) :: speeds(size(trains))
     real(wp) :: known(equations%bodies), largest   ! 0: not computed yet
     integer :: entry, i, k, unknown
 
@@ -313,7 +313,7 @@ contains
         end do
       end do
     end do
-    pace = known(trains)
+    speeds = known(trains)
   end function effective_speeds
 
 end module nocdyn_train_relations

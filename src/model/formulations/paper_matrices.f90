@@ -161,8 +161,8 @@ contains
   !> alpha = [omega; phi] of eq. (42), alpha' = [omega'; phi'] of eq. (41), [2n]; beta = [alpha; F] of eq. (46),
   !> beta' = [alpha'; F'] of eq. (45), [3n]. With phi' = omega, eqs. (32), (33).
   subroutine stack(upper, lower, vector)
-    real(wp), intent(in) :: upper(:), lower(:)
-    real(wp), intent(inout) :: vector(:)   !! [upper + lower]
+    real(wp), intent(in) :: upper(:), lower(:)   !! omega, phi; or alpha, F
+    real(wp), intent(inout) :: vector(:)         !! [upper + lower]
 
     vector(:size(upper)) = upper
     vector(size(upper) + 1:) = lower

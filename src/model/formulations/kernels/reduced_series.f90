@@ -253,7 +253,7 @@ contains
   pure subroutine multiply(rows, columns, matrix, x, u)
     integer, intent(in) :: rows   !! whole vectors
     integer, intent(in) :: columns
-    real(wp), intent(in) :: matrix(rows, columns), x(columns)
+    real(wp), intent(in) :: matrix(rows, columns), x(columns)   !! padded with zeros to whole vectors
     real(wp), intent(inout) :: u(rows)
     real(wp) :: sum(width)
     integer :: c, i
@@ -313,10 +313,10 @@ contains
 
   !> Adds by_speed_squared u'^2.
   pure subroutine add_squares(n, k, vectors, by_speed_squared, speed, applied)
-    integer, intent(in) :: n, k         !! stride, number of the coefficients
-    integer, intent(in) :: vectors(:)   !! first values of the vectors with quadratic terms
-    real(wp), intent(in) :: by_speed_squared(n), speed(n, 0:k)
-    real(wp), intent(inout) :: applied(n, 0:k)
+    integer, intent(in) :: n, k                                  !! stride, number of the coefficients
+    integer, intent(in) :: vectors(:)                            !! first values of the vectors with quadratic terms
+    real(wp), intent(in) :: by_speed_squared(n), speed(n, 0:k)   !! law, u'
+    real(wp), intent(inout) :: applied(n, 0:k)                   !! column k is changed
     real(wp) :: sum(width)
     integer :: i, j, s
 
@@ -335,8 +335,8 @@ contains
   !> Sum of restoring and applied moments.
   pure subroutine add(n, restoring, applied, moment)
     integer, intent(in) :: n
-    real(wp), intent(in) :: restoring(n), applied(n)
-    real(wp), intent(inout) :: moment(n)
+    real(wp), intent(in) :: restoring(n), applied(n)   !! [N m]
+    real(wp), intent(inout) :: moment(n)               !! [N m]
     integer :: i
 
     do i = 1, n, width

@@ -145,8 +145,8 @@ contains
 
   !> Moments number 0, without the terms in the square of the speed.
   pure subroutine begin_moments(constant, by_speed, speed, restoring, moment)
-    real(wp), intent(in), dimension(strip) :: constant, by_speed, speed, restoring
-    real(wp), intent(inout) :: moment(strip)
+    real(wp), intent(in), dimension(strip) :: constant, by_speed, speed, restoring   !! law, u', restoring moments
+    real(wp), intent(inout) :: moment(strip)                                         !! [N m]
 
     moment = restoring + (constant + by_speed * speed)
   end subroutine begin_moments
@@ -158,7 +158,7 @@ contains
     integer, intent(in) :: column(entries)                                          !! of the entries of U
     real(wp), intent(in) :: ratio(strip, entries)                                   !! of the entries of U
     real(wp), intent(in) :: q(strip, freedoms), by_speed(strip), restoring(strip)   !! q' number k; of the element
-    real(wp), intent(inout) :: speed(strip), moment(strip)
+    real(wp), intent(inout) :: speed(strip), moment(strip)                          !! u', moments
     real(wp) :: v
     integer :: c, d, i, k
 
@@ -197,9 +197,9 @@ contains
   !> Computes coefficient k of w, from coefficient k - 1 of the speed if k > 0, and of -linear w.
   pure subroutine find_linear(k, inverse, linear, speed, w, restoring)
     integer, intent(in) :: k
-    real(wp), intent(in) :: inverse   !! 1 / k
-    real(wp), intent(in) :: linear(strip), speed(strip)
-    real(wp), intent(inout) :: w(strip), restoring(strip)
+    real(wp), intent(in) :: inverse                         !! 1 / k
+    real(wp), intent(in) :: linear(strip), speed(strip)     !! law, u'
+    real(wp), intent(inout) :: w(strip), restoring(strip)   !! u - rest, moments
 
     if (k > 0) w = inverse * speed
     restoring = -linear * w
@@ -209,9 +209,9 @@ contains
   !> products with w2 are added up in the same loop as those of w.
   pure subroutine find_cubic(k, inverse, linear, cubic, speed, w, w2, restoring)
     integer, intent(in) :: k
-    real(wp), intent(in) :: inverse   !! 1 / k
-    real(wp), intent(in) :: linear(strip), cubic(strip), speed(strip)
-    real(wp), intent(inout) :: w(strip, 0:k), w2(strip, 0:k), restoring(strip)
+    real(wp), intent(in) :: inverse                                              !! 1 / k
+    real(wp), intent(in) :: linear(strip), cubic(strip), speed(strip)            !! law, u'
+    real(wp), intent(inout) :: w(strip, 0:k), w2(strip, 0:k), restoring(strip)   !! column k is set
     real(wp) :: sum(strip), sum_of_cubes(strip)
     integer :: j, middle
 
@@ -249,9 +249,9 @@ contains
   !> Moments number k of an element with a term in the square of the speed v.
   pure subroutine find_moments_of_squares(k, constant, by_speed, by_speed_squared, v, restoring, moment)
     integer, intent(in) :: k
-    real(wp), intent(in), dimension(strip) :: constant, by_speed, by_speed_squared, restoring
-    real(wp), intent(in) :: v(strip, 0:k)
-    real(wp), intent(inout) :: moment(strip)
+    real(wp), intent(in), dimension(strip) :: constant, by_speed, by_speed_squared, restoring   !! law, restoring moments
+    real(wp), intent(in) :: v(strip, 0:k)                                                       !! u'
+    real(wp), intent(inout) :: moment(strip)                                                    !! [N m]
     real(wp) :: sum(strip)
     integer :: j
 
