@@ -55,10 +55,12 @@ module nocdyn_bank
     logical :: is_time_only = .false.             !! whether the rest of its law depends on the time only
     logical :: has_paper_law = .true.             !! whether its law is that of eqs. (3), (5), (17) or (20)
     integer :: states = 0                         !! internal states of each element
+    character(len=24), allocatable :: internal_names(:)   !! e.g. 'armature current', [states]
     integer :: first_internal = 1                 !! number of the first internal state of `first` in the machine
     integer :: internal_values = 0                !! lanes * states * elements
     integer :: first_internal_value = 1           !! index of lane 1 of `first_internal` in the flat arrays of the machine
     integer, allocatable :: switch_element(:)     !! element of each switch, numbered within the bank
+    character(len=24), allocatable :: switch_names(:)   !! of the boundaries, e.g. 'edge of the gap', [switches]
     integer, allocatable :: branch(:, :)          !! present branch of each switch, [lanes, switches]
   contains
     procedure :: polynomials
@@ -71,12 +73,10 @@ module nocdyn_bank
     procedure :: to_mean_torque
     procedure :: start_internal
     procedure :: evaluate_internal
-    procedure :: internal_name
     procedure :: choose
     procedure :: indicator
-    procedure :: switch_name
     procedure :: connect
-    procedure :: set_switches
+    procedure :: add_switches
     procedure :: list_structure
     procedure :: list_parameters
     procedure :: last
@@ -134,18 +134,24 @@ contains
     self%with_work = [(e, e=1, size(to))]
     self%elastic = [(e, e=1, merge(size(to), 0, role == role_coupling))]
     self%internal_values = lanes * self%states * size(to)
-    call self%set_switches([integer ::])
+    allocate (self%switch_element(0), self%switch_names(0), self%branch(lanes, 0))
   end subroutine connect
 
-  !> Gives elements one switch each. The branches are 0 until `choose` sets them.
-  subroutine set_switches(self, elements)
+  !> Gives every element one more switch. All branches are 0 until `choose` sets them.
+  subroutine add_switches(self, names)
     class(bank_t), intent(inout) :: self
-    integer, intent(in) :: elements(:)   !! with a switch, numbered within the bank
+    character(len=*), intent(in) :: names(:)   !! of the boundaries, [elements]
+    character(len=len(self%switch_names)), allocatable :: all_names(:)
+    integer :: e
 
-    self%switch_element = elements
-    if (allocated(self%branch)) deallocate (self%branch)
-    allocate (self%branch(self%lanes, size(elements)), source=0)
-  end subroutine set_switches
+    allocate (all_names(size(self%switch_names) + size(names)))
+    all_names(:size(self%switch_names)) = self%switch_names
+    all_names(size(self%switch_names) + 1:) = names
+    call move_alloc(all_names, self%switch_names)
+    self%switch_element = [self%switch_element, (e, e=1, size(self%to))]
+    deallocate (self%branch)
+    allocate (self%branch(self%lanes, size(self%switch_element)), source=0)
+  end subroutine add_switches
 
   !> Adds to the structure of a list which elements the bank has, and of what kind they are.
   subroutine list_structure(self, parameters)
@@ -262,16 +268,6 @@ contains
     error stop 'nocdyn_bank: a bank with internal states overrides evaluate_internal'
   end subroutine evaluate_internal
 
-  !> Name of an internal state, e.g. 'armature current'.
-  function internal_name(self, index) result(name)
-    class(bank_t), intent(in) :: self
-    integer, intent(in) :: index   !! 1 to `states`
-    character(len=:), allocatable :: name
-
-    name = ''
-    error stop 'nocdyn_bank: a bank with internal states overrides internal_name'
-  end function internal_name
-
   !> Sets the branch of a switch in one lane to the one that contains the state.
   subroutine choose(self, switch, lane, t, angle, speed, internal)
     class(bank_t), intent(inout) :: self
@@ -297,16 +293,6 @@ contains
     indicator = 0.0_wp
     error stop 'nocdyn_bank: a bank with switches overrides indicator'
   end function indicator
-
-  !> Name of the boundaries of a switch, e.g. 'edge of the gap'.
-  function switch_name(self, switch) result(name)
-    class(bank_t), intent(in) :: self
-    integer, intent(in) :: switch   !! numbered within the bank
-    character(len=:), allocatable :: name
-
-    name = ''
-    error stop 'nocdyn_bank: a bank with switches overrides switch_name'
-  end function switch_name
 
   !> The columns of the bank in the table of results, by default the torque of each element.
   function quantities(self) result(columns)

@@ -78,7 +78,7 @@ contains
     character(len=:), allocatable :: name
 
     associate (bank => banks(self%bank(switch))%bank, number => self%number(switch))
-      name = bank%switch_name(number) // ' of ' // trim(role_names(bank%role)) // ' ' // &
+      name = trim(bank%switch_names(number)) // ' of ' // trim(role_names(bank%role)) // ' ' // &
              quoted(bank%names(bank%switch_element(number))%text)
     end associate
   end function name

@@ -31,7 +31,6 @@ module nocdyn_table_laws
     procedure :: evaluate_energies
     procedure :: choose
     procedure :: indicator
-    procedure :: switch_name
     procedure, private :: argument_of
   end type table_laws_t
 
@@ -63,7 +62,7 @@ contains
     self%has_paper_law = .false.
     if (argument == over_twist) self%has_polynomial_potential = .false.
     allocate (self%curve, source=curve)
-    call self%set_switches([(e, e=1, size(self%to))])
+    call self%add_switches([('point in the table', e=1, size(self%to))])
   end subroutine set_curves
 
   subroutine evaluate(self, time, angle, speed, restoring, applied)
@@ -185,14 +184,6 @@ contains
       end if
     end associate
   end function indicator
-
-  function switch_name(self, switch) result(name)
-    class(table_laws_t), intent(in) :: self
-    integer, intent(in) :: switch   !! numbered within the bank
-    character(len=:), allocatable :: name
-
-    name = 'point in the table'
-  end function switch_name
 
   subroutine list_parameters(self, parameters)
     class(table_laws_t), target, intent(inout) :: self

@@ -176,7 +176,7 @@ contains
       associate (bank => self%banks(self%internal_banks(i))%bank)
         associate (offset => index - bank%first_internal)
           if (offset >= bank%states * size(bank%to)) cycle
-          name = bank%internal_name(1 + modulo(offset, bank%states)) // ' of ' // trim(role_names(bank%role)) // ' ' // &
+          name = trim(bank%internal_names(1 + modulo(offset, bank%states))) // ' of ' // trim(role_names(bank%role)) // ' ' // &
                  quoted(bank%names(1 + offset / bank%states)%text)
           return
         end associate

@@ -30,7 +30,6 @@ module nocdyn_gap_couplings
     procedure :: evaluate_energies
     procedure :: choose
     procedure :: indicator
-    procedure :: switch_name
   end type gap_couplings_t
 
   ! the branches; the negative of each is that at the edge -gap / 2
@@ -62,7 +61,7 @@ contains
     bank%boundary_shift = boundary_width * bank%scale * bank%gap
     bank%with_work = pack([(e, e=1, size(bank%to))], [(any(bank%with_work == e) .or. can_pull(coefficient(:, :, e)), &
                                                   e=1, size(bank%to))])
-    call bank%set_switches([(e, e=1, size(bank%to))])
+    call bank%add_switches([('edge of the gap', e=1, size(bank%to))])
   end function new_gap_couplings
 
   !> Whether the elastic moment of a contact can change its sign. A contact that would pull dissipates its stored energy, even
@@ -236,14 +235,6 @@ contains
     end associate
     indicator = indicator + self%boundary_shift(lane, switch)
   end function indicator
-
-  function switch_name(self, switch) result(name)
-    class(gap_couplings_t), intent(in) :: self
-    integer, intent(in) :: switch   !! numbered within the bank
-    character(len=:), allocatable :: name
-
-    name = 'edge of the gap'
-  end function switch_name
 
   subroutine list_parameters(self, parameters)
     class(gap_couplings_t), target, intent(inout) :: self

@@ -26,8 +26,10 @@ module nocdyn_timed_excitations
     procedure :: differentiate
     procedure :: choose
     procedure :: indicator
-    procedure :: switch_name
   end type timed_excitations_t
+
+  character(len=*), parameter :: switch_names(3) = &   ! by shape
+    [character(len=16) :: 'step', 'end of the ramp', 'end of the pulse']
 
   integer, parameter :: before = 0, during = 1, after = 2   ! the branches
   real(wp), parameter :: pi = acos(-1.0_wp)
@@ -50,7 +52,7 @@ contains
     allocate (bank%amplitude, source=amplitude)
     allocate (bank%begin, source=begin)
     allocate (bank%duration, source=duration)
-    call bank%set_switches([(e, e=1, size(body))])
+    call bank%add_switches(switch_names(shape))
   end function new_timed_excitations
 
   subroutine evaluate(self, time, angle, speed, restoring, applied)
@@ -150,21 +152,6 @@ contains
       indicator = huge(indicator)
     end select
   end function indicator
-
-  function switch_name(self, switch) result(name)
-    class(timed_excitations_t), intent(in) :: self
-    integer, intent(in) :: switch   !! numbered within the bank
-    character(len=:), allocatable :: name
-
-    select case (self%shape(self%switch_element(switch)))
-    case (shape_step)
-      name = 'step'
-    case (shape_ramp)
-      name = 'end of the ramp'
-    case default
-      name = 'end of the pulse'
-    end select
-  end function switch_name
 
   subroutine list_parameters(self, parameters)
     class(timed_excitations_t), target, intent(inout) :: self

@@ -23,10 +23,8 @@ module nocdyn_dc_motors
     procedure :: start_internal
     procedure :: evaluate_internal
     procedure :: differentiate
-    procedure :: internal_name
     procedure :: choose
     procedure :: indicator
-    procedure :: switch_name
     procedure :: quantities
     procedure :: observe
   end type dc_motors_t
@@ -47,6 +45,7 @@ contains
     bank%has_paper_law = .false.
     bank%states = 1
     if (present(governor)) bank%states = 2
+    allocate (bank%internal_names, source=[character(len=24) :: 'armature current', 'governor integral'])
     call bank%connect(role_motor, size(voltage, 1), names, [(0, e=1, size(body))], body)
     allocate (bank%voltage, source=voltage)
     allocate (bank%resistance, source=resistance)
@@ -54,7 +53,7 @@ contains
     allocate (bank%inductance, source=inductance)
     if (.not. present(governor)) return
     allocate (bank%governor, source=governor)
-    call bank%set_switches([(e, e=1, size(body))])
+    call bank%add_switches([('limit of the governor', e=1, size(body))])
   end function new_dc_motors
 
   subroutine start_internal(self, speed, internal)
@@ -125,15 +124,6 @@ contains
     end do
   end subroutine differentiate
 
-  function internal_name(self, index) result(name)
-    class(dc_motors_t), intent(in) :: self
-    integer, intent(in) :: index   !! of the internal state, 1 to `states`
-    character(len=:), allocatable :: name
-
-    name = 'armature current'
-    if (index == 2) name = 'governor integral'
-  end function internal_name
-
   subroutine choose(self, switch, lane, t, angle, speed, internal)
     class(dc_motors_t), intent(inout) :: self
     integer, intent(in) :: switch, lane   !! switch numbered within the bank
@@ -152,14 +142,6 @@ contains
 
     indicator = self%governor%indicator(lane, switch, self%branch(lane, switch), internal(2), speed)
   end function indicator
-
-  function switch_name(self, switch) result(name)
-    class(dc_motors_t), intent(in) :: self
-    integer, intent(in) :: switch   !! numbered within the bank
-    character(len=:), allocatable :: name
-
-    name = 'limit of the governor'
-  end function switch_name
 
   !> Torque, armature current and, with a governor, throttle.
   function quantities(self) result(columns)

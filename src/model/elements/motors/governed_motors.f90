@@ -27,10 +27,8 @@ module nocdyn_governed_motors
     procedure :: differentiate
     procedure :: start_internal
     procedure :: evaluate_internal
-    procedure :: internal_name
     procedure :: choose
     procedure :: indicator
-    procedure :: switch_name
     procedure :: quantities
     procedure :: observe
     procedure, private :: first_governor
@@ -53,8 +51,9 @@ contains
     bank%governor = governor
     allocate (bank%drag, source=drag)
     bank%states = 1
+    allocate (bank%internal_names, source=[character(len=24) :: 'governor integral'])
     bank%internal_values = bank%values
-    call bank%set_switches([bank%switch_element, (e, e=1, size(body))])
+    call bank%add_switches([('limit of the governor', e=1, size(body))])
   end function new_governed_motors
 
   subroutine polynomials(self, laws)
@@ -135,14 +134,6 @@ contains
     end do
   end subroutine differentiate
 
-  function internal_name(self, index) result(name)
-    class(governed_motors_t), intent(in) :: self
-    integer, intent(in) :: index   !! of the internal state, 1 to `states`
-    character(len=:), allocatable :: name
-
-    name = 'governor integral'
-  end function internal_name
-
   subroutine choose(self, switch, lane, t, angle, speed, internal)
     class(governed_motors_t), intent(inout) :: self
     integer, intent(in) :: switch, lane   !! switch numbered within the bank
@@ -173,15 +164,6 @@ contains
       end if
     end associate
   end function indicator
-
-  function switch_name(self, switch) result(name)
-    class(governed_motors_t), intent(in) :: self
-    integer, intent(in) :: switch   !! numbered within the bank
-    character(len=:), allocatable :: name
-
-    name = 'point in the table'
-    if (switch > self%first_governor()) name = 'limit of the governor'
-  end function switch_name
 
   !> Torque and throttle.
   function quantities(self) result(columns)
