@@ -11,7 +11,7 @@ module nocdyn_merge_command
   use nocdyn_sweep_journal, only: journal_names, open_journal, sweep_journal_t
   use nocdyn_sweep_plan, only: sweep_plan_t
   use nocdyn_recorded_quantities, only: wanted_trajectories
-  use nocdyn_sweep_results, only: results_options_t, print_results, write_results
+  use nocdyn_sweep_results, only: print_results, write_results
   use nocdyn_sweep_summary, only: sweep_summary_t
   use nocdyn_target_consistency, only: find_targets
   use nocdyn_text, only: append, string_t, strings
@@ -30,16 +30,15 @@ contains
 
     code = exit_done
     call catch_interrupts()
-    call merge_folder(normalised_path(arguments%operands(1)%text), &
-                      results_options_t(arguments%is_given('--csv'), arguments%is_given('--quiet')), code, error)
+    call merge_folder(normalised_path(arguments%operands(1)%text), arguments, code, error)
     if (.not. allocated(error)) return
     call report_error(error, code)
   end subroutine merge_command
 
   !> Writes and prints the results of all journals of a folder.
-  subroutine merge_folder(folder, options, code, error)
+  subroutine merge_folder(folder, arguments, code, error)
     character(len=*), intent(in) :: folder
-    type(results_options_t), intent(in) :: options
+    type(arguments_t), intent(in) :: arguments
     integer, intent(inout) :: code
     type(error_t), allocatable, intent(out) :: error
     type(sweep_journal_t), allocatable :: journals(:)
@@ -56,8 +55,8 @@ contains
       call find_targets(plan%input, labels_of(header%parameters), plan%targets, messages)
     end associate
     allocate (plan%trajectories, source=wanted_trajectories(plan%input))
-    call write_results(plan, folder, journals, options, summary, error)
-    if (.not. allocated(error)) call print_results(plan, folder, journals(1)%header, options, summary, code)
+    call write_results(plan, folder, journals, arguments, summary, error)
+    if (.not. allocated(error)) call print_results(plan, folder, journals(1)%header, arguments, summary, code)
   end subroutine merge_folder
 
   pure function labels_of(quantities) result(labels)

@@ -15,7 +15,7 @@ module nocdyn_sweep_job
   use nocdyn_sweep_plan, only: add_plan_diagnostics, make_plan, sweep_plan_t
   use nocdyn_sweep_progress, only: console_sweep_progress_t
   use nocdyn_sweep_resumption, only: check_journal, check_results, refuse_other_journals
-  use nocdyn_sweep_results, only: results_options_t, print_results, write_results
+  use nocdyn_sweep_results, only: print_results, write_results
   use nocdyn_sweep_setup, only: prepare_sweep, sweep_setup_t
   use nocdyn_sweep_summary, only: sweep_effort_t, sweep_summary_t
   use nocdyn_sweep_csv, only: sweep_csv_name
@@ -144,7 +144,6 @@ contains
     integer, intent(in) :: ranks     !! processes
     integer, intent(out) :: code
     type(sweep_summary_t) :: summary
-    type(results_options_t) :: options
     type(error_t), allocatable :: error
 
     code = exit_done
@@ -157,11 +156,10 @@ contains
     else if (job%arguments%shards > 1) then
       if (.not. job%arguments%is_given('--quiet')) call print_text(part_text(job, scheduler))
     else
-      options = results_options_t(job%arguments%is_given('--csv'), job%arguments%is_given('--quiet'))
-      call write_results(job%plan, job%folder, job%journals, options, summary, error)
+      call write_results(job%plan, job%folder, job%journals, job%arguments, summary, error)
       if (.not. allocated(error)) then
         call job%journals(1)%remove()   ! before printing: if the reader of the output is gone, printing ends the program
-        call print_results(job%plan, job%folder, job%journals(1)%header, options, summary, code)
+        call print_results(job%plan, job%folder, job%journals(1)%header, job%arguments, summary, code)
       end if
     end if
     call job%journals(1)%close()

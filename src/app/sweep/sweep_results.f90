@@ -1,6 +1,7 @@
 !> Writes the files of a finished sweep, and prints its summary.
 module nocdyn_sweep_results
   use, intrinsic :: iso_fortran_env, only: int64
+  use nocdyn_arguments, only: arguments_t
   use nocdyn_console, only: print_text, report_error
   use nocdyn_errors, only: error_t, exit_done, exit_failed, raise
   use nocdyn_folders, only: folder_names, remove_empty_folder
@@ -29,21 +30,15 @@ module nocdyn_sweep_results
 
   character(len=*), parameter :: variant_folder = 'variant-'
 
-  !> What the command line asks for besides sweep.nc.
-  type, public :: results_options_t
-    logical :: wants_csv = .false.
-    logical :: is_quiet = .false.
-  end type results_options_t
-
 contains
 
   !> Writes all files of a sweep whose variants are all in the journals. Once sweep.nc is written, files of an earlier sweep or
   !> run in the folder are removed.
-  subroutine write_results(plan, folder, journals, options, summary, error)
+  subroutine write_results(plan, folder, journals, arguments, summary, error)
     type(sweep_plan_t), intent(in) :: plan
     character(len=*), intent(in) :: folder
     type(sweep_journal_t), intent(inout) :: journals(:)
-    type(results_options_t), intent(in) :: options
+    type(arguments_t), intent(in) :: arguments
     type(sweep_summary_t), intent(inout) :: summary   !! with the effort, but for a merge
     type(error_t), allocatable, intent(out) :: error
     integer(int64) :: began, now, rate
@@ -54,9 +49,9 @@ contains
     summary%failed = sum(journals%failed)
     call find_order_statistics(journals, summary%statistics, error)
     if (.not. allocated(error)) call write_sweep_netcdf(folder, journals, error)
-    if (.not. allocated(error)) call remove_other_results(folder, keeps_table=options%wants_csv)
-    if (.not. allocated(error) .and. options%wants_csv) call write_sweep_csv(folder, journals, error)
-    if (.not. allocated(error)) call write_trajectories(plan, folder, journals, options, &
+    if (.not. allocated(error)) call remove_other_results(folder, keeps_table=arguments%is_given('--csv'))
+    if (.not. allocated(error) .and. arguments%is_given('--csv')) call write_sweep_csv(folder, journals, error)
+    if (.not. allocated(error)) call write_trajectories(plan, folder, journals, arguments, &
                                                          summary%without_trajectory, error)
     if (.not. allocated(error)) call write_file(folder, input_file, input_text(plan%input), error)
     call system_clock(now)
@@ -105,18 +100,18 @@ contains
   end subroutine remove_run
 
   !> Prints the summary. A sweep without any variant done is a failure.
-  subroutine print_results(plan, folder, header, options, summary, code)
+  subroutine print_results(plan, folder, header, arguments, summary, code)
     type(sweep_plan_t), intent(in) :: plan
     character(len=*), intent(in) :: folder
     type(sweep_header_t), intent(in) :: header
-    type(results_options_t), intent(in) :: options
+    type(arguments_t), intent(in) :: arguments
     type(sweep_summary_t), intent(in) :: summary   !! from `write_results`
     integer, intent(out) :: code                   !! 1 if no variant is done
     type(error_t), allocatable :: error
     character(len=:), allocatable :: note
 
     code = exit_done
-    if (.not. options%is_quiet) then
+    if (.not. arguments%is_given('--quiet')) then
       if (summary%done > 0) call print_text(sweep_table(header, summary))
       note = sweep_note(plan%input, summary)
       if (note /= '') call print_text(note)
@@ -144,11 +139,11 @@ contains
 
   !> Runs the chosen variants again as `nocdyn run` does, with the values from the journals. A variant that fails leaves a partial
   !> trajectory; a refused one leaves none.
-  subroutine write_trajectories(plan, folder, journals, options, refused, error)
+  subroutine write_trajectories(plan, folder, journals, arguments, refused, error)
     type(sweep_plan_t), intent(in) :: plan
     character(len=*), intent(in) :: folder
     type(sweep_journal_t), intent(inout) :: journals(:)
-    type(results_options_t), intent(in) :: options
+    type(arguments_t), intent(in) :: arguments
     integer, allocatable, intent(out) :: refused(:)   !! variants without a trajectory
     type(error_t), allocatable, intent(out) :: error
     type(input_t) :: input
@@ -169,7 +164,7 @@ contains
           cycle
         end if
         call run_to_files(without_sweep(input), folder // '/' // variant_folder // to_text(variant), &
-                          folder // '/' // variant_folder // to_text(variant), options%is_quiet, summary, error)
+                          folder // '/' // variant_folder // to_text(variant), arguments%is_given('--quiet'), summary, error)
       end associate
       if (is_interrupted()) then
         call raise(error, exit_failed, plan%input%file // ': interrupted while trajectories were written; ' // &
