@@ -1,7 +1,6 @@
 !> The settings that all blocks of a sweep share, and the check that its base machine can be run.
 module nocdyn_sweep_setup
   use nocdyn_assembly, only: assemble_machine, new_formulation
-  use nocdyn_block_sizes, only: lanes_for
   use nocdyn_errors, only: error_t
   use nocdyn_formulation, only: formulation_t
   use nocdyn_input, only: group_t, input_t
@@ -9,6 +8,7 @@ module nocdyn_sweep_setup
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
   use nocdyn_run_settings, only: settings_of
+  use nocdyn_series_strips, only: strip
   use nocdyn_size_limits, only: check_size, choose_method
   use nocdyn_statistics_observer, only: needs_work_integrals
   use nocdyn_sweep_plan, only: sweep_plan_t
@@ -18,8 +18,13 @@ module nocdyn_sweep_setup
 
   public :: prepare_sweep, read_settings
 
+  ! Measured: chains of 10 rotors are fastest with 32 lanes, those of 100 with 8 to 32, those of 1000 with 4 to 8. No result
+  ! depends on the number of lanes.
+  integer, parameter :: max_states = 250   ! the parameters of `strip` lanes fit into the second-level cache
+  integer, parameter :: small_block = 8    ! lanes of larger machines: a multiple of the vector length of any processor
+
   type, public :: sweep_setup_t
-    integer :: lanes = 1               !! of a block
+    integer :: lanes = 1                       !! of a block
     logical :: has_energy_balance = .false.    !! whether a recorded column needs the work integrals
   end type sweep_setup_t
 
@@ -44,7 +49,7 @@ contains
     call read_settings(plan%input, formulation, settings, times, error)
     if (allocated(error)) return
     setup%has_energy_balance = needs_work_integrals(formulation, plan%statistics)
-    setup%lanes = lanes_for(formulation%states)
+    setup%lanes = merge(strip, small_block, formulation%states <= max_states)
   end subroutine prepare_sweep
 
   !> The integration settings and the times of &run.
