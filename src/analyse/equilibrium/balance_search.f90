@@ -161,11 +161,11 @@ contains
     integer, intent(in) :: member   !! number of the rigid motion
     real(wp), intent(in) :: speed   !! [rad/s]
     real(wp) :: torque
-    real(wp) :: trial(size(z))
+    real(wp) :: point(size(z))
 
-    trial = z
-    trial(member) = speed
-    call balance%evaluate(trial)
+    point = z
+    point(member) = speed
+    call balance%evaluate(point)
     torque = balance%residual(member)
     if (abs(torque) <= rounding * balance%scale(member)) torque = 0.0_wp
   end function imbalance
@@ -262,19 +262,19 @@ contains
     real(wp), intent(in) :: z(:)   !! start of the machine, [unknowns]
     type(block_solutions_t), intent(inout) :: block
     real(wp), parameter :: speeds(9) = [0.0_wp, 1.0_wp, -1.0_wp, 10.0_wp, -10.0_wp, 100.0_wp, -100.0_wp, 1000.0_wp, -1000.0_wp]
-    real(wp) :: trial(size(z))
+    real(wp) :: point(size(z))
     integer :: i, j, moving
 
     associate (members => block%members)
       moving = count(members <= balance%motions%freedoms())
-      trial = z
-      call newton(balance, trial, block)
+      point = z
+      call newton(balance, point, block)
       do i = 1, size(speeds)
         do j = 1, merge(size(speeds), 1, moving > 1)
-          trial = z
-          trial(members(:moving)) = speeds(i)
-          if (moving > 0) trial(members(1)) = speeds(merge(j, i, moving > 1))
-          call newton(balance, trial, block)
+          point = z
+          point(members(:moving)) = speeds(i)
+          if (moving > 0) point(members(1)) = speeds(merge(j, i, moving > 1))
+          call newton(balance, point, block)
         end do
       end do
     end associate

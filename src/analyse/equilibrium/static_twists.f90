@@ -50,7 +50,7 @@ contains
     integer, parameter :: most_steps = 500
     real(wp), parameter :: stalled = 1.0e3_wp   ! residuals up to this many tolerances are rounding if they stop falling
     type(twist_problem_t) :: self
-    real(wp) :: damping, trial(size(q)), step(size(q))
+    real(wp) :: damping, new_q(size(q)), step(size(q))
     real(wp) :: energy, excess, last_excess
     integer :: i
     logical :: is_singular
@@ -68,10 +68,10 @@ contains
       last_excess = excess
       energy = self%energy
       call solve(balance, damping, self, step, is_singular)
-      trial = q + step
-      if (.not. is_singular) call evaluate_angles(balance, trial, self)
+      new_q = q + step
+      if (.not. is_singular) call evaluate_angles(balance, new_q, self)
       if (.not. is_singular .and. lowers_energy(self, energy, step)) then
-        q = trial
+        q = new_q
         damping = merge(0.0_wp, 0.1_wp * damping, damping < 1.0e-8_wp)
         is_found = all(abs(step) <= 4 * spacing(abs(q)))
         if (is_found) exit

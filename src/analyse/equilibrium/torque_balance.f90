@@ -15,6 +15,7 @@ module nocdyn_torque_balance
 
   public :: set_up_balance
 
+  !> The equations of one machine, and work space for their evaluation.
   type, public :: torque_balance_t
     class(formulation_t), allocatable :: formulation   !! reduced, one lane, without work integrals
     type(element_coordinates_t) :: incidence

@@ -23,6 +23,7 @@ module nocdyn_linearisation
   !> values and of eigenvalues, which are squares.
   real(wp), parameter :: rigid_share = 1.0e-12_wp, rigid_share_of_squares = 1.0e-13_wp
 
+  !> The modes and the first-order matrix at one state.
   type, public :: linearisation_t
     real(wp), allocatable :: shapes(:, :)   !! modes in the coordinates q, M-normalised, [coordinates, modes]
     real(wp), allocatable :: twists(:, :)   !! modes in the twists of all elements, [elements, modes]

@@ -23,6 +23,7 @@ module nocdyn_coordinates
 
   integer, parameter :: most_names = 12   ! in a message
 
+  !> The coordinates of all groups, with L_tau and the responses by body.
   type, public :: coordinates_t
     integer :: freedoms = 0                             !! number of coordinates
     integer, allocatable :: body(:)                     !! independent body of each coordinate, [freedoms]

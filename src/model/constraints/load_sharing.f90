@@ -23,6 +23,7 @@ module nocdyn_load_sharing
     procedure :: orthonormalise
   end type load_sharing_block_t
 
+  !> All blocks of a machine.
   type, public :: load_sharing_t
     type(load_sharing_block_t), allocatable :: blocks(:)
   contains

@@ -25,6 +25,7 @@ module nocdyn_reaction_solver
     real(wp), allocatable :: dual(:, :, :)   !! D of the core, [core_trains, core, lanes]
   end type relation_group_t
 
+  !> The order of the solution, the coefficients of all lanes, and work space.
   type, public :: reaction_solver_t
     private
     integer, allocatable :: train(:)       !! train of each body

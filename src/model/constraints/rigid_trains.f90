@@ -17,6 +17,7 @@ module nocdyn_rigid_trains
 
   integer, parameter, public :: max_exponent = 500   !! binary exponent up to which squares of ratios do not overflow
 
+  !> The trees of all rigid trains of a machine.
   type, public :: rigid_trains_t
     integer, allocatable :: order(:)        !! bodies, train by train, each behind its parent
     integer, allocatable :: position(:)     !! position of each body in `order`

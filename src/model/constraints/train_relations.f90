@@ -12,6 +12,7 @@ module nocdyn_train_relations
 
   public :: new_relations, scaled_rows, unit_rows, distinct_trains
 
+  !> The relations of a machine, in all lanes.
   type, public :: train_relations_t
     integer, allocatable :: row(:)     !! constraint row of each relation
     type(constraints_t) :: equations   !! the relations; its bodies are the trains; coefficients are zero where terms cancel

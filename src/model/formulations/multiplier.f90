@@ -9,6 +9,7 @@ module nocdyn_multiplier
 
   public :: new_multiplier
 
+  !> A machine in the multiplier formulation, with the factors of its constant matrix.
   type, extends(body_formulation_t), public :: multiplier_t
     integer, allocatable :: kept(:)             !! independent constraint rows, which are those of the system
     real(wp), allocatable :: factors(:, :, :)   !! LU factors of the constant matrix, [n + kept, n + kept, lanes]

@@ -25,6 +25,7 @@ module nocdyn_paper
     real(wp), allocatable :: beta(:)         !! [omega; phi; F], then its derivative
   end type matrices_t
 
+  !> A machine in the paper's formulation, with the factors of J_3.
   type, extends(body_formulation_t), public :: paper_t
     real(wp), allocatable, private :: complement(:, :, :)      !! L_tau, [n, freedoms, lanes]
     real(wp), allocatable, private :: factors(:, :, :)         !! LU of J_3, [3n, 3n, lanes]

@@ -21,6 +21,7 @@ module nocdyn_machine
     real(wp) :: energy_lost = 0.0_wp      !! kinetic energy lost [J]
   end type start_impulse_t
 
+  !> All data of a machine; the parameters of each lane may differ.
   type, public :: machine_t
     integer :: lanes = 1
     integer :: bodies = 0

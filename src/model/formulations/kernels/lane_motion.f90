@@ -18,6 +18,7 @@ module nocdyn_lane_motion
   integer, parameter, public :: motion_strip = 32   !! lanes that are computed together; the lanes of a block must be a multiple
   integer, parameter :: strip = motion_strip
 
+  !> Work space, and the kept torques that depend on the time alone.
   type, public :: lane_motion_t
     private
     real(wp), allocatable :: angle(:), speed(:)   !! u - rest [rad], u' [rad/s] of one element, [strip]

@@ -15,6 +15,7 @@ module nocdyn_lane_series
 
   public :: new_lane_series
 
+  !> Work space of the recurrence.
   type, public :: lane_series_t
     private
     integer :: order = 0
