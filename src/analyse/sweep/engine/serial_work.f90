@@ -49,7 +49,7 @@ contains
     real(wp), intent(in) :: values(:)                         !! [targets]
     type(machine_t), intent(inout) :: machine                 !! of no use if `message` is not ''
     character(len=:), allocatable, intent(out) :: message     !! '', or why there is no such machine
-    integer, intent(in), optional :: lanes                    !! absent: 1
+    integer, intent(in), optional :: lanes                    !! 1 if absent
     type(error_t), allocatable :: error
 
     !$omp critical (texts)

@@ -17,7 +17,7 @@ module nocdyn_step_strips
     real(wp), dimension(width) :: scale = 0.0_wp      !! 0 in lanes that have not taken a step: x is constant there
     real(wp), dimension(width) :: x_start = 0.0_wp, x_end = 0.0_wp
     real(wp) :: c(width, max_degree) = 0.0_wp         !! x = x_start + sum of c_p (scale s)^p, s from 0 to 1
-    real(wp), dimension(width) :: above = 0.0_wp, below = 0.0_wp   !! bounds: how far x leaves the range of its ends
+    real(wp), dimension(width) :: above = 0.0_wp, below = 0.0_wp   !! bounds of how far x leaves the range of its ends
   end type strip_t
 
 contains
