@@ -1,6 +1,7 @@
 """Rules for the Fortran sources that CONTRIBUTING.md states: their length, their arguments, their comments."""
 
 import functools
+from collections import Counter
 
 import pytest
 from conftest import SOURCE
@@ -61,6 +62,9 @@ LONG_PROCEDURES = {
     ),
 }
 
+# Arguments in src/model that need no comment: src/base/contract says what they are.
+ARGUMENTS_OF_THE_CONTRACT = {"t", "y", "dydt", "dfdy", "dfdt"}
+
 
 @functools.cache
 def sources(folder):
@@ -114,4 +118,21 @@ def test_public_procedures_have_a_doc_comment():
         for path, source, procedure in procedures("src")
         if procedure.host is None and procedure.name.lower() in source.public and not procedure.doc
     ]
+    assert not bare, "\n".join(bare)
+
+
+def test_real_arguments_in_model_have_a_comment():
+    """Those of public procedures, of interfaces, and of bindings that no other type has, which is no override."""
+    bindings = Counter(binding for source in sources("src").values() for binding in source.bindings.values())
+    bare = []
+    for path, source in sources("src/model").items():
+        for procedure in source.procedures:
+            name = procedure.name.lower()
+            is_own = name in source.bindings and bindings[source.bindings[name]] == 1
+            if procedure.host is None and (procedure.is_interface or name in source.public or is_own):
+                bare += [
+                    f"{path}: {name}: {a.name}"
+                    for a in procedure.arguments
+                    if a.is_real and not a.comment and a.name not in ARGUMENTS_OF_THE_CONTRACT
+                ]
     assert not bare, "\n".join(bare)

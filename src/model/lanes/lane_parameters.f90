@@ -86,7 +86,7 @@ contains
   subroutine add_key(self, key, value, element)
     class(lane_parameters_t), intent(inout) :: self
     character(len=*), intent(in) :: key
-    real(wp), contiguous, target, intent(inout) :: value(:, :)
+    real(wp), contiguous, target, intent(inout) :: value(:, :)   !! in the unit of the key
     integer, intent(in), optional :: element(:)   !! of the bank in each column; absent: column k is that of element k
     integer :: k
 
@@ -112,7 +112,7 @@ contains
   subroutine add_blocks(self, name, value)
     class(lane_parameters_t), intent(inout) :: self
     character(len=*), intent(in) :: name   !! for comparisons of structures
-    real(wp), contiguous, target, intent(inout) :: value(:, :, :)
+    real(wp), contiguous, target, intent(inout) :: value(:, :, :)   !! [rows, columns, lanes]
 
     call self%next_array(name)
     self%array(self%arrays)%value(1:size(value, 1) * size(value, 2), 1:size(value, 3), 1:1) => value
@@ -321,7 +321,7 @@ contains
     class(lane_parameters_t), intent(inout) :: self
     type(parameter_index_t), intent(in) :: index
     integer, intent(in) :: lane
-    real(wp), intent(in) :: value
+    real(wp), intent(in) :: value   !! in the unit of the array
 
     self%array(index%array)%value(index%row, lane, index%column) = value
   end subroutine set_value

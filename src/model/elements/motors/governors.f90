@@ -62,7 +62,8 @@ contains
   pure function rate(self, lane, motor, throttle, z)
     class(governor_t), intent(in) :: self
     integer, intent(in) :: lane, motor
-    real(wp), intent(in) :: throttle, z
+    real(wp), intent(in) :: throttle   !! [1]
+    real(wp), intent(in) :: z          !! integral [1]
     real(wp) :: rate
 
     rate = (throttle - z) / self%time(lane, motor)
