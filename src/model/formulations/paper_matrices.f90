@@ -171,7 +171,7 @@ contains
   !> diag(block, I): J_2 = diag(J_1, I) of eq. (35), [2n, 2n], and J_3 = diag(J_2, I) of eq. (44), [3n, 3n].
   pure subroutine extend_by_unit(block, matrix)
     real(wp), intent(in) :: block(:, :)   !! J_1 or J_2
-    real(wp), intent(inout) :: matrix(:, :)
+    real(wp), intent(inout) :: matrix(:, :)   !! J_2 or J_3
     integer :: i
 
     call extend_by_zero(block, matrix)
@@ -183,7 +183,7 @@ contains
   !> diag(block, 0) with the zero matrix of eq. (37): C_2 of eq. (38), [2n, 2n], and C_3 of eq. (60), [3n, 3n].
   pure subroutine extend_by_zero(block, matrix)
     real(wp), intent(in) :: block(:, :)   !! C_1 or C_2
-    real(wp), intent(inout) :: matrix(:, :)
+    real(wp), intent(inout) :: matrix(:, :)   !! C_2 or C_3
 
     matrix = 0.0_wp
     matrix(:size(block, 1), :size(block, 2)) = block
@@ -192,7 +192,7 @@ contains
   !> [upper; 0] with the zero vector of eq. (59): Q_2 of eq. (40), [2n], and Q_3 of eq. (58), [3n].
   pure subroutine append_zeros(upper, vector)
     real(wp), intent(in) :: upper(:)   !! Q_1 or Q_2
-    real(wp), intent(inout) :: vector(:)
+    real(wp), intent(inout) :: vector(:)   !! Q_2 or Q_3
 
     vector = 0.0_wp
     vector(:size(upper)) = upper
@@ -201,7 +201,7 @@ contains
   !> K_2 of eq. (39): [0, K_1; I, 0], [2n, 2n].
   subroutine stiffness_2(stiffness_1, matrix)
     real(wp), intent(in) :: stiffness_1(:, :)   !! K_1, [n, n]
-    real(wp), intent(inout) :: matrix(:, :)
+    real(wp), intent(inout) :: matrix(:, :)   !! K_2, [2n, 2n]
     integer :: i, n
 
     n = size(stiffness_1, 1)
@@ -216,7 +216,7 @@ contains
   subroutine stiffness_3(matrix_2, tangent, matrix)
     real(wp), intent(in) :: matrix_2(:, :)   !! K_2, [2n, 2n]
     real(wp), intent(in) :: tangent(:, :)    !! K_4, [n, n]
-    real(wp), intent(inout) :: matrix(:, :)
+    real(wp), intent(inout) :: matrix(:, :)   !! K_3, [3n, 3n]
 
     call extend_by_zero(matrix_2, matrix)
     matrix(size(matrix_2, 1) + 1:, :size(tangent, 2)) = tangent
