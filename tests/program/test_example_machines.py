@@ -207,7 +207,7 @@ MOTOR_COUPLING_GEAR = {"equilibrium": 11.4525188732, "rest": 8.7961662238}
 ACCURACY = 1e-7
 
 # Of the energy that is turned over, at these tolerances.
-AUDIT_ACCURACY = 1e-7
+BALANCE_ACCURACY = 1e-7
 
 
 def input_of(name):
@@ -278,7 +278,7 @@ def test_published_numbers_are_reproduced(shared_nocdyn, name):
 def test_no_energy_is_lost(run_of, name):
     columns = run_of(name).columns
     turned_over = max(max(map(abs, columns[key])) for key in ("kinetic_energy [J]", "work_in [J]", "work_out [J]"))
-    assert max(map(abs, columns["energy_residual [J]"])) < AUDIT_ACCURACY * turned_over
+    assert max(map(abs, columns["energy_residual [J]"])) < BALANCE_ACCURACY * turned_over
 
 
 def test_two_equal_paths_share_the_torque(run_of):

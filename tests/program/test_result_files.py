@@ -126,7 +126,7 @@ def test_columns_obey_their_definitions(full):
         assert close(value["kinetic_energy"], sum(j * value[f"omega_{body}"] ** 2 / 2 for body, j in inertia.items()))
 
 
-def test_the_energy_audit_closes(full):
+def test_the_energy_balance_closes(full):
     # the tolerances of the file
     table = columns(full, "full")
     assert max(map(abs, table["energy_residual [J]"])) < 1e-6 * table["work_in [J]"][-1]
@@ -386,7 +386,7 @@ def test_input_nml_reproduces_the_run_bit_for_bit(nocdyn, path, overrides):
     assert (first / "input.nml").read_bytes() == (second / "input.nml").read_bytes()
 
 
-def test_a_motion_that_the_energy_audit_refutes_is_noted(nocdyn):
+def test_a_motion_that_the_energy_balance_refutes_is_noted(nocdyn):
     nocdyn.write(
         "coarse.nml",
         """\
@@ -401,7 +401,7 @@ def test_a_motion_that_the_energy_audit_refutes_is_noted(nocdyn):
     assert "tighten rtol and atol" in nocdyn.summary("out")["machine"]["notes"][0]
 
 
-def test_a_motion_that_the_energy_audit_confirms_has_no_note(nocdyn):
+def test_a_motion_that_the_energy_balance_confirms_has_no_note(nocdyn):
     outcome = nocdyn("run", CASE_2, "--out", "out")
     assert "note" not in outcome.stdout
     assert nocdyn.summary("out")["machine"]["notes"] == []

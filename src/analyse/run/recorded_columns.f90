@@ -46,7 +46,7 @@ contains
     integer :: i
 
     if (any(columns%kind >= column_work_in) .and. .not. formulation%has_energy_balance) then
-      error stop 'nocdyn_recorded_columns: works need a formulation that is audited'
+      error stop 'nocdyn_recorded_columns: work columns need a formulation with an energy balance'
     end if
     allocate (self%formulation, source=formulation)
     allocate (self%segments, source=segments_of(columns))
