@@ -1,7 +1,8 @@
 !> Linear combinations of stages: the inner loops of every Runge-Kutta method.
 !>
-!> The sums of up to twelve terms are written out. A loop over the terms takes 1.3 to 2 times as long for 8 to 60 numbers and
-!> eight terms or more (gfortran 12, AVX2): the sums of several vectors then wait for one another.
+!> The sums of up to twelve terms are written out, above six for even numbers of terms only: a term of weight zero completes the
+!> others. A loop over the terms takes 1.3 to 2 times as long for 8 to 60 numbers and eight terms or more (gfortran 12, AVX2): the
+!> sums of several vectors then wait for one another.
 module nocdyn_stage_sums
   use, intrinsic :: iso_fortran_env, only: int64
   use nocdyn_finite, only: are_finite => all_finite
@@ -15,7 +16,6 @@ module nocdyn_stage_sums
   integer(int64), parameter :: exponent_mask = shiftl(2047_int64, 52)   ! all ones in a number that is not finite
   integer, parameter, public :: width = 4          !! length of the vectors; all arrays here consist of whole vectors
   integer, parameter :: few = 16                   !! up to so many numbers a plain loop over vectors finds infinities soonest
-  integer, parameter :: tile = 32                  !! numbers of each stage in one pass over the terms
   integer, parameter, public :: large_tile = 256   !! numbers of each stage that are summed and checked before the next ones
 
   !> The non-zero weights of a row of a tableau, and the positions of their stages.
@@ -25,7 +25,7 @@ module nocdyn_stage_sums
     integer :: stages(max_terms) = 0     !! indices in the array of stages
     integer :: length = 0                !! of a stage
     integer :: extent = 0                !! of the array of stages
-    integer :: offsets(max_terms) = 0    !! of the stages in that array
+    integer :: offsets(max_terms) = 0    !! of the stages in that array; after the last term those of the first one
   end type stage_sum_t
 
 contains
@@ -54,6 +54,7 @@ contains
     stage_sum%length = length
     stage_sum%extent = length * stages
     stage_sum%offsets = length * (stage_sum%stages - 1)
+    stage_sum%offsets(stage_sum%terms + 1:) = stage_sum%offsets(1)
   end subroutine set_offsets
 
   !> The number of columns, at least one, of an array [lanes, columns] of whole vectors that holds all components.
@@ -86,14 +87,10 @@ contains
     end if
     associate (n => stage_sum%length, m => stage_sum%extent, terms => stage_sum%terms, w => stage_sum%weights, &
                o => stage_sum%offsets)
-      if (modulo(n, tile) == 0) then
-        call sum_tiles(n, m, terms, w, o, k, x, h, y)
-      else if (terms <= 4) then
-        call sum_up_to_4(n, m, terms, w, o, k, x, h, y)
-      else if (terms <= 8) then
-        call sum_up_to_8(n, m, terms, w, o, k, x, h, y)
+      if (terms <= 6) then
+        call sum_few_terms(n, m, terms, w, o, k, x, h, y)
       else
-        call sum_up_to_12(n, m, terms, w, o, k, x, h, y)
+        call sum_many_terms(n, m, terms, w, o, k, x, h, y)
       end if
     end associate
     if (.not. present(all_finite)) return
@@ -131,103 +128,10 @@ contains
     end do
   end subroutine sum_large_tiles
 
-  !> Sums of any number of terms, for whole tiles: loops of constant length have no mispredicted end.
-  pure subroutine sum_tiles(n, m, terms, w, o, k, x, h, y)
-    integer, intent(in) :: n, m, terms
-    real(wp), intent(in) :: w(max_terms)
-    integer, intent(in) :: o(max_terms)
-    real(wp), intent(in) :: k(m), x(n), h(n)
-    real(wp), intent(inout) :: y(n)
-    real(wp) :: total(tile)
-    integer :: before, i, term
-
-    if (terms == 0) y = x
-    if (terms == 0) return
-    do before = 0, n - 1, tile
-      call begin_sum(m, min(terms, 4), w, o, before, k, total)
-      do term = 5, terms, 4
-        call continue_sum(m, min(terms - term + 1, 4), w(term), o(term), before, k, total)
-      end do
-      do i = 1, tile
-        y(before + i) = x(before + i) + h(before + i) * total(i)
-      end do
-    end do
-  end subroutine sum_tiles
-
-  !> The first one to four terms of a sum.
-  pure subroutine begin_sum(m, terms, w, o, before, k, total)
-    integer, intent(in) :: m, terms
-    real(wp), intent(in) :: w(4)
-    integer, intent(in) :: o(4)
-    integer, intent(in) :: before
-    real(wp), intent(in) :: k(m)
-    real(wp), intent(inout) :: total(tile)
-    integer :: a, b, c, d, i
-
-    a = before + o(1)
-    b = before + o(2)
-    c = before + o(3)
-    d = before + o(4)
-    select case (terms)
-    case (1)
-      do i = 1, tile
-        total(i) = w(1) * k(a + i)
-      end do
-    case (2)
-      do i = 1, tile
-        total(i) = w(1) * k(a + i) + w(2) * k(b + i)
-      end do
-    case (3)
-      do i = 1, tile
-        total(i) = w(1) * k(a + i) + w(2) * k(b + i) + w(3) * k(c + i)
-      end do
-    case default
-      do i = 1, tile
-        total(i) = w(1) * k(a + i) + w(2) * k(b + i) + w(3) * k(c + i) + w(4) * k(d + i)
-      end do
-    end select
-  end subroutine begin_sum
-
-  !> Adds the next one to four terms of a sum, in the order in which the other procedures add them.
-  pure subroutine continue_sum(m, terms, w, o, before, k, total)
-    integer, intent(in) :: m, terms
-    real(wp), intent(in) :: w(4)
-    integer, intent(in) :: o(4)
-    integer, intent(in) :: before
-    real(wp), intent(in) :: k(m)
-    real(wp), intent(inout) :: total(tile)
-    integer :: a, b, c, d, i
-
-    a = before + o(1)
-    b = before + o(2)
-    c = before + o(3)
-    d = before + o(4)
-    select case (terms)
-    case (1)
-      do i = 1, tile
-        total(i) = total(i) + w(1) * k(a + i)
-      end do
-    case (2)
-      do i = 1, tile
-        total(i) = total(i) + w(1) * k(a + i) + w(2) * k(b + i)
-      end do
-    case (3)
-      do i = 1, tile
-        total(i) = total(i) + w(1) * k(a + i) + w(2) * k(b + i) + w(3) * k(c + i)
-      end do
-    case default
-      do i = 1, tile
-        total(i) = total(i) + w(1) * k(a + i) + w(2) * k(b + i) + w(3) * k(c + i) + w(4) * k(d + i)
-      end do
-    end select
-  end subroutine continue_sum
-
-  !> Sums of up to four terms.
-  pure subroutine sum_up_to_4(n, m, terms, w, o, k, x, h, y)
-    integer, intent(in) :: n, m, terms
-    real(wp), intent(in) :: w(max_terms)
-    integer, intent(in) :: o(max_terms)
-    real(wp), intent(in) :: k(m), x(n), h(n)
+  !> Sums of up to six terms.
+  pure subroutine sum_few_terms(n, m, terms, w, o, k, x, h, y)
+    integer, intent(in) :: n, m, terms, o(max_terms)
+    real(wp), intent(in) :: w(max_terms), k(m), x(n), h(n)
     real(wp), intent(inout) :: y(n)
     integer :: i
 
@@ -245,106 +149,57 @@ contains
     case (3)
       do i = 1, n, width
         y(i:i + 3) = x(i:i + 3) + h(i:i + 3) * (w(1) * k(i + o(1):i + 3 + o(1)) + w(2) * k(i + o(2):i + 3 + o(2)) &
-                                   + w(3) * k(i + o(3):i + 3 + o(3)))
+          + w(3) * k(i + o(3):i + 3 + o(3)))
       end do
     case (4)
       do i = 1, n, width
         y(i:i + 3) = x(i:i + 3) + h(i:i + 3) * (w(1) * k(i + o(1):i + 3 + o(1)) + w(2) * k(i + o(2):i + 3 + o(2)) &
-                                   + w(3) * k(i + o(3):i + 3 + o(3)) + w(4) * k(i + o(4):i + 3 + o(4)))
+          + w(3) * k(i + o(3):i + 3 + o(3)) + w(4) * k(i + o(4):i + 3 + o(4)))
       end do
-    case default
-      error stop 'nocdyn_stage_sums: another procedure sums so many terms'
-    end select
-  end subroutine sum_up_to_4
-
-  !> Sums of five to eight terms.
-  pure subroutine sum_up_to_8(n, m, terms, w, o, k, x, h, y)
-    integer, intent(in) :: n, m, terms
-    real(wp), intent(in) :: w(max_terms)
-    integer, intent(in) :: o(max_terms)
-    real(wp), intent(in) :: k(m), x(n), h(n)
-    real(wp), intent(inout) :: y(n)
-    integer :: i
-
-    select case (terms)
     case (5)
       do i = 1, n, width
         y(i:i + 3) = x(i:i + 3) + h(i:i + 3) * (w(1) * k(i + o(1):i + 3 + o(1)) + w(2) * k(i + o(2):i + 3 + o(2)) &
-                                   + w(3) * k(i + o(3):i + 3 + o(3)) + w(4) * k(i + o(4):i + 3 + o(4)) &
-                                   + w(5) * k(i + o(5):i + 3 + o(5)))
-      end do
-    case (6)
-      do i = 1, n, width
-        y(i:i + 3) = x(i:i + 3) + h(i:i + 3) * (w(1) * k(i + o(1):i + 3 + o(1)) + w(2) * k(i + o(2):i + 3 + o(2)) &
-                                   + w(3) * k(i + o(3):i + 3 + o(3)) + w(4) * k(i + o(4):i + 3 + o(4)) &
-                                   + w(5) * k(i + o(5):i + 3 + o(5)) + w(6) * k(i + o(6):i + 3 + o(6)))
-      end do
-    case (7)
-      do i = 1, n, width
-        y(i:i + 3) = x(i:i + 3) + h(i:i + 3) * (w(1) * k(i + o(1):i + 3 + o(1)) + w(2) * k(i + o(2):i + 3 + o(2)) &
-                                   + w(3) * k(i + o(3):i + 3 + o(3)) + w(4) * k(i + o(4):i + 3 + o(4)) &
-                                   + w(5) * k(i + o(5):i + 3 + o(5)) + w(6) * k(i + o(6):i + 3 + o(6)) &
-                                   + w(7) * k(i + o(7):i + 3 + o(7)))
-      end do
-    case (8)
-      do i = 1, n, width
-        y(i:i + 3) = x(i:i + 3) + h(i:i + 3) * (w(1) * k(i + o(1):i + 3 + o(1)) + w(2) * k(i + o(2):i + 3 + o(2)) &
-                                   + w(3) * k(i + o(3):i + 3 + o(3)) + w(4) * k(i + o(4):i + 3 + o(4)) &
-                                   + w(5) * k(i + o(5):i + 3 + o(5)) + w(6) * k(i + o(6):i + 3 + o(6)) &
-                                   + w(7) * k(i + o(7):i + 3 + o(7)) + w(8) * k(i + o(8):i + 3 + o(8)))
+          + w(3) * k(i + o(3):i + 3 + o(3)) + w(4) * k(i + o(4):i + 3 + o(4)) + w(5) * k(i + o(5):i + 3 + o(5)))
       end do
     case default
-      error stop 'nocdyn_stage_sums: another procedure sums so many terms'
+      do i = 1, n, width
+        y(i:i + 3) = x(i:i + 3) + h(i:i + 3) * (w(1) * k(i + o(1):i + 3 + o(1)) + w(2) * k(i + o(2):i + 3 + o(2)) &
+          + w(3) * k(i + o(3):i + 3 + o(3)) + w(4) * k(i + o(4):i + 3 + o(4)) + w(5) * k(i + o(5):i + 3 + o(5)) &
+          + w(6) * k(i + o(6):i + 3 + o(6)))
+      end do
     end select
-  end subroutine sum_up_to_8
+  end subroutine sum_few_terms
 
-  !> Sums of nine to twelve terms.
-  pure subroutine sum_up_to_12(n, m, terms, w, o, k, x, h, y)
-    integer, intent(in) :: n, m, terms
-    real(wp), intent(in) :: w(max_terms)
-    integer, intent(in) :: o(max_terms)
-    real(wp), intent(in) :: k(m), x(n), h(n)
+  !> Sums of seven to twelve terms.
+  pure subroutine sum_many_terms(n, m, terms, w, o, k, x, h, y)
+    integer, intent(in) :: n, m, terms, o(max_terms)
+    real(wp), intent(in) :: w(max_terms), k(m), x(n), h(n)
     real(wp), intent(inout) :: y(n)
     integer :: i
 
     select case (terms)
-    case (9)
+    case (7, 8)
       do i = 1, n, width
         y(i:i + 3) = x(i:i + 3) + h(i:i + 3) * (w(1) * k(i + o(1):i + 3 + o(1)) + w(2) * k(i + o(2):i + 3 + o(2)) &
-                                   + w(3) * k(i + o(3):i + 3 + o(3)) + w(4) * k(i + o(4):i + 3 + o(4)) &
-                                   + w(5) * k(i + o(5):i + 3 + o(5)) + w(6) * k(i + o(6):i + 3 + o(6)) &
-                                   + w(7) * k(i + o(7):i + 3 + o(7)) + w(8) * k(i + o(8):i + 3 + o(8)) &
-                                   + w(9) * k(i + o(9):i + 3 + o(9)))
+          + w(3) * k(i + o(3):i + 3 + o(3)) + w(4) * k(i + o(4):i + 3 + o(4)) + w(5) * k(i + o(5):i + 3 + o(5)) &
+          + w(6) * k(i + o(6):i + 3 + o(6)) + w(7) * k(i + o(7):i + 3 + o(7)) + w(8) * k(i + o(8):i + 3 + o(8)))
       end do
-    case (10)
+    case (9, 10)
       do i = 1, n, width
         y(i:i + 3) = x(i:i + 3) + h(i:i + 3) * (w(1) * k(i + o(1):i + 3 + o(1)) + w(2) * k(i + o(2):i + 3 + o(2)) &
-                                   + w(3) * k(i + o(3):i + 3 + o(3)) + w(4) * k(i + o(4):i + 3 + o(4)) &
-                                   + w(5) * k(i + o(5):i + 3 + o(5)) + w(6) * k(i + o(6):i + 3 + o(6)) &
-                                   + w(7) * k(i + o(7):i + 3 + o(7)) + w(8) * k(i + o(8):i + 3 + o(8)) &
-                                   + w(9) * k(i + o(9):i + 3 + o(9)) + w(10) * k(i + o(10):i + 3 + o(10)))
-      end do
-    case (11)
-      do i = 1, n, width
-        y(i:i + 3) = x(i:i + 3) + h(i:i + 3) * (w(1) * k(i + o(1):i + 3 + o(1)) + w(2) * k(i + o(2):i + 3 + o(2)) &
-                                   + w(3) * k(i + o(3):i + 3 + o(3)) + w(4) * k(i + o(4):i + 3 + o(4)) &
-                                   + w(5) * k(i + o(5):i + 3 + o(5)) + w(6) * k(i + o(6):i + 3 + o(6)) &
-                                   + w(7) * k(i + o(7):i + 3 + o(7)) + w(8) * k(i + o(8):i + 3 + o(8)) &
-                                   + w(9) * k(i + o(9):i + 3 + o(9)) + w(10) * k(i + o(10):i + 3 + o(10)) &
-                                   + w(11) * k(i + o(11):i + 3 + o(11)))
-      end do
-    case (12)
-      do i = 1, n, width
-        y(i:i + 3) = x(i:i + 3) + h(i:i + 3) * (w(1) * k(i + o(1):i + 3 + o(1)) + w(2) * k(i + o(2):i + 3 + o(2)) &
-                                   + w(3) * k(i + o(3):i + 3 + o(3)) + w(4) * k(i + o(4):i + 3 + o(4)) &
-                                   + w(5) * k(i + o(5):i + 3 + o(5)) + w(6) * k(i + o(6):i + 3 + o(6)) &
-                                   + w(7) * k(i + o(7):i + 3 + o(7)) + w(8) * k(i + o(8):i + 3 + o(8)) &
-                                   + w(9) * k(i + o(9):i + 3 + o(9)) + w(10) * k(i + o(10):i + 3 + o(10)) &
-                                   + w(11) * k(i + o(11):i + 3 + o(11)) + w(12) * k(i + o(12):i + 3 + o(12)))
+          + w(3) * k(i + o(3):i + 3 + o(3)) + w(4) * k(i + o(4):i + 3 + o(4)) + w(5) * k(i + o(5):i + 3 + o(5)) &
+          + w(6) * k(i + o(6):i + 3 + o(6)) + w(7) * k(i + o(7):i + 3 + o(7)) + w(8) * k(i + o(8):i + 3 + o(8)) &
+          + w(9) * k(i + o(9):i + 3 + o(9)) + w(10) * k(i + o(10):i + 3 + o(10)))
       end do
     case default
-      error stop 'nocdyn_stage_sums: another procedure sums so many terms'
+      do i = 1, n, width
+        y(i:i + 3) = x(i:i + 3) + h(i:i + 3) * (w(1) * k(i + o(1):i + 3 + o(1)) + w(2) * k(i + o(2):i + 3 + o(2)) &
+          + w(3) * k(i + o(3):i + 3 + o(3)) + w(4) * k(i + o(4):i + 3 + o(4)) + w(5) * k(i + o(5):i + 3 + o(5)) &
+          + w(6) * k(i + o(6):i + 3 + o(6)) + w(7) * k(i + o(7):i + 3 + o(7)) + w(8) * k(i + o(8):i + 3 + o(8)) &
+          + w(9) * k(i + o(9):i + 3 + o(9)) + w(10) * k(i + o(10):i + 3 + o(10)) + w(11) * k(i + o(11):i + 3 + o(11)) &
+          + w(12) * k(i + o(12):i + 3 + o(12)))
+      end do
     end select
-  end subroutine sum_up_to_12
+  end subroutine sum_many_terms
 
 end module nocdyn_stage_sums
