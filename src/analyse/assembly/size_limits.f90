@@ -1,13 +1,13 @@
 !> Limits on the size of dense matrices; the method that a machine can be integrated with.
 module nocdyn_size_limits
-  use nocdyn_banded_matrix, only: half_bandwidths
   use nocdyn_errors, only: error_t, exit_input, raise
   use nocdyn_formulation, only: formulation_t
   use nocdyn_input, only: group_t, input_t
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
   use nocdyn_ordering, only: reverse_cuthill_mckee
-  use nocdyn_pattern_entries, only: entries_t, state_entries
+  use nocdyn_pattern_entries, only: entries_in_rows, entries_t
+  use nocdyn_stage_matrix, only: half_bandwidths
   use nocdyn_text, only: append, quoted, string_t, to_text
   implicit none (type, external)
   private
@@ -114,7 +114,7 @@ contains
     type(entries_t) :: entries
     integer :: lower, upper
 
-    entries = state_entries(formulation%jacobian_pattern(), formulation%states)
+    entries = entries_in_rows(formulation%jacobian_pattern(), 1, formulation%states)
     call half_bandwidths(reverse_cuthill_mckee(formulation%states, entries%row, entries%column), entries, lower, upper)
     rows = min(2 * lower + upper + 1, formulation%states)
   end function stage_matrix_rows

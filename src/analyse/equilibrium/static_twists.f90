@@ -5,13 +5,13 @@
 !> not lower the energy, as inside of a gap or where a spring softens. The matrix is banded, in a good order of the
 !> coordinates.
 module nocdyn_static_twists
-  use nocdyn_banded_matrix, only: half_bandwidths
   use nocdyn_errors, only: error_t, exit_input, raise
   use nocdyn_kinds, only: wp
   use nocdyn_lapack_band, only: band_factor, band_solve
   use nocdyn_ordering, only: reverse_cuthill_mckee
   use nocdyn_pattern_entries, only: entries_t
   use nocdyn_rigid_motions, only: new_rigid_motions, rigid_motions_t
+  use nocdyn_stage_matrix, only: half_bandwidths
   use nocdyn_text, only: to_text
   use nocdyn_torque_balance, only: torque_balance_t
   implicit none (type, external)

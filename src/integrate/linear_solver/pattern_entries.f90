@@ -1,11 +1,11 @@
-!> The entries of a Jacobian's pattern in the rows of the states and in those of the quadratures, and checks of a pattern.
+!> Some entries of a Jacobian's pattern, such as those in the rows of the states, and checks of a pattern.
 module nocdyn_pattern_entries
   use nocdyn_grouping, only: grouped, groups_t
   use nocdyn_system, only: pattern_t
   implicit none (type, external)
   private
 
-  public :: pattern_error, state_entries, quadrature_entries
+  public :: pattern_error, entries_in_rows
 
   !> Length of the messages. They are not allocatable: gfortran 12 keeps the length of an allocatable function result in static
   !> memory, which all threads share.
@@ -58,41 +58,17 @@ contains
     end do
   end function has_duplicates
 
-  !> Entries in the rows of the states.
-  pure function state_entries(pattern, states) result(entries)
+  !> The entries of a pattern in the rows from `first` to `last`.
+  pure function entries_in_rows(pattern, first, last) result(entries)
     type(pattern_t), intent(in) :: pattern
-    integer, intent(in) :: states
+    integer, intent(in) :: first, last
     type(entries_t) :: entries
+    logical :: is_chosen(size(pattern%row))
+    integer :: p
 
-    entries = chosen_entries(pattern, pattern%row <= states)
-  end function state_entries
-
-  !> Entries in the rows of the quadratures.
-  pure function quadrature_entries(pattern, states) result(entries)
-    type(pattern_t), intent(in) :: pattern
-    integer, intent(in) :: states
-    type(entries_t) :: entries
-
-    entries = chosen_entries(pattern, pattern%row > states)
-  end function quadrature_entries
-
-  !> The entries of a pattern that are chosen by a mask.
-  pure function chosen_entries(pattern, is_chosen) result(entries)
-    type(pattern_t), intent(in) :: pattern
-    logical, intent(in) :: is_chosen(:)
-    type(entries_t) :: entries
-    integer :: p, filled
-
-    filled = count(is_chosen)
-    allocate (entries%position(filled), entries%row(filled), entries%column(filled))
-    filled = 0
-    do p = 1, size(is_chosen)
-      if (.not. is_chosen(p)) cycle
-      filled = filled + 1
-      entries%position(filled) = p
-      entries%row(filled) = pattern%row(p)
-      entries%column(filled) = pattern%column(p)
-    end do
-  end function chosen_entries
+    is_chosen = pattern%row >= first .and. pattern%row <= last
+    entries = entries_t(pack([(p, p=1, size(is_chosen))], is_chosen), pack(pattern%row, is_chosen), &
+                        pack(pattern%column, is_chosen))
+  end function entries_in_rows
 
 end module nocdyn_pattern_entries

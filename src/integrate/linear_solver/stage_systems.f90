@@ -2,9 +2,8 @@
 module nocdyn_stage_systems
   use nocdyn_finite, only: all_finite, is_finite
   use nocdyn_kinds, only: wp
-  use nocdyn_pattern_entries, only: entries_t, message_length, pattern_error, quadrature_entries, state_entries
-  use nocdyn_stage_matrix, only: stage_matrix_t
-  use nocdyn_stage_solver, only: choose_stage_matrix
+  use nocdyn_pattern_entries, only: entries_in_rows, entries_t, message_length, pattern_error
+  use nocdyn_stage_matrix, only: choose_stage_matrix, stage_matrix_t
   use nocdyn_step_attempt, only: attempt_not_finite, attempt_recoverable, disable_lane, step_attempt_t
   use nocdyn_system, only: evaluation_ok, pattern_t, system_t
   implicit none (type, external)
@@ -17,7 +16,7 @@ module nocdyn_stage_systems
   type, public :: stage_system_t
     real(wp), allocatable :: dfdt(:, :)                     !! [lanes, components]
     real(wp), allocatable :: dfdy(:, :)                     !! [lanes, positions]
-    class(stage_matrix_t), allocatable, private :: matrix   !! not allocated if there are no states
+    type(stage_matrix_t), private :: matrix                 !! of the states, if there are any
     type(entries_t), private :: quadratures                 !! entries of the Jacobian in the rows of quadratures
   end type stage_system_t
 
@@ -36,8 +35,10 @@ contains
     associate (lanes => system%lanes, states => system%states, components => system%states + system%quadratures)
       allocate (stage_system%dfdy(lanes, size(pattern%row)), source=0.0_wp)
       allocate (stage_system%dfdt(lanes, components), source=0.0_wp)
-      stage_system%quadratures = quadrature_entries(pattern, states)
-      if (states > 0) call choose_stage_matrix(state_entries(pattern, states), lanes, states, stage_system%matrix)
+      stage_system%quadratures = entries_in_rows(pattern, states + 1, components)
+      if (states > 0) then
+        call choose_stage_matrix(entries_in_rows(pattern, 1, states), lanes, states, stage_system%matrix)
+      end if
     end associate
   end subroutine allocate_stage_system
 

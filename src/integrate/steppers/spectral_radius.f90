@@ -1,7 +1,8 @@
 !> Estimates of the spectral radius of the Jacobian of each lane, by power iteration.
 module nocdyn_spectral_radius
   use nocdyn_kinds, only: wp
-  use nocdyn_system, only: pattern_t, system_t
+  use nocdyn_pattern_entries, only: entries_in_rows, entries_t
+  use nocdyn_system, only: system_t
   implicit none (type, external)
   private
 
@@ -11,9 +12,7 @@ module nocdyn_spectral_radius
 
   !> A power iteration that continues from step to step.
   type, public :: spectral_radius_t
-    integer, allocatable, private :: position(:)   !! of the entries in the rows of states, among the values of the Jacobian
-    integer, allocatable, private :: row(:)
-    integer, allocatable, private :: column(:)
+    type(entries_t), private :: entries            !! of the Jacobian in the rows of states
     real(wp), allocatable, private :: vector(:, :) !! of unit length, [states, lanes]
     real(wp), allocatable, private :: start(:)     !! start vector, of unit length, [states]
     real(wp), allocatable, private :: image(:)     !! Jacobian times vector, [states]
@@ -25,14 +24,9 @@ contains
   subroutine allocate_spectral_radius(spectrum, system)
     type(spectral_radius_t), intent(out) :: spectrum
     class(system_t), intent(in) :: system
-    type(pattern_t) :: pattern
     integer :: i, lane
 
-    pattern = system%jacobian_pattern()
-    allocate (spectrum%position, source=pack([(i, i=1, size(pattern%row))], pattern%row <= system%states))
-    allocate (spectrum%row(size(spectrum%position)), spectrum%column(size(spectrum%position)))
-    spectrum%row(:) = pattern%row(spectrum%position)   ! gfortran 12 counts from 0 with `source=` here
-    spectrum%column(:) = pattern%column(spectrum%position)
+    spectrum%entries = entries_in_rows(system%jacobian_pattern(), 1, system%states)
     allocate (spectrum%image(system%states), spectrum%vector(system%states, system%lanes), source=0.0_wp)
     allocate (spectrum%start(system%states))
     spectrum%start(:) = [(1 + 0.5_wp * mod(i, 3), i=1, system%states)]
@@ -62,7 +56,7 @@ contains
 
     growth(:) = 0.0_wp
     do i = 1, 2
-      call multiply(spectrum%position, spectrum%row, spectrum%column, dfdy, lane, spectrum%vector(:, lane), spectrum%image)
+      call multiply(spectrum%entries, dfdy, lane, spectrum%vector(:, lane), spectrum%image)
       growth(i) = norm2(spectrum%image)
       if (.not. growth(i) > 0) exit
       spectrum%vector(:, lane) = spectrum%image / growth(i)
@@ -77,8 +71,8 @@ contains
   end subroutine estimate_spectral_radius
 
   !> Multiplies a vector by the Jacobian of a lane.
-  pure subroutine multiply(position, row, column, dfdy, lane, vector, image)
-    integer, intent(in) :: position(:), row(:), column(:)
+  pure subroutine multiply(entries, dfdy, lane, vector, image)
+    type(entries_t), intent(in) :: entries
     real(wp), contiguous, intent(in) :: dfdy(:, :)
     integer, intent(in) :: lane
     real(wp), contiguous, intent(in) :: vector(:)
@@ -86,9 +80,11 @@ contains
     integer :: i
 
     image(:) = 0.0_wp
-    do i = 1, size(position)
-      image(row(i)) = image(row(i)) + dfdy(lane, position(i)) * vector(column(i))
-    end do
+    associate (row => entries%row, column => entries%column, position => entries%position)
+      do i = 1, size(position)
+        image(row(i)) = image(row(i)) + dfdy(lane, position(i)) * vector(column(i))
+      end do
+    end associate
   end subroutine multiply
 
 end module nocdyn_spectral_radius
