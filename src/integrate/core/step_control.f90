@@ -234,68 +234,42 @@ contains
     integer, intent(in) :: error_order(lanes)    !! the error falls as h^(error_order + 1)
     real(wp), intent(in) :: max_growth(lanes)   !! largest ratio of the next step size to h
     real(wp), intent(in) :: h(lanes)   !! sizes of the attempts [s]
-
     integer :: lane
 
+    call find_step_factors(lanes, accepted, error_order, control%mean_square, control%log_error, control%log_ratio, &
+                           control%factor)
     if (lanes > 1) then
       if (all_true(lanes, accepted) .and. .not. any_true(lanes, control%was_rejected)) then
-        call adapt_accepted_steps(lanes, error_order, max_growth, h, control%mean_square, control%log_error, control%log_ratio, &
-                      control%factor, control%h)
+        do lane = 1, lanes   ! the general case without a branch
+          control%h(lane) = max(min_factor, min(safety * control%factor(lane), max_growth(lane))) * h(lane)
+          control%log_error(lane) = max(control%log_ratio(lane), min_log_error)
+        end do
         return
       end if
     end if
-    !GCC$ novector
-    do lane = 1, lanes
-      control%log_ratio(lane) = max(control%mean_square(lane), no_error)
-    end do
-    call log2s(lanes, control%log_ratio)
-    call find_step_factors(lanes, accepted, error_order, control%log_error, control%log_ratio, control%factor)
-    call exp2s(lanes, control%factor)
     do lane = 1, lanes
       if (accepted(lane) .or. rejected(lane)) call set_next_step(control, lane, accepted(lane), max_growth(lane), h(lane))
     end do
   end subroutine adapt_steps
 
-  !> The same where all lanes have been accepted twice, in loops without a branch.
-  pure subroutine adapt_accepted_steps(lanes, error_order, max_growth, h, mean_square, log_error, log_ratio, factor, next)
-    integer, intent(in) :: lanes
-    integer, intent(in) :: error_order(lanes)
-    real(wp), intent(in) :: max_growth(lanes), h(lanes), mean_square(lanes)
-    real(wp), intent(inout) :: log_error(lanes), log_ratio(lanes), factor(lanes)
-    real(wp), intent(inout) :: next(lanes)   !! next step sizes [s]
-    integer :: lane
-
-    do lane = 1, lanes
-      log_ratio(lane) = max(mean_square(lane), no_error)
-    end do
-    call log2s(lanes, log_ratio)
-    do lane = 1, lanes
-      log_ratio(lane) = 0.5_wp * log_ratio(lane)
-      factor(lane) = beta * log_error(lane) - (1.0_wp / (error_order(lane) + 1) - pi_correction * beta) * log_ratio(lane)
-    end do
-    call exp2s(lanes, factor)
-    do lane = 1, lanes
-      next(lane) = max(min_factor, min(safety * factor(lane), max_growth(lane))) * h(lane)
-      log_error(lane) = max(log_ratio(lane), min_log_error)
-    end do
-  end subroutine adapt_accepted_steps
-
-  !> The logarithms of the error norms and of the factors of the step sizes.
-  pure subroutine find_step_factors(lanes, accepted, error_order, log_error, log_ratio, factor)
+  !> The logarithms of the error norms, and the factors of the step sizes.
+  pure subroutine find_step_factors(lanes, accepted, error_order, mean_square, log_error, log_ratio, factor)
     integer, intent(in) :: lanes
     logical, intent(in) :: accepted(lanes)
     integer, intent(in) :: error_order(lanes)
-    real(wp), intent(in) :: log_error(lanes)
+    real(wp), intent(in) :: mean_square(lanes), log_error(lanes)
     real(wp), intent(inout) :: log_ratio(lanes), factor(lanes)
     real(wp) :: present_exponent
     integer :: lane
 
-    !GCC$ novector
+    log_ratio = max(mean_square, no_error)
+    call log2s(lanes, log_ratio)
     do lane = 1, lanes
       present_exponent = 1.0_wp / (error_order(lane) + 1) - pi_correction * beta
       log_ratio(lane) = 0.5_wp * log_ratio(lane)
       factor(lane) = merge(beta, 0.0_wp, accepted(lane)) * log_error(lane) - present_exponent * log_ratio(lane)
     end do
+    call exp2s(lanes, factor)
   end subroutine find_step_factors
 
   !> Multiplies the step size h of a lane by its factor, within the limits; no growth right after a rejection.

@@ -45,8 +45,8 @@ contains
     failed = 0
     if (is_plain) then
       solver_status%accepted(:) = solver_status%accepted + 1
-      call end_lanes(integrator%attempt%lanes, integrator%control%ends_at_t_end, solver_status%code)
-      integrator%inspects = has_passed(integrator%attempt%lanes, integrator%next_time, integrator%t_new)
+      solver_status%code(:) = merge(integration_done, solver_status%code, integrator%control%ends_at_t_end)
+      integrator%inspects = count(integrator%next_time <= integrator%t_new) > 0   ! `any` does not vectorise
     else
       call finish_steps(integrator, solver_status, failed)
     end if
@@ -70,7 +70,7 @@ contains
     associate (attempt => integrator%attempt)
       if (modulo(attempt%lanes, width) /= 0 .or. integrator%inspects) return
       if (largest_excess(attempt%lanes, integrator%control%mean_square, integrator%t_new, integrator%next_time) > 0) return
-      if (largest_count(attempt%lanes, solver_status%steps) >= integrator%max_steps) return
+      if (maxval(solver_status%steps) >= integrator%max_steps) return
       if (any_true(attempt%lanes, attempt%implicit) .or. any_true(attempt%lanes, solver_status%implicit)) return
       is_plain_step = all_true(attempt%lanes, attempt%active)
     end associate
@@ -89,43 +89,6 @@ contains
     end do
     excess = max(max(most(1), most(2)), max(most(3), most(4)))
   end function largest_excess
-
-  !> The largest of some counts.
-  pure integer function largest_count(lanes, counts) result(largest)
-    integer, intent(in) :: lanes
-    integer, intent(in) :: counts(lanes)
-    integer :: i
-
-    largest = 0
-    do i = 1, lanes
-      largest = max(largest, counts(i))
-    end do
-  end function largest_count
-
-  !> The lanes whose steps end on the final time are done.
-  pure subroutine end_lanes(lanes, ends_at_t_end, status)
-    integer, intent(in) :: lanes
-    logical, intent(in) :: ends_at_t_end(lanes)
-    integer, intent(inout) :: status(lanes)
-    integer :: i
-
-    do i = 1, lanes
-      status(i) = merge(integration_done, status(i), ends_at_t_end(i))
-    end do
-  end subroutine end_lanes
-
-  !> Whether any lane has reached its `time`.
-  pure logical function has_passed(lanes, time, t)
-    integer, intent(in) :: lanes
-    real(wp), intent(in) :: time(lanes), t(lanes)
-    integer :: i, passed
-
-    passed = 0
-    do i = 1, lanes
-      passed = passed + merge(1, 0, time(i) <= t(i))
-    end do
-    has_passed = passed > 0
-  end function has_passed
 
   !> Accepts the steps of all lanes.
   pure subroutine accept_all(integrator, wanted)
@@ -207,17 +170,12 @@ contains
       if (attempt%step_status(lane) == attempt_fatal) then
         solver_status%code(lane) = integration_rhs_failed
       else if (solver_status%h(lane) <= smallest_step(attempt%t(lane))) then
-        select case (attempt%step_status(lane))
-        case (attempt_ok)
-          solver_status%code(lane) = integration_step_too_small
+        solver_status%code(lane) = merge(integration_not_finite, integration_step_too_small, &
+                                         attempt%step_status(lane) == attempt_not_finite)
+        solver_status%component(lane) = attempt%component(lane)
+        if (attempt%step_status(lane) == attempt_ok) then
           solver_status%component(lane) = maxloc(attempt%error_estimate(lane, :attempt%states), dim=1)
-        case (attempt_not_finite)
-          solver_status%code(lane) = integration_not_finite
-          solver_status%component(lane) = attempt%component(lane)
-        case default
-          solver_status%code(lane) = integration_step_too_small
-          solver_status%component(lane) = attempt%component(lane)
-        end select
+        end if
       end if
     end associate
   end subroutine handle_rejection

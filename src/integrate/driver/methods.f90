@@ -9,7 +9,7 @@ module nocdyn_methods
   use nocdyn_rosenbrock_tables, only: rodas4, rodas5p
   use nocdyn_stepper, only: stepper_t
   use nocdyn_taylor_stepper, only: taylor_stepper
-  use nocdyn_text, only: joined, nearest_word, quoted, string_t
+  use nocdyn_text, only: joined, nearest_word, quoted, string_t, strings
   implicit none (type, external)
   private
 
@@ -49,12 +49,10 @@ contains
   function unknown_method(name) result(message)
     character(len=*), intent(in) :: name
     character(len=:), allocatable :: message
-    type(string_t) :: names(size(method_names))
+    type(string_t), allocatable :: names(:)
     integer :: i
 
-    do i = 1, size(names)
-      names(i)%text = trim(method_names(i))
-    end do
+    names = strings(method_names)
     message = 'there is no integration method ' // quoted(name) // '; the methods are ' // joined(names, ', ')
     i = nearest_word(name, names)
     if (i > 0) message = message // '. Did you mean ' // quoted(names(i)%text) // '?'
