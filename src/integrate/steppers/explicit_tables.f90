@@ -12,18 +12,13 @@ module nocdyn_explicit_tables
   !> it is Hairer's e^2 / sqrt(e^2 + 0.01 e_low^2), e_low = h sum low_order_error_i k_i: with embedded methods of the orders p and
   !> q it falls as h^(2 p - q + 1), and `error_order` is 2 p - q.
   type, public :: explicit_table_t
-    character(len=:), allocatable :: name
-    character(len=:), allocatable :: reference
-    integer :: stages                             !! of the step
-    integer :: dense_stages = 0                   !! further stages, for the dense output only
     integer :: order                              !! of y_new
     integer :: error_order                        !! the error estimate falls as h^(error_order + 1)
-    integer :: dense_order                        !! of the dense output
     logical :: first_same_as_last                 !! the last stage is f(t + h, y_new), the first stage of the next step
     real(wp) :: max_growth = 6.0_wp               !! largest ratio of step sizes, as in the authors' code
     real(wp) :: stability_limit = 0.0_wp          !! of |h lambda|, just inside the stability domain on the negative real axis
     real(wp), allocatable :: a(:, :)              !! strictly lower triangular, [all stages, all stages]
-    real(wp), allocatable :: b(:)                 !! [stages]
+    real(wp), allocatable :: b(:)                 !! [stages]; the stages after these are for the dense output only
     real(wp), allocatable :: c(:)                 !! [all stages]
     real(wp), allocatable :: error(:)             !! b minus the embedded weights, [stages]
     real(wp), allocatable :: low_order_error(:)   !! the same of a second embedded method of lower order, if there is one
@@ -32,17 +27,14 @@ module nocdyn_explicit_tables
 
 contains
 
-  !> DOPRI5, the pair RK5(4)7M with the dense output of order 4 of its authors and of Hairer's code.
+  !> DOPRI5, the pair RK5(4)7M of J. R. Dormand, P. J. Prince, J. Comput. Appl. Math. 6 (1980) 19-26, with the dense output of
+  !> order 4 of E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential Equations I, 2nd ed. (1993), II.6, and of
+  !> their code DOPRI5.
   function dormand_prince_5() result(table)
     type(explicit_table_t) :: table
 
-    table%name = 'rk45'
-    table%reference = 'J. R. Dormand, P. J. Prince, J. Comput. Appl. Math. 6 (1980) 19-26; dense output: E. Hairer, ' // &
-      'S. P. Norsett, G. Wanner, Solving Ordinary Differential Equations I, 2nd ed. (1993), II.6, and their code DOPRI5'
-    table%stages = 7
     table%order = 5
     table%error_order = 4
-    table%dense_order = 4
     table%first_same_as_last = .true.
     table%max_growth = 10.0_wp
     table%stability_limit = 3.25_wp
@@ -76,18 +68,14 @@ contains
     call expand(dense)
   end function dormand_prince_5_dense
 
-  !> DOP853, of order 8 with twelve stages, embedded methods of orders 5 and 3, dense output of order 7.
+  !> DOP853, of order 8 with twelve stages, embedded methods of orders 5 and 3, dense output of order 7 with three more stages:
+  !> E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential Equations I, 2nd ed. (1993), II.5, II.6 and II.10, and
+  !> their code DOP853; the method is due to J. R. Dormand and P. J. Prince.
   function dormand_prince_8() result(table)
     type(explicit_table_t) :: table
 
-    table%name = 'rk853'
-    table%reference = 'E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential Equations I, 2nd ed. (1993), ' // &
-      'II.5, II.6 and II.10, and their code DOP853; the method is due to J. R. Dormand and P. J. Prince'
-    table%stages = 13
-    table%dense_stages = 3
     table%order = 8
     table%error_order = 7
-    table%dense_order = 7
     table%first_same_as_last = .true.
     table%stability_limit = 6.1_wp
     allocate (table%a(16, 16), table%b(13), table%c(16), table%dense(16, 7), source=0.0_wp)

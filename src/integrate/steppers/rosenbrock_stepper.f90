@@ -56,8 +56,8 @@ contains
     stepper%gamma = table%gamma
     allocate (stepper%alpha, source=table%alpha)
     allocate (stepper%gamma_sum, source=table%gamma_sum)
-    allocate (stepper%coupling(table%stages))
-    do i = 1, table%stages
+    allocate (stepper%coupling(size(table%m)))
+    do i = 1, size(table%m)
       stepper%coupling(i) = stage_sum(table%c(i, :))
     end do
     call set_tableau(stepper%stages, table%a, table%m, table%error, table%dense)

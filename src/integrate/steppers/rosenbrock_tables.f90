@@ -10,12 +10,8 @@ module nocdyn_rosenbrock_tables
   !> y_new = y + h sum m_i k_i, where
   !> (1/gamma - h J) k_i = f(t + alpha_i h, y + h sum a_ij k_j) + sum c_ij k_j + gamma_i h df/dt.
   type, public :: rosenbrock_table_t
-    character(len=:), allocatable :: name
-    character(len=:), allocatable :: reference
-    integer :: stages
     integer :: order                         !! of y_new
     integer :: error_order                   !! of the embedded solution
-    integer :: dense_order                   !! of the dense output
     real(wp) :: gamma
     real(wp), allocatable :: a(:, :)         !! strictly lower triangular, [stages, stages]
     real(wp), allocatable :: c(:, :)         !! strictly lower triangular, [stages, stages]
@@ -28,17 +24,13 @@ module nocdyn_rosenbrock_tables
 
 contains
 
-  !> RODAS, of order 4(3), stiffly accurate, L-stable, with a dense output of order 3.
+  !> RODAS, of order 4(3), stiffly accurate, L-stable, with a dense output of order 3: E. Hairer, G. Wanner, Solving Ordinary
+  !> Differential Equations II, 2nd ed. (1996), IV.7 and VI.4, and their code RODAS (METH = 1).
   function rodas4() result(table)
     type(rosenbrock_table_t) :: table
 
-    table%name = 'rosenbrock'
-    table%reference = 'E. Hairer, G. Wanner, Solving Ordinary Differential Equations II, 2nd ed. (1996), IV.7 and VI.4, ' // &
-      'and their code RODAS (METH = 1)'
-    table%stages = 6
     table%order = 4
     table%error_order = 3
-    table%dense_order = 3
     table%gamma = 0.25_wp
     allocate (table%a(6, 6), table%c(6, 6), table%dense(6, 3), source=0.0_wp)
     allocate (table%alpha(6), table%gamma_sum(6), table%m(6), table%error(6), source=0.0_wp)
@@ -76,17 +68,13 @@ contains
   end function rodas_dense
 
   !> RODAS5P, of order 5(4), stiffly accurate, L-stable, with a dense output of order 4; no loss of order on stiff problems of
-  !> Prothero and Robinson's kind.
+  !> Prothero and Robinson's kind: G. Steinebach, Construction of Rosenbrock-Wanner method Rodas5P and numerical benchmarks within
+  !> the Julia Differential Equations package, BIT Numer. Math. 63 (2023) 27.
   function rodas5p() result(table)
     type(rosenbrock_table_t) :: table
 
-    table%name = 'rodas5p'
-    table%reference = 'G. Steinebach, Construction of Rosenbrock-Wanner method Rodas5P and numerical benchmarks within ' // &
-      'the Julia Differential Equations package, BIT Numer. Math. 63 (2023) 27'
-    table%stages = 8
     table%order = 5
     table%error_order = 4
-    table%dense_order = 4
     table%gamma = 0.21193756319429014_wp
     allocate (table%a(8, 8), table%c(8, 8), table%dense(8, 4), source=0.0_wp)
     allocate (table%alpha(8), table%gamma_sum(8), table%m(8), table%error(8), source=0.0_wp)
