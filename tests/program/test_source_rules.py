@@ -22,8 +22,7 @@ MANY_ARGUMENTS = {
     "src/analyse/sweep/statistics/step_strips.f90": (KERNEL, "add_integrals", "add_pair", "cut_step", "expand", "set_pair"),
     "src/base/numerics/band_products.f90": (KERNEL, "pair_of_band", "pair_of_chain", "pair_of_toeplitz"),
     "src/base/numerics/csr_products.f90": (KERNEL, "multiply_lanes", "multiply_rows"),
-    "src/integrate/core/stage_sums.f90": (KERNEL, "sum_tiles", "sum_up_to_12", "sum_up_to_4", "sum_up_to_8"),
-    "src/integrate/core/step_control.f90": (KERNEL, "adapt_accepted_steps"),
+    "src/integrate/core/stage_sums.f90": (KERNEL, "sum_few_terms", "sum_many_terms"),
     "src/model/constraints/coordinates.f90": (
         "constructor: what the analysis of the constraints has found, and the bodies that the user wants",
         "build_coordinates",
@@ -54,7 +53,6 @@ MANY_ARGUMENTS = {
 
 # Longer procedures, by file, and why.
 LONG_PROCEDURES = {
-    "src/integrate/core/stage_sums.f90": ("kernel: a sum for each number of stages, in one loop", "sum_up_to_12"),
     "src/model/formulations/kernels/series_strips.f90": (
         "kernel: what a loop keeps in registers cannot be shared with another procedure",
         "accelerate",
