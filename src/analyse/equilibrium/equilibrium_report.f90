@@ -4,7 +4,7 @@ module nocdyn_equilibrium_report
   use nocdyn_energy_balance, only: work_element_names
   use nocdyn_equilibrium, only: equilibrium_t, t_infinity
   use nocdyn_formulation, only: formulation_t
-  use nocdyn_input, only: group_t, input_t
+  use nocdyn_input, only: input_t
   use nocdyn_json, only: json_t
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
@@ -14,7 +14,6 @@ module nocdyn_equilibrium_report
   use nocdyn_text, only: rounded_text, selected, string_t, to_text
   use nocdyn_text_buffer, only: text_buffer_t
   use nocdyn_trajectory_table, only: new_trajectory_table, trajectory_table_t
-  use nocdyn_version, only: compiler_text, version
   implicit none (type, external)
   private
 
@@ -148,16 +147,9 @@ contains
     type(equilibrium_report_t), intent(in) :: self
     character(len=:), allocatable :: text
     type(json_t) :: json
-    type(group_t) :: about
     integer :: k
 
-    call json%open()
-    call json%put('program', 'nocdyn')
-    call json%put('version', version)
-    call json%put('compiler', compiler_text())
-    call json%put('input', input%file)
-    about = input%single('case')
-    call json%put('title', about%text('title'))
+    call json%open_report(input%file, input%title())
     call json%put('independent', self%coordinates)
     call json%put('notes', self%notes)
     call json%open_list('steady_states')

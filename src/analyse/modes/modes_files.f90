@@ -1,14 +1,13 @@
 !> The files on the modes of a machine: modes.csv and modes.json.
 module nocdyn_modes_files
   use nocdyn_equilibrium, only: t_infinity
-  use nocdyn_input, only: group_t, input_t
+  use nocdyn_input, only: input_t
   use nocdyn_json, only: json_t
   use nocdyn_kinds, only: wp
   use nocdyn_modes, only: kind_names, mode_oscillating, mode_t
   use nocdyn_modes_report, only: modes_report_t
   use nocdyn_text, only: to_text
   use nocdyn_text_buffer, only: text_buffer_t
-  use nocdyn_version, only: compiler_text, version
   implicit none (type, external)
   private
 
@@ -101,16 +100,9 @@ contains
     type(modes_report_t), intent(in) :: self
     character(len=:), allocatable :: text
     type(json_t) :: json
-    type(group_t) :: about
     integer :: i, number
 
-    call json%open()
-    call json%put('program', 'nocdyn')
-    call json%put('version', version)
-    call json%put('compiler', compiler_text())
-    call json%put('input', input%file)
-    about = input%single('case')
-    call json%put('title', about%text('title'))
+    call json%open_report(input%file, input%title())
     call json%put('about', self%point)
     if (self%t < t_infinity) call json%put('time_s', self%t)
     call json%put('notes', self%notes)

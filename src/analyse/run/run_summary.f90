@@ -1,7 +1,7 @@
 !> The summary of a run: the contents of summary.json and of the printed table.
 module nocdyn_run_summary
   use nocdyn_energy_balance, only: energy_balance_t, put_energy_balance
-  use nocdyn_input, only: group_t, input_t
+  use nocdyn_input, only: input_t
   use nocdyn_json, only: json_t
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
@@ -10,7 +10,6 @@ module nocdyn_run_summary
   use nocdyn_run_settings, only: put_settings
   use nocdyn_observer, only: ranges_t
   use nocdyn_text, only: append, rounded_text, string_t
-  use nocdyn_version, only: compiler_text, version
   implicit none (type, external)
   private
 
@@ -132,17 +131,8 @@ contains
     type(run_summary_t), intent(in) :: summary
     character(len=:), allocatable :: text
     type(json_t) :: json
-    type(group_t) :: about
 
-    call json%open()
-    call json%put('program', 'nocdyn')
-    call json%put('version', version)
-    call json%put('compiler', compiler_text())
-    call json%put('status', trim(summary%status))
-    if (allocated(summary%message)) call json%put('message', summary%message)
-    call json%put('input', input%file)
-    about = input%single('case')
-    call json%put('title', about%text('title'))
+    call json%open_report(input%file, input%title(), summary%status, summary%message)
     call put_machine(json, summary)
     call put_settings(json, input%single('run'))
     call put_counts(json, summary)

@@ -1,7 +1,7 @@
 !> The printed summary of a run.
 module nocdyn_summary_table
   use nocdyn_energy_balance, only: append_energy_balance
-  use nocdyn_input, only: group_t, input_t
+  use nocdyn_input, only: input_t
   use nocdyn_kinds, only: wp
   use nocdyn_run_summary, only: run_summary_t
   use nocdyn_table_text, only: append_table, cell_digits
@@ -53,12 +53,10 @@ contains
     type(run_summary_t), intent(in) :: summary
     character(len=:), allocatable :: text
     character(len=*), parameter :: headings(*) = [character(len=8) :: 'the last', 'smallest', 'at t [s]', 'largest', 'at t [s]']
-    type(group_t) :: about
     type(text_buffer_t) :: report
     character(len=:), allocatable :: heading
 
-    about = input%single('case')
-    if (about%text('title') /= '') call report%append_line(about%text('title'))
+    if (input%title() /= '') call report%append_line(input%title())
     heading = 'of ' // to_text(summary%extremes%rows) // ' rows:'
     if (summary%extremes%are_continuous) heading = 'of the motion:'
     associate (extremes => summary%extremes, n => size(summary%labels))

@@ -51,6 +51,7 @@ module nocdyn_input
   contains
     procedure :: groups_named   !! indices of the groups with a name, perhaps only those of one law
     procedure :: single         !! the one group of a kind that occurs once
+    procedure :: title
     procedure :: label          !! "&gear 'reducer'"
     procedure :: location       !! where a group or a key comes from, to begin a message with
     procedure :: diagnostics_text   !! all messages with their locations
@@ -145,12 +146,9 @@ contains
     character(len=*), intent(in) :: key
     real(wp), allocatable :: numbers(:)
 
+    allocate (numbers(0))
     associate (value => self%values(self%key_position(key)))
-      if (allocated(value%numbers)) then
-        numbers = value%numbers
-      else
-        allocate (numbers(0))
-      end if
+      if (allocated(value%numbers)) numbers = value%numbers
     end associate
   end function numbers
 
@@ -160,12 +158,9 @@ contains
     character(len=*), intent(in) :: key
     integer, allocatable :: whole_numbers(:)
 
+    allocate (whole_numbers(0))
     associate (value => self%values(self%key_position(key)))
-      if (allocated(value%whole_numbers)) then
-        whole_numbers = value%whole_numbers
-      else
-        allocate (whole_numbers(0))
-      end if
+      if (allocated(value%whole_numbers)) whole_numbers = value%whole_numbers
     end associate
   end function whole_numbers
 
@@ -175,12 +170,9 @@ contains
     character(len=*), intent(in) :: key
     type(string_t), allocatable :: texts(:)
 
+    allocate (texts(0))
     associate (value => self%values(self%key_position(key)))
-      if (allocated(value%texts)) then
-        texts = value%texts
-      else
-        allocate (texts(0))
-      end if
+      if (allocated(value%texts)) texts = value%texts
     end associate
   end function texts
 
@@ -247,6 +239,16 @@ contains
     end do
     error stop 'nocdyn_input: single() is for groups that occur once'
   end function single
+
+  !> The title of the file.
+  pure function title(self)
+    class(input_t), intent(in) :: self
+    character(len=:), allocatable :: title
+    type(group_t) :: about
+
+    about = self%single('case')
+    title = about%text('title')
+  end function title
 
   !> "machine.nml:12: &gear 'reducer'", with the line of `key` if the file sets it, or "--set PATH=VALUE: &gear
   !> 'reducer'" if an override does.

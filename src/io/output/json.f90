@@ -4,6 +4,7 @@ module nocdyn_json
   use nocdyn_kinds, only: wp
   use nocdyn_text, only: string_t, to_text
   use nocdyn_text_buffer, only: text_buffer_t
+  use nocdyn_version, only: compiler_text, version
   implicit none (type, external)
   private
 
@@ -16,14 +17,12 @@ module nocdyn_json
     logical, private :: is_first = .true.   !! the next member or item is the first one
   contains
     procedure :: open => open_object
+    procedure :: open_report
     procedure :: close => close_object
-    procedure :: open_list
-    procedure :: close_list
-    procedure :: text
+    procedure :: open_list, close_list, text
     generic :: put => put_text, put_texts, put_number, put_numbers, put_integer, put_integers
     procedure, private :: put_text, put_texts, put_number, put_numbers, put_integer, put_integers
-    procedure, private :: begin_member
-    procedure, private :: begin_item
+    procedure, private :: begin_member, begin_item, end_level
   end type json_t
 
 contains
@@ -43,15 +42,28 @@ contains
     self%is_first = .true.
   end subroutine open_object
 
+  !> Begins the outermost object, that of a report: the program, how a computation ended, the input.
+  subroutine open_report(self, input, title, status, message)
+    class(json_t), intent(inout) :: self
+    character(len=*), intent(in) :: input, title                !! path and title of the input
+    character(len=*), optional, intent(in) :: status, message   !! 'done' or another end, and its reason
+
+    call self%open()
+    call self%put('program', 'nocdyn')
+    call self%put('version', version)
+    call self%put('compiler', compiler_text())
+    if (present(status)) call self%put('status', trim(status))
+    if (present(message)) call self%put('message', message)
+    call self%put('input', input)
+    call self%put('title', title)
+  end subroutine open_report
+
   !> Ends the object that was opened last.
   subroutine close_object(self)
     class(json_t), intent(inout) :: self
 
-    self%depth = self%depth - 1
-    if (.not. self%is_first) call self%buffer%append(new_line('a') // repeat('  ', self%depth))
-    call self%buffer%append('}')
+    call self%end_level('}')
     if (self%depth == 0) call self%buffer%append(new_line('a'))
-    self%is_first = .false.
   end subroutine close_object
 
   !> Begins a list of objects.
@@ -69,11 +81,19 @@ contains
   subroutine close_list(self)
     class(json_t), intent(inout) :: self
 
+    call self%end_level(']')
+  end subroutine close_list
+
+  !> Ends an object or a list.
+  subroutine end_level(self, bracket)
+    class(json_t), intent(inout) :: self
+    character(len=1), intent(in) :: bracket
+
     self%depth = self%depth - 1
     if (.not. self%is_first) call self%buffer%append(new_line('a') // repeat('  ', self%depth))
-    call self%buffer%append(']')
+    call self%buffer%append(bracket)
     self%is_first = .false.
-  end subroutine close_list
+  end subroutine end_level
 
   !> The text so far.
   pure function text(self)

@@ -9,7 +9,6 @@ module nocdyn_sweep_summary
   use nocdyn_table_text, only: append_table
   use nocdyn_text, only: rounded_text, string_t, to_text
   use nocdyn_text_buffer, only: text_buffer_t
-  use nocdyn_version, only: compiler_text, version
   implicit none (type, external)
   private
 
@@ -43,13 +42,7 @@ contains
     character(len=:), allocatable :: text
     type(json_t) :: json
 
-    call json%open()
-    call json%put('program', 'nocdyn')
-    call json%put('version', version)
-    call json%put('compiler', compiler_text())
-    call json%put('status', trim(merge('done  ', 'failed', summary%done > 0)))
-    call json%put('input', input%file)
-    call json%put('title', header%title)
+    call json%open_report(input%file, header%title, merge('done  ', 'failed', summary%done > 0))
     call put_settings(json, input%single('run'))
     call put_design(json, header)
     call json%open('counts')

@@ -19,8 +19,7 @@ contains
     type(sweep_header_t) :: header
     type(group_t) :: group
 
-    group = plan%input%single('case')
-    header%title = group%text('title')
+    header%title = plan%input%title()
     header%source = 'nocdyn ' // version // ' (' // compiler_text() // ')'
     group = plan%input%single('sweep')
     header%design = group%text('design')
