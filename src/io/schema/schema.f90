@@ -16,8 +16,7 @@ module nocdyn_schema
   implicit none (type, external)
   private
 
-  public :: group_rule_index, key_rule_index, selector_rule, selector_name, first_key, last_key, key_name, is_single, &
-    holds_texts, has_word, words_in, words_of
+  public :: group_rule_index, key_rule_index, selector_name, key_name, holds_texts, has_word, words_in, words_of
 
   type(allowed_t), parameter :: steps = allowed_t(low=1.0_wp, high=1.0e8_wp)
   type(allowed_t), parameter :: tolerance = allowed_t(low=1.0e-14_wp, high=0.1_wp)
@@ -98,9 +97,17 @@ module nocdyn_schema
     example_t('output',     'interval = 0.01'), &
     coupling_examples, constraint_examples, torque_examples, sweep_examples]
 
-  integer :: rule   ! index of the list below
-  integer, parameter :: first_keys(size(group_rules)) = &
+  ! One value for each row of `group_rules`. The rows of `key_rules` of a group are consecutive.
+  integer :: rule   ! index of the lists below
+  integer, parameter, public :: first_key(*) = &   !! first row of `key_rules`
     [(findloc(key_rules%group, group_rules(rule)%name, dim=1), rule=1, size(group_rules))]
+  integer, parameter, public :: last_key(*) = &   !! last row of `key_rules`
+    [(findloc(key_rules%group, group_rules(rule)%name, dim=1, back=.true.), rule=1, size(group_rules))]
+  integer, parameter, public :: selector_rule(*) = &   !! row of `key_rules` of the selector key, 0 if the group has none
+    [(findloc(key_rules%group == group_rules(rule)%name .and. key_rules%value_type == a_selector, .true., dim=1), &
+      rule=1, size(group_rules))]
+  logical, parameter, public :: is_single(*) = &   !! the group occurs at most once: paths to its keys need no name
+    group_rules%occurrence == exactly_once .or. group_rules%occurrence == at_most_once
 
 contains
 
@@ -112,22 +119,6 @@ contains
       if (group_rules(rule)%name == name) return
     end do
   end function group_rule_index
-
-  !> First row of `key_rules` of a group; the rows of a group are consecutive.
-  pure integer function first_key(group_rule) result(key)
-    integer, intent(in) :: group_rule   !! row of `group_rules`
-
-    key = first_keys(group_rule)
-  end function first_key
-
-  !> Last row of `key_rules` of a group.
-  pure integer function last_key(group_rule) result(key)
-    integer, intent(in) :: group_rule   !! row of `group_rules`
-
-    do key = size(key_rules), 1, -1
-      if (key_rules(key)%group == group_rules(group_rule)%name) return
-    end do
-  end function last_key
 
   !> Row of `key_rules`, 0 if the group has no such key.
   pure integer function key_rule_index(group_rule, name) result(key)
@@ -149,16 +140,6 @@ contains
     name = trim(key_rules(first_key(group_rule) + position - 1)%name)
   end function key_name
 
-  !> Row of `key_rules` of the selector key of a group, 0 if it has none.
-  pure integer function selector_rule(group_rule) result(key)
-    integer, intent(in) :: group_rule   !! row of `group_rules`
-
-    do key = first_key(group_rule), last_key(group_rule)
-      if (key_rules(key)%value_type == a_selector) return
-    end do
-    key = 0
-  end function selector_rule
-
   !> Name of the selector key: "kind", "design" ...
   pure function selector_name(group_rule) result(name)
     integer, intent(in) :: group_rule   !! row of `group_rules`, of a group that has a selector key
@@ -166,13 +147,6 @@ contains
 
     name = trim(key_rules(selector_rule(group_rule))%name)
   end function selector_name
-
-  !> Whether a group occurs at most once, so that paths to its keys need no name.
-  pure logical function is_single(group_rule)
-    integer, intent(in) :: group_rule   !! row of `group_rules`
-
-    is_single = any(group_rules(group_rule)%occurrence == [exactly_once, at_most_once])
-  end function is_single
 
   !> Whether values of a type are written in quotes.
   pure logical function holds_texts(value_type)

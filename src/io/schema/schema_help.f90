@@ -3,9 +3,10 @@ module nocdyn_schema_help
   use nocdyn_errors, only: error_t, exit_input, raise
   use nocdyn_schema, only: examples, first_key, group_rule_index, group_rules, has_word, key_rules, kind_rules, last_key, &
     selector_name, selector_rule
-  use nocdyn_schema_rules, only: a_flag, a_number, a_selector, a_word, an_integer, body_or_ground, example_t, key_rule_t
+  use nocdyn_schema_rules, only: a_flag, a_number, a_selector, a_word, an_integer, body_or_ground, example_t, key_rule_t, &
+    occurrence_texts
   use nocdyn_schema_sentences, only: default_text, sentences_on
-  use nocdyn_schema_text, only: allowed_text, group_names, occurrence_text, suggestion, type_text
+  use nocdyn_schema_text, only: allowed_text, group_names, suggestion, type_text
   use nocdyn_text, only: append, lower_case, quoted, string_t
   use nocdyn_text_buffer, only: text_buffer_t
   use nocdyn_text_phrases, only: listed
@@ -89,7 +90,7 @@ contains
     integer :: k, key, selector
 
     call buffer%append_line(prefix // '&' // trim(group_rules(rule)%name) // ', ' // &
-                            occurrence_text(group_rules(rule)%occurrence))
+                            trim(occurrence_texts(group_rules(rule)%occurrence)))
     call buffer%append_line(prefix // '  ' // trim(group_rules(rule)%help))
     selector = selector_rule(rule)
     if (selector == 0) selector = last_key(rule)

@@ -2,9 +2,9 @@
 module nocdyn_schema_reference
   use nocdyn_schema, only: first_key, group_rules, has_word, key_rules, kind_rules, last_key, selector_name
   use nocdyn_schema_help, only: append_examples
-  use nocdyn_schema_rules, only: key_rule_t
+  use nocdyn_schema_rules, only: key_rule_t, occurrence_texts
   use nocdyn_schema_sentences, only: default_text, sentences_on
-  use nocdyn_schema_text, only: allowed_text, occurrence_text, type_text
+  use nocdyn_schema_text, only: allowed_text, type_text
   use nocdyn_text, only: quoted, string_t
   use nocdyn_text_buffer, only: text_buffer_t
   implicit none (type, external)
@@ -37,7 +37,8 @@ contains
     call buffer%append_line('')
     call buffer%append_line('## `&' // trim(group_rules(rule)%name) // '`')
     call buffer%append_line('')
-    call buffer%append_line(trim(group_rules(rule)%help) // ' Given ' // occurrence_text(group_rules(rule)%occurrence) // '.')
+    call buffer%append_line(trim(group_rules(rule)%help) // ' Given ' // &
+                            trim(occurrence_texts(group_rules(rule)%occurrence)) // '.')
     call append_head(buffer)
     do key = first_key(rule), last_key(rule)
       if (key_rules(key)%only_if == '') call append_key(buffer, key_rules(key))

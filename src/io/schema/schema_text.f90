@@ -1,16 +1,15 @@
 !> Rows of the schema as texts for messages and help.
 module nocdyn_schema_text
   use nocdyn_kinds, only: wp
-  use nocdyn_schema, only: aliases, first_key, group_rules, has_word, key_name, key_rules, last_key, words_in, words_of
-  use nocdyn_schema_rules, only: a_body, a_file, a_flag, a_folder, a_name, a_number, a_selector, a_text, a_word, allowed_t, &
-    an_integer, any_number, at_least_once, at_most_once, body_or_ground, exactly_once, key_rule_t
-  use nocdyn_text, only: append, joined, nearest_word, quoted, string_t, to_text
+  use nocdyn_schema, only: aliases, first_key, group_rules, has_word, key_rules, last_key, words_in, words_of
+  use nocdyn_schema_rules, only: a_body, a_file, a_flag, a_folder, a_name, a_number, a_selector, a_word, allowed_t, an_integer, &
+    any_number, body_or_ground, key_rule_t, type_nouns
+  use nocdyn_text, only: append, joined, nearest_word, quoted, selected, string_t, strings, to_text
   use nocdyn_text_phrases, only: listed
   implicit none (type, external)
   private
 
-  public :: allowed_text, type_text, only_if_text, listed_keys, occurrence_text, group_names, key_names, similar_keys, &
-    key_suggestion, suggestion
+  public :: allowed_text, type_text, only_if_text, listed_keys, group_names, key_names, similar_keys, key_suggestion, suggestion
 
 contains
 
@@ -64,56 +63,37 @@ contains
     type(key_rule_t), intent(in) :: rule
     character(len=:), allocatable :: text
 
-    select case (rule%value_type)
-    case (a_text)
-      text = noun('text', 'texts', rule%count)
-    case (a_file)
-      text = noun('file', 'files', rule%count)
-    case (a_folder)
-      text = noun('folder', 'folders', rule%count)
-    case (a_name)
-      text = noun('name', 'names', rule%count)
-    case (a_body, body_or_ground)
-      text = noun('body', 'bodies', rule%count)
-    case (a_word, a_selector)
-      text = noun('word', 'words', rule%count)
-    case (a_number)
-      text = noun('number', 'numbers', rule%count)
-    case (an_integer)
-      text = noun('whole number', 'whole numbers', rule%count)
-    case default
-      text = noun('logical', 'logicals', rule%count)
-    end select
+    text = trim(type_nouns(rule%value_type))
+    if (rule%count == 1) return
+    if (text == 'body') text = 'bodie'
+    text = text // 's'
+    if (rule%count == any_number) then
+      text = 'list of ' // text
+    else
+      text = to_text(rule%count) // ' ' // text
+    end if
   end function type_text
-
-  pure function noun(singular, plural, count) result(text)
-    character(len=*), intent(in) :: singular, plural
-    integer, intent(in) :: count
-    character(len=:), allocatable :: text
-
-    select case (count)
-    case (1)
-      text = singular
-    case (any_number)
-      text = 'list of ' // plural
-    case default
-      text = to_text(count) // ' ' // plural
-    end select
-  end function noun
 
   !> The kinds that have a key: "'ramp' or 'pulse'".
   pure function only_if_text(rule) result(text)
     type(key_rule_t), intent(in) :: rule
     character(len=:), allocatable :: text
-    type(string_t), allocatable :: words(:)
+
+    text = quoted_list(words_in(rule%only_if))
+  end function only_if_text
+
+  !> "'ramp' or 'pulse'".
+  pure function quoted_list(words) result(text)
+    type(string_t), intent(in) :: words(:)   !! one at least
+    character(len=:), allocatable :: text
+    type(string_t) :: in_quotes(size(words))
     integer :: i
 
-    allocate (words, source=words_in(rule%only_if))
     do i = 1, size(words)
-      words(i)%text = quoted(words(i)%text)
+      in_quotes(i)%text = quoted(words(i)%text)
     end do
-    text = listed(words, ' or ')
-  end function only_if_text
+    text = listed(in_quotes, ' or ')
+  end function quoted_list
 
   !> Names of keys of a group: "a, b or c".
   pure function listed_keys(group_rule, positions, conjunction) result(text)
@@ -121,54 +101,23 @@ contains
     integer, intent(in) :: positions(:)           !! of the keys among the keys of the group
     character(len=*), intent(in) :: conjunction   !! ' or ', ' and '
     character(len=:), allocatable :: text
-    type(string_t), allocatable :: names(:)
-    integer :: i
 
-    allocate (names(size(positions)))
-    do i = 1, size(names)
-      names(i)%text = key_name(group_rule, positions(i))
-    end do
-    text = listed(names, conjunction)
+    text = listed(selected(key_names(group_rule), positions), conjunction)
   end function listed_keys
-
-  !> How often a group may occur, in words.
-  pure function occurrence_text(occurrence) result(text)
-    integer, intent(in) :: occurrence   !! `exactly_once` ... `any_times`
-    character(len=:), allocatable :: text
-
-    select case (occurrence)
-    case (exactly_once)
-      text = 'once'
-    case (at_most_once)
-      text = 'at most once'
-    case (at_least_once)
-      text = 'at least once'
-    case default
-      text = 'any number of times'
-    end select
-  end function occurrence_text
 
   !> The names of all groups.
   pure function group_names() result(names)
     type(string_t), allocatable :: names(:)
-    integer :: i
 
-    allocate (names(size(group_rules)))
-    do i = 1, size(names)
-      names(i)%text = trim(group_rules(i)%name)
-    end do
+    allocate (names, source=strings([group_rules%name]))
   end function group_names
 
   !> The names of the keys of a group.
   pure function key_names(group_rule) result(names)
     integer, intent(in) :: group_rule   !! row of `group_rules`
     type(string_t), allocatable :: names(:)
-    integer :: i
 
-    allocate (names(last_key(group_rule) - first_key(group_rule) + 1))
-    do i = 1, size(names)
-      names(i)%text = key_name(group_rule, i)
-    end do
+    allocate (names, source=strings([key_rules(first_key(group_rule):last_key(group_rule))%name]))
   end function key_names
 
   !> The keys that the user may have meant by a word that is not a key of the group.
@@ -196,17 +145,13 @@ contains
     character(len=*), intent(in) :: word   !! in lower case
     character(len=:), allocatable :: text
     type(string_t), allocatable :: keys(:)
-    integer :: i
 
     allocate (keys, source=similar_keys(group_rule, word))
-    if (size(keys) == 0) then
+    if (size(keys) > 0) then
+      text = '; did you mean ' // quoted_list(keys) // '?'
+    else
       text = suggestion(word, key_names(group_rule))
-      return
     end if
-    do i = 1, size(keys)
-      keys(i)%text = quoted(keys(i)%text)
-    end do
-    text = '; did you mean ' // listed(keys, ' or ') // '?'
   end function key_suggestion
 
   !> "; did you mean 'stiffness'?", or all candidates if none is similar and they are few.

@@ -10,8 +10,8 @@ module nocdyn_input_reader
   use nocdyn_namelist_scanner, only: scan_namelist
   use nocdyn_schema, only: first_key, group_rule_index, group_rules, is_single, key_rules, last_key
   use nocdyn_schema_relations, only: relations_of, relations_t
-  use nocdyn_schema_rules, only: at_least_once, exactly_once, required
-  use nocdyn_schema_text, only: group_names, occurrence_text, suggestion
+  use nocdyn_schema_rules, only: at_least_once, exactly_once, occurrence_texts, required
+  use nocdyn_schema_text, only: group_names, suggestion
   use nocdyn_text, only: nearest_word, quoted, shortened, string_t, to_text
   use nocdyn_text_file, only: read_text_file
   implicit none (type, external)
@@ -154,14 +154,14 @@ contains
         first(rule) = g
       else if (is_single(rule)) then
         call diagnostics%add(groups(g)%line, g, 'given twice, first on line ' // to_text(groups(first(rule))%line) &
-          // '; allowed: ' // occurrence_text(group_rules(rule)%occurrence))
+          // '; allowed: ' // trim(occurrence_texts(group_rules(rule)%occurrence)))
       end if
     end do
     do rule = 1, size(group_rules)
       if (first(rule) > 0 .or. is_misspelt(rule)) cycle
       if (all(group_rules(rule)%occurrence /= [exactly_once, at_least_once])) cycle
       call diagnostics%add(no_line, 0, 'there is no &' // trim(group_rules(rule)%name) // '; needed: ' &
-        // occurrence_text(group_rules(rule)%occurrence))
+        // trim(occurrence_texts(group_rules(rule)%occurrence)))
     end do
   end subroutine check_occurrences
 
