@@ -1,8 +1,29 @@
-!> What a command line says: the command, its operands and its options.
+!> What a command line says, the command with its operands and options; the table of all options.
 module nocdyn_arguments
   use nocdyn_text, only: append, string_t
   implicit none (type, external)
   private
+
+  public :: option_index
+
+  type, public :: option_t
+    character(len=9) :: name
+    character(len=2) :: short = ''         !! another name, blank if there is none
+    character(len=26) :: value = ''        !! what follows the name, blank if the option has no value
+    logical :: may_repeat = .false.        !! whether it may be given more than once
+  end type option_t
+
+  !> Which commands take them is said in the table of commands.
+  type(option_t), parameter, public :: options(*) = [ &
+    option_t('--out', value='DIR'), &
+    option_t('--set', value='PATH=VALUE', may_repeat=.true.), &
+    option_t('--at', value='equilibrium|rest|TIME'), &
+    option_t('--threads', value='NUMBER'), &
+    option_t('--shard', value='K/N'), &
+    option_t('--resume', may_repeat=.true.), &
+    option_t('--csv', may_repeat=.true.), &
+    option_t('--quiet', short='-q', may_repeat=.true.), &
+    option_t('--help', short='-h', may_repeat=.true.)]
 
   type, public :: arguments_t
     character(len=:), allocatable :: command
@@ -13,12 +34,20 @@ module nocdyn_arguments
     type(string_t), allocatable :: names(:)          !! long names of all options, in the order of the command line
     type(string_t), allocatable :: values(:)         !! of these options, '' if an option takes none
   contains
-    procedure :: add
-    procedure :: is_given
-    procedure :: value
+    procedure :: add, is_given, value
   end type arguments_t
 
 contains
+
+  !> The position of an option in `options`, 0 if none has this name.
+  pure integer function option_index(name)
+    character(len=*), intent(in) :: name
+
+    do option_index = size(options), 1, -1
+      if (options(option_index)%name == name) return
+      if (name /= '' .and. options(option_index)%short == name) return
+    end do
+  end function option_index
 
   !> Adds an option.
   subroutine add(self, name, value)
@@ -36,10 +65,7 @@ contains
     character(len=*), intent(in) :: name   !! long name, e.g. '--quiet'
     integer :: i
 
-    is_given = .false.
-    do i = 1, size(self%names)
-      if (self%names(i)%text == name) is_given = .true.
-    end do
+    is_given = any([(self%names(i)%text == name, i=1, size(self%names))])
   end function is_given
 
   !> The value of an option, '' if the option is not on the command line.

@@ -1,9 +1,8 @@
 !> Parses the command line by the tables of commands and options.
 module nocdyn_command_line
-  use nocdyn_arguments, only: arguments_t
+  use nocdyn_arguments, only: arguments_t, option_index, option_t, options
   use nocdyn_commands, only: command_index, command_names, command_t, commands_with_option
   use nocdyn_errors, only: error_t, exit_input, raise
-  use nocdyn_options, only: option_index, option_t, options
   use nocdyn_text, only: append, joined, nearest_word, quoted, shortened, string_t, to_text
   implicit none (type, external)
   private

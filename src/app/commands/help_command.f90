@@ -1,10 +1,9 @@
 !> Help on the program and on its commands, made of the tables of commands and options.
 module nocdyn_help_command
-  use nocdyn_arguments, only: arguments_t
+  use nocdyn_arguments, only: arguments_t, options
   use nocdyn_commands, only: command_index, command_names, command_t
   use nocdyn_console, only: print_text, report_error
   use nocdyn_errors, only: error_t, exit_done, exit_input, raise
-  use nocdyn_options, only: options
   use nocdyn_schema, only: group_rule_index
   use nocdyn_schema_help, only: group_help, input_help
   use nocdyn_text, only: joined, lower_case, quoted
