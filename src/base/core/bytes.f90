@@ -6,7 +6,7 @@ module nocdyn_bytes
   implicit none (type, external)
   private
 
-  public :: put_integers, put_reals, put_text
+  public :: put_integers, put_reals, put_text, widen
 
   integer, parameter, public :: integer_bytes = 4, real_bytes = 8
 
@@ -42,36 +42,53 @@ contains
 
   !> Packs integers, four bytes each.
   subroutine put_integers(bytes, used, values)
-    character(len=*), intent(inout) :: bytes    !! buffer, long enough
+    character(len=:), allocatable, intent(inout) :: bytes   !! buffer, which is made longer if needed
     integer, intent(inout) :: used              !! number of bytes in use
     integer(int32), contiguous, intent(in) :: values(:)
     type(c_ptr) :: same
 
+    call widen(bytes, used + integer_bytes * size(values))
     if (size(values) > 0) same = c_copy_in(bytes(used + 1:), values, int(integer_bytes * size(values), c_size_t))
     used = used + integer_bytes * size(values)
   end subroutine put_integers
 
   !> Packs reals, eight bytes each.
   subroutine put_reals(bytes, used, values)
-    character(len=*), intent(inout) :: bytes
+    character(len=:), allocatable, intent(inout) :: bytes
     integer, intent(inout) :: used
     real(wp), contiguous, intent(in) :: values(:, :)   !! in array element order
     type(c_ptr) :: same
 
+    call widen(bytes, used + real_bytes * size(values))
     if (size(values) > 0) same = c_copy_in(bytes(used + 1:), values, int(real_bytes * size(values), c_size_t))
     used = used + real_bytes * size(values)
   end subroutine put_reals
 
   !> Packs the length of a text, then its characters.
   subroutine put_text(bytes, used, text)
-    character(len=*), intent(inout) :: bytes
+    character(len=:), allocatable, intent(inout) :: bytes
     integer, intent(inout) :: used
     character(len=*), intent(in) :: text
 
     call put_integers(bytes, used, [len(text)])
+    call widen(bytes, used + len(text))
     bytes(used + 1:used + len(text)) = text
     used = used + len(text)
   end subroutine put_text
+
+  !> Makes a buffer longer than needed if it is too short, so that appending takes amortised constant time for each byte.
+  subroutine widen(bytes, needed)
+    character(len=:), allocatable, intent(inout) :: bytes
+    integer, intent(in) :: needed   !! [bytes]
+    character(len=:), allocatable :: wider
+    integer, parameter :: least = 256
+
+    if (.not. allocated(bytes)) allocate (character(len=least) :: bytes)
+    if (needed <= len(bytes)) return
+    allocate (character(len=2 * needed) :: wider)
+    wider(:len(bytes)) = bytes
+    call move_alloc(wider, bytes)
+  end subroutine widen
 
   !> Unpacks integers.
   subroutine take_integers(self, bytes, values)

@@ -2,7 +2,7 @@
 !>
 !> A process that reads the text of `input_text` instead of the file takes these, so that its messages name the same places.
 module nocdyn_input_sources
-  use nocdyn_bytes, only: byte_reader_t, integer_bytes, put_integers, put_text
+  use nocdyn_bytes, only: byte_reader_t, put_integers, put_text
   use nocdyn_input, only: input_t
   implicit none (type, external)
   private
@@ -15,16 +15,8 @@ contains
   subroutine pack_sources(input, bytes)
     type(input_t), intent(in) :: input
     character(len=:), allocatable, intent(out) :: bytes
-    integer :: g, i, length, used
+    integer :: g, i, used
 
-    length = integer_bytes
-    do i = 1, size(input%overrides)
-      length = length + integer_bytes + len(input%overrides(i)%text)
-    end do
-    do g = 1, size(input%groups)
-      length = length + integer_bytes * (1 + 2 * size(input%groups(g)%values))
-    end do
-    allocate (character(len=length) :: bytes)
     used = 0
     call put_integers(bytes, used, [size(input%overrides)])
     do i = 1, size(input%overrides)
@@ -36,6 +28,7 @@ contains
                                         (group%values(i)%override, i=1, size(group%values))])
       end associate
     end do
+    bytes = bytes(:used)
   end subroutine pack_sources
 
   !> Gives an input the sources of another one with the same groups in the same order.

@@ -6,7 +6,7 @@
 !> few seconds, so that a power failure costs the work of these seconds.
 module nocdyn_log_file
   use, intrinsic :: iso_fortran_env, only: int32, int64
-  use nocdyn_bytes, only: byte_reader_t, integer_bytes, put_integers
+  use nocdyn_bytes, only: byte_reader_t, integer_bytes, put_integers, widen
   use nocdyn_checksums, only: checksum_table_t, make_checksum_table
   use nocdyn_errors, only: error_t, exit_file, exit_input, raise
   use nocdyn_posix, only: close_file, last_failure, make_folders, remove_file, write_bytes
@@ -31,20 +31,13 @@ module nocdyn_log_file
     integer(int64), private :: flushed = 0         !! count of the system clock at the last flush
     integer, private :: descriptor = -1
   contains
-    procedure :: create
     procedure :: open => open_file
     procedure :: write => write_entry
     procedure :: read => read_entry
     procedure :: size => bytes_in_file
-    procedure :: cut
     procedure :: close => close_log_file
-    procedure :: remove
-    procedure, private :: prepare
-    procedure, private :: lock
-    procedure, private :: read_start
-    procedure, private :: widen_buffer
-    procedure, private :: flush_if_due
-    procedure, private :: raise_write_error
+    procedure :: create, cut, remove
+    procedure, private :: prepare, lock, read_start, flush_if_due, raise_write_error
   end type log_file_t
 
 contains
@@ -145,7 +138,7 @@ contains
     integer :: begins, length, used
     logical :: is_cut, is_done
 
-    call self%widen_buffer(start_bytes + frame_bytes + len(bytes))
+    call widen(self%buffer, start_bytes + frame_bytes + len(bytes))
     used = 0
     if (self%end == 0) then
       self%buffer(:len(first_line)) = first_line
@@ -200,19 +193,10 @@ contains
     if (is_there) is_there = numbers(3) <= self%size() - offset - frame_bytes
     if (.not. is_there) return
     length = numbers(3)
-    call self%widen_buffer(frame_bytes + length)
+    call widen(self%buffer, frame_bytes + length)
     call read_at(self%descriptor, offset, self%buffer(:frame_bytes + length), is_there)
     if (is_there) is_good = self%table%checksum(self%buffer(integer_bytes + 1:frame_bytes + length)) == numbers(1)
   end subroutine read_entry
-
-  subroutine widen_buffer(self, needed)
-    class(log_file_t), intent(inout) :: self
-    integer, intent(in) :: needed   !! [bytes]
-
-    if (needed <= len(self%buffer)) return
-    deallocate (self%buffer)
-    allocate (character(len=needed + needed / 2) :: self%buffer)
-  end subroutine widen_buffer
 
   integer(int64) function bytes_in_file(self)
     class(log_file_t), intent(in) :: self

@@ -53,17 +53,12 @@ contains
   subroutine pack_chunk(chunk, bytes)
     type(chunk_t), intent(in) :: chunk
     character(len=:), allocatable, intent(out) :: bytes
-    integer :: i, length, longest, used
+    integer :: i, longest, used
 
-    length = integer_bytes * (summary_numbers + 2 * chunk%count) + &
-             real_bytes * (size(chunk%parameters) + size(chunk%results))
     longest = 0
     do i = 1, chunk%count
-      if (chunk%status(i) == status_done) cycle
-      length = length + integer_bytes + len(chunk%reasons(i)%text)
-      longest = max(longest, len(chunk%reasons(i)%text))
+      if (chunk%status(i) /= status_done) longest = max(longest, len(chunk%reasons(i)%text))
     end do
-    allocate (character(len=length) :: bytes)
     used = 0
     call put_integers(bytes, used, [chunk%first, chunk%count, size(chunk%parameters, 1), size(chunk%results, 1), &
                                     count(chunk%status == status_refused), count(chunk%status == status_failed), longest])
@@ -74,6 +69,7 @@ contains
     do i = 1, chunk%count
       if (chunk%status(i) /= status_done) call put_text(bytes, used, chunk%reasons(i)%text)
     end do
+    bytes = bytes(:used)
   end subroutine pack_chunk
 
   !> Unpacks a chunk. Bytes that are not those of a chunk are a fault of the program: checksums have been compared before.

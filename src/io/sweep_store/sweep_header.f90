@@ -37,7 +37,6 @@ contains
     character(len=:), allocatable, intent(out) :: bytes
     integer :: used
 
-    allocate (character(len=packed_length(header)) :: bytes)
     used = 0
     associate (parameters => header%parameters, results => header%results)
       call put_integers(bytes, used, [header%seed, header%variants, header%first, header%last, size(parameters), size(results)])
@@ -50,25 +49,8 @@ contains
       call put_quantities(bytes, used, parameters)
       call put_quantities(bytes, used, results)
     end associate
+    bytes = bytes(:used)
   end subroutine pack_header
-
-  pure integer function packed_length(header) result(length)
-    type(sweep_header_t), intent(in) :: header
-
-    length = 12 * integer_bytes + len(header%title) + len(header%source) + len(header%design) + len(header%input_file) + &
-             len(header%input_text) + len(header%list_checksum) + quantities_length(header%parameters) + &
-             quantities_length(header%results)
-  end function packed_length
-
-  pure integer function quantities_length(quantities) result(length)
-    type(quantity_t), intent(in) :: quantities(:)
-    integer :: i
-
-    length = 0
-    do i = 1, size(quantities)
-      length = length + 3 * integer_bytes + len(quantities(i)%label) + len(quantities(i)%unit) + len(quantities(i)%long_name)
-    end do
-  end function quantities_length
 
   subroutine put_quantities(bytes, used, quantities)
     character(len=:), allocatable, intent(inout) :: bytes

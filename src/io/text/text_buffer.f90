@@ -1,5 +1,6 @@
 !> A text to which characters are appended in amortised constant time.
 module nocdyn_text_buffer
+  use nocdyn_bytes, only: widen
   implicit none (type, external)
   private
 
@@ -10,8 +11,7 @@ module nocdyn_text_buffer
     character(len=:), allocatable :: storage
     integer :: length = 0
   contains
-    procedure :: append
-    procedure :: append_line
+    procedure :: append, append_line
     procedure :: text => buffer_text
   end type text_buffer_t
 
@@ -21,14 +21,8 @@ contains
   subroutine append(self, text)
     class(text_buffer_t), intent(inout) :: self
     character(len=*), intent(in) :: text
-    character(len=:), allocatable :: wider
 
-    if (.not. allocated(self%storage)) allocate (character(len=256) :: self%storage)
-    if (self%length + len(text) > len(self%storage)) then
-      allocate (character(len=2 * (self%length + len(text))) :: wider)
-      wider(:self%length) = self%storage(:self%length)
-      call move_alloc(wider, self%storage)
-    end if
+    call widen(self%storage, self%length + len(text))
     self%storage(self%length + 1:self%length + len(text)) = text
     self%length = self%length + len(text)
   end subroutine append
