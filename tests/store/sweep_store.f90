@@ -30,7 +30,7 @@ program sweep_store
   call write_sweep_csv(trim(folder), journals, error)
   call stop_on(error)
   call print_statistics()
-  call journals(1)%remove()
+  call journals(1)%file%remove()
 
 contains
 

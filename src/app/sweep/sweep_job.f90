@@ -2,28 +2,37 @@
 module nocdyn_sweep_job
   use, intrinsic :: iso_fortran_env, only: int64
   use nocdyn_arguments, only: arguments_t
-  use nocdyn_console, only: report_error, new_status_line, print_text
+  use nocdyn_console, only: report_error, new_status_line, print_text, status_line_t
   use nocdyn_errors, only: error_t, exit_done, exit_failed, exit_file, exit_input, raise
   use nocdyn_input, only: input_t
   use nocdyn_input_reader, only: read_input
   use nocdyn_diagnostics, only: diagnostics_t
+  use nocdyn_kinds, only: wp
   use nocdyn_result_folders, only: result_folder
   use nocdyn_sweep_header, only: sweep_netcdf_name, sweep_header_t
   use nocdyn_plan_header, only: new_sweep_header
   use nocdyn_sweep_journal, only: create_journal, journal_name, open_journal, sweep_journal_t
   use nocdyn_journal_scheduler, only: journal_scheduler_t
+  use nocdyn_scheduler, only: sweep_counts_t, sweep_progress_t
   use nocdyn_sweep_plan, only: add_plan_diagnostics, make_plan, sweep_plan_t
-  use nocdyn_sweep_progress, only: console_sweep_progress_t
   use nocdyn_sweep_resumption, only: check_journal, check_results, refuse_other_journals
   use nocdyn_sweep_results, only: print_results, write_results
   use nocdyn_sweep_setup, only: prepare_sweep, sweep_setup_t
   use nocdyn_sweep_summary, only: sweep_effort_t, sweep_summary_t
   use nocdyn_sweep_csv, only: sweep_csv_name
-  use nocdyn_text, only: to_text
+  use nocdyn_text, only: rounded_text, to_text
   implicit none (type, external)
   private
 
   public :: start_job, finish_job
+
+  !> "tolerance.nml: 51200 of 100000 variants, 31000 per second, 2 s left, 3 failed"
+  type, extends(sweep_progress_t), public :: console_sweep_progress_t
+    type(status_line_t) :: line
+    character(len=:), allocatable :: title
+  contains
+    procedure :: update
+  end type console_sweep_progress_t
 
   type, public :: sweep_job_t
     type(arguments_t) :: arguments
@@ -129,10 +138,10 @@ contains
     if (job%arguments%is_given('--quiet')) return
     associate (file => job%plan%input%file, journal => job%journals(1))
       if (journal%damaged_bytes > 0) then
-        call print_text(file // ': note: ' // journal%path() // ' has damaged entries; their variants are computed again')
+        call print_text(file // ': note: ' // journal%file%path // ' has damaged entries; their variants are computed again')
       end if
       call print_text(file // ': reusing ' // to_text(journal%done + journal%refused + journal%failed) // ' of ' // &
-                      to_text(journal%header%last - journal%header%first + 1) // ' variants from ' // journal%path())
+                      to_text(journal%header%last - journal%header%first + 1) // ' variants from ' // journal%file%path)
     end associate
   end subroutine print_journal_state
 
@@ -158,11 +167,11 @@ contains
     else
       call write_results(job%plan, job%folder, job%journals, job%arguments, summary, error)
       if (.not. allocated(error)) then
-        call job%journals(1)%remove()   ! before printing: if the reader of the output is gone, printing ends the program
+        call job%journals(1)%file%remove()   ! before printing: if the reader of the output is gone, printing ends the program
         call print_results(job%plan, job%folder, job%journals(1)%header, job%arguments, summary, code)
       end if
     end if
-    call job%journals(1)%close()
+    call job%journals(1)%file%close()
     if (.not. allocated(error)) return
     if (error%code == exit_file) error%message = error%message // '; when it can be written, repeat the ' // &
                                                  'command with --resume to continue'
@@ -188,5 +197,26 @@ contains
     text = job%plan%input%file // ': part ' // to_text(job%arguments%shard) // ' of ' // to_text(job%arguments%shards) // &
            ' done, ' // to_text(scheduler%counts%total) // ' variants; when all parts are done: nocdyn merge ' // job%folder
   end function part_text
+
+  !> Shows the line if it is due.
+  subroutine update(self, counts)
+    class(console_sweep_progress_t), intent(inout) :: self
+    type(sweep_counts_t), intent(in) :: counts
+    real(wp) :: rate
+    integer :: failures, left
+    character(len=:), allocatable :: text
+
+    if (.not. self%line%is_due()) return
+    rate = counts%new / self%line%elapsed()
+    failures = counts%refused + counts%failed
+    left = counts%total - counts%done - failures
+    text = self%title // ': ' // to_text(counts%total - left) // ' of ' // to_text(counts%total) // ' variants'
+    if (counts%new > 0) then
+      text = text // ', ' // rounded_text(rate, 3) // ' per second, ' // &
+             to_text(int(min(left / rate, 1.0e8_wp)) + 1) // ' s left'
+    end if
+    if (failures > 0) text = text // ', ' // to_text(failures) // ' failed'
+    call self%line%show(text)
+  end subroutine update
 
 end module nocdyn_sweep_job

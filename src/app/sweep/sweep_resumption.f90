@@ -1,7 +1,7 @@
 !> Checks whether a sweep may resume what its folder holds.
 module nocdyn_sweep_resumption
   use nocdyn_errors, only: error_t, exit_input, raise
-  use nocdyn_sweep_differences, only: input_difference
+  use nocdyn_sweep_differences, only: header_difference
   use nocdyn_sweep_header, only: sweep_header_t
   use nocdyn_sweep_journal, only: journal_name, journal_names, sweep_journal_t
   use nocdyn_sweep_provenance, only: read_provenance
@@ -23,14 +23,27 @@ contains
     type(error_t), allocatable, intent(out) :: error
     character(len=:), allocatable :: difference
 
-    difference = header_difference(journal%header, header)
+    difference = change(journal%header, header)
+    if (difference == '' .and. (journal%header%first /= header%first .or. journal%header%last /= header%last)) then
+      difference = 'it holds the variants ' // to_text(journal%header%first) // ' to ' // to_text(journal%header%last) // &
+                   ', not ' // to_text(header%first) // ' to ' // to_text(header%last)
+    end if
     if (difference /= '') then
-      call raise(error, exit_input, journal%path() // ' belongs to another sweep: ' // difference // &
+      call raise(error, exit_input, journal%file%path // ' belongs to another sweep: ' // difference // &
                  '; remove it, or choose another folder with --out')
     else if (.not. resumes) then
-      call raise(error, exit_input, journal%path() // ' holds ' // journal_content_text(journal))
+      call raise(error, exit_input, journal%file%path // ' holds ' // journal_content_text(journal))
     end if
   end subroutine check_journal
+
+  !> The first difference between what a folder holds and the requested sweep; '' if there is none.
+  function change(old, new) result(text)
+    type(sweep_header_t), intent(in) :: old, new
+    character(len=:), allocatable :: text
+
+    text = header_difference(old, new, 'it was started by ' // old%source // ', this is ' // new%source, &
+                             'the input has changed: ', 'the file of &sweep with the variants has changed')
+  end function change
 
   !> How many variants a journal holds, and what can be done with it.
   function journal_content_text(journal) result(text)
@@ -48,27 +61,6 @@ contains
              '--resume, or remove it'
     end if
   end function journal_content_text
-
-  !> The first difference between two sweeps as a phrase; '' if they are the same.
-  function header_difference(old, new) result(text)
-    type(sweep_header_t), intent(in) :: old, new
-    character(len=:), allocatable :: text
-
-    text = ''
-    if (old%source /= new%source) then
-      text = 'it was started by ' // old%source // ', this is ' // new%source
-      return
-    end if
-    text = input_difference(old%input_text, new%input_text)
-    if (text /= '') then
-      text = 'the input has changed: ' // text
-    else if (old%list_checksum /= new%list_checksum) then
-      text = 'the file of &sweep with the variants has changed'
-    else if (old%first /= new%first .or. old%last /= new%last) then
-      text = 'it holds the variants ' // to_text(old%first) // ' to ' // to_text(old%last) // ', not ' // &
-             to_text(new%first) // ' to ' // to_text(new%last)
-    end if
-  end function header_difference
 
   !> Refuses journals of a whole sweep and of parts in one folder: `nocdyn merge` would use all of them.
   subroutine refuse_other_journals(folder, shards, error)
@@ -104,9 +96,7 @@ contains
 
     call read_provenance(folder, old, error)
     if (allocated(error)) return
-    old%first = header%first
-    old%last = header%last
-    difference = header_difference(old, header)
+    difference = change(old, header)
     if (difference /= '') call raise(error, exit_input, folder // ' holds the results of another sweep: ' // difference // &
                                      '; without --resume they are replaced')
   end subroutine check_results

@@ -3,8 +3,7 @@ module nocdyn_journal_chunks
   use nocdyn_errors, only: error_t, exit_input, raise
   use nocdyn_number_ranges, only: ascending_order, gaps, range_t
   use nocdyn_sweep_chunk, only: chunk_t
-  use nocdyn_sweep_differences, only: input_difference
-  use nocdyn_sweep_header, only: sweep_header_t
+  use nocdyn_sweep_differences, only: header_difference
   use nocdyn_sweep_journal, only: journal_name, sweep_journal_t
   use nocdyn_text, only: to_text
   implicit none (type, external)
@@ -89,7 +88,7 @@ contains
     do i = 2, size(order)
       if (ranges(order(i))%first > ranges(order(i - 1))%last) cycle
       call raise(error, exit_input, 'variant ' // to_text(ranges(order(i))%first) // ' is held twice: by ' // &
-                 journals(journal(order(i - 1)))%path() // ' and ' // journals(journal(order(i)))%path())
+                 journals(journal(order(i - 1)))%file%path // ' and ' // journals(journal(order(i)))%file%path)
       return
     end do
     call gaps(ranges, range_t(1, journals(1)%header%variants), open_ranges)
@@ -105,11 +104,11 @@ contains
 
     text = ''
     absent = 0
-    shards = shards_of(journals(1)%path())
+    shards = shards_of(journals(1)%file%path)
     do k = 1, shards
       name = journal_name(k, shards)
       do i = 1, size(journals)
-        if (file_name(journals(i)%path()) == name) exit
+        if (file_name(journals(i)%file%path) == name) exit
       end do
       if (i <= size(journals)) cycle
       absent = absent + 1
@@ -145,35 +144,22 @@ contains
   subroutine check_headers(journals, error)
     type(sweep_journal_t), intent(in) :: journals(:)
     type(error_t), allocatable, intent(out) :: error
+    character(len=*), parameter :: other_lists = 'the files with their variants differ'
     character(len=:), allocatable :: difference
     integer :: i
 
     do i = 2, size(journals)
-      difference = header_difference(journals(1)%header, journals(i)%header)
+      associate (first => journals(1)%header, second => journals(i)%header)
+        difference = header_difference(first, second, 'they were written by ' // first%source // ' and ' // second%source, &
+                                       'their inputs differ, from the first to the second: ', other_lists)
+        if (difference == '' .and. first%variants /= second%variants) difference = other_lists
+      end associate
       if (difference == '') cycle
-      call raise(error, exit_input, journals(1)%path() // ' and ' // journals(i)%path() // ' are not of one sweep: ' // &
+      call raise(error, exit_input, journals(1)%file%path // ' and ' // journals(i)%file%path // ' are not of one sweep: ' // &
                  difference)
       return
     end do
   end subroutine check_headers
-
-  !> In what the headers of two shards differ; '' if they are of one sweep.
-  function header_difference(first, second) result(text)
-    type(sweep_header_t), intent(in) :: first, second
-    character(len=:), allocatable :: text
-
-    text = ''
-    if (first%source /= second%source) then
-      text = 'they were written by ' // first%source // ' and ' // second%source
-      return
-    end if
-    text = input_difference(first%input_text, second%input_text)
-    if (text /= '') then
-      text = 'their inputs differ, from the first to the second: ' // text
-    else if (first%list_checksum /= second%list_checksum .or. first%variants /= second%variants) then
-      text = 'the files with their variants differ'
-    end if
-  end function header_difference
 
   !> Refuses journals that lack variants of their shards, by their names.
   subroutine check_wholeness(journals, error)
@@ -189,7 +175,7 @@ contains
         call gaps(journals(i)%ranges(), range_t(header%first, header%last), open_ranges)
         if (size(open_ranges) == 0) cycle
         if (message /= '') message = message // new_line('a')
-        message = message // journals(i)%path() // ': unfinished, without ' // ranges_text(open_ranges) // ' of ' // &
+        message = message // journals(i)%file%path // ': unfinished, without ' // ranges_text(open_ranges) // ' of ' // &
                   to_text(header%first) // ' to ' // to_text(header%last) // '; --resume goes on with it'
       end associate
     end do

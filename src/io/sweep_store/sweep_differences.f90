@@ -1,15 +1,32 @@
-!> The differences between the inputs of two sweeps, in a sentence.
+!> The differences between two sweeps, as phrases.
 module nocdyn_sweep_differences
   use nocdyn_input_differences, only: find_differences
+  use nocdyn_sweep_header, only: sweep_header_t
   use nocdyn_text, only: string_t, to_text
   implicit none (type, external)
   private
 
-  public :: input_difference
+  public :: header_difference
 
   integer, parameter :: max_listed = 5   ! differences
 
 contains
+
+  !> What is said of the first difference between two sweeps; '' if program, input and list of variants are the same.
+  function header_difference(old, new, sources, inputs, lists) result(text)
+    type(sweep_header_t), intent(in) :: old, new
+    character(len=*), intent(in) :: sources, inputs, lists   !! if that differs; `inputs` is followed by the differences
+    character(len=:), allocatable :: text
+
+    text = sources
+    if (old%source /= new%source) return
+    text = input_difference(old%input_text, new%input_text)
+    if (text /= '') then
+      text = inputs // text
+    else if (old%list_checksum /= new%list_checksum) then
+      text = lists
+    end if
+  end function header_difference
 
   !> The first differences that change results; '' if there are none.
   function input_difference(old, new) result(text)

@@ -28,20 +28,11 @@ module nocdyn_sweep_journal
     integer :: entries = 0                         !! chunks in it
     integer :: longest_reason = 0                  !! [characters]
     integer(int64) :: damaged_bytes = 0            !! ignored by `open_journal`
-    type(log_file_t), private :: file
+    type(log_file_t) :: file
     type(log_entry_t), allocatable, private :: index(:)
   contains
-    procedure :: path
-    procedure :: append
-    procedure :: append_packed
-    procedure :: ranges
-    procedure :: missing
-    procedure :: entry_of
-    procedure :: read_entry
-    procedure :: close => close_journal
-    procedure :: remove => remove_journal
-    procedure, private :: add_entry
-    procedure, private :: read_chunks
+    procedure :: append, append_packed, ranges, missing, entry_of, read_entry
+    procedure, private :: add_entry, read_chunks
   end type sweep_journal_t
 
 contains
@@ -89,7 +80,7 @@ contains
     if (allocated(error)) return
     call pack_header(header, bytes)
     call journal%file%write(header_tag, bytes, error)
-    if (allocated(error)) call journal%remove()
+    if (allocated(error)) call journal%file%remove()
   end subroutine create_journal
 
   !> Opens an existing journal to read it or to resume the sweep. An entry that was not written as a whole is removed.
@@ -110,9 +101,9 @@ contains
       call journal%read_chunks()
       call journal%file%cut(error)
     else
-      call raise(error, exit_input, journal%path() // ': the head of this journal is damaged; nothing can be made of the rest')
+      call raise(error, exit_input, journal%file%path // ': the head of this journal is damaged; nothing can be made of the rest')
     end if
-    if (allocated(error)) call journal%close()
+    if (allocated(error)) call journal%file%close()
   end subroutine open_journal
 
   !> Finds the entries of chunks. A damaged one is ignored; the first bytes that are no entry end the journal.
@@ -152,13 +143,8 @@ contains
     class(sweep_journal_t), intent(inout) :: self
     integer(int64), intent(in) :: offset
     type(chunk_summary_t), intent(in) :: summary
-    type(log_entry_t), allocatable :: longer(:)
 
-    if (self%entries == size(self%index)) then
-      allocate (longer(2 * self%entries))
-      longer(:self%entries) = self%index
-      call move_alloc(longer, self%index)
-    end if
+    if (self%entries == size(self%index)) self%index = [self%index, self%index]
     self%entries = self%entries + 1
     self%index(self%entries) = log_entry_t(offset, summary%first, summary%count)
     self%refused = self%refused + summary%refused
@@ -194,13 +180,6 @@ contains
     call self%file%write(chunk_tag, bytes, error)
     if (.not. allocated(error)) call self%add_entry(offset, summary)
   end subroutine append_packed
-
-  pure function path(self)
-    class(sweep_journal_t), intent(in) :: self
-    character(len=:), allocatable :: path
-
-    path = self%file%path
-  end function path
 
   !> The range of variants of each entry.
   pure function ranges(self)
@@ -249,22 +228,8 @@ contains
     if (is_good) then
       call unpack_chunk(self%file%buffer(frame_bytes + 1:frame_bytes + length), chunk)
     else
-      call raise(error, exit_file, self%path() // ': cannot be read: it is not as it was when it was opened')
+      call raise(error, exit_file, self%file%path // ': cannot be read: it is not as it was when it was opened')
     end if
   end subroutine read_entry
-
-  !> Closes the journal.
-  subroutine close_journal(self)
-    class(sweep_journal_t), intent(inout) :: self
-
-    call self%file%close()
-  end subroutine close_journal
-
-  !> Closes and removes the journal.
-  subroutine remove_journal(self)
-    class(sweep_journal_t), intent(inout) :: self
-
-    call self%file%remove()
-  end subroutine remove_journal
 
 end module nocdyn_sweep_journal
