@@ -2,16 +2,15 @@
 module nocdyn_test_full_machines
   use nocdyn_bank, only: append_bank, role_excitation
   use nocdyn_couplings, only: coupling_common_t, new_table_couplings
-  use nocdyn_curve_motors, only: new_curve_motors
   use nocdyn_curves, only: curve_t, extrapolation_constant, extrapolation_linear, interpolation_cubic, interpolation_linear, &
                            new_curve
   use nocdyn_dc_motors, only: new_dc_motors
   use nocdyn_gap_couplings, only: new_gap_couplings
-  use nocdyn_governed_motors, only: new_governed_motors
   use nocdyn_governors, only: governor_t
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
-  use nocdyn_nonlinear_loads, only: new_nonlinear_loads
+  use nocdyn_motors, only: new_curve_motors
+  use nocdyn_loads, only: new_nonlinear_loads
   use nocdyn_polynomial_couplings, only: new_polynomial_couplings
   use nocdyn_saturated_couplings, only: new_saturated_couplings
   use nocdyn_table_laws, only: new_table_laws, over_time
@@ -122,9 +121,11 @@ contains
       call append_bank(machine%banks, &
                        new_curve_motors(numbered_names('table', 1), [bodies], size(variants), curve=table))
       call append_bank(machine%banks, &
-                       new_governed_motors(numbered_names('governed', 1), [2], governor, 2.0_wp * one, law=quadratic))
+                       new_curve_motors(numbered_names('governed', 1), [2], size(variants), quadratic, governor=governor, &
+                                        drag=2.0_wp * one))
       call append_bank(machine%banks, &
-                       new_governed_motors(numbered_names('throttled', 1), [1], governor, 0.0_wp * one, curve=table))
+                       new_curve_motors(numbered_names('throttled', 1), [1], size(variants), curve=table, governor=governor, &
+                                        drag=0.0_wp * one))
       call append_bank(machine%banks, &
                        new_dc_motors(numbered_names('dc', 1), [2], 24.0_wp * one, 2.0_wp * one, 1.5_wp * one, &
                                      0.5_wp * one))

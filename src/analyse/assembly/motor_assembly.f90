@@ -1,16 +1,14 @@
 !> The banks of motors of an input: one for each form of their laws that it has.
 module nocdyn_motor_assembly
   use nocdyn_bank, only: append_bank, bank_slot_t
-  use nocdyn_curve_motors, only: new_curve_motors
   use nocdyn_curves, only: curve_t
   use nocdyn_dc_motors, only: new_dc_motors
   use nocdyn_element_groups, only: add_banks, element_groups_t
   use nocdyn_errors, only: error_t, exit_input, raise
-  use nocdyn_governed_motors, only: new_governed_motors
   use nocdyn_governors, only: governor_t
   use nocdyn_input, only: group_t, input_t
   use nocdyn_kinds, only: wp
-  use nocdyn_motors, only: new_motors
+  use nocdyn_motors, only: new_curve_motors, new_motors
   use nocdyn_text, only: to_text
   use nocdyn_torque_curves, only: induction_curve_t, quadratic_curve_t, torque_curve_t
   implicit none (type, external)
@@ -92,7 +90,7 @@ contains
       call append_bank(banks, new_curve_motors(groups%names, body, groups%lanes, law, curve))
     case default
       call make_law(groups, form - 1, law, curve)
-      call append_bank(banks, new_governed_motors(groups%names, body, governor_of(groups), drags(groups), law, curve))
+      call append_bank(banks, new_curve_motors(groups%names, body, groups%lanes, law, curve, governor_of(groups), drags(groups)))
     end select
   end subroutine add_form
 

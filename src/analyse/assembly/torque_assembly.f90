@@ -5,8 +5,7 @@ module nocdyn_torque_assembly
   use nocdyn_excitations, only: new_excitations
   use nocdyn_input, only: group_t
   use nocdyn_kinds, only: wp
-  use nocdyn_loads, only: new_loads
-  use nocdyn_nonlinear_loads, only: new_nonlinear_loads
+  use nocdyn_loads, only: new_loads, new_nonlinear_loads
   use nocdyn_table_laws, only: new_table_laws, over_time
   use nocdyn_timed_excitations, only: new_timed_excitations, shape_pulse, shape_ramp, shape_step
   use nocdyn_wave_excitations, only: new_wave_excitations

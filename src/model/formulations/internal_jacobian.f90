@@ -4,8 +4,7 @@
 !> q'' = R M and on its work integral, W' = M u'.
 module nocdyn_internal_jacobian
   use nocdyn_element_coordinates, only: element_coordinates_t
-  use nocdyn_elements, only: elements_t
-  use nocdyn_internal_states, only: internal_states_t
+  use nocdyn_elements, only: elements_t, internal_states_t
   use nocdyn_kinds, only: wp
   use nocdyn_lane_parameters, only: lane_parameters_t
   use nocdyn_system, only: pattern_t
@@ -19,11 +18,10 @@ module nocdyn_internal_jacobian
   type, public :: internal_jacobian_t
     type(pattern_t) :: pattern
     integer, private :: before = 0                          !! number of positions of the Jacobian before these
-    type(element_coordinates_t), private :: incidence       !! entries of the element of each internal state
+    type(element_coordinates_t) :: incidence                !! entries of the element of each internal state
     logical, allocatable, private :: has_work_integral(:)   !! of the element of each internal state
   contains
     procedure :: fill
-    procedure :: refresh_lane
     procedure :: list_parameters
   end type internal_jacobian_t
 
@@ -100,16 +98,6 @@ contains
       end do
     end associate
   end subroutine fill
-
-  !> Updates the responses of one lane.
-  pure subroutine refresh_lane(self, lane, incidence, internal)
-    class(internal_jacobian_t), intent(inout) :: self
-    integer, intent(in) :: lane
-    type(element_coordinates_t), intent(in) :: incidence   !! entries of all elements
-    type(internal_states_t), intent(in) :: internal
-
-    call self%incidence%refresh_selected(lane, incidence, internal%element, with_ratio_only=.false.)
-  end subroutine refresh_lane
 
   !> Registers the arrays whose values may differ from variant to variant.
   subroutine list_parameters(self, parameters)

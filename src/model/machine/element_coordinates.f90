@@ -17,6 +17,7 @@ module nocdyn_element_coordinates
     integer, allocatable :: coordinate(:)     !! [entries]
     real(wp), allocatable :: ratio(:, :)      !! difference of the rows of L_tau of `to` and `from`, [lanes, entries]
     real(wp), allocatable :: response(:, :)   !! the same difference of ((L_tau^T J L_tau)^-1 L_tau^T)^T, [lanes, entries]
+    integer, allocatable, private :: source(:)   !! by `selected`: number that each entry has among all, [entries]
   contains
     procedure :: selected
     procedure :: refresh_responses
@@ -77,10 +78,10 @@ contains
       end do
     end do
     some%first(size(some%first)) = next
-    allocate (some%coordinate(next - 1), some%ratio(size(self%ratio, 1), next - 1), some%response(size(self%ratio, 1), next - 1))
-    some%coordinate(:) = self%coordinate(entry(:next - 1))
-    some%ratio(:, :) = self%ratio(:, entry(:next - 1))
-    some%response(:, :) = self%response(:, entry(:next - 1))
+    some%source = entry(:next - 1)
+    some%coordinate = self%coordinate(some%source)
+    some%ratio = self%ratio(:, some%source)
+    some%response = self%response(:, some%source)
   end function selected
 
   !> Updates the responses of one lane from the coordinates.
@@ -119,22 +120,12 @@ contains
   end subroutine add_response
 
   !> Updates the responses of one lane in entries made by `selected`.
-  pure subroutine refresh_selected(self, lane, all, elements, with_ratio_only)
+  pure subroutine refresh_selected(self, lane, all)
     class(element_coordinates_t), intent(inout) :: self
     integer, intent(in) :: lane
-    type(element_coordinates_t), intent(in) :: all   !! entries of all elements
-    integer, intent(in) :: elements(:)               !! as given to `selected`
-    logical, intent(in) :: with_ratio_only           !! as given to `selected`
-    integer :: i, k, next
+    type(element_coordinates_t), intent(in) :: all   !! of which they were selected
 
-    next = 0
-    do i = 1, size(elements)
-      do k = all%first(elements(i)), all%first(elements(i) + 1) - 1
-        if (with_ratio_only .and. .not. abs(all%ratio(lane, k)) > 0) cycle
-        next = next + 1
-        self%response(lane, next) = all%response(lane, k)
-      end do
-    end do
+    self%response(lane, :) = all%response(lane, self%source)
   end subroutine refresh_selected
 
   !> Whether an element turns with the coordinate of an entry. In a group of several freedoms an element may change the
