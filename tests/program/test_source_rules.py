@@ -48,7 +48,7 @@ MANY_ARGUMENTS = {
         "find_moments",
         "gather_laws",
     ),
-    "src/model/lanes/sparse_map.f90": (KERNEL, "pair_of_rows", "pair_on_lanes", "sum_of_rows", "sum_on_lanes"),
+    "src/model/lanes/sparse_map.f90": (KERNEL, "pair_of_rows", "pair_on_lanes"),
 }
 
 # Longer procedures, by file, and why.

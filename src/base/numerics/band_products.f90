@@ -1,14 +1,13 @@
 !> Products of band matrices with vectors: rows whose columns all advance by one from row to row.
 !>
-!> `multiply`: u = A x; `pair`: u = offset + A x and v = A y; `sum`: u = A (x + y). A band is stored diagonal by diagonal; of a
-!> Toeplitz band, whose rows all have the same coefficients, only the first row is stored. The terms of a row are added one
-!> after the other.
+!> `multiply`: u = A x; `pair`: u = offset + A x and v = A y. A band is stored diagonal by diagonal; of a Toeplitz band, whose
+!> rows all have the same coefficients, only the first row is stored. The terms of a row are added one after the other.
 module nocdyn_band_products
   use nocdyn_kinds, only: wp
   implicit none (type, external)
   private
 
-  public :: multiply_band, multiply_toeplitz, pair_of_band, pair_of_toeplitz, sum_of_band, sum_of_toeplitz
+  public :: multiply_band, multiply_toeplitz, pair_of_band, pair_of_toeplitz
 
   integer, parameter :: strip = 256   !! rows whose results stay in the first-level cache from diagonal to diagonal
 
@@ -42,8 +41,19 @@ contains
     integer, intent(in) :: column(width)
     real(wp), intent(in) :: coefficient(width), x(columns)
     real(wp), intent(inout) :: u(rows)
-    integer :: begin, c, i, k
+    real(wp) :: a, b
+    integer :: begin, c, d, i, k
 
+    if (width == 2) then   ! of a chain: nothing is read twice
+      a = coefficient(1)
+      b = coefficient(2)
+      c = column(1) - 1
+      d = column(2) - 1
+      do i = 1, rows
+        u(i) = (0.0_wp + a * x(c + i)) + b * x(d + i)
+      end do
+      return
+    end if
     do begin = 1, rows, strip
       c = column(1) - 1
       do i = begin, min(begin + strip - 1, rows)
@@ -137,60 +147,5 @@ contains
       end do
     end if
   end subroutine pair_of_chain
-
-  !> u = A (x + y).
-  pure subroutine sum_of_band(rows, width, columns, column, coefficient, x, y, u)
-    integer, intent(in) :: rows, width, columns
-    integer, intent(in) :: column(rows, width)
-    real(wp), intent(in) :: coefficient(rows, width), x(columns), y(columns)
-    real(wp), intent(inout) :: u(rows)
-    integer :: begin, c, i, k
-
-    do begin = 1, rows, strip
-      c = column(1, 1) - 1
-      do i = begin, min(begin + strip - 1, rows)
-        u(i) = 0.0_wp + coefficient(i, 1) * (x(c + i) + y(c + i))
-      end do
-      do k = 2, width
-        c = column(1, k) - 1
-        do i = begin, min(begin + strip - 1, rows)
-          u(i) = u(i) + coefficient(i, k) * (x(c + i) + y(c + i))
-        end do
-      end do
-    end do
-  end subroutine sum_of_band
-
-  !> u = A (x + y) for rows with equal coefficients.
-  pure subroutine sum_of_toeplitz(rows, width, columns, column, coefficient, x, y, u)
-    integer, intent(in) :: rows, width, columns
-    integer, intent(in) :: column(width)
-    real(wp), intent(in) :: coefficient(width), x(columns), y(columns)
-    real(wp), intent(inout) :: u(rows)
-    real(wp) :: a, b
-    integer :: begin, c, d, i, k
-
-    if (width == 2) then   ! of a chain: nothing is read twice
-      a = coefficient(1)
-      b = coefficient(2)
-      c = column(1) - 1
-      d = column(2) - 1
-      do i = 1, rows
-        u(i) = (0.0_wp + a * (x(c + i) + y(c + i))) + b * (x(d + i) + y(d + i))
-      end do
-      return
-    end if
-    do begin = 1, rows, strip
-      c = column(1) - 1
-      do i = begin, min(begin + strip - 1, rows)
-        u(i) = 0.0_wp + coefficient(1) * (x(c + i) + y(c + i))
-      end do
-      do k = 2, width
-        c = column(k) - 1
-        do i = begin, min(begin + strip - 1, rows)
-          u(i) = u(i) + coefficient(k) * (x(c + i) + y(c + i))
-        end do
-      end do
-    end do
-  end subroutine sum_of_toeplitz
 
 end module nocdyn_band_products

@@ -35,10 +35,16 @@ contains
     integer :: c, i, k, l
 
     do i = 1, rows
+      k = first(i)
+      if (k == first(i + 1)) then
+        u(:, i) = 0.0_wp
+        cycle
+      end if
+      c = column(k)
       do l = 1, lanes
-        u(l, i) = 0.0_wp
+        u(l, i) = 0.0_wp + coefficient(l, k) * x(l, c)
       end do
-      do k = first(i), first(i + 1) - 1
+      do k = first(i) + 1, first(i + 1) - 1
         c = column(k)
         do l = 1, lanes
           u(l, i) = u(l, i) + coefficient(l, k) * x(l, c)

@@ -159,7 +159,7 @@ contains
     offending_group = 0
     inertia = self%inertia(lane, :)
     ratio = trains%ratios(constraints, lane)
-    call self%reactions%set_ratios(lane, ratio)
+    self%reactions%ratio(lane, :) = ratio
     do g = 1, size(groups)
       local(groups(g)%trains) = [(k, k=1, size(groups(g)%trains))]
       call find_motion(relations, groups(g)%elimination, local, size(groups(g)%trains), lane, found)
@@ -230,7 +230,7 @@ contains
     do i = 1, size(group%bodies)
       associate (b => group%bodies(i))
         associate (of_train => mass(local(trains%train(b))))
-          of_train = of_train + inertia(b) * self%reactions%root_ratio(lane, b)**2
+          of_train = of_train + inertia(b) * self%reactions%ratio(lane, b)**2
         end associate
       end associate
     end do
@@ -242,7 +242,7 @@ contains
     do i = 1, size(group%bodies)
       associate (b => group%bodies(i))
         k = self%first(b)
-        self%response(lane, k:k + size(motion, 2) - 1) = self%reactions%root_ratio(lane, b) * response(:, local(trains%train(b)))
+        self%response(lane, k:k + size(motion, 2) - 1) = self%reactions%ratio(lane, b) * response(:, local(trains%train(b)))
         self%inertia(lane, b) = inertia(b)
       end associate
     end do

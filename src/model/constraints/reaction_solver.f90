@@ -28,8 +28,8 @@ module nocdyn_reaction_solver
   !> The order of the solution, the coefficients of all lanes, and work space.
   type, public :: reaction_solver_t
     private
-    integer, allocatable :: train(:)       !! train of each body
-    real(wp), allocatable :: ratio(:, :)   !! of each body to the root of its train, [lanes, bodies]
+    integer, allocatable :: train(:)               !! train of each body
+    real(wp), allocatable, public :: ratio(:, :)   !! of each body to the root of its train, [lanes, bodies]
     type(train_relations_t) :: relations
     integer, allocatable :: first(:)                      !! first entry of each relation between bodies, [relations + 1]
     integer, allocatable :: body(:)                       !! [entries]
@@ -38,15 +38,12 @@ module nocdyn_reaction_solver
     integer, allocatable :: group_index(:)                !! index of each group in `groups`, 0 without relations
     integer, allocatable :: child(:), parent(:), row(:)   !! bodies, parents, rows between them; outer ones first
     real(wp), allocatable :: own(:, :), other(:, :)       !! coefficients of child and parent, [lanes, pairs]
-    type(load_sharing_t) :: load_sharing
+    type(load_sharing_t), public :: load_sharing          !! distributes reactions of the kept rows over all rows
     real(wp), allocatable :: of_trains(:)      !! moments on trains, [trains], work space
     real(wp), allocatable :: of_relations(:)   !! multipliers, [relations], work space
   contains
     procedure :: set_core
-    procedure :: set_ratios
-    procedure :: root_ratio
     procedure :: find_null_vectors
-    procedure :: share_loads
     procedure :: find_reactions
     procedure :: list_parameters
     procedure, private :: back_substitute
@@ -55,7 +52,7 @@ module nocdyn_reaction_solver
 
 contains
 
-  !> The order of the solution. The values of each lane are set by `set_core` and `set_ratios`.
+  !> The order of the solution. The values of each lane are set by `set_core` and in `ratio`.
   function new_reaction_solver(constraints, trains, relations, groups) result(self)
     type(constraints_t), intent(in) :: constraints
     type(rigid_trains_t), intent(in) :: trains
@@ -143,23 +140,6 @@ contains
     if (self%group_index(group) > 0) self%groups(self%group_index(group))%dual(:, :, lane) = dual
   end subroutine set_core
 
-  !> Sets the ratios of all bodies to the roots of their trains.
-  pure subroutine set_ratios(self, lane, ratio)
-    class(reaction_solver_t), intent(inout) :: self
-    integer, intent(in) :: lane
-    real(wp), intent(in) :: ratio(:)   !! [bodies]
-
-    self%ratio(lane, :) = ratio
-  end subroutine set_ratios
-
-  !> omega(body) / omega(root of its train).
-  pure real(wp) function root_ratio(self, lane, body) result(ratio)
-    class(reaction_solver_t), intent(in) :: self
-    integer, intent(in) :: lane, body
-
-    ratio = self%ratio(lane, body)
-  end function root_ratio
-
   !> Finds the null vectors of the redundant rows, after the values of all lanes have been set: a reaction 1 of such a row and the
   !> negative reactions that the rows which it repeats have instead.
   subroutine find_null_vectors(self, constraints, groups)
@@ -204,15 +184,6 @@ contains
     call self%back_substitute(lane, moment, lambda)
     call self%load_sharing%minimise_norm(lane, lambda)
   end subroutine find_reactions
-
-  !> Distributes reactions of the kept rows over all rows.
-  pure subroutine share_loads(self, lane, lambda)
-    class(reaction_solver_t), intent(in) :: self
-    integer, intent(in) :: lane
-    real(wp), intent(inout) :: lambda(:)   !! [rows]; on entry 0 for redundant rows
-
-    call self%load_sharing%minimise_norm(lane, lambda)
-  end subroutine share_loads
 
   !> Reactions of the kept rows only.
   pure subroutine back_substitute(self, lane, moment, lambda)

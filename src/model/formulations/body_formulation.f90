@@ -28,7 +28,6 @@ module nocdyn_body_formulation
     procedure :: set_state
     procedure :: observe => observe_bodies
     procedure :: jacobian => jacobian_of_bodies
-    procedure :: component_name
     procedure :: series_obstacle
     procedure :: switch_motion
   end type body_formulation_t
@@ -42,11 +41,11 @@ contains
     type(machine_t), intent(in) :: machine
     integer, intent(in) :: mechanical            !! number of mechanical states, at least 2 * bodies
     logical, intent(in) :: with_energy_balance   !! whether the powers of the elements `machine%with_work` are integrated
-    integer :: l
+    integer :: b, l
 
     self%word = word
     self%machine = machine
-    call self%allocate_state(mechanical, with_energy_balance)
+    call self%allocate_state([(b, b=1, machine%bodies)], mechanical, with_energy_balance)
     allocate (self%slope(self%lanes, self%states + self%quadratures), source=0.0_wp)
     allocate (self%status(self%lanes), source=evaluation_ok)
     allocate (self%mobility(machine%bodies, machine%bodies, self%lanes))
@@ -68,7 +67,7 @@ contains
     y(:, self%mechanical + 1:self%states) = self%machine%start_internal()
   end function start_of_bodies
 
-  !> Copies the speeds and angles of the bodies from the state.
+  !> Copies the speeds and angles of the bodies and the internal states from the state.
   subroutine set_state(self, y)
     class(body_formulation_t), intent(inout) :: self
     real(wp), contiguous, intent(in) :: y(:, :)   !! state, [lanes, states], at least
@@ -78,6 +77,7 @@ contains
       self%omega(:, b) = y(:, b)
       self%phi(:, b) = y(:, self%machine%bodies + b)
     end do
+    if (self%internal > 0) self%machine%elements%internal%value(:, :) = y(:, self%mechanical + 1:self%states)
   end subroutine set_state
 
   !> Evaluates the right-hand side at a state and keeps it in `slope`.
@@ -87,7 +87,7 @@ contains
     real(wp), contiguous, intent(in) :: y(:, :)   !! state, [lanes, states], at least
 
     call self%set_state(y)
-    if (self%switches > 0) call self%choose_all_branches(t, y)
+    if (self%switches > 0) call self%machine%choose_branches(t, self%phi, self%omega)
     call self%derivative(t, y, self%slope, self%status)
   end subroutine observe_bodies
 
@@ -139,7 +139,6 @@ contains
 
     n = self%machine%bodies
     call self%set_state(y)
-    call self%set_internal_states(y(:, self%mechanical + 1:))
     call self%machine%differentiate(t, self%phi, self%omega)
     dfdy = 0.0_wp
     dfdt = 0.0_wp
@@ -233,27 +232,6 @@ contains
       product = product + matrix(:, j) * vector(j)
     end do
   end subroutine multiply
-
-  !> Name of a component of the state, for messages.
-  function component_name(self, index) result(name)
-    class(body_formulation_t), intent(in) :: self
-    integer, intent(in) :: index
-    character(len=:), allocatable :: name
-
-    associate (n => self%machine%bodies)
-      if (index <= n) then
-        name = 'speed of ' // quoted(self%machine%names(index)%text)
-      else if (index <= 2 * n) then
-        name = 'angle of ' // quoted(self%machine%names(index - n)%text)
-      else if (index <= self%mechanical) then
-        name = 'elastic moment on ' // quoted(self%machine%names(index - 2 * n)%text)
-      else if (index <= self%states) then
-        name = self%machine%internal_name(index - self%mechanical)
-      else
-        name = 'work of ' // quoted(self%machine%element_name(self%machine%with_work(index - self%states)))
-      end if
-    end associate
-  end function component_name
 
   !> Only the reduced formulation has a Taylor series.
   subroutine series_obstacle(self, obstacle)

@@ -3,13 +3,16 @@ module nocdyn_formulation
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
   use nocdyn_system, only: system_t
+  use nocdyn_text, only: quoted
   implicit none (type, external)
   private
 
-  !> Extensions choose the mechanical states. The internal states of the elements follow. If there is an energy balance, the
-  !> work integrals of the elements `machine%with_work` come last, as quadratures.
+  !> Extensions choose the mechanical states, the first of which are the speeds and angles of some bodies. The internal states
+  !> of the elements follow. If there is an energy balance, the work integrals of the elements `machine%with_work` come last, as
+  !> quadratures.
   type, abstract, extends(system_t), public :: formulation_t
     type(machine_t) :: machine
+    integer, allocatable :: moving(:)        !! bodies whose speeds and then angles are the first states
     integer :: mechanical = 0                !! number of states before the internal states
     integer :: internal = 0                  !! number of internal states
     logical :: has_energy_balance = .true.   !! whether the powers of the elements `machine%with_work` are integrated
@@ -22,8 +25,7 @@ module nocdyn_formulation
     procedure(reactions_interface), deferred :: reactions
     procedure(motion_interface), deferred :: switch_motion
     procedure :: allocate_state
-    procedure :: set_internal_states
-    procedure :: choose_all_branches
+    procedure :: component_name
     procedure :: observe
     procedure :: refresh_lane
     procedure :: start_lane
@@ -41,7 +43,7 @@ module nocdyn_formulation
       real(wp), allocatable :: y(:, :)
     end function start_interface
 
-    !> Fills `phi` and `omega` from the state.
+    !> Fills `phi`, `omega` and the internal states of the elements from the state.
     subroutine set_state_interface(self, y)
       import :: formulation_t, wp
       class(formulation_t), intent(inout) :: self
@@ -72,12 +74,14 @@ module nocdyn_formulation
 contains
 
   !> Counts the states of `machine` and allocates the arrays of the bodies.
-  subroutine allocate_state(self, mechanical, with_energy_balance)
+  subroutine allocate_state(self, moving, mechanical, with_energy_balance)
     class(formulation_t), intent(inout) :: self
+    integer, intent(in) :: moving(:)             !! bodies whose speeds and then angles are the first states
     integer, intent(in) :: mechanical            !! number of states before the internal states
     logical, intent(in) :: with_energy_balance   !! whether the powers of the elements `machine%with_work` are integrated
 
     associate (machine => self%machine)
+      self%moving = moving
       self%mechanical = mechanical
       self%internal = machine%elements%internal%count
       self%states = self%mechanical + self%internal
@@ -91,23 +95,26 @@ contains
     end associate
   end subroutine allocate_state
 
-  !> Copies the internal states to the elements.
-  subroutine set_internal_states(self, internal)
-    class(formulation_t), intent(inout) :: self
-    real(wp), intent(in) :: internal(self%lanes, self%internal)   !! part of the state
+  !> Name of a component of the state, for messages.
+  function component_name(self, index) result(name)
+    class(formulation_t), intent(in) :: self
+    integer, intent(in) :: index
+    character(len=:), allocatable :: name
 
-    if (self%internal > 0) self%machine%elements%internal%value(:, :) = internal
-  end subroutine set_internal_states
-
-  !> Chooses the branches of the laws in all lanes, after `set_state` with the same state.
-  subroutine choose_all_branches(self, t, y)
-    class(formulation_t), intent(inout) :: self
-    real(wp), contiguous, intent(in) :: t(:)      !! [s], [lanes]
-    real(wp), contiguous, intent(in) :: y(:, :)   !! [lanes, states], at least
-
-    call self%set_internal_states(y(:, self%mechanical + 1:))
-    call self%machine%choose_branches(t, self%phi, self%omega)
-  end subroutine choose_all_branches
+    associate (n => size(self%moving), names => self%machine%names)
+      if (index <= n) then
+        name = 'speed of ' // quoted(names(self%moving(index))%text)
+      else if (index <= 2 * n) then
+        name = 'angle of ' // quoted(names(self%moving(index - n))%text)
+      else if (index <= self%mechanical) then
+        name = 'elastic moment on ' // quoted(names(self%moving(index - 2 * n))%text)
+      else if (index <= self%states) then
+        name = self%machine%internal_name(index - self%mechanical)
+      else
+        name = 'work of ' // quoted(self%machine%element_name(self%machine%with_work(index - self%states)))
+      end if
+    end associate
+  end function component_name
 
   !> Evaluates bodies, elements and torques at a state, so that they and the reactions can be read.
   !>
@@ -118,8 +125,7 @@ contains
     real(wp), contiguous, intent(in) :: y(:, :)   !! [lanes, states], at least
 
     call self%set_state(y)
-    if (self%switches > 0) call self%choose_all_branches(t, y)
-    if (self%internal > 0) call self%set_internal_states(y(:, self%mechanical + 1:))
+    if (self%switches > 0) call self%machine%choose_branches(t, self%phi, self%omega)
     call self%machine%evaluate(t, self%phi, self%omega, self%torque)
   end subroutine observe
 

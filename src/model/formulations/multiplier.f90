@@ -59,7 +59,6 @@ contains
 
     n = self%machine%bodies
     call self%set_state(y)
-    call self%set_internal_states(y(:, self%mechanical + 1:))
     call self%machine%evaluate(t, self%phi, self%omega, self%torque)
     do l = 1, self%lanes
       self%solution(:n, l) = self%torque(l, 1:)
@@ -83,7 +82,7 @@ contains
     do i = 1, size(self%kept)
       lambda(self%kept(i)) = self%solution(self%machine%bodies + i, lane)
     end do
-    call self%machine%coordinates%reactions%share_loads(lane, lambda)
+    call self%machine%coordinates%reactions%load_sharing%minimise_norm(lane, lambda)
   end subroutine reactions
 
 end module nocdyn_multiplier

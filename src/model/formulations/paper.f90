@@ -138,7 +138,6 @@ contains
 
     n = self%machine%bodies
     call self%set_state(y)
-    call self%set_internal_states(y(:, self%mechanical + 1:))
     call self%machine%evaluate(t, self%phi, self%omega, self%torque)
     call self%machine%evaluate_energies()
     call self%machine%differentiate_elements(t)

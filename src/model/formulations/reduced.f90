@@ -5,6 +5,7 @@
 !> u' = U q'. Their moments M give q'' = R M with R = (L_tau^T J L_tau)^-1 L_tau^T B, where the columns of B are
 !> the unit moments of the elements on their two bodies, and U = B^T L_tau.
 module nocdyn_reduced
+  use nocdyn_bank, only: role_names
   use nocdyn_element_coordinates, only: element_coordinates_t, new_element_coordinates, twist_map
   use nocdyn_formulation, only: formulation_t
   use nocdyn_internal_jacobian, only: internal_jacobian_t, new_internal_jacobian
@@ -40,7 +41,7 @@ module nocdyn_reduced
     type(lane_series_t), allocatable, private :: lane_series   !! replaces `series_kernel`, if the lanes are whole strips
     type(internal_jacobian_t), private :: internal_rows        !! positions of the internal states in the Jacobian
     type(element_coordinates_t), private :: switching          !! entries of the elements that switch
-    real(wp), allocatable, private :: zeros(:, :)              !! [lanes, elements]
+    real(wp), allocatable, private :: moment(:, :)             !! M [N m], [lanes, elements], work space
   contains
     procedure :: formulate
     procedure :: update_inertia
@@ -49,7 +50,6 @@ module nocdyn_reduced
     procedure :: derivative
     procedure :: jacobian
     procedure :: jacobian_pattern
-    procedure :: component_name
     procedure :: series_obstacle
     procedure :: prepare_series
     procedure :: series
@@ -82,7 +82,7 @@ contains
 
     is_block = .false.
     if (present(as_block)) is_block = as_block
-    call self%allocate_state(2 * self%machine%coordinates%freedoms, with_energy_balance)
+    call self%allocate_state(self%machine%coordinates%body, 2 * self%machine%coordinates%freedoms, with_energy_balance)
     self%incidence = new_element_coordinates(self%machine%elements, self%machine%coordinates)
     associate (machine => self%machine, incidence => self%incidence, freedoms => self%machine%coordinates%freedoms)
       call form_responses(freedoms, is_block, self)
@@ -92,7 +92,7 @@ contains
       self%switching = incidence%selected(machine%switches%element, with_ratio_only=.true.)
       self%start_twist = machine%start_twist()
       self%twists = twist_map(incidence, without_offset=.not. any(abs(self%start_twist) > 0), without_bands=is_block)
-      self%zeros = 0.0_wp * self%start_twist
+      self%moment = 0.0_wp * self%start_twist
       if (allocated(self%terms)) deallocate (self%terms)
       if (allocated(self%lane_motion)) deallocate (self%lane_motion)
       if (machine%lanes > 1 .and. self%quadratures == 0 .and. is_polynomial_or_external(machine)) then
@@ -140,10 +140,10 @@ contains
       if (is_indefinite) return
     end do
     call self%incidence%refresh_responses(lane, self%machine%elements, self%machine%coordinates)
-    call self%accelerations%set_lane(lane, self%incidence%response, self%response_entry)
+    self%accelerations%coefficient(lane, :) = self%incidence%response(lane, self%response_entry)
     call self%element_jacobian%refresh_lane(lane, self%incidence)
-    call self%internal_rows%refresh_lane(lane, self%incidence, self%machine%elements%internal)
-    call self%switching%refresh_selected(lane, self%incidence, self%machine%switches%element, with_ratio_only=.true.)
+    call self%internal_rows%incidence%refresh_selected(lane, self%incidence)
+    call self%switching%refresh_selected(lane, self%incidence)
   end subroutine update_inertia
 
   !> Registers the arrays that may differ from variant to variant, without those that `refresh_lane` updates. The formulation must
@@ -199,7 +199,7 @@ contains
                                           y(:self%machine%coordinates%freedoms))
   end subroutine project_start_speeds
 
-  !> omega = L_tau q', eq. (82) of section 5, and phi = start_angle + L_tau q.
+  !> omega = L_tau q', eq. (82) of section 5, phi = start_angle + L_tau q, and the internal states.
   subroutine set_state(self, y)
     class(reduced_t), intent(inout) :: self
     real(wp), contiguous, intent(in) :: y(:, :)   !! state, [lanes, states], at least
@@ -219,6 +219,7 @@ contains
         end do
       end do
     end associate
+    if (self%internal > 0) self%machine%elements%internal%value(:, :) = y(:, self%mechanical + 1:self%states)
   end subroutine set_state
 
   !> q'' = R M, and the derivatives of internal states and work integrals.
@@ -249,7 +250,8 @@ contains
                                        y(n + 1), dydt)
     else
       call evaluate_at(self, n, internal, t, y)
-      call self%accelerations%multiply_sum(self%machine%elements%restoring, self%machine%elements%applied, dydt)
+      call add(size(self%moment), self%machine%elements%restoring, self%machine%elements%applied, self%moment)
+      call self%accelerations%multiply(self%moment, dydt)
     end if
     do i = 1, n
       dydt(n + i) = y(i)
@@ -271,12 +273,20 @@ contains
     call self%machine%evaluate_elements(t)
   end subroutine evaluate_at
 
-  !> Why the machine has no Taylor series, empty if it has one.
+  !> Sentence about the first element without a Taylor series; empty if every element has one.
   subroutine series_obstacle(self, obstacle)
     class(reduced_t), intent(in) :: self
     character(len=:), allocatable, intent(out) :: obstacle
+    integer :: i
 
-    call self%machine%series_obstacle(obstacle)
+    obstacle = ''
+    do i = 1, size(self%machine%banks)
+      associate (bank => self%machine%banks(i)%bank)
+        if (size(bank%to) == 0 .or. bank%has_series()) cycle
+        obstacle = trim(role_names(bank%role)) // ' ' // quoted(bank%names(1)%text) // ' has no Taylor series'
+        return
+      end associate
+    end do
   end subroutine series_obstacle
 
   !> Allocates the recurrence for series up to an order.
@@ -317,6 +327,15 @@ contains
     y = x
   end subroutine copy
 
+  !> Adds arrays of any shape, by address.
+  pure subroutine add(n, x, y, sum)
+    integer, intent(in) :: n
+    real(wp), intent(in) :: x(n), y(n)
+    real(wp), intent(inout) :: sum(n)
+
+    sum = x + y
+  end subroutine add
+
   !> Relative angle and speed of the element of a switch.
   pure subroutine switch_motion(self, lane, switch, y, angle, speed)
     class(reduced_t), intent(in) :: self
@@ -351,7 +370,7 @@ contains
       call machine%differentiate_elements(t)
       call self%element_jacobian%fill(elements, dfdy)
       if (self%internal > 0) call self%internal_rows%fill(elements, dfdy)
-      call self%accelerations%multiply_sum(self%zeros, elements%applied_time, dfdt)
+      call self%accelerations%multiply(elements%applied_time, dfdt)
       dfdt(:, f + 1:self%states) = 0.0_wp
       do k = 1, self%quadratures
         e = machine%with_work(k)
@@ -377,24 +396,5 @@ contains
 
     call self%machine%coordinates%reactions_of_torques(lane, self%torque(lane, 1:), lambda)
   end subroutine reactions
-
-  !> Name of a component of the state, for messages.
-  function component_name(self, index) result(name)
-    class(reduced_t), intent(in) :: self
-    integer, intent(in) :: index
-    character(len=:), allocatable :: name
-
-    associate (coordinates => self%machine%coordinates)
-      if (index <= coordinates%freedoms) then
-        name = 'speed of ' // quoted(self%machine%names(coordinates%body(index))%text)
-      else if (index <= self%mechanical) then
-        name = 'angle of ' // quoted(self%machine%names(coordinates%body(index - coordinates%freedoms))%text)
-      else if (index <= self%states) then
-        name = self%machine%internal_name(index - self%mechanical)
-      else
-        name = 'work of ' // quoted(self%machine%element_name(self%machine%with_work(index - self%states)))
-      end if
-    end associate
-  end function component_name
 
 end module nocdyn_reduced

@@ -177,11 +177,8 @@ contains
     class(reduced_jacobian_t), intent(inout) :: self
     integer, intent(in) :: lane
     type(element_coordinates_t), intent(in) :: incidence
-    integer :: n
 
-    do n = 1, size(self%element)
-      self%product(lane, n) = incidence%response(lane, self%response_entry(n)) * incidence%ratio(lane, self%ratio_entry(n))
-    end do
+    self%product(lane, :) = incidence%response(lane, self%response_entry) * incidence%ratio(lane, self%ratio_entry)
   end subroutine refresh_lane
 
   !> Registers the arrays whose values may differ from variant to variant.

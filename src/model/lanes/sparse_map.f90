@@ -6,8 +6,7 @@ module nocdyn_sparse_map
   use nocdyn_kinds, only: wp
   use nocdyn_lane_parameters, only: lane_parameters_t
   use nocdyn_csr_products, only: multiply_lanes, multiply_rows
-  use nocdyn_band_products, only: multiply_toeplitz, multiply_band, pair_of_toeplitz, pair_of_band, &
-    sum_of_toeplitz, sum_of_band
+  use nocdyn_band_products, only: multiply_band, multiply_toeplitz, pair_of_band, pair_of_toeplitz
   implicit none (type, external)
   private
 
@@ -36,8 +35,6 @@ module nocdyn_sparse_map
   contains
     procedure :: multiply
     procedure :: multiply_pair
-    procedure :: multiply_sum
-    procedure :: set_lane
     procedure :: list_parameters
   end type sparse_map_t
 
@@ -123,13 +120,10 @@ contains
     integer, intent(in) :: width   !! entries of each row
     integer, intent(in) :: rows
     real(wp), intent(in) :: coefficient(:, :)   !! [lanes, entries]
-    integer :: k
 
-    has_constant_diagonals = .false.
-    do k = first + width, first + width * rows - 1
-      if (any(abs(coefficient(:, k) - coefficient(:, k - width)) > 0)) return
-    end do
-    has_constant_diagonals = .true.
+    associate (last => first + width * rows - 1)
+      has_constant_diagonals = all(.not. abs(coefficient(:, first + width:last) - coefficient(:, first:last - width)) > 0)
+    end associate
   end function has_constant_diagonals
 
   subroutine append_csr_rows(first, begin, end, order, self)
@@ -293,89 +287,6 @@ contains
       end do
     end do
   end subroutine pair_on_lanes
-
-  !> u = map (x + y).
-  subroutine multiply_sum(self, x, y, u)
-    class(sparse_map_t), intent(in) :: self
-    real(wp), intent(in) :: x(self%lanes * self%columns), y(self%lanes * self%columns)   !! [lanes, columns]
-    real(wp), intent(inout) :: u(self%lanes * self%all_rows)                             !! [lanes, rows]
-    integer :: s
-
-    if (self%lanes > 1) then
-      call sum_on_lanes(self%lanes, self%all_rows, self%columns, size(self%column), self%first, self%column, &
-                        self%coefficient, x, y, u)
-      return
-    end if
-    call sum_of_rows(self%csr_rows, self%all_rows, self%columns, size(self%column), self%row, self%first, self%column, &
-                     self%coefficient, x, y, u)
-    do s = 1, self%bands
-      associate (entry => self%first_entry(s))
-        if (self%is_toeplitz(s)) then
-          call sum_of_toeplitz(self%rows(s), self%width(s), self%columns, self%column(entry), &
-                                   self%coefficient(1, entry), x, y, u(self%first_row(s)))
-        else
-          call sum_of_band(self%rows(s), self%width(s), self%columns, self%column(entry), self%coefficient(1, entry), &
-                              x, y, u(self%first_row(s)))
-        end if
-      end associate
-    end do
-  end subroutine multiply_sum
-
-  pure subroutine sum_of_rows(rows, all_rows, columns, entries, row, first, column, coefficient, x, y, u)
-    integer, intent(in) :: rows, all_rows, columns, entries
-    integer, intent(in) :: row(rows), first(rows + 1), column(entries)
-    real(wp), intent(in) :: coefficient(entries), x(columns), y(columns)
-    real(wp), intent(inout) :: u(all_rows)
-    real(wp) :: sum
-    integer :: i, k
-
-    do i = 1, rows
-      sum = 0.0_wp
-      do k = first(i), first(i + 1) - 1
-        sum = sum + coefficient(k) * (x(column(k)) + y(column(k)))
-      end do
-      u(row(i)) = sum
-    end do
-  end subroutine sum_of_rows
-
-  pure subroutine sum_on_lanes(lanes, rows, columns, entries, first, column, coefficient, x, y, u)
-    integer, intent(in) :: lanes, rows, columns, entries
-    integer, intent(in) :: first(rows + 1), column(entries)
-    real(wp), intent(in) :: coefficient(lanes, entries), x(lanes, columns), y(lanes, columns)
-    real(wp), intent(inout) :: u(lanes, rows)
-    integer :: c, i, k, l
-
-    do i = 1, rows
-      k = first(i)
-      if (k == first(i + 1)) then
-        u(:, i) = 0.0_wp
-        cycle
-      end if
-      c = column(k)
-      do l = 1, lanes
-        u(l, i) = 0.0_wp + coefficient(l, k) * (x(l, c) + y(l, c))
-      end do
-      do k = first(i) + 1, first(i + 1) - 1
-        c = column(k)
-        do l = 1, lanes
-          u(l, i) = u(l, i) + coefficient(l, k) * (x(l, c) + y(l, c))
-        end do
-      end do
-    end do
-  end subroutine sum_on_lanes
-
-  !> Sets the coefficients of one lane of a map without bands: entry i becomes coefficient(lane, order(i)).
-  subroutine set_lane(self, lane, coefficient, order)
-    class(sparse_map_t), intent(inout) :: self
-    integer, intent(in) :: lane
-    real(wp), intent(in) :: coefficient(:, :)   !! [lanes, numbers]
-    integer, intent(in) :: order(:)             !! [entries]
-    integer :: i
-
-    do i = 1, size(self%column)
-      self%coefficient(lane, i) = coefficient(lane, order(i))
-    end do
-  end subroutine set_lane
 
   !> Lists the coefficients; only for a map without bands.
   subroutine list_parameters(self, parameters)

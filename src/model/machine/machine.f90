@@ -56,7 +56,7 @@ module nocdyn_machine
     procedure :: differentiate
     procedure :: differentiate_elements
     procedure :: evaluate_energies
-    procedure :: series_obstacle
+    procedure :: forcing_series
     procedure :: power
     procedure :: kinetic_energy
     procedure :: stored_energy
@@ -321,21 +321,20 @@ contains
     end do
   end subroutine evaluate_energies
 
-  !> Sentence about the first element without a Taylor series; empty if every element has one.
-  subroutine series_obstacle(self, obstacle)
+  !> Taylor coefficients 0 to `last` of the torques that depend on the time alone.
+  subroutine forcing_series(self, last, stride, t, applied)
     class(machine_t), intent(in) :: self
-    character(len=:), allocatable, intent(out) :: obstacle
+    integer, intent(in) :: last, stride                      !! number of the last coefficient; from column to column
+    real(wp), intent(in) :: t(self%lanes)                    !! [s]
+    real(wp), intent(inout) :: applied(stride, 0:last + 1)   !! [N m / s^k]; the last column leaves room for offsets
     integer :: i
 
-    obstacle = ''
-    do i = 1, size(self%banks)
-      associate (bank => self%banks(i)%bank)
-        if (size(bank%to) == 0 .or. bank%has_series()) cycle
-        obstacle = trim(role_names(bank%role)) // ' ' // quoted(bank%names(1)%text) // ' has no Taylor series'
-        return
+    do i = 1, size(self%general_banks)
+      associate (bank => self%banks(self%general_banks(i))%bank)
+        call bank%forcing_series(last, stride, t, applied(bank%first_value, 0))
       end associate
     end do
-  end subroutine series_obstacle
+  end subroutine forcing_series
 
   !> Powers of the elements `with_work` after `evaluate`, positive into the machine.
   subroutine power(self, watts)

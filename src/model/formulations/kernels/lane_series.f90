@@ -68,7 +68,7 @@ contains
     real(wp), intent(inout) :: y(machine%lanes, columns, 0:self%order)   !! coefficients; number 0 is given
     integer :: l
 
-    call forcing_series(self, machine, t)
+    call machine%forcing_series(self%order - 1, machine%lanes * self%elements, t, self%external)
     associate (lanes => machine%lanes, f => machine%coordinates%freedoms, n => self%elements, laws => machine%laws, &
                entries => size(twists%column), responses => size(accelerations%column))
       do l = 1, lanes, strip
@@ -87,19 +87,5 @@ contains
       end do
     end associate
   end subroutine expand
-
-  !> Coefficients of the torques that depend on the time alone.
-  subroutine forcing_series(self, machine, t)
-    type(lane_series_t), intent(inout) :: self
-    type(machine_t), intent(in) :: machine
-    real(wp), intent(in) :: t(machine%lanes)   !! [s]
-    integer :: i
-
-    do i = 1, size(machine%general_banks)
-      associate (bank => machine%banks(machine%general_banks(i))%bank)
-        call bank%forcing_series(self%order - 1, machine%lanes * self%elements, t, self%external(1, bank%first, 0))
-      end associate
-    end do
-  end subroutine forcing_series
 
 end module nocdyn_lane_series

@@ -143,7 +143,7 @@ contains
     real(wp), intent(inout) :: y(length, 0:self%order)        !! coefficients; number 0 is given
     integer :: k
 
-    call forcing_series(self, machine, t)
+    call machine%forcing_series(self%order - 1, self%stride, t, self%external)
     call twists%multiply_pair(start_twist, y(n + 1, 0), y(1, 0), self%angle, self%speed)
     do k = 0, self%order - 1
       if (k > 0) call element_speeds(self, twists, n, y(1, k), self%speed(1, k))
@@ -153,20 +153,6 @@ contains
       if (self%has_energy_balance) call integrate_powers(self, machine, k, y(2 * n + 1, k + 1))
     end do
   end subroutine expand
-
-  !> Coefficients of the torques that depend on the time alone.
-  subroutine forcing_series(self, machine, t)
-    type(reduced_series_t), intent(inout) :: self
-    type(machine_t), intent(in) :: machine
-    real(wp), intent(in) :: t(self%lanes)   !! [s]
-    integer :: i
-
-    do i = 1, size(machine%general_banks)
-      associate (bank => machine%banks(machine%general_banks(i))%bank)
-        call bank%forcing_series(self%order - 1, self%stride, t, self%external(bank%first_value, 0))
-      end associate
-    end do
-  end subroutine forcing_series
 
   !> Computes u'_k = U q'_k.
   subroutine element_speeds(self, twists, n, q, u)
