@@ -59,12 +59,11 @@ contains
     type(torque_balance_t), intent(inout) :: balance
     real(wp), intent(in) :: z(:)   !! the other unknowns, [unknowns]
     type(block_solutions_t), intent(inout) :: block
-    real(wp) :: grid(-2 * decades * points_per_decade - 1:2 * decades * points_per_decade + 1)
-    real(wp) :: torque(lbound(grid, 1):ubound(grid, 1))
+    real(wp), dimension(4 * decades * points_per_decade + 3) :: grid, torque
     integer :: i
 
     call fill_speed_grid(balance, block%members(1), grid)
-    do i = lbound(grid, 1), ubound(grid, 1)
+    do i = 1, size(grid)
       torque(i) = imbalance(balance, z, block%members(1), grid(i))
       if (abs(torque(i)) < abs(block%least_torque)) then
         block%least_torque = torque(i)
@@ -76,8 +75,8 @@ contains
       call add(z(block%members), block)
       return
     end if
-    do i = lbound(grid, 1), ubound(grid, 1)
-      call search_interval(balance, z, grid, torque, lbound(grid, 1), i, block)
+    do i = 1, size(grid)
+      call search_interval(balance, z, grid, torque, i, block)
     end do
   end subroutine scan
 
@@ -85,36 +84,37 @@ contains
   subroutine fill_speed_grid(balance, freedom, grid)
     type(torque_balance_t), intent(in) :: balance
     integer, intent(in) :: freedom
-    real(wp), intent(out) :: grid(-2 * decades * points_per_decade - 1:)   !! [rad/s]
+    real(wp), intent(out) :: grid(:)   !! [rad/s]
     real(wp) :: unit(balance%motions%freedoms()), fastest
-    integer :: i
+    integer :: i, middle
 
     unit = 0.0_wp
     unit(freedom) = 1.0_wp
     fastest = maxval(abs(balance%body_speeds(unit)))
-    grid(0) = 0.0_wp
-    do i = 1, ubound(grid, 1)
-      grid(i) = 10.0_wp**(real(i - 1, wp) / points_per_decade - decades) / fastest
-      grid(-i) = -grid(i)
+    middle = (size(grid) + 1) / 2
+    grid(middle) = 0.0_wp
+    do i = 1, middle - 1
+      grid(middle + i) = 10.0_wp**(real(i - 1, wp) / points_per_decade - decades) / fastest
+      grid(middle - i) = -grid(middle + i)
     end do
   end subroutine fill_speed_grid
 
   !> Finds the solutions between a point of the grid and the next, and near a minimum at the point.
-  subroutine search_interval(balance, z, grid, torque, lower, i, block)
+  subroutine search_interval(balance, z, grid, torque, i, block)
     type(torque_balance_t), intent(inout) :: balance
-    real(wp), intent(in) :: z(:)                           !! the other unknowns, [unknowns]
-    integer, intent(in) :: lower, i                        !! lower bound of the grid, point
-    real(wp), intent(in) :: grid(lower:), torque(lower:)   !! [rad/s], [N m]
+    real(wp), intent(in) :: z(:)                 !! the other unknowns, [unknowns]
+    real(wp), intent(in) :: grid(:), torque(:)   !! [rad/s], [N m]
+    integer, intent(in) :: i                     !! point of the grid
     type(block_solutions_t), intent(inout) :: block
     real(wp) :: middle, top
 
-    associate (member => block%members(1), n => ubound(grid, 1))
+    associate (member => block%members(1))
       if (abs(torque(i)) <= 0.0_wp) then
-        call add_range(z(member), grid, torque, lower, i, block)
-      else if (i < n) then
+        call add_range(z(member), grid, torque, i, block)
+      else if (i < size(grid)) then
         if (torque(i) * torque(i + 1) < 0.0_wp) then
           call solve_bracketed(balance, z, grid(i), grid(i + 1), torque(i), block)
-        else if (i > lower) then
+        else if (i > 1) then
           if (.not. is_local_minimum(torque(i - 1:i + 1))) return
           call minimise_torque(balance, z, member, grid(i - 1), grid(i + 1), middle, top)
           if (abs(top) <= 0.0_wp) then
@@ -129,17 +129,15 @@ contains
   end subroutine search_interval
 
   !> Adds a point of the grid at which the torques balance, or, of a range that begins there, the speed nearest to `start`.
-  subroutine add_range(start, grid, torque, lower, i, block)
-    real(wp), intent(in) :: start                          !! [rad/s]
-    integer, intent(in) :: lower, i                        !! lower bound of the grid, point
-    real(wp), intent(in) :: grid(lower:), torque(lower:)   !! [rad/s], [N m]
+  subroutine add_range(start, grid, torque, i, block)
+    real(wp), intent(in) :: start                !! [rad/s]
+    real(wp), intent(in) :: grid(:), torque(:)   !! [rad/s], [N m]
+    integer, intent(in) :: i                     !! point of the grid
     type(block_solutions_t), intent(inout) :: block
     integer :: last
 
-    if (i > lower) then
-      if (abs(torque(i - 1)) <= 0.0_wp) return
-    end if
-    do last = i, ubound(grid, 1) - 1
+    if (any(abs(torque(max(1, i - 1):i - 1)) <= 0.0_wp)) return
+    do last = i, size(grid) - 1
       if (abs(torque(last + 1)) > 0.0_wp) exit
     end do
     call add([max(grid(i), min(start, grid(last)))], block)
@@ -186,9 +184,7 @@ contains
     b = right
     sign_outside = imbalance(balance, z, member, left)
     inside = [b - golden * (b - a), a + golden * (b - a)]
-    do i = 1, 2
-      value(i) = imbalance(balance, z, member, inside(i))
-    end do
+    value = [(imbalance(balance, z, member, inside(i)), i=1, 2)]
     do i = 1, sections
       if (any(value * sign_outside <= 0.0_wp)) exit
       if (abs(value(1)) < abs(value(2))) then
@@ -293,7 +289,7 @@ contains
     associate (members => block%members)
       call balance%evaluate(z)
       do i = 1, most_steps
-        if (is_balanced(balance, members)) exit
+        if (all(abs(balance%residual(members)) <= epsilon(1.0_wp) * balance%scale(members))) exit   ! zero up to the last bit
         call balance%differentiate(slopes)
         weight = 1.0_wp / max(maxval(abs(slopes(members, members)), dim=2), tiny(1.0_wp)**0.25_wp)
         before = norm2(weight * balance%residual(members))
@@ -369,31 +365,14 @@ contains
     moved(members) = moved(members) + step
   end function moved
 
-  !> Whether the residuals are zero up to the last bit of their terms.
-  pure logical function is_balanced(balance, members)
-    type(torque_balance_t), intent(in) :: balance
-    integer, intent(in) :: members(:)   !! unknowns of the block
-
-    is_balanced = all(abs(balance%residual(members)) <= epsilon(1.0_wp) * balance%scale(members))
-  end function is_balanced
-
   !> Whether the residuals are rounding, so that Newton's method has ended at a root.
   pure logical function is_nearly_balanced(balance, members)
     type(torque_balance_t), intent(in) :: balance
     integer, intent(in) :: members(:)   !! unknowns of the block
     real(wp), parameter :: near = 1.0e-10_wp
-    integer :: i
 
-    is_nearly_balanced = .true.
-    do i = 1, size(members)
-      associate (residual => abs(balance%residual(members(i))))
-        if (members(i) <= balance%motions%freedoms()) then
-          is_nearly_balanced = is_nearly_balanced .and. residual <= near * balance%scale(members(i))
-        else
-          is_nearly_balanced = is_nearly_balanced .and. residual <= near
-        end if
-      end associate
-    end do
+    is_nearly_balanced = all(abs(balance%residual(members)) <= &
+                             near * merge(balance%scale(members), 1.0_wp, members <= balance%motions%freedoms()))
   end function is_nearly_balanced
 
 end module nocdyn_balance_search

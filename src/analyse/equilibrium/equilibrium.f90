@@ -1,6 +1,7 @@
 !> Steady states of a machine: constant speeds, mean torques, constant twists.
 module nocdyn_equilibrium
   use nocdyn_balance_search, only: block_solutions_t, search_balance
+  use nocdyn_energy_balance, only: element_names
   use nocdyn_errors, only: error_t, exit_failed, raise
   use nocdyn_formulation, only: formulation_t
   use nocdyn_kinds, only: wp
@@ -128,7 +129,6 @@ contains
     real(wp), intent(in) :: z(:)       !! the solution, [unknowns]
     type(string_t), allocatable, intent(inout) :: notes(:)
     integer, allocatable :: undetermined(:)
-    type(string_t), allocatable :: names(:)
     integer :: i
 
     do i = 1, size(blocks)
@@ -139,12 +139,9 @@ contains
     end do
     allocate (undetermined, source=undetermined_elements(balance))
     if (size(undetermined) == 0) return
-    allocate (names(0))
-    do i = 1, size(undetermined)
-      call append(names, balance%formulation%machine%element_name(undetermined(i)))
-    end do
     call append_new(notes, 'inside an open gap, or where a law is level, any twist is steady: of ' // &
-                           joined(names, ', ', most_names) // ' one near the start is kept')
+                           joined(element_names(balance%formulation%machine, undetermined), ', ', most_names) // &
+                           ' one near the start is kept')
   end subroutine add_range_notes
 
   !> Appends a note, unless the list has it.
@@ -153,10 +150,7 @@ contains
     character(len=*), intent(in) :: text
     integer :: i
 
-    do i = 1, size(notes)
-      if (notes(i)%text == text) return
-    end do
-    call append(notes, text)
+    if (.not. any([(notes(i)%text == text, i=1, size(notes))])) call append(notes, text)
   end subroutine append_new
 
   !> Advances to the next combination; false after the last one.

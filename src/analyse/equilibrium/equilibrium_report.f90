@@ -157,8 +157,8 @@ contains
       call json%open()
       call json%put('stability', trim(self%equilibria(k)%stability))
       if (self%equilibria(k)%stability /= 'not determined') call json%put('growth_rate_1_s', self%equilibria(k)%growth)
-      call put_members(json, 'values', self%labels, self%values(:, k))
-      call put_members(json, 'power_W', self%work_elements, self%power(:, k))
+      call json%put('values', self%labels, self%values(:, k))
+      call json%put('power_W', self%work_elements, self%power(:, k))
       call json%put('power_put_in_W', sum(max(self%power(:, k), 0.0_wp)))
       call json%put('power_residual_W', sum(self%power(:, k)))
       call json%close()
@@ -167,19 +167,5 @@ contains
     call json%close()
     text = json%text()
   end function equilibrium_json
-
-  subroutine put_members(json, key, labels, values)
-    type(json_t), intent(inout) :: json
-    character(len=*), intent(in) :: key
-    type(string_t), intent(in) :: labels(:)
-    real(wp), intent(in) :: values(:)
-    integer :: i
-
-    call json%open(key)
-    do i = 1, size(labels)
-      call json%put(labels(i)%text, values(i))
-    end do
-    call json%close()
-  end subroutine put_members
 
 end module nocdyn_equilibrium_report

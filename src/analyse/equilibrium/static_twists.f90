@@ -128,13 +128,9 @@ contains
   pure real(wp) function torque_excess(self)
     type(twist_problem_t), intent(in) :: self
 
-    integer :: c, i
-
-    torque_excess = 0.0_wp
-    do i = 1, size(self%unknown)
-      c = self%unknown(i)
-      if (abs(self%torque(c)) > 0.0_wp) torque_excess = max(torque_excess, abs(self%torque(c)) / self%tolerance(c))
-    end do
+    associate (torque => abs(self%torque(self%unknown)))
+      torque_excess = max(0.0_wp, maxval(torque / self%tolerance(self%unknown), mask=torque > 0.0_wp))
+    end associate
   end function torque_excess
 
   !> Whether a step has lowered the energy, or changed it by rounding only.
@@ -143,10 +139,8 @@ contains
     real(wp), intent(in) :: energy    !! before the step
     real(wp), intent(in) :: step(:)   !! [rad], [coordinates]
     real(wp), parameter :: rounding = 1.0e-12_wp
-    real(wp) :: turned
 
-    turned = abs(energy) + sum(abs(self%external_torque * step))
-    lowers_energy = self%energy <= energy + rounding * turned
+    lowers_energy = self%energy <= energy + rounding * (abs(energy) + sum(abs(self%external_torque * step)))
   end function lowers_energy
 
   !> Sets the order of the coordinates and the torques of the other elements.

@@ -72,15 +72,11 @@ contains
   pure subroutine clear_rounding(values)
     complex(wp), intent(inout) :: values(:)   !! eigenvalues [1/s]
     real(wp), parameter :: rounding = 1.0e-13_wp
-    real(wp) :: least, parts(2)
-    integer :: i
+    real(wp) :: parts(size(values), 2)
 
-    least = rounding * maxval(abs(values))
-    do i = 1, size(values)
-      parts = [real(values(i), wp), aimag(values(i))]
-      where (abs(parts) <= least) parts = 0.0_wp
-      values(i) = cmplx(parts(1), parts(2), wp)
-    end do
+    parts = reshape([real(values, wp), aimag(values)], shape(parts))
+    where (abs(parts) <= rounding * maxval(abs(values))) parts = 0.0_wp
+    values = cmplx(parts(:, 1), parts(:, 2), wp)
   end subroutine clear_rounding
 
   !> Speeds of the coordinates and twists of the elastic elements, from the eigenvectors (p, e, internal states).

@@ -1,6 +1,6 @@
 !> The printed report on the modes of a machine.
 module nocdyn_modes_report
-  use nocdyn_energy_balance, only: elastic_element_names
+  use nocdyn_energy_balance, only: element_names
   use nocdyn_errors, only: error_t
   use nocdyn_kinds, only: wp
   use nocdyn_linearisation, only: linearisation_t, linearise
@@ -48,7 +48,7 @@ contains
     if (allocated(error)) return
     self%machine = point%formulation%machine
     allocate (self%elastic, source=self%machine%elastic())
-    allocate (self%elastic_names, source=elastic_element_names(self%machine))
+    allocate (self%elastic_names, source=element_names(self%machine, self%elastic))
     call find_modes(point%formulation, linear, self%elastic, self%modes, error)
     if (allocated(error)) return
     call point%formulation%set_state(point%y)

@@ -10,7 +10,7 @@ module nocdyn_energy_balance
   implicit none (type, external)
   private
 
-  public :: work_element_names, elastic_element_names, put_energy_balance, append_energy_balance
+  public :: work_element_names, element_names, put_energy_balance, append_energy_balance
 
   integer, parameter :: max_lines = 10   ! of each list
 
@@ -23,12 +23,6 @@ module nocdyn_energy_balance
   contains
     procedure :: residual
   end type energy_balance_t
-
-  !> One line of the printed table.
-  type :: entry_t
-    character(len=:), allocatable :: name
-    real(wp) :: energy = 0.0_wp   !! into the machine, negative if out of it [J]
-  end type entry_t
 
 contains
 
@@ -50,19 +44,18 @@ contains
     end do
   end function work_element_names
 
-  !> The names of the elements that can store energy, in the order of `elastic` of the machine.
-  function elastic_element_names(machine) result(names)
+  !> The names of some elements of a machine.
+  function element_names(machine, elements) result(names)
     type(machine_t), intent(in) :: machine
+    integer, intent(in) :: elements(:)   !! their numbers
     type(string_t), allocatable :: names(:)
     integer :: i
 
-    associate (elastic => machine%elastic())
-      allocate (names(size(elastic)))
-      do i = 1, size(elastic)
-        names(i)%text = machine%element_name(elastic(i))
-      end do
-    end associate
-  end function elastic_element_names
+    allocate (names(size(elements)))
+    do i = 1, size(elements)
+      names(i)%text = machine%element_name(elements(i))
+    end do
+  end function element_names
 
   !> The energy balance error [J]: the increase of the stored energies, less the works.
   pure real(wp) function residual(self)
@@ -78,11 +71,7 @@ contains
     integer :: i
 
     call json%open('energy_account')
-    call json%open('work_in_J')
-    do i = 1, size(self%work_elements)
-      call json%put(self%work_elements(i)%text, self%work(i))
-    end do
-    call json%close()
+    call json%put('work_in_J', self%work_elements, self%work)
     call json%open('stored_J')
     do i = 1, size(self%elastic_elements)
       call json%put(self%elastic_elements(i)%text, [self%stored_start(i), self%stored_end(i)])
@@ -99,58 +88,56 @@ contains
     type(text_buffer_t), intent(inout) :: report
     type(energy_balance_t), intent(in) :: self
     character(len=*), parameter :: last_line = 'energy balance error'
-    type(entry_t), allocatable :: entries(:)
+    type(string_t), allocatable :: names(:)
+    real(wp), allocatable :: energies(:)
     integer :: i, width
 
-    allocate (entries, source=all_entries(self))
-    if (all(abs(entries%energy) <= 0.0_wp)) return
+    call list_entries(self, names, energies)
+    if (all(abs(energies) <= 0.0_wp)) return
     width = len(last_line)
-    do i = 1, size(entries)
-      if (abs(entries(i)%energy) > 0.0_wp) width = max(width, text_width(entries(i)%name) + 2)
+    do i = 1, size(names)
+      if (abs(energies(i)) > 0.0_wp) width = max(width, text_width(names(i)%text) + 2)
     end do
     call report%append_line('energy came from [J]')
-    call append_side(entries, 1.0_wp, width, report)
+    call append_side(names, energies, 1.0_wp, width, report)
     call report%append_line('and went to [J]')
-    call append_side(entries, -1.0_wp, width, report)
+    call append_side(names, energies, -1.0_wp, width, report)
     call report%append_line(padded(last_line, width) // cell(self%residual()))
   end subroutine append_energy_balance
 
   !> The works, and the energies that couplings and bodies have released.
-  function all_entries(self) result(entries)
+  subroutine list_entries(self, names, energies)
     type(energy_balance_t), intent(in) :: self
-    type(entry_t), allocatable :: entries(:)
-    integer :: i, n
+    type(string_t), allocatable, intent(out) :: names(:)
+    real(wp), allocatable, intent(out) :: energies(:)   !! into the machine, negative if out of it [J]
+    integer :: i
 
-    n = size(self%work_elements)
-    allocate (entries(n + size(self%elastic_elements) + 1))
-    do i = 1, n
-      entries(i)%name = self%work_elements(i)%text
-      entries(i)%energy = self%work(i)
-    end do
+    allocate (energies, source=[self%work, self%stored_start - self%stored_end, self%kinetic_start - self%kinetic_end])
+    allocate (names(size(energies)))
+    names(:size(self%work)) = self%work_elements
     do i = 1, size(self%elastic_elements)
-      entries(n + i)%name = 'stored in ' // self%elastic_elements(i)%text
-      entries(n + i)%energy = self%stored_start(i) - self%stored_end(i)
+      names(size(self%work) + i)%text = 'stored in ' // self%elastic_elements(i)%text
     end do
-    entries(size(entries))%name = 'kinetic energy'
-    entries(size(entries))%energy = self%kinetic_start - self%kinetic_end
-  end function all_entries
+    names(size(names))%text = 'kinetic energy'
+  end subroutine list_entries
 
   !> The entries of one side, the largest first.
-  subroutine append_side(entries, sign, width, report)
-    type(entry_t), intent(in) :: entries(:)
-    real(wp), intent(in) :: sign              !! of their energies: 1 or -1
+  subroutine append_side(names, energies, sign, width, report)
+    type(string_t), intent(in) :: names(:)
+    real(wp), intent(in) :: energies(:)       !! [J]
+    real(wp), intent(in) :: sign              !! of those of the side: 1 or -1
     integer, intent(in) :: width              !! of the names
     type(text_buffer_t), intent(inout) :: report
-    real(wp) :: left(size(entries)), total
+    real(wp) :: left(size(energies)), total
     integer :: i, largest, lines, others
 
-    left = max(sign * entries%energy, 0.0_wp)
-    total = sum(max(entries%energy, 0.0_wp))
+    left = max(sign * energies, 0.0_wp)
+    total = sum(max(energies, 0.0_wp))
     others = count(left > 0.0_wp)
     lines = merge(others, max_lines - 1, others <= max_lines)
     do i = 1, lines
       largest = maxloc(left, dim=1)
-      call append_entry(report, entries(largest)%name, left(largest), total, width)
+      call append_entry(report, names(largest)%text, left(largest), total, width)
       left(largest) = 0.0_wp
     end do
     others = others - lines
@@ -163,11 +150,10 @@ contains
     real(wp), intent(in) :: energy   !! [J]
     real(wp), intent(in) :: total    !! of which the share is printed [J]
     integer, intent(in) :: width
-    character(len=:), allocatable :: line
 
-    line = padded('  ' // name, width) // cell(energy)
-    if (total > 0.0_wp) line = line // '  ' // rounded_text(100.0_wp * energy / total, 3) // ' %'
-    call report%append_line(line)
+    call report%append(padded('  ' // name, width) // cell(energy))
+    if (total > 0.0_wp) call report%append('  ' // rounded_text(100.0_wp * energy / total, 3) // ' %')
+    call report%append_line('')
   end subroutine append_entry
 
 end module nocdyn_energy_balance

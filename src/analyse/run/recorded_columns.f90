@@ -64,25 +64,23 @@ contains
   pure function segments_of(columns) result(segments)
     type(column_t), intent(in) :: columns(:)
     type(segment_t), allocatable :: segments(:)
-    type(segment_t) :: all(size(columns))
+    type(segment_t) :: all(0:size(columns))
     logical :: is_of_same
     integer :: i, n
 
     n = 0
+    all(0)%kind = 0   ! of no column
     do i = 1, size(columns)
-      is_of_same = .false.
-      if (n > 0) is_of_same = columns(i)%kind == all(n)%kind .and. columns(i)%bank == all(n)%bank .and. &
-                              columns(i)%quantity == all(n)%quantity
-      if (is_of_same) then
-        if (columns(i)%index == all(n)%index + i - all(n)%first) then
-          all(n)%last = i
-          cycle
-        end if
+      is_of_same = columns(i)%kind == all(n)%kind .and. columns(i)%bank == all(n)%bank .and. &
+                   columns(i)%quantity == all(n)%quantity
+      if (is_of_same .and. columns(i)%index == all(n)%index + i - all(n)%first) then
+        all(n)%last = i
+        cycle
       end if
       n = n + 1
       all(n) = segment_t(columns(i)%kind, columns(i)%bank, columns(i)%quantity, columns(i)%index, i, i, .not. is_of_same)
     end do
-    segments = all(:n)
+    segments = all(1:n)
   end function segments_of
 
   !> Copies the parameters of a lane from the formulation that is integrated.
@@ -202,12 +200,10 @@ contains
     integer, intent(in) :: lane
     logical, intent(in) :: of_sources
     real(wp), contiguous, intent(in) :: y(:, :)
-    integer :: i
 
-    work = 0.0_wp
-    do i = 1, size(self%is_source)
-      if (self%is_source(i) .eqv. of_sources) work = work + y(lane, self%formulation%states + i)
-    end do
+    associate (states => self%formulation%states)
+      work = sum(y(lane, states + 1:states + size(self%is_source)), mask=self%is_source .eqv. of_sources)
+    end associate
   end function work
 
 end module nocdyn_recorded_columns

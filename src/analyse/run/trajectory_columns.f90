@@ -21,7 +21,7 @@ module nocdyn_trajectory_columns
   integer, parameter, public :: column_work_out = 10
   integer, parameter, public :: column_residual = 11
 
-  character(len=*), parameter :: energy_labels(column_kinetic:column_residual) = &
+  character(len=*), parameter, public :: energy_labels(column_kinetic:column_residual) = &
     [character(len=19) :: 'kinetic_energy [J]', 'elastic_energy [J]', 'work_in [J]', 'work_out [J]', 'energy_residual [J]']
 
   type, public :: column_t
@@ -39,7 +39,7 @@ contains
     type(column_t), allocatable, intent(out) :: columns(:)
     type(string_t), allocatable, intent(out) :: labels(:)
     type(quantity_t), allocatable :: quantities(:)
-    integer :: b, count, i, kind
+    integer :: b, bank, count, e, kind, q
 
     count = column_count(machine)
     allocate (columns(count), labels(count))
@@ -51,9 +51,16 @@ contains
     do b = 1, machine%bodies
       call add_column(columns, labels, count, column_t(column_speed, index=b), 'omega_' // machine%names(b)%text // ' [rad/s]')
     end do
-    do i = 1, size(machine%banks)
-      quantities = machine%banks(i)%bank%quantities()
-      call add_bank(machine%banks(i)%bank%names, i, quantities, columns, labels, count)
+    do bank = 1, size(machine%banks)
+      quantities = machine%banks(bank)%bank%quantities()
+      do q = 1, size(quantities)
+        do e = 1, size(quantities(q)%elements)
+          associate (element => quantities(q)%elements(e), names => machine%banks(bank)%bank%names)
+            call add_column(columns, labels, count, column_t(column_element, bank, q, element), &
+                            trim(quantities(q)%name) // '_' // names(element)%text // ' [' // trim(quantities(q)%unit) // ']')
+          end associate
+        end do
+      end do
     end do
     call add_reactions(machine%constraints, columns, labels, count)
     do kind = column_kinetic, column_residual
@@ -72,25 +79,6 @@ contains
     columns(count) = column
     labels(count)%text = label
   end subroutine add_column
-
-  subroutine add_bank(names, bank, quantities, columns, labels, count)
-    type(string_t), intent(in) :: names(:)
-    integer, intent(in) :: bank
-    type(quantity_t), intent(in) :: quantities(:)
-    type(column_t), intent(inout) :: columns(:)
-    type(string_t), intent(inout) :: labels(:)
-    integer, intent(inout) :: count
-    integer :: e, q
-
-    do q = 1, size(quantities)
-      do e = 1, size(quantities(q)%elements)
-        associate (element => quantities(q)%elements(e))
-          call add_column(columns, labels, count, column_t(column_element, bank, q, element), &
-                          trim(quantities(q)%name) // '_' // names(element)%text // ' [' // trim(quantities(q)%unit) // ']')
-        end associate
-      end do
-    end do
-  end subroutine add_bank
 
   !> The multiplier of each row, followed by the torques on those of its members that have a column.
   subroutine add_reactions(constraints, columns, labels, count)

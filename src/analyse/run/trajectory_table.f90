@@ -1,6 +1,6 @@
 !> The rows of trajectory.csv: all columns of a machine of one lane at a time and state.
 module nocdyn_trajectory_table
-  use nocdyn_energy_balance, only: elastic_element_names, energy_balance_t, work_element_names
+  use nocdyn_energy_balance, only: element_names, energy_balance_t, work_element_names
   use nocdyn_formulation, only: formulation_t
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
@@ -69,7 +69,7 @@ contains
     associate (formulation => self%columns%formulation, machine => self%columns%formulation%machine)
       allocate (balance%work_elements, source=work_element_names(machine))
       allocate (balance%work, source=y(formulation%states + 1:))
-      allocate (balance%elastic_elements, source=elastic_element_names(machine))
+      allocate (balance%elastic_elements, source=element_names(machine, machine%elastic()))
       allocate (balance%stored_start, source=self%start_stored)
       allocate (balance%stored_end, source=stored_energies(machine))
     end associate
@@ -81,11 +81,8 @@ contains
   pure function stored_energies(machine) result(energies)
     type(machine_t), intent(in) :: machine
     real(wp), allocatable :: energies(:)
-    integer, allocatable :: elastic(:)
-    integer :: i
 
-    allocate (elastic, source=machine%elastic())
-    energies = [(machine%elements%stored(1, elastic(i)), i=1, size(elastic))]
+    allocate (energies, source=machine%elements%stored(1, machine%elastic()))
   end function stored_energies
 
 end module nocdyn_trajectory_table

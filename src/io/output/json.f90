@@ -20,8 +20,8 @@ module nocdyn_json
     procedure :: open_report
     procedure :: close => close_object
     procedure :: open_list, close_list, text
-    generic :: put => put_text, put_texts, put_number, put_numbers, put_integer, put_integers
-    procedure, private :: put_text, put_texts, put_number, put_numbers, put_integer, put_integers
+    generic :: put => put_text, put_texts, put_number, put_numbers, put_integer, put_integers, put_members
+    procedure, private :: put_text, put_texts, put_number, put_numbers, put_integer, put_integers, put_members
     procedure, private :: begin_member, begin_item, end_level
   end type json_t
 
@@ -197,6 +197,21 @@ contains
     end do
     call put_list(self, key, items)
   end subroutine put_integers
+
+  !> An object of numbers.
+  subroutine put_members(self, key, labels, values)
+    class(json_t), intent(inout) :: self
+    character(len=*), intent(in) :: key
+    type(string_t), intent(in) :: labels(:)
+    real(wp), intent(in) :: values(:)   !! [labels]
+    integer :: i
+
+    call self%open(key)
+    do i = 1, size(labels)
+      call self%put(labels(i)%text, values(i))
+    end do
+    call self%close()
+  end subroutine put_members
 
   !> Begins a member of an object.
   subroutine begin_member(self, key)

@@ -2,8 +2,8 @@
 module nocdyn_linear_accumulators
   use nocdyn_kinds, only: wp
   use nocdyn_linear_columns, only: strip_of, width
-  use nocdyn_statistics, only: statistic_final, statistic_max, statistic_max_abs, statistic_min, statistic_t, &
-    statistic_time_of_max
+  use nocdyn_statistics, only: statistic_final, statistic_max, statistic_max_abs, statistic_mean, statistic_min, statistic_rms, &
+    statistic_t, statistic_time_of_max
   implicit none (type, external)
   private
 
@@ -43,7 +43,13 @@ contains
         end do
         if (k > size(accumulators)) accumulators = [accumulators, accumulator_t(column=c, from=statistics(i)%from)]
         acc(i) = k
-        call add_kind(accumulators(k), statistics(i)%kind)
+        associate (self => accumulators(k), kind => statistics(i)%kind)
+          self%has_max = self%has_max .or. kind == statistic_max .or. kind == statistic_time_of_max
+          self%has_time = self%has_time .or. kind == statistic_time_of_max
+          self%has_min = self%has_min .or. kind == statistic_min
+          self%has_max_abs = self%has_max_abs .or. kind == statistic_max_abs
+          self%has_sums = self%has_sums .or. kind == statistic_mean .or. kind == statistic_rms
+        end associate
       end do
     end do
     do k = 1, size(accumulators)
@@ -51,23 +57,6 @@ contains
       call allocate_accumulator(accumulators(k), strip_of(lanes))
     end do
   end subroutine new_accumulators
-
-  pure subroutine add_kind(acc, kind)
-    type(accumulator_t), intent(inout) :: acc
-    integer, intent(in) :: kind   !! of a statistic
-
-    select case (kind)
-    case (statistic_max, statistic_time_of_max)
-      acc%has_max = .true.
-      acc%has_time = acc%has_time .or. kind == statistic_time_of_max
-    case (statistic_min)
-      acc%has_min = .true.
-    case (statistic_max_abs)
-      acc%has_max_abs = .true.
-    case default
-      acc%has_sums = .true.
-    end select
-  end subroutine add_kind
 
   pure subroutine allocate_accumulator(acc, strips)
     type(accumulator_t), intent(inout) :: acc

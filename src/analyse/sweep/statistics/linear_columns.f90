@@ -4,7 +4,6 @@
 !> x = offset + sum of factor * y(component). An angle, a speed or a twist is x. An elastic moment is (linear + cubic x^2) x,
 !> where x is the twist minus that at rest.
 module nocdyn_linear_columns
-  use nocdyn_bank, only: bank_t
   use nocdyn_coordinates, only: coordinates_t
   use nocdyn_formulation, only: formulation_t
   use nocdyn_kinds, only: wp
@@ -45,44 +44,33 @@ contains
     class(formulation_t), intent(in) :: block
     type(column_t), intent(in) :: column
 
-    is_linear = column%kind == column_angle .or. column%kind == column_speed
-    if (.not. is_linear) is_linear = is_twist(block%machine, column)
-    if (.not. is_linear) is_linear = has_law(block%machine, column)
+    is_linear = .false.
     select type (block)
     class is (reduced_t)
-      return
-    class default
-      is_linear = .false.
+      is_linear = any([column%kind == column_angle, column%kind == column_speed, &
+                       is_quantity(block%machine, column, 'twist'), has_law(block%machine, column)])
     end select
   end function is_linear
-
-  logical function is_twist(machine, column)
-    type(machine_t), intent(in) :: machine
-    type(column_t), intent(in) :: column
-
-    is_twist = .false.
-    if (column%kind == column_element) is_twist = is_quantity(machine%banks(column%bank)%bank, column%quantity, 'twist')
-  end function is_twist
 
   !> Whether a column is the elastic moment of a coupling with the law of eq. (3).
   logical function has_law(machine, column)
     type(machine_t), intent(in) :: machine
     type(column_t), intent(in) :: column
 
-    has_law = .false.
-    if (column%kind /= column_element) return
-    associate (bank => machine%banks(column%bank)%bank)
-      has_law = bank%has_polynomial_potential .and. is_quantity(bank, column%quantity, 'moment')
-    end associate
+    has_law = is_quantity(machine, column, 'moment')
+    if (has_law) has_law = machine%banks(column%bank)%bank%has_polynomial_potential
   end function has_law
 
-  logical function is_quantity(bank, quantity, name)
-    class(bank_t), intent(in) :: bank
-    integer, intent(in) :: quantity
-    character(len=*), intent(in) :: name
+  !> Whether a column is a quantity of an element.
+  logical function is_quantity(machine, column, name)
+    type(machine_t), intent(in) :: machine
+    type(column_t), intent(in) :: column
+    character(len=*), intent(in) :: name   !! of the quantity
 
-    associate (quantities => bank%quantities())
-      is_quantity = quantities(quantity)%name == name
+    is_quantity = .false.
+    if (column%kind /= column_element) return
+    associate (quantities => machine%banks(column%bank)%bank%quantities())
+      is_quantity = quantities(column%quantity)%name == name
     end associate
   end function is_quantity
 
@@ -94,7 +82,7 @@ contains
     integer :: i, strips
 
     self%count = size(columns)
-    strips = (block%lanes + width - 1) / width
+    strips = strip_of(block%lanes)
     allocate (self%first(self%count + 1), source=1)
     allocate (self%component(0), self%ratio(0), self%is_minus(0))
     allocate (self%is_speed, source=columns%kind == column_speed)
