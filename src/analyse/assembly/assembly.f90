@@ -1,24 +1,23 @@
 !> From an input to a machine and its formulation: bodies, banks, constraints and coordinates.
 module nocdyn_assembly
-  use nocdyn_body_index, only: bodies_of, body_index_t, new_body_index
   use nocdyn_complement, only: complement_natural, complement_negated, complement_scaled
   use nocdyn_constraint_analysis, only: analyse_constraints
   use nocdyn_constraint_assembly, only: assemble_constraints, constraint_groups
   use nocdyn_coordinates, only: build_coordinates
-  use nocdyn_coupling_assembly, only: add_couplings, check_couplings
-  use nocdyn_element_groups, only: element_groups_t, new_element_groups
+  use nocdyn_coupling_assembly, only: add_coupling_form, check_couplings, coupling_form
+  use nocdyn_element_groups, only: add_banks, bodies_of, body_index_t, element_groups_t, new_body_index, new_element_groups
   use nocdyn_errors, only: error_t, exit_input, raise
   use nocdyn_formulation, only: formulation_t
-  use nocdyn_input, only: group_t, input_t
+  use nocdyn_input, only: input_t
   use nocdyn_machine, only: machine_t
   use nocdyn_massless_motion, only: massless_bodies
-  use nocdyn_motor_assembly, only: add_motors, check_motors
+  use nocdyn_motor_assembly, only: add_motor_form, check_motors, motor_form
   use nocdyn_multiplier, only: new_multiplier
   use nocdyn_paper, only: new_paper
   use nocdyn_reduced, only: new_reduced
   use nocdyn_start_speeds, only: fit_start_speeds
   use nocdyn_text, only: joined, selected
-  use nocdyn_torque_assembly, only: add_excitations, add_loads
+  use nocdyn_torque_assembly, only: add_excitation_form, add_load_form, excitation_form, load_form
   implicit none (type, external)
   private
 
@@ -51,35 +50,44 @@ contains
     if (.not. allocated(error)) call check_motors(input, error)
     if (allocated(error)) return
     allocate (machine%banks(0))
-    call add_couplings(new_element_groups(input, 'coupling', machine%lanes, body_index), machine%banks)
-    call add_motors(new_element_groups(input, 'motor', machine%lanes, body_index), machine%banks)
-    call add_loads(new_element_groups(input, 'load', machine%lanes, body_index), machine%banks)
-    call add_excitations(new_element_groups(input, 'excitation', machine%lanes, body_index), machine%banks)
+    associate (n => machine%lanes)
+      call add_banks(new_element_groups(input, 'coupling', n, body_index), coupling_form, add_coupling_form, machine%banks)
+      call add_banks(new_element_groups(input, 'motor', n, body_index), motor_form, add_motor_form, machine%banks)
+      call add_banks(new_element_groups(input, 'load', n, body_index), load_form, add_load_form, machine%banks)
+      call add_banks(new_element_groups(input, 'excitation', n, body_index), excitation_form, add_excitation_form, machine%banks)
+    end associate
     call machine%number_elements()
     call analyse_machine_constraints(input, body_index, machine, error)
   end subroutine assemble_machine
 
-  !> Analyses the constraints, chooses the coordinates and makes the start speeds consistent.
+  !> Analyses the constraints, chooses the coordinates and makes the start speeds consistent. A message begins with file, line and
+  !> group: those of a constraint row, or of `independent`.
   subroutine analyse_machine_constraints(input, body_index, machine, error)
     type(input_t), intent(in) :: input
     type(body_index_t), intent(in) :: body_index
     type(machine_t), intent(inout) :: machine
     type(error_t), allocatable, intent(out) :: error
-    type(group_t) :: run
-    integer, allocatable :: wanted(:)   ! bodies that are to be the coordinates
+    integer, allocatable :: indices(:), wanted(:)   ! groups of the rows, bodies that are to be the coordinates
     integer :: offending_row
 
-    run = input%single('run')
-    wanted = bodies_of(run, 'independent', body_index)
-    call analyse_constraints(machine%constraints, machine%names, wanted, machine%trains, machine%groups, offending_row, error)
-    if (.not. allocated(error)) then
-      call refuse_massless_motion(input, machine, error)
-      if (allocated(error)) return
-      call build_coordinates(machine%constraints, machine%names, machine%trains, machine%groups, machine%inertia, wanted, &
-                             complement_choice(run%text('complement')), machine%coordinates, error)
+    associate (run => input%groups(input%position('run')))
+      allocate (wanted, source=bodies_of(run, 'independent', body_index))
+      call analyse_constraints(machine%constraints, machine%names, wanted, machine%trains, machine%groups, offending_row, error)
+      if (.not. allocated(error)) then
+        call refuse_massless_motion(input, machine, error)
+        if (allocated(error)) return
+        call build_coordinates(machine%constraints, machine%names, machine%trains, machine%groups, machine%inertia, wanted, &
+                               complement_choice(run%text('complement')), machine%coordinates, error)
+      end if
+      if (.not. allocated(error)) call fit_start_speeds(machine, run%text('start') == 'projected', offending_row, error)
+    end associate
+    if (.not. allocated(error)) return
+    if (offending_row > 0) then
+      allocate (indices, source=constraint_groups(input))
+      error%message = input%location(indices(offending_row)) // ': ' // error%message
+    else
+      error%message = input%location(input%position('run'), 'independent') // ': independent ' // error%message
     end if
-    if (.not. allocated(error)) call fit_start_speeds(machine, run%text('start') == 'projected', offending_row, error)
-    if (allocated(error)) call add_location(input, offending_row, error)
   end subroutine analyse_machine_constraints
 
   !> Refuses bodies that can move while all bodies with inertia stand still: the reduced mass matrix is singular.
@@ -134,21 +142,5 @@ contains
       error stop 'nocdyn_assembly: the schema allows an unknown complement'
     end select
   end function complement_choice
-
-  !> Puts file, line and group before the message: those of a constraint row, or of `independent` if the row is 0.
-  subroutine add_location(input, offending_row, error)
-    type(input_t), intent(in) :: input
-    integer, intent(in) :: offending_row
-    type(error_t), intent(inout) :: error
-    integer, allocatable :: indices(:)
-
-    if (offending_row > 0) then
-      allocate (indices, source=constraint_groups(input))
-      error%message = input%location(indices(offending_row)) // ': ' // error%message
-    else
-      allocate (indices, source=input%groups_named('run'))
-      error%message = input%location(indices(1), 'independent') // ': independent ' // error%message
-    end if
-  end subroutine add_location
 
 end module nocdyn_assembly

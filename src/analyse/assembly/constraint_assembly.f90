@@ -1,7 +1,7 @@
 !> From the rigid joints of an input (gears, planetary sets, differentials, constraints) to constraint rows.
 module nocdyn_constraint_assembly
-  use nocdyn_body_index, only: bodies_of, body_index_t
   use nocdyn_constraints, only: constraints_t, member_torques_t, new_constraints
+  use nocdyn_element_groups, only: bodies_of, body_index_t
   use nocdyn_errors, only: error_t, exit_input, raise
   use nocdyn_input, only: group_t, input_t
   use nocdyn_kinds, only: wp

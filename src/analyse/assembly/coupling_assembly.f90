@@ -2,7 +2,7 @@
 module nocdyn_coupling_assembly
   use nocdyn_bank, only: append_bank, bank_slot_t
   use nocdyn_couplings, only: coupling_common_t, new_couplings, new_table_couplings
-  use nocdyn_element_groups, only: add_banks, element_groups_t
+  use nocdyn_element_groups, only: element_groups_t
   use nocdyn_errors, only: error_t, exit_input, raise
   use nocdyn_gap_couplings, only: new_gap_couplings
   use nocdyn_input, only: group_t, input_t
@@ -13,7 +13,7 @@ module nocdyn_coupling_assembly
   implicit none (type, external)
   private
 
-  public :: add_couplings, check_couplings
+  public :: coupling_form, add_coupling_form, check_couplings
 
   integer, parameter :: cubic = 1, slipping = 2, polynomial = 3, gap = 4, saturated = 5, table = 6   ! forms
 
@@ -29,7 +29,7 @@ contains
     allocate (indices, source=input%groups_named('coupling'))
     do i = 1, size(indices)
       associate (group => input%groups(indices(i)))
-        select case (form_of(group))
+        select case (coupling_form(group))
         case (gap)
           if (any(abs(coefficients_of(group)) > 0)) cycle
           call raise(error, exit_input, input%location(indices(i), 'gap') // ': gap = ' // to_text(group%number('gap')) // &
@@ -47,23 +47,23 @@ contains
   end subroutine check_couplings
 
   !> Form of the elastic moment of a group &coupling.
-  pure integer function form_of(group)
+  pure integer function coupling_form(group)
     type(group_t), intent(in) :: group
 
     if (group%has_value('table_twist')) then
-      form_of = table
+      coupling_form = table
     else if (group%has_value('saturation')) then
-      form_of = saturated
+      coupling_form = saturated
     else if (group%number('gap', absent=0.0_wp) > 0) then
-      form_of = gap
+      coupling_form = gap
     else if (group%has_value('polynomial')) then
-      form_of = polynomial
+      coupling_form = polynomial
     else if (group%number('friction', absent=0.0_wp) > 0) then
-      form_of = slipping
+      coupling_form = slipping
     else
-      form_of = cubic
+      coupling_form = cubic
     end if
-  end function form_of
+  end function coupling_form
 
   !> p_1, p_2, ... [N m/rad^k] of a group &coupling.
   pure function coefficients_of(group) result(coefficients)
@@ -74,16 +74,8 @@ contains
               group%number('cubic_stiffness', absent=0.0_wp), group%numbers('polynomial')))
   end function coefficients_of
 
-  !> Adds a bank of cubic couplings, perhaps empty, and one of each other form that occurs.
-  subroutine add_couplings(groups, banks)
-    type(element_groups_t), intent(in) :: groups   !! all of them
-    type(bank_slot_t), allocatable, intent(inout) :: banks(:)
-
-    call add_banks(groups, table, form_of, add_form, banks)
-  end subroutine add_couplings
-
-  !> A bank of the couplings of one form.
-  subroutine add_form(groups, form, banks)
+  !> Adds the bank of the couplings of one form.
+  subroutine add_coupling_form(groups, form, banks)
     type(element_groups_t), intent(in) :: groups
     integer, intent(in) :: form
     type(bank_slot_t), allocatable, intent(inout) :: banks(:)
@@ -102,7 +94,7 @@ contains
     case default
       call append_bank(banks, new_table_couplings(shared, groups%curves('table_twist', 'table_moment')))
     end select
-  end subroutine add_form
+  end subroutine add_coupling_form
 
   !> What the constructors of all forms take.
   function common_of(groups) result(common)

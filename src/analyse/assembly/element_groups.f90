@@ -1,17 +1,24 @@
 !> The groups of one kind of an input, sorted into banks by the form of their laws; their values as the constructors of banks
-!> take them, the same in every lane.
+!> take them, the same in every lane; the bodies that they name.
 module nocdyn_element_groups
   use nocdyn_bank, only: bank_slot_t
-  use nocdyn_body_index, only: bodies_of, body_index_t
   use nocdyn_curves, only: curve_t, extrapolation_constant, extrapolation_linear, interpolation_cubic, interpolation_linear, &
                            new_curve
   use nocdyn_input, only: group_t, input_t
   use nocdyn_kinds, only: wp
-  use nocdyn_text, only: string_t
+  use nocdyn_schema_rules, only: ground
+  use nocdyn_text, only: selected, string_t
+  use nocdyn_text_sort, only: argsort, sorted_position
   implicit none (type, external)
   private
 
-  public :: new_element_groups, add_banks
+  public :: new_body_index, bodies_of, new_element_groups, add_banks
+
+  !> Finds the bodies of an input by name.
+  type, public :: body_index_t
+    type(string_t), allocatable :: names(:)   !! of the bodies
+    integer, allocatable :: order(:)          !! bodies in the order of their names
+  end type body_index_t
 
   !> Some groups of an input. It points to the input and the index of its bodies, which have to outlive it.
   type, public :: element_groups_t
@@ -24,7 +31,6 @@ module nocdyn_element_groups
     procedure :: values
     procedure :: curves
     procedure :: bodies
-    procedure, private :: selected
   end type element_groups_t
 
   abstract interface
@@ -45,6 +51,31 @@ module nocdyn_element_groups
 
 contains
 
+  !> The index of the bodies with these names.
+  function new_body_index(names) result(body_index)
+    type(string_t), intent(in) :: names(:)
+    type(body_index_t) :: body_index
+
+    allocate (body_index%names, source=names)
+    call argsort(body_index%names, body_index%order)
+  end function new_body_index
+
+  !> Numbers of the bodies that a group names under a key, in the order of its values, 0 for the ground.
+  function bodies_of(group, key, body_index) result(bodies)
+    type(group_t), intent(in) :: group
+    character(len=*), intent(in) :: key
+    type(body_index_t), intent(in) :: body_index
+    integer, allocatable :: bodies(:)
+    type(string_t), allocatable :: names(:)
+    integer :: i
+
+    allocate (names, source=group%texts(key))
+    allocate (bodies(size(names)), source=0)
+    do i = 1, size(names)
+      if (names(i)%text /= ground) bodies(i) = sorted_position(names(i)%text, body_index%names, body_index%order)
+    end do
+  end function bodies_of
+
   !> All groups of one kind.
   function new_element_groups(input, kind, lanes, body_index) result(groups)
     type(input_t), target, intent(in) :: input
@@ -64,41 +95,34 @@ contains
     end do
   end function new_element_groups
 
-  !> A bank of form 1 in any case, one of each other form that some groups have.
-  subroutine add_banks(groups, forms, form_of, add_form, banks)
-    type(element_groups_t), intent(in) :: groups
-    integer, intent(in) :: forms   !! number of forms
+  !> Adds a bank of form 1, perhaps empty, and one of each other form that some groups have.
+  subroutine add_banks(groups, form_of, add_form, banks)
+    type(element_groups_t), intent(in) :: groups   !! all of one kind
     procedure(form_interface) :: form_of
     procedure(add_interface) :: add_form
     type(bank_slot_t), allocatable, intent(inout) :: banks(:)
     integer :: form, form_of_group(size(groups%indices)), i
 
     form_of_group = [(form_of(groups%input%groups(groups%indices(i))), i=1, size(groups%indices))]
-    do form = 1, forms
+    do form = 1, max(1, maxval(form_of_group))
       if (form > 1 .and. .not. any(form_of_group == form)) cycle
-      call add_form(groups%selected(form_of_group == form), form, banks)
+      call add_form(some_of(groups, form_of_group == form), form, banks)
     end do
   end subroutine add_banks
 
   !> Those of the groups that a mask selects.
-  function selected(self, mask) result(some)
-    class(element_groups_t), intent(in) :: self
+  function some_of(groups, mask) result(some)
+    type(element_groups_t), intent(in) :: groups
     logical, intent(in) :: mask(:)   !! [groups]
     type(element_groups_t) :: some
-    integer :: i, next
+    integer :: i
 
-    some%lanes = self%lanes
-    some%input => self%input
-    some%body_index => self%body_index
-    allocate (some%indices, source=pack(self%indices, mask))
-    allocate (some%names(size(some%indices)))
-    next = 0
-    do i = 1, size(mask)
-      if (.not. mask(i)) cycle
-      next = next + 1
-      some%names(next)%text = self%names(i)%text
-    end do
-  end function selected
+    some%lanes = groups%lanes
+    some%input => groups%input
+    some%body_index => groups%body_index
+    allocate (some%indices, source=pack(groups%indices, mask))
+    allocate (some%names, source=selected(groups%names, pack([(i, i=1, size(mask))], mask)))
+  end function some_of
 
   !> One number of each group, [lanes, groups].
   function values(self, key, absent)

@@ -3,7 +3,7 @@ module nocdyn_motor_assembly
   use nocdyn_bank, only: append_bank, bank_slot_t
   use nocdyn_curves, only: curve_t
   use nocdyn_dc_motors, only: new_dc_motors
-  use nocdyn_element_groups, only: add_banks, element_groups_t
+  use nocdyn_element_groups, only: element_groups_t
   use nocdyn_errors, only: error_t, exit_input, raise
   use nocdyn_governors, only: governor_t
   use nocdyn_input, only: group_t, input_t
@@ -14,7 +14,7 @@ module nocdyn_motor_assembly
   implicit none (type, external)
   private
 
-  public :: add_motors, check_motors
+  public :: motor_form, add_motor_form, check_motors
 
   ! forms; a motor with a governor has the next one
   integer, parameter :: quadratic = 1, induction = 3, table = 5, inductive = 7
@@ -43,32 +43,24 @@ contains
   end subroutine check_motors
 
   !> Form of the law of a group &motor. A motor with constant torque is quadratic, and so is a dc motor without inductance.
-  pure integer function form_of(group)
+  pure integer function motor_form(group)
     type(group_t), intent(in) :: group
 
     select case (group%text('kind'))
     case ('induction')
-      form_of = induction
+      motor_form = induction
     case ('table')
-      form_of = table
+      motor_form = table
     case ('dc')
-      form_of = merge(inductive, quadratic, group%number('inductance') > 0)
+      motor_form = merge(inductive, quadratic, group%number('inductance') > 0)
     case default
-      form_of = quadratic
+      motor_form = quadratic
     end select
-    if (group%has_value('governor_speed')) form_of = form_of + 1
-  end function form_of
-
-  !> Adds a bank of quadratic motors without governors, perhaps empty, and one of each other form that occurs.
-  subroutine add_motors(groups, banks)
-    type(element_groups_t), intent(in) :: groups   !! all of them
-    type(bank_slot_t), allocatable, intent(inout) :: banks(:)
-
-    call add_banks(groups, inductive + 1, form_of, add_form, banks)
-  end subroutine add_motors
+    if (group%has_value('governor_speed')) motor_form = motor_form + 1
+  end function motor_form
 
   !> Adds the bank of the motors of one form.
-  subroutine add_form(groups, form, banks)
+  subroutine add_motor_form(groups, form, banks)
     type(element_groups_t), intent(in) :: groups
     integer, intent(in) :: form
     type(bank_slot_t), allocatable, intent(inout) :: banks(:)
@@ -92,7 +84,7 @@ contains
       call make_law(groups, form - 1, law, curve)
       call append_bank(banks, new_curve_motors(groups%names, body, groups%lanes, law, curve, governor_of(groups), drags(groups)))
     end select
-  end subroutine add_form
+  end subroutine add_motor_form
 
   function governor_of(groups) result(governor)
     type(element_groups_t), intent(in) :: groups

@@ -43,19 +43,8 @@ contains
     else
       return
     end if
-    call raise(error, exit_input, output_location(input, key) // ': ' // message)
+    call raise(error, exit_input, input%location(input%position('output'), key) // ': ' // message)
   end subroutine check_output_times
-
-  !> File, line and group, to begin a message with.
-  function output_location(input, key) result(place)
-    type(input_t), intent(in) :: input
-    character(len=*), intent(in) :: key   !! of &output
-    character(len=:), allocatable :: place
-    integer, allocatable :: indices(:)
-
-    allocate (indices, source=input%groups_named('output'))
-    place = input%location(indices(1), key)
-  end function output_location
 
   !> The requested times: a row at t_start, one every `interval`, and one at t_end; or `points` rows evenly spaced.
   pure function output_times(input) result(times)

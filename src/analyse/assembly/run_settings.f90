@@ -1,28 +1,90 @@
-!> The keys of &run, as settings of the integrator and in summaries.
+!> The keys of &run: the formulation and the method that a machine allows, as settings of the integrator and in summaries.
 module nocdyn_run_settings
+  use nocdyn_errors, only: error_t, exit_input, raise
+  use nocdyn_formulation, only: formulation_t
   use nocdyn_input, only: group_t, input_t
   use nocdyn_integration_settings, only: integration_settings_t
   use nocdyn_json, only: json_t
+  use nocdyn_kinds, only: wp
+  use nocdyn_machine, only: machine_t
+  use nocdyn_ordering, only: reverse_cuthill_mckee
+  use nocdyn_pattern_entries, only: entries_in_rows, entries_t
+  use nocdyn_stage_matrix, only: half_bandwidths
+  use nocdyn_text, only: append, quoted, string_t, to_text
   implicit none (type, external)
   private
 
-  public :: settings_of, put_settings
+  public :: check_size, choose_settings, put_settings
+
+  integer, parameter :: largest_matrix = 6000   ! rows; 0.3 GB each, and there are several
 
 contains
 
-  !> The settings of an integration with a method.
-  pure function settings_of(input, method) result(settings)
+  !> Refuses machines that are too large for the dense matrices of the formulations `paper` and `multiplier`.
+  subroutine check_size(input, machine, error)
     type(input_t), intent(in) :: input
-    character(len=*), intent(in) :: method   !! of `choose_method`
-    type(integration_settings_t) :: settings
-    type(group_t) :: run
+    type(machine_t), intent(in) :: machine
+    type(error_t), allocatable, intent(out) :: error
+    character(len=:), allocatable :: formulation
+    integer :: order   ! 2 rows for each body, or 3
 
-    run = input%single('run')
-    settings%method = method
-    settings%rtol = run%number('rtol')
-    settings%atol = run%number('atol')
-    settings%max_steps = run%whole_number('max_steps')
-  end function settings_of
+    formulation = input%groups(input%position('run'))%text('formulation')
+    order = merge(3, 2, formulation == 'paper') * machine%bodies
+    if (formulation == 'reduced' .or. order <= largest_matrix) return
+    call raise(error, exit_input, input%location(input%position('run'), 'formulation') // ': formulation = ' // &
+               quoted(formulation) // ' needs dense matrices of ' // to_text(order) // &
+               ' rows for this machine; at most ' // to_text(largest_matrix) // ' are allowed; ' // &
+               'formulation = ' // quoted('reduced') // ' needs none')
+  end subroutine check_size
+
+  !> The settings of an integration, with the method of the input. Where the stage matrix would be too large, implicit methods are
+  !> refused, and 'auto' becomes its explicit method, with a note. 'taylor' is refused where an element has no Taylor series.
+  subroutine choose_settings(input, formulation, settings, notes, error)
+    type(input_t), intent(in) :: input
+    class(formulation_t), intent(in) :: formulation
+    type(integration_settings_t), intent(out) :: settings
+    type(string_t), allocatable, intent(out) :: notes(:)   !! for the user; empty if the method is that of the input
+    type(error_t), allocatable, intent(out) :: error
+    character(len=:), allocatable :: obstacle, place
+    integer :: rows
+
+    allocate (notes(0))
+    associate (run => input%groups(input%position('run')))
+      settings%method = run%text('method')
+      settings%rtol = run%number('rtol')
+      settings%atol = run%number('atol')
+      settings%max_steps = run%whole_number('max_steps')
+    end associate
+    place = input%location(input%position('run'), 'method') // ': method = ' // quoted(trim(settings%method))
+    if (settings%method == 'taylor') then
+      call formulation%series_obstacle(obstacle)
+      if (len(obstacle) > 0) call raise(error, exit_input, place // ' cannot be used: ' // obstacle)
+    end if
+    if (any(settings%method == [character(len=6) :: 'rk45', 'rk853', 'taylor']) .or. formulation%states <= largest_matrix) return
+    rows = stage_matrix_rows(formulation)
+    if (real(rows, wp) * formulation%states <= real(largest_matrix, wp)**2) return
+    obstacle = 'a matrix of ' // to_text(rows) // ' x ' // to_text(formulation%states) // ' entries for this machine, whose ' // &
+               'couplings leave no narrower band; at most ' // to_text(largest_matrix) // ' x ' // to_text(largest_matrix) // &
+               ' are allowed'
+    if (settings%method == 'auto') then
+      settings%method = 'rk853'
+      call append(notes, "method = 'auto' takes explicit steps alone, those of 'rk853': implicit ones need " // obstacle)
+    else
+      call raise(error, exit_input, place // ' needs ' // obstacle // "; method = 'rk853' needs none")
+    end if
+  end subroutine choose_settings
+
+  !> Stored rows of the factors of a stage matrix: its band with the fill-in of pivoting, at most all rows.
+  function stage_matrix_rows(formulation) result(rows)
+    class(formulation_t), intent(in) :: formulation
+    integer :: rows
+    type(entries_t) :: entries
+    integer :: lower, upper
+
+    entries = entries_in_rows(formulation%jacobian_pattern(), 1, formulation%states)
+    call half_bandwidths(reverse_cuthill_mckee(formulation%states, entries%row, entries%column), entries, lower, upper)
+    rows = min(2 * lower + upper + 1, formulation%states)
+  end function stage_matrix_rows
 
   !> Writes the keys of &run that describe the integration, with their values.
   subroutine put_settings(json, run)

@@ -1,7 +1,7 @@
 !> The banks of loads and excitations of an input: one for each form of their laws that it has.
 module nocdyn_torque_assembly
   use nocdyn_bank, only: append_bank, bank_slot_t, role_excitation
-  use nocdyn_element_groups, only: add_banks, element_groups_t
+  use nocdyn_element_groups, only: element_groups_t
   use nocdyn_excitations, only: new_excitations
   use nocdyn_input, only: group_t
   use nocdyn_kinds, only: wp
@@ -12,7 +12,7 @@ module nocdyn_torque_assembly
   implicit none (type, external)
   private
 
-  public :: add_loads, add_excitations
+  public :: load_form, add_load_form, excitation_form, add_excitation_form
 
   integer, parameter :: viscous = 1, nonlinear = 2, table = 3     ! forms of loads
   integer, parameter :: harmonic = 1, waves = 2, timed = 4        ! forms of excitations, and `table`
@@ -28,14 +28,7 @@ contains
     if (group%has_value('table_speed')) load_form = table
   end function load_form
 
-  !> Adds a bank of viscous loads, perhaps empty, and one of each other form that occurs.
-  subroutine add_loads(groups, banks)
-    type(element_groups_t), intent(in) :: groups   !! all of them
-    type(bank_slot_t), allocatable, intent(inout) :: banks(:)
-
-    call add_banks(groups, table, load_form, add_load_form, banks)
-  end subroutine add_loads
-
+  !> Adds the bank of the loads of one form.
   subroutine add_load_form(groups, form, banks)
     type(element_groups_t), intent(in) :: groups
     integer, intent(in) :: form
@@ -75,19 +68,12 @@ contains
     end select
   end function excitation_form
 
-  !> Adds a bank of harmonic excitations, perhaps empty, and one of each other form that occurs.
-  subroutine add_excitations(groups, banks)
-    type(element_groups_t), intent(in) :: groups   !! all of them
-    type(bank_slot_t), allocatable, intent(inout) :: banks(:)
-
-    call add_banks(groups, timed, excitation_form, add_excitation_form, banks)
-  end subroutine add_excitations
-
+  !> Adds the bank of the excitations of one form.
   subroutine add_excitation_form(groups, form, banks)
     type(element_groups_t), intent(in) :: groups
     integer, intent(in) :: form
     type(bank_slot_t), allocatable, intent(inout) :: banks(:)
-    integer :: body(size(groups%indices)), i
+    integer :: body(size(groups%indices)), i, shape(size(groups%indices))
 
     body = groups%bodies('body', 1)
     select case (form)
@@ -100,25 +86,15 @@ contains
       call append_bank(banks, new_table_laws(role_excitation, groups%names, body, over_time, &
                                              groups%curves('table_time', 'table_torque', extrapolation='constant')))
     case default
-      call append_bank(banks, new_timed_excitations(groups%names, body, [(shape_of(groups%input%groups(groups%indices(i))), &
-                                                                          i=1, size(body))], &
-                                                    groups%values('amplitude'), groups%values('time'), &
-                                                    groups%values('duration', absent=1.0_wp)))
+      shape = shape_pulse
+      do i = 1, size(body)
+        if (groups%input%groups(groups%indices(i))%text('kind') == 'step') shape(i) = shape_step
+        if (groups%input%groups(groups%indices(i))%text('kind') == 'ramp') shape(i) = shape_ramp
+      end do
+      call append_bank(banks, new_timed_excitations(groups%names, body, shape, groups%values('amplitude'), &
+                                                    groups%values('time'), groups%values('duration', absent=1.0_wp)))
     end select
   end subroutine add_excitation_form
-
-  pure integer function shape_of(group)
-    type(group_t), intent(in) :: group
-
-    select case (group%text('kind'))
-    case ('step')
-      shape_of = shape_step
-    case ('ramp')
-      shape_of = shape_ramp
-    case default
-      shape_of = shape_pulse
-    end select
-  end function shape_of
 
   !> Adds a bank of waves: every order is a term, and so is amplitude sin(2 (frequency t - pole_pairs phi) + phase).
   subroutine add_waves(groups, body, banks)

@@ -10,14 +10,15 @@ module nocdyn_operating_point
   use nocdyn_literals, only: literal_ok, read_real
   use nocdyn_machine, only: machine_t
   use nocdyn_reduced, only: new_reduced
-  use nocdyn_run_settings, only: settings_of
-  use nocdyn_size_limits, only: choose_method
+  use nocdyn_run_settings, only: choose_settings
   use nocdyn_solve, only: solve
   use nocdyn_text, only: append, string_t, to_text
   implicit none (type, external)
   private
 
   public :: find_operating_point
+
+  integer, parameter :: max_states = 3000   ! of a dense eigenvalue problem; it takes some minutes
 
   !> The state, and how reports call it.
   type, public :: operating_point_t
@@ -30,7 +31,7 @@ module nocdyn_operating_point
 
 contains
 
-  !> Finds the operating point.
+  !> Finds the operating point. Refuses machines with too many states for a dense eigenvalue problem.
   subroutine find_operating_point(input, machine, at, point, error)
     type(input_t), intent(in) :: input
     type(machine_t), intent(in) :: machine
@@ -41,6 +42,11 @@ contains
     real(wp) :: time
     integer :: status
 
+    if (2 * machine%coordinates%freedoms > max_states) then
+      call raise(error, exit_input, input%file // ': the modes of this machine are those of a dense matrix of ' // &
+                 to_text(2 * machine%coordinates%freedoms) // ' states; at most ' // to_text(max_states) // ' are allowed')
+      return
+    end if
     run = input%single('run')
     point%t = run%number('t_start')
     allocate (point%notes(0))
@@ -104,13 +110,11 @@ contains
     type(operating_point_t), intent(inout) :: point
     type(error_t), allocatable, intent(out) :: error
     type(integration_settings_t) :: settings
-    character(len=:), allocatable :: method
     real(wp), allocatable :: states(:, :)
 
     allocate (point%formulation, source=new_reduced(machine, .false.))
-    call choose_method(input, point%formulation, method, point%notes, error)
+    call choose_settings(input, point%formulation, settings, point%notes, error)
     if (allocated(error)) return
-    settings = settings_of(input, method)
     point%y = point%formulation%start()
     if (time > point%t) then
       allocate (states(size(point%y, 2), 2), source=0.0_wp)

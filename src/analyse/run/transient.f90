@@ -4,17 +4,15 @@ module nocdyn_transient
   use nocdyn_assembly, only: assemble_machine, new_formulation
   use nocdyn_errors, only: error_t, exit_failed, raise
   use nocdyn_formulation, only: formulation_t
-  use nocdyn_input, only: group_t, input_t
+  use nocdyn_input, only: input_t
   use nocdyn_integration, only: integrate
   use nocdyn_integration_settings, only: integration_settings_t
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
   use nocdyn_output_times, only: check_output_times, output_times
-  use nocdyn_run_output, only: run_output_t
-  use nocdyn_run_settings, only: settings_of
+  use nocdyn_run_settings, only: check_size, choose_settings
   use nocdyn_run_summary, only: check_energy_balance, describe_machine, extremes_t, run_summary_t, start_extremes, &
     update_extremes, widen_extremes
-  use nocdyn_size_limits, only: check_size, choose_method
   use nocdyn_solver_status, only: failure_message, integration_done, integration_interrupted, solver_status_t
   use nocdyn_observer, only: observer_t, ranges_t
   use nocdyn_text, only: append, string_t
@@ -23,6 +21,40 @@ module nocdyn_transient
   private
 
   public :: run_transient
+
+  !> What a run needs of its caller while it is integrated: somewhere to write the rows, and whether to stop.
+  type, abstract, public :: run_output_t
+  contains
+    procedure(start_interface), deferred :: start
+    procedure(write_row_interface), deferred :: write_row
+    procedure(wants_stop_interface), deferred :: wants_stop
+  end type run_output_t
+
+  abstract interface
+
+    !> Called once, before the first row.
+    subroutine start_interface(self, labels)
+      import :: run_output_t, string_t
+      class(run_output_t), intent(inout) :: self
+      type(string_t), intent(in) :: labels(:)   !! of the columns
+    end subroutine start_interface
+
+    !> Called at every output time.
+    subroutine write_row_interface(self, row)
+      import :: run_output_t, wp
+      class(run_output_t), intent(inout) :: self
+      real(wp), intent(in) :: row(:)   !! [columns]
+    end subroutine write_row_interface
+
+    !> Called after every step: shows the progress, and answers whether the integration is to end here.
+    function wants_stop_interface(self, fraction) result(wants_stop)
+      import :: run_output_t, wp
+      class(run_output_t), intent(inout) :: self
+      real(wp), intent(in) :: fraction   !! of the time span, 0 to 1
+      logical :: wants_stop
+    end function wants_stop_interface
+
+  end interface
 
   !> Hands out the rows, and keeps the extremes of their columns.
   type, extends(observer_t) :: run_observer_t
@@ -52,40 +84,40 @@ contains
     type(error_t), allocatable, intent(out) :: error
     class(formulation_t), allocatable :: formulation
     type(run_observer_t) :: observer
+    type(integration_settings_t) :: settings
     type(string_t), allocatable :: notes(:)
     real(wp), allocatable :: times(:)
     integer :: i
 
     call check_output_times(input, error)
-    if (.not. allocated(error)) call build_formulation(input, formulation, summary%method, notes, error)
+    if (.not. allocated(error)) call build_formulation(input, formulation, settings, notes, error)
     if (allocated(error)) return
     times = output_times(input)
+    summary%method = trim(settings%method)
     call describe_machine(formulation%machine, summary)
     do i = 1, size(notes)
       call append(summary%notes, notes(i)%text)
     end do
     call start_observer(observer, formulation, times, output)
     allocate (summary%labels, source=observer%table%labels)
-    call solve(formulation, settings_of(input, summary%method), times, observer, summary, error)
+    call solve(formulation, settings, times, observer, summary, error)
     if (summary%has_run) call complete_summary(observer, error, summary)
   end subroutine run_transient
 
   !> The equations of motion of an input. Their machine is the only one that stays.
-  subroutine build_formulation(input, formulation, method, notes, error)
+  subroutine build_formulation(input, formulation, settings, notes, error)
     type(input_t), intent(in) :: input
     class(formulation_t), allocatable, intent(out) :: formulation
-    character(len=:), allocatable, intent(out) :: method   !! of integration
+    type(integration_settings_t), intent(out) :: settings
     type(string_t), allocatable, intent(out) :: notes(:)   !! on the method
     type(error_t), allocatable, intent(out) :: error
     type(machine_t) :: machine
-    type(group_t) :: run
 
     call assemble_machine(input, machine, error)
     if (.not. allocated(error)) call check_size(input, machine, error)
     if (allocated(error)) return
-    run = input%single('run')
-    call new_formulation(run%text('formulation'), machine, formulation)
-    call choose_method(input, formulation, method, notes, error)
+    call new_formulation(input%groups(input%position('run'))%text('formulation'), machine, formulation)
+    call choose_settings(input, formulation, settings, notes, error)
   end subroutine build_formulation
 
   subroutine start_observer(observer, formulation, times, output)

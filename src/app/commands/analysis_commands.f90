@@ -19,7 +19,6 @@ module nocdyn_analysis_commands
   use nocdyn_output_file, only: write_file
   use nocdyn_output_times, only: check_output_times
   use nocdyn_result_folders, only: out_folder, refuse_shared_folders
-  use nocdyn_size_limits, only: check_dense_size
   use nocdyn_sweep_plan, only: add_plan_diagnostics, has_sweep, make_plan, sweep_plan_t
   use nocdyn_text, only: string_t
   implicit none (type, external)
@@ -144,8 +143,6 @@ contains
     type(operating_point_t) :: point
     type(modes_report_t) :: report
 
-    call check_dense_size(input, machine, error)
-    if (allocated(error)) return
     if (arguments%is_given('--at')) then
       call find_operating_point(input, machine, arguments%value('--at'), point, error)
     else

@@ -8,8 +8,7 @@ module nocdyn_run_command
   use nocdyn_posix, only: is_interrupted, catch_interrupts
   use nocdyn_result_folders, only: refuse_shared_folders, refuse_sweep_folder, result_folder
   use nocdyn_run_files, only: partial_file, run_to_files
-  use nocdyn_run_summary, only: run_summary_t
-  use nocdyn_summary_table, only: method_line, summary_line, summary_table
+  use nocdyn_run_summary, only: method_line, run_summary_t, summary_line, summary_table
   use nocdyn_text, only: string_t, to_text
   implicit none (type, external)
   private

@@ -8,10 +8,9 @@ module nocdyn_run_files
   use nocdyn_kinds, only: wp
   use nocdyn_output_file, only: output_file_t
   use nocdyn_posix, only: is_interrupted, remove_file
-  use nocdyn_run_output, only: run_output_t
   use nocdyn_run_summary, only: run_summary_t, summary_json
   use nocdyn_text, only: string_t, to_text
-  use nocdyn_transient, only: run_transient
+  use nocdyn_transient, only: run_output_t, run_transient
   implicit none (type, external)
   private
 

@@ -12,11 +12,10 @@ module nocdyn_mpi_command
   use nocdyn_mpi_root, only: mpi_root_t
   use nocdyn_mpi_worker, only: mpi_worker_t
   use nocdyn_posix, only: catch_interrupts
-  use nocdyn_sweep, only: compute_variants
   use nocdyn_sweep_job, only: start_job, finish_job, sweep_job_t
   use nocdyn_journal_scheduler, only: initialise_scheduler
   use nocdyn_sweep_plan, only: make_plan, sweep_plan_t
-  use nocdyn_sweep_setup, only: prepare_sweep, sweep_setup_t
+  use nocdyn_sweep, only: compute_variants, prepare_sweep, sweep_setup_t
   use nocdyn_sweep_threads, only: usable_threads, print_thread_note
   use nocdyn_text, only: strings
   implicit none (type, external)

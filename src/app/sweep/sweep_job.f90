@@ -9,15 +9,14 @@ module nocdyn_sweep_job
   use nocdyn_diagnostics, only: diagnostics_t
   use nocdyn_kinds, only: wp
   use nocdyn_result_folders, only: result_folder
+  use nocdyn_sweep, only: prepare_sweep, sweep_setup_t
   use nocdyn_sweep_header, only: sweep_netcdf_name, sweep_header_t
-  use nocdyn_plan_header, only: new_sweep_header
   use nocdyn_sweep_journal, only: create_journal, journal_name, open_journal, sweep_journal_t
   use nocdyn_journal_scheduler, only: journal_scheduler_t
   use nocdyn_scheduler, only: sweep_counts_t, sweep_progress_t
-  use nocdyn_sweep_plan, only: add_plan_diagnostics, make_plan, sweep_plan_t
+  use nocdyn_sweep_plan, only: add_plan_diagnostics, make_plan, new_sweep_header, sweep_plan_t
   use nocdyn_sweep_resumption, only: check_journal, check_results, refuse_other_journals
   use nocdyn_sweep_results, only: print_results, write_results
-  use nocdyn_sweep_setup, only: prepare_sweep, sweep_setup_t
   use nocdyn_sweep_summary, only: sweep_effort_t, sweep_summary_t
   use nocdyn_sweep_csv, only: sweep_csv_name
   use nocdyn_text, only: rounded_text, to_text

@@ -50,10 +50,12 @@ module nocdyn_input
     type(group_t), allocatable :: groups(:)       !! single groups that the file does not have come last
   contains
     procedure :: groups_named   !! indices of the groups with a name, perhaps only those of one law
-    procedure :: single         !! the one group of a kind that occurs once
+    procedure :: position       !! index of the group of a kind that occurs once
+    procedure :: single         !! that group
     procedure :: title
     procedure :: label          !! "&gear 'reducer'"
     procedure :: location       !! where a group or a key comes from, to begin a message with
+    procedure :: report             !! adds a diagnostic on a key of a group
     procedure :: diagnostics_text   !! all messages with their locations
   end type input_t
 
@@ -224,30 +226,32 @@ contains
     indices = pack([(i, i=1, size(is_wanted))], is_wanted)
   end function groups_named
 
+  !> Index of the group of a kind that occurs once.
+  pure integer function position(self, kind)
+    class(input_t), intent(in) :: self
+    character(len=*), intent(in) :: kind
+
+    do position = 1, size(self%groups)
+      if (self%groups(position)%kind == kind) return
+    end do
+    error stop 'nocdyn_input: position() is for groups that occur once'
+  end function position
+
   !> The group of a kind that occurs once.
   pure function single(self, kind) result(group)
     class(input_t), intent(in) :: self
     character(len=*), intent(in) :: kind
     type(group_t) :: group
-    integer :: i
 
-    do i = 1, size(self%groups)
-      if (self%groups(i)%kind == kind) then
-        group = self%groups(i)
-        return
-      end if
-    end do
-    error stop 'nocdyn_input: single() is for groups that occur once'
+    group = self%groups(self%position(kind))
   end function single
 
   !> The title of the file.
   pure function title(self)
     class(input_t), intent(in) :: self
     character(len=:), allocatable :: title
-    type(group_t) :: about
 
-    about = self%single('case')
-    title = about%text('title')
+    title = self%groups(self%position('case'))%text('title')
   end function title
 
   !> "machine.nml:12: &gear 'reducer'", with the line of `key` if the file sets it, or "--set PATH=VALUE: &gear
@@ -285,6 +289,19 @@ contains
       if (line > 0 .and. line < no_line) text = text // ':' // to_text(line)
     end if
   end function source_text
+
+  !> Adds a diagnostic on a key of a group, with the line of the key if it is given.
+  subroutine report(self, group, key, text, diagnostics, code)
+    class(input_t), intent(in) :: self
+    integer, intent(in) :: group   !! its index
+    character(len=*), intent(in) :: key, text
+    type(diagnostics_t), intent(inout) :: diagnostics
+    integer, intent(in), optional :: code   !! exit code; exit_input if absent
+
+    associate (value => self%groups(group)%values(self%groups(group)%key_position(key)))
+      call diagnostics%add(max(value%line, self%groups(group)%line), group, text, value%override, code)
+    end associate
+  end subroutine report
 
   !> All messages, one a line, each after its file and line or its override.
   function diagnostics_text(self, diagnostics) result(text)

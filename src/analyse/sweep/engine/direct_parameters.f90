@@ -64,7 +64,8 @@ contains
       if (.not. self%are_direct) return
     end do
     self%groups = pack([(g, g=1, size(machine%groups))], &
-                       [(have_common_member(machine%groups(g)%bodies, self%body), g=1, size(machine%groups))])
+                       [(any([(any(machine%groups(g)%bodies == self%body(i)), i=1, size(self%body))]), g=1, &
+                         size(machine%groups))])
   end function new_direct_parameters
 
   !> An inertia, unless the start speeds were projected with it.
@@ -118,13 +119,6 @@ contains
     key = key_rules(first_key(input%groups(target%group)%rule) + target%key - 1)%name
   end function key_of
 
-  pure logical function have_common_member(list, members)
-    integer, intent(in) :: list(:), members(:)
-    integer :: i
-
-    have_common_member = any([(any(list == members(i)), i=1, size(members))])
-  end function have_common_member
-
   !> Takes the values of a variant that has been assembled and has the structure of the block.
   subroutine accept(self, values)
     class(direct_parameters_t), intent(inout) :: self
@@ -142,15 +136,12 @@ contains
   pure logical function are_accepted(self, values)
     class(direct_parameters_t), intent(in) :: self
     real(wp), intent(in) :: values(:)   !! [targets]
-    integer :: i, pattern
+    integer :: pattern
 
     are_accepted = .false.
     if (.not. self%are_direct) return
     do pattern = 1, size(self%signs, 2)
-      do i = 1, size(values)
-        if (sign_of(values(i)) /= self%signs(i, pattern)) exit
-      end do
-      are_accepted = i > size(values)
+      are_accepted = all(sign_of(values) == self%signs(:, pattern))
       if (are_accepted) return
     end do
   end function are_accepted
@@ -179,13 +170,8 @@ contains
   pure logical function are_allowed(self, values)
     class(direct_parameters_t), intent(in) :: self
     real(wp), intent(in) :: values(:)   !! [targets]
-    integer :: i
 
-    are_allowed = .false.
-    do i = 1, size(values)
-      if (.not. (values(i) >= self%lowest(i) .and. values(i) <= self%highest(i))) return
-    end do
-    are_allowed = .true.
+    are_allowed = all(values >= self%lowest .and. values <= self%highest)
   end function are_allowed
 
   !> Makes a lane that of a variant. What the lane holds beside the values must be that of another variant.

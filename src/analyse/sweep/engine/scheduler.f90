@@ -3,24 +3,19 @@
 module nocdyn_scheduler
   use nocdyn_kinds, only: wp
   use nocdyn_sweep_chunk, only: chunk_t
-  use omp_lib, only: omp_destroy_lock, omp_init_lock, omp_lock_kind, omp_set_lock, omp_test_lock, omp_unset_lock
+  use omp_lib, only: omp_lock_kind
   implicit none (type, external)
   private
 
-  !> Threads call its procedures between `lock` and `unlock`; only `is_cancelled` may be called without.
+  !> Threads call its procedures while they have its lock; only `is_cancelled` may be called without.
   type, abstract, public :: scheduler_t
-    integer(omp_lock_kind), private :: omp_lock
+    integer(omp_lock_kind) :: lock   !! of OpenMP, while there are threads
   contains
     procedure(next_chunk_interface), deferred :: next_chunk
     procedure(submit_interface), deferred :: submit
     procedure(poll_interface), deferred :: poll
     procedure(poll_interface), deferred :: finalise
     procedure(is_cancelled_interface), deferred :: is_cancelled
-    procedure :: create_lock
-    procedure :: destroy_lock
-    procedure :: lock
-    procedure :: unlock
-    procedure :: try_lock
   end type scheduler_t
 
   !> Numbers of variants.
@@ -76,41 +71,5 @@ module nocdyn_scheduler
     end function is_cancelled_interface
 
   end interface
-
-contains
-
-  !> Before the threads.
-  subroutine create_lock(self)
-    class(scheduler_t), intent(inout) :: self
-
-    call omp_init_lock(self%omp_lock)
-  end subroutine create_lock
-
-  !> After the threads.
-  subroutine destroy_lock(self)
-    class(scheduler_t), intent(inout) :: self
-
-    call omp_destroy_lock(self%omp_lock)
-  end subroutine destroy_lock
-
-  !> Waits until no other thread has the lock.
-  subroutine lock(self)
-    class(scheduler_t), intent(inout) :: self
-
-    call omp_set_lock(self%omp_lock)
-  end subroutine lock
-
-  subroutine unlock(self)
-    class(scheduler_t), intent(inout) :: self
-
-    call omp_unset_lock(self%omp_lock)
-  end subroutine unlock
-
-  !> Takes the lock if no other thread has it.
-  logical function try_lock(self)
-    class(scheduler_t), intent(inout) :: self
-
-    try_lock = omp_test_lock(self%omp_lock)
-  end function try_lock
 
 end module nocdyn_scheduler

@@ -7,12 +7,13 @@ module nocdyn_serial_work
   use nocdyn_assembly, only: assemble_machine, new_formulation
   use nocdyn_errors, only: error_t
   use nocdyn_formulation, only: formulation_t
-  use nocdyn_input, only: group_t, input_t
+  use nocdyn_input, only: input_t
   use nocdyn_integration_settings, only: check_settings, integration_settings_t
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
   use nocdyn_methods, only: select_method
   use nocdyn_recorded_quantities, only: restrict_statistics
+  use nocdyn_run_settings, only: choose_settings
   use nocdyn_scheduler, only: sweep_counts_t, sweep_progress_t
   use nocdyn_solver_status, only: failure_message, solver_status_t
   use nocdyn_statistics, only: statistic_t
@@ -20,8 +21,8 @@ module nocdyn_serial_work
   use nocdyn_stepper, only: stepper_t
   use nocdyn_sweep_chunk, only: chunk_t
   use nocdyn_sweep_journal, only: sweep_journal_t
-  use nocdyn_sweep_setup, only: read_settings
   use nocdyn_targets, only: set_targets, target_t
+  use nocdyn_text, only: string_t
   implicit none (type, external)
   private
 
@@ -62,11 +63,9 @@ contains
   !> Whether an input asks for the reduced formulation.
   logical function has_reduced_form(input)
     type(input_t), intent(in) :: input
-    type(group_t) :: run
 
     !$omp critical (texts)
-    run = input%single('run')
-    has_reduced_form = run%text('formulation') == 'reduced'
+    has_reduced_form = input%groups(input%position('run'))%text('formulation') == 'reduced'
     !$omp end critical (texts)
   end function has_reduced_form
 
@@ -76,11 +75,9 @@ contains
     type(machine_t), intent(in) :: machine
     logical, intent(in) :: with_energy_balance   !! whether the work integrals are among the states
     class(formulation_t), allocatable, intent(out) :: formulation
-    type(group_t) :: run
 
     !$omp critical (texts)
-    run = input%single('run')
-    call new_formulation(run%text('formulation'), machine, formulation, with_energy_balance)
+    call new_formulation(input%groups(input%position('run'))%text('formulation'), machine, formulation, with_energy_balance)
     !$omp end critical (texts)
   end subroutine new_own_formulation
 
@@ -94,10 +91,14 @@ contains
     class(stepper_t), allocatable, intent(out) :: stepper
     type(statistics_observer_t), intent(out) :: observer
     character(len=:), allocatable, intent(out) :: message        !! '', or why none of these variants can be integrated
+    type(string_t), allocatable :: notes(:)
     type(error_t), allocatable :: error
 
     !$omp critical (texts)
-    call read_settings(input, formulation, settings, times, error)
+    associate (run => input%groups(input%position('run')))
+      times = [run%number('t_start'), run%number('t_end')]
+    end associate
+    call choose_settings(input, formulation, settings, notes, error)
     if (.not. allocated(error)) call check_settings(settings, error)
     if (.not. allocated(error)) call select_method(settings, stepper, error)
     if (allocated(error)) then

@@ -1,18 +1,52 @@
-!> The threads of a sweep: each takes chunks of variants from a scheduler until none are left.
+!> The threads of a sweep: each takes chunks of variants from a scheduler until none are left. What their blocks share.
 module nocdyn_sweep
   use, intrinsic :: iso_fortran_env, only: int64
-  use nocdyn_scheduler, only: scheduler_t
+  use nocdyn_errors, only: error_t
+  use nocdyn_formulation, only: formulation_t
+  use nocdyn_integration_settings, only: integration_settings_t
   use nocdyn_kinds, only: wp
+  use nocdyn_run_settings, only: choose_settings
+  use nocdyn_scheduler, only: scheduler_t
+  use nocdyn_serial_work, only: new_own_formulation
+  use nocdyn_series_strips, only: strip
+  use nocdyn_statistics_observer, only: needs_work_integrals
   use nocdyn_sweep_block, only: new_sweep_block, sweep_block_t
   use nocdyn_sweep_chunk, only: chunk_t
   use nocdyn_sweep_plan, only: sweep_plan_t
-  use nocdyn_sweep_setup, only: sweep_setup_t
+  use nocdyn_text, only: string_t
+  use omp_lib, only: omp_destroy_lock, omp_init_lock, omp_set_lock, omp_unset_lock
   implicit none (type, external)
   private
 
-  public :: compute_variants
+  public :: prepare_sweep, compute_variants
+
+  ! Measured: chains of 10 rotors are fastest with 32 lanes, those of 100 with 8 to 32, those of 1000 with 4 to 8. No result
+  ! depends on the number of lanes.
+  integer, parameter :: max_states = 250   ! the parameters of `strip` lanes fit into the second-level cache
+  integer, parameter :: small_block = 8    ! lanes of larger machines: a multiple of the vector length of any processor
+
+  !> What all blocks of a sweep share.
+  type, public :: sweep_setup_t
+    integer :: lanes = 1                       !! of a block
+    logical :: has_energy_balance = .false.    !! whether a recorded column needs the work integrals
+  end type sweep_setup_t
 
 contains
+
+  !> Finds what the blocks share; refuses a base machine that `nocdyn run` would refuse.
+  subroutine prepare_sweep(plan, setup, error)
+    type(sweep_plan_t), intent(in) :: plan
+    type(sweep_setup_t), intent(out) :: setup
+    type(error_t), allocatable, intent(out) :: error
+    class(formulation_t), allocatable :: formulation
+    type(integration_settings_t) :: settings
+    type(string_t), allocatable :: notes(:)
+
+    setup%has_energy_balance = needs_work_integrals(plan%statistics)
+    call new_own_formulation(plan%input, plan%machine, setup%has_energy_balance, formulation)
+    call choose_settings(plan%input, formulation, settings, notes, error)
+    setup%lanes = merge(strip, small_block, formulation%states <= max_states)
+  end subroutine prepare_sweep
 
   !> Computes the variants that `scheduler` hands out, by threads with a block of lanes each.
   subroutine compute_variants(plan, setup, threads, scheduler)
@@ -21,12 +55,12 @@ contains
     integer, intent(in) :: threads
     class(scheduler_t), target, intent(inout) :: scheduler
 
-    call scheduler%create_lock()
+    call omp_init_lock(scheduler%lock)
     !$omp parallel num_threads(threads) default(shared)
     call compute_chunks(plan, setup, scheduler)
     !$omp end parallel
     call scheduler%finalise()
-    call scheduler%destroy_lock()
+    call omp_destroy_lock(scheduler%lock)
   end subroutine compute_variants
 
   !> One thread's work.
@@ -41,21 +75,21 @@ contains
     logical :: is_complete
 
     allocate (block)
-    call new_sweep_block(plan, setup, scheduler, block)
+    call new_sweep_block(plan, setup%lanes, setup%has_energy_balance, scheduler, block)
     do
-      call scheduler%lock()
+      call omp_set_lock(scheduler%lock)
       call scheduler%next_chunk(first, count)
-      call scheduler%unlock()
+      call omp_unset_lock(scheduler%lock)
       if (count == 0) exit
       seconds = time_now()
       call block%compute(first, count, chunk, is_complete)
       seconds = time_now() - seconds
       if (.not. is_complete) exit
-      call scheduler%lock()
+      call omp_set_lock(scheduler%lock)
       call scheduler%submit(chunk, seconds)
-      call scheduler%unlock()
+      call omp_unset_lock(scheduler%lock)
     end do
-    call block%release()
+    call block%machines%release()
   end subroutine compute_chunks
 
   !> Of a clock that only runs forward [s].

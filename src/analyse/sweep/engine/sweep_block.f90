@@ -13,9 +13,9 @@ module nocdyn_sweep_block
   use nocdyn_stepper, only: stepper_t
   use nocdyn_sweep_chunk, only: allocate_chunk, chunk_t, status_done, status_failed, status_refused
   use nocdyn_sweep_plan, only: sweep_plan_t
-  use nocdyn_sweep_setup, only: sweep_setup_t
   use nocdyn_system, only: system_t
   use nocdyn_variant_machines, only: new_variant_machines, variant_machines_t, variant_needs_own_block, variant_refused
+  use omp_lib, only: omp_test_lock, omp_unset_lock
   implicit none (type, external)
   private
 
@@ -55,16 +55,16 @@ module nocdyn_sweep_block
     character(len=:), allocatable, private :: message   !! why the variants that fit the lanes are refused; '': they are not
   contains
     procedure :: compute
-    procedure :: release
     procedure, private :: compute_in_own_block
   end type sweep_block_t
 
 contains
 
-  !> A block of lanes of the base machine, which must not be moved. `release` frees it.
-  subroutine new_sweep_block(plan, setup, scheduler, block)
+  !> A block of lanes of the base machine, which must not be moved. `release` of its machines frees it.
+  subroutine new_sweep_block(plan, lanes, with_energy_balance, scheduler, block)
     type(sweep_plan_t), target, intent(in) :: plan
-    type(sweep_setup_t), intent(in) :: setup   !! of the plan
+    integer, intent(in) :: lanes
+    logical, intent(in) :: with_energy_balance   !! whether a recorded column needs the work integrals
     class(scheduler_t), target, intent(inout) :: scheduler
     type(sweep_block_t), target, intent(out) :: block
     real(wp) :: typical(plan%design%varied)
@@ -73,17 +73,10 @@ contains
     block%scheduler => scheduler
     block%observer%scheduler => scheduler
     call plan%values(1, typical)
-    call new_variant_machines(plan%input, plan%targets, setup%lanes, setup%has_energy_balance, block%machines, typical)
+    call new_variant_machines(plan%input, plan%targets, lanes, with_energy_balance, block%machines, typical)
     call prepare_integration(plan%input, block%machines%formulation, plan%statistics, block%settings, block%times, &
                              block%stepper, block%observer%statistics_observer_t, block%message)
   end subroutine new_sweep_block
-
-  !> Frees the lanes.
-  subroutine release(self)
-    class(sweep_block_t), intent(inout) :: self
-
-    call self%machines%release()
-  end subroutine release
 
   !> Computes the variants `first`, `first` + 1, ...
   subroutine compute(self, first, count, chunk, is_complete)
@@ -241,9 +234,9 @@ contains
     wants_stop = .false.
     self%steps = mod(self%steps + 1, poll_interval)
     if (self%steps /= 0) return
-    if (self%scheduler%try_lock()) then
+    if (omp_test_lock(self%scheduler%lock)) then
       call self%scheduler%poll()
-      call self%scheduler%unlock()
+      call omp_unset_lock(self%scheduler%lock)
     end if
     wants_stop = self%scheduler%is_cancelled()
   end function wants_stop

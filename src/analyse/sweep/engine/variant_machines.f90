@@ -99,13 +99,7 @@ contains
       associate (target => self%targets(i))
         self%is_of_run(i) = self%input%groups(target%group)%kind == 'run'
         if (.not. self%is_of_run(i)) cycle
-        associate (value => self%input%groups(target%group)%values(target%key))
-          if (target%is_integer) then
-            self%base(i) = real(value%whole_numbers(target%position), wp)
-          else
-            self%base(i) = value%numbers(target%position)
-          end if
-        end associate
+        self%base(i) = self%input%groups(target%group)%values(target%key)%number_at(target%position)
       end associate
     end do
   end subroutine find_run_values

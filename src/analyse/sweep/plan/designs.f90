@@ -12,7 +12,7 @@ module nocdyn_designs
   implicit none (type, external)
   private
 
-  public :: grid_design, random_design, latin_design, sobol_design, list_design
+  public :: grid_design, sampled_design, list_design
   public :: grid_size, can_overflow, probability_between
 
   integer, parameter, public :: max_variants = 2000000000
@@ -45,12 +45,6 @@ module nocdyn_designs
     end subroutine values_interface
   end interface
 
-  type, abstract, extends(design_t) :: sampled_design_t
-    private
-    type(distribution_t), allocatable :: distributions(:)   !! [varied]
-    integer :: seed
-  end type sampled_design_t
-
   type, extends(design_t), public :: grid_design_t
     private
     type(factor_t), allocatable :: factors(:)
@@ -58,24 +52,16 @@ module nocdyn_designs
     procedure :: values => grid_values
   end type grid_design_t
 
-  type, extends(sampled_design_t), public :: random_design_t
-  contains
-    procedure :: values => random_values
-  end type random_design_t
-
-  type, extends(sampled_design_t), public :: latin_design_t
+  type, extends(design_t), public :: sampled_design_t
     private
-    type(permutation_t), allocatable :: strata(:)
+    character(len=6) :: design                              !! 'random', 'latin', 'sobol'
+    integer :: seed
+    type(distribution_t), allocatable :: distributions(:)   !! [varied]
+    type(permutation_t), allocatable :: strata(:)           !! if latin, [varied]
+    type(sobol_points_t) :: points                          !! if sobol
   contains
-    procedure :: values => latin_values
-  end type latin_design_t
-
-  type, extends(sampled_design_t), public :: sobol_design_t
-    private
-    type(sobol_points_t) :: points
-  contains
-    procedure :: values => sobol_values
-  end type sobol_design_t
+    procedure :: values => sampled_values
+  end type sampled_design_t
 
   type, extends(design_t), public :: list_design_t
     private
@@ -131,77 +117,54 @@ contains
     end do
   end subroutine grid_values
 
-  !> Independent random values.
-  function random_design(factors, samples, seed) result(design)
-    type(factor_t), intent(in) :: factors(:)
-    integer, intent(in) :: samples   !! at least 1
-    integer, intent(in) :: seed      !! at least 0
-    type(random_design_t) :: design
-
-    call initialise(design, factors, samples, seed)
-  end function random_design
-
-  pure subroutine random_values(self, variant, x)
-    class(random_design_t), intent(in) :: self
-    integer, intent(in) :: variant
-    real(wp), intent(out) :: x(:)
-    integer :: i
-
-    do i = 1, self%varied
-      x(i) = self%distributions(i)%quantile(random_number_at(self%seed, stream_values, i, variant))
-    end do
-  end subroutine random_values
-
-  !> Latin hypercube (M. D. McKay, R. J. Beckman, W. J. Conover, Technometrics 21 (1979) 239-245): the range of each factor is
-  !> divided into as many equally probable strata as there are samples, with one random value in each stratum.
-  function latin_design(factors, samples, seed) result(design)
-    type(factor_t), intent(in) :: factors(:)
-    integer, intent(in) :: samples   !! at least 1
-    integer, intent(in) :: seed      !! at least 0
-    type(latin_design_t) :: design
-    integer :: i
-
-    call initialise(design, factors, samples, seed)
-    allocate (design%strata(size(factors)))
-    do i = 1, size(factors)
-      design%strata(i) = random_permutation(samples, seed, i)
-    end do
-  end function latin_design
-
-  pure subroutine latin_values(self, variant, x)
-    class(latin_design_t), intent(in) :: self
-    integer, intent(in) :: variant
-    real(wp), intent(out) :: x(:)
-    real(wp) :: offset
-    integer :: i
-
-    do i = 1, self%varied
-      offset = min(random_number_at(self%seed, stream_offsets, i, variant), last_offset)
-      x(i) = self%distributions(i)%quantile((self%strata(i)%image(variant - 1) + offset) / self%variants)
-    end do
-  end subroutine latin_values
-
-  !> Sobol points from the first one on; a seed other than 0 shifts all of them.
-  function sobol_design(factors, samples, seed) result(design)
-    type(factor_t), intent(in) :: factors(:)   !! at most `max_dimensions`
+  !> Random values:
+  !>
+  !> - random: independent ones.
+  !> - latin: a Latin hypercube (M. D. McKay, R. J. Beckman, W. J. Conover, Technometrics 21 (1979) 239-245): the range of each
+  !>   factor is divided into as many equally probable strata as there are samples, with one random value in each stratum.
+  !> - sobol: Sobol points from the first one on; a seed other than 0 shifts all of them.
+  function sampled_design(word, factors, samples, seed) result(design)
+    character(len=*), intent(in) :: word       !! 'random', 'latin', 'sobol'
+    type(factor_t), intent(in) :: factors(:)   !! at most `max_dimensions` if sobol
     integer, intent(in) :: samples             !! at least 1
     integer, intent(in) :: seed                !! at least 0
-    type(sobol_design_t) :: design
+    type(sampled_design_t) :: design
+    integer :: i
 
-    call initialise(design, factors, samples, seed)
-    design%points = sobol_points(size(factors), seed)
-  end function sobol_design
+    design%variants = samples
+    design%varied = size(factors)
+    design%design = word
+    design%seed = seed
+    allocate (design%distributions(size(factors)), design%strata(merge(size(factors), 0, word == 'latin')))
+    do i = 1, size(factors)
+      design%distributions(i) = distribution_of(factors(i))
+      if (word == 'latin') design%strata(i) = random_permutation(samples, seed, i)
+    end do
+    if (word == 'sobol') design%points = sobol_points(size(factors), seed)
+  end function sampled_design
 
-  pure subroutine sobol_values(self, variant, x)
-    class(sobol_design_t), intent(in) :: self
+  pure subroutine sampled_values(self, variant, x)
+    class(sampled_design_t), intent(in) :: self
     integer, intent(in) :: variant
     real(wp), intent(out) :: x(:)
+    real(wp) :: probability
     integer :: i
 
     do i = 1, self%varied
-      x(i) = self%distributions(i)%quantile(self%points%coordinate(variant - 1, i))
+      select case (self%design)
+      case ('random')
+        probability = random_number_at(self%seed, stream_values, i, variant)
+      case ('latin')
+        probability = (self%strata(i)%image(variant - 1) + &
+                       min(random_number_at(self%seed, stream_offsets, i, variant), last_offset)) / self%variants
+      case ('sobol')
+        probability = self%points%coordinate(variant - 1, i)
+      case default
+        error stop 'nocdyn_designs: there is no such design'
+      end select
+      x(i) = self%distributions(i)%quantile(probability)
     end do
-  end subroutine sobol_values
+  end subroutine sampled_values
 
   !> A list of values.
   function list_design(values) result(design)
@@ -220,22 +183,6 @@ contains
 
     x = self%list(:, variant)
   end subroutine list_values
-
-  !> What all random designs need.
-  subroutine initialise(design, factors, samples, seed)
-    class(sampled_design_t), intent(inout) :: design
-    type(factor_t), intent(in) :: factors(:)
-    integer, intent(in) :: samples, seed
-    integer :: i
-
-    design%variants = samples
-    design%varied = size(factors)
-    design%seed = seed
-    allocate (design%distributions(size(factors)))
-    do i = 1, size(factors)
-      design%distributions(i) = distribution_of(factors(i))
-    end do
-  end subroutine initialise
 
   !> The probability of the range from `low` to `high` without truncation. No value can be drawn if it is 0.
   pure real(wp) function probability_between(factor)

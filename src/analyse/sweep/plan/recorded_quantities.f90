@@ -3,8 +3,7 @@ module nocdyn_recorded_quantities
   use nocdyn_input, only: input_t
   use nocdyn_kinds, only: wp
   use nocdyn_diagnostics, only: diagnostics_t
-  use nocdyn_statistics, only: default_band, new_statistic, statistic_names, statistic_settling_time, statistic_t
-  use nocdyn_sweep_diagnostics, only: report
+  use nocdyn_statistics, only: new_statistic, statistic_names, statistic_t
   use nocdyn_text, only: append, joined, nearest_word, quoted, string_t, to_text
   implicit none (type, external)
   private
@@ -28,16 +27,14 @@ contains
     integer, intent(in) :: variants           !! number of variants, huge if it is not known
     type(statistic_t), allocatable, intent(out) :: statistics(:)
     type(diagnostics_t), intent(inout) :: diagnostics
-    type(string_t), allocatable :: names(:)
     integer :: i
 
     allocate (statistics(0))
-    call remove_units(labels, names)
     associate (records => input%groups_named('record'))
       do i = 1, size(records)
         associate (group => input%groups(records(i)))
           if (group%has_value('quantity')) then
-            call add_statistics(input, records(i), labels, names, span, statistics, diagnostics)
+            call add_statistics(input, records(i), labels, span, statistics, diagnostics)
           else if (.not. group%has_value('trajectories')) then
             call diagnostics%add(group%line, records(i), 'there is nothing to record; needed: quantity or trajectories')
           end if
@@ -52,14 +49,12 @@ contains
     type(input_t), intent(in) :: input
     type(string_t), intent(in) :: labels(:)   !! of the columns of trajectory.csv
     type(diagnostics_t), intent(inout) :: diagnostics
-    type(string_t), allocatable :: names(:)
     integer :: column, i
 
-    call remove_units(labels, names)
     associate (records => input%groups_named('record'))
       do i = 1, size(records)
         if (.not. input%groups(records(i))%has_value('quantity')) cycle
-        call find_column(input, records(i), labels, names, column, diagnostics)
+        call find_column(input, records(i), labels, column, diagnostics)
       end do
     end associate
   end subroutine check_quantities
@@ -84,60 +79,36 @@ contains
     end do
   end subroutine restrict_statistics
 
-  !> The labels without their units.
-  subroutine remove_units(labels, names)
-    type(string_t), intent(in) :: labels(:)
-    type(string_t), allocatable, intent(out) :: names(:)
-    integer :: i
-
-    allocate (names(size(labels)))
-    do i = 1, size(labels)
-      names(i)%text = labels(i)%text(:index(labels(i)%text, ' [', back=.true.) - 1)
-    end do
-  end subroutine remove_units
-
   !> Adds the statistics of one &record.
-  subroutine add_statistics(input, record, labels, names, span, statistics, diagnostics)
+  subroutine add_statistics(input, record, labels, span, statistics, diagnostics)
     type(input_t), intent(in) :: input
     integer, intent(in) :: record   !! index of the &record
-    type(string_t), intent(in) :: labels(:), names(:)   !! with and without units
+    type(string_t), intent(in) :: labels(:)
     type(time_span_t), intent(in) :: span
     type(statistic_t), allocatable, intent(inout) :: statistics(:)
     type(diagnostics_t), intent(inout) :: diagnostics
     type(statistic_t) :: statistic
     type(string_t), allocatable :: words(:)
-    real(wp) :: band
-    integer :: column, i, kind
+    real(wp), allocatable :: band, from   ! of the group, if it has them
+    integer :: column, i, k
 
-    call find_column(input, record, labels, names, column, diagnostics)
+    call find_column(input, record, labels, column, diagnostics)
     call check_from(input, record, span, diagnostics)
     if (column == 0) return
     associate (group => input%groups(record))
       words = group%texts('statistic')
-      band = group%number('band', default_band)
+      if (group%has_value('from')) from = group%number('from')
+      if (group%has_value('band')) band = group%number('band')
       do i = 1, size(words)
-        kind = kind_of(words(i)%text)
-        if (group%has_value('from')) then
-          statistic = new_statistic(labels, column, kind, span%t_start, group%number('from'), band)
-        else
-          statistic = new_statistic(labels, column, kind, span%t_start, band=band)
-        end if
-        if (kind == statistic_settling_time .and. group%has_value('band')) call name_band(statistic)
-        if (any_has_label(statistics, statistic%label)) then
-          call report(input, record, 'statistic', quoted(statistic%label) // ' is recorded already; allowed: once', diagnostics)
+        statistic = new_statistic(labels, column, kind_of(words(i)%text), span%t_start, from, band)
+        if (any([(statistics(k)%label == statistic%label, k=1, size(statistics))])) then
+          call input%report(record, 'statistic', quoted(statistic%label) // ' is recorded already; allowed: once', diagnostics)
         else
           call append_statistic(statistics, statistic)
         end if
       end do
     end associate
   end subroutine add_statistics
-
-  subroutine name_band(statistic)
-    type(statistic_t), intent(inout) :: statistic
-
-    statistic%label = statistic%label // '_band_' // to_text(statistic%band)
-    statistic%long_name = statistic%long_name // ' in a band of ' // to_text(statistic%band)
-  end subroutine name_band
 
   pure integer function kind_of(word) result(kind)
     character(len=*), intent(in) :: word
@@ -149,16 +120,18 @@ contains
   end function kind_of
 
   !> The column of the quantity of a &record, with or without its unit; 0 if there is none.
-  subroutine find_column(input, record, labels, names, column, diagnostics)
+  subroutine find_column(input, record, labels, column, diagnostics)
     type(input_t), intent(in) :: input
     integer, intent(in) :: record
-    type(string_t), intent(in) :: labels(:), names(:)
+    type(string_t), intent(in) :: labels(:)
     integer, intent(out) :: column
     type(diagnostics_t), intent(inout) :: diagnostics
     character(len=:), allocatable :: hint, quantity
+    type(string_t) :: names(size(labels))   ! labels without units
 
     quantity = trim(adjustl(input%groups(record)%text('quantity')))
     do column = 1, size(labels)
+      names(column)%text = labels(column)%text(:index(labels(column)%text, ' [', back=.true.) - 1)
       if (quantity == labels(column)%text .or. quantity == names(column)%text) return
     end do
     column = 0
@@ -168,7 +141,7 @@ contains
       hint = near_match(quantity, names)
     end if
     if (hint == '') hint = ', which has ' // related_names(quantity, names)
-    call report(input, record, 'quantity', 'quantity = ' // quoted(quantity) // ' is no column of trajectory.csv' // hint, &
+    call input%report(record, 'quantity', 'quantity = ' // quoted(quantity) // ' is no column of trajectory.csv' // hint, &
                      diagnostics)
   end subroutine find_column
 
@@ -219,21 +192,13 @@ contains
     if (.not. input%groups(record)%has_value('from')) return
     from = input%groups(record)%number('from')
     if (from < span%t_start) then
-      call report(input, record, 'from', 'from = ' // to_text(from) // ' is out of range; allowed: >= t_start = ' // &
+      call input%report(record, 'from', 'from = ' // to_text(from) // ' is out of range; allowed: >= t_start = ' // &
                        to_text(span%t_start), diagnostics)
     else if (from >= span%t_end) then
-      call report(input, record, 'from', 'from = ' // to_text(from) // ' is out of range; allowed: < t_end = ' // &
+      call input%report(record, 'from', 'from = ' // to_text(from) // ' is out of range; allowed: < t_end = ' // &
                        to_text(span%t_end), diagnostics)
     end if
   end subroutine check_from
-
-  pure logical function any_has_label(statistics, label)
-    type(statistic_t), intent(in) :: statistics(:)
-    character(len=*), intent(in) :: label
-    integer :: i
-
-    any_has_label = any([(statistics(i)%label == label, i=1, size(statistics))])
-  end function any_has_label
 
   subroutine append_statistic(statistics, statistic)
     type(statistic_t), allocatable, intent(inout) :: statistics(:)
@@ -275,7 +240,7 @@ contains
     allocate (wanted, source=input%groups(record)%whole_numbers('trajectories'))
     do i = 1, size(wanted)
       if (wanted(i) <= variants) cycle
-      call report(input, record, 'trajectories', 'trajectories(' // to_text(i) // ') = ' // to_text(wanted(i)) // &
+      call input%report(record, 'trajectories', 'trajectories(' // to_text(i) // ') = ' // to_text(wanted(i)) // &
                        ' is out of range; allowed: 1 to ' // to_text(variants) // ', the number of variants', diagnostics)
     end do
   end subroutine check_trajectories

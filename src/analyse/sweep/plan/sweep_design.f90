@@ -1,14 +1,13 @@
 !> The targets and the design of a sweep, from &sweep and &vary or from the file of a list.
 module nocdyn_sweep_design
   use nocdyn_checksums, only: checksum_digits
-  use nocdyn_designs, only: design_t, factor_t, grid_design, grid_size, latin_design, can_overflow, list_design, &
-    max_variants, probability_between, random_design, sobol_design
+  use nocdyn_designs, only: can_overflow, design_t, factor_t, grid_design, grid_size, list_design, max_variants, &
+    probability_between, sampled_design
   use nocdyn_errors, only: error_t, exit_file
   use nocdyn_input, only: group_t, input_t
   use nocdyn_kinds, only: wp
   use nocdyn_diagnostics, only: diagnostics_t, no_line
   use nocdyn_sobol_points, only: max_dimensions
-  use nocdyn_sweep_diagnostics, only: report
   use nocdyn_table_file, only: read_list_text
   use nocdyn_target_consistency, only: find_targets, target_at
   use nocdyn_targets, only: target_t
@@ -21,7 +20,7 @@ module nocdyn_sweep_design
 
 contains
 
-  !> Reads targets and design. The design is allocated if there is no error.
+  !> Reads targets and design. The design is allocated if there is no error. A list refuses &vary.
   subroutine read_design(input, sweep, targets, design, list_checksum, diagnostics)
     type(input_t), intent(in) :: input
     integer, intent(in) :: sweep   !! index of &sweep
@@ -31,14 +30,17 @@ contains
     type(diagnostics_t), intent(inout) :: diagnostics
     type(factor_t), allocatable :: factors(:)
     real(wp), allocatable :: values(:, :)
-    integer :: before
+    integer :: before, i
 
     before = diagnostics%count
     list_checksum = ''
     associate (group => input%groups(sweep), varied => input%groups_named('vary'))
       if (group%text('design') == 'list') then
         call read_list(input, sweep, targets, values, list_checksum, diagnostics)
-        call refuse_varied(input, varied, diagnostics)
+        do i = 1, size(varied)
+          call diagnostics%add(input%groups(varied(i))%line, varied(i), &
+                               "design = 'list' takes targets and values from its file; allowed: no &vary")
+        end do
         call refuse_overrides(input, [integer ::], targets, diagnostics)
         if (diagnostics%count == before) allocate (design, source=list_design(values))
       else
@@ -54,24 +56,13 @@ contains
     type(group_t), intent(in) :: group   !! &sweep
     type(factor_t), intent(in) :: factors(:)
     class(design_t), allocatable, intent(out) :: design
-    integer :: samples, seed
 
-    samples = 0
-    seed = 0
-    if (group%has_value('samples')) samples = group%whole_number('samples')
-    if (group%has_value('seed')) seed = group%whole_number('seed')
-    select case (group%text('design'))
-    case ('grid')
+    if (group%text('design') == 'grid') then
       allocate (design, source=grid_design(factors))
-    case ('random')
-      allocate (design, source=random_design(factors, samples, seed))
-    case ('latin')
-      allocate (design, source=latin_design(factors, samples, seed))
-    case ('sobol')
-      allocate (design, source=sobol_design(factors, samples, seed))
-    case default
-      error stop 'nocdyn_sweep_design: the schema allows a design that is not there'
-    end select
+    else
+      allocate (design, source=sampled_design(group%text('design'), factors, group%whole_number('samples'), &
+                                              group%whole_number('seed')))
+    end if
   end subroutine make_design
 
   !> Reads the file of a list: targets in its first line, values in the others.
@@ -91,13 +82,13 @@ contains
     file = path_in(input%file(:index(input%file, '/', back=.true.)), input%groups(sweep)%text('file'))
     call read_text_file(file, text, error)
     if (allocated(error)) then
-      call report(input, sweep, 'file', 'file: ' // error%message, diagnostics, exit_file)
+      call input%report(sweep, 'file', 'file: ' // error%message, diagnostics, exit_file)
       return
     end if
     list_checksum = checksum_digits(text)
     call read_list_text(text, file, names, line, values, messages)
     do i = 1, size(messages)
-      call report(input, sweep, 'file', 'file: ' // messages(i)%text, diagnostics)
+      call input%report(sweep, 'file', 'file: ' // messages(i)%text, diagnostics)
     end do
     call split_units(names, paths, units)
     call find_targets(input, paths, targets, messages)
@@ -107,7 +98,7 @@ contains
         if (targets(i)%unit /= '') messages(i)%text = messages(i)%text // ' [' // targets(i)%unit // ']'
       end if
       if (messages(i)%text == '') cycle
-      call report(input, sweep, 'file', 'file: ' // file // ':' // to_text(line) // ': column ' // to_text(i) // ', ' // &
+      call input%report(sweep, 'file', 'file: ' // file // ':' // to_text(line) // ': column ' // to_text(i) // ', ' // &
                        quoted(names(i)%text) // ': ' // messages(i)%text, diagnostics)
     end do
   end subroutine read_list
@@ -128,19 +119,6 @@ contains
       end associate
     end do
   end subroutine split_units
-
-  !> Refuses &vary beside a list.
-  subroutine refuse_varied(input, varied, diagnostics)
-    type(input_t), intent(in) :: input
-    integer, intent(in) :: varied(:)
-    type(diagnostics_t), intent(inout) :: diagnostics
-    integer :: i
-
-    do i = 1, size(varied)
-      call diagnostics%add(input%groups(varied(i))%line, varied(i), &
-                        "design = 'list' takes targets and values from its file; allowed: no &vary")
-    end do
-  end subroutine refuse_varied
 
   !> Refuses overrides of numbers that vary: they would have no effect.
   subroutine refuse_overrides(input, varied, targets, diagnostics)
@@ -186,12 +164,12 @@ contains
                                                                               diagnostics)
     end do
     if (size(varied) == 0) then
-      call report(input, sweep, 'design', 'design = ' // quoted(design) // ' has nothing to vary; needed: a &vary', diagnostics)
+      call input%report(sweep, 'design', 'design = ' // quoted(design) // ' has nothing to vary; needed: a &vary', diagnostics)
     else if (design == 'sobol' .and. size(varied) > max_dimensions) then
-      call report(input, sweep, 'design', "design = 'sobol' varies at most " // to_text(max_dimensions) // &
+      call input%report(sweep, 'design', "design = 'sobol' varies at most " // to_text(max_dimensions) // &
                        ' numbers; here vary ' // to_text(size(varied)), diagnostics)
     else if (design == 'grid' .and. grid_size(factors) > max_variants) then
-      call report(input, sweep, 'design', 'the grid has too many variants; allowed: at most ' // to_text(max_variants) // &
+      call input%report(sweep, 'design', 'the grid has too many variants; allowed: at most ' // to_text(max_variants) // &
                        ' by the product of all count', diagnostics)
     end if
   end subroutine read_varied
@@ -213,7 +191,7 @@ contains
     call find_targets(input, paths, targets, messages)
     do i = 1, size(varied)
       if (messages(i)%text == '' .or. .not. input%groups(varied(i))%has_value('target')) cycle
-      call report(input, varied(i), 'target', 'target = ' // quoted(paths(i)%text) // ': ' // messages(i)%text, diagnostics)
+      call input%report(varied(i), 'target', 'target = ' // quoted(paths(i)%text) // ': ' // messages(i)%text, diagnostics)
     end do
   end subroutine find_varied
 
@@ -243,30 +221,30 @@ contains
     has_count = input%groups(varied)%has_value('count')
     if (design /= 'grid') then
       if (has_count) then
-        call report(input, varied, 'count', "count belongs to design = 'grid'; here design = " // quoted(design), diagnostics)
+        call input%report(varied, 'count', "count belongs to design = 'grid'; here design = " // quoted(design), diagnostics)
       end if
       if (factor%distribution == 'uniform' .and. factor%high <= factor%low) then
-        call report(input, varied, 'high', 'high = ' // to_text(factor%high) // ' is out of range; allowed: > low = ' // &
+        call input%report(varied, 'high', 'high = ' // to_text(factor%high) // ' is out of range; allowed: > low = ' // &
                          to_text(factor%low), diagnostics)
       else if (can_overflow(factor)) then
         call refuse_overflow(input, varied, factor, diagnostics)
       else if (probability_between(factor) <= 0.0_wp) then
-        call report(input, varied, 'distribution', 'the distribution has nothing from low to high; allowed: ends ' // &
+        call input%report(varied, 'distribution', 'the distribution has nothing from low to high; allowed: ends ' // &
                          'nearer to its middle', diagnostics)
       end if
       return
     end if
     if (.not. has_count) then
-      call report(input, varied, 'count', "count is missing; design = 'grid' needs it", diagnostics)
+      call input%report(varied, 'count', "count is missing; design = 'grid' needs it", diagnostics)
     else if (factor%count > 1 .and. factor%high <= factor%low) then
-      call report(input, varied, 'count', 'count = ' // to_text(factor%count) // ' values from low = ' // &
+      call input%report(varied, 'count', 'count = ' // to_text(factor%count) // ' values from low = ' // &
                        to_text(factor%low) // ' to high = ' // to_text(factor%high) // ' are all the same; allowed: count = 1', &
                        diagnostics)
     else if (factor%distribution == 'uniform' .and. factor%count > 1 .and. can_overflow(factor)) then
       call refuse_overflow(input, varied, factor, diagnostics)
     end if
     if (factor%distribution /= 'uniform') then
-      call report(input, varied, 'distribution', 'distribution = ' // quoted(trim(factor%distribution)) // &
+      call input%report(varied, 'distribution', 'distribution = ' // quoted(trim(factor%distribution)) // &
                        " has no grid; allowed with design = 'grid': 'uniform'", diagnostics)
     end if
   end subroutine check_factor
@@ -282,14 +260,14 @@ contains
     most = to_text(huge(factor%high))
     select case (factor%distribution)
     case ('uniform')
-      call report(input, varied, 'high', 'high = ' // to_text(factor%high) // ' is too far from low = ' // &
+      call input%report(varied, 'high', 'high = ' // to_text(factor%high) // ' is too far from low = ' // &
                        to_text(factor%low) // '; allowed: high - low at most ' // most, diagnostics)
     case ('normal')
-      call report(input, varied, 'deviation', 'mean = ' // to_text(factor%mean) // ' and deviation = ' // &
+      call input%report(varied, 'deviation', 'mean = ' // to_text(factor%mean) // ' and deviation = ' // &
                        to_text(factor%deviation) // ' reach numbers beyond ' // most // &
                        '; allowed: smaller ones, or low and high', diagnostics)
     case default
-      call report(input, varied, 'log_deviation', 'median = ' // to_text(factor%median) // ' and log_deviation = ' // &
+      call input%report(varied, 'log_deviation', 'median = ' // to_text(factor%median) // ' and log_deviation = ' // &
                        to_text(factor%log_deviation) // ' reach numbers beyond ' // most // &
                        '; allowed: smaller ones, or high', diagnostics)
     end select
@@ -307,7 +285,7 @@ contains
     if (factor%distribution /= 'uniform' .or. factor%high <= factor%low .or. can_overflow(factor)) return
     room = anint(factor%high) - anint(factor%low) + 1.0_wp
     if (factor%count <= room) return
-    call report(input, varied, 'count', 'count = ' // to_text(factor%count) // ' has repeats: ' // target%path // &
+    call input%report(varied, 'count', 'count = ' // to_text(factor%count) // ' has repeats: ' // target%path // &
                      ' is a whole number, of which low = ' // to_text(factor%low) // ' to high = ' // to_text(factor%high) // &
                      ' holds ' // to_text(nint(room)) // '; allowed: 1 to ' // to_text(nint(room)), diagnostics)
   end subroutine check_whole_grid

@@ -1,34 +1,34 @@
 !> The plan of a sweep: targets, design and recorded quantities, as its input describes them. All errors in the groups of the
 !> sweep are reported at once.
 module nocdyn_sweep_plan
-  use nocdyn_assembly, only: assemble_machine
   use nocdyn_designs, only: design_t
   use nocdyn_errors, only: error_t, exit_input, raise
   use nocdyn_input, only: group_t, input_t
+  use nocdyn_input_text, only: input_text
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
   use nocdyn_diagnostics, only: diagnostics_t
   use nocdyn_output_times, only: check_output_times
   use nocdyn_schema, only: has_word
-  use nocdyn_size_limits, only: check_size
   use nocdyn_statistics, only: statistic_t
   use nocdyn_sweep_design, only: find_varied, read_design
-  use nocdyn_sweep_diagnostics, only: report
+  use nocdyn_sweep_header, only: sweep_header_t
   use nocdyn_recorded_quantities, only: check_quantities, read_recorded_quantities, time_span_t, wanted_trajectories
   use nocdyn_targets, only: target_t
   use nocdyn_text, only: string_t
   use nocdyn_text_phrases, only: counted
-  use nocdyn_trajectory_columns, only: column_t, list_columns
-  use nocdyn_variant_columns, only: add_variant_columns
+  use nocdyn_variant_columns, only: label_columns
+  use nocdyn_version, only: compiler_text, version
   implicit none (type, external)
   private
 
-  public :: make_plan, add_plan_diagnostics, has_sweep, without_sweep
+  public :: make_plan, add_plan_diagnostics, new_sweep_header, has_sweep, without_sweep
 
   character(len=*), parameter :: kinds = 'sweep vary record'   ! of the groups of a sweep
 
   type, public :: sweep_plan_t
     type(input_t) :: input                            !! of the base machine and the sweep
+    type(machine_t) :: machine                        !! the base machine, one lane
     class(design_t), allocatable :: design
     type(target_t), allocatable :: targets(:)         !! of the factors of the design
     type(statistic_t), allocatable :: statistics(:)
@@ -61,12 +61,11 @@ contains
     call read_design(input, sweeps(1), plan%targets, plan%design, plan%list_checksum, diagnostics)
     variants = huge(variants)
     if (allocated(plan%design)) variants = plan%design%variants
-    call label_columns(input, labels, failure)
+    call label_columns(input, plan%targets, plan%machine, labels, failure)
     if (.not. allocated(failure)) then
-      call add_variant_columns(input, plan%targets, labels)
       call read_recorded_quantities(input, labels, fixed_span(input, plan%targets), variants, plan%statistics, diagnostics)
       allocate (plan%trajectories, source=wanted_trajectories(input))
-      if (size(plan%statistics) == 0 .and. diagnostics%count == 0) call report(input, sweeps(1), 'design', &
+      if (size(plan%statistics) == 0 .and. diagnostics%count == 0) call input%report(sweeps(1), 'design', &
         'no number of the variants is kept; needed: a &record with quantity and statistic', diagnostics)
       if (size(plan%trajectories) > 0) call check_output_times(input, failure)
     end if
@@ -80,6 +79,7 @@ contains
     type(diagnostics_t), intent(inout) :: diagnostics   !! of reading the input
     type(error_t), allocatable, intent(inout) :: error
     type(error_t), allocatable :: failure
+    type(machine_t) :: machine
     type(string_t), allocatable :: labels(:)
     type(target_t), allocatable :: targets(:)
     integer, allocatable :: varied(:)
@@ -92,11 +92,8 @@ contains
     end do
     allocate (varied, source=input%groups_named('vary'))
     call find_varied(input, varied, targets, diagnostics)
-    call label_columns(input, labels, failure)
-    if (size(varied) > 0 .and. .not. allocated(failure)) then
-      call add_variant_columns(input, targets, labels)
-      call check_quantities(input, labels, diagnostics)
-    end if
+    call label_columns(input, targets, machine, labels, failure)
+    if (size(varied) > 0 .and. .not. allocated(failure)) call check_quantities(input, labels, diagnostics)
     call merge_errors(input, diagnostics, failure, error)
   end subroutine add_plan_diagnostics
 
@@ -123,31 +120,18 @@ contains
     if (size(self%trajectories) > 0) text = text // ', ' // counted(size(self%trajectories), 'trajectory', 'trajectories')
   end function summary
 
-  !> The labels of the columns of trajectory.csv of the base machine.
-  subroutine label_columns(input, labels, error)
-    type(input_t), intent(in) :: input
-    type(string_t), allocatable, intent(out) :: labels(:)
-    type(error_t), allocatable, intent(out) :: error
-    type(column_t), allocatable :: columns(:)
-    type(machine_t) :: machine
-
-    call assemble_machine(input, machine, error)
-    if (.not. allocated(error)) call check_size(input, machine, error)
-    if (.not. allocated(error)) call list_columns(machine, columns, labels)
-  end subroutine label_columns
-
   !> The time span of the base machine, as far as it does not vary.
   pure function fixed_span(input, targets) result(span)
     type(input_t), intent(in) :: input
     type(target_t), intent(in) :: targets(:)
     type(time_span_t) :: span
-    type(group_t) :: run
-    integer, allocatable :: runs(:)
+    integer :: i
 
-    allocate (runs, source=input%groups_named('run'))
-    run = input%groups(runs(1))
-    if (.not. any(targets%group == runs(1) .and. targets%key == run%key_position('t_start'))) span%t_start = run%number('t_start')
-    if (.not. any(targets%group == runs(1) .and. targets%key == run%key_position('t_end'))) span%t_end = run%number('t_end')
+    i = input%position('run')
+    associate (run => input%groups(i))
+      if (.not. any(targets%group == i .and. targets%key == run%key_position('t_start'))) span%t_start = run%number('t_start')
+      if (.not. any(targets%group == i .and. targets%key == run%key_position('t_end'))) span%t_end = run%number('t_end')
+    end associate
   end function fixed_span
 
   !> Makes one error of the diagnostics on the sweep and of a failure of the base machine.
@@ -166,6 +150,52 @@ contains
       error = failure
     end if
   end subroutine merge_errors
+
+  !> The header of the files of a shard.
+  function new_sweep_header(plan, shard, shards) result(header)
+    type(sweep_plan_t), intent(in) :: plan
+    integer, intent(in) :: shard, shards   !! 1 of 1 is the whole sweep
+    type(sweep_header_t) :: header
+    type(group_t) :: group
+
+    header%title = plan%input%title()
+    header%source = 'nocdyn ' // version // ' (' // compiler_text() // ')'
+    group = plan%input%single('sweep')
+    header%design = group%text('design')
+    if (group%has_value('seed')) header%seed = group%whole_number('seed')
+    header%input_file = plan%input%file
+    header%input_text = input_text(plan%input)
+    header%list_checksum = plan%list_checksum
+    header%variants = plan%design%variants
+    header%first = first_of_shard(header%variants, shard, shards)
+    header%last = first_of_shard(header%variants, shard + 1, shards) - 1
+    call name_quantities(plan, header)
+  end function new_sweep_header
+
+  !> The first variant of a shard. Shards are equal, but for one variant more in the first ones if there is a remainder.
+  pure integer function first_of_shard(variants, shard, shards) result(first)
+    integer, intent(in) :: variants, shard, shards
+
+    first = (shard - 1) * (variants / shards) + min(shard - 1, mod(variants, shards)) + 1
+  end function first_of_shard
+
+  subroutine name_quantities(plan, header)
+    type(sweep_plan_t), intent(in) :: plan
+    type(sweep_header_t), intent(inout) :: header
+    integer :: i
+
+    allocate (header%parameters(size(plan%targets)), header%results(size(plan%statistics)))
+    do i = 1, size(plan%targets)
+      header%parameters(i)%label = plan%targets(i)%path
+      header%parameters(i)%unit = plan%targets(i)%unit
+      header%parameters(i)%long_name = plan%targets(i)%long_name
+    end do
+    do i = 1, size(plan%statistics)
+      header%results(i)%label = plan%statistics(i)%label
+      header%results(i)%unit = plan%statistics(i)%unit
+      header%results(i)%long_name = plan%statistics(i)%long_name
+    end do
+  end subroutine name_quantities
 
   !> Whether an input has groups of a sweep.
   pure logical function has_sweep(input)

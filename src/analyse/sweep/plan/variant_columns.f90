@@ -1,4 +1,4 @@
-!> Columns of trajectory.csv that variants can have though the base machine does not have them.
+!> The columns of trajectory.csv of the base machine of a sweep, and those that only variants can have.
 !>
 !> The damping moment of a coupling, the current and the throttle of a motor have columns only if the numbers that cause them are
 !> given and not 0.
@@ -8,28 +8,37 @@ module nocdyn_variant_columns
   use nocdyn_input, only: input_t
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
+  use nocdyn_run_settings, only: check_size
   use nocdyn_schema, only: has_word
   use nocdyn_targets, only: set_target, target_t
   use nocdyn_text, only: append, string_t
+  use nocdyn_text_sort, only: argsort, sorted_position
   use nocdyn_trajectory_columns, only: column_t, list_columns
   implicit none (type, external)
   private
 
-  public :: add_variant_columns
+  public :: label_columns
 
   real(wp), parameter :: nonzero_value = 1.0_wp   ! instead of 0 or of no value
 
 contains
 
-  !> Appends the labels of columns that exist only if targets which are 0 or not given in the input are not 0.
-  subroutine add_variant_columns(input, targets, labels)
-    type(input_t), intent(in) :: input            !! of a valid machine
+  !> Assembles the base machine and labels its columns, then those that exist only if targets which are 0 or not given are not 0.
+  subroutine label_columns(input, targets, machine, labels, error)
+    type(input_t), intent(in) :: input
     type(target_t), intent(in) :: targets(:)      !! group 0 marks one that was not found
-    type(string_t), allocatable, intent(inout) :: labels(:)
+    type(machine_t), intent(out) :: machine
+    type(string_t), allocatable, intent(out) :: labels(:)
+    type(error_t), allocatable, intent(out) :: error
+    type(column_t), allocatable :: columns(:)
     type(target_t), allocatable :: hidden(:)
     logical :: is_valid
     integer :: i
 
+    call assemble_machine(input, machine, error)
+    if (.not. allocated(error)) call check_size(input, machine, error)
+    if (allocated(error)) return
+    call list_columns(machine, columns, labels)
     allocate (hidden, source=pack(targets, [(hides_column(input, targets(i)), i=1, size(targets))]))
     if (size(hidden) == 0) return
     call add_columns(input, hidden, labels, is_valid)
@@ -37,7 +46,7 @@ contains
     do i = 1, size(hidden)
       call add_columns(input, hidden(i:i), labels, is_valid)
     end do
-  end subroutine add_variant_columns
+  end subroutine label_columns
 
   !> Whether a target is 0 or not given, and the columns of its element may depend on it.
   logical function hides_column(input, target)
@@ -65,6 +74,7 @@ contains
     type(column_t), allocatable :: columns(:)
     type(string_t), allocatable :: others(:)
     character(len=:), allocatable :: message
+    integer, allocatable :: order(:)
     integer :: i
 
     changed = input
@@ -77,21 +87,10 @@ contains
     is_valid = .not. allocated(error)
     if (.not. is_valid) return
     call list_columns(machine, columns, others)
+    call argsort(labels, order)
     do i = 1, size(others)
-      if (.not. is_among(others(i)%text, labels)) call append(labels, others(i)%text)
+      if (sorted_position(others(i)%text, labels, order) == 0) call append(labels, others(i)%text)
     end do
   end subroutine add_columns
-
-  pure logical function is_among(label, labels)
-    character(len=*), intent(in) :: label
-    type(string_t), intent(in) :: labels(:)
-    integer :: i
-
-    is_among = .true.
-    do i = 1, size(labels)
-      if (labels(i)%text == label) return
-    end do
-    is_among = .false.
-  end function is_among
 
 end module nocdyn_variant_columns

@@ -18,7 +18,7 @@ module nocdyn_statistics
 
   character(len=*), parameter, public :: statistic_names(8) = [character(len=13) :: 'final', 'max', 'min', 'max_abs', 'mean', &
     'rms', 'time_of_max', 'settling_time']
-  real(wp), parameter, public :: default_band = 0.02_wp
+  real(wp), parameter :: default_band = 0.02_wp
 
   character(len=*), parameter :: descriptions(8) = [character(len=30) :: 'at the end', 'largest value', 'smallest value', &
     'largest absolute value', 'mean over time', 'root mean square over time', 'time of the largest value', 'settling time']
@@ -44,7 +44,7 @@ contains
     integer, intent(in) :: column, kind
     real(wp), intent(in) :: t_start             !! [s]
     real(wp), intent(in), optional :: from      !! [s]; t_start if absent
-    real(wp), intent(in), optional :: band
+    real(wp), intent(in), optional :: band      !! of a settling time; `default_band` if absent
     type(statistic_t) :: self
     integer :: bracket
 
@@ -60,10 +60,15 @@ contains
       self%long_name = text(:bracket - 1) // ', ' // trim(descriptions(kind))
     end associate
     if (kind == statistic_time_of_max .or. kind == statistic_settling_time) self%unit = 's'
-    if (.not. present(from)) return
-    self%from = from
-    self%label = self%label // '_from_' // to_text(from)
-    self%long_name = self%long_name // ' from ' // to_text(from) // ' s'
+    if (present(from)) then
+      self%from = from
+      self%label = self%label // '_from_' // to_text(from)
+      self%long_name = self%long_name // ' from ' // to_text(from) // ' s'
+    end if
+    if (present(band) .and. kind == statistic_settling_time) then
+      self%label = self%label // '_band_' // to_text(band)
+      self%long_name = self%long_name // ' in a band of ' // to_text(band)
+    end if
   end function new_statistic
 
   !> Finds the columns of statistics in the trajectory table of a machine.

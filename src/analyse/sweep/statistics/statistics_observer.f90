@@ -12,7 +12,7 @@ module nocdyn_statistics_observer
     statistic_settling_time, statistic_t, statistic_time_of_max, value_of_zero_column
   use nocdyn_observer, only: observer_t, step_block_t
   use nocdyn_text, only: string_t
-  use nocdyn_trajectory_columns, only: column_t, column_work_in, list_columns
+  use nocdyn_trajectory_columns, only: column_t, column_work_in, energy_labels, list_columns
   implicit none (type, external)
   private
 
@@ -25,7 +25,7 @@ module nocdyn_statistics_observer
   !> by `fallback` in the lanes where the moment does not increase with the twist. A torque that the machine of the block does not
   !> have is 0 at all times.
   type, extends(observer_t), public :: statistics_observer_t
-    character(len=:), allocatable :: missing                  !! a quantity without a column that is no torque, '' if none
+    character(len=:), allocatable :: missing                  !! the first quantity without a column that is no torque, or ''
     class(formulation_t), pointer, private :: block => null()
     real(wp), private :: t_start = 0.0_wp, t_end = 0.0_wp     !! of every variant [s]
     type(lane_parameters_t), private :: parameters            !! of the block; none if its lanes cannot change them
@@ -51,21 +51,11 @@ module nocdyn_statistics_observer
 contains
 
   !> Whether a statistic is of a work, or of the energy balance, and so needs the work integrals.
-  logical function needs_work_integrals(formulation, statistics)
-    class(formulation_t), intent(in) :: formulation
+  pure logical function needs_work_integrals(statistics)
     type(statistic_t), intent(in) :: statistics(:)
-    type(statistic_t), allocatable :: found(:)
-    type(column_t), allocatable :: columns(:)
-    type(string_t), allocatable :: labels(:)
     integer :: i
 
-    call list_columns(formulation%machine, columns, labels)
-    allocate (found, source=statistics)
-    call find_columns(labels, found)
-    needs_work_integrals = .false.
-    do i = 1, size(found)
-      if (found(i)%column > 0) needs_work_integrals = needs_work_integrals .or. columns(found(i)%column)%kind >= column_work_in
-    end do
+    needs_work_integrals = any([(any(energy_labels(column_work_in:) == statistics(i)%quantity), i=1, size(statistics))])
   end function needs_work_integrals
 
   !> An observer of a block, which stays where it is. Only the reduced formulation may change the parameters of its lanes.
@@ -77,6 +67,7 @@ contains
     type(statistic_t), allocatable :: found(:)
     type(column_t), allocatable :: columns(:)
     type(string_t), allocatable :: labels(:)
+    integer :: i
 
     self%block => block
     self%t_start = t_start
@@ -85,7 +76,10 @@ contains
     call list_columns(block%machine, columns, labels)
     allocate (found, source=statistics)
     call find_columns(labels, found)
-    self%missing = missing_quantity(found)
+    self%missing = ''
+    do i = size(found), 1, -1
+      if (found(i)%column == 0 .and. .not. is_torque(found(i))) self%missing = found(i)%quantity
+    end do
     allocate (self%default_value, source=value_of_zero_column(found))
     call distribute(self, found, columns)
     allocate (self%all_lanes(block%lanes), source=.true.)
@@ -96,11 +90,12 @@ contains
     end select
   end function new_statistics_observer
 
-  !> Chooses how each statistic is computed.
+  !> Chooses how each statistic is computed; finds the components of the state that linear columns read inside the steps.
   subroutine distribute(self, statistics, columns)
     type(statistics_observer_t), intent(inout) :: self
     type(statistic_t), intent(in) :: statistics(:)
     type(column_t), intent(in) :: columns(:)   !! of the trajectory table
+    type(linear_columns_t) :: read_inside   ! those with statistics of the steps
     logical, dimension(size(statistics)) :: has_fallback, is_of_linear, is_of_steps
     integer :: i
 
@@ -110,10 +105,8 @@ contains
       if (statistics(i)%column == 0 .or. statistics(i)%kind == statistic_settling_time) cycle
       associate (column => columns(statistics(i)%column), kind => statistics(i)%kind)
         is_of_linear(i) = is_linear(self%block, column)
-        if (.not. is_of_linear(i)) cycle
-        if (any(kind == [statistic_max, statistic_min, statistic_max_abs, statistic_time_of_max])) then
-          has_fallback(i) = has_law(self%block%machine, column)
-        end if
+        has_fallback(i) = has_law(self%block%machine, column) .and. is_of_linear(i) .and. &
+                          any(kind == [statistic_max, statistic_min, statistic_max_abs, statistic_time_of_max])
       end associate
     end do
     associate (is_of_sampled => statistics%column > 0 .and. .not. is_of_linear)
@@ -126,32 +119,11 @@ contains
       self%fallback = new_sampled_statistics(self%block, columns, pack(statistics, has_fallback), self%t_end)
     end associate
     is_of_steps = is_of_linear .and. statistics%kind /= statistic_final
-    call find_components(self, columns(pack([(statistics(i)%column, i=1, size(statistics))], is_of_steps)))
+    read_inside = new_linear_columns(self%block, columns(pack([(statistics(i)%column, i=1, size(statistics))], is_of_steps)))
+    if (size(read_inside%component) == 0) return
+    self%first_component = minval(read_inside%component)
+    self%last_component = maxval(read_inside%component)
   end subroutine distribute
-
-  !> Finds the components of the state that linear columns read inside the steps.
-  subroutine find_components(self, columns)
-    type(statistics_observer_t), intent(inout) :: self
-    type(column_t), intent(in) :: columns(:)   !! those with statistics of the steps
-    type(linear_columns_t) :: linear
-
-    linear = new_linear_columns(self%block, columns)
-    if (size(linear%component) == 0) return
-    self%first_component = minval(linear%component)
-    self%last_component = maxval(linear%component)
-  end subroutine find_components
-
-  !> The first quantity without a column that is no torque, '' if there is none.
-  pure function missing_quantity(found) result(quantity)
-    type(statistic_t), intent(in) :: found(:)
-    character(len=:), allocatable :: quantity
-    integer :: i
-
-    quantity = ''
-    do i = 1, size(found)
-      if (found(i)%column == 0 .and. .not. is_torque(found(i)) .and. quantity == '') quantity = found(i)%quantity
-    end do
-  end function missing_quantity
 
   !> Numbers the true elements of a mask from 1 on; 0 for the others.
   pure function indices_among(mask) result(indices)
