@@ -3,6 +3,8 @@ add_library(nocdyn_settings INTERFACE)
 # OpenMP everywhere: it also keeps local variables off static memory, so that every procedure may run in a thread.
 target_link_libraries(nocdyn_settings INTERFACE OpenMP::OpenMP_Fortran)
 
+set(CMAKE_Fortran_PREPROCESS OFF)   # no source has directives; a pass less for each of them
+
 if(CMAKE_Fortran_COMPILER_ID STREQUAL GNU)
   target_compile_options(nocdyn_settings INTERFACE
     # Procedures that override others have the arguments of these, wanted or not.
