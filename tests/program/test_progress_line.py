@@ -61,7 +61,7 @@ def test_a_long_sweep_shows_how_many_variants_are_done(nocdyn):
     terminal, end = pty.openpty()
     process = nocdyn.start("sweep", "discs.nml", "--out", "out", *endless, stderr=end)
     os.close(end)
-    shown = read_available(terminal, 3, b"left")
+    shown = read_available(terminal, 20, b"left")
     process.send_signal(signal.SIGINT)
     process.communicate(timeout=30)
     rest = os.read(terminal, 4096).decode()
