@@ -28,9 +28,7 @@ module nocdyn_element_groups
     type(input_t), pointer :: input => null()
     type(body_index_t), pointer, private :: body_index => null()
   contains
-    procedure :: values
-    procedure :: curves
-    procedure :: bodies
+    procedure :: values, curves, bodies
   end type element_groups_t
 
   abstract interface

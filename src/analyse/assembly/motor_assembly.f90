@@ -66,6 +66,7 @@ contains
     type(bank_slot_t), allocatable, intent(inout) :: banks(:)
     class(torque_curve_t), allocatable :: law
     type(curve_t), allocatable :: curve(:, :)
+    type(governor_t), allocatable :: governor
     integer :: body(size(groups%indices))
 
     body = groups%bodies('body', 1)
@@ -73,10 +74,10 @@ contains
     case (quadratic)
       call append_bank(banks, new_motors(groups%names, body, standstill_torques(groups), groups%values('b') + drags(groups), &
                                          groups%values('c')))
-    case (inductive)
-      call add_inductive(groups, body, banks)
-    case (inductive + 1)
-      call add_inductive(groups, body, banks, governor_of(groups))
+    case (inductive, inductive + 1)
+      if (form > inductive) allocate (governor, source=governor_of(groups))
+      call append_bank(banks, new_dc_motors(groups%names, body, groups%values('voltage'), groups%values('resistance'), &
+                                            groups%values('flux_constant'), groups%values('inductance'), governor))
     case (induction, table)
       call make_law(groups, form, law, curve)
       call append_bank(banks, new_curve_motors(groups%names, body, groups%lanes, law, curve))
@@ -95,16 +96,6 @@ contains
     allocate (governor%time, source=groups%values('governor_time'))
     allocate (governor%start, source=groups%values('governor_start'))
   end function governor_of
-
-  subroutine add_inductive(groups, body, banks, governor)
-    type(element_groups_t), intent(in) :: groups
-    integer, intent(in) :: body(:)
-    type(bank_slot_t), allocatable, intent(inout) :: banks(:)
-    type(governor_t), intent(in), optional :: governor   !! no motor has one if absent
-
-    call append_bank(banks, new_dc_motors(groups%names, body, groups%values('voltage'), groups%values('resistance'), &
-                                          groups%values('flux_constant'), groups%values('inductance'), governor))
-  end subroutine add_inductive
 
   !> The torque at full throttle over the speed, either as a law or as tables; the other one is not allocated.
   subroutine make_law(groups, form, law, curve)

@@ -13,7 +13,7 @@ module nocdyn_start_speeds
   public :: fit_start_speeds
 
   !> Start speeds violate a row if the sum of its terms exceeds this times the sum of their absolute values.
-  real(wp), parameter, public :: speed_tolerance = 1.0e-9_wp
+  real(wp), parameter :: speed_tolerance = 1.0e-9_wp
 
   real(wp), parameter :: least_impulse = 1.0e-12_wp   ! relative to the largest one; smaller ones are rounding errors
   integer, parameter :: most_bodies = 12   ! that a message names
@@ -101,26 +101,20 @@ contains
     real(wp), intent(in) :: nearest(:)   !! [bodies] [rad/s]
     character(len=:), allocatable :: text
     real(wp) :: residual, scale
-    integer :: b, named, others
+    integer, allocatable :: others(:)   ! bodies with another speed
+    integer :: b, i
 
     call machine%constraints%residual(1, violated(1), machine%start_speed(1, :), residual, scale)
     text = 'the start speeds violate it: ' // row_text(machine, violated(1)) // ' = ' // rounded_text(residual, 6) // &
            ', which must be 0'
     if (size(violated) > 1) text = text // ' (and ' // to_text(size(violated) - 1) // ' more)'
     text = text // '; nearest speeds that fit:'
-    named = 0
-    others = 0
-    do b = 1, machine%bodies
-      if (abs(nearest(b) - machine%start_speed(1, b)) <= speed_tolerance * abs(nearest(b))) cycle
-      named = named + 1
-      if (named > most_bodies) then
-        others = others + 1
-        cycle
-      end if
-      if (named > 1) text = text // ','
-      text = text // ' ' // rounded_text(nearest(b), digits) // ' (' // quoted(machine%names(b)%text) // ')'
+    others = pack([(b, b=1, machine%bodies)], abs(nearest - machine%start_speed(1, :)) > speed_tolerance * abs(nearest))
+    do i = 1, min(size(others), most_bodies)
+      if (i > 1) text = text // ','
+      text = text // ' ' // rounded_text(nearest(others(i)), digits) // ' (' // quoted(machine%names(others(i))%text) // ')'
     end do
-    if (others > 0) text = text // ' and ' // to_text(others) // ' more'
+    if (size(others) > most_bodies) text = text // ' and ' // to_text(size(others) - most_bodies) // ' more'
     text = text // '; &run start = ' // quoted('projected') // ' takes them'
   end function violation_message
 

@@ -29,8 +29,7 @@ module nocdyn_matrix_report
     real(wp), allocatable :: excitation(:), motor(:), torque(:)                        !! Q_0, Q_m, Q; then with index 1, ...
     real(wp), allocatable :: tangent(:, :), moments(:)                                 !! K_4, F
   contains
-    procedure :: put_matrix
-    procedure :: put_vector
+    procedure :: put_matrix, put_vector
   end type equations_t
 
 contains
@@ -280,12 +279,7 @@ contains
 
     call self%report%append_line('')
     call self%report%append_line(label // ' (' // to_text(size(matrix, 1)) // ' x ' // to_text(size(matrix, 2)) // ')')
-    width = 0
-    do j = 1, size(matrix, 2)
-      do i = 1, size(matrix, 1)
-        width = max(width, len(rounded_text(matrix(i, j), digits)))
-      end do
-    end do
+    width = maxval([((len(rounded_text(matrix(i, j), digits)), i=1, size(matrix, 1)), j=1, size(matrix, 2))])
     do i = 1, size(matrix, 1)
       do j = 1, size(matrix, 2)
         number = rounded_text(matrix(i, j), digits)

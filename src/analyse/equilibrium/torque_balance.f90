@@ -37,14 +37,7 @@ module nocdyn_torque_balance
     real(wp), allocatable :: y(:, :)   !! state after `set_state`, [1, states]
     real(wp), allocatable, private :: rate(:, :), slopes(:, :)
   contains
-    procedure :: unknowns
-    procedure :: start
-    procedure :: set_state
-    procedure :: evaluate
-    procedure :: evaluate_state
-    procedure :: differentiate
-    procedure :: blocks
-    procedure :: body_speeds
+    procedure :: unknowns, start, set_state, evaluate, evaluate_state, differentiate, blocks, body_speeds
   end type torque_balance_t
 
 contains

@@ -24,9 +24,7 @@ module nocdyn_rigid_motions
     integer, allocatable :: freedom(:)   !! rigid motion, [entries]
     real(wp), allocatable :: ratio(:)    !! [entries]
   contains
-    procedure :: freedoms
-    procedure :: speeds
-    procedure :: project_torques
+    procedure :: freedoms, speeds, project_torques
   end type rigid_motions_t
 
   !> A sparse row during the elimination.

@@ -30,10 +30,7 @@ module nocdyn_modes
     real(wp), allocatable :: potential(:)   !! share of each elastic element in the potential energy, negative if its
                                                   !! stiffness is; the absolute shares add up to 1
   contains
-    procedure :: frequency
-    procedure :: damping_ratio
-    procedure :: time_constant
-    procedure :: is_unstable
+    procedure :: frequency, damping_ratio, time_constant, is_unstable
   end type mode_t
 
 contains

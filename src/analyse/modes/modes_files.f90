@@ -6,7 +6,7 @@ module nocdyn_modes_files
   use nocdyn_kinds, only: wp
   use nocdyn_modes, only: kind_names, mode_oscillating, mode_t
   use nocdyn_modes_report, only: modes_report_t
-  use nocdyn_text, only: to_text
+  use nocdyn_text, only: string_t, to_text
   use nocdyn_text_buffer, only: text_buffer_t
   implicit none (type, external)
   private
@@ -26,12 +26,10 @@ contains
 
     call table%append('mode,kind,frequency [Hz],undamped_frequency [Hz],damping_ratio,time_constant [s],' // &
                       'real [1/s],imaginary [rad/s]')
-    call put_names('shape_', ' [1]')
-    call put_names('phase_', ' [deg]')
-    call put_names('kinetic_', ' [1]')
-    do i = 1, size(self%elastic)
-      call table%append(',potential_' // self%elastic_names(i)%text // ' [1]')
-    end do
+    call put_names('shape_', self%machine%names, ' [1]')
+    call put_names('phase_', self%machine%names, ' [deg]')
+    call put_names('kinetic_', self%machine%names, ' [1]')
+    call put_names('potential_', self%elastic_names, ' [1]')
     call table%append(new_line('a'))
     number = 0
     do i = 1, size(self%modes)
@@ -42,12 +40,13 @@ contains
 
   contains
 
-    subroutine put_names(prefix, unit)
+    subroutine put_names(prefix, names, unit)
       character(len=*), intent(in) :: prefix, unit
+      type(string_t), intent(in) :: names(:)
       integer :: b
 
-      do b = 1, self%machine%bodies
-        call table%append(',' // prefix // self%machine%names(b)%text // unit)
+      do b = 1, size(names)
+        call table%append(',' // prefix // names(b)%text // unit)
       end do
     end subroutine put_names
 

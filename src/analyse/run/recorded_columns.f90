@@ -29,11 +29,7 @@ module nocdyn_recorded_columns
     logical, allocatable, private :: is_source(:)        !! whether a work counts as put in, [quadratures]
     real(wp), allocatable, private :: start_energy(:)    !! [J], [lanes]
   contains
-    procedure :: copy_lane
-    procedure :: start_lane
-    procedure :: observe
-    procedure :: fill_row
-    procedure :: kinetic_energy
+    procedure :: copy_lane, start_lane, observe, fill_row, kinetic_energy
   end type recorded_columns_t
 
 contains

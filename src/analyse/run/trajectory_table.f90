@@ -20,8 +20,7 @@ module nocdyn_trajectory_table
     real(wp), private :: start_kinetic = 0.0_wp    !! [J]
     real(wp), allocatable, private :: start_stored(:)   !! of the elastic elements [J]
   contains
-    procedure :: fill
-    procedure :: find_energy_balance
+    procedure :: fill, find_energy_balance
   end type trajectory_table_t
 
 contains

@@ -67,10 +67,7 @@ module nocdyn_transient
     logical :: has_ranges = .false.          !! whether the columns were evaluated between the rows
     class(run_output_t), pointer :: output => null()
   contains
-    procedure :: on_output
-    procedure :: wants_stop
-    procedure :: tracked_values
-    procedure :: on_extremes
+    procedure :: on_output, wants_stop, tracked_values, on_extremes
   end type run_observer_t
 
 contains

@@ -32,11 +32,7 @@ module nocdyn_direct_parameters
     integer, allocatable, private :: signs(:, :)                  !! accepted patterns of signs, [targets, patterns]
     real(wp), allocatable, private :: lowest(:), highest(:)       !! values known to be allowed, [targets]
   contains
-    procedure :: accept
-    procedure :: are_accepted
-    procedure :: allow
-    procedure :: are_allowed
-    procedure :: write_values
+    procedure :: accept, are_accepted, allow, are_allowed, write_values
   end type direct_parameters_t
 
 contains

@@ -34,13 +34,7 @@ module nocdyn_journal_scheduler
     real(wp), private :: variant_time = 0.0_wp   !! of a worker [s], 0 if it is not known yet
     logical, private :: has_failed = .false.     !! whether `error` is allocated; other threads read this
   contains
-    procedure :: next_chunk
-    procedure :: submit
-    procedure :: poll
-    procedure :: finalise
-    procedure :: commit
-    procedure :: is_cancelled
-    procedure :: is_complete
+    procedure :: next_chunk, submit, poll, finalise, commit, is_cancelled, is_complete
   end type journal_scheduler_t
 
 contains

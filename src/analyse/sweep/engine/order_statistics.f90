@@ -158,7 +158,7 @@ contains
   end function sortable_bits
 
   !> The inverse of `sortable_bits`.
-  pure real(wp) function number_of(bits)
+  elemental real(wp) function number_of(bits)
     integer(int64), intent(in) :: bits   !! of `sortable_bits`
 
     if (bits < 0) then
@@ -169,15 +169,12 @@ contains
   end function number_of
 
   !> The ranks of both neighbours of every quantile, from 0.
-  pure subroutine choose_ranks(n, rank)
+  pure subroutine choose_ranks(n, ranks)
     integer, intent(in) :: n
-    integer, intent(out) :: rank(wanted)
-    integer :: i
+    integer, intent(out) :: ranks(wanted)
 
-    do i = 1, size(quantiles)
-      rank(2 * i - 1) = int((n - 1) * quantiles(i))
-      rank(2 * i) = min(rank(2 * i - 1) + 1, n - 1)
-    end do
+    ranks(1::2) = int((n - 1) * quantiles)
+    ranks(2::2) = min(ranks(1::2) + 1, n - 1)
   end subroutine choose_ranks
 
   !> Finds one more digit of every wanted value from the histograms.
@@ -210,17 +207,13 @@ contains
     type(selection_t), intent(in) :: selection
     type(order_statistics_t), intent(inout) :: statistics
     real(wp) :: found(size(quantiles))
-    integer :: i
 
     if (statistics%count == 0) then
       found = ieee_value(0.0_wp, ieee_quiet_nan)
       statistics%minimum = found(1)
       statistics%maximum = found(1)
     else
-      do i = 1, size(quantiles)
-        found(i) = between(number_of(selection%prefix(2 * i - 1)), number_of(selection%prefix(2 * i)), &
-                           (statistics%count - 1) * quantiles(i))
-      end do
+      found = between(number_of(selection%prefix(1::2)), number_of(selection%prefix(2::2)), (statistics%count - 1) * quantiles)
     end if
     statistics%low = found(1)
     statistics%median = found(2)
@@ -228,7 +221,7 @@ contains
   end subroutine interpolate_quantiles
 
   !> Linear interpolation from the nearer end.
-  pure real(wp) function between(a, b, position)
+  elemental real(wp) function between(a, b, position)
     real(wp), intent(in) :: a, b
     real(wp), intent(in) :: position   !! its fraction is that between a and b
     real(wp) :: fraction

@@ -40,8 +40,7 @@ module nocdyn_sweep_block
     integer, allocatable :: index(:)             !! in the chunk, of the variant in each lane
     logical, allocatable :: needs_own_block(:)   !! variants that do not fit the lanes, [variants of the chunk]
   contains
-    procedure :: next
-    procedure :: finish
+    procedure :: next, finish
   end type chunk_ensemble_t
 
   type, public :: sweep_block_t

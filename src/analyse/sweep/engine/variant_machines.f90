@@ -39,11 +39,7 @@ module nocdyn_variant_machines
     type(reduced_t), pointer, private :: assembled => null()   !! a variant of one lane, laid out as the block
     type(lane_parameters_t), private :: assembled_parameters
   contains
-    procedure :: set_variant
-    procedure :: set_by_assembly
-    procedure :: needs_assembly
-    procedure :: own_formulation
-    procedure :: release
+    procedure :: set_variant, set_by_assembly, needs_assembly, own_formulation, release
   end type variant_machines_t
 
 contains

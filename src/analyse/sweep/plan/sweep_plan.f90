@@ -35,8 +35,7 @@ module nocdyn_sweep_plan
     integer, allocatable :: trajectories(:)           !! variants whose trajectories are written, ascending
     character(len=:), allocatable :: list_checksum    !! of the file of a list, '' if there is none
   contains
-    procedure :: values
-    procedure :: summary
+    procedure :: values, summary
   end type sweep_plan_t
 
 contains

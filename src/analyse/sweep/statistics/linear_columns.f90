@@ -31,10 +31,7 @@ module nocdyn_linear_columns
     integer, allocatable, private :: element(:)     !! whose moment the column is, 0 if it is none; [columns]
     integer, allocatable, private :: from(:), to(:) !! bodies of the angle or twist, 0 is the ground; [columns]
   contains
-    procedure :: copy_lane
-    procedure :: is_increasing
-    procedure :: argument
-    procedure :: law
+    procedure :: copy_lane, is_increasing, argument, law
   end type linear_columns_t
 
 contains

@@ -35,11 +35,7 @@ module nocdyn_linear_statistics
     real(wp), allocatable, private :: y_last(:, :), y_new_last(:, :), c_last(:, :, :)   !! of an incomplete last strip, padded
     type(strip_t), private :: strip, cut
   contains
-    procedure :: start_lane
-    procedure :: is_increasing
-    procedure :: add_steps
-    procedure :: finish_lane
-    procedure :: value
+    procedure :: start_lane, is_increasing, add_steps, finish_lane, value
   end type linear_statistics_t
 
 contains

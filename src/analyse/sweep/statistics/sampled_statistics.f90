@@ -54,10 +54,7 @@ module nocdyn_sampled_statistics
     real(wp), allocatable, private :: rows(:, :)                  !! values at the times `t`, [columns, lanes]
     real(wp), allocatable, private :: t(:), theta(:), y(:, :)     !! of the sample, [lanes], [lanes, states + quadratures]
   contains
-    procedure :: start_lane
-    procedure :: add_steps
-    procedure :: finish_lane
-    procedure :: value
+    procedure :: start_lane, add_steps, finish_lane, value
   end type sampled_statistics_t
 
 contains

@@ -16,9 +16,7 @@ module nocdyn_settling_time
     real(wp), allocatable, private :: t(:, :)           !! start and end of each step [s], [2, room]
     real(wp), allocatable, private :: values(:, :, :)   !! [nodes, columns, room]
   contains
-    procedure :: clear
-    procedure :: add
-    procedure :: last_exit
+    procedure :: clear, add, last_exit
   end type settling_history_t
 
 contains

@@ -42,10 +42,7 @@ module nocdyn_statistics_observer
     logical, allocatable, private :: needs_fallback(:)        !! [lanes]
     logical, allocatable, private :: is_complete(:)           !! lanes that have reached the end
   contains
-    procedure :: start_lane
-    procedure :: results
-    procedure :: on_output
-    procedure :: on_steps
+    procedure :: start_lane, results, on_output, on_steps
   end type statistics_observer_t
 
 contains
