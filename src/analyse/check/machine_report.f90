@@ -4,9 +4,8 @@ module nocdyn_machine_report
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
   use nocdyn_rigid_trains, only: ratio_tolerance
-  use nocdyn_text, only: append, joined, quoted, rounded_text, selected, string_t, to_text
+  use nocdyn_text, only: append, counted, joined, quoted, rounded_text, selected, string_t, to_text
   use nocdyn_text_buffer, only: text_buffer_t
-  use nocdyn_text_phrases, only: counted
   implicit none (type, external)
   private
 

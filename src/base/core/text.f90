@@ -1,11 +1,12 @@
-!> Numbers as texts that read back as the same value, lists of texts, near matches of names.
+!> Numbers as texts that read back as the same value, lists of texts, phrases, near matches of names.
 module nocdyn_text
   use, intrinsic :: iso_c_binding, only: c_char, c_double, c_int, c_size_t
   use nocdyn_kinds, only: wp
   implicit none (type, external)
   private
 
-  public :: to_text, rounded_text, write_number, lower_case, quoted, joined, shortened, nearest_word, strings, append, selected
+  public :: to_text, rounded_text, write_number, lower_case, quoted, in_quotes, joined, listed, counted, shortened, &
+    nearest_word, strings, append, selected
 
   integer, parameter, public :: number_width = 32   !! no number of `write_number` is longer
 
@@ -116,6 +117,21 @@ contains
     quoted = "'" // text // "'"
   end function quoted
 
+  !> The text between quotes, of which those inside it are doubled.
+  pure function in_quotes(text, quote)
+    character(len=*), intent(in) :: text
+    character(len=1), intent(in) :: quote
+    character(len=:), allocatable :: in_quotes
+    integer :: i
+
+    in_quotes = quote
+    do i = 1, len(text)
+      in_quotes = in_quotes // text(i:i)
+      if (text(i:i) == quote) in_quotes = in_quotes // quote
+    end do
+    in_quotes = in_quotes // quote
+  end function in_quotes
+
   !> A text for a message: one of more than `most` bytes is cut between two characters of UTF-8 and ends with ' ...'.
   pure function shortened(text, most) result(short)
     character(len=*), intent(in) :: text
@@ -154,6 +170,33 @@ contains
     end do
     if (last < size(texts)) joined = joined // ' and ' // to_text(size(texts) - last) // ' more'
   end function joined
+
+  !> "1 gear", "2 gears".
+  pure function counted(number, singular, plural) result(text)
+    integer, intent(in) :: number
+    character(len=*), intent(in) :: singular, plural
+    character(len=:), allocatable :: text
+
+    text = to_text(number) // ' ' // plural
+    if (number == 1) text = to_text(number) // ' ' // singular
+  end function counted
+
+  !> "a, b or c".
+  pure function listed(texts, conjunction) result(text)
+    type(string_t), intent(in) :: texts(:)        !! one at least
+    character(len=*), intent(in) :: conjunction   !! ' or ', ' and '
+    character(len=:), allocatable :: text
+    integer :: i
+
+    text = texts(1)%text
+    do i = 2, size(texts)
+      if (i < size(texts)) then
+        text = text // ', ' // texts(i)%text
+      else
+        text = text // conjunction // texts(i)%text
+      end if
+    end do
+  end function listed
 
   !> The words without their trailing blanks.
   pure function strings(words) result(list)

@@ -2,7 +2,7 @@
 module nocdyn_input_text
   use nocdyn_input, only: group_t, input_t, value_t
   use nocdyn_schema, only: first_key, key_rules
-  use nocdyn_text, only: string_t, to_text
+  use nocdyn_text, only: in_quotes, string_t, to_text
   use nocdyn_text_buffer, only: text_buffer_t
   implicit none (type, external)
   private
@@ -68,43 +68,18 @@ contains
     type(string_t), allocatable, intent(out) :: items(:)
     integer :: i
 
-    if (allocated(value%numbers)) then
-      allocate (items(size(value%numbers)))
-      do i = 1, size(items)
+    allocate (items(value%count()))
+    do i = 1, size(items)
+      if (allocated(value%numbers)) then
         items(i)%text = to_text(value%numbers(i))
-      end do
-    else if (allocated(value%whole_numbers)) then
-      allocate (items(size(value%whole_numbers)))
-      do i = 1, size(items)
+      else if (allocated(value%whole_numbers)) then
         items(i)%text = to_text(value%whole_numbers(i))
-      end do
-    else if (allocated(value%flags)) then
-      allocate (items(size(value%flags)))
-      do i = 1, size(items)
+      else if (allocated(value%flags)) then
         items(i)%text = trim(merge('.true. ', '.false.', value%flags(i)))
-      end do
-    else if (allocated(value%texts)) then
-      allocate (items(size(value%texts)))
-      do i = 1, size(items)
-        items(i)%text = with_quotes(value%texts(i)%text)
-      end do
-    else
-      allocate (items(0))
-    end if
-  end subroutine write_items
-
-  !> In single quotes, with those inside doubled.
-  pure function with_quotes(text) result(quoted)
-    character(len=*), intent(in) :: text
-    character(len=:), allocatable :: quoted
-    integer :: i
-
-    quoted = "'"
-    do i = 1, len(text)
-      quoted = quoted // text(i:i)
-      if (text(i:i) == "'") quoted = quoted // "'"
+      else
+        items(i)%text = in_quotes(value%texts(i)%text, "'")
+      end if
     end do
-    quoted = quoted // "'"
-  end function with_quotes
+  end subroutine write_items
 
 end module nocdyn_input_text

@@ -6,7 +6,7 @@ module nocdyn_csv
   implicit none (type, external)
   private
 
-  public :: write_header, write_row
+  public :: write_header, write_row, write_numbers
 
 contains
 
@@ -27,15 +27,25 @@ contains
   subroutine write_row(file, values)
     type(output_file_t), intent(inout) :: file
     real(wp), intent(in) :: values(:)   !! [columns]
+
+    call write_numbers(file, values(:1), '')
+    call write_numbers(file, values(2:), ',')
+    call file%put(new_line('a'))
+  end subroutine write_row
+
+  !> Writes numbers with a text before each.
+  subroutine write_numbers(file, values, separator)
+    type(output_file_t), intent(inout) :: file
+    real(wp), intent(in) :: values(:)
+    character(len=*), intent(in) :: separator
     character(len=number_width) :: number
     integer :: i, length
 
     do i = 1, size(values)
-      if (i > 1) call file%put(',')
       call write_number(values(i), number, length)
+      call file%put(separator)
       call file%put(number(:length))
     end do
-    call file%put(new_line('a'))
-  end subroutine write_row
+  end subroutine write_numbers
 
 end module nocdyn_csv

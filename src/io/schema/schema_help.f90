@@ -7,9 +7,8 @@ module nocdyn_schema_help
     occurrence_texts
   use nocdyn_schema_sentences, only: default_text, sentences_on
   use nocdyn_schema_text, only: allowed_text, group_names, suggestion, type_text
-  use nocdyn_text, only: append, lower_case, quoted, string_t
+  use nocdyn_text, only: append, listed, lower_case, quoted, string_t
   use nocdyn_text_buffer, only: text_buffer_t
-  use nocdyn_text_phrases, only: listed
   implicit none (type, external)
   private
 

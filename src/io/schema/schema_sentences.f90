@@ -3,8 +3,7 @@ module nocdyn_schema_sentences
   use nocdyn_schema, only: group_rules, has_word, key_rule_index, key_rules, relation_rules, words_in
   use nocdyn_schema_rules, only: at_most_one, equal_lengths, exactly_one, key_rule_t, less_than, relation_rule_t, required, &
     requires, unset
-  use nocdyn_text, only: append, quoted, string_t, to_text
-  use nocdyn_text_phrases, only: listed
+  use nocdyn_text, only: append, listed, quoted, string_t, to_text
   implicit none (type, external)
   private
 

@@ -4,8 +4,7 @@ module nocdyn_schema_text
   use nocdyn_schema, only: aliases, first_key, group_rules, has_word, key_rules, last_key, words_in, words_of
   use nocdyn_schema_rules, only: a_body, a_file, a_flag, a_folder, a_name, a_number, a_selector, a_word, allowed_t, an_integer, &
     any_number, body_or_ground, key_rule_t, type_nouns
-  use nocdyn_text, only: append, joined, nearest_word, quoted, selected, string_t, strings, to_text
-  use nocdyn_text_phrases, only: listed
+  use nocdyn_text, only: append, joined, listed, nearest_word, quoted, selected, string_t, strings, to_text
   implicit none (type, external)
   private
 

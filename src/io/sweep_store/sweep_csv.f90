@@ -1,14 +1,13 @@
 !> The file sweep.csv: the numbers of sweep.nc as text.
 module nocdyn_sweep_csv
-  use nocdyn_csv, only: write_header
+  use nocdyn_csv, only: write_header, write_numbers
   use nocdyn_errors, only: error_t
   use nocdyn_journal_chunks, only: check_sweep, chunk_cursor_t
-  use nocdyn_kinds, only: wp
   use nocdyn_output_file, only: output_file_t
   use nocdyn_sweep_chunk, only: chunk_t, status_done, status_words
   use nocdyn_sweep_header, only: quantity_t, sweep_header_t
   use nocdyn_sweep_journal, only: sweep_journal_t
-  use nocdyn_text, only: append, number_width, string_t, to_text, write_number
+  use nocdyn_text, only: append, in_quotes, string_t, to_text
   implicit none (type, external)
   private
 
@@ -83,43 +82,15 @@ contains
 
     is_done = chunk%status(position) == status_done
     call file%put(to_text(chunk%first - 1 + position))
-    call write_numbers(file, chunk%parameters(:, position))
+    call write_numbers(file, chunk%parameters(:, position), ',')
     if (is_done) then
-      call write_numbers(file, chunk%results(:, position))
+      call write_numbers(file, chunk%results(:, position), ',')
     else
       call file%put(repeat(',', size(chunk%results, 1)))
     end if
     call file%put(',' // trim(status_words(chunk%status(position))) // ',' // to_text(chunk%steps(position)) // ',')
-    if (.not. is_done) call write_quoted(file, chunk%reasons(position)%text)
+    if (.not. is_done) call file%put(in_quotes(chunk%reasons(position)%text, '"'))
     call file%put(new_line('a'))
   end subroutine write_variant
-
-  !> Writes numbers with a comma before each.
-  subroutine write_numbers(file, values)
-    type(output_file_t), intent(inout) :: file
-    real(wp), intent(in) :: values(:)
-    character(len=number_width) :: number
-    integer :: i, length
-
-    do i = 1, size(values)
-      call write_number(values(i), number, length)
-      call file%put(',')
-      call file%put(number(:length))
-    end do
-  end subroutine write_numbers
-
-  !> Writes a text between double quotes; double quotes in it are doubled.
-  subroutine write_quoted(file, text)
-    type(output_file_t), intent(inout) :: file
-    character(len=*), intent(in) :: text
-    integer :: i
-
-    call file%put('"')
-    do i = 1, len(text)
-      if (text(i:i) == '"') call file%put('"')
-      call file%put(text(i:i))
-    end do
-    call file%put('"')
-  end subroutine write_quoted
 
 end module nocdyn_sweep_csv

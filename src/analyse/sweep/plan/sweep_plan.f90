@@ -15,8 +15,7 @@ module nocdyn_sweep_plan
   use nocdyn_sweep_header, only: sweep_header_t
   use nocdyn_recorded_quantities, only: check_quantities, read_recorded_quantities, time_span_t, wanted_trajectories
   use nocdyn_targets, only: target_t
-  use nocdyn_text, only: string_t
-  use nocdyn_text_phrases, only: counted
+  use nocdyn_text, only: counted, string_t
   use nocdyn_variant_columns, only: label_columns
   use nocdyn_version, only: compiler_text, version
   implicit none (type, external)

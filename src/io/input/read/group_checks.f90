@@ -7,8 +7,7 @@ module nocdyn_group_checks
   use nocdyn_schema, only: key_name, key_rules
   use nocdyn_schema_relations, only: relation_t, relations_t
   use nocdyn_schema_rules, only: a_body, body_or_ground, equal_lengths, less_than, unset
-  use nocdyn_text, only: quoted, string_t, to_text
-  use nocdyn_text_phrases, only: counted
+  use nocdyn_text, only: counted, quoted, string_t, to_text
   use nocdyn_text_sort, only: argsort
   implicit none (type, external)
   private

@@ -4,9 +4,8 @@ module nocdyn_table_file
   use nocdyn_errors, only: error_t, exit_file, exit_input
   use nocdyn_kinds, only: wp
   use nocdyn_literals, only: number_problem, read_real
-  use nocdyn_text, only: append, quoted, shortened, string_t, to_text
+  use nocdyn_text, only: append, counted, quoted, shortened, string_t, to_text
   use nocdyn_text_file, only: read_text_file
-  use nocdyn_text_phrases, only: counted
   implicit none (type, external)
   private
 
@@ -162,8 +161,7 @@ contains
     if (message == '') return
     reading%has_other_format = .true.
     call add_error(reading, ':' // to_text(reading%line) // ': ' // message)
-    deallocate (names)
-    allocate (names(0))
+    names = [string_t ::]
   end subroutine check_names
 
   pure function without_quotes(text) result(name)
@@ -241,7 +239,9 @@ contains
       end do
     end if
     if (.not. reading%is_list) then
-      if (message /= '' .and. rows == 0 .and. reading%errors == 0) message = message // header_hint(content)
+      if (message /= '' .and. rows == 0 .and. reading%errors == 0 .and. scan(content, '0123456789') == 0) then
+        message = message // '; a line with names of columns must begin with #'
+      end if
       if (message == '' .and. rows > 0) call check_ascent(values(1, rows), values(1, rows + 1), reading%last_row_line, message)
     end if
     if (message /= '') then
@@ -290,15 +290,6 @@ contains
     if (message /= '') message = 'column ' // to_text(column) // ', ' // excerpt(text) // ',' // message
   end subroutine read_column
 
-  !> A hint for a first line without digits, which probably has the names of the columns.
-  pure function header_hint(content) result(hint)
-    character(len=*), intent(in) :: content
-    character(len=:), allocatable :: hint
-
-    hint = ''
-    if (scan(content, '0123456789') == 0) hint = '; a line with names of columns must begin with #'
-  end function header_hint
-
   !> Checks that the first column ascends.
   subroutine check_ascent(last, this, line, message)
     real(wp), intent(in) :: last, this   !! first column of the last row and of this one
@@ -334,8 +325,7 @@ contains
     logical, intent(in) :: is_binary
 
     if (is_binary) then
-      deallocate (reading%messages)
-      allocate (reading%messages(0))
+      reading%messages = [string_t ::]
       call append(reading%messages, reading%file // ': not a text file')
     else if (reading%errors > most_messages) then
       call append(reading%messages, reading%file // ': ' // to_text(reading%errors - most_messages) // &

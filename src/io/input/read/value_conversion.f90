@@ -9,8 +9,7 @@ module nocdyn_value_conversion
   use nocdyn_schema_rules, only: a_body, a_file, a_flag, a_folder, a_name, a_number, a_selector, a_word, an_integer, &
     ground, is_out_of_range, key_rule_t, longest_file_name, longest_name, longest_path, unset
   use nocdyn_schema_text, only: allowed_text
-  use nocdyn_text, only: joined, lower_case, nearest_word, quoted, shortened, string_t, to_text
-  use nocdyn_text_phrases, only: counted
+  use nocdyn_text, only: counted, joined, lower_case, nearest_word, quoted, shortened, string_t, to_text
   implicit none (type, external)
   private
 
@@ -76,7 +75,16 @@ contains
 
     has_error = .false.
     associate (rule => key_rules(key%rule))
-      call allocate_values(rule%value_type, size(key%values), value)
+      select case (rule%value_type)
+      case (a_number)
+        allocate (value%numbers(size(key%values)), source=0.0_wp)
+      case (an_integer)
+        allocate (value%whole_numbers(size(key%values)), source=0)
+      case (a_flag)
+        allocate (value%flags(size(key%values)), source=.false.)
+      case default
+        allocate (value%texts(size(key%values)))
+      end select
       do i = 1, size(key%values)
         call convert_value(key%values(i), rule, key%override > 0, i, value, message)
         if (message == '') cycle
@@ -90,22 +98,6 @@ contains
     if (has_error) value = value_t(value%is_given, value%line, value%override)
   end subroutine convert_values
 
-  subroutine allocate_values(value_type, count, value)
-    integer, intent(in) :: value_type, count   !! type of the key, number of values
-    type(value_t), intent(inout) :: value
-
-    select case (value_type)
-    case (a_number)
-      allocate (value%numbers(count), source=0.0_wp)
-    case (an_integer)
-      allocate (value%whole_numbers(count), source=0)
-    case (a_flag)
-      allocate (value%flags(count), source=.false.)
-    case default
-      allocate (value%texts(count))
-    end select
-  end subroutine allocate_values
-
   !> Converts one value and checks it.
   subroutine convert_value(raw, rule, may_be_bare, i, value, message)
     type(raw_value_t), intent(in) :: raw
@@ -114,6 +106,7 @@ contains
     integer, intent(in) :: i                                !! index of the value
     type(value_t), intent(inout) :: value
     character(len=:), allocatable, intent(out) :: message   !! text after 'KEY = VALUE'; '': the value is valid
+    integer :: status
 
     message = ''
     if (holds_texts(rule%value_type)) then
@@ -132,7 +125,8 @@ contains
       case (an_integer)
         call convert_integer(raw%text, rule, value%whole_numbers(i), message)
       case default
-        call convert_flag(raw%text, value%flags(i), message)
+        call read_logical(raw%text, value%flags(i), status)
+        if (status /= literal_ok) message = ' is neither true nor false'
       end select
       if (message /= '') message = message // '; allowed: ' // allowed_text(rule)
     end if
@@ -167,16 +161,6 @@ contains
       message = ' is not a whole number'
     end select
   end subroutine convert_integer
-
-  subroutine convert_flag(text, value, message)
-    character(len=*), intent(in) :: text
-    logical, intent(out) :: value
-    character(len=:), allocatable, intent(inout) :: message
-    integer :: status
-
-    call read_logical(text, value, status)
-    if (status /= literal_ok) message = ' is neither true nor false'
-  end subroutine convert_flag
 
   !> Checks the text of a name, a body, a word, a file or a folder.
   subroutine check_text(rule, value, message)

@@ -6,8 +6,7 @@ module nocdyn_target_search
   use nocdyn_schema, only: first_key, group_rules, has_word, key_rules, last_key, selector_name, selector_rule
   use nocdyn_schema_rules, only: a_number, an_integer, key_rule_t
   use nocdyn_schema_text, only: only_if_text, suggestion, type_text
-  use nocdyn_text, only: append, lower_case, nearest_word, quoted, string_t, to_text
-  use nocdyn_text_phrases, only: listed
+  use nocdyn_text, only: append, listed, lower_case, nearest_word, quoted, string_t, to_text
   implicit none (type, external)
   private
 
