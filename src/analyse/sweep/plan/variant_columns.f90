@@ -10,7 +10,7 @@ module nocdyn_variant_columns
   use nocdyn_machine, only: machine_t
   use nocdyn_run_settings, only: check_size
   use nocdyn_schema, only: has_word
-  use nocdyn_targets, only: set_target, target_t
+  use nocdyn_targets, only: set_targets, target_t
   use nocdyn_text, only: append, string_t
   use nocdyn_text_sort, only: argsort, sorted_position
   use nocdyn_trajectory_columns, only: column_t, list_columns
@@ -80,7 +80,7 @@ contains
     changed = input
     do i = 1, size(hidden)
       before = changed
-      call set_target(changed, hidden(i), nonzero_value, message)
+      call set_targets(changed, hidden(i:i), [nonzero_value], message)
       if (message /= '') changed = before
     end do
     call assemble_machine(changed, machine, error)

@@ -15,7 +15,7 @@ module nocdyn_targets
   implicit none (type, external)
   private
 
-  public :: find_target, set_target, set_targets
+  public :: find_target, set_targets
 
   !> One number of an input.
   type, public :: target_t
@@ -63,22 +63,11 @@ contains
     end do
   end subroutine find_target
 
-  !> Sets one number and checks it, also against the other numbers of its group.
-  subroutine set_target(input, target, value, message)
-    type(input_t), intent(inout) :: input
-    type(target_t), intent(in) :: target
-    real(wp), intent(in) :: value   !! in the unit of the key; rounded if the key has integers
-    character(len=:), allocatable, intent(out) :: message   !! what is wrong and allowed, '' if nothing is wrong
-
-    call set_value(input%groups(target%group), target, value, message)
-    if (message == '') call check_relation(input%groups(target%group), target, message)
-  end subroutine set_target
-
-  !> Sets the numbers of a variant, then checks the relations between them. If one is wrong, some of the others are set.
+  !> Sets numbers and checks them, then the relations to the other numbers of their groups. If one is wrong, some are set.
   subroutine set_targets(input, targets, values, message)
     type(input_t), intent(inout) :: input
     type(target_t), intent(in) :: targets(:)
-    real(wp), intent(in) :: values(:)   !! [targets]
+    real(wp), intent(in) :: values(:)   !! [targets], in the units of the keys; rounded if a key has integers
     character(len=:), allocatable, intent(out) :: message   !! on the first number that is wrong, '' if none is
     integer :: i
 
