@@ -150,7 +150,7 @@ contains
       if (.not. overrides(i)%is_valid .or. overrides(i)%group_rule /= raw%rule) cycle
       if (overrides(i)%name /= name .or. overrides(i)%number /= number) cycle
       overrides(i)%is_used = .true.
-      call raw%keys(raw%position(overrides(i)%key_rule))%override_with(overrides(i)%namelist, overrides(i)%assignment, i, message)
+      call raw%keys(raw%position(overrides(i)%key_rule))%override_with(overrides(i)%namelist, overrides(i)%target, i, message)
       if (message /= '') call diagnostics%add(no_line, 0, message, i)
     end do
   end subroutine take_overrides

@@ -2,7 +2,7 @@
 module nocdyn_input_overrides
   use nocdyn_key_path, only: key_path_t, read_path
   use nocdyn_diagnostics, only: diagnostics_t, no_line
-  use nocdyn_namelist, only: assignment_t, item_t, namelist_t
+  use nocdyn_namelist, only: item_t, namelist_t
   use nocdyn_namelist_scanner, only: scan_value
   use nocdyn_namelist_values, only: longest_list
   use nocdyn_schema, only: holds_texts, key_rules
@@ -13,15 +13,10 @@ module nocdyn_input_overrides
 
   public :: read_overrides
 
-  !> One override; its value is the items of `namelist`.
-  type, public :: override_t
-    logical :: is_valid = .false.           !! path and value can be read
-    logical :: is_used = .false.            !! its group was found
-    integer :: group_rule = 0               !! row of `group_rules`
-    integer :: key_rule = 0                 !! row of `key_rules`
-    character(len=:), allocatable :: name   !! of the element, '' for groups without names
-    integer :: number = 0                   !! among the groups without names of its kind, 0 for other groups
-    type(assignment_t) :: assignment        !! key, subscript and indices of the items
+  !> One override: its path, of which `target` has the indices of the items too, and as value the items of `namelist`.
+  type, extends(key_path_t), public :: override_t
+    logical :: is_valid = .false.   !! path and value can be read
+    logical :: is_used = .false.    !! its group was found
     type(namelist_t) :: namelist
   end type override_t
 
@@ -37,7 +32,6 @@ contains
 
     allocate (overrides(size(texts)))
     do i = 1, size(texts)
-      overrides(i)%name = ''
       equals = index(texts(i)%text, '=')
       if (equals == 0) then
         message = 'there is no = in it; write PATH=VALUE'
@@ -56,25 +50,19 @@ contains
     type(override_t), intent(inout) :: override
     character(len=:), allocatable, intent(out) :: message
     type(key_rule_t) :: rule
-    type(key_path_t) :: path
 
     if (text == '') then
       message = 'there is no path before the =; write GROUP.KEY=VALUE or GROUP.NAME.KEY=VALUE'
       return
     end if
-    call read_path(text, '=VALUE', path, message)
-    override%group_rule = path%group_rule
-    override%key_rule = path%key_rule
-    override%name = path%name
-    override%number = path%number
-    override%assignment = path%target
+    call read_path(text, '=VALUE', override%key_path_t, message)
     if (message /= '') return
-    rule = key_rules(path%key_rule)
+    rule = key_rules(override%key_rule)
     if (rule%value_type == a_name) then
       message = 'a name cannot be overridden: other groups refer to it'
-    else if (path%is_out_of_range .and. rule%count == 1) then
+    else if (override%is_out_of_range .and. rule%count == 1) then
       message = trim(rule%name) // ' is a single value and takes no subscript'
-    else if (path%is_out_of_range) then
+    else if (override%is_out_of_range) then
       message = 'the subscript of ' // trim(rule%name) // ' is out of range; allowed: 1 to ' // &
                   to_text(merge(rule%count, longest_list, rule%count /= any_number))
     end if
@@ -95,7 +83,7 @@ contains
     else
       call scan_value(text, override%namelist, diagnostics)
     end if
-    override%assignment%last_item = override%namelist%item_count
+    override%target%last_item = override%namelist%item_count
     message = ''
     if (diagnostics%count > 0) then
       message = diagnostics%list(1)%text
