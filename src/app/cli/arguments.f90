@@ -1,6 +1,6 @@
 !> What a command line says, the command with its operands and options; the table of all options.
 module nocdyn_arguments
-  use nocdyn_text, only: append, string_t
+  use nocdyn_text, only: string_t
   implicit none (type, external)
   private
 
@@ -34,7 +34,7 @@ module nocdyn_arguments
     type(string_t), allocatable :: names(:)          !! long names of all options, in the order of the command line
     type(string_t), allocatable :: values(:)         !! of these options, '' if an option takes none
   contains
-    procedure :: add, is_given, value
+    procedure :: is_given, value
   end type arguments_t
 
 contains
@@ -48,16 +48,6 @@ contains
       if (name /= '' .and. options(option_index)%short == name) return
     end do
   end function option_index
-
-  !> Adds an option.
-  subroutine add(self, name, value)
-    class(arguments_t), intent(inout) :: self
-    character(len=*), intent(in) :: name    !! long name
-    character(len=*), intent(in) :: value   !! '' if the option takes none
-
-    call append(self%names, name)
-    call append(self%values, value)
-  end subroutine add
 
   !> Whether an option is on the command line.
   pure logical function is_given(self, name)

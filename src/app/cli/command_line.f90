@@ -152,7 +152,8 @@ contains
     case default
       ! read by `is_given` and `value`
     end select
-    call arguments%add(trim(option%name), value)
+    call append(arguments%names, trim(option%name))
+    call append(arguments%values, value)
   end subroutine add_option
 
   subroutine parse_threads(value, threads, error)

@@ -1,11 +1,11 @@
 !> A command as a row of a table: name, operands, options, help and procedure.
 module nocdyn_commands
   use nocdyn_arguments, only: arguments_t
-  use nocdyn_text, only: append, joined, string_t
+  use nocdyn_text, only: append, listed, string_t
   implicit none (type, external)
   private
 
-  public :: add_command, remove_procedures, set_procedure, command_index, command_names, commands_with_option
+  public :: add_command, remove_procedures, command_index, command_names, commands_with_option
 
   type, public :: command_t
     character(len=:), allocatable :: name
@@ -65,15 +65,6 @@ contains
     end do
   end subroutine remove_procedures
 
-  !> Sets the procedure of a command.
-  subroutine set_procedure(commands, name, run)
-    type(command_t), intent(inout) :: commands(:)
-    character(len=*), intent(in) :: name   !! of a command in the table
-    procedure(command_interface) :: run
-
-    commands(command_index(commands, name))%run => run
-  end subroutine set_procedure
-
   !> The row of a command, 0 if there is none of this name.
   pure integer function command_index(commands, name)
     type(command_t), intent(in) :: commands(:)
@@ -107,20 +98,16 @@ contains
   !> "run, equilibrium and modes", the commands that take an option.
   pure function commands_with_option(commands, option) result(text)
     type(command_t), intent(in) :: commands(:)
-    character(len=*), intent(in) :: option   !! long name
-    character(len=:), allocatable :: text, last
+    character(len=*), intent(in) :: option   !! long name of an option that one of them takes
+    character(len=:), allocatable :: text
+    type(string_t), allocatable :: names(:)
     integer :: i
 
-    text = ''
-    last = ''
+    allocate (names(0))
     do i = 1, size(commands)
-      if (.not. commands(i)%takes(option)) cycle
-      if (text /= '') text = text // ', '
-      text = text // last
-      last = commands(i)%name
+      if (commands(i)%takes(option)) call append(names, commands(i)%name)
     end do
-    if (text /= '') text = text // ' and '
-    text = text // last
+    text = listed(names, ' and ')
   end function commands_with_option
 
 end module nocdyn_commands

@@ -22,9 +22,7 @@ module nocdyn_console
     logical, private :: is_shown = .false.
     integer(int64), private :: began = 0, next = 0, rate = 1
   contains
-    procedure :: is_due
-    procedure :: elapsed
-    procedure :: show
+    procedure :: is_due, elapsed, show
     procedure :: clear => clear_line
   end type status_line_t
 
@@ -33,13 +31,10 @@ contains
   !> Prints one or several lines to standard output. A line end is added if there is none.
   subroutine print_text(text)
     character(len=*), intent(in) :: text
-    logical :: is_done
+    logical :: has_end, is_done
 
-    if (index(text, new_line('a'), back=.true.) == len(text)) then
-      call write_bytes(standard_output, text, is_done)
-    else
-      call write_bytes(standard_output, text // new_line('a'), is_done)
-    end if
+    has_end = index(text, new_line('a'), back=.true.) == len(text)
+    call write_bytes(standard_output, text // repeat(new_line('a'), merge(0, 1, has_end)), is_done)
     if (.not. is_done) output_is_lost = .true.
   end subroutine print_text
 

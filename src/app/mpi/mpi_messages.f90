@@ -7,9 +7,8 @@ module nocdyn_mpi_messages
   implicit none (type, external)
   private
 
-  public :: send_request, send_assignment, receive_assignment, send_results, receive_results, send_tag, receive_tag, &
-    probe_message, wait_for_message
-  public :: broadcast_text
+  public :: send_assignment, receive_assignment, send_results, receive_results, send_tag, receive_tag, probe_message, &
+    wait_for_message, broadcast_text
 
   integer, parameter, public :: root = 0
 
@@ -22,11 +21,6 @@ module nocdyn_mpi_messages
 
 contains
 
-  !> Asks rank 0 for variants.
-  subroutine send_request()
-    call send_tag(root, tag_request)
-  end subroutine send_request
-
   !> Assigns consecutive variants to a rank, none if there are no more.
   subroutine send_assignment(rank, first, count)
     integer, intent(in) :: rank    !! of the receiver
@@ -36,7 +30,7 @@ contains
     call mpi_send([first, count], 2, mpi_integer, rank, tag_assignment, mpi_comm_world)
   end subroutine send_assignment
 
-  !> Waits for the answer to `send_request`.
+  !> Waits for the answer to a request.
   subroutine receive_assignment(first, count)
     integer, intent(out) :: first   !! variant
     integer, intent(out) :: count   !! number of variants, 0: there are no more

@@ -2,9 +2,8 @@
 module nocdyn_mpi_root
   use, intrinsic :: iso_c_binding, only: c_int
   use nocdyn_kinds, only: wp
-  use nocdyn_mpi_messages, only: send_assignment, tag_done, probe_message, receive_results, receive_tag, tag_request, &
-                                 tag_results, &
-    send_tag, tag_stop
+  use nocdyn_mpi_messages, only: probe_message, receive_results, receive_tag, send_assignment, send_tag, tag_done, tag_request, &
+    tag_results, tag_stop
   use nocdyn_sweep_chunk, only: chunk_t
   use nocdyn_journal_scheduler, only: journal_scheduler_t
   implicit none (type, external)
@@ -24,8 +23,7 @@ module nocdyn_mpi_root
     integer, private :: finished_ranks = 0           !! number of ranks that have sent their last message
     logical, private :: has_stopped = .false.   !! whether the other ranks have been told to stop
   contains
-    procedure :: poll
-    procedure :: finalise
+    procedure :: poll, finalise
     procedure, private :: handle_message
   end type mpi_root_t
 

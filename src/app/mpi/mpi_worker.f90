@@ -2,9 +2,8 @@
 module nocdyn_mpi_worker
   use nocdyn_scheduler, only: scheduler_t
   use nocdyn_kinds, only: wp
-  use nocdyn_mpi_messages, only: send_request, tag_done, probe_message, receive_assignment, receive_tag, root, send_results, &
-                                 send_tag, &
-    tag_stop, wait_for_message
+  use nocdyn_mpi_messages, only: probe_message, receive_assignment, receive_tag, root, send_results, send_tag, tag_done, &
+    tag_request, tag_stop, wait_for_message
   use nocdyn_posix, only: is_interrupted
   use nocdyn_sweep_chunk, only: chunk_t
   implicit none (type, external)
@@ -14,11 +13,7 @@ module nocdyn_mpi_worker
     logical, private :: is_exhausted = .false.   !! whether rank 0 has no more variants
     logical, private :: is_stopped = .false.     !! whether rank 0 has told this rank to stop
   contains
-    procedure :: next_chunk
-    procedure :: submit
-    procedure :: poll
-    procedure :: finalise
-    procedure :: is_cancelled
+    procedure :: next_chunk, submit, poll, finalise, is_cancelled
   end type mpi_worker_t
 
 contains
@@ -33,7 +28,7 @@ contains
     count = 0
     if (self%is_exhausted) return
     if (self%is_cancelled()) return
-    call send_request()
+    call send_tag(root, tag_request)
     call receive_assignment(first, count)
     self%is_exhausted = count == 0
   end subroutine next_chunk

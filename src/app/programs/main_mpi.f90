@@ -2,7 +2,7 @@
 program nocdyn_mpi_program
   use mpi_f08, only: mpi_comm_rank, mpi_comm_world, mpi_finalize, mpi_init_thread, mpi_thread_serialized
   use nocdyn_command_table, only: list_commands
-  use nocdyn_commands, only: command_t, remove_procedures, set_procedure
+  use nocdyn_commands, only: command_index, command_t, remove_procedures
   use nocdyn_mpi_command, only: mpi_command
   use nocdyn_mpi_messages, only: root
   use nocdyn_program, only: run_program
@@ -15,7 +15,7 @@ program nocdyn_mpi_program
   call mpi_comm_rank(mpi_comm_world, rank)
   call list_commands(commands)
   call remove_procedures(commands)
-  call set_procedure(commands, 'sweep', mpi_command)
+  commands(command_index(commands, 'sweep'))%run => mpi_command
   call run_program('nocdyn-mpi', 'sweep', commands, rank == root, code)
   call mpi_finalize()
   stop code, quiet=.true.

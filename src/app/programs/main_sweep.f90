@@ -2,7 +2,7 @@
 !> NetCDF, which take milliseconds to load.
 program nocdyn_sweep_program
   use nocdyn_command_table, only: list_commands
-  use nocdyn_commands, only: command_t, remove_procedures, set_procedure
+  use nocdyn_commands, only: command_index, command_t, remove_procedures
   use nocdyn_merge_command, only: merge_command
   use nocdyn_program, only: run_program
   use nocdyn_sweep_command, only: sweep_command
@@ -13,8 +13,8 @@ program nocdyn_sweep_program
 
   call list_commands(commands)
   call remove_procedures(commands)
-  call set_procedure(commands, 'sweep', sweep_command)
-  call set_procedure(commands, 'merge', merge_command)
+  commands(command_index(commands, 'sweep'))%run => sweep_command
+  commands(command_index(commands, 'merge'))%run => merge_command
   call run_program('nocdyn-sweep', 'sweep', commands, .true., code)
   stop code, quiet=.true.
 end program nocdyn_sweep_program

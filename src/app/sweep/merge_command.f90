@@ -7,14 +7,13 @@ module nocdyn_merge_command
   use nocdyn_journal_chunks, only: check_sweep
   use nocdyn_posix, only: catch_interrupts
   use nocdyn_result_folders, only: normalised_path
-  use nocdyn_sweep_header, only: quantity_t
   use nocdyn_sweep_journal, only: journal_names, open_journal, sweep_journal_t
   use nocdyn_sweep_plan, only: sweep_plan_t
   use nocdyn_recorded_quantities, only: wanted_trajectories
   use nocdyn_sweep_results, only: print_results, write_results
   use nocdyn_sweep_summary, only: sweep_summary_t
   use nocdyn_target_consistency, only: find_targets
-  use nocdyn_text, only: append, string_t, strings
+  use nocdyn_text, only: string_t, strings
   implicit none (type, external)
   private
 
@@ -43,8 +42,9 @@ contains
     type(error_t), allocatable, intent(out) :: error
     type(sweep_journal_t), allocatable :: journals(:)
     type(sweep_plan_t) :: plan   ! without a design, which the results do not need
-    type(string_t), allocatable :: messages(:)
+    type(string_t), allocatable :: labels(:), messages(:)
     type(sweep_summary_t) :: summary
+    integer :: i
 
     call open_journals(folder, journals, error)
     if (.not. allocated(error)) call check_sweep(journals, error)
@@ -52,23 +52,16 @@ contains
     associate (header => journals(1)%header)
       call read_input_text(header%input_text, header%input_file, strings([character(len=1) ::]), plan%input, error)
       if (allocated(error)) return
-      call find_targets(plan%input, labels_of(header%parameters), plan%targets, messages)
+      allocate (labels(size(header%parameters)))
+      do i = 1, size(labels)
+        labels(i)%text = header%parameters(i)%label
+      end do
+      call find_targets(plan%input, labels, plan%targets, messages)
     end associate
     allocate (plan%trajectories, source=wanted_trajectories(plan%input))
     call write_results(plan, folder, journals, arguments, summary, error)
     if (.not. allocated(error)) call print_results(plan, folder, journals(1)%header, arguments, summary, code)
   end subroutine merge_folder
-
-  pure function labels_of(quantities) result(labels)
-    type(quantity_t), intent(in) :: quantities(:)
-    type(string_t), allocatable :: labels(:)
-    integer :: i
-
-    allocate (labels(0))
-    do i = 1, size(quantities)
-      call append(labels, quantities(i)%label)
-    end do
-  end function labels_of
 
   !> Opens all journals of a folder.
   subroutine open_journals(folder, journals, error)
