@@ -18,9 +18,8 @@ module nocdyn_input
     logical, allocatable :: flags(:)
     type(string_t), allocatable :: texts(:)
   contains
-    procedure :: has_any
     procedure :: count => count_of
-    procedure :: number_at
+    procedure :: has_any, number_at
   end type value_t
 
   !> One group of the file. To ask for a key that the schema does not have, or for another type, is an error of the program.
@@ -222,7 +221,6 @@ contains
       is_wanted(i) = self%groups(i)%kind == kind
       if (is_wanted(i) .and. present(law)) is_wanted(i) = self%groups(i)%text('kind') == law
     end do
-    allocate (indices(count(is_wanted)))
     indices = pack([(i, i=1, size(is_wanted))], is_wanted)
   end function groups_named
 

@@ -118,7 +118,7 @@ contains
     start = before%labels(old)%text // ': '
     associate (left => before%namelist, right => after%namelist)
       do a = left%groups(old)%first_assignment, left%groups(old)%last_assignment
-        if (is_ignored(before%labels(old)%text, left%assignments(a)%key)) cycle
+        if (before%labels(old)%text == '&output' .and. left%assignments(a)%key == 'directory') cycle
         other = find_assignment(right, new, left%assignments(a)%key)
         if (other == 0) then
           call append(sentences, start // left%assignments(a)%key // ' was ' // values_of(left, left%assignments(a)) // &
@@ -135,13 +135,6 @@ contains
       end do
     end associate
   end subroutine compare_groups
-
-  !> Whether a key is not compared.
-  pure logical function is_ignored(label, key)
-    character(len=*), intent(in) :: label, key
-
-    is_ignored = label == '&output' .and. key == 'directory'
-  end function is_ignored
 
   !> Compares the values of a key: of lists of equal length the first difference, of others their values or lengths.
   subroutine compare_values(start, left, old, right, new, sentences)

@@ -162,18 +162,11 @@ contains
     if (exponent == largest_exponent) then
       if (point <= len(mantissa)) mantissa = mantissa(:point - 1) // mantissa(point + 1:)
       if (leading > point) leading = leading - 1
-      overflows = without_final_zeros(mantissa(leading:)) > largest_digits
+      overflows = mantissa(leading:verify(mantissa, '0', back=.true.)) > largest_digits   ! without zeros at the end
     else
       overflows = exponent > largest_exponent
     end if
   end function overflows
-
-  pure function without_final_zeros(text) result(trimmed)
-    character(len=*), intent(in) :: text
-    character(len=:), allocatable :: trimmed
-
-    trimmed = text(:verify(text, '0', back=.true.))
-  end function without_final_zeros
 
   !> The number after the exponent letter, limited to +-`exponent_limit`; 0 without an exponent.
   pure integer function exponent_of(text)

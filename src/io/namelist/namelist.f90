@@ -39,11 +39,8 @@ module nocdyn_namelist
     type(assignment_t), allocatable :: assignments(:)
     type(item_t), allocatable :: items(:)
   contains
-    procedure :: append_group
-    procedure :: append_assignment
-    procedure :: append_item
-    procedure :: item_text
-    procedure :: as_written
+    procedure :: append_group, append_assignment, append_item
+    procedure :: item_text, as_written
   end type namelist_t
 
 contains
@@ -91,14 +88,9 @@ contains
   subroutine append_item(self, item)
     class(namelist_t), intent(inout) :: self
     type(item_t), intent(in) :: item
-    type(item_t), allocatable :: longer(:)
 
     if (.not. allocated(self%items)) allocate (self%items(64))
-    if (self%item_count == size(self%items)) then
-      allocate (longer(2 * self%item_count))
-      longer(:self%item_count) = self%items
-      call move_alloc(longer, self%items)
-    end if
+    if (self%item_count == size(self%items)) self%items = [self%items, self%items]
     self%item_count = self%item_count + 1
     self%items(self%item_count) = item
   end subroutine append_item

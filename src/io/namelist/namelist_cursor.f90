@@ -18,20 +18,10 @@ module nocdyn_namelist_cursor
     logical :: is_override = .false.        !! the text is the value of an override: '/', '!', '&' and '=' have no meaning
     character(len=:), allocatable :: key    !! whose values are read, with ': ' for messages; '': none
   contains
-    procedure :: at_end
     procedure :: next => next_character
-    procedure :: move_to
-    procedure :: skip_blanks
-    procedure :: line_end
-    procedure :: token_end
-    procedure :: value_end
-    procedure :: key_end
-    procedure :: quote_end
-    procedure :: key_follows
-    procedure :: subscript_end
-    procedure :: group_begins
-    procedure :: group_ends
-    procedure :: is_first_of_line
+    procedure :: move_to, skip_blanks
+    procedure :: line_end, token_end, value_end, key_end, quote_end, subscript_end
+    procedure :: at_end, key_follows, group_begins, group_ends, is_first_of_line
     procedure :: excerpt
   end type cursor_t
 
@@ -89,15 +79,9 @@ contains
   pure integer function token_end(self, delimiters)
     class(cursor_t), intent(in) :: self
     character(len=*), intent(in) :: delimiters   !! besides blanks
-    integer :: i
 
-    token_end = len(self%text)
-    do i = self%at, len(self%text)
-      if (scan(self%text(i:i), blanks // delimiters) == 1) then
-        token_end = i - 1
-        return
-      end if
-    end do
+    token_end = self%at - 2 + scan(self%text(self%at:), blanks // delimiters)
+    if (token_end < self%at - 1) token_end = len(self%text)
   end function token_end
 
   !> Last position of the bare value at the cursor.
@@ -171,10 +155,8 @@ contains
     character(len=*), intent(in) :: text
     integer, intent(in) :: start
 
-    do position = start, len(text)
-      if (scan(text(position:position), blanks) == 0) return
-    end do
-    position = 0
+    position = verify(text(start:), blanks)
+    if (position > 0) position = position + start - 1
   end function position_after_blanks
 
   !> Whether a group begins at the cursor: & or $ and the first letter of a name.

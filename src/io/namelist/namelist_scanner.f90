@@ -133,15 +133,13 @@ contains
     type(cursor_t), intent(in) :: cursor
     type(namelist_t), intent(in) :: namelist
     type(diagnostics_t), intent(inout) :: diagnostics
+    character(len=:), allocatable :: place
 
     associate (group => namelist%groups(namelist%group_count))
       if (group%is_malformed) return
-      if (cursor%at_end()) then
-        call diagnostics%add(group%line, namelist%group_count, "not closed: '/' is missing before the end of the file")
-      else
-        call diagnostics%add(group%line, namelist%group_count, &
-          "not closed: '/' is missing before the next group on line " // to_text(cursor%line))
-      end if
+      place = 'the end of the file'
+      if (.not. cursor%at_end()) place = 'the next group on line ' // to_text(cursor%line)
+      call diagnostics%add(group%line, namelist%group_count, "not closed: '/' is missing before " // place)
     end associate
   end subroutine refuse_unclosed
 

@@ -22,14 +22,9 @@ module nocdyn_output_file
     integer, private :: descriptor = -1                     !! -1 if the file is not open
   contains
     procedure :: open => open_hidden
-    procedure :: put
-    procedure :: complete
-    procedure :: finish
-    procedure :: discard
-    procedure, private :: flush_buffer
+    procedure :: put, complete, finish, discard
     procedure, private :: close => close_hidden
-    procedure, private :: keep_reason
-    procedure, private :: fail
+    procedure, private :: flush_buffer, keep_reason, fail
   end type output_file_t
 
 contains

@@ -360,11 +360,8 @@ contains
   !> Closes the file; the library writes what it still holds.
   subroutine close_file(file)
     type(netcdf_file_t), intent(inout) :: file
-    integer :: status
 
-    if (file%id < 0) return
-    status = nf90_close(file%id)
-    call check(file, status)
+    if (file%id >= 0) call check(file, nf90_close(file%id))
   end subroutine close_file
 
 end module nocdyn_sweep_netcdf

@@ -18,8 +18,7 @@ module nocdyn_journal_chunks
     integer, allocatable, private :: journal(:), entry(:)   !! of each chunk, in the order of the variants
     integer, private :: next = 1
   contains
-    procedure :: rewind_to_start
-    procedure :: next_chunk
+    procedure :: rewind_to_start, next_chunk
   end type chunk_cursor_t
 
 contains
@@ -30,12 +29,11 @@ contains
     type(sweep_journal_t), intent(in) :: journals(:)
     type(range_t), allocatable :: ranges(:)
     integer, allocatable :: order(:), journal(:), entry(:)
-    integer :: i
 
     call list_entries(journals, ranges, journal, entry)
     call ascending_order(ranges, order)
-    self%journal = [(journal(order(i)), i=1, size(order))]
-    self%entry = [(entry(order(i)), i=1, size(order))]
+    self%journal = journal(order)
+    self%entry = entry(order)
     self%next = 1
   end subroutine rewind_to_start
 
@@ -44,16 +42,14 @@ contains
     type(sweep_journal_t), intent(in) :: journals(:)
     type(range_t), allocatable, intent(out) :: ranges(:)
     integer, allocatable, intent(out) :: journal(:), entry(:)   !! number of the journal, and of the entry in it
-    integer :: i, last, k
+    integer :: i, k, last
 
-    allocate (ranges(sum(journals%entries)), journal(sum(journals%entries)), entry(sum(journals%entries)))
+    allocate (ranges(sum(journals%entries)))
+    journal = [((k, i=1, journals(k)%entries), k=1, size(journals))]
+    entry = [((i, i=1, journals(k)%entries), k=1, size(journals))]
     last = 0
     do k = 1, size(journals)
       ranges(last + 1:last + journals(k)%entries) = journals(k)%ranges()
-      do i = 1, journals(k)%entries
-        journal(last + i) = k
-        entry(last + i) = i
-      end do
       last = last + journals(k)%entries
     end do
   end subroutine list_entries
@@ -108,7 +104,9 @@ contains
     do k = 1, shards
       name = journal_name(k, shards)
       do i = 1, size(journals)
-        if (file_name(journals(i)%file%path) == name) exit
+        associate (path => journals(i)%file%path)
+          if (path(index(path, '/', back=.true.) + 1:) == name) exit
+        end associate
       end do
       if (i <= size(journals)) cycle
       absent = absent + 1
@@ -119,13 +117,6 @@ contains
     if (absent > max_listed) text = text // ' and ' // to_text(absent - max_listed) // ' more'
     if (absent > 0) text = text // trim(merge(' is ', ' are', absent == 1)) // ' not there: '
   end function absent_shards
-
-  pure function file_name(path) result(name)
-    character(len=*), intent(in) :: path
-    character(len=:), allocatable :: name
-
-    name = path(index(path, '/', back=.true.) + 1:)
-  end function file_name
 
   !> 5 for '.../sweep.2-of-5.journal', 0 for other names.
   pure integer function shards_of(path) result(shards)

@@ -31,7 +31,7 @@ module nocdyn_sweep_journal
     type(log_file_t) :: file
     type(log_entry_t), allocatable, private :: index(:)
   contains
-    procedure :: append, append_packed, ranges, missing, entry_of, read_entry
+    procedure :: append, ranges, missing, entry_of, read_entry
     procedure, private :: add_entry, read_chunks
   end type sweep_journal_t
 
@@ -159,27 +159,18 @@ contains
     type(chunk_t), intent(in) :: chunk
     type(error_t), allocatable, intent(out) :: error
     character(len=:), allocatable :: bytes
-
-    call pack_chunk(chunk, bytes)
-    call self%append_packed(bytes, error)
-  end subroutine append
-
-  !> Appends a chunk that `pack_chunk` has packed.
-  subroutine append_packed(self, bytes, error)
-    class(sweep_journal_t), intent(inout) :: self
-    character(len=*), intent(in) :: bytes
-    type(error_t), allocatable, intent(out) :: error
     type(chunk_summary_t) :: summary
     integer(int64) :: offset
     logical :: is_whole
 
+    call pack_chunk(chunk, bytes)
     call read_summary(bytes, summary, is_whole)
     if (is_whole) is_whole = belongs(summary, self%header)
-    if (.not. is_whole) error stop 'nocdyn_sweep_journal: append_packed needs a chunk of this sweep'
+    if (.not. is_whole) error stop 'nocdyn_sweep_journal: append needs a chunk of this sweep'
     offset = self%file%end
     call self%file%write(chunk_tag, bytes, error)
     if (.not. allocated(error)) call self%add_entry(offset, summary)
-  end subroutine append_packed
+  end subroutine append
 
   !> The range of variants of each entry.
   pure function ranges(self)
@@ -187,10 +178,7 @@ contains
     type(range_t), allocatable :: ranges(:)
     integer :: i
 
-    allocate (ranges(self%entries))
-    do i = 1, self%entries
-      ranges(i) = range_t(self%index(i)%first, self%index(i)%first + self%index(i)%count - 1)
-    end do
+    ranges = [(range_t(self%index(i)%first, self%index(i)%first + self%index(i)%count - 1), i=1, self%entries)]
   end function ranges
 
   !> The variants of this shard that the journal does not hold, as ascending ranges.
@@ -200,7 +188,6 @@ contains
     type(range_t), allocatable :: open_ranges(:)
 
     call gaps(self%ranges(), range_t(self%header%first, self%header%last), open_ranges)
-    allocate (first(size(open_ranges)), count(size(open_ranges)))
     first = open_ranges%first
     count = open_ranges%last - open_ranges%first + 1
   end subroutine missing

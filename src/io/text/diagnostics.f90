@@ -21,9 +21,7 @@ module nocdyn_diagnostics
     integer :: count = 0
     type(diagnostic_t), allocatable :: list(:)   !! the first `count` are in use
   contains
-    procedure :: add
-    procedure :: sort_by_line
-    procedure :: worst_code
+    procedure :: add, sort_by_line, worst_code
   end type diagnostics_t
 
 contains

@@ -35,11 +35,14 @@ contains
     integer, intent(in) :: left(:), right(:)   !! indices of `texts`, each list sorted
     integer, intent(out) :: merged(:)          !! both lists, sorted
     integer :: i, l, r
+    logical :: takes_left
 
     l = 1
     r = 1
     do i = 1, size(merged)
-      if (takes_left(texts, left, right, l, r)) then
+      takes_left = r > size(right)
+      if (.not. takes_left .and. l <= size(left)) takes_left = texts(left(l))%text <= texts(right(r))%text
+      if (takes_left) then
         merged(i) = left(l)
         l = l + 1
       else
@@ -48,16 +51,6 @@ contains
       end if
     end do
   end subroutine merge_runs
-
-  !> Whether the next item comes from the left list.
-  pure logical function takes_left(texts, left, right, l, r)
-    type(string_t), intent(in) :: texts(:)
-    integer, intent(in) :: left(:), right(:), l, r   !! lists as in `merge_runs`, index of the next item of each
-
-    takes_left = r > size(right)
-    if (takes_left .or. l > size(left)) return
-    takes_left = texts(left(l))%text <= texts(right(r))%text
-  end function takes_left
 
   !> Index of the first of `texts` that equals `text`, 0 if there is none.
   pure integer function sorted_position(text, texts, order) result(position)

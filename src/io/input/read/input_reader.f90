@@ -114,26 +114,15 @@ contains
     type(override_t), intent(in) :: overrides(:)
     integer, allocatable, intent(out) :: rules(:)   !! rows of `group_rules`
     integer :: g, rule
-    logical :: exists
 
     allocate (rules(0))
     do rule = 1, size(group_rules)
-      exists = .false.
-      do g = 1, namelist%group_count
-        exists = exists .or. namelist%groups(g)%name == group_rules(rule)%name
-      end do
-      if (exists .or. .not. is_single(rule)) cycle
-      if (has_required_key(rule) .and. all(overrides%group_rule /= rule)) cycle
+      if (.not. is_single(rule)) cycle
+      if (any([(namelist%groups(g)%name == group_rules(rule)%name, g=1, namelist%group_count)])) cycle
+      if (any(key_rules(first_key(rule):last_key(rule))%default == required) .and. all(overrides%group_rule /= rule)) cycle
       rules = [rules, rule]
     end do
   end subroutine find_absent_groups
-
-  !> Whether a group needs more than its defaults.
-  pure logical function has_required_key(group_rule)
-    integer, intent(in) :: group_rule   !! row of `group_rules`
-
-    has_required_key = any(key_rules(first_key(group_rule):last_key(group_rule))%default == required)
-  end function has_required_key
 
   !> Checks how often each group occurs.
   subroutine check_occurrences(groups, diagnostics)

@@ -139,7 +139,10 @@ contains
     one = group%first_given(relation%first)
     other = group%first_given(relation%second)
     if (one > 0 .and. other > 0) then
-      call refuse_both(group, one, other, diagnostics)
+      if ((group%keys(one)%override > 0) .eqv. (group%keys(other)%override > 0)) then   ! no override decides between them
+        call group%report([one, other], listed_keys(group%rule, [one, other], ' and ') // &
+                          ' are both given; allowed: one of them', diagnostics)
+      end if
       if (group%keys(other)%override > 0 .and. group%keys(one)%override == 0) one = 0
     end if
     if (one > 0) then
@@ -153,17 +156,6 @@ contains
                         ' is missing; one of them is needed', diagnostics)
     end if
   end subroutine choose
-
-  !> Adds an error for two keys that exclude each other, unless an override decides between them.
-  subroutine refuse_both(group, one, other, diagnostics)
-    type(raw_group_t), intent(in) :: group
-    integer, intent(in) :: one, other   !! positions of two keys that are both given
-    type(diagnostics_t), intent(inout) :: diagnostics
-
-    if ((group%keys(one)%override > 0) .neqv. (group%keys(other)%override > 0)) return
-    call group%report([one, other], listed_keys(group%rule, [one, other], ' and ') // &
-                      ' are both given; allowed: one of them', diagnostics)
-  end subroutine refuse_both
 
   !> Excludes keys because another set is given.
   subroutine supersede(group, positions)

@@ -35,13 +35,8 @@ module nocdyn_raw_group
     type(raw_value_t), allocatable :: values(:)
   contains
     procedure :: name
-    procedure :: assign
-    procedure :: override_with
-    procedure :: fill_defaults
-    procedure :: count_given
-    procedure :: is_given
-    procedure :: has_value
-    procedure :: exclude
+    procedure :: assign, override_with, fill_defaults, exclude
+    procedure :: count_given, is_given, has_value
   end type raw_key_t
 
   !> All keys of one group. Positions count them in the order of the schema.
@@ -51,9 +46,7 @@ module nocdyn_raw_group
     integer :: line = 0
     type(raw_key_t), allocatable :: keys(:)
   contains
-    procedure :: position
-    procedure :: first_given
-    procedure :: report
+    procedure :: position, first_given, report
   end type raw_group_t
 
 contains
