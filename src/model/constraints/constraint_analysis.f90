@@ -38,7 +38,7 @@ contains
 
     call find_groups(constraints, groups, group_of)
     call find_trains(constraints, trains, is_kept)
-    offending_row = first_contradiction(constraints, trains, is_kept)
+    offending_row = trains%first_contradiction(constraints, is_kept)
     if (offending_row > 0) then
       call raise_loop_conflict(constraints, body_names, trains, offending_row, error)
       return
@@ -56,19 +56,6 @@ contains
     call explain_redundancies(constraints, trains, relations, is_kept, groups)
     call choose_coordinates(constraints, body_names, wanted, group_of, is_kept, trains, groups, error)
   end subroutine analyse_constraints
-
-  !> The first row of two bodies that closes a loop with another ratio than that of the rows before it, 0 if there is none.
-  integer function first_contradiction(constraints, trains, is_tree) result(row)
-    type(constraints_t), intent(in) :: constraints
-    type(rigid_trains_t), intent(in) :: trains
-    logical, intent(in) :: is_tree(:)   !! [rows]
-    integer, allocatable :: loops(:)
-    integer :: r
-
-    loops = pack([(r, r=1, constraints%rows())], [(constraints%entries(r) == 2 .and. .not. is_tree(r), r=1, constraints%rows())])
-    row = findloc(trains%is_inconsistent(constraints, loops), .true., dim=1)
-    if (row > 0) row = loops(row)
-  end function first_contradiction
 
   !> Lists the trains of each group.
   subroutine distribute_trains(group_of, groups)
@@ -91,12 +78,9 @@ contains
     type(leaf_elimination_t) :: leaves
     integer, allocatable :: order(:)
     integer :: first(groups + 1), g, i
-    logical :: all_relations(size(relations%row)), no_train(size(group_of))
 
-    all_relations = .true.
-    no_train = .false.
     is_kept(relations%row) = .true.
-    leaves = relations%eliminate_leaves(all_relations, no_train)
+    leaves = relations%eliminate_leaves(spread(.true., 1, size(relations%row)), spread(.false., 1, size(group_of)))
     if (size(leaves%core) == 0) return
     allocate (order(size(leaves%core)))
     call transposed_order([(group_of(relations%equations%body(relations%equations%first(leaves%core(i)))), &
@@ -253,10 +237,8 @@ contains
 
     relation = findloc(relations%row, row, dim=1)
     moment = 0.0_wp
-    associate (equations => relations%equations)
-      associate (first => equations%first(relation), last => equations%first(relation + 1) - 1)
-        moment(equations%body(first:last)) = equations%coefficient(1, first:last)
-      end associate
+    associate (first => relations%equations%first(relation), last => relations%equations%first(relation + 1) - 1)
+      moment(relations%equations%body(first:last)) = relations%equations%coefficient(1, first:last)
     end associate
     lambda = 0.0_wp
     call find_loads(relations, elimination, dual, 1, moment, lambda)

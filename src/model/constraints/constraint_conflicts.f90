@@ -189,12 +189,11 @@ contains
     integer, intent(in) :: chosen(:)
     type(elimination_t) :: elimination
     type(leaf_elimination_t) :: leaves
-    logical :: takes_part(size(relations%row)), no_train(relations%equations%bodies)
+    logical :: takes_part(size(relations%row))
 
     takes_part = .false.
     takes_part(chosen) = .true.
-    no_train = .false.
-    leaves = relations%eliminate_leaves(takes_part, no_train)
+    leaves = relations%eliminate_leaves(takes_part, spread(.false., 1, relations%equations%bodies))
     elimination = pivoted_elimination(relations, distinct_trains(relations%equations, chosen), leaves%relation, &
                                       leaves%train, leaves%core)
   end function partial_elimination

@@ -3,7 +3,7 @@ module nocdyn_constraints
   use nocdyn_kinds, only: wp
   use nocdyn_lane_parameters, only: lane_parameters_t
   use nocdyn_sparse_map, only: transposed_order
-  use nocdyn_text, only: string_t, strings
+  use nocdyn_text, only: selected, string_t, strings
   implicit none (type, external)
   private
 
@@ -30,6 +30,7 @@ module nocdyn_constraints
     procedure :: rows
     procedure :: entries
     procedure :: pair_coefficients
+    procedure :: subset
     procedure :: list_body_rows
     procedure :: block
     procedure :: residual
@@ -98,6 +99,23 @@ contains
       end if
     end associate
   end subroutine pair_coefficients
+
+  !> Some of the rows, without their torques on members.
+  function subset(self, rows) result(some)
+    class(constraints_t), intent(in) :: self
+    integer, intent(in) :: rows(:)
+    type(constraints_t) :: some
+    integer, allocatable :: entry(:)
+    integer :: first(size(rows) + 1), i, k
+
+    first(1) = 1
+    do i = 1, size(rows)
+      first(i + 1) = first(i) + self%entries(rows(i))
+    end do
+    entry = [([(k, k=self%first(rows(i)), self%first(rows(i) + 1) - 1)], i=1, size(rows))]
+    some = new_constraints(self%bodies, selected(self%names, rows), selected(self%units, rows), first, self%body(entry), &
+                           self%coefficient(:, entry))
+  end function subset
 
   !> Lists the chosen rows of each body, ascending: row(first(b)) to row(first(b + 1) - 1).
   subroutine list_body_rows(self, is_chosen, first, row)

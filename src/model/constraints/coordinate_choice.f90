@@ -27,11 +27,11 @@ contains
     integer, intent(in) :: group_of(:)     !! group of each body
     type(rigid_trains_t), intent(in) :: trains
     type(geared_group_t), intent(inout) :: groups(:)
-    logical :: is_free_root(size(group_of)), no_train(size(trains%root))
+    logical :: is_free_root(size(group_of))
     integer :: g
 
-    no_train = .false.
-    call distribute(relations, relations%eliminate_leaves(takes_part, no_train), group_of(trains%root), groups)
+    call distribute(relations, relations%eliminate_leaves(takes_part, spread(.false., 1, size(trains%root))), &
+                    group_of(trains%root), groups)
     is_free_root = .false.
     do g = 1, size(groups)
       associate (group => groups(g))

@@ -60,8 +60,8 @@ contains
     type(coordinates_t), intent(out) :: self
     type(error_t), allocatable, intent(out) :: error
     type(train_relations_t) :: relations
-    integer :: coordinate_of(size(inertia, 2))
-    integer :: offending_group, lane
+    integer :: coordinate_of(size(inertia, 2)), b, lane, offending_group
+    logical :: is_geared(size(inertia, 2))
 
     call number_coordinates(groups, wanted, self, coordinate_of)
     call lay_out_entries(groups, coordinate_of, size(inertia, 2), size(inertia, 1), self)
@@ -77,24 +77,11 @@ contains
       end if
     end do
     call self%reactions%find_null_vectors(constraints, groups)
-    self%geared = geared_bodies(groups, size(inertia, 2))
+    is_geared = .false.
+    is_geared(constraints%body) = .true.
+    self%geared = pack([(b, b=1, size(is_geared))], is_geared)
     allocate (self%imbalance(size(inertia, 2)), self%acceleration(self%freedoms))
   end subroutine build_coordinates
-
-  !> Bodies in groups with rows, ascending.
-  pure function geared_bodies(groups, bodies) result(geared)
-    type(geared_group_t), intent(in) :: groups(:)
-    integer, intent(in) :: bodies
-    integer, allocatable :: geared(:)
-    logical :: is_geared(bodies)
-    integer :: b, g
-
-    is_geared = .false.
-    do g = 1, size(groups)
-      if (size(groups(g)%rows) > 0) is_geared(groups(g)%bodies) = .true.
-    end do
-    geared = pack([(b, b=1, bodies)], is_geared)
-  end function geared_bodies
 
   !> Numbers the coordinates.
   subroutine number_coordinates(groups, wanted, self, coordinate_of)

@@ -39,11 +39,13 @@ contains
     integer, intent(in) :: rows, lanes
     type(load_sharing_t) :: self
     integer :: parent(rows), block_of(rows)   ! union-find over the rows
+    integer, allocatable :: redundant(:)
     integer :: g, i, j, k, r, root
 
     parent = [(r, r=1, rows)]
     block_of = 0
     k = 0
+    redundant = [(groups(g)%redundancies%row, g=1, size(groups))]
     do g = 1, size(groups)
       do i = 1, size(groups(g)%redundancies)
         associate (redundancy => groups(g)%redundancies(i))
@@ -53,13 +55,11 @@ contains
         end associate
       end do
     end do
-    do g = 1, size(groups)
-      do i = 1, size(groups(g)%redundancies)
-        call find_root(parent, groups(g)%redundancies(i)%row, root)
-        if (block_of(root) > 0) cycle
-        k = k + 1
-        block_of(root) = k
-      end do
+    do i = 1, size(redundant)
+      call find_root(parent, redundant(i), root)
+      if (block_of(root) > 0) cycle
+      k = k + 1
+      block_of(root) = k
     end do
     allocate (self%blocks(k))
     if (k == 0) return

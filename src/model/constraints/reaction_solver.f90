@@ -31,9 +31,6 @@ module nocdyn_reaction_solver
     integer, allocatable :: train(:)               !! train of each body
     real(wp), allocatable, public :: ratio(:, :)   !! of each body to the root of its train, [lanes, bodies]
     type(train_relations_t) :: relations
-    integer, allocatable :: first(:)                      !! first entry of each relation between bodies, [relations + 1]
-    integer, allocatable :: body(:)                       !! [entries]
-    real(wp), allocatable :: coefficient(:, :)            !! [lanes, entries]
     type(relation_group_t), allocatable :: groups(:)      !! groups with relations
     integer, allocatable :: group_index(:)                !! index of each group in `groups`, 0 without relations
     integer, allocatable :: child(:), parent(:), row(:)   !! bodies, parents, rows between them; outer ones first
@@ -59,25 +56,13 @@ contains
     type(train_relations_t), intent(in) :: relations
     type(geared_group_t), intent(in) :: groups(:)
     type(reaction_solver_t) :: self
-    integer :: entry, i, lanes, next
+    integer :: lanes
 
     lanes = size(constraints%coefficient, 1)
     allocate (self%train, source=trains%train)
     self%relations = relations
     allocate (self%ratio(lanes, constraints%bodies))
     allocate (self%of_trains(size(trains%root)), self%of_relations(size(relations%row)))
-    next = sum([(constraints%entries(relations%row(i)), i=1, size(relations%row))])
-    allocate (self%first(size(relations%row) + 1), self%body(next), self%coefficient(lanes, next))
-    next = 1
-    do i = 1, size(relations%row)
-      self%first(i) = next
-      do entry = constraints%first(relations%row(i)), constraints%first(relations%row(i) + 1) - 1
-        self%body(next) = constraints%body(entry)
-        self%coefficient(:, next) = constraints%coefficient(:, entry)
-        next = next + 1
-      end do
-    end do
-    self%first(size(self%first)) = next
     call list_groups(groups, lanes, self)
     call list_pairs(constraints, trains, self)
   end function new_reaction_solver
@@ -220,9 +205,11 @@ contains
     end do
     do i = 1, size(self%of_relations)
       lambda(self%relations%row(i)) = self%of_relations(i)
-      do entry = self%first(i), self%first(i + 1) - 1
-        moment(self%body(entry)) = moment(self%body(entry)) - self%coefficient(lane, entry) * self%of_relations(i)
-      end do
+      associate (rows => self%relations%rows)
+        do entry = rows%first(i), rows%first(i + 1) - 1
+          moment(rows%body(entry)) = moment(rows%body(entry)) - rows%coefficient(lane, entry) * self%of_relations(i)
+        end do
+      end associate
     end do
   end subroutine solve_relations
 
@@ -234,15 +221,13 @@ contains
 
     call parameters%add_structure(self%train)
     call parameters%add_structure(self%relations%row)
-    call parameters%add_structure(self%first)
-    call parameters%add_structure(self%body)
     call parameters%add_structure(self%group_index)
     call parameters%add_structure(self%child)
     call parameters%add_structure(self%parent)
     call parameters%add_structure(self%row)
+    call self%relations%rows%list_parameters(parameters)
     call self%relations%equations%list_parameters(parameters)
     call parameters%add('reactions: ratio', self%ratio)
-    call parameters%add('reactions: coefficient', self%coefficient)
     call parameters%add('reactions: own', self%own)
     call parameters%add('reactions: other', self%other)
     do g = 1, size(self%groups)

@@ -30,7 +30,7 @@ module nocdyn_rigid_trains
     procedure :: fastest_bodies
     procedure :: largest_exponents
     procedure :: ratios
-    procedure :: is_inconsistent
+    procedure :: first_contradiction
     procedure :: find_path
     procedure :: is_loaded
     procedure, private :: scaled_ratios
@@ -158,20 +158,13 @@ contains
       associate (best => fastest(self%train(b)))
         if (best == 0) then
           best = b
-        else if (quotient_of(fractions, exponents, b, best) > 1.0_wp + ratio_tolerance) then
+        else if (scale(abs(fractions(b) / fractions(best)), max(-max_exponent, min(max_exponent, exponents(b) - exponents(best)))) &
+                 > 1.0_wp + ratio_tolerance) then
           best = b
         end if
       end associate
     end do
   end function fastest_bodies
-
-  !> |omega(a)| / |omega(b)|, limited to the exponents -max_exponent to max_exponent.
-  pure real(wp) function quotient_of(fractions, exponents, a, b) result(quotient)
-    real(wp), intent(in) :: fractions(:)   !! by `scaled_ratios`, [bodies]
-    integer, intent(in) :: exponents(:), a, b
-
-    quotient = scale(abs(fractions(a) / fractions(b)), max(-max_exponent, min(max_exponent, exponents(a) - exponents(b))))
-  end function quotient_of
 
   !> The largest binary exponent of a ratio to the root in each train, and the body that has it, in the first lane.
   subroutine largest_exponents(self, constraints, largest, body)
@@ -193,18 +186,19 @@ contains
     end do
   end subroutine largest_exponents
 
-  !> Whether each of some rows between two bodies of one train contradicts the ratios of its tree, in the first lane, [rows].
-  function is_inconsistent(self, constraints, rows) result(answer)
+  !> The first row of two bodies that closes a loop with another ratio than that of the rows before it, in the first lane; 0 if
+  !> there is none.
+  integer function first_contradiction(self, constraints, is_tree) result(row)
     class(rigid_trains_t), intent(in) :: self
     type(constraints_t), intent(in) :: constraints
-    integer, intent(in) :: rows(:)
-    logical :: answer(size(rows))
+    logical, intent(in) :: is_tree(:)   !! [rows]
     real(wp) :: fractions(constraints%bodies), quotient
-    integer :: exponents(constraints%bodies), a, b, i, power
+    integer :: exponents(constraints%bodies), a, b, power
 
     call self%scaled_ratios(constraints, 1, fractions, exponents)
-    do i = 1, size(rows)
-      associate (first => constraints%first(rows(i)))
+    do row = 1, constraints%rows()
+      if (constraints%entries(row) /= 2 .or. is_tree(row)) cycle
+      associate (first => constraints%first(row))
         a = constraints%body(first)
         b = constraints%body(first + 1)
         quotient = -fraction(constraints%coefficient(1, first + 1)) * fractions(b) &
@@ -212,45 +206,38 @@ contains
         power = exponent(constraints%coefficient(1, first + 1)) + exponents(b) &
                 - exponent(constraints%coefficient(1, first)) - exponents(a)
       end associate
-      answer(i) = abs(scale(quotient, max(-3, min(3, power))) - 1.0_wp) > ratio_tolerance
+      if (abs(scale(quotient, max(-3, min(3, power))) - 1.0_wp) > ratio_tolerance) return
     end do
-  end function is_inconsistent
+    row = 0
+  end function first_contradiction
 
   !> The path through the tree from body a to body b of one train: rows(i) is between bodies(i) and bodies(i + 1).
   subroutine find_path(self, a, b, bodies, rows)
     class(rigid_trains_t), intent(in) :: self
     integer, intent(in) :: a, b
     integer, allocatable, intent(out) :: bodies(:), rows(:)
-    integer :: from_a, from_b, i, j, meeting
+    integer, dimension(size(self%parent)) :: path, path_rows   ! from a forwards, from b backwards
+    integer :: head, i, j, tail
 
-    from_a = 0
-    from_b = 0
     i = a
     j = b
+    head = 0
+    tail = size(path) + 1
     do while (i /= j)   ! a body has a later position than its parent
       if (self%position(i) > self%position(j)) then
+        head = head + 1
+        path(head) = i
+        path_rows(head) = self%parent_row(i)
         i = self%parent(i)
-        from_a = from_a + 1
       else
+        tail = tail - 1
+        path(tail) = j
+        path_rows(tail) = self%parent_row(j)
         j = self%parent(j)
-        from_b = from_b + 1
       end if
     end do
-    meeting = i
-    allocate (bodies(from_a + from_b + 1), rows(from_a + from_b))
-    i = a
-    do j = 1, from_a
-      bodies(j) = i
-      rows(j) = self%parent_row(i)
-      i = self%parent(i)
-    end do
-    bodies(from_a + 1) = meeting
-    i = b
-    do j = size(rows), from_a + 1, -1
-      bodies(j + 1) = i
-      rows(j) = self%parent_row(i)
-      i = self%parent(i)
-    end do
+    bodies = [path(:head), i, path(tail:)]
+    rows = [path_rows(:head), path_rows(tail:)]
   end subroutine find_path
 
   !> Which tree rows carry load when their reactions, and torques on the roots, balance moments on the bodies, [rows].

@@ -6,7 +6,6 @@ module nocdyn_train_relations
   use nocdyn_constraints, only: constraints_t, new_constraints
   use nocdyn_kinds, only: wp
   use nocdyn_rigid_trains, only: ratio_tolerance, rigid_trains_t
-  use nocdyn_text, only: selected
   implicit none (type, external)
   private
 
@@ -15,6 +14,7 @@ module nocdyn_train_relations
   !> The relations of a machine, in all lanes.
   type, public :: train_relations_t
     integer, allocatable :: row(:)     !! constraint row of each relation
+    type(constraints_t) :: rows        !! these rows
     type(constraints_t) :: equations   !! the relations; its bodies are the trains; coefficients are zero where terms cancel
   contains
     procedure :: eliminate_leaves
@@ -42,40 +42,36 @@ contains
     real(wp), allocatable :: coefficient(:, :)
 
     allocate (self%row, source=pack([(r, r=1, constraints%rows())], [(constraints%entries(r) /= 2, r=1, constraints%rows())]))
-    call gather_trains(constraints, trains, self%row, first, train, entry_of)
+    self%rows = constraints%subset(self%row)
+    call gather_trains(self%rows, trains, first, train, entry_of)
     allocate (coefficient(size(constraints%coefficient, 1), size(train)))
     do lane = 1, size(coefficient, 1)
-      coefficient(lane, :) = summed(constraints, self%row, entry_of, trains%ratios(constraints, lane), lane, size(train))
+      coefficient(lane, :) = summed(self%rows, entry_of, trains%ratios(constraints, lane), lane, size(train))
     end do
-    self%equations = new_constraints(size(trains%root), selected(constraints%names, self%row), &
-                                   selected(constraints%units, self%row), first, train, coefficient)
+    self%equations = new_constraints(size(trains%root), self%rows%names, self%rows%units, first, train, coefficient)
   end function new_relations
 
   !> Lists the trains of each relation once, and the relation entry of each row entry.
-  subroutine gather_trains(constraints, trains, rows, first, train, entry_of)
-    type(constraints_t), intent(in) :: constraints
+  subroutine gather_trains(rows, trains, first, train, entry_of)
+    type(constraints_t), intent(in) :: rows
     type(rigid_trains_t), intent(in) :: trains
-    integer, intent(in) :: rows(:)
     integer, allocatable, intent(out) :: first(:), train(:)
-    integer, allocatable, intent(out) :: entry_of(:)   !! of each entry of `rows`, in order
-    integer :: at(size(trains%root)), entry, i, k, next
+    integer, allocatable, intent(out) :: entry_of(:)   !! of each entry of `rows`
+    integer :: at(size(trains%root)), entry, i, next
 
-    k = sum([(constraints%entries(rows(i)), i=1, size(rows))])
-    allocate (first(size(rows) + 1), train(k), entry_of(k))
+    allocate (first(size(rows%first)), train(size(rows%body)), entry_of(size(rows%body)))
     at = 0
-    k = 0
     next = 1
-    do i = 1, size(rows)
+    do i = 1, rows%rows()
       first(i) = next
-      do entry = constraints%first(rows(i)), constraints%first(rows(i) + 1) - 1
-        associate (t => trains%train(constraints%body(entry)))
+      do entry = rows%first(i), rows%first(i + 1) - 1
+        associate (t => trains%train(rows%body(entry)))
           if (at(t) < first(i)) then
             at(t) = next
             train(next) = t
             next = next + 1
           end if
-          k = k + 1
-          entry_of(k) = at(t)
+          entry_of(entry) = at(t)
         end associate
       end do
     end do
@@ -84,23 +80,19 @@ contains
   end subroutine gather_trains
 
   !> Coefficients of the relations of one lane, [entries]; 0 where those of the bodies cancel.
-  function summed(constraints, rows, entry_of, ratio, lane, entries) result(coefficient)
-    type(constraints_t), intent(in) :: constraints
-    integer, intent(in) :: rows(:), entry_of(:), lane, entries
+  function summed(rows, entry_of, ratio, lane, entries) result(coefficient)
+    type(constraints_t), intent(in) :: rows
+    integer, intent(in) :: entry_of(:), lane, entries
     real(wp), intent(in) :: ratio(:)   !! of each body to the root of its train
     real(wp) :: coefficient(entries), bound(entries), term
-    integer :: entry, i, k
+    integer :: entry
 
     coefficient = 0.0_wp
     bound = 0.0_wp
-    k = 0
-    do i = 1, size(rows)
-      do entry = constraints%first(rows(i)), constraints%first(rows(i) + 1) - 1
-        k = k + 1
-        term = constraints%coefficient(lane, entry) * ratio(constraints%body(entry))
-        coefficient(entry_of(k)) = coefficient(entry_of(k)) + term
-        bound(entry_of(k)) = bound(entry_of(k)) + abs(term)
-      end do
+    do entry = 1, size(entry_of)
+      term = rows%coefficient(lane, entry) * ratio(rows%body(entry))
+      coefficient(entry_of(entry)) = coefficient(entry_of(entry)) + term
+      bound(entry_of(entry)) = bound(entry_of(entry)) + abs(term)
     end do
     where (abs(coefficient) <= ratio_tolerance * bound) coefficient = 0.0_wp
   end function summed
@@ -217,10 +209,8 @@ contains
     moment = 0.0_wp
     if (root > 0) moment(root) = -1.0_wp
     do i = 1, size(active)
-      r = self%row(active(i))
-      associate (first => constraints%first(r), last => constraints%first(r + 1) - 1)
-        moment(constraints%body(first:last)) = moment(constraints%body(first:last)) &
-                                               + lambda(active(i)) * constraints%coefficient(1, first:last)
+      associate (first => self%rows%first(active(i)), last => self%rows%first(active(i) + 1) - 1, body => self%rows%body)
+        moment(body(first:last)) = moment(body(first:last)) + lambda(active(i)) * self%rows%coefficient(1, first:last)
       end associate
     end do
     is_loaded = trains%is_loaded(constraints, moment)
