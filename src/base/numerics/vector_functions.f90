@@ -20,7 +20,7 @@ module nocdyn_vector_functions
   implicit none (type, external)
   private
 
-  public :: sine_of, sines, cosines, tanh_of, log2s, exp2s
+  public :: sine_of, cosine_of, sines, cosines, tanh_of, log2s, exp2s
 
   real(wp), parameter :: pi_high = 3.1415926535846666_wp         ! 35 bits
   real(wp), parameter :: pi_middle = 5.1266883031679116e-12_wp   ! the next 35 bits
@@ -37,7 +37,7 @@ module nocdyn_vector_functions
 contains
 
   !> sin(x), with the bits that `sines` gives.
-  pure real(wp) function sine_of(x)
+  elemental real(wp) function sine_of(x)
     real(wp), intent(in) :: x
 
     if (abs(x) <= largest) then
@@ -46,6 +46,17 @@ contains
       sine_of = sin(x)
     end if
   end function sine_of
+
+  !> cos(x), with the bits that `cosines` gives.
+  elemental real(wp) function cosine_of(x)
+    real(wp), intent(in) :: x
+
+    if (abs(x) <= largest) then
+      cosine_of = cosine(x)
+    else
+      cosine_of = cos(x)
+    end if
+  end function cosine_of
 
   !> Replaces each x by sin(x).
   pure subroutine sines(n, x)
@@ -60,11 +71,7 @@ contains
     else
       !GCC$ novector
       do i = 1, n
-        if (abs(x(i)) > largest) then
-          x(i) = sin(x(i))
-        else
-          x(i) = sine(x(i))
-        end if
+        x(i) = sine_of(x(i))
       end do
     end if
   end subroutine sines
@@ -82,11 +89,7 @@ contains
     else
       !GCC$ novector
       do i = 1, n
-        if (abs(x(i)) > largest) then
-          x(i) = cos(x(i))
-        else
-          x(i) = cosine(x(i))
-        end if
+        x(i) = cosine_of(x(i))
       end do
     end if
   end subroutine cosines
@@ -139,7 +142,7 @@ contains
   end function signed_sine
 
   !> tanh(x).
-  pure real(wp) function tanh_of(x)
+  elemental real(wp) function tanh_of(x)
     real(wp), intent(in) :: x
     real(wp), parameter :: b2 = 1.0_wp / 2.0_wp, b3 = b2 / 3.0_wp, b4 = b3 / 4.0_wp, b5 = b4 / 5.0_wp, b6 = b5 / 6.0_wp
     real(wp), parameter :: b7 = b6 / 7.0_wp, b8 = b7 / 8.0_wp, b9 = b8 / 9.0_wp, b10 = b9 / 10.0_wp, b11 = b10 / 11.0_wp

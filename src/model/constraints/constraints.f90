@@ -179,8 +179,7 @@ contains
     class(constraints_t), target, intent(inout) :: self
     type(lane_parameters_t), intent(inout) :: parameters
 
-    call parameters%add_structure(self%first)
-    call parameters%add_structure(self%body)
+    call parameters%add_structure(self%first, self%body)
     call parameters%add('constraints: coefficient', self%coefficient)
     call parameters%add('constraints: factor', self%members%factor)
   end subroutine list_parameters

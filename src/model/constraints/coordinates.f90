@@ -326,10 +326,7 @@ contains
     class(coordinates_t), target, intent(inout) :: self
     type(lane_parameters_t), intent(inout) :: parameters
 
-    call parameters%add_structure(self%body)
-    call parameters%add_structure(self%first)
-    call parameters%add_structure(self%coordinate)
-    call parameters%add_structure(self%geared)
+    call parameters%add_structure(self%body, self%first, self%coordinate, self%geared)
     call parameters%add('coordinates: ratio', self%ratio)
     call parameters%add('coordinates: response', self%response)
     call parameters%add('coordinates: inertia', self%inertia)

@@ -219,12 +219,8 @@ contains
     type(lane_parameters_t), intent(inout) :: parameters
     integer :: g
 
-    call parameters%add_structure(self%train)
-    call parameters%add_structure(self%relations%row)
-    call parameters%add_structure(self%group_index)
-    call parameters%add_structure(self%child)
-    call parameters%add_structure(self%parent)
-    call parameters%add_structure(self%row)
+    call parameters%add_structure(self%train, self%relations%row, self%group_index)
+    call parameters%add_structure(self%child, self%parent, self%row)
     call self%relations%rows%list_parameters(parameters)
     call self%relations%equations%list_parameters(parameters)
     call parameters%add('reactions: ratio', self%ratio)

@@ -117,11 +117,7 @@ contains
     class(elimination_t), intent(in) :: self
     type(lane_parameters_t), intent(inout) :: parameters
 
-    call parameters%add_structure(self%free)
-    call parameters%add_structure(self%relation)
-    call parameters%add_structure(self%train)
-    call parameters%add_structure(self%core)
-    call parameters%add_structure(self%core_trains)
+    call parameters%add_structure(self%free, self%relation, self%train, self%core, self%core_trains)
   end subroutine list_structure
 
 end module nocdyn_train_motion

@@ -117,19 +117,21 @@ contains
   end function time_reached
 
   !> Sets the connectivity. Every constructor calls it, after setting `states` where its elements have internal states.
-  subroutine connect(self, role, lanes, names, from, to)
+  subroutine connect(self, role, lanes, names, to, from)
     class(bank_t), intent(inout) :: self
-    integer, intent(in) :: role              !! role_...
+    integer, intent(in) :: role                 !! role_...
     integer, intent(in) :: lanes
-    type(string_t), intent(in) :: names(:)   !! [elements]
-    integer, intent(in) :: from(:), to(:)    !! bodies, 0 = ground, [elements]
+    type(string_t), intent(in) :: names(:)      !! [elements]
+    integer, intent(in) :: to(:)                !! bodies, 0 = ground, [elements]
+    integer, intent(in), optional :: from(:)    !! the same; absent: 0
     integer :: e
 
     self%role = role
     self%lanes = lanes
     self%values = lanes * size(to)
     self%names = names
-    self%from = from
+    self%from = 0 * to
+    if (present(from)) self%from = from
     self%to = to
     self%with_work = [(e, e=1, size(to))]
     self%elastic = [(e, e=1, merge(size(to), 0, role == role_coupling))]
@@ -141,13 +143,9 @@ contains
   subroutine add_switches(self, names)
     class(bank_t), intent(inout) :: self
     character(len=*), intent(in) :: names(:)   !! of the boundaries, [elements]
-    character(len=len(self%switch_names)), allocatable :: all_names(:)
     integer :: e
 
-    allocate (all_names(size(self%switch_names) + size(names)))
-    all_names(:size(self%switch_names)) = self%switch_names
-    all_names(size(self%switch_names) + 1:) = names
-    call move_alloc(all_names, self%switch_names)
+    self%switch_names = [character(len=len(self%switch_names)) :: self%switch_names, names]
     self%switch_element = [self%switch_element, (e, e=1, size(self%to))]
     deallocate (self%branch)
     allocate (self%branch(self%lanes, size(self%switch_element)), source=0)
@@ -161,10 +159,7 @@ contains
     call parameters%add_structure([self%role, self%first, self%states])
     call parameters%add_structure(self%is_polynomial)
     call parameters%add_structure(self%names)
-    call parameters%add_structure(self%from)
-    call parameters%add_structure(self%to)
-    call parameters%add_structure(self%with_work)
-    call parameters%add_structure(self%switch_element)
+    call parameters%add_structure(self%from, self%to, self%with_work, self%switch_element)
   end subroutine list_structure
 
   !> Lists the parameter arrays of its elements. An array that holds the values of a key unchanged has the name of the key.

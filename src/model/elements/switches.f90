@@ -11,8 +11,8 @@ module nocdyn_switches
   type, public :: switches_t
     integer :: count = 0
     integer, allocatable :: element(:)       !! element of each switch, numbered in the machine, [switches]
-    integer, allocatable :: first_internal(:)   !! first internal state of that element, numbered in the machine, [switches]
-    integer, allocatable :: last_internal(:)    !! last internal state of that element, [switches]
+    integer, allocatable, private :: first_internal(:)   !! first internal state of that element, numbered in the machine, [switches]
+    integer, allocatable, private :: last_internal(:)    !! last internal state of that element, [switches]
     integer, allocatable, private :: bank(:)     !! [switches]
     integer, allocatable, private :: number(:)   !! of the switch in its bank, [switches]
   contains
@@ -53,9 +53,10 @@ contains
     type(bank_slot_t), intent(inout) :: banks(:)
     integer, intent(in) :: switch, lane   !! switch numbered in the machine
     real(wp), intent(in) :: t, angle, speed   !! [s]; of the element of the switch [rad], [rad/s]
-    real(wp), intent(in) :: internal(:)          !! its internal states
+    real(wp), intent(in) :: internal(:)       !! the internal states of all elements
 
-    call banks(self%bank(switch))%bank%choose(self%number(switch), lane, t, angle, speed, internal)
+    call banks(self%bank(switch))%bank%choose(self%number(switch), lane, t, angle, speed, &
+                                              internal(self%first_internal(switch):self%last_internal(switch)))
   end subroutine choose
 
   !> Distance of a lane from the nearest boundary of the present branch of a switch, negative beyond it.
@@ -64,10 +65,11 @@ contains
     type(bank_slot_t), intent(in) :: banks(:)
     integer, intent(in) :: switch, lane   !! switch numbered in the machine
     real(wp), intent(in) :: t, angle, speed   !! [s]; of the element of the switch [rad], [rad/s]
-    real(wp), intent(in) :: internal(:)          !! its internal states
+    real(wp), intent(in) :: internal(:)       !! the internal states of all elements
     real(wp) :: indicator
 
-    indicator = banks(self%bank(switch))%bank%indicator(self%number(switch), lane, t, angle, speed, internal)
+    indicator = banks(self%bank(switch))%bank%indicator(self%number(switch), lane, t, angle, speed, &
+                                                        internal(self%first_internal(switch):self%last_internal(switch)))
   end function indicator
 
   !> E.g. "edge of the gap of coupling 'mesh'".

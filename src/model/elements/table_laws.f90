@@ -44,9 +44,8 @@ contains
     integer, intent(in) :: argument            !! over_speed or over_time
     type(curve_t), intent(in) :: curve(:, :)   !! [N m] over [rad/s] or [s], shape [lanes, elements]
     type(table_laws_t) :: bank
-    integer :: e
 
-    call bank%connect(role, size(curve, 1), names, [(0, e=1, size(body))], body)
+    call bank%connect(role, size(curve, 1), names, body)
     call bank%set_curves(argument, curve)
   end function new_table_laws
 

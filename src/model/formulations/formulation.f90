@@ -163,8 +163,7 @@ contains
       do switch = 1, self%switches
         call self%switch_motion(lane, switch, y, angle, speed)
         g(switch) = switches%indicator(self%machine%banks, switch, lane, t, angle, speed, &
-                                       y(self%mechanical + switches%first_internal(switch): &
-                                         self%mechanical + switches%last_internal(switch)))
+                                       y(self%mechanical + 1:self%states))
       end do
     end associate
   end subroutine indicator_values
@@ -182,7 +181,7 @@ contains
     associate (switches => self%machine%switches)
       call self%switch_motion(lane, which, y, angle, speed)
       call switches%choose(self%machine%banks, which, lane, t, angle, speed, &
-                           y(self%mechanical + switches%first_internal(which):self%mechanical + switches%last_internal(which)))
+                           y(self%mechanical + 1:self%states))
     end associate
   end subroutine change_branch
 

@@ -104,8 +104,7 @@ contains
     class(internal_jacobian_t), target, intent(inout) :: self
     type(lane_parameters_t), intent(inout) :: parameters
 
-    call parameters%add_structure(self%pattern%row)
-    call parameters%add_structure(self%pattern%column)
+    call parameters%add_structure(self%pattern%row, self%pattern%column)
     call self%incidence%list_parameters(parameters)
   end subroutine list_parameters
 

@@ -43,48 +43,41 @@ contains
     integer, intent(in) :: with_work(:)   !! elements with work integrals
     integer, intent(in) :: internal   !! number of internal states, which stand between the coordinates and the work integrals
     type(reduced_jacobian_t) :: self
-    integer, allocatable :: row(:), column(:)
-    integer :: c, e, products
+    type(element_coordinates_t) :: works   ! entries of the elements with work integrals
+    integer, allocatable :: row(:), column(:), work(:)   ! `work` is the number of the work integral of each of their entries
+    integer :: element_of(size(incidence%coordinate)), c, products
 
     self%freedoms = freedoms
-    products = product_count(incidence)
+    element_of = incidence%entry_elements()
+    products = sum(incidence%first(element_of + 1) - incidence%first(element_of), mask=any(abs(incidence%ratio) > 0.0_wp, dim=1))
     allocate (self%element(products), self%position(products), self%response_entry(products), self%ratio_entry(products))
     allocate (row(products), column(products))
     allocate (self%product(size(incidence%ratio, 1), size(self%element)))
-    call form_products(freedoms, incidence, row, column, self)
+    call form_products(freedoms, incidence, element_of, row, column, self)
     row = row(:self%pairs)
     column = column(:self%pairs)
-    self%pattern%row = [row, row, [(freedoms + c, c=1, freedoms)]]
-    self%pattern%column = [column, freedoms + column, [(c, c=1, freedoms)]]
-    call append_works(freedoms, incidence, with_work, 2 * freedoms + internal, self)
-    self%work_element = [(spread(with_work(e), 1, incidence%first(with_work(e) + 1) - incidence%first(with_work(e))), &
-                          e=1, size(with_work))]
+    works = incidence%selected(with_work, with_ratio_only=.false.)
+    self%ratio = works%ratio
+    allocate (work(size(works%coordinate)))
+    work(:) = works%entry_elements()
+    self%work_element = with_work(work)
+    self%pattern%row = [row, row, (freedoms + c, c=1, freedoms), &
+                        (spread(2 * freedoms + internal + work(c), 1, 2), c=1, size(work))]
+    self%pattern%column = [column, freedoms + column, (c, c=1, freedoms), &
+                           (works%coordinate(c), freedoms + works%coordinate(c), c=1, size(work))]
   end function new_reduced_jacobian
 
-  !> Number of pairs of entries of one element of which the second has a ratio.
-  pure integer function product_count(incidence) result(products)
-    type(element_coordinates_t), intent(in) :: incidence
-    integer :: b, e
-
-    products = 0
-    do e = 1, size(incidence%first) - 1
-      do b = incidence%first(e), incidence%first(e + 1) - 1
-        if (incidence%has_ratio(b)) products = products + incidence%first(e + 1) - incidence%first(e)
-      end do
-    end do
-  end function product_count
-
   !> Forms the products of these pairs, column by column, and their distinct positions.
-  subroutine form_products(freedoms, incidence, row, column, self)
+  subroutine form_products(freedoms, incidence, element_of, row, column, self)
     integer, intent(in) :: freedoms
     type(element_coordinates_t), intent(in) :: incidence
+    integer, intent(in) :: element_of(:)          !! element of each entry
     integer, intent(inout) :: row(:), column(:)   !! of each position
     type(reduced_jacobian_t), intent(inout) :: self
-    integer :: element_of(size(incidence%coordinate)), order(size(incidence%coordinate)), first(freedoms + 1)
+    integer :: order(size(incidence%coordinate)), first(freedoms + 1)
     integer :: position(freedoms)   ! position of each row in the present column, if not below `begin`
     integer :: a, b, begin, e, i, n, q
 
-    element_of = incidence%entry_elements()
     call transposed_order(incidence%coordinate, freedoms, order, first)
     position = 0
     n = 0
@@ -113,33 +106,6 @@ contains
       end do
     end do
   end subroutine form_products
-
-  !> Appends the positions of the work integrals: two for each entry of an element.
-  subroutine append_works(freedoms, incidence, with_work, states, self)
-    integer, intent(in) :: freedoms
-    type(element_coordinates_t), intent(in) :: incidence
-    integer, intent(in) :: with_work(:)   !! elements with work integrals
-    integer, intent(in) :: states         !! number of states
-    type(reduced_jacobian_t), intent(inout) :: self
-    integer, allocatable :: row(:), column(:), entry(:)
-    integer :: i, k, n
-
-    n = sum(incidence%first(with_work + 1) - incidence%first(with_work))
-    allocate (row(2 * n), column(2 * n), entry(n))
-    n = 0
-    do k = 1, size(with_work)
-      do i = incidence%first(with_work(k)), incidence%first(with_work(k) + 1) - 1
-        n = n + 1
-        entry(n) = i
-        row(2 * n - 1:2 * n) = states + k
-        column(2 * n - 1) = incidence%coordinate(i)
-        column(2 * n) = freedoms + incidence%coordinate(i)
-      end do
-    end do
-    self%ratio = incidence%ratio(:, entry)
-    self%pattern%row = [self%pattern%row, row]
-    self%pattern%column = [self%pattern%column, column]
-  end subroutine append_works
 
   !> Computes the values at the positions of `pattern`, from the elements after `differentiate`.
   subroutine fill(self, elements, dfdy)
@@ -186,11 +152,7 @@ contains
     class(reduced_jacobian_t), target, intent(inout) :: self
     type(lane_parameters_t), intent(inout) :: parameters
 
-    call parameters%add_structure(self%element)
-    call parameters%add_structure(self%position)
-    call parameters%add_structure(self%work_element)
-    call parameters%add_structure(self%pattern%row)
-    call parameters%add_structure(self%pattern%column)
+    call parameters%add_structure(self%element, self%position, self%work_element, self%pattern%row, self%pattern%column)
     call parameters%add('jacobian: product', self%product)
     call parameters%add('jacobian: ratio', self%ratio)
   end subroutine list_parameters

@@ -46,7 +46,7 @@ module nocdyn_lane_parameters
     procedure :: add_key
     procedure :: add_blocks
     procedure :: add_curves
-    generic :: add_structure => add_integer, add_integers, add_flag, add_names
+    generic :: add_structure => add_integers, add_flag, add_names
     procedure :: has_same_structure
     procedure :: copy_lane
     procedure :: differences
@@ -55,7 +55,7 @@ module nocdyn_lane_parameters
     procedure :: value
     procedure :: set_value
     procedure, private :: add_matrix, add_stack
-    procedure, private :: add_integer, add_integers, add_flag, add_names
+    procedure, private :: add_integers, add_flag, add_names
     procedure, private :: next_array
   end type lane_parameters_t
 
@@ -152,17 +152,11 @@ contains
     call self%add_structure([(curve(1, e)%points(), e=1, size(curve, 2))])
   end subroutine add_curves
 
-  subroutine add_integer(self, part)
-    class(lane_parameters_t), intent(inout) :: self
-    integer, intent(in) :: part
-
-    call self%add_structure([part])
-  end subroutine add_integer
-
-  !> Adds integers that describe the structure, preceded by their number.
-  subroutine add_integers(self, parts)
+  !> Adds lists of integers that describe the structure, each preceded by its length.
+  recursive subroutine add_integers(self, parts, second, third, fourth, fifth)
     class(lane_parameters_t), intent(inout) :: self
     integer, intent(in) :: parts(:)
+    integer, intent(in), optional :: second(:), third(:), fourth(:), fifth(:)
     integer, allocatable :: longer(:)
 
     associate (used => self%structure_size, added => size(parts) + 1)
@@ -175,6 +169,7 @@ contains
       self%structure(used + 2:used + added) = parts
       used = used + added
     end associate
+    if (present(second)) call self%add_structure(second, third, fourth, fifth)
   end subroutine add_integers
 
   subroutine add_flag(self, flag)
@@ -203,9 +198,7 @@ contains
     has_same_structure = .false.
     if (self%arrays /= other%arrays .or. self%curve_arrays /= other%curve_arrays) return
     if (self%structure_size /= other%structure_size) return
-    do i = 1, self%structure_size
-      if (self%structure(i) /= other%structure(i)) return
-    end do
+    if (any(self%structure(:self%structure_size) /= other%structure(:self%structure_size))) return
     do i = 1, self%arrays
       associate (here => self%array(i), there => other%array(i))
         if (size(here%value, 1) /= size(there%value, 1) .or. size(here%value, 3) /= size(there%value, 3)) return

@@ -294,8 +294,7 @@ contains
     type(lane_parameters_t), intent(inout) :: parameters
 
     if (self%bands > 0) error stop 'nocdyn_sparse_map: parameters in bands cannot be listed'
-    call parameters%add_structure(self%first(:self%csr_rows + 1))
-    call parameters%add_structure(self%column)
+    call parameters%add_structure(self%first(:self%csr_rows + 1), self%column)
     call parameters%add('map: coefficient', self%coefficient)
   end subroutine list_parameters
 

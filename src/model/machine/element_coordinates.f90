@@ -203,8 +203,7 @@ contains
     class(element_coordinates_t), target, intent(inout) :: self
     type(lane_parameters_t), intent(inout) :: parameters
 
-    call parameters%add_structure(self%first)
-    call parameters%add_structure(self%coordinate)
+    call parameters%add_structure(self%first, self%coordinate)
     call parameters%add('elements: ratio', self%ratio)
     call parameters%add('elements: response', self%response)
   end subroutine list_parameters

@@ -102,7 +102,7 @@ contains
     type(lane_parameters_t), intent(inout) :: parameters
     integer :: i
 
-    call parameters%add_structure(self%bodies)
+    call parameters%add_structure([self%bodies])
     call parameters%add('machine: inertia', self%inertia)
     call parameters%add('machine: start_angle', self%start_angle)
     call parameters%add('machine: start_speed', self%start_speed)
@@ -199,8 +199,7 @@ contains
         associate (from => self%elements%from(switches%element(k)), to => self%elements%to(switches%element(k)))
           do lane = 1, self%lanes
             call switches%choose(self%banks, k, lane, t(lane), phi(lane, to) - phi(lane, from), &
-                                 omega(lane, to) - omega(lane, from), &
-                                 internal(lane, switches%first_internal(k):switches%last_internal(k)))
+                                 omega(lane, to) - omega(lane, from), internal(lane, :))
           end do
         end associate
       end do

@@ -81,7 +81,7 @@ contains
     integer :: e
     logical :: is_dissipative(size(common%to))
 
-    call bank%connect(role_coupling, size(common%damping, 1), common%names, common%from, common%to)
+    call bank%connect(role_coupling, size(common%damping, 1), common%names, common%to, common%from)
     bank%stiffness = stiffness
     bank%cubic_stiffness = cubic_stiffness
     bank%damping = common%damping
@@ -146,18 +146,12 @@ contains
   subroutine differentiate(self, elements)
     class(couplings_t), intent(in) :: self
     type(elements_t), intent(inout) :: elements
-    integer :: e, l
 
     call self%table_laws_t%differentiate(elements)
     if (.not. allocated(self%friction)) return
-    do e = 1, size(self%to)
-      do l = 1, self%lanes
-        associate (slope => elements%applied_speed(l, self%first + e - 1), scale => self%friction_speed(l, e), &
-                   speed => elements%speed(l, self%first + e - 1))
-          slope = slope - self%friction(l, e) / scale * (1.0_wp - tanh_of(speed / scale)**2)
-        end associate
-      end do
-    end do
+    associate (slope => elements%applied_speed(:, self%first:self%last()), speed => elements%speed(:, self%first:self%last()))
+      slope = slope - self%friction / self%friction_speed * (1.0_wp - tanh_of(speed / self%friction_speed)**2)
+    end associate
   end subroutine differentiate
 
   function quantities(self) result(columns)

@@ -5,7 +5,7 @@ module nocdyn_excitations
   use nocdyn_kinds, only: wp
   use nocdyn_lane_parameters, only: lane_parameters_t
   use nocdyn_text, only: string_t
-  use nocdyn_vector_functions, only: cosines, sine_of, sines
+  use nocdyn_vector_functions, only: cosine_of, cosines, sine_of, sines
   implicit none (type, external)
   private
 
@@ -34,11 +34,10 @@ contains
     integer, intent(in) :: body(:)
     real(wp), intent(in) :: amplitude(:, :), frequency(:, :), phase(:, :)   !! [N m], [rad/s], [rad], shape [lanes, excitations]
     type(excitations_t) :: bank
-    integer :: e
 
     bank%is_polynomial = .false.
     bank%is_time_only = .true.
-    call bank%connect(role_excitation, size(amplitude, 1), names, [(0, e=1, size(body))], body)
+    call bank%connect(role_excitation, size(amplitude, 1), names, body)
     bank%amplitude = amplitude
     bank%frequency = frequency
     bank%phase = phase
@@ -132,16 +131,12 @@ contains
   subroutine differentiate(self, elements)
     class(excitations_t), intent(in) :: self
     type(elements_t), intent(inout) :: elements
-    real(wp) :: wave(1)
-    integer :: e, l
+    integer :: e
 
     associate (slope => elements%applied_time(:, self%first:self%last()))
       do e = 1, size(self%to)
-        do l = 1, self%lanes
-          wave(1) = self%frequency(l, e) * elements%time(l) + self%phase(l, e)
-          call cosines(1, wave)
-          slope(l, e) = slope(l, e) + self%amplitude(l, e) * self%frequency(l, e) * wave(1)
-        end do
+        slope(:, e) = slope(:, e) + self%amplitude(:, e) * self%frequency(:, e) &
+                                    * cosine_of(self%frequency(:, e) * elements%time + self%phase(:, e))
       end do
     end associate
   end subroutine differentiate

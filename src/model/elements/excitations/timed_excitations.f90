@@ -5,7 +5,7 @@ module nocdyn_timed_excitations
   use nocdyn_kinds, only: wp
   use nocdyn_lane_parameters, only: lane_parameters_t
   use nocdyn_text, only: string_t
-  use nocdyn_vector_functions, only: cosines, sine_of
+  use nocdyn_vector_functions, only: cosine_of, sine_of
   implicit none (type, external)
   private
 
@@ -43,11 +43,10 @@ contains
     integer, intent(in) :: shape(:)   !! shape_... of each
     real(wp), intent(in) :: amplitude(:, :), begin(:, :), duration(:, :)   !! [N m], [s], [s], shape [lanes, excitations]
     type(timed_excitations_t) :: bank
-    integer :: e
 
     bank%is_polynomial = .false.
     bank%has_paper_law = .false.
-    call bank%connect(role_excitation, size(amplitude, 1), names, [(0, e=1, size(body))], body)
+    call bank%connect(role_excitation, size(amplitude, 1), names, body)
     allocate (bank%shape, source=shape)
     allocate (bank%amplitude, source=amplitude)
     allocate (bank%begin, source=begin)
@@ -91,20 +90,18 @@ contains
   subroutine differentiate(self, elements)
     class(timed_excitations_t), intent(in) :: self
     type(elements_t), intent(inout) :: elements
-    real(wp) :: wave(1)
+    real(wp) :: slope
     integer :: e, l
 
     do e = 1, size(self%to)
       do l = 1, self%lanes
         if (self%branch(l, e) /= during) cycle
-        wave(1) = 1.0_wp
+        slope = 1.0_wp
         if (self%shape(e) == shape_pulse) then
-          wave(1) = pi * (elements%time(l) - self%begin(l, e)) / self%duration(l, e)
-          call cosines(1, wave)
-          wave(1) = pi * wave(1)
+          slope = pi * cosine_of(pi * (elements%time(l) - self%begin(l, e)) / self%duration(l, e))
         end if
-        associate (slope => elements%applied_time(l, self%first + e - 1))
-          slope = slope + self%amplitude(l, e) * wave(1) / self%duration(l, e)
+        associate (by_time => elements%applied_time(l, self%first + e - 1))
+          by_time = by_time + self%amplitude(l, e) * slope / self%duration(l, e)
         end associate
       end do
     end do

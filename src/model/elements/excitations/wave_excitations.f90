@@ -8,7 +8,7 @@ module nocdyn_wave_excitations
   use nocdyn_kinds, only: wp
   use nocdyn_lane_parameters, only: lane_parameters_t
   use nocdyn_text, only: string_t
-  use nocdyn_vector_functions, only: cosines, sine_of
+  use nocdyn_vector_functions, only: cosine_of, sine_of
   implicit none (type, external)
   private
 
@@ -37,11 +37,10 @@ contains
     real(wp), intent(in) :: amplitude(:, :), frequency(:, :)   !! [N m], [rad/s], shape [lanes, terms]
     real(wp), intent(in) :: order(:, :), phase(:, :)           !! [1], [rad], shape [lanes, terms]
     type(wave_excitations_t) :: bank
-    integer :: e
 
     bank%is_polynomial = .false.
     bank%has_paper_law = .false.
-    call bank%connect(role_excitation, size(amplitude, 1), names, [(0, e=1, size(body))], body)
+    call bank%connect(role_excitation, size(amplitude, 1), names, body)
     allocate (bank%owner, source=owner)
     allocate (bank%amplitude, source=amplitude)
     allocate (bank%frequency, source=frequency)
@@ -67,17 +66,16 @@ contains
   subroutine differentiate(self, elements)
     class(wave_excitations_t), intent(in) :: self
     type(elements_t), intent(inout) :: elements
-    real(wp) :: wave(1)
+    real(wp) :: wave
     integer :: i, k, l
 
     do k = 1, size(self%owner)
       i = self%first + self%owner(k) - 1
       do l = 1, self%lanes
-        wave(1) = self%frequency(l, k) * elements%time(l) + self%order(l, k) * elements%angle(l, i) + self%phase(l, k)
-        call cosines(1, wave)
-        wave(1) = self%amplitude(l, k) * wave(1)
-        elements%applied_angle(l, i) = elements%applied_angle(l, i) + self%order(l, k) * wave(1)
-        elements%applied_time(l, i) = elements%applied_time(l, i) + self%frequency(l, k) * wave(1)
+        wave = self%amplitude(l, k) * cosine_of(self%frequency(l, k) * elements%time(l) &
+                                                + self%order(l, k) * elements%angle(l, i) + self%phase(l, k))
+        elements%applied_angle(l, i) = elements%applied_angle(l, i) + self%order(l, k) * wave
+        elements%applied_time(l, i) = elements%applied_time(l, i) + self%frequency(l, k) * wave
       end do
     end do
   end subroutine differentiate

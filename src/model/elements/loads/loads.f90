@@ -40,9 +40,8 @@ contains
     integer, intent(in) :: body(:)
     real(wp), intent(in) :: viscous(:, :)   !! c [N m s/rad], shape [lanes, loads]
     type(loads_t) :: bank
-    integer :: e
 
-    call bank%connect(role_load, size(viscous, 1), names, [(0, e=1, size(body))], body)
+    call bank%connect(role_load, size(viscous, 1), names, body)
     bank%viscous = viscous
   end function new_loads
 
@@ -104,17 +103,11 @@ contains
   subroutine differentiate(self, elements)
     class(nonlinear_loads_t), intent(in) :: self
     type(elements_t), intent(inout) :: elements
-    integer :: e, l
 
-    do e = 1, size(self%to)
-      do l = 1, self%lanes
-        associate (slope => elements%applied_speed(l, self%first + e - 1), speed => elements%speed(l, self%first + e - 1), &
-                   constant_speed => self%constant_speed(l, e))
-          slope = slope - (2.0_wp * self%quadratic(l, e) * abs(speed) &
-                           + self%constant(l, e) / constant_speed * (1.0_wp - tanh_of(speed / constant_speed)**2))
-        end associate
-      end do
-    end do
+    associate (slope => elements%applied_speed(:, self%first:self%last()), speed => elements%speed(:, self%first:self%last()))
+      slope = slope - (2.0_wp * self%quadratic * abs(speed) &
+                       + self%constant / self%constant_speed * (1.0_wp - tanh_of(speed / self%constant_speed)**2))
+    end associate
     call self%loads_t%differentiate(elements)
   end subroutine differentiate
 

@@ -34,13 +34,12 @@ contains
     real(wp), intent(in) :: flux_constant(:, :), inductance(:, :)   !! [V s/rad], [H], shape [lanes, motors]
     type(governor_t), intent(in), optional :: governor   !! no motor has one if absent
     type(dc_motors_t) :: bank
-    integer :: e
 
     bank%is_polynomial = .false.
     bank%has_paper_law = .false.
     bank%states = 1
     allocate (bank%internal_names, source=[character(len=24) :: 'armature current', 'governor integral'])
-    call bank%connect(role_motor, size(voltage, 1), names, [(0, e=1, size(body))], body)
+    call bank%connect(role_motor, size(voltage, 1), names, body)
     allocate (bank%voltage, source=voltage)
     allocate (bank%resistance, source=resistance)
     allocate (bank%flux_constant, source=flux_constant)

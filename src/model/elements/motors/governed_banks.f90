@@ -65,7 +65,10 @@ contains
     if (.not. allocated(self%governor)) return
     do e = 1, size(self%to)
       do l = 1, self%lanes
-        internal(self%lanes * (self%states * e - 1) + l) = self%governor%start_integral(l, e, speed(self%lanes * (e - 1) + l))
+        associate (governor => self%governor)
+          internal(self%lanes * (self%states * e - 1) + l) = &
+            governor%start(l, e) - governor%gain(l, e) * (governor%set_speed(l, e) - speed(self%lanes * (e - 1) + l))
+        end associate
       end do
     end do
   end subroutine start_internal

@@ -18,7 +18,6 @@ module nocdyn_governors
     real(wp), allocatable :: start(:, :)       !! throttle y at the start, 0 to 1
   contains
     procedure :: list_parameters
-    procedure :: start_integral
     procedure :: throttle
     procedure :: rate
     procedure :: slopes
@@ -29,16 +28,6 @@ module nocdyn_governors
   integer, parameter :: closed = -1, governing = 0, open = 1   ! the branches
 
 contains
-
-  !> The integral z with which the throttle has its value at the start.
-  pure function start_integral(self, lane, motor, speed) result(z)
-    class(governor_t), intent(in) :: self
-    integer, intent(in) :: lane, motor
-    real(wp), intent(in) :: speed   !! [rad/s]
-    real(wp) :: z
-
-    z = self%start(lane, motor) - self%gain(lane, motor) * (self%set_speed(lane, motor) - speed)
-  end function start_integral
 
   !> Throttle y on a branch.
   pure function throttle(self, lane, motor, branch, z, speed) result(y)

@@ -59,12 +59,11 @@ contains
     type(governor_t), intent(in), optional :: governor    !! of all motors; no motor has one if absent
     real(wp), intent(in), optional :: drag(:, :)          !! [N m s/rad], shape [lanes, motors]; present with `governor`
     type(motors_t) :: bank
-    integer :: e
 
     if (present(law) .eqv. present(curve)) error stop 'nocdyn_motors: motors have either a law or tables'
     bank%is_polynomial = .false.
     bank%has_paper_law = .false.
-    call bank%connect(role_motor, lanes, names, [(0, e=1, size(body))], body)
+    call bank%connect(role_motor, lanes, names, body)
     if (present(law)) allocate (bank%law, source=law)
     if (present(curve)) call bank%set_curves(over_speed, curve)
     if (.not. present(governor)) return
