@@ -135,7 +135,7 @@ contains
     type(rigid_trains_t), intent(in) :: trains
     type(geared_group_t), intent(inout) :: groups(:)
     type(error_t), allocatable, intent(out) :: error
-    integer :: first(size(groups) + 1), order(size(wanted)), freedoms, g, k
+    integer :: first(size(groups) + 1), order(size(wanted)), freedoms, g
     logical :: is_taken(size(trains%root))
 
     is_taken = .false.
@@ -148,15 +148,11 @@ contains
                                              selected(body_names, groups(g)%independent), freedoms))
         return
       end if
-      do k = 1, freedoms
-        associate (train => trains%train(groups(g)%independent(k)))
-          if (is_taken(train)) then
-            call raise_related(body_names, groups(g)%independent, error)
-            return
-          end if
-          is_taken(train) = .true.
-        end associate
-      end do
+      is_taken(trains%train(groups(g)%independent)) = .true.
+      if (count(is_taken(groups(g)%trains)) < freedoms) then
+        call raise_related(body_names, groups(g)%independent, error)
+        return
+      end if
     end do
   end subroutine set_wanted
 

@@ -159,7 +159,9 @@ contains
         offending_group = g
         return
       end if
-      call self%reactions%set_core(g, lane, found%dual)
+      associate (index => self%reactions%group_index(g))
+        if (index > 0) self%reactions%groups(index)%dual(:, :, lane) = found%dual
+      end associate
     end do
   end subroutine fill_lane
 

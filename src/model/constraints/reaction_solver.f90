@@ -31,15 +31,14 @@ module nocdyn_reaction_solver
     integer, allocatable :: train(:)               !! train of each body
     real(wp), allocatable, public :: ratio(:, :)   !! of each body to the root of its train, [lanes, bodies]
     type(train_relations_t) :: relations
-    type(relation_group_t), allocatable :: groups(:)      !! groups with relations
-    integer, allocatable :: group_index(:)                !! index of each group in `groups`, 0 without relations
+    type(relation_group_t), allocatable, public :: groups(:)   !! groups with relations
+    integer, allocatable, public :: group_index(:)             !! index of each group in `groups`, 0 without relations
     integer, allocatable :: child(:), parent(:), row(:)   !! bodies, parents, rows between them; outer ones first
     real(wp), allocatable :: own(:, :), other(:, :)       !! coefficients of child and parent, [lanes, pairs]
     type(load_sharing_t), public :: load_sharing          !! distributes reactions of the kept rows over all rows
     real(wp), allocatable :: of_trains(:)      !! moments on trains, [trains], work space
     real(wp), allocatable :: of_relations(:)   !! multipliers, [relations], work space
   contains
-    procedure :: set_core
     procedure :: find_null_vectors
     procedure :: find_reactions
     procedure :: list_parameters
@@ -49,7 +48,7 @@ module nocdyn_reaction_solver
 
 contains
 
-  !> The order of the solution. The values of each lane are set by `set_core` and in `ratio`.
+  !> The order of the solution. The values of each lane are set in `ratio` and in `dual` of the groups.
   function new_reaction_solver(constraints, trains, relations, groups) result(self)
     type(constraints_t), intent(in) :: constraints
     type(rigid_trains_t), intent(in) :: trains
@@ -115,15 +114,6 @@ contains
       end do
     end do
   end subroutine list_pairs
-
-  !> Sets the inverse of the core of a group.
-  pure subroutine set_core(self, group, lane, dual)
-    class(reaction_solver_t), intent(inout) :: self
-    integer, intent(in) :: group, lane   !! `group` is its number in the machine
-    real(wp), intent(in) :: dual(:, :)   !! D of the core, [core_trains, core]
-
-    if (self%group_index(group) > 0) self%groups(self%group_index(group))%dual(:, :, lane) = dual
-  end subroutine set_core
 
   !> Finds the null vectors of the redundant rows, after the values of all lanes have been set: a reaction 1 of such a row and the
   !> negative reactions that the rows which it repeats have instead.

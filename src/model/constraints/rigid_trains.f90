@@ -158,8 +158,8 @@ contains
       associate (best => fastest(self%train(b)))
         if (best == 0) then
           best = b
-        else if (scale(abs(fractions(b) / fractions(best)), max(-max_exponent, min(max_exponent, exponents(b) - exponents(best)))) &
-                 > 1.0_wp + ratio_tolerance) then
+        else if (scale(abs(fractions(b) / fractions(best)), &
+                       max(-max_exponent, min(max_exponent, exponents(b) - exponents(best)))) > 1.0_wp + ratio_tolerance) then
           best = b
         end if
       end associate

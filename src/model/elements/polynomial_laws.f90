@@ -26,7 +26,7 @@ module nocdyn_polynomial_laws
     logical, private :: is_divided = .false.          !! whether some parts are plain springs
     integer, private :: parts = 0
     integer, allocatable, private :: first(:)         !! first element of each part, [parts + 1]
-    logical, allocatable, private :: is_plain(:)       !! whether all elements of a part are plain springs
+    logical, allocatable, private :: is_plain(:)      !! whether all elements of a part are plain springs; before part 1: true
   contains
     procedure :: find_plain_parts
     procedure :: refresh_lane
@@ -49,7 +49,7 @@ contains
     allocate (self%linear, self%cubic, self%constant, self%by_speed, self%by_speed_squared, self%damping, source=self%rest)
     self%values = lanes * elements
     allocate (self%first(elements + 1), source=1)
-    allocate (self%is_plain(elements), source=.false.)
+    allocate (self%is_plain(0:elements), source=.true.)
   end function new_polynomial_laws
 
   !> Divides the elements into long runs of plain springs and the others. To be called when the coefficients are set.
@@ -63,24 +63,15 @@ contains
     do while (e <= size(self%rest, 2))
       run = plain_run(self, e)
       is_long = size(self%rest, 1) * run >= short
-      if (is_long .or. self%parts == 0) then
-        call begin_part()
-      else if (self%is_plain(self%parts)) then
-        call begin_part()
+      if (is_long .or. self%is_plain(self%parts)) then
+        self%parts = self%parts + 1
+        self%first(self%parts) = e
+        self%is_plain(self%parts) = is_long
       end if
       e = e + max(run, 1)
     end do
     self%first(self%parts + 1) = e
-    self%is_divided = any(self%is_plain(:self%parts))
-
-  contains
-
-    subroutine begin_part()
-      self%parts = self%parts + 1
-      self%first(self%parts) = e
-      self%is_plain(self%parts) = is_long
-    end subroutine begin_part
-
+    self%is_divided = any(self%is_plain(1:self%parts))
   end subroutine find_plain_parts
 
   !> Divides the elements again if a lane has new parameters by which an element of a plain part is no plain spring any more.

@@ -11,7 +11,7 @@ module nocdyn_switches
   type, public :: switches_t
     integer :: count = 0
     integer, allocatable :: element(:)       !! element of each switch, numbered in the machine, [switches]
-    integer, allocatable, private :: first_internal(:)   !! first internal state of that element, numbered in the machine, [switches]
+    integer, allocatable, private :: first_internal(:)   !! first internal state of that element in the machine, [switches]
     integer, allocatable, private :: last_internal(:)    !! last internal state of that element, [switches]
     integer, allocatable, private :: bank(:)     !! [switches]
     integer, allocatable, private :: number(:)   !! of the switch in its bank, [switches]

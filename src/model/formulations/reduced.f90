@@ -8,7 +8,6 @@ module nocdyn_reduced
   use nocdyn_bank, only: role_names
   use nocdyn_element_coordinates, only: element_coordinates_t, new_element_coordinates, twist_map
   use nocdyn_formulation, only: formulation_t
-  use nocdyn_internal_jacobian, only: internal_jacobian_t, new_internal_jacobian
   use nocdyn_kinds, only: wp
   use nocdyn_lane_parameters, only: lane_parameters_t
   use nocdyn_lane_motion, only: lane_motion_t, motion_strip, new_lane_motion
@@ -39,7 +38,6 @@ module nocdyn_reduced
     type(lane_terms_t), allocatable, private :: terms          !! terms of its laws
     type(lane_motion_t), allocatable, private :: lane_motion   !! accelerations of strips, if the lanes are whole strips
     type(lane_series_t), allocatable, private :: lane_series   !! replaces `series_kernel`, if the lanes are whole strips
-    type(internal_jacobian_t), private :: internal_rows        !! positions of the internal states in the Jacobian
     type(element_coordinates_t), private :: switching          !! entries of the elements that switch
     real(wp), allocatable, private :: moment(:, :)             !! M [N m], [lanes, elements], work space
   contains
@@ -86,9 +84,8 @@ contains
     self%incidence = new_element_coordinates(self%machine%elements, self%machine%coordinates)
     associate (machine => self%machine, incidence => self%incidence, freedoms => self%machine%coordinates%freedoms)
       call form_responses(freedoms, is_block, self)
-      self%element_jacobian = new_reduced_jacobian(freedoms, incidence, machine%with_work(:self%quadratures), self%internal)
-      self%internal_rows = new_internal_jacobian(freedoms, incidence, machine%with_work(:self%quadratures), &
-                                                 machine%elements%internal, size(self%element_jacobian%pattern%row))
+      self%element_jacobian = new_reduced_jacobian(freedoms, incidence, machine%with_work(:self%quadratures), &
+                                                   machine%elements%internal)
       self%switching = incidence%selected(machine%switches%element, with_ratio_only=.true.)
       self%start_twist = machine%start_twist()
       self%twists = twist_map(incidence, without_offset=.not. any(abs(self%start_twist) > 0), without_bands=is_block)
@@ -142,7 +139,6 @@ contains
     call self%incidence%refresh_responses(lane, self%machine%elements, self%machine%coordinates)
     self%accelerations%coefficient(lane, :) = self%incidence%response(lane, self%response_entry)
     call self%element_jacobian%refresh_lane(lane, self%incidence)
-    call self%internal_rows%incidence%refresh_selected(lane, self%incidence)
     call self%switching%refresh_selected(lane, self%incidence)
   end subroutine update_inertia
 
@@ -160,7 +156,6 @@ contains
     call self%twists%list_parameters(parameters)
     call self%accelerations%list_parameters(parameters)
     call self%element_jacobian%list_parameters(parameters)
-    call self%internal_rows%list_parameters(parameters)
     call self%switching%list_parameters(parameters)
   end subroutine list_parameters
 
@@ -369,7 +364,6 @@ contains
       call evaluate_at(self, self%lanes * f, self%lanes * self%internal, t, y)
       call machine%differentiate_elements(t)
       call self%element_jacobian%fill(elements, dfdy)
-      if (self%internal > 0) call self%internal_rows%fill(elements, dfdy)
       call self%accelerations%multiply(elements%applied_time, dfdt)
       dfdt(:, f + 1:self%states) = 0.0_wp
       do k = 1, self%quadratures
@@ -379,13 +373,11 @@ contains
     end associate
   end subroutine jacobian
 
-  !> Positions, those of the coordinates and work integrals, then those of the internal states.
   function jacobian_pattern(self) result(pattern)
     class(reduced_t), intent(in) :: self
     type(pattern_t) :: pattern
 
-    allocate (pattern%row, source=[self%element_jacobian%pattern%row, self%internal_rows%pattern%row])
-    allocate (pattern%column, source=[self%element_jacobian%pattern%column, self%internal_rows%pattern%column])
+    pattern = self%element_jacobian%pattern
   end function jacobian_pattern
 
   !> Reactions from the torques of the last `observe`.

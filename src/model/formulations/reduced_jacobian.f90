@@ -3,9 +3,12 @@
 !> With u' = U q' and q'' = R M, the derivative of q'' by q' is R diag(dM/du') U and the derivative by q is R diag(dM/du) U. Each
 !> element adds a product response * ratio * dM at the position of every pair of its coordinates. These products response * ratio
 !> and the positions are computed once, so the time to fill the Jacobian is linear in their number.
+!>
+!> An internal state z of an element with the speed u' = U q' has the rate r(u', z). The moment M(z) of the element acts on
+!> q'' = R M and on its work integral, W' = M u'.
 module nocdyn_reduced_jacobian
   use nocdyn_element_coordinates, only: element_coordinates_t
-  use nocdyn_elements, only: elements_t
+  use nocdyn_elements, only: elements_t, internal_states_t
   use nocdyn_kinds, only: wp
   use nocdyn_lane_parameters, only: lane_parameters_t
   use nocdyn_sparse_map, only: transposed_order
@@ -16,7 +19,9 @@ module nocdyn_reduced_jacobian
   public :: new_reduced_jacobian
 
   !> Order of the values: the blocks dq''/dq' and dq''/dq with the same pattern; the ones of dq/dt = q'; then, for each entry of
-  !> each element with a work integral W, dW'/dq' and dW'/dq.
+  !> each element with a work integral W, dW'/dq' and dW'/dq. Then, for each internal state: for each entry of its element
+  !> dq''/dz and, if the entry has a ratio, dr/dq'; dr/dz of each internal state of that element; dW'/dz if the element has a
+  !> work integral.
   type, public :: reduced_jacobian_t
     type(pattern_t) :: pattern
     integer, private :: freedoms = 0
@@ -28,6 +33,8 @@ module nocdyn_reduced_jacobian
     real(wp), allocatable, private :: product(:, :)      !! response * ratio, [lanes, products]
     integer, allocatable, private :: work_element(:)     !! element of each entry of a work integral
     real(wp), allocatable, private :: ratio(:, :)        !! ratio of these entries, [lanes, entries of work integrals]
+    type(element_coordinates_t), private :: incidence       !! entries of the element of each internal state
+    logical, allocatable, private :: has_work_integral(:)   !! of the element of each internal state
   contains
     procedure :: fill
     procedure :: refresh_lane
@@ -41,7 +48,7 @@ contains
     integer, intent(in) :: freedoms   !! number of coordinates
     type(element_coordinates_t), intent(in) :: incidence   !! entries of all elements
     integer, intent(in) :: with_work(:)   !! elements with work integrals
-    integer, intent(in) :: internal   !! number of internal states, which stand between the coordinates and the work integrals
+    type(internal_states_t), intent(in) :: internal   !! they stand between the coordinates and the work integrals
     type(reduced_jacobian_t) :: self
     type(element_coordinates_t) :: works   ! entries of the elements with work integrals
     integer, allocatable :: row(:), column(:), work(:)   ! `work` is the number of the work integral of each of their entries
@@ -62,9 +69,10 @@ contains
     work(:) = works%entry_elements()
     self%work_element = with_work(work)
     self%pattern%row = [row, row, (freedoms + c, c=1, freedoms), &
-                        (spread(2 * freedoms + internal + work(c), 1, 2), c=1, size(work))]
+                        (spread(2 * freedoms + internal%count + work(c), 1, 2), c=1, size(work))]
     self%pattern%column = [column, freedoms + column, (c, c=1, freedoms), &
                            (works%coordinate(c), freedoms + works%coordinate(c), c=1, size(work))]
+    call append_internal(freedoms, incidence, with_work, internal, self)
   end function new_reduced_jacobian
 
   !> Forms the products of these pairs, column by column, and their distinct positions.
@@ -107,6 +115,51 @@ contains
     end do
   end subroutine form_products
 
+  !> Appends the positions of the internal states.
+  subroutine append_internal(freedoms, incidence, with_work, internal, self)
+    integer, intent(in) :: freedoms
+    type(element_coordinates_t), intent(in) :: incidence
+    integer, intent(in) :: with_work(:)   !! elements with work integrals
+    type(internal_states_t), intent(in) :: internal
+    type(reduced_jacobian_t), intent(inout) :: self
+    type(pattern_t) :: added
+    integer :: i, next, s, work(size(incidence%first) - 1)   ! number of the work integral of each element, or 0
+
+    work = 0
+    work(with_work) = [(i, i=1, size(with_work))]
+    self%incidence = incidence%selected(internal%element, with_ratio_only=.false.)
+    self%has_work_integral = work(internal%element) > 0
+    next = size(self%incidence%coordinate) + sum(internal%members) + count(self%has_work_integral) &
+           + count([(self%incidence%has_ratio(i), i=1, size(self%incidence%coordinate))])
+    allocate (added%row(next), added%column(next))
+    next = 1
+    do s = 1, internal%count
+      do i = self%incidence%first(s), self%incidence%first(s + 1) - 1
+        call add_position(self%incidence%coordinate(i), 2 * freedoms + s, added, next)
+        if (self%incidence%has_ratio(i)) call add_position(2 * freedoms + s, self%incidence%coordinate(i), added, next)
+      end do
+      do i = 0, internal%members(s) - 1
+        call add_position(2 * freedoms + s, 2 * freedoms + internal%first(s) + i, added, next)
+      end do
+      if (self%has_work_integral(s)) then
+        call add_position(2 * freedoms + internal%count + work(internal%element(s)), 2 * freedoms + s, added, next)
+      end if
+    end do
+    self%pattern%row = [self%pattern%row, added%row]
+    self%pattern%column = [self%pattern%column, added%column]
+  end subroutine append_internal
+
+  !> Appends a position.
+  subroutine add_position(row, column, pattern, next)
+    integer, intent(in) :: row, column
+    type(pattern_t), intent(inout) :: pattern
+    integer, intent(inout) :: next   !! index of the position; increased by one
+
+    pattern%row(next) = row
+    pattern%column(next) = column
+    next = next + 1
+  end subroutine add_position
+
   !> Computes the values at the positions of `pattern`, from the elements after `differentiate`.
   subroutine fill(self, elements, dfdy)
     class(reduced_jacobian_t), intent(in) :: self
@@ -136,14 +189,45 @@ contains
       end do
       at = at + 2
     end do
+    if (elements%internal%count > 0) call fill_internal(self, elements, at, dfdy)
   end subroutine fill
 
-  !> Updates the products of one lane.
+  !> Computes the values that come from internal states.
+  subroutine fill_internal(self, elements, before, dfdy)
+    class(reduced_jacobian_t), intent(in) :: self
+    type(elements_t), intent(in) :: elements
+    integer, intent(in) :: before   !! number of positions before these
+    real(wp), contiguous, intent(inout) :: dfdy(:, :)
+    integer :: at, i, s
+
+    at = before
+    associate (internal => elements%internal, incidence => self%incidence)
+      do s = 1, internal%count
+        do i = incidence%first(s), incidence%first(s + 1) - 1
+          at = at + 1
+          dfdy(:, at) = incidence%response(:, i) * internal%applied(:, s)
+          if (.not. incidence%has_ratio(i)) cycle
+          at = at + 1
+          dfdy(:, at) = incidence%ratio(:, i) * internal%rate_speed(:, s)
+        end do
+        do i = 1, internal%members(s)
+          dfdy(:, at + i) = internal%rate_internal(:, i, s)
+        end do
+        at = at + internal%members(s)
+        if (.not. self%has_work_integral(s)) cycle
+        at = at + 1
+        dfdy(:, at) = elements%speed(:, internal%element(s)) * internal%applied(:, s)
+      end do
+    end associate
+  end subroutine fill_internal
+
+  !> Updates the products and responses of one lane.
   pure subroutine refresh_lane(self, lane, incidence)
     class(reduced_jacobian_t), intent(inout) :: self
     integer, intent(in) :: lane
     type(element_coordinates_t), intent(in) :: incidence
 
+    call self%incidence%refresh_selected(lane, incidence)
     self%product(lane, :) = incidence%response(lane, self%response_entry) * incidence%ratio(lane, self%ratio_entry)
   end subroutine refresh_lane
 
@@ -155,6 +239,7 @@ contains
     call parameters%add_structure(self%element, self%position, self%work_element, self%pattern%row, self%pattern%column)
     call parameters%add('jacobian: product', self%product)
     call parameters%add('jacobian: ratio', self%ratio)
+    call self%incidence%list_parameters(parameters)
   end subroutine list_parameters
 
 end module nocdyn_reduced_jacobian

@@ -59,7 +59,6 @@ module nocdyn_machine
     procedure :: forcing_series
     procedure :: power
     procedure :: kinetic_energy
-    procedure :: stored_energy
   end type machine_t
 
 contains
@@ -358,15 +357,5 @@ contains
 
     energy = 0.5_wp * sum(self%inertia(lane, :) * omega**2)
   end function kinetic_energy
-
-  !> Potential energy of the elements of one lane, at the angles of the last `evaluate` [J].
-  function stored_energy(self, lane) result(energy)
-    class(machine_t), intent(inout) :: self
-    integer, intent(in) :: lane
-    real(wp) :: energy
-
-    call self%evaluate_energies()
-    energy = sum(self%elements%stored(lane, :))
-  end function stored_energy
 
 end module nocdyn_machine

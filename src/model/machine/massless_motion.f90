@@ -8,7 +8,7 @@ module nocdyn_massless_motion
   use nocdyn_machine, only: machine_t
   use nocdyn_rigid_trains, only: ratio_tolerance
   use nocdyn_train_motion, only: find_motion, train_motion_t
-  use nocdyn_train_relations, only: new_relations, train_relations_t
+  use nocdyn_train_relations, only: new_relations, train_relations_t, unit_rows
   implicit none (type, external)
   private
 
@@ -68,17 +68,10 @@ contains
   integer function rank_of(motion, selected)
     real(wp), intent(in) :: motion(:, :)
     logical, intent(in) :: selected(:)   !! [rows]
-    real(wp), allocatable :: rows(:, :)
     integer :: pivots(count(selected)), i
 
-    allocate (rows(size(motion, 2), count(selected)))
-    do i = 1, size(motion, 2)
-      rows(i, :) = pack(motion(:, i), selected)
-    end do
-    do i = 1, size(rows, 2)
-      rows(:, i) = rows(:, i) / norm2(rows(:, i))
-    end do
-    call pivoted_rank(rows, ratio_tolerance, rank_of, pivots)
+    call pivoted_rank(transpose(unit_rows(motion(pack([(i, i=1, size(selected))], selected), :))), ratio_tolerance, rank_of, &
+                      pivots)
   end function rank_of
 
 end module nocdyn_massless_motion
