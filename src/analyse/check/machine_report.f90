@@ -167,10 +167,7 @@ contains
     character(len=*), intent(in) :: kind
     integer :: row
 
-    number = 0
-    do row = 1, machine%constraints%rows()
-      if (machine%constraints%kinds(row)%text == kind) number = number + 1
-    end do
+    number = count([(machine%constraints%kinds(row)%text == kind, row=1, machine%constraints%rows())])
   end function constraint_count
 
   !> Appends the groups of bodies that are geared together.
@@ -204,17 +201,16 @@ contains
     type(text_buffer_t), intent(inout) :: report
     type(machine_t), intent(in) :: machine
     logical :: is_coordinate(machine%bodies)
-    integer :: b, found
+    integer, allocatable :: others(:)
+    integer :: b
 
     is_coordinate = .false.
     is_coordinate(machine%coordinates%body) = .true.
-    found = 0
-    do b = 1, machine%bodies
-      if (is_coordinate(b)) cycle
-      found = found + 1
-      if (found <= max_lines) call put_line(report, speed_relation(machine, b))
+    others = pack([(b, b=1, machine%bodies)], .not. is_coordinate)
+    do b = 1, min(size(others), max_lines)
+      call put_line(report, speed_relation(machine, others(b)))
     end do
-    if (found > max_lines) call put_line(report, 'and ' // to_text(found - max_lines) // ' more dependent speeds')
+    if (size(others) > max_lines) call put_line(report, 'and ' // to_text(size(others) - max_lines) // ' more dependent speeds')
   end subroutine put_relations
 
   !> "speed of 'machine' = -0.6666667 * speed of 'pinion'", for a dependent body.

@@ -232,24 +232,18 @@ contains
     class(formulation_t), intent(inout) :: formulation
     type(equilibrium_t), intent(in) :: equilibria(:)
     integer :: nearest
-    real(wp) :: distance, least
-    real(wp) :: start(formulation%machine%bodies)
+    real(wp) :: distances(size(equilibria)), start(formulation%machine%bodies)
+    logical :: is_stable(size(equilibria))
     integer :: i
-    logical :: has_stable
 
     call formulation%set_state(formulation%start())
     start = formulation%omega(1, 1:)
-    has_stable = any(equilibria%stability == 'stable')
-    least = huge(least)
-    nearest = 1
     do i = 1, size(equilibria)
-      if (has_stable .and. equilibria(i)%stability /= 'stable') cycle
       call formulation%set_state(equilibria(i)%y)
-      distance = formulation%machine%kinetic_energy(1, formulation%omega(1, 1:) - start)
-      if (distance >= least) cycle
-      least = distance
-      nearest = i
+      distances(i) = formulation%machine%kinetic_energy(1, formulation%omega(1, 1:) - start)
     end do
+    is_stable = equilibria%stability == 'stable'
+    nearest = minloc(distances, dim=1, mask=is_stable .or. .not. any(is_stable))
   end function nearest_equilibrium
 
   !> Message about a block without solution.

@@ -91,33 +91,26 @@ contains
     type(modes_report_t), intent(in) :: self
     type(text_buffer_t), intent(inout) :: report
     integer, parameter :: number_width = 6
-    integer :: i, number, total, width
+    integer, allocatable :: chosen(:)
+    integer :: i, shown, width
 
-    total = count(self%modes%kind == mode_oscillating)
-    if (total == 0) return
-    number = 0
-    width = len('kinetic energy in')
-    do i = 1, size(self%modes)
-      if (self%modes(i)%kind /= mode_oscillating .or. number == max_modes) cycle
-      number = number + 1
-      width = max(width, text_width(shares_text(self%modes(i)%kinetic, self%machine%names)))
-    end do
+    allocate (chosen, source=modes_of(self, mode_oscillating))
+    if (size(chosen) == 0) return
+    shown = min(size(chosen), max_modes)
+    width = maxval([len('kinetic energy in'), &
+                    (text_width(shares_text(self%modes(chosen(i))%kinetic, self%machine%names)), i=1, shown)])
     call report%append_line('  mode' // cell('frequency [Hz]') // cell('undamped [Hz]') // cell('damping ratio') // &
                             cell('decay time [s]') // '  ' // padded('kinetic energy in', width) // '  potential energy in')
-    number = 0
-    do i = 1, size(self%modes)
-      if (self%modes(i)%kind /= mode_oscillating) cycle
-      number = number + 1
-      if (number > max_modes) cycle
-      associate (mode => self%modes(i))
-        call report%append_line(repeat(' ', number_width - len(to_text(number))) // to_text(number) // cell(mode%frequency()) // &
+    do i = 1, shown
+      associate (mode => self%modes(chosen(i)))
+        call report%append_line(repeat(' ', number_width - len(to_text(i))) // to_text(i) // cell(mode%frequency()) // &
                                 cell(mode%undamped) // cell(mode%damping_ratio()) // time_cell(mode) // '  ' // &
                                 padded(shares_text(mode%kinetic, self%machine%names), width) // '  ' // &
                                 shares_text(mode%potential, self%elastic_names) // &
                                 trim(merge(', unstable', '          ', mode%is_unstable())))
       end associate
     end do
-    if (total > max_modes) call report%append_line('  (' // to_text(total - max_modes) // ' more in modes.csv)')
+    if (shown < size(chosen)) call report%append_line('  (' // to_text(size(chosen) - shown) // ' more in modes.csv)')
   end subroutine put_oscillations
 
   function time_cell(mode) result(text)
@@ -133,18 +126,29 @@ contains
     type(modes_report_t), intent(in) :: self
     integer, intent(in) :: kind
     type(text_buffer_t), intent(inout) :: report
-    integer :: i, number
+    integer, allocatable :: chosen(:)
+    integer :: i, shown
 
-    number = 0
-    do i = 1, size(self%modes)
-      if (self%modes(i)%kind /= kind) cycle
-      number = number + 1
-      if (number > max_modes) cycle
-      call report%append_line('  ' // trim(kind_names(kind)) // ': ' // rate_text(self%modes(i)) // &
-                              '; kinetic energy in ' // shares_text(self%modes(i)%kinetic, self%machine%names))
+    allocate (chosen, source=modes_of(self, kind))
+    shown = min(size(chosen), max_modes)
+    do i = 1, shown
+      associate (mode => self%modes(chosen(i)))
+        call report%append_line('  ' // trim(kind_names(kind)) // ': ' // rate_text(mode) // '; kinetic energy in ' // &
+                                shares_text(mode%kinetic, self%machine%names))
+      end associate
     end do
-    if (number > max_modes) call report%append_line('  (' // to_text(number - max_modes) // ' more in modes.csv)')
+    if (shown < size(chosen)) call report%append_line('  (' // to_text(size(chosen) - shown) // ' more in modes.csv)')
   end subroutine put_real
+
+  !> The modes of one kind.
+  pure function modes_of(self, kind) result(chosen)
+    type(modes_report_t), intent(in) :: self
+    integer, intent(in) :: kind
+    integer, allocatable :: chosen(:)
+    integer :: i
+
+    allocate (chosen, source=pack([(i, i=1, size(self%modes))], self%modes%kind == kind))
+  end function modes_of
 
   function rate_text(mode) result(text)
     type(mode_t), intent(in) :: mode
@@ -194,7 +198,7 @@ contains
     character(len=:), allocatable :: line
     integer :: b, first, i, last, width
 
-    chosen = pack([(i, i=1, size(self%modes))], self%modes%kind == mode_oscillating)
+    allocate (chosen, source=modes_of(self, mode_oscillating))
     width = max(len('shape of mode'), maxval([(text_width(self%machine%names(b)%text), b=1, self%machine%bodies)]))
     do first = 1, size(chosen), shapes_per_row
       last = min(first + shapes_per_row - 1, size(chosen))

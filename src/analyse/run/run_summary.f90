@@ -10,7 +10,7 @@ module nocdyn_run_summary
   use nocdyn_run_settings, only: put_settings
   use nocdyn_observer, only: ranges_t
   use nocdyn_table_text, only: append_table, cell_digits
-  use nocdyn_text, only: append, rounded_text, string_t, to_text
+  use nocdyn_text, only: append, rounded_text, string_t, strings, to_text
   use nocdyn_text_buffer, only: text_buffer_t
   implicit none (type, external)
   private
@@ -209,19 +209,16 @@ contains
   subroutine put_columns(json, summary)
     type(json_t), intent(inout) :: json
     type(run_summary_t), intent(in) :: summary
+    type(string_t) :: keys(5)
     integer :: i
 
+    keys = strings([character(len=11) :: 'min', 'time_of_min', 'max', 'time_of_max', 'last'])
     call json%put('extremes', trim(merge('of the motion', 'of the rows  ', summary%extremes%are_continuous)))
     call json%open('columns')
     associate (extremes => summary%extremes)
       do i = 2, merge(size(summary%labels), 1, extremes%rows > 0)
-        call json%open(summary%labels(i)%text)
-        call json%put('min', extremes%lowest(i))
-        call json%put('time_of_min', extremes%lowest_time(i))
-        call json%put('max', extremes%highest(i))
-        call json%put('time_of_max', extremes%highest_time(i))
-        call json%put('last', extremes%last(i))
-        call json%close()
+        call json%put(summary%labels(i)%text, keys, [extremes%lowest(i), extremes%lowest_time(i), extremes%highest(i), &
+                                                     extremes%highest_time(i), extremes%last(i)])
       end do
     end associate
     call json%close()

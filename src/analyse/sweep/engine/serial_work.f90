@@ -81,7 +81,8 @@ contains
     !$omp end critical (texts)
   end subroutine new_own_formulation
 
-  !> Settings, stepper and observer of the variants that a formulation is integrated for.
+  !> Settings, stepper and observer of the variants that a formulation is integrated for. Statistics that begin outside of the
+  !> times are refused, and columns that the machine does not have.
   subroutine prepare_integration(input, formulation, statistics, settings, times, stepper, observer, message)
     type(input_t), intent(in) :: input
     class(formulation_t), target, intent(inout) :: formulation   !! stays where it is, as the observer does
@@ -92,6 +93,7 @@ contains
     type(statistics_observer_t), intent(out) :: observer
     character(len=:), allocatable, intent(out) :: message        !! '', or why none of these variants can be integrated
     type(string_t), allocatable :: notes(:)
+    type(statistic_t), allocatable :: restricted(:)
     type(error_t), allocatable :: error
 
     !$omp critical (texts)
@@ -104,26 +106,14 @@ contains
     if (allocated(error)) then
       call move_alloc(error%message, message)
     else
-      call set_observer(formulation, statistics, times, observer, message)
+      call restrict_statistics(statistics, times(1), times(2), restricted, message)
+      observer = new_statistics_observer(formulation, restricted, times(1), times(2))
+      if (message == '' .and. observer%missing /= '') then
+        message = observer%missing // ' is recorded, but this machine has no such column'
+      end if
     end if
     !$omp end critical (texts)
   end subroutine prepare_integration
-
-  !> Refuses statistics that begin outside of the times, and columns that the machine does not have.
-  subroutine set_observer(formulation, statistics, times, observer, message)
-    class(formulation_t), target, intent(inout) :: formulation
-    type(statistic_t), intent(in) :: statistics(:)
-    real(wp), intent(in) :: times(2)   !! start and end [s]
-    type(statistics_observer_t), intent(out) :: observer
-    character(len=:), allocatable, intent(out) :: message
-    type(statistic_t), allocatable :: restricted(:)
-
-    call restrict_statistics(statistics, times(1), times(2), restricted, message)
-    observer = new_statistics_observer(formulation, restricted, times(1), times(2))
-    if (message == '' .and. observer%missing /= '') then
-      message = observer%missing // ' is recorded, but this machine has no such column'
-    end if
-  end subroutine set_observer
 
   !> Why the integration of a lane failed.
   subroutine explain_failure(solver_status, lane, formulation, settings, message)

@@ -86,8 +86,12 @@ contains
     type(chunk_ensemble_t) :: ensemble
     class(stepper_t), allocatable :: stepper
     type(solver_status_t) :: solver_status
+    real(wp), allocatable :: y(:)
+    real(wp) :: t
     integer :: i
+    logical :: found
 
+    t = 0.0_wp
     call allocate_chunk(chunk, first, count, self%plan%design%varied, size(self%plan%statistics))
     chunk%results(:, :) = ieee_value(0.0_wp, ieee_quiet_nan)
     chunk%status(:) = not_computed
@@ -99,7 +103,8 @@ contains
       allocate (stepper, source=self%stepper)
       call integrate_with(stepper, self%machines%formulation, self%settings, self%times, ensemble, self%observer, solver_status)
     else
-      call refuse_all(self%machines%formulation, ensemble)
+      allocate (y(self%machines%formulation%states + self%machines%formulation%quadratures), source=0.0_wp)
+      call ensemble%next(self%machines%formulation, 1, t, y, found)   ! refuses all, or notes that they need a block of their own
     end if
     do i = 1, count
       if (.not. ensemble%needs_own_block(i)) cycle
@@ -108,20 +113,6 @@ contains
     end do
     is_complete = all(chunk%status /= not_computed)
   end subroutine compute
-
-  !> Goes through a chunk of which no variant is run in the lanes: each is refused or needs a block of its own.
-  subroutine refuse_all(formulation, ensemble)
-    class(formulation_t), intent(inout) :: formulation
-    type(chunk_ensemble_t), intent(inout) :: ensemble
-    real(wp), allocatable :: y(:)
-    real(wp) :: t
-    logical :: found
-
-    allocate (y(formulation%states + formulation%quadratures), source=0.0_wp)
-    t = 0.0_wp
-    call ensemble%next(formulation, 1, t, y, found)
-    if (found) error stop 'nocdyn_sweep_block: a variant is set in a lane that does not run'
-  end subroutine refuse_all
 
   !> Sets the next variant that fits the lanes in one of them.
   subroutine next(self, system, lane, t, y, found)
