@@ -1,6 +1,7 @@
 !> The names in a folder, and removal of empty folders.
 module nocdyn_folders
   use, intrinsic :: iso_c_binding, only: c_char, c_int, c_null_char, c_size_t
+  use nocdyn_posix, only: path_call
   use nocdyn_text, only: append, string_t
   implicit none (type, external)
   private
@@ -16,12 +17,9 @@ module nocdyn_folders
       integer(c_size_t), value, intent(in) :: capacity
       integer(c_size_t) :: length
     end function c_folder_names
-
-    integer(c_int) function c_rmdir(path) bind(c, name='rmdir')
-      import :: c_char, c_int
-      character(kind=c_char), intent(in) :: path(*)
-    end function c_rmdir
   end interface
+
+  procedure(path_call), bind(c, name='rmdir') :: c_rmdir
 
 contains
 

@@ -9,6 +9,7 @@ module nocdyn_posix
   public :: make_folders, rename_file, remove_file, process_id, is_terminal, catch_interrupts, is_interrupted, &
     ignore_file_size_signal
   public :: create_file, write_bytes, close_file, last_failure, failure_number, is_interrupted_call
+  public :: path_call, path_number_call, descriptor_call
 
   integer, parameter, public :: standard_output = 1, standard_error = 2   !! file descriptors
 
@@ -21,28 +22,36 @@ module nocdyn_posix
   integer(c_int), volatile :: received_signal = 0
   integer(c_long), volatile :: received_time = 0
 
-  interface
-    integer(c_int) function c_mkdir(path, mode) bind(c, name='mkdir')
+  ! Functions of the operating system that return a negative number on failure.
+  abstract interface
+    integer(c_int) function path_call(path) bind(c)
       import :: c_char, c_int
       character(kind=c_char), intent(in) :: path(*)
-      integer(c_int), value, intent(in) :: mode
-    end function c_mkdir
+    end function path_call
 
+    integer(c_int) function path_number_call(path, number) bind(c)
+      import :: c_char, c_int
+      character(kind=c_char), intent(in) :: path(*)
+      integer(c_int), value, intent(in) :: number
+    end function path_number_call
+
+    integer(c_int) function descriptor_call(descriptor) bind(c)
+      import :: c_int
+      integer(c_int), value, intent(in) :: descriptor
+    end function descriptor_call
+  end interface
+
+  procedure(path_call), bind(c, name='unlink') :: c_unlink
+  procedure(path_number_call), bind(c, name='mkdir') :: c_mkdir
+  procedure(path_number_call), bind(c, name='creat') :: c_creat
+  procedure(descriptor_call), bind(c, name='close') :: c_close
+  procedure(descriptor_call), bind(c, name='isatty') :: c_isatty
+
+  interface
     integer(c_int) function c_rename(from, to) bind(c, name='rename')
       import :: c_char, c_int
       character(kind=c_char), intent(in) :: from(*), to(*)
     end function c_rename
-
-    integer(c_int) function c_unlink(path) bind(c, name='unlink')
-      import :: c_char, c_int
-      character(kind=c_char), intent(in) :: path(*)
-    end function c_unlink
-
-    integer(c_int) function c_creat(path, mode) bind(c, name='creat')
-      import :: c_char, c_int
-      character(kind=c_char), intent(in) :: path(*)
-      integer(c_int), value, intent(in) :: mode
-    end function c_creat
 
     integer(c_intptr_t) function c_write(descriptor, bytes, length) bind(c, name='write')
       import :: c_char, c_int, c_intptr_t, c_size_t
@@ -50,11 +59,6 @@ module nocdyn_posix
       character(kind=c_char), intent(in) :: bytes(*)
       integer(c_size_t), value, intent(in) :: length
     end function c_write
-
-    integer(c_int) function c_close(descriptor) bind(c, name='close')
-      import :: c_int
-      integer(c_int), value, intent(in) :: descriptor
-    end function c_close
 
     integer(c_int) function c_errno() bind(c, name='nocdyn_errno')
       import :: c_int
@@ -73,11 +77,6 @@ module nocdyn_posix
     integer(c_int) function c_getpid() bind(c, name='getpid')
       import :: c_int
     end function c_getpid
-
-    integer(c_int) function c_isatty(descriptor) bind(c, name='isatty')
-      import :: c_int
-      integer(c_int), value, intent(in) :: descriptor
-    end function c_isatty
 
     integer(c_long) function c_time(result) bind(c, name='time')
       import :: c_long, c_ptr

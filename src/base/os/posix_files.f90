@@ -2,7 +2,8 @@
 module nocdyn_posix_files
   use, intrinsic :: iso_c_binding, only: c_char, c_int, c_int64_t, c_intptr_t, c_null_char, c_size_t
   use, intrinsic :: iso_fortran_env, only: int64
-  use nocdyn_posix, only: close_file, failure_number, is_interrupted_call, last_failure
+  use nocdyn_posix, only: close_file, descriptor_call, failure_number, is_interrupted_call, last_failure, path_call, &
+    path_number_call
   implicit none (type, external)
   private
 
@@ -14,18 +15,12 @@ module nocdyn_posix_files
   integer, parameter :: would_block = 11   ! EWOULDBLOCK
   integer, parameter :: disk_errors(4) = [5, 27, 28, 122]   ! EIO, EFBIG, ENOSPC, EDQUOT
 
+  procedure(path_call), bind(c, name='nocdyn_open_new') :: c_open_new
+  procedure(path_number_call), bind(c, name='nocdyn_open_existing') :: c_open_existing
+  procedure(descriptor_call), bind(c, name='fdatasync') :: c_fdatasync
+  procedure(descriptor_call), bind(c, name='fsync') :: c_fsync
+
   interface
-    integer(c_int) function c_open_new(path) bind(c, name='nocdyn_open_new')
-      import :: c_char, c_int
-      character(kind=c_char), intent(in) :: path(*)
-    end function c_open_new
-
-    integer(c_int) function c_open_existing(path, is_to_change) bind(c, name='nocdyn_open_existing')
-      import :: c_char, c_int
-      character(kind=c_char), intent(in) :: path(*)
-      integer(c_int), value, intent(in) :: is_to_change
-    end function c_open_existing
-
     integer(c_intptr_t) function c_pread(descriptor, bytes, length, offset) bind(c, name='pread')
       import :: c_char, c_int, c_int64_t, c_intptr_t, c_size_t
       integer(c_int), value, intent(in) :: descriptor
@@ -46,16 +41,6 @@ module nocdyn_posix_files
       integer(c_int), value, intent(in) :: descriptor
       integer(c_int64_t), value, intent(in) :: length
     end function c_ftruncate
-
-    integer(c_int) function c_fdatasync(descriptor) bind(c, name='fdatasync')
-      import :: c_int
-      integer(c_int), value, intent(in) :: descriptor
-    end function c_fdatasync
-
-    integer(c_int) function c_fsync(descriptor) bind(c, name='fsync')
-      import :: c_int
-      integer(c_int), value, intent(in) :: descriptor
-    end function c_fsync
 
     integer(c_int) function c_flock(descriptor, operation) bind(c, name='flock')
       import :: c_int
