@@ -7,7 +7,7 @@
 module nocdyn_static_twists
   use nocdyn_errors, only: error_t, exit_input, raise
   use nocdyn_kinds, only: wp
-  use nocdyn_lapack_band, only: band_factor, band_solve
+  use nocdyn_lapack_lu, only: band_factor, band_solve
   use nocdyn_ordering, only: reverse_cuthill_mckee
   use nocdyn_pattern_entries, only: entries_t
   use nocdyn_rigid_motions, only: new_rigid_motions, rigid_motions_t

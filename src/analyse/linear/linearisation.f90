@@ -12,7 +12,7 @@ module nocdyn_linearisation
   use nocdyn_errors, only: error_t, exit_failed, raise
   use nocdyn_formulation, only: formulation_t
   use nocdyn_kinds, only: wp
-  use nocdyn_lapack_eigen, only: cholesky_factor, solve_left, solve_right, singular_vectors, symmetric_eigenvectors
+  use nocdyn_lapack_eigen, only: cholesky_factor, singular_vectors, solve_triangular, symmetric_eigenvectors
   use nocdyn_system, only: pattern_t
   implicit none (type, external)
   private
@@ -86,13 +86,13 @@ contains
           flexibility(i, incidence%coordinate(e)) = incidence%ratio(1, e) * sqrt(abs(self%stiffness(elastic(i))))
         end do
       end do
-      if (size(elastic) > 0) call solve_right(factor, flexibility)
+      if (size(elastic) > 0) call solve_triangular(factor, flexibility, from_right=.true.)
       call solve_undamped(flexibility, self%stiffness(elastic), self, has_failed)
       if (has_failed) then
         call raise(error, exit_failed, 'the natural frequencies were not found: LAPACK did not converge')
         return
       end if
-      call solve_left(factor, self%shapes)
+      call solve_triangular(factor, self%shapes, from_right=.false.)
     end associate
     allocate (self%twists(size(self%stiffness), size(self%natural)), source=0.0_wp)
     do e = 1, size(self%stiffness)

@@ -4,7 +4,7 @@ module nocdyn_lapack_eigen
   implicit none (type, external)
   private
 
-  public :: cholesky_factor, solve_left, solve_right, singular_vectors, symmetric_eigenvectors, eigenvectors
+  public :: cholesky_factor, solve_triangular, singular_vectors, symmetric_eigenvectors, eigenvectors
 
   interface
     subroutine dpotrf(uplo, n, a, lda, info)
@@ -63,23 +63,15 @@ contains
     is_indefinite = info /= 0
   end subroutine cholesky_factor
 
-  !> Replaces B by R^-1 B (DTRSM).
-  subroutine solve_left(factor, matrix)
+  !> Replaces B by R^-1 B or, from the right, by B R^-1 (DTRSM).
+  subroutine solve_triangular(factor, matrix, from_right)
     real(wp), contiguous, intent(in) :: factor(:, :)      !! of `cholesky_factor`
     real(wp), contiguous, intent(inout) :: matrix(:, :)   !! B
+    logical, intent(in) :: from_right
 
-    call dtrsm('L', 'U', 'N', 'N', size(matrix, 1), size(matrix, 2), 1.0_wp, factor, max(1, size(factor, 1)), &
-               matrix, max(1, size(matrix, 1)))
-  end subroutine solve_left
-
-  !> Replaces B by B R^-1 (DTRSM).
-  subroutine solve_right(factor, matrix)
-    real(wp), contiguous, intent(in) :: factor(:, :)      !! of `cholesky_factor`
-    real(wp), contiguous, intent(inout) :: matrix(:, :)   !! B
-
-    call dtrsm('R', 'U', 'N', 'N', size(matrix, 1), size(matrix, 2), 1.0_wp, factor, max(1, size(factor, 1)), &
-               matrix, max(1, size(matrix, 1)))
-  end subroutine solve_right
+    call dtrsm(merge('R', 'L', from_right), 'U', 'N', 'N', size(matrix, 1), size(matrix, 2), 1.0_wp, factor, &
+               max(1, size(factor, 1)), matrix, max(1, size(matrix, 1)))
+  end subroutine solve_triangular
 
   !> Singular values, descending, and all right singular vectors, as columns (DGESVD).
   subroutine singular_vectors(matrix, values, vectors, has_failed)

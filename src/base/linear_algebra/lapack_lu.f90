@@ -1,4 +1,7 @@
-!> LU factors of a square matrix and solutions with them, by LAPACK.
+!> LU factors of a square matrix or of a band matrix and solutions with them, by LAPACK.
+!>
+!> Element (i, j) of a band matrix with `lower` and `upper` diagonals beside the main one is
+!> band(lower + upper + 1 + i - j, j); the first `lower` rows of the band are room for the row interchanges.
 !>
 !> Integrators mostly solve small systems, for which the calls inside LAPACK cost more than the arithmetic. With the reference
 !> LAPACK and gfortran 12, at order 4 (12), the unblocked DGETF2 takes a third (two fifths) of the time of DGETRF, and a plain
@@ -8,7 +11,7 @@ module nocdyn_lapack_lu
   implicit none (type, external)
   private
 
-  public :: lu_factor, lu_solve
+  public :: lu_factor, lu_solve, band_factor, band_solve
 
   integer, parameter :: small_order = 64   ! above it blocks pay if an optimised LAPACK is linked
 
@@ -21,14 +24,6 @@ module nocdyn_lapack_lu
       integer, intent(out) :: info
     end subroutine dgetrf
 
-    subroutine dgetf2(m, n, a, lda, ipiv, info)
-      import :: wp
-      integer, intent(in) :: m, n, lda
-      real(wp), intent(inout) :: a(lda, n)
-      integer, intent(out) :: ipiv(n)
-      integer, intent(out) :: info
-    end subroutine dgetf2
-
     subroutine dgetrs(trans, n, nrhs, a, lda, ipiv, b, ldb, info)
       import :: wp
       character, intent(in) :: trans
@@ -38,7 +33,27 @@ module nocdyn_lapack_lu
       real(wp), intent(inout) :: b(ldb, nrhs)
       integer, intent(out) :: info
     end subroutine dgetrs
+
+    subroutine dgbtrf(m, n, kl, ku, ab, ldab, ipiv, info)
+      import :: wp
+      integer, intent(in) :: m, n, kl, ku, ldab
+      real(wp), intent(inout) :: ab(ldab, n)
+      integer, intent(out) :: ipiv(n)
+      integer, intent(out) :: info
+    end subroutine dgbtrf
+
+    subroutine dgbtrs(trans, n, kl, ku, nrhs, ab, ldab, ipiv, b, ldb, info)
+      import :: wp
+      character, intent(in) :: trans
+      integer, intent(in) :: n, kl, ku, nrhs, ldab, ldb
+      real(wp), intent(in) :: ab(ldab, n)
+      integer, intent(in) :: ipiv(n)
+      real(wp), intent(inout) :: b(ldb, nrhs)
+      integer, intent(out) :: info
+    end subroutine dgbtrs
   end interface
+
+  procedure(dgetrf) :: dgetf2
 
 contains
 
@@ -105,5 +120,32 @@ contains
       end do
     end do
   end subroutine substitute
+
+  !> Factors P A = L U of a band matrix with row interchanges.
+  subroutine band_factor(lower, upper, band, pivots, singular)
+    integer, intent(in) :: lower, upper                  !! numbers of diagonals below and above the main one
+    real(wp), contiguous, intent(inout) :: band(:, :)    !! A, on return L and U; shape [2 lower + upper + 1, n], n > 0
+    integer, contiguous, intent(inout) :: pivots(:)      !! row interchanges, shape [n]
+    logical, intent(out) :: singular                     !! a pivot is exactly zero: the factors cannot be used
+    integer :: n, info
+
+    n = size(band, 2)
+    call dgbtrf(n, n, lower, upper, band, size(band, 1), pivots, info)
+    if (info < 0) error stop 'nocdyn_lapack_lu: dgbtrf refused an argument'
+    singular = info > 0
+  end subroutine band_factor
+
+  !> Solves A x = b with the factors of `band_factor`.
+  subroutine band_solve(lower, upper, factors, pivots, x)
+    integer, intent(in) :: lower, upper                  !! numbers of diagonals below and above the main one
+    real(wp), contiguous, intent(in) :: factors(:, :)    !! of `band_factor`
+    integer, contiguous, intent(in) :: pivots(:)         !! of `band_factor`
+    real(wp), contiguous, intent(inout) :: x(:)          !! b, on return x; shape [n]
+    integer :: n, info
+
+    n = size(factors, 2)
+    call dgbtrs('N', n, lower, upper, 1, factors, size(factors, 1), pivots, x, n, info)
+    if (info /= 0) error stop 'nocdyn_lapack_lu: dgbtrs refused an argument'
+  end subroutine band_solve
 
 end module nocdyn_lapack_lu

@@ -2,8 +2,7 @@
 !> banded with the states in an order that makes the band narrow.
 module nocdyn_stage_matrix
   use nocdyn_kinds, only: wp
-  use nocdyn_lapack_band, only: band_factor, band_solve
-  use nocdyn_lapack_lu, only: lu_factor, lu_solve
+  use nocdyn_lapack_lu, only: band_factor, band_solve, lu_factor, lu_solve
   use nocdyn_ordering, only: reverse_cuthill_mckee
   use nocdyn_pattern_entries, only: entries_t
   implicit none (type, external)
