@@ -50,28 +50,21 @@ contains
     type(solver_status_t), intent(out) :: solver_status            !! of the last variant in each lane
     type(error_t), allocatable, intent(out) :: error   !! allocated if a setting is refused
     class(stepper_t), allocatable :: stepper
+    character(len=:), allocatable :: obstacle
 
     call check_settings(settings, error)
     if (allocated(error)) return
     call select_method(settings, stepper, error)
-    if (.not. allocated(error)) call refuse_missing_series(stepper, system, settings, error)
     if (allocated(error)) return
+    if (stepper%needs_series) then
+      call system%series_obstacle(obstacle)
+      if (len(obstacle) > 0) then
+        call raise(error, exit_input, 'method ' // quoted(trim(settings%method)) // ' cannot be used: ' // obstacle)
+        return
+      end if
+    end if
     call integrate_with(stepper, system, settings, times, ensemble, observer, solver_status)
   end subroutine integrate_ensemble
-
-  !> Raises an error if the method needs Taylor series and the system has none.
-  subroutine refuse_missing_series(stepper, system, settings, error)
-    class(stepper_t), intent(in) :: stepper
-    class(system_t), intent(in) :: system
-    type(integration_settings_t), intent(in) :: settings
-    type(error_t), allocatable, intent(out) :: error
-    character(len=:), allocatable :: obstacle
-
-    if (.not. stepper%needs_series) return
-    call system%series_obstacle(obstacle)
-    if (len(obstacle) == 0) return
-    call raise(error, exit_input, 'method ' // quoted(trim(settings%method)) // ' cannot be used: ' // obstacle)
-  end subroutine refuse_missing_series
 
   !> The same with a given stepper and with settings that have been checked.
   subroutine integrate_with(stepper, system, settings, times, ensemble, observer, solver_status)

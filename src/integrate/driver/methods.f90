@@ -52,7 +52,7 @@ contains
     type(string_t), allocatable :: names(:)
     integer :: i
 
-    names = strings(method_names)
+    allocate (names, source=strings(method_names))
     message = 'there is no integration method ' // quoted(name) // '; the methods are ' // joined(names, ', ')
     i = nearest_word(name, names)
     if (i > 0) message = message // '. Did you mean ' // quoted(names(i)%text) // '?'

@@ -162,8 +162,8 @@ contains
     call reset_solver_status(solver_status, lane)
   end subroutine set_start
 
-  !> Starts the lanes in `starting`: evaluates the slope, passes the start to the observer if it is an output time, and chooses
-  !> the first step.
+  !> Starts the lanes in `starting`: lets the system choose their branches, evaluates the slope, passes the start to the observer
+  !> if it is an output time, and chooses the first step.
   subroutine start_lanes(integrator, stepper, system, times, observer, solver_status)
     type(integrator_t), intent(inout) :: integrator
     class(stepper_t), intent(inout) :: stepper
@@ -175,7 +175,10 @@ contains
 
     associate (attempt => integrator%attempt)
       do lane = 1, attempt%lanes
-        if (integrator%starting(lane)) call choose_branches(integrator, system, observer, lane, solver_status)
+        if (.not. integrator%starting(lane)) cycle
+        integrator%sample(:) = attempt%y(lane, :attempt%components)
+        call system%start_lane(lane, attempt%t(lane), integrator%sample)
+        if (integrator%has_switches) call start_switching(integrator%switching, system, observer, attempt, lane, solver_status)
       end do
       call evaluate_starts(integrator, system, solver_status)
       call stepper%start(attempt, integrator%starting)
@@ -192,21 +195,6 @@ contains
       call guess_first_steps(integrator%control, stepper%order, system, attempt)
     end associate
   end subroutine start_lanes
-
-  !> Lets the system choose the branches of a lane at its start.
-  subroutine choose_branches(integrator, system, observer, lane, solver_status)
-    type(integrator_t), intent(inout) :: integrator
-    class(system_t), intent(inout) :: system
-    class(observer_t), intent(inout) :: observer
-    integer, intent(in) :: lane
-    type(solver_status_t), intent(inout) :: solver_status
-
-    associate (attempt => integrator%attempt)
-      integrator%sample(:) = attempt%y(lane, :attempt%components)
-      call system%start_lane(lane, attempt%t(lane), integrator%sample)
-      if (integrator%has_switches) call start_switching(integrator%switching, system, observer, attempt, lane, solver_status)
-    end associate
-  end subroutine choose_branches
 
   !> Evaluates the slope at the states of the lanes in `starting`, and ends those where that fails.
   subroutine evaluate_starts(integrator, system, solver_status)
@@ -236,24 +224,19 @@ contains
     type(solver_status_t), intent(inout) :: solver_status
 
     associate (attempt => integrator%attempt)
-      call find_running(attempt%lanes, integrator%occupied, solver_status%code, integrator%running)
+      integrator%running(:) = integrator%occupied .and. solver_status%code == integration_running
       attempt%active(:) = integrator%running
-      if (stepper%chooses_steps) call choose_step_sizes(integrator, stepper, system, solver_status)
+      if (stepper%chooses_steps) then
+        call stepper%choose_steps(system, attempt, integrator%control)
+        if (integrator%first_step > 0) then
+          where (solver_status%steps == 0) integrator%control%h = min(integrator%control%h, integrator%first_step)
+        end if
+      end if
       call propose_steps(integrator%control, attempt%lanes, attempt%t, attempt%h, integrator%t_new)
       call count_attempts(attempt%lanes, integrator%running, attempt%h, solver_status%h, solver_status%steps)
       call begin_attempt(attempt)
     end associate
   end subroutine begin_attempts
-
-  !> Finds the lanes that hold a variant and are not done.
-  pure subroutine find_running(lanes, occupied, status, running)
-    integer, intent(in) :: lanes
-    logical, intent(in) :: occupied(lanes)
-    integer, intent(in) :: status(lanes)
-    logical, intent(inout) :: running(lanes)
-
-    running = merge(occupied, .false., status == integration_running)
-  end subroutine find_running
 
   !> Counts the attempts of the running lanes and stores their sizes; the other lanes get the step size 0.
   pure subroutine count_attempts(lanes, running, h, h_stored, steps)
@@ -269,21 +252,6 @@ contains
       steps(lane) = steps(lane) + merge(1, 0, running(lane))
     end do
   end subroutine count_attempts
-
-  !> Lets the stepper choose the step sizes; the first step is at most as long as the setting says.
-  subroutine choose_step_sizes(integrator, stepper, system, solver_status)
-    type(integrator_t), intent(inout) :: integrator
-    class(stepper_t), intent(inout) :: stepper
-    class(system_t), intent(inout) :: system
-    type(solver_status_t), intent(in) :: solver_status
-    integer :: lane
-
-    call stepper%choose_steps(system, integrator%attempt, integrator%control)
-    if (integrator%first_step <= 0) return
-    do lane = 1, integrator%attempt%lanes
-      if (solver_status%steps(lane) == 0) integrator%control%h(lane) = min(integrator%control%h(lane), integrator%first_step)
-    end do
-  end subroutine choose_step_sizes
 
   !> Moves the accepted lanes to the ends of their steps.
   subroutine advance_lanes(integrator, times)
@@ -303,7 +271,7 @@ contains
           if (accepted(lane)) attempt%t(lane) = integrator%t_new(lane)
         end do
         do component = 1, attempt%components
-          call copy_accepted(attempt%lanes, accepted, attempt%y_new(1, component), attempt%y(1, component))
+          attempt%y(:, component) = merge(attempt%y_new(:, component), attempt%y(:, component), accepted)
         end do
       end if
       if (.not. integrator%inspects) return
@@ -313,16 +281,6 @@ contains
       end do
     end associate
   end subroutine advance_lanes
-
-  !> Copies one component of the accepted lanes.
-  pure subroutine copy_accepted(lanes, accepted, new, old)
-    integer, intent(in) :: lanes
-    logical, intent(in) :: accepted(lanes)
-    real(wp), intent(in) :: new(lanes)
-    real(wp), intent(inout) :: old(lanes)
-
-    old = merge(new, old, accepted)
-  end subroutine copy_accepted
 
   !> Passes the lanes that have ended to the ensemble and frees them.
   subroutine release_lanes(integrator, ensemble, observer, solver_status)
