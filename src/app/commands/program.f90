@@ -34,7 +34,7 @@ contains
         if (size(arguments%operands) == 0 .and. topic /= '') call append(arguments%operands, topic)
         if (prints) call help_command(commands, arguments, code)
       else if (arguments%command == 'version') then
-        if (prints) call print_text('nocdyn ' // version // ' (' // compiler_text() // ')')
+        if (prints) call print_text('nocdyn ' // version // ' (' // compiler_text // ')')
       else
         associate (command => commands(command_index(commands, arguments%command)))
           if (associated(command%run)) then

@@ -83,13 +83,7 @@ contains
     integer :: i, j
 
     associate (components => self%states + self%quadratures)
-      allocate (pattern%row(components * self%states), pattern%column(components * self%states))
-      do j = 1, self%states
-        do i = 1, components
-          pattern%row(i + (j - 1) * components) = i
-          pattern%column(i + (j - 1) * components) = j
-        end do
-      end do
+      pattern = pattern_t([((i, i=1, components), j=1, self%states)], [((j, i=1, components), j=1, self%states)])
     end associate
   end function jacobian_pattern
 

@@ -110,10 +110,8 @@ contains
     real(wp), contiguous, intent(inout) :: values(:, :)
     type(c_ptr) :: same
 
-    if (.not. self%has(bytes, real_bytes, size(values))) then
-      values = 0.0_wp
-      return
-    end if
+    values = 0.0_wp
+    if (.not. self%has(bytes, real_bytes, size(values))) return
     if (size(values) > 0) same = c_copy_out(values, bytes(self%next:), int(real_bytes * size(values), c_size_t))
     self%next = self%next + real_bytes * size(values)
   end subroutine take_reals

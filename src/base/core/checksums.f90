@@ -32,10 +32,8 @@ contains
       table%entries(byte, 1) = value
     end do
     do slice = 2, slices
-      do byte = 0, 255
-        value = table%entries(byte, slice - 1)
-        table%entries(byte, slice) = ieor(shiftr(value, 8), table%entries(iand(value, 255_int32), 1))
-      end do
+      table%entries(:, slice) = ieor(shiftr(table%entries(:, slice - 1), 8), &
+                                     table%entries(iand(table%entries(:, slice - 1), 255_int32), 1))
     end do
   end subroutine make_checksum_table
 

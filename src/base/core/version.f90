@@ -4,17 +4,7 @@ module nocdyn_version
   implicit none (type, external)
   private
 
-  public :: compiler_text
-
   character(len=*), parameter, public :: version = '0.1.0'   !! as in CMakeLists.txt, which a test compares
-
-contains
-
-  !> Name and version of the compiler.
-  function compiler_text() result(text)
-    character(len=:), allocatable :: text
-
-    text = compiler_version()
-  end function compiler_text
+  character(len=*), parameter, public :: compiler_text = compiler_version()   !! name and version
 
 end module nocdyn_version

@@ -2,7 +2,7 @@
 module nocdyn_step_attempt
   use nocdyn_finite, only: all_finite, is_finite
   use nocdyn_kinds, only: wp
-  use nocdyn_masks, only: all_true, any_differs
+  use nocdyn_masks, only: any_differs
   use nocdyn_stage_sums, only: large_tile, padded_columns
   use nocdyn_system, only: evaluation_fatal, evaluation_ok, evaluation_recoverable, system_t
   implicit none (type, external)
@@ -109,11 +109,7 @@ contains
 
     attempt%uncounted = attempt%uncounted + 1
     call system%derivative(t, y, dydt, attempt%rhs_status)
-    if (attempt%lanes == 1) then
-      if (attempt%rhs_status(1) /= evaluation_ok) call disable_failed_lanes(attempt, dydt)
-    else if (any_differs(attempt%lanes, attempt%rhs_status, evaluation_ok)) then
-      call disable_failed_lanes(attempt, dydt)
-    end if
+    if (any_differs(attempt%lanes, attempt%rhs_status, evaluation_ok)) call disable_failed_lanes(attempt, dydt)
   end subroutine evaluate
 
   !> The same, and disables lanes whose values are not finite.
@@ -147,17 +143,8 @@ contains
   !> Adds the evaluations since the last call to the counts of the active lanes.
   pure subroutine count_evaluations(attempt)
     type(step_attempt_t), intent(inout) :: attempt
-    integer :: lane
 
-    if (attempt%lanes == 1) then
-      if (attempt%active(1)) attempt%evaluations(1) = attempt%evaluations(1) + attempt%uncounted
-    else if (all_true(attempt%lanes, attempt%active)) then
-      attempt%evaluations(:) = attempt%evaluations + attempt%uncounted
-    else
-      do lane = 1, attempt%lanes
-        if (attempt%active(lane)) attempt%evaluations(lane) = attempt%evaluations(lane) + attempt%uncounted
-      end do
-    end if
+    attempt%evaluations(:) = attempt%evaluations + merge(attempt%uncounted, 0, attempt%active)
     attempt%uncounted = 0
   end subroutine count_evaluations
 

@@ -82,7 +82,7 @@ contains
     type(step_attempt_t), intent(inout) :: attempt
     type(step_control_t), intent(inout) :: control
 
-    error stop 'nocdyn_stepper: a stepper that chooses its steps overrides plan'
+    error stop 'nocdyn_stepper: a stepper that chooses its steps overrides choose_steps'
   end subroutine choose_steps
 
   !> Restarts lanes whose equations have changed at their present state, after `accept`, with attempt%slope = f(t, y).

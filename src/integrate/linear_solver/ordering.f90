@@ -27,12 +27,13 @@ contains
     integer, intent(in) :: nodes                !! rows of the matrix
     integer, intent(in) :: row(:), column(:)    !! of the entries, each at most once, in any order
     integer :: order(nodes)
-    type(groups_t) :: graph, by_degree
+    type(groups_t) :: graph
+    type(groups_t) :: by_degree   ! all nodes, those with the fewest neighbours first
     type(search_t) :: search
     integer :: i
 
     graph = neighbours(nodes, row, column)
-    by_degree = nodes_by_degree(graph)
+    by_degree = grouped(nodes, graph%start(2:) - graph%start(:nodes) + 1, [(i, i=1, nodes)])
     graph = sorted_neighbours(graph, by_degree%member)
     allocate (search%reached_in(nodes), search%reached(nodes), source=0)
     do i = 1, nodes
@@ -68,16 +69,6 @@ contains
     graph%start(nodes + 1) = filled + 1
   end function neighbours
 
-  !> All nodes, those with the fewest neighbours first.
-  pure function nodes_by_degree(graph) result(by_degree)
-    type(groups_t), intent(in) :: graph
-    type(groups_t) :: by_degree
-    integer :: node, nodes
-
-    nodes = size(graph%start) - 1
-    by_degree = grouped(nodes, graph%start(2:) - graph%start(:nodes) + 1, [(node, node=1, nodes)])
-  end function nodes_by_degree
-
   !> The same graph, with the neighbours of each node in the order of `nodes`.
   pure function sorted_neighbours(graph, nodes) result(sorted)
     type(groups_t), intent(in) :: graph
@@ -104,24 +95,17 @@ contains
     type(groups_t), intent(in) :: graph
     integer, intent(in) :: start
     type(search_t), intent(inout) :: search
+    integer, allocatable :: last(:)   ! nodes in the last level
     integer :: levels
 
     call search_levels(graph, start, search)
     do
       levels = search%levels
-      call search_levels(graph, fewest_neighbours(graph, search%reached(search%last_level:search%last)), search)
+      last = search%reached(search%last_level:search%last)
+      call search_levels(graph, last(minloc(graph%start(last + 1) - graph%start(last), 1)), search)
       if (search%levels <= levels) exit
     end do
   end subroutine search_from_periphery
-
-  !> The node with the fewest neighbours among some nodes.
-  pure function fewest_neighbours(graph, nodes) result(node)
-    type(groups_t), intent(in) :: graph
-    integer, intent(in) :: nodes(:)
-    integer :: node
-
-    node = nodes(minloc(graph%start(nodes + 1) - graph%start(nodes), 1))
-  end function fewest_neighbours
 
   !> The Cuthill-McKee order from a root: each node is followed by its neighbours, those with the fewest neighbours first.
   pure subroutine search_levels(graph, root, search)

@@ -82,47 +82,27 @@ contains
     integer :: last, stage
 
     if (any_true(attempt%lanes, self%moved)) then
-      if (any(self%moved .and. attempt%active)) call renew_first_stage(self, system, attempt)
+      if (any(self%moved .and. attempt%active)) then
+        call evaluate_start(attempt, system, self%moved, self%stages%k)
+        self%moved(:) = self%moved .and. .not. attempt%active
+      end if
     end if
     last = merge(self%stages%step - 1, self%stages%step, self%first_same_as_last)
     do stage = 2, last
       if (.not. any(attempt%active)) exit
       call stage_state(self%stages, attempt, stage, self%y_stage)
-      call set_stage_time(attempt%lanes, attempt%t, attempt%h, self%c(stage), self%t_stage)
+      self%t_stage(:) = attempt%t + self%c(stage) * attempt%h
       call evaluate(attempt, system, self%t_stage, self%y_stage, self%stages%k(1, 1, self%stages%k_index(stage)))
     end do
     call update_state(self%stages, attempt)
     if (self%first_same_as_last) then
-      call set_stage_time(attempt%lanes, attempt%t, attempt%h, 1.0_wp, self%t_stage)
+      self%t_stage(:) = attempt%t + attempt%h
       call evaluate_finite(attempt, system, self%t_stage, attempt%y_new, self%stages%k(1, 1, &
                                                                                        self%stages%k_index(self%stages%step)))
     end if
     call estimate_error(self%stages, attempt)
     call count_evaluations(attempt)
   end subroutine take_step
-
-  !> The times of a stage: t + c h.
-  pure subroutine set_stage_time(lanes, t, h, c, t_stage)
-    integer, intent(in) :: lanes
-    real(wp), intent(in) :: t(lanes), h(lanes), c
-    real(wp), intent(inout) :: t_stage(lanes)
-
-    if (lanes == 1) then
-      t_stage(1) = t(1) + c * h(1)
-    else
-      t_stage = t + c * h
-    end if
-  end subroutine set_stage_time
-
-  !> Evaluates the first stage of the active lanes that have moved.
-  subroutine renew_first_stage(self, system, attempt)
-    class(explicit_stepper_t), intent(inout) :: self
-    class(system_t), intent(inout) :: system
-    type(step_attempt_t), intent(inout) :: attempt
-
-    call evaluate_start(attempt, system, self%moved, self%stages%k)
-    self%moved(:) = self%moved .and. .not. attempt%active
-  end subroutine renew_first_stage
 
   !> Evaluates the stages that only the dense output needs, then its polynomials.
   subroutine interpolate(self, system, attempt, wanted, coefficients)
@@ -137,7 +117,7 @@ contains
       attempt%active(:) = wanted
       do stage = self%stages%step + 1, self%stages%all
         call stage_state(self%stages, attempt, stage, self%y_stage)
-        call set_stage_time(attempt%lanes, attempt%t, attempt%h, self%c(stage), self%t_stage)
+        self%t_stage(:) = attempt%t + self%c(stage) * attempt%h
         call evaluate_finite(attempt, system, self%t_stage, self%y_stage, &
                              self%stages%k(1, 1, self%stages%k_index(stage)))
       end do

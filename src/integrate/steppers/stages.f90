@@ -54,19 +54,19 @@ contains
   !> its state has been formed. The first stage and the last two stages of a step are never overwritten.
   pure subroutine share_storage(self)
     type(stages_t), intent(inout) :: self
+    type(stage_sum_t) :: sums(self%all + 3 + size(self%dense))
+    integer :: read_at(size(sums))   ! stage at which each sum is formed
     integer :: last_read(self%all)   ! first stage that may overwrite each stage
     integer :: owner(self%all)       ! stage at each index of `k`
     integer :: i, k_index, stage
 
+    sums = [self%internal, self%update, self%error, self%low_order_error, self%dense]
+    read_at = [(i, i=1, self%all), (self%step + 1, i=1, 3), (self%all + 1, i=1, size(self%dense))]
     last_read = 0
-    do stage = 2, self%all
-      call note_reads(self%internal(stage), stage, last_read)
-    end do
-    call note_reads(self%update, self%step + 1, last_read)
-    call note_reads(self%error, self%step + 1, last_read)
-    call note_reads(self%low_order_error, self%step + 1, last_read)
-    do i = 1, size(self%dense)
-      call note_reads(self%dense(i), self%all + 1, last_read)
+    do i = 1, size(sums)
+      associate (read => sums(i)%stages(:sums(i)%terms))
+        last_read(read) = max(last_read(read), read_at(i))
+      end associate
     end do
     last_read([1, self%step - 1, self%step]) = self%all + 1
     self%k_count = 0
@@ -78,37 +78,17 @@ contains
       owner(k_index) = stage
       self%k_index(stage) = k_index
     end do
-    do stage = 1, self%all
-      call relocate(self%internal(stage), self%k_index)
+    do i = 1, size(sums)
+      associate (read => sums(i)%stages(:sums(i)%terms))
+        read = self%k_index(read)
+      end associate
     end do
-    call relocate(self%update, self%k_index)
-    call relocate(self%error, self%k_index)
-    call relocate(self%low_order_error, self%k_index)
-    do i = 1, size(self%dense)
-      call relocate(self%dense(i), self%k_index)
-    end do
+    self%internal = sums(:self%all)
+    self%update = sums(self%all + 1)
+    self%error = sums(self%all + 2)
+    self%low_order_error = sums(self%all + 3)
+    self%dense = sums(self%all + 4:)
   end subroutine share_storage
-
-  !> Replaces the stages of a sum by their indices in `k`.
-  pure subroutine relocate(stage_sum, k_index)
-    type(stage_sum_t), intent(inout) :: stage_sum
-    integer, intent(in) :: k_index(:)   !! of each stage
-
-    associate (read => stage_sum%stages(:stage_sum%terms))
-      read = k_index(read)
-    end associate
-  end subroutine relocate
-
-  !> Raises `last_read` of the stages that a sum reads.
-  pure subroutine note_reads(stage_sum, stage, last_read)
-    type(stage_sum_t), intent(in) :: stage_sum
-    integer, intent(in) :: stage
-    integer, intent(inout) :: last_read(:)
-
-    associate (read => stage_sum%stages(:stage_sum%terms))
-      last_read(read) = max(last_read(read), stage)
-    end associate
-  end subroutine note_reads
 
   !> Allocates the stages of every lane.
   subroutine allocate_stages(self, system)

@@ -82,7 +82,7 @@ contains
     type(step_attempt_t), intent(inout) :: attempt
     logical, intent(in) :: starting(:)
 
-    call mark_moved(size(starting), starting, self%moved)
+    self%moved(:) = self%moved .or. starting
   end subroutine start
 
   !> Computes the series of the lanes that have moved, and their step sizes. `take_step` disables the lanes where that fails.
@@ -318,17 +318,8 @@ contains
     class(taylor_stepper_t), intent(inout) :: self
     logical, intent(in) :: accepted(:)
 
-    call mark_moved(size(accepted), accepted, self%moved)
+    self%moved(:) = self%moved .or. accepted
   end subroutine accept
-
-  !> Marks the lanes in `moving` as moved.
-  pure subroutine mark_moved(lanes, moving, moved)
-    integer, intent(in) :: lanes
-    logical, intent(in) :: moving(lanes)
-    logical, intent(inout) :: moved(lanes)
-
-    moved = merge(.true., moved, moving)
-  end subroutine mark_moved
 
   !> Passes the series itself, in powers of the time, to the observer.
   subroutine pass_steps(self, steps, attempt, coefficients, observer)

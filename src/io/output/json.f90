@@ -51,7 +51,7 @@ contains
     call self%open()
     call self%put('program', 'nocdyn')
     call self%put('version', version)
-    call self%put('compiler', compiler_text())
+    call self%put('compiler', compiler_text)
     if (present(status)) call self%put('status', trim(status))
     if (present(message)) call self%put('message', message)
     call self%put('input', input)

@@ -157,7 +157,7 @@ contains
     type(group_t) :: group
 
     header%title = plan%input%title()
-    header%source = 'nocdyn ' // version // ' (' // compiler_text() // ')'
+    header%source = 'nocdyn ' // version // ' (' // compiler_text // ')'
     group = plan%input%single('sweep')
     header%design = group%text('design')
     if (group%has_value('seed')) header%seed = group%whole_number('seed')
