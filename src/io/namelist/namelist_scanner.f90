@@ -8,6 +8,7 @@ module nocdyn_namelist_scanner
   use nocdyn_namelist_cursor, only: cursor_t
   use nocdyn_namelist_values, only: longest_list, read_subscript, scan_items
   use nocdyn_text, only: lower_case, to_text
+  use nocdyn_text_file, only: first_position
   implicit none (type, external)
   private
 
@@ -53,9 +54,8 @@ contains
     type(namelist_t), intent(inout) :: namelist
     type(cursor_t), intent(out) :: cursor
     type(diagnostics_t), intent(inout) :: diagnostics
-    character(len=*), parameter :: byte_order_mark = char(239) // char(187) // char(191)
 
-    cursor%text = text(merge(4, 1, index(text, byte_order_mark) == 1):) // new_line('a')
+    cursor%text = text(first_position(text):) // new_line('a')
     cursor%key = ''
     call blank_control_characters(cursor%text, diagnostics)
     namelist%source = cursor%text

@@ -6,7 +6,7 @@ module nocdyn_text_file
   implicit none (type, external)
   private
 
-  public :: path_in, read_text_file
+  public :: first_position, path_in, read_text_file
 
   integer, parameter :: reason_length = 256
 
@@ -21,6 +21,15 @@ contains
     whole = folder // path
     if (path(1:1) == '/') whole = path
   end function path_in
+
+  !> Position after the byte-order mark, if there is one.
+  pure integer function first_position(text)
+    character(len=*), intent(in) :: text
+    character(len=*), parameter :: byte_order_mark = char(239) // char(187) // char(191)
+
+    first_position = 1
+    if (index(text, byte_order_mark) == 1) first_position = 1 + len(byte_order_mark)
+  end function first_position
 
   !> Reads all bytes of a file or a pipe.
   subroutine read_text_file(file, text, error)

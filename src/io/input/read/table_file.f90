@@ -5,7 +5,7 @@ module nocdyn_table_file
   use nocdyn_kinds, only: wp
   use nocdyn_literals, only: number_problem, read_real
   use nocdyn_text, only: append, counted, quoted, shortened, string_t, to_text
-  use nocdyn_text_file, only: read_text_file
+  use nocdyn_text_file, only: first_position, read_text_file
   implicit none (type, external)
   private
 
@@ -13,7 +13,6 @@ module nocdyn_table_file
 
   integer, parameter :: most_messages = 5   !! a file of another format has as many errors as lines
   character(len=*), parameter :: line_end = achar(10), tab = achar(9), carriage_return = achar(13)
-  character(len=*), parameter :: byte_order_mark = char(239) // char(187) // char(191)
   character(len=*), parameter :: blanks = ' ' // tab, comments = '#!', quotes = '"' // "'"
 
   !> The state of reading a table line by line.
@@ -95,14 +94,6 @@ contains
     values = lines(:, :rows)
     call move_alloc(reading%messages, messages)
   end subroutine read_list_text
-
-  !> Position after the byte-order mark, if there is one.
-  pure integer function first_position(text)
-    character(len=*), intent(in) :: text
-
-    first_position = 1
-    if (index(text, byte_order_mark) == 1) first_position = 1 + len(byte_order_mark)
-  end function first_position
 
   !> Last position of the line that begins at `start`.
   pure integer function line_last(text, start)
