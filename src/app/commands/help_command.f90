@@ -37,7 +37,8 @@ contains
     else if (topic == 'input' .and. size(arguments%operands) == 2) then
       call group_help(arguments%operands(2)%text, text, error)
     else if (row > 0) then
-      text = command_help(commands(row))
+      text = usage(commands(row))
+      if (commands(row)%help /= '') text = text // nl // nl // commands(row)%help
     else if (group_rule_index(lower_case(topic)) > 0) then
       call raise(error, exit_input, quoted(topic) // ' is a group of the input: nocdyn help input ' // topic)
     else
@@ -51,15 +52,6 @@ contains
       call print_text(text)
     end if
   end subroutine help_command
-
-  !> Usage and description of a command.
-  pure function command_help(command) result(text)
-    type(command_t), intent(in) :: command
-    character(len=:), allocatable :: text
-
-    text = usage(command)
-    if (command%help /= '') text = text // nl // nl // command%help
-  end function command_help
 
   !> "nocdyn run FILE... [--out DIR] [--set PATH=VALUE]... [--quiet]", on as many lines as it needs.
   pure function usage(command) result(text)

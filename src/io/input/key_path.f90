@@ -76,7 +76,7 @@ contains
     type(key_path_t), intent(inout) :: path
     character(len=:), allocatable, intent(out) :: key
     character(len=:), allocatable, intent(out) :: message
-    integer :: open
+    integer :: number, open, status
 
     open = index(text // '(', '(')
     key = lower_case(trim(text(:open - 1)))
@@ -88,19 +88,14 @@ contains
         key_suggestion(path%group_rule, key)
     else if (open <= len(text)) then
       call read_subscript(text(open + 1:max(open, len(text) - 1)), path%target)
-      if (path%target%is_malformed) path%is_out_of_range = is_whole_number(text(open + 1:max(open, len(text) - 1)))
+      if (path%target%is_malformed) then
+        call read_integer(trim(adjustl(text(open + 1:max(open, len(text) - 1)))), number, status)
+        path%is_out_of_range = status == literal_ok
+      end if
       if ((path%target%is_malformed .and. .not. path%is_out_of_range) .or. text(len(text):) /= ')') message = text(open:) &
         // ' is neither an index such as (3) nor a section such as (1:3)'
     end if
   end subroutine read_key
-
-  logical function is_whole_number(text)
-    character(len=*), intent(in) :: text
-    integer :: number, status
-
-    call read_integer(trim(adjustl(text)), number, status)
-    is_whole_number = status == literal_ok
-  end function is_whole_number
 
   !> Checks that the path has a name or a number if and only if its group needs one.
   subroutine check_form(path, ending, has_name, message)

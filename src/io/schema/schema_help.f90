@@ -86,6 +86,7 @@ contains
     type(text_buffer_t), intent(inout) :: buffer
     integer, intent(in) :: rule              !! row of `group_rules`
     character(len=*), intent(in) :: prefix   !! of each line
+    type(string_t), allocatable :: sentences(:)
     integer :: k, key, selector
 
     call buffer%append_line(prefix // '&' // trim(group_rules(rule)%name) // ', ' // &
@@ -105,7 +106,10 @@ contains
     do key = selector + 1, last_key(rule)
       if (key_rules(key)%only_if == '') call append_key(buffer, key_rules(key), prefix)
     end do
-    call append_sentences(buffer, rule, prefix)
+    allocate (sentences, source=sentences_on(rule))
+    do k = 1, size(sentences)
+      call append_wrapped(buffer, sentences(k)%text, prefix // '  ')
+    end do
   end subroutine append_group
 
   !> A kind with its keys; of keys that an earlier kind has too only the names.
@@ -165,19 +169,6 @@ contains
     end if
     text = text // ' ' // default_text(rule)
   end function short_rule
-
-  subroutine append_sentences(buffer, rule, prefix)
-    type(text_buffer_t), intent(inout) :: buffer
-    integer, intent(in) :: rule              !! row of `group_rules`
-    character(len=*), intent(in) :: prefix
-    type(string_t), allocatable :: sentences(:)
-    integer :: i
-
-    allocate (sentences, source=sentences_on(rule))
-    do i = 1, size(sentences)
-      call append_wrapped(buffer, sentences(i)%text, prefix // '  ')
-    end do
-  end subroutine append_sentences
 
   !> A sentence on as many lines as it needs.
   subroutine append_wrapped(buffer, text, prefix)

@@ -32,6 +32,7 @@ contains
   subroutine append_group(buffer, rule)
     type(text_buffer_t), intent(inout) :: buffer
     integer, intent(in) :: rule   !! row of `group_rules`
+    type(string_t), allocatable :: sentences(:)
     integer :: k, key
 
     call buffer%append_line('')
@@ -46,7 +47,11 @@ contains
     do k = 1, size(kind_rules)
       if (kind_rules(k)%group == group_rules(rule)%name) call append_kind(buffer, k, rule)
     end do
-    call append_sentences(buffer, rule)
+    allocate (sentences, source=sentences_on(rule))
+    if (size(sentences) > 0) call buffer%append_line('')
+    do k = 1, size(sentences)
+      call buffer%append_line(sentences(k)%text)
+    end do
     call buffer%append_line('')
     call buffer%append_line('```')
     call append_examples(buffer, rule, .false.)
@@ -83,18 +88,5 @@ contains
     call buffer%append_line('| `' // trim(rule%name) // '` | ' // type_text(rule) // ' | ' // default_text(rule) // ' | ' // &
                             allowed_text(rule) // ' | ' // trim(rule%help) // ' |')
   end subroutine append_key
-
-  subroutine append_sentences(buffer, rule)
-    type(text_buffer_t), intent(inout) :: buffer
-    integer, intent(in) :: rule   !! row of `group_rules`
-    type(string_t), allocatable :: sentences(:)
-    integer :: i
-
-    allocate (sentences, source=sentences_on(rule))
-    if (size(sentences) > 0) call buffer%append_line('')
-    do i = 1, size(sentences)
-      call buffer%append_line(sentences(i)%text)
-    end do
-  end subroutine append_sentences
 
 end module nocdyn_schema_reference

@@ -8,7 +8,7 @@ module nocdyn_schema_rules
 
   ! Occurrence of a group.
   integer, parameter, public :: exactly_once = 1, at_most_once = 2, at_least_once = 3, any_times = 4
-  character(len=19), parameter, public :: occurrence_texts(4) = &
+  character(len=19), parameter, public :: occurrence_texts(4) = &   !! of `exactly_once` ... `any_times`
     [character(len=19) :: 'once', 'at most once', 'at least once', 'any number of times']
 
   ! Type of the values of a key.
@@ -18,8 +18,8 @@ module nocdyn_schema_rules
   integer, parameter, public :: a_selector = 9   !! a word of `kind_rules`, the kind of the group; at most one key of a group
   integer, parameter, public :: a_file = 10      !! path of a table file, relative to the folder of the input
   integer, parameter, public :: a_folder = 11    !! path of a folder
-  character(len=12), parameter, public :: type_nouns(11) = [character(len=12) :: 'text', 'name', 'body', 'body', 'word', &
-    'number', 'whole number', 'logical', 'word', 'file', 'folder']
+  character(len=12), parameter, public :: type_nouns(11) = [character(len=12) :: &   !! of `a_text` ... `a_folder`
+    'text', 'name', 'body', 'body', 'word', 'number', 'whole number', 'logical', 'word', 'file', 'folder']
 
   ! Relations between two sets of keys, `first` and `second`.
   integer, parameter, public :: exactly_one = 1    !! keys of one set are given; those of the other lose their defaults

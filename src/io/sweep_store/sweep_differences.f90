@@ -15,7 +15,7 @@ contains
   !> What is said of the first difference between two sweeps; '' if program, input and list of variants are the same.
   function header_difference(old, new, sources, inputs, lists) result(text)
     type(sweep_header_t), intent(in) :: old, new
-    character(len=*), intent(in) :: sources, inputs, lists   !! if that differs; `inputs` is followed by the differences
+    character(len=*), intent(in) :: sources, inputs, lists   !! what is said if that differs; differences of inputs follow
     character(len=:), allocatable :: text
 
     text = sources

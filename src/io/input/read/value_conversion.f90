@@ -121,7 +121,9 @@ contains
     else
       select case (rule%value_type)
       case (a_number)
-        call convert_number(raw%text, rule, value%numbers(i), message)
+        call read_real(raw%text, value%numbers(i), status)
+        message = number_problem(status)
+        if (message == '' .and. is_out_of_range(value%numbers(i), rule%allowed)) message = ' is out of range'
       case (an_integer)
         call convert_integer(raw%text, rule, value%whole_numbers(i), message)
       case default
@@ -131,18 +133,6 @@ contains
       if (message /= '') message = message // '; allowed: ' // allowed_text(rule)
     end if
   end subroutine convert_value
-
-  subroutine convert_number(text, rule, value, message)
-    character(len=*), intent(in) :: text
-    type(key_rule_t), intent(in) :: rule
-    real(wp), intent(out) :: value
-    character(len=:), allocatable, intent(inout) :: message
-    integer :: status
-
-    call read_real(text, value, status)
-    message = number_problem(status)
-    if (message == '' .and. is_out_of_range(value, rule%allowed)) message = ' is out of range'
-  end subroutine convert_number
 
   subroutine convert_integer(text, rule, value, message)
     character(len=*), intent(in) :: text
