@@ -61,11 +61,10 @@ contains
   !>
   !> Section 6 multiplies the column of the gear pair by R2 or by -R2, which is the determinant of L_lambda^ext up to
   !> its sign; for a group of r gears the factor is the geometric mean over the gears, and 1 for a free body.
-  pure function complement_factor(choice, log_determinant, rows) result(factor)
+  pure real(wp) function complement_factor(choice, log_determinant, rows) result(factor)
     integer, intent(in) :: choice             !! complement_...
     real(wp), intent(in) :: log_determinant   !! log |det L_lambda^ext| of the group
     integer, intent(in) :: rows               !! number of independent rows of the group
-    real(wp) :: factor
 
     factor = 1.0_wp
     if (choice == complement_natural .or. rows == 0) return

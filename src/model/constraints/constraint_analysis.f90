@@ -169,7 +169,7 @@ contains
 
     do g = 1, size(groups)
       associate (elimination => groups(g)%elimination)
-        if (size(elimination%relation) + size(elimination%core) == 0) cycle
+        if (.not. elimination%has_relations()) cycle
         if (.not. any(locked_trains(relations, elimination))) cycle
         call raise_lock(constraints, body_names, trains, relations, &
                            [elimination%relation, elimination%core], offending_row, error)

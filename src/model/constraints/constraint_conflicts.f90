@@ -6,7 +6,7 @@ module nocdyn_constraint_conflicts
   use nocdyn_errors, only: error_t, exit_input, raise
   use nocdyn_kinds, only: wp
   use nocdyn_lapack, only: pivoted_rank
-  use nocdyn_rigid_trains, only: ratio_tolerance, rigid_trains_t
+  use nocdyn_rigid_trains, only: most_names, ratio_tolerance, rigid_trains_t
   use nocdyn_text, only: joined, quoted, rounded_text, selected, string_t
   use nocdyn_train_motion, only: elimination_t, find_loads, find_motion, train_motion_t
   use nocdyn_train_relations, only: distinct_trains, scaled_rows, leaf_elimination_t, train_relations_t
@@ -15,7 +15,6 @@ module nocdyn_constraint_conflicts
 
   public :: locked_trains, raise_lock, raise_loop_conflict
 
-  integer, parameter :: most_names = 12     ! in a message
   integer, parameter :: ratio_digits = 12   ! enough to tell two ratios apart, without digits that are rounding
 
 contains
@@ -28,7 +27,7 @@ contains
     integer, intent(in) :: row
     type(error_t), allocatable, intent(out) :: error
     integer, allocatable :: bodies(:), rows(:), bodies_of_tree(:), bodies_of_row(:), tree_rows(:), other_rows(:)
-    integer :: first_body, last
+    integer :: first_body, last, t
 
     associate (first => constraints%first(row))
       call trains%find_path(constraints%body(first), constraints%body(first + 1), bodies, rows)
@@ -46,7 +45,8 @@ contains
       bodies_of_row = [bodies(last), bodies(1)]
       other_rows = [row]
     end if
-    call raise(error, exit_input, 'locks ' // locked_names(body_names, trains, [trains%train(bodies(1))]) // ': ' // &
+    call raise(error, exit_input, 'locks ' // &
+               locked_names(body_names, trains, [(t == trains%train(bodies(1)), t=1, size(trains%root))]) // ': ' // &
                joined(selected(constraints%names, tree_rows), ', ', most_names) // ' and ' // &
                joined(selected(constraints%names, other_rows), ', ', most_names) // ' drive ' // &
                quoted(body_names(bodies_of_tree(size(bodies_of_tree)))%text) // ' at ' // &
@@ -71,16 +71,13 @@ contains
   end function ratio_along
 
   !> Names of the bodies of some trains.
-  function locked_names(body_names, trains, locked) result(names)
+  function locked_names(body_names, trains, is_locked) result(names)
     type(string_t), intent(in) :: body_names(:)
     type(rigid_trains_t), intent(in) :: trains
-    integer, intent(in) :: locked(:)   !! trains
+    logical, intent(in) :: is_locked(:)   !! [trains]
     character(len=:), allocatable :: names
     integer :: b
-    logical :: is_locked(size(trains%root))
 
-    is_locked = .false.
-    is_locked(locked) = .true.
     names = joined(selected(body_names, pack([(b, b=1, size(body_names))], is_locked(trains%train))), ', ', most_names)
   end function locked_names
 
@@ -167,7 +164,7 @@ contains
     is_locked = locked_trains(relations, elimination)
     rows = locking_rows(constraints, trains, relations, elimination, findloc(is_locked, .true., dim=1))
     rows = pack(rows, rows /= offending_row)
-    call raise(error, exit_input, 'locks ' // locked_names(body_names, trains, pack([(i, i=1, size(is_locked))], is_locked)) // &
+    call raise(error, exit_input, 'locks ' // locked_names(body_names, trains, is_locked) // &
                reason(selected(constraints%names, rows)))
   end subroutine raise_lock
 

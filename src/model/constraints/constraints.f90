@@ -108,11 +108,12 @@ contains
     integer, allocatable :: entry(:)
     integer :: first(size(rows) + 1), i, k
 
+    allocate (entry(sum(self%first(rows + 1) - self%first(rows))))
     first(1) = 1
     do i = 1, size(rows)
       first(i + 1) = first(i) + self%entries(rows(i))
+      entry(first(i):first(i + 1) - 1) = [(k, k=self%first(rows(i)), self%first(rows(i) + 1) - 1)]
     end do
-    entry = [([(k, k=self%first(rows(i)), self%first(rows(i) + 1) - 1)], i=1, size(rows))]
     some = new_constraints(self%bodies, selected(self%names, rows), selected(self%units, rows), first, self%body(entry), &
                            self%coefficient(:, entry))
   end function subset

@@ -5,7 +5,7 @@ module nocdyn_coordinate_choice
   use nocdyn_geared_groups, only: geared_group_t
   use nocdyn_kinds, only: wp
   use nocdyn_lapack, only: pivoted_rank
-  use nocdyn_rigid_trains, only: ratio_tolerance, rigid_trains_t, max_exponent
+  use nocdyn_rigid_trains, only: max_exponent, most_names, ratio_tolerance, rigid_trains_t
   use nocdyn_sparse_map, only: transposed_order
   use nocdyn_text, only: joined, quoted, selected, string_t, to_text
   use nocdyn_train_motion, only: elimination_t
@@ -15,8 +15,6 @@ module nocdyn_coordinate_choice
   private
 
   public :: eliminate, choose_coordinates, pivoted_elimination
-
-  integer, parameter :: most_names = 12   ! in a message
 
 contains
 

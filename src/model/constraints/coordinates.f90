@@ -12,7 +12,7 @@ module nocdyn_coordinates
   use nocdyn_lane_parameters, only: lane_parameters_t
   use nocdyn_lapack, only: solve_positive_definite
   use nocdyn_reaction_solver, only: new_reaction_solver, reaction_solver_t
-  use nocdyn_rigid_trains, only: rigid_trains_t
+  use nocdyn_rigid_trains, only: most_names, rigid_trains_t
   use nocdyn_text, only: joined, selected, string_t
   use nocdyn_train_motion, only: find_motion, train_motion_t
   use nocdyn_train_relations, only: new_relations, train_relations_t
@@ -20,8 +20,6 @@ module nocdyn_coordinates
   private
 
   public :: build_coordinates
-
-  integer, parameter :: most_names = 12   ! in a message
 
   !> The coordinates of all groups, with L_tau and the responses by body.
   type, public :: coordinates_t
@@ -109,8 +107,7 @@ contains
     type(geared_group_t), intent(in) :: groups(:)
     integer, intent(in) :: coordinate_of(:), bodies, lanes   !! `coordinate_of` as in `number_coordinates`
     type(coordinates_t), intent(inout) :: self
-    integer :: group_of(bodies)
-    integer :: b, g
+    integer :: group_of(bodies), b, g
 
     do g = 1, size(groups)
       group_of(groups(g)%bodies) = g

@@ -74,16 +74,13 @@ contains
     integer :: g, k
 
     allocate (self%group_index(size(groups)), source=0)
+    allocate (self%groups(count([(groups(g)%elimination%has_relations(), g=1, size(groups))])))
     k = 0
     do g = 1, size(groups)
-      if (size(groups(g)%elimination%relation) + size(groups(g)%elimination%core) == 0) cycle
+      if (.not. groups(g)%elimination%has_relations()) cycle
       k = k + 1
       self%group_index(g) = k
-    end do
-    allocate (self%groups(k))
-    do g = 1, size(groups)
-      if (self%group_index(g) == 0) cycle
-      associate (group => self%groups(self%group_index(g)), elimination => groups(g)%elimination)
+      associate (group => self%groups(k), elimination => groups(g)%elimination)
         group%bodies = groups(g)%bodies
         group%elimination = elimination
         allocate (group%dual(size(elimination%core_trains), size(elimination%core), lanes))
@@ -138,8 +135,7 @@ contains
             end associate
             call self%back_substitute(lane, moment, null_vector)
             null_vector(row) = 1.0_wp
-            is_member(row) = .true.
-            is_member(block%redundancies(i)%repeats) = .true.
+            is_member([row, block%redundancies(i)%repeats]) = .true.
             where (is_member(block%rows)) block%null_vectors(:, i, lane) = null_vector(block%rows)
             is_member(block%rows) = .false.
           end do

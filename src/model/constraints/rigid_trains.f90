@@ -15,6 +15,8 @@ module nocdyn_rigid_trains
   !> Relative tolerance for the agreement of two ratios and for sums that are zero: decimals such as 0.1 * 3 and 0.3 agree.
   real(wp), parameter, public :: ratio_tolerance = 1.0e-9_wp
 
+  integer, parameter, public :: most_names = 12   !! of bodies or rows in a message of this room
+
   integer, parameter, public :: max_exponent = 500   !! binary exponent up to which squares of ratios do not overflow
 
   !> The trees of all rigid trains of a machine.

@@ -20,6 +20,7 @@ module nocdyn_train_motion
     integer, allocatable :: core(:)          !! relations that are solved together
     integer, allocatable :: core_trains(:)   !! all trains in the core
   contains
+    procedure :: has_relations
     procedure :: list_structure
   end type elimination_t
 
@@ -111,6 +112,13 @@ contains
       end do
     end do
   end subroutine find_loads
+
+  !> Whether relations between trains are left in the group.
+  pure logical function has_relations(self)
+    class(elimination_t), intent(in) :: self
+
+    has_relations = size(self%relation) + size(self%core) > 0
+  end function has_relations
 
   !> Registers the integers on which the layout depends.
   subroutine list_structure(self, parameters)

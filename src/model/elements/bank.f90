@@ -276,14 +276,13 @@ contains
   end subroutine choose
 
   !> Distance of a lane from the nearest boundary of its present branch, in a unit of the law: continuous, negative beyond.
-  pure function indicator(self, switch, lane, t, angle, speed, internal)
+  pure real(wp) function indicator(self, switch, lane, t, angle, speed, internal)
     class(bank_t), intent(in) :: self
     integer, intent(in) :: switch          !! numbered within the bank
     integer, intent(in) :: lane
     real(wp), intent(in) :: t              !! [s]
     real(wp), intent(in) :: angle, speed   !! u [rad], u' [rad/s] of the switching element
     real(wp), intent(in) :: internal(:)       !! its internal states
-    real(wp) :: indicator
 
     indicator = 0.0_wp
     error stop 'nocdyn_bank: a bank with switches overrides indicator'

@@ -60,13 +60,12 @@ contains
   end subroutine choose
 
   !> Distance of a lane from the nearest boundary of the present branch of a switch, negative beyond it.
-  pure function indicator(self, banks, switch, lane, t, angle, speed, internal)
+  pure real(wp) function indicator(self, banks, switch, lane, t, angle, speed, internal)
     class(switches_t), intent(in) :: self
     type(bank_slot_t), intent(in) :: banks(:)
     integer, intent(in) :: switch, lane   !! switch numbered in the machine
     real(wp), intent(in) :: t, angle, speed   !! [s]; of the element of the switch [rad], [rad/s]
     real(wp), intent(in) :: internal(:)       !! the internal states of all elements
-    real(wp) :: indicator
 
     indicator = banks(self%bank(switch))%bank%indicator(self%number(switch), lane, t, angle, speed, &
                                                         internal(self%first_internal(switch):self%last_internal(switch)))

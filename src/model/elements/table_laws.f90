@@ -168,12 +168,11 @@ contains
   end subroutine choose
 
   !> Of a curve over the time in seconds: time does not go back across a boundary.
-  pure function indicator(self, switch, lane, t, angle, speed, internal)
+  pure real(wp) function indicator(self, switch, lane, t, angle, speed, internal)
     class(table_laws_t), intent(in) :: self
     integer, intent(in) :: switch, lane   !! switch numbered within the bank
     real(wp), intent(in) :: t, angle, speed   !! t [s], u [rad], u' [rad/s]
     real(wp), intent(in) :: internal(:)   !! internal states of the element
-    real(wp) :: indicator
 
     associate (curve => self%curve(lane, switch), segment => self%branch(lane, switch))
       if (self%argument == over_time) then

@@ -69,7 +69,7 @@ contains
     work(:) = works%entry_elements()
     self%work_element = with_work(work)
     self%pattern%row = [row, row, (freedoms + c, c=1, freedoms), &
-                        (spread(2 * freedoms + internal%count + work(c), 1, 2), c=1, size(work))]
+                        (2 * freedoms + internal%count + work((c + 1) / 2), c=1, 2 * size(work))]
     self%pattern%column = [column, freedoms + column, (c, c=1, freedoms), &
                            (works%coordinate(c), freedoms + works%coordinate(c), c=1, size(work))]
     call append_internal(freedoms, incidence, with_work, internal, self)

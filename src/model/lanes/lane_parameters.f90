@@ -139,14 +139,9 @@ contains
   subroutine add_curves(self, curve)
     class(lane_parameters_t), intent(inout) :: self
     type(curve_t), target, intent(inout) :: curve(:, :)
-    type(curve_array_t), allocatable :: longer(:)
     integer :: e
 
-    if (self%curve_arrays == size(self%curve_array)) then
-      allocate (longer(2 * self%curve_arrays))
-      longer(:self%curve_arrays) = self%curve_array
-      call move_alloc(longer, self%curve_array)
-    end if
+    if (self%curve_arrays == size(self%curve_array)) self%curve_array = [self%curve_array, self%curve_array]
     self%curve_arrays = self%curve_arrays + 1
     self%curve_array(self%curve_arrays)%curve => curve
     call self%add_structure([(curve(1, e)%points(), e=1, size(curve, 2))])

@@ -51,8 +51,7 @@ contains
     logical, intent(in), optional :: without_bands    !! whether all rows are stored as CSR; absent: .false.
     type(sparse_map_t) :: self
     logical :: has_bands
-    integer :: order(size(column))
-    integer :: entries, rows
+    integer :: order(size(column)), entries, rows
 
     rows = size(first) - 1
     self%lanes = size(coefficient, 1)

@@ -186,13 +186,11 @@ contains
   pure subroutine sort_entries(self, begin, end)
     type(element_coordinates_t), intent(inout) :: self
     integer, intent(in) :: begin, end   !! first and last entry of the element
-    integer :: least, k, other
+    integer :: least, k
 
     do k = begin, end - 1
       least = k - 1 + minloc(self%coordinate(k:end), dim=1)
-      other = self%coordinate(k)
-      self%coordinate(k) = self%coordinate(least)
-      self%coordinate(least) = other
+      self%coordinate([k, least]) = self%coordinate([least, k])
       self%ratio(:, [k, least]) = self%ratio(:, [least, k])
       self%response(:, [k, least]) = self%response(:, [least, k])
     end do

@@ -349,11 +349,10 @@ contains
   end subroutine power
 
   !> Kinetic energy omega^T J omega / 2 of one lane [J].
-  pure function kinetic_energy(self, lane, omega) result(energy)
+  pure real(wp) function kinetic_energy(self, lane, omega) result(energy)
     class(machine_t), intent(in) :: self
     integer, intent(in) :: lane
     real(wp), intent(in) :: omega(:)   !! [rad/s], [bodies]
-    real(wp) :: energy
 
     energy = 0.5_wp * sum(self%inertia(lane, :) * omega**2)
   end function kinetic_energy

@@ -79,11 +79,10 @@ contains
   end subroutine polynomials
 
   !> Penetration of the edge of a branch [rad], negative at the lower edge.
-  pure function penetration(self, branch, lane, coupling, angle) result(x)
+  pure real(wp) function penetration(self, branch, lane, coupling, angle) result(x)
     class(gap_couplings_t), intent(in) :: self
     integer, intent(in) :: branch, lane, coupling
     real(wp), intent(in) :: angle   !! u [rad]
-    real(wp) :: x
 
     x = (angle - self%rest_twist(lane, coupling)) - sign(0.5_wp * self%gap(lane, coupling), real(branch, wp))
   end function penetration
@@ -111,10 +110,9 @@ contains
   end subroutine evaluate
 
   !> Damping moment of a branch [N m], or a derivative of it from those of M and d u'.
-  pure function damping_moment(branch, elastic, viscous) result(moment)
+  pure real(wp) function damping_moment(branch, elastic, viscous) result(moment)
     integer, intent(in) :: branch
     real(wp), intent(in) :: elastic, viscous   !! M, d u'
-    real(wp) :: moment
 
     select case (abs(branch))
     case (contact)
@@ -209,12 +207,11 @@ contains
     end associate
   end subroutine choose
 
-  pure function indicator(self, switch, lane, t, angle, speed, internal)
+  pure real(wp) function indicator(self, switch, lane, t, angle, speed, internal)
     class(gap_couplings_t), intent(in) :: self
     integer, intent(in) :: switch, lane   !! switch numbered within the bank
     real(wp), intent(in) :: t, angle, speed   !! t [s], u [rad], u' [rad/s]
     real(wp), intent(in) :: internal(:)   !! internal states of the element
-    real(wp) :: indicator
     real(wp) :: depth, elastic, viscous
     integer :: side
 

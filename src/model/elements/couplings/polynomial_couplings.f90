@@ -106,9 +106,8 @@ contains
   end subroutine evaluate_energies
 
   !> p_1 w + p_2 w^2 + ...
-  pure function elastic_moment(p, w) result(moment)
+  pure real(wp) function elastic_moment(p, w) result(moment)
     real(wp), intent(in) :: p(:), w   !! [N m/rad^k], [rad]
-    real(wp) :: moment
     integer :: k
 
     moment = 0.0_wp
@@ -118,9 +117,8 @@ contains
   end function elastic_moment
 
   !> d/dw of sum p_k w^k.
-  pure function elastic_slope(p, w) result(slope)
+  pure real(wp) function elastic_slope(p, w) result(slope)
     real(wp), intent(in) :: p(:), w   !! [N m/rad^k], [rad]
-    real(wp) :: slope
     integer :: k
 
     slope = 0.0_wp
@@ -130,9 +128,8 @@ contains
   end function elastic_slope
 
   !> d2/dw2 of sum p_k w^k.
-  pure function elastic_curvature(p, w) result(curvature)
+  pure real(wp) function elastic_curvature(p, w) result(curvature)
     real(wp), intent(in) :: p(:), w   !! [N m/rad^k], [rad]
-    real(wp) :: curvature
     integer :: k
 
     curvature = 0.0_wp
@@ -142,9 +139,8 @@ contains
   end function elastic_curvature
 
   !> sum p_k w^(k+1) / (k + 1).
-  pure function elastic_energy(p, w) result(energy)
+  pure real(wp) function elastic_energy(p, w) result(energy)
     real(wp), intent(in) :: p(:), w   !! [N m/rad^k], [rad]
-    real(wp) :: energy
     integer :: k
 
     energy = 0.0_wp

@@ -70,11 +70,10 @@ contains
   end subroutine evaluate
 
   !> Torque as a part of the amplitude.
-  pure function part_of_amplitude(self, lane, excitation, time) result(part)
+  pure real(wp) function part_of_amplitude(self, lane, excitation, time) result(part)
     class(timed_excitations_t), intent(in) :: self
     integer, intent(in) :: lane, excitation
     real(wp), intent(in) :: time   !! [s]
-    real(wp) :: part
 
     select case (self%branch(lane, excitation))
     case (before)
@@ -108,10 +107,9 @@ contains
   end subroutine differentiate
 
   !> Time at which the change ends [s].
-  pure function end_of_change(self, lane, excitation) result(time)
+  pure real(wp) function end_of_change(self, lane, excitation) result(time)
     class(timed_excitations_t), intent(in) :: self
     integer, intent(in) :: lane, excitation
-    real(wp) :: time
 
     time = self%begin(lane, excitation)
     if (self%shape(excitation) /= shape_step) time = time + self%duration(lane, excitation)
@@ -133,12 +131,11 @@ contains
   end subroutine choose
 
   !> In seconds, without a shift: time does not go back across a boundary.
-  pure function indicator(self, switch, lane, t, angle, speed, internal)
+  pure real(wp) function indicator(self, switch, lane, t, angle, speed, internal)
     class(timed_excitations_t), intent(in) :: self
     integer, intent(in) :: switch, lane   !! switch numbered within the bank
     real(wp), intent(in) :: t, angle, speed   !! t [s], u [rad], u' [rad/s]
     real(wp), intent(in) :: internal(:)   !! internal states of the element
-    real(wp) :: indicator
 
     select case (self%branch(lane, switch))
     case (before)

@@ -88,12 +88,11 @@ contains
     end associate
   end subroutine choose
 
-  pure function indicator(self, switch, lane, t, angle, speed, internal)
+  pure real(wp) function indicator(self, switch, lane, t, angle, speed, internal)
     class(governed_bank_t), intent(in) :: self
     integer, intent(in) :: switch, lane   !! switch numbered within the bank
     real(wp), intent(in) :: t, angle, speed   !! t [s], u [rad], u' [rad/s]
     real(wp), intent(in) :: internal(:)   !! internal states of the element
-    real(wp) :: indicator
 
     associate (motor => switch - self%first_governor())
       if (motor > 0) then

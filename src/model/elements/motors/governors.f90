@@ -30,12 +30,11 @@ module nocdyn_governors
 contains
 
   !> Throttle y on a branch.
-  pure function throttle(self, lane, motor, branch, z, speed) result(y)
+  pure real(wp) function throttle(self, lane, motor, branch, z, speed) result(y)
     class(governor_t), intent(in) :: self
     integer, intent(in) :: lane, motor
     integer, intent(in) :: branch   !! closed, governing or open
     real(wp), intent(in) :: z, speed   !! integral, speed of the motor [rad/s]
-    real(wp) :: y
 
     select case (branch)
     case (governing)
@@ -48,12 +47,11 @@ contains
   end function throttle
 
   !> Rate z' of the integral [1/s].
-  pure function rate(self, lane, motor, throttle, z)
+  pure real(wp) function rate(self, lane, motor, throttle, z)
     class(governor_t), intent(in) :: self
     integer, intent(in) :: lane, motor
     real(wp), intent(in) :: throttle   !! [1]
     real(wp), intent(in) :: z          !! integral [1]
-    real(wp) :: rate
 
     rate = (throttle - z) / self%time(lane, motor)
   end function rate
@@ -86,12 +84,11 @@ contains
   end function branch
 
   !> Distance of the throttle from the nearest boundary of a branch, negative beyond it.
-  pure function indicator(self, lane, motor, branch, z, speed)
+  pure real(wp) function indicator(self, lane, motor, branch, z, speed)
     class(governor_t), intent(in) :: self
     integer, intent(in) :: lane, motor
     integer, intent(in) :: branch   !! closed, governing or open
     real(wp), intent(in) :: z, speed   !! integral, speed of the motor [rad/s]
-    real(wp) :: indicator
 
     associate (y => self%throttle(lane, motor, governing, z, speed))
       select case (branch)

@@ -52,8 +52,7 @@ contains
   !> A bank of motors, each on one body, either with a law or with tables.
   function new_curve_motors(names, body, lanes, law, curve, governor, drag) result(bank)
     type(string_t), intent(in) :: names(:)
-    integer, intent(in) :: body(:)
-    integer, intent(in) :: lanes
+    integer, intent(in) :: body(:), lanes
     class(torque_curve_t), intent(in), optional :: law    !! of all motors
     type(curve_t), intent(in), optional :: curve(:, :)    !! [N m] over [rad/s], shape [lanes, motors]
     type(governor_t), intent(in), optional :: governor    !! of all motors; no motor has one if absent

@@ -51,20 +51,18 @@ module nocdyn_torque_curves
 
 contains
 
-  pure function quadratic_torque(self, lane, motor, speed) result(value)
+  pure real(wp) function quadratic_torque(self, lane, motor, speed) result(value)
     class(quadratic_curve_t), intent(in) :: self
     integer, intent(in) :: lane, motor
     real(wp), intent(in) :: speed   !! [rad/s]
-    real(wp) :: value
 
     value = self%a(lane, motor) - (self%b(lane, motor) + self%c(lane, motor) * speed) * speed
   end function quadratic_torque
 
-  pure function quadratic_slope(self, lane, motor, speed) result(value)
+  pure real(wp) function quadratic_slope(self, lane, motor, speed) result(value)
     class(quadratic_curve_t), intent(in) :: self
     integer, intent(in) :: lane, motor
     real(wp), intent(in) :: speed   !! [rad/s]
-    real(wp) :: value
 
     value = -(self%b(lane, motor) + 2.0_wp * self%c(lane, motor) * speed)
   end function quadratic_slope
