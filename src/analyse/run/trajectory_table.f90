@@ -80,8 +80,10 @@ contains
   pure function stored_energies(machine) result(energies)
     type(machine_t), intent(in) :: machine
     real(wp), allocatable :: energies(:)
+    integer, allocatable :: elastic(:)
 
-    allocate (energies, source=machine%elements%stored(1, machine%elastic()))
+    allocate (elastic, source=machine%elastic())
+    energies = machine%elements%stored(1, elastic)
   end function stored_energies
 
 end module nocdyn_trajectory_table

@@ -56,7 +56,10 @@ contains
       call count_digits(journals, pass, selections, statistics, error)
       if (allocated(error)) return
       do i = 1, size(selections)
-        if (pass == 1) call choose_ranks(statistics(i)%count, selections(i)%rank)
+        if (pass == 1) then   ! both neighbours of every quantile
+          selections(i)%rank(1::2) = int((statistics(i)%count - 1) * quantiles)
+          selections(i)%rank(2::2) = min(selections(i)%rank(1::2) + 1, statistics(i)%count - 1)
+        end if
         if (statistics(i)%count > 0) call resolve_digit(selections(i))
       end do
     end do
@@ -167,15 +170,6 @@ contains
       number_of = transfer(not(bits), number_of)
     end if
   end function number_of
-
-  !> The ranks of both neighbours of every quantile, from 0.
-  pure subroutine choose_ranks(n, ranks)
-    integer, intent(in) :: n
-    integer, intent(out) :: ranks(wanted)
-
-    ranks(1::2) = int((n - 1) * quantiles)
-    ranks(2::2) = min(ranks(1::2) + 1, n - 1)
-  end subroutine choose_ranks
 
   !> Finds one more digit of every wanted value from the histograms.
   pure subroutine resolve_digit(selection)

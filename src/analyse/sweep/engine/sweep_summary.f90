@@ -169,16 +169,15 @@ contains
     text = ''
     associate (variants => summary%without_trajectory)
       if (size(variants) == 0) return
-      text = input%file // ': note: variant ' // to_text(variants(1))
-      if (size(variants) > 1) text = input%file // ': note: variants ' // to_text(variants(1))
+      if (size(variants) == 1) then
+        text = input%file // ': note: variant ' // to_text(variants(1)) // ' was refused; it has no trajectory'
+        return
+      end if
+      text = input%file // ': note: variants ' // to_text(variants(1))
       do i = 2, size(variants)
         text = text // ', ' // to_text(variants(i))
       end do
-      if (size(variants) > 1) then
-        text = text // ' were refused; they have no trajectories'
-      else
-        text = text // ' was refused; it has no trajectory'
-      end if
+      text = text // ' were refused; they have no trajectories'
     end associate
   end function sweep_note
 

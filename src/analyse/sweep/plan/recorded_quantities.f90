@@ -187,17 +187,15 @@ contains
     integer, intent(in) :: record
     type(time_span_t), intent(in) :: span
     type(diagnostics_t), intent(inout) :: diagnostics
+    character(len=:), allocatable :: allowed
     real(wp) :: from
 
     if (.not. input%groups(record)%has_value('from')) return
     from = input%groups(record)%number('from')
-    if (from < span%t_start) then
-      call input%report(record, 'from', 'from = ' // to_text(from) // ' is out of range; allowed: >= t_start = ' // &
-                       to_text(span%t_start), diagnostics)
-    else if (from >= span%t_end) then
-      call input%report(record, 'from', 'from = ' // to_text(from) // ' is out of range; allowed: < t_end = ' // &
-                       to_text(span%t_end), diagnostics)
-    end if
+    allowed = '< t_end = ' // to_text(span%t_end)
+    if (from < span%t_start) allowed = '>= t_start = ' // to_text(span%t_start)
+    if (from < span%t_start .or. from >= span%t_end) call input%report(record, 'from', 'from = ' // to_text(from) // &
+                                                       ' is out of range; allowed: ' // allowed, diagnostics)
   end subroutine check_from
 
   subroutine append_statistic(statistics, statistic)
