@@ -20,8 +20,14 @@ KERNEL = "kernel"
 MANY_ARGUMENTS = {
     "src/analyse/sweep/statistics/linear_statistics.f90": (KERNEL, "bound_excess", "look_inside"),
     "src/analyse/sweep/statistics/step_strips.f90": (KERNEL, "add_integrals", "add_pair", "cut_step", "expand", "set_pair"),
-    "src/base/numerics/band_products.f90": (KERNEL, "pair_of_band", "pair_of_chain", "pair_of_toeplitz"),
-    "src/base/numerics/csr_products.f90": (KERNEL, "multiply_lanes", "multiply_rows"),
+    "src/base/numerics/sparse_products.f90": (
+        KERNEL,
+        "multiply_lanes",
+        "multiply_rows",
+        "pair_of_band",
+        "pair_of_chain",
+        "pair_of_toeplitz",
+    ),
     "src/integrate/core/stage_sums.f90": (KERNEL, "sum_few_terms", "sum_many_terms"),
     "src/model/constraints/coordinates.f90": (
         "constructor: what the analysis of the constraints has found, and the bodies that the user wants",

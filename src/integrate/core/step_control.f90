@@ -103,17 +103,12 @@ contains
     real(wp), intent(inout) :: t_new(lanes)   !! ends of the steps [s]
     integer :: lane
 
-    if (lanes == 1) then
-      call propose_one(control%longest, control%t_end, t(1), control%h(1), h(1), t_new(1))
-      control%ends_at_t_end(1) = t_new(1) >= control%t_end
-    else
-      associate (longest => control%longest, t_end => control%t_end, wanted => control%h)
-        do lane = 1, lanes
-          call propose_one(longest, t_end, t(lane), wanted(lane), h(lane), t_new(lane))
-        end do
-        control%ends_at_t_end(:) = t_new >= t_end
-      end associate
-    end if
+    associate (longest => control%longest, t_end => control%t_end, wanted => control%h)
+      do lane = 1, lanes
+        call propose_one(longest, t_end, t(lane), wanted(lane), h(lane), t_new(lane))
+      end do
+      control%ends_at_t_end(:) = t_new >= t_end
+    end associate
   end subroutine propose_steps
 
   !> The step of one lane, whose controller wants the size `wanted`.

@@ -43,7 +43,6 @@ module nocdyn_ensemble
   !> One variant for each lane, whose parameters the system holds already.
   type, extends(ensemble_t), public :: initial_states_t
     real(wp), allocatable :: y(:, :)        !! [lanes, components]: initial states, replaced by the last states
-    type(solver_status_t) :: solver_status
     logical, allocatable :: begun(:)
   contains
     procedure :: next

@@ -3,10 +3,11 @@
 !> The terms of a row are added in the order of its entries, in every lane and in each of the loops below, so that the result
 !> of a lane has the same bits in a block of any size.
 module nocdyn_sparse_map
+  use nocdyn_grouping, only: grouped, groups_t
   use nocdyn_kinds, only: wp
   use nocdyn_lane_parameters, only: lane_parameters_t
-  use nocdyn_csr_products, only: multiply_lanes, multiply_rows
-  use nocdyn_band_products, only: multiply_band, multiply_toeplitz, pair_of_band, pair_of_toeplitz
+  use nocdyn_sparse_products, only: multiply_band, multiply_lanes, multiply_rows, multiply_toeplitz, pair_of_band, &
+    pair_of_toeplitz
   implicit none (type, external)
   private
 
@@ -166,21 +167,12 @@ contains
     integer, intent(in) :: columns
     integer, intent(out) :: order(:)     !! [entries]
     integer, intent(out) :: first(:)     !! [columns + 1]
-    integer :: next(columns), i
+    type(groups_t) :: by_column
+    integer :: i
 
-    first = 0
-    do i = 1, size(column)
-      first(column(i) + 1) = first(column(i) + 1) + 1
-    end do
-    first(1) = 1
-    do i = 1, columns
-      first(i + 1) = first(i) + first(i + 1)
-    end do
-    next = first(:columns)
-    do i = 1, size(column)
-      order(next(column(i))) = i
-      next(column(i)) = next(column(i)) + 1
-    end do
+    by_column = grouped(columns, column, [(i, i=1, size(column))])
+    order = by_column%member
+    first = by_column%start
   end subroutine transposed_order
 
   !> u = map x.

@@ -1,13 +1,14 @@
-!> Products of band matrices with vectors: rows whose columns all advance by one from row to row.
+!> Products of sparse matrices with vectors, the loops of `sparse_map_t`: of bands, which are rows whose columns all advance by
+!> one from row to row, and of other rows in CSR form, there on blocks of lanes too.
 !>
 !> `multiply`: u = A x; `pair`: u = offset + A x and v = A y. A band is stored diagonal by diagonal; of a Toeplitz band, whose
 !> rows all have the same coefficients, only the first row is stored. The terms of a row are added one after the other.
-module nocdyn_band_products
+module nocdyn_sparse_products
   use nocdyn_kinds, only: wp
   implicit none (type, external)
   private
 
-  public :: multiply_band, multiply_toeplitz, pair_of_band, pair_of_toeplitz
+  public :: multiply_band, multiply_lanes, multiply_rows, multiply_toeplitz, pair_of_band, pair_of_toeplitz
 
   integer, parameter :: strip = 256   !! rows whose results stay in the first-level cache from diagonal to diagonal
 
@@ -148,4 +149,49 @@ contains
     end if
   end subroutine pair_of_chain
 
-end module nocdyn_band_products
+  !> u = A x in some rows in CSR form, one lane.
+  pure subroutine multiply_rows(rows, all_rows, columns, entries, row, first, column, coefficient, x, u)
+    integer, intent(in) :: rows, all_rows, columns, entries
+    integer, intent(in) :: row(rows), first(rows + 1), column(entries)
+    real(wp), intent(in) :: coefficient(entries), x(columns)
+    real(wp), intent(inout) :: u(all_rows)
+    real(wp) :: sum
+    integer :: i, k
+
+    do i = 1, rows
+      sum = 0.0_wp
+      do k = first(i), first(i + 1) - 1
+        sum = sum + coefficient(k) * x(column(k))
+      end do
+      u(row(i)) = sum
+    end do
+  end subroutine multiply_rows
+
+  !> u = A x in every lane, in CSR form.
+  pure subroutine multiply_lanes(lanes, rows, columns, entries, first, column, coefficient, x, u)
+    integer, intent(in) :: lanes, rows, columns, entries
+    integer, intent(in) :: first(rows + 1), column(entries)
+    real(wp), intent(in) :: coefficient(lanes, entries), x(lanes, columns)
+    real(wp), intent(inout) :: u(lanes, rows)
+    integer :: c, i, k, l
+
+    do i = 1, rows
+      k = first(i)
+      if (k == first(i + 1)) then
+        u(:, i) = 0.0_wp
+        cycle
+      end if
+      c = column(k)
+      do l = 1, lanes
+        u(l, i) = 0.0_wp + coefficient(l, k) * x(l, c)
+      end do
+      do k = first(i) + 1, first(i + 1) - 1
+        c = column(k)
+        do l = 1, lanes
+          u(l, i) = u(l, i) + coefficient(l, k) * x(l, c)
+        end do
+      end do
+    end do
+  end subroutine multiply_lanes
+
+end module nocdyn_sparse_products
