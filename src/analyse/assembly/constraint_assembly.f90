@@ -146,10 +146,9 @@ contains
   end subroutine form_rows
 
   !> The torques of members that have columns of their own.
-  function member_torques(joints, lanes) result(members)
+  type(member_torques_t) function member_torques(joints, lanes) result(members)
     type(joint_t), intent(in) :: joints(:)
     integer, intent(in) :: lanes
-    type(member_torques_t) :: members
     integer :: i, k, m
 
     associate (columns => sum([(count(joints(i)%members /= ''), i=1, size(joints))]))

@@ -97,9 +97,8 @@ contains
   end subroutine add_coupling_form
 
   !> What the constructors of all forms take.
-  function common_of(groups) result(common)
+  type(coupling_common_t) function common_of(groups) result(common)
     type(element_groups_t), intent(in) :: groups
-    type(coupling_common_t) :: common
     real(wp) :: friction(groups%lanes, size(groups%indices))
 
     allocate (common%names, source=groups%names)

@@ -50,9 +50,8 @@ module nocdyn_element_groups
 contains
 
   !> The index of the bodies with these names.
-  function new_body_index(names) result(body_index)
+  type(body_index_t) function new_body_index(names) result(body_index)
     type(string_t), intent(in) :: names(:)
-    type(body_index_t) :: body_index
 
     allocate (body_index%names, source=names)
     call argsort(body_index%names, body_index%order)
@@ -75,12 +74,11 @@ contains
   end function bodies_of
 
   !> All groups of one kind.
-  function new_element_groups(input, kind, lanes, body_index) result(groups)
+  type(element_groups_t) function new_element_groups(input, kind, lanes, body_index) result(groups)
     type(input_t), target, intent(in) :: input
     character(len=*), intent(in) :: kind   !! 'coupling', 'motor' ...
     integer, intent(in) :: lanes
     type(body_index_t), target, intent(in), optional :: body_index   !! for `bodies`
-    type(element_groups_t) :: groups
     integer :: i
 
     groups%lanes = lanes
@@ -109,10 +107,9 @@ contains
   end subroutine add_banks
 
   !> Those of the groups that a mask selects.
-  function some_of(groups, mask) result(some)
+  type(element_groups_t) function some_of(groups, mask) result(some)
     type(element_groups_t), intent(in) :: groups
     logical, intent(in) :: mask(:)   !! [groups]
-    type(element_groups_t) :: some
     integer :: i
 
     some%lanes = groups%lanes

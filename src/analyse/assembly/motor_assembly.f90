@@ -87,9 +87,8 @@ contains
     end select
   end subroutine add_motor_form
 
-  function governor_of(groups) result(governor)
+  type(governor_t) function governor_of(groups) result(governor)
     type(element_groups_t), intent(in) :: groups
-    type(governor_t) :: governor
 
     allocate (governor%set_speed, source=groups%values('governor_speed'))
     allocate (governor%gain, source=groups%values('governor_gain'))

@@ -75,9 +75,8 @@ contains
   end subroutine choose_settings
 
   !> Stored rows of the factors of a stage matrix: its band with the fill-in of pivoting, at most all rows.
-  function stage_matrix_rows(formulation) result(rows)
+  integer function stage_matrix_rows(formulation) result(rows)
     class(formulation_t), intent(in) :: formulation
-    integer :: rows
     type(entries_t) :: entries
     integer :: lower, upper
 

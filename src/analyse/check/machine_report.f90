@@ -242,10 +242,9 @@ contains
   end function speed_relation
 
   !> The ratio of an independent body's speed to its coordinate: 1 with the natural complement.
-  pure function own_ratio(machine, body) result(ratio)
+  pure real(wp) function own_ratio(machine, body) result(ratio)
     type(machine_t), intent(in) :: machine
     integer, intent(in) :: body
-    real(wp) :: ratio
     integer :: entry
 
     ratio = 0.0_wp

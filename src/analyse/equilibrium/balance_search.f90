@@ -153,12 +153,11 @@ contains
   end function is_local_minimum
 
   !> Torque along a rigid motion at a speed; zero if it is rounding.
-  function imbalance(balance, z, member, speed) result(torque)
+  real(wp) function imbalance(balance, z, member, speed) result(torque)
     type(torque_balance_t), intent(inout) :: balance
     real(wp), intent(in) :: z(:)    !! the other unknowns, [unknowns]
     integer, intent(in) :: member   !! number of the rigid motion
     real(wp), intent(in) :: speed   !! [rad/s]
-    real(wp) :: torque
     real(wp) :: point(size(z))
 
     point = z

@@ -228,10 +228,9 @@ contains
   end function growth_rate
 
   !> The steady state with the least kinetic energy relative to the start; among the stable ones, if there are any.
-  function nearest_equilibrium(formulation, equilibria) result(nearest)
+  integer function nearest_equilibrium(formulation, equilibria) result(nearest)
     class(formulation_t), intent(inout) :: formulation
     type(equilibrium_t), intent(in) :: equilibria(:)
-    integer :: nearest
     real(wp) :: distances(size(equilibria)), start(formulation%machine%bodies)
     logical :: is_stable(size(equilibria))
     integer :: i

@@ -36,11 +36,10 @@ module nocdyn_equilibrium_report
 contains
 
   !> Evaluates the columns of trajectory.csv at the steady states.
-  function new_equilibrium_report(formulation, equilibria, notes) result(self)
+  type(equilibrium_report_t) function new_equilibrium_report(formulation, equilibria, notes) result(self)
     class(formulation_t), intent(in) :: formulation
     type(equilibrium_t), intent(in) :: equilibria(:)
     type(string_t), intent(in) :: notes(:)
-    type(equilibrium_report_t) :: self
     type(trajectory_table_t) :: table
     real(wp), allocatable :: row(:), watts(:, :), y(:)
     integer, allocatable :: reported(:)                 !! columns

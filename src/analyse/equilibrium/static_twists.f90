@@ -176,10 +176,9 @@ contains
   end subroutine set_up
 
   !> Pairs of coordinates that an elastic element couples.
-  function joined_coordinates(balance, number) result(entries)
+  type(entries_t) function joined_coordinates(balance, number) result(entries)
     type(torque_balance_t), intent(in) :: balance
     integer, intent(in) :: number(:)   !! of each coordinate in the matrix, 0 if it has none
-    type(entries_t) :: entries
     integer :: e, i, k, n
 
     associate (first => balance%incidence%first, coordinate => balance%incidence%coordinate)

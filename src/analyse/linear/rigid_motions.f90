@@ -41,11 +41,10 @@ module nocdyn_rigid_motions
 contains
 
   !> The rigid motions of a machine.
-  function new_rigid_motions(freedoms, incidence, elastic) result(self)
+  type(rigid_motions_t) function new_rigid_motions(freedoms, incidence, elastic) result(self)
     integer, intent(in) :: freedoms                        !! number of coordinates
     type(element_coordinates_t), intent(in) :: incidence   !! twists of the elements by coordinates; the first lane is used
     integer, intent(in) :: elastic(:)                      !! elements that must not be twisted
-    type(rigid_motions_t) :: self
     type(linear_combination_t) :: definition(freedoms)
     type(row_t) :: row
     integer :: e, k

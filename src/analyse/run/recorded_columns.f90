@@ -35,10 +35,9 @@ module nocdyn_recorded_columns
 contains
 
   !> An evaluator of some columns.
-  function new_recorded_columns(formulation, columns) result(self)
+  type(recorded_columns_t) function new_recorded_columns(formulation, columns) result(self)
     class(formulation_t), intent(in) :: formulation   !! with work integrals if a column needs them
     type(column_t), intent(in) :: columns(:)
-    type(recorded_columns_t) :: self
     integer :: i
 
     if (any(columns%kind >= column_work_in) .and. .not. formulation%has_energy_balance) then

@@ -26,10 +26,9 @@ module nocdyn_trajectory_table
 contains
 
   !> A table for the columns of a machine. The energies of the start are those at `t_start`.
-  function new_trajectory_table(formulation, t_start) result(table)
+  type(trajectory_table_t) function new_trajectory_table(formulation, t_start) result(table)
     class(formulation_t), intent(in) :: formulation   !! of one lane, with work integrals
     real(wp), intent(in) :: t_start                   !! [s]
-    type(trajectory_table_t) :: table
     type(column_t), allocatable :: columns(:)
 
     call list_columns(formulation%machine, columns, table%labels)

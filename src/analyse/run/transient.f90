@@ -213,10 +213,9 @@ contains
   end subroutine on_extremes
 
   !> Whether the caller wants the run to end.
-  function wants_stop(self, t)
+  logical function wants_stop(self, t)
     class(run_observer_t), intent(inout) :: self
     real(wp), intent(in) :: t   !! time reached [s]
-    logical :: wants_stop
 
     wants_stop = self%output%wants_stop((t - self%t_start) / (self%t_end - self%t_start))
   end function wants_stop

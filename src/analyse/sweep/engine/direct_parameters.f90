@@ -38,12 +38,11 @@ module nocdyn_direct_parameters
 contains
 
   !> Finds the targets in the machine of a block.
-  function new_direct_parameters(input, targets, machine, parameters) result(self)
+  type(direct_parameters_t) function new_direct_parameters(input, targets, machine, parameters) result(self)
     type(input_t), intent(in) :: input
     type(target_t), intent(in) :: targets(:)
     type(machine_t), intent(in) :: machine
     type(lane_parameters_t), intent(in) :: parameters   !! of the block
-    type(direct_parameters_t) :: self
     integer :: g, i
 
     allocate (self%target(0), self%index(0), self%banks(0), self%inertia_target(0), self%body(0))

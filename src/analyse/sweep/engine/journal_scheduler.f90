@@ -139,9 +139,8 @@ contains
   end subroutine finalise
 
   !> True after Ctrl-C, and when the journal cannot be written.
-  function is_cancelled(self)
+  logical function is_cancelled(self)
     class(journal_scheduler_t), intent(in) :: self
-    logical :: is_cancelled
 
     !$omp atomic read
     is_cancelled = self%has_failed

@@ -93,8 +93,7 @@ contains
   end subroutine compute_chunks
 
   !> Of a clock that only runs forward [s].
-  function time_now() result(seconds)
-    real(wp) :: seconds
+  real(wp) function time_now() result(seconds)
     integer(int64) :: count, rate
 
     call system_clock(count, rate)

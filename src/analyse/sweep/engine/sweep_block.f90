@@ -216,10 +216,9 @@ contains
   end subroutine compute_in_own_block
 
   !> Polls the scheduler every `poll_interval` steps, unless another thread does.
-  function wants_stop(self, t)
+  logical function wants_stop(self, t)
     class(block_observer_t), intent(inout) :: self
     real(wp), intent(in) :: t
-    logical :: wants_stop
 
     wants_stop = .false.
     self%steps = mod(self%steps + 1, poll_interval)

@@ -74,9 +74,8 @@ contains
 
   !> All combinations of `count` equidistant values from `low` to `high` of each factor (`low` alone if `count` is 1). The last
   !> factor varies fastest. The distributions do not matter.
-  function grid_design(factors) result(design)
+  type(grid_design_t) function grid_design(factors) result(design)
     type(factor_t), intent(in) :: factors(:)   !! with `grid_size` at most `max_variants`
-    type(grid_design_t) :: design
 
     if (grid_size(factors) > max_variants) error stop 'nocdyn_designs: the grid has too many variants'
     design%variants = int(grid_size(factors))
@@ -123,12 +122,11 @@ contains
   !> - latin: a Latin hypercube (M. D. McKay, R. J. Beckman, W. J. Conover, Technometrics 21 (1979) 239-245): the range of each
   !>   factor is divided into as many equally probable strata as there are samples, with one random value in each stratum.
   !> - sobol: Sobol points from the first one on; a seed other than 0 shifts all of them.
-  function sampled_design(word, factors, samples, seed) result(design)
+  type(sampled_design_t) function sampled_design(word, factors, samples, seed) result(design)
     character(len=*), intent(in) :: word       !! 'random', 'latin', 'sobol'
     type(factor_t), intent(in) :: factors(:)   !! at most `max_dimensions` if sobol
     integer, intent(in) :: samples             !! at least 1
     integer, intent(in) :: seed                !! at least 0
-    type(sampled_design_t) :: design
     integer :: i
 
     design%variants = samples
@@ -167,9 +165,8 @@ contains
   end subroutine sampled_values
 
   !> A list of values.
-  function list_design(values) result(design)
+  type(list_design_t) function list_design(values) result(design)
     real(wp), intent(in) :: values(:, :)   !! [varied, variants]
-    type(list_design_t) :: design
 
     design%varied = size(values, 1)
     design%variants = size(values, 2)
@@ -212,9 +209,8 @@ contains
     end select
   end function can_overflow
 
-  pure function distribution_of(factor) result(distribution)
+  pure type(distribution_t) function distribution_of(factor) result(distribution)
     type(factor_t), intent(in) :: factor
-    type(distribution_t) :: distribution
 
     select case (factor%distribution)
     case ('uniform')

@@ -195,9 +195,8 @@ contains
     end do
   end subroutine find_varied
 
-  function factor_of(group) result(factor)
+  type(factor_t) function factor_of(group) result(factor)
     type(group_t), intent(in) :: group
-    type(factor_t) :: factor
 
     factor%distribution = group%text('distribution')
     factor%low = group%number('low', factor%low)

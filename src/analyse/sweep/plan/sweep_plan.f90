@@ -119,10 +119,9 @@ contains
   end function summary
 
   !> The time span of the base machine, as far as it does not vary.
-  pure function fixed_span(input, targets) result(span)
+  pure type(time_span_t) function fixed_span(input, targets) result(span)
     type(input_t), intent(in) :: input
     type(target_t), intent(in) :: targets(:)
-    type(time_span_t) :: span
     integer :: i
 
     i = input%position('run')
@@ -150,10 +149,9 @@ contains
   end subroutine merge_errors
 
   !> The header of the files of a shard.
-  function new_sweep_header(plan, shard, shards) result(header)
+  type(sweep_header_t) function new_sweep_header(plan, shard, shards) result(header)
     type(sweep_plan_t), intent(in) :: plan
     integer, intent(in) :: shard, shards   !! 1 of 1 is the whole sweep
-    type(sweep_header_t) :: header
     type(group_t) :: group
 
     header%title = plan%input%title()
@@ -204,9 +202,8 @@ contains
   end function has_sweep
 
   !> The input without the groups of the sweep.
-  pure function without_sweep(input) result(machine_input)
+  pure type(input_t) function without_sweep(input) result(machine_input)
     type(input_t), intent(in) :: input
-    type(input_t) :: machine_input
     logical :: is_kept(size(input%groups))
     integer :: i, kept
 

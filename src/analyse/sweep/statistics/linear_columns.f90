@@ -72,10 +72,9 @@ contains
   end function is_quantity
 
   !> The given columns, each `is_linear`. `copy_lane` sets the parameters of a lane.
-  function new_linear_columns(block, columns) result(self)
+  type(linear_columns_t) function new_linear_columns(block, columns) result(self)
     class(formulation_t), intent(in) :: block
     type(column_t), intent(in) :: columns(:)
-    type(linear_columns_t) :: self
     integer :: i, strips
 
     self%count = size(columns)

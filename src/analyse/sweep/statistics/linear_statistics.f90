@@ -41,12 +41,11 @@ module nocdyn_linear_statistics
 contains
 
   !> Statistics of the variants that pass through the lanes of a block.
-  function new_linear_statistics(block, columns, statistics, t_start, t_end) result(self)
+  type(linear_statistics_t) function new_linear_statistics(block, columns, statistics, t_start, t_end) result(self)
     class(formulation_t), intent(in) :: block
     type(column_t), intent(in) :: columns(:)         !! of the trajectory table
     type(statistic_t), intent(in) :: statistics(:)   !! each of a column that `is_linear`
     real(wp), intent(in) :: t_start, t_end           !! of every variant [s]
-    type(linear_statistics_t) :: self
     integer, allocatable :: wanted(:)
     integer :: i
 

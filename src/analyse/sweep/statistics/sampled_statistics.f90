@@ -60,12 +60,11 @@ module nocdyn_sampled_statistics
 contains
 
   !> Statistics of the variants that pass through the lanes of a formulation.
-  function new_sampled_statistics(formulation, columns, statistics, t_end) result(self)
+  type(sampled_statistics_t) function new_sampled_statistics(formulation, columns, statistics, t_end) result(self)
     class(formulation_t), intent(in) :: formulation
     type(column_t), intent(in) :: columns(:)         !! of the trajectory table
     type(statistic_t), intent(in) :: statistics(:)   !! each of a column
     real(wp), intent(in) :: t_end                    !! of every variant [s]
-    type(sampled_statistics_t) :: self
     integer, allocatable :: column_numbers(:), wanted(:)
 
     if (size(statistics) == 0) return   ! without a copy of the formulation

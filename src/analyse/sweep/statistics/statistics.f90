@@ -39,13 +39,12 @@ module nocdyn_statistics
 contains
 
   !> The statistic of a column with a label such as 'moment_shaft [N m]'.
-  function new_statistic(labels, column, kind, t_start, from, band) result(self)
+  type(statistic_t) function new_statistic(labels, column, kind, t_start, from, band) result(self)
     type(string_t), intent(in) :: labels(:)     !! of the trajectory table
     integer, intent(in) :: column, kind
     real(wp), intent(in) :: t_start             !! [s]
     real(wp), intent(in), optional :: from      !! [s]; t_start if absent
     real(wp), intent(in), optional :: band      !! of a settling time; `default_band` if absent
-    type(statistic_t) :: self
     integer :: bracket
 
     self%quantity = labels(column)%text

@@ -56,11 +56,10 @@ contains
   end function needs_work_integrals
 
   !> An observer of a block, which stays where it is. Only the reduced formulation may change the parameters of its lanes.
-  function new_statistics_observer(block, statistics, t_start, t_end) result(self)
+  type(statistics_observer_t) function new_statistics_observer(block, statistics, t_start, t_end) result(self)
     class(formulation_t), target, intent(inout) :: block   !! with work integrals if `needs_work_integrals`
     type(statistic_t), intent(in) :: statistics(:)         !! each with t_start <= from < t_end
     real(wp), intent(in) :: t_start, t_end                 !! of every variant [s]
-    type(statistics_observer_t) :: self
     type(statistic_t), allocatable :: found(:)
     type(column_t), allocatable :: columns(:)
     type(string_t), allocatable :: labels(:)
