@@ -45,7 +45,7 @@ contains
     parent = [(r, r=1, rows)]
     block_of = 0
     k = 0
-    redundant = [(groups(g)%redundancies%row, g=1, size(groups))]
+    allocate (redundant, source=[(groups(g)%redundancies%row, g=1, size(groups))])
     do g = 1, size(groups)
       do i = 1, size(groups(g)%redundancies)
         associate (redundancy => groups(g)%redundancies(i))
