@@ -23,10 +23,14 @@ module nocdyn_recorded_columns
     class(formulation_t), allocatable :: formulation
     type(segment_t), allocatable, private :: segments(:)
     type(lane_parameters_t), private :: parameters       !! of `formulation`; empty before `copy_lane`
-    logical, private :: have_reactions = .false., have_energies = .false.
+    logical, private :: have_reactions = .false.
+    logical, private :: have_energies = .false.          !! whether a column is an energy or a work
+    logical, private :: have_elastic = .false., have_works = .false.   !! whether a column needs these
     real(wp), allocatable, private :: values(:)          !! of one quantity of a bank; work space
     real(wp), allocatable, private :: lambda(:)          !! multipliers of the constraint rows; work space
-    logical, allocatable, private :: is_source(:)        !! whether a work counts as put in, [quadratures]
+    integer, allocatable, private :: works_in(:)         !! indices of the works that count as put in, in the quadratures
+    integer, allocatable, private :: works_out(:)        !! those of the others
+    real(wp), private :: energies(column_kinetic:column_residual) = 0.0_wp   !! of one row [J]; work space
     real(wp), allocatable, private :: start_energy(:)    !! [J], [lanes]
   contains
     procedure :: copy_lane, start_lane, observe, fill_row, kinetic_energy
@@ -38,6 +42,7 @@ contains
   type(recorded_columns_t) function new_recorded_columns(formulation, columns) result(self)
     class(formulation_t), intent(in) :: formulation   !! with work integrals if a column needs them
     type(column_t), intent(in) :: columns(:)
+    logical, allocatable :: is_source(:)   ! [quadratures]
     integer :: i
 
     if (any(columns%kind >= column_work_in) .and. .not. formulation%has_energy_balance) then
@@ -46,11 +51,15 @@ contains
     allocate (self%formulation, source=formulation)
     allocate (self%segments, source=segments_of(columns))
     self%have_reactions = any(columns%kind == column_reaction .or. columns%kind == column_member)
-    self%have_energies = any(columns%kind == column_elastic .or. columns%kind == column_residual)
+    self%have_energies = any(columns%kind >= column_kinetic)
+    self%have_elastic = any(columns%kind == column_elastic .or. columns%kind == column_residual)
+    self%have_works = any(columns%kind >= column_work_in)
     associate (banks => formulation%machine%banks)
       allocate (self%values(maxval([(size(banks(i)%bank%to), i=1, size(banks))])), source=0.0_wp)
-      allocate (self%is_source, source=[(spread(banks(i)%bank%is_source(), 1, size(banks(i)%bank%with_work)), i=1, size(banks))])
+      allocate (is_source, source=[(spread(banks(i)%bank%is_source(), 1, size(banks(i)%bank%with_work)), i=1, size(banks))])
     end associate
+    allocate (self%works_in, source=pack([(i, i=1, size(is_source))], is_source))
+    allocate (self%works_out, source=pack([(i, i=1, size(is_source))], .not. is_source))
     allocate (self%lambda(formulation%machine%constraints%rows()), source=0.0_wp)
     allocate (self%start_energy(formulation%lanes), source=0.0_wp)
   end function new_recorded_columns
@@ -97,7 +106,7 @@ contains
     class(recorded_columns_t), intent(inout) :: self
     integer, intent(in) :: lane
 
-    if (self%have_energies) self%start_energy(lane) = self%kinetic_energy(lane) + elastic_energy(self, lane)
+    if (self%have_elastic) self%start_energy(lane) = self%kinetic_energy(lane) + elastic_energy(self, lane)
   end subroutine start_lane
 
   !> Evaluates the machine of all lanes at a time and state.
@@ -107,7 +116,7 @@ contains
     real(wp), contiguous, intent(in) :: y(:, :)   !! [lanes, states + quadratures]
 
     call self%formulation%observe(t, y)
-    if (self%have_energies) call self%formulation%machine%evaluate_energies()
+    if (self%have_elastic) call self%formulation%machine%evaluate_energies()
   end subroutine observe
 
   !> The values of a lane's columns, after `observe` at (t, y).
@@ -120,6 +129,7 @@ contains
     integer :: k
 
     if (self%have_reactions) call self%formulation%reactions(lane, self%lambda)
+    if (self%have_energies) call find_energies(self, lane, y)
     associate (machine => self%formulation%machine, members => self%formulation%machine%constraints%members)
       do k = 1, size(self%segments)
         associate (segment => self%segments(k), first => self%segments(k)%first, last => self%segments(k)%last, &
@@ -141,37 +151,33 @@ contains
             row(first:last) = self%lambda(i:j)
           case (column_member)
             row(first:last) = members%factor(lane, i:j) * self%lambda(members%row(i:j))
+          case (column_kinetic:column_residual)
+            row(first) = self%energies(segment%kind)
           case default
-            row(first) = energy(self, lane, segment%kind, y)
+            error stop 'nocdyn_recorded_columns: there is no such column'
           end select
         end associate
       end do
     end associate
   end subroutine fill_row
 
-  !> The value of an energy or work column of one lane [J].
-  real(wp) function energy(self, lane, kind, y)
-    type(recorded_columns_t), intent(in) :: self
-    integer, intent(in) :: lane, kind
-    real(wp), contiguous, intent(in) :: y(:, :)
+  !> Energies and works of one lane, one number for each kind of column.
+  subroutine find_energies(self, lane, y)
+    type(recorded_columns_t), intent(inout) :: self
+    integer, intent(in) :: lane
+    real(wp), contiguous, intent(in) :: y(:, :)   !! [lanes, states + quadratures]
 
-    energy = 0.0_wp
-    select case (kind)
-    case (column_kinetic)
-      energy = self%kinetic_energy(lane)
-    case (column_elastic)
-      energy = elastic_energy(self, lane)
-    case (column_work_in)
-      energy = work(self, lane, .true., y)
-    case (column_work_out)
-      energy = 0.0_wp - work(self, lane, .false., y)   ! not -0 without any work
-    case (column_residual)
-      energy = (self%kinetic_energy(lane) + elastic_energy(self, lane) - self%start_energy(lane)) &
-               - (work(self, lane, .true., y) + work(self, lane, .false., y))
-    case default
-      error stop 'nocdyn_recorded_columns: there is no such column'
-    end select
-  end function energy
+    associate (energies => self%energies)
+      energies(column_kinetic) = self%kinetic_energy(lane)
+      if (self%have_elastic) energies(column_elastic) = elastic_energy(self, lane)
+      if (.not. self%have_works) return
+      energies(column_work_in) = work(self%works_in, self%formulation%states, lane, y)
+      energies(column_work_out) = work(self%works_out, self%formulation%states, lane, y)
+      energies(column_residual) = (energies(column_kinetic) + energies(column_elastic) - self%start_energy(lane)) &
+                                  - (energies(column_work_in) + energies(column_work_out))
+      energies(column_work_out) = 0.0_wp - energies(column_work_out)   ! not -0 without any work
+    end associate
+  end subroutine find_energies
 
   !> The kinetic energy of a lane after `observe` [J].
   pure real(wp) function kinetic_energy(self, lane)
@@ -189,16 +195,18 @@ contains
     elastic_energy = sum(self%formulation%machine%elements%stored(lane, :))
   end function elastic_energy
 
-  !> The integrated work of the sources, or of all other elements, positive into the machine [J].
-  pure real(wp) function work(self, lane, of_sources, y)
-    type(recorded_columns_t), intent(in) :: self
+  !> The sum of some work integrals of a lane, positive into the machine [J].
+  pure real(wp) function work(works, states, lane, y)
+    integer, intent(in) :: works(:)   !! indices in the quadratures
+    integer, intent(in) :: states     !! their number, before the quadratures
     integer, intent(in) :: lane
-    logical, intent(in) :: of_sources
     real(wp), contiguous, intent(in) :: y(:, :)
+    integer :: i
 
-    associate (states => self%formulation%states)
-      work = sum(y(lane, states + 1:states + size(self%is_source)), mask=self%is_source .eqv. of_sources)
-    end associate
+    work = 0.0_wp
+    do i = 1, size(works)
+      work = work + y(lane, states + works(i))
+    end do
   end function work
 
 end module nocdyn_recorded_columns
