@@ -93,22 +93,40 @@ contains
     end do
   end subroutine evaluate_batch
 
-  !> Horner's scheme.
+  !> Horner's scheme, written out for the degrees of the methods so that the innermost loop is over the components.
   pure subroutine evaluate(n, degree, x, c, y)
     integer, intent(in) :: n, degree
     real(wp), intent(in) :: x
     real(wp), intent(in) :: c(n, 0:degree)
     real(wp), intent(inout) :: y(n)
-    real(wp) :: sum(width)
     integer :: i, p
 
-    do i = 1, n, width
-      sum = c(i:i + width - 1, degree)
-      do p = degree - 1, 0, -1
-        sum = c(i:i + width - 1, p) + x * sum
+    select case (degree)
+    case (3)
+      do i = 1, n, width
+        associate (j => i + width - 1)
+          y(i:j) = c(i:j, 0) + x * (c(i:j, 1) + x * (c(i:j, 2) + x * c(i:j, 3)))
+        end associate
       end do
-      y(i:i + width - 1) = sum
-    end do
+    case (4)
+      do i = 1, n, width
+        associate (j => i + width - 1)
+          y(i:j) = c(i:j, 0) + x * (c(i:j, 1) + x * (c(i:j, 2) + x * (c(i:j, 3) + x * c(i:j, 4))))
+        end associate
+      end do
+    case (7)
+      do i = 1, n, width
+        associate (j => i + width - 1)
+          y(i:j) = c(i:j, 0) + x * (c(i:j, 1) + x * (c(i:j, 2) + x * (c(i:j, 3) + x * (c(i:j, 4) + x * (c(i:j, 5) &
+                                    + x * (c(i:j, 6) + x * c(i:j, 7)))))))
+        end associate
+      end do
+    case default
+      y(:) = c(:, degree)
+      do p = degree - 1, 0, -1
+        y(:) = c(:, p) + x * y
+      end do
+    end select
   end subroutine evaluate
 
 end module nocdyn_dense_output
