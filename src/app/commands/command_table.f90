@@ -1,8 +1,11 @@
 !> The table of commands. A new command is a row here and a module with its procedure.
 module nocdyn_command_table
-  use nocdyn_analysis_commands, only: analyse_files
+  use nocdyn_check_command, only: check_command
   use nocdyn_commands, only: add_command, command_t
   use nocdyn_companion_command, only: companion_command
+  use nocdyn_equilibrium_command, only: equilibrium_command
+  use nocdyn_matrices_command, only: matrices_command
+  use nocdyn_modes_command, only: modes_command
   use nocdyn_new_command, only: new_command
   use nocdyn_run_command, only: run_command
   implicit none (type, external)
@@ -39,14 +42,14 @@ contains
       'failed computation, the rows up to there are in trajectory.partial.csv.', run_command)
     call add_command(commands, 'check', 'FILE...', '--set', 'read and analyse, integrate nothing', &
       'Reads the files and analyses the machines. Prints every error with its line, or the degrees of freedom,' // nl // &
-      'independent coordinates, ratios between geared bodies, redundant gears, and the sweep if there is one.', analyse_files)
+      'independent coordinates, ratios between geared bodies, redundant gears, and the sweep if there is one.', check_command)
     call add_command(commands, 'equilibrium', 'FILE...', '--out --set', &
       'steady states: speeds, torques, twists, powers, stability', &
       'Finds the steady states of the machines: constant speeds at which the mean torques balance, and the' // nl // &
       'twists of the couplings that transmit them. If there are several steady states, all are printed with' // nl // &
       'their stability. Excitations enter with their mean.' // nl // nl // &
       '  --out DIR          write equilibrium.json to DIR, with several files to DIR/<name of the file>' // nl // nl // &
-      'Exit code 1: there is no steady state.', analyse_files)
+      'Exit code 1: there is no steady state.', equilibrium_command)
     call add_command(commands, 'modes', 'FILE...', '--out --set --at', &
       'natural frequencies, damping, shapes and energies of the modes', &
       'Linearises the machines and prints natural frequencies, damping ratios, time constants and the' // nl // &
@@ -54,9 +57,9 @@ contains
       '  --at equilibrium   about the steady state (default); of several, the stable one nearest to the start' // nl // &
       '  --at rest          at the start angles, with zero speeds and mean torques' // nl // &
       '  --at TIME          at a time of the run [s], which is integrated up to there' // nl // &
-      '  --out DIR          write modes.csv and modes.json to DIR, with several files to DIR/<name of the file>', analyse_files)
+      '  --out DIR          write modes.csv and modes.json to DIR, with several files to DIR/<name of the file>', modes_command)
     call add_command(commands, 'matrices', 'FILE', '--set', 'print the matrices of the method for a machine', &
-      'Prints every matrix and vector of the method for the machine at its start, with its equation number.', analyse_files)
+      'Prints every matrix and vector of the method for the machine at its start, with its equation number.', matrices_command)
   end subroutine list_analyses
 
   subroutine list_sweeps(commands)
