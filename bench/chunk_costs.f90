@@ -42,19 +42,19 @@ contains
     type(chunk_t), intent(in) :: chunk
     real(wp), intent(in) :: seconds
 
-    if (chunk%count > self%size .or. seconds < 0) error stop 'counting_dispatcher: a chunk that was not handed out'
+    if (chunk%count > self%size .or. seconds < 0) error stop 'counting_scheduler: a chunk that was not handed out'
   end subroutine submit
 
   subroutine poll(self)
     class(counting_scheduler_t), intent(inout) :: self
 
-    if (self%left < 0) error stop 'counting_dispatcher: more was handed out than there is'
+    if (self%left < 0) error stop 'counting_scheduler: more was handed out than there is'
   end subroutine poll
 
   subroutine finalise(self)
     class(counting_scheduler_t), intent(inout) :: self
 
-    if (self%left > 0) error stop 'counting_dispatcher: something is left'
+    if (self%left > 0) error stop 'counting_scheduler: something is left'
   end subroutine finalise
 
   logical function is_cancelled(self)
@@ -73,13 +73,13 @@ program chunk_costs
   use nocdyn_input, only: input_t
   use nocdyn_input_reader, only: read_input
   use nocdyn_kinds, only: wp
+  use nocdyn_sweep, only: prepare_sweep, sweep_setup_t
   use nocdyn_sweep_block, only: new_sweep_block, sweep_block_t
   use nocdyn_sweep_chunk, only: chunk_t, pack_chunk
-  use nocdyn_plan_header, only: new_sweep_header
   use nocdyn_sweep_journal, only: create_journal, sweep_journal_t
-  use nocdyn_sweep_plan, only: make_plan, sweep_plan_t
-  use nocdyn_sweep_setup, only: prepare_sweep, sweep_setup_t
+  use nocdyn_sweep_plan, only: make_plan, new_sweep_header, sweep_plan_t
   use nocdyn_text, only: string_t
+  use omp_lib, only: omp_destroy_lock, omp_init_lock, omp_set_lock, omp_unset_lock
   implicit none (type, external)
 
   type(sweep_plan_t), target :: plan
@@ -109,9 +109,9 @@ contains
     if (allocated(error)) call give_up(error%message)
     scheduler%left = whole_argument(2)
     scheduler%size = whole_argument(3)
-    call scheduler%create_lock()
+    call omp_init_lock(scheduler%lock)
     allocate (block)
-    call new_sweep_block(plan, setup, scheduler, block)
+    call new_sweep_block(plan, setup%lanes, setup%has_energy_balance, scheduler, block)
     call create_journal(text_argument(4), 'sweep.journal', new_sweep_header(plan, 1, 1), journal, error)
     if (allocated(error)) call give_up(error%message)
   end subroutine set_up
@@ -130,9 +130,9 @@ contains
     steps = 0
     do
       began = seconds_now()
-      call scheduler%lock()
+      call omp_set_lock(scheduler%lock)
       call scheduler%next_chunk(first, count)
-      call scheduler%unlock()
+      call omp_unset_lock(scheduler%lock)
       handing = handing + seconds_now() - began
       if (count == 0) exit
       began = seconds_now()
@@ -147,9 +147,9 @@ contains
       call pack_chunk(chunk, packed)
       bytes = len(packed)
     end do
-    call journal%remove()
+    call journal%file%remove()
     call scheduler%finalise()
-    call scheduler%destroy_lock()
+    call omp_destroy_lock(scheduler%lock)
   end subroutine measure
 
   subroutine give_up(message)
