@@ -1,5 +1,6 @@
 // Tells ThreadSanitizer how OpenMP orders what threads do: gfortran's OpenMP library is not compiled for it, and without this every
-// access that follows a critical section or the end of a parallel region looks like a race. scripts/memcheck --threads links it.
+// access that follows a critical section or the end of a parallel region looks like a race. scripts/sanitize links it. Each procedure
+// below takes away one kind of false report, and says why it is false.
 #include <dlfcn.h>
 
 extern "C" {
@@ -23,6 +24,8 @@ static void run_region(void *argument) {
   __tsan_release(&join_point);
 }
 
+// What was written before a parallel region is read in it, and what its threads wrote is read behind it: they start after the fork, and
+// the join waits for all of them.
 void GOMP_parallel(void (*run)(void *), void *data, unsigned threads, unsigned flags) {
   LIBRARY(GOMP_parallel);
   region_t region{run, data};
@@ -31,6 +34,7 @@ void GOMP_parallel(void (*run)(void *), void *data, unsigned threads, unsigned f
   __tsan_acquire(&join_point);
 }
 
+// What one thread wrote before a barrier others read behind it: none passes before all have come.
 void GOMP_barrier(void) {
   LIBRARY(GOMP_barrier);
   __tsan_release(&barrier);
@@ -38,6 +42,7 @@ void GOMP_barrier(void) {
   __tsan_acquire(&barrier);
 }
 
+// What one thread wrote in a critical section the next one reads in it: they are in it one after the other.
 void GOMP_critical_start(void) {
   LIBRARY(GOMP_critical_start);
   library();
@@ -50,6 +55,7 @@ void GOMP_critical_end(void) {
   library();
 }
 
+// The same for a critical section with a name, which has an order of its own.
 void GOMP_critical_name_start(void **name) {
   LIBRARY(GOMP_critical_name_start);
   library(name);
@@ -62,7 +68,7 @@ void GOMP_critical_name_end(void **name) {
   library(name);
 }
 
-// Locks, by the names that gfortran gives them.
+// What the holder of a lock wrote the next holder reads. The names are those that gfortran gives the procedures.
 void omp_set_lock_(void *lock) {
   LIBRARY(omp_set_lock_);
   library(lock);
