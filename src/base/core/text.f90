@@ -79,6 +79,10 @@ contains
     real(wp) :: near
     integer :: length
 
+    if (abs(value) <= 0.0_wp) then
+      text = '0'   ! most entries of a matrix
+      return
+    end if
     write (edit, '(a, i0, a)') '(es32.', digits - 1, 'e4)'
     write (buffer, edit) value
     read (buffer, *) near
