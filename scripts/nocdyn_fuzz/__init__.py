@@ -1,0 +1,1 @@
+"""Mutated inputs and command lines against nocdyn: `scripts/fuzz --help`."""
