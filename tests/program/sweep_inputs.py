@@ -1,6 +1,7 @@
 """Sweeps for tests, and the programs that run them."""
 
 import os
+import resource
 import shutil
 from pathlib import Path
 
@@ -54,3 +55,8 @@ needs_mpi = pytest.mark.skipif(not MPI_PROGRAM.exists() or not shutil.which("mpi
 def mpirun(ranks):
     """The words before those of a sweep on so many ranks."""
     return ["mpirun", "-n", str(ranks), str(MPI_PROGRAM)]
+
+
+def limited_to(size):
+    """Files of the process cannot grow beyond so many bytes."""
+    return lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (size, size))

@@ -1,0 +1,164 @@
+"""Kills, full disks and damaged journals with three ranks and with shards: the end has the bytes of a sweep that ran through."""
+
+import os
+import random
+import re
+import signal
+import subprocess
+import time
+
+import pytest
+from conftest import TRAPS_EXCEPTIONS, wait_for
+from sweep_inputs import MPI_ENVIRONMENT, MPI_PROGRAM, SWEEP, TWO_DISCS, limited_to, mpirun, needs_mpi, needs_sweeps
+
+pytestmark = needs_sweeps
+
+RANKS = 3
+SHARDS = 2
+SAMPLES = 1000 if TRAPS_EXCEPTIONS else 10000
+LONG = ("--set", f"sweep.samples={SAMPLES}", "--set", "run.t_end=20")
+
+
+@pytest.fixture
+def discs(nocdyn):
+    return nocdyn.write("discs.nml", TWO_DISCS + SWEEP)
+
+
+def shard_words(number):
+    return ["--shard", f"{number}/{SHARDS}"]
+
+
+def start_ranks(nocdyn, *words, limit="unlimited"):
+    """mpirun and its ranks in a process group of their own; `limit` of files in blocks of 512 bytes."""
+    # MPI has files of its own that grow, unless the ranks talk by TCP
+    environment = MPI_ENVIRONMENT | {"OMPI_MCA_btl": "self,tcp", "PMIX_MCA_gds": "hash"}
+    shell = ["sh", "-c", f'ulimit -f {limit}; exec "$@"', "sh", str(MPI_PROGRAM), *map(str, words)]
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+    return subprocess.Popen([*mpirun(RANKS)[:-1], *shell], cwd=nocdyn.folder, env=environment, start_new_session=True, **pipes)
+
+
+def kill_ranks(process):
+    """All ranks at once, as a computer that loses its power does."""
+    ranks = subprocess.run(["pgrep", "-P", str(process.pid)], check=False, capture_output=True, text=True).stdout.split()
+    for rank in ranks:
+        os.kill(int(rank), signal.SIGKILL)
+
+
+def journal(nocdyn, name="sweep.journal"):
+    return nocdyn.folder / "out" / name
+
+
+def results(nocdyn, folder):
+    return (nocdyn.folder / folder / "sweep.nc").read_bytes()
+
+
+def assert_ends_as_a_whole_sweep(nocdyn, discs):
+    assert nocdyn("sweep", discs, "--out", "whole", *LONG).returncode == 0
+    assert nocdyn.files("out") == ["input.nml", "summary.json", "sweep.nc"]
+    assert results(nocdyn, "out") == results(nocdyn, "whole")
+
+
+def finish_on_ranks(nocdyn, discs):
+    """Goes on with three ranks; the output."""
+    process = start_ranks(nocdyn, "sweep", discs, "--out", "out", "--resume", *LONG)
+    output, complaint = process.communicate(timeout=60)
+    assert (process.returncode, complaint) == (0, "")
+    assert_ends_as_a_whole_sweep(nocdyn, discs)
+    return output
+
+
+def finish_shards(nocdyn, discs):
+    """Goes on with the first shard, computes the others and merges them; the output of the first."""
+    first, *others = (
+        nocdyn("sweep", discs, "--out", "out", "--resume", *shard_words(number), *LONG) for number in range(1, SHARDS + 1)
+    )
+    merged = nocdyn("merge", "out")
+    for outcome in (first, *others, merged):
+        assert (outcome.returncode, outcome.stderr) == (0, "")
+    for number in range(1, SHARDS + 1):
+        journal(nocdyn, f"sweep.{number}-of-{SHARDS}.journal").unlink(missing_ok=True)
+    assert_ends_as_a_whole_sweep(nocdyn, discs)
+    return first.stdout
+
+
+def wait_until_it_computes(process, file):
+    """Until it has added to its journal."""
+    before = file.stat().st_size if file.exists() else 0
+    wait_for(lambda: process.poll() is not None or (file.exists() and file.stat().st_size > before + 4000))
+
+
+@needs_mpi
+def test_ranks_that_are_killed_together_lose_nothing_that_was_done(nocdyn, discs):
+    for _ in range(2):
+        process = start_ranks(nocdyn, "sweep", discs, "--out", "out", "--resume", *LONG)
+        wait_until_it_computes(process, journal(nocdyn))
+        kill_ranks(process)
+        process.communicate(timeout=60)
+        assert process.returncode != 0 and nocdyn.files("out") == ["sweep.journal"]
+    finish_on_ranks(nocdyn, discs)
+
+
+def test_a_shard_that_is_killed_ten_times_ends_as_one_that_is_not(nocdyn, discs):
+    moments = random.Random(20261122)
+    for kill in range(10):
+        process = nocdyn.start("sweep", discs, "--out", "out", "--threads", 1 + kill % 2, "--resume", *shard_words(1), *LONG)
+        time.sleep(moments.uniform(0.0, 0.08))
+        process.kill()
+        process.communicate()
+    finish_shards(nocdyn, discs)
+
+
+@needs_mpi
+def test_a_full_disk_stops_three_ranks_that_can_be_gone_on_with(nocdyn, discs):
+    process = start_ranks(nocdyn, "sweep", discs, "--out", "out", *LONG, limit=60)
+    output, complaint = process.communicate(timeout=60)
+    assert (process.returncode, output) == (3, "")
+    assert complaint.count("nocdyn: ") == 1 and "nocdyn: cannot write 'out/sweep.journal': File too large; when" in complaint
+    assert nocdyn.files("out") == ["sweep.journal"]
+    assert "reusing " in finish_on_ranks(nocdyn, discs)
+
+
+def test_a_full_disk_stops_a_shard_that_can_be_gone_on_with(nocdyn, discs):
+    outcome = nocdyn("sweep", discs, "--out", "out", *shard_words(1), *LONG, preexec_fn=limited_to(20000))
+    assert (outcome.returncode, outcome.stdout) == (3, "")
+    remedy = "when it can be written, repeat the command with --resume to continue"
+    assert outcome.stderr == f"nocdyn: cannot write 'out/sweep.1-of-2.journal': File too large; {remedy}\n"
+    assert nocdyn.files("out") == ["sweep.1-of-2.journal"]
+    assert "reusing " in finish_shards(nocdyn, discs)
+
+
+def test_a_disk_without_room_for_merged_results_keeps_the_journals(nocdyn, discs):
+    journals = [f"sweep.{number}-of-{SHARDS}.journal" for number in (1, 2)]
+    for number in (1, 2):
+        assert nocdyn("sweep", discs, "--out", "out", *shard_words(number)).returncode == 0
+    outcome = nocdyn("merge", "out", preexec_fn=limited_to(10000))
+    assert (outcome.returncode, outcome.stdout) == (3, "")
+    assert "sweep.nc" in outcome.stderr and outcome.stderr.count("\n") == 1
+    assert nocdyn.files("out") == journals
+    assert nocdyn("merge", "out").returncode == 0
+
+
+def damage(file):
+    """A bit in the midst of the entries has flipped, and the last entry is cut."""
+    content = bytearray(file.read_bytes()[:-10])
+    content[len(content) // 2] ^= 1
+    file.write_bytes(content)
+
+
+@needs_mpi
+def test_three_ranks_make_a_damaged_journal_good(nocdyn, discs):
+    start_ranks(nocdyn, "sweep", discs, "--out", "out", *LONG, limit=60).communicate(timeout=60)
+    damage(journal(nocdyn))
+    output = finish_on_ranks(nocdyn, discs)
+    note = "note: out/sweep.journal has damaged entries; their variants are computed again"
+    assert output.startswith(f"{discs}: {note}\n{discs}: reusing ")
+
+
+def test_a_damaged_shard_is_told_and_made_good(nocdyn, discs):
+    file = journal(nocdyn, "sweep.1-of-2.journal")
+    assert nocdyn("sweep", discs, "--out", "out", *shard_words(1), *LONG).returncode == 0
+    damage(file)
+    output = finish_shards(nocdyn, discs)
+    note = f"note: out/{file.name} has damaged entries; their variants are computed again"
+    assert output.startswith(f"{discs}: {note}\n{discs}: reusing ")
+    assert int(re.search(r"reusing (\d+) of", output)[1]) < SAMPLES // 2
