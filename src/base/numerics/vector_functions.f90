@@ -207,8 +207,10 @@ contains
     real(wp), intent(in) :: x
     real(wp), parameter :: largest_exponent = 1000.0_wp
     real(wp), parameter :: to_exponent = to_whole + 1023.0_wp   ! leaves the bits of the exponent at the end
-    real(wp), parameter :: b1 = 0.69314718055994531_wp, b2 = b1**2 / 2.0_wp, b3 = b1**3 / 6.0_wp, b4 = b1**4 / 24.0_wp
-    real(wp), parameter :: b5 = b1**5 / 120.0_wp, b6 = b1**6 / 720.0_wp, b7 = b1**7 / 5040.0_wp
+    ! ln(2)^n / n!, written out: compilers round powers of constants differently
+    real(wp), parameter :: b1 = 0.69314718055994531_wp, b2 = 0.24022650695910069_wp, b3 = 0.055504108664821576_wp
+    real(wp), parameter :: b4 = 0.0096181291076284769_wp, b5 = 0.0013333558146428441_wp
+    real(wp), parameter :: b6 = 0.00015403530393381606_wp, b7 = 1.5252733804059838e-05_wp
     real(wp) :: moderate, r, r2, r4, shifted, two_to_k
 
     moderate = max(-largest_exponent, min(x, largest_exponent))
