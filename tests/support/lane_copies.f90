@@ -42,7 +42,8 @@ contains
 
     do i = 1, size(machines)
       system = new_reduced(machines(i), .true.)
-      ensemble = copies_t()
+      ensemble%next_variant = 1
+      ensemble%done = 0
       allocate (ensemble%y, source=system%start())
       allocate (ensemble%variant(1), source=0)
       call run(system, method, times, ensemble)
