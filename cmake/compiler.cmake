@@ -19,4 +19,8 @@ if(CMAKE_Fortran_COMPILER_ID STREQUAL GNU)
     string(APPEND CMAKE_Fortran_FLAGS_RELEASE " -march=native")
   endif()
   set(CMAKE_Fortran_FLAGS_DEBUG "-O0 -g -fcheck=all -ffpe-trap=invalid,zero,overflow -finit-real=snan")
+elseif(CMAKE_Fortran_COMPILER_ID STREQUAL LLVMFlang)
+  set(CMAKE_Fortran_FLAGS_RELEASE "-O1 -ffp-contract=off")   # a check, not a program to be used: quick to compile
+  set(CMAKE_Fortran_LINKER_WRAPPER_FLAG "-Wl,")   # CMake 3.25 does not know how Flang hands options to the linker
+  set(CMAKE_Fortran_LINKER_WRAPPER_FLAG_SEP ",")
 endif()

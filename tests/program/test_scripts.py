@@ -1,6 +1,7 @@
 """The scripts around the program: figures, numbers, and what scripts/setup installs."""
 
 import importlib.util
+import math
 import os
 import shutil
 import subprocess
@@ -265,6 +266,18 @@ def test_refusals_leave_with_exit_code_1_and_one_line(tmp_path):
     assert result.stderr.count("\n") == 1 and result.stderr.startswith("scripts/plot: ")
 
 
+def test_results_of_two_programs_are_compared_column_by_column():
+    import pandas as pd
+
+    largest_difference = importlib.import_module("nocdyn_report.differences").largest_difference
+    one = pd.DataFrame({"t [s]": [0.0, 1.0], "a": [1.0, -8.0], "work_in [J]": [0.0, 100.0], "energy_residual [J]": [0.0, 1e-9]})
+    assert largest_difference(one, one) == (0.0, "t [s]")
+    assert largest_difference(one, one.assign(a=[2.0, -8.0])) == (0.125, "a")
+    assert largest_difference(one, one.assign(**{"energy_residual [J]": 1.0})) == (0.01, "energy_residual [J]")
+    assert largest_difference(one, one.assign(a=[2.0, float("nan")])) == (math.inf, "numbers that are not finite")
+    assert largest_difference(one, one.rename(columns={"a": "b"}))[0] == math.inf
+
+
 class BareMachine:
     """A PATH with the plain tools and stand-ins: apt-get notes its arguments and 'installs' the compilers and mpirun."""
 
@@ -315,6 +328,13 @@ def test_setup_is_silent_when_nothing_is_missing(bare_machine):
     result = bare_machine.setup("build")
     assert (result.returncode, result.stdout, result.stderr) == (0, "", "")
     assert not bare_machine.calls.exists()
+
+
+def test_setup_installs_the_second_compiler_where_it_makes_no_program(bare_machine):
+    assert "flang-22 libflang-22-dev libomp-22-dev\n" in bare_machine.setup("flang").stderr
+    bare_machine.stand_in("flang-22", bare_machine.COMPILER)
+    result = bare_machine.setup("flang")
+    assert (result.returncode, result.stdout, result.stderr) == (0, "", "")
 
 
 def test_setup_without_root_and_sudo_says_what_to_run(bare_machine):
