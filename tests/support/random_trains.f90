@@ -78,6 +78,7 @@ contains
     type(growth_t), intent(inout) :: growth
     real(wp) :: row(size(growth%row, 1)), teeth
     integer :: a, b, i
+    logical :: case_first
 
     row = 0.0_wp
     a = layout%whole(1, body - 1)
@@ -92,15 +93,19 @@ contains
       row(a) = 1.0_wp
       row(body) = -(1.0_wp + teeth)
     case (5:6)   ! a planetary set, its members in any order
-      row([body, a, b]) = [1.0_wp, teeth, -(1.0_wp + teeth)]
-      if (layout%whole(1, 2) == 1) row([a, body, b]) = [1.0_wp, teeth, -(1.0_wp + teeth)]
+      row([body, a]) = [1.0_wp, teeth]
+      if (layout%whole(1, 2) == 1) row([a, body]) = [1.0_wp, teeth]
+      row(b) = -(1.0_wp + teeth)   ! a and b may be equal
     case (7)     ! a differential, the case first or last
-      row([body, a, b]) = [1.0_wp, 1.0_wp, -2.0_wp]
-      if (layout%whole(1, 2) == 1) row([a, b, body]) = [1.0_wp, 1.0_wp, -2.0_wp]
+      case_first = layout%whole(1, 2) == 1
+      row(a) = 1.0_wp
+      row(b) = merge(1.0_wp, -2.0_wp, case_first)
+      row(body) = merge(-2.0_wp, 1.0_wp, case_first)
     case (8)     ! a general row
       row(body) = layout%number(0.5_wp, 1.5_wp)
       do i = 1, layout%whole(1, 4)
-        row(layout%whole(1, body - 1)) = layout%number(-1.0_wp, 1.0_wp)
+        a = layout%whole(1, body - 1)   ! on a line of its own: the order of calls within a statement is the compiler's
+        row(a) = layout%number(-1.0_wp, 1.0_wp)
       end do
     case default
       return
@@ -113,11 +118,12 @@ contains
     type(random_stream_t), intent(inout) :: layout
     type(growth_t), intent(inout) :: growth
     real(wp) :: row(size(growth%row, 1))
-    integer :: i
+    integer :: body, i
 
     row = 0.0_wp
     do i = 1, layout%whole(2, 4)
-      row(layout%whole(1, size(row))) = layout%number(0.5_wp, 2.0_wp)
+      body = layout%whole(1, size(row))
+      row(body) = layout%number(0.5_wp, 2.0_wp)
     end do
     call take_row(row, .true., growth)
   end subroutine close_loop
@@ -126,10 +132,11 @@ contains
   subroutine repeat_rows(layout, growth)
     type(random_stream_t), intent(inout) :: layout
     type(growth_t), intent(inout) :: growth
-    real(wp) :: row(size(growth%row, 1))
+    real(wp) :: row(size(growth%row, 1)), factor
 
     if (growth%rows == 0) return
-    row = layout%number(0.5_wp, 2.0_wp) * growth%row(:, layout%whole(1, growth%rows))
+    factor = layout%number(0.5_wp, 2.0_wp)
+    row = factor * growth%row(:, layout%whole(1, growth%rows))
     if (layout%whole(1, 2) == 1) row = row - growth%row(:, layout%whole(1, growth%rows))
     where (abs(row) <= rounding) row = 0.0_wp
     call take_row(row, .false., growth)
