@@ -78,12 +78,14 @@ def set_word(rng, case):
 def mutate_words(rng, case):
     """One change of the command line."""
     words = list(case.words)
-    change = rng.choice(("set", "set", "set", "option", "twice", "drop", "swap", "odd"))
+    change = rng.choice(("set", "set", "set", "option", "command", "twice", "drop", "swap", "odd"))
     at = rng.randrange(len(words))
     if change == "set":
         words += set_word(rng, case)
     elif change == "option":
         words += rng.choice(OPTIONS)
+    elif change == "command":
+        words[0] = rng.choice(("merge", "new", "help", "sweep", "run", "matrices", "equilibrium", "chek", ""))
     elif change == "twice":
         words.insert(at, words[at])
     elif change == "drop":
