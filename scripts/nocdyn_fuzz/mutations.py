@@ -178,7 +178,7 @@ def copies_of_group(rng, content, _):
     match = pick(rng, GROUP, content)
     if not match:
         return content
-    count = rng.choice((2, 10, 300))
+    count = rng.choice((2, 10, 100))
     copies = [re.sub(rb"(\bname\s*=\s*')", rb"\g<1>" + f"n{number}".encode(), match[0]) for number in range(count)]
     return content + b"\n" + b"\n".join(copies) + b"\n"
 
