@@ -183,7 +183,7 @@ def test_filter_and_exit_codes(tmp_path, library):
 
 
 def test_compiler_names_the_line_of_the_pf_file(tmp_path, library):
-    source = sample("@test\nsubroutine t()\n@assertTrue(.true.)\n@assertTrue(unknown)\nend subroutine\n")
+    source = sample("@test\nsubroutine proves()\n@assertTrue(.true.)\n@assertTrue(unknown)\nend subroutine\n")
     assert translate(tmp_path, source).returncode == 0
     compilation = subprocess.run(
         [*COMPILE, f"-I{library}", "-c", "test_sample.f90"], cwd=tmp_path, capture_output=True, text=True
@@ -194,14 +194,16 @@ def test_compiler_names_the_line_of_the_pf_file(tmp_path, library):
 @pytest.mark.parametrize(
     "body, line, mistake",
     [
-        ("@test\nsubroutine t()\n@assertEquals(1, 1)\nend subroutine\n", 7, "unknown annotation @assertEquals: did you"),
-        ("@test\nsubroutine t()\n@assertTrue(.true.) ! so\nend subroutine\n", 7, "all on its line and nothing after"),
-        ("@test\nsubroutine t()\n@assertTrue( &\n.true.)\nend subroutine\n", 7, "all on its line"),
-        ("@test(ifdef=X)\nsubroutine t()\nend subroutine\n", 5, "@test stands alone"),
-        ("@test\nsubroutine t(this)\nend subroutine\n", 6, "expected 'subroutine NAME()' after @test"),
-        ("@test\ninteger function t()\nend function\n", 6, "expected 'subroutine NAME()' after @test"),
-        ("subroutine t()\nend subroutine\n", 1, "no @test in this file"),
-        ("pure integer function run()\nend function\n", 5, "run is a name of pFUnit's"),
+        ("@test\nsubroutine proves()\n@assertEquals(1, 1)\nend subroutine\n", 7, "unknown annotation @assertEquals: did you"),
+        ("@test\nsubroutine proves()\n@assertTrue(.true.) ! so\nend subroutine\n", 7, "all on its line and nothing after"),
+        ("@test\nsubroutine proves()\n@assertTrue( &\n.true.)\nend subroutine\n", 7, "all on its line"),
+        ("@test(ifdef=X)\nsubroutine proves()\nend subroutine\n", 5, "@test stands alone"),
+        ("@test\nsubroutine proves(this)\nend subroutine\n", 6, "expected 'subroutine NAME()' after @test"),
+        ("@test\ninteger function proves()\nend function\n", 6, "expected 'subroutine NAME()' after @test"),
+        ("subroutine proves()\nend subroutine\n", 1, "no @test in this file"),
+        ("pure integer function run()\nend function\n", 5, "run is a name of pFUnit's; call it something else"),
+        ("subroutine Near()\nend subroutine\n", 5, "Near is a name of pFUnit's"),
+        ("subroutine t()\nend subroutine\n", 5, "t is a name of pFUnit's"),
         (
             "@before\nsubroutine a()\nend subroutine\n@before\nsubroutine b()\nend subroutine\n@test\nsubroutine c()\n"
             "end subroutine\n",
@@ -218,7 +220,25 @@ def test_mistakes_are_refused_with_file_and_line(tmp_path, body, line, mistake):
     assert not (tmp_path / "test_sample.f90").exists()
 
 
+@pytest.mark.parametrize(
+    "declarations, line, name",
+    [
+        ("integer, parameter :: many = 3, run = 4\n", 4, "run"),
+        ("character(len=*), parameter :: text = 'a, run', &\n  Every = 'b'\n", 5, "Every"),
+        ("use other, only: all_of => none, some\n", 4, "all_of"),
+        ("use other, only: unheard_of, finalize\n", 4, "finalize"),
+        ("type :: predicate\ninteger :: i\nend type predicate\n", 4, "predicate"),
+        ("interface is\nmodule procedure is_so\nend interface is\n", 4, "is"),
+        ("type :: own\ninteger :: near\ncontains\nprocedure :: run\nend type own\nreal :: t\n", 9, "t"),
+    ],
+)
+def test_names_of_pfunit_are_refused_where_a_module_declares_them(tmp_path, declarations, line, name):
+    translation = translate(tmp_path, sample("@test\nsubroutine proves()\ninteger :: t\nend subroutine\n", declarations))
+    place = f"{tmp_path / 'test_sample.pf'}:{line}"
+    assert translation.stderr == f"{place}: error: {name} is a name of pFUnit's; call it something else\n"
+
+
 def test_module_must_be_named_as_its_file(tmp_path):
-    translation = translate(tmp_path, sample("@test\nsubroutine t()\nend subroutine\n"), name="test_other")
+    translation = translate(tmp_path, sample("@test\nsubroutine proves()\nend subroutine\n"), name="test_other")
     assert translation.returncode == 1
     assert "the file must hold 'module test_other'" in translation.stderr

@@ -23,14 +23,32 @@ ASSERTIONS = (
     "assertGreaterThanOrEqual",
 )
 MARKERS = ("test", "before", "after")
-# Procedures and short words that pFUnit's `funit` exports: a test module that defines one does not build with it.
-TAKEN = {"run", "initialize", "finalize", "throw", "is", "test", "every", "stub", "subject", "predicate", "disable"}
+# The names that `use funit` brings along in pFUnit 4.14 (FUnit.F90, FUnit_Core.F90, Assert.F90, fHamcrest.F90), and those of the
+# function that pFUnit makes of a test module. A module that declares or imports one of them does not build with pFUnit.
+NAMES_OF_PFUNIT = """
+    initialize run generic_run finalize loadtests_interface stub get_context output_unit
+    sourcelocation test testsuite testmethod testresult testrunner basetestrunner remoterunner robustrunner testlistener
+    testlistenervector listenerpointer resultprinter xmlprinter debuglistener namefilter testcase abstracttestparameter
+    parameterizedtestcase parallelcontext serialcontext throw catchnext catch anyexceptions expectation subject predicate
+    wascalled wasnotcalled wascalledonce testannotation disable timeoutannotation taplistener
+    assertfail asserttrue assertfalse assertequal assertexceptionraised assertsameshape assertany assertall assertnone
+    assertnotall assertnotequal assertlessthan assertlessthanorequal assertgreaterthan assertgreaterthanorequal
+    assertrelativelyequal assertisnan assertisfinite whitespaceoptions ignore_all trim_all keep_all ignore_differences
+    matcherdescription stringdescription assert_that abstractmatcher is isnot not isequal equal_to istrueorfalse true false
+    isnear near isrelativelynear relatively_near anyof any_of allof all_of every every_item stringcontains contains_string
+    stringstartswith starts_with stringendswith ends_with isarraywithsize array_with_size empty_array matchable
+    suite t
+"""
+TAKEN = set(NAMES_OF_PFUNIT.split())
 CANONICAL = {name.lower(): name for name in ASSERTIONS + MARKERS}
 
 ANNOTATION = re.compile(r"\s*@(\w*)\s*(.*?)\s*$")
 SUBROUTINE = re.compile(r"\s*subroutine\s+(\w+)\s*(\(\s*\))?\s*(!.*)?$", re.IGNORECASE)
 MODULE = re.compile(r"\s*module\s+(\w+)\s*$", re.IGNORECASE)
 PROCEDURE = re.compile(r"(?!\s*end\b)[^!'\"]*\b(?:subroutine|function)\s+(\w+)", re.IGNORECASE)
+STATEMENT_WITH_NAMES = re.compile(r"\s*(?:use\b.*?\bonly\s*:|interface\b(?=\s+\w)|[^'\"]*?::)(.*)", re.IGNORECASE)
+BLOCK = re.compile(r"\s*(type\s*(?:,[^:]*)?(?:::)?\s*\w+\s*$|(?:abstract\s+)?interface\b)", re.IGNORECASE)
+END_OF_BLOCK = re.compile(r"\s*end\s*(?:type|interface)\b", re.IGNORECASE)
 BLANK_OR_COMMENT = re.compile(r"\s*(!.*)?$")
 
 TESTS_FOLDER = Path(__file__).resolve().parent.parent
@@ -47,6 +65,9 @@ class Translation:
         self.mistakes: list[str] = []
         self.module = ""
         self.procedures: dict[str, list[str]] = {marker: [] for marker in MARKERS}
+        self.is_in_specification = True
+        self.is_in_block = False  # of a type or an interface in the specification
+        self.statement = ""  # so far, of continued lines
         self.marker = ""  # annotation that waits for its subroutine
 
     def translate(self) -> None:
@@ -71,11 +92,40 @@ class Translation:
         if self.marker and not BLANK_OR_COMMENT.match(line):
             self.name_procedure(number, line)
         procedure = PROCEDURE.match(line)
-        if procedure and procedure.group(1).lower() in TAKEN:
-            self.refuse(number, f"{procedure.group(1)} is a name of pFUnit's; call the procedure something else")
+        self.refuse_taken(number, [procedure.group(1)] if procedure else self.declared_names(line))
         module = MODULE.match(line)
         if module and not self.module:
             self.module = module.group(1)
+
+    def declared_names(self, line: str) -> list[str]:
+        """The names that a line before the module's `contains` declares or imports, a continued line after its beginning."""
+        code = re.sub(r"'[^']*'|\"[^\"]*\"", "''", line).split("!")[0].rstrip()
+        if re.match(r"\s*contains\s*$", code, re.IGNORECASE) and not self.is_in_block:
+            self.is_in_specification = False
+        if not self.is_in_specification or not code.strip():
+            return []
+        statement = self.statement + code.rstrip("&").strip().lstrip("&") + " "
+        self.statement = statement if code.endswith("&") else ""
+        if self.statement:
+            return []
+        begins_block, was_in_block = BLOCK.match(statement), self.is_in_block
+        self.is_in_block = (was_in_block or bool(begins_block)) and not END_OF_BLOCK.match(statement)
+        found = STATEMENT_WITH_NAMES.match(statement)
+        if was_in_block or not found:
+            return []
+        names, depth = [""], 0
+        for character in found.group(1):
+            depth += (character in "([") - (character in ")]")
+            if character == "," and depth == 0:
+                names.append("")
+            else:
+                names[-1] += character
+        return [match.group(1) for name in names if (match := re.match(r"\s*(\w+)", name))]
+
+    def refuse_taken(self, number: int, names: list[str]) -> None:
+        for name in names:
+            if name.lower() in TAKEN:
+                self.refuse(number, f"{name} is a name of pFUnit's; call it something else")
 
     def translate_annotation(self, number: int, word: str, arguments: str) -> None:
         name = CANONICAL.get(word.lower())
