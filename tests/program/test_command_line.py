@@ -21,7 +21,7 @@ def one_line(text):
             "allowed: 'run', 'check', 'equilibrium', 'modes', 'matrices', 'sweep', 'merge', 'new', 'help'",
         ),
         (["simulate"], "'simulate' is not a command"),
-        (["x" * 3000], "'" + "x" * 72 + " ...' is not a command; allowed: "),
+        (["x" * 3000], "'" + "x" * 80 + " ...' is not a command; allowed: "),
         (["run"], "an input file is missing: nocdyn run FILE..."),
         (["check"], "an input file is missing: nocdyn check FILE..."),
         (["equilibrium"], "an input file is missing: nocdyn equilibrium FILE..."),

@@ -1,8 +1,9 @@
 !> Standard output, error messages and the progress line.
 module nocdyn_console
-  use, intrinsic :: iso_fortran_env, only: error_unit, int64
+  use, intrinsic :: iso_fortran_env, only: int64
   use nocdyn_errors, only: error_t
   use nocdyn_kinds, only: wp
+  use nocdyn_printable, only: printable
   use nocdyn_posix, only: is_terminal, standard_error, standard_output, write_bytes
   implicit none (type, external)
   private
@@ -11,6 +12,7 @@ module nocdyn_console
 
   logical, protected, public :: output_is_lost = .false.   !! whether a write to standard output has failed
 
+  character(len=*), parameter :: line_end = new_line('a'), clear_to_end = achar(27) // '[K'
   real(wp), parameter :: first_shown_after = 1.0_wp    ! on a terminal [s]
   real(wp), parameter :: refresh_interval = 0.2_wp     ! of the line on a terminal [s]
   real(wp), parameter :: first_log_interval = 10.0_wp, longest_log_interval = 600.0_wp   ! between lines of a log [s]
@@ -31,11 +33,8 @@ contains
   !> Prints one or several lines to standard output. A line end is added if there is none.
   subroutine print_text(text)
     character(len=*), intent(in) :: text
-    logical :: has_end, is_done
 
-    has_end = index(text, new_line('a'), back=.true.) == len(text)
-    call write_bytes(standard_output, text // repeat(new_line('a'), merge(0, 1, has_end)), is_done)
-    if (.not. is_done) output_is_lost = .true.
+    call put_out(standard_output, text // repeat(line_end, merge(0, 1, index(text, line_end, back=.true.) == len(text))))
   end subroutine print_text
 
   !> Prints the message of an error to standard error, every line with the program's name before it, and raises the exit code.
@@ -46,12 +45,28 @@ contains
 
     first = 1
     do while (first <= len(error%message))
-      last = first + index(error%message(first:) // new_line('a'), new_line('a')) - 2
-      write (error_unit, '(a)') 'nocdyn: ' // error%message(first:last)
+      last = index(error%message(first:), line_end) + first - 2
+      if (last < first - 1) last = len(error%message)
+      call put_out(standard_error, 'nocdyn: ' // error%message(first:last) // line_end)
       first = last + 2
     end do
     code = max(code, error%code)
   end subroutine report_error
+
+  !> The one place where text leaves the program.
+  subroutine put_out(descriptor, text, before, after)
+    integer, intent(in) :: descriptor      !! standard_output or standard_error
+    character(len=*), intent(in) :: text
+    character(len=*), intent(in), optional :: before, after   !! control characters of the program itself
+    character(len=:), allocatable :: whole
+    logical :: is_done
+
+    whole = printable(text)
+    if (present(before)) whole = before // whole
+    if (present(after)) whole = whole // after
+    call write_bytes(descriptor, whole, is_done)
+    if (descriptor == standard_output .and. .not. is_done) output_is_lost = .true.
+  end subroutine put_out
 
   !> A status line on standard error, which appears some time after this call.
   function new_status_line(is_quiet, shows_in_logs) result(line)
@@ -97,18 +112,17 @@ contains
 
     if (self%is_in_place) then
       self%is_shown = .true.
-      write (error_unit, '(a)', advance='no') achar(13) // text // achar(27) // '[K'
+      call put_out(standard_error, text, before=achar(13), after=clear_to_end)
     else
-      write (error_unit, '(a)') text
+      call put_out(standard_error, text // line_end)
     end if
-    flush (error_unit)
   end subroutine show
 
   !> Removes the line from a terminal.
   subroutine clear_line(self)
     class(status_line_t), intent(inout) :: self
 
-    if (self%is_shown) write (error_unit, '(a)', advance='no') achar(13) // achar(27) // '[K'
+    if (self%is_shown) call put_out(standard_error, '', before=achar(13), after=clear_to_end)
     self%is_shown = .false.
   end subroutine clear_line
 

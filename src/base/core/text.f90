@@ -2,12 +2,14 @@
 module nocdyn_text
   use, intrinsic :: iso_c_binding, only: c_char, c_double, c_int, c_size_t
   use nocdyn_kinds, only: wp
+  use nocdyn_printable, only: utf_8_length
   implicit none (type, external)
   private
 
   public :: to_text, rounded_text, write_number, lower_case, quoted, in_quotes, joined, listed, counted, shortened, &
     nearest_word, strings, append, selected
 
+  integer, parameter :: longest_word = 256   ! that is compared with others
   integer, parameter, public :: number_width = 32   !! no number of `write_number` is longer
 
   !> A text of any length, for arrays of texts. gfortran 12 never frees the texts of an array constructor with `string_t(...)`,
@@ -126,35 +128,47 @@ contains
     character(len=*), intent(in) :: text
     character(len=1), intent(in) :: quote
     character(len=:), allocatable :: in_quotes
-    integer :: i
-
-    in_quotes = quote
-    do i = 1, len(text)
-      in_quotes = in_quotes // text(i:i)
-      if (text(i:i) == quote) in_quotes = in_quotes // quote
-    end do
-    in_quotes = in_quotes // quote
-  end function in_quotes
-
-  !> A text for a message: one of more than `most` bytes is cut between two characters of UTF-8 and ends with ' ...'.
-  pure function shortened(text, most) result(short)
-    character(len=*), intent(in) :: text
-    integer, intent(in), optional :: most   !! bytes; 72 if absent
-    character(len=:), allocatable :: short
-    integer, parameter :: longest_character = 4   ! bytes
     integer :: i, last
 
-    last = 72
-    if (present(most)) last = most
-    if (len(text) <= last) then
-      short = text
-      return
-    end if
-    do i = 1, longest_character - 1
-      if (iachar(text(last + 1:last + 1)) < 128 .or. iachar(text(last + 1:last + 1)) > 191) exit   ! not inside a character
-      last = last - 1
+    last = 2
+    do i = 1, len(text)
+      last = last + merge(2, 1, text(i:i) == quote)
     end do
-    short = text(:last) // ' ...'
+    allocate (character(len=last) :: in_quotes)
+    in_quotes(1:1) = quote
+    last = 1
+    do i = 1, len(text)
+      last = last + 1
+      in_quotes(last:last) = text(i:i)
+      if (text(i:i) /= quote) cycle
+      last = last + 1
+      in_quotes(last:last) = quote
+    end do
+    in_quotes(last + 1:) = quote
+  end function in_quotes
+
+  !> A text for a message: one of more than `most` characters is cut between two of them and ends with ' ...', before its closing
+  !> quote if it is in quotes. Line feeds become blanks.
+  pure function shortened(text, most) result(short)
+    character(len=*), intent(in) :: text
+    integer, intent(in), optional :: most   !! characters; 80 if absent; bytes that are not UTF-8 count as one each
+    character(len=:), allocatable :: short
+    integer :: characters, i, last
+
+    characters = 80
+    if (present(most)) characters = most
+    last = 0
+    do i = 1, characters
+      if (last < len(text)) last = last + max(1, utf_8_length(text, last + 1))
+    end do
+    short = text(:last)
+    if (last < len(text)) then
+      short = short // ' ...'
+      if (scan(text(1:1), '''"') == 1 .and. text(len(text):) == text(1:1)) short = short // text(1:1)
+    end if
+    do i = 1, len(short)
+      if (short(i:i) == new_line('a')) short(i:i) = ' '
+    end do
   end function shortened
 
   !> The texts in quotes, separated by `separator`; of more than `most`, the first `most` "and N more".
@@ -250,8 +264,10 @@ contains
     integer :: i, distance, smallest
 
     nearest = 0
+    if (len(word) > longest_word) return
     smallest = max(1, len(word) / 3) + 1
     do i = 1, size(candidates)
+      if (abs(len(word) - len(candidates(i)%text)) >= smallest) cycle
       distance = edit_distance(lower_case(word), lower_case(candidates(i)%text))
       if (distance < smallest) then
         smallest = distance

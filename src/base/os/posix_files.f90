@@ -2,12 +2,13 @@
 module nocdyn_posix_files
   use, intrinsic :: iso_c_binding, only: c_char, c_int, c_int64_t, c_intptr_t, c_null_char, c_size_t
   use, intrinsic :: iso_fortran_env, only: int64
+  use nocdyn_bytes, only: widen
   use nocdyn_posix, only: close_file, descriptor_call, failure_number, is_interrupted_call, last_failure, path_call, &
     path_number_call
   implicit none (type, external)
   private
 
-  public :: open_new, open_existing, file_size, read_at, truncate_file, sync_file, sync_path, lock_file, &
+  public :: open_new, open_existing, file_size, read_at, read_whole, truncate_file, sync_file, sync_path, lock_file, &
     disk_failure
 
   integer(c_int), parameter :: from_start = 0, from_end = 2      ! SEEK_SET, SEEK_END
@@ -28,6 +29,13 @@ module nocdyn_posix_files
       integer(c_size_t), value, intent(in) :: length
       integer(c_int64_t), value, intent(in) :: offset
     end function c_pread
+
+    integer(c_intptr_t) function c_read(descriptor, bytes, length) bind(c, name='read')
+      import :: c_char, c_int, c_intptr_t, c_size_t
+      integer(c_int), value, intent(in) :: descriptor
+      character(kind=c_char), intent(inout) :: bytes(*)
+      integer(c_size_t), value, intent(in) :: length
+    end function c_read
 
     integer(c_int64_t) function c_lseek(descriptor, offset, from) bind(c, name='lseek')
       import :: c_int, c_int64_t
@@ -92,6 +100,34 @@ contains
     end do
     is_done = next > len(bytes)
   end subroutine read_at
+
+  !> Reads all bytes of a file or a pipe from its beginning, but one more than `most` at most.
+  subroutine read_whole(descriptor, most, bytes, is_done)
+    integer, intent(in) :: descriptor
+    integer, intent(in) :: most   !! [bytes], less than half of the largest integer
+    character(len=:), allocatable, intent(out) :: bytes
+    logical, intent(out) :: is_done
+    integer(c_intptr_t) :: found
+    integer(int64) :: position
+    integer :: used
+    integer, parameter :: least = 65536
+
+    call widen(bytes, int(min(max(file_size(descriptor), int(least, int64)), int(most, int64))) + 1)   ! a pipe has no size
+    position = c_lseek(int(descriptor, c_int), 0_c_int64_t, from_start)
+    used = 0
+    do
+      if (used == len(bytes)) call widen(bytes, min(2 * used, most + 1))
+      found = c_read(int(descriptor, c_int), bytes(used + 1:), int(min(len(bytes), most + 1) - used, c_size_t))
+      if (found < 0) then
+        if (is_interrupted_call()) cycle
+      end if
+      if (found < 1) exit
+      used = used + int(found)
+      if (used > most) exit
+    end do
+    is_done = found >= 0
+    bytes = bytes(:used)
+  end subroutine read_whole
 
   !> Truncates the file to `length` bytes and continues writing there.
   subroutine truncate_file(descriptor, length, is_done)

@@ -1,9 +1,9 @@
 !> A checked input: the groups in the order of the file, every key of the schema with its value or default.
 module nocdyn_input
-  use nocdyn_diagnostics, only: diagnostics_t, no_line
+  use nocdyn_diagnostics, only: diagnostics_t, most_shown, no_line
   use nocdyn_kinds, only: wp
   use nocdyn_schema, only: first_key, group_rules, key_rules
-  use nocdyn_text, only: quoted, shortened, string_t, to_text
+  use nocdyn_text, only: counted, quoted, shortened, string_t, to_text
   use nocdyn_text_buffer, only: text_buffer_t
   implicit none (type, external)
   private
@@ -27,6 +27,7 @@ module nocdyn_input
     character(len=:), allocatable :: kind   !! 'body', 'gear' ...
     character(len=:), allocatable :: name   !! of the element, '' where the kind has no names
     integer :: rule = 0                     !! its row of `group_rules`
+    integer :: ordinal = 0                  !! its number among the groups of its kind, 0: not in the file
     integer :: line = 0                     !! where it begins, 0: not in the file
     type(value_t), allocatable :: values(:) !! one for each key, in the order of the schema
   contains
@@ -301,7 +302,7 @@ contains
     end associate
   end subroutine report
 
-  !> All messages, one a line, each after its file and line or its override.
+  !> The first messages and how many more there are, one a line, each after its file and line or its override.
   function diagnostics_text(self, diagnostics) result(text)
     class(input_t), intent(in) :: self
     type(diagnostics_t), intent(in) :: diagnostics
@@ -311,7 +312,7 @@ contains
     integer :: i
 
     call diagnostics%sort_by_line(order)
-    do i = 1, size(order)
+    do i = 1, min(size(order), most_shown)
       associate (diagnostic => diagnostics%list(order(i)))
         if (i > 1) call buffer%append(new_line('a'))
         call buffer%append(source_text(self, diagnostic%line, diagnostic%override) // ': ')
@@ -319,6 +320,9 @@ contains
         call buffer%append(diagnostic%text)
       end associate
     end do
+    if (size(order) > most_shown) call buffer%append(new_line('a') // self%file // ': ' // &
+                                                     counted(size(order) - most_shown, 'more mistake', 'more mistakes') // &
+                                                     '; the first ' // to_text(most_shown) // ' are shown')
     text = buffer%text()
   end function diagnostics_text
 
@@ -328,7 +332,7 @@ contains
     integer, intent(in) :: index   !! of the group
     character(len=:), allocatable :: text
 
-    text = '&' // self%groups(index)%kind
+    text = '&' // shortened(self%groups(index)%kind)
     if (len(self%groups(index)%name) > 0) text = text // ' ' // quoted(shortened(self%groups(index)%name))
   end function label
 

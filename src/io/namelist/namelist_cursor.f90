@@ -9,16 +9,19 @@ module nocdyn_namelist_cursor
   character(len=*), parameter :: letters = 'abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ'
   character(len=*), parameter :: letters_and_digits = letters // '0123456789_'
   character(len=*), parameter :: value_delimiters = ',/!=''"'
-  integer, parameter :: longest_excerpt = 40   !! characters of the file in a message
+  integer, parameter :: longest_excerpt = 40      !! characters of the file in a message
+  integer, parameter :: longest_subscript = 100   !! characters; what is longer is no subscript
 
   type, public :: cursor_t
     character(len=:), allocatable :: text   !! ends with a line feed
     integer :: at = 1                       !! position of the next character, len(text) + 1 at the end
     integer :: line = 1
+    integer, private :: line_start = 1      !! position of the first character of the line
+    integer, private :: line_last = 0       !! position of its line feed; each is searched once, also in a long line
     logical :: is_override = .false.        !! the text is the value of an override: '/', '!', '&' and '=' have no meaning
     character(len=:), allocatable :: key    !! whose values are read, with ': ' for messages; '': none
   contains
-    procedure :: next => next_character
+    procedure :: begin, next => next_character
     procedure :: move_to, skip_blanks
     procedure :: line_end, token_end, value_end, key_end, quote_end, subscript_end
     procedure :: at_end, key_follows, group_begins, group_ends, is_first_of_line
@@ -26,6 +29,13 @@ module nocdyn_namelist_cursor
   end type cursor_t
 
 contains
+
+  !> Starts at the beginning of `text`.
+  pure subroutine begin(self)
+    class(cursor_t), intent(inout) :: self
+
+    self%line_last = index(self%text, line_feed)
+  end subroutine begin
 
   pure logical function at_end(self)
     class(cursor_t), intent(in) :: self
@@ -48,7 +58,10 @@ contains
     integer :: i
 
     do i = self%at, min(position - 1, len(self%text))
-      if (self%text(i:i) == line_feed) self%line = self%line + 1
+      if (self%text(i:i) /= line_feed) cycle
+      self%line = self%line + 1
+      self%line_start = i + 1
+      self%line_last = i + index(self%text(i + 1:), line_feed)
     end do
     self%at = position
   end subroutine move_to
@@ -72,7 +85,7 @@ contains
   pure integer function line_end(self)
     class(cursor_t), intent(in) :: self
 
-    line_end = self%at + index(self%text(self%at:), line_feed) - 1
+    line_end = self%line_last
   end function line_end
 
   !> Last position of the bare word at the cursor; the position before the cursor if there is none.
@@ -146,8 +159,9 @@ contains
     open = position_after_blanks(self%text, start)
     if (open == 0) return
     if (self%text(open:open) /= '(') return
-    length = scan(self%text(open:), ')' // line_feed)
-    subscript_end = merge(open + length, 0, self%text(open + length - 1:open + length - 1) == ')')
+    length = scan(self%text(open:min(open + longest_subscript, len(self%text))), ')' // line_feed)
+    subscript_end = 0
+    if (length > 0) subscript_end = merge(open + length, 0, self%text(open + length - 1:open + length - 1) == ')')
   end function subscript_end
 
   !> Position of the first character from `start` on that is not blank, 0 if there is none.
@@ -184,10 +198,8 @@ contains
   !> Whether there are only blanks before the cursor on its line.
   pure logical function is_first_of_line(self)
     class(cursor_t), intent(in) :: self
-    integer :: line_start
 
-    line_start = index(self%text(:self%at - 1), line_feed, back=.true.) + 1
-    is_first_of_line = verify(self%text(line_start:self%at - 1), blanks) == 0
+    is_first_of_line = verify(self%text(self%line_start:self%at - 1), blanks) == 0
   end function is_first_of_line
 
   !> The rest of the line between angle brackets, shortened for a message.
@@ -195,7 +207,7 @@ contains
     class(cursor_t), intent(in) :: self
     character(len=:), allocatable :: text
 
-    text = self%text(self%at:self%line_end() - 1)
+    text = self%text(self%at:min(self%line_end() - 1, self%at + 4 * longest_excerpt + 4))   ! 4 bytes for a character at most
     text = text(:verify(text, blanks, back=.true.))
     text = '<' // shortened(text, longest_excerpt) // '>'
   end function excerpt

@@ -7,7 +7,7 @@ module nocdyn_namelist_scanner
   use nocdyn_namelist, only: assignment_t, namelist_t
   use nocdyn_namelist_cursor, only: cursor_t
   use nocdyn_namelist_values, only: longest_list, read_subscript, scan_items
-  use nocdyn_text, only: lower_case, to_text
+  use nocdyn_text, only: lower_case, shortened, to_text
   use nocdyn_text_file, only: first_position
   implicit none (type, external)
   private
@@ -58,6 +58,7 @@ contains
     cursor%text = text(first_position(text):) // new_line('a')
     cursor%key = ''
     call blank_control_characters(cursor%text, diagnostics)
+    call cursor%begin()
     namelist%source = cursor%text
   end subroutine begin
 
@@ -181,14 +182,15 @@ contains
     if (after > last + 1) then
       subscript = trim(adjustl(cursor%text(last + 1:after - 1)))
       call read_subscript(subscript(2:len(subscript) - 1), assignment)
-      if (assignment%is_malformed) call diagnostics%add(cursor%line, namelist%group_count, assignment%key // subscript // &
-        ': the subscript is neither an index such as (3) nor a section such as (1:3), from 1 to ' // to_text(longest_list))
+      if (assignment%is_malformed) call diagnostics%add(cursor%line, namelist%group_count, shortened(assignment%key) // &
+        shortened(subscript) // ': the subscript is neither an index such as (3) nor a section such as (1:3), from 1 to ' // &
+        to_text(longest_list))
     end if
     call cursor%move_to(after)
     call cursor%move_to(cursor%at + index(cursor%text(cursor%at:), '='))
 
     assignment%first_item = namelist%item_count + 1
-    cursor%key = assignment%key // ': '
+    cursor%key = shortened(assignment%key) // ': '
     call scan_items(cursor, namelist, diagnostics, is_malformed)
     cursor%key = ''
     assignment%last_item = namelist%item_count

@@ -11,6 +11,7 @@ module nocdyn_namelist_values
   public :: scan_items, read_subscript
 
   integer, parameter, public :: longest_list = 100000   !! largest number of values of a key
+  integer, parameter :: most_values = 5000000           !! of all keys of a file: a repeat count writes many with few characters
   character(len=*), parameter :: separators = ' ,/!' // achar(9) // achar(10)
 
 contains
@@ -22,7 +23,9 @@ contains
     type(diagnostics_t), intent(inout) :: diagnostics   !! errors are added
     logical, intent(out) :: is_malformed   !! some values cannot be read, which is reported
     logical :: is_valid, is_after_value
+    integer :: first_item
 
+    first_item = namelist%item_count + 1
     is_malformed = .false.
     is_after_value = .false.
     do
@@ -35,7 +38,7 @@ contains
       else if (cursor%key_follows()) then
         exit
       else
-        call scan_item(cursor, namelist, diagnostics, is_valid)
+        call scan_item(cursor, namelist, first_item, diagnostics, is_valid)
         is_malformed = is_malformed .or. .not. is_valid
         is_after_value = .true.
       end if
@@ -44,29 +47,39 @@ contains
   end subroutine scan_items
 
   !> Scans one value, or several given by a repeat count such as 3*0.5.
-  subroutine scan_item(cursor, namelist, diagnostics, is_valid)
+  subroutine scan_item(cursor, namelist, first_item, diagnostics, is_valid)
     type(cursor_t), intent(inout) :: cursor
     type(namelist_t), intent(inout) :: namelist
+    integer, intent(in) :: first_item   !! index of the first value of this key
     type(diagnostics_t), intent(inout) :: diagnostics
-    logical, intent(out) :: is_valid   !! .false. if the value cannot be read, which is reported
+    logical, intent(out) :: is_valid    !! .false. if the value cannot be read, which is reported
     type(item_t) :: item
-    integer :: i, repeats
+    integer :: i, repeats, room
 
     call scan_repeat_count(cursor, repeats)
     item%line = cursor%line
     is_valid = repeats >= 1 .and. repeats <= longest_list
     if (.not. is_valid) call diagnostics%add(cursor%line, namelist%group_count, cursor%key // &
       'a repeat count such as 3*0.5 must be from 1 to ' // to_text(longest_list))
-
     if (scan(cursor%next(), '''"') == 1) then
       call scan_quoted(cursor, namelist%group_count, diagnostics, item, is_valid)
     else
       call scan_bare(cursor, namelist%group_count, diagnostics, item, is_valid)
     end if
     if (.not. is_valid) return
-    do i = 1, repeats
+    room = min(first_item - 1 + longest_list, most_values) - namelist%item_count
+    do i = 1, min(repeats, room + 1)   ! the one that is too many shows that it is reported
       call namelist%append_item(item)
     end do
+    is_valid = repeats <= room
+    if (is_valid .or. room < 0) return
+    if (namelist%item_count > most_values) then
+      call diagnostics%add(cursor%line, namelist%group_count, cursor%key // 'too many values; allowed: at most ' // &
+                           to_text(most_values) // ' in a file')
+    else
+      call diagnostics%add(cursor%line, namelist%group_count, cursor%key // 'too many values; allowed: at most ' // &
+                           to_text(longest_list) // ' for a key')
+    end if
   end subroutine scan_item
 
   !> Reads and skips a repeat count such as "3*".

@@ -2,6 +2,7 @@
 module nocdyn_json
   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
   use nocdyn_kinds, only: wp
+  use nocdyn_printable, only: utf_8_length
   use nocdyn_text, only: string_t, to_text
   use nocdyn_text_buffer, only: text_buffer_t
   use nocdyn_version, only: compiler_text, version
@@ -232,29 +233,31 @@ contains
   end subroutine begin_item
 
   !> A JSON string with its quotes. Control characters, which no input contains, become blanks.
-  pure function escaped(text)
+  function escaped(text)
     character(len=*), intent(in) :: text
     character(len=:), allocatable :: escaped
+    type(text_buffer_t) :: buffer
     integer :: i, length
 
-    escaped = '"'
+    call buffer%append('"')
     i = 1
     do while (i <= len(text))
       length = utf_8_length(text, i)
       select case (text(i:i))
       case ('"', '\')
-        escaped = escaped // '\' // text(i:i)
+        call buffer%append('\' // text(i:i))
       case (achar(10))
-        escaped = escaped // '\n'
+        call buffer%append('\n')
       case (achar(0):achar(9), achar(11):achar(31))
-        escaped = escaped // ' '
+        call buffer%append(' ')
       case default
-        if (length > 0) escaped = escaped // text(i:i + length - 1)
-        if (length == 0) escaped = escaped // latin_1(text(i:i))
+        if (length > 0) call buffer%append(text(i:i + length - 1))
+        if (length == 0) call buffer%append(latin_1(text(i:i)))
       end select
       i = i + max(1, length)
     end do
-    escaped = escaped // '"'
+    call buffer%append('"')
+    escaped = buffer%text()
   end function escaped
 
   !> Whether a text is valid UTF-8 and has characters that are not ASCII.
@@ -272,26 +275,6 @@ contains
     end do
     has_utf_8 = has_utf_8 .and. i > len(text)
   end function has_utf_8
-
-  !> Number of bytes of the UTF-8 character at position `first`, 0 if there is none.
-  pure integer function utf_8_length(text, first) result(length)
-    character(len=*), intent(in) :: text
-    integer, intent(in) :: first
-    integer :: head, i, second
-
-    head = iachar(text(first:first))
-    length = 1
-    if (head < 128) return
-    length = count(head >= [194, 194, 224, 240])
-    if (head > 244 .or. first + max(2, length) - 1 > len(text)) length = 0
-    do i = first + 1, first + length - 1
-      if (iachar(text(i:i)) < 128 .or. iachar(text(i:i)) > 191) length = 0
-    end do
-    if (length < 3) return
-    second = iachar(text(first + 1:first + 1))   ! overlong forms, surrogates, beyond the last character
-    if ((head == 224 .and. second < 160) .or. (head == 237 .and. second > 159) .or. (head == 240 .and. second < 144) &
-        .or. (head == 244 .and. second > 143)) length = 0
-  end function utf_8_length
 
   !> Escape sequence of a byte that is not UTF-8, read as Latin-1.
   pure function latin_1(byte) result(escape)

@@ -101,7 +101,8 @@ contains
       call journal%read_chunks()
       call journal%file%cut(error)
     else
-      call raise(error, exit_input, journal%file%path // ': the head of this journal is damaged; nothing can be made of the rest')
+      call raise(error, exit_input, journal%file%path // ': the head of this journal is damaged, so that ' // &
+                 'nothing can be made of the rest; remove it, or choose another folder with --out')
     end if
     if (allocated(error)) call journal%file%close()
   end subroutine open_journal

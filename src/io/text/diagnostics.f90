@@ -6,6 +6,7 @@ module nocdyn_diagnostics
   implicit none (type, external)
   private
 
+  integer, parameter, public :: most_shown = 50   !! errors of a file that are shown; the others are counted
   integer, parameter, public :: no_line = huge(1)   !! of an error in the file as a whole; sorted last
 
   !> One error. File, line and group are put before its text when the names of all groups are known.

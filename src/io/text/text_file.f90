@@ -1,14 +1,16 @@
 !> Reads text files as a whole.
 module nocdyn_text_file
-  use, intrinsic :: iso_fortran_env, only: int64
   use nocdyn_errors, only: error_t, exit_file, raise
-  use nocdyn_text_buffer, only: text_buffer_t
+  use nocdyn_posix, only: close_file, failure_number, last_failure
+  use nocdyn_posix_files, only: open_existing, read_whole
+  use nocdyn_text, only: to_text
   implicit none (type, external)
   private
 
   public :: first_position, path_in, read_text_file
 
-  integer, parameter :: reason_length = 256
+  integer, parameter, public :: largest_input = 100000000   !! file [bytes]: half a million bodies
+  integer, parameter, public :: largest_table = 500000000   !! file [bytes], also of a list of variants
 
 contains
 
@@ -32,59 +34,48 @@ contains
   end function first_position
 
   !> Reads all bytes of a file or a pipe.
-  subroutine read_text_file(file, text, error)
+  subroutine read_text_file(file, text, error, most)
     character(len=*), intent(in) :: file
     character(len=:), allocatable, intent(out) :: text
     type(error_t), allocatable, intent(out) :: error   !! the file cannot be read
-    character(len=reason_length) :: reason
-    integer(int64) :: bytes
-    integer :: status, unit
-    logical :: exists
+    integer, intent(in), optional :: most              !! longest file [bytes]; `largest_table` if absent
+    integer :: descriptor, limit
+    logical :: is_closed, is_done
 
+    limit = largest_table
+    if (present(most)) limit = most
     if (file == '') then
       call raise(error, exit_file, 'an empty text is not the name of a file')
       return
     end if
-    inquire (file=file, exist=exists)
-    if (.not. exists) then
-      call raise(error, exit_file, file // ': cannot be read: there is no such file')
+    descriptor = open_existing(file, is_to_change=.false.)
+    if (descriptor < 0) then
+      call raise(error, exit_file, file // ': cannot be read: ' // reason_of_failure())
       return
     end if
-    reason = ''
-    open (newunit=unit, file=file, access='stream', form='unformatted', action='read', status='old', iostat=status, &
-      iomsg=reason)
-    if (status /= 0) then
-      ! "Cannot open file 'x': Permission denied"
-      call raise(error, exit_file, file // ': cannot be read: ' // trim(reason(index(reason, ': ', back=.true.) + 2:)))
-      return
+    call read_whole(descriptor, limit, text, is_done)
+    if (.not. is_done) then
+      call raise(error, exit_file, file // ': cannot be read: ' // reason_of_failure())
+    else if (len(text) > limit) then
+      call raise(error, exit_file, file // ': cannot be read: it has more than ' // to_text(limit) // ' bytes, the most allowed')
+      deallocate (text)
     end if
-    inquire (unit=unit, size=bytes)
-    if (bytes > 0) then
-      allocate (character(len=bytes) :: text)
-      read (unit, iostat=status, iomsg=reason) text
-    else
-      call read_to_end(unit, text, status, reason)
-    end if
-    close (unit)
-    if (status /= 0) call raise(error, exit_file, file // ': cannot be read: ' // trim(reason))
+    call close_file(descriptor, is_closed)
   end subroutine read_text_file
 
-  !> Reads byte by byte what has no size, such as a pipe.
-  subroutine read_to_end(unit, text, status, reason)
-    integer, intent(in) :: unit
-    character(len=:), allocatable, intent(out) :: text
-    integer, intent(out) :: status                          !! 0 or that of the failed `read`
-    character(len=reason_length), intent(inout) :: reason   !! of the failure
-    type(text_buffer_t) :: buffer
-    character(len=1) :: byte
+  !> Why the last call of the operating system failed.
+  function reason_of_failure() result(reason)
+    character(len=:), allocatable :: reason
+    integer, parameter :: no_entry = 2, no_folder = 20, loop_of_links = 40   ! ENOENT, ENOTDIR, ELOOP
 
-    do
-      read (unit, iostat=status, iomsg=reason) byte
-      if (status /= 0) exit
-      call buffer%append(byte)
-    end do
-    text = buffer%text()
-    if (is_iostat_end(status)) status = 0
-  end subroutine read_to_end
+    select case (failure_number())
+    case (no_entry, no_folder)
+      reason = 'there is no such file'
+    case (loop_of_links)
+      reason = 'it is a symbolic link that leads to itself'
+    case default
+      reason = last_failure()
+    end select
+  end function reason_of_failure
 
 end module nocdyn_text_file

@@ -1,6 +1,6 @@
 !> One group of the input, from the texts of the file and the overrides to checked values.
 module nocdyn_group_reader
-  use nocdyn_diagnostics, only: diagnostics_t, no_line
+  use nocdyn_diagnostics, only: diagnostics_t, most_shown, no_line
   use nocdyn_group_checks, only: check_group
   use nocdyn_input, only: group_t, value_t
   use nocdyn_input_overrides, only: override_t
@@ -12,7 +12,7 @@ module nocdyn_group_reader
   use nocdyn_schema_rules, only: a_name, equal_lengths
   use nocdyn_schema_text, only: key_suggestion, similar_keys
   use nocdyn_table_file, only: read_table_file
-  use nocdyn_text, only: lower_case, string_t
+  use nocdyn_text, only: lower_case, shortened, string_t
   use nocdyn_text_file, only: path_in
   use nocdyn_value_conversion, only: convert_key
   implicit none (type, external)
@@ -38,7 +38,10 @@ contains
     allocate (raw, source=new_raw_group(index, group%rule, group%line, source%is_malformed))
     call take_assignments(namelist, source, raw, diagnostics)
     group%name = name_of(raw)
-    call take_overrides(group%name, number_of(namelist, index, group%rule), overrides, raw, diagnostics)
+    call take_overrides(group%name, merge(group%ordinal, 0, is_unnamed(group%rule)), overrides, raw, diagnostics)
+    do i = 1, size(raw%keys)
+      call raw%keys(i)%trim_values()
+    end do
     call apply_relations(raw, relations, diagnostics)
     allocate (group%values(size(raw%keys)))
     do i = 1, size(raw%keys)
@@ -81,20 +84,27 @@ contains
     end do
   end subroutine take_assignments
 
-  !> The keys that were probably meant are not reported as missing in addition.
+  !> The keys that were probably meant are not reported as missing in addition. After many errors they are not searched.
   subroutine refuse_key(assignment, raw, diagnostics)
     type(assignment_t), intent(in) :: assignment
     type(raw_group_t), intent(inout) :: raw
     type(diagnostics_t), intent(inout) :: diagnostics
     type(string_t), allocatable :: similar(:)
+    character(len=:), allocatable :: hint
     integer :: i
 
-    allocate (similar, source=similar_keys(raw%rule, assignment%key))
-    do i = 1, size(similar)
-      raw%keys(raw%position(key_rule_index(raw%rule, similar(i)%text)))%may_be_missing = .true.
-    end do
-    call diagnostics%add(assignment%line, raw%index, assignment%key // ' is not a key of &' // &
-                         trim(group_rules(raw%rule)%name) // key_suggestion(raw%rule, assignment%key))
+    hint = ''
+    if (diagnostics%count >= most_shown) then
+      raw%keys%may_be_missing = .true.
+    else
+      allocate (similar, source=similar_keys(raw%rule, assignment%key))
+      do i = 1, size(similar)
+        raw%keys(raw%position(key_rule_index(raw%rule, similar(i)%text)))%may_be_missing = .true.
+      end do
+      hint = key_suggestion(raw%rule, assignment%key)
+    end if
+    call diagnostics%add(assignment%line, raw%index, shortened(assignment%key) // ' is not a key of &' // &
+                         trim(group_rules(raw%rule)%name) // hint)
   end subroutine refuse_key
 
   !> Row of the first key among the values of an assignment, 0 if there is none: its equals sign was probably forgotten.
@@ -125,16 +135,12 @@ contains
     end do
   end function name_of
 
-  !> Number of a group without name among those of its kind, 0 for other groups.
-  pure integer function number_of(namelist, index, rule) result(number)
-    type(namelist_t), intent(in) :: namelist
-    integer, intent(in) :: index, rule   !! of the group in the file, row of `group_rules`
-    integer :: g
+  !> Whether the groups of a row of `group_rules` have numbers instead of names in paths.
+  pure logical function is_unnamed(rule)
+    integer, intent(in) :: rule   !! row of `group_rules`
 
-    number = 0
-    if (is_single(rule) .or. group_rules(rule)%name_space /= '') return
-    number = count([(namelist%groups(g)%name == group_rules(rule)%name, g=1, index)])
-  end function number_of
+    is_unnamed = .not. is_single(rule) .and. group_rules(rule)%name_space == ''
+  end function is_unnamed
 
   !> Takes over the overrides of the group, and marks them as used.
   subroutine take_overrides(name, number, overrides, raw, diagnostics)

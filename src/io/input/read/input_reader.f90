@@ -1,6 +1,6 @@
 !> Reads an input file: scanner, schema, overrides and all checks. One error reports everything that is wrong.
 module nocdyn_input_reader
-  use nocdyn_diagnostics, only: diagnostics_t, no_line
+  use nocdyn_diagnostics, only: diagnostics_t, most_shown, no_line
   use nocdyn_errors, only: error_t, exit_input, raise
   use nocdyn_group_reader, only: read_group
   use nocdyn_input, only: group_t, input_t
@@ -13,7 +13,7 @@ module nocdyn_input_reader
   use nocdyn_schema_rules, only: at_least_once, exactly_once, occurrence_texts, required
   use nocdyn_schema_text, only: group_names, suggestion
   use nocdyn_text, only: nearest_word, quoted, shortened, string_t, to_text
-  use nocdyn_text_file, only: read_text_file
+  use nocdyn_text_file, only: largest_input, read_text_file
   implicit none (type, external)
   private
 
@@ -30,7 +30,7 @@ contains
     type(diagnostics_t), intent(out), optional :: diagnostics   !! those of the error
     character(len=:), allocatable :: text
 
-    call read_text_file(file, text, error)
+    call read_text_file(file, text, error, largest_input)
     if (allocated(error)) return
     call read_input_text(text, file, overrides, input, error, diagnostics)
   end subroutine read_input
@@ -78,11 +78,13 @@ contains
     integer, allocatable :: added(:)
     character(len=:), allocatable :: folder
     type(relations_t) :: relations(size(group_rules))
+    integer :: numbers(size(group_rules))   ! of groups so far
     integer :: g, n
 
     do g = 1, size(relations)
       relations(g) = relations_of(g)
     end do
+    numbers = 0
     folder = input%file(:index(input%file, '/', back=.true.))
     call find_absent_groups(namelist, overrides, added)
     n = namelist%group_count
@@ -100,13 +102,34 @@ contains
         group%rule = group_rule_index(group%kind)
         group%line = namelist%groups(g)%line
         if (group%rule > 0) then
+          call count_up(numbers(group%rule), group%ordinal)
           call read_group(namelist, namelist%groups(g), g, overrides, folder, relations(group%rule), group, diagnostics)
         else
-          call diagnostics%add(group%line, g, 'there is no such group' // suggestion(group%kind, group_names()))
+          call refuse_group(group, g, diagnostics)
         end if
       end associate
     end do
   end subroutine read_groups
+
+  elemental subroutine count_up(last, number)
+    integer, intent(inout) :: last
+    integer, intent(out) :: number
+
+    last = last + 1
+    number = last
+  end subroutine count_up
+
+  !> Refuses a group that the schema does not have. After many errors no similar one is searched.
+  subroutine refuse_group(group, g, diagnostics)
+    type(group_t), intent(in) :: group
+    integer, intent(in) :: g   !! its index
+    type(diagnostics_t), intent(inout) :: diagnostics
+    character(len=:), allocatable :: hint
+
+    hint = ''
+    if (diagnostics%count < most_shown) hint = suggestion(group%kind, group_names())
+    call diagnostics%add(group%line, g, 'there is no such group' // hint)
+  end subroutine refuse_group
 
   !> Rows of the single groups that the file does not have, but that have only defaults or overrides.
   subroutine find_absent_groups(namelist, overrides, rules)
@@ -131,13 +154,15 @@ contains
     integer :: first(size(group_rules))
     integer :: g, rule
     logical :: is_misspelt(size(group_rules))
+    type(string_t), allocatable :: names(:)
 
+    allocate (names, source=group_names())
     first = 0
     is_misspelt = .false.
     do g = 1, size(groups)
       rule = groups(g)%rule
       if (rule == 0) then
-        rule = nearest_word(groups(g)%kind, group_names())
+        rule = nearest_word(groups(g)%kind, names)
         if (rule > 0) is_misspelt(rule) = .true.
       else if (first(rule) == 0) then
         first(rule) = g
@@ -189,13 +214,15 @@ contains
   !> Whether the names of all bodies are known: false if there is a &body, perhaps misspelt, whose name cannot be read.
   pure logical function bodies_are_known(groups)
     type(group_t), intent(in) :: groups(:)
+    type(string_t), allocatable :: names(:)
     integer :: body, g
 
+    allocate (names, source=group_names())
     body = group_rule_index('body')
     bodies_are_known = .true.
     do g = 1, size(groups)
       if (groups(g)%rule == 0) then
-        bodies_are_known = bodies_are_known .and. nearest_word(groups(g)%kind, group_names()) /= body
+        bodies_are_known = bodies_are_known .and. nearest_word(groups(g)%kind, names) /= body
       else if (groups(g)%rule == body) then
         bodies_are_known = bodies_are_known .and. groups(g)%name /= ''
       end if

@@ -1,9 +1,12 @@
 !> The keys of one group as the file and the overrides give them: texts that are not converted yet.
 module nocdyn_raw_group
+  use, intrinsic :: iso_fortran_env, only: int64
   use nocdyn_diagnostics, only: diagnostics_t
   use nocdyn_namelist, only: assignment_t, namelist_t
+  use nocdyn_namelist_values, only: longest_list
   use nocdyn_schema, only: first_key, key_rules, last_key
   use nocdyn_schema_rules, only: any_number, key_rule_t, required, unset
+  use nocdyn_schema_text, only: allowed_text
   use nocdyn_text, only: shortened, to_text
   implicit none (type, external)
   private
@@ -25,6 +28,7 @@ module nocdyn_raw_group
     integer :: line = 0                   !! of its first assignment in the file
     integer :: override = 0               !! the last override that sets it, 0: none
     integer :: length = 0                 !! number of values that a default has
+    integer :: last = 0                   !! index of the last value that is assigned
     logical :: is_written = .false.       !! the key occurs in the file or in an override
     logical :: has_whole_list = .false.   !! an assignment has no subscript
     logical :: is_malformed = .false.     !! its values cannot be read, which is reported
@@ -32,10 +36,10 @@ module nocdyn_raw_group
     logical :: is_required = .false.
     logical :: is_excluded = .false.      !! it has neither a value nor a default in this group
     logical :: is_superseded = .false.    !! the file gives it; an override replaces it by another key
-    type(raw_value_t), allocatable :: values(:)
+    type(raw_value_t), allocatable :: values(:)   !! longer than `last` until `trim_values`
   contains
     procedure :: name
-    procedure :: assign, override_with, fill_defaults, exclude
+    procedure :: assign, override_with, trim_values, fill_defaults, exclude
     procedure :: count_given, is_given, has_value
   end type raw_key_t
 
@@ -105,7 +109,7 @@ contains
     self%is_malformed = self%is_malformed .or. assignment%is_malformed .or. message /= ''
     if (self%is_malformed) return
 
-    call lengthen(self, last)
+    call grow(self, last)
     if (any(self%values(assignment%first:last:assignment%stride)%is_assigned)) then
       message = duplicate_message(self)
       self%is_malformed = .true.
@@ -127,12 +131,13 @@ contains
     self%override = override
     if (assignment%is_whole) then
       self%values = [raw_value_t ::]
+      self%last = 0
       self%is_malformed = .false.
     end if
     call find_last(namelist, assignment, key_rules(self%rule), last, message)
     self%is_malformed = self%is_malformed .or. assignment%is_malformed .or. message /= ''
     if (self%is_malformed) return
-    call lengthen(self, last)
+    call grow(self, last)
     call take_items(self, namelist, assignment, last)
   end subroutine override_with
 
@@ -155,13 +160,19 @@ contains
     items = assignment%last_item - assignment%first_item + 1
     last = assignment%last
     if (last == 0) last = rule%count
-    if (last == 0) last = assignment%first + (items - 1) * assignment%stride
+    if (last == 0) last = int(min(assignment%first + (items - 1) * int(assignment%stride, int64), longest_list + 1_int64))
 
     message = ''
-    if (rule%count == 1 .and. .not. assignment%is_whole) then
+    if (items > longest_list) then   ! the scanner has reported it
+      return
+    else if (items == 0 .and. .not. assignment%is_malformed) then
+      message = trim(rule%name) // ' has no value; needed: ' // allowed_text(rule)
+    else if (rule%count == 1 .and. .not. assignment%is_whole) then
       message = trim(rule%name) // ' is a single value and takes no subscript'
     else if (rule%count /= any_number .and. max(last, assignment%first) > rule%count) then
       message = 'the subscript of ' // trim(rule%name) // ' is out of range; allowed: 1 to ' // to_text(rule%count)
+    else if (last > longest_list) then
+      message = trim(rule%name) // ' has too many values; allowed: at most ' // to_text(longest_list)
     else if (items > (last - assignment%first) / assignment%stride + 1) then
       message = trim(rule%name) // ' has ' // to_text(items) // ' values (' // found_values(namelist, assignment) &
         // '); allowed: ' // to_text((last - assignment%first) / assignment%stride + 1)
@@ -179,23 +190,50 @@ contains
     text = ''
     do i = assignment%first_item, min(assignment%last_item, assignment%first_item + few - 1)
       if (i > assignment%first_item) text = text // ', '
-      if (.not. namelist%items(i)%is_null) text = text // shortened(namelist%as_written(namelist%items(i)))
+      if (namelist%items(i)%is_null) then
+        text = text // 'nothing'
+      else
+        text = text // shortened(namelist%as_written(namelist%items(i)))
+      end if
     end do
     if (assignment%last_item - assignment%first_item >= few) text = text // ' ...'
   end function found_values
 
-  !> Makes room for `length` values at least.
-  subroutine lengthen(key, length)
+  !> Makes room for `length` values at least, in amortised constant time for each.
+  subroutine grow(key, length)
     type(raw_key_t), intent(inout) :: key
     integer, intent(in) :: length
-    type(raw_value_t), allocatable :: longer(:)
 
+    key%last = max(key%last, length)
     if (.not. allocated(key%values)) allocate (key%values(max(0, length)))
-    if (size(key%values) >= length) return
-    allocate (longer(length))
-    longer(:size(key%values)) = key%values
-    call move_alloc(longer, key%values)
-  end subroutine lengthen
+    if (size(key%values) < length) call resize(key, max(length, 2 * size(key%values)))
+  end subroutine grow
+
+  !> Gives back the room that is not used.
+  subroutine trim_values(self)
+    class(raw_key_t), intent(inout) :: self
+
+    if (.not. allocated(self%values)) return
+    if (size(self%values) > self%last) call resize(self, self%last)
+  end subroutine trim_values
+
+  subroutine resize(key, length)
+    class(raw_key_t), intent(inout) :: key
+    integer, intent(in) :: length   !! at least `last`
+    type(raw_value_t), allocatable :: values(:)
+    integer :: i, kept
+
+    allocate (values(length))
+    kept = min(length, size(key%values))
+    do i = 1, kept
+      call move_alloc(key%values(i)%text, values(i)%text)
+      call move_alloc(key%values(i)%written, values(i)%written)
+    end do
+    values(:kept)%is_quoted = key%values(:kept)%is_quoted
+    values(:kept)%is_assigned = key%values(:kept)%is_assigned
+    values(:kept)%line = key%values(:kept)%line
+    call move_alloc(values, key%values)
+  end subroutine resize
 
   !> Takes over the values of an assignment.
   subroutine take_items(key, namelist, assignment, last)
@@ -225,7 +263,8 @@ contains
     character(len=len(key_rules%default)) :: default
     integer :: i
 
-    call lengthen(self, self%length)
+    call grow(self, self%length)
+    call self%trim_values()
     default = key_rules(self%rule)%default
     if (default == required .or. default == unset) return
     do i = 1, size(self%values)
@@ -273,6 +312,7 @@ contains
     self%is_malformed = .false.
     self%line = 0
     self%override = 0
+    self%last = 0
     if (allocated(self%values)) deallocate (self%values)
     self%is_excluded = .true.
   end subroutine exclude

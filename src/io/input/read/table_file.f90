@@ -11,7 +11,8 @@ module nocdyn_table_file
 
   public :: read_table_file, read_table_text, read_list_text
 
-  integer, parameter :: most_messages = 5   !! a file of another format has as many errors as lines
+  integer, parameter :: most_messages = 5      !! a file of another format has as many errors as lines
+  integer, parameter :: most_columns = 10000   !! of a list
   character(len=*), parameter :: line_end = achar(10), tab = achar(9), carriage_return = achar(13)
   character(len=*), parameter :: blanks = ' ' // tab, comments = '#!', quotes = '"' // "'"
 
@@ -110,21 +111,29 @@ contains
     integer, intent(inout) :: start   !! position of the first line; on return, of the line after the names
     type(table_reader_t), intent(inout) :: reading
     type(string_t), allocatable, intent(out) :: names(:)
-    character(len=:), allocatable :: rest
-    integer :: comma, last
+    integer :: columns, comma, first, i, last
 
-    allocate (names(0))
-    do while (start <= len(text) .and. size(names) == 0)
-      last = line_last(text, start)
-      reading%line = reading%line + 1
-      rest = ''
-      if (content_end(text, start, last) >= start) rest = text(start:last)
+    last = start - 2
+    first = start
+    do while (start <= len(text) .and. last < first)
+      first = start
+      last = line_last(text, first)
       start = last + 2
-      do while (rest /= '')
-        comma = index(rest // ',', ',')
-        call append(names, without_quotes(rest(:comma - 1)))
-        rest = rest(min(comma, len(rest)) + 1:)
-      end do
+      reading%line = reading%line + 1
+      if (content_end(text, first, last) < first) last = first - 1
+    end do
+    columns = merge(1, 0, last >= first)
+    last = first - 1 + len_trim(text(first:last))
+    if (columns > 0) last = last - merge(1, 0, text(last:last) == ',')   ! nothing after the last comma is no column
+    do i = first, last
+      if (text(i:i) == ',') columns = columns + 1
+    end do
+    allocate (names(columns))
+    do i = 1, size(names)
+      comma = first + index(text(first:last), ',') - 1
+      if (comma < first) comma = last + 1
+      names(i)%text = without_quotes(text(first:comma - 1))
+      first = comma + 1
     end do
   end subroutine read_names
 
@@ -136,7 +145,9 @@ contains
     integer :: i
 
     message = ''
+    if (size(names) > most_columns) message = to_text(size(names)) // ' columns; allowed: at most ' // to_text(most_columns)
     do i = 1, size(names)
+      if (message /= '') exit
       if (index(names(i)%text, ';') > 0) then
         message = 'the columns are separated by semicolons; needed: commas, and points in numbers'
       else if (index(names(i)%text, tab) > 0) then
@@ -147,7 +158,6 @@ contains
         message = 'column ' // to_text(i) // ' has no name; needed: the path of a number'
         if (i == 1) message = message // ', without numbers of rows (pandas: to_csv(FILE, index=False))'
       end if
-      if (message /= '') exit
     end do
     if (message == '') return
     reading%has_other_format = .true.
@@ -162,35 +172,31 @@ contains
     name = text(verify(text // '.', blanks // quotes):verify(text, blanks // quotes // carriage_return, back=.true.))
   end function without_quotes
 
-  !> Reads the rows of all lines from position `first` on.
+  !> Reads the rows of all lines from position `first` on. The room for them grows with the number of rows, not of lines.
   subroutine read_rows(text, first, reading, values, rows)
     character(len=*), intent(in) :: text
     integer, intent(in) :: first   !! position of the first line
     type(table_reader_t), intent(inout) :: reading
-    real(wp), allocatable, intent(out) :: values(:, :)   !! [columns, lines], the first `rows` are in use
+    real(wp), allocatable, intent(out) :: values(:, :)   !! [columns, at least rows], the first `rows` are in use
     integer, intent(out) :: rows
+    real(wp), allocatable :: more(:, :)
     integer :: last, start
 
-    allocate (values(reading%columns, lines_of(text)))
+    allocate (values(reading%columns, 4))
     rows = 0
     start = first
     do while (start <= len(text) .and. .not. reading%has_other_format)
       last = line_last(text, start)
       reading%line = reading%line + 1
+      if (rows == size(values, 2)) then
+        allocate (more(reading%columns, 2 * rows))
+        more(:, :rows) = values
+        call move_alloc(more, values)
+      end if
       call read_line(text(start:content_end(text, start, last)), reading, values, rows)
       start = last + 2
     end do
   end subroutine read_rows
-
-  pure integer function lines_of(text) result(lines)
-    character(len=*), intent(in) :: text
-    integer :: i
-
-    lines = 1
-    do i = 1, len(text)
-      if (text(i:i) == line_end) lines = lines + 1
-    end do
-  end function lines_of
 
   !> Last position of a line without its comment, its trailing blanks and carriage returns.
   pure integer function content_end(text, first, last)
@@ -210,7 +216,8 @@ contains
     type(table_reader_t), intent(inout) :: reading
     real(wp), intent(inout) :: values(:, :)   !! [columns, lines]
     integer, intent(inout) :: rows   !! number of rows so far
-    integer :: begins(reading%columns), ends(reading%columns), column, found
+    integer, allocatable :: begins(:), ends(:)
+    integer :: column, found
     character(len=:), allocatable :: message
 
     if (content == '') return
@@ -219,6 +226,7 @@ contains
       call add_error(reading, ':' // to_text(reading%line) // ': quotes in ' // excerpt(content) // '; needed: plain numbers')
       return
     end if
+    allocate (begins(reading%columns), ends(reading%columns))
     call split(content, begins, ends, found)
     if (found /= reading%columns) then
       message = counted(found, 'column', 'columns') // ' in ' // excerpt(content) // &
@@ -251,22 +259,35 @@ contains
     integer :: first, last
 
     found = 0
-    begins = 1
-    ends = 0
-    first = verify(content, blanks)
+    first = 1
+    call skip_blanks(content, first)
     do while (first <= len(content))
-      last = first - 2 + scan(content(first:) // ',', blanks // ',')
+      last = first - 2 + scan(content(first:), blanks // ',')
+      if (last < first - 1) last = len(content)
       found = found + 1
       if (found <= size(begins)) then
         begins(found) = first
         ends(found) = last
       end if
-      first = last + verify(content(last + 1:) // '.', blanks)
+      first = last + 1
+      call skip_blanks(content, first)
       if (first > len(content)) return
-      if (content(first:first) == ',') first = first + verify(content(first + 1:) // '.', blanks)
+      if (content(first:first) /= ',') cycle
+      first = first + 1
+      call skip_blanks(content, first)
       if (first > len(content)) found = found + 1   ! an empty column after the last comma
     end do
   end subroutine split
+
+  !> Moves forward to the next character that is not blank, or behind the end.
+  pure subroutine skip_blanks(text, position)
+    character(len=*), intent(in) :: text
+    integer, intent(inout) :: position
+    integer :: length
+
+    length = verify(text(position:), blanks) - 1
+    position = merge(position + length, len(text) + 1, length >= 0)
+  end subroutine skip_blanks
 
   !> Reads one number.
   subroutine read_column(text, column, value, message)
