@@ -55,7 +55,7 @@ def test_a_reduction_beyond_all_numbers_is_no_lock(nocdyn):
     assert last["omega_b1 [rad/s]"] == pytest.approx(-last["omega_b0 [rad/s]"] / 2, rel=1e-14)
     outcome = nocdyn("check", "steep.nml", "--set", "run.independent='b1200'")
     assert (outcome.returncode, outcome.stdout) == (2, "")
-    assert "independent 'b1200' cannot be independent: 'b0' turns more than 1e150 times as fast" in outcome.stderr
+    assert "independent 'b1200' cannot be independent: 'b0' turns more than 1e100 times as fast" in outcome.stderr
 
 
 def test_long_reports_stay_readable(nocdyn):

@@ -19,11 +19,12 @@ module nocdyn_coupling_assembly
 
 contains
 
-  !> Refuses gaps and saturations without stiffness.
+  !> Refuses gaps and saturations without stiffness, and gaps of which a power is beyond all numbers.
   subroutine check_couplings(input, error)
     type(input_t), intent(in) :: input
     type(error_t), allocatable, intent(out) :: error   !! names file, line, group and key
     integer, allocatable :: indices(:)
+    character(len=:), allocatable :: obstacle
     integer :: i
 
     allocate (indices, source=input%groups_named('coupling'))
@@ -31,9 +32,9 @@ contains
       associate (group => input%groups(indices(i)))
         select case (coupling_form(group))
         case (gap)
-          if (any(abs(coefficients_of(group)) > 0)) cycle
-          call raise(error, exit_input, input%location(indices(i), 'gap') // ': gap = ' // to_text(group%number('gap')) // &
-                     ' needs an elastic moment at its edges: stiffness, cubic_stiffness or polynomial that is not 0')
+          obstacle = gap_obstacle(coefficients_of(group), group%number('gap'))
+          if (obstacle == '') cycle
+          call raise(error, exit_input, input%location(indices(i), 'gap') // ': gap = ' // to_text(group%number('gap')) // obstacle)
         case (saturated)
           if (group%number('stiffness') > 0) cycle
           call raise(error, exit_input, input%location(indices(i), 'saturation') // ': saturation = ' // &
@@ -45,6 +46,28 @@ contains
       end associate
     end do
   end subroutine check_couplings
+
+  !> What is wrong with the stiffness sum |p_k| gap^(k - 1) at the edges of a gap, '' if nothing is.
+  pure function gap_obstacle(coefficient, width) result(text)
+    real(wp), intent(in) :: coefficient(:)   !! p_k [N m/rad^k]
+    real(wp), intent(in) :: width            !! of the gap [rad]
+    character(len=:), allocatable :: text
+    real(wp), parameter :: largest_exponent = 200.0_wp   ! in 1e-200 to 1e200
+    real(wp) :: exponent
+    integer :: k
+
+    exponent = -huge(exponent)
+    do k = 1, size(coefficient)
+      if (abs(coefficient(k)) > 0) exponent = max(exponent, log10(abs(coefficient(k))) + (k - 1) * log10(width))
+    end do
+    text = ''
+    if (exponent <= -huge(exponent)) then
+      text = ' needs an elastic moment at its edges: stiffness, cubic_stiffness or polynomial that is not 0'
+    else if (abs(exponent) > largest_exponent) then
+      text = ' gives its edges a stiffness of about 1e' // to_text(nint(exponent)) // &
+             ' N m/rad; allowed: with cubic_stiffness or polynomial, one from 1e-200 to 1e200'
+    end if
+  end function gap_obstacle
 
   !> Form of the elastic moment of a group &coupling.
   pure integer function coupling_form(group)

@@ -51,7 +51,8 @@ contains
     type(input_t), intent(in) :: input   !! that `check_output_times` accepts
     real(wp), allocatable :: times(:)
     type(group_t) :: output, run
-    real(wp), parameter :: sliver = 1.0e-9_wp   ! of an interval: a last row closer to t_end than this is moved to t_end
+    real(wp), parameter :: sliver = 1.0e-9_wp   ! of an interval: a last row closer to t_end than this or rounding is moved there
+    real(wp) :: rounding   ! of the times [s]
     integer :: i, intervals
 
     output = input%single('output')
@@ -59,7 +60,8 @@ contains
     associate (t_start => run%number('t_start'), t_end => run%number('t_end'))
       if (output%has_value('interval')) then
         associate (interval => output%number('interval'))
-          intervals = max(1, ceiling((t_end - t_start) / interval - sliver))
+          rounding = spacing(max(abs(t_start), abs(t_end)))
+          intervals = max(1, ceiling((t_end - t_start) / interval - max(sliver, rounding / interval)))
           times = [(t_start + i * interval, i=0, intervals)]
         end associate
       else

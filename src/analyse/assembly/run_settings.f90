@@ -1,5 +1,6 @@
 !> The keys of &run: the formulation and the method that a machine allows, as settings of the integrator and in summaries.
 module nocdyn_run_settings
+  use nocdyn_assembly, only: new_formulation
   use nocdyn_errors, only: error_t, exit_input, raise
   use nocdyn_formulation, only: formulation_t
   use nocdyn_input, only: group_t, input_t
@@ -14,7 +15,7 @@ module nocdyn_run_settings
   implicit none (type, external)
   private
 
-  public :: check_size, choose_settings, put_settings
+  public :: check_method, check_size, choose_settings, put_settings
 
   integer, parameter :: largest_matrix = 6000   ! rows; 0.3 GB each, and there are several
 
@@ -36,6 +37,24 @@ contains
                ' rows for this machine; at most ' // to_text(largest_matrix) // ' are allowed; ' // &
                'formulation = ' // quoted('reduced') // ' needs none')
   end subroutine check_size
+
+  !> Refuses what a run or a sweep of the input refuses: a formulation or a method that the machine is too large for or cannot have.
+  subroutine check_method(input, machine, error)
+    type(input_t), intent(in) :: input
+    type(machine_t), intent(in) :: machine
+    type(error_t), allocatable, intent(out) :: error
+    class(formulation_t), allocatable :: formulation
+    type(integration_settings_t) :: settings
+    type(string_t), allocatable :: notes(:)
+
+    call check_size(input, machine, error)
+    if (allocated(error)) return
+    associate (run => input%groups(input%position('run')))
+      if (run%text('formulation') /= 'reduced' .and. run%text('method') /= 'taylor') return   ! its matrices need time
+      call new_formulation(run%text('formulation'), machine, formulation, .false.)
+    end associate
+    call choose_settings(input, formulation, settings, notes, error)
+  end subroutine check_method
 
   !> The settings of an integration, with the method of the input. Where the stage matrix would be too large, implicit methods are
   !> refused, and 'auto' becomes its explicit method, with a note. 'taylor' is refused where an element has no Taylor series.

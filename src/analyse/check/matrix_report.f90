@@ -2,6 +2,8 @@
 module nocdyn_matrix_report
   use nocdyn_bank, only: role_coupling, role_excitation, role_load, role_motor, role_names
   use nocdyn_complement, only: coordinate_selector, extended_constraint
+  use nocdyn_errors, only: error_t, exit_failed, raise
+  use nocdyn_finite, only: is_finite
   use nocdyn_kinds, only: wp
   use nocdyn_lapack_lu, only: lu_factor, lu_solve
   use nocdyn_machine, only: machine_t
@@ -23,6 +25,7 @@ module nocdyn_matrix_report
   type :: equations_t
     type(machine_t) :: machine
     type(text_buffer_t) :: report
+    type(error_t), allocatable :: error   !! on the first matrix that has no finite numbers
     integer :: n = 0
     real(wp), allocatable :: constraint(:, :), complement(:, :)                        !! L_lambda, L_tau
     real(wp), allocatable :: inertia(:, :), damping(:, :), stiffness(:, :)             !! J, C, K; then J_1, C_1, K_1; ...
@@ -35,10 +38,11 @@ module nocdyn_matrix_report
 contains
 
   !> The report as lines of text, for the machine at its start angles and speeds.
-  function matrix_report(machine, t_start) result(text)
+  subroutine matrix_report(machine, t_start, text, error)
     type(machine_t), intent(in) :: machine
     real(wp), intent(in) :: t_start   !! time [s]
-    character(len=:), allocatable :: text
+    character(len=:), allocatable, intent(out) :: text
+    type(error_t), allocatable, intent(out) :: error   !! a number is not finite
     type(equations_t) :: equations
 
     equations%machine = machine
@@ -54,7 +58,8 @@ contains
     call report_first_order(equations)
     call report_moments_as_states(equations)
     text = equations%report%text()
-  end function matrix_report
+    call move_alloc(equations%error, error)
+  end subroutine matrix_report
 
   !> Lists the elements whose laws are not those of the paper, and says what the matrices contain for them.
   subroutine report_other_laws(equations)
@@ -248,7 +253,10 @@ contains
     factors = inertia
     slope = right_hand_side
     call lu_factor(factors, pivots, is_singular)
-    if (is_singular) error stop 'nocdyn_matrix_report: the reduced mass matrix must be positive definite and the rows independent'
+    if (is_singular) then
+      call raise(equations%error, exit_failed, '(44) J_3 is singular by rounding: the inertias differ too much')
+      return
+    end if
     call lu_solve(factors, pivots, slope)
     associate (n => equations%n)
       call equations%put_vector("(14) omega' [rad/s2]", slope(:n))
@@ -277,6 +285,11 @@ contains
     character(len=:), allocatable :: number
     integer :: i, j, width
 
+    if (allocated(self%error)) return
+    if (.not. all(is_finite(matrix))) then
+      call raise(self%error, exit_failed, label // ' has an element that is not a finite number')
+      return
+    end if
     call self%report%append_line('')
     call self%report%append_line(label // ' (' // to_text(size(matrix, 1)) // ' x ' // to_text(size(matrix, 2)) // ')')
     width = maxval([((len(rounded_text(matrix(i, j), digits)), i=1, size(matrix, 1)), j=1, size(matrix, 2))])

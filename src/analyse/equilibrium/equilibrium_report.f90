@@ -3,6 +3,8 @@ module nocdyn_equilibrium_report
   use nocdyn_bank, only: role_coupling
   use nocdyn_energy_balance, only: work_element_names
   use nocdyn_equilibrium, only: equilibrium_t, t_infinity
+  use nocdyn_errors, only: error_t, exit_failed, raise
+  use nocdyn_finite, only: is_finite
   use nocdyn_formulation, only: formulation_t
   use nocdyn_input, only: input_t
   use nocdyn_json, only: json_t
@@ -36,10 +38,12 @@ module nocdyn_equilibrium_report
 contains
 
   !> Evaluates the columns of trajectory.csv at the steady states.
-  type(equilibrium_report_t) function new_equilibrium_report(formulation, equilibria, notes) result(self)
+  subroutine new_equilibrium_report(formulation, equilibria, notes, self, error)
     class(formulation_t), intent(in) :: formulation
     type(equilibrium_t), intent(in) :: equilibria(:)
     type(string_t), intent(in) :: notes(:)
+    type(equilibrium_report_t), intent(out) :: self
+    type(error_t), allocatable, intent(out) :: error   !! a number of a steady state is not finite
     type(trajectory_table_t) :: table
     real(wp), allocatable :: row(:), watts(:, :), y(:)
     integer, allocatable :: reported(:)                 !! columns
@@ -60,8 +64,26 @@ contains
       call table%columns%formulation%machine%power(watts)
       self%values(:, k) = row(reported)
       self%power(:, k) = watts(1, :)
+      i = findloc(is_finite([self%values(:, k), self%power(:, k)]), .false., dim=1)
+      if (i == 0) cycle
+      call raise(error, exit_failed, 'in steady state ' // to_text(k) // ' of ' // to_text(size(equilibria)) // ', ' // &
+                 label_of(self, i) // ' is not a finite number')
+      return
     end do
-  end function new_equilibrium_report
+  end subroutine new_equilibrium_report
+
+  !> What the number `i` of the values and then the powers is.
+  function label_of(self, i) result(label)
+    type(equilibrium_report_t), intent(in) :: self
+    integer, intent(in) :: i
+    character(len=:), allocatable :: label
+
+    if (i <= size(self%labels)) then
+      label = self%labels(i)%text
+    else
+      label = 'the power of ' // self%work_elements(i - size(self%labels))%text
+    end if
+  end function label_of
 
   !> The columns that are constant in a steady state: no angles, and no twists of couplings that slip.
   function steady_columns(table, machine) result(columns)

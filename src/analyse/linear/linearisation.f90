@@ -10,10 +10,13 @@
 module nocdyn_linearisation
   use nocdyn_element_coordinates, only: element_coordinates_t, new_element_coordinates
   use nocdyn_errors, only: error_t, exit_failed, raise
+  use nocdyn_finite, only: is_finite
   use nocdyn_formulation, only: formulation_t
   use nocdyn_kinds, only: wp
   use nocdyn_lapack_eigen, only: cholesky_factor, singular_vectors, solve_triangular, symmetric_eigenvectors
+  use nocdyn_machine, only: machine_t
   use nocdyn_system, only: pattern_t
+  use nocdyn_text, only: quoted
   implicit none (type, external)
   private
 
@@ -41,7 +44,7 @@ contains
     real(wp), intent(in) :: t                     !! [s]
     real(wp), contiguous, intent(in) :: y(:, :)   !! [1, states]
     type(linearisation_t), intent(out) :: self
-    type(error_t), allocatable, intent(out) :: error   !! if LAPACK does not converge
+    type(error_t), allocatable, intent(out) :: error   !! if a number is not finite, or LAPACK does not converge
     type(element_coordinates_t) :: incidence
     type(pattern_t) :: pattern
     real(wp), allocatable :: slopes(:, :)
@@ -57,13 +60,29 @@ contains
     associate (elements => formulation%machine%elements)
       self%stiffness = -(elements%restoring_angle(1, :) + elements%applied_angle(1, :))
     end associate
-    call find_modes(formulation, incidence, self, error)
+    call refuse_not_finite(formulation%machine, self%stiffness, error)
+    if (.not. allocated(error)) call find_modes(formulation, incidence, self, error)
     if (allocated(error)) return
     call assemble(formulation, self)
     if (formulation%states > 2 * size(self%natural)) then
       call add_internal(formulation, pattern, slopes(1, :), self)
     end if
   end subroutine linearise
+
+  !> Refuses stiffnesses and dampings that are not finite.
+  subroutine refuse_not_finite(machine, stiffness, error)
+    type(machine_t), intent(in) :: machine   !! differentiated
+    real(wp), intent(in) :: stiffness(:)     !! of all elements [N m/rad]
+    type(error_t), allocatable, intent(out) :: error
+    integer :: e
+
+    do e = 1, size(stiffness)
+      if (is_finite(stiffness(e)) .and. is_finite(machine%elements%applied_speed(1, e))) cycle
+      call raise(error, exit_failed, 'the stiffness or damping of ' // quoted(machine%element_name(e)) // &
+                 ' in this state is not a finite number')
+      return
+    end do
+  end subroutine refuse_not_finite
 
   !> Computes the undamped modes.
   subroutine find_modes(formulation, incidence, self, error)
@@ -79,7 +98,10 @@ contains
                                                                               abs(self%stiffness) > 0.0_wp))
       factor = mass_matrix(formulation)
       call cholesky_factor(factor, has_failed)
-      if (has_failed) error stop 'nocdyn_linearisation: the mass matrix must be positive definite'
+      if (has_failed) then
+        call raise(error, exit_failed, 'rounding makes the mass matrix of this machine singular: its inertias differ too much')
+        return
+      end if
       allocate (flexibility(size(elastic), f), self%shapes(f, f), self%natural(f), source=0.0_wp)
       do i = 1, size(elastic)
         do e = incidence%first(elastic(i)), incidence%first(elastic(i) + 1) - 1
@@ -89,7 +111,7 @@ contains
       if (size(elastic) > 0) call solve_triangular(factor, flexibility, from_right=.true.)
       call solve_undamped(flexibility, self%stiffness(elastic), self, has_failed)
       if (has_failed) then
-        call raise(error, exit_failed, 'the natural frequencies were not found: LAPACK did not converge')
+        call raise(error, exit_failed, 'the natural frequencies were not found: they are not finite, or LAPACK did not converge')
         return
       end if
       call solve_triangular(factor, self%shapes, from_right=.false.)

@@ -51,7 +51,8 @@ contains
     allocate (values(states), vectors(states, states))
     call eigenvectors(linear%matrix, values, vectors, has_failed)
     if (has_failed) then
-      call raise(error, exit_failed, 'the modes were not found: LAPACK did not converge')
+      call raise(error, exit_failed, 'the modes were not found: a number of the linearised machine is not finite, or ' // &
+                 'LAPACK did not converge')
       return
     end if
     call clear_rounding(values)

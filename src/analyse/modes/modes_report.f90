@@ -1,7 +1,8 @@
 !> The printed report on the modes of a machine.
 module nocdyn_modes_report
   use nocdyn_energy_balance, only: element_names
-  use nocdyn_errors, only: error_t
+  use nocdyn_errors, only: error_t, exit_failed, raise
+  use nocdyn_finite, only: is_finite
   use nocdyn_kinds, only: wp
   use nocdyn_linearisation, only: linearisation_t, linearise
   use nocdyn_machine, only: machine_t
@@ -43,6 +44,7 @@ contains
     type(modes_report_t), intent(out) :: self
     type(error_t), allocatable, intent(out) :: error
     type(linearisation_t) :: linear
+    integer :: i
 
     call linearise(point%formulation, point%t, point%y, linear, error)
     if (allocated(error)) return
@@ -51,6 +53,15 @@ contains
     allocate (self%elastic_names, source=element_names(self%machine, self%elastic))
     call find_modes(point%formulation, linear, self%elastic, self%modes, error)
     if (allocated(error)) return
+    do i = 1, size(self%modes)
+      associate (mode => self%modes(i))
+        if (all(is_finite([real(mode%eigenvalue, wp), aimag(mode%eigenvalue), mode%undamped, mode%kinetic, mode%potential, &
+                           real(mode%shape, wp), aimag(mode%shape)]))) cycle
+      end associate
+      call raise(error, exit_failed, 'mode ' // to_text(i) // ' of ' // to_text(size(self%modes)) // &
+                 ' has a frequency, shape or share of an energy that is not a finite number')
+      return
+    end do
     call point%formulation%set_state(point%y)
     allocate (self%omega, source=point%formulation%omega(1, 1:))
     self%stiffness = linear%stiffness(self%elastic)

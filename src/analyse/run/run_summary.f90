@@ -1,6 +1,8 @@
 !> The summary of a run: the contents of summary.json and of the printed table.
 module nocdyn_run_summary
   use nocdyn_energy_balance, only: append_energy_balance, energy_balance_t, put_energy_balance
+  use nocdyn_errors, only: error_t, exit_failed, raise
+  use nocdyn_finite, only: is_finite
   use nocdyn_input, only: input_t
   use nocdyn_json, only: json_t
   use nocdyn_kinds, only: wp
@@ -15,7 +17,7 @@ module nocdyn_run_summary
   implicit none (type, external)
   private
 
-  public :: start_extremes, update_extremes, widen_extremes, describe_machine, check_energy_balance
+  public :: start_extremes, update_extremes, widen_extremes, describe_machine, check_energy_balance, check_extremes
   public :: summary_json, summary_line, summary_table, method_line
 
   !> The summary notes an energy residual above this share of the largest energy or work: such a motion is not to be trusted.
@@ -99,6 +101,18 @@ contains
     end do
     extremes%are_continuous = .true.
   end subroutine widen_extremes
+
+  !> Refuses extremes that are not finite: the motion between two rows can reach them.
+  subroutine check_extremes(extremes, labels, error)
+    type(extremes_t), intent(in) :: extremes
+    type(string_t), intent(in) :: labels(:)   !! of the columns
+    type(error_t), allocatable, intent(out) :: error
+    integer :: i
+
+    i = findloc(is_finite(extremes%lowest) .and. is_finite(extremes%highest), .false., dim=1)
+    if (i > 0) call raise(error, exit_failed, labels(i)%text // ' is not a finite number between two rows, about t = ' // &
+                          to_text(merge(extremes%highest_time(i), extremes%lowest_time(i), is_finite(extremes%lowest(i)))) // ' s')
+  end subroutine check_extremes
 
   !> Takes what the summary says of the machine.
   subroutine describe_machine(machine, summary)

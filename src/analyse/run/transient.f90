@@ -3,6 +3,7 @@ module nocdyn_transient
   use, intrinsic :: iso_fortran_env, only: int64
   use nocdyn_assembly, only: assemble_machine, new_formulation
   use nocdyn_errors, only: error_t, exit_failed, raise
+  use nocdyn_finite, only: is_finite
   use nocdyn_formulation, only: formulation_t
   use nocdyn_input, only: input_t
   use nocdyn_integration, only: integrate
@@ -11,11 +12,12 @@ module nocdyn_transient
   use nocdyn_machine, only: machine_t
   use nocdyn_output_times, only: check_output_times, output_times
   use nocdyn_run_settings, only: check_size, choose_settings
-  use nocdyn_run_summary, only: check_energy_balance, describe_machine, extremes_t, run_summary_t, start_extremes, &
+  use nocdyn_run_summary, only: check_energy_balance, check_extremes, describe_machine, extremes_t, run_summary_t, start_extremes, &
     update_extremes, widen_extremes
-  use nocdyn_solver_status, only: failure_message, integration_done, integration_interrupted, solver_status_t
+  use nocdyn_solver_status, only: failure_message, integration_done, integration_interrupted, integration_not_finite, &
+    solver_status_t
   use nocdyn_observer, only: observer_t, ranges_t
-  use nocdyn_text, only: append, string_t
+  use nocdyn_text, only: append, string_t, to_text
   use nocdyn_trajectory_table, only: new_trajectory_table, trajectory_table_t
   implicit none (type, external)
   private
@@ -64,6 +66,8 @@ module nocdyn_transient
     real(wp) :: last_time = 0.0_wp           !! of the rows [s]
     real(wp), allocatable :: last_state(:)   !! at that time, [states + quadratures]
     real(wp) :: t_start, t_end               !! [s]
+    integer :: not_finite = 0                !! column of the first row with a number that is not finite, which ends the run
+    real(wp) :: failure_time = 0.0_wp        !! of that row [s]
     logical :: has_ranges = .false.          !! whether the columns were evaluated between the rows
     class(run_output_t), pointer :: output => null()
   contains
@@ -152,17 +156,22 @@ contains
     if (allocated(error)) return   ! a setting was refused
     summary%has_run = .true.
     summary%wall_time = real(ended - began, wp) / real(rate, wp)
-    if (summary%solver_status%code(1) /= integration_done) then
+    if (observer%not_finite > 0 .and. any(summary%solver_status%code(1) == [integration_done, integration_interrupted])) then
+      summary%solver_status%code(1) = integration_not_finite
+      call raise(error, exit_failed, observer%table%labels(observer%not_finite)%text // ' is not a finite number at t = ' // &
+                 to_text(observer%failure_time) // ' s')
+    else if (summary%solver_status%code(1) /= integration_done) then
       call raise(error, exit_failed, failure_message(summary%solver_status, 1, formulation, settings%rtol, settings%atol))
     end if
   end subroutine solve
 
   subroutine complete_summary(observer, error, summary)
     type(run_observer_t), intent(inout) :: observer
-    type(error_t), allocatable, intent(in) :: error   !! of the integration
+    type(error_t), allocatable, intent(inout) :: error   !! of the integration, or that a number of the summary is not finite
     type(run_summary_t), intent(inout) :: summary
 
     summary%extremes = observer%extremes
+    if (.not. allocated(error)) call check_extremes(summary%extremes, summary%labels, error)
     call check_energy_balance(summary%extremes, summary%notes)
     if (summary%extremes%rows > 0) then
       allocate (summary%energy_balance)
@@ -182,7 +191,11 @@ contains
     real(wp), contiguous, intent(in) :: y(:)   !! [states + quadratures]
 
     if (lane /= 1) error stop 'nocdyn_transient: a run is one lane'
+    if (self%not_finite > 0) return
     call self%table%fill(t, y, self%row)
+    self%not_finite = findloc(is_finite(self%row), .false., dim=1)
+    self%failure_time = t
+    if (self%not_finite > 0) return
     call update_extremes(self%extremes, self%row)
     call self%output%write_row(self%row)
     self%last_time = t
@@ -217,7 +230,7 @@ contains
     class(run_observer_t), intent(inout) :: self
     real(wp), intent(in) :: t   !! time reached [s]
 
-    wants_stop = self%output%wants_stop((t - self%t_start) / (self%t_end - self%t_start))
+    wants_stop = self%output%wants_stop((t - self%t_start) / (self%t_end - self%t_start)) .or. self%not_finite > 0
   end function wants_stop
 
 end module nocdyn_transient

@@ -7,6 +7,7 @@ module nocdyn_check_command
   use nocdyn_input_files, only: analyse_files
   use nocdyn_machine, only: machine_t
   use nocdyn_machine_report, only: machine_report
+  use nocdyn_run_settings, only: check_method
   use nocdyn_sweep_plan, only: has_sweep, make_plan, sweep_plan_t
   implicit none (type, external)
   private
@@ -31,6 +32,8 @@ contains
     type(error_t), allocatable, intent(out) :: error
     type(sweep_plan_t) :: plan
 
+    call check_method(input, machine, error)
+    if (allocated(error)) return
     if (.not. has_sweep(input)) then
       call print_text(machine_report(input%file, machine))
     else

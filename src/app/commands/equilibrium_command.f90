@@ -38,12 +38,14 @@ contains
     type(string_t), allocatable :: notes(:)
 
     call find_equilibria(machine, formulation, equilibria, notes, error)
+    if (.not. allocated(error)) then
+      call find_stability(formulation, equilibria)
+      call new_equilibrium_report(formulation, equilibria, notes, report, error)
+    end if
     if (allocated(error)) then
       error%message = input%file // ': ' // error%message
       return
     end if
-    call find_stability(formulation, equilibria)
-    report = new_equilibrium_report(formulation, equilibria, notes)
     call print_text(equilibrium_text(input%file, report))
     if (folder /= '') call write_file(folder, 'equilibrium.json', equilibrium_json(input, report), error)
   end subroutine analyse_equilibria

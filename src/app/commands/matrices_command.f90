@@ -29,9 +29,15 @@ contains
     character(len=*), intent(in) :: folder
     type(error_t), allocatable, intent(out) :: error
     type(group_t) :: run
+    character(len=:), allocatable :: text
 
     run = input%single('run')
-    call print_text(matrix_report(machine, run%number('t_start')))
+    call matrix_report(machine, run%number('t_start'), text, error)
+    if (allocated(error)) then
+      error%message = input%file // ': ' // error%message
+    else
+      call print_text(text)
+    end if
   end subroutine print_matrices
 
 end module nocdyn_matrices_command

@@ -3,7 +3,7 @@ module nocdyn_sweep_results
   use, intrinsic :: iso_fortran_env, only: int64
   use nocdyn_arguments, only: arguments_t
   use nocdyn_console, only: print_text, report_error
-  use nocdyn_errors, only: error_t, exit_done, exit_failed, raise
+  use nocdyn_errors, only: error_t, exit_done, exit_failed, exit_file, exit_input, raise
   use nocdyn_folders, only: folder_names, remove_empty_folder
   use nocdyn_input, only: input_t
   use nocdyn_input_text, only: input_text
@@ -170,7 +170,8 @@ contains
         call raise(error, exit_failed, plan%input%file // ': interrupted while trajectories were written; ' // &
                    'repeat the command with --resume to continue')
       else if (allocated(error)) then
-        if (error%code == exit_failed) deallocate (error)   ! the reason is in sweep.nc
+        if (error%code == exit_input) refused = [refused, plan%trajectories(i)]   ! its output times, which the sweep ignores
+        if (error%code /= exit_file) deallocate (error)   ! the reason of a failure is in sweep.nc
       end if
       if (allocated(error)) return
     end do

@@ -1,7 +1,10 @@
 !> Dense linear algebra by LAPACK: rank, inverse, positive definite systems, pseudo-inverse.
 !>
+!> LAPACK never sees a matrix with an infinity or a NaN, on which it may print and stop, or never end.
+!>
 !> Arrays are allocated with `source=`: gfortran 12 warns of uninitialised descriptors where an assignment allocates.
 module nocdyn_lapack
+  use nocdyn_finite, only: is_finite
   use nocdyn_kinds, only: wp
   use nocdyn_lapack_lu, only: lu_factor
   implicit none (type, external)
@@ -53,7 +56,7 @@ contains
   subroutine pivoted_rank(matrix, tolerance, rank, pivots)
     real(wp), intent(in) :: matrix(:, :)   !! [rows, columns]
     real(wp), intent(in) :: tolerance      !! relative to the largest column
-    integer, intent(out) :: rank
+    integer, intent(out) :: rank           !! 0 if an element is not finite
     integer, intent(out) :: pivots(:)      !! columns in the order of pivoting, shape [columns]; the first `rank` are independent
     real(wp), allocatable :: a(:, :), tau(:), work(:)
     integer :: info, k, m, n
@@ -62,7 +65,7 @@ contains
     n = size(matrix, 2)
     pivots = [(k, k=1, n)]
     rank = 0
-    if (min(m, n) == 0) return
+    if (min(m, n) == 0 .or. .not. all(is_finite(matrix))) return
     allocate (tau(min(m, n)), work(2 * n + 32 * (n + 1)))
     allocate (a, source=matrix)
     pivots = 0
@@ -79,7 +82,7 @@ contains
     real(wp), intent(in) :: matrix(:, :)                  !! square
     real(wp), allocatable, intent(out) :: inverse(:, :)   !! not the inverse if singular
     real(wp), intent(out) :: log_determinant              !! meaningless if singular
-    logical, intent(out) :: is_singular                   !! a pivot is exactly zero
+    logical, intent(out) :: is_singular                   !! a pivot is exactly zero, or an element is not finite
     real(wp), allocatable :: work(:)
     integer, allocatable :: ipiv(:)
     integer :: info, k, n
@@ -88,6 +91,8 @@ contains
     allocate (ipiv(n), work(max(1, 32 * n)))
     allocate (inverse, source=matrix)
     log_determinant = 0.0_wp
+    is_singular = .not. all(is_finite(matrix))
+    if (is_singular) return
     call lu_factor(inverse, ipiv, is_singular)
     if (is_singular) return
     do k = 1, n
@@ -96,25 +101,31 @@ contains
     call dgetri(n, inverse, max(1, n), ipiv, work, size(work), info)
   end subroutine invert
 
-  !> Solves matrix * x = rhs by Cholesky (DPOSV).
+  !> Solves matrix * x = rhs by Cholesky (DPOSV). A pivot that is the rounding of what it is the difference of has no value.
   subroutine solve_positive_definite(matrix, rhs, solution, is_indefinite)
     real(wp), intent(in) :: matrix(:, :)   !! symmetric, [n, n]
     real(wp), intent(in) :: rhs(:, :)   !! right-hand sides as columns, [n, m]
     real(wp), allocatable, intent(out) :: solution(:, :)   !! [n, m]
-    logical, intent(out) :: is_indefinite   !! the matrix is not positive definite: no solution
+    logical, intent(out) :: is_indefinite   !! the matrix is not positive definite, or only by rounding, or not finite: no solution
+    real(wp), parameter :: rounding = 4.0_wp * epsilon(1.0_wp)
     real(wp), allocatable :: a(:, :)
-    integer :: info, n
+    integer :: info, k, n
 
     n = size(matrix, 1)
     allocate (a, source=matrix)
     allocate (solution, source=rhs)
+    is_indefinite = .not. all(is_finite(matrix))
+    if (is_indefinite) return
     call dposv('L', n, size(rhs, 2), a, max(1, n), solution, max(1, n), info)
     is_indefinite = info /= 0
+    do k = 1, n
+      is_indefinite = is_indefinite .or. a(k, k)**2 <= rounding * matrix(k, k)
+    end do
   end subroutine solve_positive_definite
 
   !> Moore-Penrose inverse: the least-squares solutions of smallest norm for the unit vectors (DGELSY).
   function pseudo_inverse(matrix, tolerance) result(inverse)
-    real(wp), intent(in) :: matrix(:, :)   !! [rows, columns]
+    real(wp), intent(in) :: matrix(:, :)   !! [rows, columns], finite
     real(wp), intent(in) :: tolerance          !! singular below this times the largest, as in `pivoted_rank`
     real(wp) :: inverse(size(matrix, 2), size(matrix, 1))
     real(wp), allocatable :: a(:, :), b(:, :), work(:)

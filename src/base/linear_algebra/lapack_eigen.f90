@@ -1,5 +1,6 @@
-!> Dense eigenvalue problems, by LAPACK.
+!> Dense eigenvalue problems, by LAPACK, which never sees a matrix with an infinity or a NaN.
 module nocdyn_lapack_eigen
+  use nocdyn_finite, only: is_finite
   use nocdyn_kinds, only: wp
   implicit none (type, external)
   private
@@ -56,9 +57,11 @@ contains
   !> Cholesky factor R of A = R^T R (DPOTRF), in the upper triangle of `matrix`.
   subroutine cholesky_factor(matrix, is_indefinite)
     real(wp), contiguous, intent(inout) :: matrix(:, :)   !! A, symmetric
-    logical, intent(out) :: is_indefinite                 !! whether A is not positive definite
+    logical, intent(out) :: is_indefinite                 !! whether A is not positive definite, or not finite
     integer :: info
 
+    is_indefinite = .not. all(is_finite(matrix))
+    if (is_indefinite) return
     call dpotrf('U', size(matrix, 1), matrix, max(1, size(matrix, 1)), info)
     is_indefinite = info /= 0
   end subroutine cholesky_factor
@@ -78,7 +81,7 @@ contains
     real(wp), intent(in) :: matrix(:, :)                  !! [m, n]
     real(wp), intent(out) :: values(:)                    !! [n], zeros after the first min(m, n)
     real(wp), intent(out) :: vectors(:, :)                !! [n, n]
-    logical, intent(out) :: has_failed
+    logical, intent(out) :: has_failed                    !! LAPACK does not converge, or an element is not finite
     real(wp), allocatable :: a(:, :), transposed(:, :), work(:)
     real(wp) :: none(1, 1), room(1)
     integer :: info, m, n
@@ -86,6 +89,9 @@ contains
     m = max(1, size(matrix, 1))   ! one row of zeros where there is none: without rows DGESVD sets no vectors
     n = size(matrix, 2)
     values = 0.0_wp
+    vectors = 0.0_wp
+    has_failed = .not. all(is_finite(matrix))
+    if (has_failed) return
     allocate (a(m, n), source=0.0_wp)
     a(:size(matrix, 1), :) = matrix
     allocate (transposed(n, n))
@@ -101,13 +107,16 @@ contains
     real(wp), intent(in) :: matrix(:, :)   !! symmetric, [n, n]
     real(wp), intent(out) :: values(:)   !! [n]
     real(wp), contiguous, intent(out) :: vectors(:, :)    !! as columns
-    logical, intent(out) :: has_failed
+    logical, intent(out) :: has_failed                    !! LAPACK does not converge, or an element is not finite
     real(wp), allocatable :: work(:)
     integer :: info, n
 
     n = size(matrix, 1)
-    allocate (work(max(1, 34 * n)))
+    values = 0.0_wp
     vectors(:, :) = matrix
+    has_failed = .not. all(is_finite(matrix))
+    if (has_failed) return
+    allocate (work(max(1, 34 * n)))
     call dsyev('V', 'U', n, vectors, max(1, n), values, work, size(work), info)
     has_failed = info /= 0
   end subroutine symmetric_eigenvectors
@@ -117,17 +126,19 @@ contains
     real(wp), intent(in) :: matrix(:, :)   !! [n, n]
     complex(wp), intent(out) :: values(:)   !! [n]
     complex(wp), intent(out) :: vectors(:, :)             !! as columns
-    logical, intent(out) :: has_failed
+    logical, intent(out) :: has_failed                    !! LAPACK does not converge, or an element is not finite
     real(wp), allocatable :: a(:, :), imaginary(:), right(:, :), work(:)
     real(wp) :: none(1, 1), room(1)
     real(wp), allocatable :: real_part(:)
     integer :: i, info, n
 
     n = size(matrix, 1)
+    values = 0.0_wp
+    vectors = 0.0_wp
+    has_failed = .not. all(is_finite(matrix))
+    if (has_failed .or. n == 0) return
     allocate (a, source=matrix)
     allocate (right(n, n), real_part(n), imaginary(n), source=0.0_wp)
-    has_failed = .false.
-    if (n == 0) return
     call dgeev('N', 'V', n, a, n, real_part, imaginary, none, 1, right, n, room, -1, info)
     allocate (work(int(room(1))))
     call dgeev('N', 'V', n, a, n, real_part, imaginary, none, 1, right, n, work, size(work), info)

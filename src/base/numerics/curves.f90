@@ -103,11 +103,12 @@ contains
     end if
   end function end_slope
 
-  !> Zero has no sign.
+  !> Zero has no sign, nor has a slope that is next to it: its inverse would overflow.
   pure logical function have_same_sign(a, b)
     real(wp), intent(in) :: a, b
+    real(wp), parameter :: least = 1.0e-150_wp
 
-    have_same_sign = (a > 0 .and. b > 0) .or. (a < 0 .and. b < 0)
+    have_same_sign = (a > least .and. b > least) .or. (a < -least .and. b < -least)
   end function have_same_sign
 
   !> Number of points.

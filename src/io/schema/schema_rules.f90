@@ -4,7 +4,11 @@ module nocdyn_schema_rules
   implicit none (type, external)
   private
 
-  public :: is_out_of_range
+  public :: is_out_of_range, size_problem
+
+  !> Numbers of an input are at most so large in size, so that products and powers of a few of them stay finite. Those that are
+  !> divided by, which are the ones that cannot be negative, cannot be 0 or ascend, are 0 or at least so large.
+  real(wp), parameter, public :: largest_size = 1.0e50_wp, smallest_size = 1.0e-50_wp
 
   ! Occurrence of a group.
   integer, parameter, public :: exactly_once = 1, at_most_once = 2, at_least_once = 3, any_times = 4
@@ -116,5 +120,21 @@ contains
     if (allowed%excludes_low) is_out_of_range = is_out_of_range .or. .not. value > allowed%low
     if (allowed%excludes_zero) is_out_of_range = is_out_of_range .or. abs(value) <= 0.0_wp
   end function is_out_of_range
+
+  !> What is wrong with the size of a number, '' if nothing is.
+  pure function size_problem(value, allowed, ascends) result(text)
+    real(wp), intent(in) :: value
+    type(allowed_t), intent(in) :: allowed   !! values of the key
+    logical, intent(in) :: ascends           !! whether the number is one of an ascending list
+    character(len=:), allocatable :: text
+
+    text = ''
+    if (abs(value) > largest_size) then
+      text = ' is out of range: numbers are at most 1e50 in size'
+    else if (abs(value) > 0 .and. abs(value) < smallest_size .and. (ascends .or. allowed%excludes_zero .or. &
+                                                                     abs(allowed%low) <= 0)) then
+      text = ' is out of range: numbers other than 0 are at least 1e-50 in size here'
+    end if
+  end function size_problem
 
 end module nocdyn_schema_rules

@@ -6,19 +6,24 @@ module nocdyn_constraint_analysis
   use nocdyn_constraint_conflicts, only: locked_trains, raise_lock, raise_loop_conflict
   use nocdyn_constraints, only: constraints_t
   use nocdyn_coordinate_choice, only: choose_coordinates, eliminate
-  use nocdyn_errors, only: error_t
-  use nocdyn_geared_groups, only: find_groups, geared_group_t
+  use nocdyn_errors, only: error_t, exit_input, raise
+  use nocdyn_geared_groups, only: find_groups, geared_group_t, redundancy_t
   use nocdyn_kinds, only: wp
   use nocdyn_lapack, only: pivoted_rank
   use nocdyn_rigid_trains, only: find_trains, ratio_tolerance, rigid_trains_t
   use nocdyn_sparse_map, only: transposed_order
-  use nocdyn_text, only: string_t
   use nocdyn_train_motion, only: elimination_t, find_loads, find_motion, train_motion_t
+  use nocdyn_text, only: string_t, to_text
   use nocdyn_train_relations, only: distinct_trains, new_relations, scaled_rows, leaf_elimination_t, train_relations_t
+  use nocdyn_union_find, only: find_root, join_components
   implicit none (type, external)
   private
 
   public :: analyse_constraints
+
+  ! The time grows with the cube of these numbers; they take some seconds.
+  integer, parameter :: most_redundant = 1000   ! other rows that a redundant one shares loads with
+  integer, parameter :: most_in_core = 2000     ! relations of the core of a group
 
 contains
 
@@ -46,14 +51,16 @@ contains
     call trains%choose_roots(constraints, trains%fastest_bodies(constraints))
     relations = new_relations(constraints, trains)
     call distribute_trains(group_of(trains%root), groups)
-    call find_independent_relations(relations, group_of(trains%root), size(groups), is_kept)
+    call find_independent_relations(relations, group_of(trains%root), size(groups), is_kept, offending_row, error)
+    if (allocated(error)) return
     do r = 1, size(groups)
       groups(r)%kept = pack(groups(r)%rows, is_kept(groups(r)%rows))
     end do
     call eliminate(relations, is_kept(relations%row), group_of, trains, groups)
     call raise_first_lock(constraints, body_names, trains, relations, groups, offending_row, error)
     if (allocated(error)) return
-    call explain_redundancies(constraints, trains, relations, is_kept, groups)
+    call explain_redundancies(constraints, trains, relations, is_kept, groups, offending_row, error)
+    if (allocated(error)) return
     call choose_coordinates(constraints, body_names, wanted, group_of, is_kept, trains, groups, error)
   end subroutine analyse_constraints
 
@@ -70,15 +77,18 @@ contains
   end subroutine distribute_trains
 
   !> Finds the relations that are independent of those before them in the input. Relations with leaves always are.
-  subroutine find_independent_relations(relations, group_of, groups, is_kept)
+  subroutine find_independent_relations(relations, group_of, groups, is_kept, offending_row, error)
     type(train_relations_t), intent(in) :: relations
     integer, intent(in) :: group_of(:)     !! group of each train
     integer, intent(in) :: groups          !! number of groups
     logical, intent(inout) :: is_kept(:)   !! [rows]
+    integer, intent(out) :: offending_row  !! one of too many for a dense matrix, else 0
+    type(error_t), allocatable, intent(out) :: error
     type(leaf_elimination_t) :: leaves
     integer, allocatable :: order(:)
     integer :: first(groups + 1), g, i
 
+    offending_row = 0
     is_kept(relations%row) = .true.
     leaves = relations%eliminate_leaves(spread(.true., 1, size(relations%row)), spread(.false., 1, size(group_of)))
     if (size(leaves%core) == 0) return
@@ -86,6 +96,12 @@ contains
     call transposed_order([(group_of(relations%equations%body(relations%equations%first(leaves%core(i)))), &
                             i=1, size(leaves%core))], groups, order, first)
     do g = 1, groups
+      if (first(g + 1) - first(g) > most_in_core) then
+        offending_row = relations%row(leaves%core(order(first(g))))
+        call raise(error, exit_input, 'the row is one of more than ' // to_text(most_in_core) // ' of three or more bodies ' // &
+                   'that can only be solved together; allowed: ' // to_text(most_in_core))
+        return
+      end if
       if (first(g + 1) > first(g)) call find_independent_core(relations, leaves%core(order(first(g):first(g + 1) - 1)), is_kept)
     end do
   end subroutine find_independent_relations
@@ -178,17 +194,23 @@ contains
     end do
   end subroutine raise_first_lock
 
-  !> Finds the kept rows that each redundant row repeats.
-  subroutine explain_redundancies(constraints, trains, relations, is_kept, groups)
+  !> Finds the kept rows that each redundant row repeats. Ends at the first row that has more than `most_redundant` others to
+  !> share loads with.
+  subroutine explain_redundancies(constraints, trains, relations, is_kept, groups, offending_row, error)
     type(constraints_t), intent(in) :: constraints
     type(rigid_trains_t), intent(in) :: trains
     type(train_relations_t), intent(in) :: relations
     logical, intent(in) :: is_kept(:)   !! [rows]
     type(geared_group_t), intent(inout) :: groups(:)
+    integer, intent(out) :: offending_row   !! that row, else 0
+    type(error_t), allocatable, intent(out) :: error
     type(train_motion_t) :: found
     integer, allocatable :: bodies(:), redundant(:), rows(:)
     integer :: g, i, k, next, local(size(trains%root))
+    integer :: parent(size(is_kept)), sharing(size(is_kept))   ! union-find over the rows; redundant ones of each component
 
+    parent = [(i, i=1, size(parent))]
+    sharing = 0
     do g = 1, size(groups)
       associate (group => groups(g))
         allocate (group%redundancies(size(group%rows) - size(group%kept)))
@@ -197,6 +219,7 @@ contains
         local(group%trains) = [(k, k=1, size(group%trains))]
         call find_motion(relations, group%elimination, local, size(group%trains), 1, found)
         do i = 1, size(redundant)
+          offending_row = redundant(i)
           group%redundancies(i)%row = redundant(i)
           next = constraints%first(redundant(i))
           if (constraints%entries(redundant(i)) == 2) then
@@ -206,10 +229,36 @@ contains
             group%redundancies(i)%repeats = repeated_rows(constraints, trains, relations, group%elimination, found%dual, &
                                                           redundant(i))
           end if
+          call join_rows(group%redundancies(i), parent, sharing, error)
+          if (allocated(error)) return
         end do
       end associate
     end do
+    offending_row = 0
   end subroutine explain_redundancies
+
+  !> Joins a redundant row with those that it repeats; refuses more than `most_redundant` others with common rows.
+  subroutine join_rows(redundancy, parent, sharing, error)
+    type(redundancy_t), intent(in) :: redundancy
+    integer, intent(inout) :: parent(:)    !! union-find, [rows]
+    integer, intent(inout) :: sharing(:)   !! redundant rows in the component of each root, [rows]
+    type(error_t), allocatable, intent(out) :: error
+    integer :: i, joined, other, root
+
+    call find_root(parent, redundancy%row, root)
+    joined = sharing(root) + 1
+    do i = 1, size(redundancy%repeats)
+      call find_root(parent, redundancy%repeats(i), other)
+      call find_root(parent, redundancy%row, root)
+      if (other == root) cycle
+      joined = joined + sharing(other)
+      call join_components(redundancy%row, redundancy%repeats(i), parent)
+    end do
+    call find_root(parent, redundancy%row, root)
+    sharing(root) = joined
+    if (joined > most_redundant) call raise(error, exit_input, 'the row is redundant, as are ' // to_text(most_redundant) // &
+                                            ' others that share its loads by common rows; allowed: ' // to_text(most_redundant))
+  end subroutine join_rows
 
   !> Rows in ascending order.
   pure function ascending(rows) result(sorted)

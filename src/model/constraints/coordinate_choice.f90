@@ -171,7 +171,7 @@ contains
     if (t == 0) return
     if (largest(t) > max_exponent) call raise(error, exit_input, quoted(body_names(trains%root(t))%text) // &
                                           ' cannot be independent: ' // quoted(body_names(body(t))%text) // &
-                                          ' turns more than 1e150 times as fast')
+                                          ' turns more than 1e100 times as fast')
   end subroutine set_wanted_roots
 
   !> Whether the core can be solved for the trains that need not be free.

@@ -1,5 +1,6 @@
 !> The multiplier formulation: [J, -L_lambda^T; L_lambda, 0] [omega'; lambda] = [Q + C omega + K phi; 0], states omega, phi.
 module nocdyn_multiplier
+  use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
   use nocdyn_body_formulation, only: body_formulation_t
   use nocdyn_kinds, only: wp
   use nocdyn_lapack_lu, only: lu_factor, lu_solve
@@ -44,7 +45,7 @@ contains
         self%factors(:machine%bodies, machine%bodies + 1:, l) = -transpose(constraint)
       end associate
       call lu_factor(self%factors(:, :, l), self%pivots(:, l), is_singular)
-      if (is_singular) error stop 'nocdyn_multiplier: the mass matrix must be positive definite and the kept rows independent'
+      if (is_singular) self%factors(:, :, l) = ieee_value(1.0_wp, ieee_quiet_nan)   ! by rounding: the integration refuses to start
     end do
   end function new_multiplier
 

@@ -1,5 +1,6 @@
 !> The paper's formulation, eq. (43): J_3 beta' = Q_3 + C_3 beta + K_3 beta with beta = [omega; phi; F], as written.
 module nocdyn_paper
+  use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
   use nocdyn_bank, only: role_coupling, role_excitation, role_load, role_motor
   use nocdyn_body_formulation, only: body_formulation_t, jacobian_of_bodies, observe_bodies, start_of_bodies
   use nocdyn_incidence, only: add_coefficient, add_moment
@@ -67,7 +68,7 @@ contains
       call extend_by_unit(inertia_of_1, inertia_of_2)
       call extend_by_unit(inertia_of_2, self%factors(:, :, l))
       call lu_factor(self%factors(:, :, l), self%pivots(:, l), is_singular)
-      if (is_singular) error stop 'nocdyn_paper: the mass matrix must be positive definite and the kept rows independent'
+      if (is_singular) self%factors(:, :, l) = ieee_value(1.0_wp, ieee_quiet_nan)   ! by rounding: the integration refuses to start
     end do
     self%couplings = [integer ::]
     do i = 1, size(machine%banks)

@@ -12,6 +12,7 @@ module nocdyn_direct_parameters
   use nocdyn_machine, only: machine_t
   use nocdyn_reduced, only: reduced_t
   use nocdyn_schema, only: first_key, key_rules
+  use nocdyn_schema_rules, only: smallest_size
   use nocdyn_targets, only: target_t
   implicit none (type, external)
   private
@@ -161,12 +162,12 @@ contains
     self%highest = max(self%highest, values)
   end subroutine allow
 
-  !> Whether values are between some that are allowed. The range of a key has no hole but zero, which is a sign of its own here.
+  !> Whether values are between some that are allowed. The range of a key has no hole but one around zero; zero is a sign here.
   pure logical function are_allowed(self, values)
     class(direct_parameters_t), intent(in) :: self
     real(wp), intent(in) :: values(:)   !! [targets]
 
-    are_allowed = all(values >= self%lowest .and. values <= self%highest)
+    are_allowed = all(values >= self%lowest .and. values <= self%highest .and. (abs(values) >= smallest_size .or. abs(values) <= 0))
   end function are_allowed
 
   !> Makes a lane that of a variant. What the lane holds beside the values must be that of another variant.

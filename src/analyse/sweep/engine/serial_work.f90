@@ -27,6 +27,7 @@ module nocdyn_serial_work
   private
 
   public :: check_values, assemble_variant, has_reduced_form, new_own_formulation, prepare_integration, explain_failure
+  public :: explain_not_finite
   public :: append_chunk, update_progress
 
 contains
@@ -127,6 +128,16 @@ contains
     message = failure_message(solver_status, lane, formulation, settings%rtol, settings%atol)
     !$omp end critical (texts)
   end subroutine explain_failure
+
+  !> Says of which result there is no finite number.
+  subroutine explain_not_finite(label, message)
+    character(len=*), intent(in) :: label   !! of the result
+    character(len=:), allocatable, intent(out) :: message
+
+    !$omp critical (texts)
+    message = 'the result ' // label // ' is not a finite number'
+    !$omp end critical (texts)
+  end subroutine explain_not_finite
 
   !> Appends a chunk to the journal.
   subroutine append_chunk(journal, chunk, error)

@@ -2,13 +2,15 @@
 module nocdyn_sweep_block
   use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
   use nocdyn_ensemble, only: ensemble_t, initial_states, initial_states_t
+  use nocdyn_finite, only: is_finite
   use nocdyn_formulation, only: formulation_t
   use nocdyn_integration, only: integrate_with
   use nocdyn_integration_settings, only: integration_settings_t
   use nocdyn_kinds, only: wp
   use nocdyn_scheduler, only: scheduler_t
-  use nocdyn_serial_work, only: explain_failure, prepare_integration
+  use nocdyn_serial_work, only: explain_failure, explain_not_finite, prepare_integration
   use nocdyn_solver_status, only: integration_done, integration_interrupted, solver_status_t
+  use nocdyn_statistics, only: statistic_t
   use nocdyn_statistics_observer, only: statistics_observer_t
   use nocdyn_stepper, only: stepper_t
   use nocdyn_sweep_chunk, only: allocate_chunk, chunk_t, status_done, status_failed, status_refused
@@ -162,23 +164,30 @@ contains
     type(solver_status_t), intent(in) :: solver_status
 
     call store_result(self%chunk, self%index(lane), lane, solver_status, self%block%machines%formulation, self%block%settings, &
-                      self%block%observer)
+                      self%block%plan%statistics, self%block%observer)
   end subroutine finish
 
-  !> Takes the results of the variant in a lane, or why it failed.
-  subroutine store_result(chunk, index, lane, solver_status, formulation, settings, observer)
+  !> Takes the results of the variant in a lane, or why it failed. A result that is not finite is a failure.
+  subroutine store_result(chunk, index, lane, solver_status, formulation, settings, statistics, observer)
     type(chunk_t), intent(inout) :: chunk
     integer, intent(in) :: index, lane
     type(solver_status_t), intent(in) :: solver_status
     class(formulation_t), intent(in) :: formulation
     type(integration_settings_t), intent(in) :: settings
+    type(statistic_t), intent(in) :: statistics(:)
     class(statistics_observer_t), intent(inout) :: observer
+    integer :: i
 
     if (solver_status%code(lane) == integration_interrupted) return
     chunk%steps(index) = solver_status%accepted(lane)
     if (solver_status%code(lane) == integration_done) then
       chunk%status(index) = status_done
       call observer%results(lane, chunk%results(:, index))
+      i = findloc(is_finite(chunk%results(:, index)), .false., dim=1)
+      if (i == 0) return
+      chunk%status(index) = status_failed
+      call explain_not_finite(statistics(i)%label, chunk%reasons(index)%text)
+      chunk%results(:, index) = ieee_value(0.0_wp, ieee_quiet_nan)
     else
       chunk%status(index) = status_failed
       call explain_failure(solver_status, lane, formulation, settings, chunk%reasons(index)%text)
@@ -200,10 +209,10 @@ contains
     real(wp), allocatable :: start(:)
     real(wp) :: times(2)
 
-    call self%machines%own_formulation(chunk%parameters(:, index), formulation)
+    call self%machines%own_formulation(chunk%parameters(:, index), formulation, message)
     observer%scheduler => self%scheduler
-    call prepare_integration(self%machines%input, formulation, self%plan%statistics, settings, times, stepper, &
-                             observer%statistics_observer_t, message)
+    if (message == '') call prepare_integration(self%machines%input, formulation, self%plan%statistics, settings, times, &
+                                                stepper, observer%statistics_observer_t, message)
     if (message /= '') then
       call refuse(chunk, index, message)
       return
@@ -212,7 +221,7 @@ contains
     allocate (start, source=ensemble%y(1, :))
     call observer%start_lane(1, start)
     call integrate_with(stepper, formulation, settings, times, ensemble, observer, solver_status)
-    call store_result(chunk, index, 1, solver_status, formulation, settings, observer)
+    call store_result(chunk, index, 1, solver_status, formulation, settings, self%plan%statistics, observer)
   end subroutine compute_in_own_block
 
   !> Polls the scheduler every `poll_interval` steps, unless another thread does.

@@ -185,16 +185,15 @@ contains
   end subroutine set_by_assembly
 
   !> The formulation, of one lane, of a variant that needs a block of its own.
-  subroutine own_formulation(self, values, formulation)
+  subroutine own_formulation(self, values, formulation, message)
     class(variant_machines_t), intent(inout) :: self
     real(wp), contiguous, intent(in) :: values(:)   !! [targets]
     class(formulation_t), allocatable, intent(out) :: formulation
+    character(len=:), allocatable, intent(out) :: message   !! why there is no such machine, ''
     type(machine_t) :: machine
-    character(len=:), allocatable :: message
 
     call assemble_variant(self%input, self%targets, values, machine, message)
-    if (message /= '') error stop 'nocdyn_variant_machines: a variant is refused always or never'
-    call new_own_formulation(self%input, machine, self%has_energy_balance, formulation)
+    if (message == '') call new_own_formulation(self%input, machine, self%has_energy_balance, formulation)
   end subroutine own_formulation
 
   !> Frees the block.

@@ -190,23 +190,14 @@ contains
     probability_between = distribution%probability
   end function probability_between
 
-  !> Whether the width of a uniform factor, or a value of another one, can exceed the largest number.
+  !> Whether a value of a lognormal factor can exceed the largest number.
   pure logical function can_overflow(factor)
     type(factor_t), intent(in) :: factor
-    real(wp), parameter :: part = 0.01_wp   ! sums of such parts of numbers do not overflow
 
-    select case (factor%distribution)
-    case ('uniform')
-      can_overflow = part * factor%high - part * factor%low > part * huge(part)
-    case ('normal')
-      associate (middle => part * factor%mean, reach => part * tail_end * factor%deviation)
-        can_overflow = (factor%high >= huge(part) .and. middle + reach > part * huge(part)) .or. &
-                         (factor%low <= -huge(part) .and. middle - reach < -part * huge(part))
-      end associate
-    case default
-      can_overflow = factor%high >= huge(part) .and. &
-                       log(factor%median) + tail_end * factor%log_deviation > log(huge(part))
-    end select
+    can_overflow = .false.
+    if (factor%distribution == 'lognormal' .and. factor%high >= huge(factor%high)) then
+      can_overflow = log(factor%median) + tail_end * factor%log_deviation > log(huge(factor%high))
+    end if
   end function can_overflow
 
   pure type(distribution_t) function distribution_of(factor) result(distribution)

@@ -226,7 +226,9 @@ contains
         call input%report(varied, 'high', 'high = ' // to_text(factor%high) // ' is out of range; allowed: > low = ' // &
                          to_text(factor%low), diagnostics)
       else if (can_overflow(factor)) then
-        call refuse_overflow(input, varied, factor, diagnostics)
+        call input%report(varied, 'log_deviation', 'median = ' // to_text(factor%median) // ' and log_deviation = ' // &
+                         to_text(factor%log_deviation) // ' reach numbers beyond ' // to_text(huge(factor%high)) // &
+                         '; allowed: smaller ones, or high', diagnostics)
       else if (probability_between(factor) <= 0.0_wp) then
         call input%report(varied, 'distribution', 'the distribution has nothing from low to high; allowed: ends ' // &
                          'nearer to its middle', diagnostics)
@@ -239,38 +241,12 @@ contains
       call input%report(varied, 'count', 'count = ' // to_text(factor%count) // ' values from low = ' // &
                        to_text(factor%low) // ' to high = ' // to_text(factor%high) // ' are all the same; allowed: count = 1', &
                        diagnostics)
-    else if (factor%distribution == 'uniform' .and. factor%count > 1 .and. can_overflow(factor)) then
-      call refuse_overflow(input, varied, factor, diagnostics)
     end if
     if (factor%distribution /= 'uniform') then
       call input%report(varied, 'distribution', 'distribution = ' // quoted(trim(factor%distribution)) // &
                        " has no grid; allowed with design = 'grid': 'uniform'", diagnostics)
     end if
   end subroutine check_factor
-
-  !> Refuses a factor whose values can exceed the largest number.
-  subroutine refuse_overflow(input, varied, factor, diagnostics)
-    type(input_t), intent(in) :: input
-    integer, intent(in) :: varied   !! index of the &vary
-    type(factor_t), intent(in) :: factor
-    type(diagnostics_t), intent(inout) :: diagnostics
-    character(len=:), allocatable :: most
-
-    most = to_text(huge(factor%high))
-    select case (factor%distribution)
-    case ('uniform')
-      call input%report(varied, 'high', 'high = ' // to_text(factor%high) // ' is too far from low = ' // &
-                       to_text(factor%low) // '; allowed: high - low at most ' // most, diagnostics)
-    case ('normal')
-      call input%report(varied, 'deviation', 'mean = ' // to_text(factor%mean) // ' and deviation = ' // &
-                       to_text(factor%deviation) // ' reach numbers beyond ' // most // &
-                       '; allowed: smaller ones, or low and high', diagnostics)
-    case default
-      call input%report(varied, 'log_deviation', 'median = ' // to_text(factor%median) // ' and log_deviation = ' // &
-                       to_text(factor%log_deviation) // ' reach numbers beyond ' // most // &
-                       '; allowed: smaller ones, or high', diagnostics)
-    end select
-  end subroutine refuse_overflow
 
   !> Refuses a grid of integers of which some would be rounded to the same one.
   subroutine check_whole_grid(input, varied, target, factor, diagnostics)
@@ -281,7 +257,7 @@ contains
     type(diagnostics_t), intent(inout) :: diagnostics
     real(wp) :: room
 
-    if (factor%distribution /= 'uniform' .or. factor%high <= factor%low .or. can_overflow(factor)) return
+    if (factor%distribution /= 'uniform' .or. factor%high <= factor%low) return
     room = anint(factor%high) - anint(factor%low) + 1.0_wp
     if (factor%count <= room) return
     call input%report(varied, 'count', 'count = ' // to_text(factor%count) // ' has repeats: ' // target%path // &

@@ -4,6 +4,7 @@ module nocdyn_table_file
   use nocdyn_errors, only: error_t, exit_file, exit_input
   use nocdyn_kinds, only: wp
   use nocdyn_literals, only: number_problem, read_real
+  use nocdyn_schema_rules, only: anything, size_problem
   use nocdyn_text, only: append, counted, quoted, shortened, string_t, to_text
   use nocdyn_text_file, only: first_position, read_text_file
   implicit none (type, external)
@@ -234,7 +235,8 @@ contains
     else
       message = ''
       do column = 1, found
-        if (message == '') call read_column(content(begins(column):ends(column)), column, values(column, rows + 1), message)
+        if (message == '') call read_column(content(begins(column):ends(column)), column, reading%is_list, &
+                                            values(column, rows + 1), message)
       end do
     end if
     if (.not. reading%is_list) then
@@ -290,15 +292,17 @@ contains
   end subroutine skip_blanks
 
   !> Reads one number.
-  subroutine read_column(text, column, value, message)
+  subroutine read_column(text, column, has_any_size, value, message)
     character(len=*), intent(in) :: text
-    integer, intent(in) :: column   !! index, for the message
+    integer, intent(in) :: column           !! index, for the message
+    logical, intent(in) :: has_any_size     !! a number of a list is checked as a value of its variant
     real(wp), intent(out) :: value
     character(len=:), allocatable, intent(out) :: message
     integer :: status
 
     call read_real(text, value, status)
     message = number_problem(status)
+    if (message == '' .and. .not. has_any_size) message = size_problem(value, anything, ascends=column == 1)
     if (message /= '') message = 'column ' // to_text(column) // ', ' // excerpt(text) // ',' // message
   end subroutine read_column
 

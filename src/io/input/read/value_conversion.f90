@@ -7,7 +7,8 @@ module nocdyn_value_conversion
   use nocdyn_raw_group, only: new_raw_key, raw_group_t, raw_key_t, raw_value_t
   use nocdyn_schema, only: holds_texts, key_rules, words_of
   use nocdyn_schema_rules, only: a_body, a_file, a_flag, a_folder, a_name, a_number, a_selector, a_word, an_integer, &
-    ground, is_out_of_range, key_rule_t, longest_file_name, longest_name, longest_path, unset
+    ground, is_out_of_range, key_rule_t, longest_file_name, longest_name, longest_path, size_problem, &
+    unset
   use nocdyn_schema_text, only: allowed_text
   use nocdyn_text, only: counted, joined, lower_case, nearest_word, quoted, shortened, string_t, to_text
   implicit none (type, external)
@@ -123,6 +124,7 @@ contains
       case (a_number)
         call read_real(raw%text, value%numbers(i), status)
         message = number_problem(status)
+        if (message == '') message = size_problem(value%numbers(i), rule%allowed, rule%ascends)
         if (message == '' .and. is_out_of_range(value%numbers(i), rule%allowed)) message = ' is out of range'
       case (an_integer)
         call convert_integer(raw%text, rule, value%whole_numbers(i), message)

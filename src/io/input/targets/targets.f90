@@ -7,7 +7,7 @@ module nocdyn_targets
   use nocdyn_schema, only: first_key, key_rules
   use nocdyn_schema_relations, only: relation_t, relations_of, relations_t
   use nocdyn_schema_rules, only: allowed_t, an_integer, at_most_one, exactly_one, is_out_of_range, less_than, &
-    required, requires, unset
+    required, requires, size_problem, unset
   use nocdyn_schema_text, only: allowed_text
   use nocdyn_target_search, only: search_target
   use nocdyn_text, only: to_text
@@ -95,11 +95,14 @@ contains
     if (.not. ieee_is_finite(number)) then
       message = target%path // ' is not a finite number; allowed: ' // allowed_text(key_rules(target%rule))
       return
-    else if (is_out_of_range(number, target%allowed)) then
-      message = target%path // ' = ' // to_text(number) // ' is out of range; allowed: ' // allowed_text(key_rules(target%rule))
-      return
     end if
     message = ''
+    if (.not. target%is_integer) message = size_problem(number, target%allowed, key_rules(target%rule)%ascends)
+    if (message == '' .and. is_out_of_range(number, target%allowed)) message = ' is out of range'
+    if (message /= '') then
+      message = target%path // ' = ' // to_text(number) // message // '; allowed: ' // allowed_text(key_rules(target%rule))
+      return
+    end if
     if (.not. group%values(target%key)%has_any()) call give_value(group, target)
     associate (stored => group%values(target%key))
       stored%is_given = .true.
