@@ -95,7 +95,10 @@ def test_a_row_that_is_not_finite_fails_the_run(nocdyn):
 @pytest.mark.parametrize(
     ("command", "complaint"),
     [
-        (["matrices"], "(21) K, secant stiffness [N m/rad] has an element that is not a finite number"),
+        (
+            ["matrices"],
+            "K12 * rest twist of the couplings, a further term of Q [N m], transposed has an element that is not a finite number",
+        ),
         (["modes", "--at", "rest"], "the stiffness or damping of 'shaft' in this state is not a finite number"),
     ],
 )
@@ -106,21 +109,6 @@ def test_an_analysis_of_numbers_that_are_not_finite_fails(nocdyn, command, compl
     )
     assert outcome.returncode == 1
     assert outcome.stderr == f"nocdyn: stiff.nml: {complaint}\n"
-
-
-@only_without_traps
-def test_a_steady_state_that_is_not_finite_is_no_result(nocdyn):
-    nocdyn.write(
-        "fast.nml",
-        "&body name = 'slow' inertia = 1.0 /\n&body name = 'fast' inertia = 1e50 /\n"
-        "&gear name = 'g' bodies = 'slow', 'fast' radii = 1e50, 1e-50 /\n"
-        "&motor name = 'm' body = 'slow' kind = 'constant' torque = 1e50 /\n&load name = 'l' body = 'slow' viscous = 1e-50 /\n"
-        "&run t_end = 1.0 /\n&output points = 2 /\n",
-    )
-    outcome = nocdyn("equilibrium", "fast.nml", "--out", "out")
-    assert (outcome.returncode, outcome.stdout) == (1, "")
-    assert outcome.stderr == "nocdyn: fast.nml: in steady state 1 of 1, kinetic_energy [J] is not a finite number\n"
-    assert not (nocdyn.folder / "out").exists()
 
 
 SWEEP = """\
@@ -164,7 +152,9 @@ def test_a_result_that_is_not_finite_is_a_failed_variant(nocdyn):
     nocdyn.write("variants.csv", "body.disc.angle\n1\n1e50\n")
     nocdyn("sweep", "m.nml", "--out", "out", "--csv", "-q")
     rows = (nocdyn.folder / "out/sweep.csv").read_text().splitlines()[1:]
-    assert not rows[0].endswith("finite number") and rows[1].endswith("elastic_energy_final is not a finite number"), rows
+    assert not rows[0].endswith("finite number") and rows[1].endswith(
+        'failed,1,"the result elastic_energy_final is not a finite number"'
+    ), rows
 
 
 @needs_sweeps

@@ -34,7 +34,8 @@ contains
         case (gap)
           obstacle = gap_obstacle(coefficients_of(group), group%number('gap'))
           if (obstacle == '') cycle
-          call raise(error, exit_input, input%location(indices(i), 'gap') // ': gap = ' // to_text(group%number('gap')) // obstacle)
+          call raise(error, exit_input, input%location(indices(i), 'gap') // ': gap = ' // &
+                     to_text(group%number('gap')) // obstacle)
         case (saturated)
           if (group%number('stiffness') > 0) cycle
           call raise(error, exit_input, input%location(indices(i), 'saturation') // ': saturation = ' // &

@@ -38,7 +38,7 @@ contains
                'formulation = ' // quoted('reduced') // ' needs none')
   end subroutine check_size
 
-  !> Refuses what a run or a sweep of the input refuses: a formulation or a method that the machine is too large for or cannot have.
+  !> Refuses what a run or a sweep of the input refuses: a formulation or a method that is not for this machine.
   subroutine check_method(input, machine, error)
     type(input_t), intent(in) :: input
     type(machine_t), intent(in) :: machine

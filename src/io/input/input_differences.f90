@@ -18,6 +18,7 @@ module nocdyn_input_differences
 
   !> An input taken apart.
   type :: parts_t
+    logical :: is_readable = .true.            !! else the text is none of `input_text`, and there are no parts
     type(namelist_t) :: namelist
     type(string_t), allocatable :: labels(:)   !! of the groups: "&load 'work'", "&run", "&vary 2"
     integer, allocatable :: order(:)           !! of the labels, sorted
@@ -28,7 +29,7 @@ contains
 
   !> One sentence for each difference, in the order of the old input; none if both describe the same computation.
   subroutine find_differences(old, new, sentences)
-    character(len=*), intent(in) :: old, new   !! texts of `input_text`
+    character(len=*), intent(in) :: old, new   !! texts of `input_text`; what others have changed differs, in one sentence
     type(string_t), allocatable, intent(out) :: sentences(:)
     type(parts_t) :: before, after
     integer, allocatable :: partner(:)   ! in the new input, 0: none
@@ -37,6 +38,10 @@ contains
     allocate (sentences(0))
     call take_apart(old, before)
     call take_apart(new, after)
+    if (.not. (before%is_readable .and. after%is_readable)) then
+      call append(sentences, 'it is not as this program has written it')
+      return
+    end if
     allocate (partner(before%namelist%group_count))
     do g = 1, size(partner)
       partner(g) = sorted_position(before%labels(g)%text, after%labels, after%order)
@@ -62,12 +67,15 @@ contains
     integer :: g, rule
 
     call scan_namelist(text, parts%namelist, diagnostics)
-    if (diagnostics%count > 0) error stop 'nocdyn_input_differences: only texts of nocdyn_input_text are compared'
+    parts%is_readable = diagnostics%count == 0
+    if (.not. parts%is_readable) return
     allocate (parts%labels(parts%namelist%group_count), parts%name_space(parts%namelist%group_count))
     count = 0
     do g = 1, parts%namelist%group_count
       rule = group_rule_index(parts%namelist%groups(g)%name)
-      if (rule == 0) error stop 'nocdyn_input_differences: there is a group that the schema does not have'
+      parts%is_readable = rule > 0
+      if (rule > 0) parts%is_readable = group_rules(rule)%name_space == '' .or. has_name(parts%namelist, g)
+      if (.not. parts%is_readable) return
       count(rule) = count(rule) + 1
       parts%labels(g)%text = label_of(parts%namelist, g, rule, count(rule))
       parts%name_space(g) = 0
@@ -77,6 +85,17 @@ contains
     end do
     call argsort(parts%labels, parts%order)
   end subroutine take_apart
+
+  !> Whether a group has a value for `name`.
+  pure logical function has_name(namelist, g)
+    type(namelist_t), intent(in) :: namelist
+    integer, intent(in) :: g   !! index of the group
+    integer :: name
+
+    name = find_assignment(namelist, g, 'name')
+    has_name = name > 0
+    if (has_name) has_name = namelist%assignments(name)%last_item >= namelist%assignments(name)%first_item
+  end function has_name
 
   !> Label of a group, the same in both inputs.
   pure function label_of(namelist, g, rule, number) result(label)
