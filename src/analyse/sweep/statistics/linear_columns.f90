@@ -4,6 +4,7 @@
 !> x = offset + sum of factor * y(component). An angle, a speed or a twist is x. An elastic moment is (linear + cubic x^2) x,
 !> where x is the twist minus that at rest.
 module nocdyn_linear_columns
+  use nocdyn_bank, only: quantity_t
   use nocdyn_coordinates, only: coordinates_t
   use nocdyn_formulation, only: formulation_t
   use nocdyn_kinds, only: wp
@@ -63,12 +64,12 @@ contains
     type(machine_t), intent(in) :: machine
     type(column_t), intent(in) :: column
     character(len=*), intent(in) :: name   !! of the quantity
+    type(quantity_t), allocatable :: quantities(:)
 
     is_quantity = .false.
     if (column%kind /= column_element) return
-    associate (quantities => machine%banks(column%bank)%bank%quantities())
-      is_quantity = quantities(column%quantity)%name == name
-    end associate
+    quantities = machine%banks(column%bank)%bank%quantities()
+    is_quantity = quantities(column%quantity)%name == name
   end function is_quantity
 
   !> The given columns, each `is_linear`. `copy_lane` sets the parameters of a lane.
