@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 SANITIZED = {
-    "ASAN_OPTIONS": "detect_leaks=1:allocator_may_return_null=1:hard_rss_limit_mb={memory}:abort_on_error=0:exitcode=66",
+    "ASAN_OPTIONS": "detect_leaks=0:allocator_may_return_null=1:hard_rss_limit_mb={memory}:abort_on_error=0:exitcode=66",
     "UBSAN_OPTIONS": "print_stacktrace=1:halt_on_error=1:exitcode=66",
 }
 
