@@ -277,7 +277,11 @@ contains
       if (content(first:first) /= ',') cycle
       first = first + 1
       call skip_blanks(content, first)
-      if (first > len(content)) found = found + 1   ! an empty column after the last comma
+      if (first <= len(content)) cycle
+      found = found + 1   ! an empty column after the last comma
+      if (found > size(begins)) cycle
+      begins(found) = 1
+      ends(found) = 0
     end do
   end subroutine split
 
