@@ -31,6 +31,12 @@ def make_case(seed, number, corpus, shares):
     return case
 
 
+def may_be_long(case):
+    """Whether nothing limits what the input asks for: a sweep, or a command line without its limit of steps."""
+    is_limited = ("--set", commands.STEPS[1]) in zip(case.words, case.words[1:])
+    return case.words[:1] == ("sweep",) or (case.words[:1] in (("run",), ("modes",)) and not is_limited)
+
+
 def is_of_sweep(path):
     """Whether the input has groups that `check` looks at and `run` does not."""
     return any(group in path.read_bytes() for group in (b"&vary", b"&record", b"&sweep"))
@@ -42,8 +48,7 @@ def examine(case):
     for name, content in case.files.items():
         (folder / name).write_bytes(content)
     try:
-        is_sweep = "sweep" in case.words[:1]
-        outcome = execute(state["program"], case.words, folder, state["limits"], interrupt=is_sweep)
+        outcome = execute(state["program"], case.words, folder, state["limits"], interrupt=may_be_long(case))
         complaints = judge(case, outcome, folder, state["limits"].memory)
         checked = folder / "out/input.nml"
         if not complaints and outcome.code == 0 and case.words[0] == "run" and checked.is_file() and not is_of_sweep(checked):

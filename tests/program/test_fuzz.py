@@ -1,13 +1,29 @@
-"""What scripts/fuzz calls a finding, and what it makes of one."""
+"""Mutants of the shipped inputs and command lines break no promise; what the judgement of scripts/fuzz finds."""
 
+import os
+import subprocess
 import sys
+from pathlib import Path
 
 import pytest
-from conftest import SOURCE
+from conftest import SOURCE, TRAPS_EXCEPTIONS
 
 sys.path.insert(0, str(SOURCE / "scripts"))
 from nocdyn_fuzz import corpus, findings, judgement
 from nocdyn_fuzz.execution import Limits, Outcome, execute
+
+MUTANTS = 2000
+
+
+@pytest.mark.skipif(TRAPS_EXCEPTIONS, reason="the debug build ends where the others go on with infinity, and then refuse it")
+def test_no_mutant_breaks_a_promise(tmp_path):
+    build = Path(os.environ["NOCDYN"]).parents[1]
+    command = [sys.executable, "-m", "nocdyn_fuzz", "--build", build, "--count", str(MUTANTS), "--findings", tmp_path / "found"]
+    environment = os.environ | {"PYTHONPATH": str(SOURCE / "scripts")}
+    outcome = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, timeout=300)
+    assert outcome.returncode == 0, outcome.stdout + outcome.stderr
+    assert outcome.stdout.startswith(f"{MUTANTS} mutants in ")
+
 
 CASE = corpus.Case(files={"a.nml": b"&case title = 'x' /"}, words=("run", "a.nml"), main="a.nml")
 FINE = Outcome(code=0, out=b"a.nml: done\n", err=b"", in_time=True, memory=10)
