@@ -1,9 +1,11 @@
 """Limits on inputs that are small but ask for much or have many mistakes: time and memory linear in the size of the file."""
 
 import os
+import re
 import resource
 
 import pytest
+from conftest import SOURCE
 
 MACHINE = "&body name='a' inertia=1 /\n&body name='b' inertia=1 /\n&run t_end=1 /\n&output points=11 /\n"
 TABLE = "&excitation name='e' body='a' kind='table' table_time={} table_torque=1, 2 /\n"
@@ -131,3 +133,45 @@ def test_bytes_that_are_not_utf_8_are_printed_as_numbers(nocdyn):
     (nocdyn.folder / "latin.nml").write_bytes(MACHINE.encode() + b"&load name='m\xfchle' body='\xff\x9b' viscous=1 /\n")
     outcome = nocdyn("check", "latin.nml", errors="strict")
     assert "there is no &body '\\xFF\\x9B'" in outcome.stderr
+
+
+def test_a_trajectory_that_is_too_large_is_refused_before_the_run(nocdyn):
+    chain = SOURCE / "input/examples/chain_200/chain_200.nml"
+    for command in ["check", "run"]:
+        outcome = nocdyn(command, chain, "--set", "output.points=10000000")
+        assert outcome.returncode == 2
+        assert re.search(
+            r"^nocdyn: .*: &output: 10000000 rows of \d+ columns would take about \d+ GB; allowed: at most 100 GB; "
+            r"ask for fewer rows by points or interval$",
+            outcome.stderr,
+        )
+        assert ("trajectory.csv: about " in outcome.stdout) == (command == "check")
+    assert nocdyn.files(".") == []
+
+
+def test_a_sweep_that_is_too_large_is_refused_before_it_starts(nocdyn):
+    sweep = (
+        SWEEP.replace("'list' file='{}'", "'random' samples=2000000000").replace("'max'", "'max', 'min'")
+        + "&vary target='body.a.inertia' low=1 high=2 /\n"
+    )
+    nocdyn.write("large.nml", MACHINE + sweep)
+    message = (
+        "nocdyn: large.nml:7: &sweep: the files of 2000000000 variants would take about 130 GB; allowed: at most 100 GB; "
+        "ask for fewer variants, results or trajectories\n"
+    )
+    for command in ["check", "sweep"]:
+        outcome = nocdyn(command, "large.nml")
+        assert (outcome.returncode, outcome.stderr) == (2, message)
+    assert nocdyn.files(".") == ["large.nml"]
+    outcome = nocdyn("check", "large.nml", "--set", "sweep.samples=10000000")
+    assert outcome.stdout.endswith("  files: about 640 MB\n") or outcome.returncode == 3
+
+
+def test_a_time_span_beyond_the_largest_number_is_refused(nocdyn):
+    nocdyn.write("far.nml", MACHINE)
+    outcome = nocdyn("run", "far.nml", "--set", "run.t_start=-1.7e308", "--set", "run.t_end=1.7e308")
+    assert outcome.returncode == 2
+    assert (
+        "t_end = 1.7e+308 is too far from t_start = -1.7e+308; allowed: at most 1.7976931348623157e+308 s between them"
+        in outcome.stderr
+    )

@@ -132,8 +132,16 @@ def test_a_long_override_is_cut(nocdyn):
     assert outcome.stderr.startswith("nocdyn: --set output.directory=x/x/") and len(outcome.stderr) < 400
 
 
-def test_a_long_folder_of_results_is_cut(nocdyn):
-    outcome = nocdyn("run", CASE_2, "--out", "x" * 5000)
-    assert outcome.returncode == 3
-    assert outcome.stderr.startswith("nocdyn: cannot write 'xxx") and "File name too long" in outcome.stderr
-    assert len(outcome.stderr) < 600
+@pytest.mark.parametrize("folder", ["x" * 5000, "x/" * 2500, "y/" + "x" * 256])
+def test_a_folder_of_results_that_is_too_long_is_refused_before_anything_is_made(nocdyn, folder):
+    outcome = nocdyn("run", CASE_2, "--out", folder)
+    assert outcome.returncode == 2
+    assert outcome.stderr.startswith(f"nocdyn: --out {folder[:80]} ... is too long for a folder; allowed: 4000 bytes, 255 from")
+    assert nocdyn.files(".") == []
+
+
+def test_a_file_in_place_of_the_folder_of_results_is_told(nocdyn):
+    nocdyn.write("p.nml", "")
+    outcome = nocdyn("run", CASE_2, "--out", "p.nml")
+    message = "nocdyn: cannot write 'p.nml/trajectory.csv': the folder cannot be made: there is a file of this name\n"
+    assert (outcome.returncode, outcome.stderr) == (3, message)

@@ -7,9 +7,11 @@ module nocdyn_output_times
   implicit none (type, external)
   private
 
-  public :: check_output_times, output_times
+  public :: check_output_times, output_times, row_count
 
   integer, parameter :: most_rows = 10000000   ! some gigabytes of text
+
+  real(wp), parameter :: sliver = 1.0e-9_wp   ! of an interval: a last row closer to t_end than this or rounding is moved there
 
 contains
 
@@ -23,6 +25,12 @@ contains
 
     output = input%single('output')
     run = input%single('run')
+    if (run%number('t_end') / 2 - run%number('t_start') / 2 > huge(span) / 2) then
+      call raise(error, exit_input, input%location(input%position('run'), 't_end') // ': t_end = ' // &
+                 to_text(run%number('t_end')) // ' is too far from t_start = ' // to_text(run%number('t_start')) // &
+                 '; allowed: at most ' // to_text(huge(span)) // ' s between them')
+      return
+    end if
     span = run%number('t_end') - run%number('t_start')
     rounding = spacing(max(abs(run%number('t_start')), abs(run%number('t_end'))))
     if (output%has_value('interval')) then
@@ -46,13 +54,29 @@ contains
     call raise(error, exit_input, input%location(input%position('output'), key) // ': ' // message)
   end subroutine check_output_times
 
+  !> The number of the requested times.
+  pure integer function row_count(input)
+    type(input_t), intent(in) :: input   !! that `check_output_times` accepts
+    type(group_t) :: output, run
+    real(wp) :: rounding   ! of the times [s]
+
+    output = input%single('output')
+    run = input%single('run')
+    if (output%has_value('interval')) then
+      associate (t_start => run%number('t_start'), t_end => run%number('t_end'), interval => output%number('interval'))
+        rounding = spacing(max(abs(t_start), abs(t_end)))
+        row_count = 1 + max(1, ceiling((t_end - t_start) / interval - max(sliver, rounding / interval)))
+      end associate
+    else
+      row_count = output%whole_number('points')
+    end if
+  end function row_count
+
   !> The requested times: a row at t_start, one every `interval`, and one at t_end; or `points` rows evenly spaced.
   pure function output_times(input) result(times)
     type(input_t), intent(in) :: input   !! that `check_output_times` accepts
     real(wp), allocatable :: times(:)
     type(group_t) :: output, run
-    real(wp), parameter :: sliver = 1.0e-9_wp   ! of an interval: a last row closer to t_end than this or rounding is moved there
-    real(wp) :: rounding   ! of the times [s]
     integer :: i, intervals
 
     output = input%single('output')
@@ -60,8 +84,7 @@ contains
     associate (t_start => run%number('t_start'), t_end => run%number('t_end'))
       if (output%has_value('interval')) then
         associate (interval => output%number('interval'))
-          rounding = spacing(max(abs(t_start), abs(t_end)))
-          intervals = max(1, ceiling((t_end - t_start) / interval - max(sliver, rounding / interval)))
+          intervals = row_count(input) - 1
           times = [(t_start + i * interval, i=0, intervals)]
         end associate
       else

@@ -12,7 +12,7 @@ module nocdyn_run_summary
   use nocdyn_run_settings, only: put_settings
   use nocdyn_observer, only: ranges_t
   use nocdyn_table_text, only: append_table, cell_digits
-  use nocdyn_text, only: append, rounded_text, string_t, strings, to_text
+  use nocdyn_text, only: append, counted, rounded_text, string_t, strings, to_text
   use nocdyn_text_buffer, only: text_buffer_t
   implicit none (type, external)
   private
@@ -246,7 +246,7 @@ contains
     character(len=:), allocatable :: text
 
     text = input%file // ': done at t = ' // to_text(summary%solver_status%t(1)) // ' s, ' // &
-           to_text(summary%solver_status%accepted(1)) // ' steps (' // &
+           counted(summary%solver_status%accepted(1), 'step', 'steps') // ' (' // &
            to_text(summary%solver_status%rejected(1)) // ' rejected), '
     if (summary%solver_status%crossings(1) > 0) then
       text = text // to_text(summary%solver_status%crossings(1)) // ' kinks or jumps crossed, '
@@ -267,7 +267,8 @@ contains
       text = input%file // ': stiff: implicit steps from t = ' // rounded_text(solver_status%switch_times(1, 1), &
                                                                                cell_digits) // ' s'
       if (solver_status%switches(1) > 1) text = text // ' (' // to_text(solver_status%switches(1)) // ' switches in all)'
-      text = text // ', ' // to_text(solver_status%implicit_steps(1)) // ' of ' // to_text(solver_status%accepted(1)) // ' steps'
+      text = text // ', ' // to_text(solver_status%implicit_steps(1)) // ' of ' // &
+             counted(solver_status%accepted(1), 'step', 'steps')
     end associate
   end function method_line
 

@@ -2,12 +2,13 @@
 module nocdyn_trajectory_columns
   use nocdyn_bank, only: quantity_t
   use nocdyn_constraints, only: constraints_t
+  use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
   use nocdyn_text, only: string_t
   implicit none (type, external)
   private
 
-  public :: list_columns
+  public :: list_columns, column_count, table_bytes
 
   integer, parameter, public :: column_time = 1
   integer, parameter, public :: column_angle = 2        !! of a body
@@ -103,6 +104,15 @@ contains
     end do
   end subroutine add_reactions
 
+  !> About the size of a table of numbers as text [bytes].
+  pure real(wp) function table_bytes(rows, columns)
+    integer, intent(in) :: rows, columns
+    real(wp), parameter :: of_number = 19.0_wp   ! 17 digits, point and comma; signs and exponents make up for shorter numbers
+
+    table_bytes = of_number * rows * columns
+  end function table_bytes
+
+  !> The number of the columns.
   integer function column_count(machine)
     type(machine_t), intent(in) :: machine
     type(quantity_t), allocatable :: quantities(:)

@@ -35,10 +35,12 @@ module nocdyn_transient
   abstract interface
 
     !> Called once, before the first row.
-    subroutine start_interface(self, labels)
-      import :: run_output_t, string_t
+    subroutine start_interface(self, labels, rows, error)
+      import :: error_t, run_output_t, string_t
       class(run_output_t), intent(inout) :: self
       type(string_t), intent(in) :: labels(:)   !! of the columns
+      integer, intent(in) :: rows               !! their number
+      type(error_t), allocatable, intent(out) :: error   !! nothing can be written
     end subroutine start_interface
 
     !> Called at every output time.
@@ -99,7 +101,8 @@ contains
     do i = 1, size(notes)
       call append(summary%notes, notes(i)%text)
     end do
-    call start_observer(observer, formulation, times, output)
+    call start_observer(observer, formulation, times, output, error)
+    if (allocated(error)) return
     allocate (summary%labels, source=observer%table%labels)
     call solve(formulation, settings, times, observer, summary, error)
     if (summary%has_run) call complete_summary(observer, error, summary)
@@ -121,11 +124,12 @@ contains
     call choose_settings(input, formulation, settings, notes, error)
   end subroutine build_formulation
 
-  subroutine start_observer(observer, formulation, times, output)
+  subroutine start_observer(observer, formulation, times, output, error)
     type(run_observer_t), intent(inout) :: observer
     class(formulation_t), intent(in) :: formulation
     real(wp), intent(in) :: times(:)   !! of the rows [s]
     class(run_output_t), target, intent(inout) :: output
+    type(error_t), allocatable, intent(out) :: error   !! of the output
 
     observer%table = new_trajectory_table(formulation, times(1))
     observer%t_start = times(1)
@@ -135,7 +139,7 @@ contains
     allocate (observer%last_state(formulation%states + formulation%quadratures), source=0.0_wp)
     observer%tracked = size(observer%row)
     call start_extremes(observer%extremes, size(observer%row))
-    call output%start(observer%table%labels)
+    call output%start(observer%table%labels, size(times), error)
   end subroutine start_observer
 
   !> Integrates. An integration that does not reach the end is an error that says why.

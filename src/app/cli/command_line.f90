@@ -3,7 +3,8 @@ module nocdyn_command_line
   use nocdyn_arguments, only: arguments_t, option_index, option_t, options
   use nocdyn_commands, only: command_index, command_names, command_t, commands_with_option
   use nocdyn_errors, only: error_t, exit_input, raise
-  use nocdyn_text, only: append, joined, nearest_word, quoted, shortened, string_t, to_text
+  use nocdyn_text, only: append, is_too_long, joined, longest_file_name, longest_path, nearest_word, &
+    quoted, shortened, string_t, to_text
   implicit none (type, external)
   private
 
@@ -147,6 +148,9 @@ contains
       call append(arguments%overrides, value)
     case ('--threads')
       call parse_threads(value, arguments%threads, error)
+    case ('--out')
+      if (is_too_long(value)) call raise(error, exit_input, '--out ' // shortened(value) // ' is too long for a folder; ' // &
+        'allowed: ' // to_text(longest_path) // ' bytes, ' // to_text(longest_file_name) // ' from slash to slash')
     case ('--shard')
       call parse_shard(value, arguments%shard, arguments%shards, error)
     case default

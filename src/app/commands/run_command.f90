@@ -63,12 +63,15 @@ contains
     integer, intent(inout) :: code
     type(run_summary_t) :: summary
     type(error_t), allocatable :: error
+    character(len=:), allocatable :: reached
     integer :: i
 
     call run_to_files(input, folder, input%file, arguments%is_given('--quiet'), summary, error)
     if (allocated(error)) then
-      if (error%code == exit_failed) error%message = input%file // ': ' // error%message // '; the rows up to there are in ' // &
-                                                     folder // '/' // partial_file
+      reached = 'there'
+      if (summary%extremes%rows > 0) reached = 't = ' // to_text(summary%extremes%last(1)) // ' s'
+      if (error%code == exit_failed) error%message = input%file // ': ' // error%message // '; the rows up to ' // reached // &
+                                                     ' are in ' // folder // '/' // partial_file
       call report_error(error, code)
     else if (.not. arguments%is_given('--quiet')) then
       do i = 1, size(summary%notes)

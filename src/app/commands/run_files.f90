@@ -2,6 +2,7 @@
 module nocdyn_run_files
   use nocdyn_console, only: new_status_line, status_line_t
   use nocdyn_csv, only: write_header, write_row
+  use nocdyn_disk_room, only: check_room
   use nocdyn_errors, only: error_t
   use nocdyn_input, only: input_t
   use nocdyn_input_text, only: input_text
@@ -9,12 +10,14 @@ module nocdyn_run_files
   use nocdyn_output_file, only: output_file_t
   use nocdyn_posix, only: is_interrupted, remove_file
   use nocdyn_run_summary, only: run_summary_t, summary_json
-  use nocdyn_text, only: string_t, to_text
+  use nocdyn_sweep_plan, only: sweep_plan_t
+  use nocdyn_text, only: counted, string_t, to_text
+  use nocdyn_trajectory_columns, only: table_bytes
   use nocdyn_transient, only: run_output_t, run_transient
   implicit none (type, external)
   private
 
-  public :: run_to_files
+  public :: check_rows, check_variants, run_to_files
 
   character(len=*), parameter, public :: trajectory_file = 'trajectory.csv', partial_file = 'trajectory.partial.csv'
   character(len=*), parameter, public :: summary_file = 'summary.json', input_file = 'input.nml'
@@ -24,6 +27,7 @@ module nocdyn_run_files
     character(len=:), allocatable :: folder
     type(output_file_t) :: file
     character(len=:), allocatable :: title   !! of the progress line
+    character(len=:), allocatable :: place   !! of &output in the input, for messages
     type(status_line_t) :: line
     logical :: has_started = .false.         !! whether there is a file
   contains
@@ -47,6 +51,7 @@ contains
 
     writer%folder = folder
     writer%title = title
+    writer%place = input%location(input%position('output'))
     writer%line = new_status_line(is_quiet, shows_in_logs=.false.)
     call run_transient(input, writer, summary, error)
     if (summary%has_run) then
@@ -101,14 +106,43 @@ contains
   end subroutine name_files
 
   !> Opens the file and writes its header.
-  subroutine start(self, labels)
+  subroutine start(self, labels, rows, error)
     class(trajectory_writer_t), intent(inout) :: self
     type(string_t), intent(in) :: labels(:)   !! of the columns
+    integer, intent(in) :: rows               !! their number
+    type(error_t), allocatable, intent(out) :: error   !! there is no room for them
 
+    call check_rows(self%place, rows, size(labels), self%folder, error)
+    if (allocated(error)) return
     call self%file%open(self%folder, trajectory_file)
     call write_header(self%file, labels)
     self%has_started = .true.
   end subroutine start
+
+  !> Refuses more rows than there is room for.
+  subroutine check_rows(place, rows, columns, folder, error)
+    character(len=*), intent(in) :: place    !! of &output in the input
+    integer, intent(in) :: rows, columns     !! their numbers
+    character(len=*), intent(in) :: folder   !! of the results
+    type(error_t), allocatable, intent(out) :: error
+
+    call check_room(place // ': ' // to_text(rows) // ' rows of ' // to_text(columns) // ' columns', &
+                    table_bytes(rows, columns), folder, 'ask for fewer rows by points or interval', error)
+  end subroutine check_rows
+
+  !> Refuses more variants than there is room for.
+  subroutine check_variants(plan, variants, has_table, folder, held, error)
+    type(sweep_plan_t), intent(in) :: plan
+    integer, intent(in) :: variants          !! of the journal
+    logical, intent(in) :: has_table         !! whether there is a sweep.csv
+    character(len=*), intent(in) :: folder   !! of the results
+    real(wp), intent(in) :: held             !! what a journal to resume has taken already [bytes]
+    type(error_t), allocatable, intent(out) :: error
+
+    call check_room(plan%input%location(plan%input%position('sweep')) // ': the files of ' // &
+                    counted(variants, 'variant', 'variants'), plan%file_bytes(variants, has_table) - held, folder, &
+                    'ask for fewer variants, results or trajectories', error)
+  end subroutine check_variants
 
   !> Writes a row.
   subroutine write_trajectory_row(self, row)

@@ -9,6 +9,7 @@ module nocdyn_sweep_job
   use nocdyn_diagnostics, only: diagnostics_t
   use nocdyn_kinds, only: wp
   use nocdyn_result_folders, only: result_folder
+  use nocdyn_run_files, only: check_variants
   use nocdyn_sweep, only: prepare_sweep, sweep_setup_t
   use nocdyn_sweep_header, only: sweep_netcdf_name, sweep_header_t
   use nocdyn_sweep_journal, only: create_journal, journal_name, open_journal, sweep_journal_t
@@ -89,6 +90,9 @@ contains
 
     name = journal_name(max(1, job%arguments%shard), max(1, job%arguments%shards))
     inquire (file=job%folder // '/' // name, exist=is_there, size=bytes)
+    call check_variants(job%plan, header%last - header%first + 1, job%arguments%is_given('--csv'), job%folder, &
+                        merge(real(bytes, wp), 0.0_wp, is_there), error)
+    if (allocated(error)) return
     if (is_there .and. bytes > 0) then
       call open_journal(job%folder, name, job%journals(1), error)
       if (.not. allocated(error)) call check_journal(job%journals(1), header, job%arguments%is_given('--resume'), error)

@@ -7,9 +7,10 @@ module nocdyn_text
   private
 
   public :: to_text, rounded_text, write_number, lower_case, quoted, in_quotes, joined, listed, counted, shortened, &
-    nearest_word, strings, append, selected
+    nearest_word, strings, append, selected, is_too_long
 
   integer, parameter :: longest_word = 256   ! that is compared with others
+  integer, parameter, public :: longest_path = 4000, longest_file_name = 255   !! bytes, as Linux allows, less names of files
   integer, parameter, public :: number_width = 32   !! no number of `write_number` is longer
 
   !> A text of any length, for arrays of texts. gfortran 12 never frees the texts of an array constructor with `string_t(...)`,
@@ -296,5 +297,18 @@ contains
     end do
     distance = d(len(a), len(b))
   end function edit_distance
+
+  !> Whether the operating system has no folder with such a path.
+  pure logical function is_too_long(path)
+    character(len=*), intent(in) :: path
+    integer :: i, length
+
+    is_too_long = len(path) > longest_path
+    length = 0
+    do i = 1, len(path)
+      length = merge(0, length + 1, path(i:i) == '/')
+      is_too_long = is_too_long .or. length > longest_file_name
+    end do
+  end function is_too_long
 
 end module nocdyn_text

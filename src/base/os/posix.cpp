@@ -1,6 +1,8 @@
-// What of POSIX Fortran cannot bind to: `errno` is a macro, `open` takes arguments in a variable number, its flags are macros.
+// What of POSIX Fortran cannot bind to: `errno` is a macro, `open` takes arguments in a variable number, its flags are macros,
+// `statvfs` fills a structure.
 #include <cerrno>
 #include <fcntl.h>
+#include <sys/statvfs.h>
 
 extern "C" int nocdyn_errno() { return errno; }
 
@@ -8,4 +10,10 @@ extern "C" int nocdyn_open_new(const char *path) { return open(path, O_RDWR | O_
 
 extern "C" int nocdyn_open_existing(const char *path, int is_to_change) {
   return open(path, (is_to_change ? O_RDWR : O_RDONLY) | O_CLOEXEC);
+}
+
+// The bytes that a user may still write to the file system of a path, negative if there is no such path.
+extern "C" double nocdyn_free_bytes(const char *path) {
+  struct statvfs room;
+  return statvfs(path, &room) == 0 ? static_cast<double>(room.f_bavail) * room.f_frsize : -1.0;
 }

@@ -102,6 +102,7 @@ contains
     character(len=*), intent(in) :: path
     character(len=:), allocatable, intent(out) :: failure   !! reason, allocated if that failed
     integer :: i
+    logical :: is_folder
 
     do i = 2, len(path) + 1
       if (i <= len(path)) then
@@ -112,6 +113,8 @@ contains
       failure = last_failure()
       return
     end do
+    inquire (file=path // '/.', exist=is_folder)
+    if (.not. is_folder) failure = 'there is a file of this name'
   end subroutine make_folders
 
   !> Renames a file atomically and replaces the target.

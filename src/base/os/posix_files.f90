@@ -1,6 +1,6 @@
 !> Files as descriptors of the operating system: read at any offset, written at the end, truncated, locked.
 module nocdyn_posix_files
-  use, intrinsic :: iso_c_binding, only: c_char, c_int, c_int64_t, c_intptr_t, c_null_char, c_size_t
+  use, intrinsic :: iso_c_binding, only: c_char, c_double, c_int, c_int64_t, c_intptr_t, c_null_char, c_size_t
   use, intrinsic :: iso_fortran_env, only: int64
   use nocdyn_bytes, only: widen
   use nocdyn_posix, only: close_file, descriptor_call, failure_number, is_interrupted_call, last_failure, path_call, &
@@ -9,7 +9,7 @@ module nocdyn_posix_files
   private
 
   public :: open_new, open_existing, file_size, read_at, read_whole, truncate_file, sync_file, sync_path, lock_file, &
-    disk_failure
+    disk_failure, free_bytes
 
   integer(c_int), parameter :: from_start = 0, from_end = 2      ! SEEK_SET, SEEK_END
   integer(c_int), parameter :: exclusive = 2, without_waiting = 4   ! LOCK_EX, LOCK_NB
@@ -29,6 +29,11 @@ module nocdyn_posix_files
       integer(c_size_t), value, intent(in) :: length
       integer(c_int64_t), value, intent(in) :: offset
     end function c_pread
+
+    real(c_double) function c_free_bytes(path) bind(c, name='nocdyn_free_bytes')
+      import :: c_char, c_double
+      character(kind=c_char), intent(in) :: path(*)
+    end function c_free_bytes
 
     integer(c_intptr_t) function c_read(descriptor, bytes, length) bind(c, name='read')
       import :: c_char, c_int, c_intptr_t, c_size_t
@@ -170,6 +175,21 @@ contains
     is_done = c_flock(int(descriptor, c_int), ior(exclusive, without_waiting)) == 0
     if (.not. is_done) is_done = failure_number() /= would_block
   end subroutine lock_file
+
+  !> Room on the file system of a folder, which need not exist yet [bytes]; the largest number if it cannot be found.
+  real(c_double) function free_bytes(folder)
+    character(len=*), intent(in) :: folder
+    integer :: last
+
+    last = len(folder)
+    do while (last > 0)
+      free_bytes = c_free_bytes(folder(:last) // c_null_char)
+      if (free_bytes >= 0.0_c_double) return
+      last = index(folder(:last - 1), '/', back=.true.)
+    end do
+    free_bytes = c_free_bytes('.' // c_null_char)
+    if (free_bytes < 0.0_c_double) free_bytes = huge(free_bytes)
+  end function free_bytes
 
   !> The reason if the last call of a library failed because of the disk, else empty.
   function disk_failure() result(reason)

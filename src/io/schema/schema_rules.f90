@@ -36,7 +36,6 @@ module nocdyn_schema_rules
   character(len=*), parameter, public :: required = '<required>', unset = '<unset>'   !! in place of a default
   character(len=*), parameter, public :: ground = 'ground'   !! the name of the body that does not turn
   integer, parameter, public :: longest_name = 63   !! bytes of an element's name
-  integer, parameter, public :: longest_path = 4000, longest_file_name = 255   !! bytes, as Linux allows, less names of files
 
   !> The values that a key accepts.
   type, public :: allowed_t

@@ -8,7 +8,7 @@ module nocdyn_sweep_plan
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
   use nocdyn_diagnostics, only: diagnostics_t
-  use nocdyn_output_times, only: check_output_times
+  use nocdyn_output_times, only: check_output_times, row_count
   use nocdyn_schema, only: has_word
   use nocdyn_statistics, only: statistic_t
   use nocdyn_sweep_design, only: find_varied, read_design
@@ -16,6 +16,7 @@ module nocdyn_sweep_plan
   use nocdyn_recorded_quantities, only: check_quantities, read_recorded_quantities, time_span_t, wanted_trajectories
   use nocdyn_targets, only: target_t
   use nocdyn_text, only: counted, string_t
+  use nocdyn_trajectory_columns, only: column_count, table_bytes
   use nocdyn_variant_columns, only: label_columns
   use nocdyn_version, only: compiler_text, version
   implicit none (type, external)
@@ -34,7 +35,7 @@ module nocdyn_sweep_plan
     integer, allocatable :: trajectories(:)           !! variants whose trajectories are written, ascending
     character(len=:), allocatable :: list_checksum    !! of the file of a list, '' if there is none
   contains
-    procedure :: values, summary
+    procedure :: values, summary, file_bytes
   end type sweep_plan_t
 
 contains
@@ -117,6 +118,21 @@ contains
            counted(self%design%varied, 'number', 'numbers') // ', ' // counted(size(self%statistics), 'result', 'results')
     if (size(self%trajectories) > 0) text = text // ', ' // counted(size(self%trajectories), 'trajectory', 'trajectories')
   end function summary
+
+  !> About how much the journal and the results of some variants take [bytes], the trajectories included.
+  real(wp) function file_bytes(self, variants, has_table)
+    class(sweep_plan_t), intent(in) :: self
+    integer, intent(in) :: variants      !! of the journal
+    logical, intent(in) :: has_table     !! whether there is a sweep.csv
+    real(wp), parameter :: of_number = 8.0_wp, of_status = 8.0_wp
+    integer :: columns
+
+    columns = size(self%targets) + size(self%statistics)
+    file_bytes = 2 * real(variants, wp) * (of_number * columns + of_status)   ! journal and sweep.nc
+    if (has_table) file_bytes = file_bytes + table_bytes(variants, columns + 2)
+    if (size(self%trajectories) > 0) file_bytes = file_bytes + size(self%trajectories) * &
+                                                  table_bytes(row_count(self%input), column_count(self%machine))
+  end function file_bytes
 
   !> The time span of the base machine, as far as it does not vary.
   pure type(time_span_t) function fixed_span(input, targets) result(span)

@@ -7,10 +7,10 @@ module nocdyn_value_conversion
   use nocdyn_raw_group, only: new_raw_key, raw_group_t, raw_key_t, raw_value_t
   use nocdyn_schema, only: holds_texts, key_rules, words_of
   use nocdyn_schema_rules, only: a_body, a_file, a_flag, a_folder, a_name, a_number, a_selector, a_word, an_integer, &
-    ground, is_out_of_range, key_rule_t, longest_file_name, longest_name, longest_path, size_problem, &
-    unset
+    ground, is_out_of_range, key_rule_t, longest_name, size_problem, unset
   use nocdyn_schema_text, only: allowed_text
-  use nocdyn_text, only: counted, joined, lower_case, nearest_word, quoted, shortened, string_t, to_text
+  use nocdyn_text, only: counted, is_too_long, joined, longest_file_name, longest_path, lower_case, nearest_word, quoted, &
+    shortened, string_t, to_text
   implicit none (type, external)
   private
 
@@ -213,18 +213,5 @@ contains
       message = ' is a name with a comma, semicolon, equals sign, quote or tab, which is not allowed'
     end if
   end function name_message
-
-  !> Whether the operating system has no folder with such a path.
-  pure logical function is_too_long(path)
-    character(len=*), intent(in) :: path
-    integer :: i, length
-
-    is_too_long = len(path) > longest_path
-    length = 0
-    do i = 1, len(path)
-      length = merge(0, length + 1, path(i:i) == '/')
-      is_too_long = is_too_long .or. length > longest_file_name
-    end do
-  end function is_too_long
 
 end module nocdyn_value_conversion
