@@ -95,7 +95,7 @@ def execute(program, words, folder, limits, interrupt=False):
         if not wait_quickly(process, limits):
             in_time = False
             if interrupt:
-                process.send_signal(signal.SIGINT)
+                process.send_signal(signal.SIGTERM)  # SIGINT is ignored in the background
                 is_interrupted = in_time = wait_quickly(process, limits)
             process.kill()
         _, status, usage = os.wait4(process.pid, 0)

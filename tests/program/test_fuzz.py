@@ -88,3 +88,10 @@ def test_a_program_that_does_not_end_is_ended(tmp_path):
     folder.mkdir()
     outcome = execute(sys.executable, ("-c", "while True: pass"), folder, Limits(seconds=0.2))
     assert not outcome.in_time and outcome.code == -9
+
+
+def test_a_program_without_end_may_be_asked_to_end(tmp_path):
+    folder = tmp_path / "in"
+    folder.mkdir()
+    outcome = execute("/bin/sleep", ("100",), folder, Limits(seconds=0.02), interrupt=True)
+    assert outcome.in_time and outcome.is_interrupted and outcome.code == -15
