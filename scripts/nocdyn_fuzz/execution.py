@@ -95,9 +95,9 @@ def execute(program, words, folder, limits, interrupt=False):
         if not wait_quickly(process, limits):
             in_time = False
             if interrupt:
-                process.send_signal(signal.SIGTERM)  # SIGINT is ignored in the background
+                os.kill(process.pid, signal.SIGTERM)  # SIGINT is ignored in the background
                 is_interrupted = in_time = wait_quickly(process, limits)
-            process.kill()
+            os.kill(process.pid, signal.SIGKILL)  # not by `process`, which would collect the end
         _, status, usage = os.wait4(process.pid, 0)
         process.returncode = os.waitstatus_to_exitcode(status)
     answer = Outcome(process.returncode, out.read_bytes(), err.read_bytes(), in_time, usage.ru_maxrss >> 10, is_interrupted)
