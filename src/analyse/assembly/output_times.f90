@@ -25,12 +25,6 @@ contains
 
     output = input%single('output')
     run = input%single('run')
-    if (run%number('t_end') / 2 - run%number('t_start') / 2 > huge(span) / 2) then
-      call raise(error, exit_input, input%location(input%position('run'), 't_end') // ': t_end = ' // &
-                 to_text(run%number('t_end')) // ' is too far from t_start = ' // to_text(run%number('t_start')) // &
-                 '; allowed: at most ' // to_text(huge(span)) // ' s between them')
-      return
-    end if
     span = run%number('t_end') - run%number('t_start')
     rounding = spacing(max(abs(run%number('t_start')), abs(run%number('t_end'))))
     if (output%has_value('interval')) then
