@@ -165,3 +165,11 @@ def test_a_sweep_that_is_too_large_is_refused_before_it_starts(nocdyn):
     assert nocdyn.files(".") == ["large.nml"]
     outcome = nocdyn("check", "large.nml", "--set", "sweep.samples=10000000")
     assert outcome.stdout.endswith("  files: about 640 MB\n") or outcome.returncode == 3
+
+
+@pytest.mark.parametrize("teeth", ["", "2*", "3*", ", ,"])
+def test_values_of_which_none_is_given_are_refused(nocdyn, teeth):
+    nocdyn.write("teeth.nml", MACHINE + f"&gear name='g' bodies='a', 'b' teeth = {teeth} /\n")
+    outcome = nocdyn("check", "teeth.nml")
+    message = "nocdyn: teeth.nml:5: &gear 'g': teeth has no value; needed: >= 1\n"
+    assert (outcome.returncode, outcome.stderr) == (2, message)

@@ -156,6 +156,7 @@ contains
     integer, intent(out) :: last   !! if the message is empty
     character(len=:), allocatable, intent(out) :: message   !! '': the assignment fits the key
     integer :: items
+    logical :: is_null
 
     items = assignment%last_item - assignment%first_item + 1
     last = assignment%last
@@ -163,9 +164,10 @@ contains
     if (last == 0) last = int(min(assignment%first + (items - 1) * int(assignment%stride, int64), longest_list + 1_int64))
 
     message = ''
+    is_null = all(namelist%items(assignment%first_item:assignment%last_item)%is_null)
     if (items > longest_list) then   ! the scanner has reported it
       return
-    else if (items == 0 .and. .not. assignment%is_malformed) then
+    else if (.not. assignment%is_malformed .and. (items == 0 .or. (is_null .and. rule%default == unset))) then
       message = trim(rule%name) // ' has no value; needed: ' // allowed_text(rule)
     else if (rule%count == 1 .and. .not. assignment%is_whole) then
       message = trim(rule%name) // ' is a single value and takes no subscript'
