@@ -173,3 +173,10 @@ def test_values_of_which_none_is_given_are_refused(nocdyn, teeth):
     outcome = nocdyn("check", "teeth.nml")
     message = "nocdyn: teeth.nml:5: &gear 'g': teeth has no value; needed: >= 1\n"
     assert (outcome.returncode, outcome.stderr) == (2, message)
+
+
+def test_names_that_are_not_utf_8_are_latin_1_in_all_tables(nocdyn):
+    (nocdyn.folder / "latin.nml").write_bytes(MACHINE.encode() + b"&load name='m\xfchle' body='a' viscous=1 /\n")
+    assert nocdyn("run", "latin.nml", "--out", "run").returncode == 0
+    assert "torque_mühle [N m]" in nocdyn.table("run")[0]
+    assert "mühle" in (nocdyn.folder / "run/summary.json").read_text(encoding="utf-8")

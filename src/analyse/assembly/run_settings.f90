@@ -65,7 +65,8 @@ contains
     type(string_t), allocatable, intent(out) :: notes(:)   !! for the user; empty if the method is that of the input
     type(error_t), allocatable, intent(out) :: error
     character(len=:), allocatable :: obstacle, place
-    integer :: rows
+    type(entries_t) :: entries
+    integer :: lower, rows, upper   ! half-bandwidths; stored rows of the factors, with the fill-in of pivoting
 
     allocate (notes(0))
     associate (run => input%groups(input%position('run')))
@@ -80,7 +81,9 @@ contains
       if (len(obstacle) > 0) call raise(error, exit_input, place // ' cannot be used: ' // obstacle)
     end if
     if (any(settings%method == [character(len=6) :: 'rk45', 'rk853', 'taylor']) .or. formulation%states <= largest_matrix) return
-    rows = stage_matrix_rows(formulation)
+    entries = entries_in_rows(formulation%jacobian_pattern(), 1, formulation%states)
+    call half_bandwidths(reverse_cuthill_mckee(formulation%states, entries%row, entries%column), entries, lower, upper)
+    rows = min(2 * lower + upper + 1, formulation%states)
     if (real(rows, wp) * formulation%states <= real(largest_matrix, wp)**2) return
     obstacle = 'a matrix of ' // to_text(rows) // ' x ' // to_text(formulation%states) // ' entries for this machine, whose ' // &
                'couplings leave no narrower band; at most ' // to_text(largest_matrix) // ' x ' // to_text(largest_matrix) // &
@@ -92,17 +95,6 @@ contains
       call raise(error, exit_input, place // ' needs ' // obstacle // "; method = 'rk853' needs none")
     end if
   end subroutine choose_settings
-
-  !> Stored rows of the factors of a stage matrix: its band with the fill-in of pivoting, at most all rows.
-  integer function stage_matrix_rows(formulation) result(rows)
-    class(formulation_t), intent(in) :: formulation
-    type(entries_t) :: entries
-    integer :: lower, upper
-
-    entries = entries_in_rows(formulation%jacobian_pattern(), 1, formulation%states)
-    call half_bandwidths(reverse_cuthill_mckee(formulation%states, entries%row, entries%column), entries, lower, upper)
-    rows = min(2 * lower + upper + 1, formulation%states)
-  end function stage_matrix_rows
 
   !> Writes the keys of &run that describe the integration, with their values.
   subroutine put_settings(json, run)

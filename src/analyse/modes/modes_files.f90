@@ -6,6 +6,7 @@ module nocdyn_modes_files
   use nocdyn_kinds, only: wp
   use nocdyn_modes, only: kind_names, mode_oscillating, mode_t
   use nocdyn_modes_report, only: modes_report_t
+  use nocdyn_printable, only: as_utf_8
   use nocdyn_text, only: string_t, to_text
   use nocdyn_text_buffer, only: text_buffer_t
   implicit none (type, external)
@@ -46,7 +47,7 @@ contains
       integer :: b
 
       do b = 1, size(names)
-        call table%append(',' // prefix // names(b)%text // unit)
+        call table%append(',' // prefix // as_utf_8(names(b)%text) // unit)
       end do
     end subroutine put_names
 

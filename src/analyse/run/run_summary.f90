@@ -110,8 +110,9 @@ contains
     integer :: i
 
     i = findloc(is_finite(extremes%lowest) .and. is_finite(extremes%highest), .false., dim=1)
-    if (i > 0) call raise(error, exit_failed, labels(i)%text // ' is not a finite number between two rows, about t = ' // &
-                          to_text(merge(extremes%highest_time(i), extremes%lowest_time(i), is_finite(extremes%lowest(i)))) // ' s')
+    if (i > 0) call raise(error, exit_failed, labels(i)%text // ' is not a finite number between two rows, about ' // &
+                          't = ' // to_text(merge(extremes%highest_time(i), extremes%lowest_time(i), &
+                          is_finite(extremes%lowest(i)))) // ' s')
   end subroutine check_extremes
 
   !> Takes what the summary says of the machine.

@@ -60,11 +60,9 @@ contains
   function number_cell(value) result(text)
     real(wp), intent(in) :: value
     character(len=cell_width) :: text
-    integer, parameter :: all_digits = 10
-    logical :: is_whole   ! e.g. the number of a variant
+    integer, parameter :: all_digits = 10   ! of whole numbers, e.g. that of a variant
 
-    is_whole = abs(value - anint(value)) <= 0.0_wp
-    text = text_cell(rounded_text(value, merge(all_digits, cell_digits, is_whole)))
+    text = text_cell(rounded_text(value, merge(all_digits, cell_digits, abs(value - anint(value)) <= 0)))
   end function number_cell
 
   pure function text_cell(value) result(text)

@@ -12,8 +12,8 @@ module nocdyn_transient
   use nocdyn_machine, only: machine_t
   use nocdyn_output_times, only: check_output_times, output_times
   use nocdyn_run_settings, only: check_size, choose_settings
-  use nocdyn_run_summary, only: check_energy_balance, check_extremes, describe_machine, extremes_t, run_summary_t, start_extremes, &
-    update_extremes, widen_extremes
+  use nocdyn_run_summary, only: check_energy_balance, check_extremes, describe_machine, extremes_t, run_summary_t, &
+    start_extremes, update_extremes, widen_extremes
   use nocdyn_solver_status, only: failure_message, integration_done, integration_interrupted, integration_not_finite, &
     solver_status_t
   use nocdyn_observer, only: observer_t, ranges_t

@@ -40,6 +40,7 @@ contains
     integer, intent(out) :: code   !! the highest exit code of all files
     type(input_t) :: input
     type(machine_t) :: machine
+    type(diagnostics_t) :: diagnostics
     type(string_t), allocatable :: folders(:)
     type(error_t), allocatable :: error
     integer :: i
@@ -55,25 +56,13 @@ contains
       return
     end if
     do i = 1, size(folders)
-      call read_machine(arguments%operands(i)%text, arguments%overrides, input, machine, error)
+      call read_input(arguments%operands(i)%text, arguments%overrides, input, error, diagnostics)
+      if (allocated(error)) call add_plan_diagnostics(input, diagnostics, error)   ! with those of the machine
+      if (.not. allocated(error)) call check_output_times(input, error)
+      if (.not. allocated(error)) call assemble_machine(input, machine, error)
       if (.not. allocated(error)) call analyse(arguments, input, machine, folders(i)%text, error)
       if (allocated(error)) call report_error(error, code)
     end do
   end subroutine analyse_files
-
-  !> Reads an input and assembles its machine. Errors of the sweep are reported beside those of the machine.
-  subroutine read_machine(file, overrides, input, machine, error)
-    character(len=*), intent(in) :: file            !! path
-    type(string_t), intent(in) :: overrides(:)      !! PATH=VALUE of every --set
-    type(input_t), intent(out) :: input
-    type(machine_t), intent(out) :: machine
-    type(error_t), allocatable, intent(out) :: error
-    type(diagnostics_t) :: diagnostics
-
-    call read_input(file, overrides, input, error, diagnostics)
-    if (allocated(error)) call add_plan_diagnostics(input, diagnostics, error)
-    if (.not. allocated(error)) call check_output_times(input, error)
-    if (.not. allocated(error)) call assemble_machine(input, machine, error)
-  end subroutine read_machine
 
 end module nocdyn_input_files

@@ -164,9 +164,15 @@ contains
     if (allocated(scheduler%error)) then
       allocate (error, source=scheduler%error)
     else if (.not. scheduler%is_complete()) then
-      call raise(error, exit_failed, interruption_text(job, scheduler))
+      associate (counts => scheduler%counts)
+        call raise(error, exit_failed, job%plan%input%file // ': interrupted with ' // &
+                   to_text(counts%done + counts%refused + counts%failed) // ' of ' // to_text(counts%total) // &
+                   ' variants done; repeat the command with --resume to continue')
+      end associate
     else if (job%arguments%shards > 1) then
-      if (.not. job%arguments%is_given('--quiet')) call print_text(part_text(job, scheduler))
+      if (.not. job%arguments%is_given('--quiet')) call print_text(job%plan%input%file // ': part ' // &
+        to_text(job%arguments%shard) // ' of ' // to_text(job%arguments%shards) // ' done, ' // &
+        to_text(scheduler%counts%total) // ' variants; when all parts are done: nocdyn merge ' // job%folder)
     else
       call write_results(job%plan, job%folder, job%journals, job%arguments, summary, error)
       if (.not. allocated(error)) then
@@ -180,26 +186,6 @@ contains
                                                  'command with --resume to continue'
     call report_error(error, code)
   end subroutine finish_job
-
-  function interruption_text(job, scheduler) result(text)
-    type(sweep_job_t), intent(in) :: job
-    class(journal_scheduler_t), intent(in) :: scheduler
-    character(len=:), allocatable :: text
-
-    associate (counts => scheduler%counts)
-      text = job%plan%input%file // ': interrupted with ' // to_text(counts%done + counts%refused + counts%failed) // ' of ' // &
-             to_text(counts%total) // ' variants done; repeat the command with --resume to continue'
-    end associate
-  end function interruption_text
-
-  function part_text(job, scheduler) result(text)
-    type(sweep_job_t), intent(in) :: job
-    class(journal_scheduler_t), intent(in) :: scheduler
-    character(len=:), allocatable :: text
-
-    text = job%plan%input%file // ': part ' // to_text(job%arguments%shard) // ' of ' // to_text(job%arguments%shards) // &
-           ' done, ' // to_text(scheduler%counts%total) // ' variants; when all parts are done: nocdyn merge ' // job%folder
-  end function part_text
 
   !> Shows the line if it is due.
   subroutine update(self, counts)

@@ -3,7 +3,7 @@ module nocdyn_printable
   implicit none (type, external)
   private
 
-  public :: printable, utf_8_length
+  public :: printable, as_utf_8, utf_8_length
 
 contains
 
@@ -74,6 +74,26 @@ contains
       text(4 * i - 3:4 * i) = '\x' // digits(code / 16 + 1:code / 16 + 1) // digits(mod(code, 16) + 1:mod(code, 16) + 1)
     end do
   end function escaped
+
+  !> The text in UTF-8: bytes that are none of it are read as Latin-1.
+  pure function as_utf_8(text) result(utf_8)
+    character(len=*), intent(in) :: text
+    character(len=:), allocatable :: utf_8, wide
+    integer :: code, i, last, length
+
+    allocate (character(len=2 * len(text)) :: wide)
+    last = 0
+    i = 1
+    do while (i <= len(text))
+      length = utf_8_length(text, i)
+      code = iachar(text(i:i))
+      wide(last + 1:last + max(2, length)) = char(192 + code / 64) // char(128 + mod(code, 64))
+      if (length > 0) wide(last + 1:last + length) = text(i:i + length - 1)
+      last = last + merge(length, 2, length > 0)
+      i = i + max(1, length)
+    end do
+    utf_8 = wide(:last)
+  end function as_utf_8
 
   !> Number of bytes of the UTF-8 character at position `first`, 0 if there is none.
   pure integer function utf_8_length(text, first) result(length)

@@ -26,6 +26,8 @@ contains
     type(integration_settings_t), intent(in) :: settings
     class(stepper_t), allocatable, intent(out) :: stepper
     type(error_t), allocatable, intent(out) :: error   !! allocated if there is no such method
+    type(string_t), allocatable :: names(:)
+    integer :: i
 
     select case (settings%method)
     case ('auto')
@@ -41,21 +43,12 @@ contains
     case ('taylor')
       allocate (stepper, source=taylor_stepper(settings%rtol))
     case default
-      call raise(error, exit_input, unknown_method(trim(settings%method)))
+      allocate (names, source=strings(method_names))
+      i = nearest_word(trim(settings%method), names)
+      call raise(error, exit_input, 'there is no integration method ' // quoted(trim(settings%method)) // '; the methods are ' // &
+                 joined(names, ', '))
+      if (i > 0) error%message = error%message // '. Did you mean ' // quoted(names(i)%text) // '?'
     end select
   end subroutine select_method
-
-  !> The message about an unknown name of a method.
-  function unknown_method(name) result(message)
-    character(len=*), intent(in) :: name
-    character(len=:), allocatable :: message
-    type(string_t), allocatable :: names(:)
-    integer :: i
-
-    allocate (names, source=strings(method_names))
-    message = 'there is no integration method ' // quoted(name) // '; the methods are ' // joined(names, ', ')
-    i = nearest_word(name, names)
-    if (i > 0) message = message // '. Did you mean ' // quoted(names(i)%text) // '?'
-  end function unknown_method
 
 end module nocdyn_methods

@@ -2,6 +2,7 @@
 module nocdyn_csv
   use nocdyn_kinds, only: wp
   use nocdyn_output_file, only: output_file_t
+  use nocdyn_printable, only: as_utf_8
   use nocdyn_text, only: number_width, string_t, write_number
   implicit none (type, external)
   private
@@ -18,7 +19,7 @@ contains
 
     do i = 1, size(labels)
       if (i > 1) call file%put(',')
-      call file%put(labels(i)%text)
+      call file%put(as_utf_8(labels(i)%text))
     end do
     call file%put(new_line('a'))
   end subroutine write_header

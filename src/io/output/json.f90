@@ -2,7 +2,7 @@
 module nocdyn_json
   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
   use nocdyn_kinds, only: wp
-  use nocdyn_printable, only: utf_8_length
+  use nocdyn_printable, only: as_utf_8, utf_8_length
   use nocdyn_text, only: string_t, to_text
   use nocdyn_text_buffer, only: text_buffer_t
   use nocdyn_version, only: compiler_text, version
@@ -251,8 +251,7 @@ contains
       case (achar(0):achar(9), achar(11):achar(31))
         call buffer%append(' ')
       case default
-        if (length > 0) call buffer%append(text(i:i + length - 1))
-        if (length == 0) call buffer%append(latin_1(text(i:i)))
+        call buffer%append(as_utf_8(text(i:i + max(1, length) - 1)))
       end select
       i = i + max(1, length)
     end do
@@ -263,25 +262,13 @@ contains
   !> Whether a text is valid UTF-8 and has characters that are not ASCII.
   pure logical function has_utf_8(text)
     character(len=*), intent(in) :: text
-    integer :: i, length
+    integer :: i
 
     has_utf_8 = .false.
-    i = 1
-    do while (i <= len(text))
-      length = utf_8_length(text, i)
-      if (length == 0) exit
-      has_utf_8 = has_utf_8 .or. length > 1
-      i = i + length
+    do i = 1, len(text)
+      has_utf_8 = has_utf_8 .or. iachar(text(i:i)) > 127
     end do
-    has_utf_8 = has_utf_8 .and. i > len(text)
+    has_utf_8 = has_utf_8 .and. as_utf_8(text) == text
   end function has_utf_8
-
-  !> Escape sequence of a byte that is not UTF-8, read as Latin-1.
-  pure function latin_1(byte) result(escape)
-    character(len=1), intent(in) :: byte
-    character(len=6) :: escape
-
-    write (escape, '(a, z4.4)') '\u', iachar(byte)
-  end function latin_1
 
 end module nocdyn_json

@@ -37,7 +37,7 @@ contains
     integer, intent(out) :: offending_row   !! row that the error is about, 0 if it is about `wanted`
     type(error_t), allocatable, intent(out) :: error
     type(train_relations_t) :: relations
-    integer, allocatable :: group_of(:)
+    integer, allocatable :: group_of(:), first(:), order(:)
     logical, allocatable :: is_kept(:)
     integer :: r
 
@@ -50,10 +50,12 @@ contains
     end if
     call trains%choose_roots(constraints, trains%fastest_bodies(constraints))
     relations = new_relations(constraints, trains)
-    call distribute_trains(group_of(trains%root), groups)
+    allocate (first(size(groups) + 1), order(size(trains%root)))
+    call transposed_order(group_of(trains%root), size(groups), order, first)
     call find_independent_relations(relations, group_of(trains%root), size(groups), is_kept, offending_row, error)
     if (allocated(error)) return
     do r = 1, size(groups)
+      groups(r)%trains = order(first(r):first(r + 1) - 1)
       groups(r)%kept = pack(groups(r)%rows, is_kept(groups(r)%rows))
     end do
     call eliminate(relations, is_kept(relations%row), group_of, trains, groups)
@@ -63,18 +65,6 @@ contains
     if (allocated(error)) return
     call choose_coordinates(constraints, body_names, wanted, group_of, is_kept, trains, groups, error)
   end subroutine analyse_constraints
-
-  !> Lists the trains of each group.
-  subroutine distribute_trains(group_of, groups)
-    integer, intent(in) :: group_of(:)   !! [trains]
-    type(geared_group_t), intent(inout) :: groups(:)
-    integer :: first(size(groups) + 1), g, order(size(group_of))
-
-    call transposed_order(group_of, size(groups), order, first)
-    do g = 1, size(groups)
-      groups(g)%trains = order(first(g):first(g + 1) - 1)
-    end do
-  end subroutine distribute_trains
 
   !> Finds the relations that are independent of those before them in the input. Relations with leaves always are.
   subroutine find_independent_relations(relations, group_of, groups, is_kept, offending_row, error)

@@ -100,7 +100,8 @@ contains
       if (group%has_value('from')) from = group%number('from')
       if (group%has_value('band')) band = group%number('band')
       do i = 1, size(words)
-        statistic = new_statistic(labels, column, kind_of(words(i)%text), span%t_start, from, band)
+        k = findloc(statistic_names == words(i)%text, .true., dim=1)
+        statistic = new_statistic(labels, column, k, span%t_start, from, band)
         if (any([(statistics(k)%label == statistic%label, k=1, size(statistics))])) then
           call input%report(record, 'statistic', quoted(statistic%label) // ' is recorded already; allowed: once', diagnostics)
         else
@@ -109,15 +110,6 @@ contains
       end do
     end associate
   end subroutine add_statistics
-
-  pure integer function kind_of(word) result(kind)
-    character(len=*), intent(in) :: word
-
-    do kind = 1, size(statistic_names)
-      if (statistic_names(kind) == word) return
-    end do
-    error stop 'nocdyn_recorded_quantities: the schema allows a statistic that is not there'
-  end function kind_of
 
   !> The column of the quantity of a &record, with or without its unit; 0 if there is none.
   subroutine find_column(input, record, labels, column, diagnostics)

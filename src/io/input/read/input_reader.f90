@@ -101,23 +101,14 @@ contains
         group%kind = namelist%groups(g)%name
         group%rule = group_rule_index(group%kind)
         group%line = namelist%groups(g)%line
-        if (group%rule > 0) then
-          call count_up(numbers(group%rule), group%ordinal)
-          call read_group(namelist, namelist%groups(g), g, overrides, folder, relations(group%rule), group, diagnostics)
-        else
-          call refuse_group(group, g, diagnostics)
-        end if
+        if (group%rule == 0) call refuse_group(group, g, diagnostics)
+        if (group%rule == 0) cycle
+        numbers(group%rule) = numbers(group%rule) + 1
+        group%ordinal = numbers(group%rule)
+        call read_group(namelist, namelist%groups(g), g, overrides, folder, relations(group%rule), group, diagnostics)
       end associate
     end do
   end subroutine read_groups
-
-  elemental subroutine count_up(last, number)
-    integer, intent(inout) :: last
-    integer, intent(out) :: number
-
-    last = last + 1
-    number = last
-  end subroutine count_up
 
   !> Refuses a group that the schema does not have. After many errors no similar one is searched.
   subroutine refuse_group(group, g, diagnostics)
@@ -185,31 +176,22 @@ contains
     type(override_t), intent(in) :: overrides(:)
     type(diagnostics_t), intent(inout) :: diagnostics
     type(string_t), allocatable :: names(:)
+    character(len=:), allocatable :: kind
     integer :: g, i
 
     do i = 1, size(overrides)
       if (overrides(i)%is_used .or. .not. overrides(i)%is_valid) cycle
+      kind = trim(group_rules(overrides(i)%group_rule)%name)
       if (overrides(i)%number > 0) then
-        call refuse_number(groups, overrides(i), i, diagnostics)
+        call diagnostics%add(no_line, 0, 'there is no ' // kind // '(' // to_text(overrides(i)%number) // '); the file has ' // &
+                             to_text(count(groups%rule == overrides(i)%group_rule)) // ' &' // kind, i)
         cycle
       end if
       call collect_names(groups, pack([(g, g=1, size(groups))], groups%rule == overrides(i)%group_rule), names)
-      call diagnostics%add(no_line, 0, 'there is no &' // trim(group_rules(overrides(i)%group_rule)%name) // ' ' &
-        // quoted(shortened(overrides(i)%name)) // suggestion(overrides(i)%name, names), i)
+      call diagnostics%add(no_line, 0, 'there is no &' // kind // ' ' // quoted(shortened(overrides(i)%name)) // &
+                           suggestion(overrides(i)%name, names), i)
     end do
   end subroutine refuse_unused
-
-  subroutine refuse_number(groups, override, which, diagnostics)
-    type(group_t), intent(in) :: groups(:)
-    type(override_t), intent(in) :: override
-    integer, intent(in) :: which   !! index of the override
-    type(diagnostics_t), intent(inout) :: diagnostics
-    character(len=:), allocatable :: kind
-
-    kind = trim(group_rules(override%group_rule)%name)
-    call diagnostics%add(no_line, 0, 'there is no ' // kind // '(' // to_text(override%number) // '); the file has ' // &
-                      to_text(count(groups%rule == override%group_rule)) // ' &' // kind, which)
-  end subroutine refuse_number
 
   !> Whether the names of all bodies are known: false if there is a &body, perhaps misspelt, whose name cannot be read.
   pure logical function bodies_are_known(groups)

@@ -133,7 +133,8 @@ contains
     do i = 1, size(names)
       comma = first + index(text(first:last), ',') - 1
       if (comma < first) comma = last + 1
-      names(i)%text = without_quotes(text(first:comma - 1))
+      names(i)%text = text(first - 1 + verify(text(first:comma - 1) // '.', blanks // quotes): &
+                           first - 1 + verify(text(first:comma - 1), blanks // quotes // carriage_return, back=.true.))
       first = comma + 1
     end do
   end subroutine read_names
@@ -165,13 +166,6 @@ contains
     call add_error(reading, ':' // to_text(reading%line) // ': ' // message)
     names = [string_t ::]
   end subroutine check_names
-
-  pure function without_quotes(text) result(name)
-    character(len=*), intent(in) :: text
-    character(len=:), allocatable :: name
-
-    name = text(verify(text // '.', blanks // quotes):verify(text, blanks // quotes // carriage_return, back=.true.))
-  end function without_quotes
 
   !> Reads the rows of all lines from position `first` on. The room for them grows with the number of rows, not of lines.
   subroutine read_rows(text, first, reading, values, rows)
@@ -310,16 +304,6 @@ contains
     if (message /= '') message = 'column ' // to_text(column) // ', ' // excerpt(text) // ',' // message
   end subroutine read_column
 
-  !> Checks that the first column ascends.
-  subroutine check_ascent(last, this, line, message)
-    real(wp), intent(in) :: last, this   !! first column of the last row and of this one
-    integer, intent(in) :: line          !! of the last row
-    character(len=:), allocatable, intent(inout) :: message
-
-    if (this > last) return
-    message = 'column 1, ' // to_text(this) // ', must be greater than ' // to_text(last) // ' on line ' // to_text(line)
-  end subroutine check_ascent
-
   pure function excerpt(text)
     character(len=*), intent(in) :: text
     character(len=:), allocatable :: excerpt
@@ -355,5 +339,15 @@ contains
                     to_text(least))
     end if
   end subroutine check_whole
+
+  !> Checks that the first column ascends.
+  subroutine check_ascent(last, this, line, message)
+    real(wp), intent(in) :: last, this   !! first column of the last row and of this one
+    integer, intent(in) :: line          !! of the last row
+    character(len=:), allocatable, intent(inout) :: message
+
+    if (this > last) return
+    message = 'column 1, ' // to_text(this) // ', must be greater than ' // to_text(last) // ' on line ' // to_text(line)
+  end subroutine check_ascent
 
 end module nocdyn_table_file
