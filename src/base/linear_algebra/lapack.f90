@@ -106,7 +106,7 @@ contains
     real(wp), intent(in) :: matrix(:, :)   !! symmetric, [n, n]
     real(wp), intent(in) :: rhs(:, :)   !! right-hand sides as columns, [n, m]
     real(wp), allocatable, intent(out) :: solution(:, :)   !! [n, m]
-    logical, intent(out) :: is_indefinite   !! the matrix is not positive definite, or only by rounding, or not finite: no solution
+    logical, intent(out) :: is_indefinite   !! not positive definite, or only by rounding, or not finite: no solution
     real(wp), parameter :: rounding = 4.0_wp * epsilon(1.0_wp)
     real(wp), allocatable :: a(:, :)
     integer :: info, k, n

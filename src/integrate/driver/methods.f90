@@ -45,8 +45,8 @@ contains
     case default
       allocate (names, source=strings(method_names))
       i = nearest_word(trim(settings%method), names)
-      call raise(error, exit_input, 'there is no integration method ' // quoted(trim(settings%method)) // '; the methods are ' // &
-                 joined(names, ', '))
+      call raise(error, exit_input, 'there is no integration method ' // quoted(trim(settings%method)) // &
+                 '; the methods are ' // joined(names, ', '))
       if (i > 0) error%message = error%message // '. Did you mean ' // quoted(names(i)%text) // '?'
     end select
   end subroutine select_method

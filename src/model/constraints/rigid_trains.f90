@@ -17,7 +17,7 @@ module nocdyn_rigid_trains
 
   integer, parameter, public :: most_names = 12   !! of bodies or rows in a message of this room
 
-  integer, parameter, public :: max_exponent = 332   !! binary exponent up to which squares of ratios times inertias do not overflow
+  integer, parameter, public :: max_exponent = 332   !! up to 2^332, squares of ratios times inertias do not overflow
 
   !> The trees of all rigid trains of a machine.
   type, public :: rigid_trains_t

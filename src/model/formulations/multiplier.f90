@@ -45,7 +45,7 @@ contains
         self%factors(:machine%bodies, machine%bodies + 1:, l) = -transpose(constraint)
       end associate
       call lu_factor(self%factors(:, :, l), self%pivots(:, l), is_singular)
-      if (is_singular) self%factors(:, :, l) = ieee_value(1.0_wp, ieee_quiet_nan)   ! by rounding: the integration refuses to start
+      if (is_singular) self%factors(:, :, l) = ieee_value(1.0_wp, ieee_quiet_nan)   ! by rounding: the integration does not start
     end do
   end function new_multiplier
 

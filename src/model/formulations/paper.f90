@@ -68,7 +68,7 @@ contains
       call extend_by_unit(inertia_of_1, inertia_of_2)
       call extend_by_unit(inertia_of_2, self%factors(:, :, l))
       call lu_factor(self%factors(:, :, l), self%pivots(:, l), is_singular)
-      if (is_singular) self%factors(:, :, l) = ieee_value(1.0_wp, ieee_quiet_nan)   ! by rounding: the integration refuses to start
+      if (is_singular) self%factors(:, :, l) = ieee_value(1.0_wp, ieee_quiet_nan)   ! by rounding: the integration does not start
     end do
     self%couplings = [integer ::]
     do i = 1, size(machine%banks)

@@ -167,7 +167,8 @@ contains
     class(direct_parameters_t), intent(in) :: self
     real(wp), intent(in) :: values(:)   !! [targets]
 
-    are_allowed = all(values >= self%lowest .and. values <= self%highest .and. (abs(values) >= smallest_size .or. abs(values) <= 0))
+    are_allowed = all(values >= self%lowest .and. values <= self%highest .and. &
+                      (abs(values) >= smallest_size .or. abs(values) <= 0))
   end function are_allowed
 
   !> Makes a lane that of a variant. What the lane holds beside the values must be that of another variant.
