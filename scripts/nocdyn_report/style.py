@@ -104,7 +104,7 @@ def saved(names: Sequence[str], formats: Sequence[str], folder: Path) -> str:
 def save(figure: Figure, folder: Path, name: str, formats: Sequence[str] = FORMATS) -> None:
     """Writes FOLDER/NAME in each format and frees the figure."""
     folder.mkdir(parents=True, exist_ok=True)
-    figure.draw_without_rendering()
+    figure.get_layout_engine().execute(figure)
     figure.set_layout_engine("none")  # laid out once, not for each format again
     for kind in formats:
         undated = {"png": None, "svg": {"Date": None}, "pdf": {"CreationDate": None}}[kind]
