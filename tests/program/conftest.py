@@ -12,7 +12,9 @@ import pytest
 
 SOURCE = Path(os.environ["NOCDYN_SOURCE"])
 DATA = Path(__file__).parent / "data"
-TRAPS_EXCEPTIONS = "CMAKE_BUILD_TYPE:STRING=Debug" in (Path(os.environ["NOCDYN_BUILD"]) / "CMakeCache.txt").read_text()
+BUILD_SETTINGS = (Path(os.environ["NOCDYN_BUILD"]) / "CMakeCache.txt").read_text()
+TRAPS_EXCEPTIONS = "CMAKE_BUILD_TYPE:STRING=Debug" in BUILD_SETTINGS
+IS_SANITIZED = "-fsanitize=address" in BUILD_SETTINGS  # takes terabytes of addresses
 CASE_1 = SOURCE / "input/paper/case1.nml"
 CASE_2 = SOURCE / "input/paper/case2.nml"
 
