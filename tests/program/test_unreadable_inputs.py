@@ -113,7 +113,7 @@ DISC = """\
             "7: &output: directory: a quote is missing: the text <'xxx",
             "> is not closed on its line",
         ),
-        ("rtol", "2" * 5000 + "*1", "5: &run: rtol: ", "a repeat count such as 3*0.5 must be from 1 to 100000"),
+        ("rtol", "2" * 5000 + "*1", "5: &run: rtol: the repeat count of 222", "2 ... must be from 1 to 100000"),
     ],
 )
 def test_messages_name_file_line_and_key_and_cut_long_values(nocdyn, key, value, place, message):

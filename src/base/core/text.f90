@@ -7,7 +7,7 @@ module nocdyn_text
   private
 
   public :: to_text, rounded_text, write_number, lower_case, quoted, in_quotes, joined, listed, counted, shortened, &
-    nearest_word, strings, append, selected, is_too_long
+    shown_path, nearest_word, strings, append, selected, is_too_long
 
   integer, parameter :: longest_word = 256   ! that is compared with others
   integer, parameter, public :: longest_path = 4000, longest_file_name = 255   !! bytes, as Linux allows, less names of files
@@ -171,6 +171,24 @@ contains
       if (short(i:i) == new_line('a')) short(i:i) = ' '
     end do
   end function shortened
+
+  !> A path for a message: one of more than 80 characters is cut in its middle. Line feeds become blanks.
+  pure function shown_path(path) result(text)
+    character(len=*), intent(in) :: path
+    character(len=:), allocatable :: text
+    integer, parameter :: most = 80, head = 30, tail = 46   ! characters
+    logical :: begins(len(path))                            ! whether a byte is the first one of a character
+    integer :: first, i
+
+    begins = [(iachar(path(i:i)) < 128 .or. iachar(path(i:i)) > 191, i=1, len(path))]
+    text = shortened(path)
+    if (count(begins) <= most) return
+    first = len(path)
+    do while (count(begins(first:)) < tail)
+      first = first - 1
+    end do
+    text = shortened(path, head) // shortened(path(first:))
+  end function shown_path
 
   !> The texts in quotes, separated by `separator`; of more than `most`, the first `most` "and N more".
   pure function joined(texts, separator, most)

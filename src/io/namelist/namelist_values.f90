@@ -54,13 +54,14 @@ contains
     type(diagnostics_t), intent(inout) :: diagnostics
     logical, intent(out) :: is_valid    !! .false. if the value cannot be read, which is reported
     type(item_t) :: item
-    integer :: i, repeats, room
+    integer :: i, repeats, room, start
 
+    start = cursor%at
     call scan_repeat_count(cursor, repeats)
     item%line = cursor%line
     is_valid = repeats >= 1 .and. repeats <= longest_list
-    if (.not. is_valid) call diagnostics%add(cursor%line, namelist%group_count, cursor%key // &
-      'a repeat count such as 3*0.5 must be from 1 to ' // to_text(longest_list))
+    if (.not. is_valid) call diagnostics%add(cursor%line, namelist%group_count, cursor%key // 'the repeat count of ' // &
+      shortened(cursor%text(start:cursor%value_end())) // ' must be from 1 to ' // to_text(longest_list))
     if (scan(cursor%next(), '''"') == 1) then
       call scan_quoted(cursor, namelist%group_count, diagnostics, item, is_valid)
     else

@@ -4,11 +4,11 @@ module nocdyn_schema_rules
   implicit none (type, external)
   private
 
-  public :: is_out_of_range, size_problem
+  public :: is_out_of_range, is_too_small, size_limit
 
   !> Numbers of an input are at most so large in size, so that products and powers of a few of them stay finite. Those that are
   !> divided by, which are the ones that cannot be negative, cannot be 0 or ascend, are 0 or at least so large.
-  real(wp), parameter, public :: largest_size = 1.0e50_wp, smallest_size = 1.0e-50_wp
+  real(wp), parameter :: largest_size = 1.0e50_wp, smallest_size = 1.0e-50_wp
 
   ! Occurrence of a group.
   integer, parameter, public :: exactly_once = 1, at_most_once = 2, at_least_once = 3, any_times = 4
@@ -120,8 +120,15 @@ contains
     if (allowed%excludes_zero) is_out_of_range = is_out_of_range .or. abs(value) <= 0.0_wp
   end function is_out_of_range
 
-  !> What is wrong with the size of a number, '' if nothing is.
-  pure function size_problem(value, allowed, ascends) result(text)
+  !> Whether a number is not 0 but so near to it that nothing is to be divided by it.
+  elemental logical function is_too_small(value)
+    real(wp), intent(in) :: value
+
+    is_too_small = abs(value) > 0 .and. abs(value) < smallest_size
+  end function is_too_small
+
+  !> The limit on its size that a number breaks, '' if it breaks none.
+  pure function size_limit(value, allowed, ascends) result(text)
     real(wp), intent(in) :: value
     type(allowed_t), intent(in) :: allowed   !! values of the key
     logical, intent(in) :: ascends           !! whether the number is one of an ascending list
@@ -129,11 +136,11 @@ contains
 
     text = ''
     if (abs(value) > largest_size) then
-      text = ' is out of range: numbers are at most 1e50 in size'
-    else if (abs(value) > 0 .and. abs(value) < smallest_size .and. (ascends .or. allowed%excludes_zero .or. &
-                                                                     abs(allowed%low) <= 0)) then
-      text = ' is out of range: numbers other than 0 are at least 1e-50 in size here'
+      text = ', at most 1e50 in size'
+    else if (is_too_small(value) .and. (ascends .or. allowed%excludes_zero .or. abs(allowed%low) <= 0)) then
+      text = ', at least 1e-50 in size'
+      if (.not. is_out_of_range(0.0_wp, allowed)) text = text // ' unless 0'
     end if
-  end function size_problem
+  end function size_limit
 
 end module nocdyn_schema_rules

@@ -12,7 +12,7 @@ module nocdyn_direct_parameters
   use nocdyn_machine, only: machine_t
   use nocdyn_reduced, only: reduced_t
   use nocdyn_schema, only: first_key, key_rules
-  use nocdyn_schema_rules, only: smallest_size
+  use nocdyn_schema_rules, only: is_too_small
   use nocdyn_targets, only: target_t
   implicit none (type, external)
   private
@@ -167,8 +167,7 @@ contains
     class(direct_parameters_t), intent(in) :: self
     real(wp), intent(in) :: values(:)   !! [targets]
 
-    are_allowed = all(values >= self%lowest .and. values <= self%highest .and. &
-                      (abs(values) >= smallest_size .or. abs(values) <= 0))
+    are_allowed = all(values >= self%lowest .and. values <= self%highest .and. .not. is_too_small(values))
   end function are_allowed
 
   !> Makes a lane that of a variant. What the lane holds beside the values must be that of another variant.

@@ -192,11 +192,8 @@ contains
     text = ''
     do i = assignment%first_item, min(assignment%last_item, assignment%first_item + few - 1)
       if (i > assignment%first_item) text = text // ', '
-      if (namelist%items(i)%is_null) then
-        text = text // 'nothing'
-      else
-        text = text // shortened(namelist%as_written(namelist%items(i)))
-      end if
+      if (namelist%items(i)%is_null) text = text // 'nothing'
+      if (.not. namelist%items(i)%is_null) text = text // shortened(namelist%as_written(namelist%items(i)))
     end do
     if (assignment%last_item - assignment%first_item >= few) text = text // ' ...'
   end function found_values

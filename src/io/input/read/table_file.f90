@@ -4,8 +4,8 @@ module nocdyn_table_file
   use nocdyn_errors, only: error_t, exit_file, exit_input
   use nocdyn_kinds, only: wp
   use nocdyn_literals, only: number_problem, read_real
-  use nocdyn_schema_rules, only: anything, size_problem
-  use nocdyn_text, only: append, counted, quoted, shortened, string_t, to_text
+  use nocdyn_schema_rules, only: anything, size_limit
+  use nocdyn_text, only: append, counted, quoted, shortened, shown_path, string_t, to_text
   use nocdyn_text_file, only: first_position, read_text_file
   implicit none (type, external)
   private
@@ -62,7 +62,7 @@ contains
     integer :: rows
 
     allocate (reading%messages(0))
-    reading%file = file
+    reading%file = shown_path(file)
     call read_rows(text, first_position(text), reading, values, rows)
     call check_whole(reading, rows, least=2, is_binary=index(text, achar(0)) > 0)
     first = values(1, :rows)
@@ -83,7 +83,7 @@ contains
     integer :: rows, start
 
     allocate (reading%messages(0))
-    reading%file = file
+    reading%file = shown_path(file)
     reading%is_list = .true.
     start = first_position(text)
     call read_names(text, start, reading, names)
@@ -296,20 +296,21 @@ contains
     logical, intent(in) :: has_any_size     !! a number of a list is checked as a value of its variant
     real(wp), intent(out) :: value
     character(len=:), allocatable, intent(out) :: message
+    character(len=:), allocatable :: limit
     integer :: status
 
     call read_real(text, value, status)
     message = number_problem(status)
-    if (message == '' .and. .not. has_any_size) message = size_problem(value, anything, ascends=column == 1)
+    limit = size_limit(value, anything, ascends=column == 1)
+    if (limit /= '' .and. .not. has_any_size) message = ' is out of range; allowed: ' // limit(3:)
     if (message /= '') message = 'column ' // to_text(column) // ', ' // excerpt(text) // ',' // message
   end subroutine read_column
 
   pure function excerpt(text)
     character(len=*), intent(in) :: text
     character(len=:), allocatable :: excerpt
-    integer, parameter :: most = 40
 
-    excerpt = quoted(shortened(text, most))
+    excerpt = quoted(shortened(text, 40))
   end function excerpt
 
   !> Counts an error; the first ones are kept as messages.
@@ -332,11 +333,9 @@ contains
       reading%messages = [string_t ::]
       call append(reading%messages, reading%file // ': not a text file')
     else if (reading%errors > most_messages) then
-      call append(reading%messages, reading%file // ': ' // to_text(reading%errors - most_messages) // &
-                  ' more lines are wrong')
+      call append(reading%messages, reading%file // ': ' // to_text(reading%errors - most_messages) // ' more lines are wrong')
     else if (reading%errors == 0 .and. rows < least) then
-      call add_error(reading, ': ' // counted(rows, 'row', 'rows') // '; needed: at least ' // &
-                    to_text(least))
+      call add_error(reading, ': ' // counted(rows, 'row', 'rows') // '; needed: at least ' // to_text(least))
     end if
   end subroutine check_whole
 

@@ -7,7 +7,7 @@ module nocdyn_value_conversion
   use nocdyn_raw_group, only: new_raw_key, raw_group_t, raw_key_t, raw_value_t
   use nocdyn_schema, only: holds_texts, key_rules, words_of
   use nocdyn_schema_rules, only: a_body, a_file, a_flag, a_folder, a_name, a_number, a_selector, a_word, an_integer, &
-    ground, is_out_of_range, key_rule_t, longest_name, size_problem, unset
+    ground, is_out_of_range, key_rule_t, longest_name, size_limit, unset
   use nocdyn_schema_text, only: allowed_text
   use nocdyn_text, only: counted, is_too_long, joined, longest_file_name, longest_path, lower_case, nearest_word, quoted, &
     shortened, string_t, to_text
@@ -41,7 +41,8 @@ contains
       if (known == 0) then
         message = trim(merge(' has no value', ' is missing  ', key%is_written)) // '; needed: ' // allowed_text(rule)
       else if (known < size(key%values)) then
-        message = ' has ' // counted(given, 'value', 'values') // '; needed: ' // to_text(size(key%values))
+        message = ' has ' // counted(given, 'value', 'values') // ' (' // given_values(key) // '); needed: ' // &
+                  to_text(size(key%values))
       else if (known < rule%fewest) then
         message = ' has ' // counted(known, 'value', 'values') // '; needed: at least ' // to_text(rule%fewest)
       else
@@ -51,6 +52,20 @@ contains
       call group%report([position], key%name() // message, diagnostics)
     end associate
   end subroutine convert_key
+
+  !> The values that are given, as they are written.
+  pure function given_values(key) result(text)
+    type(raw_key_t), intent(in) :: key
+    character(len=:), allocatable :: text
+    integer, parameter :: few = 80   ! more are not shown anyhow
+    integer :: i
+
+    text = ''
+    do i = 1, min(size(key%values), few)
+      if (allocated(key%values(i)%written)) text = text // ', ' // key%values(i)%written
+    end do
+    text = shortened(text(3:))
+  end function given_values
 
   !> The default of a key.
   function default_value(rule) result(value)
@@ -107,9 +122,11 @@ contains
     integer, intent(in) :: i                                !! index of the value
     type(value_t), intent(inout) :: value
     character(len=:), allocatable, intent(out) :: message   !! text after 'KEY = VALUE'; '': the value is valid
+    character(len=:), allocatable :: limit
     integer :: status
 
     message = ''
+    limit = ''
     if (holds_texts(rule%value_type)) then
       value%texts(i)%text = raw%text
       if (.not. (raw%is_quoted .or. may_be_bare)) then
@@ -124,15 +141,15 @@ contains
       case (a_number)
         call read_real(raw%text, value%numbers(i), status)
         message = number_problem(status)
-        if (message == '') message = size_problem(value%numbers(i), rule%allowed, rule%ascends)
-        if (message == '' .and. is_out_of_range(value%numbers(i), rule%allowed)) message = ' is out of range'
+        limit = size_limit(value%numbers(i), rule%allowed, rule%ascends)
+        if (message == '' .and. (limit /= '' .or. is_out_of_range(value%numbers(i), rule%allowed))) message = ' is out of range'
       case (an_integer)
         call convert_integer(raw%text, rule, value%whole_numbers(i), message)
       case default
         call read_logical(raw%text, value%flags(i), status)
         if (status /= literal_ok) message = ' is neither true nor false'
       end select
-      if (message /= '') message = message // '; allowed: ' // allowed_text(rule)
+      if (message /= '') message = message // '; allowed: ' // allowed_text(rule) // limit
     end if
   end subroutine convert_value
 

@@ -7,7 +7,7 @@ module nocdyn_targets
   use nocdyn_schema, only: first_key, key_rules
   use nocdyn_schema_relations, only: relation_t, relations_of, relations_t
   use nocdyn_schema_rules, only: allowed_t, an_integer, at_most_one, exactly_one, is_out_of_range, less_than, &
-    required, requires, size_problem, unset
+    required, requires, size_limit, unset
   use nocdyn_schema_text, only: allowed_text
   use nocdyn_target_search, only: search_target
   use nocdyn_text, only: to_text
@@ -97,10 +97,10 @@ contains
       return
     end if
     message = ''
-    if (.not. target%is_integer) message = size_problem(number, target%allowed, key_rules(target%rule)%ascends)
-    if (message == '' .and. is_out_of_range(number, target%allowed)) message = ' is out of range'
-    if (message /= '') then
-      message = target%path // ' = ' // to_text(number) // message // '; allowed: ' // allowed_text(key_rules(target%rule))
+    if (.not. target%is_integer) message = size_limit(number, target%allowed, key_rules(target%rule)%ascends)
+    if (message /= '' .or. is_out_of_range(number, target%allowed)) then
+      message = target%path // ' = ' // to_text(number) // ' is out of range; allowed: ' // &
+                allowed_text(key_rules(target%rule)) // message
       return
     end if
     if (.not. group%values(target%key)%has_any()) call give_value(group, target)
