@@ -148,6 +148,9 @@ def test_what_nothing_drives_keeps_the_speed_of_its_start(nocdyn):
 def test_a_free_body_beside_a_stable_machine_leaves_it_stable(nocdyn):
     (state,) = analyse(nocdyn, TRAIN + "&body name = 'idler' inertia = 2.0 /\n")
     assert state["stability"] == "stable"
+    printed = nocdyn("equilibrium", nocdyn.write("free.nml", TRAIN + "&body name = 'idler' inertia = 2.0 /\n")).stdout
+    assert "stable but for the speeds of the notes, which disturbances change for good: others decay with " in printed
+    assert "steady state, stable: disturbances decay with " in nocdyn("equilibrium", nocdyn.write("held.nml", TRAIN)).stdout
 
 
 def test_machines_side_by_side_have_every_combination(nocdyn):

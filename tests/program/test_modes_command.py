@@ -2,6 +2,7 @@
 
 import csv
 import json
+import re
 from math import pi, sin, sqrt
 
 import pytest
@@ -54,6 +55,16 @@ def test_two_rotors_swing_at_their_frequency(nocdyn):
     assert mode["kinetic_share"] == pytest.approx([8.3 / 219.7, 211.4 / 219.7], rel=EXACT)
     assert mode["potential_share"] == [pytest.approx(1)]
     assert (rigid["kind"], rigid["frequency_Hz"], rigid["shape"]) == ("rigid body", 0, pytest.approx([1, 1]))
+
+
+def test_rounding_of_a_shape_is_printed_and_written_as_zero(nocdyn):
+    bodies = "".join(f"&body name = '{name}' inertia = 1.0 /\n" for name in "abc")
+    shafts = "".join(f"&coupling name = '{a + b}' bodies = '{a}', '{b}' stiffness = 100.0 /\n" for a, b in ["ab", "bc"])
+    path = nocdyn.write("chain.nml", bodies + shafts + "&run t_end = 1.0 /\n")
+    outcome = nocdyn("modes", path, "--out", "out")
+    assert re.search(r"^  b  +0  +1$", outcome.stdout, re.MULTILINE), outcome.stdout
+    _, first, _ = json.loads((nocdyn.folder / "out/modes.json").read_text())["modes"]
+    assert (first["shape"][1], first["phase_deg"][1], first["kinetic_share"][1]) == (0, 0, 0)
 
 
 def test_the_first_benchmark_of_the_ieee_has_its_published_modes(nocdyn):

@@ -112,6 +112,7 @@ contains
     character(len=*), intent(in) :: file
     type(equilibrium_report_t), intent(in) :: self
     character(len=:), allocatable :: text
+    character(len=:), allocatable :: heading
     type(text_buffer_t) :: report
     integer :: i, k
 
@@ -119,12 +120,9 @@ contains
       call report%append_line(file // ': note: ' // self%notes(i)%text)
     end do
     do k = 1, size(self%equilibria)
-      if (size(self%equilibria) == 1) then
-        call report%append_line(file // ': steady state, ' // stability_text(self%equilibria(k)))
-      else
-        call report%append_line(file // ': steady state ' // to_text(k) // ' of ' // to_text(size(self%equilibria)) // &
-                                ', ' // stability_text(self%equilibria(k)))
-      end if
+      heading = file // ': steady state'
+      if (size(self%equilibria) > 1) heading = heading // ' ' // to_text(k) // ' of ' // to_text(size(self%equilibria))
+      call report%append_line(heading // ', ' // stability_text(self%equilibria(k)))
       call append_table(report, self%labels, self%values(:, k:k), '', no_headings, 2, 'more values in equilibrium.json')
       call put_power(self%work_elements, self%power(:, k), report)
     end do
@@ -138,7 +136,10 @@ contains
 
     select case (equilibrium%stability)
     case ('stable')
-      text = 'stable: disturbances decay with ' // rounded_text(-equilibrium%growth, 4) // ' 1/s or faster'
+      text = 'stable: disturbances decay with '
+      if (equilibrium%free_modes > 0) text = 'stable but for the speeds of the notes, which disturbances change for good: ' // &
+                                             'others decay with '
+      text = text // rounded_text(-equilibrium%growth, 4) // ' 1/s or faster'
     case ('unstable')
       text = 'unstable: a disturbance grows with ' // rounded_text(equilibrium%growth, 4) // ' 1/s'
     case ('neutral')

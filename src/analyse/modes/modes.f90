@@ -66,9 +66,9 @@ contains
     modes = modes(order_of(modes))
   end subroutine find_modes
 
-  !> Sets parts of eigenvalues to zero that are rounding of the largest one.
+  !> Sets real and imaginary parts to zero that are rounding of the largest number.
   pure subroutine clear_rounding(values)
-    complex(wp), intent(inout) :: values(:)   !! eigenvalues [1/s]
+    complex(wp), intent(inout) :: values(:)
     real(wp), parameter :: rounding = 1.0e-13_wp
     real(wp) :: parts(size(values), 2)
 
@@ -140,12 +140,14 @@ contains
         end do
       end do
     end associate
+    call clear_rounding(mode%shape)
     mode%kinetic = formulation%machine%inertia(1, :) * abs(mode%shape)**2
     associate (total => sum(mode%kinetic), largest => mode%shape(maxloc(abs(mode%shape), dim=1)))
       if (total <= 0.0_wp) return
       mode%kinetic = mode%kinetic / total
       mode%shape = mode%shape / largest
     end associate
+    call clear_rounding(mode%shape)
   end subroutine fill_bodies
 
   !> Order in which the modes are reported.
