@@ -293,7 +293,7 @@ def test_the_extremes_of_an_oscillator_are_those_of_the_sine(nocdyn, method):
 def test_the_printed_table_has_the_extremes_of_the_motion(nocdyn):
     nocdyn.write("oscillator.nml", OSCILLATOR)
     lines = nocdyn("run", "oscillator.nml").stdout.splitlines()
-    assert lines[0].split() == ["of", "the", "motion:", "the", "last", "smallest", "at", "t", "[s]", "largest", "at", "t", "[s]"]
+    assert lines[0].split() == ["quantity", "the", "last", "smallest", "at", "t", "[s]", "largest", "at", "t", "[s]"]
     name, unit, _, smallest, _, largest, _ = lines[1].split()
     assert (name, unit, smallest, largest) == ("phi_disc", "[rad]", "-0.75", "0.75")
 

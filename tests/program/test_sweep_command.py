@@ -48,10 +48,9 @@ def test_a_sweep_leaves_its_files_and_no_journal(nocdyn, discs):
     title, header, *rows, end = outcome.stdout.splitlines()
     assert title == "Two discs"
     assert header.split() == [
-        "of",
-        "60",
-        "variants",
-        "done:",
+        "result",
+        "(60",
+        "variants)",
         "min",
         "5",
         "%",

@@ -181,9 +181,9 @@ def test_trajectories_of_refused_variants_are_said_to_be_missing(nocdyn):
     path = nocdyn.write("m.nml", SPINNER + groups)
     outcome = nocdyn("sweep", path, "--out", "out")
     assert (outcome.returncode, outcome.stderr) == (0, "")
-    assert f"\n{path}: note: variant 2 was refused; it has no trajectory\n" in outcome.stdout
+    assert f"\n{path}: note: no trajectory of variant 2: refused, or with more rows than allowed\n" in outcome.stdout
     outcome = nocdyn("sweep", path, "--out", "out", "--set", "record(2).trajectories=2,1,3")
-    assert f"\n{path}: note: variants 2, 3 were refused; they have no trajectories\n" in outcome.stdout
+    assert f"\n{path}: note: no trajectory of variants 2, 3: refused, or with more rows than allowed\n" in outcome.stdout
     assert nocdyn.files("out") == ["input.nml", "summary.json", "sweep.nc", "variant-1"]
     assert "note" not in nocdyn("sweep", path, "--out", "out", "--set", "record(2).trajectories=1").stdout
     assert nocdyn("sweep", path, "--out", "out", "-q").stdout == ""
@@ -196,7 +196,7 @@ def test_a_trajectory_of_a_machine_that_cannot_be_is_said_to_be_missing(nocdyn):
     nocdyn.write("list.csv", "body.rim.speed\n-0.5\n9\n")
     groups = "&sweep design = 'list' file = 'list.csv' /\n" + GROUPS["record"] + "&record trajectories = 2 /\n"
     outcome = nocdyn("sweep", nocdyn.write("m.nml", machine + groups), "--out", "out")
-    assert "note: variant 2 was refused; it has no trajectory\n" in outcome.stdout, outcome
+    assert "note: no trajectory of variant 2: refused, or with more rows than allowed\n" in outcome.stdout, outcome
 
 
 def test_check_looks_at_the_sweep_too(nocdyn):

@@ -12,7 +12,7 @@ module nocdyn_run_summary
   use nocdyn_run_settings, only: put_settings
   use nocdyn_observer, only: ranges_t
   use nocdyn_table_text, only: append_table, cell_digits
-  use nocdyn_text, only: append, counted, rounded_text, string_t, strings, to_text
+  use nocdyn_text, only: append, counted, longest_path, rounded_text, shortened, string_t, strings, to_text
   use nocdyn_text_buffer, only: text_buffer_t
   implicit none (type, external)
   private
@@ -246,14 +246,14 @@ contains
     character(len=*), intent(in) :: folder
     character(len=:), allocatable :: text
 
-    text = input%file // ': done at t = ' // to_text(summary%solver_status%t(1)) // ' s, ' // &
+    text = input%shown_file() // ': done at t = ' // to_text(summary%solver_status%t(1)) // ' s, ' // &
            counted(summary%solver_status%accepted(1), 'step', 'steps') // ' (' // &
            to_text(summary%solver_status%rejected(1)) // ' rejected), '
     if (summary%solver_status%crossings(1) > 0) then
       text = text // to_text(summary%solver_status%crossings(1)) // ' kinks or jumps crossed, '
     end if
     text = text // to_text(summary%extremes%rows) // ' rows, ' // rounded_text(1000.0_wp * summary%wall_time, 3) // &
-           ' ms; results in ' // folder
+           ' ms; results in ' // shortened(folder, longest_path)
   end function summary_line
 
   !> One line on the switches of the method 'auto'; empty if there are none.
@@ -265,7 +265,7 @@ contains
     text = ''
     associate (solver_status => summary%solver_status)
       if (solver_status%switches(1) == 0) return
-      text = input%file // ': stiff: implicit steps from t = ' // rounded_text(solver_status%switch_times(1, 1), &
+      text = input%shown_file() // ': stiff: implicit steps from t = ' // rounded_text(solver_status%switch_times(1, 1), &
                                                                                cell_digits) // ' s'
       if (solver_status%switches(1) > 1) text = text // ' (' // to_text(solver_status%switches(1)) // ' switches in all)'
       text = text // ', ' // to_text(solver_status%implicit_steps(1)) // ' of ' // &
@@ -283,8 +283,8 @@ contains
     character(len=:), allocatable :: heading
 
     if (input%title() /= '') call report%append_line(input%title())
-    heading = 'of ' // to_text(summary%extremes%rows) // ' rows:'
-    if (summary%extremes%are_continuous) heading = 'of the motion:'
+    heading = 'quantity (' // counted(summary%extremes%rows, 'row', 'rows') // ')'
+    if (summary%extremes%are_continuous) heading = 'quantity'
     associate (extremes => summary%extremes, n => size(summary%labels))
       call append_table(report, summary%labels(2:), reshape([extremes%last(2:), extremes%lowest(2:), extremes%lowest_time(2:), &
                                                              extremes%highest(2:), extremes%highest_time(2:)], [n - 1, 5]), &

@@ -3,7 +3,7 @@ module nocdyn_input
   use nocdyn_diagnostics, only: diagnostics_t, most_shown, no_line
   use nocdyn_kinds, only: wp
   use nocdyn_schema, only: first_key, group_rules, key_rules
-  use nocdyn_text, only: counted, quoted, shortened, string_t, to_text
+  use nocdyn_text, only: counted, quoted, shortened, shown_path, string_t, to_text
   use nocdyn_text_buffer, only: text_buffer_t
   implicit none (type, external)
   private
@@ -53,6 +53,7 @@ module nocdyn_input
     procedure :: position       !! index of the group of a kind that occurs once
     procedure :: single         !! that group
     procedure :: title
+    procedure :: shown_file     !! the path for messages
     procedure :: label          !! "&gear 'reducer'"
     procedure :: location       !! where a group or a key comes from, to begin a message with
     procedure :: report             !! adds a diagnostic on a key of a group
@@ -284,7 +285,7 @@ contains
     if (override > 0) then
       text = '--set ' // shortened(input%overrides(override)%text)
     else
-      text = input%file
+      text = input%shown_file()
       if (line > 0 .and. line < no_line) text = text // ':' // to_text(line)
     end if
   end function source_text
@@ -320,11 +321,19 @@ contains
         call buffer%append(diagnostic%text)
       end associate
     end do
-    if (size(order) > most_shown) call buffer%append(new_line('a') // self%file // ': ' // &
+    if (size(order) > most_shown) call buffer%append(new_line('a') // self%shown_file() // ': ' // &
                                                      counted(size(order) - most_shown, 'more mistake', 'more mistakes') // &
                                                      '; the first ' // to_text(most_shown) // ' are shown')
     text = buffer%text()
   end function diagnostics_text
+
+  !> The path as messages show it.
+  pure function shown_file(self) result(text)
+    class(input_t), intent(in) :: self
+    character(len=:), allocatable :: text
+
+    text = shown_path(self%file)
+  end function shown_file
 
   !> "&gear 'reducer'", for messages.
   pure function label(self, index) result(text)

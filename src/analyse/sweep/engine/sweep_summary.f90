@@ -7,7 +7,7 @@ module nocdyn_sweep_summary
   use nocdyn_order_statistics, only: order_statistics_t
   use nocdyn_run_settings, only: put_settings
   use nocdyn_table_text, only: append_table
-  use nocdyn_text, only: rounded_text, string_t, to_text
+  use nocdyn_text, only: counted, longest_path, rounded_text, shortened, string_t, to_text
   use nocdyn_text_buffer, only: text_buffer_t
   implicit none (type, external)
   private
@@ -29,7 +29,7 @@ module nocdyn_sweep_summary
     type(order_statistics_t), allocatable :: statistics(:)   !! of each result, over the variants that are done
     type(sweep_effort_t), allocatable :: effort              !! not allocated after a merge
     character(len=:), allocatable :: first_reason            !! why the first variant is not done; if no variant is
-    integer, allocatable :: without_trajectory(:)            !! refused variants of which trajectories were requested
+    integer, allocatable :: without_trajectory(:)            !! variants of which trajectories were requested
   end type sweep_summary_t
 
 contains
@@ -141,8 +141,7 @@ contains
                         real(found%variant_of_minimum, wp), real(found%variant_of_maximum, wp)]
       end associate
     end do
-    call append_table(report, labels, values, 'of ' // to_text(summary%done) // &
-                      trim(merge(' variant ', ' variants', summary%done == 1)) // ' done:', headings, 0, &
+    call append_table(report, labels, values, 'result (' // counted(summary%done, 'variant', 'variants') // ')', headings, 0, &
                       'more results in summary.json')
     text = report%text()
   end function sweep_table
@@ -169,15 +168,12 @@ contains
     text = ''
     associate (variants => summary%without_trajectory)
       if (size(variants) == 0) return
-      if (size(variants) == 1) then
-        text = input%file // ': note: variant ' // to_text(variants(1)) // ' was refused; it has no trajectory'
-        return
-      end if
-      text = input%file // ': note: variants ' // to_text(variants(1))
+      text = input%shown_file() // ': note: no trajectory of ' // trim(merge('variant ', 'variants', size(variants) == 1)) // &
+             ' ' // to_text(variants(1))
       do i = 2, size(variants)
         text = text // ', ' // to_text(variants(i))
       end do
-      text = text // ' were refused; they have no trajectories'
+      text = text // ': refused, or with more rows than allowed'
     end associate
   end function sweep_note
 
@@ -188,7 +184,7 @@ contains
     character(len=*), intent(in) :: folder
     character(len=:), allocatable :: text
 
-    text = input%file // ': ' // to_text(summary%done) // trim(merge(' variant ', ' variants', summary%done == 1)) // ' done'
+    text = input%shown_file() // ': ' // counted(summary%done, 'variant', 'variants') // ' done'
     if (summary%refused > 0) text = text // ', ' // to_text(summary%refused) // ' refused'
     if (summary%failed > 0) text = text // ', ' // to_text(summary%failed) // ' failed'
     if (allocated(summary%effort)) then
@@ -198,7 +194,7 @@ contains
         text = text // ', written in ' // rounded_text(effort%writing_time, 3) // ' s'
       end associate
     end if
-    text = text // '; results in ' // folder
+    text = text // '; results in ' // shortened(folder, longest_path)
   end function sweep_line
 
 end module nocdyn_sweep_summary
