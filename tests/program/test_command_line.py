@@ -89,6 +89,32 @@ def test_every_command_has_help_by_two_ways(nocdyn, command):
     assert nocdyn(command, "--help").stdout == by_command.stdout
 
 
+COMMANDS = ["run", "check", "equilibrium", "modes", "matrices", "sweep", "merge", "new", "help"]
+OPTIONS = {
+    "--out": "a",
+    "--set": "a=1",
+    "--at": "rest",
+    "--threads": "1",
+    "--shard": "1/2",
+    "--resume": None,
+    "--csv": None,
+    "--quiet": None,
+}
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_a_command_takes_the_options_that_its_help_names_and_no_others(nocdyn, command):
+    help_text = nocdyn("help", command).stdout
+    usage = help_text.split("\n\n")[0]
+    named = set(re.findall(r"(?<!\S)\[?(--[a-z]+)", usage))
+    assert named <= set(OPTIONS)
+    assert set(re.findall(r"^  (--[a-z]+)", help_text, re.MULTILINE)) <= named
+    for option, value in OPTIONS.items():
+        words = [option] if value is None else [option, value]
+        message = nocdyn(command, "missing", *words).stderr
+        assert (f"{option} is an option of nocdyn " in message) == (option not in named), (option, message)
+
+
 def test_help_on_run_names_its_options(nocdyn):
     text = nocdyn("help", "run").stdout
     assert all(option in text for option in ("--out DIR", "--set PATH=VALUE", "--quiet"))

@@ -9,6 +9,7 @@ module nocdyn_run_files
   use nocdyn_kinds, only: wp
   use nocdyn_output_file, only: output_file_t
   use nocdyn_posix, only: is_interrupted, remove_file
+  use nocdyn_posix_files, only: free_bytes
   use nocdyn_run_summary, only: run_summary_t, summary_json
   use nocdyn_sweep_plan, only: sweep_plan_t
   use nocdyn_text, only: counted, string_t, to_text
@@ -127,7 +128,7 @@ contains
     type(error_t), allocatable, intent(out) :: error
 
     call check_room(place // ': ' // to_text(rows) // ' rows of ' // to_text(columns) // ' columns', &
-                    table_bytes(rows, columns), folder, 'ask for fewer rows by points or interval', error)
+                    table_bytes(rows, columns), free_bytes(folder), folder, 'ask for fewer rows by points or interval', error)
   end subroutine check_rows
 
   !> Refuses more variants than there is room for.
@@ -140,8 +141,8 @@ contains
     type(error_t), allocatable, intent(out) :: error
 
     call check_room(plan%input%location(plan%input%position('sweep')) // ': the files of ' // &
-                    counted(variants, 'variant', 'variants'), plan%file_bytes(variants, has_table) - held, folder, &
-                    'ask for fewer variants, results or trajectories', error)
+                    counted(variants, 'variant', 'variants'), plan%file_bytes(variants, has_table) - held, &
+                    free_bytes(folder), folder, 'ask for fewer variants, results or trajectories', error)
   end subroutine check_variants
 
   !> Writes a row.
