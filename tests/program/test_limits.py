@@ -181,6 +181,32 @@ def test_values_of_which_none_is_given_are_refused(nocdyn, teeth):
     assert (outcome.returncode, outcome.stderr) == (2, message)
 
 
+def test_a_line_feed_in_the_name_of_a_file_splits_no_message(nocdyn):
+    for command in ["check", "run", "equilibrium", "modes"]:
+        nocdyn.write("two\nlines.nml", MACHINE)
+        outcome = nocdyn(command, "two\nlines.nml")
+        assert "\nlines" not in outcome.stdout + outcome.stderr, command
+        assert "two lines.nml: " in outcome.stdout, command
+        nocdyn.write("two\nlines.nml", MACHINE + "&load name='x' body='c' /\n")
+        outcome = nocdyn(command, "two\nlines.nml")
+        assert (outcome.returncode, outcome.stderr.count("\n")) == (2, 1), outcome.stderr
+        assert outcome.stderr.startswith("nocdyn: two lines.nml:5: &load 'x': "), outcome.stderr
+
+
+@pytest.mark.parametrize("letter", ["x", "ü", "\u4e2d"])
+def test_long_paths_are_cut_in_their_middle(nocdyn, letter):
+    path = "/".join(["", *[letter * 60] * 3, "m.nml"])
+    shown = path[:30] + " ..." + path[-46:]
+    for words in [("check", path), ("run", path)]:
+        outcome = nocdyn(*words, errors="strict")
+        assert outcome.returncode == 3
+        assert outcome.stderr == f"nocdyn: {shown}: cannot be read: there is no such file\n"
+    (nocdyn.folder / path[1:]).parent.mkdir(parents=True)
+    nocdyn.write(path[1:], MACHINE + "&load name='x' body='c' /\n")
+    outcome = nocdyn("check", path[1:], errors="strict")
+    assert outcome.stderr.startswith(f"nocdyn: {path[1:31]} ...{path[-46:]}:5: &load 'x': ")
+
+
 def test_names_that_are_not_utf_8_are_latin_1_in_all_tables(nocdyn):
     (nocdyn.folder / "latin.nml").write_bytes(MACHINE.encode() + b"&load name='m\xfchle' body='a' viscous=1 /\n")
     assert nocdyn("run", "latin.nml", "--out", "run").returncode == 0

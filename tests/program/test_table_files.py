@@ -37,7 +37,7 @@ def test_a_long_table_is_read_back_by_f90nml(nocdyn):
 
 
 def test_errors_in_a_table_file_are_reported_with_its_line(nocdyn):
-    path = write(nocdyn, b"0 1\n1 x\n")
+    path = write(nocdyn, b"0 1\n1 x\n").relative_to(nocdyn.folder)
     outcome = nocdyn("check", path)
     assert outcome.returncode == 2
     place = f"nocdyn: {path}:2: &load 'l': table_file: {path.parent}/tables/load.csv"

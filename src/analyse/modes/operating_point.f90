@@ -1,7 +1,6 @@
 !> The state at which a machine is linearised.
 module nocdyn_operating_point
-  use nocdyn_equilibrium, only: equilibrium_t, find_equilibria, find_stability, mean_formulation, nearest_equilibrium, &
-                                t_infinity
+  use nocdyn_equilibrium, only: equilibrium_t, find_equilibria, find_stability, mean_formulation, nearest_equilibrium, t_infinity
   use nocdyn_errors, only: error_t, exit_input, raise
   use nocdyn_formulation, only: formulation_t
   use nocdyn_input, only: group_t, input_t
@@ -43,7 +42,7 @@ contains
     integer :: status
 
     if (2 * machine%coordinates%freedoms > max_states) then
-      call raise(error, exit_input, input%file // ': the modes of this machine are those of a dense matrix of ' // &
+      call raise(error, exit_input, input%shown_file() // ': the modes of this machine are those of a dense matrix of ' // &
                  to_text(2 * machine%coordinates%freedoms) // ' states; at most ' // to_text(max_states) // ' are allowed')
       return
     end if
@@ -60,7 +59,7 @@ contains
       if (status /= literal_ok) then
         call raise(error, exit_input, '--at ' // at // ': allowed: equilibrium, rest or a time of the run [s]')
       else if (time < run%number('t_start') .or. time > run%number('t_end')) then
-        call raise(error, exit_input, input%file // ': --at ' // at // ' is no time of the run; allowed: ' // &
+        call raise(error, exit_input, input%shown_file() // ': --at ' // at // ' is no time of the run; allowed: ' // &
                    to_text(run%number('t_start')) // ' to ' // to_text(run%number('t_end')) // ' s')
       else
         call use_time(input, machine, time, point, error)

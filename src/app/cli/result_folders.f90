@@ -5,7 +5,7 @@ module nocdyn_result_folders
   use nocdyn_input, only: group_t, input_t
   use nocdyn_sweep_header, only: sweep_netcdf_name
   use nocdyn_sweep_journal, only: journal_names
-  use nocdyn_text, only: joined, quoted, shortened, string_t
+  use nocdyn_text, only: joined, quoted, shown_path, string_t
   implicit none (type, external)
   private
 
@@ -84,8 +84,8 @@ contains
       if (folders(i)%text == '') cycle
       do k = 1, i - 1
         if (folders(k)%text /= folders(i)%text) cycle
-        call raise(error, exit_input, quoted(files(k)%text) // ' and ' // quoted(files(i)%text) // &
-                   ' would both write to ' // quoted(shortened(folders(i)%text)) // '; nothing was run')
+        call raise(error, exit_input, quoted(shown_path(files(k)%text)) // ' and ' // quoted(shown_path(files(i)%text)) // &
+                   ' would both write to ' // quoted(shown_path(folders(i)%text)) // '; nothing was run')
         return
       end do
     end do
@@ -103,11 +103,11 @@ contains
     inquire (file=folder // '/' // sweep_netcdf_name, exist=is_there)
     allocate (names, source=journal_names(folder))
     if (is_there) then
-      call raise(error, exit_input, file // ': ' // shortened(folder) // ' holds the results of a sweep; choose another ' // &
-                 'folder with --out, or remove ' // sweep_netcdf_name)
+      call raise(error, exit_input, shown_path(file) // ': ' // shown_path(folder) // ' holds the results of a sweep; ' // &
+                 'choose another folder with --out, or remove ' // sweep_netcdf_name)
     else if (size(names) > 0) then
-      call raise(error, exit_input, file // ': ' // shortened(folder) // ' holds an unfinished sweep; choose another folder ' // &
-                 'with --out, or remove ' // joined(names, ', ', max_listed))
+      call raise(error, exit_input, shown_path(file) // ': ' // shown_path(folder) // ' holds an unfinished sweep; ' // &
+                 'choose another folder with --out, or remove ' // joined(names, ', ', max_listed))
     end if
   end subroutine refuse_sweep_folder
 

@@ -58,7 +58,7 @@ contains
       call check_rows(input%location(input%position('output')), row_count(input), column_count(machine), &
                       result_folder(arguments, input), error)
     end if
-    call print_text(machine_report(input%file, machine) // sizes)
+    call print_text(machine_report(input%shown_file(), machine) // sizes)
   end subroutine check
 
 end module nocdyn_check_command

@@ -43,10 +43,10 @@ contains
       call new_equilibrium_report(formulation, equilibria, notes, report, error)
     end if
     if (allocated(error)) then
-      error%message = input%file // ': ' // error%message
+      error%message = input%shown_file() // ': ' // error%message
       return
     end if
-    call print_text(equilibrium_text(input%file, report))
+    call print_text(equilibrium_text(input%shown_file(), report))
     if (folder /= '') call write_file(folder, 'equilibrium.json', equilibrium_json(input, report), error)
   end subroutine analyse_equilibria
 

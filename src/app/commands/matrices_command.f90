@@ -34,7 +34,7 @@ contains
     run = input%single('run')
     call matrix_report(machine, run%number('t_start'), text, error)
     if (allocated(error)) then
-      error%message = input%file // ': ' // error%message
+      error%message = input%shown_file() // ': ' // error%message
     else
       call print_text(text)
     end if

@@ -41,10 +41,10 @@ contains
     end if
     if (.not. allocated(error)) call new_modes_report(point, report, error)
     if (allocated(error)) then
-      if (error%code == exit_failed) error%message = input%file // ': ' // error%message
+      if (error%code == exit_failed) error%message = input%shown_file() // ': ' // error%message
       return
     end if
-    call print_text(modes_text(input%file, report))
+    call print_text(modes_text(input%shown_file(), report))
     if (folder == '') return
     call write_file(folder, 'modes.csv', modes_csv(report), error)
     if (.not. allocated(error)) call write_file(folder, 'modes.json', modes_json(input, report), error)

@@ -5,7 +5,7 @@ module nocdyn_new_command
   use nocdyn_errors, only: error_t, exit_done, exit_file, raise
   use nocdyn_output_file, only: write_file
   use nocdyn_schema_help, only: input_template
-  use nocdyn_text, only: quoted
+  use nocdyn_text, only: quoted, shown_path
   implicit none (type, external)
   private
 
@@ -26,7 +26,7 @@ contains
       inquire (file=path, exist=exists)
       slash = index(path, '/', back=.true.)
       if (exists) then
-        call raise(error, exit_file, quoted(path) // ' exists and was not changed')
+        call raise(error, exit_file, quoted(shown_path(path)) // ' exists and was not changed')
       else if (slash == 0) then
         call write_file('.', path, input_template(), error)
       else
@@ -35,7 +35,7 @@ contains
       if (allocated(error)) then
         call report_error(error, code)
       else
-        call print_text(path // ': a commented input; try: nocdyn run ' // path)
+        call print_text(shown_path(path) // ': a commented input; try: nocdyn run ' // shown_path(path))
       end if
     end associate
   end subroutine new_command

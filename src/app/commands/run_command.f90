@@ -9,7 +9,7 @@ module nocdyn_run_command
   use nocdyn_result_folders, only: refuse_shared_folders, refuse_sweep_folder, result_folder
   use nocdyn_run_files, only: partial_file, run_to_files
   use nocdyn_run_summary, only: method_line, run_summary_t, summary_line, summary_table
-  use nocdyn_text, only: string_t, to_text
+  use nocdyn_text, only: shown_path, string_t, to_text
   implicit none (type, external)
   private
 
@@ -66,16 +66,16 @@ contains
     character(len=:), allocatable :: reached
     integer :: i
 
-    call run_to_files(input, folder, input%file, arguments%is_given('--quiet'), summary, error)
+    call run_to_files(input, folder, input%shown_file(), arguments%is_given('--quiet'), summary, error)
     if (allocated(error)) then
       reached = 'there'
       if (summary%extremes%rows > 0) reached = 't = ' // to_text(summary%extremes%last(1)) // ' s'
-      if (error%code == exit_failed) error%message = input%file // ': ' // error%message // '; the rows up to ' // reached // &
-                                                     ' are in ' // folder // '/' // partial_file
+      if (error%code == exit_failed) error%message = input%shown_file() // ': ' // error%message // '; the rows up to ' // &
+                                                     reached // ' are in ' // shown_path(folder // '/' // partial_file)
       call report_error(error, code)
     else if (.not. arguments%is_given('--quiet')) then
       do i = 1, size(summary%notes)
-        call print_text(input%file // ': note: ' // summary%notes(i)%text)
+        call print_text(input%shown_file() // ': note: ' // summary%notes(i)%text)
       end do
       if (size(arguments%operands) == 1) call print_text(summary_table(input, summary))
       if (len(method_line(input, summary)) > 0) call print_text(method_line(input, summary))

@@ -78,7 +78,7 @@ contains
     if (allocated(error)) call report_error(error, code)
     if (text == '') return
     file = job%plan%input%file
-    if (.not. arguments%is_given('--quiet')) call print_thread_note(file, max(1, arguments%threads))
+    if (.not. arguments%is_given('--quiet')) call print_thread_note(job%plan%input%shown_file(), max(1, arguments%threads))
     call pack_sources(job%plan%input, sources)
     call broadcast_text(file)
     call broadcast_text(sources)

@@ -13,7 +13,7 @@ module nocdyn_merge_command
   use nocdyn_sweep_results, only: print_results, write_results
   use nocdyn_sweep_summary, only: sweep_summary_t
   use nocdyn_target_consistency, only: find_targets
-  use nocdyn_text, only: string_t, strings
+  use nocdyn_text, only: shown_path, string_t, strings
   implicit none (type, external)
   private
 
@@ -76,11 +76,11 @@ contains
     inquire (file=folder // '/.', exist=is_folder)
     allocate (names, source=journal_names(folder))
     if (.not. is_there) then
-      call raise(error, exit_file, folder // ': there is no such folder')
+      call raise(error, exit_file, shown_path(folder) // ': there is no such folder')
     else if (.not. is_folder) then
-      call raise(error, exit_file, folder // ': is not a folder; nocdyn merge needs the folder of the journals')
+      call raise(error, exit_file, shown_path(folder) // ': is not a folder; nocdyn merge needs the folder of the journals')
     else if (size(names) == 0) then
-      call raise(error, exit_input, folder // ': the folder holds no journal of a sweep; ' // &
+      call raise(error, exit_input, shown_path(folder) // ': the folder holds no journal of a sweep; ' // &
                  'nocdyn sweep FILE --shard K/N writes them')
     end if
     if (allocated(error)) return

@@ -35,7 +35,7 @@ contains
     end if
     if (job%is_done) return
     threads = usable_threads(thread_count(arguments))
-    if (.not. arguments%is_given('--quiet')) call print_thread_note(job%plan%input%file, thread_count(arguments))
+    if (.not. arguments%is_given('--quiet')) call print_thread_note(job%plan%input%shown_file(), thread_count(arguments))
     call initialise_scheduler(scheduler, job%journals(1), job%progress, threads, job%setup%lanes)
     call compute_variants(job%plan, job%setup, threads, scheduler)
     call finish_job(job, scheduler, threads, 1, code)

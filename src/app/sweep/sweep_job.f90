@@ -20,7 +20,7 @@ module nocdyn_sweep_job
   use nocdyn_sweep_results, only: print_results, write_results
   use nocdyn_sweep_summary, only: sweep_effort_t, sweep_summary_t
   use nocdyn_sweep_csv, only: sweep_csv_name
-  use nocdyn_text, only: rounded_text, to_text
+  use nocdyn_text, only: rounded_text, shown_path, to_text
   implicit none (type, external)
   private
 
@@ -75,7 +75,7 @@ contains
     header = new_sweep_header(job%plan, max(1, arguments%shard), max(1, arguments%shards))
     call prepare_journal(job, header, error)
     if (allocated(error) .or. job%is_done) return
-    job%progress%title = job%plan%input%file
+    job%progress%title = job%plan%input%shown_file()
     job%progress%line = new_status_line(arguments%is_given('--quiet'), shows_in_logs=.true.)
   end subroutine start_job
 
@@ -103,7 +103,7 @@ contains
       call refuse_other_journals(job%folder, job%arguments%shards, error)
       if (allocated(error)) return
       if (job%arguments%is_given('--resume') .and. .not. job%arguments%is_given('--quiet')) then
-        call print_text(job%plan%input%file // ': ' // job%folder // ' holds nothing to resume; ' // &
+        call print_text(job%plan%input%shown_file() // ': ' // shown_path(job%folder) // ' holds nothing to resume; ' // &
                         'the sweep starts from the beginning')
       end if
       call create_journal(job%folder, name, header, job%journals(1), error)
@@ -123,8 +123,8 @@ contains
     if (.not. job%is_done) return
     call check_results(job%folder, header, error)
     if (allocated(error)) return
-    message = job%plan%input%file // ': all ' // to_text(header%variants) // ' variants are done already; results in ' // &
-              job%folder
+    message = job%plan%input%shown_file() // ': all ' // to_text(header%variants) // &
+              ' variants are done already; results in ' // shown_path(job%folder)
     inquire (file=job%folder // '/' // sweep_csv_name, exist=has_table)
     if (job%arguments%is_given('--csv') .and. .not. has_table) then
       call raise(error, exit_input, message // ', without ' // sweep_csv_name // '; run without --resume to write it')
@@ -137,14 +137,18 @@ contains
   !> damaged, are computed again.
   subroutine print_journal_state(job)
     type(sweep_job_t), intent(in) :: job
+    character(len=:), allocatable :: file
 
     if (job%arguments%is_given('--quiet')) return
-    associate (file => job%plan%input%file, journal => job%journals(1))
+    file = job%plan%input%shown_file()
+    associate (journal => job%journals(1))
       if (journal%damaged_bytes > 0) then
-        call print_text(file // ': note: ' // journal%file%path // ' has damaged entries; their variants are computed again')
+        call print_text(file // ': note: ' // shown_path(journal%file%path) // &
+                        ' has damaged entries; their variants are computed again')
       end if
       call print_text(file // ': reusing ' // to_text(journal%done + journal%refused + journal%failed) // ' of ' // &
-                      to_text(journal%header%last - journal%header%first + 1) // ' variants from ' // journal%file%path)
+                      to_text(journal%header%last - journal%header%first + 1) // &
+                      ' variants from ' // shown_path(journal%file%path))
     end associate
   end subroutine print_journal_state
 
@@ -165,12 +169,12 @@ contains
       allocate (error, source=scheduler%error)
     else if (.not. scheduler%is_complete()) then
       associate (counts => scheduler%counts)
-        call raise(error, exit_failed, job%plan%input%file // ': interrupted with ' // &
+        call raise(error, exit_failed, job%plan%input%shown_file() // ': interrupted with ' // &
                    to_text(counts%done + counts%refused + counts%failed) // ' of ' // to_text(counts%total) // &
                    ' variants done; repeat the command with --resume to continue')
       end associate
     else if (job%arguments%shards > 1) then
-      if (.not. job%arguments%is_given('--quiet')) call print_text(job%plan%input%file // ': part ' // &
+      if (.not. job%arguments%is_given('--quiet')) call print_text(job%plan%input%shown_file() // ': part ' // &
         to_text(job%arguments%shard) // ' of ' // to_text(job%arguments%shards) // ' done, ' // &
         to_text(scheduler%counts%total) // ' variants; when all parts are done: nocdyn merge ' // job%folder)
     else
@@ -201,8 +205,7 @@ contains
     left = counts%total - counts%done - failures
     text = self%title // ': ' // to_text(counts%total - left) // ' of ' // to_text(counts%total) // ' variants'
     if (counts%new > 0) then
-      text = text // ', ' // rounded_text(rate, 3) // ' per second, ' // &
-             to_text(int(min(left / rate, 1.0e8_wp)) + 1) // ' s left'
+      text = text // ', ' // rounded_text(rate, 3) // ' per second, ' // to_text(int(min(left / rate, 1.0e8_wp)) + 1) // ' s left'
     end if
     if (failures > 0) text = text // ', ' // to_text(failures) // ' failed'
     call self%line%show(text)

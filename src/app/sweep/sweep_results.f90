@@ -22,7 +22,7 @@ module nocdyn_sweep_results
   use nocdyn_sweep_summary, only: sweep_json, sweep_line, sweep_note, sweep_summary_t, sweep_table
   use nocdyn_sweep_csv, only: sweep_csv_name, write_sweep_csv
   use nocdyn_targets, only: set_targets
-  use nocdyn_text, only: string_t, to_text
+  use nocdyn_text, only: shown_path, string_t, to_text
   implicit none (type, external)
   private
 
@@ -51,14 +51,11 @@ contains
     if (.not. allocated(error)) call write_sweep_netcdf(folder, journals, error)
     if (.not. allocated(error)) call remove_other_results(folder, keeps_table=arguments%is_given('--csv'))
     if (.not. allocated(error) .and. arguments%is_given('--csv')) call write_sweep_csv(folder, journals, error)
-    if (.not. allocated(error)) call write_trajectories(plan, folder, journals, arguments, &
-                                                         summary%without_trajectory, error)
+    if (.not. allocated(error)) call write_trajectories(plan, folder, journals, arguments, summary%without_trajectory, error)
     if (.not. allocated(error)) call write_file(folder, input_file, input_text(plan%input), error)
     call system_clock(now)
     if (allocated(summary%effort)) summary%effort%writing_time = real(now - began, wp) / real(rate, wp)
-    if (.not. allocated(error)) then
-      call write_file(folder, summary_file, sweep_json(plan%input, journals(1)%header, summary), error)
-    end if
+    if (.not. allocated(error)) call write_file(folder, summary_file, sweep_json(plan%input, journals(1)%header, summary), error)
     if (summary%done == 0 .and. .not. allocated(error)) call find_first_reason(journals, summary%first_reason, error)
   end subroutine write_results
 
@@ -118,8 +115,8 @@ contains
       call print_text(sweep_line(plan%input, summary, folder))
     end if
     if (summary%done > 0) return
-    call raise(error, exit_failed, plan%input%file // ': no variant can be computed; reason of the first one: ' // &
-               summary%first_reason // '; all reasons are in ' // folder // '/' // sweep_netcdf_name)
+    call raise(error, exit_failed, plan%input%shown_file() // ': no variant can be computed; reason of the first one: ' // &
+               summary%first_reason // '; all reasons are in ' // shown_path(folder // '/' // sweep_netcdf_name))
     call report_error(error, code)
   end subroutine print_results
 
@@ -167,7 +164,7 @@ contains
                           folder // '/' // variant_folder // to_text(variant), arguments%is_given('--quiet'), summary, error)
       end associate
       if (is_interrupted()) then
-        call raise(error, exit_failed, plan%input%file // ': interrupted while trajectories were written; ' // &
+        call raise(error, exit_failed, plan%input%shown_file() // ': interrupted while trajectories were written; ' // &
                    'repeat the command with --resume to continue')
       else if (allocated(error)) then
         if (error%code == exit_input) refused = [refused, plan%trajectories(i)]   ! its output times, which the sweep ignores

@@ -5,7 +5,7 @@ module nocdyn_sweep_resumption
   use nocdyn_sweep_header, only: sweep_header_t
   use nocdyn_sweep_journal, only: journal_name, journal_names, sweep_journal_t
   use nocdyn_sweep_provenance, only: read_provenance
-  use nocdyn_text, only: joined, string_t, to_text
+  use nocdyn_text, only: joined, shown_path, string_t, to_text
   implicit none (type, external)
   private
 
@@ -29,10 +29,10 @@ contains
                    ', not ' // to_text(header%first) // ' to ' // to_text(header%last)
     end if
     if (difference /= '') then
-      call raise(error, exit_input, journal%file%path // ' belongs to another sweep: ' // difference // &
+      call raise(error, exit_input, shown_path(journal%file%path) // ' belongs to another sweep: ' // difference // &
                  '; remove it, or choose another folder with --out')
     else if (.not. resumes) then
-      call raise(error, exit_input, journal%file%path // ' holds ' // journal_content_text(journal))
+      call raise(error, exit_input, shown_path(journal%file%path) // ' holds ' // journal_content_text(journal))
     end if
   end subroutine check_journal
 
@@ -76,10 +76,11 @@ contains
     do i = 1, size(names)
       if (names(i)%text == whole .eqv. shards <= 1) cycle
       if (shards > 1) then
-        call raise(error, exit_input, folder // ' holds the journal of a whole sweep, ' // whole // '; continue it with ' // &
-                   '--resume and without --shard, remove it, or choose another folder with --out')
+        call raise(error, exit_input, shown_path(folder) // ' holds the journal of a whole sweep, ' // whole // &
+                   '; continue it with --resume and without --shard, remove it, or choose another folder with --out')
       else
-        call raise(error, exit_input, folder // ' holds journals of parts of a sweep: ' // joined(names, ', ', max_listed) // &
+        call raise(error, exit_input, shown_path(folder) // ' holds journals of parts of a sweep: ' // &
+                   joined(names, ', ', max_listed) // &
                    '; continue them with --shard, remove them, or choose another folder with --out')
       end if
       return
@@ -97,8 +98,8 @@ contains
     call read_provenance(folder, old, error)
     if (allocated(error)) return
     difference = change(old, header)
-    if (difference /= '') call raise(error, exit_input, folder // ' holds the results of another sweep: ' // difference // &
-                                     '; without --resume they are replaced')
+    if (difference /= '') call raise(error, exit_input, shown_path(folder) // ' holds the results of another sweep: ' // &
+                                     difference // '; without --resume they are replaced')
   end subroutine check_results
 
 end module nocdyn_sweep_resumption

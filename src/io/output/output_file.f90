@@ -2,14 +2,13 @@
 module nocdyn_output_file
   use nocdyn_errors, only: error_t, exit_file, raise
   use nocdyn_posix, only: close_file, create_file, last_failure, make_folders, process_id, remove_file, rename_file, write_bytes
-  use nocdyn_text, only: quoted, shortened, to_text
+  use nocdyn_text, only: quoted, shown_path, to_text
   implicit none (type, external)
   private
 
   public :: write_file
 
   integer, parameter :: buffer_size = 65536
-  integer, parameter :: longest_shown = 400   !! bytes of a path in a message
 
   !> A file that is being written. The first failure sets `has_failed`; `complete` and `finish` report it.
   type, public :: output_file_t
@@ -141,7 +140,7 @@ contains
     type(error_t), allocatable, intent(out) :: error
 
     call remove_file(self%hidden_path)
-    call raise(error, exit_file, 'cannot write ' // quoted(shortened(self%folder // name, longest_shown)) // ': ' // self%reason)
+    call raise(error, exit_file, 'cannot write ' // quoted(shown_path(self%folder // name)) // ': ' // self%reason)
   end subroutine fail
 
   !> Keeps the reason of the first failure.

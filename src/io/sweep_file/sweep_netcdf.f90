@@ -3,8 +3,7 @@
 !> Its bytes depend on the results alone: it holds neither time nor host, and NetCDF tells HDF5 not to store when an object was
 !> created. Numbers are not compressed: the last digits of computed numbers are noise.
 module nocdyn_sweep_netcdf
-  use, intrinsic :: iso_c_binding, only: c_associated, c_char, c_f_procpointer, c_funptr, c_int, c_loc, &
-    c_null_char, c_null_ptr
+  use, intrinsic :: iso_c_binding, only: c_associated, c_char, c_f_procpointer, c_funptr, c_int, c_loc, c_null_char, c_null_ptr
   use, intrinsic :: iso_fortran_env, only: int8
   use netcdf, only: nf90_byte, nf90_char, nf90_chunked, nf90_clobber, nf90_close, nf90_create, nf90_def_dim, &
     nf90_def_var, nf90_def_var_chunking, nf90_def_var_fill, nf90_double, nf90_ebadname, nf90_ehdferr, nf90_enameinuse, &
@@ -20,14 +19,13 @@ module nocdyn_sweep_netcdf
   use nocdyn_sweep_chunk, only: chunk_t, status_done, status_words
   use nocdyn_sweep_header, only: quantity_t, sweep_netcdf_name, sweep_header_t
   use nocdyn_sweep_journal, only: sweep_journal_t
-  use nocdyn_text, only: append, quoted, string_t, strings, to_text
+  use nocdyn_text, only: append, quoted, shown_path, string_t, strings, to_text
   implicit none (type, external)
   private
 
   public :: write_sweep_netcdf
 
-  character(len=14), parameter :: own_names(5) = &
-    [character(len=14) :: 'variant', 'status', 'steps', 'failed_variant', 'reason']
+  character(len=14), parameter :: own_names(5) = [character(len=14) :: 'variant', 'status', 'steps', 'failed_variant', 'reason']
   integer, parameter :: block_variants = 16384   ! of one write to each variable
   integer, parameter :: chunk_failures = 4096
   integer, parameter :: megabyte = 2**20      ! the library's unit for the size of caches
@@ -75,7 +73,7 @@ contains
     temporary = path(:len(path) - len(sweep_netcdf_name)) // '.' // sweep_netcdf_name // '.' // to_text(process_id())
     call make_folders(folder, failure)
     if (allocated(failure)) then
-      call raise(error, exit_file, 'cannot write ' // quoted(path) // ': the folder cannot be made: ' // failure)
+      call raise(error, exit_file, 'cannot write ' // quoted(shown_path(path)) // ': the folder cannot be made: ' // failure)
       return
     end if
     call create_file(file, temporary, journals)
@@ -87,7 +85,7 @@ contains
       if (.not. is_done) file%failure = last_failure()
     end if
     if (allocated(file%failure) .or. allocated(error)) call remove_file(temporary)
-    if (allocated(file%failure)) call raise(error, exit_file, 'cannot write ' // quoted(path) // ': ' // file%failure)
+    if (allocated(file%failure)) call raise(error, exit_file, 'cannot write ' // quoted(shown_path(path)) // ': ' // file%failure)
   end subroutine write_sweep_netcdf
 
   !> Keeps the reason of the first failure. The reason that the disk gives is clearer than that of the library.

@@ -5,7 +5,7 @@ module nocdyn_journal_chunks
   use nocdyn_sweep_chunk, only: chunk_t
   use nocdyn_sweep_differences, only: header_difference
   use nocdyn_sweep_journal, only: journal_name, sweep_journal_t
-  use nocdyn_text, only: to_text
+  use nocdyn_text, only: shown_path, to_text
   implicit none (type, external)
   private
 
@@ -84,7 +84,8 @@ contains
     do i = 2, size(order)
       if (ranges(order(i))%first > ranges(order(i - 1))%last) cycle
       call raise(error, exit_input, 'variant ' // to_text(ranges(order(i))%first) // ' is held twice: by ' // &
-                 journals(journal(order(i - 1)))%file%path // ' and ' // journals(journal(order(i)))%file%path)
+                 shown_path(journals(journal(order(i - 1)))%file%path) // ' and ' // &
+                 shown_path(journals(journal(order(i)))%file%path))
       return
     end do
     call gaps(ranges, range_t(1, journals(1)%header%variants), open_ranges)
@@ -146,8 +147,8 @@ contains
         if (difference == '' .and. first%variants /= second%variants) difference = other_lists
       end associate
       if (difference == '') cycle
-      call raise(error, exit_input, journals(1)%file%path // ' and ' // journals(i)%file%path // ' are not of one sweep: ' // &
-                 difference)
+      call raise(error, exit_input, shown_path(journals(1)%file%path) // ' and ' // shown_path(journals(i)%file%path) // &
+                 ' are not of one sweep: ' // difference)
       return
     end do
   end subroutine check_headers
@@ -166,8 +167,8 @@ contains
         call gaps(journals(i)%ranges(), range_t(header%first, header%last), open_ranges)
         if (size(open_ranges) == 0) cycle
         if (message /= '') message = message // new_line('a')
-        message = message // journals(i)%file%path // ': unfinished, without ' // ranges_text(open_ranges) // ' of ' // &
-                  to_text(header%first) // ' to ' // to_text(header%last) // '; --resume goes on with it'
+        message = message // shown_path(journals(i)%file%path) // ': unfinished, without ' // ranges_text(open_ranges) // &
+                  ' of ' // to_text(header%first) // ' to ' // to_text(header%last) // '; --resume goes on with it'
       end associate
     end do
     if (message /= '') call raise(error, exit_input, message)

@@ -11,7 +11,7 @@ module nocdyn_log_file
   use nocdyn_errors, only: error_t, exit_file, exit_input, raise
   use nocdyn_posix, only: close_file, last_failure, make_folders, remove_file, write_bytes
   use nocdyn_posix_files, only: file_size, lock_file, open_existing, open_new, read_at, sync_file, truncate_file
-  use nocdyn_text, only: quoted, to_text
+  use nocdyn_text, only: quoted, shown_path, to_text
   implicit none (type, external)
   private
 
@@ -75,7 +75,7 @@ contains
     call self%prepare(folder, name)
     self%descriptor = open_existing(self%path, .true.)
     if (self%descriptor < 0) then
-      call raise(error, exit_file, self%path // ': cannot be opened: ' // last_failure())
+      call raise(error, exit_file, shown_path(self%path) // ': cannot be opened: ' // last_failure())
       return
     end if
     call self%lock(error)
@@ -100,7 +100,7 @@ contains
     logical :: is_done
 
     call lock_file(self%descriptor, is_done)
-    if (.not. is_done) call raise(error, exit_input, self%path // ': another process is at work on this sweep')
+    if (.not. is_done) call raise(error, exit_input, shown_path(self%path) // ': another process is at work on this sweep')
   end subroutine lock
 
   !> Reads and checks what precedes the entries.
@@ -115,15 +115,15 @@ contains
     start = ''
     call read_at(self%descriptor, 0_int64, start, is_done)
     if (start(:len(first_line)) /= first_line .or. .not. is_done) then
-      call raise(error, exit_input, self%path // ': is no journal of a sweep, or its beginning is lost')
+      call raise(error, exit_input, shown_path(self%path) // ': is no journal of a sweep, or its beginning is lost')
       return
     end if
     reader%next = len(first_line) + 1
     call reader%take_integers(start, numbers)
     if (numbers(2) /= byte_order) then
-      call raise(error, exit_input, self%path // ': was written on a machine with another order of bytes')
+      call raise(error, exit_input, shown_path(self%path) // ': was written on a machine with another order of bytes')
     else if (numbers(1) /= format_version) then
-      call raise(error, exit_input, self%path // ': has format ' // to_text(numbers(1)) // &
+      call raise(error, exit_input, shown_path(self%path) // ': has format ' // to_text(numbers(1)) // &
                  ' of journals; this nocdyn reads format ' // to_text(format_version))
     end if
     self%end = start_bytes
@@ -219,7 +219,7 @@ contains
     character(len=*), intent(in) :: reason
     type(error_t), allocatable, intent(out) :: error
 
-    call raise(error, exit_file, 'cannot write ' // quoted(self%path) // ': ' // reason)
+    call raise(error, exit_file, 'cannot write ' // quoted(shown_path(self%path)) // ': ' // reason)
   end subroutine raise_write_error
 
   !> Closes the file.

@@ -7,7 +7,7 @@ module nocdyn_sweep_journal
   use nocdyn_log_file, only: frame_bytes, log_file_t
   use nocdyn_sweep_chunk, only: chunk_summary_t, chunk_t, pack_chunk, read_summary, unpack_chunk
   use nocdyn_sweep_header, only: pack_header, sweep_header_t, unpack_header
-  use nocdyn_text, only: append_text => append, string_t, to_text
+  use nocdyn_text, only: append_text => append, shown_path, string_t, to_text
   use nocdyn_text_sort, only: argsort
   implicit none (type, external)
   private
@@ -101,7 +101,7 @@ contains
       call journal%read_chunks()
       call journal%file%cut(error)
     else
-      call raise(error, exit_input, journal%file%path // ': the head of this journal is damaged, so that ' // &
+      call raise(error, exit_input, shown_path(journal%file%path) // ': the head of this journal is damaged, so that ' // &
                  'nothing can be made of the rest; remove it, or choose another folder with --out')
     end if
     if (allocated(error)) call journal%file%close()
@@ -216,7 +216,7 @@ contains
     if (is_good) then
       call unpack_chunk(self%file%buffer(frame_bytes + 1:frame_bytes + length), chunk)
     else
-      call raise(error, exit_file, self%file%path // ': cannot be read: it is not as it was when it was opened')
+      call raise(error, exit_file, shown_path(self%file%path) // ': cannot be read: it is not as it was when it was opened')
     end if
   end subroutine read_entry
 

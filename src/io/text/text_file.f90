@@ -3,7 +3,7 @@ module nocdyn_text_file
   use nocdyn_errors, only: error_t, exit_file, raise
   use nocdyn_posix, only: close_file, failure_number, last_failure
   use nocdyn_posix_files, only: open_existing, read_whole
-  use nocdyn_text, only: to_text
+  use nocdyn_text, only: shown_path, to_text
   implicit none (type, external)
   private
 
@@ -50,14 +50,15 @@ contains
     end if
     descriptor = open_existing(file, is_to_change=.false.)
     if (descriptor < 0) then
-      call raise(error, exit_file, file // ': cannot be read: ' // reason_of_failure())
+      call raise(error, exit_file, shown_path(file) // ': cannot be read: ' // reason_of_failure())
       return
     end if
     call read_whole(descriptor, limit, text, is_done)
     if (.not. is_done) then
-      call raise(error, exit_file, file // ': cannot be read: ' // reason_of_failure())
+      call raise(error, exit_file, shown_path(file) // ': cannot be read: ' // reason_of_failure())
     else if (len(text) > limit) then
-      call raise(error, exit_file, file // ': cannot be read: it has more than ' // to_text(limit) // ' bytes, the most allowed')
+      call raise(error, exit_file, shown_path(file) // ': cannot be read: it has more than ' // to_text(limit) // &
+                 ' bytes, the most allowed')
       deallocate (text)
     end if
     call close_file(descriptor, is_closed)

@@ -53,7 +53,7 @@ contains
 
     allocate (sweeps, source=input%groups_named('sweep'))
     if (size(sweeps) == 0) then
-      call raise(error, exit_input, input%file // ": there is no &sweep; 'nocdyn help input sweep' shows one")
+      call raise(error, exit_input, input%shown_file() // ": there is no &sweep; 'nocdyn help input sweep' shows one")
       return
     end if
     plan%input = input

@@ -50,12 +50,12 @@ contains
     input%file = file
     input%overrides = overrides
     if (index(text, achar(0)) > 0) then
-      call raise(error, exit_input, file // ': not a text file')
+      call raise(error, exit_input, input%shown_file() // ': not a text file')
       return
     end if
     call scan_namelist(text, namelist, diagnostics)
     if (namelist%group_count == 0 .and. diagnostics%count == 0) then
-      call raise(error, exit_input, file // ": no group in it; 'nocdyn new FILE' writes an example")
+      call raise(error, exit_input, input%shown_file() // ": no group in it; 'nocdyn new FILE' writes an example")
       return
     end if
 
