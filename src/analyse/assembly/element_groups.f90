@@ -162,11 +162,8 @@ contains
     allocate (curves(self%lanes, size(self%indices)))
     do i = 1, size(self%indices)
       associate (group => self%input%groups(self%indices(i)))
-        if (present(extrapolation)) then
-          beyond = extrapolation
-        else
-          beyond = group%text('extrapolation')
-        end if
+        if (present(extrapolation)) beyond = extrapolation
+        if (.not. present(extrapolation)) beyond = group%text('extrapolation')
         inside = merge(interpolation_cubic, interpolation_linear, group%text('interpolation') == 'cubic')
         outside = merge(extrapolation_constant, extrapolation_linear, beyond == 'constant')
         curves(1, i) = new_curve(group%numbers(x), group%numbers(y), inside, outside)

@@ -125,8 +125,7 @@ contains
     end do
     associate (lanes => groups%lanes)
       call append_bank(banks, new_wave_excitations(groups%names, body, owner, spread(amplitude, 1, lanes), &
-                                                   spread(frequency, 1, lanes), spread(order, 1, lanes), &
-                                                   spread(phase, 1, lanes)))
+                                                   spread(frequency, 1, lanes), spread(order, 1, lanes), spread(phase, 1, lanes)))
     end associate
   end subroutine add_waves
 

@@ -226,9 +226,7 @@ contains
         call balance%differentiate(slopes)
         step = 0.0_wp
         if (abs(slopes(member, member)) > 0.0_wp) step = -torque / slopes(member, member)
-        if (abs(slopes(member, member)) <= 0.0_wp .or. speed + step <= a .or. speed + step >= b) then
-          step = 0.5_wp * (a + b) - speed
-        end if
+        if (abs(slopes(member, member)) <= 0.0_wp .or. speed + step <= a .or. speed + step >= b) step = 0.5_wp * (a + b) - speed
         speed = speed + step
         if (abs(step) <= spacing(speed)) exit
       end do

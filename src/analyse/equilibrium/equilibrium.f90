@@ -268,8 +268,7 @@ contains
       else
         sentence = sentence // 'the torques on ' // moving_bodies(balance, block%members) // ' at any speed; at least ' // &
                    rounded_text(block%least_torque, digits) // ' N m are left over, at ' // &
-                   rounded_text(block%least_speed, digits) // ' rad/s of ' // &
-                   quoted(body_of(balance, member))
+                   rounded_text(block%least_speed, digits) // ' rad/s of ' // quoted(body_of(balance, member))
       end if
     end associate
   end function no_balance_message

@@ -2,8 +2,7 @@
 !>
 !> They minimise the potential energy of the couplings minus the work of the other torques on the coordinates. Newton's method
 !> uses the stiffness matrix; Levenberg's damping (Quart. Appl. Math. 2 (1944) 164) is added to its diagonal where a step would
-!> not lower the energy, as inside of a gap or where a spring softens. The matrix is banded, in a good order of the
-!> coordinates.
+!> not lower the energy, as inside of a gap or where a spring softens. The matrix is banded, in a good order of the coordinates.
 module nocdyn_static_twists
   use nocdyn_errors, only: error_t, exit_input, raise
   use nocdyn_kinds, only: wp
@@ -83,8 +82,7 @@ contains
     end do
   end subroutine find_twists
 
-  !> Elastic elements whose twists are not determined: at the solution, rigid motions of the elements with stiffness twist
-  !> them.
+  !> Elastic elements whose twists are not determined: at the solution, rigid motions of the elements with stiffness twist them.
   function undetermined_elements(balance) result(undetermined)
     type(torque_balance_t), intent(in) :: balance   !! after `find_twists`
     integer, allocatable :: undetermined(:)
@@ -236,8 +234,7 @@ contains
     call balance%formulation%machine%evaluate_energies()
     self%torque = self%external_torque
     self%tolerance = self%floor + balanced * self%external_scale
-    associate (elements => balance%formulation%machine%elements, incidence => balance%incidence, &
-               phi => balance%formulation%phi)
+    associate (elements => balance%formulation%machine%elements, incidence => balance%incidence, phi => balance%formulation%phi)
       self%energy = sum(elements%stored(1, balance%elastic)) - sum(self%external_torque * q)
       do i = 1, size(balance%elastic)
         e = balance%elastic(i)

@@ -64,9 +64,7 @@ contains
     if (.not. allocated(error)) call find_modes(formulation, incidence, self, error)
     if (allocated(error)) return
     call assemble(formulation, self)
-    if (formulation%states > 2 * size(self%natural)) then
-      call add_internal(formulation, pattern, slopes(1, :), self)
-    end if
+    if (formulation%states > 2 * size(self%natural)) call add_internal(formulation, pattern, slopes(1, :), self)
   end subroutine linearise
 
   !> Refuses stiffnesses and dampings that are not finite.

@@ -1,12 +1,10 @@
 !> The contract between a model and an integrator: a first-order system on a block of lanes.
 !>
-!> A block holds `lanes` copies of one system with different parameters. The lane is the first, contiguous index of every
-!> array, so that each operation is a loop over lanes; one machine is a block of one lane. A lane never reads the values of
-!> another lane.
+!> A block holds `lanes` copies of one system with different parameters. The lane is the first, contiguous index of every array,
+!> so that each operation is a loop over lanes; one machine is a block of one lane. A lane never reads the values of another lane.
 !>
-!> The last `quadratures` components of a state are pure integrals: the derivative depends on none of them. Error control
-!> allows them errors a thousand times larger, relative to the largest of them. Linear systems have only the first `states`
-!> components.
+!> The last `quadratures` components of a state are pure integrals: the derivative depends on none of them. Error control allows
+!> them errors a thousand times larger, relative to the largest of them. Linear systems have only the first `states` components.
 !>
 !> The Jacobian is a list of values at the positions that `jacobian_pattern` returns once, before the integration. By default
 !> these are all positions, column by column.

@@ -57,8 +57,7 @@ contains
         associate (side => events%roots%side(dense%lane, function), g => events%roots%values(function, part))
           if (.not. is_finite(g)) cycle
           if (is_event(side, g, events%directions(function))) then
-            call find_root(events%roots, system, observer, dense, &
-                           part_bracket(events%roots, function, part, theta_end), root)
+            call find_root(events%roots, system, observer, dense, part_bracket(events%roots, function, part, theta_end), root)
             call insert(events, function, root)
           end if
           side = sign_of(g)

@@ -82,8 +82,7 @@ contains
 
     roots%values(:, 0) = roots%last(:, dense%lane)
     do part = 1, roots%parts
-      call evaluate(roots%of_system, system, observer, dense, part_end(roots, part, theta_end), roots%y, &
-                    roots%values(:, part))
+      call evaluate(roots%of_system, system, observer, dense, part_end(roots, part, theta_end), roots%y, roots%values(:, part))
     end do
     roots%last(:, dense%lane) = roots%values(:, roots%parts)
   end subroutine scan_step

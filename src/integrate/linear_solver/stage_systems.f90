@@ -36,9 +36,7 @@ contains
       allocate (stage_system%dfdy(lanes, size(pattern%row)), source=0.0_wp)
       allocate (stage_system%dfdt(lanes, components), source=0.0_wp)
       stage_system%quadratures = entries_in_rows(pattern, states + 1, components)
-      if (states > 0) then
-        call choose_stage_matrix(entries_in_rows(pattern, 1, states), lanes, states, stage_system%matrix)
-      end if
+      if (states > 0) call choose_stage_matrix(entries_in_rows(pattern, 1, states), lanes, states, stage_system%matrix)
     end associate
   end subroutine allocate_stage_system
 
@@ -51,8 +49,7 @@ contains
 
     call system%jacobian(attempt%t, attempt%y, stage_system%dfdy, stage_system%dfdt, attempt%rhs_status)
     associate (dfdy => stage_system%dfdy, dfdt => stage_system%dfdt)
-      if (all_finite(size(dfdy), dfdy) .and. all_finite(size(dfdt), dfdt) &
-          .and. all(attempt%rhs_status == evaluation_ok)) return
+      if (all_finite(size(dfdy), dfdy) .and. all_finite(size(dfdt), dfdt) .and. all(attempt%rhs_status == evaluation_ok)) return
       do lane = 1, attempt%lanes
         if (attempt%rhs_status(lane) == evaluation_ok) then
           if (all(is_finite(dfdy(lane, :))) .and. all(is_finite(dfdt(lane, :)))) cycle

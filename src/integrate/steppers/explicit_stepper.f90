@@ -118,8 +118,7 @@ contains
       do stage = self%stages%step + 1, self%stages%all
         call stage_state(self%stages, attempt, stage, self%y_stage)
         self%t_stage(:) = attempt%t + self%c(stage) * attempt%h
-        call evaluate_finite(attempt, system, self%t_stage, self%y_stage, &
-                             self%stages%k(1, 1, self%stages%k_index(stage)))
+        call evaluate_finite(attempt, system, self%t_stage, self%y_stage, self%stages%k(1, 1, self%stages%k_index(stage)))
       end do
       call count_evaluations(attempt)
     end if

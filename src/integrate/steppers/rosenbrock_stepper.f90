@@ -2,8 +2,7 @@
 module nocdyn_rosenbrock_stepper
   use nocdyn_kinds, only: wp
   use nocdyn_rosenbrock_tables, only: rosenbrock_table_t
-  use nocdyn_spectral_radius, only: allocate_spectral_radius, estimate_spectral_radius, restart_power_iteration, &
-    spectral_radius_t
+  use nocdyn_spectral_radius, only: allocate_spectral_radius, estimate_spectral_radius, restart_power_iteration, spectral_radius_t
   use nocdyn_stage_sums, only: set_offsets, stage_sum, stage_sum_t, sum_stages
   use nocdyn_stage_systems, only: allocate_stage_system, factor, renew_jacobian, solve, stage_system_t
   use nocdyn_stages, only: allocate_stages, estimate_error, form_dense_output, set_tableau, stage_state, stages_t, update_state

@@ -7,8 +7,7 @@ module nocdyn_rosenbrock_tables
   public :: rodas4, rodas5p
 
   !> The transformed form of Hairer and Wanner, Solving Ordinary Differential Equations II, (IV.7.25), with u_i = h k_i:
-  !> y_new = y + h sum m_i k_i, where
-  !> (1/gamma - h J) k_i = f(t + alpha_i h, y + h sum a_ij k_j) + sum c_ij k_j + gamma_i h df/dt.
+  !> y_new = y + h sum m_i k_i, where (1/gamma - h J) k_i = f(t + alpha_i h, y + h sum a_ij k_j) + sum c_ij k_j + gamma_i h df/dt.
   type, public :: rosenbrock_table_t
     integer :: order                         !! of y_new
     integer :: error_order                   !! of the embedded solution

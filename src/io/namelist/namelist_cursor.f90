@@ -101,11 +101,8 @@ contains
   pure integer function value_end(self)
     class(cursor_t), intent(in) :: self
 
-    if (self%is_override) then
-      value_end = self%token_end(',')
-    else
-      value_end = self%token_end(value_delimiters)
-    end if
+    value_end = self%token_end(value_delimiters)
+    if (self%is_override) value_end = self%token_end(',')
   end function value_end
 
   !> Last position of the key at the cursor.

@@ -9,8 +9,7 @@ module nocdyn_coordinate_choice
   use nocdyn_sparse_map, only: transposed_order
   use nocdyn_text, only: joined, quoted, selected, string_t, to_text
   use nocdyn_train_motion, only: elimination_t
-  use nocdyn_train_relations, only: distinct_trains, leaf_elimination_t, new_relations, scaled_rows, train_relations_t, &
-                                    unit_rows
+  use nocdyn_train_relations, only: distinct_trains, leaf_elimination_t, new_relations, scaled_rows, train_relations_t, unit_rows
   implicit none (type, external)
   private
 

@@ -260,8 +260,7 @@ contains
     complement = self%complement(lane)
     do b = 1, size(matrix, 2)
       response = 0.0_wp
-      response(self%coordinate(self%first(b):self%first(b + 1) - 1)) = &
-        self%response(lane, self%first(b):self%first(b + 1) - 1)
+      response(self%coordinate(self%first(b):self%first(b + 1) - 1)) = self%response(lane, self%first(b):self%first(b + 1) - 1)
       matrix(:, b) = matmul(complement, response)
     end do
   end function mobility

@@ -162,8 +162,7 @@ contains
     associate (switches => self%machine%switches)
       do switch = 1, self%switches
         call self%switch_motion(lane, switch, y, angle, speed)
-        g(switch) = switches%indicator(self%machine%banks, switch, lane, t, angle, speed, &
-                                       y(self%mechanical + 1:self%states))
+        g(switch) = switches%indicator(self%machine%banks, switch, lane, t, angle, speed, y(self%mechanical + 1:self%states))
       end do
     end associate
   end subroutine indicator_values
@@ -180,8 +179,7 @@ contains
 
     associate (switches => self%machine%switches)
       call self%switch_motion(lane, which, y, angle, speed)
-      call switches%choose(self%machine%banks, which, lane, t, angle, speed, &
-                           y(self%mechanical + 1:self%states))
+      call switches%choose(self%machine%banks, which, lane, t, angle, speed, y(self%mechanical + 1:self%states))
     end associate
   end subroutine change_branch
 

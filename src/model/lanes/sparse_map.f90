@@ -108,9 +108,7 @@ contains
     do r = size(band_rows) - 1, 1, -1
       width = first(r + 1) - first(r)
       if (first(r + 2) - first(r + 1) /= width) cycle
-      if (all(column(first(r + 1):first(r + 2) - 1) == column(first(r):first(r + 1) - 1) + 1)) then
-        band_rows(r) = band_rows(r + 1) + 1
-      end if
+      if (all(column(first(r + 1):first(r + 2) - 1) == column(first(r):first(r + 1) - 1) + 1)) band_rows(r) = band_rows(r + 1) + 1
     end do
   end function band_lengths
 

@@ -122,8 +122,7 @@ contains
     real(wp), intent(in) :: value, best
     integer, intent(in) :: variant, variant_of_best   !! 0 if there is no value yet
 
-    precedes = variant_of_best == 0 .or. value < best .or. &
-                  (value <= best .and. variant < variant_of_best)
+    precedes = variant_of_best == 0 .or. value < best .or. (value <= best .and. variant < variant_of_best)
   end function precedes
 
   !> Takes the digits of a chunk's values into the histograms of their prefixes.

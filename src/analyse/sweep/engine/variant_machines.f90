@@ -44,8 +44,7 @@ module nocdyn_variant_machines
 
 contains
 
-  !> A block of lanes for the variants of an input, which can be assembled; laid out as a typical variant. `release` frees
-  !> it.
+  !> A block of lanes for the variants of an input, which can be assembled; laid out as a typical variant. `release` frees it.
   subroutine new_variant_machines(input, targets, lanes, with_energy_balance, self, typical)
     type(input_t), intent(in) :: input
     type(target_t), intent(in) :: targets(:)

@@ -127,11 +127,8 @@ contains
       if (quantity == labels(column)%text .or. quantity == names(column)%text) return
     end do
     column = 0
-    if (index(quantity, '[') > 0) then
-      hint = near_match(quantity, labels)
-    else
-      hint = near_match(quantity, names)
-    end if
+    hint = near_match(quantity, names)
+    if (index(quantity, '[') > 0) hint = near_match(quantity, labels)
     if (hint == '') hint = ', which has ' // related_names(quantity, names)
     call input%report(record, 'quantity', 'quantity = ' // quoted(quantity) // ' is no column of trajectory.csv' // hint, &
                      diagnostics)

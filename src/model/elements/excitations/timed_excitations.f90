@@ -96,9 +96,7 @@ contains
       do l = 1, self%lanes
         if (self%branch(l, e) /= during) cycle
         slope = 1.0_wp
-        if (self%shape(e) == shape_pulse) then
-          slope = pi * cosine_of(pi * (elements%time(l) - self%begin(l, e)) / self%duration(l, e))
-        end if
+        if (self%shape(e) == shape_pulse) slope = pi * cosine_of(pi * (elements%time(l) - self%begin(l, e)) / self%duration(l, e))
         associate (by_time => elements%applied_time(l, self%first + e - 1))
           by_time = by_time + self%amplitude(l, e) * slope / self%duration(l, e)
         end associate

@@ -39,8 +39,7 @@ contains
     integer, intent(in) :: lanes, elements
     type(lane_motion_t) :: self
 
-    allocate (self%moment(lanes, elements), self%zeros(lanes, elements), self%angle(strip), self%speed(strip), &
-              source=0.0_wp)
+    allocate (self%moment(lanes, elements), self%zeros(lanes, elements), self%angle(strip), self%speed(strip), source=0.0_wp)
     allocate (self%time(lanes), source=no_time)
   end function new_lane_motion
 

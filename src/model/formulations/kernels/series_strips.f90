@@ -229,9 +229,7 @@ contains
       middle = (k - 1) / 2
       sum = 0.0_wp + w(:, middle) * w(:, k - middle)
       sum_of_cubes = w(:, middle) * w2(:, k - middle) + w(:, k - middle) * w2(:, middle)
-      if (modulo(k, 2) == 0) then
-        sum_of_cubes = w(:, k / 2) * w2(:, k / 2) + sum_of_cubes
-      end if
+      if (modulo(k, 2) == 0) sum_of_cubes = w(:, k / 2) * w2(:, k / 2) + sum_of_cubes
       do j = middle - 1, 1, -1
         sum = sum + w(:, j) * w(:, k - j)
         sum_of_cubes = sum_of_cubes + (w(:, j) * w2(:, k - j) + w(:, k - j) * w2(:, j))
