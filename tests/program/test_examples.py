@@ -5,7 +5,7 @@ import re
 import subprocess
 
 import pytest
-from conftest import SOURCE
+from conftest import FORTRAN_FLAGS, SOURCE
 
 PAGES = SOURCE / "docs" / "pages"
 QUOTED = {
@@ -37,6 +37,7 @@ def built(tmp_path_factory):
         build,
         f"-DCMAKE_PREFIX_PATH={prefix}",
         f"-DCMAKE_Fortran_COMPILER={os.environ.get('FC', 'gfortran')}",
+        f"-DCMAKE_Fortran_FLAGS={FORTRAN_FLAGS}",  # instrumentation needs its libraries
     )
     run("cmake", "--build", build)
     return build

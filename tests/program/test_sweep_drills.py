@@ -8,14 +8,14 @@ import subprocess
 import time
 
 import pytest
-from conftest import TRAPS_EXCEPTIONS, wait_for
+from conftest import IS_SLOW, wait_for
 from sweep_inputs import MPI_ENVIRONMENT, MPI_PROGRAM, SWEEP, TWO_DISCS, limited_to, mpirun, needs_mpi, needs_sweeps
 
 pytestmark = needs_sweeps
 
 RANKS = 3
 SHARDS = 2
-SAMPLES = 1000 if TRAPS_EXCEPTIONS else 6000
+SAMPLES = 1000 if IS_SLOW else 6000
 LONG = ("--set", f"sweep.samples={SAMPLES}", "--set", "run.t_end=20")
 
 

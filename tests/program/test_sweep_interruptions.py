@@ -10,13 +10,13 @@ import time
 import h5py
 import numpy
 import pytest
-from conftest import TRAPS_EXCEPTIONS, wait_for
+from conftest import IS_SLOW, wait_for
 from sweep_inputs import MPI_ENVIRONMENT, MPI_PROGRAM, SWEEP, TWO_DISCS, limited_to, mpirun, needs_mpi, needs_sweeps
 
 pytestmark = needs_sweeps
 
-# variants that take this sweep about two seconds of one thread
-SAMPLES = 1500 if TRAPS_EXCEPTIONS else 15000
+# variants that take this sweep about a second of one thread
+SAMPLES = 1000 if IS_SLOW else 10000
 LONG = ("--set", f"sweep.samples={SAMPLES}", "--set", "run.t_end=20")
 ENDLESS = ("--set", "sweep.samples=100000000", "--set", "run.t_end=20")
 INTERRUPTED = (
