@@ -74,8 +74,8 @@ def wait_for(condition, seconds=30):
 
 
 @pytest.fixture
-def nocdyn(tmp_path):
-    return Program(tmp_path)
+def nocdyn(tmp_path_factory):
+    return Program(tmp_path_factory.mktemp("run"))  # not tmp_path, whose long name messages would cut
 
 
 @pytest.fixture(scope="module")
