@@ -3,6 +3,7 @@
 import os
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -34,7 +35,7 @@ def judged(folder, code=0, out=b"", err=b"", in_time=True, memory=10):
 
 
 def test_an_outcome_as_promised_is_no_finding(tmp_path):
-    (tmp_path / "trajectory.csv").write_text("t [s],phi_inf [rad]\n0,1e308\n")
+    (tmp_path / "trajectory.csv").write_text("t [s],phi_inf [rad],inf\n0,1e308,-1\n")
     (tmp_path / "summary.json").write_text('{"status": "done"}')
     assert judgement.findings(CASE, FINE, tmp_path, memory=100) == []
     assert judged(tmp_path / "none", code=2, err="nocdyn: 'ä' is wrong\n".encode()) == []
@@ -86,8 +87,10 @@ def test_a_finding_is_made_small():
 def test_a_program_that_does_not_end_is_ended(tmp_path):
     folder = tmp_path / "in"
     folder.mkdir()
+    begun = time.monotonic()
     outcome = execute(sys.executable, ("-c", "while True: pass"), folder, Limits(seconds=0.2))
     assert not outcome.in_time and outcome.code == -9
+    assert time.monotonic() - begun < 30  # by the clock ten times what is allowed of the processor
 
 
 def test_a_program_without_end_may_be_asked_to_end(tmp_path):
