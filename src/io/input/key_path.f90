@@ -4,8 +4,9 @@ module nocdyn_key_path
   use nocdyn_literals, only: literal_ok, read_integer
   use nocdyn_namelist, only: assignment_t
   use nocdyn_namelist_values, only: read_subscript
-  use nocdyn_schema, only: group_rule_index, group_rules, is_single, key_rule_index
+  use nocdyn_schema, only: group_rule_index, group_rules, is_single
   use nocdyn_schema_text, only: group_names, key_suggestion, suggestion
+  use nocdyn_schema_units, only: find_key
   use nocdyn_text, only: lower_case, quoted, shortened
   implicit none (type, external)
   private
@@ -16,6 +17,7 @@ module nocdyn_key_path
   type, public :: key_path_t
     integer :: group_rule = 0               !! row of `group_rules`, 0: there is no such group
     integer :: key_rule = 0                 !! row of `key_rules`, 0: there is no such key
+    integer :: unit = 0                     !! of its numbers: index of `units`, 0: that of the schema
     character(len=:), allocatable :: name   !! of the element, '' for groups without names
     integer :: number = 0                   !! of a group without name among those of its kind, 0: the path has none
     type(assignment_t) :: target            !! key and subscript
@@ -81,7 +83,7 @@ contains
     open = index(text // '(', '(')
     key = lower_case(trim(text(:open - 1)))
     path%target%key = key
-    path%key_rule = key_rule_index(path%group_rule, key)
+    call find_key(path%group_rule, key, path%key_rule, path%unit)
     message = ''
     if (path%key_rule == 0) then
       message = shortened(key) // ' is not a key of &' // trim(group_rules(path%group_rule)%name) // &

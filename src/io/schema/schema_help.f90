@@ -5,7 +5,7 @@ module nocdyn_schema_help
     selector_name, selector_rule
   use nocdyn_schema_rules, only: a_flag, a_number, a_selector, a_word, an_integer, body_or_ground, example_t, key_rule_t, &
     occurrence_texts
-  use nocdyn_schema_sentences, only: default_text, sentences_on
+  use nocdyn_schema_sentences, only: default_text, sentences_on, unit_sentence
   use nocdyn_schema_text, only: allowed_text, group_names, suggestion, type_text
   use nocdyn_text, only: append, listed, lower_case, quoted, string_t
   use nocdyn_text_buffer, only: text_buffer_t
@@ -29,8 +29,9 @@ contains
     integer :: rule
 
     call buffer%append_line('An input file is a Fortran namelist: groups &NAME KEY = VALUE ... / in any order, texts in quotes,')
-    call buffer%append_line('lists with commas or blanks, SI units, upper and lower case alike in groups and keys; ! begins a')
-    call buffer%append_line("comment. 'nocdyn new FILE' writes the example below with these explanations.")
+    call buffer%append_line('lists with commas or blanks, upper and lower case alike in groups and keys; ! begins a comment.')
+    call buffer%append_line('SI units, or the unit at the end of a key: speed_rpm, frequency_hz, phase_deg.')
+    call buffer%append_line("'nocdyn new FILE' writes the example below with these explanations.")
     call buffer%append_line('')
     do rule = 1, size(group_rules)
       call append_group(buffer, rule, '')
@@ -141,6 +142,7 @@ contains
 
     call buffer%append_line(prefix // '    ' // rule%name // short_rule(rule, prefix))
     call buffer%append_line(prefix // '      ' // trim(rule%help))
+    if (unit_sentence(rule) /= '') call buffer%append_line(prefix // '      ' // unit_sentence(rule))
   end subroutine append_key
 
   !> Type, allowed values and default in one line; the default is in a column of its own, after long texts in a line of its own.

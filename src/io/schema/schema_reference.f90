@@ -3,7 +3,7 @@ module nocdyn_schema_reference
   use nocdyn_schema, only: first_key, group_rules, has_word, key_rules, kind_rules, last_key, selector_name
   use nocdyn_schema_help, only: append_examples
   use nocdyn_schema_rules, only: key_rule_t, occurrence_texts
-  use nocdyn_schema_sentences, only: default_text, sentences_on
+  use nocdyn_schema_sentences, only: default_text, sentences_on, unit_sentence
   use nocdyn_schema_text, only: allowed_text, type_text
   use nocdyn_text, only: quoted, string_t
   use nocdyn_text_buffer, only: text_buffer_t
@@ -22,7 +22,8 @@ contains
 
     call buffer%append_line('# Input reference')
     call buffer%append_line('')
-    call buffer%append_line('An input file is a Fortran namelist in SI units. Groups may be in any order.')
+    call buffer%append_line('An input file is a Fortran namelist in SI units. Groups may be in any order. A speed, a ' // &
+                            'frequency or an angle may be given in rpm, Hz or degrees instead, by the key that ends in the unit.')
     do rule = 1, size(group_rules)
       call append_group(buffer, rule)
     end do
@@ -85,8 +86,12 @@ contains
     type(text_buffer_t), intent(inout) :: buffer
     type(key_rule_t), intent(in) :: rule
 
+    character(len=:), allocatable :: meaning
+
+    meaning = trim(rule%help)
+    if (unit_sentence(rule) /= '') meaning = meaning // '; ' // unit_sentence(rule)
     call buffer%append_line('| `' // trim(rule%name) // '` | ' // type_text(rule) // ' | ' // default_text(rule) // ' | ' // &
-                            allowed_text(rule) // ' | ' // trim(rule%help) // ' |')
+                            allowed_text(rule) // ' | ' // meaning // ' |')
   end subroutine append_key
 
 end module nocdyn_schema_reference

@@ -3,11 +3,12 @@ module nocdyn_schema_sentences
   use nocdyn_schema, only: group_rules, has_word, key_rule_index, key_rules, relation_rules, words_in
   use nocdyn_schema_rules, only: at_most_one, equal_lengths, exactly_one, key_rule_t, less_than, relation_rule_t, required, &
     requires, unset
+  use nocdyn_schema_units, only: name_in_unit, other_unit, unit_name
   use nocdyn_text, only: append, listed, quoted, string_t, to_text
   implicit none (type, external)
   private
 
-  public :: default_text, sentences_on
+  public :: default_text, sentences_on, unit_sentence
 
 contains
 
@@ -33,6 +34,17 @@ contains
       end associate
     end do
   end function default_text
+
+  !> "or speed_rpm [rpm]", '' if the key has no other unit.
+  pure function unit_sentence(rule) result(text)
+    type(key_rule_t), intent(in) :: rule
+    character(len=:), allocatable :: text
+
+    text = ''
+    associate (unit => other_unit(rule))
+      if (unit > 0) text = 'or ' // name_in_unit(rule, unit) // ' [' // unit_name(rule, unit) // ']'
+    end associate
+  end function unit_sentence
 
   !> One sentence for each relation between the keys of a group.
   pure function sentences_on(group_rule) result(sentences)

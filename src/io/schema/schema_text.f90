@@ -1,27 +1,35 @@
 !> Rows of the schema as texts for messages and help.
 module nocdyn_schema_text
   use nocdyn_kinds, only: wp
-  use nocdyn_schema, only: aliases, first_key, group_rules, has_word, key_rules, last_key, words_in, words_of
+  use nocdyn_schema, only: aliases, first_key, group_rules, has_word, key_rule_index, key_rules, last_key, words_in, words_of
   use nocdyn_schema_rules, only: a_body, a_file, a_flag, a_folder, a_name, a_number, a_selector, a_word, allowed_t, an_integer, &
     any_number, body_or_ground, key_rule_t, type_nouns
-  use nocdyn_text, only: append, joined, listed, nearest_word, quoted, selected, string_t, strings, to_text
+  use nocdyn_schema_units, only: name_in_unit, other_unit, unit_name
+  use nocdyn_text, only: append, joined, listed, nearest_word, quoted, rounded_text, selected, string_t, strings, to_text
+  use nocdyn_units, only: from_si
   implicit none (type, external)
   private
 
-  public :: allowed_text, type_text, only_if_text, listed_keys, group_names, key_names, similar_keys, key_suggestion, suggestion
+  public :: allowed_text, number_text, type_text, only_if_text, listed_keys, group_names, key_names, similar_keys, key_suggestion
+  public :: suggestion
 
 contains
 
   !> "> 0 [kg m2]", "'rk45', 'rosenbrock'", ".true., .false." ...; never empty.
-  function allowed_text(rule) result(text)
+  function allowed_text(rule, unit) result(text)
     type(key_rule_t), intent(in) :: rule
+    integer, intent(in), optional :: unit   !! of the numbers: index of `units`; that of the schema if absent or 0
     character(len=:), allocatable :: text
+    integer :: number_unit
+
+    number_unit = 0
+    if (present(unit)) number_unit = unit
 
     select case (rule%value_type)
     case (a_number, an_integer)
-      text = range_text(rule%allowed)
+      text = range_text(rule%allowed, number_unit)
       if (text == '') text = 'any value'
-      if (rule%unit /= '') text = text // ' [' // trim(rule%unit) // ']'
+      if (rule%unit /= '') text = text // ' [' // unit_name(rule, number_unit) // ']'
     case (a_word, a_selector)
       text = joined(words_of(rule), ', ')
     case (a_flag)
@@ -42,20 +50,35 @@ contains
   end function allowed_text
 
   !> "> 0", ">= 2", "1e-14 to 0.1", '' if all is allowed.
-  function range_text(allowed) result(text)
+  function range_text(allowed, unit) result(text)
     type(allowed_t), intent(in) :: allowed
+    integer, intent(in) :: unit   !! index of `units`
     character(len=:), allocatable :: text
 
     text = ''
     if (allowed%high < huge(1.0_wp)) then
-      text = to_text(allowed%low) // ' to ' // to_text(allowed%high)
+      text = number_text(allowed%low, unit) // ' to ' // number_text(allowed%high, unit)
     else if (allowed%low > -huge(1.0_wp)) then
-      text = '>= ' // to_text(allowed%low)
-      if (allowed%excludes_low) text = '> ' // to_text(allowed%low)
+      text = '>= ' // number_text(allowed%low, unit)
+      if (allowed%excludes_low) text = '> ' // number_text(allowed%low, unit)
     else if (allowed%excludes_zero) then
       text = 'not 0'
     end if
   end function range_text
+
+  !> A number of SI in a unit; all its digits, but for those that the conversion rounds.
+  function number_text(value, unit) result(text)
+    real(wp), intent(in) :: value   !! in the SI unit
+    integer, intent(in) :: unit     !! index of `units`, 0: SI
+    character(len=:), allocatable :: text
+    integer, parameter :: kept = 14
+
+    if (unit == 0) then
+      text = to_text(value)
+    else
+      text = rounded_text(from_si(value, unit), kept)
+    end if
+  end function number_text
 
   !> "number", "2 bodies", "list of bodies" ...
   pure function type_text(rule) result(text)
@@ -119,13 +142,26 @@ contains
     allocate (names, source=strings([key_rules(first_key(group_rule):last_key(group_rule))%name]))
   end function key_names
 
-  !> The keys that the user may have meant by a word that is not a key of the group.
+  !> The names of the keys of a group, those in other units included.
+  pure function all_names(group_rule) result(names)
+    integer, intent(in) :: group_rule   !! row of `group_rules`
+    type(string_t), allocatable :: names(:)
+    integer :: key, unit
+
+    allocate (names, source=key_names(group_rule))
+    do key = first_key(group_rule), last_key(group_rule)
+      unit = other_unit(key_rules(key))
+      if (unit > 0) call append(names, name_in_unit(key_rules(key), unit))
+    end do
+  end function all_names
+
+  !> The keys that the user may have meant by a word that is not a key of the group, perhaps in their other units.
   pure function similar_keys(group_rule, word) result(keys)
     integer, intent(in) :: group_rule      !! row of `group_rules`
     character(len=*), intent(in) :: word   !! in lower case
     type(string_t), allocatable :: keys(:)
     type(string_t), allocatable :: names(:)
-    integer :: i, nearest
+    integer :: i, key, nearest
 
     allocate (keys(0))
     do i = 1, size(aliases)
@@ -133,7 +169,14 @@ contains
       keys = words_in(aliases(i)%keys)
       return
     end do
-    allocate (names, source=key_names(group_rule))
+    key = key_rule_index(group_rule, word(:index(word, '_', back=.true.) - 1))
+    if (key > 0) then
+      if (other_unit(key_rules(key)) > 0) then   ! the key with the ending of another unit
+        call append(keys, name_in_unit(key_rules(key), other_unit(key_rules(key))))
+        return
+      end if
+    end if
+    allocate (names, source=all_names(group_rule))
     nearest = nearest_word(word, names)
     if (nearest > 0) call append(keys, names(nearest)%text)
   end function similar_keys

@@ -14,6 +14,7 @@ module nocdyn_direct_parameters
   use nocdyn_schema, only: first_key, key_rules
   use nocdyn_schema_rules, only: is_too_small
   use nocdyn_targets, only: target_t
+  use nocdyn_units, only: in_si
   implicit none (type, external)
   private
 
@@ -24,6 +25,7 @@ module nocdyn_direct_parameters
 
   type, public :: direct_parameters_t
     logical :: are_direct = .false.                               !! whether all targets are
+    integer, allocatable, private :: unit(:)                      !! of the values of each target: index of `units`
     integer, allocatable, private :: target(:)                    !! targets whose values are in arrays of banks ...
     type(parameter_index_t), allocatable, private :: index(:)     !! ... and where each of them is
     integer, allocatable, private :: banks(:)                     !! with such arrays
@@ -48,6 +50,8 @@ contains
 
     allocate (self%target(0), self%index(0), self%banks(0), self%inertia_target(0), self%body(0))
     allocate (self%signs(size(targets), 0))
+    allocate (self%unit(size(targets)))
+    self%unit(:) = targets%in_unit
     allocate (self%lowest(size(targets)), source=huge(1.0_wp))
     allocate (self%highest(size(targets)), source=-huge(1.0_wp))
     self%are_direct = .true.
@@ -167,7 +171,7 @@ contains
     class(direct_parameters_t), intent(in) :: self
     real(wp), intent(in) :: values(:)   !! [targets]
 
-    are_allowed = all(values >= self%lowest .and. values <= self%highest .and. .not. is_too_small(values))
+    are_allowed = all(values >= self%lowest .and. values <= self%highest .and. .not. is_too_small(in_si(values, self%unit)))
   end function are_allowed
 
   !> Makes a lane that of a variant. What the lane holds beside the values must be that of another variant.
@@ -183,7 +187,7 @@ contains
     logical :: is_indefinite
 
     do i = 1, size(self%target)
-      call parameters%set_value(self%index(i), lane, values(self%target(i)))
+      call parameters%set_value(self%index(i), lane, in_si(values(self%target(i)), self%unit(self%target(i))))
     end do
     do i = 1, size(self%banks)
       call block%machine%banks(self%banks(i))%bank%polynomials(block%machine%laws)

@@ -4,9 +4,12 @@ module nocdyn_group_checks
   use nocdyn_diagnostics, only: diagnostics_t
   use nocdyn_input, only: group_t
   use nocdyn_raw_group, only: raw_group_t
-  use nocdyn_schema, only: key_name, key_rules
+  use nocdyn_kinds, only: wp
+  use nocdyn_schema, only: first_key, key_name, key_rules
   use nocdyn_schema_relations, only: relation_t, relations_t
   use nocdyn_schema_rules, only: a_body, body_or_ground, equal_lengths, less_than, unset
+  use nocdyn_schema_text, only: number_text
+  use nocdyn_schema_units, only: name_in_unit
   use nocdyn_text, only: counted, quoted, string_t, to_text
   use nocdyn_text_sort, only: argsort
   implicit none (type, external)
@@ -54,7 +57,7 @@ contains
 
     associate (value => group%values(position))
       do i = 2, value%count()
-        message = ascending_message(group, position, i)
+        message = ascending_message(group, position, i, raw%keys(position)%unit)
         if (message == '') cycle
         call diagnostics%add(max(value%line, raw%keys(position)%values(i)%line), raw%index, message, value%override)
       end do
@@ -62,10 +65,11 @@ contains
   end subroutine check_ascending
 
   !> What is wrong with value `i` of an ascending list if it is not greater than the one before it, else ''.
-  function ascending_message(group, position, i) result(message)
+  function ascending_message(group, position, i, unit) result(message)
     type(group_t), intent(in) :: group
     integer, intent(in) :: position   !! of the key
     integer, intent(in) :: i          !! 2 to the length of the list
+    integer, intent(in) :: unit       !! of the message: index of `units`, 0: that of the schema
     character(len=:), allocatable :: message
 
     message = ''
@@ -76,7 +80,8 @@ contains
       integer, intent(in) :: i
       character(len=:), allocatable :: text
 
-      text = key_name(group%rule, position) // '(' // to_text(i) // ') = ' // to_text(group%values(position)%number_at(i))
+      text = name_in_unit(key_rules(first_key(group%rule) + position - 1), unit) // '(' // to_text(i) // ') = ' // &
+             number_text(group%values(position)%number_at(i), unit)
     end function element
   end function ascending_message
 

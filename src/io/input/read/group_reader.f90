@@ -7,10 +7,11 @@ module nocdyn_group_reader
   use nocdyn_key_relations, only: apply_relations
   use nocdyn_namelist, only: assignment_t, namelist_group_t, namelist_t
   use nocdyn_raw_group, only: new_raw_group, raw_group_t
-  use nocdyn_schema, only: group_rules, is_single, key_rule_index, key_rules
+  use nocdyn_schema, only: group_rules, is_single, key_rules
   use nocdyn_schema_relations, only: relations_t
   use nocdyn_schema_rules, only: a_name, equal_lengths
   use nocdyn_schema_text, only: key_suggestion, similar_keys
+  use nocdyn_schema_units, only: find_key
   use nocdyn_table_file, only: read_table_file
   use nocdyn_text, only: lower_case, shortened, string_t
   use nocdyn_text_file, only: path_in
@@ -63,16 +64,16 @@ contains
     type(raw_group_t), intent(inout) :: raw
     type(diagnostics_t), intent(inout) :: diagnostics
     character(len=:), allocatable :: message
-    integer :: i, key
+    integer :: i, key, unit
 
     do i = source%first_assignment, source%last_assignment
       associate (assignment => namelist%assignments(i))
-        key = key_rule_index(raw%rule, assignment%key)
+        call find_key(raw%rule, assignment%key, key, unit)
         if (key == 0) then
           call refuse_key(assignment, raw, diagnostics)
           cycle
         end if
-        call raw%keys(raw%position(key))%assign(namelist, assignment, message)
+        call raw%keys(raw%position(key))%assign(namelist, assignment, unit, message)
         if (message == '') cycle
         key = key_without_equals(namelist, assignment, raw%rule)
         if (key > 0) then
@@ -91,7 +92,7 @@ contains
     type(diagnostics_t), intent(inout) :: diagnostics
     type(string_t), allocatable :: similar(:)
     character(len=:), allocatable :: hint
-    integer :: i
+    integer :: i, key, unit
 
     hint = ''
     if (diagnostics%count >= most_shown) then
@@ -99,7 +100,8 @@ contains
     else
       allocate (similar, source=similar_keys(raw%rule, assignment%key))
       do i = 1, size(similar)
-        raw%keys(raw%position(key_rule_index(raw%rule, similar(i)%text)))%may_be_missing = .true.
+        call find_key(raw%rule, similar(i)%text, key, unit)
+        raw%keys(raw%position(key))%may_be_missing = .true.
       end do
       hint = key_suggestion(raw%rule, assignment%key)
     end if
@@ -108,16 +110,16 @@ contains
   end subroutine refuse_key
 
   !> Row of the first key among the values of an assignment, 0 if there is none: its equals sign was probably forgotten.
-  pure integer function key_without_equals(namelist, assignment, rule) result(key)
+  integer function key_without_equals(namelist, assignment, rule) result(key)
     type(namelist_t), intent(in) :: namelist
     type(assignment_t), intent(in) :: assignment
     integer, intent(in) :: rule   !! row of `group_rules`
-    integer :: i
+    integer :: i, unit
 
     key = 0
     do i = assignment%first_item, assignment%last_item
       if (namelist%items(i)%is_quoted .or. namelist%items(i)%is_null) cycle
-      key = key_rule_index(rule, lower_case(namelist%item_text(namelist%items(i))))
+      call find_key(rule, lower_case(namelist%item_text(namelist%items(i))), key, unit)
       if (key > 0) return
     end do
   end function key_without_equals
@@ -156,7 +158,8 @@ contains
       if (.not. overrides(i)%is_valid .or. overrides(i)%group_rule /= raw%rule) cycle
       if (overrides(i)%name /= name .or. overrides(i)%number /= number) cycle
       overrides(i)%is_used = .true.
-      call raw%keys(raw%position(overrides(i)%key_rule))%override_with(overrides(i)%namelist, overrides(i)%target, i, message)
+      call raw%keys(raw%position(overrides(i)%key_rule))%override_with(overrides(i)%namelist, overrides(i)%target, &
+                                                                       overrides(i)%unit, i, message)
       if (message /= '') call diagnostics%add(no_line, 0, message, i)
     end do
   end subroutine take_overrides

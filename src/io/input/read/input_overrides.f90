@@ -61,9 +61,9 @@ contains
     if (rule%value_type == a_name) then
       message = 'a name cannot be overridden: other groups refer to it'
     else if (override%is_out_of_range .and. rule%count == 1) then
-      message = trim(rule%name) // ' is a single value and takes no subscript'
+      message = override%target%key // ' is a single value and takes no subscript'
     else if (override%is_out_of_range) then
-      message = 'the subscript of ' // trim(rule%name) // ' is out of range; allowed: 1 to ' // &
+      message = 'the subscript of ' // override%target%key // ' is out of range; allowed: 1 to ' // &
                   to_text(merge(rule%count, longest_list, rule%count /= any_number))
     end if
   end subroutine find_key

@@ -140,7 +140,7 @@ contains
     other = group%first_given(relation%second)
     if (one > 0 .and. other > 0) then
       if ((group%keys(one)%override > 0) .eqv. (group%keys(other)%override > 0)) then   ! no override decides between them
-        call group%report([one, other], listed_keys(group%rule, [one, other], ' and ') // &
+        call group%report([one, other], group%written_names([one, other], ' and ') // &
                           ' are both given; allowed: one of them', diagnostics)
       end if
       if (group%keys(other)%override > 0 .and. group%keys(one)%override == 0) one = 0

@@ -7,7 +7,8 @@ module nocdyn_raw_group
   use nocdyn_schema, only: first_key, key_rules, last_key
   use nocdyn_schema_rules, only: any_number, key_rule_t, required, unset
   use nocdyn_schema_text, only: allowed_text
-  use nocdyn_text, only: shortened, to_text
+  use nocdyn_schema_units, only: name_in_unit
+  use nocdyn_text, only: listed, shortened, string_t, to_text
   implicit none (type, external)
   private
 
@@ -20,6 +21,7 @@ module nocdyn_raw_group
     logical :: is_quoted = .false.
     logical :: is_assigned = .false.           !! by an assignment, perhaps with a null value
     integer :: line = 0
+    integer :: unit = 0                        !! of a number: index of `units`, 0: that of the schema
   end type raw_value_t
 
   !> One key.
@@ -27,6 +29,7 @@ module nocdyn_raw_group
     integer :: rule = 0                   !! its row of `key_rules`
     integer :: line = 0                   !! of its first assignment in the file
     integer :: override = 0               !! the last override that sets it, 0: none
+    integer :: unit = 0                   !! in which it is written last: index of `units`, 0: that of the schema
     integer :: length = 0                 !! number of values that a default has
     integer :: last = 0                   !! index of the last value that is assigned
     logical :: is_written = .false.       !! the key occurs in the file or in an override
@@ -50,7 +53,7 @@ module nocdyn_raw_group
     integer :: line = 0
     type(raw_key_t), allocatable :: keys(:)
   contains
-    procedure :: position, first_given, report
+    procedure :: position, first_given, written_names, report
   end type raw_group_t
 
 contains
@@ -82,26 +85,30 @@ contains
     key%is_required = key_rules(rule)%default == required
   end function new_raw_key
 
-  !> Name of the key.
+  !> Name of the key in the unit in which it is written.
   pure function name(self)
     class(raw_key_t), intent(in) :: self
     character(len=:), allocatable :: name
 
-    name = trim(key_rules(self%rule)%name)
+    name = name_in_unit(key_rules(self%rule), self%unit)
   end function name
 
   !> Takes over one assignment of the file.
-  subroutine assign(self, namelist, assignment, message)
+  subroutine assign(self, namelist, assignment, unit, message)
     class(raw_key_t), intent(inout) :: self
     type(namelist_t), intent(in) :: namelist
     type(assignment_t), intent(in) :: assignment
+    integer, intent(in) :: unit                             !! of the numbers: index of `units`, 0: that of the schema
     character(len=:), allocatable, intent(out) :: message   !! '': the assignment is valid
     integer :: last
 
-    if (self%is_written .and. (self%has_whole_list .or. assignment%is_whole)) then
+    if (self%is_written .and. self%unit /= unit) then
+      message = two_units_message(self, assignment%line, unit)
+    else if (self%is_written .and. (self%has_whole_list .or. assignment%is_whole)) then
       message = duplicate_message(self)
     else
-      call find_last(namelist, assignment, key_rules(self%rule), last, message)
+      self%unit = unit
+      call find_last(namelist, assignment, self, last, message)
     end if
     if (.not. self%is_written) self%line = assignment%line
     self%is_written = .true.
@@ -119,22 +126,24 @@ contains
   end subroutine assign
 
   !> Takes over an override, which replaces the values of the file and of earlier overrides.
-  subroutine override_with(self, namelist, assignment, override, message)
+  subroutine override_with(self, namelist, assignment, unit, override, message)
     class(raw_key_t), intent(inout) :: self
     type(namelist_t), intent(in) :: namelist
     type(assignment_t), intent(in) :: assignment
+    integer, intent(in) :: unit                             !! of the numbers: index of `units`, 0: that of the schema
     integer, intent(in) :: override                         !! index of the override
     character(len=:), allocatable, intent(out) :: message   !! '': the override is valid
     integer :: last
 
     self%is_written = .true.
     self%override = override
+    self%unit = unit
     if (assignment%is_whole) then
       self%values = [raw_value_t ::]
       self%last = 0
       self%is_malformed = .false.
     end if
-    call find_last(namelist, assignment, key_rules(self%rule), last, message)
+    call find_last(namelist, assignment, self, last, message)
     self%is_malformed = self%is_malformed .or. assignment%is_malformed .or. message /= ''
     if (self%is_malformed) return
     call grow(self, last)
@@ -148,16 +157,28 @@ contains
     message = key%name() // ' is given twice, first on line ' // to_text(key%line)
   end function duplicate_message
 
+  !> "speed on line 3 and speed_rpm on line 4 are both given; allowed: one of them".
+  pure function two_units_message(key, line, unit) result(message)
+    type(raw_key_t), intent(in) :: key
+    integer, intent(in) :: line, unit   !! of the second assignment
+    character(len=:), allocatable :: message
+
+    message = key%name() // ' on line ' // to_text(key%line) // ' and ' // name_in_unit(key_rules(key%rule), unit) // &
+              ' on line ' // to_text(line) // ' are both given; allowed: one of them'
+  end function two_units_message
+
   !> Index of the last value that an assignment can set.
-  subroutine find_last(namelist, assignment, rule, last, message)
+  subroutine find_last(namelist, assignment, key, last, message)
     type(namelist_t), intent(in) :: namelist
     type(assignment_t), intent(in) :: assignment
-    type(key_rule_t), intent(in) :: rule
+    type(raw_key_t), intent(in) :: key   !! with the unit of the assignment
     integer, intent(out) :: last   !! if the message is empty
     character(len=:), allocatable, intent(out) :: message   !! '': the assignment fits the key
+    type(key_rule_t) :: rule
     integer :: items
     logical :: is_null
 
+    rule = key_rules(key%rule)
     items = assignment%last_item - assignment%first_item + 1
     last = assignment%last
     if (last == 0) last = rule%count
@@ -168,15 +189,15 @@ contains
     if (items > longest_list) then   ! the scanner has reported it
       return
     else if (.not. assignment%is_malformed .and. (items == 0 .or. (is_null .and. rule%default == unset))) then
-      message = trim(rule%name) // ' has no value; needed: ' // allowed_text(rule)
+      message = key%name() // ' has no value; needed: ' // allowed_text(rule, key%unit)
     else if (rule%count == 1 .and. .not. assignment%is_whole) then
-      message = trim(rule%name) // ' is a single value and takes no subscript'
+      message = key%name() // ' is a single value and takes no subscript'
     else if (rule%count /= any_number .and. max(last, assignment%first) > rule%count) then
-      message = 'the subscript of ' // trim(rule%name) // ' is out of range; allowed: 1 to ' // to_text(rule%count)
+      message = 'the subscript of ' // key%name() // ' is out of range; allowed: 1 to ' // to_text(rule%count)
     else if (last > longest_list) then
-      message = trim(rule%name) // ' has too many values; allowed: at most ' // to_text(longest_list)
+      message = key%name() // ' has too many values; allowed: at most ' // to_text(longest_list)
     else if (items > (last - assignment%first) / assignment%stride + 1) then
-      message = trim(rule%name) // ' has ' // to_text(items) // ' values (' // found_values(namelist, assignment) &
+      message = key%name() // ' has ' // to_text(items) // ' values (' // found_values(namelist, assignment) &
         // '); allowed: ' // to_text((last - assignment%first) / assignment%stride + 1)
     end if
   end subroutine find_last
@@ -231,6 +252,7 @@ contains
     values(:kept)%is_quoted = key%values(:kept)%is_quoted
     values(:kept)%is_assigned = key%values(:kept)%is_assigned
     values(:kept)%line = key%values(:kept)%line
+    values(:kept)%unit = key%values(:kept)%unit
     call move_alloc(values, key%values)
   end subroutine resize
 
@@ -251,6 +273,7 @@ contains
         key%values(i)%written = namelist%as_written(namelist%items(item))
         key%values(i)%is_quoted = namelist%items(item)%is_quoted
         key%values(i)%line = namelist%items(item)%line
+        key%values(i)%unit = key%unit
       end if
       item = item + 1
     end do
@@ -311,6 +334,7 @@ contains
     self%is_malformed = .false.
     self%line = 0
     self%override = 0
+    self%unit = 0
     self%last = 0
     if (allocated(self%values)) deallocate (self%values)
     self%is_excluded = .true.
@@ -339,6 +363,21 @@ contains
       given = positions(i)
     end do
   end function first_given
+
+  !> Names of keys as they are written: "table_twist_deg and gap".
+  pure function written_names(self, positions, conjunction) result(text)
+    class(raw_group_t), intent(in) :: self
+    integer, intent(in) :: positions(:)           !! of the keys
+    character(len=*), intent(in) :: conjunction   !! ' or ', ' and '
+    character(len=:), allocatable :: text
+    type(string_t) :: names(size(positions))
+    integer :: i
+
+    do i = 1, size(positions)
+      names(i)%text = self%keys(positions(i))%name()
+    end do
+    text = listed(names, conjunction)
+  end function written_names
 
   !> Adds an error at the last of some keys, or at the group if there are none.
   subroutine report(self, positions, text, diagnostics)

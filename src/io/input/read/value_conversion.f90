@@ -9,12 +9,14 @@ module nocdyn_value_conversion
   use nocdyn_schema_rules, only: a_body, a_file, a_flag, a_folder, a_name, a_number, a_selector, a_word, an_integer, &
     ground, is_out_of_range, key_rule_t, longest_name, size_limit, unset
   use nocdyn_schema_text, only: allowed_text
+  use nocdyn_schema_units, only: name_in_unit
   use nocdyn_text, only: counted, is_too_long, joined, longest_file_name, longest_path, lower_case, nearest_word, quoted, &
     shortened, string_t, to_text
+  use nocdyn_units, only: in_si
   implicit none (type, external)
   private
 
-  public :: convert_key, default_value
+  public :: convert_key, convert_number, default_value
 
 contains
 
@@ -39,7 +41,7 @@ contains
       known = key%count_given()
       if (known == 0 .and. .not. key%is_required) return
       if (known == 0) then
-        message = trim(merge(' has no value', ' is missing  ', key%is_written)) // '; needed: ' // allowed_text(rule)
+        message = trim(merge(' has no value', ' is missing  ', key%is_written)) // '; needed: ' // allowed_text(rule, key%unit)
       else if (known < size(key%values)) then
         message = ' has ' // counted(given, 'value', 'values') // ' (' // given_values(key) // '); needed: ' // &
                   to_text(size(key%values))
@@ -105,7 +107,7 @@ contains
         call convert_value(key%values(i), rule, key%override > 0, i, value, message)
         if (message == '') cycle
         has_error = .true.
-        element = key%name()
+        element = name_in_unit(rule, key%values(i)%unit)
         if (rule%count /= 1) element = element // '(' // to_text(i) // ')'
         call diagnostics%add(max(key%line, key%values(i)%line), group, &
                              element // ' = ' // shortened(key%values(i)%written) // message, key%override)
@@ -122,11 +124,9 @@ contains
     integer, intent(in) :: i                                !! index of the value
     type(value_t), intent(inout) :: value
     character(len=:), allocatable, intent(out) :: message   !! text after 'KEY = VALUE'; '': the value is valid
-    character(len=:), allocatable :: limit
     integer :: status
 
     message = ''
-    limit = ''
     if (holds_texts(rule%value_type)) then
       value%texts(i)%text = raw%text
       if (.not. (raw%is_quoted .or. may_be_bare)) then
@@ -135,23 +135,43 @@ contains
         call check_text(rule, value%texts(i), message)
       end if
     else if (raw%is_quoted) then
-      message = ' is a text; needed without quotes: ' // allowed_text(rule)
+      message = ' is a text; needed without quotes: ' // allowed_text(rule, raw%unit)
     else
       select case (rule%value_type)
       case (a_number)
         call read_real(raw%text, value%numbers(i), status)
         message = number_problem(status)
-        limit = size_limit(value%numbers(i), rule%allowed, rule%ascends)
-        if (message == '' .and. (limit /= '' .or. is_out_of_range(value%numbers(i), rule%allowed))) message = ' is out of range'
+        if (message == '') then
+          call convert_number(rule, raw%unit, value%numbers(i), message)
+          return
+        end if
       case (an_integer)
         call convert_integer(raw%text, rule, value%whole_numbers(i), message)
       case default
         call read_logical(raw%text, value%flags(i), status)
         if (status /= literal_ok) message = ' is neither true nor false'
       end select
-      if (message /= '') message = message // '; allowed: ' // allowed_text(rule) // limit
+      if (message /= '') message = message // '; allowed: ' // allowed_text(rule, raw%unit)
     end if
   end subroutine convert_value
+
+  !> Converts a number to the unit of the schema and checks it.
+  subroutine convert_number(rule, unit, number, message)
+    type(key_rule_t), intent(in) :: rule
+    integer, intent(in) :: unit        !! in which it is given: index of `units`, 0: that of the schema
+    real(wp), intent(inout) :: number  !! then in the unit of the schema, unless it is wrong
+    character(len=:), allocatable, intent(out) :: message   !! text after 'KEY = VALUE'; '': the number is valid
+    character(len=:), allocatable :: limit
+
+    message = ''
+    limit = size_limit(number, rule%allowed, rule%ascends)
+    if (limit == '') then
+      number = in_si(number, unit)
+      if (unit > 0) limit = size_limit(number, rule%allowed, rule%ascends)
+      if (limit == '' .and. .not. is_out_of_range(number, rule%allowed)) return
+    end if
+    message = ' is out of range; allowed: ' // allowed_text(rule, unit) // limit
+  end subroutine convert_number
 
   subroutine convert_integer(text, rule, value, message)
     character(len=*), intent(in) :: text
@@ -201,7 +221,7 @@ contains
     integer :: i
 
     do i = 1, size(words)
-      if (lower_case(value%text) /= words(i)%text) cycle
+      if (lower_case(value%text) /= lower_case(words(i)%text)) cycle
       value%text = words(i)%text
       return
     end do

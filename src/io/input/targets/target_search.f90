@@ -6,6 +6,7 @@ module nocdyn_target_search
   use nocdyn_schema, only: first_key, group_rules, has_word, key_rules, last_key, selector_name, selector_rule
   use nocdyn_schema_rules, only: a_number, an_integer, key_rule_t
   use nocdyn_schema_text, only: only_if_text, suggestion, type_text
+  use nocdyn_schema_units, only: name_in_unit, other_unit
   use nocdyn_text, only: append, listed, lower_case, nearest_word, quoted, string_t, to_text
   implicit none (type, external)
   private
@@ -18,19 +19,17 @@ module nocdyn_target_search
 contains
 
   !> Finds a number by its path.
-  subroutine search_target(input, text, group, rule, position, message)
+  subroutine search_target(input, text, group, path, position, message)
     type(input_t), intent(in) :: input
     character(len=*), intent(in) :: text   !! a path
     integer, intent(out) :: group      !! index in the input, 0: not found
-    integer, intent(out) :: rule       !! row of `key_rules`
+    type(key_path_t), intent(out) :: path
     integer, intent(out) :: position   !! in the list of the key
     character(len=:), allocatable, intent(out) :: message   !! what is wrong and allowed, '' if nothing is wrong
-    type(key_path_t) :: path
 
     group = 0
     position = 1
     call read_path(text, '', path, message)
-    rule = path%key_rule
     if (path%key_rule == 0) call suggest_path(input, text, path%group_rule > 0, message)
     if (path%group_rule > 0) then
       if (has_word(fixed_groups, group_rules(path%group_rule)%name)) message = 'the keys of &' // &
@@ -40,7 +39,7 @@ contains
     if (message /= '') return
     call find_group(input, path, group, message)
     if (message /= '') call suggest_path(input, text, .true., message)
-    if (message == '') call check_law(input%groups(group), key_rules(rule), message)
+    if (message == '') call check_law(input%groups(group), key_rules(path%key_rule), message)
     if (message == '') call find_position(input%groups(group), text, path, position, message)
   end subroutine search_target
 
@@ -67,7 +66,7 @@ contains
                 tails(near)%text // text(subscript:) // "'?"
   end subroutine suggest_path
 
-  !> The paths of all keys that can vary, without their groups.
+  !> The paths of all keys that can vary, also in their other units, without their groups.
   subroutine list_tails(input, tails, owners)
     type(input_t), intent(in) :: input
     type(string_t), allocatable, intent(out) :: tails(:)
@@ -76,8 +75,10 @@ contains
 
     found = 0
     do g = 1, size(input%groups)
-      if (can_vary(input%groups(g))) found = found + &
-        count(is_numeric(key_rules(first_key(input%groups(g)%rule):last_key(input%groups(g)%rule))))
+      if (.not. can_vary(input%groups(g))) cycle
+      associate (rules => key_rules(first_key(input%groups(g)%rule):last_key(input%groups(g)%rule)))
+        found = found + count(is_numeric(rules)) + count(other_unit(rules) > 0)
+      end associate
     end do
     allocate (tails(found), owners(found))
     found = 0
@@ -85,12 +86,23 @@ contains
       if (.not. can_vary(input%groups(g))) cycle
       do key = first_key(input%groups(g)%rule), last_key(input%groups(g)%rule)
         if (.not. is_numeric(key_rules(key))) cycle
-        found = found + 1
-        owners(found) = g
-        tails(found)%text = trim(key_rules(key)%name)
-        if (input%groups(g)%name /= '') tails(found)%text = input%groups(g)%name // '.' // tails(found)%text
+        call add_tail(g, name_in_unit(key_rules(key), 0))
+        if (other_unit(key_rules(key)) > 0) call add_tail(g, name_in_unit(key_rules(key), other_unit(key_rules(key))))
       end do
     end do
+
+  contains
+
+    subroutine add_tail(owner, key_name)
+      integer, intent(in) :: owner   !! index of the group
+      character(len=*), intent(in) :: key_name
+
+      found = found + 1
+      owners(found) = owner
+      tails(found)%text = key_name
+      if (input%groups(owner)%name /= '') tails(found)%text = input%groups(owner)%name // '.' // key_name
+    end subroutine add_tail
+
   end subroutine list_tails
 
   !> Whether keys of a group can vary.
@@ -165,16 +177,16 @@ contains
     count = group%values(path%key_rule - first_key(path%group_rule) + 1)%count()
     associate (rule => key_rules(path%key_rule))
       if (rule%count == 1) then
-        if (.not. path%target%is_whole) message = trim(rule%name) // ' is a single value and takes no subscript'
+        if (.not. path%target%is_whole) message = path%target%key // ' is a single value and takes no subscript'
       else if (count == 0) then
-        message = trim(rule%name) // ' has no values in the input'
+        message = path%target%key // ' has no values in the input'
       else if (path%target%is_whole) then
-        message = trim(rule%name) // ' is a list; allowed: one of its values, ' // value_paths(text, count)
+        message = path%target%key // ' is a list; allowed: one of its values, ' // value_paths(text, count)
       else if (path%target%last /= position) then
-        message = 'several values of ' // trim(rule%name) // '; allowed: one, ' // &
+        message = 'several values of ' // path%target%key // '; allowed: one, ' // &
                   value_paths(text(:index(text, '(', back=.true.) - 1), count)
       else if (position < 1 .or. position > count) then
-        message = 'the subscript of ' // trim(rule%name) // ' is out of range; allowed: 1 to ' // to_text(count)
+        message = 'the subscript of ' // path%target%key // ' is out of range; allowed: 1 to ' // to_text(count)
       end if
     end associate
   end subroutine find_position

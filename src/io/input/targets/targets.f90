@@ -3,15 +3,18 @@ module nocdyn_targets
   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
   use nocdyn_group_checks, only: ascending_message, less_than_message
   use nocdyn_input, only: group_t, input_t, value_t
+  use nocdyn_key_path, only: key_path_t
   use nocdyn_kinds, only: wp
   use nocdyn_schema, only: first_key, key_rules
   use nocdyn_schema_relations, only: relation_t, relations_of, relations_t
   use nocdyn_schema_rules, only: allowed_t, an_integer, at_most_one, exactly_one, is_out_of_range, less_than, &
-    required, requires, size_limit, unset
+    required, requires, unset
   use nocdyn_schema_text, only: allowed_text
+  use nocdyn_schema_units, only: name_in_unit, unit_name
   use nocdyn_target_search, only: search_target
   use nocdyn_text, only: to_text
-  use nocdyn_value_conversion, only: default_value
+  use nocdyn_units, only: in_si
+  use nocdyn_value_conversion, only: convert_number, default_value
   implicit none (type, external)
   private
 
@@ -23,7 +26,8 @@ module nocdyn_targets
     integer :: group = 0                         !! index in the input
     integer :: key = 0                           !! index in the group's values
     integer :: position = 1                      !! in the list of the key
-    character(len=:), allocatable :: unit        !! '' if it has none
+    character(len=:), allocatable :: unit        !! of its values, '' if it has none
+    integer :: in_unit = 0                       !! the same: index of `units`, 0: that of the schema
     character(len=:), allocatable :: long_name   !! "viscous of &load 'work': torque per speed"
     logical :: is_integer = .false.              !! values are rounded to the nearest integer
     integer, private :: rule = 0                 !! row of `key_rules`
@@ -40,18 +44,21 @@ contains
     type(target_t), intent(out) :: target
     character(len=:), allocatable, intent(out) :: message   !! what is wrong and allowed, '' if nothing is wrong
     type(relations_t) :: relations
+    type(key_path_t) :: parts
     integer :: group, i
 
     target%path = trim(adjustl(path))
     target%unit = ''
     target%long_name = ''
-    call search_target(input, target%path, group, target%rule, target%position, message)
+    call search_target(input, target%path, group, parts, target%position, message)
     if (message /= '') return
     target%group = group
+    target%rule = parts%key_rule
+    target%in_unit = parts%unit
     target%key = target%rule - first_key(input%groups(group)%rule) + 1
     associate (rule => key_rules(target%rule))
-      target%unit = trim(rule%unit)
-      target%long_name = trim(rule%name) // ' of ' // input%label(group) // ': ' // trim(rule%help)
+      target%unit = unit_name(rule, parts%unit)
+      target%long_name = name_in_unit(rule, parts%unit) // ' of ' // input%label(group) // ': ' // trim(rule%help)
       target%is_integer = rule%value_type == an_integer
       target%allowed = rule%allowed
     end associate
@@ -67,7 +74,7 @@ contains
   subroutine set_targets(input, targets, values, message)
     type(input_t), intent(inout) :: input
     type(target_t), intent(in) :: targets(:)
-    real(wp), intent(in) :: values(:)   !! [targets], in the units of the keys; rounded if a key has integers
+    real(wp), intent(in) :: values(:)   !! [targets], in the units of the targets; rounded if a key has integers
     character(len=:), allocatable, intent(out) :: message   !! on the first number that is wrong, '' if none is
     integer :: i
 
@@ -86,33 +93,46 @@ contains
   subroutine set_value(group, target, value, message)
     type(group_t), intent(inout) :: group
     type(target_t), intent(in) :: target
-    real(wp), intent(in) :: value   !! in the unit of the key; rounded if the key has integers
+    real(wp), intent(in) :: value   !! in the unit of the target; rounded if the key has integers
     character(len=:), allocatable, intent(out) :: message
     real(wp) :: number
 
     number = value
     if (target%is_integer) number = anint(value)
     if (.not. ieee_is_finite(number)) then
-      message = target%path // ' is not a finite number; allowed: ' // allowed_text(key_rules(target%rule))
+      message = target%path // ' is not a finite number; allowed: ' // allowed_text(key_rules(target%rule), target%in_unit)
       return
     end if
-    message = ''
-    if (.not. target%is_integer) message = size_limit(number, target%allowed, key_rules(target%rule)%ascends)
-    if (message /= '' .or. is_out_of_range(number, target%allowed)) then
-      message = target%path // ' = ' // to_text(number) // ' is out of range; allowed: ' // &
-                allowed_text(key_rules(target%rule)) // message
-      return
-    end if
+    call check_value(target, number, message)
+    if (message /= '') return
     if (.not. group%values(target%key)%has_any()) call give_value(group, target)
     associate (stored => group%values(target%key))
       stored%is_given = .true.
       if (target%is_integer) then
         stored%whole_numbers(target%position) = int(number)
       else
-        stored%numbers(target%position) = number
+        stored%numbers(target%position) = in_si(number, target%in_unit)
       end if
     end associate
   end subroutine set_value
+
+  !> Whether a number is in the range of its key.
+  subroutine check_value(target, value, message)
+    type(target_t), intent(in) :: target
+    real(wp), intent(in) :: value   !! finite, in the unit of the target
+    character(len=:), allocatable, intent(out) :: message
+    real(wp) :: number
+
+    number = value
+    if (.not. target%is_integer) then
+      call convert_number(key_rules(target%rule), target%in_unit, number, message)
+    else if (is_out_of_range(number, target%allowed)) then
+      message = ' is out of range; allowed: ' // allowed_text(key_rules(target%rule))
+    else
+      message = ''
+    end if
+    if (message /= '') message = target%path // ' = ' // to_text(value) // message
+  end subroutine check_value
 
   !> Gives a value to a key that has none. Keys that exclude it lose theirs; keys that require it get their defaults.
   subroutine give_value(group, target)
@@ -175,7 +195,7 @@ contains
 
     if (key_rules(target%rule)%ascends) then
       do i = max(2, target%position), min(target%position + 1, group%values(target%key)%count())
-        if (message == '') message = ascending_message(group, target%key, i)
+        if (message == '') message = ascending_message(group, target%key, i, target%in_unit)
       end do
     else if (allocated(target%less_than)) then
       message = less_than_message(group, target%less_than)
