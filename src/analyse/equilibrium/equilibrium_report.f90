@@ -38,10 +38,11 @@ module nocdyn_equilibrium_report
 contains
 
   !> Evaluates the columns of trajectory.csv at the steady states.
-  subroutine new_equilibrium_report(formulation, equilibria, notes, self, error)
+  subroutine new_equilibrium_report(formulation, equilibria, notes, wanted, self, error)
     class(formulation_t), intent(in) :: formulation
     type(equilibrium_t), intent(in) :: equilibria(:)
     type(string_t), intent(in) :: notes(:)
+    integer, intent(in) :: wanted(:)   !! units of the columns: indices of `units`; others are those of SI
     type(equilibrium_report_t), intent(out) :: self
     type(error_t), allocatable, intent(out) :: error   !! a number of a steady state is not finite
     type(trajectory_table_t) :: table
@@ -52,7 +53,7 @@ contains
     allocate (self%equilibria, source=equilibria)
     allocate (self%notes, source=notes)
     allocate (self%coordinates, source=coordinate_names(formulation%machine))
-    table = new_trajectory_table(new_reduced(formulation%machine, .true.), t_infinity)
+    table = new_trajectory_table(new_reduced(formulation%machine, .true.), t_infinity, wanted)
     reported = steady_columns(table, formulation%machine)
     allocate (self%labels, source=selected(table%labels, reported))
     allocate (self%work_elements, source=work_element_names(formulation%machine))
@@ -100,7 +101,8 @@ contains
       associate (bank => machine%banks(b)%bank)
         do e = 1, merge(size(bank%names), 0, bank%role == role_coupling)
           if (any(bank%elastic == e)) cycle
-          is_steady = is_steady .and. [(table%labels(c)%text /= 'twist_' // bank%names(e)%text // ' [rad]', c=1, size(is_steady))]
+          is_steady = is_steady .and. [(index(table%labels(c)%text, 'twist_' // bank%names(e)%text // ' [') /= 1, &
+                                        c=1, size(is_steady))]
         end do
       end associate
     end do

@@ -11,6 +11,7 @@ module nocdyn_modes_report
   use nocdyn_table_text, only: cell, cell_width, padded, text_width
   use nocdyn_text, only: append, rounded_text, string_t, to_text
   use nocdyn_text_buffer, only: text_buffer_t
+  use nocdyn_units, only: from_si, in_si, unit_hz, unit_rpm
   implicit none (type, external)
   private
 
@@ -76,9 +77,10 @@ contains
   end subroutine new_modes_report
 
   !> Tables of the modes, and of the shapes of small machines.
-  function modes_text(file, self) result(text)
+  function modes_text(file, self, wanted) result(text)
     character(len=*), intent(in) :: file
     type(modes_report_t), intent(in) :: self
+    integer, intent(in) :: wanted(:)   !! indices of `units`: with that of rpm, frequencies are printed in it too
     character(len=:), allocatable :: text
     type(text_buffer_t) :: report
     integer :: i
@@ -87,7 +89,7 @@ contains
       call report%append_line(file // ': note: ' // self%notes(i)%text)
     end do
     call report%append_line(file // ': modes about ' // self%point)
-    call put_oscillations(self, report)
+    call put_oscillations(self, any(wanted == unit_rpm), report)
     call put_real(self, mode_rigid, report)
     call put_real(self, mode_overdamped, report)
     call put_real(self, mode_diverging, report)
@@ -98,11 +100,13 @@ contains
   end function modes_text
 
   !> Appends a line for every oscillating mode.
-  subroutine put_oscillations(self, report)
+  subroutine put_oscillations(self, has_rpm, report)
     type(modes_report_t), intent(in) :: self
+    logical, intent(in) :: has_rpm
     type(text_buffer_t), intent(inout) :: report
     integer, parameter :: number_width = 6
     integer, allocatable :: chosen(:)
+    character(len=:), allocatable :: rpm
     integer :: i, shown, width
 
     allocate (chosen, source=modes_of(self, mode_oscillating))
@@ -110,11 +114,14 @@ contains
     shown = min(size(chosen), max_modes)
     width = maxval([len('kinetic energy in'), &
                     (text_width(shares_text(self%modes(chosen(i))%kinetic, self%machine%names)), i=1, shown)])
-    call report%append_line('  mode' // cell('frequency [Hz]') // cell('undamped [Hz]') // cell('damping ratio') // &
+    rpm = ''
+    if (has_rpm) rpm = cell('[rpm]')
+    call report%append_line('  mode' // cell('frequency [Hz]') // rpm // cell('undamped [Hz]') // cell('damping ratio') // &
                             cell('decay time [s]') // '  ' // padded('kinetic energy in', width) // '  potential energy in')
     do i = 1, shown
       associate (mode => self%modes(chosen(i)))
-        call report%append_line(repeat(' ', number_width - len(to_text(i))) // to_text(i) // cell(mode%frequency()) // &
+        if (has_rpm) rpm = cell(from_si(in_si(mode%frequency(), unit_hz), unit_rpm))
+        call report%append_line(repeat(' ', number_width - len(to_text(i))) // to_text(i) // cell(mode%frequency()) // rpm // &
                                 cell(mode%undamped) // cell(mode%damping_ratio()) // time_cell(mode) // '  ' // &
                                 padded(shares_text(mode%kinetic, self%machine%names), width) // '  ' // &
                                 shares_text(mode%potential, self%elastic_names) // &

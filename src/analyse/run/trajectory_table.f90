@@ -4,9 +4,11 @@ module nocdyn_trajectory_table
   use nocdyn_formulation, only: formulation_t
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
+  use nocdyn_output_units, only: turn_labels
   use nocdyn_recorded_columns, only: new_recorded_columns, recorded_columns_t
   use nocdyn_text, only: string_t
   use nocdyn_trajectory_columns, only: column_t, list_columns
+  use nocdyn_units, only: from_si
   implicit none (type, external)
   private
 
@@ -14,6 +16,7 @@ module nocdyn_trajectory_table
 
   type, public :: trajectory_table_t
     type(string_t), allocatable :: labels(:)
+    integer, allocatable, private :: unit(:)       !! of each column: index of `units`, 0: that of SI
     type(recorded_columns_t) :: columns            !! with a copy of the formulation
     real(wp), private :: t(1) = 0.0_wp             !! [s]
     real(wp), allocatable, private :: y(:, :)      !! [1, states + quadratures]
@@ -26,13 +29,16 @@ module nocdyn_trajectory_table
 contains
 
   !> A table for the columns of a machine. The energies of the start are those at `t_start`.
-  type(trajectory_table_t) function new_trajectory_table(formulation, t_start) result(table)
+  type(trajectory_table_t) function new_trajectory_table(formulation, t_start, wanted) result(table)
     class(formulation_t), intent(in) :: formulation   !! of one lane, with work integrals
     real(wp), intent(in) :: t_start                   !! [s]
+    integer, intent(in), optional :: wanted(:)        !! units of columns: indices of `units`; absent: those of SI
     type(column_t), allocatable :: columns(:)
 
     call list_columns(formulation%machine, columns, table%labels)
     table%columns = new_recorded_columns(formulation, columns)
+    allocate (table%unit(size(columns)), source=0)
+    if (present(wanted)) call turn_labels(table%labels, wanted, table%unit)
     table%t(1) = t_start
     table%y = formulation%start()
     call table%columns%observe(table%t, table%y)
@@ -52,6 +58,7 @@ contains
     self%y(1, :) = y
     call self%columns%observe(self%t, self%y)
     call self%columns%fill_row(1, self%t, self%y, row)
+    row = from_si(row, self%unit)
   end subroutine fill
 
   !> Works and energies from the start to a time and state.

@@ -11,6 +11,7 @@ module nocdyn_transient
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
   use nocdyn_output_times, only: check_output_times, output_times
+  use nocdyn_output_units, only: output_units
   use nocdyn_run_settings, only: check_size, choose_settings
   use nocdyn_run_summary, only: check_energy_balance, check_extremes, describe_machine, extremes_t, run_summary_t, &
     start_extremes, update_extremes, widen_extremes
@@ -101,7 +102,7 @@ contains
     do i = 1, size(notes)
       call append(summary%notes, notes(i)%text)
     end do
-    call start_observer(observer, formulation, times, output, error)
+    call start_observer(observer, formulation, times, output_units(input), output, error)
     if (allocated(error)) return
     allocate (summary%labels, source=observer%table%labels)
     call solve(formulation, settings, times, observer, summary, error)
@@ -124,14 +125,15 @@ contains
     call choose_settings(input, formulation, settings, notes, error)
   end subroutine build_formulation
 
-  subroutine start_observer(observer, formulation, times, output, error)
+  subroutine start_observer(observer, formulation, times, wanted, output, error)
     type(run_observer_t), intent(inout) :: observer
     class(formulation_t), intent(in) :: formulation
     real(wp), intent(in) :: times(:)   !! of the rows [s]
+    integer, intent(in) :: wanted(:)   !! units of the columns
     class(run_output_t), target, intent(inout) :: output
     type(error_t), allocatable, intent(out) :: error   !! of the output
 
-    observer%table = new_trajectory_table(formulation, times(1))
+    observer%table = new_trajectory_table(formulation, times(1), wanted)
     observer%t_start = times(1)
     observer%t_end = times(size(times))
     observer%output => output

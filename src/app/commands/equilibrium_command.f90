@@ -10,6 +10,7 @@ module nocdyn_equilibrium_command
   use nocdyn_input_files, only: analyse_files
   use nocdyn_machine, only: machine_t
   use nocdyn_output_file, only: write_file
+  use nocdyn_output_units, only: output_units
   use nocdyn_text, only: string_t
   implicit none (type, external)
   private
@@ -40,7 +41,7 @@ contains
     call find_equilibria(machine, formulation, equilibria, notes, error)
     if (.not. allocated(error)) then
       call find_stability(formulation, equilibria)
-      call new_equilibrium_report(formulation, equilibria, notes, report, error)
+      call new_equilibrium_report(formulation, equilibria, notes, output_units(input), report, error)
     end if
     if (allocated(error)) then
       error%message = input%shown_file() // ': ' // error%message

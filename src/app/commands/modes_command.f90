@@ -10,6 +10,7 @@ module nocdyn_modes_command
   use nocdyn_modes_report, only: modes_report_t, modes_text, new_modes_report
   use nocdyn_operating_point, only: find_operating_point, operating_point_t
   use nocdyn_output_file, only: write_file
+  use nocdyn_output_units, only: output_units
   implicit none (type, external)
   private
 
@@ -44,7 +45,7 @@ contains
       if (error%code == exit_failed) error%message = input%shown_file() // ': ' // error%message
       return
     end if
-    call print_text(modes_text(input%shown_file(), report))
+    call print_text(modes_text(input%shown_file(), report, output_units(input)))
     if (folder == '') return
     call write_file(folder, 'modes.csv', modes_csv(report), error)
     if (.not. allocated(error)) call write_file(folder, 'modes.json', modes_json(input, report), error)

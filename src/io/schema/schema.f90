@@ -24,6 +24,7 @@ module nocdyn_schema
   character(len=*), parameter :: default_method = "'auto'"
   type(allowed_t), parameter :: formulations = allowed_t(words='reduced paper multiplier')
   type(allowed_t), parameter :: complements = allowed_t(words='natural scaled negated')
+  type(allowed_t), parameter :: output_units = allowed_t(words='rpm Hz deg')
   type(allowed_t), parameter :: starts = allowed_t(words='given projected')
 
   type(group_rule_t), parameter, public :: group_rules(*) = [ &
@@ -73,6 +74,8 @@ module nocdyn_schema
       'time from row to row'), &
     key_rule_t('output',     'points',          an_integer,     1, '',            '1001',      from_2, &
       'number of rows from t_start to t_end'), &
+    key_rule_t('output',     'units',           a_word,         any_number, '',   unset,       output_units, &
+      'of speeds (rpm, Hz), angles (deg) and frequencies in results; those of SI if not given', fewest=1), &
     key_rule_t('output',     'directory',       a_folder,       1, '',            "''",        anything, &
       "folder of the results; '' means results/ and the name of the input file")]
 
