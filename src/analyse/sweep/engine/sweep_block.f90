@@ -16,6 +16,7 @@ module nocdyn_sweep_block
   use nocdyn_sweep_chunk, only: allocate_chunk, chunk_t, status_done, status_failed, status_refused
   use nocdyn_sweep_plan, only: sweep_plan_t
   use nocdyn_system, only: system_t
+  use nocdyn_units, only: from_si
   use nocdyn_variant_machines, only: new_variant_machines, variant_machines_t, variant_needs_own_block, variant_refused
   use omp_lib, only: omp_test_lock, omp_unset_lock
   implicit none (type, external)
@@ -183,6 +184,9 @@ contains
     if (solver_status%code(lane) == integration_done) then
       chunk%status(index) = status_done
       call observer%results(lane, chunk%results(:, index))
+      do i = 1, size(statistics)
+        chunk%results(i, index) = from_si(chunk%results(i, index), statistics(i)%in_unit)
+      end do
       i = findloc(is_finite(chunk%results(:, index)), .false., dim=1)
       if (i == 0) return
       chunk%status(index) = status_failed

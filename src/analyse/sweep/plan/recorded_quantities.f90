@@ -3,6 +3,7 @@ module nocdyn_recorded_quantities
   use nocdyn_input, only: input_t
   use nocdyn_kinds, only: wp
   use nocdyn_diagnostics, only: diagnostics_t
+  use nocdyn_output_units, only: match_column, output_units
   use nocdyn_statistics, only: new_statistic, statistic_names, statistic_t
   use nocdyn_text, only: append, joined, nearest_word, quoted, string_t, to_text
   implicit none (type, external)
@@ -90,9 +91,9 @@ contains
     type(statistic_t) :: statistic
     type(string_t), allocatable :: words(:)
     real(wp), allocatable :: band, from   ! of the group, if it has them
-    integer :: column, i, k
+    integer :: column, i, k, unit
 
-    call find_column(input, record, labels, column, diagnostics)
+    call find_column(input, record, labels, column, diagnostics, unit)
     call check_from(input, record, span, diagnostics)
     if (column == 0) return
     associate (group => input%groups(record))
@@ -101,7 +102,7 @@ contains
       if (group%has_value('band')) band = group%number('band')
       do i = 1, size(words)
         k = findloc(statistic_names == words(i)%text, .true., dim=1)
-        statistic = new_statistic(labels, column, k, span%t_start, from, band)
+        statistic = new_statistic(labels, column, k, span%t_start, from, band, unit)
         if (any([(statistics(k)%label == statistic%label, k=1, size(statistics))])) then
           call input%report(record, 'statistic', quoted(statistic%label) // ' is recorded already; allowed: once', diagnostics)
         else
@@ -111,20 +112,29 @@ contains
     end associate
   end subroutine add_statistics
 
-  !> The column of the quantity of a &record, with or without its unit; 0 if there is none.
-  subroutine find_column(input, record, labels, column, diagnostics)
+  !> The column of the quantity of a &record, with or without its unit; 0 if there is none. The unit may be one of the field;
+  !> without one it is that of trajectory.csv.
+  subroutine find_column(input, record, labels, column, diagnostics, unit)
     type(input_t), intent(in) :: input
     integer, intent(in) :: record
     type(string_t), intent(in) :: labels(:)
     integer, intent(out) :: column
     type(diagnostics_t), intent(inout) :: diagnostics
+    integer, intent(out), optional :: unit   !! of its statistics: index of `units`, 0: that of SI
     character(len=:), allocatable :: hint, quantity
+    integer, allocatable :: wanted(:)
+    integer :: quantity_unit
+    logical :: is_column
     type(string_t) :: names(size(labels))   ! labels without units
 
+    allocate (wanted, source=output_units(input))
     quantity = trim(adjustl(input%groups(record)%text('quantity')))
     do column = 1, size(labels)
       names(column)%text = labels(column)%text(:index(labels(column)%text, ' [', back=.true.) - 1)
-      if (quantity == labels(column)%text .or. quantity == names(column)%text) return
+      call match_column(labels(column)%text, quantity, wanted, is_column, quantity_unit)
+      if (.not. is_column) cycle
+      if (present(unit)) unit = quantity_unit
+      return
     end do
     column = 0
     hint = near_match(quantity, names)

@@ -2,6 +2,7 @@
 module nocdyn_statistics
   use nocdyn_kinds, only: wp
   use nocdyn_text, only: string_t, to_text
+  use nocdyn_units, only: units
   implicit none (type, external)
   private
 
@@ -33,18 +34,20 @@ module nocdyn_statistics
     real(wp) :: band = default_band                  !! for settling_time only
     character(len=:), allocatable :: label           !! e.g. 'moment_shaft_max_abs_from_2'
     character(len=:), allocatable :: unit            !! e.g. 'N m'
+    integer :: in_unit = 0                           !! the same: index of `units`, 0: that of SI
     character(len=:), allocatable :: long_name       !! a description
   end type statistic_t
 
 contains
 
   !> The statistic of a column with a label such as 'moment_shaft [N m]'.
-  type(statistic_t) function new_statistic(labels, column, kind, t_start, from, band) result(self)
+  type(statistic_t) function new_statistic(labels, column, kind, t_start, from, band, unit) result(self)
     type(string_t), intent(in) :: labels(:)     !! of the trajectory table
     integer, intent(in) :: column, kind
     real(wp), intent(in) :: t_start             !! [s]
     real(wp), intent(in), optional :: from      !! [s]; t_start if absent
     real(wp), intent(in), optional :: band      !! of a settling time; `default_band` if absent
+    integer, intent(in), optional :: unit       !! of its values: index of `units`; absent: that of SI
     integer :: bracket
 
     self%quantity = labels(column)%text
@@ -58,7 +61,12 @@ contains
       self%unit = text(bracket + 2:len(text) - 1)
       self%long_name = text(:bracket - 1) // ', ' // trim(descriptions(kind))
     end associate
-    if (kind == statistic_time_of_max .or. kind == statistic_settling_time) self%unit = 's'
+    if (kind == statistic_time_of_max .or. kind == statistic_settling_time) then
+      self%unit = 's'
+    else if (present(unit)) then
+      self%in_unit = unit
+      if (unit > 0) self%unit = trim(units(unit)%name)
+    end if
     if (present(from)) then
       self%from = from
       self%label = self%label // '_from_' // to_text(from)
