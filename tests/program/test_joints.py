@@ -12,7 +12,8 @@ FOUR = "".join(f"&body name = 'body{i}' inertia = 1.0 /\n" for i in range(1, 5))
 def test_check_tells_what_the_joints_allow(nocdyn):
     outcome = nocdyn("check", JOINTS)
     assert (outcome.returncode, outcome.stderr) == (0, "")
-    first, *lines = outcome.stdout.splitlines()
+    report, speeds = outcome.stdout.split("  speeds at the start, and those given", 1)
+    first, *lines = report.splitlines()
     assert "7 bodies, 2 gears, 2 planetary sets, 1 differential, 1 constraint, 2 couplings" in first
     assert lines == [
         "  3 degrees of freedom",
@@ -30,6 +31,7 @@ def test_check_tells_what_the_joints_allow(nocdyn):
         lines[-1],
     ]
     assert lines[-1].startswith("  note: the start speeds were projected onto the constraints: impulse ")
+    assert [line.split()[0] for line in speeds.splitlines()[1:]] == ["sun", "ring", "carrier", "output", "left", "right", "pump"]
 
 
 def test_members_of_planetary_sets_and_differentials_have_columns_of_their_own(nocdyn):

@@ -6,6 +6,7 @@ module nocdyn_check_command
   use nocdyn_errors, only: error_t
   use nocdyn_input, only: input_t
   use nocdyn_input_files, only: analyse_files
+  use nocdyn_input_speeds, only: given_speeds, named_speeds_t
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
   use nocdyn_machine_report, only: machine_report
@@ -14,7 +15,11 @@ module nocdyn_check_command
   use nocdyn_run_files, only: check_rows, check_variants
   use nocdyn_run_settings, only: check_method
   use nocdyn_sweep_plan, only: has_sweep, make_plan, sweep_plan_t
+  use nocdyn_table_text, only: append_table
+  use nocdyn_text, only: selected, string_t
+  use nocdyn_text_buffer, only: text_buffer_t
   use nocdyn_trajectory_columns, only: column_count, table_bytes
+  use nocdyn_units, only: from_si, unit_hz, unit_rpm
   implicit none (type, external)
   private
 
@@ -58,7 +63,36 @@ contains
       call check_rows(input%location(input%position('output')), row_count(input), column_count(machine), &
                       result_folder(arguments, input), error)
     end if
-    call print_text(machine_report(input%shown_file(), machine) // sizes)
+    call print_text(machine_report(input%shown_file(), machine) // speed_table(input, machine) // sizes)
   end subroutine check
+
+  !> The start speeds and the other speeds and frequencies of an input, also in rpm and Hz, on lines of their own; zeros are left
+  !> out.
+  function speed_table(input, machine) result(text)
+    type(input_t), intent(in) :: input
+    type(machine_t), intent(in) :: machine
+    character(len=:), allocatable :: text
+    character(len=*), parameter :: headings(*) = [character(len=7) :: '[rad/s]', '[rpm]', '[Hz]']
+    type(text_buffer_t) :: report
+    type(named_speeds_t) :: given
+    type(string_t), allocatable :: labels(:)
+    integer, allocatable :: moving(:)
+    real(wp), allocatable :: speeds(:)   ! [rad/s]
+    integer :: b
+
+    allocate (moving, source=pack([(b, b=1, machine%bodies)], abs(machine%start_speed(1, :)) > 0))
+    given = given_speeds(input)
+    allocate (speeds, source=[machine%start_speed(1, moving), given%speeds])
+    allocate (labels(size(speeds)))
+    labels(:size(moving)) = selected(machine%names, moving)
+    labels(size(moving) + 1:) = given%labels
+    text = ''
+    if (size(speeds) == 0) return
+    call append_table(report, labels, &
+                      reshape([speeds, from_si(speeds, unit_rpm), from_si(speeds, unit_hz)], [size(speeds), 3]), &
+                      'speeds at the start, and those given', headings, 2, 'more')
+    text = report%text()
+    text = new_line('a') // text(:len(text) - 1)
+  end function speed_table
 
 end module nocdyn_check_command
