@@ -38,7 +38,7 @@ class Family:
 
 
 def is_frequency(key: Variable) -> bool:
-    return key.key == "frequency" and key.unit == "rad/s"
+    return (key.key, key.unit) in {("frequency", "rad/s"), ("frequency_hz", "Hz")}
 
 
 def family_of(sweep: Sweep) -> Family | None:
@@ -94,6 +94,7 @@ def _mark_peak(axes: Axes, family: Family, result: Variable, curve: tuple[np.nda
     x, y = curve
     peak, word = (np.nanargmin(y), "smallest") if result.is_minimum else (np.nanargmax(y), "largest")
     height, place = f"{y[peak]:.5g} {result.shown_unit}".rstrip(), f"{x[peak]:.5g} {family.key.unit}"
+    hertz = "" if family.key.unit == "Hz" else f" = {x[peak] / TURN:.4g} Hz"
     if family.parameter is not None:
         axes.plot(x[peak], y[peak], "o", color="black", markersize=3.5, zorder=3)
         return f"{name}: {word} {height} at {place}"
@@ -105,7 +106,7 @@ def _mark_peak(axes: Axes, family: Family, result: Variable, curve: tuple[np.nda
         color="black",
         markersize=5,
         zorder=3,
-        label=plain(f"{word}: {height}\nat {place} = {x[peak] / TURN:.4g} Hz"),
+        label=plain(f"{word}: {height}\nat {place}{hertz}"),
     )
     return name
 

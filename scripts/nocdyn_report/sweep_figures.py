@@ -78,7 +78,7 @@ def draw_curves(sweep: Sweep, results: Sequence[Variable], family: Family) -> Fi
     for axes, result in zip(panels, results):
         draw_family(axes, sweep, family, result)
     panels[-1].set_xlabel(plain(family.key.label))
-    if family.is_resonance:
+    if family.is_resonance and family.key.unit != "Hz":
         add_hertz(panels[0])
     add_note(figure, explain_marks(family))
     explain_not_done(figure, sweep, **TICK)

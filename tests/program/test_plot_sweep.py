@@ -14,7 +14,8 @@ SIGNATURES = {"png": b"\x89PNG", "svg": b"<?xml", "pdf": b"%PDF"}
 
 pytestmark = pytest.mark.filterwarnings("error::UserWarning")  # as Matplotlib's of a layout that does not fit
 DONE, REFUSED, FAILED = 0, 1, 2
-UNITS = {"viscous": "N m s/rad", "cubic_stiffness": "N m/rad3", "stiffness": "N m/rad", "frequency": "rad/s", "inertia": "kg m2"}
+UNITS = {"viscous": "N m s/rad", "cubic_stiffness": "N m/rad3", "stiffness": "N m/rad", "inertia": "kg m2"}
+UNITS |= {"frequency": "rad/s", "frequency_hz": "Hz"}
 
 LOAD, CUBIC = "load.work.viscous", "coupling.coupling.cubic_stiffness"
 MOMENT, SPEED = "moment_coupling_max_abs", "omega_motor_final"
@@ -231,6 +232,15 @@ def test_frequency_alone_gives_a_resonance_curve_with_its_peak(tmp_path, monkeyp
     assert "excitation.shaker.frequency [rad/s]" in text
     assert text.count("largest: ") == 1, "the latest of times is no peak"
     assert "smallest: -10 N m" in text and text.count("at 6.4 rad/s = 1.019 Hz") == 2
+
+
+def test_a_frequency_in_hz_gives_a_resonance_curve_with_one_scale(tmp_path, monkeypatch, capsys):
+    frequency = np.linspace(0.5, 12.0, 116)
+    moment = 1.0 / np.abs(6.4 + 0.1j - frequency)
+    folder = write_sweep(tmp_path, "grid", {"excitation.shaker.frequency_hz": frequency}, {MOMENT: moment})
+    assert draw(monkeypatch, capsys, folder) == ["resonance"]
+    text = text_of(folder, "resonance")
+    assert "at 6.4 Hz" in text and "6.4 Hz =" not in text and "frequency [Hz]" not in text
 
 
 def test_another_number_alone_gives_curves(tmp_path, monkeypatch, capsys):
