@@ -20,6 +20,15 @@ EXAMPLES = Path(__file__).parents[2] / "input/examples"
 DATA = Path(__file__).parent / "data"
 
 
+UNITS = {"_rpm": np.pi / 30, "_hz": 2 * np.pi, "_deg": np.pi / 180}
+
+
+def in_si(group):
+    """A group with the keys in rad/s and rad of those in other units beside them."""
+    si = {key.removesuffix(end): value * one for end, one in UNITS.items() for key, value in group.items() if key.endswith(end)}
+    return group | si
+
+
 class Machine:
     """The groups of an input: machine.body["motor"]["inertia"]."""
 
@@ -28,7 +37,7 @@ class Machine:
         self.kinds = {}
         for kind, groups in f90nml.read(path).items():
             for group in groups if isinstance(groups, list) else [groups]:
-                self.kinds.setdefault(kind, {})[group.get("name", "")] = group
+                self.kinds.setdefault(kind, {})[group.get("name", "")] = in_si(group)
 
     def __getattr__(self, kind):
         return self.kinds[kind]

@@ -1,5 +1,6 @@
 """The inputs stay real namelists: Fortran's own read, f90nml and nocdyn find the same values in them."""
 
+import math
 import os
 import shutil
 import subprocess
@@ -10,6 +11,14 @@ from conftest import DATA, SOURCE
 
 INPUTS = sorted((SOURCE / "input").rglob("*.nml")) + sorted(DATA.glob("*.nml"))
 WITHOUT_TABLE_FILES = [path for path in INPUTS if "table_file" not in path.read_text()]
+
+
+UNITS = {"_rpm": math.pi / 30, "_hz": 2 * math.pi, "_deg": math.pi / 180}
+
+
+def unit_of(key):
+    """The ending of a key that is not in SI."""
+    return next((unit for unit in UNITS if key.endswith(unit)), "")
 
 
 def names(path):
@@ -62,6 +71,10 @@ def test_f90nml_reads_the_same_values(nocdyn, path):
     for (_, values), (_, all_values) in zip(given, used):
         # in place of a table's file stand its values
         values.pop("table_file", None)
+        # in place of a number in a unit of the field stands that in SI
+        values = {
+            key.removesuffix(unit_of(key)): value * UNITS[unit_of(key)] for key, value in values.items() if unit_of(key)
+        } | {key: value for key, value in values.items() if not unit_of(key)}
         assert values == {key: all_values[key] for key in values}
 
 

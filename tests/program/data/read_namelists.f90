@@ -7,6 +7,7 @@ program read_namelists
   integer, parameter :: most_bodies = 8       ! in a list
   integer, parameter :: most_numbers = 16     ! in a list
   real(wp), parameter :: not_given = -huge(1.0_wp)
+  real(wp), parameter :: hertz = 2.0_wp * acos(-1.0_wp), rpm = hertz / 60.0_wp   ! [rad/s]
   character(len=256) :: file
   integer :: unit
 
@@ -158,12 +159,12 @@ contains
   subroutine read_motors()
     character(len=64) :: name, body, kind, interpolation, extrapolation
     real(wp) :: a, b, c, torque, breakdown_torque, breakdown_slip, synchronous_speed, voltage, resistance, flux_constant
-    real(wp) :: inductance, governor_speed, governor_gain, governor_time, governor_start
+    real(wp) :: synchronous_speed_rpm, inductance, governor_speed, governor_gain, governor_time, governor_start
     real(wp), dimension(most_numbers) :: table_speed, table_torque
     integer :: status
     namelist /motor/ name, body, kind, a, b, c, torque, table_speed, table_torque, interpolation, extrapolation, &
-      breakdown_torque, breakdown_slip, synchronous_speed, voltage, resistance, flux_constant, inductance, governor_speed, &
-      governor_gain, governor_time, governor_start
+      breakdown_torque, breakdown_slip, synchronous_speed, synchronous_speed_rpm, voltage, resistance, flux_constant, inductance, &
+      governor_speed, governor_gain, governor_time, governor_start
 
     rewind (unit)
     do
@@ -177,6 +178,7 @@ contains
       breakdown_torque = not_given
       breakdown_slip = not_given
       synchronous_speed = not_given
+      synchronous_speed_rpm = not_given
       voltage = not_given
       resistance = not_given
       flux_constant = not_given
@@ -190,6 +192,7 @@ contains
       read (unit, nml=motor, iostat=status)
       if (is_iostat_end(status)) exit
       if (status /= 0) error stop 'motor'
+      if (synchronous_speed_rpm > not_given) synchronous_speed = synchronous_speed_rpm * rpm
       print '(*(g0, 1x))', 'motor', trim(name), trim(body), trim(kind), a, b, c, torque, table_speed, table_torque, &
         trim(interpolation), trim(extrapolation), breakdown_torque, breakdown_slip, synchronous_speed, voltage, resistance, &
         flux_constant, inductance, governor_speed, governor_gain, governor_time, governor_start
@@ -224,10 +227,10 @@ contains
 
   subroutine read_excitations()
     character(len=64) :: name, body, kind, interpolation
-    real(wp) :: amplitude, frequency, phase, time, duration
+    real(wp) :: amplitude, frequency, frequency_hz, phase, time, duration
     real(wp), dimension(most_numbers) :: orders, amplitudes, phases, table_time, table_torque
     integer :: pole_pairs, status
-    namelist /excitation/ name, body, kind, amplitude, frequency, phase, orders, amplitudes, phases, table_time, &
+    namelist /excitation/ name, body, kind, amplitude, frequency, frequency_hz, phase, orders, amplitudes, phases, table_time, &
       table_torque, interpolation, time, duration, pole_pairs
 
     rewind (unit)
@@ -235,6 +238,7 @@ contains
       kind = 'harmonic'
       amplitude = not_given
       frequency = not_given
+      frequency_hz = not_given
       phase = 0.0_wp
       orders = not_given
       amplitudes = not_given
@@ -248,6 +252,7 @@ contains
       read (unit, nml=excitation, iostat=status)
       if (is_iostat_end(status)) exit
       if (status /= 0) error stop 'excitation'
+      if (frequency_hz > not_given) frequency = frequency_hz * hertz
       print '(*(g0, 1x))', 'excitation', trim(name), trim(body), trim(kind), amplitude, frequency, phase, orders, amplitudes, &
         phases, table_time, table_torque, trim(interpolation), time, duration, pole_pairs
     end do
