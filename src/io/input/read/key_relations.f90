@@ -199,7 +199,8 @@ contains
     integer :: status
 
     is_zero = .false.
-    if (key%is_malformed .or. key%count_given() /= 1 .or. size(key%values) /= 1) return
+    if (key%is_malformed .or. key%count_given() /= 1) return
+    if (size(key%values) /= 1) return
     call read_real(key%values(1)%text, value, status)
     is_zero = status == literal_ok .and. abs(value) <= 0.0_wp
   end function is_zero
