@@ -11,7 +11,7 @@ module nocdyn_group_reader
   use nocdyn_schema_relations, only: relations_t
   use nocdyn_schema_rules, only: a_name, equal_lengths
   use nocdyn_schema_text, only: key_suggestion, similar_keys
-  use nocdyn_schema_units, only: find_key
+  use nocdyn_schema_units, only: find_key, name_in_unit
   use nocdyn_table_file, only: read_table_file
   use nocdyn_text, only: lower_case, shortened, string_t
   use nocdyn_text_file, only: path_in
@@ -75,9 +75,9 @@ contains
         end if
         call raw%keys(raw%position(key))%assign(namelist, assignment, unit, message)
         if (message == '') cycle
-        key = key_without_equals(namelist, assignment, raw%rule)
+        call find_key_without_equals(namelist, assignment, raw%rule, key, unit)
         if (key > 0) then
-          message = message // "; is '=' missing after " // trim(key_rules(key)%name) // '?'
+          message = message // "; is '=' missing after " // name_in_unit(key_rules(key), unit) // '?'
           raw%keys(raw%position(key))%may_be_missing = .true.
         end if
         call diagnostics%add(assignment%line, raw%index, message)
@@ -109,20 +109,23 @@ contains
                          trim(group_rules(raw%rule)%name) // hint)
   end subroutine refuse_key
 
-  !> Row of the first key among the values of an assignment, 0 if there is none: its equals sign was probably forgotten.
-  integer function key_without_equals(namelist, assignment, rule) result(key)
+  !> The first key among the values of an assignment: its equals sign was probably forgotten.
+  subroutine find_key_without_equals(namelist, assignment, rule, key, unit)
     type(namelist_t), intent(in) :: namelist
     type(assignment_t), intent(in) :: assignment
     integer, intent(in) :: rule   !! row of `group_rules`
-    integer :: i, unit
+    integer, intent(out) :: key   !! row of `key_rules`, 0 if there is none
+    integer, intent(out) :: unit  !! in which the key is written
+    integer :: i
 
     key = 0
+    unit = 0
     do i = assignment%first_item, assignment%last_item
       if (namelist%items(i)%is_quoted .or. namelist%items(i)%is_null) cycle
       call find_key(rule, lower_case(namelist%item_text(namelist%items(i))), key, unit)
       if (key > 0) return
     end do
-  end function key_without_equals
+  end subroutine find_key_without_equals
 
   !> The name that the file gives to the element, '' if none.
   pure function name_of(raw) result(name)
