@@ -158,13 +158,13 @@ contains
 
   subroutine read_motors()
     character(len=64) :: name, body, kind, interpolation, extrapolation
-    real(wp) :: a, b, c, torque, breakdown_torque, breakdown_slip, synchronous_speed, voltage, resistance, flux_constant
-    real(wp) :: synchronous_speed_rpm, inductance, governor_speed, governor_gain, governor_time, governor_start
+    real(wp) :: a, b, c, torque, breakdown_torque, breakdown_slip, synchronous_speed, synchronous_speed_rpm, voltage, resistance
+    real(wp) :: flux_constant, inductance, governor_speed, governor_gain, governor_time, governor_start
     real(wp), dimension(most_numbers) :: table_speed, table_torque
     integer :: status
     namelist /motor/ name, body, kind, a, b, c, torque, table_speed, table_torque, interpolation, extrapolation, &
-      breakdown_torque, breakdown_slip, synchronous_speed, synchronous_speed_rpm, voltage, resistance, flux_constant, inductance, &
-      governor_speed, governor_gain, governor_time, governor_start
+      breakdown_torque, breakdown_slip, synchronous_speed, synchronous_speed_rpm, voltage, resistance, flux_constant, &
+      inductance, governor_speed, governor_gain, governor_time, governor_start
 
     rewind (unit)
     do
@@ -192,10 +192,9 @@ contains
       read (unit, nml=motor, iostat=status)
       if (is_iostat_end(status)) exit
       if (status /= 0) error stop 'motor'
-      if (synchronous_speed_rpm > not_given) synchronous_speed = synchronous_speed_rpm * rpm
       print '(*(g0, 1x))', 'motor', trim(name), trim(body), trim(kind), a, b, c, torque, table_speed, table_torque, &
-        trim(interpolation), trim(extrapolation), breakdown_torque, breakdown_slip, synchronous_speed, voltage, resistance, &
-        flux_constant, inductance, governor_speed, governor_gain, governor_time, governor_start
+        trim(interpolation), trim(extrapolation), breakdown_torque, breakdown_slip, voltage, resistance, flux_constant, inductance, &
+        max(synchronous_speed, rpm * synchronous_speed_rpm), governor_speed, governor_gain, governor_time, governor_start
     end do
   end subroutine read_motors
 
