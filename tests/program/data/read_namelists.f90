@@ -7,7 +7,7 @@ program read_namelists
   integer, parameter :: most_bodies = 8       ! in a list
   integer, parameter :: most_numbers = 16     ! in a list
   real(wp), parameter :: not_given = -huge(1.0_wp)
-  real(wp), parameter :: hertz = 2.0_wp * acos(-1.0_wp), rpm = hertz / 60.0_wp   ! [rad/s]
+  real(wp), parameter :: hertz = 2.0_wp * acos(-1.0_wp)   ! [rad/s]
   character(len=256) :: file
   integer :: unit
 
@@ -158,13 +158,13 @@ contains
 
   subroutine read_motors()
     character(len=64) :: name, body, kind, interpolation, extrapolation
-    real(wp) :: a, b, c, torque, breakdown_torque, breakdown_slip, synchronous_speed, synchronous_speed_rpm, voltage, resistance
-    real(wp) :: flux_constant, inductance, governor_speed, governor_gain, governor_time, governor_start
+    real(wp) :: a, b, c, torque, breakdown_torque, breakdown_slip, synchronous_speed, voltage, resistance, flux_constant
+    real(wp) :: inductance, governor_speed, governor_gain, governor_time, governor_start
     real(wp), dimension(most_numbers) :: table_speed, table_torque
     integer :: status
     namelist /motor/ name, body, kind, a, b, c, torque, table_speed, table_torque, interpolation, extrapolation, &
-      breakdown_torque, breakdown_slip, synchronous_speed, synchronous_speed_rpm, voltage, resistance, flux_constant, &
-      inductance, governor_speed, governor_gain, governor_time, governor_start
+      breakdown_torque, breakdown_slip, synchronous_speed, voltage, resistance, flux_constant, inductance, governor_speed, &
+      governor_gain, governor_time, governor_start
 
     rewind (unit)
     do
@@ -178,7 +178,6 @@ contains
       breakdown_torque = not_given
       breakdown_slip = not_given
       synchronous_speed = not_given
-      synchronous_speed_rpm = not_given
       voltage = not_given
       resistance = not_given
       flux_constant = not_given
@@ -193,8 +192,8 @@ contains
       if (is_iostat_end(status)) exit
       if (status /= 0) error stop 'motor'
       print '(*(g0, 1x))', 'motor', trim(name), trim(body), trim(kind), a, b, c, torque, table_speed, table_torque, &
-        trim(interpolation), trim(extrapolation), breakdown_torque, breakdown_slip, voltage, resistance, flux_constant, inductance, &
-        max(synchronous_speed, rpm * synchronous_speed_rpm), governor_speed, governor_gain, governor_time, governor_start
+        trim(interpolation), trim(extrapolation), breakdown_torque, breakdown_slip, synchronous_speed, voltage, resistance, &
+        flux_constant, inductance, governor_speed, governor_gain, governor_time, governor_start
     end do
   end subroutine read_motors
 
