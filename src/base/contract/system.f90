@@ -38,6 +38,7 @@ module nocdyn_system
     procedure(jacobian_interface), deferred :: jacobian
     procedure :: jacobian_pattern
     procedure :: component_name
+    procedure :: prepare_integration
     procedure :: series_obstacle
     procedure :: prepare_series
     procedure :: series
@@ -94,6 +95,13 @@ contains
     name = 'component ' // to_text(index)
     if (index > self%states) name = 'quadrature ' // to_text(index - self%states)
   end function component_name
+
+  !> Called once before an integration, with its tolerances and its end; by default it does nothing.
+  subroutine prepare_integration(self, rtol, atol, t_end)
+    class(system_t), intent(inout) :: self
+    real(wp), intent(in) :: rtol, atol   !! positive
+    real(wp), intent(in) :: t_end        !! [s]
+  end subroutine prepare_integration
 
   !> The reason why the solution has no Taylor series, e.g. "coupling 'x' has no Taylor series"; empty if it has one. No function,
   !> because threads call it (`string_t` says more).

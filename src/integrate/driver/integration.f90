@@ -80,6 +80,7 @@ contains
 
     if (size(times) < 2) error stop 'nocdyn_integration: times needs a start and an end'
     if (.not. all(times(2:) > times(:size(times) - 1))) error stop 'nocdyn_integration: times must ascend'
+    call system%prepare_integration(settings%rtol, settings%atol, times(size(times)))
     call allocate_solver_status(solver_status, system%lanes)
     if (stepper%needs_series) call system%prepare_series(stepper%order)
     call prepare_integrator(integrator, stepper, system, settings, times, observer)
