@@ -1,6 +1,7 @@
-"""Draws the results of any run: motion, phase planes, torques, energy."""
+"""Draws the results of any run: motion, phase planes, torques, energy; or the columns that --columns names."""
 
 import argparse
+import math
 import sys
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -10,57 +11,98 @@ from matplotlib import pyplot
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from .phase_planes import draw_phase_planes
-from .results import Column, Results, ResultsError, read_results
-from .style import COLOURS, WIDTH, add_format_option, add_title, draw_lines, save, saved
+from .multiples import MOST_PANELS, draw_multiples
+from .phase_planes import MOST_PLANES, draw_phase_planes
+from .results import Column, Header, Results, ResultsError, read_results
+from .selection import matching, widest
+from .style import COLOURS, PIXELS, WIDTH, add_format_option, add_title, draw_lines, save, saved
+from .thinning import thin
 
-MOTION = {"omega": "speed", "twist": "twist"}
-TORQUES = {
+CAPTIONS = {
+    "phi": "angle",
+    "omega": "speed",
+    "twist": "twist",
     "torque": "motors, loads,\nexcitations",
+    "shaft": "shaft moment\non the first body",
     "moment": "elastic moment\non the first body",
     "damping": "damping moment\non the first body",
     "throttle": "throttle",
     "current": "current",
     "reaction": "reaction of\ngears, joints",
+    "energy": "energy",
+    "residual": "energy residual",
 }
+MOTION = ("omega", "twist")
+TORQUES = ("torque", "shaft", "moment", "damping", "throttle", "current", "reaction")
+ENERGIES = {
+    "kinetic_energy [J]": "kinetic",
+    "elastic_energy [J]": "elastic",
+    "work_in [J]": "work put in",
+    "work_out [J]": "work taken out",
+}
+RESIDUAL = "energy_residual [J]"
 SMOOTH_ROWS = 12  # of an oscillation, with which its phase plane looks round
 FEWEST_TURNS = 20  # turning points that make an oscillation
-ENERGIES = {
-    "kinetic": "kinetic_energy [J]",
-    "elastic": "elastic_energy [J]",
-    "work put in": "work_in [J]",
-    "work taken out": "work_out [J]",
-}
+
+Figures = dict[str, Figure]
 
 
-def draw_over_time(results: Results, captions: dict[str, str]) -> Figure | None:
-    """One panel over time for each quantity and unit that the run has; None if it has none of them."""
-    panels = [(captions[quantity], columns) for quantity in captions for columns in _by_unit(results.columns(quantity))]
+def draw_over_time(results: Results, name: str, labels: Sequence[str]) -> Figures:
+    """A figure with a panel for each quantity and unit, and figures with a panel for each column where these are many."""
+    groups = _by_quantity([results.column(label) for label in labels])
+    few = [columns for columns in groups if len(columns) <= len(COLOURS)]
+    figures = {name: _draw_panels(results, few)} if few else {}
+    for columns in groups:
+        for start in range(0, len(columns) if columns not in few else 0, MOST_PANELS):
+            page = columns[start : start + MOST_PANELS]
+            figure = draw_multiples(results.time, page, CAPTIONS[page[0].quantity])
+            _add_title(figure, results, _left_out(results.header, len(columns), page[0].quantity))
+            figures[_unused(page[0].quantity, figures)] = figure
+    return figures
+
+
+def _by_quantity(columns: list[Column]) -> list[list[Column]]:
+    """By the unit too: tooth forces [N] and gear moments [N m] do not share an axis."""
+    groups: dict[tuple[str, str], list[Column]] = {}
+    for column in columns:
+        groups.setdefault((column.quantity, column.unit), []).append(column)
+    return list(groups.values())
+
+
+def _unused(name: str, figures: Figures) -> str:
+    """The name, with a number from the second figure on."""
+    pages = sum(other == name or other.startswith(f"{name}_") for other in figures)
+    return f"{name}_{pages + 1}" if pages else name
+
+
+def _draw_panels(results: Results, groups: list[list[Column]]) -> Figure:
+    figure, grid = pyplot.subplots(len(groups), 1, squeeze=False, sharex=True, figsize=(WIDTH, 2.4 * len(groups) + 0.8))
+    for axes, columns in zip(grid.flat, groups):
+        draw_lines(axes, [column.element for column in columns], [(results.time, column.values) for column in columns])
+        axes.set_ylabel(f"{CAPTIONS[columns[0].quantity]} [{columns[0].unit}]")
+    _finish_time_axis(grid.flat[-1], results)
+    _add_title(figure, results)
+    return figure
+
+
+def draw_energy(results: Results) -> Figure | None:
+    """Energies and works, and below them the energy balance error; what the trajectory has of them."""
+    panels = [[label for label in labels if label in results.table] for labels in (ENERGIES, [RESIDUAL])]
+    panels = [labels for labels in panels if labels]
     if not panels:
         return None
-    figure, grid = pyplot.subplots(len(panels), 1, squeeze=False, sharex=True, figsize=(WIDTH, 2.4 * len(panels) + 0.8))
-    for axes, (caption, columns) in zip(grid.flat, panels):
-        draw_lines(axes, [column.element for column in columns], [(results.time, column.values) for column in columns])
-        axes.set_ylabel(f"{caption} [{columns[0].unit}]")
+    heights = [1 if RESIDUAL in labels else 2 for labels in panels]
+    size = (WIDTH, 1.7 * sum(heights) + 0.9)
+    figure, grid = pyplot.subplots(len(panels), 1, squeeze=False, sharex=True, figsize=size, height_ratios=heights)
+    for axes, labels in zip(grid.flat, panels):
+        if RESIDUAL in labels:
+            axes.plot(*thin(results.time, results.values(RESIDUAL), PIXELS), color=COLOURS[-1], linewidth=0.8)
+        else:
+            draw_lines(axes, [ENERGIES[label] for label in labels], [(results.time, results.values(label)) for label in labels])
+        axes.set_ylabel("energy residual [J]" if RESIDUAL in labels else "energy [J]")
     _finish_time_axis(grid.flat[-1], results)
+    _add_title(figure, results)
     return figure
-
-
-def draw_energy(results: Results) -> Figure:
-    """Energies and works, and below them the energy balance error."""
-    figure, (energies, residual) = pyplot.subplots(2, 1, sharex=True, figsize=(WIDTH, 6.0), height_ratios=(2, 1))
-    draw_lines(energies, list(ENERGIES), [(results.time, results.values(label)) for label in ENERGIES.values()])
-    energies.set_ylabel("energy [J]")
-    residual.plot(results.time, results.values("energy_residual [J]"), color=COLOURS[-1], linewidth=0.8)
-    residual.set_ylabel("energy residual [J]")
-    _finish_time_axis(residual, results)
-    return figure
-
-
-def _by_unit(columns: list[Column]) -> Iterator[list[Column]]:
-    """Tooth forces [N] and gear moments [N m] do not share an axis."""
-    for unit in dict.fromkeys(column.unit for column in columns):
-        yield [column for column in columns if column.unit == unit]
 
 
 def _finish_time_axis(axes: Axes, results: Results) -> None:
@@ -68,19 +110,49 @@ def _finish_time_axis(axes: Axes, results: Results) -> None:
     axes.set_xlabel("time [s]")
 
 
-def draw_run(results: Results, folder: Path, formats: Sequence[str]) -> list[str]:
-    """Saves the figures and gives their names."""
-    figures = {
-        "motion": draw_over_time(results, MOTION),
-        "phase_planes": draw_phase_planes(results),
-        "torques": draw_over_time(results, TORQUES),
-        "energy": draw_energy(results),
-    }
-    drawn = [name for name, figure in figures.items() if figure]
-    for name in drawn:
-        add_title(figures[name], results.title, results.shortfall)
-        save(figures[name], folder, name, formats)
-    return drawn
+def _add_title(figure: Figure, results: Results, *remarks: str) -> None:
+    add_title(figure, results.title, results.shortfall, *remarks)
+
+
+def _left_out(header: Header, shown: int, quantity: str) -> str:
+    """What says that not all columns of a quantity are drawn."""
+    total = len(header.of(quantity))
+    return f"{shown} of {total}: {'those that vary most' if header.ranges else 'the first'}" if shown < total else ""
+
+
+def default_labels(header: Header) -> dict[str, list[str]]:
+    """The columns of each figure: of quantities that many elements have, those that vary most."""
+
+    def shown(quantities: Sequence[str]) -> list[str]:
+        return [label for quantity in quantities for label in widest(header, header.of(quantity), MOST_PANELS)]
+
+    energies = [label for label in (*ENERGIES, RESIDUAL) if label in header.labels]
+    return {"motion": shown(MOTION), "phase_planes": _plane_labels(header), "torques": shown(TORQUES), "energy": energies}
+
+
+def _plane_labels(header: Header) -> list[str]:
+    """Twists and angles if all have room, else twists, for the angles of bodies that turn say little; with their speeds."""
+    twists, angles = header.of("twist"), header.of("phi")
+    if len(twists) + len(angles) <= MOST_PLANES:
+        return twists + angles + header.of("omega")
+    if not twists:
+        return widest(header, angles, MOST_PLANES) + header.of("omega")
+    planes = widest(header, twists, MOST_PLANES)
+    return planes + [speed for twist in planes for speed in header.speeds_about(twist)]
+
+
+def default_figures(results: Results) -> Figures:
+    labels = default_labels(results.header)
+    figures = draw_over_time(results, "motion", labels["motion"])
+    if planes := draw_phase_planes(results, labels["phase_planes"]):
+        quantity = "twist" if results.header.of("twist") else "phi"
+        shown = len([label for label in labels["phase_planes"] if label in results.header.of(quantity)])
+        _add_title(planes, results, _left_out(results.header, shown, quantity))
+        figures["phase_planes"] = planes
+    figures |= draw_over_time(results, "torques", labels["torques"])
+    if energy := draw_energy(results):
+        figures["energy"] = energy
+    return figures
 
 
 def coarsest(results: Results) -> tuple[str, float]:
@@ -105,23 +177,71 @@ def _advise(results: Results) -> str:
     return f"about {rows:.0f} rows for an oscillation of '{name}' draw corners; smooth: &output interval = {interval:.1g}"
 
 
-def main() -> None:
+def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="scripts/plot", description=__doc__)
     parser.add_argument("results", type=Path, metavar="RESULTS", help="folder that 'nocdyn run' wrote")
     parser.add_argument("--out", type=Path, metavar="DIR", help="where the figures go (RESULTS/figures)")
+    parser.add_argument(
+        "--columns",
+        nargs="+",
+        metavar="PATTERN",
+        help="draws these columns only, e.g. 'moment_*' omega_motor; '*' stands for any text, '?' for a character",
+    )
+    parser.add_argument("--from", dest="start", type=_time, default=-math.inf, metavar="T", help="first time [s]")
+    parser.add_argument("--to", dest="end", type=_time, default=math.inf, metavar="T", help="last time [s]")
+    parser.add_argument("--rpm", action="store_true", help="speeds in rpm")
     add_format_option(parser)
+    return parser
+
+
+def _hint(header: Header, patterns: Sequence[str] | None) -> str:
+    """What draws the columns that are left out, '' if all are drawn."""
+    left_out = [quantity for quantity in (*MOTION, *TORQUES) if len(header.of(quantity)) > MOST_PANELS]
+    return "" if patterns or not left_out else "others: --columns " + " ".join(f"'{quantity}_*'" for quantity in left_out)
+
+
+def _time(text: str) -> float:
+    try:
+        time = float(text)
+    except ValueError:
+        time = math.nan
+    if not math.isfinite(time):
+        raise argparse.ArgumentTypeError(f"'{text}' is no time")
+    return time
+
+
+def _drawn(results: Results, arguments: argparse.Namespace) -> Figures:
+    if arguments.columns:
+        return draw_over_time(results, "columns", matching(results.header, arguments.columns))
+    return default_figures(results)
+
+
+def _needed(header: Header, patterns: Sequence[str] | None) -> Iterator[str]:
+    if patterns:
+        return iter(matching(header, patterns))
+    return (label for labels in default_labels(header).values() for label in labels)
+
+
+def main() -> None:
+    parser = _parser()
     arguments = parser.parse_args()
+    if arguments.start >= arguments.end:
+        parser.error(f"--from {arguments.start:g} must be less than --to {arguments.end:g}")
     folder = arguments.out or arguments.results / "figures"
     try:
-        results = read_results(arguments.results)
-        if results.shortfall:
-            print(f"{parser.prog}: {arguments.results}: the trajectory is partial: {results.shortfall}", file=sys.stderr)
-        names = draw_run(results, folder, arguments.format)
+        results = read_results(arguments.results, lambda header: _needed(header, arguments.columns), arguments.rpm)
+        results = results.between(arguments.start, arguments.end)
     except ResultsError as error:
         sys.exit(f"{parser.prog}: {error}")
-    print(saved(names, arguments.format, folder))
-    if advice := _advise(results):
-        print(advice)
+    if results.shortfall:
+        print(f"{parser.prog}: {arguments.results}: the trajectory is partial: {results.shortfall}", file=sys.stderr)
+    figures = _drawn(results, arguments)
+    for name, figure in figures.items():
+        save(figure, folder, name, arguments.format)
+    print(saved(list(figures), arguments.format, folder))
+    for remark in (_hint(results.header, arguments.columns), _advise(results)):
+        if remark:
+            print(remark)
 
 
 if __name__ == "__main__":
