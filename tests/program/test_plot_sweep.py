@@ -29,15 +29,6 @@ def python_packages() -> None:
     sys.path.insert(0, str(SOURCE / "scripts"))
 
 
-@pytest.fixture(autouse=True)
-def plain_tick_labels(monkeypatch) -> None:
-    """Matplotlib spends 40 % of the time of a figure on reading numbers as mathematics."""
-    import matplotlib
-
-    importlib.import_module("nocdyn_report.style")
-    monkeypatch.setitem(matplotlib.rcParams, "axes.formatter.use_mathtext", False)
-
-
 def unit_of(name: str) -> str:
     if "." in name:
         return UNITS[name.rsplit(".", 1)[-1]]

@@ -9,26 +9,18 @@ import sys
 from pathlib import Path
 
 import pytest
+from figure_files import assert_figures, call, chain, refusal, run_input
 
 NOCDYN = os.environ["NOCDYN"]
 SOURCE = Path(os.environ["NOCDYN_SOURCE"])
 SCRIPTS = SOURCE / "scripts"
 SETUP = SCRIPTS / "setup"
 CASES = [SOURCE / "input" / "paper" / f"case{number}.nml" for number in (1, 2)]
-SIGNATURES = {"png": b"\x89PNG", "svg": b"<?xml", "pdf": b"%PDF"}
 
 # The uniform motion of the paper's machine: the root of w^2 + (10 + 100 (2/3)^2) w - 200 = 0.
 UNIFORM_SPEED = 3.454305983687
 # The paper's case 1 has settled to this after 10 s.
 SETTLED = 1e-6
-
-
-@pytest.fixture(scope="session", autouse=True)
-def python_packages() -> None:
-    for package in ("f90nml", "matplotlib", "numpy", "pandas"):
-        if importlib.util.find_spec(package) is None:
-            pytest.fail(f"{package} is not installed for {sys.executable}: run scripts/setup figures test", pytrace=False)
-    sys.path.insert(0, str(SCRIPTS))
 
 
 @pytest.fixture(scope="session")
@@ -38,120 +30,10 @@ def paper_results(tmp_path_factory) -> list[Path]:
     return [folder / case.stem for case in CASES]
 
 
-def run_input(folder: Path, text: str, *options: str) -> Path:
-    """Results of a machine, in `folder`; the run itself may fail."""
-    file = folder / "machine.nml"
-    file.write_text(text, encoding="utf-8")
-    subprocess.run([NOCDYN, "run", "--quiet", "--out", folder / "results", *options, file], capture_output=True)
-    return folder / "results"
-
-
-@pytest.fixture(autouse=True)
-def plain_tick_labels(monkeypatch) -> None:
-    """Matplotlib spends 40 % of the time of a figure on reading numbers as mathematics."""
-    import matplotlib
-
-    importlib.import_module("nocdyn_report.style")
-    monkeypatch.setitem(matplotlib.rcParams, "axes.formatter.use_mathtext", False)
-
-
-def call(monkeypatch, module: str, *arguments: object) -> None:
-    """A script's Python part within this process, for the start of Matplotlib takes a second."""
-    main = importlib.import_module(f"nocdyn_report.{module}").main
-    monkeypatch.setattr(sys, "argv", [module, *map(str, arguments)])
-    main()
-
-
-def refusal(monkeypatch, module: str, *arguments: object) -> str:
-    with pytest.raises(SystemExit) as leaving:
-        call(monkeypatch, module, *arguments)
-    return leaving.value.code
-
-
-def assert_figures(folder: Path, *names: str, formats: tuple[str, ...] = tuple(SIGNATURES)) -> None:
-    for name in names:
-        for kind in formats:
-            content = (folder / f"{name}.{kind}").read_bytes()
-            assert content.startswith(SIGNATURES[kind]) and len(content) > 1000, f"{name}.{kind}"
-    assert len(list(folder.iterdir())) == len(names) * len(formats)
-
-
-def chain(bodies: int, run: str) -> str:
-    groups = [f"&body name = 'rotor{i}' inertia = 1.0 /" for i in range(bodies)]
-    groups += [
-        f"&coupling name = 'shaft{i}' bodies = 'rotor{i - 1}', 'rotor{i}' stiffness = 1e3 damping = 1.0 /"
-        for i in range(1, bodies)
-    ]
-    return "\n".join([*groups, "&motor name = 'drive' body = 'rotor0' a = 100.0 b = 1.0 c = 0.0 /", f"&run {run} /", ""])
-
-
 def test_paper_figures_appear_in_three_formats(paper_results, tmp_path, monkeypatch):
-    import matplotlib
-
-    monkeypatch.setitem(matplotlib.rcParams, "axes.formatter.use_mathtext", True)
     call(monkeypatch, "paper_figures", *paper_results, "--out", tmp_path)
     assert_figures(tmp_path, "figure2", "figure3", "figure4", "figure5")
     assert "Paper, case 2" in (tmp_path / "figure5.svg").read_text(encoding="utf-8")
-
-
-def test_single_body_is_drawn(tmp_path, monkeypatch, capsys):
-    results = run_input(tmp_path, chain(1, "t_end = 1.0"))
-    call(monkeypatch, "run_figures", results, "--format", "PNG,svg")
-    assert_figures(results / "figures", "motion", "phase_planes", "torques", "energy", formats=("png", "svg"))
-    assert capsys.readouterr().out == f"motion, phase_planes, torques, energy (PNG, SVG) are in {results / 'figures'}\n"
-
-
-def test_machine_with_ground_and_awkward_names_is_drawn(tmp_path, monkeypatch):
-    results = run_input(
-        tmp_path,
-        """
-&case title = 'Costs $5, and a title that is far too long for one line: 50 % of a lot of words that nobody wants to read' /
-&body name = 'a $ b' inertia = 1.0 speed = 1.0 /
-&body name = 'wheel_2' inertia = 1.0 speed = -1.0 /
-&coupling name = 'mount [x]' bodies = 'ground', 'a $ b' stiffness = 100.0 damping = 0.1 /
-&gear name = 'g' bodies = 'a $ b', 'wheel_2' teeth = 20, 20 /
-&run t_end = 1.0 /
-""",
-    )
-    call(monkeypatch, "run_figures", results, "--format", "svg")
-    assert_figures(results / "figures", "motion", "phase_planes", "torques", "energy", formats=("svg",))
-
-
-def test_partial_trajectory_of_many_bodies_is_drawn_and_called_partial(tmp_path, monkeypatch, capsys):
-    results = run_input(tmp_path, chain(30, "t_end = 1000.0"), "--set", "run.max_steps=200", "--set", "output.points=10001")
-    assert (results / "trajectory.partial.csv").is_file()
-    call(monkeypatch, "run_figures", results, "--format", "svg")
-    assert_figures(results / "figures", "motion", "phase_planes", "torques", "energy", formats=("svg",))
-    assert "the trajectory is partial: failed, ends at t = " in capsys.readouterr().err
-    assert "failed, ends at t = " in (results / "figures" / "motion.svg").read_text(encoding="utf-8")
-
-
-def test_corners_of_a_fast_oscillation_are_told_with_the_interval_that_rounds_them(tmp_path, monkeypatch, capsys):
-    machine = """
-&body name = 'disc' inertia = 1.0 angle = 1.0 /
-&coupling name = 'spring' bodies = 'ground', 'disc' stiffness = 39.478417604357434 /  ! (2 pi)^2: a second an oscillation
-&run t_end = 50.0 /
-"""
-    call(monkeypatch, "run_figures", run_input(tmp_path, machine, "--set", "output.interval=0.15"), "--format", "svg")
-    advice = capsys.readouterr().out.splitlines()[1]
-    assert advice == "about 6 rows for an oscillation of 'spring' draw corners; smooth: &output interval = 0.04"
-    call(monkeypatch, "run_figures", run_input(tmp_path, machine, "--set", "output.interval=0.04"), "--format", "svg")
-    assert len(capsys.readouterr().out.splitlines()) == 1
-
-
-def test_throttle_and_current_are_drawn(tmp_path, monkeypatch):
-    results = run_input(
-        tmp_path,
-        """
-&body name = 'rotor' inertia = 1.0 /
-&motor name = 'drive' body = 'rotor' kind = 'dc' voltage = 24.0 resistance = 1.0 flux_constant = 0.5 inductance = 0.1
-       governor_speed = 20.0 governor_gain = 0.1 governor_time = 1.0 /
-&run t_end = 1.0 /
-""",
-    )
-    call(monkeypatch, "run_figures", results, "--format", "svg")
-    text = (results / "figures" / "torques.svg").read_text(encoding="utf-8")
-    assert "throttle [1]" in text and "current [A]" in text
 
 
 def test_numbers_stand_beside_their_closed_forms(paper_results, monkeypatch, capsys):
@@ -229,41 +111,6 @@ def test_a_folder_without_modes_is_refused(tmp_path, monkeypatch, content, messa
 def test_a_machine_that_does_not_oscillate_is_refused(tmp_path, monkeypatch):
     results = modes_of(tmp_path, chain(1, "t_end = 1.0"))
     assert "nothing to draw: no mode oscillates" in refusal(monkeypatch, "mode_figures", results)
-
-
-@pytest.mark.parametrize(
-    ("files", "message"),
-    [
-        (None, "there is no such results folder"),
-        ({}, "no trajectory.csv here"),
-        ({"trajectory.csv": ""}, "not a table of numbers"),
-        ({"trajectory.csv": "t [s],phi_a [rad]\n0,one\n"}, "not a table of numbers"),
-        ({"trajectory.csv": "a,b\n0,1\n2,3\n"}, "there is no column 't [s]'"),
-        ({"trajectory.csv": "t [s],phi_a [rad]\n0,1\n"}, "nothing to draw: the trajectory has 1 row(s)"),
-        ({"trajectory.partial.csv": "t [s],phi_a [rad]\n"}, "nothing to draw: the trajectory has 0 row(s)"),
-        ({"trajectory.csv": "t [s],phi_a [rad]\n0,1\n1,1\n"}, "input.nml: missing"),
-    ],
-)
-def test_unusable_results_are_one_clear_line(files, message, tmp_path, monkeypatch):
-    folder = tmp_path / "results"
-    for name, text in (files or {}).items():
-        folder.mkdir(exist_ok=True)
-        (folder / name).write_text(text, encoding="utf-8")
-    if files == {}:
-        folder.mkdir()
-    said = refusal(monkeypatch, "run_figures", folder)
-    assert message in said and str(folder) in said and "\n" not in said
-
-
-def test_refusals_leave_with_exit_code_1_and_one_line(tmp_path):
-    result = subprocess.run(
-        [sys.executable, "-m", "nocdyn_report.run_figures", tmp_path / "none"],
-        text=True,
-        capture_output=True,
-        env={**os.environ, "PYTHONPATH": str(SCRIPTS)},
-    )
-    assert result.returncode == 1
-    assert result.stderr.count("\n") == 1 and result.stderr.startswith("scripts/plot: ")
 
 
 def test_results_of_two_programs_are_compared_column_by_column():

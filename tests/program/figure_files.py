@@ -1,0 +1,57 @@
+"""What the tests of figures share: runs, and the scripts' Python parts within this process."""
+
+import importlib
+import importlib.util
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+NOCDYN = os.environ["NOCDYN"]
+SCRIPTS = Path(os.environ["NOCDYN_SOURCE"]) / "scripts"
+SIGNATURES = {"png": b"\x89PNG", "svg": b"<?xml", "pdf": b"%PDF"}
+
+for package in ("f90nml", "matplotlib", "numpy", "pandas"):
+    if importlib.util.find_spec(package) is None:
+        pytest.fail(f"{package} is not installed for {sys.executable}: run scripts/setup figures test", pytrace=False)
+sys.path.insert(0, str(SCRIPTS))
+
+
+def run_input(folder: Path, text: str, *options: str) -> Path:
+    """Results of a machine, in `folder`; the run itself may fail."""
+    file = folder / "machine.nml"
+    file.write_text(text, encoding="utf-8")
+    subprocess.run([NOCDYN, "run", "--quiet", "--out", folder / "results", *options, file], capture_output=True)
+    return folder / "results"
+
+
+def call(monkeypatch, module: str, *arguments: object) -> None:
+    """A script's Python part within this process, for the start of Matplotlib takes a second."""
+    main = importlib.import_module(f"nocdyn_report.{module}").main
+    monkeypatch.setattr(sys, "argv", [module, *map(str, arguments)])
+    main()
+
+
+def refusal(monkeypatch, module: str, *arguments: object) -> str:
+    with pytest.raises(SystemExit) as leaving:
+        call(monkeypatch, module, *arguments)
+    return leaving.value.code
+
+
+def assert_figures(folder: Path, *names: str, formats: tuple[str, ...] = tuple(SIGNATURES)) -> None:
+    for name in names:
+        for kind in formats:
+            content = (folder / f"{name}.{kind}").read_bytes()
+            assert content.startswith(SIGNATURES[kind]) and len(content) > 1000, f"{name}.{kind}"
+    assert len(list(folder.iterdir())) == len(names) * len(formats)
+
+
+def chain(bodies: int, run: str) -> str:
+    groups = [f"&body name = 'rotor{i}' inertia = 1.0 /" for i in range(bodies)]
+    groups += [
+        f"&coupling name = 'shaft{i}' bodies = 'rotor{i - 1}', 'rotor{i}' stiffness = 1e3 damping = 1.0 /"
+        for i in range(1, bodies)
+    ]
+    return "\n".join([*groups, "&motor name = 'drive' body = 'rotor0' a = 100.0 b = 1.0 c = 0.0 /", f"&run {run} /", ""])
