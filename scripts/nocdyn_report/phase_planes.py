@@ -65,6 +65,6 @@ def _draw_plane(axes: Axes, plane: Plane) -> None:
     axes.plot(angle[0], rate[0], "o", color="black", markerfacecolor="white", label="start")
     axes.plot(angle[-1], rate[-1], "o", color="black", label="end")
     axes.set_title(plain(f"{plane.noun} {plane.angle.element}"))
-    axes.xaxis.set_major_locator(MaxNLocator(4, steps=[1, 2, 5, 10]))
+    axes.xaxis.set_major_locator(MaxNLocator(5, steps=[1, 2, 5, 10]))
     axes.set_xlabel(f"{plane.angle_label} [{plane.angle.unit}]")
     axes.set_ylabel(f"{plane.rate_label} [{plane.rate.unit}]")

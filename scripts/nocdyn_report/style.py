@@ -10,6 +10,9 @@ import matplotlib
 import numpy as np
 from matplotlib import pyplot
 from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.backends.backend_pdf import FigureCanvasPdf
+from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 from matplotlib.ticker import ScalarFormatter
 
@@ -18,7 +21,9 @@ from .thinning import thin
 # Okabe and Ito's colours, told apart with any colour vision; grey for the yellow that white paper swallows.
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#999999", "#000000")
 REFERENCE = {"color": "0.35", "linestyle": (0, (5, 3)), "linewidth": 0.9}
-FORMATS = ("png", "svg", "pdf")
+CANVASES = {"png": FigureCanvasAgg, "svg": FigureCanvasSVG, "pdf": FigureCanvasPdf}
+FORMATS = tuple(CANVASES)
+DPI = 160
 WIDTH = 8.0  # of a figure [in]
 TITLE_LENGTH = 75  # characters that fit on a line of that width
 PIXELS = 1200  # that a line is wide
@@ -43,7 +48,6 @@ matplotlib.rcParams.update(
         "legend.frameon": False,
         "lines.linewidth": 1.3,
         "pdf.fonttype": 42,  # fonts as TrueType, so that the text stays text
-        "savefig.dpi": 160,
         "svg.fonttype": "none",
         "svg.hashsalt": "nocdyn",  # the same picture gives the same file
     }
@@ -104,9 +108,11 @@ def save(figure: Figure, folder: Path, name: str, formats: Sequence[str] = FORMA
     for axis in (axis for axes in figure.axes for axis in (axes.xaxis, axes.yaxis)):
         if type(axis.get_major_formatter()) is ScalarFormatter:
             axis.set_major_formatter(PlainFormatter())
+    figure.set_dpi(DPI)
     figure.get_layout_engine().execute(figure)
     figure.set_layout_engine("none")  # laid out once, not for each format again
     for kind in formats:
         undated = {"png": None, "svg": {"Date": None}, "pdf": {"CreationDate": None}}[kind]
-        figure.savefig(folder / f"{name}.{kind}", metadata=undated)
+        # savefig would draw each twice, first without a result
+        getattr(CANVASES[kind](figure), f"print_{kind}")(folder / f"{name}.{kind}", metadata=undated)
     pyplot.close(figure)
