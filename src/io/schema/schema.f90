@@ -75,7 +75,7 @@ module nocdyn_schema
     key_rule_t('output',     'points',          an_integer,     1, '',            '1001',      from_2, &
       'number of rows from t_start to t_end'), &
     key_rule_t('output',     'units',           a_word,         any_number, '',   unset,       output_units, &
-      'of speeds (rpm, Hz), angles (deg) and frequencies in results; those of SI if not given', fewest=1), &
+      'units of speeds (rpm or Hz) and of angles (deg) in results; those of SI if not given', fewest=1), &
     key_rule_t('output',     'directory',       a_folder,       1, '',            "''",        anything, &
       "folder of the results; '' means results/ and the name of the input file")]
 
