@@ -78,24 +78,35 @@ contains
     end if
   end function new_statistic
 
-  !> Finds the columns of statistics in the trajectory table of a machine.
+  !> Finds the columns of statistics in the trajectory table of a machine. A coupling without damping has no column for the moment
+  !> in the shaft: that is its elastic moment.
   subroutine find_columns(labels, statistics)
     type(string_t), intent(in) :: labels(:)   !! of the machine's trajectory table
     type(statistic_t), intent(inout) :: statistics(:)
-    integer :: column, i
+    integer :: i
 
     do i = 1, size(statistics)
       associate (statistic => statistics(i))
         if (statistic%column >= 1 .and. statistic%column <= size(labels)) then
           if (labels(statistic%column)%text == statistic%quantity) cycle
         end if
-        statistic%column = 0
-        do column = 1, size(labels)
-          if (labels(column)%text == statistic%quantity) statistic%column = column
-        end do
+        statistic%column = column_of(labels, statistic%quantity)
+        if (statistic%column == 0 .and. index(statistic%quantity, 'shaft_') == 1) then
+          statistic%column = column_of(labels, 'moment' // statistic%quantity(len('shaft_'):))
+        end if
       end associate
     end do
   end subroutine find_columns
+
+  !> The column with a label, 0 if there is none.
+  pure integer function column_of(labels, label)
+    type(string_t), intent(in) :: labels(:)
+    character(len=*), intent(in) :: label
+
+    do column_of = size(labels), 1, -1
+      if (labels(column_of)%text == label) return
+    end do
+  end function column_of
 
   !> Whether the column is a torque. In a machine without such a column the torque is 0.
   pure logical function is_torque(statistic)

@@ -49,7 +49,7 @@ module nocdyn_couplings
     procedure :: observe
   end type couplings_t
 
-  integer, parameter :: twist = 1, moment = 2, damping_moment = 3   ! the order of `quantities`
+  integer, parameter :: twist = 1, moment = 2, damping_moment = 3, shaft_moment = 4   ! the order of `quantities`
 
 contains
 
@@ -159,17 +159,19 @@ contains
     type(quantity_t), allocatable :: columns(:)
     integer :: e
 
-    allocate (columns(3))
+    allocate (columns(4))
     columns(twist) = quantity_t('twist', 'rad', [(e, e=1, size(self%to))])
     columns(moment) = quantity_t('moment', 'N m', [(e, e=1, size(self%to))])
     columns(damping_moment) = quantity_t('damping', 'N m', self%with_work)
+    columns(shaft_moment) = quantity_t('shaft', 'N m', self%with_work)
   end function quantities
 
-  !> Twist [rad], and the moments on the first body [N m]: the elastic one, F1 of the paper, and that of damping and friction.
+  !> Twist [rad], and the moments on the first body [N m]: the elastic one, F1 of the paper, that of damping and friction, and
+  !> both together, the moment in the shaft.
   pure subroutine observe(self, elements, quantity, lane, values)
     class(couplings_t), intent(in) :: self
     type(elements_t), intent(in) :: elements
-    integer, intent(in) :: quantity   !! twist, moment or damping_moment
+    integer, intent(in) :: quantity   !! twist, moment, damping_moment or shaft_moment
     integer, intent(in) :: lane
     real(wp), intent(out) :: values(:)   !! [elements of the bank]
 
@@ -177,9 +179,11 @@ contains
     case (twist)
       values = elements%angle(lane, self%first:self%last())
     case (moment)
-      values = -elements%restoring(lane, self%first:self%last())
+      values = 0.0_wp - elements%restoring(lane, self%first:self%last())   ! not -0 without any moment
+    case (damping_moment)
+      values = 0.0_wp - elements%applied(lane, self%first:self%last())
     case default
-      values = -elements%applied(lane, self%first:self%last())
+      values = 0.0_wp - (elements%restoring(lane, self%first:self%last()) + elements%applied(lane, self%first:self%last()))
     end select
   end subroutine observe
 
