@@ -17,6 +17,7 @@ module nocdyn_observer
   type, public :: observer_t
     integer, allocatable :: directions(:)   !! event_... of each event function; not allocated: there are none
     integer :: tracked = 0                  !! number of tracked functions
+    real(wp) :: tracked_from = -huge(1.0_wp)   !! time from which their extremes are taken [s]
     logical :: wants_steps = .false.        !! whether `on_steps` is called
     integer :: first_read = 1               !! components whose polynomials `on_steps` reads; may change from variant to variant
     integer :: last_read = huge(0)
@@ -43,7 +44,7 @@ module nocdyn_observer
     real(wp), allocatable :: t_new(:)       !! end [s]
   end type step_block_t
 
-  !> Smallest and largest values of the tracked functions so far, with their times [s]; [functions].
+  !> Smallest and largest values of the tracked functions from `tracked_from` on, with their times [s]; [functions].
   type, public :: ranges_t
     real(wp), allocatable :: lowest(:), lowest_time(:), highest(:), highest_time(:)
   end type ranges_t
@@ -101,7 +102,7 @@ contains
     error stop 'nocdyn_observer: an observer with tracked functions overrides tracked_values'
   end subroutine tracked_values
 
-  !> The ranges of the tracked functions when a lane has ended.
+  !> The ranges of the tracked functions when a lane has ended; not called if it has ended before `tracked_from`.
   subroutine on_extremes(self, lane, ranges)
     class(observer_t), intent(inout) :: self
     integer, intent(in) :: lane

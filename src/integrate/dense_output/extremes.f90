@@ -21,6 +21,7 @@ module nocdyn_extremes
 
   type, public :: extremes_t
     type(ranges_t), allocatable :: ranges(:)               !! [lanes]
+    logical, allocatable :: have_begun(:)                  !! whether a lane has come to the time from which they count, [lanes]
     real(wp), allocatable, private :: last(:, :)           !! values at the ends of the last steps, [functions, lanes]
     real(wp), allocatable, private :: nodes(:)             !! in the step, -1 to 1, [nodes]
     real(wp), allocatable, private :: to_series(:, :)      !! matrix from values to coefficients of T_0, T_1, ...
@@ -41,6 +42,7 @@ contains
     allocate (extremes%nodes(degree + 1), extremes%to_series(degree + 1, degree + 1))
     call lobatto_nodes(degree, extremes%nodes, extremes%to_series)
     allocate (extremes%ranges(attempt%lanes))
+    allocate (extremes%have_begun(attempt%lanes), source=.false.)
     do lane = 1, attempt%lanes
       call allocate_ranges(extremes%ranges(lane), functions)
     end do
@@ -57,13 +59,15 @@ contains
               ranges%highest_time(functions), source=0.0_wp)
   end subroutine allocate_ranges
 
-  !> Sets the ranges of a lane at its start.
+  !> Sets the ranges of a lane at its start, if they count from there.
   subroutine start_extremes(extremes, observer, attempt, lane)
     type(extremes_t), intent(inout) :: extremes
     class(observer_t), intent(inout) :: observer
     type(step_attempt_t), intent(in) :: attempt
     integer, intent(in) :: lane
 
+    extremes%have_begun(lane) = attempt%t(lane) >= observer%tracked_from
+    if (.not. extremes%have_begun(lane)) return
     call restart_extremes(extremes, observer, attempt, lane)
     call start_ranges(extremes%ranges(lane), extremes%last(:, lane), attempt%t(lane))
   end subroutine start_extremes
@@ -87,34 +91,51 @@ contains
     type(step_attempt_t), intent(in) :: attempt
     integer, intent(in) :: lane
 
+    if (.not. extremes%have_begun(lane)) return
     extremes%y(:) = attempt%y(lane, :attempt%components)
     call observer%tracked_values(lane, attempt%t(lane), extremes%y, extremes%last(:, lane))
   end subroutine restart_extremes
 
-  !> Widens the ranges of a lane by its last step, up to t_end. If the step ends at a crossing, the last node is just before it:
-  !> a function may jump there, which would spoil the polynomial.
+  !> Widens the ranges of a lane by its last step, from `tracked_from` up to t_end. If the step ends at a crossing, the last node
+  !> is just before it: a function may jump there, which would spoil the polynomial.
   subroutine update_extremes(extremes, observer, dense, t_end, ends_at_crossing)
     type(extremes_t), intent(inout) :: extremes
     class(observer_t), intent(inout) :: observer
     type(dense_output_t), intent(inout) :: dense   !! of the lane
     real(wp), intent(in) :: t_end   !! end of the step [s]
     logical, intent(in) :: ends_at_crossing
-    real(wp) :: t, half, middle
+    real(wp) :: t, half, middle, t_start
     integer :: i, last
 
+    if (t_end <= observer%tracked_from) return
+    t_start = max(dense%t, observer%tracked_from)
+    if (.not. extremes%have_begun(dense%lane)) call begin(extremes, observer, dense, t_start)
     last = size(extremes%nodes)
-    half = 0.5_wp * (t_end - dense%t)
-    middle = dense%t + half
+    half = 0.5_wp * (t_end - t_start)
+    middle = t_start + half
     extremes%values(:, 1) = extremes%last(:, dense%lane)
     do i = 2, last
       t = middle + extremes%nodes(i) * half
-      if (i == last .and. ends_at_crossing) t = max(dense%t, t_end - before_jump * spacing(t_end))
+      if (i == last .and. ends_at_crossing) t = max(t_start, t_end - before_jump * spacing(t_end))
       call sample(dense, min(1.0_wp, (t - dense%t) / dense%h), extremes%y)
       call observer%tracked_values(dense%lane, t, extremes%y, extremes%values(:, i))
     end do
     extremes%last(:, dense%lane) = extremes%values(:, last)
-    call widen_ranges(last, extremes%nodes, extremes%to_series, extremes%values, extremes%ranges(dense%lane), dense%t, t_end)
+    call widen_ranges(last, extremes%nodes, extremes%to_series, extremes%values, extremes%ranges(dense%lane), t_start, t_end)
   end subroutine update_extremes
+
+  !> Sets the ranges of a lane to the values at a time in its last step.
+  subroutine begin(extremes, observer, dense, t)
+    type(extremes_t), intent(inout) :: extremes
+    class(observer_t), intent(inout) :: observer
+    type(dense_output_t), intent(inout) :: dense   !! of the lane
+    real(wp), intent(in) :: t                      !! [s]
+
+    call sample(dense, (t - dense%t) / dense%h, extremes%y)
+    call observer%tracked_values(dense%lane, t, extremes%y, extremes%last(:, dense%lane))
+    call start_ranges(extremes%ranges(dense%lane), extremes%last(:, dense%lane), t)
+    extremes%have_begun(dense%lane) = .true.
+  end subroutine begin
 
   !> Widens the ranges by the maxima and minima of the polynomials through `values_of`, over the times from t_start to t_end.
   pure subroutine widen_ranges(n, nodes, to_series, values_of, ranges, t_start, t_end)

@@ -300,7 +300,7 @@ contains
       solver_status%jacobians(lane) = integrator%attempt%jacobians(lane)
       solver_status%factorisations(lane) = integrator%attempt%factorisations(lane)
       if (integrator%has_extremes .and. solver_status%steps(lane) > 0) then
-        call observer%on_extremes(lane, integrator%extremes%ranges(lane))
+        if (integrator%extremes%have_begun(lane)) call observer%on_extremes(lane, integrator%extremes%ranges(lane))
       end if
       integrator%sample(:) = integrator%attempt%y(lane, :integrator%attempt%components)
       call ensemble%finish(lane, integrator%sample, solver_status)
