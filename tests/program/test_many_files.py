@@ -45,12 +45,12 @@ def test_several_files_print_one_line_each(nocdyn):
     assert second.startswith(f"{CASE_2}: done at t = 10 s, ") and "1001 rows" in second
 
 
-def test_one_file_prints_title_and_every_column(nocdyn):
+def test_one_file_prints_title_and_all_columns_that_fit_a_screen(nocdyn):
     outcome = nocdyn("run", CASE_2)
     assert outcome.stdout.startswith("Paper, case 2: harmonic torque on the motor\n")
     header, _ = nocdyn.table("results/case2")
     table, _ = outcome.stdout.split("energy came from [J]\n")
-    assert [line.split("]")[0] + "]" for line in table.splitlines()[2:]] == header[1:]
+    assert sorted(line.split("]")[0] + "]" for line in table.splitlines()[2:-1]) == sorted(header[1:])
 
 
 def test_quiet_prints_nothing_but_errors(nocdyn, spinner):
@@ -118,5 +118,5 @@ def test_the_table_of_a_large_machine_stops_and_says_so(nocdyn):
     bodies = "".join(f"&body name = 'b{i}' inertia = 1.0 /\n" for i in range(40))
     nocdyn.write("many.nml", bodies + "&run t_end = 1.0 /\n&output points = 2 /\n")
     lines = nocdyn("run", "many.nml").stdout.splitlines()
-    assert lines[-2] == "(25 more columns in summary.json)"
-    assert len(lines) == 63
+    assert lines[-2] == "(60 more columns: summary.json has all; &output columns = 'omega_*', for instance, chooses)"
+    assert len(lines) == 29  # with the note that nothing moves the bodies

@@ -7,7 +7,7 @@ module nocdyn_output_times
   implicit none (type, external)
   private
 
-  public :: check_output_times, output_times, row_count
+  public :: check_output_times, output_note, output_times, row_count
 
   integer, parameter :: most_rows = 10000000   ! some gigabytes of text
 
@@ -15,7 +15,8 @@ module nocdyn_output_times
 
 contains
 
-  !> Refuses more than `most_rows` rows, and intervals that are so short that rounding makes their times equal.
+  !> Refuses more than `most_rows` rows, intervals that are so short that rounding makes their times equal, and extremes from a
+  !> time that is not in the run.
   subroutine check_output_times(input, error)
     type(input_t), intent(in) :: input   !! checked
     type(error_t), allocatable, intent(out) :: error
@@ -26,6 +27,8 @@ contains
     output = input%single('output')
     run = input%single('run')
     span = run%number('t_end') - run%number('t_start')
+    call check_extremes_from(input, error)
+    if (allocated(error)) return
     rounding = spacing(max(abs(run%number('t_start')), abs(run%number('t_end'))))
     if (output%has_value('interval')) then
       key = 'interval'
@@ -47,6 +50,41 @@ contains
     end if
     call raise(error, exit_input, input%location(input%position('output'), key) // ': ' // message)
   end subroutine check_output_times
+
+  !> Refuses extremes from a time before the start, or from the end on.
+  subroutine check_extremes_from(input, error)
+    type(input_t), intent(in) :: input
+    type(error_t), allocatable, intent(out) :: error
+    type(group_t) :: output, run
+    character(len=:), allocatable :: allowed
+
+    output = input%single('output')
+    run = input%single('run')
+    if (.not. output%has_value('extremes_from')) return
+    associate (from => output%number('extremes_from'), t_start => run%number('t_start'), t_end => run%number('t_end'))
+      if (from >= t_start .and. from < t_end) return
+      allowed = '< t_end = ' // to_text(t_end)
+      if (from < t_start) allowed = '>= t_start = ' // to_text(t_start)
+      call raise(error, exit_input, input%location(input%position('output'), 'extremes_from') // ': extremes_from = ' // &
+                 to_text(from) // ' is out of range; allowed: ' // allowed)
+    end associate
+  end subroutine check_extremes_from
+
+  !> What a person may not have meant: an interval that is longer than the run; '' if there is nothing to tell.
+  function output_note(input) result(text)
+    type(input_t), intent(in) :: input
+    character(len=:), allocatable :: text
+    type(group_t) :: output, run
+
+    output = input%single('output')
+    run = input%single('run')
+    text = ''
+    if (.not. output%has_value('interval')) return
+    associate (interval => output%number('interval'), span => run%number('t_end') - run%number('t_start'))
+      if (interval > span) text = 'interval = ' // to_text(interval) // ' s is longer than the run of ' // &
+                                  rounded_text(span, 6) // ' s: there are rows at t_start and t_end only'
+    end associate
+  end function output_note
 
   !> The number of the requested times.
   pure integer function row_count(input)

@@ -25,7 +25,7 @@ contains
     allocate (names, source=selected(machine%names, machine%coordinates%body))
   end function coordinate_names
 
-  !> Notes on redundant constraints, and on start speeds that were projected onto the constraints.
+  !> Notes on redundant constraints, on start speeds that were projected onto the constraints, and on bodies that nothing moves.
   function machine_notes(machine) result(notes)
     type(machine_t), intent(in) :: machine
     type(string_t), allocatable :: notes(:)
@@ -33,6 +33,7 @@ contains
     allocate (notes(0))
     call add_redundancy_notes(machine, notes)
     if (allocated(machine%start_impulse)) call add_impulse_note(machine, notes)
+    call add_loose_note(machine, notes)
   end function machine_notes
 
   !> Appends a sentence for every redundant constraint.
@@ -91,6 +92,25 @@ contains
       call append(notes, text // '; kinetic energy lost: ' // rounded_text(impulse%energy_lost, 7) // ' J')
     end associate
   end subroutine add_impulse_note
+
+  !> Appends a note on the bodies that no element and no constraint acts on.
+  subroutine add_loose_note(machine, notes)
+    type(machine_t), intent(in) :: machine
+    type(string_t), allocatable, intent(inout) :: notes(:)
+    logical :: is_loose(0:machine%bodies)
+    integer :: b
+
+    is_loose = .true.
+    is_loose(0) = .false.   ! the ground
+    is_loose(machine%elements%from) = .false.
+    is_loose(machine%elements%to) = .false.
+    is_loose(machine%constraints%body) = .false.
+    associate (loose => pack([(b, b=1, machine%bodies)], is_loose(1:)))
+      if (size(loose) == 0) return
+      call append(notes, 'nothing connects or drives ' // joined(selected(machine%names, loose), ', ', max_names) // &
+                         trim(merge(': it keeps its speed     ', ': they keep their speeds ', size(loose) == 1)))
+    end associate
+  end subroutine add_loose_note
 
   !> "gear 'reducer'".
   function label(machine, row)

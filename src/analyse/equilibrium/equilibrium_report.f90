@@ -12,7 +12,7 @@ module nocdyn_equilibrium_report
   use nocdyn_machine, only: machine_t
   use nocdyn_machine_report, only: coordinate_names
   use nocdyn_reduced, only: new_reduced
-  use nocdyn_table_text, only: append_table, cell, cell_digits, padded
+  use nocdyn_table_text, only: append_table, cell, cell_digits, clear_rounding, padded, rounding
   use nocdyn_text, only: rounded_text, selected, string_t, to_text
   use nocdyn_text_buffer, only: text_buffer_t
   use nocdyn_trajectory_table, only: new_trajectory_table, trajectory_table_t
@@ -22,7 +22,6 @@ module nocdyn_equilibrium_report
   public :: equilibrium_json, equilibrium_text, new_equilibrium_report
 
   integer, parameter :: trailing = 3        ! last columns: works and their residual, of which a steady state has none
-  character(len=1), parameter :: no_headings(0) = [character(len=1) ::]
 
   !> The contents of the printed report and of equilibrium.json.
   type, public :: equilibrium_report_t
@@ -116,6 +115,7 @@ contains
     character(len=:), allocatable :: text
     character(len=:), allocatable :: heading
     type(text_buffer_t) :: report
+    real(wp), allocatable :: values(:, :)   ! of one steady state
     integer :: i, k
 
     do i = 1, size(self%notes)
@@ -125,7 +125,9 @@ contains
       heading = file // ': steady state'
       if (size(self%equilibria) > 1) heading = heading // ' ' // to_text(k) // ' of ' // to_text(size(self%equilibria))
       call report%append_line(heading // ', ' // stability_text(self%equilibria(k)))
-      call append_table(report, self%labels, self%values(:, k:k), '', no_headings, 2, 'more values in equilibrium.json')
+      values = self%values(:, k:k)
+      call clear_rounding(self%labels, values)
+      call append_table(report, self%labels, values, [''], 2, 'more values in equilibrium.json')
       call put_power(self%work_elements, self%power(:, k), report)
     end do
     text = report%text()
@@ -156,12 +158,16 @@ contains
     type(string_t), intent(in) :: work_elements(:)   !! names
     real(wp), intent(in) :: power(:)                 !! into the machine [W]
     type(text_buffer_t), intent(inout) :: report
+    real(wp) :: rounded(size(power), 1), total
     integer :: width
 
     if (size(work_elements) == 0) return
-    call append_table(report, work_elements, reshape(power, [size(power), 1]), 'power into the machine [W]', no_headings, 2, &
-                      'more in equilibrium.json', width)
-    call report%append_line('  ' // padded('in all', width) // cell(sum(power)) // ', of ' // &
+    rounded(:, 1) = power
+    call clear_rounding(work_elements, rounded)
+    call append_table(report, work_elements, rounded, ['power into the machine [W]'], 2, 'more in equilibrium.json', width)
+    total = sum(power)
+    if (abs(total) <= rounding * sum(abs(power))) total = 0.0_wp
+    call report%append_line('  ' // padded('in all', width) // cell(total) // ', of ' // &
                             rounded_text(sum(max(power, 0.0_wp)), cell_digits) // ' put in')
   end subroutine put_power
 

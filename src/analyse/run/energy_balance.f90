@@ -12,7 +12,7 @@ module nocdyn_energy_balance
 
   public :: work_element_names, element_names, put_energy_balance, append_energy_balance
 
-  integer, parameter :: max_lines = 10   ! of each list
+  integer, parameter :: max_lines = 5   ! of each list
 
   type, public :: energy_balance_t
     type(string_t), allocatable :: work_elements(:)      !! "load work": elements whose work is integrated, with their role

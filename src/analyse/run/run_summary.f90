@@ -1,6 +1,6 @@
-!> The summary of a run: the contents of summary.json and of the printed table.
+!> The summary of a run, and its form as summary.json and as printed lines.
 module nocdyn_run_summary
-  use nocdyn_energy_balance, only: append_energy_balance, energy_balance_t, put_energy_balance
+  use nocdyn_energy_balance, only: energy_balance_t, put_energy_balance
   use nocdyn_errors, only: error_t, exit_failed, raise
   use nocdyn_finite, only: is_finite
   use nocdyn_input, only: input_t
@@ -11,14 +11,15 @@ module nocdyn_run_summary
   use nocdyn_solver_status, only: max_switch_times, solver_status_t
   use nocdyn_run_settings, only: put_settings
   use nocdyn_observer, only: ranges_t
-  use nocdyn_table_text, only: append_table, cell_digits
-  use nocdyn_text, only: append, counted, longest_path, rounded_text, shortened, string_t, strings, to_text
-  use nocdyn_text_buffer, only: text_buffer_t
+  use nocdyn_start_transient, only: start_transient_t
+  use nocdyn_table_text, only: cell_digits
+  use nocdyn_text, only: append, counted, longest_path, rounded_text, selected, shortened, string_t, strings, &
+    to_text
   implicit none (type, external)
   private
 
   public :: start_extremes, update_extremes, widen_extremes, describe_machine, check_energy_balance, check_extremes
-  public :: summary_json, summary_line, summary_table, method_line
+  public :: summary_json, summary_line, method_line
 
   !> The summary notes an energy residual above this share of the largest energy or work: such a motion is not to be trusted.
   real(wp), parameter :: energy_error_limit = 0.01_wp
@@ -27,9 +28,12 @@ module nocdyn_run_summary
   !> excess is rounding: a machine that starts at rest has its smallest energy at the start.
   real(wp), parameter :: rounding_limit = 16 * epsilon(1.0_wp)
 
-  !> Smallest and largest values of the columns with their times: of the rows; after `widen_extremes`, of the whole motion.
+  !> Smallest and largest values of the columns from `from` on, with their times: of the rows; after `widen_extremes`, of the
+  !> motion.
   type, public :: extremes_t
-    integer :: rows = 0
+    integer :: rows = 0                   !! before `from` too
+    real(wp) :: from = -huge(1.0_wp)      !! [s]
+    logical :: have_begun = .false.       !! whether the run has come to `from`
     logical :: are_continuous = .false.   !! whether the motion between the rows is included
     real(wp), allocatable :: lowest(:), lowest_time(:), highest(:), highest_time(:), last(:)   !! [columns]
   end type extremes_t
@@ -42,7 +46,10 @@ module nocdyn_run_summary
     type(string_t), allocatable :: coordinates(:)   !! names of the independent bodies
     type(string_t), allocatable :: notes(:)         !! on the machine and the run, one sentence each
     type(string_t), allocatable :: labels(:)        !! of the columns
+    integer, allocatable :: chosen(:)               !! columns that are written, ascending, the time first
+    real(wp) :: t_start = 0.0_wp                    !! [s]
     type(extremes_t) :: extremes
+    type(start_transient_t) :: transient            !! of a run that has come to its end
     character(len=:), allocatable :: method         !! of integration
     type(solver_status_t) :: solver_status
     type(energy_balance_t), allocatable :: energy_balance  !! from the start to the last row; not allocated if there are no rows
@@ -52,10 +59,12 @@ module nocdyn_run_summary
 contains
 
   !> No rows yet; the first row sets everything.
-  subroutine start_extremes(extremes, columns)
+  subroutine start_extremes(extremes, columns, from)
     type(extremes_t), intent(out) :: extremes
     integer, intent(in) :: columns   !! their number
+    real(wp), intent(in) :: from     !! [s]
 
+    extremes%from = from
     allocate (extremes%lowest(columns), source=huge(1.0_wp))
     allocate (extremes%highest(columns), source=-huge(1.0_wp))
     allocate (extremes%lowest_time(columns), extremes%highest_time(columns), extremes%last(columns), source=0.0_wp)
@@ -67,6 +76,10 @@ contains
     real(wp), intent(in) :: row(:)   !! [columns]
     integer :: i
 
+    extremes%last(:) = row
+    extremes%rows = extremes%rows + 1
+    if (row(1) < extremes%from) return
+    extremes%have_begun = .true.
     do i = 1, size(row)
       if (row(i) < extremes%lowest(i)) then
         extremes%lowest(i) = row(i)
@@ -77,8 +90,6 @@ contains
         extremes%highest_time(i) = row(1)
       end if
     end do
-    extremes%last(:) = row
-    extremes%rows = extremes%rows + 1
   end subroutine update_extremes
 
   !> Includes the extremes of the motion where they exceed those of the rows by more than rounding.
@@ -100,6 +111,7 @@ contains
       end if
     end do
     extremes%are_continuous = .true.
+    extremes%have_begun = .true.
   end subroutine widen_extremes
 
   !> Refuses extremes that are not finite: the motion between two rows can reach them.
@@ -138,7 +150,7 @@ contains
     columns = size(extremes%last)
     residual = max(abs(extremes%lowest(columns)), abs(extremes%highest(columns)))
     largest = maxval(max(abs(extremes%lowest(columns - 4:columns - 1)), abs(extremes%highest(columns - 4:columns - 1))))
-    if (extremes%rows == 0 .or. residual <= energy_error_limit * largest) return
+    if (.not. extremes%have_begun .or. residual <= energy_error_limit * largest) return
     call append(notes, 'large energy balance error: energy_residual reaches ' // rounded_text(residual, 3) // &
                        ' J; the largest energy or work is ' // rounded_text(largest, 3) // ' J; tighten rtol and atol')
   end subroutine check_energy_balance
@@ -228,16 +240,39 @@ contains
     integer :: i
 
     keys = strings([character(len=11) :: 'min', 'time_of_min', 'max', 'time_of_max', 'last'])
-    call json%put('extremes', trim(merge('of the motion', 'of the rows  ', summary%extremes%are_continuous)))
-    call json%open('columns')
     associate (extremes => summary%extremes)
+      call json%put('extremes', trim(merge('of the motion', 'of the rows  ', extremes%are_continuous)))
+      if (extremes%from > summary%t_start) call json%put('extremes_from', extremes%from)
+      call put_transient(json, summary)
+      call json%open('columns')
       do i = 2, merge(size(summary%labels), 1, extremes%rows > 0)
-        call json%put(summary%labels(i)%text, keys, [extremes%lowest(i), extremes%lowest_time(i), extremes%highest(i), &
-                                                     extremes%highest_time(i), extremes%last(i)])
+        if (extremes%have_begun) then
+          call json%put(summary%labels(i)%text, keys, [extremes%lowest(i), extremes%lowest_time(i), extremes%highest(i), &
+                                                       extremes%highest_time(i), extremes%last(i)])
+        else
+          call json%put(summary%labels(i)%text, keys(5:), [extremes%last(i)])
+        end if
       end do
+      call json%close()
     end associate
-    call json%close()
   end subroutine put_columns
+
+  !> The first fast transient of a start out of balance, and the columns whose extremes lie in it.
+  subroutine put_transient(json, summary)
+    type(json_t), intent(inout) :: json
+    type(run_summary_t), intent(in) :: summary
+    integer :: i
+
+    if (.not. allocated(summary%transient%has_lowest)) return
+    if (summary%transient%until <= summary%t_start) return
+    associate (columns => [(i, i=1, size(summary%labels))], transient => summary%transient)
+      call json%open('start_transient')
+      call json%put('until', transient%until)
+      call json%put('has_min_of', selected(summary%labels, pack(columns, transient%has_lowest)))
+      call json%put('has_max_of', selected(summary%labels, pack(columns, transient%has_highest)))
+      call json%close()
+    end associate
+  end subroutine put_transient
 
   !> One line with the counts of the integration and the folder of the results.
   function summary_line(input, summary, folder) result(text)
@@ -272,26 +307,5 @@ contains
              counted(solver_status%accepted(1), 'step', 'steps')
     end associate
   end function method_line
-
-  !> The title; for every column the last value and the extremes with their times; then the energy balance.
-  function summary_table(input, summary) result(text)
-    type(input_t), intent(in) :: input
-    type(run_summary_t), intent(in) :: summary
-    character(len=:), allocatable :: text
-    character(len=*), parameter :: headings(*) = [character(len=8) :: 'the last', 'smallest', 'at t [s]', 'largest', 'at t [s]']
-    type(text_buffer_t) :: report
-    character(len=:), allocatable :: heading
-
-    if (input%title() /= '') call report%append_line(input%title())
-    heading = 'quantity (' // counted(summary%extremes%rows, 'row', 'rows') // ')'
-    if (summary%extremes%are_continuous) heading = 'quantity'
-    associate (extremes => summary%extremes, n => size(summary%labels))
-      call append_table(report, summary%labels(2:), reshape([extremes%last(2:), extremes%lowest(2:), extremes%lowest_time(2:), &
-                                                             extremes%highest(2:), extremes%highest_time(2:)], [n - 1, 5]), &
-                        heading, headings, 0, 'more columns in summary.json')
-    end associate
-    if (allocated(summary%energy_balance)) call append_energy_balance(report, summary%energy_balance)
-    text = report%text()
-  end function summary_table
 
 end module nocdyn_run_summary

@@ -2,6 +2,7 @@
 module nocdyn_transient
   use, intrinsic :: iso_fortran_env, only: int64
   use nocdyn_assembly, only: assemble_machine, new_formulation
+  use nocdyn_column_names, only: choose_columns
   use nocdyn_errors, only: error_t, exit_failed, raise
   use nocdyn_finite, only: is_finite
   use nocdyn_formulation, only: formulation_t
@@ -10,7 +11,7 @@ module nocdyn_transient
   use nocdyn_integration_settings, only: integration_settings_t
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
-  use nocdyn_output_times, only: check_output_times, output_times
+  use nocdyn_output_times, only: check_output_times, output_note, output_times
   use nocdyn_output_units, only: output_units
   use nocdyn_run_settings, only: check_size, choose_settings
   use nocdyn_run_summary, only: check_energy_balance, check_extremes, describe_machine, extremes_t, run_summary_t, &
@@ -18,7 +19,8 @@ module nocdyn_transient
   use nocdyn_solver_status, only: failure_message, integration_done, integration_interrupted, integration_not_finite, &
     solver_status_t
   use nocdyn_observer, only: observer_t, ranges_t
-  use nocdyn_text, only: append, string_t, to_text
+  use nocdyn_start_transient, only: find_start_transient
+  use nocdyn_text, only: append, selected, string_t, to_text
   use nocdyn_trajectory_table, only: new_trajectory_table, trajectory_table_t
   implicit none (type, external)
   private
@@ -66,6 +68,8 @@ module nocdyn_transient
     type(trajectory_table_t) :: table
     type(extremes_t) :: extremes
     real(wp), allocatable :: row(:)          !! [columns]
+    integer, allocatable :: chosen(:)        !! columns that are written
+    real(wp), allocatable :: written(:)      !! their values in the row
     real(wp) :: last_time = 0.0_wp           !! of the rows [s]
     real(wp), allocatable :: last_state(:)   !! at that time, [states + quadratures]
     real(wp) :: t_start, t_end               !! [s]
@@ -99,12 +103,16 @@ contains
     times = output_times(input)
     summary%method = trim(settings%method)
     call describe_machine(formulation%machine, summary)
+    if (output_note(input) /= '') call append(notes, output_note(input))
     do i = 1, size(notes)
       call append(summary%notes, notes(i)%text)
     end do
-    call start_observer(observer, formulation, times, output_units(input), output, error)
+    call start_observer(observer, input, formulation, times, error)
+    if (.not. allocated(error)) call start_output(observer, output, size(times), error)
     if (allocated(error)) return
     allocate (summary%labels, source=observer%table%labels)
+    allocate (summary%chosen, source=observer%chosen)
+    summary%t_start = times(1)
     call solve(formulation, settings, times, observer, summary, error)
     if (summary%has_run) call complete_summary(observer, error, summary)
   end subroutine run_transient
@@ -125,24 +133,38 @@ contains
     call choose_settings(input, formulation, settings, notes, error)
   end subroutine build_formulation
 
-  subroutine start_observer(observer, formulation, times, wanted, output, error)
+  subroutine start_observer(observer, input, formulation, times, error)
     type(run_observer_t), intent(inout) :: observer
+    type(input_t), intent(in) :: input
     class(formulation_t), intent(in) :: formulation
     real(wp), intent(in) :: times(:)   !! of the rows [s]
-    integer, intent(in) :: wanted(:)   !! units of the columns
-    class(run_output_t), target, intent(inout) :: output
-    type(error_t), allocatable, intent(out) :: error   !! of the output
+    type(error_t), allocatable, intent(out) :: error   !! columns are asked for that there are not
 
-    observer%table = new_trajectory_table(formulation, times(1), wanted)
+    observer%table = new_trajectory_table(formulation, times(1), output_units(input))
     observer%t_start = times(1)
     observer%t_end = times(size(times))
-    observer%output => output
+    if (input%groups(input%position('output'))%has_value('extremes_from')) then
+      observer%tracked_from = input%groups(input%position('output'))%number('extremes_from')
+    end if
     allocate (observer%row(size(observer%table%labels)))
     allocate (observer%last_state(formulation%states + formulation%quadratures), source=0.0_wp)
     observer%tracked = size(observer%row)
-    call start_extremes(observer%extremes, size(observer%row))
-    call output%start(observer%table%labels, size(times), error)
+    call start_extremes(observer%extremes, size(observer%row), observer%tracked_from)
+    call choose_columns(input, observer%table%labels, observer%chosen, error)
   end subroutine start_observer
+
+  subroutine start_output(observer, output, rows, error)
+    type(run_observer_t), intent(inout) :: observer
+    class(run_output_t), target, intent(inout) :: output
+    integer, intent(in) :: rows                        !! their number
+    type(error_t), allocatable, intent(out) :: error   !! of the output
+    type(string_t), allocatable :: labels(:)
+
+    observer%output => output
+    allocate (observer%written(size(observer%chosen)))
+    allocate (labels, source=selected(observer%table%labels, observer%chosen))
+    call output%start(labels, rows, error)
+  end subroutine start_output
 
   !> Integrates. An integration that does not reach the end is an error that says why.
   subroutine solve(formulation, settings, times, observer, summary, error)
@@ -183,7 +205,14 @@ contains
       allocate (summary%energy_balance)
       call observer%table%find_energy_balance(observer%last_time, observer%last_state, summary%energy_balance)
     end if
-    if (.not. allocated(error)) return
+    if (.not. allocated(error)) then
+      associate (extremes => summary%extremes)
+        call find_start_transient(observer%table%columns%formulation%machine, [observer%t_start, observer%t_end], &
+                                  summary%labels, max(abs(extremes%lowest), abs(extremes%highest)), &
+                                  extremes%lowest_time, extremes%highest_time, summary%transient)
+      end associate
+      return
+    end if
     summary%message = error%message
     summary%status = 'failed'
     if (summary%solver_status%code(1) == integration_interrupted) summary%status = 'interrupted'
@@ -203,7 +232,8 @@ contains
     self%failure_time = t
     if (self%not_finite > 0) return
     call update_extremes(self%extremes, self%row)
-    call self%output%write_row(self%row)
+    self%written(:) = self%row(self%chosen)
+    call self%output%write_row(self%written)
     self%last_time = t
     self%last_state(:) = y
   end subroutine on_output

@@ -1,6 +1,7 @@
 !> nocdyn check: reads and analyses machines, integrates nothing.
 module nocdyn_check_command
   use nocdyn_arguments, only: arguments_t
+  use nocdyn_column_names, only: count_columns
   use nocdyn_console, only: print_text
   use nocdyn_disk_room, only: bytes_text
   use nocdyn_errors, only: error_t
@@ -10,7 +11,7 @@ module nocdyn_check_command
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
   use nocdyn_machine_report, only: machine_report
-  use nocdyn_output_times, only: row_count
+  use nocdyn_output_times, only: output_note, row_count
   use nocdyn_result_folders, only: result_folder
   use nocdyn_run_files, only: check_rows, check_variants
   use nocdyn_run_settings, only: check_method
@@ -18,7 +19,7 @@ module nocdyn_check_command
   use nocdyn_table_text, only: append_table
   use nocdyn_text, only: selected, string_t
   use nocdyn_text_buffer, only: text_buffer_t
-  use nocdyn_trajectory_columns, only: column_count, table_bytes
+  use nocdyn_trajectory_columns, only: table_bytes
   use nocdyn_units, only: from_si, unit_hz, unit_rpm
   implicit none (type, external)
   private
@@ -46,21 +47,24 @@ contains
     type(sweep_plan_t) :: plan
     character(len=:), allocatable :: sizes
     real(wp) :: bytes
+    integer :: columns
 
     call check_method(input, machine, error)
+    if (.not. allocated(error)) call count_columns(input, machine, columns, error)
     if (allocated(error)) return
     sizes = ''
+    if (output_note(input) /= '') sizes = new_line('a') // '  note: ' // output_note(input)
     if (has_sweep(input)) then
       call make_plan(input, plan, error)
       if (allocated(error)) return
       bytes = plan%file_bytes(plan%design%variants, has_table=.false.)
-      sizes = new_line('a') // '  sweep: ' // plan%summary()
+      sizes = sizes // new_line('a') // '  sweep: ' // plan%summary()
       if (bytes >= large) sizes = sizes // new_line('a') // '  files: about ' // bytes_text(bytes)
       call check_variants(plan, plan%design%variants, .false., result_folder(arguments, input), 0.0_wp, error)
     else
-      bytes = table_bytes(row_count(input), column_count(machine))
-      if (bytes >= large) sizes = new_line('a') // '  trajectory.csv: about ' // bytes_text(bytes)
-      call check_rows(input%location(input%position('output')), row_count(input), column_count(machine), &
+      bytes = table_bytes(row_count(input), columns)
+      if (bytes >= large) sizes = sizes // new_line('a') // '  trajectory.csv: about ' // bytes_text(bytes)
+      call check_rows(input%location(input%position('output')), row_count(input), columns, &
                       result_folder(arguments, input), error)
     end if
     call print_text(machine_report(input%shown_file(), machine) // speed_table(input, machine) // sizes)
@@ -72,7 +76,8 @@ contains
     type(input_t), intent(in) :: input
     type(machine_t), intent(in) :: machine
     character(len=:), allocatable :: text
-    character(len=*), parameter :: headings(*) = [character(len=7) :: '[rad/s]', '[rpm]', '[Hz]']
+    character(len=*), parameter :: headings(*) = &
+      [character(len=36) :: 'speeds at the start, and those given', '[rad/s]', '[rpm]', '[Hz]']
     type(text_buffer_t) :: report
     type(named_speeds_t) :: given
     type(string_t), allocatable :: labels(:)
@@ -90,7 +95,7 @@ contains
     if (size(speeds) == 0) return
     call append_table(report, labels, &
                       reshape([speeds, from_si(speeds, unit_rpm), from_si(speeds, unit_hz)], [size(speeds), 3]), &
-                      'speeds at the start, and those given', headings, 2, 'more')
+                      headings, 2, 'more')
     text = report%text()
     text = new_line('a') // text(:len(text) - 1)
   end function speed_table

@@ -8,7 +8,8 @@ module nocdyn_run_command
   use nocdyn_posix, only: is_interrupted, catch_interrupts
   use nocdyn_result_folders, only: refuse_shared_folders, refuse_sweep_folder, result_folder
   use nocdyn_run_files, only: partial_file, run_to_files
-  use nocdyn_run_summary, only: method_line, run_summary_t, summary_line, summary_table
+  use nocdyn_run_summary, only: method_line, run_summary_t, summary_line
+  use nocdyn_run_table, only: summary_table
   use nocdyn_text, only: shown_path, string_t, to_text
   implicit none (type, external)
   private

@@ -74,6 +74,10 @@ module nocdyn_schema
       'time from row to row'), &
     key_rule_t('output',     'points',          an_integer,     1, '',            '1001',      from_2, &
       'number of rows from t_start to t_end'), &
+    key_rule_t('output',     'columns',         a_text,         any_number, '',   unset,       anything, &
+      "columns that are written: names, or patterns with *, e.g. 'moment_*'; all if not given", fewest=1), &
+    key_rule_t('output',     'extremes_from',   a_number,       1, 's',           unset,       anything, &
+      'start of the time over which extremes are taken; t_start if not given'), &
     key_rule_t('output',     'units',           a_word,         any_number, '',   unset,       output_units, &
       'units of speeds (rpm or Hz) and of angles (deg) in results; those of SI if not given', fewest=1), &
     key_rule_t('output',     'directory',       a_folder,       1, '',            "''",        anything, &

@@ -126,11 +126,12 @@ contains
     type(sweep_header_t), intent(in) :: header
     type(sweep_summary_t), intent(in) :: summary
     character(len=:), allocatable :: text
-    character(len=*), parameter :: headings(*) = &
+    character(len=*), parameter :: of_columns(*) = &
       [character(len=14) :: 'min', '5 %', 'median', '95 %', 'max', 'variant of min', 'variant of max']
     type(text_buffer_t) :: report
     type(string_t) :: labels(size(header%results))
-    real(wp) :: values(size(labels), size(headings))
+    real(wp) :: values(size(labels), size(of_columns))
+    character(len=32) :: headings(0:size(of_columns))
     integer :: i
 
     if (header%title /= '') call report%append_line(header%title)
@@ -141,8 +142,9 @@ contains
                         real(found%variant_of_minimum, wp), real(found%variant_of_maximum, wp)]
       end associate
     end do
-    call append_table(report, labels, values, 'result (' // counted(summary%done, 'variant', 'variants') // ')', headings, 0, &
-                      'more results in summary.json')
+    headings(0) = 'result (' // counted(summary%done, 'variant', 'variants') // ')'
+    headings(1:) = of_columns
+    call append_table(report, labels, values, headings, 0, 'more results in summary.json')
     text = report%text()
   end function sweep_table
 

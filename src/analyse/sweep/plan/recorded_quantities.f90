@@ -1,11 +1,12 @@
 !> The recorded quantities of a sweep: the statistics and trajectories that the groups &record ask for.
 module nocdyn_recorded_quantities
+  use nocdyn_column_names, only: no_column_text
   use nocdyn_input, only: input_t
   use nocdyn_kinds, only: wp
   use nocdyn_diagnostics, only: diagnostics_t
   use nocdyn_output_units, only: match_column, output_units
   use nocdyn_statistics, only: new_statistic, statistic_names, statistic_t
-  use nocdyn_text, only: append, joined, nearest_word, quoted, string_t, to_text
+  use nocdyn_text, only: quoted, string_t, to_text
   implicit none (type, external)
   private
 
@@ -121,65 +122,23 @@ contains
     integer, intent(out) :: column
     type(diagnostics_t), intent(inout) :: diagnostics
     integer, intent(out), optional :: unit   !! of its statistics: index of `units`, 0: that of SI
-    character(len=:), allocatable :: hint, quantity
+    character(len=:), allocatable :: quantity
     integer, allocatable :: wanted(:)
     integer :: quantity_unit
     logical :: is_column
-    type(string_t) :: names(size(labels))   ! labels without units
 
     allocate (wanted, source=output_units(input))
     quantity = trim(adjustl(input%groups(record)%text('quantity')))
     do column = 1, size(labels)
-      names(column)%text = labels(column)%text(:index(labels(column)%text, ' [', back=.true.) - 1)
       call match_column(labels(column)%text, quantity, wanted, is_column, quantity_unit)
       if (.not. is_column) cycle
       if (present(unit)) unit = quantity_unit
       return
     end do
     column = 0
-    hint = near_match(quantity, names)
-    if (index(quantity, '[') > 0) hint = near_match(quantity, labels)
-    if (hint == '') hint = ', which has ' // related_names(quantity, names)
-    call input%report(record, 'quantity', 'quantity = ' // quoted(quantity) // ' is no column of trajectory.csv' // hint, &
-                     diagnostics)
+    call input%report(record, 'quantity', 'quantity = ' // quoted(quantity) // ' is no column of trajectory.csv' // &
+                      no_column_text(quantity, labels), diagnostics)
   end subroutine find_column
-
-  !> E.g. "; did you mean 'omega_motor'?", '' if no name is similar.
-  pure function near_match(quantity, candidates) result(text)
-    character(len=*), intent(in) :: quantity
-    type(string_t), intent(in) :: candidates(:)
-    character(len=:), allocatable :: text
-    integer :: nearest
-
-    text = ''
-    nearest = nearest_word(quantity, candidates)
-    if (nearest > 0) text = '; did you mean ' // quoted(candidates(nearest)%text) // '?'
-  end function near_match
-
-  !> The columns of the element or of the kind that a quantity may mean; if there are none, the first ones of all columns.
-  pure function related_names(quantity, names) result(text)
-    character(len=*), intent(in) :: quantity
-    type(string_t), intent(in) :: names(:)   !! without units
-    character(len=:), allocatable :: text
-    integer, parameter :: most = 16
-    type(string_t), allocatable :: related(:)
-    character(len=:), allocatable :: element, name
-    integer :: i
-
-    name = quantity(:index(quantity // ' [', ' [') - 1)
-    element = name(index(name, '_') + 1:)
-    allocate (related(0))
-    do i = 1, size(names)
-      if (index(names(i)%text // '|', '_' // element // '|') == 0 .and. index(names(i)%text, name // '_') /= 1) cycle
-      call append(related, names(i)%text)
-    end do
-    if (size(related) > 0) then
-      text = joined(related, ', ', most)
-    else
-      text = joined(names, ', ', most)
-      if (size(names) > most) text = text // ' in its first line'
-    end if
-  end function related_names
 
   subroutine check_from(input, record, span, diagnostics)
     type(input_t), intent(in) :: input

@@ -1,6 +1,7 @@
 !> The plan of a sweep: targets, design and recorded quantities, as its input describes them. All errors in the groups of the
 !> sweep are reported at once.
 module nocdyn_sweep_plan
+  use nocdyn_column_names, only: count_columns
   use nocdyn_designs, only: design_t
   use nocdyn_errors, only: error_t, exit_input, raise
   use nocdyn_input, only: group_t, input_t
@@ -16,7 +17,7 @@ module nocdyn_sweep_plan
   use nocdyn_recorded_quantities, only: check_quantities, read_recorded_quantities, time_span_t, wanted_trajectories
   use nocdyn_targets, only: target_t
   use nocdyn_text, only: counted, string_t
-  use nocdyn_trajectory_columns, only: column_count, table_bytes
+  use nocdyn_trajectory_columns, only: table_bytes
   use nocdyn_variant_columns, only: label_columns
   use nocdyn_version, only: compiler_text, version
   implicit none (type, external)
@@ -33,6 +34,7 @@ module nocdyn_sweep_plan
     type(target_t), allocatable :: targets(:)         !! of the factors of the design
     type(statistic_t), allocatable :: statistics(:)
     integer, allocatable :: trajectories(:)           !! variants whose trajectories are written, ascending
+    integer :: columns = 0                            !! of each trajectory
     character(len=:), allocatable :: list_checksum    !! of the file of a list, '' if there is none
   contains
     procedure :: values, summary, file_bytes
@@ -67,6 +69,7 @@ contains
       if (size(plan%statistics) == 0 .and. diagnostics%count == 0) call input%report(sweeps(1), 'design', &
         'no number of the variants is kept; needed: a &record with quantity and statistic', diagnostics)
       if (size(plan%trajectories) > 0) call check_output_times(input, failure)
+      if (.not. allocated(failure)) call count_columns(input, plan%machine, plan%columns, failure)
     end if
     call merge_errors(input, diagnostics, failure, error)
   end subroutine make_plan
@@ -131,7 +134,7 @@ contains
     file_bytes = 2 * real(variants, wp) * (of_number * columns + of_status)   ! journal and sweep.nc
     if (has_table) file_bytes = file_bytes + table_bytes(variants, columns + 2)
     if (size(self%trajectories) > 0) file_bytes = file_bytes + size(self%trajectories) * &
-                                                  table_bytes(row_count(self%input), column_count(self%machine))
+                                                  table_bytes(row_count(self%input), self%columns)
   end function file_bytes
 
   !> The time span of the base machine, as far as it does not vary.

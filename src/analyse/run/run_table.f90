@@ -1,0 +1,132 @@
+!> The printed table of a run: what one looks for first, on one screen.
+module nocdyn_run_table
+  use nocdyn_column_names, only: quantity_of
+  use nocdyn_energy_balance, only: append_energy_balance
+  use nocdyn_input, only: input_t
+  use nocdyn_kinds, only: wp
+  use nocdyn_run_summary, only: run_summary_t
+  use nocdyn_table_text, only: append_table, clear_rounding
+  use nocdyn_text, only: counted, rounded_text, selected, string_t, to_text
+  use nocdyn_text_buffer, only: text_buffer_t
+  use nocdyn_text_sort, only: argsort, sorted_position
+  implicit none (type, external)
+  private
+
+  public :: summary_table
+
+  integer, parameter :: most_lines = 25   ! of columns and of the energy balance
+  integer, parameter :: sorts = 5         ! of columns, see `sort_of`
+
+contains
+
+  !> The title; last value and extremes with their times of the columns that one looks for, marked where they lie in the transient
+  !> of the start; then the energy balance.
+  function summary_table(input, summary) result(text)
+    type(input_t), intent(in) :: input
+    type(run_summary_t), intent(in) :: summary
+    character(len=:), allocatable :: text
+    type(text_buffer_t) :: report, energies
+    integer :: left   ! lines
+
+    if (allocated(summary%energy_balance)) call append_energy_balance(energies, summary%energy_balance)
+    text = energies%text()
+    left = most_lines - count(transfer(text, 'a', len(text)) == new_line('a'))
+    if (input%title() /= '') call report%append_line(input%title())
+    call append_columns(report, summary, left)
+    call report%append(text)
+    text = report%text()
+  end function summary_table
+
+  !> Appends the lines of the columns.
+  subroutine append_columns(report, summary, most)
+    type(text_buffer_t), intent(inout) :: report
+    type(run_summary_t), intent(in) :: summary
+    integer, intent(in) :: most   !! columns
+    character(len=64) :: headings(0:5)
+    character(len=:), allocatable :: until
+    type(string_t), allocatable :: labels(:)
+    integer, allocatable :: shown(:)
+    real(wp), allocatable :: values(:, :), times(:, :)
+    logical, allocatable :: marks(:, :)
+
+    headings(0) = 'quantity (' // counted(summary%extremes%rows, 'row', 'rows') // ')'
+    headings(1:) = [character(len=8) :: 'the last', 'smallest', 'at t [s]', 'largest', 'at t [s]']
+    if (summary%extremes%are_continuous) headings(0) = 'quantity'
+    associate (extremes => summary%extremes)
+      if (extremes%from > summary%t_start) headings(0) = trim(headings(0)) // ' from t = ' // to_text(extremes%from) // ' s'
+      allocate (shown, source=columns_to_show(summary%labels, summary%chosen(2:), &
+                                              max(abs(extremes%lowest), abs(extremes%highest)), most))
+      allocate (values, source=reshape([extremes%last(shown), extremes%lowest(shown), extremes%highest(shown)], [size(shown), 3]))
+      allocate (times, source=reshape([extremes%lowest_time(shown), extremes%highest_time(shown)], [size(shown), 2]))
+    end associate
+    allocate (marks(size(shown), 5), source=.false.)
+    marks(:, 3) = summary%transient%has_lowest(shown)
+    marks(:, 5) = summary%transient%has_highest(shown)
+    allocate (labels, source=selected(summary%labels, shown))
+    call clear_rounding(labels, values)
+    call append_table(report, labels, reshape([values(:, 1:2), times(:, 1), values(:, 3), times(:, 2)], [size(shown), 5]), &
+                      headings, 0, '', marks=marks)
+    if (size(shown) < size(summary%chosen) - 1) then
+      call report%append_line('(' // counted(size(summary%chosen) - 1 - size(shown), 'more column', 'more columns') // &
+                              ": summary.json has all; &output columns = 'omega_*', for instance, chooses)")
+    end if
+    if (.not. any(marks)) return
+    until = rounded_text(summary%transient%until, 3)
+    call report%append_line('* in the first fast transient of a start out of balance, up to t = ' // until // &
+                            ' s; &output extremes_from = ' // until // ' leaves it out')
+  end subroutine append_columns
+
+  !> The columns to print, by sorts and within each in the order of the table: of every sort its share of the lines at least, and
+  !> of many columns those with the largest values.
+  function columns_to_show(labels, columns, sizes, most) result(shown)
+    type(string_t), intent(in) :: labels(:)   !! of all columns
+    integer, intent(in) :: columns(:)         !! that may be shown
+    real(wp), intent(in) :: sizes(:)          !! largest magnitudes of all columns
+    integer, intent(in) :: most               !! to show
+    integer, allocatable :: shown(:)
+    integer, allocatable :: order(:)   ! of the labels
+    integer :: available(sorts), lines(sorts), sort, sort_of_column(size(columns))
+    integer :: i
+    logical :: is_shown(size(columns))
+
+    call argsort(labels, order)
+    sort_of_column = [(sort_of(labels(columns(i))%text, labels, order), i=1, size(columns))]
+    available = [(count(sort_of_column == sort), sort=1, sorts)]
+    lines = min(available, [(most / (sorts - 1), i=2, sorts), 0])
+    do sort = 1, sorts
+      lines(sort) = min(available(sort), lines(sort) + most - sum(lines))
+    end do
+    allocate (shown(0))
+    do sort = 1, sorts
+      is_shown = .false.
+      do i = 1, lines(sort)
+        is_shown(maxloc(sizes(columns), dim=1, mask=sort_of_column == sort .and. .not. is_shown)) = .true.
+      end do
+      shown = [shown, pack(columns, is_shown)]
+    end do
+  end function columns_to_show
+
+  !> What one looks for first, 1, to last, 5: the moments in couplings; reactions; torques; speeds; all others, among them the
+  !> parts of a moment that has a column in whole.
+  integer function sort_of(label, labels, order) result(sort)
+    character(len=*), intent(in) :: label
+    type(string_t), intent(in) :: labels(:)   !! of all columns
+    integer, intent(in) :: order(:)           !! in which they are sorted
+
+    select case (quantity_of(label))
+    case ('shaft')
+      sort = 1
+    case ('moment')
+      sort = merge(5, 1, sorted_position('shaft' // label(len('moment') + 1:), labels, order) > 0)
+    case ('reaction')
+      sort = 2
+    case ('torque')
+      sort = 3
+    case ('omega')
+      sort = 4
+    case default
+      sort = 5
+    end select
+  end function sort_of
+
+end module nocdyn_run_table

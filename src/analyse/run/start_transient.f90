@@ -1,0 +1,107 @@
+!> The first fast transient of a start out of balance, and the extremes that lie in it.
+!>
+!> The machine is linearised at its start. What the moments there accelerate and the speeds of twist make each mode swing about
+!> its position of balance; the modes with the largest moments in a coupling are the excited ones. The transient lasts for some
+!> periods of the slowest of them. A start in balance, as that of a steady state, has none.
+module nocdyn_start_transient
+  use nocdyn_column_names, only: quantity_of
+  use nocdyn_errors, only: error_t
+  use nocdyn_kinds, only: wp
+  use nocdyn_linearisation, only: linearisation_t, linearise
+  use nocdyn_machine, only: machine_t
+  use nocdyn_reduced, only: new_reduced, reduced_t
+  use nocdyn_text, only: string_t
+  implicit none (type, external)
+  private
+
+  public :: find_start_transient
+
+  real(wp), parameter :: periods = 3.0_wp           !! of the slowest excited mode
+  real(wp), parameter :: excited_share = 0.05_wp    ! of the largest moment: smaller ones do not count
+  real(wp), parameter :: balance_share = 1.0e-6_wp  ! of the moments of the run: a smaller swing is none
+  real(wp), parameter :: fast_share = 0.5_wp        ! of the run: what lasts longer is no fast transient
+  integer, parameter :: most_freedoms = 100         ! the matrices are dense
+
+  type, public :: start_transient_t
+    real(wp) :: until = 0.0_wp                                     !! its end [s]; the start if there is none
+    logical, allocatable :: has_lowest(:), has_highest(:)          !! whether these extremes lie in it, [columns]
+  end type start_transient_t
+
+contains
+
+  !> Finds the transient of a run and the extremes in it, of the columns that swing with the couplings.
+  subroutine find_start_transient(machine, span, labels, sizes, lowest_time, highest_time, transient)
+    type(machine_t), intent(in) :: machine
+    real(wp), intent(in) :: span(2)                                !! start and end of the run [s]
+    type(string_t), intent(in) :: labels(:)                        !! of the columns
+    real(wp), intent(in) :: sizes(:)                               !! largest magnitudes of the columns
+    real(wp), intent(in) :: lowest_time(:), highest_time(:)        !! of their extremes [s]
+    type(start_transient_t), intent(out) :: transient
+    logical :: is_moment(size(labels)), swings(size(labels))
+    integer :: i
+
+    is_moment = [(quantity_of(labels(i)%text) == 'moment', i=1, size(labels))]
+    swings = [(swings_with_couplings(labels(i)), i=1, size(labels))]
+    transient%until = transient_end(machine, span(1), span(2), maxval(sizes, mask=is_moment))
+    allocate (transient%has_lowest, source=swings .and. lowest_time <= transient%until .and. transient%until > span(1))
+    allocate (transient%has_highest, source=swings .and. highest_time <= transient%until .and. transient%until > span(1))
+  end subroutine find_start_transient
+
+  !> The end of the first fast transient [s]; t_start if there is none, or if it cannot be told: of a machine of many degrees of
+  !> freedom, or one whose couplings have no stiffness at the start.
+  real(wp) function transient_end(machine, t_start, t_end, largest_moment) result(until)
+    type(machine_t), intent(in) :: machine
+    real(wp), intent(in) :: t_start, t_end    !! of the run [s]
+    real(wp), intent(in) :: largest_moment    !! of any coupling in the run [N m]
+    type(reduced_t) :: formulation
+    type(linearisation_t) :: linear
+    type(error_t), allocatable :: error
+    real(wp), allocatable :: y(:, :), moments(:)
+    real(wp), parameter :: two_pi = 2.0_wp * acos(-1.0_wp)
+
+    until = t_start
+    if (machine%coordinates%freedoms > most_freedoms) return
+    formulation = new_reduced(machine, .false.)
+    allocate (y, source=formulation%start())
+    call linearise(formulation, t_start, y, linear, error)
+    if (allocated(error)) return
+    call formulation%observe([t_start], y)
+    allocate (moments, source=moments_of_modes(formulation%machine, linear))
+    if (size(moments) == 0) return
+    if (maxval(moments) <= balance_share * largest_moment) return
+    associate (slowest => minval(linear%natural, mask=moments >= excited_share * maxval(moments)))
+      if (periods * two_pi > fast_share * (t_end - t_start) * slowest) return
+      until = t_start + periods * two_pi / slowest
+    end associate
+  end function transient_end
+
+  !> The largest amplitude of an elastic moment when each mode swings freely from the state of the machine [N m], [modes].
+  pure function moments_of_modes(machine, linear) result(moments)
+    type(machine_t), intent(in) :: machine           !! evaluated at that state
+    type(linearisation_t), intent(in) :: linear      !! there
+    real(wp), allocatable :: moments(:)
+    real(wp) :: offset, rate   ! of the modal coordinate from balance
+    integer :: i
+
+    allocate (moments(size(linear%natural)), source=0.0_wp)
+    associate (elements => machine%elements)
+      do i = 1, size(moments)
+        associate (natural => linear%natural(i), twists => linear%twists(:, i))
+          if (natural <= 0) cycle
+          offset = dot_product(elements%restoring(1, :) + elements%applied(1, :), twists) / natural**2
+          rate = dot_product(linear%stiffness * twists, elements%speed(1, :)) / natural**2
+          moments(i) = hypot(offset, rate / natural) * maxval(abs(linear%stiffness * twists))
+        end associate
+      end do
+    end associate
+  end function moments_of_modes
+
+  !> Whether a column swings with the couplings: twists, moments and reactions do.
+  pure logical function swings_with_couplings(label)
+    type(string_t), intent(in) :: label
+
+    swings_with_couplings = any(quantity_of(label%text) == &
+                                [character(len=8) :: 'twist', 'moment', 'damping', 'shaft', 'reaction'])
+  end function swings_with_couplings
+
+end module nocdyn_start_transient
