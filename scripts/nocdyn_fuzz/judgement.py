@@ -11,7 +11,7 @@ CRASHES = (
 )  # fmt: skip
 NOT_FINITE = re.compile(r"(?<![\w'.])[-+]?(?:nan|inf|infinity)(?!\w)", re.IGNORECASE)
 QUOTED = re.compile(rb"'[^'\n]*'|\"[^\"\n]*\"|=[^/\n]*")
-FINISHED = ("trajectory.csv", "equilibrium.json", "modes.csv", "modes.json", "sweep.nc", "sweep.csv")
+FINISHED = ("trajectory.csv", "trajectory.nc", "equilibrium.json", "modes.csv", "modes.json", "sweep.nc", "sweep.csv")
 DIRECTIONS = "\u061c\u200e\u200f\u202a\u202b\u202c\u202d\u202e\u2066\u2067\u2068\u2069"
 
 

@@ -33,7 +33,7 @@ contains
     type(command_t), allocatable, intent(inout) :: commands(:)
 
     call add_command(commands, 'run', 'FILE...', '--out --set --quiet', 'integrate machines and write their results', &
-      'Integrates every input file and writes trajectory.csv, summary.json and input.nml.' // nl // nl // &
+      'Integrates every input file and writes trajectory.csv (or trajectory.nc), summary.json and input.nml.' // nl // nl // &
       '  --out DIR          write to DIR, with several files to DIR/<name of the file>;' // nl // &
       '                     default: &output directory, else results/<name of the file>' // nl // &
       '  --set PATH=VALUE   override a key: run.rtol=1e-9, load.work.viscous=80, gear.reducer.radii=2,3' // nl // &

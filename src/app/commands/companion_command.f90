@@ -1,4 +1,4 @@
-!> Commands that another program beside this one runs: sweep and merge.
+!> What another program beside this one does: the commands sweep and merge, and runs that write NetCDF.
 module nocdyn_companion_command
   use nocdyn_arguments, only: arguments_t
   use nocdyn_command_line, only: command_line
@@ -9,13 +9,21 @@ module nocdyn_companion_command
   implicit none (type, external)
   private
 
-  public :: companion_command
+  public :: become_companion, companion_command
 
 contains
 
-  !> Replaces this program by nocdyn-sweep with the same command line. Returns only if that fails.
+  !> A command of the companion.
   subroutine companion_command(arguments, code)
     type(arguments_t), intent(in) :: arguments
+    integer, intent(out) :: code
+
+    call become_companion('nocdyn ' // arguments%command, code)
+  end subroutine companion_command
+
+  !> Replaces this program by nocdyn-sweep with the same command line. Returns only if that fails.
+  subroutine become_companion(purpose, code)
+    character(len=*), intent(in) :: purpose   !! what the program is for, for the message
     integer, intent(out) :: code
     type(error_t), allocatable :: error
     character(len=:), allocatable :: failure, path
@@ -27,11 +35,11 @@ contains
       call exec_program(path, command_line(), failure)
       call raise(error, exit_file, quoted(path) // ' cannot be started: ' // failure)
     else
-      call raise(error, exit_file, quoted(path) // ', the program for nocdyn ' // arguments%command // ', does not exist; ' // &
+      call raise(error, exit_file, quoted(path) // ', the program for ' // purpose // ', does not exist; ' // &
                  'cmake --build --preset release builds it beside nocdyn, unless -DNOCDYN_SWEEP=OFF is set')
     end if
     code = exit_done
     call report_error(error, code)
-  end subroutine companion_command
+  end subroutine become_companion
 
 end module nocdyn_companion_command

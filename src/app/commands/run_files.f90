@@ -1,7 +1,6 @@
-!> The files that a run leaves: trajectory.csv, summary.json and input.nml.
+!> The files that a run leaves: trajectory.csv or trajectory.nc, summary.json and input.nml.
 module nocdyn_run_files
   use nocdyn_console, only: new_status_line, status_line_t
-  use nocdyn_csv, only: write_header, write_row
   use nocdyn_disk_room, only: check_room
   use nocdyn_errors, only: error_t
   use nocdyn_input, only: input_t
@@ -14,19 +13,24 @@ module nocdyn_run_files
   use nocdyn_sweep_plan, only: sweep_plan_t
   use nocdyn_text, only: counted, string_t, to_text
   use nocdyn_trajectory_columns, only: table_bytes
+  use nocdyn_trajectory_file, only: csv_trajectory_t, trajectory_file_t
   use nocdyn_transient, only: run_output_t, run_transient
   implicit none (type, external)
   private
 
-  public :: check_rows, check_variants, run_to_files
+  public :: check_rows, check_variants, partial_file, remove_trajectories, run_to_files, wants_netcdf
 
-  character(len=*), parameter, public :: trajectory_file = 'trajectory.csv', partial_file = 'trajectory.partial.csv'
+  !> Names of the rows: of a run that is done, of one that is not; as CSV, as NetCDF.
+  character(len=22), parameter :: trajectory_names(2, 2) = reshape([character(len=22) :: 'trajectory.csv', &
+    'trajectory.partial.csv', 'trajectory.nc', 'trajectory.partial.nc'], [2, 2])
   character(len=*), parameter, public :: summary_file = 'summary.json', input_file = 'input.nml'
 
   !> Writes the rows and shows the progress while the run is integrated.
   type, extends(run_output_t) :: trajectory_writer_t
     character(len=:), allocatable :: folder
-    type(output_file_t) :: file
+    class(trajectory_file_t), allocatable :: file
+    character(len=:), allocatable :: input_title, input_text   !! for the file
+    integer :: form = 1                      !! column of `trajectory_names`
     character(len=:), allocatable :: title   !! of the progress line
     character(len=:), allocatable :: place   !! of &output in the input, for messages
     type(status_line_t) :: line
@@ -39,18 +43,44 @@ module nocdyn_run_files
 
 contains
 
-  !> Runs an input and writes its results to `folder`. A run that fails leaves trajectory.partial.csv instead of trajectory.csv.
-  subroutine run_to_files(input, folder, title, is_quiet, summary, error)
+  !> Whether the rows of a run are to be written as NetCDF.
+  pure logical function wants_netcdf(input)
+    type(input_t), intent(in) :: input
+
+    wants_netcdf = input%groups(input%position('output'))%text('format') == 'netcdf'
+  end function wants_netcdf
+
+  !> The name of the file with the rows of a run that is not done.
+  pure function partial_file(input) result(name)
+    type(input_t), intent(in) :: input
+    character(len=:), allocatable :: name
+
+    name = trim(trajectory_names(2, merge(2, 1, wants_netcdf(input))))
+  end function partial_file
+
+  !> Runs an input and writes its results to `folder`. A run that fails leaves its rows under the name of a partial trajectory.
+  subroutine run_to_files(input, folder, title, is_quiet, summary, error, netcdf)
     type(input_t), intent(in) :: input
     character(len=*), intent(in) :: folder
     character(len=*), intent(in) :: title         !! of the progress line
     logical, intent(in) :: is_quiet               !! whether there is no progress line
     type(run_summary_t), intent(out) :: summary
     type(error_t), allocatable, intent(out) :: error
+    class(trajectory_file_t), intent(in), optional :: netcdf   !! not open; of programs that can write NetCDF
     type(trajectory_writer_t), target :: writer
     type(error_t), allocatable :: write_error
 
+    if (.not. wants_netcdf(input)) then
+      allocate (csv_trajectory_t :: writer%file)
+    else if (present(netcdf)) then
+      allocate (writer%file, source=netcdf)
+      writer%form = 2
+    else
+      error stop 'nocdyn_run_files: this program does not write NetCDF'
+    end if
     writer%folder = folder
+    writer%input_title = input%title()
+    writer%input_text = input_text(input)
     writer%title = title
     writer%place = input%location(input%position('output'))
     writer%line = new_status_line(is_quiet, shows_in_logs=.false.)
@@ -76,7 +106,7 @@ contains
     call input_copy%put(input_text(input))
     call report%open(writer%folder, summary_file)
     call report%put(summary_json(input, summary))
-    call writer%file%complete(trajectory_file, error)
+    call writer%file%complete(trim(trajectory_names(1, writer%form)), error)
     if (.not. allocated(error)) call input_copy%complete(input_file, error)
     if (.not. allocated(error)) call report%complete(summary_file, error)
     if (.not. allocated(error)) call name_files(writer, summary%status == 'done', input_copy, report, error)
@@ -86,25 +116,36 @@ contains
     call report%discard()
   end subroutine write_results
 
-  !> Removes the trajectory of an earlier run that ended otherwise. summary.json goes first and comes last: without it there are
-  !> no results, if a file in between cannot take its name.
+  !> Removes the trajectories of an earlier run under other names. summary.json goes first and comes last: without it there are no
+  !> results, if a file in between cannot take its name.
   subroutine name_files(writer, is_done, input_copy, report, error)
     type(trajectory_writer_t), intent(inout) :: writer
     logical, intent(in) :: is_done   !! whether the run has reached its end
     type(output_file_t), intent(inout) :: input_copy, report
     type(error_t), allocatable, intent(out) :: error
 
+    character(len=:), allocatable :: name
+
+    name = trim(trajectory_names(merge(1, 2, is_done), writer%form))
     call remove_file(writer%folder // '/' // summary_file)
-    if (is_done) then
-      call remove_file(writer%folder // '/' // partial_file)
-      call writer%file%finish(trajectory_file, error)
-    else
-      call remove_file(writer%folder // '/' // trajectory_file)
-      call writer%file%finish(partial_file, error)
-    end if
+    call remove_trajectories(writer%folder, name)
+    call writer%file%finish(name, error)
     if (.not. allocated(error)) call input_copy%finish(input_file, error)
     if (.not. allocated(error)) call report%finish(summary_file, error)
   end subroutine name_files
+
+  !> Removes the trajectories in a folder.
+  subroutine remove_trajectories(folder, kept)
+    character(len=*), intent(in) :: folder
+    character(len=*), intent(in) :: kept   !! name of one that stays, '': none
+    integer :: i, k
+
+    do k = 1, size(trajectory_names, 2)
+      do i = 1, size(trajectory_names, 1)
+        if (trajectory_names(i, k) /= kept) call remove_file(folder // '/' // trim(trajectory_names(i, k)))
+      end do
+    end do
+  end subroutine remove_trajectories
 
   !> Opens the file and writes its header.
   subroutine start(self, labels, rows, error)
@@ -115,8 +156,7 @@ contains
 
     call check_rows(self%place, rows, size(labels), self%folder, error)
     if (allocated(error)) return
-    call self%file%open(self%folder, trajectory_file)
-    call write_header(self%file, labels)
+    call self%file%open(self%folder, labels, rows, self%input_title, self%input_text)
     self%has_started = .true.
   end subroutine start
 
@@ -150,7 +190,7 @@ contains
     class(trajectory_writer_t), intent(inout) :: self
     real(wp), intent(in) :: row(:)   !! [columns]
 
-    call write_row(self%file, row)
+    call self%file%put_row(row)
   end subroutine write_trajectory_row
 
   !> Shows the progress. The run stops after Ctrl-C, and if the file cannot be written.

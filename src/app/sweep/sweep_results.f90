@@ -12,7 +12,7 @@ module nocdyn_sweep_results
   use nocdyn_order_statistics, only: find_order_statistics
   use nocdyn_output_file, only: write_file
   use nocdyn_posix, only: is_interrupted, remove_file
-  use nocdyn_run_files, only: input_file, partial_file, run_to_files, summary_file, trajectory_file
+  use nocdyn_run_files, only: input_file, remove_trajectories, run_to_files, summary_file
   use nocdyn_run_summary, only: run_summary_t
   use nocdyn_sweep_chunk, only: chunk_t, status_refused
   use nocdyn_sweep_netcdf, only: write_sweep_netcdf
@@ -23,6 +23,7 @@ module nocdyn_sweep_results
   use nocdyn_sweep_csv, only: sweep_csv_name, write_sweep_csv
   use nocdyn_targets, only: set_targets
   use nocdyn_text, only: shown_path, string_t, to_text
+  use nocdyn_trajectory_netcdf, only: netcdf_trajectory_t
   implicit none (type, external)
   private
 
@@ -92,8 +93,7 @@ contains
     character(len=*), intent(in) :: folder
 
     call remove_file(folder // '/' // summary_file)
-    call remove_file(folder // '/' // trajectory_file)
-    call remove_file(folder // '/' // partial_file)
+    call remove_trajectories(folder, '')
   end subroutine remove_run
 
   !> Prints the summary. A sweep without any variant done is a failure.
@@ -145,6 +145,7 @@ contains
     type(error_t), allocatable, intent(out) :: error
     type(input_t) :: input
     type(run_summary_t) :: summary
+    type(netcdf_trajectory_t) :: netcdf
     real(wp), allocatable :: values(:)
     character(len=:), allocatable :: message
     integer :: i, status
@@ -161,7 +162,8 @@ contains
           cycle
         end if
         call run_to_files(without_sweep(input), folder // '/' // variant_folder // to_text(variant), &
-                          folder // '/' // variant_folder // to_text(variant), arguments%is_given('--quiet'), summary, error)
+                          folder // '/' // variant_folder // to_text(variant), arguments%is_given('--quiet'), summary, error, &
+                          netcdf)
       end associate
       if (is_interrupted()) then
         call raise(error, exit_failed, plan%input%shown_file() // ': interrupted while trajectories were written; ' // &

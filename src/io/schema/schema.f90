@@ -25,6 +25,7 @@ module nocdyn_schema
   type(allowed_t), parameter :: formulations = allowed_t(words='reduced paper multiplier')
   type(allowed_t), parameter :: complements = allowed_t(words='natural scaled negated')
   type(allowed_t), parameter :: output_units = allowed_t(words='rpm Hz deg')
+  type(allowed_t), parameter :: formats = allowed_t(words='csv netcdf')
   type(allowed_t), parameter :: starts = allowed_t(words='given projected')
 
   type(group_rule_t), parameter, public :: group_rules(*) = [ &
@@ -76,6 +77,8 @@ module nocdyn_schema
       'number of rows from t_start to t_end'), &
     key_rule_t('output',     'columns',         a_text,         any_number, '',   unset,       anything, &
       "columns that are written: names, or patterns with *, e.g. 'moment_*'; all if not given", fewest=1), &
+    key_rule_t('output',     'format',          a_word,         1, '',            "'csv'",     formats, &
+      'trajectory.csv, or trajectory.nc, which nocdyn-sweep writes'), &
     key_rule_t('output',     'extremes_from',   a_number,       1, 's',           unset,       anything, &
       'start of the time over which extremes are taken; t_start if not given'), &
     key_rule_t('output',     'units',           a_word,         any_number, '',   unset,       output_units, &
