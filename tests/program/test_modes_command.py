@@ -140,6 +140,43 @@ def test_an_oscillator_has_the_damping_of_its_closed_form(nocdyn):
     assert mode["eigenvalue_1_s"] == [pytest.approx(-1, rel=EXACT), pytest.approx(5 * sqrt(0.96), rel=EXACT)]
 
 
+@pytest.mark.parametrize("inductance", [1e-3, 0.4])
+def test_the_decay_of_a_current_is_not_that_of_a_rigid_body(nocdyn, inductance):
+    # L s^2 + (R + d L / J) s + (R d + k^2) / J = 0; the mode that is nearer to R / L is that of the current
+    text = f"""\
+&body name = 'disc' inertia = 2.0 /
+&motor name = 'drive' body = 'disc' kind = 'dc' voltage = 10.0 resistance = 1.0 flux_constant = 0.5 inductance = {inductance} /
+&load name = 'drag' body = 'disc' viscous = 0.1 /
+&run t_end = 1.0 /
+"""
+    content = modes_of(nocdyn, text)
+    middle, product = (1 + 0.05 * inductance) / (2 * inductance), (0.1 + 0.25) / (2 * inductance)
+    root = sqrt(middle**2 - product)
+    (rigid,), (current,) = of_kind(content, "rigid body"), of_kind(content, "internal state")
+    assert rigid["time_constant_s"] == pytest.approx(1 / (middle - root), rel=1e-9)
+    assert current["time_constant_s"] == pytest.approx(1 / (middle + root), rel=1e-9)
+    assert current["state"] == "armature current of motor 'drive'" and "state" not in rigid
+    lines = nocdyn("modes", "machine.nml").stdout.splitlines()
+    assert any(line.startswith("  armature current of motor 'drive': decays with time constant ") for line in lines)
+
+
+def test_the_decay_of_a_governor_is_not_that_of_a_rigid_body(nocdyn):
+    # J s^2 + M g s + M g / T = 0 with T = 100 s: the integral is slow, the speed fast
+    text = """\
+&body name = 'disc' inertia = 2.0 /
+&motor name = 'drive' body = 'disc' kind = 'constant' torque = 40.0
+       governor_speed = 10.0 governor_gain = 0.05 governor_time = 100.0 /
+&load name = 'drag' body = 'disc' constant = 10.0 constant_speed = 0.1 /
+&run t_end = 1.0 /
+"""
+    content = modes_of(nocdyn, text)
+    (rigid,), (governor,) = of_kind(content, "rigid body"), of_kind(content, "internal state")
+    root = sqrt(0.25 - 1 / 100)
+    assert rigid["time_constant_s"] == pytest.approx(1 / (0.5 + root), rel=1e-6)
+    assert governor["time_constant_s"] == pytest.approx(1 / (0.5 - root), rel=1e-6)
+    assert governor["state"] == "governor integral of motor 'drive'"
+
+
 def test_an_overdamped_oscillator_has_two_time_constants(nocdyn):
     text = """\
 &body name = 'disc' inertia = 2.0 /

@@ -17,11 +17,15 @@ module nocdyn_modes
   integer, parameter, public :: mode_overdamped = 3    !! a real eigenvalue, not positive
   integer, parameter, public :: mode_diverging = 4     !! a positive real eigenvalue
 
-  character(len=*), parameter, public :: kind_names(4) = ['rigid body ', 'oscillating', 'overdamped ', 'diverging  ']
+  integer, parameter, public :: mode_internal = 5      !! a real eigenvalue of a governor or of a current, not of the motion
+
+  character(len=*), parameter, public :: kind_names(5) = [character(len=14) :: 'rigid body', 'oscillating', 'overdamped', &
+    'diverging', 'internal state']
 
   !> A mode, or a pair of conjugate complex ones.
   type, public :: mode_t
     integer :: kind = mode_oscillating
+    integer :: internal = 0              !! of `mode_internal`: the internal state of the machine that takes part most
     complex(wp) :: eigenvalue = 0.0_wp   !! imaginary part >= 0 [1/s]
     real(wp) :: undamped = 0.0_wp        !! frequency of the most similar undamped mode, negative if that
                                                   !! diverges [Hz]
@@ -42,14 +46,19 @@ contains
     integer, intent(in) :: elastic(:)   !! elements whose shares in the potential energy are wanted
     type(mode_t), allocatable, intent(out) :: modes(:)
     type(error_t), allocatable, intent(out) :: error   !! if LAPACK does not converge
-    complex(wp), allocatable :: speeds(:, :), twists(:, :), values(:), vectors(:, :)
+    complex(wp), allocatable :: left(:, :), speeds(:, :), twists(:, :), values(:), vectors(:, :)
     integer, allocatable :: kept(:)
     integer :: i, states
     logical :: has_failed
 
     states = size(linear%matrix, 1)
     allocate (values(states), vectors(states, states))
-    call eigenvectors(linear%matrix, values, vectors, has_failed)
+    if (states > size(linear%natural) + size(linear%flexible)) then   ! there are internal states
+      allocate (left(states, states))
+      call eigenvectors(linear%matrix, values, vectors, has_failed, left)
+    else
+      call eigenvectors(linear%matrix, values, vectors, has_failed)
+    end if
     if (has_failed) then
       call raise(error, exit_failed, 'the modes were not found: a number of the linearised machine is not finite, or ' // &
                  'LAPACK did not converge')
@@ -61,6 +70,7 @@ contains
     allocate (modes(size(kept)))
     do i = 1, size(kept)
       call fill_mode(linear, elastic, values(kept(i)), vectors(:, kept(i)), twists(:, i), modes(i))
+      if (allocated(left)) call find_internal(linear, left(:, kept(i)) * vectors(:, kept(i)), modes(i))
       call fill_bodies(formulation, speeds(:, i), modes(i))
     end do
     modes = modes(order_of(modes))
@@ -123,6 +133,21 @@ contains
       mode%kind = mode_overdamped
     end if
   end subroutine fill_mode
+
+  !> Whether a mode with a real eigenvalue is one of the internal states: they take part more than the motion does. Participation
+  !> factors, products of left and right eigenvectors, compare states of different units.
+  subroutine find_internal(linear, participation, mode)
+    type(linearisation_t), intent(in) :: linear
+    complex(wp), intent(in) :: participation(:)   !! [first-order states]
+    type(mode_t), intent(inout) :: mode
+
+    if (mode%kind == mode_oscillating) return
+    associate (shares => abs(participation), mechanical => size(linear%natural) + size(linear%flexible))
+      if (sum(shares(mechanical + 1:)) <= sum(shares(:mechanical))) return
+      mode%kind = mode_internal
+      mode%internal = maxloc(shares(mechanical + 1:), dim=1)
+    end associate
+  end subroutine find_internal
 
   !> Sets shape and kinetic energies of the bodies.
   subroutine fill_bodies(formulation, speeds, mode)

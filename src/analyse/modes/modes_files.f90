@@ -4,7 +4,7 @@ module nocdyn_modes_files
   use nocdyn_input, only: input_t
   use nocdyn_json, only: json_t
   use nocdyn_kinds, only: wp
-  use nocdyn_modes, only: kind_names, mode_oscillating, mode_t
+  use nocdyn_modes, only: kind_names, mode_internal, mode_oscillating, mode_t
   use nocdyn_modes_report, only: modes_report_t
   use nocdyn_printable, only: as_utf_8
   use nocdyn_text, only: string_t, to_text
@@ -111,7 +111,7 @@ contains
     number = 0
     do i = 1, size(self%modes)
       if (self%modes(i)%kind == mode_oscillating) number = number + 1
-      call put_mode(json, self%modes(i), number, i <= self%shapes)
+      call put_mode(json, self, i, number)
     end do
     call json%close_list()
     call json%close()
@@ -153,27 +153,30 @@ contains
     call json%close_list()
   end subroutine put_drivetrain
 
-  subroutine put_mode(json, mode, number, has_shape)
+  subroutine put_mode(json, self, i, number)
     type(json_t), intent(inout) :: json
-    type(mode_t), intent(in) :: mode
-    integer, intent(in) :: number
-    logical, intent(in) :: has_shape
+    type(modes_report_t), intent(in) :: self
+    integer, intent(in) :: i        !! index of the mode
+    integer, intent(in) :: number   !! among the oscillating ones
 
-    call json%open()
-    if (mode%kind == mode_oscillating) call json%put('mode', number)
-    call json%put('kind', trim(kind_names(mode%kind)))
-    call json%put('frequency_Hz', mode%frequency())
-    call json%put('undamped_frequency_Hz', mode%undamped)
-    call json%put('damping_ratio', mode%damping_ratio())
-    if (mode%time_constant() < huge(1.0_wp)) call json%put('time_constant_s', mode%time_constant())
-    call json%put('eigenvalue_1_s', [real(mode%eigenvalue, wp), aimag(mode%eigenvalue)])
-    if (has_shape) then
-      call json%put('shape', abs(mode%shape))
-      call json%put('phase_deg', phases(mode%shape))
-      call json%put('kinetic_share', mode%kinetic)
-      call json%put('potential_share', mode%potential)
-    end if
-    call json%close()
+    associate (mode => self%modes(i))
+      call json%open()
+      if (mode%kind == mode_oscillating) call json%put('mode', number)
+      call json%put('kind', trim(kind_names(mode%kind)))
+      if (mode%kind == mode_internal) call json%put('state', self%machine%internal_name(mode%internal))
+      call json%put('frequency_Hz', mode%frequency())
+      call json%put('undamped_frequency_Hz', mode%undamped)
+      call json%put('damping_ratio', mode%damping_ratio())
+      if (mode%time_constant() < huge(1.0_wp)) call json%put('time_constant_s', mode%time_constant())
+      call json%put('eigenvalue_1_s', [real(mode%eigenvalue, wp), aimag(mode%eigenvalue)])
+      if (i <= self%shapes) then
+        call json%put('shape', abs(mode%shape))
+        call json%put('phase_deg', phases(mode%shape))
+        call json%put('kinetic_share', mode%kinetic)
+        call json%put('potential_share', mode%potential)
+      end if
+      call json%close()
+    end associate
   end subroutine put_mode
 
 end module nocdyn_modes_files

@@ -6,7 +6,8 @@ module nocdyn_modes_report
   use nocdyn_kinds, only: wp
   use nocdyn_linearisation, only: linearisation_t, linearise
   use nocdyn_machine, only: machine_t
-  use nocdyn_modes, only: find_modes, kind_names, mode_diverging, mode_oscillating, mode_overdamped, mode_rigid, mode_t
+  use nocdyn_modes, only: find_modes, kind_names, mode_diverging, mode_internal, mode_oscillating, mode_overdamped, mode_rigid, &
+    mode_t
   use nocdyn_operating_point, only: operating_point_t
   use nocdyn_table_text, only: cell, cell_width, padded, text_width
   use nocdyn_text, only: append, rounded_text, string_t, to_text
@@ -93,6 +94,7 @@ contains
     call put_real(self, mode_rigid, report)
     call put_real(self, mode_overdamped, report)
     call put_real(self, mode_diverging, report)
+    call put_internal(self, report)
     if (count(self%modes%kind == mode_oscillating) <= max_shapes .and. self%machine%bodies <= max_shapes) then
       call put_shapes(self, report)
     end if
@@ -157,6 +159,22 @@ contains
     end do
     if (shown < size(chosen)) call report%append_line('  (' // to_text(size(chosen) - shown) // ' more in modes.csv)')
   end subroutine put_real
+
+  !> Appends a line for every mode of an internal state.
+  subroutine put_internal(self, report)
+    type(modes_report_t), intent(in) :: self
+    type(text_buffer_t), intent(inout) :: report
+    integer, allocatable :: chosen(:)
+    integer :: i
+
+    allocate (chosen, source=modes_of(self, mode_internal))
+    do i = 1, min(size(chosen), max_modes)
+      associate (mode => self%modes(chosen(i)))
+        call report%append_line('  ' // self%machine%internal_name(mode%internal) // ': ' // rate_text(mode))
+      end associate
+    end do
+    if (size(chosen) > max_modes) call report%append_line('  (' // to_text(size(chosen) - max_modes) // ' more in modes.csv)')
+  end subroutine put_internal
 
   !> The modes of one kind.
   pure function modes_of(self, kind) result(chosen)

@@ -122,37 +122,51 @@ contains
   end subroutine symmetric_eigenvectors
 
   !> Eigenvalues of a real matrix and right eigenvectors; conjugate pairs follow each other (DGEEV).
-  subroutine eigenvectors(matrix, values, vectors, has_failed)
+  subroutine eigenvectors(matrix, values, vectors, has_failed, left_vectors)
     real(wp), intent(in) :: matrix(:, :)   !! [n, n]
     complex(wp), intent(out) :: values(:)   !! [n]
     complex(wp), intent(out) :: vectors(:, :)             !! as columns
     logical, intent(out) :: has_failed                    !! LAPACK does not converge, or an element is not finite
-    real(wp), allocatable :: a(:, :), imaginary(:), right(:, :), work(:)
-    real(wp) :: none(1, 1), room(1)
-    real(wp), allocatable :: real_part(:)
-    integer :: i, info, n
+    complex(wp), intent(out), optional :: left_vectors(:, :)   !! u with u^H A = value u^H, as columns
+    real(wp), allocatable :: a(:, :), imaginary(:), left(:, :), real_part(:), right(:, :), work(:)
+    real(wp) :: room(1)
+    integer :: info, n
 
     n = size(matrix, 1)
     values = 0.0_wp
     vectors = 0.0_wp
+    if (present(left_vectors)) left_vectors = 0.0_wp
     has_failed = .not. all(is_finite(matrix))
     if (has_failed .or. n == 0) return
     allocate (a, source=matrix)
-    allocate (right(n, n), real_part(n), imaginary(n), source=0.0_wp)
-    call dgeev('N', 'V', n, a, n, real_part, imaginary, none, 1, right, n, room, -1, info)
-    allocate (work(int(room(1))))
-    call dgeev('N', 'V', n, a, n, real_part, imaginary, none, 1, right, n, work, size(work), info)
+    allocate (right(n, n), left(n, n), real_part(n), imaginary(n), source=0.0_wp)
+    associate (job => merge('V', 'N', present(left_vectors)))
+      call dgeev(job, 'V', n, a, n, real_part, imaginary, left, n, right, n, room, -1, info)
+      allocate (work(int(room(1))))
+      call dgeev(job, 'V', n, a, n, real_part, imaginary, left, n, right, n, work, size(work), info)
+    end associate
     has_failed = info /= 0
     values = cmplx(real_part, imaginary, wp)
-    do i = 1, n
+    call combine_parts(imaginary, right, vectors)
+    if (present(left_vectors)) call combine_parts(imaginary, left, left_vectors)
+  end subroutine eigenvectors
+
+  !> Complex vectors from the form of LAPACK: of a conjugate pair the first column is the real part, the second the imaginary one.
+  pure subroutine combine_parts(imaginary, parts, vectors)
+    real(wp), intent(in) :: imaginary(:)          !! parts of the eigenvalues
+    real(wp), intent(in) :: parts(:, :)
+    complex(wp), intent(inout) :: vectors(:, :)
+    integer :: i
+
+    do i = 1, size(imaginary)
       if (imaginary(i) > 0.0_wp) then
-        vectors(:, i) = cmplx(right(:, i), right(:, i + 1), wp)
+        vectors(:, i) = cmplx(parts(:, i), parts(:, i + 1), wp)
       else if (imaginary(i) < 0.0_wp) then
-        vectors(:, i) = cmplx(right(:, i - 1), -right(:, i), wp)
+        vectors(:, i) = cmplx(parts(:, i - 1), -parts(:, i), wp)
       else
-        vectors(:, i) = cmplx(right(:, i), 0.0_wp, wp)
+        vectors(:, i) = cmplx(parts(:, i), 0.0_wp, wp)
       end if
     end do
-  end subroutine eigenvectors
+  end subroutine combine_parts
 
 end module nocdyn_lapack_eigen
