@@ -102,7 +102,7 @@ contains
       call read_input(file, arguments%overrides, reading%input, reading%error)
       if (allocated(reading%error)) return
       folder = result_folder(arguments, reading%input)
-      call refuse_sweep_folder(file, folder, reading%error)
+      call refuse_sweep_folder(reading%input%file, folder, reading%error)
       if (allocated(reading%error)) return
       reading%folder = folder
       if (has_netcdf .or. .not. wants_netcdf(reading%input)) return

@@ -37,7 +37,7 @@ module nocdyn_schema
     group_rule_t('load',       any_times,     'torque',   'A resisting torque on a body: the sum of the terms that are given.'), &
     group_rule_t('excitation', any_times,     'torque',   'A torque on a body, by a law of time or of its angle.'), &
     group_rule_t('run',        exactly_once,  '',         'What is computed, and how.'), &
-    group_rule_t('output',     at_most_once,  '',         'Which times are written, and where.'), &
+    group_rule_t('output',     at_most_once,  '',         'What is written, in which form, and where.'), &
     sweep_groups]
 
   type(key_rule_t), parameter :: frame_keys(*) = [ &

@@ -278,19 +278,23 @@ contains
   end subroutine read_run
 
   subroutine read_output()
-    real(wp) :: interval
+    real(wp) :: interval, extremes_from
     integer :: points, status
     character(len=256) :: directory
-    namelist /output/ interval, points, directory
+    character(len=64) :: columns(8), format
+    namelist /output/ interval, points, columns, format, extremes_from, directory
 
     interval = not_given
     points = 0
+    columns = ''
+    format = 'csv'
+    extremes_from = not_given
     directory = ''
     rewind (unit)
     read (unit, nml=output, iostat=status)
     if (status > 0) error stop 'output'
     if (points == 0 .and. interval < 0) points = 1001
-    print '(*(g0, 1x))', 'output', interval, points, trim(directory)
+    print '(*(g0, 1x))', 'output', interval, points, columns, trim(format), extremes_from, trim(directory)
   end subroutine read_output
 
   subroutine read_sweep()
