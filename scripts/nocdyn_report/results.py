@@ -11,16 +11,15 @@ import f90nml
 import numpy as np
 import pandas as pd
 
+from .trajectory_files import ResultsError, labels_of, read_columns
+
 COLUMN = re.compile(
     r"(?P<quantity>phi|omega|twist|moment|damping|shaft|torque|throttle|current|reaction)_(?P<element>.+) "
     r"\[(?P<unit>[^]]+)\]"
 )
 TIME = "t [s]"
+FILES = ("trajectory.csv", "trajectory.nc", "trajectory.partial.csv", "trajectory.partial.nc")
 RPM = 30.0 / math.pi  # for a rad/s
-
-
-class ResultsError(Exception):
-    """A folder whose results cannot be used; the message is one line for the person at the keyboard."""
 
 
 @dataclass(frozen=True)
@@ -136,32 +135,23 @@ def bodies_of(machine: f90nml.Namelist, coupling: str) -> list[str]:
 
 
 def read_results(folder: Path, choose: Callable[[Header], Iterable[str]] | None = None, rpm: bool = False) -> Results:
-    """The results in a folder; of a run that failed, what it has. `choose` gives the labels that are needed besides the time:
-    to read a column takes ten times as long as to skip it."""
+    """The results in a folder; of a run that failed, what it has. `choose` gives the labels that are needed besides the time."""
     if not folder.is_dir():
         raise ResultsError(f"{folder}: there is no such results folder")
-    files = [folder / name for name in ("trajectory.csv", "trajectory.partial.csv")]
-    file = next((file for file in files if file.is_file()), None)
+    file = next((folder / name for name in FILES if (folder / name).is_file()), None)
     if file is None:
         raise ResultsError(f"{folder}: no trajectory.csv here; is this the results folder of a 'nocdyn run'?")
-    labels = list(_read_table(file, nrows=0))
+    labels = labels_of(file)
     if TIME not in labels:
         raise ResultsError(f"{file}: not a trajectory of nocdyn: there is no column '{TIME}'")
     summary, machine = _read_summary(folder), folder / "input.nml"
     header = Header(folder, labels, _ranges(summary), f90nml.read(machine) if machine.is_file() else f90nml.Namelist())
-    table = _read_table(file, dtype=float, usecols={TIME, *choose(header)} if choose else None)
+    table = read_columns(file, {TIME, *choose(header)} if choose else set(labels))
     if len(table) < 2:
         raise ResultsError(f"{file}: nothing to draw: the trajectory has {len(table)} row(s)")
     if not machine.is_file():
         raise ResultsError(f"{machine}: missing; the figures need the input of the run beside its trajectory")
-    return Results(folder, header, table, "" if file == files[0] else _shortfall(summary, table), rpm)
-
-
-def _read_table(file: Path, **options: object) -> pd.DataFrame:
-    try:
-        return pd.read_csv(file, index_col=False, **options)
-    except (ValueError, OSError) as error:  # pandas' own parser errors are ValueErrors
-        raise ResultsError(f"{file}: not a table of numbers: {' '.join(str(error).split())}") from None
+    return Results(folder, header, table, _shortfall(summary, table) if ".partial" in file.suffixes else "", rpm)
 
 
 def _ranges(summary: dict) -> dict[str, float]:

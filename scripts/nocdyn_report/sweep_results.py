@@ -9,7 +9,7 @@ import h5netcdf
 import numpy as np
 import pandas as pd
 
-from .results import ResultsError
+from .trajectory_files import ResultsError, text_of
 
 DONE, REFUSED, FAILED = 0, 1, 2
 STATUS_WORDS = {"done": DONE, "refused": REFUSED, "failed": FAILED}
@@ -115,8 +115,8 @@ def _read_netcdf(file: Path) -> Sweep:
         with h5netcdf.File(file, "r") as content:
             status = content.variables["status"][...].astype(int)
             return Sweep(
-                title=_text(content.attrs.get("title", "")) or file.resolve().parent.name,
-                design=_text(content.attrs["design"]),
+                title=text_of(content.attrs.get("title", "")) or file.resolve().parent.name,
+                design=text_of(content.attrs["design"]),
                 varied=_variables(content, "parameter"),
                 results=_variables(content, "result"),
                 status=status,
@@ -131,23 +131,14 @@ def _variables(content: h5netcdf.File, role: str) -> list[Variable]:
     return [
         Variable(
             *(
-                _text(variable.attrs.get(attribute, default))
+                text_of(variable.attrs.get(attribute, default))
                 for attribute, default in (("label", name), ("units", ""), ("long_name", name))
             ),
             values=np.asarray(variable[...], dtype=float),
         )
         for name, variable in content.variables.items()
-        if _text(variable.attrs.get("role", "")) == role
+        if text_of(variable.attrs.get("role", "")) == role
     ]
-
-
-def _text(value: object) -> str:
-    """The text of an attribute: UTF-8, which the NetCDF library marks as ASCII; what is no UTF-8 is taken for Latin-1."""
-    stored = value if isinstance(value, bytes) else str(value).encode("utf-8", "surrogateescape")
-    try:
-        return stored.decode("utf-8")
-    except UnicodeDecodeError:
-        return stored.decode("latin-1")
 
 
 def _read_table(file: Path) -> Sweep:

@@ -6,6 +6,7 @@ import subprocess
 import sys
 import time
 
+import h5netcdf
 import numpy as np
 import pandas as pd
 import pytest
@@ -152,6 +153,31 @@ def test_columns_are_chosen_by_patterns_and_rows_by_times(tmp_path, monkeypatch,
     assert ">0.3<" in text or ">0.30<" in text
     assert ">0.2<" not in text and ">0.8<" not in text
     assert capsys.readouterr().out == f"columns (SVG) are in {results / 'figures'}\n"
+
+
+def as_netcdf(results):
+    """trajectory.csv replaced by trajectory.nc as nocdyn-sweep writes it."""
+    table = pd.read_csv(results / "trajectory.csv")
+    with h5netcdf.File(results / "trajectory.nc", "w") as file:
+        file.dimensions = {"t": len(table)}
+        for i, label in enumerate(table):
+            name, unit = label.removesuffix("]").split(" [")
+            variable = file.create_variable("t" if name == "t" else f"changed_{i}", ("t",), data=table[label].to_numpy())
+            variable.attrs.update(units=np.bytes_(unit.encode()), long_name=np.bytes_(name.encode()))
+    (results / "trajectory.csv").unlink()
+    return results
+
+
+def test_a_trajectory_in_netcdf_is_drawn_too(tmp_path, monkeypatch):
+    results = turning(tmp_path / "größe")
+    (results / "trajectory.csv").write_text((results / "trajectory.csv").read_text().replace("fan", "Lüfter"))
+    tables = [read_results(results).table, read_results(as_netcdf(results)).table]
+    assert (tables[0] == tables[1][list(tables[0])]).all(axis=None)
+    assert list(read_results(results, lambda header: header.of("twist")[:1]).table) == ["t [s]", "twist_shaft [rad]"]
+    call(monkeypatch, "run_figures", results, "--columns", "omega_*", "--format", "svg")
+    assert "Lüfter" in text_of(results / "figures", "columns")
+    (results / "trajectory.nc").write_text("no NetCDF")
+    assert f"{results}/trajectory.nc: cannot be read: " in refusal(monkeypatch, "run_figures", results)
 
 
 def test_only_the_columns_that_are_drawn_are_read(tmp_path):
