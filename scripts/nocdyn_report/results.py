@@ -19,7 +19,7 @@ COLUMN = re.compile(
 )
 TIME = "t [s]"
 FILES = ("trajectory.csv", "trajectory.nc", "trajectory.partial.csv", "trajectory.partial.nc")
-RPM = 30.0 / math.pi  # for a rad/s
+RPM = {"rad/s": 30.0 / math.pi, "Hz": 60.0}
 
 
 @dataclass(frozen=True)
@@ -56,7 +56,7 @@ class Results:
     header: Header
     table: pd.DataFrame  # labels of trajectory.csv, all or those that were asked for
     shortfall: str  # why the trajectory ends early, '' if it is complete
-    rpm: bool = False  # whether columns give speeds in rpm that the file has in rad/s
+    rpm: bool = False  # whether columns give speeds in rpm, whatever the file has
 
     @property
     def time(self) -> np.ndarray:
@@ -77,8 +77,8 @@ class Results:
         unit = label.rsplit(" [", 1)[-1].removesuffix("]")
         others = "residual" if "residual" in label else "energy"
         quantity, element = (match["quantity"], match["element"]) if match else (others, name_of(label))
-        if self.rpm and quantity == "omega" and unit == "rad/s":
-            return Column(quantity, element, "rpm", self.values(label) * RPM)
+        if self.rpm and quantity == "omega" and unit in RPM:
+            return Column(quantity, element, "rpm", self.values(label) * RPM[unit])
         return Column(quantity, element, unit, self.values(label))
 
     def columns(self, quantity: str) -> list[Column]:

@@ -127,7 +127,8 @@ def default_labels(header: Header) -> dict[str, list[str]]:
         return [label for quantity in quantities for label in widest(header, header.of(quantity), MOST_PANELS)]
 
     energies = [label for label in (*ENERGIES, RESIDUAL) if label in header.labels]
-    return {"motion": shown(MOTION), "phase_planes": _plane_labels(header), "torques": shown(TORQUES), "energy": energies}
+    motion = shown(MOTION if header.of("omega") else ("phi", "twist"))
+    return {"motion": motion, "phase_planes": _plane_labels(header), "torques": shown(TORQUES), "energy": energies}
 
 
 def _plane_labels(header: Header) -> list[str]:
@@ -236,6 +237,8 @@ def main() -> None:
     if results.shortfall:
         print(f"{parser.prog}: {arguments.results}: the trajectory is partial: {results.shortfall}", file=sys.stderr)
     figures = _drawn(results, arguments)
+    if not figures:
+        sys.exit(f"{parser.prog}: {arguments.results}: nothing to draw: the trajectory has the time only")
     for name, figure in figures.items():
         save(figure, folder, name, arguments.format)
     print(saved(list(figures), arguments.format, folder))

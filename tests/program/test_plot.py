@@ -131,6 +131,19 @@ def test_speeds_are_drawn_in_rpm_if_asked_for(tmp_path, monkeypatch):
     assert rpm.twist_rate("mount").values == pytest.approx(-20.0 * 30.0 / np.pi)
 
 
+def test_speeds_in_hertz_become_rpm_too(tmp_path):
+    results = turning(tmp_path / "results", "Hz")
+    assert read_results(results).speed("fan").unit == "Hz"
+    assert read_results(results, rpm=True).speed("fan").values == pytest.approx(20.0 * 60.0)
+
+
+def test_angles_without_speeds_are_drawn_over_time(tmp_path, monkeypatch):
+    results = write_results(tmp_path / "results", {"t [s]": [0.0, 1.0], "phi_fan [rad]": [0.0, 2.0]})
+    call(monkeypatch, "run_figures", results, "--format", "svg")
+    assert_figures(results / "figures", "motion", formats=("svg",))
+    assert "angle [rad]" in text_of(results / "figures", "motion")
+
+
 @pytest.mark.parametrize("options", [[], ["--rpm"]])
 def test_units_of_the_file_are_those_of_the_axes(options, tmp_path, monkeypatch):
     results = turning(tmp_path / "results", "rpm", "deg")
@@ -307,6 +320,7 @@ def test_powers_of_ten_stand_above_the_axis(tmp_path):
         ({"trajectory.csv": "t [s],phi_a [rad]\n0,1\n"}, "nothing to draw: the trajectory has 1 row(s)"),
         ({"trajectory.partial.csv": "t [s],phi_a [rad]\n"}, "nothing to draw: the trajectory has 0 row(s)"),
         ({"trajectory.csv": "t [s],phi_a [rad]\n0,1\n1,1\n"}, "input.nml: missing"),
+        ({"trajectory.csv": "t [s]\n0\n1\n", "input.nml": ""}, "nothing to draw: the trajectory has the time only"),
     ],
 )
 def test_unusable_results_are_one_clear_line(files, message, tmp_path, monkeypatch):
