@@ -53,12 +53,15 @@ contains
     real(wp), intent(in) :: t                  !! [s]
     real(wp), contiguous, intent(in) :: y(:)   !! [states + quadratures]
     real(wp), intent(inout) :: row(:)          !! [labels]
+    integer :: i
 
     self%t(1) = t
     self%y(1, :) = y
     call self%columns%observe(self%t, self%y)
     call self%columns%fill_row(1, self%t, self%y, row)
-    row = from_si(row, self%unit)
+    do i = 1, size(row)   ! without memory for the whole row
+      row(i) = from_si(row(i), self%unit(i))
+    end do
   end subroutine fill
 
   !> Works and energies from the start to a time and state.
