@@ -86,7 +86,7 @@ def test_partial_trajectory_of_many_bodies_is_drawn_and_called_partial(tmp_path,
     results = run_input(tmp_path, chain(10, "t_end = 1000.0"), "--set", "run.max_steps=200", "--set", "output.points=10001")
     assert (results / "trajectory.partial.csv").is_file()
     call(monkeypatch, "run_figures", results, "--format", "svg")
-    names = ("omega", "twist", "phase_planes", "torques", "moment", "damping", "energy")
+    names = ("omega", "twist", "phase_planes", "torques", "moment", "damping", "shaft", "energy")
     assert_figures(results / "figures", *names, formats=("svg",))
     assert "the trajectory is partial: failed, ends at t = " in capsys.readouterr().err
     assert all("failed, ends at t = " in text_of(results / "figures", name) for name in names)
