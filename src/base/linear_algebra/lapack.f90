@@ -1,4 +1,4 @@
-!> Dense linear algebra by LAPACK: rank, inverse, positive definite systems, pseudo-inverse.
+!> Dense linear algebra by LAPACK: rank, inverse, positive definite systems, pseudo-inverse; sorting.
 !>
 !> LAPACK never sees a matrix with an infinity or a NaN, on which it may print and stop, or never end.
 !>
@@ -10,7 +10,7 @@ module nocdyn_lapack
   implicit none (type, external)
   private
 
-  public :: pivoted_rank, invert, solve_positive_definite, pseudo_inverse
+  public :: pivoted_rank, invert, solve_positive_definite, pseudo_inverse, sort_ascending
 
   interface
     subroutine dgeqp3(m, n, a, lda, jpvt, tau, work, lwork, info)
@@ -48,6 +48,14 @@ module nocdyn_lapack
       integer, intent(out) :: rank, info
       real(wp), intent(out) :: work(*)
     end subroutine dgelsy
+
+    subroutine dlasrt(id, n, d, info)
+      import :: wp
+      character(len=1), intent(in) :: id
+      integer, intent(in) :: n
+      real(wp), intent(inout) :: d(*)
+      integer, intent(out) :: info
+    end subroutine dlasrt
   end interface
 
 contains
@@ -144,5 +152,13 @@ contains
     if (min(m, n) > 0) call dgelsy(m, n, m, a, m, b, size(b, 1), jpvt, tolerance, rank, work, size(work), info)
     inverse = b(:n, :)
   end function pseudo_inverse
+
+  !> Sorts numbers (DLASRT).
+  subroutine sort_ascending(values)
+    real(wp), contiguous, intent(inout) :: values(:)   !! of any unit
+    integer :: info
+
+    call dlasrt('I', size(values), values, info)
+  end subroutine sort_ascending
 
 end module nocdyn_lapack

@@ -23,6 +23,7 @@ module nocdyn_curves
     real(wp), allocatable, private :: area(:)            !! integral from the first point to the origin, [0:points]
   contains
     procedure :: points
+    procedure :: knots
     procedure :: is_same
     procedure :: segment
     procedure :: inset
@@ -117,6 +118,14 @@ contains
 
     points = size(self%knot)
   end function points
+
+  !> Arguments of the points, ascending.
+  pure function knots(self) result(x)
+    class(curve_t), intent(in) :: self
+    real(wp), allocatable :: x(:)
+
+    allocate (x, source=self%knot)
+  end function knots
 
   !> Whether two curves with the same number of points are equal.
   pure logical function is_same(self, other)

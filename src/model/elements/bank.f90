@@ -72,6 +72,8 @@ module nocdyn_bank
     procedure :: series
     procedure :: to_mean_torque
     procedure :: start_internal
+    procedure :: steady_internal
+    procedure :: knees
     procedure :: evaluate_internal
     procedure :: choose
     procedure :: indicator
@@ -251,6 +253,25 @@ contains
 
     internal = 0.0_wp
   end subroutine start_internal
+
+  !> The internal states of one lane that do not change while the speeds stay.
+  subroutine steady_internal(self, speed, internal)
+    class(bank_t), intent(in) :: self
+    real(wp), intent(in) :: speed(:)          !! u' [rad/s], [elements]
+    real(wp), intent(inout) :: internal(:)    !! [states * elements], the states of the first element first
+
+    if (self%states > 0) error stop 'nocdyn_bank: a bank with internal states overrides steady_internal'
+  end subroutine steady_internal
+
+  !> Speeds at which the applied moment of an element in the first lane has an extreme, changes its sign, bends or jumps [rad/s]:
+  !> where the search of steady states looks closely. By default there are none.
+  function knees(self, element) result(speeds)
+    class(bank_t), intent(in) :: self
+    integer, intent(in) :: element   !! numbered within the bank
+    real(wp), allocatable :: speeds(:)
+
+    allocate (speeds(0))
+  end function knees
 
   !> Adds the moments that depend on internal states to those of `evaluate` and of the polynomials, and sets the rates.
   subroutine evaluate_internal(self, speed, internal, applied, rate)

@@ -31,6 +31,7 @@ module nocdyn_table_laws
     procedure :: evaluate_energies
     procedure :: choose
     procedure :: indicator
+    procedure :: knees
     procedure, private :: argument_of
   end type table_laws_t
 
@@ -182,6 +183,15 @@ contains
       end if
     end associate
   end function indicator
+
+  function knees(self, element) result(speeds)
+    class(table_laws_t), intent(in) :: self
+    integer, intent(in) :: element   !! numbered within the bank
+    real(wp), allocatable :: speeds(:)
+
+    allocate (speeds(0))
+    if (allocated(self%curve) .and. self%argument == over_speed) speeds = self%curve(1, element)%knots()
+  end function knees
 
   subroutine list_parameters(self, parameters)
     class(table_laws_t), target, intent(inout) :: self

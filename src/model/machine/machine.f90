@@ -51,6 +51,8 @@ module nocdyn_machine
     procedure :: start_internal
     procedure :: internal_name
     procedure :: choose_branches
+    procedure :: choose_element_branches
+    procedure :: settle_internal
     procedure :: evaluate
     procedure :: evaluate_elements
     procedure :: differentiate
@@ -204,6 +206,37 @@ contains
       end do
     end associate
   end subroutine choose_branches
+
+  !> Chooses the branches from the angles, speeds and internal states in `elements`.
+  subroutine choose_element_branches(self, t)
+    class(machine_t), intent(inout) :: self
+    real(wp), intent(in) :: t   !! [s]
+    integer :: k, lane
+
+    associate (switches => self%switches, elements => self%elements)
+      do k = 1, switches%count
+        associate (e => switches%element(k))
+          do lane = 1, self%lanes
+            call switches%choose(self%banks, k, lane, t, elements%angle(lane, e), elements%speed(lane, e), &
+                                 elements%internal%value(lane, :))
+          end do
+        end associate
+      end do
+    end associate
+  end subroutine choose_element_branches
+
+  !> Replaces the internal states in the first lane of `elements` by those that do not change at the speeds there.
+  subroutine settle_internal(self)
+    class(machine_t), intent(inout) :: self
+    integer :: i
+
+    do i = 1, size(self%internal_banks)
+      associate (bank => self%banks(self%internal_banks(i))%bank, elements => self%elements)
+        call bank%steady_internal(elements%speed(1, bank%first:bank%last()), elements%internal%value(1, &
+                                  bank%first_internal:bank%first_internal + bank%states * size(bank%to) - 1))
+      end associate
+    end do
+  end subroutine settle_internal
 
   !> Name of an element.
   pure function element_name(self, element) result(name)

@@ -22,6 +22,8 @@ module nocdyn_dc_motors
     procedure :: list_parameters
     procedure :: evaluate_internal
     procedure :: differentiate
+    procedure :: steady_internal
+    procedure :: knees
   end type dc_motors_t
 
 contains
@@ -99,6 +101,31 @@ contains
       end do
     end do
   end subroutine differentiate
+
+  subroutine steady_internal(self, speed, internal)
+    class(dc_motors_t), intent(in) :: self
+    real(wp), intent(in) :: speed(:)         !! u' [rad/s], [motors]
+    real(wp), intent(inout) :: internal(:)   !! [states * motors]
+    real(wp) :: throttle
+    integer :: e
+
+    call self%governed_bank_t%steady_internal(speed, internal)
+    throttle = 1.0_wp
+    do e = 1, size(self%to)
+      if (allocated(self%governor)) throttle = internal(self%states * e)
+      internal(self%states * (e - 1) + 1) = (throttle * self%voltage(1, e) - self%flux_constant(1, e) * speed(e)) &
+                                            / self%resistance(1, e)
+    end do
+  end subroutine steady_internal
+
+  !> The speed without torque, and that of the governor.
+  function knees(self, element) result(speeds)
+    class(dc_motors_t), intent(in) :: self
+    integer, intent(in) :: element   !! numbered within the bank
+    real(wp), allocatable :: speeds(:)
+
+    speeds = [self%governed_bank_t%knees(element), self%voltage(1, element) / self%flux_constant(1, element)]
+  end function knees
 
   subroutine list_parameters(self, parameters)
     class(dc_motors_t), target, intent(inout) :: self

@@ -18,6 +18,8 @@ module nocdyn_governed_banks
     procedure :: throttle
     procedure :: list_parameters
     procedure :: start_internal
+    procedure :: steady_internal
+    procedure :: knees
     procedure :: choose
     procedure :: indicator
     procedure :: quantities
@@ -72,6 +74,29 @@ contains
       end do
     end do
   end subroutine start_internal
+
+  !> The integral of a governor at rest is its throttle.
+  subroutine steady_internal(self, speed, internal)
+    class(governed_bank_t), intent(in) :: self
+    real(wp), intent(in) :: speed(:)         !! u' [rad/s], [motors]
+    real(wp), intent(inout) :: internal(:)   !! [states * motors]
+    integer :: e
+
+    if (.not. allocated(self%governor)) return
+    do e = 1, size(self%to)
+      internal(self%states * e) = self%governor%steady_throttle(e, speed(e))
+    end do
+  end subroutine steady_internal
+
+  !> The points of a table, and the speed that a governor keeps.
+  function knees(self, element) result(speeds)
+    class(governed_bank_t), intent(in) :: self
+    integer, intent(in) :: element   !! numbered within the bank
+    real(wp), allocatable :: speeds(:)
+
+    speeds = self%table_laws_t%knees(element)
+    if (allocated(self%governor)) speeds = [speeds, self%governor%set_speed(1, element)]
+  end function knees
 
   subroutine choose(self, switch, lane, t, angle, speed, internal)
     class(governed_bank_t), intent(inout) :: self

@@ -19,6 +19,7 @@ module nocdyn_governors
   contains
     procedure :: list_parameters
     procedure :: throttle
+    procedure :: steady_throttle
     procedure :: rate
     procedure :: slopes
     procedure :: branch
@@ -45,6 +46,15 @@ contains
       y = 0.0_wp
     end select
   end function throttle
+
+  !> Throttle that a constant speed of the first lane ends in; at the set speed, where any is steady, the open one.
+  pure real(wp) function steady_throttle(self, motor, speed) result(y)
+    class(governor_t), intent(in) :: self
+    integer, intent(in) :: motor
+    real(wp), intent(in) :: speed   !! of the motor [rad/s]
+
+    y = merge(1.0_wp, 0.0_wp, self%gain(1, motor) * (self%set_speed(1, motor) - speed) >= 0.0_wp)
+  end function steady_throttle
 
   !> Rate z' of the integral [1/s].
   pure real(wp) function rate(self, lane, motor, throttle, z)

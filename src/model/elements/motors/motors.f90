@@ -28,6 +28,7 @@ module nocdyn_motors
     procedure :: differentiate
     procedure :: torque
     procedure :: slope
+    procedure :: knees
   end type motors_t
 
 contains
@@ -173,6 +174,15 @@ contains
       end do
     end do
   end subroutine differentiate
+
+  function knees(self, element) result(speeds)
+    class(motors_t), intent(in) :: self
+    integer, intent(in) :: element   !! numbered within the bank
+    real(wp), allocatable :: speeds(:)
+
+    speeds = self%governed_bank_t%knees(element)
+    if (allocated(self%law)) speeds = [speeds, self%law%knees(element)]
+  end function knees
 
   subroutine list_parameters(self, parameters)
     class(motors_t), target, intent(inout) :: self

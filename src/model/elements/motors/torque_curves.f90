@@ -11,6 +11,7 @@ module nocdyn_torque_curves
     procedure(torque_interface), deferred :: torque   !! [N m]
     procedure(torque_interface), deferred :: slope    !! by the speed [N m s/rad]
     procedure(list_interface), deferred :: list_parameters
+    procedure(knees_interface), deferred :: knees     !! speeds of an extreme or of no torque, in the first lane [rad/s]
   end type torque_curve_t
 
   abstract interface
@@ -27,6 +28,13 @@ module nocdyn_torque_curves
       class(torque_curve_t), target, intent(inout) :: self
       type(lane_parameters_t), intent(inout) :: parameters
     end subroutine list_interface
+
+    pure function knees_interface(self, motor) result(speeds)
+      import :: torque_curve_t, wp
+      class(torque_curve_t), intent(in) :: self
+      integer, intent(in) :: motor
+      real(wp), allocatable :: speeds(:)
+    end function knees_interface
   end interface
 
   !> Eq. (20): A - B omega - C omega^2.
@@ -36,6 +44,7 @@ module nocdyn_torque_curves
     procedure :: torque => quadratic_torque
     procedure :: slope => quadratic_slope
     procedure :: list_parameters => list_quadratic
+    procedure :: knees => quadratic_knees
   end type quadratic_curve_t
 
   !> Kloss' formula 2 T_k / (s / s_k + s_k / s) with the slip s = 1 - omega / synchronous_speed, as 2 T_k s s_k / (s^2 + s_k^2).
@@ -47,6 +56,7 @@ module nocdyn_torque_curves
     procedure :: torque => induction_torque
     procedure :: slope => induction_slope
     procedure :: list_parameters => list_induction
+    procedure :: knees => induction_knees
   end type induction_curve_t
 
 contains
@@ -91,6 +101,33 @@ contains
               / self%synchronous_speed(lane, motor)
     end associate
   end function induction_slope
+
+  !> The vertex, and the speeds without torque.
+  pure function quadratic_knees(self, motor) result(speeds)
+    class(quadratic_curve_t), intent(in) :: self
+    integer, intent(in) :: motor
+    real(wp), allocatable :: speeds(:)
+    real(wp) :: discriminant
+
+    allocate (speeds(0))
+    associate (a => self%a(1, motor), b => self%b(1, motor), c => self%c(1, motor))
+      discriminant = b**2 + 4.0_wp * a * c
+      if (abs(c) > 0.0_wp) then
+        speeds = -0.5_wp / c * [b, b - sqrt(max(discriminant, 0.0_wp)), b + sqrt(max(discriminant, 0.0_wp))]
+      else if (abs(b) > 0.0_wp) then
+        speeds = [a / b]
+      end if
+    end associate
+  end function quadratic_knees
+
+  !> The synchronous speed, and those of the largest torque as a motor and as a generator.
+  pure function induction_knees(self, motor) result(speeds)
+    class(induction_curve_t), intent(in) :: self
+    integer, intent(in) :: motor
+    real(wp), allocatable :: speeds(:)
+
+    speeds = self%synchronous_speed(1, motor) * (1.0_wp + self%breakdown_slip(1, motor) * [-1.0_wp, 0.0_wp, 1.0_wp])
+  end function induction_knees
 
   subroutine list_quadratic(self, parameters)
     class(quadratic_curve_t), target, intent(inout) :: self

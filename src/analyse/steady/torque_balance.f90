@@ -8,7 +8,6 @@ module nocdyn_torque_balance
   use nocdyn_formulation, only: formulation_t
   use nocdyn_kinds, only: wp
   use nocdyn_rigid_motions, only: new_rigid_motions, rigid_motions_t
-  use nocdyn_system, only: pattern_t
   use nocdyn_union_find, only: find_root, join_components
   implicit none (type, external)
   private
@@ -29,15 +28,16 @@ module nocdyn_torque_balance
     ! work space:
     real(wp) :: t(1) = 0.0_wp
     integer :: status(1) = 0
-    integer, allocatable, private :: inelastic(:)   !! elements that are not elastic
+    integer, allocatable :: inelastic(:)            !! elements that are not elastic
     integer, allocatable :: first(:)                !! first entry of each inelastic element, [inelastic + 1]
     integer, allocatable :: freedom(:)              !! rigid motion, [entries]
-    real(wp), allocatable, private :: ratio(:)      !! G, [entries]
-    type(pattern_t), private :: pattern
+    real(wp), allocatable :: ratio(:)               !! G, [entries]
     real(wp), allocatable :: y(:, :)   !! state after `set_state`, [1, states]
-    real(wp), allocatable, private :: rate(:, :), slopes(:, :)
+    real(wp), allocatable, private :: rate(:, :)
+    real(wp), allocatable, private :: start_twist(:)   !! [rad], [elements]
   contains
-    procedure :: unknowns, start, set_state, evaluate, evaluate_state, differentiate, blocks, body_speeds
+    procedure :: unknowns, start, set_state, settle, moments_at, inertia, evaluate, evaluate_state, differentiate
+    procedure :: blocks, body_speeds
   end type torque_balance_t
 
 contains
@@ -62,10 +62,9 @@ contains
     end associate
     self%t = t
     call gather_ratios(self)
-    self%pattern = self%formulation%jacobian_pattern()
     allocate (self%y(1, self%formulation%states), source=0.0_wp)
     allocate (self%rate, source=self%y)
-    allocate (self%slopes(1, size(self%pattern%row)), source=0.0_wp)
+    allocate (self%start_twist, source=pack(self%formulation%machine%start_twist(), .true.))
     allocate (self%residual(self%unknowns()), self%scale(self%unknowns()), source=0.0_wp)
   end subroutine set_up_balance
 
@@ -145,6 +144,27 @@ contains
     end do
   end function mean_motion
 
+  !> Inertias of some unknowns: those of rigid motions, N^T L_tau^T J L_tau N [kg m2]; 1 of internal states, [members, members].
+  function inertia(self, members) result(matrix)
+    class(torque_balance_t), intent(in) :: self
+    integer, intent(in) :: members(:)   !! unknowns
+    real(wp) :: matrix(size(members), size(members))
+    real(wp) :: column(self%unknowns()), unit(self%motions%freedoms())
+    integer :: k
+
+    do k = 1, size(members)
+      column = 0.0_wp
+      if (members(k) > size(unit)) then
+        column(members(k)) = 1.0_wp
+      else
+        unit = 0.0_wp
+        unit(members(k)) = 1.0_wp
+        column(:size(unit)) = self%motions%project_torques(inertial_torque(self, self%motions%speeds(unit)))
+      end if
+      matrix(:, k) = column(members)
+    end do
+  end function inertia
+
   !> L_tau^T J L_tau v, [coordinates].
   pure function inertial_torque(self, v) result(torque)
     class(torque_balance_t), intent(in) :: self
@@ -207,6 +227,55 @@ contains
     call self%formulation%derivative(self%t, self%y, self%rate, self%status)
   end subroutine evaluate_state
 
+  !> Gives the elements the speeds and internal states of the unknowns, at the start angles.
+  subroutine set_elements(self, z)
+    class(torque_balance_t), intent(inout) :: self
+    real(wp), intent(in) :: z(:)   !! [unknowns]
+    integer :: i, k
+    real(wp) :: speed
+
+    associate (elements => self%formulation%machine%elements)
+      elements%angle(1, :) = self%start_twist
+      elements%speed(1, :) = 0.0_wp
+      do i = 1, size(self%inelastic)
+        speed = 0.0_wp
+        do k = self%first(i), self%first(i + 1) - 1
+          speed = speed + self%ratio(k) * z(self%freedom(k))
+        end do
+        elements%speed(1, self%inelastic(i)) = speed
+      end do
+      elements%internal%value(1, :) = z(self%motions%freedoms() + 1:)
+    end associate
+  end subroutine set_elements
+
+  !> Replaces the internal states by those that do not change at the speeds.
+  subroutine settle(self, z)
+    class(torque_balance_t), intent(inout) :: self
+    real(wp), intent(inout) :: z(:)   !! [unknowns]
+
+    if (self%internal == 0) return
+    call set_elements(self, z)
+    call self%formulation%machine%settle_internal()
+    z(self%motions%freedoms() + 1:) = self%formulation%machine%elements%internal%value(1, :)
+  end subroutine settle
+
+  !> Moments of the inelastic elements that all have one speed, with internal states that do not change [N m], [inelastic].
+  function moments_at(self, speed) result(moments)
+    class(torque_balance_t), intent(inout) :: self
+    real(wp), intent(in) :: speed   !! u' [rad/s]
+    real(wp) :: moments(size(self%inelastic))
+
+    associate (machine => self%formulation%machine)
+      machine%elements%angle(1, :) = self%start_twist
+      machine%elements%speed(1, :) = 0.0_wp
+      machine%elements%speed(1, self%inelastic) = speed
+      call machine%settle_internal()
+      call machine%choose_element_branches(self%t(1))
+      call machine%evaluate_elements(self%t)
+      moments = machine%elements%restoring(1, self%inelastic) + machine%elements%applied(1, self%inelastic)
+    end associate
+  end function moments_at
+
   !> Computes the residuals of the equations.
   subroutine evaluate(self, z)
     class(torque_balance_t), intent(inout) :: self
@@ -215,22 +284,22 @@ contains
     integer :: e, i, k
 
     call self%set_state(z)
-    call self%evaluate_state()
+    call set_elements(self, z)
     self%residual = 0.0_wp
     self%scale = 0.0_wp
-    associate (elements => self%formulation%machine%elements)
+    associate (machine => self%formulation%machine, r => self%motions%freedoms())
+      call machine%choose_element_branches(self%t(1))
+      call machine%evaluate_elements(self%t)
       do i = 1, size(self%inelastic)
         e = self%inelastic(i)
         do k = self%first(i), self%first(i + 1) - 1
-          term = self%ratio(k) * (elements%restoring(1, e) + elements%applied(1, e))
+          term = self%ratio(k) * (machine%elements%restoring(1, e) + machine%elements%applied(1, e))
           self%residual(self%freedom(k)) = self%residual(self%freedom(k)) + term
           self%scale(self%freedom(k)) = self%scale(self%freedom(k)) + abs(term)
         end do
       end do
-    end associate
-    associate (r => self%motions%freedoms(), f => self%coordinates)
-      self%residual(r + 1:) = self%rate(1, 2 * f + 1:)
-      self%scale(r + 1:) = abs(self%rate(1, 2 * f + 1:))
+      self%residual(r + 1:) = machine%elements%internal%rate(1, :)
+      self%scale(r + 1:) = abs(self%residual(r + 1:))
     end associate
   end subroutine evaluate
 
@@ -238,81 +307,62 @@ contains
   subroutine differentiate(self, matrix)
     class(torque_balance_t), intent(inout) :: self
     real(wp), intent(out) :: matrix(:, :)   !! [unknowns, unknowns]
-    real(wp) :: dfdt(1, self%formulation%states)
-    integer :: e, i, j, k
+    integer :: i, j, k
 
     matrix = 0.0_wp
-    call self%formulation%jacobian(self%t, self%y, self%slopes, dfdt, self%status)
+    call self%formulation%machine%differentiate_elements(self%t)
     associate (elements => self%formulation%machine%elements)
       do i = 1, size(self%inelastic)
-        e = self%inelastic(i)
         do k = self%first(i), self%first(i + 1) - 1
           do j = self%first(i), self%first(i + 1) - 1
-            matrix(self%freedom(k), self%freedom(j)) = matrix(self%freedom(k), self%freedom(j)) &
-                                                       + self%ratio(k) * self%ratio(j) * elements%applied_speed(1, e)
+            associate (entry => matrix(self%freedom(k), self%freedom(j)))
+              entry = entry + self%ratio(k) * self%ratio(j) * elements%applied_speed(1, self%inelastic(i))
+            end associate
           end do
         end do
       end do
     end associate
-    if (self%internal > 0) call differentiate_internal(self, matrix)
+    call differentiate_internal(self, matrix)
   end subroutine differentiate
 
-  !> Fills the rows and columns of the internal states x: N^T M dq''/dx, dx'/dq' N and dx'/dx.
+  !> Fills the rows and columns of the internal states x.
   subroutine differentiate_internal(self, matrix)
     type(torque_balance_t), intent(in) :: self
     real(wp), intent(inout) :: matrix(:, :)   !! [unknowns, unknowns]
-    real(wp) :: accelerations(self%coordinates, self%internal)
-    integer :: c, k, p, r
+    integer :: column, i, k, m, x
 
-    r = self%motions%freedoms()
-    accelerations = 0.0_wp
-    associate (f => self%coordinates, motions => self%motions)
-      do p = 1, size(self%pattern%row)
-        associate (row => self%pattern%row(p), column => self%pattern%column(p), slope => self%slopes(1, p))
-          if (row <= f .and. column > 2 * f) then
-            accelerations(row, column - 2 * f) = slope
-          else if (row > 2 * f .and. column > 2 * f) then
-            matrix(r + row - 2 * f, r + column - 2 * f) = slope
-          else if (row > 2 * f .and. column <= f) then
-            do k = motions%first(column), motions%first(column + 1) - 1
-              c = motions%freedom(k)
-              matrix(r + row - 2 * f, c) = matrix(r + row - 2 * f, c) + slope * motions%ratio(k)
-            end do
-          end if
-        end associate
+    associate (states => self%formulation%machine%elements%internal, r => self%motions%freedoms())
+      do x = 1, self%internal
+        do m = 1, states%members(x)
+          column = r + states%first(x) + m - 1
+          matrix(r + x, column) = states%rate_internal(1, m, x)
+        end do
+        i = findloc(self%inelastic, states%element(x), dim=1)
+        do k = self%first(i), self%first(i + 1) - 1
+          matrix(self%freedom(k), r + x) = matrix(self%freedom(k), r + x) + self%ratio(k) * states%applied(1, x)
+          matrix(r + x, self%freedom(k)) = matrix(r + x, self%freedom(k)) + self%ratio(k) * states%rate_speed(1, x)
+        end do
       end do
     end associate
-    do k = 1, self%internal
-      matrix(:r, r + k) = self%motions%project_torques(inertial_torque(self, accelerations(:, k)))
-    end do
   end subroutine differentiate_internal
 
   !> Numbers of the blocks of unknowns, [unknowns]. Unknowns of different blocks have no common equation.
   function blocks(self) result(block_of)
     class(torque_balance_t), intent(in) :: self
     integer :: block_of(self%unknowns())
-    integer :: i, k, p, r, root
+    integer :: i, k, root, x
 
-    r = self%motions%freedoms()
     block_of = [(i, i=1, size(block_of))]
     do i = 1, size(self%inelastic)
       do k = self%first(i) + 1, self%first(i + 1) - 1
         call join_components(self%freedom(self%first(i)), self%freedom(k), block_of)
       end do
     end do
-    associate (f => self%coordinates, motions => self%motions)
-      do p = 1, size(self%pattern%row)
-        associate (row => self%pattern%row(p), column => self%pattern%column(p))
-          if (max(row, column) <= 2 * f) cycle
-          if (min(row, column) > 2 * f) then
-            call join_components(r + row - 2 * f, r + column - 2 * f, block_of)
-          else
-            i = merge(min(row, column), min(row, column) - f, min(row, column) <= f)
-            do k = motions%first(i), motions%first(i + 1) - 1
-              call join_components(r + max(row, column) - 2 * f, motions%freedom(k), block_of)
-            end do
-          end if
-        end associate
+    associate (states => self%formulation%machine%elements%internal, r => self%motions%freedoms())
+      do x = 1, self%internal
+        call join_components(r + states%first(x), r + x, block_of)
+        i = findloc(self%inelastic, states%element(x), dim=1)
+        if (self%first(i) < self%first(i + 1)) call join_components(self%freedom(self%first(i)), r + x, block_of)
       end do
     end associate
     do i = 1, size(block_of)

@@ -1,0 +1,149 @@
+!> Search for the speeds at which the torques on a machine balance, from many starts: by Newton's method, and by following the
+!> motion from the start of the machine until it is steady.
+module nocdyn_balance_starts
+  use nocdyn_block_solutions, only: block_solutions_t, is_nearly_balanced
+  use nocdyn_kinds, only: wp
+  use nocdyn_lapack, only: pseudo_inverse
+  use nocdyn_torque_balance, only: torque_balance_t
+  implicit none (type, external)
+  private
+
+  public :: search_from_starts
+
+  real(wp), parameter :: singular = 1.0e-13_wp   ! relative to the largest singular value
+
+contains
+
+  !> Newton's method from the start of the machine and from combinations of speeds, and the motion from the start.
+  subroutine search_from_starts(balance, knees, block)
+    type(torque_balance_t), intent(inout) :: balance
+    real(wp), intent(in) :: knees(:)   !! speeds at which a law bends [rad/s]
+    type(block_solutions_t), intent(inout) :: block
+    integer, parameter :: most_starts = 300
+    real(wp), allocatable :: candidates(:)
+    real(wp) :: point(balance%unknowns()), start(balance%unknowns())
+    integer :: i, k, moving, number
+
+    start = balance%start()
+    moving = count(block%members <= balance%motions%freedoms())
+    allocate (candidates, source=[0.0_wp, knees, 0.5_wp * knees])
+    if (size(knees) == 0) candidates = [0.0_wp, 1.0_wp, -1.0_wp, 10.0_wp, -10.0_wp, 100.0_wp, -100.0_wp]
+    block%starts = nint(min(real(most_starts, wp), real(size(candidates), wp)**moving))
+    do i = 1, block%starts
+      point = start
+      ! the digits of a number, in the base of the candidates: all combinations, or a part of them that has each candidate
+      number = i - 1
+      do k = 1, moving
+        point(block%members(k)) = candidates(1 + modulo(number + (k - 1) * (i - 1), size(candidates)))
+        number = number / size(candidates)
+      end do
+      call balance%settle(point)
+      call newton(balance, point, block)
+    end do
+    point = start
+    call newton(balance, point, block)
+    point = start
+    call follow_motion(balance, point, block)
+    call newton(balance, point, block)
+  end subroutine search_from_starts
+
+  !> Newton's method with steps of minimum norm, halved until the residuals fall. Adds the solution if it converges.
+  subroutine newton(balance, z, block)
+    type(torque_balance_t), intent(inout) :: balance
+    real(wp), intent(inout) :: z(:)   !! start, then the last iterate, [unknowns]
+    type(block_solutions_t), intent(inout) :: block
+    integer, parameter :: most_steps = 100
+    real(wp), parameter :: tiny_step = 1.0e-13_wp, highest = 1.0e7_wp   ! relative; a speed [rad/s]
+    real(wp) :: slopes(size(z), size(z)), step(size(block%members)), weight(size(block%members)), before, factor
+    integer :: i
+
+    associate (members => block%members)
+      call balance%evaluate(z)
+      do i = 1, most_steps
+        if (all(abs(balance%residual(members)) <= epsilon(1.0_wp) * balance%scale(members))) exit   ! zero up to the last bit
+        call balance%differentiate(slopes)
+        weight = 1.0_wp / max(maxval(abs(slopes(members, members)), dim=2), tiny(1.0_wp)**0.25_wp)
+        before = norm2(weight * balance%residual(members))
+        step = -matmul(pseudo_inverse(spread(weight, 2, size(members)) * slopes(members, members), singular), &
+                       weight * balance%residual(members))
+        factor = 1.0_wp
+        do while (factor > 1.0e-6_wp)
+          call balance%evaluate(moved(z, members, factor * step))
+          if (norm2(weight * balance%residual(members)) < (1.0_wp - 1.0e-4_wp * factor) * before) exit
+          factor = 0.5_wp * factor
+        end do
+        if (factor <= 1.0e-6_wp) exit
+        z(members) = z(members) + factor * step
+        if (all(abs(step) <= tiny_step * abs(z(members)))) exit
+      end do
+      if (any(abs(z(members)) > highest .and. members <= balance%motions%freedoms())) return
+      if (is_nearly_balanced(balance, members, z)) call block%add_or_join(balance, z)
+      call balance%evaluate(z)
+      if (abs(balance%residual(members(1))) < abs(block%least_torque)) then
+        block%least_torque = balance%residual(members(1))
+        block%least_speed = z(members(1))
+      end if
+    end associate
+  end subroutine newton
+
+  !> Follows the motion of the rigid bodies and the internal states by Euler's implicit method, with steps that grow while
+  !> Newton's method converges in a few iterations: at the end they are long, and what is left is steady.
+  subroutine follow_motion(balance, z, block)
+    type(torque_balance_t), intent(inout) :: balance
+    real(wp), intent(inout) :: z(:)   !! start, then the end, [unknowns]
+    type(block_solutions_t), intent(in) :: block
+    integer, parameter :: most_steps = 400
+    real(wp), parameter :: first_step = 1.0e-6_wp, longest = 1.0e12_wp   ! s
+    real(wp), allocatable :: inertia(:, :)
+    real(wp) :: ahead(size(z)), step
+    integer :: i
+    logical :: is_solved
+
+    allocate (inertia, source=balance%inertia(block%members))
+    step = first_step
+    do i = 1, most_steps
+      ahead = z
+      call solve_step(balance, block%members, inertia, z, step, ahead, is_solved)
+      if (is_solved) z = ahead
+      step = merge(2.0_wp, 0.25_wp, is_solved) * step
+      if (step > longest .or. step < epsilon(1.0_wp) * first_step) exit
+    end do
+  end subroutine follow_motion
+
+  !> One step of Euler's implicit method: inertia (ahead - z) / step = torques (ahead).
+  subroutine solve_step(balance, members, inertia, z, step, ahead, is_solved)
+    type(torque_balance_t), intent(inout) :: balance
+    integer, intent(in) :: members(:)          !! unknowns of the block
+    real(wp), intent(in) :: inertia(:, :)      !! [kg m2], 1 of the internal states, [members, members]
+    real(wp), intent(in) :: z(:), step         !! unknowns before the step; its length [s]
+    real(wp), intent(inout) :: ahead(:)        !! guess, then unknowns after it
+    logical, intent(out) :: is_solved
+    integer, parameter :: most_iterations = 8
+    real(wp), parameter :: converged = 1.0e-9_wp, least = 1.0e-12_wp   ! change, relative or in rad/s
+    real(wp), parameter :: highest = 1.0e12_wp                         ! rad/s
+    real(wp) :: change(size(members)), slopes(size(z), size(z))
+    integer :: i
+
+    is_solved = .false.
+    do i = 1, most_iterations
+      call balance%evaluate(ahead)
+      call balance%differentiate(slopes)
+      change = matmul(pseudo_inverse(inertia / step - slopes(members, members), singular), &
+                      balance%residual(members) - matmul(inertia, ahead(members) - z(members)) / step)
+      ahead(members) = ahead(members) + change
+      is_solved = all(abs(change) <= converged * abs(ahead(members)) + least)
+      if (is_solved .or. any(abs(ahead(members)) > highest)) exit
+    end do
+  end subroutine solve_step
+
+  !> The unknowns after a step of some of them.
+  pure function moved(z, members, step)
+    real(wp), intent(in) :: z(:), step(:)   !! [unknowns], [members]
+    integer, intent(in) :: members(:)       !! unknowns of the block
+    real(wp) :: moved(size(z))
+
+    moved = z
+    moved(members) = moved(members) + step
+  end function moved
+
+end module nocdyn_balance_starts
