@@ -40,12 +40,16 @@ contains
   !> The argument at which the function is to be evaluated.
   pure real(wp) function next(self) result(x)
     class(bracket_t), intent(in) :: self
-    real(wp) :: share
+    real(wp) :: least, share, width
+    integer :: near   ! end from which the argument is counted, so that it has no rounding of the other one
 
-    share = self%weight(1) / (self%weight(1) - self%weight(2))
-    if (self%bisects .or. .not. (share > 0.0_wp .and. share < 1.0_wp)) share = 0.5_wp
-    x = self%x(1) + share * (self%x(2) - self%x(1))
-    if (x <= minval(self%x) .or. x >= maxval(self%x)) x = self%x(1) + 0.5_wp * (self%x(2) - self%x(1))
+    near = minloc(abs(self%weight), dim=1)
+    width = self%x(3 - near) - self%x(near)
+    ! next to an end that is the root to rounding, a point beyond it narrows the bracket at once
+    least = 2.0_wp * spacing(abs(self%x(near))) / abs(width)
+    share = max(least, self%weight(near) / (self%weight(near) - self%weight(3 - near)))
+    if (self%bisects .or. .not. share < 0.5_wp) share = 0.5_wp
+    x = self%x(near) + share * width
   end function next
 
   !> Replaces the end at which the function has the sign of its value at the argument.
