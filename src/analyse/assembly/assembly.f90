@@ -16,6 +16,7 @@ module nocdyn_assembly
   use nocdyn_paper, only: new_paper
   use nocdyn_reduced, only: new_reduced
   use nocdyn_start_speeds, only: fit_start_speeds
+  use nocdyn_steady_start, only: start_steadily
   use nocdyn_text, only: joined, selected
   use nocdyn_torque_assembly, only: add_excitation_form, add_load_form, excitation_form, load_form
   implicit none (type, external)
@@ -28,8 +29,9 @@ module nocdyn_assembly
 contains
 
   !> Builds the machine of a checked input, with the same parameters in every lane. Bodies without inertia that move alone,
-  !> constraints that lock, and start speeds that violate constraints are errors that name file, line, group and key.
-  subroutine assemble_machine(input, machine, error, lanes)
+  !> constraints that lock, start speeds that violate constraints, and a steady start that is not found are errors that name file,
+  !> line, group and key.
+  recursive subroutine assemble_machine(input, machine, error, lanes)
     type(input_t), target, intent(in) :: input
     type(machine_t), intent(out) :: machine
     type(error_t), allocatable, intent(out) :: error
@@ -44,6 +46,7 @@ contains
     machine%inertia = bodies%values('inertia')
     machine%start_angle = bodies%values('angle')
     machine%start_speed = bodies%values('speed')
+    allocate (machine%start_notes(0))
     body_index = new_body_index(machine%names)
     call assemble_constraints(input, body_index, machine%lanes, machine%constraints, error)
     if (.not. allocated(error)) call check_couplings(input, error)
@@ -58,7 +61,45 @@ contains
     end associate
     call machine%number_elements()
     call analyse_machine_constraints(input, body_index, machine, error)
+    if (.not. allocated(error)) call start_machine(input, machine, error)
   end subroutine assemble_machine
+
+  !> Starts a machine in its steady state, if the input wants it.
+  recursive subroutine start_machine(input, machine, error)
+    type(input_t), intent(in) :: input
+    type(machine_t), intent(inout) :: machine
+    type(error_t), allocatable, intent(out) :: error
+    type(machine_t) :: single   ! of one lane
+
+    associate (run => input%groups(input%position('run')))
+      if (run%text('start') /= 'equilibrium') return
+      if (machine%lanes > 1) then
+        call assemble_machine(input, single, error)
+        if (allocated(error)) return
+        machine%start_speed(:, :) = spread(single%start_speed(1, :), 1, machine%lanes)
+        machine%start_angle(:, :) = spread(single%start_angle(1, :), 1, machine%lanes)
+        allocate (machine%steady_internal, source=spread(single%steady_internal(1, :), 1, machine%lanes))
+      else
+        call start_steadily(machine, given_speeds(input), run%number('t_start'), error)
+        if (allocated(error)) error%message = input%location(input%position('run'), 'start') // ": start = 'equilibrium': " // &
+          error%message // "; start = 'given' starts with the speeds of the bodies"
+      end if
+    end associate
+  end subroutine start_machine
+
+  !> Whether the input gives the start speed of a body, [bodies].
+  function given_speeds(input) result(is_given)
+    type(input_t), intent(in) :: input
+    logical, allocatable :: is_given(:)
+    integer, allocatable :: bodies(:)
+    integer :: b
+
+    allocate (bodies, source=input%groups_named('body'))
+    allocate (is_given(size(bodies)))
+    do b = 1, size(bodies)
+      is_given(b) = input%groups(bodies(b))%is_given('speed')
+    end do
+  end function given_speeds
 
   !> Analyses the constraints, chooses the coordinates and makes the start speeds consistent. A message begins with file, line and
   !> group: those of a constraint row, or of `independent`.

@@ -25,15 +25,21 @@ contains
     allocate (names, source=selected(machine%names, machine%coordinates%body))
   end function coordinate_names
 
-  !> Notes on redundant constraints, on start speeds that were projected onto the constraints, and on bodies that nothing moves.
+  !> Notes on redundant constraints, on the start (speeds projected onto the constraints or rounded, a steady state), and on bodies
+  !> that nothing moves.
   function machine_notes(machine) result(notes)
     type(machine_t), intent(in) :: machine
     type(string_t), allocatable :: notes(:)
+    integer :: i
 
     allocate (notes(0))
     call add_redundancy_notes(machine, notes)
     if (allocated(machine%start_impulse)) call add_impulse_note(machine, notes)
     call add_loose_note(machine, notes)
+    if (.not. allocated(machine%start_notes)) return
+    do i = 1, size(machine%start_notes)
+      call append(notes, machine%start_notes(i)%text)
+    end do
   end function machine_notes
 
   !> Appends a sentence for every redundant constraint.

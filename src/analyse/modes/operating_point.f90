@@ -75,9 +75,9 @@ contains
     type(equilibrium_t), allocatable :: equilibria(:)
     integer :: nearest
 
-    call find_equilibria(machine, point%formulation, equilibria, point%notes, error)
+    call find_equilibria(machine, t_infinity, point%formulation, equilibria, point%notes, error)
     if (allocated(error)) return
-    if (size(equilibria) > 1) call find_stability(point%formulation, equilibria)
+    if (size(equilibria) > 1) call find_stability(point%formulation, t_infinity, equilibria)
     nearest = nearest_equilibrium(point%formulation, equilibria)
     point%t = t_infinity
     point%y = equilibria(nearest)%y

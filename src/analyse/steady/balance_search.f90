@@ -72,10 +72,8 @@ contains
       call reduced%solve(balance, found%grid(i))
       found%torque(i) = reduced%torque
       found%is_balanced(i) = reduced%is_balanced
-      if (.not. reduced%is_balanced .or. abs(reduced%torque) >= abs(block%least_torque)) cycle
-      block%least_torque = reduced%torque
-      block%least_speed = found%grid(i)
     end do
+    call find_least(found, block)
     block%is_complete = reduced%is_unique
     block%is_unloaded = all(abs(found%torque) <= 0.0_wp .and. found%is_balanced)
     do i = 1, merge(1, size(found%grid), block%is_unloaded)
@@ -83,6 +81,22 @@ contains
     end do
     block%is_range = block%is_range .and. .not. block%is_unloaded
   end subroutine scan
+
+  !> The smallest imbalance of a scan; of equal ones that at the lowest speed.
+  subroutine find_least(found, block)
+    type(scan_t), intent(in) :: found
+    type(block_solutions_t), intent(inout) :: block
+    real(wp), parameter :: equal = 1.0e-9_wp   ! relative difference
+    real(wp) :: least
+    integer :: i
+
+    if (.not. any(found%is_balanced)) return
+    least = minval(abs(found%torque), mask=found%is_balanced)
+    i = minloc(abs(found%grid), dim=1, mask=found%is_balanced .and. abs(found%torque) <= (1.0_wp + equal) * least)
+    block%least_torque = found%torque(i)
+    block%least_speed = found%grid(i)
+    block%is_level = maxval(abs(found%torque - found%torque(i)), mask=found%is_balanced) <= equal * least
+  end subroutine find_least
 
   !> Finds the solutions between a point of the grid and the next, and near a minimum at the point.
   subroutine search_interval(balance, reduced, found, i, start, block)

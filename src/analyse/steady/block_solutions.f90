@@ -18,6 +18,7 @@ module nocdyn_block_solutions
     logical :: is_unloaded = .false.          !! no torque acts: any speed is steady, and that of the start is taken
     logical :: is_complete = .true.           !! whether a scan of one speed has found all solutions
     integer :: starts = 0                     !! of Newton's method, if the scan has not
+    logical :: is_level = .false.             !! whether the imbalance is the same at every speed
     real(wp) :: least_torque = huge(1.0_wp)   !! smallest imbalance found, with its sign [N m]
     real(wp) :: least_speed = 0.0_wp          !! speed of the smallest imbalance [rad/s]
   contains

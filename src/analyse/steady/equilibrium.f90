@@ -1,6 +1,7 @@
 !> Steady states of a machine: constant speeds, mean torques, constant twists.
 module nocdyn_equilibrium
   use nocdyn_balance_search, only: search_balance
+  use nocdyn_balance_texts, only: moving_bodies, no_balance_message, speed_text
   use nocdyn_block_solutions, only: block_solutions_t
   use nocdyn_errors, only: error_t, exit_failed, raise
   use nocdyn_formulation, only: formulation_t
@@ -10,7 +11,7 @@ module nocdyn_equilibrium
   use nocdyn_machine, only: machine_t
   use nocdyn_reduced, only: reduced_t
   use nocdyn_static_twists, only: find_twists, undetermined_elements
-  use nocdyn_text, only: append, joined, quoted, rounded_text, selected, string_t
+  use nocdyn_text, only: append, joined, string_t
   use nocdyn_torque_balance, only: set_up_balance, torque_balance_t
   implicit none (type, external)
   private
@@ -22,7 +23,6 @@ module nocdyn_equilibrium
   integer, parameter :: most_combinations = 64   ! of the solutions of independent parts of a machine
   integer, parameter :: most_states = 1000       ! up to which eigenvalues are computed, which takes some seconds
   integer, parameter :: most_names = 5           ! of bodies in a message
-  integer, parameter :: digits = 6
 
   !> A steady state and its stability.
   type, public :: equilibrium_t
@@ -35,8 +35,9 @@ module nocdyn_equilibrium
 contains
 
   !> Finds the steady states of a machine with mean torques.
-  subroutine find_equilibria(machine, formulation, equilibria, notes, error)
+  subroutine find_equilibria(machine, t, formulation, equilibria, notes, error)
     type(machine_t), intent(in) :: machine                          !! one lane
+    real(wp), intent(in) :: t   !! time at which torques over the time have their values [s]; `t_infinity` after all changes
     class(formulation_t), allocatable, intent(out) :: formulation   !! reduced formulation of the machine with mean torques
     type(equilibrium_t), allocatable, intent(out) :: equilibria(:)
     type(string_t), allocatable, intent(out) :: notes(:)   !! remarks for the report
@@ -46,7 +47,7 @@ contains
     integer :: i
 
     call mean_formulation(machine, formulation)
-    call set_up_balance(formulation, t_infinity, balance)
+    call set_up_balance(formulation, t, balance)
     call search_balance(balance, blocks)
     allocate (notes(0))
     do i = 1, size(blocks)
@@ -76,13 +77,14 @@ contains
   end subroutine mean_formulation
 
   !> Determines the stability of every steady state.
-  subroutine find_stability(formulation, equilibria)
+  subroutine find_stability(formulation, t, equilibria)
     class(formulation_t), intent(inout) :: formulation
+    real(wp), intent(in) :: t   !! [s]
     type(equilibrium_t), intent(inout) :: equilibria(:)
     integer :: i
 
     do i = 1, size(equilibria)
-      call classify(formulation, equilibria(i))
+      call classify(formulation, t, equilibria(i))
     end do
   end subroutine find_stability
 
@@ -113,12 +115,12 @@ contains
         call add_range_notes(balance, blocks, choice, z, notes)
       else
         call append(notes, 'the torques balance at ' // speed_text(balance, z, [(i, i=1, size(z))]) // &
-                           ', but no twists of the couplings carry them')
+                           ', but no twists of the couplings were found that carry them')
       end if
       if (.not. advance(blocks, choice)) exit
     end do
     if (size(equilibria) > 0) return
-    call raise(error, exit_failed, 'there is no steady state: ' // notes(size(notes))%text)
+    call raise(error, exit_failed, 'no steady state was found: ' // notes(size(notes))%text)
   end subroutine combine
 
   !> Adds notes about other steady speeds and twists beside a solution.
@@ -191,8 +193,9 @@ contains
   end subroutine complete
 
   !> Determines the stability by the eigenvalues of the linearised machine, unless it has too many states.
-  subroutine classify(formulation, equilibrium)
+  subroutine classify(formulation, t, equilibrium)
     class(formulation_t), intent(inout) :: formulation
+    real(wp), intent(in) :: t   !! [s]
     type(equilibrium_t), intent(inout) :: equilibrium
     real(wp), parameter :: rounding = 1.0e-10_wp   ! as a share of the largest eigenvalue
     type(linearisation_t) :: linear
@@ -202,7 +205,7 @@ contains
 
     equilibrium%stability = 'not determined'
     if (formulation%states > most_states) return
-    call linearise(formulation, t_infinity, equilibrium%y, linear, error)
+    call linearise(formulation, t, equilibrium%y, linear, error)
     if (allocated(error)) return
     allocate (values(size(linear%matrix, 1)), vectors(size(linear%matrix, 1), size(linear%matrix, 1)))
     call eigenvectors(linear%matrix, values, vectors, has_failed)
@@ -232,102 +235,31 @@ contains
     if (any(counts)) growth_rate = maxval(real(values, wp), mask=counts)
   end function growth_rate
 
-  !> The steady state with the least kinetic energy relative to the start; among the stable ones, if there are any.
-  integer function nearest_equilibrium(formulation, equilibria) result(nearest)
+  !> The steady state with the least kinetic energy relative to the start: among the stable ones; if there are none, among those
+  !> that are not unstable. If the start says nothing, the one with the most kinetic energy.
+  integer function nearest_equilibrium(formulation, equilibria, counts) result(nearest)
     class(formulation_t), intent(inout) :: formulation
     type(equilibrium_t), intent(in) :: equilibria(:)
+    logical, intent(in), optional :: counts(:)   !! bodies whose start speeds count, [bodies]; absent: all
     real(wp) :: distances(size(equilibria)), start(formulation%machine%bodies)
-    logical :: is_stable(size(equilibria))
+    logical :: is_start(formulation%machine%bodies)
+    logical :: is_candidate(size(equilibria))
     integer :: i
 
     call formulation%set_state(formulation%start())
     start = formulation%omega(1, 1:)
+    is_start = .true.
+    if (present(counts)) is_start = counts
     do i = 1, size(equilibria)
       call formulation%set_state(equilibria(i)%y)
-      distances(i) = formulation%machine%kinetic_energy(1, formulation%omega(1, 1:) - start)
+      associate (machine => formulation%machine, omega => formulation%omega(1, 1:))
+        distances(i) = machine%kinetic_energy(1, merge(omega - start, 0.0_wp, is_start))
+        if (.not. any(is_start)) distances(i) = -machine%kinetic_energy(1, omega)
+      end associate
     end do
-    is_stable = equilibria%stability == 'stable'
-    nearest = minloc(distances, dim=1, mask=is_stable .or. .not. any(is_stable))
+    is_candidate = equilibria%stability == 'stable'
+    if (.not. any(is_candidate)) is_candidate = equilibria%stability /= 'unstable'
+    nearest = minloc(distances, dim=1, mask=is_candidate .or. .not. any(is_candidate))
   end function nearest_equilibrium
-
-  !> Message about a block without solution.
-  function no_balance_message(balance, block) result(sentence)
-    type(torque_balance_t), intent(inout) :: balance
-    type(block_solutions_t), intent(in) :: block
-    character(len=:), allocatable :: sentence
-    real(wp) :: z(balance%unknowns()), slopes(balance%unknowns(), balance%unknowns())
-
-    sentence = 'there is no steady state: nothing balances '
-    if (any(block%members > balance%motions%freedoms()) .or. size(block%members) > 1) then
-      sentence = sentence // 'the torques on ' // moving_bodies(balance, block%members) // &
-                 '; Newton''s method found no solution from any start'
-      return
-    end if
-    z = balance%start()
-    call balance%evaluate(z)
-    call balance%differentiate(slopes)
-    associate (member => block%members(1))
-      if (abs(slopes(member, member)) <= 0.0_wp) then
-        sentence = sentence // rounded_text(block%least_torque, digits) // ' N m on ' // &
-                   moving_bodies(balance, block%members) // ' at any speed; a load is missing, or a motor whose torque falls'
-      else
-        sentence = sentence // 'the torques on ' // moving_bodies(balance, block%members) // ' at any speed; at least ' // &
-                   rounded_text(block%least_torque, digits) // ' N m are left over, at ' // &
-                   rounded_text(block%least_speed, digits) // ' rad/s of ' // quoted(body_of(balance, member))
-      end if
-    end associate
-  end function no_balance_message
-
-  !> Name of the independent body of a rigid motion.
-  function body_of(balance, freedom) result(name)
-    type(torque_balance_t), intent(in) :: balance
-    integer, intent(in) :: freedom
-    character(len=:), allocatable :: name
-
-    associate (machine => balance%formulation%machine)
-      name = machine%names(machine%coordinates%body(balance%motions%free(freedom)))%text
-    end associate
-  end function body_of
-
-  !> Names of the bodies that turn in some rigid motions.
-  function moving_bodies(balance, members) result(text)
-    type(torque_balance_t), intent(in) :: balance
-    integer, intent(in) :: members(:)   !! unknowns; those that are internal states are ignored
-    character(len=:), allocatable :: text
-    real(wp) :: unit(balance%motions%freedoms())
-    logical :: moves(balance%formulation%machine%bodies)
-    integer, allocatable :: bodies(:)
-    integer :: b, i
-
-    moves = .false.
-    do i = 1, size(members)
-      if (members(i) > size(unit)) cycle
-      unit = 0.0_wp
-      unit(members(i)) = 1.0_wp
-      moves = moves .or. abs(balance%body_speeds(unit)) > 0.0_wp
-    end do
-    bodies = pack([(b, b=1, size(moves))], moves)
-    associate (names => balance%formulation%machine%names)
-      text = joined(selected(names, bodies), ', ', most_names)
-    end associate
-  end function moving_bodies
-
-  !> Speeds of rigid motions as text, such as "12.5 rad/s of 'motor'".
-  function speed_text(balance, z, members) result(text)
-    type(torque_balance_t), intent(in) :: balance
-    real(wp), intent(in) :: z(:)        !! [unknowns]
-    integer, intent(in) :: members(:)   !! unknowns; those that are internal states are ignored
-    character(len=:), allocatable :: text
-    integer, allocatable :: freedoms(:)
-    integer :: i
-
-    text = ''
-    freedoms = pack(members, members <= balance%motions%freedoms())
-    do i = 1, min(size(freedoms), most_names)
-      if (i > 1) text = text // ', '
-      text = text // rounded_text(z(freedoms(i)), digits) // ' rad/s of ' // quoted(body_of(balance, freedoms(i)))
-    end do
-    if (text == '') text = 'rest'
-  end function speed_text
 
 end module nocdyn_equilibrium

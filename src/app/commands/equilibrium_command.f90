@@ -2,7 +2,7 @@
 module nocdyn_equilibrium_command
   use nocdyn_arguments, only: arguments_t
   use nocdyn_console, only: print_text
-  use nocdyn_equilibrium, only: equilibrium_t, find_equilibria, find_stability
+  use nocdyn_equilibrium, only: equilibrium_t, find_equilibria, find_stability, t_infinity
   use nocdyn_equilibrium_report, only: equilibrium_json, equilibrium_report_t, equilibrium_text, new_equilibrium_report
   use nocdyn_errors, only: error_t
   use nocdyn_formulation, only: formulation_t
@@ -38,9 +38,9 @@ contains
     type(equilibrium_report_t) :: report
     type(string_t), allocatable :: notes(:)
 
-    call find_equilibria(machine, formulation, equilibria, notes, error)
+    call find_equilibria(machine, t_infinity, formulation, equilibria, notes, error)
     if (.not. allocated(error)) then
-      call find_stability(formulation, equilibria)
+      call find_stability(formulation, t_infinity, equilibria)
       call new_equilibrium_report(formulation, equilibria, notes, output_units(input), report, error)
     end if
     if (allocated(error)) then

@@ -137,8 +137,10 @@ contains
     if (allocated(error)) then
       reached = 'there'
       if (summary%extremes%rows > 0) reached = 't = ' // to_text(summary%extremes%last(1)) // ' s'
-      if (error%code == exit_failed) error%message = input%shown_file() // ': ' // error%message // '; the rows up to ' // &
-                                                     reached // ' are in ' // shown_path(folder // '/' // partial_file(input))
+      if (error%code == exit_failed .and. summary%has_run) then
+        error%message = input%shown_file() // ': ' // error%message // '; the rows up to ' // reached // ' are in ' // &
+                        shown_path(folder // '/' // partial_file(input))
+      end if
       call report_error(error, code)
     else if (.not. arguments%is_given('--quiet')) then
       do i = 1, size(summary%notes)

@@ -26,7 +26,7 @@ module nocdyn_schema
   type(allowed_t), parameter :: complements = allowed_t(words='natural scaled negated')
   type(allowed_t), parameter :: output_units = allowed_t(words='rpm Hz deg')
   type(allowed_t), parameter :: formats = allowed_t(words='csv netcdf')
-  type(allowed_t), parameter :: starts = allowed_t(words='given projected')
+  type(allowed_t), parameter :: starts = allowed_t(words='given projected equilibrium')
 
   type(group_rule_t), parameter, public :: group_rules(*) = [ &
     group_rule_t('case',       at_most_once,  '',         'What the file is about.'), &
@@ -68,7 +68,7 @@ module nocdyn_schema
     key_rule_t('run',        'complement',      a_word,         1, '',            "'natural'", complements, &
       'orthogonal complement of the gear constraints'), &
     key_rule_t('run',        'start',           a_word,         1, '',            "'given'",   starts, &
-      'start speeds that violate a constraint: refused (given) or corrected by an impact'), &
+      'given speeds; projected: after an impact, if they violate gears; equilibrium: steady state near'), &
     key_rule_t('run',        'max_steps',       an_integer,     1, '',            '1000000',   steps, &
       'the run fails after this many steps'), &
     key_rule_t('output',     'interval',        a_number,       1, 's',           unset,       positive, &

@@ -30,6 +30,8 @@ module nocdyn_machine
     real(wp), allocatable :: start_angle(:, :)            !! [rad], [lanes, bodies]
     real(wp), allocatable :: start_speed(:, :)            !! [rad/s], [lanes, bodies], obeys the constraints
     type(start_impulse_t), allocatable :: start_impulse   !! if the start speeds of the input were projected
+    real(wp), allocatable :: steady_internal(:, :)        !! internal states of a steady start, [lanes, internal states]
+    type(string_t), allocatable :: start_notes(:)         !! how the start was found
     type(bank_slot_t), allocatable :: banks(:)
     type(elements_t) :: elements                !! elements of all banks, after `number_elements`
     type(polynomial_laws_t) :: laws             !! polynomial parts of their laws, after `number_elements`
@@ -107,6 +109,8 @@ contains
     call parameters%add('machine: inertia', self%inertia)
     call parameters%add('machine: start_angle', self%start_angle)
     call parameters%add('machine: start_speed', self%start_speed)
+    call parameters%add_structure(allocated(self%steady_internal))
+    if (allocated(self%steady_internal)) call parameters%add('machine: steady_internal', self%steady_internal)
     do i = 1, size(self%banks)
       parameters%first_element = self%banks(i)%bank%first
       call self%banks(i)%bank%list_structure(parameters)
@@ -156,6 +160,8 @@ contains
     real(wp) :: omega(self%lanes, 0:self%bodies)
     integer :: i
 
+    if (allocated(self%steady_internal)) allocate (internal, source=self%steady_internal)
+    if (allocated(internal)) return
     allocate (internal(self%lanes, self%elements%internal%count), source=0.0_wp)
     omega(:, 0) = 0.0_wp
     omega(:, 1:) = self%start_speed

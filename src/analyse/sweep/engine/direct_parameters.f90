@@ -54,7 +54,8 @@ contains
     self%unit(:) = targets%in_unit
     allocate (self%lowest(size(targets)), source=huge(1.0_wp))
     allocate (self%highest(size(targets)), source=-huge(1.0_wp))
-    self%are_direct = .true.
+    self%are_direct = .not. allocated(machine%steady_internal)   ! the start follows from all values
+    if (.not. self%are_direct) return
     do i = 1, size(targets)
       if (input%groups(targets(i)%group)%kind == 'body') then
         call add_inertia(self, i, input, targets(i), machine)

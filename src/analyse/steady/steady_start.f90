@@ -1,0 +1,67 @@
+!> The start of a machine in a steady state: the speeds, the angles and the internal states there.
+module nocdyn_steady_start
+  use nocdyn_balance_texts, only: state_speeds_text
+  use nocdyn_equilibrium, only: equilibrium_t, find_equilibria, find_stability, nearest_equilibrium
+  use nocdyn_errors, only: error_t
+  use nocdyn_formulation, only: formulation_t
+  use nocdyn_kinds, only: wp
+  use nocdyn_machine, only: machine_t
+  use nocdyn_text, only: append, string_t, to_text
+  implicit none (type, external)
+  private
+
+  public :: start_steadily
+
+contains
+
+  !> Starts a machine in the steady state nearest to its given start speeds, a stable one if there is one, and notes which it is;
+  !> if none is given, in the fastest one. Torques over the time have their values at the start, periodic ones their means.
+  subroutine start_steadily(machine, is_given, t_start, error)
+    type(machine_t), intent(inout) :: machine   !! one lane
+    logical, intent(in) :: is_given(:)          !! whether the start speed of a body is given, [bodies]
+    real(wp), intent(in) :: t_start             !! [s]
+    type(error_t), allocatable, intent(out) :: error   !! there is no steady state, or none was found
+    class(formulation_t), allocatable :: formulation
+    type(equilibrium_t), allocatable :: equilibria(:)
+    type(string_t), allocatable :: notes(:)
+    integer :: i, nearest
+
+    call find_equilibria(machine, t_start, formulation, equilibria, notes, error)
+    if (allocated(error)) return
+    call find_stability(formulation, t_start, equilibria)
+    nearest = nearest_equilibrium(formulation, equilibria, is_given)
+    call formulation%set_state(equilibria(nearest)%y)
+    machine%start_speed(1, :) = formulation%omega(1, 1:)
+    machine%start_angle(1, :) = formulation%phi(1, 1:)
+    allocate (machine%steady_internal, source=formulation%machine%elements%internal%value)
+    call append(machine%start_notes, 'the start is ' // name_of(equilibria, nearest, any(is_given)) // ', at ' // &
+                                     state_speeds_text(formulation))
+    do i = 1, size(notes)
+      call append(machine%start_notes, notes(i)%text)
+    end do
+  end subroutine start_steadily
+
+  !> "steady state 3 of 3, of 2 stable ones the nearest to the given speeds".
+  function name_of(equilibria, number, is_near) result(text)
+    type(equilibrium_t), intent(in) :: equilibria(:)
+    integer, intent(in) :: number
+    logical, intent(in) :: is_near   !! to given speeds; else it is the fastest
+    character(len=:), allocatable :: text
+
+    associate (alike => count(equilibria%stability == equilibria(number)%stability))
+      if (size(equilibria) == 1) then
+        text = 'the steady state, which is ' // trim(equilibria(1)%stability)
+        if (equilibria(1)%stability == 'not determined') text = 'the steady state, of which the stability is not determined'
+      else
+        text = 'steady state ' // to_text(number) // ' of ' // to_text(size(equilibria)) // ', '
+        if (alike == 1) then
+          text = text // 'the only one that is ' // trim(equilibria(number)%stability)
+        else
+          text = text // 'of ' // to_text(alike) // ' ' // trim(equilibria(number)%stability) // ' ones the ' // &
+                 trim(merge('nearest to the given speeds  ', 'fastest, as no speed is given', is_near))
+        end if
+      end if
+    end associate
+  end function name_of
+
+end module nocdyn_steady_start
