@@ -120,7 +120,8 @@ contains
         call build_coordinates(machine%constraints, machine%names, machine%trains, machine%groups, machine%inertia, wanted, &
                                complement_choice(run%text('complement')), machine%coordinates, error)
       end if
-      if (.not. allocated(error)) call fit_start_speeds(machine, run%text('start') == 'projected', offending_row, error)
+      if (.not. allocated(error)) call fit_start_speeds(machine, given_speeds(input), run%text('start') == 'projected', &
+                                                           offending_row, error)
     end associate
     if (.not. allocated(error)) return
     if (offending_row > 0) then

@@ -1,9 +1,11 @@
-!> Consistent start speeds: those that violate constraints are refused, or replaced by the nearest that satisfy them.
+!> Consistent start speeds: those that are not given follow from the others; those that violate constraints are refused, or
+!> replaced by the nearest that satisfy them.
 !>
 !> omega* = L_tau (L_tau^T J L_tau)^-1 L_tau^T J omega minimises the kinetic energy of the difference. These are the speeds
 !> after an impact, in which impulses of the constraints act.
 module nocdyn_start_speeds
   use nocdyn_errors, only: error_t, exit_input, raise
+  use nocdyn_followed_speeds, only: follow_speeds
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
   use nocdyn_text, only: quoted, rounded_text, to_text
@@ -21,19 +23,24 @@ module nocdyn_start_speeds
 
 contains
 
-  !> Checks the start speeds of a machine. If they may be projected, projects those of the groups with violated rows.
-  subroutine fit_start_speeds(machine, may_project, offending_row, error)
+  !> Completes and checks the start speeds of a machine. If they may be projected, projects those of the groups with violated
+  !> rows; speeds that are not given count as 0 then.
+  subroutine fit_start_speeds(machine, is_given, may_project, offending_row, error)
     type(machine_t), intent(inout) :: machine
+    logical, intent(in) :: is_given(:)      !! whether the start speed of a body is given, [bodies]
     logical, intent(in) :: may_project      !! whether violations are repaired; they are errors otherwise
     integer, intent(out) :: offending_row   !! first violated row, 0 if there is no error
     type(error_t), allocatable, intent(out) :: error
     real(wp) :: nearest(machine%bodies)
     integer, allocatable :: violated(:)
-    integer :: row
 
     offending_row = 0
-    violated = pack([(row, row=1, machine%constraints%rows())], [(is_violated(machine, row), row=1, machine%constraints%rows())])
+    violated = violated_rows(machine)
     if (size(violated) == 0) return
+    if (.not. may_project) then
+      call follow_in_groups(machine, is_given, violated)
+      if (size(violated) == 0) return
+    end if
     nearest = nearest_speeds(machine, violated)
     if (may_project) then
       call project_start(nearest, machine)
@@ -42,6 +49,33 @@ contains
       call raise(error, exit_input, violation_message(machine, violated, nearest))
     end if
   end subroutine fit_start_speeds
+
+  !> The rows that the start speeds violate.
+  function violated_rows(machine) result(rows)
+    type(machine_t), intent(in) :: machine
+    integer, allocatable :: rows(:)
+    integer :: row
+
+    rows = pack([(row, row=1, machine%constraints%rows())], [(is_violated(machine, row), row=1, machine%constraints%rows())])
+  end function violated_rows
+
+  !> Lets the start speeds that are not given follow from the others, in the groups with violated rows.
+  subroutine follow_in_groups(machine, is_given, violated)
+    type(machine_t), intent(inout) :: machine
+    logical, intent(in) :: is_given(:)   !! [bodies]
+    integer, allocatable, intent(inout) :: violated(:)   !! rows; those that stay violated after the call
+    integer :: g, i
+    logical :: is_consistent, is_row_violated(machine%constraints%rows())
+
+    is_row_violated = .false.
+    is_row_violated(violated) = .true.
+    do g = 1, size(machine%groups)
+      if (any([(is_row_violated(machine%groups(g)%rows(i)), i=1, size(machine%groups(g)%rows))])) then
+        call follow_speeds(machine, g, is_given, is_consistent)
+      end if
+    end do
+    violated = violated_rows(machine)
+  end subroutine follow_in_groups
 
   !> Whether the start speeds violate a row.
   logical function is_violated(machine, row)
