@@ -360,10 +360,8 @@ def test_torques_that_never_balance_are_refused_with_what_is_left_over(nocdyn):
 
 def test_couplings_that_cannot_carry_the_torque_are_refused(nocdyn):
     soft = TRAIN.replace("cubic_stiffness = 2e5", "cubic_stiffness = -2e5")  # carries 19.5 N m at most
-    assert (
-        "no steady state: the torques balance at 600 rad/s of 'motor', but no twists of the couplings were found that carry them"
-        in refusal(nocdyn, soft)
-    )
+    message = refusal(nocdyn, soft)
+    assert "no steady state was found: the torques balance at 600 rad/s of 'motor', but no twists of the couplings" in message
 
 
 def test_a_machine_whose_stiffness_matrix_has_no_narrow_band_is_refused(nocdyn):

@@ -2,8 +2,8 @@
 !>
 !> The given speeds of a group of geared bodies are taken one after the other, those with the fewest digits first: 100 is meant to
 !> the last digit rather than 33.33. A speed that follows from those before it must agree with it within half a unit of its
-!> last digit, in rad/s or rpm, and have three digits at least; else the other order is tried. Of the speeds that stay open the sum of the squares is as small as
-!> possible, so that they are zero if they can be, and a note names them.
+!> last digit, in rad/s or rpm, and have three digits at least; else the other order is tried. Of the speeds that stay open the
+!> sum of the squares is as small as possible, so that they are zero if they can be, and a note names them.
 module nocdyn_followed_speeds
   use nocdyn_kinds, only: wp
   use nocdyn_lapack, only: pseudo_inverse
@@ -161,12 +161,12 @@ contains
     type(known_t), intent(in) :: known
     logical, intent(in) :: is_given(:)           !! [bodies]
     type(decimal_t), intent(in) :: decimals(:)   !! [bodies]
-    real(wp) :: open(size(complement, 2), size(complement, 2)), speed(size(bodies))
+    real(wp) :: free(size(complement, 2), size(complement, 2)), speed(size(bodies))
     type(string_t), allocatable :: changes(:), left_open(:)
     integer :: i
 
-    open = open_motions(known)
-    speed = matmul(complement, smallest_speeds(complement, known, open))
+    free = free_motions(known)
+    speed = matmul(complement, smallest_speeds(complement, known, free))
     allocate (changes(0), left_open(0))
     do i = 1, size(bodies)
       associate (start => machine%start_speed(:, bodies(i)))
@@ -175,7 +175,7 @@ contains
           call append(changes, value_text(start(1), decimals(i)) // ' of ' // quoted(machine%names(bodies(i))%text) // ' by ' // &
                                rounded_text(speed(i) / decimals(i)%unit, shown_digits))
         end if
-        if (norm2(matmul(complement(i, :), open)) > rounding * norm2(complement(i, :)) .and. abs(speed(i)) > 0.0_wp) then
+        if (norm2(matmul(complement(i, :), free)) > rounding * norm2(complement(i, :)) .and. abs(speed(i)) > 0.0_wp) then
           call append(left_open, quoted(machine%names(bodies(i))%text))
         end if
         start = speed(i)
@@ -192,31 +192,31 @@ contains
   end subroutine set_speeds
 
   !> Projection on the motions that do not change the known combinations, [coordinates, coordinates].
-  pure function open_motions(known) result(open)
+  pure function free_motions(known) result(free)
     type(known_t), intent(in) :: known
-    real(wp) :: open(size(known%value), size(known%value))
+    real(wp) :: free(size(known%value), size(known%value))
     integer :: i, k
 
-    open = 0.0_wp
-    do i = 1, size(open, 1)
-      open(i, i) = 1.0_wp
+    free = 0.0_wp
+    do i = 1, size(free, 1)
+      free(i, i) = 1.0_wp
       do k = 1, known%count
-        open(:, i) = open(:, i) - known%orthonormal(i, k) * known%orthonormal(:, k)
+        free(:, i) = free(:, i) - known%orthonormal(i, k) * known%orthonormal(:, k)
       end do
     end do
-    if (known%count == size(open, 1)) open = 0.0_wp
-  end function open_motions
+    if (known%count == size(free, 1)) free = 0.0_wp
+  end function free_motions
 
   !> Speeds of the coordinates with the known combinations, and the smallest speeds of the bodies [rad/s], [coordinates].
-  function smallest_speeds(complement, known, open) result(speeds)
+  function smallest_speeds(complement, known, free) result(speeds)
     real(wp), intent(in) :: complement(:, :)   !! [bodies, coordinates]
     type(known_t), intent(in) :: known
-    real(wp), intent(in) :: open(:, :)         !! by `open_motions`
+    real(wp), intent(in) :: free(:, :)         !! by `free_motions`
     real(wp) :: speeds(size(complement, 2))
 
     speeds = matmul(known%orthonormal(:, :known%count), known%value(:known%count))
     if (known%count == size(speeds)) return
-    speeds = speeds - matmul(open, matmul(pseudo_inverse(matmul(complement, open), rounding), matmul(complement, speeds)))
+    speeds = speeds - matmul(free, matmul(pseudo_inverse(matmul(complement, free), rounding), matmul(complement, speeds)))
   end function smallest_speeds
 
   !> "33.33 rpm".

@@ -11,6 +11,7 @@ module nocdyn_transient
   use nocdyn_integration_settings, only: integration_settings_t
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
+  use nocdyn_missed_states, only: note_missed_state
   use nocdyn_output_times, only: check_output_times, output_note, output_times
   use nocdyn_output_units, only: output_units
   use nocdyn_run_settings, only: check_size, choose_settings
@@ -115,6 +116,11 @@ contains
     summary%t_start = times(1)
     call solve(formulation, settings, times, observer, summary, error)
     if (summary%has_run) call complete_summary(observer, error, summary)
+    if (.not. summary%has_run .or. allocated(error) .or. allocated(formulation%machine%steady_internal)) return
+    associate (bodies => formulation%machine%bodies)
+      call note_missed_state(formulation%machine, observer%last_time, summary%extremes%last(bodies + 2:2 * bodies + 1), &
+                             summary%notes)
+    end associate
   end subroutine run_transient
 
   !> The equations of motion of an input. Their machine is the only one that stays.

@@ -25,8 +25,8 @@ contains
     if (.not. block%is_complete) then
       sentence = 'no steady state was found: nothing was found that balances the torques on ' // &
                  moving_bodies(balance, block%members) // '; tried: a scan over one speed with the others following it, ' // &
-                 'Newton''s method from ' // to_text(block%starts) // ' combinations of rest, synchronous speeds and knees of ' // &
-                 'the curves, and the motion from the start'
+                 'Newton''s method from ' // to_text(block%starts) // ' combinations of rest, synchronous speeds and knees ' // &
+                 'of the curves, and the motion from the start'
       return
     end if
     sentence = 'there is no steady state: nothing balances '

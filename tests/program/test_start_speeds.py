@@ -1,0 +1,108 @@
+"""Start speeds that are not given follow from the others through the gears; digits that are only rounded are accepted."""
+
+from math import pi
+
+import pytest
+
+RPM = pi / 30
+ROUNDED = "note: start speeds contradict the gears by no more than their rounding, and are replaced: "
+EXACT = 1e-12
+
+GEAR = "&gear name = 'g' bodies = 'a', 'b' teeth = 20, 60 internal = .true. /\n"  # b turns with a third of the speed of a
+AXLE = "&differential name = 'axle' sides = 'left', 'right' case = 'case' /\n"
+
+
+def bodies(**speeds):
+    return "".join(
+        f"&body name = '{name}' inertia = {i + 1}.0" + (f" speed = {speed!r}" if speed is not None else "") + " /\n"
+        for i, (name, speed) in enumerate(speeds.items())
+    )
+
+
+def start(nocdyn, text, *options):
+    """Speeds at the start, and the notes of the run."""
+    outcome = nocdyn("run", nocdyn.write("m.nml", text + "&run t_end = 1e-3 /\n"), "--out", "out", *options)
+    assert (outcome.returncode, outcome.stderr) == (0, "")
+    header, rows = nocdyn.table("out")
+    speeds = {label[6:-8]: value for label, value in zip(header, rows[0]) if label.startswith("omega_")}
+    return speeds, [line.split(": ", 1)[1] for line in outcome.stdout.splitlines() if ": note: " in line]
+
+
+def refusal(nocdyn, text):
+    outcome = nocdyn("check", nocdyn.write("m.nml", text + "&run t_end = 1e-3 /\n"))
+    assert (outcome.returncode, outcome.stdout) == (2, "")
+    return outcome.stderr
+
+
+@pytest.mark.parametrize(("given", "speed"), [("a", 90.0), ("b", 30.0), ("c", -60.0)])
+def test_one_speed_serves_a_train(nocdyn, given, speed):
+    train = bodies(**{name: speed if name == given else None for name in "abc"}) + GEAR
+    speeds, notes = start(nocdyn, train + "&gear name = 'h' bodies = 'b', 'c' teeth = 40, 20 /\n")
+    assert speeds == {"a": pytest.approx(90, rel=EXACT), "b": pytest.approx(30, rel=EXACT), "c": pytest.approx(-60, rel=EXACT)}
+    assert notes == []
+
+
+def test_a_train_without_given_speeds_and_the_bodies_beside_it_start_at_rest(nocdyn):
+    speeds, _ = start(nocdyn, bodies(a=None, b=None, c=None, d=7.0) + GEAR)
+    assert speeds == {"a": 0, "b": 0, "c": 0, "d": 7}
+
+
+@pytest.mark.parametrize(
+    ("a", "b", "true", "replaced"),
+    [
+        (100.0, 33.33, 100.0, "33.33 rad/s of 'b' by 33.33333333"),
+        (100 * RPM, 33.33 * RPM, 100 * RPM, "33.33 rpm of 'b' by 33.33333333"),
+        (1480 * RPM, 493 * RPM, 1480 * RPM, "493 rpm of 'b' by 493.3333333"),
+        (104.7, 34.907, 104.721, "104.7 rad/s of 'a' by 104.721"),
+    ],
+)
+def test_digits_that_are_only_rounded_are_accepted_with_a_note(nocdyn, a, b, true, replaced):
+    speeds, notes = start(nocdyn, bodies(a=a, b=b) + GEAR)
+    assert speeds == {"a": pytest.approx(true, rel=EXACT), "b": pytest.approx(true / 3, rel=EXACT)}
+    assert notes == [ROUNDED + replaced]
+
+
+@pytest.mark.parametrize(("a", "b"), [(100.0, 33.5), (100.0, 33.0), (100.0, 33.32), (100.0, 0.0), (104.7, 34.95)])
+def test_digits_that_contradict_the_gears_are_refused(nocdyn, a, b):
+    message = refusal(nocdyn, bodies(a=a, b=b) + GEAR)
+    assert ":3: &gear 'g': the start speeds violate it: 1 * 10" in message
+    assert "which must be 0; nearest speeds that fit: " in message and message.endswith("&run start = 'projected' takes them\n")
+
+
+def test_two_speeds_of_a_differential_give_the_third(nocdyn):
+    speeds, notes = start(nocdyn, bodies(case=100.0, left=120.0, right=None) + AXLE)
+    assert speeds["right"] == pytest.approx(80, rel=EXACT)
+    assert notes == []
+
+
+def test_speeds_that_the_given_ones_leave_open_are_named(nocdyn):
+    speeds, notes = start(nocdyn, bodies(case=100.0, left=None, right=None) + AXLE)
+    assert speeds == {name: pytest.approx(100, rel=EXACT) for name in ("case", "left", "right")}
+    assert notes == [
+        "note: the given start speeds do not determine those of 'left', 'right': the smallest ones that fit are taken"
+    ]
+
+
+def test_speeds_that_may_stay_zero_do(nocdyn):
+    speeds, notes = start(
+        nocdyn, bodies(case=None, left=100.0, right=-100.0, d=None, e=None) + AXLE + GEAR.replace("a'", "d'").replace("b'", "e'")
+    )
+    assert speeds == {
+        "case": pytest.approx(0, abs=1e-12),
+        "left": pytest.approx(100),
+        "right": pytest.approx(-100),
+        "d": 0,
+        "e": 0,
+    }
+    assert notes == []
+
+
+def test_an_override_gives_a_speed(nocdyn):
+    speeds, _ = start(nocdyn, bodies(a=None, b=None) + GEAR, "--set", "body.b.speed=5")
+    assert speeds["a"] == pytest.approx(15, rel=EXACT)
+
+
+def test_bodies_without_speed_stand_still_before_an_impact(nocdyn):
+    # momentum 8 of inertia 1 + 2/9 seen from 'a'
+    speeds, _ = start(nocdyn, bodies(a=8.0, b=None) + GEAR, "--set", "run.start=projected")
+    assert speeds["a"] == pytest.approx(8 / (1 + 2 / 9), rel=EXACT)
