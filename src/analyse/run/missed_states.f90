@@ -1,4 +1,4 @@
-!> A hint after a run: the machine ends in a slow steady state, as a motor does that does not start its load, and could run faster.
+!> A hint after a run: the machine ends in a slow steady state, as a motor does that cannot start its load, and could run faster.
 module nocdyn_missed_states
   use nocdyn_balance_texts, only: state_speeds_text
   use nocdyn_equilibrium, only: equilibrium_t, find_equilibria, find_stability
