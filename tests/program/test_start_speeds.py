@@ -62,6 +62,12 @@ def test_digits_that_are_only_rounded_are_accepted_with_a_note(nocdyn, a, b, tru
     assert notes == [ROUNDED + replaced]
 
 
+def test_speeds_in_rpm_are_given_too(nocdyn):
+    speeds, notes = start(nocdyn, (bodies(a=100.0, b=33.33) + GEAR).replace("speed =", "speed_rpm ="))
+    assert speeds == {"a": pytest.approx(100 * RPM, rel=EXACT), "b": pytest.approx(100 * RPM / 3, rel=EXACT)}
+    assert notes == [ROUNDED + "33.33 rpm of 'b' by 33.33333333"]
+
+
 @pytest.mark.parametrize(("a", "b"), [(100.0, 33.5), (100.0, 33.0), (100.0, 33.32), (100.0, 0.0), (104.7, 34.95)])
 def test_digits_that_contradict_the_gears_are_refused(nocdyn, a, b):
     message = refusal(nocdyn, bodies(a=a, b=b) + GEAR)

@@ -117,9 +117,9 @@ contains
     call solve(formulation, settings, times, observer, summary, error)
     if (summary%has_run) call complete_summary(observer, error, summary)
     if (.not. summary%has_run .or. allocated(error) .or. allocated(formulation%machine%steady_internal)) return
-    associate (bodies => formulation%machine%bodies)
-      call note_missed_state(formulation%machine, observer%last_time, summary%extremes%last(bodies + 2:2 * bodies + 1), &
-                             summary%notes)
+    associate (last => observer%table%columns%formulation)
+      call last%set_state(reshape(observer%last_state, [1, size(observer%last_state)]))
+      call note_missed_state(formulation%machine, observer%last_time, last%omega(1, 1:), summary%notes)
     end associate
   end subroutine run_transient
 

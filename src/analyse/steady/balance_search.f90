@@ -86,7 +86,7 @@ contains
   subroutine find_least(found, block)
     type(scan_t), intent(in) :: found
     type(block_solutions_t), intent(inout) :: block
-    real(wp), parameter :: equal = 1.0e-12_wp   ! relative difference
+    real(wp), parameter :: equal = 1.0e-9_wp   ! relative difference
     real(wp) :: least
     integer :: i
 

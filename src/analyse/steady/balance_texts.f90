@@ -11,7 +11,7 @@ module nocdyn_balance_texts
   public :: moving_bodies, no_balance_message, speed_text, state_speeds_text
 
   integer, parameter :: most_names = 5   ! of bodies in a message
-  integer, parameter :: digits = 6
+  integer, parameter :: digits = 6, speed_digits = 4   ! at a minimum of the torque the speed has half of the digits
   real(wp), parameter :: alike = 1.0e-6_wp   ! relative difference of speeds that are printed alike
 
 contains
@@ -37,7 +37,7 @@ contains
       sentence = sentence // 'the torques on ' // moving_bodies(balance, block%members) // ' at any speed'
       if (block%least_torque < huge(1.0_wp)) then
         sentence = sentence // '; at least ' // rounded_text(block%least_torque, digits) // ' N m are left over, at ' // &
-                   rounded_text(block%least_speed, digits) // ' rad/s of ' // quoted(body_of(balance, block%members(1)))
+                   rounded_text(block%least_speed, speed_digits) // ' rad/s of ' // quoted(body_of(balance, block%members(1)))
       end if
     end if
   end function no_balance_message

@@ -50,7 +50,7 @@ module nocdyn_schema
     key_rule_t('body',       'angle',           a_number,       1, 'rad',         '0',         anything, &
       'angle at the start'), &
     key_rule_t('body',       'speed',           a_number,       1, 'rad/s',       '0',         anything, &
-      'speed at the start; geared bodies must start with speeds that fit the gears'), &
+      'speed at the start; that of a geared body follows from others, if it is not given'), &
     key_rule_t('run',        't_start',         a_number,       1, 's',           '0',         anything, &
       'time of the start'), &
     key_rule_t('run',        't_end',           a_number,       1, 's',           required,    anything, &
