@@ -25,8 +25,8 @@ contains
     allocate (names, source=selected(machine%names, machine%coordinates%body))
   end function coordinate_names
 
-  !> Notes on redundant constraints, on the start (speeds projected onto the constraints or rounded, a steady state), and on bodies
-  !> that nothing moves.
+  !> Notes on redundant constraints, on the start (speeds projected onto the constraints or rounded, a steady state), and on
+  !> bodies that nothing moves.
   function machine_notes(machine) result(notes)
     type(machine_t), intent(in) :: machine
     type(string_t), allocatable :: notes(:)
