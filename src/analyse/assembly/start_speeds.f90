@@ -35,7 +35,7 @@ contains
     integer, allocatable :: violated(:)
 
     offending_row = 0
-    violated = violated_rows(machine)
+    allocate (violated, source=violated_rows(machine))
     if (size(violated) == 0) return
     if (.not. may_project) then
       call follow_in_groups(machine, is_given, violated)

@@ -93,10 +93,13 @@ contains
     real(wp), intent(in) :: z(:)        !! [unknowns]
     real(wp), parameter :: near = 1.0e-10_wp, spacings = 8 * epsilon(1.0_wp)
     real(wp) :: slopes(size(z), size(z)), tolerance(size(members)), changes(size(members))
+    integer :: i
 
     call balance%evaluate(z)
     call balance%differentiate(slopes)
-    changes = matmul(abs(slopes(members, members)), abs(z(members)))
+    do i = 1, size(members)
+      changes(i) = sum(abs(slopes(members(i), members) * z(members)))
+    end do
     tolerance = spacings * changes + near * merge(balance%scale(members), changes, members <= balance%motions%freedoms())
     is_nearly_balanced = all(abs(balance%residual(members)) <= tolerance)
   end function is_nearly_balanced
