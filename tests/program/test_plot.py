@@ -229,6 +229,12 @@ def test_options_that_are_wrong_are_usage_errors(options, message, tmp_path, mon
     assert message in capsys.readouterr().err
 
 
+def test_patterns_before_the_folder_are_told_by_the_usage(tmp_path, monkeypatch, capsys):
+    assert refusal(monkeypatch, "run_figures", "--columns", "omega_*", tmp_path) == 2
+    said = capsys.readouterr().err
+    assert said.startswith("usage: scripts/plot RESULTS [--columns PATTERN ...]") and "are required: RESULTS" in said
+
+
 def many(folder, elements, rows=50):
     """As many moments as that, the later the larger."""
     t = np.linspace(0.0, 1.0, rows)
