@@ -185,6 +185,19 @@ def test_a_transient_as_long_as_the_run_is_not_told(nocdyn):
     assert "*" in discs(nocdyn, "", "", "", "--set", "run.t_end=0.9").stdout
 
 
+@pytest.mark.parametrize(
+    ("damping", "until"),
+    [
+        (0.45, 6 * HALF_PERIOD),  # decays in 2.2 s, and 6.7 s are more than half of the run
+        (4.5, 3 / 4.5),  # three decay times
+        (18.0, 6 * HALF_PERIOD),  # three decay times are less than three periods
+    ],
+)
+def test_the_transient_lasts_until_it_has_decayed_or_for_three_periods(nocdyn, damping, until):
+    discs(nocdyn, "", "", "", "--set", f"coupling.line.damping={damping}")
+    assert nocdyn.summary("out")["start_transient"]["until"] == pytest.approx(until, rel=1e-6)
+
+
 def test_a_speed_of_twist_at_the_start_is_out_of_balance(nocdyn):
     text = discs(nocdyn, "angle = 0.0148148148148148 speed = 0.1").stdout
     assert "out of balance, up to t = 0.419 s" in text

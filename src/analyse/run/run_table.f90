@@ -73,7 +73,8 @@ contains
     if (.not. any(marks)) return
     until = rounded_text(summary%transient%until, 3)
     call report%append_line('* in the first fast transient of a start out of balance, up to t = ' // until // &
-                            ' s; &output extremes_from = ' // until // ' leaves it out')
+                            ' s; &output extremes_from = ' // until // &
+                            " leaves it out, &run start = 'equilibrium' begins in balance")
   end subroutine append_columns
 
   !> The columns to print, by sorts and within each in the order of the table: of every sort its share of the lines at least, and

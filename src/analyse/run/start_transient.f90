@@ -1,8 +1,9 @@
 !> The first fast transient of a start out of balance, and the extremes that lie in it.
 !>
 !> The machine is linearised at its start. What the moments there accelerate and the speeds of twist make each mode swing about
-!> its position of balance; the modes with the largest moments in a coupling are the excited ones. The transient lasts for some
-!> periods of the slowest of them. A start in balance, as that of a steady state, has none.
+!> its position of balance; the modes with the largest moments in a coupling are the excited ones. The transient lasts until these
+!> have decayed, but for some periods at least; where they decay too slowly, for these periods. A start in balance, as that of a
+!> steady state, has none.
 module nocdyn_start_transient
   use nocdyn_column_names, only: quantity_of
   use nocdyn_errors, only: error_t
@@ -16,7 +17,8 @@ module nocdyn_start_transient
 
   public :: find_start_transient
 
-  real(wp), parameter :: periods = 3.0_wp           !! of the slowest excited mode
+  real(wp), parameter :: periods = 3.0_wp           ! of an excited mode
+  real(wp), parameter :: decays = 3.0_wp            ! times of decay by the factor e: 5 % are left
   real(wp), parameter :: excited_share = 0.05_wp    ! of the largest moment: smaller ones do not count
   real(wp), parameter :: balance_share = 1.0e-6_wp  ! of the moments of the run: a smaller swing is none
   real(wp), parameter :: fast_share = 0.5_wp        ! of the run: what lasts longer is no fast transient
@@ -58,6 +60,8 @@ contains
     type(error_t), allocatable :: error
     real(wp), allocatable :: y(:, :), moments(:)
     real(wp), parameter :: two_pi = 2.0_wp * acos(-1.0_wp)
+    real(wp) :: damping, duration, longest   ! of a mode: 2 zeta omega [1/s]; [s]
+    integer :: i
 
     until = t_start
     if (machine%coordinates%freedoms > most_freedoms) return
@@ -68,11 +72,16 @@ contains
     call formulation%observe([t_start], y)
     allocate (moments, source=moments_of_modes(formulation%machine, linear))
     if (size(moments) == 0) return
-    if (maxval(moments) <= balance_share * largest_moment) return
-    associate (slowest => minval(linear%natural, mask=moments >= excited_share * maxval(moments)))
-      if (periods * two_pi > fast_share * (t_end - t_start) * slowest) return
-      until = t_start + periods * two_pi / slowest
-    end associate
+    if (maxval(moments) <= max(balance_share * largest_moment, 0.0_wp)) return
+    longest = fast_share * (t_end - t_start)
+    duration = 0.0_wp
+    do i = 1, size(moments)
+      if (moments(i) < excited_share * maxval(moments)) cycle
+      duration = max(duration, periods * two_pi / linear%natural(i))
+      damping = -dot_product(formulation%machine%elements%applied_speed(1, :), linear%twists(:, i)**2)
+      if (decays * 2.0_wp <= longest * damping) duration = max(duration, decays * 2.0_wp / damping)
+    end do
+    if (duration <= longest) until = t_start + duration
   end function transient_end
 
   !> The largest amplitude of an elastic moment when each mode swings freely from the state of the machine [N m], [modes].
