@@ -156,11 +156,11 @@ def test_the_first_swings_of_a_start_out_of_balance_are_told(nocdyn):
     assert moment["min"] == pytest.approx(-30, rel=0.02) and moment["time_of_min"] == pytest.approx(HALF_PERIOD, rel=1e-3)
     transient = summary["start_transient"]
     assert transient["until"] == pytest.approx(3 * 2 * HALF_PERIOD, rel=1e-6)
-    # the moment is 0 at the start, and largest there
+    # the moments are largest, 0, at the start itself
     swinging = ["twist_line [rad]", "moment_line [N m]", "damping_line [N m]", "shaft_line [N m]"]
-    assert (transient["has_min_of"], transient["has_max_of"]) == (swinging, swinging)
+    assert (transient["has_min_of"], transient["has_max_of"]) == (swinging, ["damping_line [N m]"])
     (shaft,) = (line for line in lines if line.startswith("shaft_line [N m]"))
-    assert re.fullmatch(r"shaft_line \[N m\] .* [0-9.]+\* +0 +0\*", shaft)
+    assert re.fullmatch(r"shaft_line \[N m\] .* [0-9.]+\* +0 +0", shaft)
     assert "* in the first fast transient of a start out of balance, up to t = 0.419 s; " in "\n".join(lines)
     assert not any("*" in line for line in lines if line.startswith(("omega", "torque", "phi")))
 

@@ -26,7 +26,7 @@ module nocdyn_start_transient
 
   type, public :: start_transient_t
     real(wp) :: until = 0.0_wp                                     !! its end [s]; the start if there is none
-    logical, allocatable :: has_lowest(:), has_highest(:)          !! whether these extremes lie in it, [columns]
+    logical, allocatable :: has_lowest(:), has_highest(:)          !! whether these extremes lie in it, after the start, [columns]
   end type start_transient_t
 
 contains
@@ -45,8 +45,8 @@ contains
     is_moment = [(quantity_of(labels(i)%text) == 'moment', i=1, size(labels))]
     swings = [(swings_with_couplings(labels(i)), i=1, size(labels))]
     transient%until = transient_end(machine, span(1), span(2), maxval(sizes, mask=is_moment))
-    allocate (transient%has_lowest, source=swings .and. lowest_time <= transient%until .and. transient%until > span(1))
-    allocate (transient%has_highest, source=swings .and. highest_time <= transient%until .and. transient%until > span(1))
+    allocate (transient%has_lowest, source=swings .and. lowest_time > span(1) .and. lowest_time <= transient%until)
+    allocate (transient%has_highest, source=swings .and. highest_time > span(1) .and. highest_time <= transient%until)
   end subroutine find_start_transient
 
   !> The end of the first fast transient [s]; t_start if there is none, or if it cannot be told: of a machine of many degrees of
