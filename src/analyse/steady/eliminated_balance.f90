@@ -56,6 +56,7 @@ contains
     call gather_rows(balance, self%speeds, elements, rows)
     allocate (rises(size(elements)), source=.false.)
     if (size(self%speeds) > 1) call find_rising_laws(balance, elements, rises)
+    rises = rises .and. maxval(abs(rows), dim=2) > 0.0_wp
     i = findloc(rises, .true., dim=1)
     self%row(1) = 1.0_wp
     if (i > 0) self%row = rows(i, :)

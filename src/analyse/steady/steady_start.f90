@@ -12,6 +12,8 @@ module nocdyn_steady_start
 
   public :: start_steadily
 
+  integer, parameter :: most_states = 100   ! for which eigenvalues are computed at once, of a steady state without others
+
 contains
 
   !> Starts a machine in the steady state nearest to its given start speeds, a stable one if there is one, and notes which it is;
@@ -28,7 +30,7 @@ contains
 
     call find_equilibria(machine, t_start, formulation, equilibria, notes, error)
     if (allocated(error)) return
-    call find_stability(formulation, t_start, equilibria)
+    if (size(equilibria) > 1 .or. formulation%states <= most_states) call find_stability(formulation, t_start, equilibria)
     nearest = nearest_equilibrium(formulation, equilibria, is_given)
     call formulation%set_state(equilibria(nearest)%y)
     machine%start_speed(1, :) = formulation%omega(1, 1:)
