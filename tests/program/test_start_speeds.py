@@ -112,3 +112,19 @@ def test_bodies_without_speed_stand_still_before_an_impact(nocdyn):
     # momentum 8 of inertia 1 + 2/9 seen from 'a'
     speeds, _ = start(nocdyn, bodies(a=8.0, b=None) + GEAR, "--set", "run.start=projected")
     assert speeds["a"] == pytest.approx(8 / (1 + 2 / 9), rel=EXACT)
+
+
+@pytest.mark.parametrize("method", ["given", "equilibrium"])
+def test_the_input_that_a_run_leaves_starts_like_the_run(nocdyn, method):
+    load = "&load name = 'l' body = 'b' viscous = 1.0 /\n&motor name = 'm' body = 'a' a = 9.0 b = 1.0 c = 0.0 /\n"
+    speeds, _ = start(nocdyn, bodies(a=90.0, b=None) + GEAR + load, "--set", f"run.start={method}")
+    assert nocdyn("run", "out/input.nml", "--out", "again").returncode == 0
+    header, rows = nocdyn.table("again")
+    again = {label[6:-8]: value for label, value in zip(header, rows[0]) if label.startswith("omega_")}
+    assert again == speeds
+
+
+@pytest.mark.parametrize("speed", ["1e-308", "1e-49", "1e49"])
+def test_speeds_of_any_size_have_digits(nocdyn, speed):
+    speeds, _ = start(nocdyn, (bodies(a=1.0, b=None) + GEAR).replace("speed = 1.0", f"speed = {speed}"))
+    assert speeds["b"] == pytest.approx(float(speed) / 3, rel=EXACT, abs=0)

@@ -103,11 +103,14 @@ contains
   pure type(decimal_t) function decimals_in(speed, unit) result(decimal)
     real(wp), intent(in) :: speed, unit   !! [rad/s]
     real(wp), parameter :: conversion = 1.0e-14_wp   ! relative error of a change of the unit
+    real(wp), parameter :: smallest = 1.0e-50_wp     ! of which digits are counted
     real(wp) :: scale, x
 
     decimal%unit = unit
     x = abs(speed / unit)
     if (x <= 0.0_wp) return
+    if (x < smallest) decimal%digits = most_digits
+    scale = 1.0_wp / smallest
     do while (decimal%digits < most_digits)
       decimal%digits = decimal%digits + 1
       scale = 10.0_wp**(decimal%digits - 1 - floor(log10(x)))

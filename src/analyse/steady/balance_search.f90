@@ -7,7 +7,7 @@
 module nocdyn_balance_search
   use nocdyn_balance_starts, only: search_from_starts
   use nocdyn_block_solutions, only: block_solutions_t, is_nearly_balanced
-  use nocdyn_brackets, only: bracket_t, new_bracket
+  use nocdyn_brackets, only: bracket_t, have_same_sign, new_bracket
   use nocdyn_eliminated_balance, only: eliminated_balance_t, new_eliminated_balance
   use nocdyn_kinds, only: wp
   use nocdyn_speed_grid, only: new_speed_grid
@@ -48,7 +48,7 @@ contains
         call balance%settle(reduced%z)
         call add_if_balanced(balance, reduced%z, .false., blocks(k))
       end if
-      if (.not. blocks(k)%is_complete) call search_from_starts(balance, reduced%knees, blocks(k))
+      if (.not. blocks(k)%is_complete) call search_from_starts(balance, reduced, blocks(k))
     end do
   end subroutine search_balance
 
@@ -113,12 +113,12 @@ contains
         call add_range(balance, reduced, found, i, start, block)
       else if (i < size(grid)) then
         if (.not. found%is_balanced(i + 1)) return
-        if (torque(i) * torque(i + 1) < 0.0_wp) then
+        if (abs(torque(i + 1)) > 0.0_wp .and. .not. have_same_sign(torque(i), torque(i + 1))) then
           call solve_bracketed(balance, reduced, grid(i:i + 1), torque(i:i + 1), block)
         else if (i > 1) then
           if (.not. (found%is_balanced(i - 1) .and. is_local_minimum(torque(max(1, i - 1):i + 1)))) return
           call minimise_torque(balance, reduced, grid(i - 1), grid(i + 1), middle, top)
-          if (top * torque(i) > 0.0_wp) return
+          if (have_same_sign(top, torque(i))) return
           call solve_bracketed(balance, reduced, [grid(i - 1), middle], [torque(i - 1), top], block)
           call solve_bracketed(balance, reduced, [middle, grid(i + 1)], [top, torque(i + 1)], block)
         end if
@@ -148,7 +148,7 @@ contains
   pure logical function is_local_minimum(torque)
     real(wp), intent(in) :: torque(3)   !! [N m]
 
-    is_local_minimum = torque(1) * torque(2) > 0.0_wp .and. torque(3) * torque(2) > 0.0_wp .and. &
+    is_local_minimum = have_same_sign(torque(1), torque(2)) .and. have_same_sign(torque(3), torque(2)) .and. &
                        abs(torque(2)) <= abs(torque(1)) .and. abs(torque(2)) <= abs(torque(3))
   end function is_local_minimum
 
@@ -165,7 +165,7 @@ contains
 
     a = left
     b = right
-    sign_outside = imbalance(balance, reduced, left)
+    sign_outside = sign(1.0_wp, imbalance(balance, reduced, left))
     inside = [b - golden * (b - a), a + golden * (b - a)]
     value = [(imbalance(balance, reduced, inside(i)), i=1, 2)]
     do i = 1, sections

@@ -2,6 +2,7 @@
 !> motion from the start of the machine until it is steady.
 module nocdyn_balance_starts
   use nocdyn_block_solutions, only: block_solutions_t, is_nearly_balanced
+  use nocdyn_eliminated_balance, only: eliminated_balance_t
   use nocdyn_kinds, only: wp
   use nocdyn_lapack, only: pseudo_inverse
   use nocdyn_torque_balance, only: torque_balance_t
@@ -14,30 +15,31 @@ module nocdyn_balance_starts
 
 contains
 
-  !> Newton's method from the start of the machine and from combinations of speeds, and the motion from the start.
-  subroutine search_from_starts(balance, knees, block)
+  !> Newton's method from the start of the machine and from combinations of speeds, and the motion from the start. The speeds of
+  !> elements whose torques rise are combined, and the others follow.
+  subroutine search_from_starts(balance, reduced, block)
     type(torque_balance_t), intent(inout) :: balance
-    real(wp), intent(in) :: knees(:)   !! speeds at which a law bends [rad/s]
+    type(eliminated_balance_t), intent(inout) :: reduced
     type(block_solutions_t), intent(inout) :: block
-    integer, parameter :: most_starts = 300
-    real(wp), allocatable :: candidates(:)
-    real(wp) :: point(balance%unknowns()), start(balance%unknowns())
-    integer :: i, k, moving, number
+    integer, parameter :: most_starts = 400
+    real(wp) :: point(balance%unknowns()), speeds(size(reduced%speeds)), start(balance%unknowns())
+    integer :: counts(size(speeds)), digits(size(speeds)), i, k
 
     start = balance%start()
-    moving = count(block%members <= balance%motions%freedoms())
-    allocate (candidates, source=[0.0_wp, knees, 0.5_wp * knees])
-    if (size(knees) == 0) candidates = [0.0_wp, 1.0_wp, -1.0_wp, 10.0_wp, -10.0_wp, 100.0_wp, -100.0_wp]
-    block%starts = nint(min(real(most_starts, wp), real(size(candidates), wp)**moving))
+    counts = [(size(candidates(reduced, k)), k=1, size(speeds))]
+    block%starts = nint(min(real(most_starts, wp), product(real(counts, wp))))
     do i = 1, block%starts
-      point = start
-      ! the digits of a number, in the base of the candidates: all combinations, or a part of them that has each candidate
-      number = i - 1
-      do k = 1, moving
-        point(block%members(k)) = candidates(1 + modulo(number + (k - 1) * (i - 1), size(candidates)))
-        number = number / size(candidates)
+      digits = combination(i, counts, product(real(counts, wp)) > most_starts)
+      speeds = 0.0_wp
+      do k = 1, size(speeds)
+        associate (list => candidates(reduced, k))
+          if (size(list) > 0) speeds(k) = list(digits(k))
+        end associate
       end do
-      call balance%settle(point)
+      reduced%z = start
+      reduced%z(reduced%speeds) = matmul(reduced%basis, speeds)
+      call reduced%solve(balance, speeds(1), holds_rising=.true.)
+      point = reduced%z
       call newton(balance, point, block)
     end do
     point = start
@@ -46,6 +48,37 @@ contains
     call follow_motion(balance, point, block)
     call newton(balance, point, block)
   end subroutine search_from_starts
+
+  !> Speeds to begin with for a column of the basis [rad/s]: rest, those at which laws bend, and between them; one for others.
+  function candidates(reduced, column) result(speeds)
+    type(eliminated_balance_t), intent(in) :: reduced
+    integer, intent(in) :: column
+    real(wp), allocatable :: speeds(:)
+
+    associate (knees => reduced%rising(column)%knees)
+      allocate (speeds, source=[0.0_wp, knees, 0.5_wp * knees])
+      if (size(knees) > 1) speeds = [speeds, 0.5_wp * (knees(2:) + knees(:size(knees) - 1))]
+    end associate
+  end function candidates
+
+  !> The candidates of a combination: all combinations in turn, or of many a part that has each candidate.
+  pure function combination(number, counts, are_many) result(digits)
+    integer, intent(in) :: number      !! 1 to the number of combinations, or less if they are many
+    integer, intent(in) :: counts(:)   !! of the candidates of each speed
+    logical, intent(in) :: are_many
+    integer :: digits(size(counts))
+    integer :: k, rest
+
+    rest = number - 1
+    do k = 1, size(counts)
+      digits(k) = 1 + modulo(rest, counts(k))
+      if (are_many) then
+        rest = (number - 1) * (2 * k + 1) / 2
+      else
+        rest = rest / counts(k)
+      end if
+    end do
+  end function combination
 
   !> Newton's method with steps of minimum norm, halved until the residuals fall. Adds the solution if it converges.
   subroutine newton(balance, z, block)

@@ -7,7 +7,7 @@
 !>
 !> Internal states are those that do not change at the speeds.
 module nocdyn_eliminated_balance
-  use nocdyn_brackets, only: bracket_t, new_bracket
+  use nocdyn_brackets, only: bracket_t, have_same_sign, new_bracket
   use nocdyn_kinds, only: wp
   use nocdyn_lapack, only: pseudo_inverse
   use nocdyn_speed_grid, only: new_speed_grid
@@ -20,6 +20,11 @@ module nocdyn_eliminated_balance
   real(wp), parameter :: rounding = 8 * epsilon(1.0_wp)   ! a sum below this share of its terms is zero
   real(wp), parameter :: tight = 1.0e-13_wp, loose = 1.0e-9_wp   ! shares below which torques balance: the aim, and what serves
 
+  !> Knees of the elements whose torques rise somewhere, or jump, and whose speed is that of a column of the basis.
+  type, public :: rising_speed_t
+    real(wp), allocatable :: knees(:)   !! [rad/s]
+  end type rising_speed_t
+
   !> The balance of one block of unknowns.
   type, public :: eliminated_balance_t
     integer, allocatable :: speeds(:)      !! unknowns that are speeds of rigid motions
@@ -27,6 +32,7 @@ module nocdyn_eliminated_balance
     real(wp), allocatable :: basis(:, :)   !! speeds = basis (the speed that is set, the others), [speeds, speeds]
     real(wp), allocatable :: knees(:)      !! values of the speed that is set at which a law bends [rad/s]
     logical :: is_unique = .true.          !! whether the other speeds are determined by the first
+    type(rising_speed_t), allocatable :: rising(:)   !! for each column of the basis
     real(wp), allocatable :: z(:)          !! all unknowns; those of the block after `solve`
     real(wp) :: torque = 0.0_wp            !! left over along the speed that is set, 0 if it is rounding, after `solve` [N m]
     logical :: is_balanced = .true.        !! whether the torques along the other speeds balance, after `solve`
@@ -65,7 +71,28 @@ contains
     do e = 1, size(elements)
       self%knees = [self%knees, knees_along(self, element_knees(balance, elements(e)), rows(e, :))]
     end do
+    call collect_rising(self, balance, pack(elements, rises), rows(pack([(e, e=1, size(rises))], rises), :))
   end subroutine new_eliminated_balance
+
+  !> Collects the speeds of the elements whose torques rise, in which the solutions may be several.
+  subroutine collect_rising(self, balance, elements, rows)
+    type(eliminated_balance_t), intent(inout) :: self
+    type(torque_balance_t), intent(in) :: balance
+    integer, intent(in) :: elements(:)   !! those whose torques rise, numbered among the inelastic ones
+    real(wp), intent(in) :: rows(:, :)   !! their speeds by those of the block, [elements, speeds]
+    real(wp) :: ratios(size(self%speeds))
+    integer :: e, k
+
+    allocate (self%rising(size(self%speeds)))
+    do k = 1, size(self%speeds)
+      allocate (self%rising(k)%knees(0))
+      do e = 1, size(elements)
+        ratios = matmul(rows(e, :), self%basis)
+        if (count(abs(ratios) > 0.0_wp) /= 1 .or. abs(ratios(k)) <= 0.0_wp) cycle
+        self%rising(k)%knees = [self%rising(k)%knees, element_knees(balance, elements(e)) / ratios(k)]
+      end do
+    end do
+  end subroutine collect_rising
 
   !> The inelastic elements whose speeds depend on those of a block.
   subroutine gather_rows(balance, speeds, elements, rows)
@@ -180,14 +207,18 @@ contains
   end function is_parallel
 
   !> Sets the first speed and finds the others, from those of the last call.
-  subroutine solve(self, balance, speed)
+  subroutine solve(self, balance, speed, holds_rising)
     class(eliminated_balance_t), intent(inout) :: self
     type(torque_balance_t), intent(inout) :: balance
     real(wp), intent(in) :: speed   !! to be set [rad/s]
-    integer, parameter :: most_cycles = 100
+    logical, intent(in), optional :: holds_rising   !! whether other speeds with rising torques stay; absent: .false.
+    integer, parameter :: most_cycles = 20
     integer :: k, number
+    logical :: holds
 
     self%is_balanced = .true.
+    holds = .false.
+    if (present(holds_rising)) holds = holds_rising
     associate (pivot => maxloc(abs(self%row), dim=1), others => self%z(self%speeds))
       ! the speed and nothing else decides: a difference to the last one would keep its rounding
       self%z(self%speeds(pivot)) = (speed - dot_product(self%row(:pivot - 1), others(:pivot - 1)) &
@@ -195,11 +226,12 @@ contains
     end associate
     do number = 1, most_cycles
       do k = 2, size(self%speeds)
+        if (holds .and. size(self%rising(k)%knees) > 0) cycle
         call balance_along(self, balance, self%basis(:, k))
         if (.not. self%is_balanced) exit
       end do
       self%torque = self%torque_along(balance, self%basis(:, 1))
-      if (size(self%speeds) <= 2 .or. .not. self%is_balanced) return
+      if (size(self%speeds) <= 2 .or. holds .or. .not. self%is_balanced) return
       if (others_balance(self, balance, tight)) return
       call balance_along(self, balance, newton_direction(self, balance))
     end do
@@ -272,15 +304,15 @@ contains
       way = 0.0_wp
       torque(2) = torque(1)
       step = merge(1, -1, trial == 1) * sign(first_step, torque(1))
-      do while (torque(1) * torque(2) > 0.0_wp .and. abs(way(2)) * maxval(abs(direction)) < highest)
+      do while (have_same_sign(torque(1), torque(2)) .and. abs(way(2)) * maxval(abs(direction)) < highest)
         way = [way(2), way(2) + step]
         self%z(self%speeds) = origin + way(2) * direction
         torque(2) = self%torque_along(balance, direction)
         step = growth * step
       end do
-      if (torque(1) * torque(2) <= 0.0_wp) exit
+      if (.not. have_same_sign(torque(1), torque(2))) exit
     end do
-    self%is_balanced = torque(1) * torque(2) <= 0.0_wp
+    self%is_balanced = .not. have_same_sign(torque(1), torque(2))
     if (self%is_balanced) then
       ! between the last two steps the torque changes its sign; at the first of them it is nearer to zero than at the origin
       self%z(self%speeds) = origin + way(1) * direction

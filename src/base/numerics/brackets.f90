@@ -8,7 +8,7 @@ module nocdyn_brackets
   implicit none (type, external)
   private
 
-  public :: new_bracket
+  public :: have_same_sign, new_bracket
 
   type, public :: bracket_t
     real(wp) :: x(2)       !! the ends, ascending or not
@@ -36,6 +36,13 @@ contains
     self%weight = value
     self%old_width = abs(x(2) - x(1))
   end function new_bracket
+
+  !> Whether two values are both positive or both negative; their product might overflow.
+  pure logical function have_same_sign(one, other)
+    real(wp), intent(in) :: one, other   !! of any unit
+
+    have_same_sign = (one > 0.0_wp .and. other > 0.0_wp) .or. (one < 0.0_wp .and. other < 0.0_wp)
+  end function have_same_sign
 
   !> The argument at which the function is to be evaluated.
   pure real(wp) function next(self) result(x)

@@ -102,19 +102,20 @@ contains
     end associate
   end function induction_slope
 
-  !> The vertex, and the speeds without torque.
+  !> The vertex, and the speeds without torque, where a, b and c are of sizes that belong together.
   pure function quadratic_knees(self, motor) result(speeds)
     class(quadratic_curve_t), intent(in) :: self
     integer, intent(in) :: motor
     real(wp), allocatable :: speeds(:)
+    real(wp), parameter :: together = 1.0e-20_wp   ! ratio of coefficients below which one is no part of the law
     real(wp) :: discriminant
 
     allocate (speeds(0))
     associate (a => self%a(1, motor), b => self%b(1, motor), c => self%c(1, motor))
       discriminant = b**2 + 4.0_wp * a * c
-      if (abs(c) > 0.0_wp) then
+      if (abs(c) > together * max(abs(a), abs(b))) then
         speeds = -0.5_wp / c * [b, b - sqrt(max(discriminant, 0.0_wp)), b + sqrt(max(discriminant, 0.0_wp))]
-      else if (abs(b) > 0.0_wp) then
+      else if (abs(b) > together * abs(a)) then
         speeds = [a / b]
       end if
     end associate
