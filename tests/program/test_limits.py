@@ -148,7 +148,7 @@ def test_a_trajectory_that_is_too_large_is_refused_before_the_run(nocdyn):
         assert outcome.returncode == 2
         assert re.search(
             r"^nocdyn: .*: &output: 10000000 rows of \d+ columns would take about \d+ GB; allowed: at most 100 GB; "
-            r"ask for fewer rows by points or interval$",
+            r"ask for fewer rows by points or interval, or for some columns$",
             outcome.stderr,
         )
         assert ("trajectory.csv: about " in outcome.stdout) == (command == "check")

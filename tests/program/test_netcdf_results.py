@@ -150,6 +150,13 @@ def test_a_format_that_is_not_known_is_refused(nocdyn):
     )
 
 
+def test_its_size_is_estimated(nocdyn):
+    chain = SOURCE / "input/examples/chain_200/chain_200.nml"
+    columns = ("--set", "output.columns='omega_*'")
+    outcome = nocdyn("check", chain, "--set", "output.points=200001", *columns, *NETCDF)
+    assert outcome.stdout.endswith("\n  trajectory.nc: about 320 MB\n")  # 201 columns
+
+
 def test_a_pipe_cannot_be_read_by_both_programs(nocdyn):
     outcome = nocdyn("run", "/dev/stdin", *NETCDF, input=CASE_2.read_text())
     assert (outcome.returncode, outcome.stdout) == (2, "")

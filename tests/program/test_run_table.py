@@ -5,6 +5,7 @@ import re
 
 import pytest
 from conftest import CASE_2, SOURCE
+from sweep_inputs import SWEEP_PROGRAM
 
 INPUTS = sorted((SOURCE / "input").rglob("*.nml"))
 TUTORIAL = SOURCE / "docs/tutorial/pump.nml"
@@ -62,7 +63,7 @@ def test_chosen_columns_have_the_values_of_the_whole_table(nocdyn):
 
 
 def test_a_pattern_without_a_column_is_refused_with_the_nearest(nocdyn):
-    patterns = "'omega_*', 'momnt_*', '*_pinyon', 'omega_motr', 'phi_motor [deg]', 'power'"
+    patterns = "'omega_*', 'momnt_*', '*_pinyon', 'omega_motr', 'phi_motor [deg]', 'power', 'moments', 'motor'"
     nocdyn.write("case.nml", CASE_2.read_text().replace("interval = 0.01", f"interval = 0.01 columns = {patterns}"))
     line = 1 + (nocdyn.folder / "case.nml").read_text().split("columns =")[0].count("\n")
     messages = [
@@ -78,6 +79,8 @@ def test_a_pattern_without_a_column_is_refused_with_the_nearest(nocdyn):
                 "; allowed: 'phi_*', 'omega_*', 'twist_*', 'moment_*', 'torque_*', 'reaction_*', 'kinetic_energy', "
                 "'elastic_energy', 'work_in', 'work_out', 'energy_residual'",
             ),
+            (7, "moments", "; did you mean 'moment_*'?"),
+            (8, "motor", "; did you mean '*_motor'?"),
         )
     ]
     for command in ("run", "check"):
@@ -89,6 +92,28 @@ def test_a_pattern_without_a_column_is_refused_with_the_nearest(nocdyn):
 def test_the_columns_of_no_pattern_are_refused(nocdyn):
     outcome = nocdyn("run", CASE_2, "--set", "output.columns=''")
     assert outcome.returncode == 2 and "columns(1) = '' matches no column of trajectory.csv; allowed: 'phi_*'," in outcome.stderr
+
+
+def test_patterns_with_units_are_those_of_the_columns(nocdyn):
+    rpm = ("--set", "output.units=rpm")
+    speeds = [f"omega_{body} [rpm]" for body in ("motor", "pinion", "machine")]
+    assert header_of(nocdyn, *rpm, "--set", "output.columns='* [rpm]'") == ["t [s]", *speeds]
+    outcome = nocdyn("check", CASE_2, *rpm, "--set", "output.columns='omega_motor [rad/s]'")
+    assert outcome.stderr.endswith(" matches no column of trajectory.csv; did you mean 'omega_motor [rpm]'?\n")
+
+
+def test_trajectories_of_a_sweep_have_the_chosen_columns(nocdyn):
+    sweep = (
+        "&sweep design = 'grid' /\n&vary target = 'motor.drive.torque' low = 10.0 high = 30.0 count = 2 /\n"
+        "&record quantity = 'omega_driver' statistic = 'final' trajectories = 2 /\n"
+    )
+    nocdyn.write("discs.nml", DISCS.format(driver="", run="", output="columns = 'shaft_*'") + sweep)
+    if SWEEP_PROGRAM.exists():
+        assert nocdyn("sweep", "discs.nml", "--out", "out").returncode == 0
+        assert nocdyn.table("out/variant-2")[0] == ["t [s]", "shaft_line [N m]"]
+    outcome = nocdyn("check", "discs.nml", "--set", "output.columns=shaft")
+    assert (outcome.returncode, outcome.stdout) == (2, "")
+    assert "columns(1) = 'shaft' matches no column of trajectory.csv; did you mean 'shaft_*'?" in outcome.stderr
 
 
 # extremes from a time

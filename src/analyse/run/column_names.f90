@@ -118,6 +118,8 @@ contains
     text = near_match(pattern, of_quantities)
     if (text == '') text = near_match(pattern, names)
     if (text == '') text = near_match(pattern, of_elements)
+    if (text == '') text = near_match(pattern // '_*', of_quantities)
+    if (text == '') text = near_match('*_' // pattern, of_elements)
     if (text == '' .and. index(pattern, '[') > 0) text = near_match(pattern, labels)
     if (text == '') text = '; allowed: ' // joined(of_quantities, ', ', most_names)
   end function hint_for

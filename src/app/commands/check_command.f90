@@ -13,13 +13,12 @@ module nocdyn_check_command
   use nocdyn_machine_report, only: machine_report
   use nocdyn_output_times, only: output_note, row_count
   use nocdyn_result_folders, only: result_folder
-  use nocdyn_run_files, only: check_rows, check_variants
+  use nocdyn_run_files, only: check_rows, check_variants, trajectory_bytes, wants_netcdf
   use nocdyn_run_settings, only: check_method
   use nocdyn_sweep_plan, only: has_sweep, make_plan, sweep_plan_t
   use nocdyn_table_text, only: append_table
   use nocdyn_text, only: selected, string_t
   use nocdyn_text_buffer, only: text_buffer_t
-  use nocdyn_trajectory_columns, only: table_bytes
   use nocdyn_units, only: from_si, unit_hz, unit_rpm
   implicit none (type, external)
   private
@@ -62,9 +61,10 @@ contains
       if (bytes >= large) sizes = sizes // new_line('a') // '  files: about ' // bytes_text(bytes)
       call check_variants(plan, plan%design%variants, .false., result_folder(arguments, input), 0.0_wp, error)
     else
-      bytes = table_bytes(row_count(input), columns)
-      if (bytes >= large) sizes = sizes // new_line('a') // '  trajectory.csv: about ' // bytes_text(bytes)
-      call check_rows(input%location(input%position('output')), row_count(input), columns, &
+      bytes = trajectory_bytes(row_count(input), columns, wants_netcdf(input))
+      if (bytes >= large) sizes = sizes // new_line('a') // '  trajectory.' // &
+                                  trim(merge('nc ', 'csv', wants_netcdf(input))) // ': about ' // bytes_text(bytes)
+      call check_rows(input%location(input%position('output')), row_count(input), columns, wants_netcdf(input), &
                       result_folder(arguments, input), error)
     end if
     call print_text(machine_report(input%shown_file(), machine) // speed_table(input, machine) // sizes)

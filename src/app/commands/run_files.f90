@@ -18,7 +18,8 @@ module nocdyn_run_files
   implicit none (type, external)
   private
 
-  public :: check_rows, check_variants, partial_file, remove_trajectories, run_to_files, wants_netcdf
+  public :: check_rows, check_variants, partial_file, remove_trajectories, run_to_files, trajectory_bytes, &
+    wants_netcdf
 
   !> Names of the rows: of a run that is done, of one that is not; as CSV, as NetCDF.
   character(len=22), parameter :: trajectory_names(2, 2) = reshape([character(len=22) :: 'trajectory.csv', &
@@ -154,22 +155,34 @@ contains
     integer, intent(in) :: rows               !! their number
     type(error_t), allocatable, intent(out) :: error   !! there is no room for them
 
-    call check_rows(self%place, rows, size(labels), self%folder, error)
+    call check_rows(self%place, rows, size(labels), self%form == 2, self%folder, error)
     if (allocated(error)) return
     call self%file%open(self%folder, labels, rows, self%input_title, self%input_text)
     self%has_started = .true.
   end subroutine start
 
   !> Refuses more rows than there is room for.
-  subroutine check_rows(place, rows, columns, folder, error)
+  subroutine check_rows(place, rows, columns, is_netcdf, folder, error)
     character(len=*), intent(in) :: place    !! of &output in the input
     integer, intent(in) :: rows, columns     !! their numbers
+    logical, intent(in) :: is_netcdf         !! whether they are written as NetCDF
     character(len=*), intent(in) :: folder   !! of the results
     type(error_t), allocatable, intent(out) :: error
 
     call check_room(place // ': ' // to_text(rows) // ' rows of ' // to_text(columns) // ' columns', &
-                    table_bytes(rows, columns), free_bytes(folder), folder, 'ask for fewer rows by points or interval', error)
+                    trajectory_bytes(rows, columns, is_netcdf), free_bytes(folder), folder, &
+                    'ask for fewer rows by points or interval, or for some columns', error)
   end subroutine check_rows
+
+  !> About the size of the file with the rows of a run [bytes].
+  pure real(wp) function trajectory_bytes(rows, columns, is_netcdf)
+    integer, intent(in) :: rows, columns
+    logical, intent(in) :: is_netcdf
+    real(wp), parameter :: of_number = 8.0_wp, of_variable = 9.0e3_wp   ! its name, its units, its reference to the time
+
+    trajectory_bytes = table_bytes(rows, columns)
+    if (is_netcdf) trajectory_bytes = columns * (of_number * rows + of_variable)
+  end function trajectory_bytes
 
   !> Refuses more variants than there is room for.
   subroutine check_variants(plan, variants, has_table, folder, held, error)

@@ -12,7 +12,7 @@ module nocdyn_netcdf_file
   use nocdyn_posix, only: last_failure, make_folders, process_id, remove_file, rename_file
   use nocdyn_posix_files, only: disk_failure, sync_path
   use nocdyn_posix_programs, only: find_library_procedure
-  use nocdyn_text, only: append, quoted, shown_path, string_t, to_text
+  use nocdyn_text, only: quoted, shown_path, string_t, to_text
   implicit none (type, external)
   private
 
@@ -21,7 +21,7 @@ module nocdyn_netcdf_file
   !> A file while it is written. After the first failure nothing more is written.
   type, public :: netcdf_file_t
     integer :: id = -1
-    type(string_t), allocatable :: names(:)                 !! of the variables, so far
+    type(string_t), allocatable :: reserved(:)              !! names that `new_name` leaves to others
     character(len=:), allocatable :: failure                !! the reason of the first one
     character(len=:), allocatable, private :: folder        !! with a slash at its end, or ''
     character(len=:), allocatable, private :: hidden_path   !! of the file until `finish`
@@ -74,7 +74,7 @@ contains
     file%folder = folder // '/'
     if (folder == '.') file%folder = ''
     file%hidden_path = file%folder // '.' // name // '.' // to_text(process_id())
-    if (.not. allocated(file%names)) allocate (file%names(0))
+    if (.not. allocated(file%reserved)) allocate (file%reserved(0))
     call make_folders(folder, failure)
     if (allocated(failure)) then
       file%failure = 'the folder cannot be made: ' // failure
@@ -116,7 +116,7 @@ contains
       possible = ascii(name)
       status = nf90_def_var(file%id, possible, kind, [dimension], variable)
     end if
-    do while (status == nf90_enameinuse)   ! only such letters differ
+    do while (status == nf90_enameinuse)   ! only changed letters differ
       possible = possible // '_'
       status = nf90_def_var(file%id, possible, kind, [dimension], variable)
     end do
@@ -135,9 +135,9 @@ contains
     end do
   end function ascii
 
-  !> The label without slashes, which separate groups in NetCDF; shortened, and made different from the names in use.
+  !> The label without slashes, which separate groups in NetCDF; shortened, and made different from the reserved names.
   function new_name(file, label) result(name)
-    class(netcdf_file_t), intent(inout) :: file
+    class(netcdf_file_t), intent(in) :: file
     character(len=*), intent(in) :: label
     character(len=:), allocatable :: name
     integer :: i
@@ -146,10 +146,9 @@ contains
     do i = 1, len(name)
       if (name(i:i) == '/') name(i:i) = '_'
     end do
-    do while (any([(file%names(i)%text == name, i=1, size(file%names))]))
+    do while (any([(file%reserved(i)%text == name, i=1, size(file%reserved))]))
       name = name // '_'
     end do
-    call append(file%names, name)
   end function new_name
 
   !> Closes the file; the library writes what it still holds.

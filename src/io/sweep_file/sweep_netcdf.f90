@@ -46,7 +46,7 @@ contains
 
     call check_sweep(journals, error)
     if (allocated(error)) return
-    allocate (file%names, source=strings(own_names))
+    allocate (file%reserved, source=strings(own_names))
     call create(file, folder, sweep_netcdf_name)
     if (.not. allocated(file%failure)) call define_all(file, journals)
     if (.not. allocated(file%failure)) call write_rows(file, journals, error)
