@@ -204,6 +204,22 @@ def test_extremes_after_the_transient_are_not_marked(nocdyn):
     assert "*" not in text
 
 
+@pytest.mark.parametrize("speed", [0.0, 3000.0])
+def test_the_beats_after_the_start_of_an_excitation_are_told(nocdyn, speed):
+    # the torque begins with 0, but not the motion that belongs to it: 33 N m at first, 20 N m in the end
+    nocdyn.write(
+        "beats.nml",
+        f"&body name = 'a' inertia = 1.0 speed = {speed} /\n&body name = 'b' inertia = 1.0 speed = {speed} /\n"
+        "&coupling name = 's' bodies = 'a', 'b' stiffness = 1e4 damping = 0.2 /\n"
+        "&excitation name = 'x' body = 'a' amplitude = 20.0 frequency = 100.0 /\n"
+        "&run t_end = 40.0 rtol = 1e-9 atol = 1e-11 /\n&output points = 2 /\n",
+    )
+    assert "*" in nocdyn("run", "beats.nml", "--out", "out").stdout
+    transient = nocdyn.summary("out")["start_transient"]
+    assert transient["until"] == pytest.approx(3 / 0.2, rel=1e-6)
+    assert "moment_s [N m]" in transient["has_min_of"] and "moment_s [N m]" in transient["has_max_of"]
+
+
 def test_a_transient_as_long_as_the_run_is_not_told(nocdyn):
     # three periods are 0.42 s
     assert "*" not in discs(nocdyn, "", "", "", "--set", "run.t_end=0.8").stdout

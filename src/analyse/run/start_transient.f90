@@ -1,6 +1,6 @@
 !> The first fast transient of a start out of balance, and the extremes that lie in it.
 !>
-!> The machine is linearised at its start. What the moments there accelerate and the speeds of twist make each mode swing about
+!> The machine is linearised at its start. The moments there, their rates and the speeds of twist make each mode swing about
 !> its position of balance; the modes with the largest moments in a coupling are the excited ones. The transient lasts until these
 !> have decayed, but for some periods at least; where they decay too slowly, for these periods. A start in balance, as that of a
 !> steady state, has none.
@@ -20,7 +20,7 @@ module nocdyn_start_transient
   real(wp), parameter :: periods = 3.0_wp           ! of an excited mode
   real(wp), parameter :: decays = 3.0_wp            ! times of decay by the factor e: 5 % are left
   real(wp), parameter :: excited_share = 0.05_wp    ! of the largest moment: smaller ones do not count
-  real(wp), parameter :: balance_share = 1.0e-6_wp  ! of the moments of the run: a smaller swing is none
+  real(wp), parameter :: balance_share = 1.0e-3_wp  ! of the moments of the run: a smaller swing is none
   real(wp), parameter :: fast_share = 0.5_wp        ! of the run: what lasts longer is no fast transient
   integer, parameter :: most_freedoms = 100         ! the matrices are dense
 
@@ -84,22 +84,28 @@ contains
     if (duration <= longest) until = t_start + duration
   end function transient_end
 
-  !> The largest amplitude of an elastic moment when each mode swings freely from the state of the machine [N m], [modes].
+  !> The largest amplitude of an elastic moment when each mode of the couplings swings freely from the state of the machine [N m],
+  !> [modes].
   pure function moments_of_modes(machine, linear) result(moments)
     type(machine_t), intent(in) :: machine           !! evaluated at that state
     type(linearisation_t), intent(in) :: linear      !! there
     real(wp), allocatable :: moments(:)
-    real(wp) :: offset, rate   ! of the modal coordinate from balance
+    real(wp) :: force_rate, offset, rate   ! of the modal coordinate from balance
+    integer, allocatable :: elastic(:)
     integer :: i
 
     allocate (moments(size(linear%natural)), source=0.0_wp)
+    allocate (elastic, source=machine%elastic())
     associate (elements => machine%elements)
       do i = 1, size(moments)
         associate (natural => linear%natural(i), twists => linear%twists(:, i))
           if (natural <= 0) cycle
+          if (sum(linear%stiffness(elastic) * twists(elastic)**2) < 0.5_wp * natural**2) cycle   ! by torques over the angle
           offset = dot_product(elements%restoring(1, :) + elements%applied(1, :), twists) / natural**2
           rate = dot_product(linear%stiffness * twists, elements%speed(1, :)) / natural**2
-          moments(i) = hypot(offset, rate / natural) * maxval(abs(linear%stiffness * twists))
+          force_rate = dot_product(elements%applied_time(1, :) + elements%applied_angle(1, :) * elements%speed(1, :), twists)
+          moments(i) = norm2([offset, rate / natural, force_rate / natural**3]) * &
+                       maxval(abs(linear%stiffness(elastic) * twists(elastic)))
         end associate
       end do
     end associate
