@@ -22,6 +22,7 @@ module nocdyn_balance_search
     real(wp), allocatable :: grid(:)          !! [rad/s]
     real(wp), allocatable :: torque(:)        !! [N m], [grid]
     logical, allocatable :: is_balanced(:)    !! whether the torques along the other speeds balance, [grid]
+    real(wp), allocatable :: speeds(:, :)     !! the speeds of the block [rad/s], [speeds, grid]
   end type scan_t
 
 contains
@@ -43,7 +44,7 @@ contains
       allocate (blocks(k)%values(size(blocks(k)%members), 0), blocks(k)%is_range(0))
       call new_eliminated_balance(balance, blocks(k)%members, reduced)
       if (size(reduced%speeds) > 0) then
-        call scan(balance, reduced, blocks(k))
+        call scan_along(balance, reduced, blocks(k))
       else
         call balance%settle(reduced%z)
         call add_if_balanced(balance, reduced%z, .false., blocks(k))
@@ -52,15 +53,37 @@ contains
     end do
   end subroutine search_balance
 
-  !> Finds all values of the speed that is set at which the torque changes its sign.
-  subroutine scan(balance, reduced, block)
+  !> Scans a speed; if others are not determined by it, upwards and downwards, and the others likewise, as they follow from where
+  !> they have been.
+  subroutine scan_along(balance, reduced, block)
     type(torque_balance_t), intent(inout) :: balance
     type(eliminated_balance_t), intent(inout) :: reduced
+    type(block_solutions_t), intent(inout) :: block
+    integer, parameter :: most_choices = 4
+    type(eliminated_balance_t) :: other
+    integer :: choice
+
+    call scan(balance, reduced, .false., block)
+    block%is_complete = reduced%choices == 1
+    if (block%is_complete) return
+    call scan(balance, reduced, .true., block)
+    do choice = 2, min(most_choices, reduced%choices)
+      call new_eliminated_balance(balance, block%members, other, choice)
+      call scan(balance, other, .false., block)
+      call scan(balance, other, .true., block)
+    end do
+  end subroutine scan_along
+
+  !> Finds all values of the speed that is set at which the torque changes its sign.
+  subroutine scan(balance, reduced, is_downwards, block)
+    type(torque_balance_t), intent(inout) :: balance
+    type(eliminated_balance_t), intent(inout) :: reduced
+    logical, intent(in) :: is_downwards   !! whether it begins at the highest speed
     type(block_solutions_t), intent(inout) :: block
     integer, parameter :: points_alone = 100, points = 25   ! per decade; of a speed alone, or with others to be found
     type(scan_t) :: found
     real(wp) :: start, unit(balance%motions%freedoms())
-    integer :: i
+    integer :: i, k
 
     start = dot_product(reduced%row, reduced%z(reduced%speeds))
     unit = 0.0_wp
@@ -68,16 +91,20 @@ contains
     allocate (found%grid, source=new_speed_grid(merge(points_alone, points, size(unit(reduced%speeds)) == 1), &
                                                 1.0_wp / maxval(abs(balance%body_speeds(unit))), reduced%knees))
     allocate (found%torque(size(found%grid)), found%is_balanced(size(found%grid)))
-    do i = 1, size(found%grid)
+    allocate (found%speeds(size(reduced%speeds), size(found%grid)))
+    do k = 1, size(found%grid)
+      i = merge(size(found%grid) + 1 - k, k, is_downwards)
       call reduced%solve(balance, found%grid(i))
       found%torque(i) = reduced%torque
       found%is_balanced(i) = reduced%is_balanced
+      found%speeds(:, i) = reduced%z(reduced%speeds)
     end do
     call find_least(found, block)
-    block%is_complete = reduced%is_unique
     block%is_unloaded = all(abs(found%torque) <= 0.0_wp .and. found%is_balanced)
     do i = 1, merge(1, size(found%grid), block%is_unloaded)
-      if (found%is_balanced(i)) call search_interval(balance, reduced, found, i, start, block)
+      if (.not. found%is_balanced(i)) cycle
+      reduced%z(reduced%speeds) = found%speeds(:, i)
+      call search_interval(balance, reduced, found, i, start, block)
     end do
     block%is_range = block%is_range .and. .not. block%is_unloaded
   end subroutine scan

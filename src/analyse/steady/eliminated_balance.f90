@@ -31,7 +31,7 @@ module nocdyn_eliminated_balance
     real(wp), allocatable :: row(:)        !! the speed that is set = sum of row * speeds, [speeds]
     real(wp), allocatable :: basis(:, :)   !! speeds = basis (the speed that is set, the others), [speeds, speeds]
     real(wp), allocatable :: knees(:)      !! values of the speed that is set at which a law bends [rad/s]
-    logical :: is_unique = .true.          !! whether the other speeds are determined by the first
+    integer :: choices = 1                 !! speeds with rising torques; of one, the other speeds are determined by it
     type(rising_speed_t), allocatable :: rising(:)   !! for each column of the basis
     real(wp), allocatable :: z(:)          !! all unknowns; those of the block after `solve`
     real(wp) :: torque = 0.0_wp            !! left over along the speed that is set, 0 if it is rounding, after `solve` [N m]
@@ -45,13 +45,15 @@ module nocdyn_eliminated_balance
 contains
 
   !> The balance of a block of unknowns.
-  subroutine new_eliminated_balance(balance, members, self)
+  subroutine new_eliminated_balance(balance, members, self, choice)
     type(torque_balance_t), intent(inout) :: balance
     integer, intent(in) :: members(:)   !! unknowns of the block
     type(eliminated_balance_t), intent(out) :: self
+    integer, intent(in), optional :: choice   !! number of the speed to be set, 1 to `choices`; absent: 1
     integer, allocatable :: elements(:)   ! those of the block, numbered among the inelastic ones
     real(wp), allocatable :: rows(:, :)   ! their speeds by those of the block, [elements, speeds]
     logical, allocatable :: rises(:)
+    integer, allocatable :: choices(:)
     integer :: e, i
 
     self%speeds = pack(members, members <= balance%motions%freedoms())
@@ -63,16 +65,34 @@ contains
     allocate (rises(size(elements)), source=.false.)
     if (size(self%speeds) > 1) call find_rising_laws(balance, elements, rises)
     rises = rises .and. maxval(abs(rows), dim=2) > 0.0_wp
-    i = findloc(rises, .true., dim=1)
     self%row(1) = 1.0_wp
-    if (i > 0) self%row = rows(i, :)
-    self%is_unique = all([(is_parallel(rows(e, :), self%row) .or. .not. rises(e), e=1, size(rises))])
+    if (any(rises)) then
+      call find_choices(rows, rises, choices)
+      self%choices = size(choices)
+      i = 1
+      if (present(choice)) i = choice
+      self%row = rows(choices(i), :)
+    end if
     call set_basis(self%row, self%basis)
     do e = 1, size(elements)
       self%knees = [self%knees, knees_along(self, element_knees(balance, elements(e)), rows(e, :))]
     end do
     call collect_rising(self, balance, pack(elements, rises), rows(pack([(e, e=1, size(rises))], rises), :))
   end subroutine new_eliminated_balance
+
+  !> The elements with rising torques that have speeds of their own.
+  pure subroutine find_choices(rows, rises, choices)
+    real(wp), intent(in) :: rows(:, :)                !! speeds of the elements, [elements, speeds]
+    logical, intent(in) :: rises(:)                   !! [elements]
+    integer, allocatable, intent(out) :: choices(:)   !! elements
+    integer :: e, i
+
+    allocate (choices(0))
+    do e = 1, size(rises)
+      if (.not. rises(e)) cycle
+      if (.not. any([(is_parallel(rows(e, :), rows(choices(i), :)), i=1, size(choices))])) choices = [choices, e]
+    end do
+  end subroutine find_choices
 
   !> Collects the speeds of the elements whose torques rise, in which the solutions may be several.
   subroutine collect_rising(self, balance, elements, rows)
@@ -300,7 +320,7 @@ contains
 
     torque(1) = self%torque_along(balance, direction)
     first_step = max(0.3_wp * self%reach, 1.0e-8_wp * maxval(abs(origin)), 1.0e-9_wp) / maxval(abs(direction))
-    do trial = 1, merge(1, 2, self%is_unique)
+    do trial = 1, merge(1, 2, self%choices == 1)
       way = 0.0_wp
       torque(2) = torque(1)
       step = merge(1, -1, trial == 1) * sign(first_step, torque(1))
