@@ -13,7 +13,8 @@ module nocdyn_input_text
 
 contains
 
-  !> A namelist with every key that has a value, defaults and overrides included. Numbers read back as the same bits.
+  !> A namelist with every key that has a value, defaults and overrides included, but for values that follow from others. Numbers
+  !> read back as the same bits.
   function input_text(input) result(text)
     type(input_t), intent(in) :: input
     character(len=:), allocatable :: text
@@ -36,8 +37,11 @@ contains
 
     call buffer%append_line('&' // group%kind)
     do i = 1, size(group%values)
-      call write_items(group%values(i), items)
-      if (size(items) > 0) call append_key(buffer, trim(key_rules(first_key(group%rule) + i - 1)%name), items)
+      associate (rule => key_rules(first_key(group%rule) + i - 1))
+        if (rule%follows .and. .not. group%values(i)%is_given) cycle
+        call write_items(group%values(i), items)
+        if (size(items) > 0) call append_key(buffer, trim(rule%name), items)
+      end associate
     end do
     call buffer%append_line('/')
   end subroutine append_group

@@ -49,8 +49,8 @@ module nocdyn_schema
       'moment of inertia about the axis; 0 where a body with an inertia is geared to it'), &
     key_rule_t('body',       'angle',           a_number,       1, 'rad',         '0',         anything, &
       'angle at the start'), &
-    key_rule_t('body',       'speed',           a_number,       1, 'rad/s',       unset,       anything, &
-      'speed at the start; if not given it follows through the gears from others, else it is 0'), &
+    key_rule_t('body',       'speed',           a_number,       1, 'rad/s',       '0',         anything, &
+      'speed at the start; if not given it follows through the gears from others, else it is 0', follows=.true.), &
     key_rule_t('run',        't_start',         a_number,       1, 's',           '0',         anything, &
       'time of the start'), &
     key_rule_t('run',        't_end',           a_number,       1, 's',           required,    anything, &

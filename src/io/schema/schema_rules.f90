@@ -75,6 +75,7 @@ module nocdyn_schema_rules
     integer :: fewest = 0                   !! least number of values of a list that is given
     character(len=12) :: required_if = ''   !! the kind with which this key must be given
     logical :: ascends = .false.            !! each value of the list is greater than the one before
+    logical :: follows = .false.            !! if not given, it may follow from other groups, and the default is not written
   end type key_rule_t
 
   !> A relation between keys of one group.
