@@ -68,7 +68,7 @@ module nocdyn_schema
     key_rule_t('run',        'complement',      a_word,         1, '',            "'natural'", complements, &
       'orthogonal complement of the gear constraints'), &
     key_rule_t('run',        'start',           a_word,         1, '',            "'given'",   starts, &
-      'given speeds; projected: after an impact, if they violate gears; equilibrium: steady state near'), &
+      'given speeds; projected: after an impact if they violate gears; equilibrium: steady'), &
     key_rule_t('run',        'max_steps',       an_integer,     1, '',            '1000000',   steps, &
       'the run fails after this many steps'), &
     key_rule_t('output',     'interval',        a_number,       1, 's',           unset,       positive, &
