@@ -127,3 +127,47 @@ def test_every_variant_of_a_sweep_starts_in_its_own_steady_state(nocdyn):
         nocdyn("equilibrium", "one.nml", "--out", "one")
         states = json.loads((nocdyn.folder / "one/equilibrium.json").read_text())["steady_states"]
         assert final == pytest.approx(states[-1]["values"]["omega_fan [rad/s]"], rel=STEADY)
+
+
+MISSED = (
+    "the machine ends in the steady state at 0.411677 rad/s of 'rotor', 0.0346617 rad/s of 'pump'; it could run at "
+    "155.795 rad/s of 'rotor', 154.612 rad/s of 'pump', where &run start = 'equilibrium' starts it"
+)
+
+
+@pytest.mark.parametrize(("speed", "notes"), [("", [MISSED]), ("speed = 155.0", [MISSED]), ("speed = 0.4", [MISSED])])
+def test_a_motor_that_does_not_start_its_load_is_told_how_it_could_run(nocdyn, speed, notes):
+    # the locked rotor has 10 N m, the load 30 N m; the breakdown torque is 100 N m
+    text = drive(speed).replace("start = 'equilibrium'", "").replace("t_end = 2.0 rtol = 1e-11 atol = 1e-11", "t_end = 60.0")
+    if speed == "speed = 155.0":  # with its load it goes on
+        text = text.replace("name = 'pump' inertia = 1.0", "name = 'pump' inertia = 1.0 speed = 155.0")
+        text = text.replace("name = 'fan' inertia = 2.0", "name = 'fan' inertia = 2.0 speed = 155.0")
+        notes = []
+    _, _, seen = run(nocdyn, text)
+    assert seen == notes
+    assert nocdyn.summary("out")["machine"]["notes"] == notes
+
+
+def test_a_slow_start_that_was_wanted_is_not_told(nocdyn):
+    _, _, notes = run(nocdyn, drive("speed = 1.0"))
+    assert len(notes) == 1 and notes[0].startswith("the start is steady state 1 of 3")
+
+
+def test_what_was_tried_is_told_where_it_is_not_known_that_there_is_none(nocdyn):
+    motor = "kind = 'table' table_speed = 0.0, 100.0 table_torque = 10.0, {}"
+    text = f"""\
+&body name = 'a' inertia = 1.0 /
+&body name = 'b' inertia = 1.0 /
+&coupling name = 'c' bodies = 'a', 'b' friction = 5.0 /
+&motor name = 'one' body = 'a' {motor.format(20.0)} extrapolation = 'constant' /
+&motor name = 'two' body = 'b' {motor.format(30.0)} extrapolation = 'constant' /
+&run t_end = 1.0 start = 'equilibrium' /
+"""
+    outcome = nocdyn("run", nocdyn.write("m.nml", text), "--out", "out")
+    assert (outcome.returncode, outcome.stdout) == (1, "")
+    assert outcome.stderr == (
+        f"nocdyn: {nocdyn.folder}/m.nml:6: &run: start = 'equilibrium': no steady state was found: nothing was found that "
+        "balances the torques on 'a', 'b'; tried: a scan over one speed with the others following it, Newton's method from 36 "
+        "combinations of rest, synchronous speeds and knees of the curves, and the motion from the start; start = 'given' "
+        "starts with the speeds of the bodies\n"
+    )
