@@ -105,7 +105,8 @@ contains
 
     n = machine%bodies
     copy = machine
-    call copy%choose_branches([(0.0_wp, l=1, machine%lanes)], phi, omega)
+    call copy%elements%gather(phi, omega)
+    call copy%choose_branches([(0.0_wp, l=1, machine%lanes)])
     call bring_to(copy, [(0.0_wp, l=1, machine%lanes)], phi, omega)
     do l = 1, machine%lanes
       call elastic_moments(copy, l, moments)

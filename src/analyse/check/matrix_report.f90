@@ -106,7 +106,8 @@ contains
     phi(:, 1:) = machine%start_angle
     omega(:, 1:) = machine%start_speed
     machine%elements%internal%value = machine%start_internal()
-    call machine%choose_branches([t_start], phi, omega)
+    call machine%elements%gather(phi, omega)
+    call machine%choose_branches([t_start])
     call machine%differentiate([t_start], phi, omega)
     call machine%evaluate_energies()
   end subroutine set_start_state

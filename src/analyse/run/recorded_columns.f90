@@ -33,7 +33,7 @@ module nocdyn_recorded_columns
     real(wp), private :: energies(column_kinetic:column_residual) = 0.0_wp   !! of one row [J]; work space
     real(wp), allocatable, private :: start_energy(:)    !! [J], [lanes]
   contains
-    procedure :: copy_lane, start_lane, observe, fill_row, kinetic_energy
+    procedure :: copy_lane, start_lane, move_origin, observe, fill_row, kinetic_energy
   end type recorded_columns_t
 
 contains
@@ -108,6 +108,15 @@ contains
 
     if (self%have_elastic) self%start_energy(lane) = self%kinetic_energy(lane) + elastic_energy(self, lane)
   end subroutine start_lane
+
+  !> Takes a shift of the state of a lane.
+  subroutine move_origin(self, lane, shift)
+    class(recorded_columns_t), intent(inout) :: self
+    integer, intent(in) :: lane
+    real(wp), contiguous, intent(in) :: shift(:)   !! [states + quadratures]
+
+    call self%formulation%move_origin(lane, shift)
+  end subroutine move_origin
 
   !> Evaluates the machine of all lanes at a time and state.
   subroutine observe(self, t, y)

@@ -79,7 +79,7 @@ module nocdyn_transient
     logical :: has_ranges = .false.          !! whether the columns were evaluated between the rows
     class(run_output_t), pointer :: output => null()
   contains
-    procedure :: on_output, wants_stop, tracked_values, on_extremes
+    procedure :: on_output, wants_stop, tracked_values, on_extremes, on_shift
   end type run_observer_t
 
 contains
@@ -256,6 +256,14 @@ contains
     call self%table%fill(t, y, values)
     self%has_ranges = .true.
   end subroutine tracked_values
+
+  subroutine on_shift(self, lane, shift)
+    class(run_observer_t), intent(inout) :: self
+    integer, intent(in) :: lane
+    real(wp), contiguous, intent(in) :: shift(:)
+
+    call self%table%columns%move_origin(lane, shift)
+  end subroutine on_shift
 
   !> The extremes of the motion. A run that fails at its start has none.
   subroutine on_extremes(self, lane, ranges)

@@ -29,6 +29,7 @@ module nocdyn_observer
     procedure :: tracked_values
     procedure :: on_extremes
     procedure :: on_steps
+    procedure :: on_shift
   end type observer_t
 
   !> The steps that the lanes of a block have taken together; [lanes].
@@ -121,5 +122,12 @@ contains
 
     error stop 'nocdyn_observer: an observer that wants steps overrides on_steps'
   end subroutine on_steps
+
+  !> The system has taken a shift out of the state of a lane: from now on each y of this lane stands for y + all shifts so far.
+  subroutine on_shift(self, lane, shift)
+    class(observer_t), intent(inout) :: self
+    integer, intent(in) :: lane
+    real(wp), contiguous, intent(in) :: shift(:)   !! [states + quadratures]
+  end subroutine on_shift
 
 end module nocdyn_observer

@@ -10,6 +10,11 @@
 !> these are all positions, column by column.
 !>
 !> A system may provide the Taylor series of its solution, which the method `taylor` needs; by default it does not.
+!>
+!> The error of a step is that of the states, each relative to its own size, unless the system names quantities of its own in
+!> which it is measured: combinations of the states that matter, such as differences of large numbers. If its equations stay the
+!> same when some states are shifted together, it may keep such a shift apart, so that those states stay small and keep their
+!> digits.
 module nocdyn_system
   use nocdyn_kinds, only: wp
   use nocdyn_text, only: to_text
@@ -33,12 +38,20 @@ module nocdyn_system
     integer :: states = 0        !! components that the equations depend on
     integer :: quadratures = 0   !! components after the states that are integrals only
     integer :: switches = 0      !! indicator functions: a step ends where one of them falls through zero
+    integer :: measures = 0      !! quantities in which `measure` measures errors; 0: errors are those of the states
+    integer :: phases = 0        !! the last of these: angles whose speeds tell nothing about the step size
+    logical :: may_shift = .false.   !! whether `find_far` is called after every step
   contains
     procedure(derivative_interface), deferred :: derivative
     procedure(jacobian_interface), deferred :: jacobian
     procedure :: jacobian_pattern
     procedure :: component_name
     procedure :: prepare_integration
+    procedure :: measure
+    procedure :: measure_name
+    procedure :: find_far
+    procedure :: shift_state
+    procedure :: restore_state
     procedure :: series_obstacle
     procedure :: prepare_series
     procedure :: series
@@ -102,6 +115,53 @@ contains
     real(wp), intent(in) :: rtol, atol   !! positive
     real(wp), intent(in) :: t_end        !! [s]
   end subroutine prepare_integration
+
+  !> The sizes of the measured quantities at the state y, by which errors are judged, and an error of the state in these
+  !> quantities, to which it contributes linearly.
+  subroutine measure(self, columns, y, error, sizes, errors)
+    class(system_t), intent(in) :: self
+    integer, intent(in) :: columns   !! at least `states`
+    real(wp), intent(in), dimension(self%lanes, columns) :: y, error
+    real(wp), intent(inout), dimension(self%lanes, self%measures) :: sizes, errors   !! of any sign
+
+    error stop 'nocdyn_system: a system with measures overrides measure'
+  end subroutine measure
+
+  !> The name of a measured quantity in messages, e.g. "twist of 'shaft'"; that of the state if the states are measured.
+  function measure_name(self, index) result(name)
+    class(system_t), intent(in) :: self
+    integer, intent(in) :: index   !! 1 to measures, or to states
+    character(len=:), allocatable :: name
+
+    name = self%component_name(index)
+  end function measure_name
+
+  !> Finds the lanes whose states should be shifted; called after every step if `may_shift`.
+  subroutine find_far(self, columns, y, is_far)
+    class(system_t), intent(in) :: self
+    integer, intent(in) :: columns   !! at least `states`
+    real(wp), intent(in) :: y(self%lanes, columns)
+    logical, intent(inout) :: is_far(self%lanes)
+
+    is_far = .false.
+  end subroutine find_far
+
+  !> Takes a shift out of the state of a lane, which from now on stands for y + shift, and keeps it until `restore_state`.
+  subroutine shift_state(self, lane, y, shift)
+    class(system_t), intent(inout) :: self
+    integer, intent(in) :: lane
+    real(wp), contiguous, intent(inout) :: y(:, :)    !! [lanes, columns]
+    real(wp), contiguous, intent(inout) :: shift(:)   !! [states + quadratures]
+
+    error stop 'nocdyn_system: a system that shifts its states overrides shift_state'
+  end subroutine shift_state
+
+  !> Puts all shifts of a lane that has ended back into its state.
+  subroutine restore_state(self, lane, y)
+    class(system_t), intent(inout) :: self
+    integer, intent(in) :: lane
+    real(wp), contiguous, intent(inout) :: y(:)   !! [states + quadratures]
+  end subroutine restore_state
 
   !> The reason why the solution has no Taylor series, e.g. "coupling 'x' has no Taylor series"; empty if it has one. No function,
   !> because threads call it (`string_t` says more).

@@ -27,6 +27,7 @@ module nocdyn_solver_status
     real(wp), allocatable :: t(:)               !! time reached [s]
     real(wp), allocatable :: h(:)               !! step size of the last attempt [s]
     integer, allocatable :: component(:)        !! that caused a failure, 0 if none did
+    integer, allocatable :: measure(:)          !! measured quantity whose error did, 0 if none did
     integer, allocatable :: steps(:)            !! attempts, accepted or rejected
     integer, allocatable :: accepted(:)
     integer, allocatable :: rejected(:)
@@ -52,10 +53,10 @@ contains
 
     allocate (solver_status%code(lanes), source=integration_idle)
     allocate (solver_status%t(lanes), solver_status%h(lanes), source=0.0_wp)
-    allocate (solver_status%component(lanes), solver_status%steps(lanes), solver_status%accepted(lanes), &
-              solver_status%rejected(lanes), solver_status%evaluations(lanes), solver_status%jacobians(lanes), &
-              solver_status%factorisations(lanes), solver_status%implicit_steps(lanes), solver_status%switches(lanes), &
-              solver_status%crossings(lanes), solver_status%last_crossing(lanes), source=0)
+    allocate (solver_status%component(lanes), solver_status%measure(lanes), solver_status%steps(lanes), &
+              solver_status%accepted(lanes), solver_status%rejected(lanes), solver_status%evaluations(lanes), &
+              solver_status%jacobians(lanes), solver_status%factorisations(lanes), solver_status%implicit_steps(lanes), &
+              solver_status%switches(lanes), solver_status%crossings(lanes), solver_status%last_crossing(lanes), source=0)
     allocate (solver_status%switch_times(max_switch_times, lanes), source=0.0_wp)
     allocate (solver_status%implicit(lanes), source=.false.)
   end subroutine allocate_solver_status
@@ -68,6 +69,7 @@ contains
     solver_status%code(lane) = integration_running
     solver_status%h(lane) = 0.0_wp
     solver_status%component(lane) = 0
+    solver_status%measure(lane) = 0
     solver_status%steps(lane) = 0
     solver_status%accepted(lane) = 0
     solver_status%rejected(lane) = 0
@@ -169,11 +171,15 @@ contains
     real(wp), intent(in) :: rtol, atol
     character(len=*), intent(in) :: when
     character(len=:), allocatable :: sentence
+    character(len=:), allocatable :: what
 
+    what = ''
+    if (solver_status%component(lane) > 0) what = system%component_name(solver_status%component(lane))
+    if (solver_status%measure(lane) > 0) what = system%measure_name(solver_status%measure(lane))
     sentence = 'the step size became too small at ' // when // ' (h = ' // rounded_text(solver_status%h(lane), digits) // ' s): '
-    if (solver_status%component(lane) > 0) then
-      sentence = sentence // 'the error of the ' // system%component_name(solver_status%component(lane)) // &
-        ' cannot be kept within rtol = ' // rounded_text(rtol, digits) // ', atol = ' // rounded_text(atol, digits) // &
+    if (what /= '') then
+      sentence = sentence // 'the error of the ' // what // ' cannot be kept within rtol = ' // &
+        rounded_text(rtol, digits) // ', atol = ' // rounded_text(atol, digits) // &
         '; loosen the tolerances, or look for a jump or a singularity there'
     else
       sentence = sentence // 'the equations cannot be evaluated beyond this time; look for a limit that is reached there'

@@ -3,12 +3,13 @@ module nocdyn_step_control
   use nocdyn_kinds, only: wp
   use nocdyn_masks, only: all_true, any_true
   use nocdyn_step_attempt, only: step_attempt_t
+  use nocdyn_system, only: system_t
   use nocdyn_vector_functions, only: exp2s, log2s
   implicit none (type, external)
   private
 
-  public :: step_control, reset_control, resume_control, measure_error, adapt_steps, shorten_step, propose_steps, &
-    smallest_step, any_too_small
+  public :: step_control, reset_control, resume_control, measure_start, advance_measures, measure_error, worst_measure, &
+    adapt_steps, shorten_step, propose_steps, smallest_step, any_too_small
 
   ! The constants of Hairer's DOPRI5, for any order of the error estimate.
   real(wp), parameter :: beta = 0.04_wp             !! exponent of the previous error in the PI controller
@@ -33,13 +34,18 @@ module nocdyn_step_control
     logical, allocatable :: ends_at_t_end(:)           !! whether the present attempt ends on t_end
     real(wp), allocatable :: mean_square(:)            !! square of the error norm of the present attempt, 1 at the tolerance
     real(wp), allocatable :: log_ratio(:), factor(:)   !! work space
+    ! If the system measures errors in quantities of its own, [lanes, measures]:
+    real(wp), allocatable :: size(:, :)                !! of the quantities at the starts of the steps, after `measure_start`
+    real(wp), allocatable :: new_size(:, :)            !! at the ends
+    real(wp), allocatable :: error(:, :)               !! of the quantities; after the test their terms of `mean_square`
   end type step_control_t
 
 contains
 
   !> A controller for a block of lanes; the caller sets the first step sizes `h`.
-  pure function step_control(lanes, rtol, atol, t_end, longest) result(control)
+  pure function step_control(lanes, measures, rtol, atol, t_end, longest) result(control)
     integer, intent(in) :: lanes
+    integer, intent(in) :: measures   !! of the system
     real(wp), intent(in) :: rtol, atol
     real(wp), intent(in) :: t_end     !! final time [s]
     real(wp), intent(in) :: longest   !! largest step size [s]
@@ -50,6 +56,7 @@ contains
     control%t_end = t_end
     control%longest = longest
     allocate (control%h(lanes), control%mean_square(lanes), control%log_ratio(lanes), control%factor(lanes), source=0.0_wp)
+    allocate (control%size(lanes, measures), control%new_size(lanes, measures), control%error(lanes, measures), source=0.0_wp)
     allocate (control%log_error(lanes), source=min_log_error)
     allocate (control%was_rejected(lanes), control%ends_at_t_end(lanes), source=.false.)
   end function step_control
@@ -124,29 +131,97 @@ contains
     t_new = merge(t_end, t + step, overshoot >= 0)
   end subroutine propose_one
 
-  !> Sets `mean_square`, the mean over the states of (error / (atol + rtol max(|y|, |y_new|)))^2. Each term replaces the error
-  !> in `error_estimate`. Two estimates are combined as in DOP853: E5^2 / (E5 + 0.01 E3), where E5 and E3 are sums of such terms.
-  pure subroutine measure_error(control, attempt)
+  !> Measures the sizes at the present states of all lanes, where a lane starts or restarts.
+  subroutine measure_start(control, system, attempt)
     type(step_control_t), intent(inout) :: control
+    class(system_t), intent(in) :: system
+    type(step_attempt_t), intent(in) :: attempt
+
+    if (system%measures > 0) call system%measure(size(attempt%y, 2), attempt%y, attempt%y, control%size, control%error)
+  end subroutine measure_start
+
+  !> Takes the sizes at the ends of accepted steps for the next ones.
+  pure subroutine advance_measures(control, accepted)
+    type(step_control_t), intent(inout) :: control
+    logical, intent(in) :: accepted(:)
+    real(wp), allocatable :: spare(:, :)
+    integer :: i
+
+    if (size(control%size) == 0) return
+    if (all_true(size(accepted), accepted)) then
+      call move_alloc(control%size, spare)
+      call move_alloc(control%new_size, control%size)
+      call move_alloc(spare, control%new_size)
+    else
+      do i = 1, size(control%size, 2)
+        control%size(:, i) = merge(control%new_size(:, i), control%size(:, i), accepted)
+      end do
+    end if
+  end subroutine advance_measures
+
+  !> Sets `mean_square`, the mean of (error / (atol + rtol max(|y|, |y_new|)))^2 over the states, or over the quantities that the
+  !> system measures. Each term replaces the error. Two estimates are combined as in DOP853: E5^2 / (E5 + 0.01 E3), where E5
+  !> and E3 are sums of such terms.
+  subroutine measure_error(control, system, attempt)
+    type(step_control_t), intent(inout) :: control
+    class(system_t), intent(in) :: system
     type(step_attempt_t), intent(inout) :: attempt
     integer :: lane
 
-    call square_scaled_errors(attempt%lanes * attempt%states, control, attempt%y, attempt%y_new, attempt%error_estimate)
-    call sum_over_states(attempt%lanes, attempt%states, attempt%error_estimate, control%mean_square)
+    if (attempt%has_low_order_estimate) call sum_errors(control, system, attempt, attempt%low_order_estimate, attempt%scratch)
+    call sum_errors(control, system, attempt, attempt%error_estimate, control%mean_square)
     if (attempt%has_low_order_estimate) then
-      call square_scaled_errors(attempt%lanes * attempt%states, control, attempt%y, attempt%y_new, attempt%low_order_estimate)
-      call sum_over_states(attempt%lanes, attempt%states, attempt%low_order_estimate, attempt%scratch)
       do lane = 1, attempt%lanes
         associate (error_norm => control%mean_square(lane), low_order => attempt%scratch(lane))
           if (error_norm > 0) error_norm = error_norm * (error_norm / (error_norm + low_order_share * low_order))
         end associate
       end do
     end if
-    control%mean_square(:) = control%mean_square / max(attempt%states, 1)
+    control%mean_square(:) = control%mean_square / max(measured(system), 1)
     if (attempt%components > attempt%states) then
       call limit_by_quadratures(attempt, attempt%y, attempt%y_new, attempt%error_estimate, attempt%low_order_estimate, control)
     end if
   end subroutine measure_error
+
+  !> The number of measured quantities.
+  pure integer function measured(system)
+    class(system_t), intent(in) :: system
+
+    measured = merge(system%measures, system%states, system%measures > 0)
+  end function measured
+
+  !> The sum of the squared errors of a step, each relative to its tolerance.
+  subroutine sum_errors(control, system, attempt, estimate, total)
+    type(step_control_t), intent(inout) :: control
+    class(system_t), intent(in) :: system
+    type(step_attempt_t), intent(in) :: attempt
+    real(wp), contiguous, intent(inout) :: estimate(:, :)   !! an error estimate, [lanes, padded columns]
+    real(wp), contiguous, intent(inout) :: total(:)         !! [lanes]
+
+    associate (terms => attempt%lanes * measured(system))
+      if (system%measures > 0) then
+        call system%measure(size(estimate, 2), attempt%y_new, estimate, control%new_size, control%error)
+        call square_scaled_errors(terms, control%rtol, control%atol, control%size, control%new_size, control%error)
+        call sum_over_states(attempt%lanes, system%measures, control%error, total)
+      else
+        call square_scaled_errors(terms, control%rtol, control%atol, attempt%y, attempt%y_new, estimate)
+        call sum_over_states(attempt%lanes, system%states, estimate, total)
+      end if
+    end associate
+  end subroutine sum_errors
+
+  !> The measured quantity, or the state, whose error was the largest in the last test of a lane.
+  pure integer function worst_measure(control, attempt, lane)
+    type(step_control_t), intent(in) :: control
+    type(step_attempt_t), intent(in) :: attempt
+    integer, intent(in) :: lane
+
+    if (size(control%error) > 0) then
+      worst_measure = maxloc(control%error(lane, :), dim=1)
+    else
+      worst_measure = maxloc(attempt%error_estimate(lane, :attempt%states), dim=1)
+    end if
+  end function worst_measure
 
   !> Raises `mean_square` where the error of a quadrature exceeds `quadrature_leniency` times the tolerance, relative to the
   !> largest quadrature. Nothing else limits steps over which the states have no error, e.g. polynomials of the time. Two
@@ -176,16 +251,13 @@ contains
   end subroutine limit_by_quadratures
 
   !> Replaces each error by (error / (atol + rtol max(|y|, |y_new|)))^2.
-  pure subroutine square_scaled_errors(n, control, y, y_new, error_estimate)
+  pure subroutine square_scaled_errors(n, rtol, atol, y, y_new, error_estimate)
     integer, intent(in) :: n   !! lanes * states
-    type(step_control_t), intent(in) :: control
+    real(wp), intent(in) :: rtol, atol
     real(wp), intent(in) :: y(n), y_new(n)
     real(wp), intent(inout) :: error_estimate(n)
-    real(wp) :: rtol, atol
     integer :: i
 
-    rtol = control%rtol
-    atol = control%atol
     do i = 1, n
       error_estimate(i) = min(abs(error_estimate(i)) / (atol + rtol * max(abs(y(i)), abs(y_new(i)))), largest_ratio)**2
     end do

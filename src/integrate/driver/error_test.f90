@@ -7,7 +7,7 @@ module nocdyn_error_test
     integration_step_too_small, integration_too_many_steps, solver_status_t
   use nocdyn_stage_sums, only: width
   use nocdyn_step_attempt, only: attempt_fatal, attempt_not_finite, attempt_ok
-  use nocdyn_step_control, only: adapt_steps, measure_error, shorten_step, smallest_step
+  use nocdyn_step_control, only: adapt_steps, measure_error, shorten_step, smallest_step, worst_measure
   use nocdyn_stepper, only: stepper_t
   use nocdyn_system, only: system_t
   use nocdyn_time_stepping, only: integrator_t
@@ -28,7 +28,7 @@ contains
     integer :: failed, lane, wanted
     logical :: is_plain   ! whether the steps of all lanes have only to be counted
 
-    if (.not. stepper%chooses_steps) call measure_error(integrator%control, integrator%attempt)
+    if (.not. stepper%chooses_steps) call measure_error(integrator%control, system, integrator%attempt)
     integrator%inspects = integrator%has_events .or. integrator%has_extremes .or. integrator%has_switches
     is_plain = .false.
     if (integrator%attempt%lanes > 1) is_plain = is_plain_step(integrator, solver_status)
@@ -174,7 +174,8 @@ contains
                                          attempt%step_status(lane) == attempt_not_finite)
         solver_status%component(lane) = attempt%component(lane)
         if (attempt%step_status(lane) == attempt_ok) then
-          solver_status%component(lane) = maxloc(attempt%error_estimate(lane, :attempt%states), dim=1)
+          solver_status%component(lane) = 0
+          solver_status%measure(lane) = worst_measure(integrator%control, attempt, lane)
         end if
       end if
     end associate

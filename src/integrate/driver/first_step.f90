@@ -34,7 +34,7 @@ contains
     do lane = 1, attempt%lanes
       attempt%h(lane) = 0.0_wp
       if (.not. attempt%active(lane)) cycle
-      attempt%h(lane) = euler_step(control, attempt, lane)
+      attempt%h(lane) = euler_step(control, system, attempt, lane)
       control%h(lane) = retreat * attempt%h(lane)
     end do
     call begin_attempt(attempt)
@@ -47,8 +47,8 @@ contains
     attempt%error_estimate(:, :) = attempt%error_estimate - attempt%slope
     do lane = 1, attempt%lanes
       if (.not. attempt%active(lane)) cycle
-      slope = weighted_size(control, attempt, lane, attempt%slope)
-      steepest = max(slope, weighted_size(control, attempt, lane, attempt%error_estimate) / attempt%h(lane))
+      slope = weighted_size(control, system, attempt, lane, attempt%slope)
+      steepest = max(slope, weighted_size(control, system, attempt, lane, attempt%error_estimate) / attempt%h(lane))
       if (steepest <= no_curvature) then
         longer = max(small_step, attempt%h(lane) * 1.0e-3_wp)
       else
@@ -59,35 +59,58 @@ contains
   end subroutine guess_first_steps
 
   !> A step over which y changes by about 1 % if the slope stays as it is.
-  pure function euler_step(control, attempt, lane) result(h)
-    type(step_control_t), intent(in) :: control
+  function euler_step(control, system, attempt, lane) result(h)
+    type(step_control_t), intent(inout) :: control
+    class(system_t), intent(in) :: system
     type(step_attempt_t), intent(in) :: attempt
     integer, intent(in) :: lane
     real(wp) :: h
     real(wp) :: position, slope
 
-    position = weighted_size(control, attempt, lane, attempt%y)
-    slope = weighted_size(control, attempt, lane, attempt%slope)
+    if (system%measures > 0) then
+      position = rms_ratio(control, control%size(lane, :system%measures - system%phases), &
+                           control%size(lane, :system%measures - system%phases))
+    else
+      position = rms_ratio(control, attempt%y(lane, :attempt%states), attempt%y(lane, :attempt%states))
+    end if
+    slope = weighted_size(control, system, attempt, lane, attempt%slope)
     h = small_step
     if (min(position, slope) >= negligible) h = small_change * position / slope
     h = min(h, control%longest, control%t_end - attempt%t(lane))
     h = max(h, smallest_step(attempt%t(lane)))
   end function euler_step
 
-  !> Root mean square of x / (atol + rtol |y|) over the states.
-  pure function weighted_size(control, attempt, lane, x) result(rms)
-    type(step_control_t), intent(in) :: control
+  !> Root mean square of x / (atol + rtol |y|) over the states, or over the quantities that the system measures; without the
+  !> phases, since the speed of a rotation is no error and sets no time scale.
+  function weighted_size(control, system, attempt, lane, x) result(rms)
+    type(step_control_t), intent(inout) :: control
+    class(system_t), intent(in) :: system
     type(step_attempt_t), intent(in) :: attempt
     integer, intent(in) :: lane
-    real(wp), intent(in) :: x(:, :)
+    real(wp), contiguous, intent(in) :: x(:, :)   !! [lanes, padded columns]
     real(wp) :: rms
+
+    if (system%measures > 0) then
+      call system%measure(size(x, 2), attempt%y, x, control%size, control%error)
+      associate (n => system%measures - system%phases)
+        rms = rms_ratio(control, control%error(lane, :n), control%size(lane, :n))
+      end associate
+    else
+      rms = rms_ratio(control, x(lane, :attempt%states), attempt%y(lane, :attempt%states))
+    end if
+  end function weighted_size
+
+  !> Root mean square of x / (atol + rtol |y|).
+  pure real(wp) function rms_ratio(control, x, y) result(rms)
+    type(step_control_t), intent(in) :: control
+    real(wp), intent(in) :: x(:), y(:)
     integer :: i
 
     rms = 0.0_wp
-    do i = 1, attempt%states
-      rms = rms + min(abs(x(lane, i)) / (control%atol + control%rtol * abs(attempt%y(lane, i))), largest_ratio)**2
+    do i = 1, size(x)
+      rms = rms + min(abs(x(i)) / (control%atol + control%rtol * abs(y(i))), largest_ratio)**2
     end do
-    rms = sqrt(rms / max(attempt%states, 1))
-  end function weighted_size
+    rms = sqrt(rms / max(size(x), 1))
+  end function rms_ratio
 
 end module nocdyn_first_step

@@ -13,7 +13,8 @@ module nocdyn_integration
   use nocdyn_stepper, only: stepper_t
   use nocdyn_system, only: system_t
   use nocdyn_text, only: quoted
-  use nocdyn_time_stepping, only: advance_lanes, begin_attempts, fill_lanes, integrator_t, prepare_integrator, release_lanes
+  use nocdyn_time_stepping, only: advance_lanes, begin_attempts, fill_lanes, integrator_t, prepare_integrator, &
+    release_lanes, shift_states
   implicit none (type, external)
   private
 
@@ -96,11 +97,12 @@ contains
         end if
         if (integrator%wants_steps) call observe_steps(integrator, stepper, observer)
         call advance_lanes(integrator, times)
+        if (system%may_shift) call shift_states(integrator, system, observer)
         call stepper%accept(integrator%accepted)
         if (integrator%has_switches) call change_branches(integrator, stepper, system, observer, solver_status)
       end if
       call interrupt_if_asked(integrator, observer, solver_status, is_interrupted)
-      call release_lanes(integrator, ensemble, observer, solver_status)
+      call release_lanes(integrator, system, ensemble, observer, solver_status)
       if (is_interrupted) exit
     end do
   end subroutine integrate_with

@@ -7,20 +7,20 @@ module nocdyn_time_stepping
   use nocdyn_first_step, only: guess_first_steps
   use nocdyn_integration_settings, only: integration_settings_t
   use nocdyn_kinds, only: wp
-  use nocdyn_masks, only: all_true, any_differs
+  use nocdyn_masks, only: all_true, any_differs, any_true
   use nocdyn_observer, only: observer_t, step_block_t
   use nocdyn_root_functions, only: start_root_functions
   use nocdyn_solver_status, only: integration_not_finite, integration_rhs_failed, integration_running, reset_solver_status, &
     solver_status_t
   use nocdyn_step_attempt, only: allocate_step_attempt, attempt_not_finite, begin_attempt, evaluate_start, step_attempt_t
-  use nocdyn_step_control, only: propose_steps, reset_control, step_control, step_control_t
+  use nocdyn_step_control, only: advance_measures, measure_start, propose_steps, reset_control, step_control, step_control_t
   use nocdyn_stepper, only: stepper_t
   use nocdyn_switching, only: allocate_switching, start_switching, switching_t
   use nocdyn_system, only: system_t
   implicit none (type, external)
   private
 
-  public :: prepare_integrator, fill_lanes, evaluate_starts, begin_attempts, advance_lanes, release_lanes
+  public :: prepare_integrator, fill_lanes, evaluate_starts, begin_attempts, advance_lanes, shift_states, release_lanes
 
   type, public :: integrator_t
     type(step_attempt_t) :: attempt
@@ -46,6 +46,7 @@ module nocdyn_time_stepping
     logical, allocatable :: accepted(:)              !! lanes whose last attempt was accepted
     logical, allocatable :: wanted(:)                !! lanes whose dense output of the last step is needed
     logical, allocatable :: inspected(:)             !! lanes whose dense output is evaluated lane by lane
+    logical, allocatable :: far(:)                   !! lanes whose states are to be shifted
     type(step_block_t) :: steps                      !! the last steps, for the observer
     real(wp), allocatable :: t_new(:)                !! end of the last attempt of each lane [s]
     real(wp), allocatable :: next_time(:)            !! next output time of each lane [s], huge if none is left
@@ -71,7 +72,8 @@ contains
     integrator%attempt%error_order(:) = stepper%error_order
     integrator%attempt%max_growth(:) = stepper%max_growth
     integrator%attempt%has_low_order_estimate = stepper%has_low_order_error
-    integrator%control = step_control(system%lanes, settings%rtol, settings%atol, times(size(times)), settings%longest_step)
+    integrator%control = step_control(system%lanes, system%measures, settings%rtol, settings%atol, times(size(times)), &
+                                      settings%longest_step)
     integrator%first_step = settings%first_step
     integrator%max_steps = settings%max_steps
     call allocate_lanes(integrator, system%lanes, system%states + system%quadratures, stepper%degree, times(1))
@@ -97,7 +99,8 @@ contains
 
     integrator%free = lanes
     allocate (integrator%occupied(lanes), integrator%running(lanes), integrator%starting(lanes), integrator%accepted(lanes), &
-              integrator%rejected(lanes), integrator%wanted(lanes), integrator%inspected(lanes), integrator%steps%taken(lanes), &
+              integrator%rejected(lanes), integrator%wanted(lanes), integrator%inspected(lanes), integrator%far(lanes), &
+              integrator%steps%taken(lanes), &
               integrator%steps%crosses(lanes), source=.false.)
     allocate (integrator%t_new(lanes), integrator%next_time(lanes), source=t_start)
     allocate (integrator%steps%t(lanes), integrator%steps%h(lanes), integrator%steps%scale(lanes), &
@@ -206,6 +209,7 @@ contains
     associate (attempt => integrator%attempt)
       attempt%active(:) = integrator%starting
       call evaluate_start(attempt, system, integrator%starting, attempt%slope)
+      call measure_start(integrator%control, system, attempt)
       do lane = 1, attempt%lanes
         if (.not. integrator%starting(lane) .or. attempt%active(lane)) cycle
         if (solver_status%code(lane) /= integration_running) cycle
@@ -261,6 +265,7 @@ contains
     integer :: component, lane
 
     associate (attempt => integrator%attempt, accepted => integrator%accepted)
+      call advance_measures(integrator%control, accepted)
       if (all_true(attempt%lanes, accepted)) then   ! swaps the arrays: y_new is not read any more
         attempt%t(:) = integrator%t_new
         call move_alloc(attempt%y, spare)
@@ -282,9 +287,28 @@ contains
     end associate
   end subroutine advance_lanes
 
-  !> Passes the lanes that have ended to the ensemble and frees them.
-  subroutine release_lanes(integrator, ensemble, observer, solver_status)
+  !> Lets the system shift the states of the lanes that have moved, if any lane has gone far.
+  subroutine shift_states(integrator, system, observer)
     type(integrator_t), intent(inout) :: integrator
+    class(system_t), intent(inout) :: system
+    class(observer_t), intent(inout) :: observer
+    integer :: lane
+
+    associate (attempt => integrator%attempt)
+      call system%find_far(size(attempt%y, 2), attempt%y, integrator%far)
+      if (.not. any_true(attempt%lanes, integrator%far)) return
+      do lane = 1, attempt%lanes
+        if (.not. (integrator%far(lane) .and. integrator%accepted(lane))) cycle
+        call system%shift_state(lane, attempt%y, integrator%sample)
+        call observer%on_shift(lane, integrator%sample)
+      end do
+    end associate
+  end subroutine shift_states
+
+  !> Passes the lanes that have ended to the ensemble and frees them.
+  subroutine release_lanes(integrator, system, ensemble, observer, solver_status)
+    type(integrator_t), intent(inout) :: integrator
+    class(system_t), intent(inout) :: system
     class(ensemble_t), intent(inout) :: ensemble
     class(observer_t), intent(inout) :: observer
     type(solver_status_t), intent(inout) :: solver_status
@@ -303,6 +327,7 @@ contains
         if (integrator%extremes%have_begun(lane)) call observer%on_extremes(lane, integrator%extremes%ranges(lane))
       end if
       integrator%sample(:) = integrator%attempt%y(lane, :integrator%attempt%components)
+      if (system%may_shift) call system%restore_state(lane, integrator%sample)
       call ensemble%finish(lane, integrator%sample, solver_status)
     end do
   end subroutine release_lanes

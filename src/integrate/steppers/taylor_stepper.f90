@@ -103,8 +103,7 @@ contains
     are_finite = all_finite(2 * attempt%length, self%series) .and. all_finite(2 * attempt%length, self%series(1, 1, &
                                                                                                               self%order - 1))
     if (.not. are_finite) call clear_infinities(self)
-    call measure_norms(attempt%lanes, attempt%states, size(self%series, 2), control, self%series, &
-                       self%series(1, 1, self%order - 1), self%last_norm, self%previous_norm)
+    call measure_norms(self, system, attempt, control)
     call find_steps(attempt%lanes, self%order, self%last_norm, self%previous_norm)
     if (have_all_moved .and. are_finite .and. .not. any_differs(attempt%lanes, attempt%rhs_status, evaluation_ok)) then
       if (.not. any_too_small(attempt%lanes, attempt%t, self%last_norm)) then
@@ -176,37 +175,46 @@ contains
     end do
   end subroutine clear_infinities
 
-  !> The norm of the last two coefficients of each lane: the largest |y_j| / (atol + rtol |y|) of the states, at least 1e-300 so
-  !> that its logarithm is finite.
-  pure subroutine measure_norms(lanes, states, columns, control, y, y_j, last_norm, previous_norm)
-    integer, intent(in) :: lanes, states, columns
-    type(step_control_t), intent(in) :: control
-    real(wp), intent(in) :: y(lanes, states), y_j(lanes, columns, 2)   !! y_j of the orders p - 1 and p
-    real(wp), intent(inout) :: last_norm(lanes), previous_norm(lanes)
+  !> The norms of the last two coefficients of each lane, over the states or over the quantities that the system measures.
+  subroutine measure_norms(self, system, attempt, control)
+    type(taylor_stepper_t), intent(inout) :: self
+    class(system_t), intent(in) :: system
+    type(step_attempt_t), intent(in) :: attempt
+    type(step_control_t), intent(inout) :: control
+
+    associate (lanes => attempt%lanes, columns => size(self%series, 2), order => self%order)
+      if (system%measures > 0) then
+        call system%measure(columns, attempt%y, self%series(1, 1, order), control%size, control%error)
+        call system%measure(columns, attempt%y, self%series(1, 1, order - 1), control%size, control%new_size)
+        call find_norms(lanes, system%measures, control%rtol, control%atol, control%size, control%new_size, control%error, &
+                        self%previous_norm, self%last_norm)
+      else
+        call find_norms(lanes, attempt%states, control%rtol, control%atol, attempt%y, self%series(1, 1, order - 1), &
+                        self%series(1, 1, order), self%previous_norm, self%last_norm)
+      end if
+    end associate
+  end subroutine measure_norms
+
+  !> The largest |y_j| / (atol + rtol |y|) of each lane for j = p - 1 and p, at least 1e-300 so that its logarithm is finite.
+  pure subroutine find_norms(lanes, states, rtol, atol, y, y_previous, y_last, previous_norm, last_norm)
+    integer, intent(in) :: lanes, states
+    real(wp), intent(in) :: rtol, atol
+    real(wp), intent(in), dimension(lanes, states) :: y, y_previous, y_last   !! y, y_(p - 1) and y_p
+    real(wp), intent(inout) :: previous_norm(lanes), last_norm(lanes)
     real(wp), parameter :: smallest = 1.0e-300_wp
-    real(wp) :: atol, rtol, weight
+    real(wp) :: weight
     integer :: i, lane
 
-    atol = control%atol
-    rtol = control%rtol
     last_norm = smallest
     previous_norm = smallest
-    if (lanes == 1) then
-      do i = 1, states
-        weight = 1.0_wp / (atol + rtol * abs(y(1, i)))
-        previous_norm(1) = max(previous_norm(1), weight * abs(y_j(1, i, 1)))
-        last_norm(1) = max(last_norm(1), weight * abs(y_j(1, i, 2)))
+    do i = 1, states
+      do lane = 1, lanes
+        weight = 1.0_wp / (atol + rtol * abs(y(lane, i)))
+        previous_norm(lane) = max(previous_norm(lane), weight * abs(y_previous(lane, i)))
+        last_norm(lane) = max(last_norm(lane), weight * abs(y_last(lane, i)))
       end do
-    else
-      do i = 1, states
-        do lane = 1, lanes
-          weight = 1.0_wp / (atol + rtol * abs(y(lane, i)))
-          previous_norm(lane) = max(previous_norm(lane), weight * abs(y_j(lane, i, 1)))
-          last_norm(lane) = max(last_norm(lane), weight * abs(y_j(lane, i, 2)))
-        end do
-      end do
-    end if
-  end subroutine measure_norms
+    end do
+  end subroutine find_norms
 
   !> Replaces the norms `last_norm` by the step sizes that both norms allow.
   pure subroutine find_steps(lanes, order, last_norm, previous_norm)

@@ -1,9 +1,12 @@
 !> Formulations whose states are the speeds and angles of all bodies, omega and phi: `paper` and `multiplier`.
 module nocdyn_body_formulation
+  use nocdyn_element_coordinates, only: new_element_coordinates
+  use nocdyn_error_measures, only: error_measures_t, new_error_measures
   use nocdyn_formulation, only: formulation_t
   use nocdyn_incidence, only: add_coefficients, add_moment
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
+  use nocdyn_rigid_motions, only: new_rigid_motions, rigid_motions_t
   use nocdyn_system, only: evaluation_ok
   use nocdyn_text, only: quoted
   implicit none (type, external)
@@ -54,7 +57,37 @@ contains
     do l = 1, self%lanes
       self%mobility(:, :, l) = machine%coordinates%mobility(l)
     end do
+    allocate (self%zero_twist(self%lanes, size(machine%elements%to)), source=0.0_wp)
+    call self%set_norm(measures_of_bodies(machine, self%states))
   end subroutine set_machine
+
+  !> The measures of errors: every state is one body's.
+  function measures_of_bodies(machine, states) result(norm)
+    type(machine_t), intent(in) :: machine
+    integer, intent(in) :: states
+    type(error_measures_t) :: norm
+    type(rigid_motions_t) :: motions
+    integer, allocatable :: body(:), couplings(:), first(:)
+    real(wp), allocatable :: sign(:)
+    integer :: i
+
+    motions = new_rigid_motions(machine%coordinates%freedoms, &
+                                new_element_coordinates(machine%elements, machine%coordinates), machine%stiff())
+    allocate (couplings, source=machine%couplings())
+    allocate (body(0), sign(0))
+    allocate (first(size(couplings) + 1), source=1)
+    do i = 1, size(couplings)
+      associate (from => machine%elements%from(couplings(i)), to => machine%elements%to(couplings(i)))
+        if (to > 0) body = [body, to]
+        if (to > 0) sign = [sign, 1.0_wp]
+        if (from > 0) body = [body, from]
+        if (from > 0) sign = [sign, -1.0_wp]
+      end associate
+      first(i + 1) = size(body) + 1
+    end do
+    norm = new_error_measures(couplings, first, body, spread(sign, 1, machine%lanes), &
+                              machine%coordinates%body(motions%free), machine%bodies, states, without_bands=.true.)
+  end function measures_of_bodies
 
   !> Start speeds, angles and internal states; further mechanical states and the work integrals are zero.
   function start_of_bodies(self) result(y)
@@ -86,8 +119,8 @@ contains
     real(wp), contiguous, intent(in) :: t(:)      !! [s], [lanes]
     real(wp), contiguous, intent(in) :: y(:, :)   !! state, [lanes, states], at least
 
-    call self%set_state(y)
-    if (self%switches > 0) call self%machine%choose_branches(t, self%phi, self%omega)
+    call self%gather(y)
+    if (self%switches > 0) call self%machine%choose_branches(t)
     call self%derivative(t, y, self%slope, self%status)
   end subroutine observe_bodies
 

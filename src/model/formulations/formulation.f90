@@ -1,6 +1,8 @@
 !> A machine as a first-order system: the common part of the three formulations.
 module nocdyn_formulation
+  use nocdyn_error_measures, only: error_measures_t
   use nocdyn_kinds, only: wp
+  use nocdyn_lane_parameters, only: lane_parameters_t
   use nocdyn_machine, only: machine_t
   use nocdyn_system, only: system_t
   use nocdyn_text, only: quoted
@@ -18,6 +20,8 @@ module nocdyn_formulation
     logical :: has_energy_balance = .true.   !! whether the powers of the elements `machine%with_work` are integrated
     real(wp), allocatable :: phi(:, :)       !! angles [rad] after `set_state`, [lanes, 0:bodies], body 0 is the ground
     real(wp), allocatable :: omega(:, :)     !! speeds [rad/s] after `set_state`, [lanes, 0:bodies]
+    real(wp), allocatable :: zero_twist(:, :)   !! twists where the angles in the state are zero [rad], [lanes, elements]
+    type(error_measures_t), private :: norm     !! quantities in which errors are measured
     real(wp), allocatable :: torque(:, :)    !! torques of the elements on the bodies [N m] after `observe`, [lanes, 0:bodies]
   contains
     procedure(start_interface), deferred :: start
@@ -25,7 +29,16 @@ module nocdyn_formulation
     procedure(reactions_interface), deferred :: reactions
     procedure(motion_interface), deferred :: switch_motion
     procedure :: allocate_state
+    procedure :: set_norm
+    procedure :: list_norm
+    procedure :: gather
+    procedure :: move_origin
+    procedure :: reset_origin
+    procedure :: angle_at_zero
+    procedure :: twist_at_zero
     procedure :: component_name
+    procedure :: measure
+    procedure :: measure_name
     procedure :: observe
     procedure :: refresh_lane
     procedure :: start_lane
@@ -124,10 +137,93 @@ contains
     real(wp), contiguous, intent(in) :: t(:)      !! [s], [lanes]
     real(wp), contiguous, intent(in) :: y(:, :)   !! [lanes, states], at least
 
-    call self%set_state(y)
-    if (self%switches > 0) call self%machine%choose_branches(t, self%phi, self%omega)
-    call self%machine%evaluate(t, self%phi, self%omega, self%torque)
+    call self%gather(y)
+    if (self%switches > 0) call self%machine%choose_branches(t)
+    call self%machine%evaluate_elements(t)
+    call self%machine%elements%scatter(self%torque)
   end subroutine observe
+
+  !> Sets the motion of bodies and elements from the state.
+  subroutine gather(self, y)
+    class(formulation_t), intent(inout) :: self
+    real(wp), contiguous, intent(in) :: y(:, :)   !! [lanes, states], at least
+
+    call self%set_state(y)
+    call self%machine%elements%gather(self%phi, self%omega)
+  end subroutine gather
+
+  !> Takes a shift of the state (`shift_state`) that another copy of this formulation has made. By default there are none.
+  subroutine move_origin(self, lane, shift)
+    class(formulation_t), intent(inout) :: self
+    integer, intent(in) :: lane
+    real(wp), intent(in) :: shift(:)   !! [states], at least
+  end subroutine move_origin
+
+  !> Forgets the shifts of a lane, before it starts. By default there are none.
+  subroutine reset_origin(self, lane)
+    class(formulation_t), intent(inout) :: self
+    integer, intent(in) :: lane
+  end subroutine reset_origin
+
+  !> The angle of a body where the angles in the state are zero [rad]; by default they are those of the bodies.
+  pure real(wp) function angle_at_zero(self, lane, body)
+    class(formulation_t), intent(in) :: self
+    integer, intent(in) :: lane, body
+
+    angle_at_zero = 0.0_wp
+  end function angle_at_zero
+
+  !> The same for the twist of an element [rad].
+  pure real(wp) function twist_at_zero(self, lane, element)
+    class(formulation_t), intent(in) :: self
+    integer, intent(in) :: lane, element
+
+    twist_at_zero = self%zero_twist(lane, element)
+  end function twist_at_zero
+
+  !> Sets the quantities in which errors are measured.
+  subroutine set_norm(self, norm)
+    class(formulation_t), intent(inout) :: self
+    type(error_measures_t), intent(in) :: norm
+
+    self%norm = norm
+    self%measures = norm%count
+    self%phases = size(norm%free)
+  end subroutine set_norm
+
+  !> Registers their arrays that may differ from variant to variant.
+  subroutine list_norm(self, parameters)
+    class(formulation_t), target, intent(inout) :: self
+    type(lane_parameters_t), intent(inout) :: parameters
+
+    call self%norm%list_parameters(parameters)
+  end subroutine list_norm
+
+  !> The sizes of the measured quantities, and an error of the state in them.
+  subroutine measure(self, columns, y, error, sizes, errors)
+    class(formulation_t), intent(in) :: self
+    integer, intent(in) :: columns
+    real(wp), intent(in), dimension(self%lanes, columns) :: y, error
+    real(wp), intent(inout), dimension(self%lanes, self%measures) :: sizes, errors
+
+    call self%norm%measure(self%lanes, columns, y, error, sizes, errors)
+  end subroutine measure
+
+  !> Name of a measured quantity, for messages.
+  function measure_name(self, index) result(name)
+    class(formulation_t), intent(in) :: self
+    integer, intent(in) :: index
+    character(len=:), allocatable :: name
+    integer :: element
+
+    element = self%norm%twist_of(index)
+    if (element == 0) then
+      name = self%component_name(self%norm%state_of(index))
+    else
+      name = 'twist of ' // quoted(self%machine%element_name(element))
+      if (index <= size(self%norm%coupling)) name = 'rate of ' // name
+    end if
+  end function measure_name
 
   !> Updates everything that depends on the parameters of a lane, after they have changed. By default nothing does.
   subroutine refresh_lane(self, lane)
@@ -144,6 +240,7 @@ contains
     integer :: switch
 
     call self%refresh_lane(lane)
+    call self%norm%start_lane(lane, y, self%zero_twist(lane, :), self%machine%laws%rest(lane, :))
     do switch = 1, self%switches
       call self%change_branch(lane, switch, t, y)
     end do

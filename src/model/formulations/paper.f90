@@ -49,7 +49,7 @@ contains
     type(machine_t), intent(in) :: machine
     logical, intent(in) :: with_energy_balance   !! whether the powers of the elements `machine%with_work` are integrated
     type(paper_t) :: self
-    integer :: b, g, i, l, n
+    integer :: b, g, l, n
     logical :: is_singular
     real(wp) :: inertia(machine%bodies, machine%bodies), inertia_of_1(machine%bodies, machine%bodies)
     real(wp) :: inertia_of_2(2 * machine%bodies, 2 * machine%bodies)
@@ -70,12 +70,7 @@ contains
       call lu_factor(self%factors(:, :, l), self%pivots(:, l), is_singular)
       if (is_singular) self%factors(:, :, l) = ieee_value(1.0_wp, ieee_quiet_nan)   ! by rounding: the integration does not start
     end do
-    self%couplings = [integer ::]
-    do i = 1, size(machine%banks)
-      associate (bank => machine%banks(i)%bank)
-        if (bank%role == role_coupling) self%couplings = [self%couplings, [(b, b=bank%first, bank%last())]]
-      end associate
-    end do
+    allocate (self%couplings, source=machine%couplings())
     self%moment_of_bodies = pseudo_inverse(coupling_incidence(machine, self%couplings), 1.0e-10_wp)
   end function new_paper
 
@@ -120,7 +115,8 @@ contains
     phi(:, 1:) = self%machine%start_angle
     machine = self%machine
     if (self%internal > 0) machine%elements%internal%value = machine%start_internal()
-    call machine%choose_branches(t, phi, omega)
+    call machine%elements%gather(phi, omega)
+    call machine%choose_branches(t)
     call machine%evaluate(t, phi, omega, torque)
     do l = 1, self%lanes
       call elastic_moments(machine, l, moments)

@@ -1,13 +1,12 @@
 !> The reduced formulation: L_tau^T J L_tau q'' = L_tau^T (Q + C omega + K phi). Its states are q', q and the internal states z of
 !> the elements; the work integrals follow.
 !>
-!> The motion of the bodies is not computed on the way. The elements have the angles u = u_start + U q and the speeds
+!> The motion of the bodies is not computed on the way. The elements have the angles u = u_0 + U q and the speeds
 !> u' = U q'. Their moments M give q'' = R M with R = (L_tau^T J L_tau)^-1 L_tau^T B, where the columns of B are
 !> the unit moments of the elements on their two bodies, and U = B^T L_tau.
 module nocdyn_reduced
   use nocdyn_bank, only: role_names
-  use nocdyn_element_coordinates, only: element_coordinates_t, new_element_coordinates, twist_map
-  use nocdyn_formulation, only: formulation_t
+  use nocdyn_coordinate_formulation, only: coordinate_formulation_t
   use nocdyn_kinds, only: wp
   use nocdyn_lane_parameters, only: lane_parameters_t
   use nocdyn_lane_motion, only: lane_motion_t, motion_strip, new_lane_motion
@@ -25,12 +24,8 @@ module nocdyn_reduced
 
   public :: new_reduced
 
-  !> q is measured from the start: phi = start_angle + L_tau q.
-  type, extends(formulation_t), public :: reduced_t
-    real(wp), allocatable, private :: start_twist(:, :)     !! u_start [rad], [lanes, elements]
-    type(sparse_map_t), private :: twists                   !! U
+  type, extends(coordinate_formulation_t), public :: reduced_t
     type(sparse_map_t), private :: accelerations            !! R
-    type(element_coordinates_t), private :: incidence       !! entries of which U and R are made
     integer, allocatable, private :: response_entry(:)      !! entry of `incidence` of each entry of R
     type(reduced_jacobian_t), private :: element_jacobian   !! R diag U
     type(reduced_series_t), private :: series_kernel        !! Taylor recurrence of any machine, after `prepare_series`
@@ -38,7 +33,6 @@ module nocdyn_reduced
     type(lane_terms_t), allocatable, private :: terms          !! terms of its laws
     type(lane_motion_t), allocatable, private :: lane_motion   !! accelerations of strips, if the lanes are whole strips
     type(lane_series_t), allocatable, private :: lane_series   !! replaces `series_kernel`, if the lanes are whole strips
-    type(element_coordinates_t), private :: switching          !! entries of the elements that switch
     real(wp), allocatable, private :: moment(:, :)             !! M [N m], [lanes, elements], work space
   contains
     procedure :: formulate
@@ -51,11 +45,6 @@ module nocdyn_reduced
     procedure :: series_obstacle
     procedure :: prepare_series
     procedure :: series
-    procedure :: start
-    procedure :: project_start_speeds
-    procedure :: set_state
-    procedure :: reactions
-    procedure :: switch_motion
   end type reduced_t
 
 contains
@@ -80,16 +69,12 @@ contains
 
     is_block = .false.
     if (present(as_block)) is_block = as_block
-    call self%allocate_state(self%machine%coordinates%body, 2 * self%machine%coordinates%freedoms, with_energy_balance)
-    self%incidence = new_element_coordinates(self%machine%elements, self%machine%coordinates)
+    call self%set_coordinates(with_energy_balance, is_block)
     associate (machine => self%machine, incidence => self%incidence, freedoms => self%machine%coordinates%freedoms)
       call form_responses(freedoms, is_block, self)
       self%element_jacobian = new_reduced_jacobian(freedoms, incidence, machine%with_work(:self%quadratures), &
                                                    machine%elements%internal)
-      self%switching = incidence%selected(machine%switches%element, with_ratio_only=.true.)
-      self%start_twist = machine%start_twist()
-      self%twists = twist_map(incidence, without_offset=.not. any(abs(self%start_twist) > 0), without_bands=is_block)
-      self%moment = 0.0_wp * self%start_twist
+      self%moment = 0.0_wp * self%zero_twist
       if (allocated(self%terms)) deallocate (self%terms)
       if (allocated(self%lane_motion)) deallocate (self%lane_motion)
       if (machine%lanes > 1 .and. self%quadratures == 0 .and. is_polynomial_or_external(machine)) then
@@ -150,13 +135,9 @@ contains
 
     call parameters%clear()
     call parameters%add_structure([self%states, self%quadratures, self%switches])
-    call self%machine%list_parameters(parameters)
-    call parameters%add('start_twist', self%start_twist)
-    call self%incidence%list_parameters(parameters)
-    call self%twists%list_parameters(parameters)
+    call self%list_coordinates(parameters)
     call self%accelerations%list_parameters(parameters)
     call self%element_jacobian%list_parameters(parameters)
-    call self%switching%list_parameters(parameters)
   end subroutine list_parameters
 
   !> Updates copies and precomputed values after the parameters of a lane have changed.
@@ -164,58 +145,13 @@ contains
     class(reduced_t), intent(inout) :: self
     integer, intent(in) :: lane
 
+    call self%reset_origin(lane)
     call self%machine%laws%refresh_lane(lane)
     call self%series_kernel%refresh_lane(lane, self%machine%laws, self%twists, self%accelerations)
     if (.not. allocated(self%terms)) return
     call self%terms%add_lane_terms(self%machine, lane)
     if (allocated(self%lane_motion)) call self%lane_motion%invalidate(lane)
   end subroutine refresh_lane
-
-  !> Start speeds and angles of the coordinates and start values of the internal states; the work integrals are zero.
-  function start(self) result(y)
-    class(reduced_t), intent(in) :: self
-    real(wp), allocatable :: y(:, :)
-    integer :: l
-
-    allocate (y(self%lanes, self%states + self%quadratures), source=0.0_wp)
-    do l = 1, self%lanes
-      call self%project_start_speeds(l, y(l, :))
-    end do
-    y(:, self%mechanical + 1:self%states) = self%machine%start_internal()
-  end function start
-
-  !> Sets the start speeds of the coordinates of one lane; the rest of the state stays.
-  pure subroutine project_start_speeds(self, lane, y)
-    class(reduced_t), intent(in) :: self
-    integer, intent(in) :: lane
-    real(wp), intent(inout) :: y(:)   !! [states + quadratures]
-
-    call self%machine%coordinates%project(lane, self%machine%inertia(lane, :), self%machine%start_speed(lane, :), &
-                                          y(:self%machine%coordinates%freedoms))
-  end subroutine project_start_speeds
-
-  !> omega = L_tau q', eq. (82) of section 5, phi = start_angle + L_tau q, and the internal states.
-  subroutine set_state(self, y)
-    class(reduced_t), intent(inout) :: self
-    real(wp), contiguous, intent(in) :: y(:, :)   !! state, [lanes, states], at least
-    integer :: b, c, f, k, l
-
-    f = self%machine%coordinates%freedoms
-    associate (coordinates => self%machine%coordinates, start_angle => self%machine%start_angle)
-      do b = 1, self%machine%bodies
-        self%omega(:, b) = 0.0_wp
-        self%phi(:, b) = start_angle(:, b)
-        do k = coordinates%first(b), coordinates%first(b + 1) - 1
-          c = coordinates%coordinate(k)
-          do l = 1, self%lanes
-            self%omega(l, b) = self%omega(l, b) + coordinates%ratio(l, k) * y(l, c)
-            self%phi(l, b) = self%phi(l, b) + coordinates%ratio(l, k) * y(l, f + c)
-          end do
-        end do
-      end do
-    end associate
-    if (self%internal > 0) self%machine%elements%internal%value(:, :) = y(:, self%mechanical + 1:self%states)
-  end subroutine set_state
 
   !> q'' = R M, and the derivatives of internal states and work integrals.
   subroutine derivative(self, t, y, dydt, status)
@@ -241,7 +177,7 @@ contains
     integer :: i
 
     if (allocated(self%lane_motion)) then
-      call self%lane_motion%accelerate(self%machine, self%terms, self%twists, self%accelerations, self%start_twist, t, y, &
+      call self%lane_motion%accelerate(self%machine, self%terms, self%twists, self%accelerations, self%twist_at_origin, t, y, &
                                        y(n + 1), dydt)
     else
       call evaluate_at(self, n, internal, t, y)
@@ -263,7 +199,7 @@ contains
     real(wp), intent(in) :: t(self%lanes)         !! [s]
     real(wp), intent(in) :: y(2 * n + internal)   !! state
 
-    call self%twists%multiply_pair(self%start_twist, y(n + 1), y(1), self%machine%elements%angle, self%machine%elements%speed)
+    call self%twists%multiply_pair(self%twist_at_origin, y(n + 1), y(1), self%machine%elements%angle, self%machine%elements%speed)
     if (internal > 0) call copy(internal, y(2 * n + 1), self%machine%elements%internal%value)
     call self%machine%evaluate_elements(t)
   end subroutine evaluate_at
@@ -306,9 +242,9 @@ contains
     integer, intent(inout) :: status(self%lanes)
 
     if (allocated(self%lane_series)) then
-      call self%lane_series%expand(self%machine, self%terms, self%twists, self%accelerations, self%start_twist, columns, t, y)
+      call self%lane_series%expand(self%machine, self%terms, self%twists, self%accelerations, self%twist_at_origin, columns, t, y)
     else
-      call self%series_kernel%expand(self%machine, self%twists, self%accelerations, self%start_twist, &
+      call self%series_kernel%expand(self%machine, self%twists, self%accelerations, self%twist_at_origin, &
                               self%lanes * self%machine%coordinates%freedoms, self%lanes * columns, t, y)
     end if
   end subroutine series
@@ -330,24 +266,6 @@ contains
 
     sum = x + y
   end subroutine add
-
-  !> Relative angle and speed of the element of a switch.
-  pure subroutine switch_motion(self, lane, switch, y, angle, speed)
-    class(reduced_t), intent(in) :: self
-    integer, intent(in) :: lane, switch
-    real(wp), contiguous, intent(in) :: y(:)   !! state, [states + quadratures]
-    real(wp), intent(out) :: angle, speed      !! [rad], [rad/s]
-    integer :: k
-
-    angle = self%start_twist(lane, self%machine%switches%element(switch))
-    speed = 0.0_wp
-    associate (switching => self%switching, f => self%machine%coordinates%freedoms)
-      do k = switching%first(switch), switching%first(switch + 1) - 1
-        angle = angle + switching%ratio(lane, k) * y(f + switching%coordinate(k))
-        speed = speed + switching%ratio(lane, k) * y(switching%coordinate(k))
-      end do
-    end associate
-  end subroutine switch_motion
 
   !> Values of the Jacobian at the positions of `jacobian_pattern`.
   subroutine jacobian(self, t, y, dfdy, dfdt, status)
@@ -379,14 +297,5 @@ contains
 
     pattern = self%element_jacobian%pattern
   end function jacobian_pattern
-
-  !> Reactions from the torques of the last `observe`.
-  subroutine reactions(self, lane, lambda)
-    class(reduced_t), intent(inout) :: self
-    integer, intent(in) :: lane
-    real(wp), intent(out) :: lambda(:)   !! [rows]
-
-    call self%machine%coordinates%reactions_of_torques(lane, self%torque(lane, 1:), lambda)
-  end subroutine reactions
 
 end module nocdyn_reduced

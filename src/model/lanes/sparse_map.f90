@@ -23,13 +23,13 @@ module nocdyn_sparse_map
     integer, private :: columns = 0                      !! number of the last column that has an entry
     integer, private :: csr_rows = 0
     integer, private :: bands = 0
-    logical, private :: without_offset = .false.         !! whether Toeplitz bands do not read offsets, which are zero
     integer, allocatable, private :: row(:)              !! row of the matrix of each CSR row, [csr_rows]
     integer, allocatable :: first(:)                     !! first entry of each CSR row, [csr_rows + 1]
     integer, allocatable, private :: first_row(:)        !! of each band
     integer, allocatable, private :: rows(:)             !! number of rows of each band
     integer, allocatable, private :: width(:)            !! entries of each row of a band, at least 1
     logical, allocatable, private :: is_toeplitz(:)      !! of each band
+    logical, allocatable, private :: has_offset(:)       !! of each band; a Toeplitz band without does not read offsets
     integer, allocatable, private :: first_entry(:)      !! of each band
     integer, allocatable :: column(:)                    !! [entries]
     real(wp), allocatable :: coefficient(:, :)           !! [lanes, entries]
@@ -44,11 +44,11 @@ module nocdyn_sparse_map
 contains
 
   !> A map from rows in CSR form: row r has the entries first(r) to first(r + 1) - 1.
-  function new_sparse_map(first, column, coefficient, without_offset, without_bands) result(self)
+  function new_sparse_map(first, column, coefficient, has_offset, without_bands) result(self)
     integer, intent(in) :: first(:)               !! [rows + 1]
     integer, intent(in) :: column(:)              !! [entries]
     real(wp), intent(in) :: coefficient(:, :)     !! [lanes, entries]
-    logical, intent(in), optional :: without_offset   !! whether all offsets of `multiply_pair` will be zero; absent: .false.
+    logical, intent(in), optional :: has_offset(:)    !! rows whose offsets in `multiply_pair` may not be zero; absent: all
     logical, intent(in), optional :: without_bands    !! whether all rows are stored as CSR; absent: .false.
     type(sparse_map_t) :: self
     logical :: has_bands
@@ -56,7 +56,6 @@ contains
 
     rows = size(first) - 1
     self%lanes = size(coefficient, 1)
-    if (present(without_offset)) self%without_offset = without_offset
     has_bands = self%lanes == 1
     if (present(without_bands)) has_bands = has_bands .and. .not. without_bands
     self%all_rows = rows
@@ -64,9 +63,11 @@ contains
     allocate (self%row(rows), self%first(rows + 1))
     allocate (self%first_row(rows / short), self%first_entry(rows / short))
     allocate (self%rows(rows / short), self%width(rows / short), self%is_toeplitz(rows / short))
+    allocate (self%has_offset(rows / short), source=.true.)
     self%first(1) = 1
     call append_rows(first, column, coefficient, has_bands, order, self)
     call append_bands(first, order, entries, self)
+    if (present(has_offset)) call mark_offsets(has_offset, self)
     allocate (self%column(entries), self%coefficient(self%lanes, entries))
     self%column(:) = column(order(:entries))
     self%coefficient(:, :) = coefficient(:, order(:entries))
@@ -159,6 +160,17 @@ contains
     end do
   end subroutine append_bands
 
+  !> Marks the bands that have offsets.
+  pure subroutine mark_offsets(has_offset, self)
+    logical, intent(in) :: has_offset(:)   !! [rows]
+    type(sparse_map_t), intent(inout) :: self
+    integer :: s
+
+    do s = 1, self%bands
+      self%has_offset(s) = any(has_offset(self%first_row(s):self%first_row(s) + self%rows(s) - 1))
+    end do
+  end subroutine mark_offsets
+
   !> The transposed structure: the order of entries sorted by column, and the first entry of each column in that order.
   pure subroutine transposed_order(column, columns, order, first)
     integer, intent(in) :: column(:)     !! [entries]
@@ -219,7 +231,7 @@ contains
       associate (entry => self%first_entry(s), row => self%first_row(s))
         if (self%is_toeplitz(s)) then
           call pair_of_toeplitz(self%rows(s), self%width(s), self%columns, self%column(entry), &
-                                    self%coefficient(1, entry), self%without_offset, offset(row), x, y, u(row), v(row))
+                                    self%coefficient(1, entry), .not. self%has_offset(s), offset(row), x, y, u(row), v(row))
         else
           call pair_of_band(self%rows(s), self%width(s), self%columns, self%column(entry), self%coefficient(1, entry), &
                                offset(row), x, y, u(row), v(row))

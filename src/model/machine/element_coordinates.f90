@@ -207,16 +207,16 @@ contains
   end subroutine list_parameters
 
   !> The map U from coordinates to twists: the speeds of the elements are U q'.
-  function twist_map(incidence, without_offset, without_bands) result(map)
+  function twist_map(incidence, has_offset, without_bands) result(map)
     type(element_coordinates_t), intent(in) :: incidence
-    logical, intent(in) :: without_offset   !! whether all start twists are zero
+    logical, intent(in) :: has_offset(:)    !! elements whose angles may not be zero where the coordinates are, [elements]
     logical, intent(in) :: without_bands    !! whether the map is stored by rows only
     type(sparse_map_t) :: map
     type(element_coordinates_t) :: turning   ! entries with a ratio
     integer :: e
 
     turning = incidence%selected([(e, e=1, size(incidence%first) - 1)], with_ratio_only=.true.)
-    map = new_sparse_map(turning%first, turning%coordinate, turning%ratio, without_offset, without_bands)
+    map = new_sparse_map(turning%first, turning%coordinate, turning%ratio, has_offset, without_bands)
   end function twist_map
 
 end module nocdyn_element_coordinates

@@ -1,6 +1,6 @@
 !> A machine on a block of lanes: bodies, banks of elements, constraints, and the independent coordinates.
 module nocdyn_machine
-  use nocdyn_bank, only: bank_slot_t, bank_t, role_names
+  use nocdyn_bank, only: bank_slot_t, bank_t, role_coupling, role_names
   use nocdyn_constraints, only: constraints_t
   use nocdyn_coordinates, only: coordinates_t
   use nocdyn_elements, only: elements_t, new_elements
@@ -48,6 +48,8 @@ module nocdyn_machine
     procedure :: list_parameters
     procedure :: to_mean_torque
     procedure :: elastic
+    procedure :: stiff
+    procedure :: couplings
     procedure :: element_name
     procedure :: start_twist
     procedure :: start_internal
@@ -142,6 +144,37 @@ contains
     elements = [(self%banks(i)%bank%first - 1 + self%banks(i)%bank%elastic, i=1, size(self%banks))]
   end function elastic
 
+  !> Elements with a restoring moment in any lane, ascending.
+  pure function stiff(self) result(elements)
+    class(machine_t), intent(in) :: self
+    integer, allocatable :: elements(:)
+    logical :: is_stiff(size(self%elements%to))
+    integer :: e, i
+
+    is_stiff = any(abs(self%laws%linear) + abs(self%laws%cubic) > 0, dim=1)
+    do i = 1, size(self%banks)
+      associate (bank => self%banks(i)%bank)
+        if (.not. bank%has_polynomial_potential) is_stiff(bank%first:bank%last()) = .true.
+      end associate
+    end do
+    elements = self%elastic()
+    elements = pack(elements, [(is_stiff(elements(e)), e=1, size(elements))])
+  end function stiff
+
+  !> Elements of the role coupling, ascending.
+  pure function couplings(self) result(elements)
+    class(machine_t), intent(in) :: self
+    integer, allocatable :: elements(:)
+    integer :: e, i
+
+    elements = [integer ::]
+    do i = 1, size(self%banks)
+      associate (bank => self%banks(i)%bank)
+        if (bank%role == role_coupling) elements = [elements, [(e, e=bank%first, bank%last())]]
+      end associate
+    end do
+  end function couplings
+
   !> Twists of the elements at the start [rad], [lanes, elements].
   pure function start_twist(self) result(twist)
     class(machine_t), intent(in) :: self
@@ -193,22 +226,18 @@ contains
     error stop 'nocdyn_machine: there are not so many inner states'
   end function internal_name
 
-  !> Chooses the branches of the laws in all lanes; reads the internal states in `elements`.
-  subroutine choose_branches(self, t, phi, omega)
+  !> Chooses the branches of the laws in all lanes, from the angles, speeds and internal states in `elements`.
+  subroutine choose_branches(self, t)
     class(machine_t), intent(inout) :: self
-    real(wp), contiguous, intent(in) :: t(:)           !! [s], [lanes]
-    real(wp), contiguous, intent(in) :: phi(:, 0:)     !! angles [rad], [lanes, 0:bodies], body 0 is the ground
-    real(wp), contiguous, intent(in) :: omega(:, 0:)   !! speeds [rad/s], [lanes, 0:bodies]
+    real(wp), contiguous, intent(in) :: t(:)   !! [s], [lanes]
     integer :: k, lane
 
-    associate (switches => self%switches, internal => self%elements%internal%value)
+    associate (switches => self%switches, elements => self%elements)
       do k = 1, switches%count
-        associate (from => self%elements%from(switches%element(k)), to => self%elements%to(switches%element(k)))
-          do lane = 1, self%lanes
-            call switches%choose(self%banks, k, lane, t(lane), phi(lane, to) - phi(lane, from), &
-                                 omega(lane, to) - omega(lane, from), internal(lane, :))
-          end do
-        end associate
+        do lane = 1, self%lanes
+          call switches%choose(self%banks, k, lane, t(lane), elements%angle(lane, switches%element(k)), &
+                               elements%speed(lane, switches%element(k)), elements%internal%value(lane, :))
+        end do
       end do
     end associate
   end subroutine choose_branches

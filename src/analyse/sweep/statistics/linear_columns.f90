@@ -29,7 +29,8 @@ module nocdyn_linear_columns
     integer, allocatable, private :: ratio(:)       !! entry of the coordinates, 0 if it only completes a pair; [entries]
     logical, allocatable, private :: is_minus(:)    !! whether the factor is the negative of that ratio, [entries]
     logical, allocatable, private :: is_speed(:)    !! [columns]
-    integer, allocatable, private :: element(:)     !! whose moment the column is, 0 if it is none; [columns]
+    integer, allocatable, private :: element(:)     !! whose twist or moment the column is, 0 if it is none; [columns]
+    logical, allocatable, private :: has_law(:)     !! whether it is a moment; [columns]
     integer, allocatable, private :: from(:), to(:) !! bodies of the angle or twist, 0 is the ground; [columns]
   contains
     procedure :: copy_lane, is_increasing, argument, law
@@ -83,6 +84,7 @@ contains
     allocate (self%first(self%count + 1), source=1)
     allocate (self%component(0), self%ratio(0), self%is_minus(0))
     allocate (self%is_speed, source=columns%kind == column_speed)
+    allocate (self%has_law(self%count), source=.false.)
     allocate (self%element(self%count), self%from(self%count), self%to(self%count), source=0)
     do i = 1, self%count
       call set_column(self, i, block%machine, columns(i))
@@ -98,14 +100,13 @@ contains
     integer, intent(in) :: number
     type(machine_t), intent(in) :: machine
     type(column_t), intent(in) :: column
-    integer :: element
 
     self%to(number) = column%index
     if (column%kind /= column_element) return
-    element = machine%banks(column%bank)%bank%first - 1 + column%index
-    self%to(number) = machine%elements%to(element)
-    self%from(number) = machine%elements%from(element)
-    if (has_law(machine, column)) self%element(number) = element
+    self%element(number) = machine%banks(column%bank)%bank%first - 1 + column%index
+    self%to(number) = machine%elements%to(self%element(number))
+    self%from(number) = machine%elements%from(self%element(number))
+    self%has_law(number) = has_law(machine, column)
   end subroutine set_column
 
   subroutine add_entries(self, number, coordinates)
@@ -148,10 +149,12 @@ contains
       do i = 1, self%count
         if (self%is_speed(i)) cycle
         associate (offset => self%offset(at, i, strip))
-          offset = 0.0_wp
-          if (self%to(i) > 0) offset = machine%start_angle(lane, self%to(i))
-          if (self%from(i) > 0) offset = offset - machine%start_angle(lane, self%from(i))
-          if (self%element(i) == 0) cycle
+          if (self%element(i) == 0) then
+            offset = block%angle_at_zero(lane, self%to(i))
+            cycle
+          end if
+          offset = block%twist_at_zero(lane, self%element(i))
+          if (.not. self%has_law(i)) cycle
           offset = offset - machine%laws%rest(lane, self%element(i))
           self%linear(at, i, strip) = machine%laws%linear(lane, self%element(i))
           self%cubic(at, i, strip) = machine%laws%cubic(lane, self%element(i))

@@ -42,7 +42,7 @@ module nocdyn_statistics_observer
     logical, allocatable, private :: needs_fallback(:)        !! [lanes]
     logical, allocatable, private :: is_complete(:)           !! lanes that have reached the end
   contains
-    procedure :: start_lane, results, on_output, on_steps
+    procedure :: start_lane, results, on_output, on_steps, on_shift
   end type statistics_observer_t
 
 contains
@@ -139,6 +139,7 @@ contains
 
     self%is_complete(lane) = .false.
     self%needs_fallback(lane) = .false.
+    call self%block%reset_origin(lane)
     call self%linear%start_lane(self%block, lane, y)
     do i = 1, size(self%fallback_index)
       if (self%fallback_index(i) == 0) cycle
@@ -201,6 +202,17 @@ contains
     call self%linear%finish_lane(lane, y)
     if (self%uses_sampled) call self%sampled%finish_lane(lane, t, y)
   end subroutine on_output
+
+  !> Takes the shift that `block` has made of the state of a lane.
+  subroutine on_shift(self, lane, shift)
+    class(statistics_observer_t), intent(inout) :: self
+    integer, intent(in) :: lane
+    real(wp), contiguous, intent(in) :: shift(:)
+
+    call self%linear%columns%copy_lane(self%block, lane)
+    if (self%uses_sampled) call self%sampled%recorded%move_origin(lane, shift)
+    if (self%needs_fallback(lane)) call self%fallback%recorded%move_origin(lane, shift)
+  end subroutine on_shift
 
   subroutine on_steps(self, steps, y, y_new, c)
     class(statistics_observer_t), intent(inout) :: self

@@ -1,0 +1,247 @@
+!> Formulations whose states are the speeds and angles of the independent coordinates, q' and q: `reduced`.
+!>
+!> q is measured from the start and from an origin that moves with the rigid motions: phi = start_angle + L_tau (origin + q). The
+!> elements have the angles u = u_0 + U q and the speeds u' = U q', which are no differences of large angles.
+module nocdyn_coordinate_formulation
+  use nocdyn_element_coordinates, only: element_coordinates_t, new_element_coordinates, twist_map
+  use nocdyn_error_measures, only: new_error_measures
+  use nocdyn_formulation, only: formulation_t
+  use nocdyn_kinds, only: wp
+  use nocdyn_lane_parameters, only: lane_parameters_t
+  use nocdyn_moving_origin, only: moving_origin_t, new_moving_origin
+  use nocdyn_sparse_map, only: sparse_map_t
+  implicit none (type, external)
+  private
+
+  !> Extensions compute the accelerations.
+  type, abstract, extends(formulation_t), public :: coordinate_formulation_t
+    real(wp), allocatable :: twist_at_origin(:, :)       !! u_0 [rad], [lanes, elements]: `zero_twist` and the moving origin
+    type(sparse_map_t) :: twists                         !! U
+    type(element_coordinates_t) :: incidence             !! entries of which U is made
+    type(element_coordinates_t) :: switching             !! entries of the elements that switch
+    type(moving_origin_t), private :: origin
+  contains
+    procedure :: set_coordinates
+    procedure :: list_coordinates
+    procedure :: start
+    procedure :: project_start_speeds
+    procedure :: set_state
+    procedure :: gather
+    procedure :: find_far
+    procedure :: shift_state
+    procedure :: move_origin
+    procedure :: restore_state
+    procedure :: reset_origin
+    procedure :: angle_at_zero
+    procedure :: twist_at_zero
+    procedure :: switch_motion
+    procedure :: reactions
+  end type coordinate_formulation_t
+
+contains
+
+  !> Forms what depends on the coordinates of `machine`.
+  subroutine set_coordinates(self, with_energy_balance, is_block)
+    class(coordinate_formulation_t), intent(inout) :: self
+    logical, intent(in) :: with_energy_balance   !! whether the powers of the elements `machine%with_work` are integrated
+    logical, intent(in) :: is_block              !! whether a single lane gets the layout of a block
+    type(element_coordinates_t) :: turning   ! entries of the couplings
+    integer, allocatable :: couplings(:)
+    logical :: has_offset(size(self%machine%elements%to))
+
+    call self%allocate_state(self%machine%coordinates%body, 2 * self%machine%coordinates%freedoms, with_energy_balance)
+    self%incidence = new_element_coordinates(self%machine%elements, self%machine%coordinates)
+    self%zero_twist = self%machine%start_twist()
+    self%twist_at_origin = self%zero_twist
+    associate (machine => self%machine, incidence => self%incidence, freedoms => self%machine%coordinates%freedoms)
+      self%switching = incidence%selected(machine%switches%element, with_ratio_only=.true.)
+      self%origin = new_moving_origin(machine%lanes, freedoms, incidence, machine%stiff())
+      has_offset = any(abs(self%zero_twist) > 0, dim=1)
+      has_offset(self%origin%turning) = .true.
+      self%twists = twist_map(incidence, has_offset, without_bands=is_block)
+      self%may_shift = self%origin%motions%freedoms() > 0
+      allocate (couplings, source=machine%couplings())
+      turning = incidence%selected(couplings, with_ratio_only=.true.)
+      call self%set_norm(new_error_measures(couplings, turning%first, turning%coordinate, turning%ratio, &
+                                            self%origin%motions%free, freedoms, self%states, without_bands=is_block))
+    end associate
+  end subroutine set_coordinates
+
+  !> Registers the arrays that may differ from variant to variant.
+  subroutine list_coordinates(self, parameters)
+    class(coordinate_formulation_t), target, intent(inout) :: self
+    type(lane_parameters_t), intent(inout) :: parameters
+
+    call self%machine%list_parameters(parameters)
+    call parameters%add('zero_twist', self%zero_twist)
+    call self%incidence%list_parameters(parameters)
+    call self%twists%list_parameters(parameters)
+    call self%switching%list_parameters(parameters)
+    call self%origin%list_parameters(parameters)
+    call self%list_norm(parameters)
+  end subroutine list_coordinates
+
+  !> Start speeds and angles of the coordinates and start values of the internal states; the work integrals are zero.
+  function start(self) result(y)
+    class(coordinate_formulation_t), intent(in) :: self
+    real(wp), allocatable :: y(:, :)
+    integer :: l
+
+    allocate (y(self%lanes, self%states + self%quadratures), source=0.0_wp)
+    do l = 1, self%lanes
+      call self%project_start_speeds(l, y(l, :))
+    end do
+    y(:, self%mechanical + 1:self%states) = self%machine%start_internal()
+  end function start
+
+  !> Sets the start speeds of the coordinates of one lane; the rest of the state stays.
+  pure subroutine project_start_speeds(self, lane, y)
+    class(coordinate_formulation_t), intent(in) :: self
+    integer, intent(in) :: lane
+    real(wp), intent(inout) :: y(:)   !! [states + quadratures]
+
+    call self%machine%coordinates%project(lane, self%machine%inertia(lane, :), self%machine%start_speed(lane, :), &
+                                          y(:self%machine%coordinates%freedoms))
+  end subroutine project_start_speeds
+
+  !> omega = L_tau q', eq. (82) of section 5, phi = start_angle + L_tau (origin + q), and the internal states.
+  subroutine set_state(self, y)
+    class(coordinate_formulation_t), intent(inout) :: self
+    real(wp), contiguous, intent(in) :: y(:, :)   !! state, [lanes, states], at least
+    integer :: b, c, f, k, l
+
+    f = self%machine%coordinates%freedoms
+    associate (coordinates => self%machine%coordinates, start_angle => self%machine%start_angle)
+      do b = 1, self%machine%bodies
+        self%omega(:, b) = 0.0_wp
+        self%phi(:, b) = start_angle(:, b)
+        do k = coordinates%first(b), coordinates%first(b + 1) - 1
+          c = coordinates%coordinate(k)
+          do l = 1, self%lanes
+            self%omega(l, b) = self%omega(l, b) + coordinates%ratio(l, k) * y(l, c)
+            self%phi(l, b) = self%phi(l, b) + coordinates%ratio(l, k) * (self%origin%q(l, c) + y(l, f + c))
+          end do
+        end do
+      end do
+    end associate
+    if (self%internal > 0) self%machine%elements%internal%value(:, :) = y(:, self%mechanical + 1:self%states)
+  end subroutine set_state
+
+  !> Sets the motion of bodies and elements; the twists are not differences of the bodies' angles, which may be large.
+  subroutine gather(self, y)
+    class(coordinate_formulation_t), intent(inout) :: self
+    real(wp), contiguous, intent(in) :: y(:, :)   !! [lanes, states], at least
+
+    call self%set_state(y)
+    associate (f => self%machine%coordinates%freedoms, elements => self%machine%elements)
+      call self%twists%multiply_pair(self%twist_at_origin, y(:, f + 1:2 * f), y(:, :f), elements%angle, elements%speed)
+    end associate
+  end subroutine gather
+
+  !> Finds the lanes in which a rigid motion has gone far from the origin.
+  subroutine find_far(self, columns, y, is_far)
+    class(coordinate_formulation_t), intent(in) :: self
+    integer, intent(in) :: columns
+    real(wp), intent(in) :: y(self%lanes, columns)   !! [lanes, states], at least
+    logical, intent(inout) :: is_far(self%lanes)
+
+    call self%origin%find_far(self%lanes, columns, self%machine%coordinates%freedoms, y, is_far)
+  end subroutine find_far
+
+  !> Puts the coordinates of a lane back near the origin, and moves the origin instead.
+  subroutine shift_state(self, lane, y, shift)
+    class(coordinate_formulation_t), intent(inout) :: self
+    integer, intent(in) :: lane
+    real(wp), contiguous, intent(inout) :: y(:, :)     !! [lanes, columns]
+    real(wp), contiguous, intent(inout) :: shift(:)    !! [states + quadratures]
+
+    associate (first => self%machine%coordinates%freedoms + 1, last => 2 * self%machine%coordinates%freedoms)
+      shift(:) = 0.0_wp
+      shift(first:last) = self%origin%shift_of(lane, y(lane, first:last))
+      y(lane, first:last) = y(lane, first:last) - shift(first:last)
+    end associate
+    call self%move_origin(lane, shift)
+  end subroutine shift_state
+
+  subroutine move_origin(self, lane, shift)
+    class(coordinate_formulation_t), intent(inout) :: self
+    integer, intent(in) :: lane
+    real(wp), intent(in) :: shift(:)   !! [states], at least
+
+    associate (f => self%machine%coordinates%freedoms)
+      call self%origin%move(lane, shift(f + 1:2 * f))
+    end associate
+    self%twist_at_origin(lane, :) = self%zero_twist(lane, :)
+    call self%origin%move_twists(lane, self%incidence, self%twist_at_origin(lane, :))
+  end subroutine move_origin
+
+  subroutine restore_state(self, lane, y)
+    class(coordinate_formulation_t), intent(inout) :: self
+    integer, intent(in) :: lane
+    real(wp), contiguous, intent(inout) :: y(:)   !! [states + quadratures]
+
+    associate (f => self%machine%coordinates%freedoms)
+      y(f + 1:2 * f) = y(f + 1:2 * f) + self%origin%q(lane, :)
+    end associate
+    call self%reset_origin(lane)
+  end subroutine restore_state
+
+  !> Puts the origin of a lane back to the start.
+  subroutine reset_origin(self, lane)
+    class(coordinate_formulation_t), intent(inout) :: self
+    integer, intent(in) :: lane
+
+    call self%origin%clear(lane)
+    self%twist_at_origin(lane, :) = self%zero_twist(lane, :)
+  end subroutine reset_origin
+
+  !> The angle of a body where the angles in the state are zero [rad].
+  pure real(wp) function angle_at_zero(self, lane, body)
+    class(coordinate_formulation_t), intent(in) :: self
+    integer, intent(in) :: lane, body
+    integer :: k
+
+    angle_at_zero = self%machine%start_angle(lane, body)
+    associate (coordinates => self%machine%coordinates)
+      do k = coordinates%first(body), coordinates%first(body + 1) - 1
+        angle_at_zero = angle_at_zero + coordinates%ratio(lane, k) * self%origin%q(lane, coordinates%coordinate(k))
+      end do
+    end associate
+  end function angle_at_zero
+
+  !> The same for the twist of an element [rad].
+  pure real(wp) function twist_at_zero(self, lane, element)
+    class(coordinate_formulation_t), intent(in) :: self
+    integer, intent(in) :: lane, element
+
+    twist_at_zero = self%twist_at_origin(lane, element)
+  end function twist_at_zero
+
+  !> Relative angle and speed of the element of a switch.
+  pure subroutine switch_motion(self, lane, switch, y, angle, speed)
+    class(coordinate_formulation_t), intent(in) :: self
+    integer, intent(in) :: lane, switch
+    real(wp), contiguous, intent(in) :: y(:)   !! state, [states + quadratures]
+    real(wp), intent(out) :: angle, speed      !! [rad], [rad/s]
+    integer :: k
+
+    angle = self%twist_at_origin(lane, self%machine%switches%element(switch))
+    speed = 0.0_wp
+    associate (switching => self%switching, f => self%machine%coordinates%freedoms)
+      do k = switching%first(switch), switching%first(switch + 1) - 1
+        angle = angle + switching%ratio(lane, k) * y(f + switching%coordinate(k))
+        speed = speed + switching%ratio(lane, k) * y(switching%coordinate(k))
+      end do
+    end associate
+  end subroutine switch_motion
+
+  !> Reactions from the torques of the last `observe`.
+  subroutine reactions(self, lane, lambda)
+    class(coordinate_formulation_t), intent(inout) :: self
+    integer, intent(in) :: lane
+    real(wp), intent(out) :: lambda(:)   !! [rows]
+
+    call self%machine%coordinates%reactions_of_torques(lane, self%torque(lane, 1:), lambda)
+  end subroutine reactions
+
+end module nocdyn_coordinate_formulation

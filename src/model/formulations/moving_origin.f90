@@ -1,0 +1,139 @@
+!> The origin of the coordinates, which moves with the rigid motions of a machine: q stands for origin + q.
+!>
+!> A machine that turns has angles that grow without bound, and its twists are small differences of them. Where the angle of a
+!> rigid motion has become large, all coordinates that turn with it are put back, so that their differences keep their digits.
+!> The origin of each rigid motion is a whole multiple of 64 rad, which is added up exactly.
+module nocdyn_moving_origin
+  use nocdyn_element_coordinates, only: element_coordinates_t
+  use nocdyn_kinds, only: wp
+  use nocdyn_lane_parameters, only: lane_parameters_t
+  use nocdyn_rigid_motions, only: new_rigid_motions, rigid_motions_t
+  implicit none (type, external)
+  private
+
+  public :: new_moving_origin
+
+  real(wp), parameter :: far = 256.0_wp    !! angle from which a rigid motion is put back [rad]
+  real(wp), parameter :: unit = 64.0_wp    !! of which the origins are multiples [rad]
+
+  type, public :: moving_origin_t
+    type(rigid_motions_t) :: motions
+    real(wp), allocatable :: q(:, :)                      !! origin of the coordinates [rad], [lanes, coordinates]
+    integer, allocatable :: turning(:)                    !! elements that are not elastic but turn with a rigid motion
+    real(wp), allocatable, private :: ratio(:, :)         !! as in `motions`, of each lane, [lanes, entries]
+    real(wp), allocatable, private :: angle(:, :)         !! origin of the rigid motions [rad], [lanes, motions]
+  contains
+    procedure :: find_far
+    procedure :: shift_of
+    procedure :: move
+    procedure :: clear
+    procedure :: move_twists
+    procedure :: list_parameters
+  end type moving_origin_t
+
+contains
+
+  !> The origin of a block of equal lanes.
+  function new_moving_origin(lanes, freedoms, incidence, elastic) result(self)
+    integer, intent(in) :: lanes
+    integer, intent(in) :: freedoms                        !! number of coordinates
+    type(element_coordinates_t), intent(in) :: incidence   !! twists of the elements by coordinates
+    integer, intent(in) :: elastic(:)                      !! elements that must not be twisted
+    type(moving_origin_t) :: self
+    logical :: is_turning(size(incidence%first) - 1)
+    integer :: e
+
+    self%motions = new_rigid_motions(freedoms, incidence, elastic)
+    allocate (self%q(lanes, freedoms), self%angle(lanes, self%motions%freedoms()), source=0.0_wp)
+    allocate (self%ratio, source=spread(self%motions%ratio, 1, lanes))
+    is_turning = .true.
+    is_turning(elastic) = .false.
+    self%turning = pack([(e, e=1, size(is_turning))], is_turning)
+  end function new_moving_origin
+
+  !> Finds the lanes in which a rigid motion is far from the origin.
+  pure subroutine find_far(self, lanes, columns, before, y, is_far)
+    class(moving_origin_t), intent(in) :: self
+    integer, intent(in) :: lanes, columns
+    integer, intent(in) :: before                !! columns before the angles of the coordinates
+    real(wp), intent(in) :: y(lanes, columns)    !! angles [rad]
+    logical, intent(inout) :: is_far(lanes)
+    integer :: m
+
+    is_far = .false.
+    do m = 1, size(self%motions%free)
+      is_far = is_far .or. abs(y(:, before + self%motions%free(m))) > far
+    end do
+  end subroutine find_far
+
+  !> The shift of the coordinates of a lane that brings its rigid motions back near the origin [rad], [coordinates].
+  pure function shift_of(self, lane, q) result(shift)
+    class(moving_origin_t), intent(in) :: self
+    integer, intent(in) :: lane
+    real(wp), intent(in) :: q(:)   !! angles of the coordinates [rad]
+    real(wp) :: shift(size(q))
+
+    shift = along_motions(self, lane, unit * anint(q(self%motions%free) / unit))
+  end function shift_of
+
+  !> Moves the origin of a lane by a shift that `shift_of` gave.
+  pure subroutine move(self, lane, shift)
+    class(moving_origin_t), intent(inout) :: self
+    integer, intent(in) :: lane
+    real(wp), intent(in) :: shift(:)   !! [rad], [coordinates]
+
+    self%angle(lane, :) = self%angle(lane, :) + shift(self%motions%free)
+    self%q(lane, :) = along_motions(self, lane, self%angle(lane, :))
+  end subroutine move
+
+  !> Moves the origin of a lane back to zero.
+  pure subroutine clear(self, lane)
+    class(moving_origin_t), intent(inout) :: self
+    integer, intent(in) :: lane
+
+    self%angle(lane, :) = 0.0_wp
+    self%q(lane, :) = 0.0_wp
+  end subroutine clear
+
+  !> Angles of the coordinates from those of the rigid motions.
+  pure function along_motions(self, lane, angle) result(q)
+    type(moving_origin_t), intent(in) :: self
+    integer, intent(in) :: lane
+    real(wp), intent(in) :: angle(:)   !! [rad], [motions]
+    real(wp) :: q(size(self%q, 2))
+    integer :: c, k
+
+    do c = 1, size(q)
+      q(c) = 0.0_wp
+      do k = self%motions%first(c), self%motions%first(c + 1) - 1
+        q(c) = q(c) + self%ratio(lane, k) * angle(self%motions%freedom(k))
+      end do
+    end do
+  end function along_motions
+
+  !> Adds the angle of the origin to those of the elements that turn with it. Elastic elements do not feel it.
+  pure subroutine move_twists(self, lane, incidence, twist)
+    class(moving_origin_t), intent(in) :: self
+    integer, intent(in) :: lane
+    type(element_coordinates_t), intent(in) :: incidence
+    real(wp), intent(inout) :: twist(:)   !! [rad], [elements]
+    integer :: e, i, k
+
+    do i = 1, size(self%turning)
+      e = self%turning(i)
+      do k = incidence%first(e), incidence%first(e + 1) - 1
+        twist(e) = twist(e) + incidence%ratio(lane, k) * self%q(lane, incidence%coordinate(k))
+      end do
+    end do
+  end subroutine move_twists
+
+  !> Registers the arrays that may differ from variant to variant.
+  subroutine list_parameters(self, parameters)
+    class(moving_origin_t), target, intent(inout) :: self
+    type(lane_parameters_t), intent(inout) :: parameters
+
+    call parameters%add_structure(self%motions%free, self%motions%first, self%motions%freedom)
+    call parameters%add('rigid motions: ratio', self%ratio)
+  end subroutine list_parameters
+
+end module nocdyn_moving_origin
