@@ -29,7 +29,7 @@ def test_a_machine_that_blows_up_fails_with_time_and_state(nocdyn, method):
     outcome = nocdyn("run", "exploding.nml", "--out", "out", "--set", f"run.method={method}")
     assert (outcome.returncode, outcome.stdout) == (1, "")
     assert outcome.stderr.startswith("nocdyn: exploding.nml: the step size became too small at t = 1.31")
-    assert " of 'disc' " in outcome.stderr
+    assert "twist of 'shaft' cannot be kept within" in outcome.stderr
     assert outcome.stderr.endswith("; the rows up to t = 1.3 s are in out/trajectory.partial.csv\n")
     assert nocdyn.files("out") == PARTIAL
 

@@ -55,7 +55,7 @@ contains
     self%twist_at_origin = self%zero_twist
     associate (machine => self%machine, incidence => self%incidence, freedoms => self%machine%coordinates%freedoms)
       self%switching = incidence%selected(machine%switches%element, with_ratio_only=.true.)
-      self%origin = new_moving_origin(machine%lanes, freedoms, incidence, machine%stiff())
+      self%origin = new_moving_origin(machine%lanes, freedoms, incidence, machine%stiff(), machine%has_springs_only())
       has_offset = any(abs(self%zero_twist) > 0, dim=1)
       has_offset(self%origin%turning) = .true.
       self%twists = twist_map(incidence, has_offset, without_bands=is_block)
@@ -191,7 +191,7 @@ contains
     class(coordinate_formulation_t), intent(inout) :: self
     integer, intent(in) :: lane
 
-    call self%origin%clear(lane)
+    call self%origin%start_lane(lane, self%incidence, self%machine%laws%linear(lane, :))
     self%twist_at_origin(lane, :) = self%zero_twist(lane, :)
   end subroutine reset_origin
 

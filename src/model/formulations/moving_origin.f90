@@ -2,7 +2,8 @@
 !>
 !> A machine that turns has angles that grow without bound, and its twists are small differences of them. Where the angle of a
 !> rigid motion has become large, all coordinates that turn with it are put back, so that their differences keep their digits.
-!> The origin of each rigid motion is a whole multiple of 64 rad, which is added up exactly.
+!> The rounding of an angle disturbs the acceleration of a twist in proportion to the square of its natural frequency: the
+!> stiffer a machine, the smaller its angles are kept. An origin is a whole multiple of a power of two, added up exactly.
 module nocdyn_moving_origin
   use nocdyn_element_coordinates, only: element_coordinates_t
   use nocdyn_kinds, only: wp
@@ -13,8 +14,10 @@ module nocdyn_moving_origin
 
   public :: new_moving_origin
 
-  real(wp), parameter :: far = 256.0_wp    !! angle from which a rigid motion is put back [rad]
-  real(wp), parameter :: unit = 64.0_wp    !! of which the origins are multiples [rad]
+  real(wp), parameter :: noise = 1.0e6_wp        !! largest angle times the square of a natural frequency [rad/s2]
+  integer, parameter :: smallest_exponent = 0    !! of the angles, powers of two
+  integer, parameter :: largest_exponent = 8     !! of a machine of springs
+  integer, parameter :: usual_exponent = 4       !! of a machine with other elastic laws
 
   type, public :: moving_origin_t
     type(rigid_motions_t) :: motions
@@ -22,11 +25,14 @@ module nocdyn_moving_origin
     integer, allocatable :: turning(:)                    !! elements that are not elastic but turn with a rigid motion
     real(wp), allocatable, private :: ratio(:, :)         !! as in `motions`, of each lane, [lanes, entries]
     real(wp), allocatable, private :: angle(:, :)         !! origin of the rigid motions [rad], [lanes, motions]
+    real(wp), allocatable, private :: unit(:)             !! angle from which a rigid motion is put back [rad], [lanes]
+    integer, allocatable, private :: elastic(:)           !! elements that must not be twisted
+    logical, private :: has_springs_only = .true.         !! whether the laws of these are polynomials
   contains
     procedure :: find_far
     procedure :: shift_of
     procedure :: move
-    procedure :: clear
+    procedure :: start_lane
     procedure :: move_twists
     procedure :: list_parameters
   end type moving_origin_t
@@ -34,17 +40,21 @@ module nocdyn_moving_origin
 contains
 
   !> The origin of a block of equal lanes.
-  function new_moving_origin(lanes, freedoms, incidence, elastic) result(self)
+  function new_moving_origin(lanes, freedoms, incidence, elastic, has_springs_only) result(self)
     integer, intent(in) :: lanes
     integer, intent(in) :: freedoms                        !! number of coordinates
     type(element_coordinates_t), intent(in) :: incidence   !! twists of the elements by coordinates
     integer, intent(in) :: elastic(:)                      !! elements that must not be twisted
+    logical, intent(in) :: has_springs_only                !! whether the laws of these are polynomials
     type(moving_origin_t) :: self
     logical :: is_turning(size(incidence%first) - 1)
     integer :: e
 
     self%motions = new_rigid_motions(freedoms, incidence, elastic)
     allocate (self%q(lanes, freedoms), self%angle(lanes, self%motions%freedoms()), source=0.0_wp)
+    allocate (self%unit(lanes), source=1.0_wp)
+    allocate (self%elastic, source=elastic)
+    self%has_springs_only = has_springs_only
     allocate (self%ratio, source=spread(self%motions%ratio, 1, lanes))
     is_turning = .true.
     is_turning(elastic) = .false.
@@ -62,7 +72,7 @@ contains
 
     is_far = .false.
     do m = 1, size(self%motions%free)
-      is_far = is_far .or. abs(y(:, before + self%motions%free(m))) > far
+      is_far = is_far .or. abs(y(:, before + self%motions%free(m))) > self%unit
     end do
   end subroutine find_far
 
@@ -73,7 +83,7 @@ contains
     real(wp), intent(in) :: q(:)   !! angles of the coordinates [rad]
     real(wp) :: shift(size(q))
 
-    shift = along_motions(self, lane, unit * anint(q(self%motions%free) / unit))
+    shift = along_motions(self, lane, self%unit(lane) * anint(q(self%motions%free) / self%unit(lane)))
   end function shift_of
 
   !> Moves the origin of a lane by a shift that `shift_of` gave.
@@ -86,14 +96,27 @@ contains
     self%q(lane, :) = along_motions(self, lane, self%angle(lane, :))
   end subroutine move
 
-  !> Moves the origin of a lane back to zero.
-  pure subroutine clear(self, lane)
+  !> Moves the origin of a lane back to zero, and sets how far its rigid motions may go from it.
+  pure subroutine start_lane(self, lane, incidence, stiffness)
     class(moving_origin_t), intent(inout) :: self
     integer, intent(in) :: lane
+    type(element_coordinates_t), intent(in) :: incidence
+    real(wp), intent(in) :: stiffness(:)   !! linear stiffness of the elements [N m/rad], [elements]
+    real(wp) :: square   ! of the highest natural frequency of one element with the bodies that it joins
+    integer :: i
 
     self%angle(lane, :) = 0.0_wp
     self%q(lane, :) = 0.0_wp
-  end subroutine clear
+    square = noise * epsilon(square)
+    do i = 1, size(self%elastic)
+      associate (first => incidence%first(self%elastic(i)), last => incidence%first(self%elastic(i) + 1) - 1)
+        square = max(square, abs(stiffness(self%elastic(i))) &
+                     * sum(incidence%ratio(lane, first:last) * incidence%response(lane, first:last)))
+      end associate
+    end do
+    self%unit(lane) = 2.0_wp**max(smallest_exponent, min(exponent(noise / square), &
+                                                         merge(largest_exponent, usual_exponent, self%has_springs_only)))
+  end subroutine start_lane
 
   !> Angles of the coordinates from those of the rigid motions.
   pure function along_motions(self, lane, angle) result(q)

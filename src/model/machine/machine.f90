@@ -49,6 +49,7 @@ module nocdyn_machine
     procedure :: to_mean_torque
     procedure :: elastic
     procedure :: stiff
+    procedure :: has_springs_only
     procedure :: couplings
     procedure :: element_name
     procedure :: start_twist
@@ -160,6 +161,15 @@ contains
     elements = self%elastic()
     elements = pack(elements, [(is_stiff(elements(e)), e=1, size(elements))])
   end function stiff
+
+  !> Whether all restoring moments are polynomials.
+  pure logical function has_springs_only(self)
+    class(machine_t), intent(in) :: self
+    integer :: i
+
+    has_springs_only = all([(self%banks(i)%bank%has_polynomial_potential .or. size(self%banks(i)%bank%to) == 0, &
+                             i=1, size(self%banks))])
+  end function has_springs_only
 
   !> Elements of the role coupling, ascending.
   pure function couplings(self) result(elements)
