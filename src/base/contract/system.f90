@@ -3,8 +3,9 @@
 !> A block holds `lanes` copies of one system with different parameters. The lane is the first, contiguous index of every array,
 !> so that each operation is a loop over lanes; one machine is a block of one lane. A lane never reads the values of another lane.
 !>
-!> The last `quadratures` components of a state are pure integrals: the derivative depends on none of them. Error control allows
-!> them errors a thousand times larger, relative to the largest of them. Linear systems have only the first `states` components.
+!> The last `quadratures` components of a state are pure integrals: the derivative depends on none of them. Their errors are
+!> controlled loosely: those of all steps add up to about a ten-thousandth of what they change by in all. Linear systems have only
+!> the first `states` components.
 !>
 !> The Jacobian is a list of values at the positions that `jacobian_pattern` returns once, before the integration. By default
 !> these are all positions, column by column.

@@ -9,7 +9,7 @@ module nocdyn_step_control
   private
 
   public :: step_control, reset_control, resume_control, measure_start, advance_measures, measure_error, worst_measure, &
-    adapt_steps, shorten_step, propose_steps, smallest_step, any_too_small
+    quadrature_tolerance, adapt_steps, shorten_step, propose_steps, smallest_step, any_too_small
 
   ! The constants of Hairer's DOPRI5, for any order of the error estimate.
   real(wp), parameter :: beta = 0.04_wp             !! exponent of the previous error in the PI controller
@@ -19,7 +19,8 @@ module nocdyn_step_control
   real(wp), parameter :: final_stretch = 1.01_wp    !! a step is stretched by up to 1 % to end on the final time
   real(wp), parameter :: min_log_error = -13.287712379549449_wp   !! log2 of 1e-4
   real(wp), parameter :: low_order_share = 0.01_wp  !! weight of the second estimate in the error norm of Hairer's DOP853
-  real(wp), parameter :: quadrature_leniency = 1000.0_wp   !! ratio of the errors allowed in quadratures to those in states
+  real(wp), parameter :: quadrature_leniency = 100.0_wp    !! ratio of the errors allowed in quadratures to those in states
+  real(wp), parameter :: usual_rtol = 1.0e-6_wp            !! the quadratures are not less accurate than with this rtol
 
   real(wp), parameter :: no_error = 1.0e-30_wp         !! replaces an error of zero, whose logarithm is infinite
   real(wp), parameter :: largest_ratio = 1.0e100_wp    !! keeps the square of an error ratio finite
@@ -223,32 +224,44 @@ contains
     end if
   end function worst_measure
 
-  !> Raises `mean_square` where the error of a quadrature exceeds `quadrature_leniency` times the tolerance, relative to the
-  !> largest quadrature. Nothing else limits steps over which the states have no error, e.g. polynomials of the time. Two
-  !> estimates are combined as for the states.
+  !> Raises `mean_square` where the largest error of the quadratures exceeds what `quadrature_tolerance` allows. Nothing else
+  !> limits steps over which the states have no error, e.g. polynomials of the time. Two estimates are combined as for the states.
   pure subroutine limit_by_quadratures(attempt, y, y_new, error_estimate, low_order_estimate, control)
     type(step_attempt_t), intent(in) :: attempt
     real(wp), intent(in), dimension(attempt%lanes, attempt%components) :: y, y_new, error_estimate, low_order_estimate
     type(step_control_t), intent(inout) :: control
-    real(wp) :: low_order, error, largest
+    real(wp) :: low_order, error, largest, change
     integer :: i, lane
 
     do lane = 1, attempt%lanes
       error = 0.0_wp
       low_order = 0.0_wp
       largest = 0.0_wp
+      change = 0.0_wp
       do i = attempt%states + 1, attempt%components
         error = max(error, abs(error_estimate(lane, i)))
         if (attempt%has_low_order_estimate) low_order = max(low_order, abs(low_order_estimate(lane, i)))
         largest = max(largest, abs(y(lane, i)), abs(y_new(lane, i)))
+        change = max(change, abs(y_new(lane, i) - y(lane, i)))
       end do
       error = min(error, largest_ratio)
       if (error > 0) error = error * (error / hypot(error, sqrt(low_order_share) * low_order))
-      associate (ratio => error / (quadrature_leniency * (control%atol + control%rtol * largest)))
+      associate (ratio => error / quadrature_tolerance(control, largest, change))
         control%mean_square(lane) = max(control%mean_square(lane), min(ratio, largest_ratio)**2)
       end associate
     end do
   end subroutine limit_by_quadratures
+
+  !> The error allowed to the quadratures in a step: a share of what they change by, so that their errors add up to no more than
+  !> this share of all that is turned over; where they hardly change, 100 times the tolerance.
+  elemental real(wp) function quadrature_tolerance(control, largest, change) result(tolerance)
+    type(step_control_t), intent(in) :: control
+    real(wp), intent(in) :: largest   !! absolute value of a quadrature
+    real(wp), intent(in) :: change    !! absolute change of a quadrature in the step
+
+    tolerance = quadrature_leniency * (control%atol + min(control%rtol, usual_rtol) * change) &
+                + min(control%rtol, usual_rtol) * largest
+  end function quadrature_tolerance
 
   !> Replaces each error by (error / (atol + rtol max(|y|, |y_new|)))^2.
   pure subroutine square_scaled_errors(n, rtol, atol, y, y_new, error_estimate)

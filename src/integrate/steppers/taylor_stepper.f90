@@ -2,7 +2,7 @@
 !>
 !> The last two coefficients limit the step size: h is the smaller of ||y_j||^(-1/j), j = p - 1 and p, where the norm is the
 !> largest |y_j| / (atol + rtol |y|) of the states. The terms h^j y_j are then within the tolerance, and there is no error test
-!> after a step. With p = 1 - ln(tol) / 2 this is the step rho / e^2 of A. Jorba, M. Zou, A software package for the numerical
+!> after a step. The last terms of the quadratures are kept within theirs. With p = 1 - ln(tol) / 2 this is the step rho / e^2 of A. Jorba, M. Zou, A software package for the numerical
 !> integration of ODEs by means of high-order Taylor methods, Experimental Mathematics 14 (2005) 99-117. They assume that the
 !> work grows as p^2. Here it grows more slowly at small p, and the order is higher.
 module nocdyn_taylor_stepper
@@ -13,7 +13,7 @@ module nocdyn_taylor_stepper
   use nocdyn_stage_sums, only: padded_columns, width
   use nocdyn_step_attempt, only: attempt_not_finite, attempt_ok, attempt_recoverable, disable_lane, disable_non_finite_lanes, &
     step_attempt_t
-  use nocdyn_step_control, only: any_too_small, smallest_step, step_control_t
+  use nocdyn_step_control, only: any_too_small, quadrature_tolerance, smallest_step, step_control_t
   use nocdyn_stepper, only: stepper_t
   use nocdyn_system, only: evaluation_ok, system_t
   use nocdyn_vector_functions, only: exp2s, log2s
@@ -105,6 +105,7 @@ contains
     if (.not. are_finite) call clear_infinities(self)
     call measure_norms(self, system, attempt, control)
     call find_steps(attempt%lanes, self%order, self%last_norm, self%previous_norm)
+    if (attempt%components > attempt%states) call limit_by_quadratures(self, attempt, control)
     if (have_all_moved .and. are_finite .and. .not. any_differs(attempt%lanes, attempt%rhs_status, evaluation_ok)) then
       if (.not. any_too_small(attempt%lanes, attempt%t, self%last_norm)) then
         call take_all_steps(attempt%lanes, self%last_norm, self%moved, self%step_status, self%component, attempt%evaluations, &
@@ -232,6 +233,29 @@ contains
     end do
     call exp2s(lanes, last_norm)
   end subroutine find_steps
+
+  !> Shortens the steps, now in `last_norm`, in which the last terms of the quadratures exceed their tolerance.
+  pure subroutine limit_by_quadratures(self, attempt, control)
+    type(taylor_stepper_t), intent(inout) :: self
+    type(step_attempt_t), intent(in) :: attempt
+    type(step_control_t), intent(in) :: control
+    real(wp) :: allowed, excess, term
+    integer :: j, lane
+
+    do lane = 1, attempt%lanes
+      associate (h => self%last_norm(lane), first => attempt%states + 1, last => attempt%components)
+        h = min(h, max(control%t_end - attempt%t(lane), 0.0_wp))
+        do j = self%order - 1, self%order
+          term = maxval(abs(self%series(lane, first:last, j)))
+          allowed = quadrature_tolerance(control, maxval(abs(attempt%y(lane, first:last))), &
+                                         h * maxval(abs(self%series(lane, first:last, 1))))
+          if (.not. min(h, term) > 0) cycle
+          excess = j * log(h) + log(term) - log(allowed)
+          if (excess > 0) h = h * exp(-excess / (j - 1))
+        end do
+      end associate
+    end do
+  end subroutine limit_by_quadratures
 
   !> Sums the series at the end of the step.
   subroutine take_step(self, system, attempt)
