@@ -21,8 +21,10 @@ module nocdyn_run_summary
   public :: start_extremes, update_extremes, widen_extremes, describe_machine, check_energy_balance, check_extremes
   public :: summary_json, summary_line, method_line
 
-  !> The summary notes an energy residual above this share of the largest energy or work: such a motion is not to be trusted.
+  !> The summary notes an energy residual above this share of the largest energy of the vibration: such a motion is not to be
+  !> trusted.
   real(wp), parameter :: energy_error_limit = 0.01_wp
+  real(wp), parameter :: rounding_share = 1.0e-10_wp   !! of the largest energy or work: less may be rounding
 
   !> An extreme between the rows counts if it exceeds that of the rows by more than this share of the largest value. A smaller
   !> excess is rounding: a machine that starts at rest has its smallest energy at the start.
@@ -141,18 +143,28 @@ contains
   end subroutine describe_machine
 
   !> Adds a note on a large energy balance error. The last five columns are the energies and works; the last one is the error.
-  subroutine check_energy_balance(extremes, notes)
+  subroutine check_energy_balance(extremes, vibration, notes)
     type(extremes_t), intent(in) :: extremes
+    real(wp), intent(in) :: vibration   !! largest energy of the vibration [J]; 0 if nothing can vibrate
     type(string_t), allocatable, intent(inout) :: notes(:)
+    character(len=:), allocatable :: compared
     real(wp) :: residual, largest
     integer :: columns
 
     columns = size(extremes%last)
     residual = max(abs(extremes%lowest(columns)), abs(extremes%highest(columns)))
     largest = maxval(max(abs(extremes%lowest(columns - 4:columns - 1)), abs(extremes%highest(columns - 4:columns - 1))))
-    if (.not. extremes%have_begun .or. residual <= energy_error_limit * largest) return
-    call append(notes, 'large energy balance error: energy_residual reaches ' // rounded_text(residual, 3) // &
-                       ' J; the largest energy or work is ' // rounded_text(largest, 3) // ' J; tighten rtol and atol')
+    if (.not. extremes%have_begun) return
+    if (vibration > 0) then
+      if (residual <= max(energy_error_limit * vibration, rounding_share * largest)) return
+      compared = 'the vibration, as kinetic energy about the rigid motion and elastic energy, holds at most ' // &
+        rounded_text(vibration, 3)
+    else
+      if (residual <= energy_error_limit * largest) return
+      compared = 'the largest energy or work is ' // rounded_text(largest, 3)
+    end if
+    call append(notes, 'large energy balance error: energy_residual reaches ' // rounded_text(residual, 3) // ' J; ' // &
+                       compared // ' J; tighten rtol and atol')
   end subroutine check_energy_balance
 
   !> The text of summary.json.

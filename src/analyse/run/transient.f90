@@ -23,6 +23,7 @@ module nocdyn_transient
   use nocdyn_start_transient, only: find_start_transient
   use nocdyn_text, only: append, selected, string_t, to_text
   use nocdyn_trajectory_table, only: new_trajectory_table, trajectory_table_t
+  use nocdyn_vibration_energy, only: new_vibration, vibration_t
   implicit none (type, external)
   private
 
@@ -71,6 +72,7 @@ module nocdyn_transient
     real(wp), allocatable :: row(:)          !! [columns]
     integer, allocatable :: chosen(:)        !! columns that are written
     real(wp), allocatable :: written(:)      !! their values in the row
+    type(vibration_t) :: vibration           !! its energy in the rows
     real(wp) :: last_time = 0.0_wp           !! of the rows [s]
     real(wp), allocatable :: last_state(:)   !! at that time, [states + quadratures]
     real(wp) :: t_start, t_end               !! [s]
@@ -147,6 +149,7 @@ contains
     type(error_t), allocatable, intent(out) :: error   !! columns are asked for that there are not
 
     observer%table = new_trajectory_table(formulation, times(1), output_units(input))
+    observer%vibration = new_vibration(formulation%machine)
     observer%t_start = times(1)
     observer%t_end = times(size(times))
     if (input%groups(input%position('output'))%has_value('extremes_from')) then
@@ -206,7 +209,7 @@ contains
 
     summary%extremes = observer%extremes
     if (.not. allocated(error)) call check_extremes(summary%extremes, summary%labels, error)
-    call check_energy_balance(summary%extremes, summary%notes)
+    call check_energy_balance(summary%extremes, observer%vibration%largest, summary%notes)
     if (summary%extremes%rows > 0) then
       allocate (summary%energy_balance)
       call observer%table%find_energy_balance(observer%last_time, observer%last_state, summary%energy_balance)
@@ -238,6 +241,9 @@ contains
     self%failure_time = t
     if (self%not_finite > 0) return
     call update_extremes(self%extremes, self%row)
+    associate (formulation => self%table%columns%formulation)
+      call self%vibration%include_energy(formulation%machine, formulation%omega(1, 1:))
+    end associate
     self%written(:) = self%row(self%chosen)
     call self%output%write_row(self%written)
     self%last_time = t

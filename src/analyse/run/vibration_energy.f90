@@ -1,0 +1,63 @@
+!> The energy of the vibration of a machine: its kinetic energy about the rigid motions, and the elastic energy.
+!>
+!> The speeds of the rigid motion are those with the momentum of the bodies along each rigid motion:
+!> omega_r = P (P^T J P)^-1 P^T J omega, where the columns of P are the rigid motions.
+module nocdyn_vibration_energy
+  use nocdyn_element_coordinates, only: new_element_coordinates
+  use nocdyn_kinds, only: wp
+  use nocdyn_lapack, only: solve_positive_definite
+  use nocdyn_machine, only: machine_t
+  use nocdyn_rigid_motions, only: new_rigid_motions, rigid_motions_t
+  implicit none (type, external)
+  private
+
+  public :: new_vibration
+
+  type, public :: vibration_t
+    real(wp), allocatable, private :: motion(:, :)       !! P, [bodies, motions]
+    real(wp), allocatable, private :: momentum(:, :)     !! (P^T J P)^-1 P^T J, [motions, bodies]
+    real(wp) :: largest = 0.0_wp                         !! of the energies so far [J]
+  contains
+    procedure :: include_energy
+  end type vibration_t
+
+contains
+
+  !> The rigid motions of a machine of one lane. Without an elastic element there is no vibration, and its energy is 0.
+  type(vibration_t) function new_vibration(machine) result(self)
+    type(machine_t), intent(in) :: machine
+    type(rigid_motions_t) :: motions
+    real(wp), allocatable :: speeds(:), momentum(:, :)
+    logical :: is_indefinite
+    integer :: b, k, m
+
+    if (size(machine%stiff()) == 0) return
+    associate (coordinates => machine%coordinates)
+      motions = new_rigid_motions(coordinates%freedoms, new_element_coordinates(machine%elements, coordinates), machine%stiff())
+      allocate (self%motion(machine%bodies, motions%freedoms()), source=0.0_wp)
+      do m = 1, motions%freedoms()
+        speeds = motions%speeds([(merge(1.0_wp, 0.0_wp, k == m), k=1, motions%freedoms())])
+        do b = 1, machine%bodies
+          do k = coordinates%first(b), coordinates%first(b + 1) - 1
+            self%motion(b, m) = self%motion(b, m) + coordinates%ratio(1, k) * speeds(coordinates%coordinate(k))
+          end do
+        end do
+      end do
+    end associate
+    allocate (momentum, source=transpose(self%motion) * spread(machine%inertia(1, :), 1, motions%freedoms()))
+    call solve_positive_definite(matmul(momentum, self%motion), momentum, self%momentum, is_indefinite)
+    if (is_indefinite) deallocate (self%motion)   ! by rounding: no energy is known
+  end function new_vibration
+
+  !> Takes the energy at the present speeds and twists of a machine, after its `evaluate_energies`.
+  subroutine include_energy(self, machine, omega)
+    class(vibration_t), intent(inout) :: self
+    type(machine_t), intent(in) :: machine
+    real(wp), intent(in) :: omega(:)   !! speeds [rad/s], [bodies]
+
+    if (.not. allocated(self%motion)) return
+    self%largest = max(self%largest, machine%kinetic_energy(1, omega - matmul(self%motion, matmul(self%momentum, omega))) &
+                       + sum(machine%elements%stored(1, :)))
+  end subroutine include_energy
+
+end module nocdyn_vibration_energy
