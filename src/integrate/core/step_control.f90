@@ -8,7 +8,7 @@ module nocdyn_step_control
   implicit none (type, external)
   private
 
-  public :: step_control, reset_control, resume_control, measure_start, advance_measures, measure_error, worst_measure, &
+  public :: step_control, reset_control, resume_control, measure_start, remember, advance_measures, measure_error, worst_measure, &
     quadrature_tolerance, adapt_steps, shorten_step, propose_steps, smallest_step, any_too_small
 
   ! The constants of Hairer's DOPRI5, for any order of the error estimate.
@@ -20,6 +20,7 @@ module nocdyn_step_control
   real(wp), parameter :: min_log_error = -13.287712379549449_wp   !! log2 of 1e-4
   real(wp), parameter :: low_order_share = 0.01_wp  !! weight of the second estimate in the error norm of Hairer's DOP853
   real(wp), parameter :: quadrature_leniency = 100.0_wp    !! ratio of the errors allowed in quadratures to those in states
+  real(wp), parameter :: memory = 0.95_wp                  !! of the sizes of measured quantities, from step to step
   real(wp), parameter :: usual_rtol = 1.0e-6_wp            !! the quadratures are not less accurate than with this rtol
 
   real(wp), parameter :: no_error = 1.0e-30_wp         !! replaces an error of zero, whose logarithm is infinite
@@ -132,14 +133,33 @@ contains
     t_new = merge(t_end, t + step, overshoot >= 0)
   end subroutine propose_one
 
-  !> Measures the sizes at the present states of all lanes, where a lane starts or restarts.
-  subroutine measure_start(control, system, attempt)
+  !> Measures the sizes at the states of the lanes that start.
+  subroutine measure_start(control, system, attempt, starting)
     type(step_control_t), intent(inout) :: control
     class(system_t), intent(in) :: system
     type(step_attempt_t), intent(in) :: attempt
+    logical, intent(in) :: starting(:)   !! [lanes]
+    integer :: i
 
-    if (system%measures > 0) call system%measure(size(attempt%y, 2), attempt%y, attempt%y, control%size, control%error)
+    if (system%measures == 0) return
+    call system%measure(size(attempt%y, 2), attempt%y, attempt%y, control%new_size, control%error)
+    do i = 1, system%measures
+      control%size(:, i) = merge(abs(control%new_size(:, i)), control%size(:, i), starting)
+    end do
   end subroutine measure_start
+
+  !> Sizes for the next step: the absolute values, or those before if they were larger, forgotten within some dozens of steps. An
+  !> oscillation is then as large where it passes through zero as elsewhere.
+  pure subroutine remember(n, before, size)
+    integer, intent(in) :: n   !! lanes * measures
+    real(wp), intent(in) :: before(n)
+    real(wp), intent(inout) :: size(n)
+    integer :: i
+
+    do i = 1, n
+      size(i) = max(abs(size(i)), memory * before(i))
+    end do
+  end subroutine remember
 
   !> Takes the sizes at the ends of accepted steps for the next ones.
   pure subroutine advance_measures(control, accepted)
@@ -202,6 +222,7 @@ contains
     associate (terms => attempt%lanes * measured(system))
       if (system%measures > 0) then
         call system%measure(size(estimate, 2), attempt%y_new, estimate, control%new_size, control%error)
+        call remember(terms, control%size, control%new_size)
         call square_scaled_errors(terms, control%rtol, control%atol, control%size, control%new_size, control%error)
         call sum_over_states(attempt%lanes, system%measures, control%error, total)
       else

@@ -91,7 +91,7 @@ contains
     real(wp) :: rms
 
     if (system%measures > 0) then
-      call system%measure(size(x, 2), attempt%y, x, control%size, control%error)
+      call system%measure(size(x, 2), attempt%y, x, control%new_size, control%error)
       associate (n => system%measures - system%phases)
         rms = rms_ratio(control, control%error(lane, :n), control%size(lane, :n))
       end associate

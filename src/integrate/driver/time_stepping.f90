@@ -184,6 +184,7 @@ contains
         if (integrator%has_switches) call start_switching(integrator%switching, system, observer, attempt, lane, solver_status)
       end do
       call evaluate_starts(integrator, system, solver_status)
+      call measure_start(integrator%control, system, attempt, integrator%starting)
       call stepper%start(attempt, integrator%starting)
       do lane = 1, attempt%lanes
         if (.not. integrator%starting(lane)) cycle
@@ -209,7 +210,6 @@ contains
     associate (attempt => integrator%attempt)
       attempt%active(:) = integrator%starting
       call evaluate_start(attempt, system, integrator%starting, attempt%slope)
-      call measure_start(integrator%control, system, attempt)
       do lane = 1, attempt%lanes
         if (.not. integrator%starting(lane) .or. attempt%active(lane)) cycle
         if (solver_status%code(lane) /= integration_running) cycle

@@ -13,7 +13,7 @@ module nocdyn_taylor_stepper
   use nocdyn_stage_sums, only: padded_columns, width
   use nocdyn_step_attempt, only: attempt_not_finite, attempt_ok, attempt_recoverable, disable_lane, disable_non_finite_lanes, &
     step_attempt_t
-  use nocdyn_step_control, only: any_too_small, quadrature_tolerance, smallest_step, step_control_t
+  use nocdyn_step_control, only: any_too_small, quadrature_tolerance, remember, smallest_step, step_control_t
   use nocdyn_stepper, only: stepper_t
   use nocdyn_system, only: evaluation_ok, system_t
   use nocdyn_vector_functions, only: exp2s, log2s
@@ -29,6 +29,7 @@ module nocdyn_taylor_stepper
   type, extends(stepper_t), public :: taylor_stepper_t
     private
     real(wp), allocatable :: series(:, :, :)   !! y_0, y_1, ... of each lane, [lanes, padded columns, 0:order]
+    real(wp), allocatable :: previous(:, :)    !! y_(p - 1) in the quantities that the system measures, [lanes, measures]
     real(wp), allocatable :: last_norm(:)      !! norms of the last coefficients, then the step sizes, [lanes]
     real(wp), allocatable :: previous_norm(:)
     logical, allocatable :: moved(:)           !! lanes that need a new series
@@ -66,11 +67,11 @@ contains
     class(taylor_stepper_t), intent(inout) :: self
     class(system_t), intent(in) :: system
 
-    if (allocated(self%series)) deallocate (self%series, self%last_norm, self%previous_norm, self%moved, self%step_status, &
-                                            self%component, self%infinite)
+    if (allocated(self%series)) deallocate (self%series, self%previous, self%last_norm, self%previous_norm, self%moved, &
+                                            self%step_status, self%component, self%infinite)
     associate (lanes => system%lanes)
       allocate (self%series(lanes, padded_columns(lanes, system%states + system%quadratures), 0:self%order), source=0.0_wp)
-      allocate (self%last_norm(lanes), self%previous_norm(lanes), source=0.0_wp)
+      allocate (self%previous(lanes, system%measures), self%last_norm(lanes), self%previous_norm(lanes), source=0.0_wp)
       allocate (self%moved(lanes), source=.true.)
       allocate (self%step_status(lanes), source=attempt_ok)
       allocate (self%component(lanes), self%infinite(lanes), source=0)
@@ -185,9 +186,10 @@ contains
 
     associate (lanes => attempt%lanes, columns => size(self%series, 2), order => self%order)
       if (system%measures > 0) then
-        call system%measure(columns, attempt%y, self%series(1, 1, order), control%size, control%error)
-        call system%measure(columns, attempt%y, self%series(1, 1, order - 1), control%size, control%new_size)
-        call find_norms(lanes, system%measures, control%rtol, control%atol, control%size, control%new_size, control%error, &
+        call system%measure(columns, attempt%y, self%series(1, 1, order - 1), control%new_size, self%previous)
+        call system%measure(columns, attempt%y, self%series(1, 1, order), control%new_size, control%error)
+        call remember(lanes * system%measures, control%size, control%new_size)
+        call find_norms(lanes, system%measures, control%rtol, control%atol, control%new_size, self%previous, control%error, &
                         self%previous_norm, self%last_norm)
       else
         call find_norms(lanes, attempt%states, control%rtol, control%atol, attempt%y, self%series(1, 1, order - 1), &
