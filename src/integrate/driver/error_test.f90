@@ -1,5 +1,6 @@
 !> The error test: accepts or rejects the step attempts of the lanes, and ends lanes that are done or have failed.
 module nocdyn_error_test
+  use nocdyn_error_norm, only: measure_error, worst_measure
   use nocdyn_kinds, only: wp
   use nocdyn_masks, only: all_true, any_true
   use nocdyn_observer, only: observer_t
@@ -7,7 +8,7 @@ module nocdyn_error_test
     integration_step_too_small, integration_too_many_steps, solver_status_t
   use nocdyn_stage_sums, only: width
   use nocdyn_step_attempt, only: attempt_fatal, attempt_not_finite, attempt_ok
-  use nocdyn_step_control, only: adapt_steps, measure_error, shorten_step, smallest_step, worst_measure
+  use nocdyn_step_control, only: adapt_steps, shorten_step, smallest_step
   use nocdyn_stepper, only: stepper_t
   use nocdyn_system, only: system_t
   use nocdyn_time_stepping, only: integrator_t

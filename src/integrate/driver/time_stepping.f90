@@ -2,6 +2,7 @@
 module nocdyn_time_stepping
   use nocdyn_dense_output, only: allocate_dense_output, dense_output_t
   use nocdyn_ensemble, only: ensemble_t
+  use nocdyn_error_norm, only: advance_measures, measure_start
   use nocdyn_events, only: allocate_events, events_t
   use nocdyn_extremes, only: allocate_extremes, extremes_t, start_extremes
   use nocdyn_first_step, only: guess_first_steps
@@ -13,7 +14,7 @@ module nocdyn_time_stepping
   use nocdyn_solver_status, only: integration_not_finite, integration_rhs_failed, integration_running, reset_solver_status, &
     solver_status_t
   use nocdyn_step_attempt, only: allocate_step_attempt, attempt_not_finite, begin_attempt, evaluate_start, step_attempt_t
-  use nocdyn_step_control, only: advance_measures, measure_start, propose_steps, reset_control, step_control, step_control_t
+  use nocdyn_step_control, only: propose_steps, reset_control, step_control, step_control_t
   use nocdyn_stepper, only: stepper_t
   use nocdyn_switching, only: allocate_switching, start_switching, switching_t
   use nocdyn_system, only: system_t

@@ -1,11 +1,13 @@
 !> Steps by the Taylor series of the solution, of a constant order p.
 !>
 !> The last two coefficients limit the step size: h is the smaller of ||y_j||^(-1/j), j = p - 1 and p, where the norm is the
-!> largest |y_j| / (atol + rtol |y|) of the states. The terms h^j y_j are then within the tolerance, and there is no error test
-!> after a step. The last terms of the quadratures are kept within theirs. With p = 1 - ln(tol) / 2 this is the step rho / e^2 of A. Jorba, M. Zou, A software package for the numerical
-!> integration of ODEs by means of high-order Taylor methods, Experimental Mathematics 14 (2005) 99-117. They assume that the
-!> work grows as p^2. Here it grows more slowly at small p, and the order is higher.
+!> largest |y_j| / (atol + rtol |y|) of the states, or of the quantities that the system measures. The terms h^j y_j are then
+!> within the tolerance, and there is no error test after a step. The last term of the quadratures is kept within theirs. With
+!> p = 1 - ln(tol) / 2 this is the step rho / e^2 of A. Jorba, M. Zou, A software package for the numerical integration of ODEs
+!> by means of high-order Taylor methods, Experimental Mathematics 14 (2005) 99-117. They assume that the work grows as p^2. Here
+!> it grows more slowly at small p, and the order is higher.
 module nocdyn_taylor_stepper
+  use nocdyn_error_norm, only: quadrature_tolerance, remember
   use nocdyn_finite, only: all_finite, is_finite
   use nocdyn_kinds, only: wp
   use nocdyn_masks, only: all_true, any_differs
@@ -13,7 +15,7 @@ module nocdyn_taylor_stepper
   use nocdyn_stage_sums, only: padded_columns, width
   use nocdyn_step_attempt, only: attempt_not_finite, attempt_ok, attempt_recoverable, disable_lane, disable_non_finite_lanes, &
     step_attempt_t
-  use nocdyn_step_control, only: any_too_small, quadrature_tolerance, remember, smallest_step, step_control_t
+  use nocdyn_step_control, only: any_too_small, smallest_step, step_control_t
   use nocdyn_stepper, only: stepper_t
   use nocdyn_system, only: evaluation_ok, system_t
   use nocdyn_vector_functions, only: exp2s, log2s
@@ -23,6 +25,8 @@ module nocdyn_taylor_stepper
   public :: taylor_stepper
 
   real(wp), parameter :: order_offset = 3.0_wp, order_slope = 0.7_wp   !! order as a function of -ln(rtol), measured
+
+  real(wp), parameter :: quadrature_share = 0.2_wp   !! of the error allowed to a quadrature, for its last term
 
   integer, parameter :: long = 32   !! numbers summed together in blocks of many lanes
 
@@ -189,25 +193,27 @@ contains
         call system%measure(columns, attempt%y, self%series(1, 1, order - 1), control%new_size, self%previous)
         call system%measure(columns, attempt%y, self%series(1, 1, order), control%new_size, control%error)
         call remember(lanes * system%measures, control%size, control%new_size)
-        call find_norms(lanes, system%measures, control%rtol, control%atol, control%new_size, self%previous, control%error, &
-                        self%previous_norm, self%last_norm)
+        call find_norms(lanes, system%measures, control, control%new_size, self%previous, control%error, self%previous_norm, &
+                        self%last_norm)
       else
-        call find_norms(lanes, attempt%states, control%rtol, control%atol, attempt%y, self%series(1, 1, order - 1), &
-                        self%series(1, 1, order), self%previous_norm, self%last_norm)
+        call find_norms(lanes, attempt%states, control, attempt%y, self%series(1, 1, order - 1), self%series(1, 1, order), &
+                        self%previous_norm, self%last_norm)
       end if
     end associate
   end subroutine measure_norms
 
   !> The largest |y_j| / (atol + rtol |y|) of each lane for j = p - 1 and p, at least 1e-300 so that its logarithm is finite.
-  pure subroutine find_norms(lanes, states, rtol, atol, y, y_previous, y_last, previous_norm, last_norm)
+  pure subroutine find_norms(lanes, states, control, y, y_previous, y_last, previous_norm, last_norm)
     integer, intent(in) :: lanes, states
-    real(wp), intent(in) :: rtol, atol
+    type(step_control_t), intent(in) :: control
     real(wp), intent(in), dimension(lanes, states) :: y, y_previous, y_last   !! y, y_(p - 1) and y_p
     real(wp), intent(inout) :: previous_norm(lanes), last_norm(lanes)
     real(wp), parameter :: smallest = 1.0e-300_wp
-    real(wp) :: weight
+    real(wp) :: atol, rtol, weight
     integer :: i, lane
 
+    atol = control%atol
+    rtol = control%rtol
     last_norm = smallest
     previous_norm = smallest
     do i = 1, states
@@ -236,25 +242,23 @@ contains
     call exp2s(lanes, last_norm)
   end subroutine find_steps
 
-  !> Shortens the steps, now in `last_norm`, in which the last terms of the quadratures exceed their tolerance.
+  !> Shortens the steps, now in `last_norm`, in which the last term of a quadrature exceeds their tolerance.
   pure subroutine limit_by_quadratures(self, attempt, control)
     type(taylor_stepper_t), intent(inout) :: self
     type(step_attempt_t), intent(in) :: attempt
     type(step_control_t), intent(in) :: control
     real(wp) :: allowed, excess, term
-    integer :: j, lane
+    integer :: lane
 
     do lane = 1, attempt%lanes
       associate (h => self%last_norm(lane), first => attempt%states + 1, last => attempt%components)
         h = min(h, max(control%t_end - attempt%t(lane), 0.0_wp))
-        do j = self%order - 1, self%order
-          term = maxval(abs(self%series(lane, first:last, j)))
-          allowed = quadrature_tolerance(control, maxval(abs(attempt%y(lane, first:last))), &
-                                         h * maxval(abs(self%series(lane, first:last, 1))))
-          if (.not. min(h, term) > 0) cycle
-          excess = j * log(h) + log(term) - log(allowed)
-          if (excess > 0) h = h * exp(-excess / (j - 1))
-        end do
+        term = maxval(abs(self%series(lane, first:last, self%order)))
+        if (.not. min(h, term) > 0) cycle
+        allowed = quadrature_share * quadrature_tolerance(control, maxval(abs(attempt%y(lane, first:last))), &
+                                       h * maxval(abs(self%series(lane, first:last, 1))))
+        excess = self%order * log(h) + log(term) - log(allowed)
+        if (excess > 0) h = h * exp(-excess / (self%order - 1))
       end associate
     end do
   end subroutine limit_by_quadratures
