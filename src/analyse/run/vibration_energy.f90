@@ -16,6 +16,7 @@ module nocdyn_vibration_energy
   type, public :: vibration_t
     real(wp), allocatable, private :: motion(:, :)       !! P, [bodies, motions]
     real(wp), allocatable, private :: momentum(:, :)     !! (P^T J P)^-1 P^T J, [motions, bodies]
+    real(wp), allocatable, private :: speed(:)           !! of the bodies about the rigid motion [rad/s], work space
     real(wp) :: largest = 0.0_wp                         !! of the energies so far [J]
   contains
     procedure :: include_energy
@@ -46,6 +47,7 @@ contains
     end associate
     allocate (momentum, source=transpose(self%motion) * spread(machine%inertia(1, :), 1, motions%freedoms()))
     call solve_positive_definite(matmul(momentum, self%motion), momentum, self%momentum, is_indefinite)
+    allocate (self%speed(machine%bodies))
     if (is_indefinite) deallocate (self%motion)   ! by rounding: no energy is known
   end function new_vibration
 
@@ -54,10 +56,14 @@ contains
     class(vibration_t), intent(inout) :: self
     type(machine_t), intent(in) :: machine
     real(wp), intent(in) :: omega(:)   !! speeds [rad/s], [bodies]
+    integer :: m
 
     if (.not. allocated(self%motion)) return
-    self%largest = max(self%largest, machine%kinetic_energy(1, omega - matmul(self%motion, matmul(self%momentum, omega))) &
-                       + sum(machine%elements%stored(1, :)))
+    self%speed(:) = omega
+    do m = 1, size(self%motion, 2)
+      self%speed(:) = self%speed - self%motion(:, m) * dot_product(self%momentum(m, :), omega)
+    end do
+    self%largest = max(self%largest, machine%kinetic_energy(1, self%speed) + sum(machine%elements%stored(1, :)))
   end subroutine include_energy
 
 end module nocdyn_vibration_energy

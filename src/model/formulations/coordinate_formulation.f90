@@ -157,7 +157,7 @@ contains
 
     associate (first => self%machine%coordinates%freedoms + 1, last => 2 * self%machine%coordinates%freedoms)
       shift(:) = 0.0_wp
-      shift(first:last) = self%origin%shift_of(lane, y(lane, first:last))
+      call self%origin%find_shift(lane, y(lane, first:last), shift(first:last))
       y(lane, first:last) = y(lane, first:last) - shift(first:last)
     end associate
     call self%move_origin(lane, shift)
@@ -172,7 +172,7 @@ contains
       call self%origin%move(lane, shift(f + 1:2 * f))
     end associate
     self%twist_at_origin(lane, :) = self%zero_twist(lane, :)
-    call self%origin%move_twists(lane, self%incidence, self%twist_at_origin(lane, :))
+    call self%origin%move_twists(lane, self%incidence, self%twist_at_origin)
   end subroutine move_origin
 
   subroutine restore_state(self, lane, y)

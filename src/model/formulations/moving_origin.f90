@@ -30,7 +30,7 @@ module nocdyn_moving_origin
     logical, private :: has_springs_only = .true.         !! whether the laws of these are polynomials
   contains
     procedure :: find_far
-    procedure :: shift_of
+    procedure :: find_shift
     procedure :: move
     procedure :: start_lane
     procedure :: move_twists
@@ -77,23 +77,39 @@ contains
   end subroutine find_far
 
   !> The shift of the coordinates of a lane that brings its rigid motions back near the origin [rad], [coordinates].
-  pure function shift_of(self, lane, q) result(shift)
+  pure subroutine find_shift(self, lane, q, shift)
     class(moving_origin_t), intent(in) :: self
     integer, intent(in) :: lane
-    real(wp), intent(in) :: q(:)   !! angles of the coordinates [rad]
-    real(wp) :: shift(size(q))
+    real(wp), intent(in) :: q(:)           !! angles of the coordinates [rad]
+    real(wp), intent(inout) :: shift(:)    !! [rad], [coordinates]
+    integer :: c, k
 
-    shift = along_motions(self, lane, self%unit(lane) * anint(q(self%motions%free) / self%unit(lane)))
-  end function shift_of
+    do c = 1, size(q)
+      shift(c) = 0.0_wp
+      do k = self%motions%first(c), self%motions%first(c + 1) - 1
+        associate (angle => q(self%motions%free(self%motions%freedom(k))))
+          shift(c) = shift(c) + self%ratio(lane, k) * (self%unit(lane) * anint(angle / self%unit(lane)))
+        end associate
+      end do
+    end do
+  end subroutine find_shift
 
-  !> Moves the origin of a lane by a shift that `shift_of` gave.
+  !> Moves the origin of a lane by a shift that `find_shift` gave.
   pure subroutine move(self, lane, shift)
     class(moving_origin_t), intent(inout) :: self
     integer, intent(in) :: lane
     real(wp), intent(in) :: shift(:)   !! [rad], [coordinates]
+    integer :: c, k, m
 
-    self%angle(lane, :) = self%angle(lane, :) + shift(self%motions%free)
-    self%q(lane, :) = along_motions(self, lane, self%angle(lane, :))
+    do m = 1, size(self%motions%free)
+      self%angle(lane, m) = self%angle(lane, m) + shift(self%motions%free(m))
+    end do
+    do c = 1, size(self%q, 2)
+      self%q(lane, c) = 0.0_wp
+      do k = self%motions%first(c), self%motions%first(c + 1) - 1
+        self%q(lane, c) = self%q(lane, c) + self%ratio(lane, k) * self%angle(lane, self%motions%freedom(k))
+      end do
+    end do
   end subroutine move
 
   !> Moves the origin of a lane back to zero, and sets how far its rigid motions may go from it.
@@ -118,34 +134,18 @@ contains
                                                          merge(largest_exponent, usual_exponent, self%has_springs_only)))
   end subroutine start_lane
 
-  !> Angles of the coordinates from those of the rigid motions.
-  pure function along_motions(self, lane, angle) result(q)
-    type(moving_origin_t), intent(in) :: self
-    integer, intent(in) :: lane
-    real(wp), intent(in) :: angle(:)   !! [rad], [motions]
-    real(wp) :: q(size(self%q, 2))
-    integer :: c, k
-
-    do c = 1, size(q)
-      q(c) = 0.0_wp
-      do k = self%motions%first(c), self%motions%first(c + 1) - 1
-        q(c) = q(c) + self%ratio(lane, k) * angle(self%motions%freedom(k))
-      end do
-    end do
-  end function along_motions
-
   !> Adds the angle of the origin to those of the elements that turn with it. Elastic elements do not feel it.
   pure subroutine move_twists(self, lane, incidence, twist)
     class(moving_origin_t), intent(in) :: self
     integer, intent(in) :: lane
     type(element_coordinates_t), intent(in) :: incidence
-    real(wp), intent(inout) :: twist(:)   !! [rad], [elements]
+    real(wp), intent(inout) :: twist(:, :)   !! [rad], [lanes, elements]
     integer :: e, i, k
 
     do i = 1, size(self%turning)
       e = self%turning(i)
       do k = incidence%first(e), incidence%first(e + 1) - 1
-        twist(e) = twist(e) + incidence%ratio(lane, k) * self%q(lane, incidence%coordinate(k))
+        twist(lane, e) = twist(lane, e) + incidence%ratio(lane, k) * self%q(lane, incidence%coordinate(k))
       end do
     end do
   end subroutine move_twists
