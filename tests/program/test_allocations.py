@@ -51,7 +51,7 @@ def test_nothing_is_allocated_in_the_time_loop(nocdyn, counter, formulation, met
 
 def test_nothing_is_allocated_when_auto_switches(nocdyn, counter):
     common = ["run.method=auto", "coupling.coupling.damping=1e4"]
-    few = allocations(nocdyn, counter, CASE_2, *common, "run.rtol=1e-4")
+    few = allocations(nocdyn, counter, CASE_2, *common, "run.rtol=1e-5")
     steps = nocdyn.summary("out")["method"]
     many = allocations(nocdyn, counter, CASE_2, *common, "run.rtol=1e-7")
     more_steps = nocdyn.summary("out")["method"]

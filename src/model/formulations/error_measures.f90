@@ -28,6 +28,8 @@ module nocdyn_error_measures
     procedure :: list_parameters
   end type error_measures_t
 
+  real(wp), parameter :: rounding = 1.0e-6_wp   !! of a large angle within a step: rtol times this is above its rounding
+
 contains
 
   !> The measures of a first-order system whose first states are `moving` speeds, and then their angles.
@@ -74,7 +76,9 @@ contains
     real(wp), intent(inout), dimension(lanes, self%count) :: sizes, errors
 
     call self%map%multiply_pair(self%offset, y, error, sizes, errors)
-    sizes(:, self%count - size(self%free) + 1:) = 1.0_wp
+    associate (phases => self%count - size(self%free) + 1)
+      sizes(:, phases:) = 1.0_wp + rounding * abs(sizes(:, phases:))
+    end associate
   end subroutine measure
 
   !> Counts the sizes of a lane that starts at the state y.
