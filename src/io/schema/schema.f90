@@ -58,9 +58,9 @@ module nocdyn_schema
     key_rule_t('run',        'method',          a_word,         1, '',            default_method, methods, &
       'explicit: rk45, rk853, taylor; implicit: rodas4 = rosenbrock, rodas5p; auto: two of them'), &
     key_rule_t('run',        'rtol',            a_number,       1, '',            '1e-6',      tolerance, &
-      'error of a step, relative to the size of twists, their rates, internal states, rigid motions'), &
+      'error of a step, relative to twists, their rates, internal states and rigid motions'), &
     key_rule_t('run',        'atol',            a_number,       1, '',            '1e-9',      positive, &
-      'error of a step that is allowed however small these are [rad, rad/s, the unit of the state]'), &
+      'error of a step that is allowed however small these are [rad, rad/s, unit of the state]'), &
     key_rule_t('run',        'formulation',     a_word,         1, '',            "'reduced'", formulations, &
       'equations that are integrated: they give the same motion, reduced is the fastest'), &
     key_rule_t('run',        'independent',     a_body,         any_number, '',   unset,       anything, &

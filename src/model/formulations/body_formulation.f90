@@ -1,6 +1,7 @@
 !> Formulations whose states are the speeds and angles of all bodies, omega and phi: `paper` and `multiplier`.
 module nocdyn_body_formulation
   use nocdyn_element_coordinates, only: new_element_coordinates
+  use nocdyn_element_sets, only: coupling_elements, stiff_elements
   use nocdyn_error_measures, only: error_measures_t, new_error_measures
   use nocdyn_formulation, only: formulation_t
   use nocdyn_incidence, only: add_coefficients, add_moment
@@ -72,8 +73,8 @@ contains
     integer :: i
 
     motions = new_rigid_motions(machine%coordinates%freedoms, &
-                                new_element_coordinates(machine%elements, machine%coordinates), machine%stiff())
-    allocate (couplings, source=machine%couplings())
+                                new_element_coordinates(machine%elements, machine%coordinates), stiff_elements(machine))
+    allocate (couplings, source=coupling_elements(machine))
     allocate (body(0), sign(0))
     allocate (first(size(couplings) + 1), source=1)
     do i = 1, size(couplings)

@@ -3,6 +3,7 @@ module nocdyn_paper
   use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
   use nocdyn_bank, only: role_coupling, role_excitation, role_load, role_motor
   use nocdyn_body_formulation, only: body_formulation_t, jacobian_of_bodies, observe_bodies, start_of_bodies
+  use nocdyn_element_sets, only: coupling_elements
   use nocdyn_incidence, only: add_coefficient, add_moment
   use nocdyn_kinds, only: wp
   use nocdyn_lapack, only: pseudo_inverse
@@ -70,7 +71,7 @@ contains
       call lu_factor(self%factors(:, :, l), self%pivots(:, l), is_singular)
       if (is_singular) self%factors(:, :, l) = ieee_value(1.0_wp, ieee_quiet_nan)   ! by rounding: the integration does not start
     end do
-    allocate (self%couplings, source=machine%couplings())
+    allocate (self%couplings, source=coupling_elements(machine))
     self%moment_of_bodies = pseudo_inverse(coupling_incidence(machine, self%couplings), 1.0e-10_wp)
   end function new_paper
 

@@ -1,6 +1,6 @@
 !> A machine on a block of lanes: bodies, banks of elements, constraints, and the independent coordinates.
 module nocdyn_machine
-  use nocdyn_bank, only: bank_slot_t, bank_t, role_coupling, role_names
+  use nocdyn_bank, only: bank_slot_t, bank_t, role_names
   use nocdyn_constraints, only: constraints_t
   use nocdyn_coordinates, only: coordinates_t
   use nocdyn_elements, only: elements_t, new_elements
@@ -48,9 +48,6 @@ module nocdyn_machine
     procedure :: list_parameters
     procedure :: to_mean_torque
     procedure :: elastic
-    procedure :: stiff
-    procedure :: has_springs_only
-    procedure :: couplings
     procedure :: element_name
     procedure :: start_twist
     procedure :: start_internal
@@ -144,46 +141,6 @@ contains
 
     elements = [(self%banks(i)%bank%first - 1 + self%banks(i)%bank%elastic, i=1, size(self%banks))]
   end function elastic
-
-  !> Elements with a restoring moment in any lane, ascending.
-  pure function stiff(self) result(elements)
-    class(machine_t), intent(in) :: self
-    integer, allocatable :: elements(:)
-    logical :: is_stiff(size(self%elements%to))
-    integer :: e, i
-
-    is_stiff = any(abs(self%laws%linear) + abs(self%laws%cubic) > 0, dim=1)
-    do i = 1, size(self%banks)
-      associate (bank => self%banks(i)%bank)
-        if (.not. bank%has_polynomial_potential) is_stiff(bank%first:bank%last()) = .true.
-      end associate
-    end do
-    elements = self%elastic()
-    elements = pack(elements, [(is_stiff(elements(e)), e=1, size(elements))])
-  end function stiff
-
-  !> Whether all restoring moments are polynomials.
-  pure logical function has_springs_only(self)
-    class(machine_t), intent(in) :: self
-    integer :: i
-
-    has_springs_only = all([(self%banks(i)%bank%has_polynomial_potential .or. size(self%banks(i)%bank%to) == 0, &
-                             i=1, size(self%banks))])
-  end function has_springs_only
-
-  !> Elements of the role coupling, ascending.
-  pure function couplings(self) result(elements)
-    class(machine_t), intent(in) :: self
-    integer, allocatable :: elements(:)
-    integer :: e, i
-
-    elements = [integer ::]
-    do i = 1, size(self%banks)
-      associate (bank => self%banks(i)%bank)
-        if (bank%role == role_coupling) elements = [elements, [(e, e=bank%first, bank%last())]]
-      end associate
-    end do
-  end function couplings
 
   !> Twists of the elements at the start [rad], [lanes, elements].
   pure function start_twist(self) result(twist)

@@ -1,0 +1,52 @@
+!> Sets of elements of a machine, by what their laws are.
+module nocdyn_element_sets
+  use nocdyn_bank, only: role_coupling
+  use nocdyn_machine, only: machine_t
+  implicit none (type, external)
+  private
+
+  public :: stiff_elements, has_springs_only, coupling_elements
+
+contains
+
+  !> Elements with a restoring moment in any lane, ascending.
+  pure function stiff_elements(machine) result(elements)
+    type(machine_t), intent(in) :: machine
+    integer, allocatable :: elements(:)
+    logical :: is_stiff(size(machine%elements%to))
+    integer :: e, i
+
+    is_stiff = any(abs(machine%laws%linear) + abs(machine%laws%cubic) > 0, dim=1)
+    do i = 1, size(machine%banks)
+      associate (bank => machine%banks(i)%bank)
+        if (.not. bank%has_polynomial_potential) is_stiff(bank%first:bank%last()) = .true.
+      end associate
+    end do
+    elements = machine%elastic()
+    elements = pack(elements, [(is_stiff(elements(e)), e=1, size(elements))])
+  end function stiff_elements
+
+  !> Whether all restoring moments are polynomials.
+  pure logical function has_springs_only(machine)
+    type(machine_t), intent(in) :: machine
+    integer :: i
+
+    has_springs_only = all([(machine%banks(i)%bank%has_polynomial_potential .or. size(machine%banks(i)%bank%to) == 0, &
+                             i=1, size(machine%banks))])
+  end function has_springs_only
+
+  !> Elements of the role coupling, ascending.
+  pure function coupling_elements(machine) result(elements)
+    type(machine_t), intent(in) :: machine
+    integer, allocatable :: elements(:)
+    integer :: e, i
+
+    elements = [integer ::]
+    do i = 1, size(machine%banks)
+      associate (bank => machine%banks(i)%bank)
+        if (bank%role == role_coupling) elements = [elements, [(e, e=bank%first, bank%last())]]
+      end associate
+    end do
+  end function coupling_elements
+
+end module nocdyn_element_sets
