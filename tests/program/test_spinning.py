@@ -130,6 +130,13 @@ def test_works_are_right_where_the_motion_is_easy(nocdyn, method, rtol):
         assert abs(work - exact) < 1e-3 * turned_over
 
 
+def test_a_body_without_any_element_keeps_turning(nocdyn):
+    nocdyn.write("body.nml", "&body name = 'disc' inertia = 1.0 speed = 1.0e4 /\n&run t_end = 100.0 /\n&output points = 3 /\n")
+    for method in ("rk45", "rodas5p", "taylor"):
+        _, columns = run(nocdyn, "body.nml", "out", f"run.method={method}")
+        assert columns["phi_disc [rad]"] == pytest.approx([0.0, 5e5, 1e6], rel=1e-12)
+
+
 def test_the_balance_is_judged_by_the_vibration(nocdyn):
     # turning, the discs hold 9e6 J; their vibration 0.1 J
     nocdyn.write("discs.nml", DISCS)

@@ -176,6 +176,7 @@ contains
     integer, intent(in) :: k
     real(wp), intent(in) :: t(self%lanes)   !! [s]
 
+    if (self%stride == 0) return   ! a machine without elements
     if (k == 0) then
       call begin_moments(self%stride, self%laws%rest, self%laws%linear, self%laws%by_speed, self%external, self%angle, &
                          self%speed, self%restoring, self%applied)
