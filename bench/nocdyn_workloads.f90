@@ -9,8 +9,10 @@ module kept_states
     real(wp), allocatable :: t(:)      !! [outputs]
     real(wp), allocatable :: y(:, :)   !! [components, outputs]
     integer :: outputs = 0
+    real(wp), allocatable :: shift(:)  !! what has been taken out of the states so far, [components]
   contains
     procedure :: on_output
+    procedure :: on_shift
     procedure :: wants_stop
   end type keeper_t
 
@@ -26,7 +28,17 @@ contains
     self%outputs = self%outputs + 1
     self%t(self%outputs) = t
     self%y(:, self%outputs) = y
+    if (allocated(self%shift)) self%y(:, self%outputs) = y + self%shift
   end subroutine on_output
+
+  subroutine on_shift(self, lane, shift)
+    class(keeper_t), intent(inout) :: self
+    integer, intent(in) :: lane
+    real(wp), contiguous, intent(in) :: shift(:)
+
+    if (.not. allocated(self%shift)) allocate (self%shift, source=0.0_wp * shift)
+    self%shift(:) = self%shift + shift
+  end subroutine on_shift
 
   function wants_stop(self, t)
     class(keeper_t), intent(inout) :: self
@@ -105,6 +117,7 @@ contains
     do i = 1, size(seconds)
       y = formulation%start()
       keeper%outputs = 0
+      if (allocated(keeper%shift)) deallocate (keeper%shift)
       seconds(i) = seconds_now()
       call integrate(formulation, settings, times, y, keeper, solver_status, error)
       seconds(i) = seconds_now() - seconds(i)
