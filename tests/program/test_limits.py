@@ -6,6 +6,7 @@ import resource
 
 import pytest
 from conftest import IS_SANITIZED, SOURCE
+from sweep_inputs import needs_sweeps
 
 MACHINE = "&body name='a' inertia=1 /\n&body name='b' inertia=1 /\n&run t_end=1 /\n&output points=11 /\n"
 TABLE = "&excitation name='e' body='a' kind='table' table_time={} table_torque=1, 2 /\n"
@@ -155,6 +156,7 @@ def test_a_trajectory_that_is_too_large_is_refused_before_the_run(nocdyn):
     assert nocdyn.files(".") == []
 
 
+@needs_sweeps
 def test_a_sweep_that_is_too_large_is_refused_before_it_starts(nocdyn):
     sweep = (
         SWEEP.replace("'list' file='{}'", "'random' samples=2000000000").replace("'max'", "'max', 'min'")

@@ -4,6 +4,7 @@ import cmath
 import math
 
 import pytest
+from sweep_inputs import needs_sweeps
 
 # Two discs; the first is shaken. Their twist obeys w'' = -2 (k w + d w') - A sin(W t), a linear equation.
 DISCS = """
@@ -88,6 +89,7 @@ def test_a_rotation_that_is_added_changes_no_step_and_no_moment(nocdyn, formulat
         assert max(abs(a - b) for a, b in zip(still[name], moved[name])) <= 10 * 1e-6 * largest + 1e-9, name
 
 
+@needs_sweeps
 def test_variants_of_a_machine_that_turns_are_those_of_runs(nocdyn):
     quantities = ["phi_drum", "twist_shaft", "twist_slip", "moment_shaft", "moment_rope", "omega_ring"]
     sweep = "&sweep design = 'grid' /\n&vary target = 'coupling.quill.damping' low = 0.5 high = 2.5 count = 5 /\n"

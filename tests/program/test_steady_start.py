@@ -4,6 +4,7 @@ import csv
 import json
 
 import pytest
+from sweep_inputs import needs_sweeps
 
 # What steps with the tolerances of DRIVE leave of a motion that does not change.
 STEADY = 1e-6
@@ -107,6 +108,7 @@ def test_a_machine_without_steady_state_is_refused(nocdyn):
         assert outcome.stderr.endswith(" rad/s of 'rotor'; start = 'given' starts with the speeds of the bodies\n")
 
 
+@needs_sweeps
 def test_every_variant_of_a_sweep_starts_in_its_own_steady_state(nocdyn):
     sweep = """\
 &sweep design = 'grid' /

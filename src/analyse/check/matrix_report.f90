@@ -247,11 +247,12 @@ contains
     type(equations_t), intent(inout) :: equations
     real(wp), intent(in) :: inertia(:, :)         !! J_3
     real(wp), intent(in) :: right_hand_side(:)    !! Q_3 + C_3 beta + K_3 beta
-    real(wp) :: factors(size(inertia, 1), size(inertia, 2)), slope(size(right_hand_side)), rates(equations%n)
+    real(wp), allocatable :: factors(:, :)   ! too large for a stack
+    real(wp) :: slope(size(right_hand_side)), rates(equations%n)
     integer :: pivots(size(right_hand_side))
     logical :: is_singular
 
-    factors = inertia
+    allocate (factors, source=inertia)
     slope = right_hand_side
     call lu_factor(factors, pivots, is_singular)
     if (is_singular) then

@@ -80,7 +80,7 @@ contains
     character(len=12) :: edit
     real(wp), parameter :: smallest = 1.0e-4_wp, largest = 1.0e9_wp   ! without an exponent
     real(wp) :: near
-    integer :: length
+    integer :: length, status
 
     if (abs(value) <= 0.0_wp) then
       text = '0'   ! most entries of a matrix
@@ -88,7 +88,8 @@ contains
     end if
     write (edit, '(a, i0, a)') '(es32.', digits - 1, 'e4)'
     write (buffer, edit) value
-    read (buffer, *) near
+    read (buffer, *, iostat=status) near
+    if (status /= 0) near = value   ! rounded up beyond the largest number
     if (abs(near) <= 0.0_wp) near = 0.0_wp   ! no "-0"
     length = int(shortest_form(near, merge(1_c_int, 0_c_int, abs(near) > 0.0_wp .and. (abs(near) < smallest .or. &
                                                              .not. abs(near) < largest)), buffer, int(len(buffer), c_size_t)))
