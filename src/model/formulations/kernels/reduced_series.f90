@@ -26,7 +26,7 @@ module nocdyn_reduced_series
     integer :: order = 0   !! order of the series of the state
     integer :: lanes = 1
     logical :: has_energy_balance = .false.   !! whether the powers of the elements `machine%with_work` are integrated
-    integer :: stride = 0                     !! lanes * elements, rounded up to whole vectors
+    integer :: stride = 0                     !! lanes * elements, rounded up to whole vectors, at least one
     logical :: is_dense = .false.             !! whether U and R are dense matrices
     ! [stride, 0:order]; banks write with offsets, for which the last column leaves room
     real(wp), allocatable :: angle(:, :)       !! u - rest
@@ -62,7 +62,7 @@ contains
     self%order = order
     self%lanes = machine%lanes
     self%has_energy_balance = with_energy_balance .and. size(machine%with_work) > 0
-    self%stride = whole_vectors(size(machine%laws%rest))
+    self%stride = whole_vectors(max(size(machine%laws%rest), 1))
     allocate (self%angle(self%stride, 0:order), source=0.0_wp)
     allocate (self%speed, self%restoring, self%applied, self%external, self%square, source=self%angle)
     allocate (self%acceleration(whole_vectors(machine%lanes * machine%coordinates%freedoms)), source=0.0_wp)
@@ -176,7 +176,6 @@ contains
     integer, intent(in) :: k
     real(wp), intent(in) :: t(self%lanes)   !! [s]
 
-    if (self%stride == 0) return   ! a machine without elements
     if (k == 0) then
       call begin_moments(self%stride, self%laws%rest, self%laws%linear, self%laws%by_speed, self%external, self%angle, &
                          self%speed, self%restoring, self%applied)
