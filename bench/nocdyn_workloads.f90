@@ -118,6 +118,7 @@ contains
       y = formulation%start()
       keeper%outputs = 0
       if (allocated(keeper%shift)) deallocate (keeper%shift)
+      keeper%takes_shifts = .true.
       seconds(i) = seconds_now()
       call integrate(formulation, settings, times, y, keeper, solver_status, error)
       seconds(i) = seconds_now() - seconds(i)

@@ -150,6 +150,7 @@ contains
 
     observer%table = new_trajectory_table(formulation, times(1), output_units(input))
     observer%vibration = new_vibration(formulation%machine)
+    observer%takes_shifts = .true.
     observer%t_start = times(1)
     observer%t_end = times(size(times))
     if (input%groups(input%position('output'))%has_value('extremes_from')) then

@@ -97,7 +97,7 @@ contains
         end if
         if (integrator%wants_steps) call observe_steps(integrator, stepper, observer)
         call advance_lanes(integrator, times)
-        if (system%may_shift) call shift_states(integrator, system, observer)
+        if (integrator%may_shift) call shift_states(integrator, system, observer)
         call stepper%accept(integrator%accepted)
         if (integrator%has_switches) call change_branches(integrator, stepper, system, observer, solver_status)
       end if

@@ -35,6 +35,7 @@ module nocdyn_time_stepping
     logical :: has_events = .false.
     logical :: has_extremes = .false.
     logical :: has_switches = .false.
+    logical :: may_shift = .false.                   !! whether the system may shift states
     logical :: wants_steps = .false.                 !! whether the observer receives the dense output of all steps
     logical :: wants_dense_steps = .false.           !! whether that is the result of `interpolate`
     logical :: is_exhausted = .false.                !! the ensemble has no variant left
@@ -81,6 +82,7 @@ contains
     call allocate_dense_output(integrator%dense, integrator%attempt%components, stepper%degree)
     integrator%wants_steps = observer%wants_steps
     integrator%wants_dense_steps = integrator%wants_steps .and. .not. stepper%passes_series
+    integrator%may_shift = system%may_shift .and. observer%takes_shifts
     integrator%has_switches = system%switches > 0
     if (integrator%has_switches) then
       call allocate_switching(integrator%switching, system, stepper%degree, integrator%attempt, times(size(times)) - times(1))
@@ -328,7 +330,7 @@ contains
         if (integrator%extremes%have_begun(lane)) call observer%on_extremes(lane, integrator%extremes%ranges(lane))
       end if
       integrator%sample(:) = integrator%attempt%y(lane, :integrator%attempt%components)
-      if (system%may_shift) call system%restore_state(lane, integrator%sample)
+      if (integrator%may_shift) call system%restore_state(lane, integrator%sample)
       call ensemble%finish(lane, integrator%sample, solver_status)
     end do
   end subroutine release_lanes
