@@ -218,7 +218,7 @@ contains
       call self%line%show(self%title // ': ' // to_text(int(100.0_wp * fraction)) // ' %, ' // &
                           to_text(int(min(left, 1.0e8_wp)) + 1) // ' s left')
     end if
-    wants_stop = is_interrupted() .or. self%file%has_failed
+    wants_stop = is_interrupted() .or. self%file%has_failed()
   end function wants_stop
 
 end module nocdyn_run_files

@@ -8,12 +8,12 @@ module nocdyn_trajectory_file
   implicit none (type, external)
   private
 
-  !> A file of any form. The first failure sets `has_failed`; `complete` and `finish` report it.
+  !> A file of any form. After the first failure, `complete` and `finish` report it.
   type, abstract, public :: trajectory_file_t
-    logical :: has_failed = .false.
   contains
     procedure(open_interface), deferred :: open
     procedure(put_row_interface), deferred :: put_row
+    procedure(has_failed_interface), deferred :: has_failed
     procedure(complete_interface), deferred :: complete
     procedure(complete_interface), deferred :: finish
     procedure(discard_interface), deferred :: discard
@@ -38,6 +38,12 @@ module nocdyn_trajectory_file
       real(wp), intent(in) :: row(:)   !! [columns]
     end subroutine put_row_interface
 
+    !> Whether there has been a failure since `open`.
+    pure logical function has_failed_interface(self)
+      import :: trajectory_file_t
+      class(trajectory_file_t), intent(in) :: self
+    end function has_failed_interface
+
     !> `complete` closes the file, which keeps its hidden name, and `finish` renames it too. After a failure since `open` there is
     !> an error and no file.
     subroutine complete_interface(self, name, error)
@@ -60,7 +66,7 @@ module nocdyn_trajectory_file
     type(output_file_t), private :: file
   contains
     procedure :: open => open_csv
-    procedure :: put_row, complete, finish, discard
+    procedure :: put_row, has_failed, complete, finish, discard
   end type csv_trajectory_t
 
 contains
@@ -74,7 +80,6 @@ contains
 
     call self%file%open(folder, 'trajectory.csv')
     call write_header(self%file, labels)
-    self%has_failed = self%file%has_failed
   end subroutine open_csv
 
   subroutine put_row(self, row)
@@ -82,8 +87,13 @@ contains
     real(wp), intent(in) :: row(:)   !! [columns]
 
     call write_row(self%file, row)
-    self%has_failed = self%file%has_failed
   end subroutine put_row
+
+  pure logical function has_failed(self)
+    class(csv_trajectory_t), intent(in) :: self
+
+    has_failed = allocated(self%file%failure)
+  end function has_failed
 
   subroutine complete(self, name, error)
     class(csv_trajectory_t), intent(inout) :: self

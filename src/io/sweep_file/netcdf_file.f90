@@ -7,27 +7,24 @@ module nocdyn_netcdf_file
     c_null_char, c_null_ptr
   use netcdf, only: nf90_clobber, nf90_close, nf90_create, nf90_def_var, nf90_ebadname, nf90_ehdferr, nf90_enameinuse, &
     nf90_max_name, nf90_netcdf4, nf90_noerr, nf90_put_att, nf90_put_att_any, nf90_strerror, nf90_string
-  use nocdyn_errors, only: error_t, exit_file, raise
+  use nocdyn_hidden_file, only: hidden_file_t
   use nocdyn_json, only: has_utf_8
-  use nocdyn_posix, only: last_failure, make_folders, process_id, remove_file, rename_file
+  use nocdyn_posix, only: last_failure
   use nocdyn_posix_files, only: disk_failure, sync_path
   use nocdyn_posix_programs, only: find_library_procedure
-  use nocdyn_text, only: quoted, shown_path, string_t, to_text
+  use nocdyn_text, only: string_t
   implicit none (type, external)
   private
 
   public :: check, create, define, put_text, new_name
 
   !> A file while it is written. After the first failure nothing more is written.
-  type, public :: netcdf_file_t
+  type, extends(hidden_file_t), public :: netcdf_file_t
     integer :: id = -1
-    type(string_t), allocatable :: reserved(:)              !! names that `new_name` leaves to others
-    character(len=:), allocatable :: failure                !! the reason of the first one
-    character(len=:), allocatable, private :: folder        !! with a slash at its end, or ''
-    character(len=:), allocatable, private :: hidden_path   !! of the file until `finish`
+    type(string_t), allocatable :: reserved(:)   !! names that `new_name` leaves to others
   contains
-    procedure :: complete, finish, discard
-    procedure, private :: close => close_file
+    procedure :: close => close_file
+    procedure :: close_whole
   end type netcdf_file_t
 
   interface
@@ -69,17 +66,10 @@ contains
     class(netcdf_file_t), intent(inout) :: file
     character(len=*), intent(in) :: folder
     character(len=*), intent(in) :: name     !! of the hidden file, without its dot and process number
-    character(len=:), allocatable :: failure
 
-    file%folder = folder // '/'
-    if (folder == '.') file%folder = ''
-    file%hidden_path = file%folder // '.' // name // '.' // to_text(process_id())
     if (.not. allocated(file%reserved)) allocate (file%reserved(0))
-    call make_folders(folder, failure)
-    if (allocated(failure)) then
-      file%failure = 'the folder cannot be made: ' // failure
-      return
-    end if
+    call file%place(folder, name)
+    if (allocated(file%failure)) return
     call keep_library_from_crashing()
     call check(file, nf90_create(file%hidden_path, ior(nf90_clobber, nf90_netcdf4), file%id))
   end subroutine create
@@ -159,54 +149,16 @@ contains
     self%id = -1
   end subroutine close_file
 
-  !> Closes the file, which keeps its hidden name. After a failure there is an error and no file.
-  subroutine complete(self, name, error)
+  !> Closes the file and has the disk store it.
+  subroutine close_whole(self)
     class(netcdf_file_t), intent(inout) :: self
-    character(len=*), intent(in) :: name     !! of the finished file, for the message
-    type(error_t), allocatable, intent(out) :: error
     logical :: is_done
 
-    if (self%id >= 0) then
-      call self%close()
-      if (.not. allocated(self%failure)) then
-        call sync_path(self%hidden_path, is_done)
-        if (.not. is_done) self%failure = last_failure()
-      end if
-    end if
-    if (allocated(self%failure)) call fail(self, name, error)
-  end subroutine complete
-
-  !> Closes the file if it is open, and renames it. After a failure there is an error and no file.
-  subroutine finish(self, name, error)
-    class(netcdf_file_t), intent(inout) :: self
-    character(len=*), intent(in) :: name
-    type(error_t), allocatable, intent(out) :: error
-    logical :: is_done
-
-    call self%complete(name, error)
-    if (allocated(error)) return
-    call rename_file(self%hidden_path, self%folder // name, is_done)
-    if (is_done) return
-    self%failure = last_failure()
-    call fail(self, name, error)
-  end subroutine finish
-
-  !> Removes the file and raises the error.
-  subroutine fail(self, name, error)
-    class(netcdf_file_t), intent(in) :: self
-    character(len=*), intent(in) :: name
-    type(error_t), allocatable, intent(out) :: error
-
-    call remove_file(self%hidden_path)
-    call raise(error, exit_file, 'cannot write ' // quoted(shown_path(self%folder // name)) // ': ' // self%failure)
-  end subroutine fail
-
-  !> Closes and removes the file.
-  subroutine discard(self)
-    class(netcdf_file_t), intent(inout) :: self
-
+    if (self%id < 0) return
     call self%close()
-    call remove_file(self%hidden_path)
-  end subroutine discard
+    if (allocated(self%failure)) return
+    call sync_path(self%hidden_path, is_done)
+    if (.not. is_done) call self%keep_failure(last_failure())
+  end subroutine close_whole
 
 end module nocdyn_netcdf_file

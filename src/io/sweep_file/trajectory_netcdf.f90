@@ -22,7 +22,7 @@ module nocdyn_trajectory_netcdf
     integer, private :: written = 0                !! rows in the file
   contains
     procedure :: open => open_netcdf
-    procedure :: put_row, complete, finish, discard
+    procedure :: put_row, has_failed, complete, finish, discard
   end type netcdf_trajectory_t
 
 contains
@@ -49,7 +49,6 @@ contains
       call define_column(self%file, labels(i)%text, dimension, block, self%variables(i))
     end do
     if (.not. allocated(self%file%failure)) call check(self%file, nf90_enddef(self%file%id))
-    self%has_failed = allocated(self%file%failure)
   end subroutine open_netcdf
 
   subroutine define_column(file, label, dimension, block, variable)
@@ -86,8 +85,13 @@ contains
     end do
     self%written = self%written + self%count
     self%count = 0
-    self%has_failed = allocated(self%file%failure)
   end subroutine write_block
+
+  pure logical function has_failed(self)
+    class(netcdf_trajectory_t), intent(in) :: self
+
+    has_failed = allocated(self%file%failure)
+  end function has_failed
 
   subroutine complete(self, name, error)
     class(netcdf_trajectory_t), intent(inout) :: self

@@ -35,7 +35,7 @@ contains
     call cursor%rewind_to_start(journals)
     do
       call cursor%next_chunk(journals, chunk, is_there, error)
-      if (allocated(error) .or. file%has_failed .or. .not. is_there) exit
+      if (allocated(error) .or. allocated(file%failure) .or. .not. is_there) exit
       do i = 1, chunk%count
         call write_variant(file, chunk, i)
       end do
