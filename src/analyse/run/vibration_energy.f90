@@ -4,7 +4,6 @@
 !> omega_r = P (P^T J P)^-1 P^T J omega, where the columns of P are the rigid motions.
 module nocdyn_vibration_energy
   use nocdyn_element_coordinates, only: new_element_coordinates
-  use nocdyn_element_sets, only: stiff_elements
   use nocdyn_kinds, only: wp
   use nocdyn_lapack, only: solve_positive_definite
   use nocdyn_machine, only: machine_t
@@ -33,10 +32,10 @@ contains
     logical :: is_indefinite
     integer :: b, k, m
 
-    if (size(stiff_elements(machine)) == 0) return
+    if (size(machine%elastic()) == 0) return
     associate (coordinates => machine%coordinates)
       motions = new_rigid_motions(coordinates%freedoms, new_element_coordinates(machine%elements, coordinates), &
-                                  stiff_elements(machine))
+                                  machine%elastic())
       allocate (self%motion(machine%bodies, motions%freedoms()), source=0.0_wp)
       do m = 1, motions%freedoms()
         speeds = motions%speeds([(merge(1.0_wp, 0.0_wp, k == m), k=1, motions%freedoms())])

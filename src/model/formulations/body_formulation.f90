@@ -1,7 +1,7 @@
 !> Formulations whose states are the speeds and angles of all bodies, omega and phi: `paper` and `multiplier`.
 module nocdyn_body_formulation
   use nocdyn_element_coordinates, only: new_element_coordinates
-  use nocdyn_element_sets, only: coupling_elements, stiff_elements
+  use nocdyn_element_sets, only: coupling_elements
   use nocdyn_error_measures, only: error_measures_t, new_error_measures
   use nocdyn_formulation, only: formulation_t
   use nocdyn_incidence, only: add_coefficients, add_moment
@@ -73,7 +73,7 @@ contains
     integer :: i
 
     motions = new_rigid_motions(machine%coordinates%freedoms, &
-                                new_element_coordinates(machine%elements, machine%coordinates), stiff_elements(machine))
+                                new_element_coordinates(machine%elements, machine%coordinates), machine%elastic())
     allocate (couplings, source=coupling_elements(machine))
     allocate (body(0), sign(0))
     allocate (first(size(couplings) + 1), source=1)
@@ -120,8 +120,10 @@ contains
     real(wp), contiguous, intent(in) :: t(:)      !! [s], [lanes]
     real(wp), contiguous, intent(in) :: y(:, :)   !! state, [lanes, states], at least
 
-    call self%gather(y)
-    if (self%switches > 0) call self%machine%choose_branches(t)
+    if (self%switches > 0) then
+      call self%gather(y)
+      call self%machine%choose_branches(t)
+    end if
     call self%derivative(t, y, self%slope, self%status)
   end subroutine observe_bodies
 

@@ -4,7 +4,7 @@
 !> elements have the angles u = u_0 + U q and the speeds u' = U q', which are no differences of large angles.
 module nocdyn_coordinate_formulation
   use nocdyn_element_coordinates, only: element_coordinates_t, new_element_coordinates, twist_map
-  use nocdyn_element_sets, only: coupling_elements, has_springs_only, stiff_elements
+  use nocdyn_element_sets, only: coupling_elements, has_springs_only
   use nocdyn_error_measures, only: new_error_measures
   use nocdyn_formulation, only: formulation_t
   use nocdyn_kinds, only: wp
@@ -56,7 +56,7 @@ contains
     self%twist_at_origin = self%zero_twist
     associate (machine => self%machine, incidence => self%incidence, freedoms => self%machine%coordinates%freedoms)
       self%switching = incidence%selected(machine%switches%element, with_ratio_only=.true.)
-      self%origin = new_moving_origin(machine%lanes, freedoms, incidence, stiff_elements(machine), has_springs_only(machine))
+      self%origin = new_moving_origin(machine%lanes, freedoms, incidence, machine%elastic(), has_springs_only(machine))
       has_offset = any(abs(self%zero_twist) > 0, dim=1)
       has_offset(self%origin%turning) = .true.
       self%twists = twist_map(incidence, has_offset, without_bands=is_block)

@@ -5,26 +5,9 @@ module nocdyn_element_sets
   implicit none (type, external)
   private
 
-  public :: stiff_elements, has_springs_only, coupling_elements
+  public :: has_springs_only, coupling_elements
 
 contains
-
-  !> Elements with a restoring moment in any lane, ascending.
-  pure function stiff_elements(machine) result(elements)
-    type(machine_t), intent(in) :: machine
-    integer, allocatable :: elements(:)
-    logical :: is_stiff(size(machine%elements%to))
-    integer :: e, i
-
-    is_stiff = any(abs(machine%laws%linear) + abs(machine%laws%cubic) > 0, dim=1)
-    do i = 1, size(machine%banks)
-      associate (bank => machine%banks(i)%bank)
-        if (.not. bank%has_polynomial_potential) is_stiff(bank%first:bank%last()) = .true.
-      end associate
-    end do
-    elements = machine%elastic()
-    elements = pack(elements, [(is_stiff(elements(e)), e=1, size(elements))])
-  end function stiff_elements
 
   !> Whether all restoring moments are polynomials.
   pure logical function has_springs_only(machine)
