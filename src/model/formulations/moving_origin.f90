@@ -25,6 +25,7 @@ module nocdyn_moving_origin
     integer, allocatable :: turning(:)                    !! elements that are not elastic but turn with a rigid motion
     real(wp), allocatable, private :: ratio(:, :)         !! as in `motions`, of each lane, [lanes, entries]
     real(wp), allocatable, private :: angle(:, :)         !! origin of the rigid motions [rad], [lanes, motions]
+    real(wp), allocatable, private :: turn(:)             !! part of a shift along each rigid motion [rad], work space, [motions]
     real(wp), allocatable, private :: unit(:)             !! angle from which a rigid motion is put back [rad], [lanes]
     integer, allocatable, private :: elastic(:)           !! elements that must not be twisted
     logical, private :: has_springs_only = .true.         !! whether the laws of these are polynomials
@@ -52,6 +53,7 @@ contains
 
     self%motions = new_rigid_motions(freedoms, incidence, elastic)
     allocate (self%q(lanes, freedoms), self%angle(lanes, self%motions%freedoms()), source=0.0_wp)
+    allocate (self%turn(self%motions%freedoms()), source=0.0_wp)
     allocate (self%unit(lanes), source=1.0_wp)
     allocate (self%elastic, source=elastic)
     self%has_springs_only = has_springs_only
@@ -78,20 +80,16 @@ contains
 
   !> The shift of the coordinates of a lane that brings its rigid motions back near the origin [rad], [coordinates].
   pure subroutine find_shift(self, lane, q, shift)
-    class(moving_origin_t), intent(in) :: self
+    class(moving_origin_t), intent(inout) :: self
     integer, intent(in) :: lane
     real(wp), intent(in) :: q(:)           !! angles of the coordinates [rad]
     real(wp), intent(inout) :: shift(:)    !! [rad], [coordinates]
-    integer :: c, k
+    integer :: m
 
-    do c = 1, size(q)
-      shift(c) = 0.0_wp
-      do k = self%motions%first(c), self%motions%first(c + 1) - 1
-        associate (angle => q(self%motions%free(self%motions%freedom(k))))
-          shift(c) = shift(c) + self%ratio(lane, k) * (self%unit(lane) * anint(angle / self%unit(lane)))
-        end associate
-      end do
+    do m = 1, size(self%turn)
+      self%turn(m) = self%unit(lane) * anint(q(self%motions%free(m)) / self%unit(lane))
     end do
+    call self%motions%combine(self%ratio(lane, :), self%turn, shift)
   end subroutine find_shift
 
   !> Moves the origin of a lane by a shift that `find_shift` gave.
@@ -99,17 +97,12 @@ contains
     class(moving_origin_t), intent(inout) :: self
     integer, intent(in) :: lane
     real(wp), intent(in) :: shift(:)   !! [rad], [coordinates]
-    integer :: c, k, m
+    integer :: m
 
-    do m = 1, size(self%motions%free)
+    do m = 1, size(self%turn)
       self%angle(lane, m) = self%angle(lane, m) + shift(self%motions%free(m))
     end do
-    do c = 1, size(self%q, 2)
-      self%q(lane, c) = 0.0_wp
-      do k = self%motions%first(c), self%motions%first(c + 1) - 1
-        self%q(lane, c) = self%q(lane, c) + self%ratio(lane, k) * self%angle(lane, self%motions%freedom(k))
-      end do
-    end do
+    call self%motions%combine(self%ratio(lane, :), self%angle(lane, :), self%q(lane, :))
   end subroutine move
 
   !> Moves the origin of a lane back to zero, and sets how far its rigid motions may go from it.

@@ -24,7 +24,7 @@ module nocdyn_rigid_motions
     integer, allocatable :: freedom(:)   !! rigid motion, [entries]
     real(wp), allocatable :: ratio(:)    !! [entries]
   contains
-    procedure :: freedoms, speeds, project_torques
+    procedure :: freedoms, combine, speeds, project_torques
   end type rigid_motions_t
 
   !> A sparse row during the elimination.
@@ -185,15 +185,25 @@ contains
     class(rigid_motions_t), intent(in) :: self
     real(wp), intent(in) :: s(:)   !! speeds of the rigid motions, [freedoms]
     real(wp) :: q_rate(size(self%first) - 1)
+
+    call self%combine(self%ratio, s, q_rate)
+  end function speeds
+
+  !> Coordinates as combinations of the rigid motions, with the given ratios in place of the stored ones.
+  pure subroutine combine(self, ratio, s, q)
+    class(rigid_motions_t), intent(in) :: self
+    real(wp), intent(in) :: ratio(:)     !! [entries]
+    real(wp), intent(in) :: s(:)         !! of the rigid motions, speeds or angles, [freedoms]
+    real(wp), intent(inout) :: q(:)      !! of the coordinates, [coordinates]
     integer :: c, k
 
-    do c = 1, size(q_rate)
-      q_rate(c) = 0.0_wp
+    do c = 1, size(q)
+      q(c) = 0.0_wp
       do k = self%first(c), self%first(c + 1) - 1
-        q_rate(c) = q_rate(c) + self%ratio(k) * s(self%freedom(k))
+        q(c) = q(c) + ratio(k) * s(self%freedom(k))
       end do
     end do
-  end function speeds
+  end subroutine combine
 
   !> Torques along the rigid motions from torques along the coordinates: the transpose of `speeds`, [freedoms].
   pure function project_torques(self, torque) result(total)
