@@ -4,14 +4,13 @@
 !> over some dozens of steps, so that an oscillation is as large where it passes through zero as elsewhere.
 module nocdyn_error_norm
   use nocdyn_kinds, only: wp
-  use nocdyn_masks, only: all_true
   use nocdyn_step_attempt, only: step_attempt_t
   use nocdyn_step_control, only: step_control_t
   use nocdyn_system, only: system_t
   implicit none (type, external)
   private
 
-  public :: measure_start, remember, advance_measures, measure_error, worst_measure, quadrature_tolerance
+  public :: measure_start, remember, measure_error, worst_measure, quadrature_tolerance
 
   real(wp), parameter :: low_order_share = 0.01_wp  !! weight of the second estimate in the error norm of Hairer's DOP853
   real(wp), parameter :: quadrature_leniency = 100.0_wp    !! ratio of the errors allowed in quadratures to those in states
@@ -49,25 +48,6 @@ contains
       size(i) = max(abs(size(i)), memory * before(i))
     end do
   end subroutine remember
-
-  !> Takes the sizes at the ends of accepted steps for the next ones.
-  pure subroutine advance_measures(control, accepted)
-    type(step_control_t), intent(inout) :: control
-    logical, intent(in) :: accepted(:)
-    real(wp), allocatable :: spare(:, :)
-    integer :: i
-
-    if (size(control%size) == 0) return
-    if (all_true(size(accepted), accepted)) then
-      call move_alloc(control%size, spare)
-      call move_alloc(control%new_size, control%size)
-      call move_alloc(spare, control%new_size)
-    else
-      do i = 1, size(control%size, 2)
-        control%size(:, i) = merge(control%new_size(:, i), control%size(:, i), accepted)
-      end do
-    end if
-  end subroutine advance_measures
 
   !> Sets `mean_square`, the mean of (error / (atol + rtol max(|y|, |y_new|)))^2 over the states, or over the quantities that the
   !> system measures. Each term replaces the error. Two estimates are combined as in DOP853: E5^2 / (E5 + 0.01 E3), where E5

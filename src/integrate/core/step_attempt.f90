@@ -2,14 +2,14 @@
 module nocdyn_step_attempt
   use nocdyn_finite, only: all_finite, is_finite
   use nocdyn_kinds, only: wp
-  use nocdyn_masks, only: any_differs
+  use nocdyn_masks, only: all_true, any_differs
   use nocdyn_stage_sums, only: large_tile, padded_columns
   use nocdyn_system, only: evaluation_fatal, evaluation_ok, evaluation_recoverable, system_t
   implicit none (type, external)
   private
 
   public :: allocate_step_attempt, begin_attempt, spread_steps, evaluate, evaluate_finite, evaluate_start, count_evaluations
-  public :: disable_lane, disable_non_finite_lanes
+  public :: disable_lane, disable_non_finite_lanes, advance
 
   ! Status of a lane's step attempt.
   integer, parameter, public :: attempt_ok = evaluation_ok
@@ -193,5 +193,23 @@ contains
     attempt%h(lane) = 0.0_wp
     attempt%h_spread(lane, :) = 0.0_wp
   end subroutine disable_lane
+
+  !> Takes new values for those of accepted lanes; the new ones are not read any more.
+  pure subroutine advance(accepted, values, new_values)
+    logical, intent(in) :: accepted(:)                                  !! [lanes]
+    real(wp), allocatable, intent(inout) :: values(:, :), new_values(:, :)   !! [lanes, any]
+    real(wp), allocatable :: spare(:, :)
+    integer :: i
+
+    if (all_true(size(accepted), accepted)) then
+      call move_alloc(values, spare)
+      call move_alloc(new_values, values)
+      call move_alloc(spare, new_values)
+    else
+      do i = 1, size(values, 2)
+        values(:, i) = merge(new_values(:, i), values(:, i), accepted)
+      end do
+    end if
+  end subroutine advance
 
 end module nocdyn_step_attempt

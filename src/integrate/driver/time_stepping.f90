@@ -2,18 +2,18 @@
 module nocdyn_time_stepping
   use nocdyn_dense_output, only: allocate_dense_output, dense_output_t
   use nocdyn_ensemble, only: ensemble_t
-  use nocdyn_error_norm, only: advance_measures, measure_start
+  use nocdyn_error_norm, only: measure_start
   use nocdyn_events, only: allocate_events, events_t
   use nocdyn_extremes, only: allocate_extremes, extremes_t, start_extremes
   use nocdyn_first_step, only: guess_first_steps
   use nocdyn_integration_settings, only: integration_settings_t
   use nocdyn_kinds, only: wp
-  use nocdyn_masks, only: all_true, any_differs, any_true
+  use nocdyn_masks, only: any_differs, any_true
   use nocdyn_observer, only: observer_t, step_block_t
   use nocdyn_root_functions, only: start_root_functions
   use nocdyn_solver_status, only: integration_not_finite, integration_rhs_failed, integration_running, reset_solver_status, &
     solver_status_t
-  use nocdyn_step_attempt, only: allocate_step_attempt, attempt_not_finite, begin_attempt, evaluate_start, step_attempt_t
+  use nocdyn_step_attempt, only: advance, allocate_step_attempt, attempt_not_finite, begin_attempt, evaluate_start, step_attempt_t
   use nocdyn_step_control, only: propose_steps, reset_control, step_control, step_control_t
   use nocdyn_stepper, only: stepper_t
   use nocdyn_switching, only: allocate_switching, start_switching, switching_t
@@ -264,24 +264,12 @@ contains
   subroutine advance_lanes(integrator, times)
     type(integrator_t), intent(inout) :: integrator
     real(wp), contiguous, intent(in) :: times(:)   !! output times [s]
-    real(wp), allocatable :: spare(:, :)
-    integer :: component, lane
+    integer :: lane
 
     associate (attempt => integrator%attempt, accepted => integrator%accepted)
-      call advance_measures(integrator%control, accepted)
-      if (all_true(attempt%lanes, accepted)) then   ! swaps the arrays: y_new is not read any more
-        attempt%t(:) = integrator%t_new
-        call move_alloc(attempt%y, spare)
-        call move_alloc(attempt%y_new, attempt%y)
-        call move_alloc(spare, attempt%y_new)
-      else
-        do lane = 1, attempt%lanes
-          if (accepted(lane)) attempt%t(lane) = integrator%t_new(lane)
-        end do
-        do component = 1, attempt%components
-          attempt%y(:, component) = merge(attempt%y_new(:, component), attempt%y(:, component), accepted)
-        end do
-      end if
+      attempt%t(:) = merge(integrator%t_new, attempt%t, accepted)
+      call advance(accepted, attempt%y, attempt%y_new)
+      if (size(integrator%control%size) > 0) call advance(accepted, integrator%control%size, integrator%control%new_size)
       if (.not. integrator%inspects) return
       do lane = 1, attempt%lanes
         integrator%next_time(lane) = huge(integrator%next_time)
