@@ -28,77 +28,87 @@ contains
     integer, intent(in) :: order
     class(system_t), intent(inout) :: system
     type(step_attempt_t), intent(inout) :: attempt   !! reads t, y, slope and active; overwrites h, y_new and error_estimate
-    real(wp) :: slope, steepest, longer
+    real(wp) :: steepest, longer
     integer :: component, lane
 
-    do lane = 1, attempt%lanes
-      attempt%h(lane) = 0.0_wp
-      if (.not. attempt%active(lane)) cycle
-      attempt%h(lane) = euler_step(control, system, attempt, lane)
-      control%h(lane) = retreat * attempt%h(lane)
-    end do
-    call begin_attempt(attempt)
-    attempt%scratch(:) = attempt%t + attempt%h
-    do component = 1, attempt%components
-      attempt%y_new(:, component) = attempt%y(:, component) + attempt%h * attempt%slope(:, component)
-    end do
-    call evaluate_finite(attempt, system, attempt%scratch, attempt%y_new, attempt%error_estimate)
-    call count_evaluations(attempt)
-    attempt%error_estimate(:, :) = attempt%error_estimate - attempt%slope
-    do lane = 1, attempt%lanes
-      if (.not. attempt%active(lane)) cycle
-      slope = weighted_size(control, system, attempt, lane, attempt%slope)
-      steepest = max(slope, weighted_size(control, system, attempt, lane, attempt%error_estimate) / attempt%h(lane))
-      if (steepest <= no_curvature) then
-        longer = max(small_step, attempt%h(lane) * 1.0e-3_wp)
-      else
-        longer = (small_change / steepest)**(1.0_wp / order)
-      end if
-      control%h(lane) = min(max_growth * attempt%h(lane), longer)
-    end do
+    associate (slope => control%factor, curvature => control%log_ratio)   ! work space, [lanes]
+      call weigh(control, system, attempt, attempt%slope)
+      slope(:) = control%log_ratio
+      do lane = 1, attempt%lanes
+        attempt%h(lane) = 0.0_wp
+        if (.not. attempt%active(lane)) cycle
+        attempt%h(lane) = euler_step(control, system, attempt, lane, slope(lane))
+        control%h(lane) = retreat * attempt%h(lane)
+      end do
+      call begin_attempt(attempt)
+      attempt%scratch(:) = attempt%t + attempt%h
+      do component = 1, attempt%components
+        attempt%y_new(:, component) = attempt%y(:, component) + attempt%h * attempt%slope(:, component)
+      end do
+      call evaluate_finite(attempt, system, attempt%scratch, attempt%y_new, attempt%error_estimate)
+      call count_evaluations(attempt)
+      attempt%error_estimate(:, :) = attempt%error_estimate - attempt%slope
+      call weigh(control, system, attempt, attempt%error_estimate)
+      do lane = 1, attempt%lanes
+        if (.not. attempt%active(lane)) cycle
+        steepest = max(slope(lane), curvature(lane) / attempt%h(lane))
+        if (steepest <= no_curvature) then
+          longer = max(small_step, attempt%h(lane) * 1.0e-3_wp)
+        else
+          longer = (small_change / steepest)**(1.0_wp / order)
+        end if
+        control%h(lane) = min(max_growth * attempt%h(lane), longer)
+      end do
+    end associate
   end subroutine guess_first_steps
 
   !> A step over which y changes by about 1 % if the slope stays as it is.
-  function euler_step(control, system, attempt, lane) result(h)
-    type(step_control_t), intent(inout) :: control
+  pure real(wp) function euler_step(control, system, attempt, lane, slope) result(h)
+    type(step_control_t), intent(in) :: control
     class(system_t), intent(in) :: system
     type(step_attempt_t), intent(in) :: attempt
     integer, intent(in) :: lane
-    real(wp) :: h
-    real(wp) :: position, slope
+    real(wp), intent(in) :: slope   !! its weighted size [1/s]
+    real(wp) :: position
 
     if (system%measures > 0) then
-      position = rms_ratio(control, control%size(lane, :system%measures - system%phases), &
-                           control%size(lane, :system%measures - system%phases))
+      position = rms_ratio(control, control%size(lane, :counted(system)), control%size(lane, :counted(system)))
     else
       position = rms_ratio(control, attempt%y(lane, :attempt%states), attempt%y(lane, :attempt%states))
     end if
-    slope = weighted_size(control, system, attempt, lane, attempt%slope)
     h = small_step
     if (min(position, slope) >= negligible) h = small_change * position / slope
     h = min(h, control%longest, control%t_end - attempt%t(lane))
     h = max(h, smallest_step(attempt%t(lane)))
   end function euler_step
 
-  !> Root mean square of x / (atol + rtol |y|) over the states, or over the quantities that the system measures; without the
-  !> phases, since the speed of a rotation is no error and sets no time scale.
-  function weighted_size(control, system, attempt, lane, x) result(rms)
+  !> The number of measured quantities without the phases: the speed of a rotation is no error and sets no time scale.
+  pure integer function counted(system)
+    class(system_t), intent(in) :: system
+
+    counted = system%measures - system%phases
+  end function counted
+
+  !> Sets `log_ratio` of the active lanes to the root mean square of x / (atol + rtol |y|) over the states, or over the quantities
+  !> that the system measures, without the phases.
+  subroutine weigh(control, system, attempt, x)
     type(step_control_t), intent(inout) :: control
     class(system_t), intent(in) :: system
     type(step_attempt_t), intent(in) :: attempt
-    integer, intent(in) :: lane
     real(wp), contiguous, intent(in) :: x(:, :)   !! [lanes, padded columns]
-    real(wp) :: rms
+    integer :: lane
 
-    if (system%measures > 0) then
-      call system%measure(size(x, 2), attempt%y, x, control%new_size, control%error)
-      associate (n => system%measures - system%phases)
-        rms = rms_ratio(control, control%error(lane, :n), control%size(lane, :n))
-      end associate
-    else
-      rms = rms_ratio(control, x(lane, :attempt%states), attempt%y(lane, :attempt%states))
-    end if
-  end function weighted_size
+    if (system%measures > 0) call system%measure(size(x, 2), attempt%y, x, control%new_size, control%error)
+    do lane = 1, attempt%lanes
+      if (.not. attempt%active(lane)) cycle
+      if (system%measures > 0) then
+        control%log_ratio(lane) = rms_ratio(control, control%error(lane, :counted(system)), &
+                                            control%size(lane, :counted(system)))
+      else
+        control%log_ratio(lane) = rms_ratio(control, x(lane, :attempt%states), attempt%y(lane, :attempt%states))
+      end if
+    end do
+  end subroutine weigh
 
   !> Root mean square of x / (atol + rtol |y|).
   pure real(wp) function rms_ratio(control, x, y) result(rms)
