@@ -2,7 +2,7 @@
 module nocdyn_json
   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
   use nocdyn_kinds, only: wp
-  use nocdyn_printable, only: as_utf_8, utf_8_length
+  use nocdyn_printable, only: as_utf_8
   use nocdyn_text, only: string_t, to_text
   use nocdyn_text_buffer, only: text_buffer_t
   use nocdyn_version, only: compiler_text, version
@@ -237,23 +237,22 @@ contains
     character(len=*), intent(in) :: text
     character(len=:), allocatable :: escaped
     type(text_buffer_t) :: buffer
-    integer :: i, length
+    character(len=:), allocatable :: utf_8
+    integer :: i
 
+    utf_8 = as_utf_8(text)
     call buffer%append('"')
-    i = 1
-    do while (i <= len(text))
-      length = utf_8_length(text, i)
-      select case (text(i:i))
+    do i = 1, len(utf_8)
+      select case (utf_8(i:i))
       case ('"', '\')
-        call buffer%append('\' // text(i:i))
+        call buffer%append('\' // utf_8(i:i))
       case (achar(10))
         call buffer%append('\n')
       case (achar(0):achar(9), achar(11):achar(31))
         call buffer%append(' ')
       case default
-        call buffer%append(as_utf_8(text(i:i + max(1, length) - 1)))
+        call buffer%append(utf_8(i:i))
       end select
-      i = i + max(1, length)
     end do
     call buffer%append('"')
     escaped = buffer%text()
