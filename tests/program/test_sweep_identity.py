@@ -3,6 +3,7 @@
 import subprocess
 
 import pytest
+from conftest import SOURCE
 from sweep_inputs import MIXED, MPI_ENVIRONMENT, SWEEP, TWO_DISCS, mpirun, needs_mpi, needs_sweeps
 
 pytestmark = needs_sweeps
@@ -16,13 +17,21 @@ def whole(shared_nocdyn):
     """sweep.nc of one thread, and the function that compares with it."""
     shared_nocdyn.write("discs.nml", TWO_DISCS + SWEEP)
     shared_nocdyn.write("mixed.nml", MIXED)
+    shared_nocdyn.write("assembled.nml", (SOURCE / "tests/sanitize/assembled.nml").read_text(encoding="utf-8"))
     assert shared_nocdyn("sweep", "discs.nml", "--out", "discs", "--threads", 1, *MANY).returncode == 0
     assert shared_nocdyn("sweep", "mixed.nml", "--out", "mixed", "--threads", 1).returncode == 0
+    assert shared_nocdyn("sweep", "assembled.nml", "--out", "assembled", "--threads", 1).returncode == 0
     return shared_nocdyn
 
 
 def bytes_of(nocdyn, folder):
     return (nocdyn.folder / folder / "sweep.nc").read_bytes()
+
+
+@pytest.mark.parametrize("threads", [2, 3, 7])
+def test_threads_that_assemble_machines_do_not_show(whole, threads):
+    whole("sweep", "assembled.nml", "--out", f"assembled-{threads}", "--threads", threads)
+    assert bytes_of(whole, f"assembled-{threads}") == bytes_of(whole, "assembled")
 
 
 @pytest.mark.parametrize("threads", [2, 3])

@@ -32,7 +32,7 @@ contains
       associate (group => input%groups(indices(i)))
         select case (coupling_form(group))
         case (gap)
-          obstacle = gap_obstacle(coefficients_of(group), group%number('gap'))
+          call find_gap_obstacle(coefficients_of(group), group%number('gap'), obstacle)
           if (obstacle == '') cycle
           call raise(error, exit_input, input%location(indices(i), 'gap') // ': gap = ' // &
                      to_text(group%number('gap')) // obstacle)
@@ -49,10 +49,10 @@ contains
   end subroutine check_couplings
 
   !> What is wrong with the stiffness sum |p_k| gap^(k - 1) at the edges of a gap, '' if nothing is.
-  pure function gap_obstacle(coefficient, width) result(text)
+  pure subroutine find_gap_obstacle(coefficient, width, text)
     real(wp), intent(in) :: coefficient(:)   !! p_k [N m/rad^k]
     real(wp), intent(in) :: width            !! of the gap [rad]
-    character(len=:), allocatable :: text
+    character(len=:), allocatable, intent(out) :: text
     real(wp), parameter :: largest_exponent = 200.0_wp   ! in 1e-200 to 1e200
     real(wp) :: exponent
     integer :: k
@@ -68,7 +68,7 @@ contains
       text = ' gives its edges a stiffness of about 1e' // to_text(nint(exponent)) // &
              ' N m/rad; allowed: with cubic_stiffness or polynomial, one from 1e-200 to 1e200'
     end if
-  end function gap_obstacle
+  end subroutine find_gap_obstacle
 
   !> Form of the elastic moment of a group &coupling.
   pure integer function coupling_form(group)

@@ -166,6 +166,7 @@ contains
     type(decimal_t), intent(in) :: decimals(:)   !! [bodies]
     real(wp) :: free(size(complement, 2), size(complement, 2)), speed(size(bodies))
     type(string_t), allocatable :: changes(:), left_open(:)
+    character(len=:), allocatable :: text
     integer :: i
 
     free = free_motions(known)
@@ -175,7 +176,8 @@ contains
       associate (start => machine%start_speed(:, bodies(i)))
         if (is_given(i) .and. abs(speed(i) - start(1)) <= rounding * abs(start(1))) cycle
         if (is_given(i)) then
-          call append(changes, value_text(start(1), decimals(i)) // ' of ' // quoted(machine%names(bodies(i))%text) // ' by ' // &
+          call write_speed(start(1), decimals(i), text)
+          call append(changes, text // ' of ' // quoted(machine%names(bodies(i))%text) // ' by ' // &
                                rounded_text(speed(i) / decimals(i)%unit, shown_digits))
         end if
         if (norm2(matmul(complement(i, :), free)) > rounding * norm2(complement(i, :)) .and. abs(speed(i)) > 0.0_wp) then
@@ -185,11 +187,13 @@ contains
       end associate
     end do
     if (size(changes) > 0) then
+      call join_texts(changes, text)
       call append(machine%start_notes, 'start speeds contradict the gears by no more than their rounding, and are replaced: ' // &
-                                       joined_texts(changes))
+                                       text)
     end if
     if (size(left_open) > 0) then
-      call append(machine%start_notes, 'the given start speeds do not determine those of ' // joined_texts(left_open) // &
+      call join_texts(left_open, text)
+      call append(machine%start_notes, 'the given start speeds do not determine those of ' // text // &
                                        ': the smallest ones that fit are taken')
     end if
   end subroutine set_speeds
@@ -223,18 +227,18 @@ contains
   end function smallest_speeds
 
   !> "33.33 rpm".
-  function value_text(speed, decimal) result(text)
+  subroutine write_speed(speed, decimal, text)
     real(wp), intent(in) :: speed   !! [rad/s]
     type(decimal_t), intent(in) :: decimal
-    character(len=:), allocatable :: text
+    character(len=:), allocatable, intent(out) :: text
 
     text = rounded_text(speed / decimal%unit, shown_digits) // ' ' // trim(merge('rad/s', 'rpm  ', decimal%unit >= 1.0_wp))
-  end function value_text
+  end subroutine write_speed
 
   !> Texts with commas between them, and how many more there are.
-  function joined_texts(texts) result(text)
+  subroutine join_texts(texts, text)
     type(string_t), intent(in) :: texts(:)
-    character(len=:), allocatable :: text
+    character(len=:), allocatable, intent(out) :: text
     integer :: i
 
     text = texts(1)%text
@@ -242,6 +246,6 @@ contains
       text = text // ', ' // texts(i)%text
     end do
     if (size(texts) > most_names) text = text // ' and ' // to_text(size(texts) - most_names) // ' more'
-  end function joined_texts
+  end subroutine join_texts
 
 end module nocdyn_followed_speeds

@@ -33,6 +33,7 @@ contains
     type(error_t), allocatable, intent(out) :: error
     real(wp) :: nearest(machine%bodies)
     integer, allocatable :: violated(:)
+    character(len=:), allocatable :: message
 
     offending_row = 0
     allocate (violated, source=violated_rows(machine))
@@ -46,7 +47,8 @@ contains
       call project_start(nearest, machine)
     else
       offending_row = violated(1)
-      call raise(error, exit_input, violation_message(machine, violated, nearest))
+      call describe_violation(machine, violated, nearest, message)
+      call raise(error, exit_input, message)
     end if
   end subroutine fit_start_speeds
 
@@ -129,17 +131,19 @@ contains
   end subroutine project_start
 
   !> "the start speeds violate this gear: 2 * 1 rad/s ('pinion') + ... = 2, which must be 0; nearest speeds that ...".
-  function violation_message(machine, violated, nearest) result(text)
+  subroutine describe_violation(machine, violated, nearest, text)
     type(machine_t), intent(in) :: machine
     integer, intent(in) :: violated(:)   !! rows
     real(wp), intent(in) :: nearest(:)   !! [bodies] [rad/s]
-    character(len=:), allocatable :: text
+    character(len=:), allocatable, intent(out) :: text
+    character(len=:), allocatable :: row
     real(wp) :: residual, scale
     integer, allocatable :: others(:)   ! bodies with another speed
     integer :: b, i
 
     call machine%constraints%residual(1, violated(1), machine%start_speed(1, :), residual, scale)
-    text = 'the start speeds violate it: ' // row_text(machine, violated(1)) // ' = ' // rounded_text(residual, 6) // &
+    call describe_row(machine, violated(1), row)
+    text = 'the start speeds violate it: ' // row // ' = ' // rounded_text(residual, 6) // &
            ', which must be 0'
     if (size(violated) > 1) text = text // ' (and ' // to_text(size(violated) - 1) // ' more)'
     text = text // '; nearest speeds that fit:'
@@ -150,13 +154,13 @@ contains
     end do
     if (size(others) > most_bodies) text = text // ' and ' // to_text(size(others) - most_bodies) // ' more'
     text = text // '; &run start = ' // quoted('projected') // ' takes them'
-  end function violation_message
+  end subroutine describe_violation
 
   !> The left-hand side of a row with the start speeds in it, e.g. "2 * 1 rad/s ('pinion') + 3 * 0 rad/s ('machine')".
-  function row_text(machine, row) result(text)
+  subroutine describe_row(machine, row, text)
     type(machine_t), intent(in) :: machine
     integer, intent(in) :: row
-    character(len=:), allocatable :: text
+    character(len=:), allocatable, intent(out) :: text
     integer :: entry, last
 
     text = ''
@@ -170,6 +174,6 @@ contains
       end do
       if (last < rows%first(row + 1) - 1) text = text // ' + ' // to_text(rows%first(row + 1) - 1 - last) // ' more terms'
     end associate
-  end function row_text
+  end subroutine describe_row
 
 end module nocdyn_start_speeds

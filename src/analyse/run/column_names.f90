@@ -5,12 +5,13 @@ module nocdyn_column_names
   use nocdyn_input, only: input_t
   use nocdyn_machine, only: machine_t
   use nocdyn_output_units, only: output_units, turn_labels
-  use nocdyn_text, only: append, joined, nearest_word, quoted, string_t, to_text
+  use nocdyn_near_words, only: nearest_word
+  use nocdyn_text, only: append, joined, quoted, string_t, to_text
   use nocdyn_trajectory_columns, only: column_count, column_t, list_columns
   implicit none (type, external)
   private
 
-  public :: choose_columns, count_columns, no_column_text, quantity_of
+  public :: choose_columns, count_columns, explain_no_column, quantity_of
 
   integer, parameter :: most_names = 16   ! in a message
 
@@ -134,10 +135,10 @@ contains
   end subroutine append_new
 
   !> Why a name that is no column may have been written, e.g. "; did you mean 'omega_motor'?".
-  pure function no_column_text(name, labels) result(text)
+  pure subroutine explain_no_column(name, labels, text)
     character(len=*), intent(in) :: name
     type(string_t), intent(in) :: labels(:)   !! of the columns, with their units
-    character(len=:), allocatable :: text
+    character(len=:), allocatable, intent(out) :: text
     type(string_t) :: names(size(labels))   ! labels without units
     integer :: i
 
@@ -150,7 +151,7 @@ contains
       text = near_match(name, names)
     end if
     if (text == '') text = ', which has ' // related_names(name, names)
-  end function no_column_text
+  end subroutine explain_no_column
 
   !> The label without its unit.
   pure function without_unit(label) result(name)

@@ -1,6 +1,6 @@
 !> A hint after a run: the machine ends in a slow steady state, as a motor does that cannot start its load, and could run faster.
 module nocdyn_missed_states
-  use nocdyn_balance_texts, only: state_speeds_text
+  use nocdyn_balance_texts, only: describe_state_speeds
   use nocdyn_equilibrium, only: equilibrium_t, find_equilibria, find_stability
   use nocdyn_errors, only: error_t
   use nocdyn_formulation, only: formulation_t
@@ -28,7 +28,7 @@ contains
     type(string_t), allocatable :: remarks(:)
     type(error_t), allocatable :: error
     real(wp), allocatable :: distance(:), energy(:)
-    character(len=:), allocatable :: here
+    character(len=:), allocatable :: here, there
     integer :: fastest, i, nearest
 
     if (machine%bodies > most_bodies) return
@@ -48,10 +48,11 @@ contains
     fastest = maxloc(energy, dim=1)
     if (nearest == fastest .or. distance(nearest) > near * distance(fastest)) return
     call formulation%set_state(equilibria(nearest)%y)
-    here = state_speeds_text(formulation)
+    call describe_state_speeds(formulation, here)
     call formulation%set_state(equilibria(fastest)%y)
+    call describe_state_speeds(formulation, there)
     call append(notes, 'the machine ends in the steady state at ' // here // '; it could run at ' // &
-                       state_speeds_text(formulation) // ", where &run start = 'equilibrium' starts it")
+                       there // ", where &run start = 'equilibrium' starts it")
   end subroutine note_missed_state
 
 end module nocdyn_missed_states

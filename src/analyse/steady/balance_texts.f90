@@ -3,12 +3,12 @@ module nocdyn_balance_texts
   use nocdyn_block_solutions, only: block_solutions_t
   use nocdyn_formulation, only: formulation_t
   use nocdyn_kinds, only: wp
-  use nocdyn_text, only: joined, quoted, rounded_text, selected, to_text
+  use nocdyn_text, only: joined, quoted, rounded_text, selected, string_t, to_text
   use nocdyn_torque_balance, only: torque_balance_t
   implicit none (type, external)
   private
 
-  public :: moving_bodies, no_balance_message, speed_text, state_speeds_text
+  public :: describe_speeds, describe_state_speeds, explain_no_balance, list_moving_bodies
 
   integer, parameter :: most_names = 5   ! of bodies in a message
   integer, parameter :: digits = 6, speed_digits = 4   ! at a minimum of the torque the speed has half of the digits
@@ -17,14 +17,18 @@ module nocdyn_balance_texts
 contains
 
   !> Message about a block without solution: that there is none, if that is known, or what was tried.
-  function no_balance_message(balance, block) result(sentence)
+  subroutine explain_no_balance(balance, block, sentence)
     type(torque_balance_t), intent(in) :: balance
     type(block_solutions_t), intent(in) :: block
-    character(len=:), allocatable :: sentence
+    character(len=:), allocatable, intent(out) :: sentence
+    character(len=:), allocatable :: bodies
+    type(string_t), allocatable :: names(:)
 
+    allocate (names, source=balance%formulation%machine%names)
+    call list_moving_bodies(balance, block%members, bodies)
     if (.not. block%is_complete) then
       sentence = 'no steady state was found: nothing was found that balances the torques on ' // &
-                 moving_bodies(balance, block%members) // '; tried: a scan over one speed with the others following it, ' // &
+                 bodies // '; tried: a scan over one speed with the others following it, ' // &
                  'Newton''s method from ' // to_text(block%starts) // ' combinations of rest, synchronous speeds and knees ' // &
                  'of the curves, and the motion from the start'
       return
@@ -32,32 +36,30 @@ contains
     sentence = 'there is no steady state: nothing balances '
     if (block%is_level) then
       sentence = sentence // rounded_text(block%least_torque, digits) // ' N m on ' // &
-                 moving_bodies(balance, block%members) // ' at any speed; a load is missing, or a motor whose torque falls'
+                 bodies // ' at any speed; a load is missing, or a motor whose torque falls'
     else
-      sentence = sentence // 'the torques on ' // moving_bodies(balance, block%members) // ' at any speed'
+      sentence = sentence // 'the torques on ' // bodies // ' at any speed'
       if (block%least_torque < huge(1.0_wp)) then
         sentence = sentence // '; at least ' // rounded_text(block%least_torque, digits) // ' N m are left over, at ' // &
-                   rounded_text(block%least_speed, speed_digits) // ' rad/s of ' // quoted(body_of(balance, block%members(1)))
+                   rounded_text(block%least_speed, speed_digits) // ' rad/s of ' // &
+                   quoted(names(body_of(balance, block%members(1)))%text)
       end if
     end if
-  end function no_balance_message
+  end subroutine explain_no_balance
 
-  !> Name of the independent body of a rigid motion.
-  function body_of(balance, freedom) result(name)
+  !> The independent body of a rigid motion.
+  integer function body_of(balance, freedom)
     type(torque_balance_t), intent(in) :: balance
     integer, intent(in) :: freedom
-    character(len=:), allocatable :: name
 
-    associate (machine => balance%formulation%machine)
-      name = machine%names(machine%coordinates%body(balance%motions%free(freedom)))%text
-    end associate
+    body_of = balance%formulation%machine%coordinates%body(balance%motions%free(freedom))
   end function body_of
 
   !> Names of the bodies that turn in some rigid motions.
-  function moving_bodies(balance, members) result(text)
+  subroutine list_moving_bodies(balance, members, text)
     type(torque_balance_t), intent(in) :: balance
     integer, intent(in) :: members(:)   !! unknowns; those that are internal states are ignored
-    character(len=:), allocatable :: text
+    character(len=:), allocatable, intent(out) :: text
     real(wp) :: unit(balance%motions%freedoms())
     logical :: moves(balance%formulation%machine%bodies)
     integer, allocatable :: bodies(:)
@@ -74,14 +76,14 @@ contains
     associate (names => balance%formulation%machine%names)
       text = joined(selected(names, bodies), ', ', most_names)
     end associate
-  end function moving_bodies
+  end subroutine list_moving_bodies
 
   !> Speeds of rigid motions as text, such as "12.5 rad/s of 'motor'".
-  function speed_text(balance, z, members) result(text)
+  subroutine describe_speeds(balance, z, members, text)
     type(torque_balance_t), intent(in) :: balance
     real(wp), intent(in) :: z(:)        !! [unknowns]
     integer, intent(in) :: members(:)   !! unknowns; those that are internal states are ignored
-    character(len=:), allocatable :: text
+    character(len=:), allocatable, intent(out) :: text
     integer, allocatable :: freedoms(:)
     integer :: i
 
@@ -89,15 +91,16 @@ contains
     freedoms = pack(members, members <= balance%motions%freedoms())
     do i = 1, min(size(freedoms), most_names)
       if (i > 1) text = text // ', '
-      text = text // rounded_text(z(freedoms(i)), digits) // ' rad/s of ' // quoted(body_of(balance, freedoms(i)))
+      text = text // rounded_text(z(freedoms(i)), digits) // ' rad/s of ' // &
+             quoted(balance%formulation%machine%names(body_of(balance, freedoms(i)))%text)
     end do
     if (text == '') text = 'rest'
-  end function speed_text
+  end subroutine describe_speeds
 
   !> Speeds of the bodies of a machine at its state, such as "12.5 rad/s of 'motor'"; of bodies with equal speeds the first.
-  function state_speeds_text(formulation) result(text)
+  subroutine describe_state_speeds(formulation, text)
     class(formulation_t), intent(in) :: formulation
-    character(len=:), allocatable :: text
+    character(len=:), allocatable, intent(out) :: text
     integer :: b, named
 
     text = ''
@@ -112,6 +115,6 @@ contains
       end do
     end associate
     if (named > most_names) text = text // ' ...'
-  end function state_speeds_text
+  end subroutine describe_state_speeds
 
 end module nocdyn_balance_texts

@@ -1,7 +1,7 @@
 !> Steady states of a machine: constant speeds, mean torques, constant twists.
 module nocdyn_equilibrium
   use nocdyn_balance_search, only: search_balance
-  use nocdyn_balance_texts, only: moving_bodies, no_balance_message, speed_text
+  use nocdyn_balance_texts, only: describe_speeds, explain_no_balance, list_moving_bodies
   use nocdyn_block_solutions, only: block_solutions_t
   use nocdyn_errors, only: error_t, exit_failed, raise
   use nocdyn_formulation, only: formulation_t
@@ -44,6 +44,7 @@ contains
     type(error_t), allocatable, intent(out) :: error       !! if no steady state was found
     type(torque_balance_t) :: balance
     type(block_solutions_t), allocatable :: blocks(:)
+    character(len=:), allocatable :: text
     integer :: i
 
     call mean_formulation(machine, formulation)
@@ -52,12 +53,14 @@ contains
     allocate (notes(0))
     do i = 1, size(blocks)
       if (size(blocks(i)%values, 2) > 0) cycle
-      call raise(error, exit_failed, no_balance_message(balance, blocks(i)))
+      call explain_no_balance(balance, blocks(i), text)
+      call raise(error, exit_failed, text)
       return
     end do
     do i = 1, size(blocks)
-      if (blocks(i)%is_unloaded) call append(notes, 'nothing drives or brakes ' // moving_bodies(balance, blocks(i)%members) // &
-                                                ': any speed is steady, and the one of the start is kept')
+      if (.not. blocks(i)%is_unloaded) cycle
+      call list_moving_bodies(balance, blocks(i)%members, text)
+      call append(notes, 'nothing drives or brakes ' // text // ': any speed is steady, and the one of the start is kept')
     end do
     call combine(balance, blocks, equilibria, notes, error)
     call move_alloc(balance%formulation, formulation)
@@ -98,6 +101,7 @@ contains
     integer :: choice(size(blocks)), i, number
     real(wp) :: z(balance%unknowns())
     type(equilibrium_t) :: found
+    character(len=:), allocatable :: speeds
     logical :: is_found
 
     allocate (equilibria(0))
@@ -114,8 +118,8 @@ contains
         equilibria = [equilibria, found]
         call add_range_notes(balance, blocks, choice, z, notes)
       else
-        call append(notes, 'the torques balance at ' // speed_text(balance, z, [(i, i=1, size(z))]) // &
-                           ', but no twists of the couplings were found that carry them')
+        call describe_speeds(balance, z, [(i, i=1, size(z))], speeds)
+        call append(notes, 'the torques balance at ' // speeds // ', but no twists of the couplings were found that carry them')
       end if
       if (.not. advance(blocks, choice)) exit
     end do
@@ -132,13 +136,15 @@ contains
     type(string_t), allocatable, intent(inout) :: notes(:)
     integer, allocatable :: undetermined(:)
     type(string_t), allocatable :: names(:)
+    character(len=:), allocatable :: bodies, speeds
     integer :: i
 
     do i = 1, size(blocks)
       if (.not. blocks(i)%is_range(choice(i))) cycle
-      call append_new(notes, 'the torques on ' // moving_bodies(balance, blocks(i)%members) // ' balance over a range of ' // &
-                             'speeds: any of them is steady, and of those that were found the one nearest to the start is ' // &
-                             'kept, ' // speed_text(balance, z, blocks(i)%members))
+      call list_moving_bodies(balance, blocks(i)%members, bodies)
+      call describe_speeds(balance, z, blocks(i)%members, speeds)
+      call append_new(notes, 'the torques on ' // bodies // ' balance over a range of speeds: any of them is steady, and of ' // &
+                             'those that were found the one nearest to the start is kept, ' // speeds)
     end do
     allocate (undetermined, source=undetermined_elements(balance))
     if (size(undetermined) == 0) return

@@ -1,6 +1,6 @@
 !> The start of a machine in a steady state: the speeds, the angles and the internal states there.
 module nocdyn_steady_start
-  use nocdyn_balance_texts, only: state_speeds_text
+  use nocdyn_balance_texts, only: describe_state_speeds
   use nocdyn_equilibrium, only: equilibrium_t, find_equilibria, find_stability, nearest_equilibrium
   use nocdyn_errors, only: error_t
   use nocdyn_formulation, only: formulation_t
@@ -26,6 +26,7 @@ contains
     class(formulation_t), allocatable :: formulation
     type(equilibrium_t), allocatable :: equilibria(:)
     type(string_t), allocatable :: notes(:)
+    character(len=:), allocatable :: name, speeds
     integer :: i, nearest
 
     call find_equilibria(machine, t_start, formulation, equilibria, notes, error)
@@ -36,19 +37,20 @@ contains
     machine%start_speed(1, :) = formulation%omega(1, 1:)
     machine%start_angle(1, :) = formulation%phi(1, 1:)
     allocate (machine%steady_internal, source=formulation%machine%elements%internal%value)
-    call append(machine%start_notes, 'the start is ' // name_of(equilibria, nearest, any(is_given)) // ', at ' // &
-                                     state_speeds_text(formulation))
+    call describe_choice(equilibria, nearest, any(is_given), name)
+    call describe_state_speeds(formulation, speeds)
+    call append(machine%start_notes, 'the start is ' // name // ', at ' // speeds)
     do i = 1, size(notes)
       call append(machine%start_notes, notes(i)%text)
     end do
   end subroutine start_steadily
 
   !> "steady state 3 of 3, of 2 stable ones the nearest to the given speeds".
-  function name_of(equilibria, number, is_near) result(text)
+  subroutine describe_choice(equilibria, number, is_near, text)
     type(equilibrium_t), intent(in) :: equilibria(:)
     integer, intent(in) :: number
     logical, intent(in) :: is_near   !! to given speeds; else it is the fastest
-    character(len=:), allocatable :: text
+    character(len=:), allocatable, intent(out) :: text
 
     associate (alike => count(equilibria%stability == equilibria(number)%stability))
       if (size(equilibria) == 1) then
@@ -64,6 +66,6 @@ contains
         end if
       end if
     end associate
-  end function name_of
+  end subroutine describe_choice
 
 end module nocdyn_steady_start

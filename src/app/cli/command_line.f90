@@ -3,7 +3,8 @@ module nocdyn_command_line
   use nocdyn_arguments, only: arguments_t, option_index, option_t, options
   use nocdyn_commands, only: command_index, command_names, command_t, commands_with_option
   use nocdyn_errors, only: error_t, exit_input, raise
-  use nocdyn_text, only: append, is_too_long, joined, longest_file_name, longest_path, nearest_word, &
+  use nocdyn_near_words, only: nearest_word
+  use nocdyn_text, only: append, is_too_long, joined, longest_file_name, longest_path, &
     quoted, shortened, string_t, to_text
   implicit none (type, external)
   private

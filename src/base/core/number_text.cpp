@@ -3,14 +3,14 @@
 #include <charconv>
 #include <cstddef>
 
-extern "C" int nocdyn_shortest_decimal(double value, char *buffer, std::size_t capacity) {
+extern "C" void nocdyn_shortest_decimal(double value, char *buffer, std::size_t capacity, int *length) {
   const auto result = std::to_chars(buffer, buffer + capacity, value);
-  return result.ec == std::errc{} ? static_cast<int>(result.ptr - buffer) : 0;
+  *length = result.ec == std::errc{} ? static_cast<int>(result.ptr - buffer) : 0;
 }
 
 // The same without an exponent, or always with one.
-extern "C" int nocdyn_shortest_form(double value, int has_exponent, char *buffer, std::size_t capacity) {
+extern "C" void nocdyn_shortest_form(double value, int has_exponent, char *buffer, std::size_t capacity, int *length) {
   const auto form = has_exponent ? std::chars_format::scientific : std::chars_format::fixed;
   const auto result = std::to_chars(buffer, buffer + capacity, value, form);
-  return result.ec == std::errc{} ? static_cast<int>(result.ptr - buffer) : 0;
+  *length = result.ec == std::errc{} ? static_cast<int>(result.ptr - buffer) : 0;
 }

@@ -3,7 +3,7 @@ module nocdyn_printable
   implicit none (type, external)
   private
 
-  public :: printable, as_utf_8, utf_8_length
+  public :: printable, as_utf_8, in_quotes, utf_8_length
 
 contains
 
@@ -114,5 +114,29 @@ contains
     if ((head == 224 .and. second < 160) .or. (head == 237 .and. second > 159) .or. (head == 240 .and. second < 144) &
         .or. (head == 244 .and. second > 143)) length = 0
   end function utf_8_length
+
+  !> The text between quotes, of which those inside it are doubled.
+  pure function in_quotes(text, quote)
+    character(len=*), intent(in) :: text
+    character(len=1), intent(in) :: quote
+    character(len=:), allocatable :: in_quotes
+    integer :: i, last
+
+    last = 2
+    do i = 1, len(text)
+      last = last + merge(2, 1, text(i:i) == quote)
+    end do
+    allocate (character(len=last) :: in_quotes)
+    in_quotes(1:1) = quote
+    last = 1
+    do i = 1, len(text)
+      last = last + 1
+      in_quotes(last:last) = text(i:i)
+      if (text(i:i) /= quote) cycle
+      last = last + 1
+      in_quotes(last:last) = quote
+    end do
+    in_quotes(last + 1:) = quote
+  end function in_quotes
 
 end module nocdyn_printable

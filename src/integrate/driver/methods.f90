@@ -9,7 +9,8 @@ module nocdyn_methods
   use nocdyn_rosenbrock_tables, only: rodas4, rodas5p
   use nocdyn_stepper, only: stepper_t
   use nocdyn_taylor_stepper, only: taylor_stepper
-  use nocdyn_text, only: joined, nearest_word, quoted, string_t, strings
+  use nocdyn_near_words, only: nearest_word
+  use nocdyn_text, only: joined, quoted, string_t, strings
   implicit none (type, external)
   private
 

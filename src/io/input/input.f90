@@ -55,7 +55,8 @@ module nocdyn_input
     procedure :: title
     procedure :: shown_file     !! the path for messages
     procedure :: label          !! "&gear 'reducer'"
-    procedure :: location       !! where a group or a key comes from, to begin a message with
+    procedure, private :: location_of_group, location_of_key
+    generic :: location => location_of_group, location_of_key   !! where they come from, to begin a message with
     procedure :: report             !! adds a diagnostic on a key of a group
     procedure :: diagnostics_text   !! all messages with their locations
   end type input_t
@@ -135,13 +136,20 @@ contains
   pure function text(self, key)
     class(group_t), intent(in) :: self
     character(len=*), intent(in) :: key
-    character(len=:), allocatable :: text
+    character(len=text_length(self, key)) :: text
+
+    text = self%values(self%key_position(key))%texts(1)%text
+  end function text
+
+  pure integer function text_length(self, key)
+    class(group_t), intent(in) :: self
+    character(len=*), intent(in) :: key
     integer :: k
 
     k = self%key_position(key)
     if (.not. allocated(self%values(k)%texts)) error stop 'nocdyn_input: text() of a key without a text'
-    text = self%values(k)%texts(1)%text
-  end function text
+    text_length = len(self%values(k)%texts(1)%text)
+  end function text_length
 
   !> All values of a key, none if it has no value.
   pure function numbers(self, key)
@@ -254,41 +262,71 @@ contains
     title = self%groups(self%position('case'))%text('title')
   end function title
 
-  !> "machine.nml:12: &gear 'reducer'", with the line of `key` if the file sets it, or "--set PATH=VALUE: &gear
-  !> 'reducer'" if an override does.
-  pure function location(self, index, key) result(text)
+  !> "machine.nml:12: &gear 'reducer'".
+  pure function location_of_group(self, index) result(text)
     class(input_t), intent(in) :: self
     integer, intent(in) :: index   !! of the group
-    character(len=*), optional, intent(in) :: key
-    character(len=:), allocatable :: text
-    integer :: line, override
+    character(len=source_length(self, self%groups(index)%line, 0) + 2 + label_length(self, index)) :: text
 
-    line = self%groups(index)%line
-    override = 0
-    if (present(key)) then
-      associate (value => self%groups(index)%values(self%groups(index)%key_position(key)))
-        if (value%line > 0) line = value%line
-        override = value%override
-      end associate
-    end if
+    text = source_text(self, self%groups(index)%line, 0) // ': ' // self%label(index)
+  end function location_of_group
 
-    text = source_text(self, line, override) // ': ' // self%label(index)
-  end function location
+  !> The same with the line of `key` if the file sets it, or "--set PATH=VALUE: &gear 'reducer'" if an override does.
+  pure function location_of_key(self, index, key) result(text)
+    class(input_t), intent(in) :: self
+    integer, intent(in) :: index   !! of the group
+    character(len=*), intent(in) :: key
+    character(len=key_source_length(self, index, key) + 2 + label_length(self, index)) :: text
+
+    associate (value => self%groups(index)%values(self%groups(index)%key_position(key)))
+      text = source_text(self, merge(value%line, self%groups(index)%line, value%line > 0), value%override) // ': ' // &
+             self%label(index)
+    end associate
+  end function location_of_key
+
+  pure integer function key_source_length(self, index, key) result(length)
+    class(input_t), intent(in) :: self
+    integer, intent(in) :: index
+    character(len=*), intent(in) :: key
+
+    associate (value => self%groups(index)%values(self%groups(index)%key_position(key)))
+      length = source_length(self, merge(value%line, self%groups(index)%line, value%line > 0), value%override)
+    end associate
+  end function key_source_length
 
   !> "machine.nml:12", or "--set PATH=VALUE" of an override.
   pure function source_text(input, line, override) result(text)
-    type(input_t), intent(in) :: input
+    class(input_t), intent(in) :: input
     integer, intent(in) :: line       !! 0 or `no_line`: the file as a whole
     integer, intent(in) :: override   !! index of the override, 0: none
-    character(len=:), allocatable :: text
+    character(len=source_length(input, line, override)) :: text
+    character(len=:), allocatable :: source
+
+    call make_source(input, line, override, source)
+    text = source
+  end function source_text
+
+  pure integer function source_length(input, line, override) result(length)
+    class(input_t), intent(in) :: input
+    integer, intent(in) :: line, override
+    character(len=:), allocatable :: source
+
+    call make_source(input, line, override, source)
+    length = len(source)
+  end function source_length
+
+  pure subroutine make_source(input, line, override, source)
+    class(input_t), intent(in) :: input
+    integer, intent(in) :: line, override
+    character(len=:), allocatable, intent(out) :: source
 
     if (override > 0) then
-      text = '--set ' // shortened(input%overrides(override)%text)
+      source = '--set ' // shortened(input%overrides(override)%text)
     else
-      text = input%shown_file()
-      if (line > 0 .and. line < no_line) text = text // ':' // to_text(line)
+      source = shown_path(input%file)
+      if (line > 0 .and. line < no_line) source = source // ':' // to_text(line)
     end if
-  end function source_text
+  end subroutine make_source
 
   !> Adds a diagnostic on a key of a group, with the line of the key if it is given.
   subroutine report(self, group, key, text, diagnostics, code)
@@ -330,7 +368,7 @@ contains
   !> The path as messages show it.
   pure function shown_file(self) result(text)
     class(input_t), intent(in) :: self
-    character(len=:), allocatable :: text
+    character(len=source_length(self, 0, 0)) :: text
 
     text = shown_path(self%file)
   end function shown_file
@@ -339,10 +377,18 @@ contains
   pure function label(self, index) result(text)
     class(input_t), intent(in) :: self
     integer, intent(in) :: index   !! of the group
-    character(len=:), allocatable :: text
+    character(len=label_length(self, index)) :: text
 
     text = '&' // shortened(self%groups(index)%kind)
-    if (len(self%groups(index)%name) > 0) text = text // ' ' // quoted(shortened(self%groups(index)%name))
+    if (len(self%groups(index)%name) > 0) text = trim(text) // ' ' // quoted(shortened(self%groups(index)%name))
   end function label
+
+  pure integer function label_length(self, index) result(length)
+    class(input_t), intent(in) :: self
+    integer, intent(in) :: index
+
+    length = 1 + len(shortened(self%groups(index)%kind))
+    if (len(self%groups(index)%name) > 0) length = length + 1 + len(quoted(shortened(self%groups(index)%name)))
+  end function label_length
 
 end module nocdyn_input

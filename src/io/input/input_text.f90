@@ -2,7 +2,8 @@
 module nocdyn_input_text
   use nocdyn_input, only: group_t, input_t, value_t
   use nocdyn_schema, only: first_key, key_rules
-  use nocdyn_text, only: in_quotes, string_t, to_text
+  use nocdyn_printable, only: in_quotes
+  use nocdyn_text, only: string_t, to_text
   use nocdyn_text_buffer, only: text_buffer_t
   implicit none (type, external)
   private

@@ -5,7 +5,8 @@ module nocdyn_schema_text
   use nocdyn_schema_rules, only: a_body, a_file, a_flag, a_folder, a_name, a_number, a_selector, a_word, allowed_t, an_integer, &
     any_number, body_or_ground, key_rule_t, type_nouns
   use nocdyn_schema_units, only: name_in_unit, other_unit, unit_name
-  use nocdyn_text, only: append, joined, listed, nearest_word, quoted, rounded_text, selected, string_t, strings, to_text
+  use nocdyn_near_words, only: nearest_word
+  use nocdyn_text, only: append, joined, listed, quoted, rounded_text, selected, string_t, strings, to_text
   use nocdyn_units, only: from_si
   implicit none (type, external)
   private

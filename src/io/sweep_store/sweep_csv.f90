@@ -7,7 +7,8 @@ module nocdyn_sweep_csv
   use nocdyn_sweep_chunk, only: chunk_t, status_done, status_words
   use nocdyn_sweep_header, only: quantity_t, sweep_header_t
   use nocdyn_sweep_journal, only: sweep_journal_t
-  use nocdyn_text, only: append, in_quotes, string_t, to_text
+  use nocdyn_printable, only: in_quotes
+  use nocdyn_text, only: append, string_t, to_text
   implicit none (type, external)
   private
 

@@ -46,7 +46,8 @@ contains
       other_rows = [row]
     end if
     call raise(error, exit_input, 'locks ' // &
-               locked_names(body_names, trains, [(t == trains%train(bodies(1)), t=1, size(trains%root))]) // ': ' // &
+               joined(selected(body_names, bodies_of(trains, [(t == trains%train(bodies(1)), t=1, size(trains%root))])), &
+                      ', ', most_names) // ': ' // &
                joined(selected(constraints%names, tree_rows), ', ', most_names) // ' and ' // &
                joined(selected(constraints%names, other_rows), ', ', most_names) // ' drive ' // &
                quoted(body_names(bodies_of_tree(size(bodies_of_tree)))%text) // ' at ' // &
@@ -70,16 +71,15 @@ contains
     end do
   end function ratio_along
 
-  !> Names of the bodies of some trains.
-  function locked_names(body_names, trains, is_locked) result(names)
-    type(string_t), intent(in) :: body_names(:)
+  !> The bodies of some trains.
+  pure function bodies_of(trains, is_locked) result(bodies)
     type(rigid_trains_t), intent(in) :: trains
     logical, intent(in) :: is_locked(:)   !! [trains]
-    character(len=:), allocatable :: names
+    integer, allocatable :: bodies(:)
     integer :: b
 
-    names = joined(selected(body_names, pack([(b, b=1, size(body_names))], is_locked(trains%train))), ', ', most_names)
-  end function locked_names
+    bodies = pack([(b, b=1, size(trains%train))], is_locked(trains%train))
+  end function bodies_of
 
   !> Trains that the relations lock: those of the core whose row of the complement is zero, and those whose relation has only
   !> locked trains or speeds that cancel.
@@ -144,6 +144,7 @@ contains
     type(elimination_t) :: elimination
     logical :: is_member(size(relations%row)), is_locked(size(trains%root))
     integer, allocatable :: ascending(:), rows(:)
+    character(len=:), allocatable :: reason
     integer :: free, i, lock, middle
 
     is_member = .false.
@@ -164,21 +165,22 @@ contains
     is_locked = locked_trains(relations, elimination)
     rows = locking_rows(constraints, trains, relations, elimination, findloc(is_locked, .true., dim=1))
     rows = pack(rows, rows /= offending_row)
-    call raise(error, exit_input, 'locks ' // locked_names(body_names, trains, is_locked) // &
-               reason(selected(constraints%names, rows)))
+    call explain_lock(selected(constraints%names, rows), reason)
+    call raise(error, exit_input, 'locks ' // joined(selected(body_names, bodies_of(trains, is_locked)), ', ', most_names) // &
+               reason)
   end subroutine raise_lock
 
   !> The other rows that cause the lock, as text.
-  function reason(names) result(text)
+  subroutine explain_lock(names, text)
     type(string_t), intent(in) :: names(:)
-    character(len=:), allocatable :: text
+    character(len=:), allocatable, intent(out) :: text
 
     if (size(names) == 0) then
       text = ', as no other body in it turns'
     else
       text = ': together with ' // joined(names, ', ', most_names) // ' it leaves no speed but 0'
     end if
-  end function reason
+  end subroutine explain_lock
 
   !> The elimination of some relations only.
   function partial_elimination(relations, chosen) result(elimination)

@@ -141,8 +141,7 @@ contains
       freedoms = size(groups(g)%independent)
       groups(g)%independent = wanted(order(first(g):first(g + 1) - 1))
       if (size(groups(g)%independent) /= freedoms) then
-        call raise(error, exit_input, count_message(selected(body_names, groups(g)%bodies), &
-                                             selected(body_names, groups(g)%independent), freedoms))
+        call raise_count(selected(body_names, groups(g)%bodies), selected(body_names, groups(g)%independent), freedoms, error)
         return
       end if
       is_taken(trains%train(groups(g)%independent)) = .true.
@@ -202,10 +201,11 @@ contains
                ' cannot be independent: the constraints relate their speeds')
   end subroutine raise_related
 
-  !> Message for a wrong number of independent bodies in a group.
-  function count_message(bodies, named, freedoms) result(text)
+  !> Raises the error for a wrong number of independent bodies in a group.
+  subroutine raise_count(bodies, named, freedoms, error)
     type(string_t), intent(in) :: bodies(:), named(:)   !! of the group; those that the input names
     integer, intent(in) :: freedoms                     !! number that must be named
+    type(error_t), allocatable, intent(out) :: error
     character(len=:), allocatable :: text
 
     if (size(bodies) == 1) then
@@ -219,6 +219,7 @@ contains
     else
       text = text // '; it names ' // joined(named, ', ', most_names)
     end if
-  end function count_message
+    call raise(error, exit_input, text)
+  end subroutine raise_count
 
 end module nocdyn_coordinate_choice

@@ -21,7 +21,7 @@ module nocdyn_bank
   implicit none (type, external)
   private
 
-  public :: append_bank, time_reached
+  public :: append_bank, bank_of, name_length, time_reached
 
   integer, parameter, public :: role_coupling = 1     !! in K and C of eqs. (21), (22); stores energy
   integer, parameter, public :: role_load = 2         !! in C of eq. (22); takes energy out
@@ -332,5 +332,26 @@ contains
     values = elements%restoring(lane, self%first:self%last()) + elements%applied(lane, self%first:self%last())
     if (quantity /= 1) error stop 'nocdyn_bank: a bank with several quantities overrides observe'
   end subroutine observe
+
+  !> Number of the bank that holds an element.
+  pure integer function bank_of(banks, element)
+    type(bank_slot_t), intent(in) :: banks(:)
+    integer, intent(in) :: element   !! number in the machine
+
+    do bank_of = 1, size(banks)
+      if (element <= banks(bank_of)%bank%last()) return
+    end do
+    error stop 'nocdyn_bank: there are not so many elements'
+  end function bank_of
+
+  !> Length of the name of an element.
+  pure integer function name_length(banks, element)
+    type(bank_slot_t), intent(in) :: banks(:)
+    integer, intent(in) :: element   !! number in the machine
+
+    associate (bank => banks(bank_of(banks, element))%bank)
+      name_length = len(bank%names(element - bank%first + 1)%text)
+    end associate
+  end function name_length
 
 end module nocdyn_bank

@@ -1,6 +1,6 @@
 !> A machine on a block of lanes: bodies, banks of elements, constraints, and the independent coordinates.
 module nocdyn_machine
-  use nocdyn_bank, only: bank_slot_t, bank_t, role_names
+  use nocdyn_bank, only: bank_of, bank_slot_t, bank_t, name_length, role_names
   use nocdyn_constraints, only: constraints_t
   use nocdyn_coordinates, only: coordinates_t
   use nocdyn_elements, only: elements_t, new_elements
@@ -244,18 +244,11 @@ contains
   pure function element_name(self, element) result(name)
     class(machine_t), intent(in) :: self
     integer, intent(in) :: element   !! number in the machine
-    character(len=:), allocatable :: name
-    integer :: i
+    character(len=name_length(self%banks, element)) :: name
 
-    do i = 1, size(self%banks)
-      associate (bank => self%banks(i)%bank)
-        if (element <= bank%last()) then
-          name = bank%names(element - bank%first + 1)%text
-          return
-        end if
-      end associate
-    end do
-    error stop 'nocdyn_machine: there are not so many elements'
+    associate (bank => self%banks(bank_of(self%banks, element))%bank)
+      name = bank%names(element - bank%first + 1)%text
+    end associate
   end function element_name
 
   !> Torques T = Q + C omega + K phi of all elements on the bodies: the right-hand side of eq. (12) without reactions.

@@ -4,7 +4,6 @@ module nocdyn_journal_scheduler
   use nocdyn_kinds, only: wp
   use nocdyn_posix, only: is_interrupted
   use nocdyn_scheduler, only: scheduler_t, sweep_counts_t, sweep_progress_t
-  use nocdyn_serial_work, only: append_chunk, update_progress
   use nocdyn_sweep_chunk, only: chunk_t, status_refused
   use nocdyn_sweep_journal, only: sweep_journal_t
   implicit none (type, external)
@@ -114,7 +113,7 @@ contains
     real(wp), intent(in) :: seconds
 
     if (allocated(self%error)) return
-    call append_chunk(self%journal, chunk, self%error)
+    call self%journal%append(chunk, self%error)
     if (allocated(self%error)) then
       !$omp atomic write
       self%has_failed = .true.
@@ -130,7 +129,7 @@ contains
   subroutine poll(self)
     class(journal_scheduler_t), intent(inout) :: self
 
-    call update_progress(self%progress, self%counts)
+    call self%progress%update(self%counts)
   end subroutine poll
 
   !> There is nothing to do: the journal holds all results.

@@ -7,13 +7,13 @@ module nocdyn_sweep
   use nocdyn_kinds, only: wp
   use nocdyn_run_settings, only: choose_settings
   use nocdyn_scheduler, only: scheduler_t
-  use nocdyn_serial_work, only: new_own_formulation
   use nocdyn_series_strips, only: strip
   use nocdyn_statistics_observer, only: needs_work_integrals
   use nocdyn_sweep_block, only: new_sweep_block, sweep_block_t
   use nocdyn_sweep_chunk, only: chunk_t
   use nocdyn_sweep_plan, only: sweep_plan_t
   use nocdyn_text, only: string_t
+  use nocdyn_variant_machines, only: new_own_formulation
   use omp_lib, only: omp_destroy_lock, omp_init_lock, omp_set_lock, omp_unset_lock
   implicit none (type, external)
   private

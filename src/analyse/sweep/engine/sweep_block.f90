@@ -2,20 +2,26 @@
 module nocdyn_sweep_block
   use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
   use nocdyn_ensemble, only: ensemble_t, initial_states, initial_states_t
+  use nocdyn_errors, only: error_t
   use nocdyn_finite, only: is_finite
   use nocdyn_formulation, only: formulation_t
   use nocdyn_integration, only: integrate_with
-  use nocdyn_integration_settings, only: integration_settings_t
+  use nocdyn_input, only: input_t
+  use nocdyn_integration_settings, only: check_settings, integration_settings_t
   use nocdyn_kinds, only: wp
+  use nocdyn_methods, only: select_method
+  use nocdyn_recorded_quantities, only: restrict_statistics
+  use nocdyn_run_settings, only: choose_settings
   use nocdyn_scheduler, only: scheduler_t
-  use nocdyn_serial_work, only: explain_failure, explain_not_finite, prepare_integration
+  use nocdyn_serial_work, only: explain_failure
   use nocdyn_solver_status, only: integration_done, integration_interrupted, solver_status_t
   use nocdyn_statistics, only: statistic_t
-  use nocdyn_statistics_observer, only: statistics_observer_t
+  use nocdyn_statistics_observer, only: new_statistics_observer, statistics_observer_t
   use nocdyn_stepper, only: stepper_t
   use nocdyn_sweep_chunk, only: allocate_chunk, chunk_t, status_done, status_failed, status_refused
   use nocdyn_sweep_plan, only: sweep_plan_t
   use nocdyn_system, only: system_t
+  use nocdyn_text, only: string_t
   use nocdyn_units, only: from_si
   use nocdyn_variant_machines, only: new_variant_machines, variant_machines_t, variant_needs_own_block, variant_refused
   use omp_lib, only: omp_test_lock, omp_unset_lock
@@ -79,6 +85,38 @@ contains
     call prepare_integration(plan%input, block%machines%formulation, plan%statistics, block%settings, block%times, &
                              block%stepper, block%observer%statistics_observer_t, block%message)
   end subroutine new_sweep_block
+
+  !> Settings, stepper and observer of the variants that a formulation is integrated for. Statistics that begin outside of the
+  !> times are refused, and columns that the machine does not have.
+  subroutine prepare_integration(input, formulation, statistics, settings, times, stepper, observer, message)
+    type(input_t), intent(in) :: input
+    class(formulation_t), target, intent(inout) :: formulation   !! stays where it is, as the observer does
+    type(statistic_t), intent(in) :: statistics(:)               !! of the plan
+    type(integration_settings_t), intent(out) :: settings
+    real(wp), intent(out) :: times(2)                            !! start and end [s]
+    class(stepper_t), allocatable, intent(out) :: stepper
+    type(statistics_observer_t), intent(out) :: observer
+    character(len=:), allocatable, intent(out) :: message        !! '', or why none of these variants can be integrated
+    type(string_t), allocatable :: notes(:)
+    type(statistic_t), allocatable :: restricted(:)
+    type(error_t), allocatable :: error
+
+    associate (run => input%groups(input%position('run')))
+      times = [run%number('t_start'), run%number('t_end')]
+    end associate
+    call choose_settings(input, formulation, settings, notes, error)
+    if (.not. allocated(error)) call check_settings(settings, error)
+    if (.not. allocated(error)) call select_method(settings, stepper, error)
+    if (allocated(error)) then
+      call move_alloc(error%message, message)
+    else
+      call restrict_statistics(statistics, times(1), times(2), restricted, message)
+      observer = new_statistics_observer(formulation, restricted, times(1), times(2))
+      if (message == '' .and. observer%missing /= '') then
+        message = observer%missing // ' is recorded, but this machine has no such column'
+      end if
+    end if
+  end subroutine prepare_integration
 
   !> Computes the variants `first`, `first` + 1, ...
   subroutine compute(self, first, count, chunk, is_complete)
@@ -190,7 +228,7 @@ contains
       i = findloc(is_finite(chunk%results(:, index)), .false., dim=1)
       if (i == 0) return
       chunk%status(index) = status_failed
-      call explain_not_finite(statistics(i)%label, chunk%reasons(index)%text)
+      chunk%reasons(index)%text = 'the result ' // statistics(i)%label // ' is not a finite number'
       chunk%results(:, index) = ieee_value(0.0_wp, ieee_quiet_nan)
     else
       chunk%status(index) = status_failed

@@ -5,19 +5,21 @@
 !> the structure of the block, its parameters are copied into the lane. If not, the variant needs a block of its own: a friction
 !> that is 0 in the block and not in the variant is an example, and other values of &run are another.
 module nocdyn_variant_machines
+  use nocdyn_assembly, only: assemble_machine, new_formulation
   use nocdyn_direct_parameters, only: direct_parameters_t, new_direct_parameters
+  use nocdyn_errors, only: error_t
   use nocdyn_formulation, only: formulation_t
   use nocdyn_input, only: input_t
   use nocdyn_kinds, only: wp
   use nocdyn_lane_parameters, only: lane_parameters_t
   use nocdyn_machine, only: machine_t
   use nocdyn_reduced, only: reduced_t
-  use nocdyn_serial_work, only: assemble_variant, check_values, has_reduced_form, new_own_formulation
+  use nocdyn_serial_work, only: check_values
   use nocdyn_targets, only: target_t
   implicit none (type, external)
   private
 
-  public :: new_variant_machines
+  public :: new_own_formulation, new_variant_machines
 
   integer, parameter, public :: variant_set = 0               !! its parameters are in the lane
   integer, parameter, public :: variant_refused = 1           !! there is no such machine
@@ -73,7 +75,7 @@ contains
       if (message /= '') error stop 'nocdyn_variant_machines: the machine of the input cannot be assembled'
     end if
     allocate (self%holds_variant(lanes), source=is_typical)
-    if (has_reduced_form(self%input)) then
+    if (self%input%groups(self%input%position('run'))%text('formulation') == 'reduced') then
       call share_block(self, block)
       if (is_typical) call self%direct%accept(typical)
     else
@@ -122,6 +124,31 @@ contains
     starts = formulation%start()
     start = starts(1, :)
   end subroutine take_start
+
+  !> Sets the values of the targets in an input and assembles its machine with all the checks of a single run.
+  subroutine assemble_variant(input, targets, values, machine, message, lanes)
+    type(input_t), intent(inout) :: input
+    type(target_t), intent(in) :: targets(:)
+    real(wp), intent(in) :: values(:)                         !! [targets]
+    type(machine_t), intent(inout) :: machine                 !! of no use if `message` is not ''
+    character(len=:), allocatable, intent(out) :: message     !! '', or why there is no such machine
+    integer, intent(in), optional :: lanes                    !! 1 if absent
+    type(error_t), allocatable :: error
+
+    call check_values(input, targets, values, message)
+    if (message == '') call assemble_machine(input, machine, error, lanes)
+    if (allocated(error)) call move_alloc(error%message, message)
+  end subroutine assemble_variant
+
+  !> The formulation that an input asks for.
+  subroutine new_own_formulation(input, machine, with_energy_balance, formulation)
+    type(input_t), intent(in) :: input
+    type(machine_t), intent(in) :: machine
+    logical, intent(in) :: with_energy_balance   !! whether the work integrals are among the states
+    class(formulation_t), allocatable, intent(out) :: formulation
+
+    call new_formulation(input%groups(input%position('run'))%text('formulation'), machine, formulation, with_energy_balance)
+  end subroutine new_own_formulation
 
   !> Sets a variant in a lane.
   subroutine set_variant(self, values, lane, y, status, message)

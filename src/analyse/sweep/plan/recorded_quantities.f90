@@ -1,6 +1,6 @@
 !> The recorded quantities of a sweep: the statistics and trajectories that the groups &record ask for.
 module nocdyn_recorded_quantities
-  use nocdyn_column_names, only: no_column_text
+  use nocdyn_column_names, only: explain_no_column
   use nocdyn_input, only: input_t
   use nocdyn_kinds, only: wp
   use nocdyn_diagnostics, only: diagnostics_t
@@ -122,7 +122,7 @@ contains
     integer, intent(out) :: column
     type(diagnostics_t), intent(inout) :: diagnostics
     integer, intent(out), optional :: unit   !! of its statistics: index of `units`, 0: that of SI
-    character(len=:), allocatable :: quantity
+    character(len=:), allocatable :: quantity, reason
     integer, allocatable :: wanted(:)
     integer :: quantity_unit
     logical :: is_column
@@ -136,8 +136,9 @@ contains
       return
     end do
     column = 0
-    call input%report(record, 'quantity', 'quantity = ' // quoted(quantity) // ' is no column of trajectory.csv' // &
-                      no_column_text(quantity, labels), diagnostics)
+    call explain_no_column(quantity, labels, reason)
+    call input%report(record, 'quantity', 'quantity = ' // quoted(quantity) // ' is no column of trajectory.csv' // reason, &
+                      diagnostics)
   end subroutine find_column
 
   subroutine check_from(input, record, span, diagnostics)

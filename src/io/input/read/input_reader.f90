@@ -12,7 +12,8 @@ module nocdyn_input_reader
   use nocdyn_schema_relations, only: relations_of, relations_t
   use nocdyn_schema_rules, only: at_least_once, exactly_once, occurrence_texts, required
   use nocdyn_schema_text, only: group_names, suggestion
-  use nocdyn_text, only: nearest_word, quoted, shortened, string_t, to_text
+  use nocdyn_near_words, only: nearest_word
+  use nocdyn_text, only: quoted, shortened, string_t, to_text
   use nocdyn_text_file, only: largest_input, read_text_file
   implicit none (type, external)
   private

@@ -10,7 +10,8 @@ module nocdyn_value_conversion
     ground, is_out_of_range, key_rule_t, longest_name, size_limit, unset
   use nocdyn_schema_text, only: allowed_text
   use nocdyn_schema_units, only: name_in_unit
-  use nocdyn_text, only: counted, is_too_long, joined, longest_file_name, longest_path, lower_case, nearest_word, quoted, &
+  use nocdyn_near_words, only: nearest_word
+  use nocdyn_text, only: counted, is_too_long, joined, longest_file_name, longest_path, lower_case, quoted, &
     shortened, string_t, to_text
   use nocdyn_units, only: in_si
   implicit none (type, external)

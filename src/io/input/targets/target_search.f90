@@ -7,7 +7,8 @@ module nocdyn_target_search
   use nocdyn_schema_rules, only: a_number, an_integer, key_rule_t
   use nocdyn_schema_text, only: only_if_text, suggestion, type_text
   use nocdyn_schema_units, only: name_in_unit, other_unit
-  use nocdyn_text, only: append, listed, lower_case, nearest_word, quoted, string_t, to_text
+  use nocdyn_near_words, only: nearest_word
+  use nocdyn_text, only: append, listed, lower_case, quoted, string_t, to_text
   implicit none (type, external)
   private
 
