@@ -1,13 +1,24 @@
 """What takes part in a workload."""
 
+import subprocess
 from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
+MOST_WORDS = 40  # of the message of a program that fails
+
 
 class ContestantError(Exception):
     """A contestant could not do what was asked; the message says why."""
+
+
+def report_of(command: list, **options) -> str:
+    """What a program prints; ContestantError with its message, without the backtrace, if it fails."""
+    done = subprocess.run(list(map(str, command)), capture_output=True, text=True, stdin=subprocess.DEVNULL, **options)
+    if done.returncode != 0:
+        raise ContestantError(" ".join(done.stderr.partition("ERROR STOP")[0].split()[:MOST_WORDS]))
+    return done.stdout
 
 
 @dataclass

@@ -5,6 +5,8 @@ from pathlib import Path
 
 import numpy as np
 
+from .shipped import Shipped
+
 
 @dataclass(frozen=True)
 class Case2:
@@ -20,6 +22,14 @@ class Case2:
     motor_a, motor_b, motor_c = 200.0, 10.0, 1.0
     viscous = 100.0
     amplitude, frequency = 20.0, 5.0
+    t_end = 10.0  # [s]
+    moment_of = "coupling"
+    watched = (0, 1)  # the bodies whose twist is looked at
+    state_names = ("omega_motor", "omega_pinion", "phi_motor", "phi_pinion")
+
+    @property
+    def start(self) -> np.ndarray:
+        return np.zeros(self.states)
 
     @property
     def inertia_23(self) -> float:
@@ -28,16 +38,23 @@ class Case2:
 
     @property
     def times(self) -> np.ndarray:
-        return np.linspace(0.0, 10.0, 1001)
+        return np.linspace(0.0, self.t_end, 1001)
 
     @property
     def words(self) -> list[str]:
         """What the program for SUNDIALS wants to know."""
         return ["case2", repr(self.stiffness), repr(self.cubic_stiffness), repr(self.inertia_3)]
 
+    def numbers(self, targets: tuple[str, ...] = (), parameters: np.ndarray | None = None) -> np.ndarray:
+        """Viscous load and cubic stiffness of each variant, which are the parameters if there are some."""
+        return np.array([[self.viscous, self.cubic_stiffness]]) if parameters is None else parameters
+
+    def moments(self, twists: np.ndarray, numbers: np.ndarray) -> np.ndarray:
+        """Elastic moments [N m]."""
+        return (self.stiffness + numbers[:, 1] * twists**2) * twists
+
     def moment(self, states: np.ndarray) -> np.ndarray:
-        twist = states[:, 3] - states[:, 2]
-        return (self.stiffness + self.cubic_stiffness * twist**2) * twist
+        return self.moments(states[:, 3] - states[:, 2], self.numbers())
 
     def select(self, bodies: np.ndarray) -> np.ndarray:
         """The four states from omega and phi of the three bodies."""
@@ -77,6 +94,10 @@ class Chain:
         return 2 * self.bodies
 
     @property
+    def start(self) -> np.ndarray:
+        return np.zeros(self.states)
+
+    @property
     def times(self) -> np.ndarray:
         return np.array([0.0, self.t_end])
 
@@ -103,4 +124,4 @@ class Chain:
         file.write_text("\n".join(lines) + "\n")
 
 
-Problem = Case2 | Chain
+Problem = Case2 | Chain | Shipped

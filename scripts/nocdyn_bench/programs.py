@@ -7,11 +7,9 @@ from pathlib import Path
 
 import numpy as np
 
-from .contestant import Contestant, ContestantError, Run, Solve
+from .contestant import Contestant, Run, Solve, report_of
 from .problems import Case2, Problem
 from .variants import Found, SolveAll, SweepContestant
-
-MOST_WORDS = 25  # of the message of a program that fails
 
 
 class Programs:
@@ -104,12 +102,8 @@ class Programs:
                 *after,
                 parameters_file,
             ]
-            done = subprocess.run(
-                command, capture_output=True, text=True, stdin=subprocess.DEVNULL, env={**os.environ, "OMP_NUM_THREADS": "1"}
-            )
-            if done.returncode != 0:
-                raise ContestantError(" ".join(done.stderr.split()[:MOST_WORDS]))
-            return Found(json.loads(done.stdout)["seconds"][0], np.fromfile(results_file).reshape(-1, 5))
+            report = report_of(command, env={**os.environ, "OMP_NUM_THREADS": "1"})
+            return Found(json.loads(report)["seconds"][0], np.fromfile(results_file).reshape(-1, 5))
 
         return solve
 
@@ -118,10 +112,7 @@ class Programs:
 
         def solve(rtol: float, atol: float, repetitions: int) -> Run:
             command = [self.folder / head[0], *head[1:], repr(rtol), repr(atol), str(repetitions), states, *tail]
-            done = subprocess.run(command, capture_output=True, text=True, stdin=subprocess.DEVNULL)
-            if done.returncode != 0:
-                raise ContestantError(" ".join(done.stderr.split()[:MOST_WORDS]))
-            report = json.loads(done.stdout)
+            report = json.loads(report_of(command))
             found = np.fromfile(states).reshape(len(problem.times), -1)
             return Run(report["seconds"], problem.select(found) if selects else found, report["steps"], report["evaluations"])
 

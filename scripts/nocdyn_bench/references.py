@@ -6,6 +6,7 @@ import numpy as np
 
 from .peers import heyoka, numbalsoda, scipy
 from .problems import Case2, Chain
+from .shipped import Shipped
 
 
 @dataclass(frozen=True)
@@ -15,7 +16,7 @@ class Reference:
     note: str
 
 
-def case2_reference(problem: Case2) -> Reference:
+def accurate_reference(problem: Case2 | Shipped) -> Reference:
     states = heyoka.accurate_states(problem)
     other = numbalsoda.contestants(problem, ["DOP853"])[0].solve(1e-13, 1e-13, 1).states
     return Reference(

@@ -13,10 +13,11 @@ from .chains import Scaling
 from .costs import Costs
 from .rounds import Point
 from .tables import table
-from .throughput import SAMPLE, SLOW_SAMPLE, Rate, Throughput
+from .throughput import SLOW_SAMPLE, Rate, Throughput
 from .whole_process import Workload, largest_error
 from .work_precision import WorkPrecision
 
+COLUMNS = {"states": "error", "moment": "moment"}  # kinds of errors, as heads of tables name them
 PEERS = ("heyoka", "numbalsoda", "numba", "scipy", "numpy")
 VERDICTS = {
     "W1": targets.case2_verdicts,
@@ -145,17 +146,18 @@ def ratio_table(measured: list) -> str:
     columns = {}
     for workload in measured:
         if isinstance(workload, WorkPrecision):
-            for error in workload.errors_wanted:
-                columns[f"{workload.name}, error {error:.0e}"] = {
-                    contestant.label: workload.time_at(contestant, error) for contestant in workload.contestants
-                }
+            for kind, error in workload.columns:
+                if kind == "states" or workload.moments_wanted:
+                    columns[f"{workload.name}, {COLUMNS[kind]} {error:.0e}"] = {
+                        contestant.label: workload.time_at(contestant, error, kind) for contestant in workload.contestants
+                    }
         elif isinstance(workload, Scaling):
             for chain in workload.chains:
                 columns[f"{workload.name}, N = {chain.bodies}"] = {
                     point.contestant.label: point.seconds for point in workload.points[chain]
                 }
         elif isinstance(workload, Throughput):
-            columns[f"{workload.name}, error {workload.error_wanted:.0e}"] = {
+            columns[f"{workload.name}, error {workload.family.wanted}"] = {
                 rate.contestant.label: 1.0 / rate.best for rate in workload.rates if rate.contestant.has_peak
             }
     labels = list(dict.fromkeys(label for column in columns.values() for label in column))
@@ -175,25 +177,23 @@ def _milliseconds(seconds: float | None) -> str:
 def _work_precision(workload: WorkPrecision) -> list[str]:
     head = [
         "time, ms",
-        *(f"error {error:.0e}" for error in workload.errors_wanted),
-        *(f"moment {error:.0e}" for error in workload.errors_wanted),
+        *(f"{COLUMNS[kind]} {error:.0e}" for kind, error in workload.columns),
         *(f"tol {tolerance:.0e} (error)" for tolerance in workload.tolerances_wanted),
     ]
     rows = []
     for contestant in workload.contestants:
-        row = [contestant.label]
-        for kind in ("states", "moment"):
-            row += [_milliseconds(workload.time_at(contestant, error, kind)) for error in workload.errors_wanted]
+        row = [contestant.label, *(_milliseconds(workload.time_at(contestant, error, kind)) for kind, error in workload.columns)]
         for tolerance in workload.tolerances_wanted:
             point = workload.point_at(contestant, tolerance)
             row.append(f"{_milliseconds(point.seconds)} ({point.errors['states']:.0e})" if point else "-")
         rows.append(row)
+    unit = "relative to its largest value" if workload.moments_wanted else "[N m]"
     return [
         *table(head, rows),
         "",
-        "Errors are the largest absolute ones, of all states [rad, rad/s] or of the elastic moment [N m], "
-        "over all outputs; times between two tolerances are interpolated, linear in the logarithms; - : not reached before the "
-        "sweep ends, at the first run slower than 2 s (SciPy Radau: 8 s) or the tightest tolerance. rtol = atol.",
+        f"Errors are the largest absolute ones, of all states [rad, rad/s] or of the elastic moment {unit}, over all outputs; "
+        "times between two tolerances are interpolated, linear in the logarithms; - : not reached before the sweep "
+        "ends, at the first run slower than 2 s (SciPy Radau: 8 s) or the tightest tolerance. rtol = atol.",
         "",
         f"Reference: {workload.reference.note}; they differ by {workload.reference.distance:.1e}.",
         "",
@@ -236,7 +236,8 @@ def _scaling(workload: Scaling) -> list[str]:
 
 
 def _throughput(workload: Throughput) -> list[str]:
-    rivals = [workload.rate(label) for label in ("hand-written loop", "heyoka with the peak")]
+    *states, moment = workload.family.records
+    rivals = [rate for label in ("hand-written loop", "heyoka with the peak") if (rate := workload.rate(label))]
     rows = []
     for rate in workload.rates:
         whole = workload.whole_rate(rate)
@@ -244,7 +245,7 @@ def _throughput(workload: Throughput) -> list[str]:
             [
                 rate.contestant.label,
                 _rounded(rate.best),
-                *(f"{rate.best / rival.best:.3g}" if rival else "-" for rival in rivals),
+                *(f"{rate.best / rival.best:.3g}" for rival in rivals),
                 _rounded(whole) if whole else "-",
                 f"{rate.tolerance:.1e}",
                 f"{rate.errors.state:.0e}",
@@ -255,8 +256,7 @@ def _throughput(workload: Throughput) -> list[str]:
     head = [
         "",
         "variants per second",
-        "hand-written loop = 1",
-        "heyoka with the peak = 1",
+        *(f"{rival.contestant.label} = 1" for rival in rivals),
         "whole process",
         "tolerance",
         "error of the state",
@@ -267,10 +267,10 @@ def _throughput(workload: Throughput) -> list[str]:
         *table(head, rows),
         "",
         "Each contestant has the loosest tolerance, in tenths of a decade, with which its errors are below "
-        f"{workload.error_wanted:.0e}: the largest absolute one of the four states at the end [rad, rad/s], and the largest "
-        f"relative one of the peak, of the first {_rounded(SAMPLE)} variants, {SLOW_SAMPLE} of those that integrate a part of "
-        f"the {_rounded(workload.count)} variants. One thread where nothing else is said. Whole process: from its start until "
-        "the files are written.",
+        f"{workload.family.wanted}: the largest absolute one of {states[0]} to {states[-1]} at the end [rad, rad/s], and the "
+        f"largest relative one of the peak of {moment}, of the first {_rounded(workload.sample)} variants, at most {SLOW_SAMPLE} "
+        f"of those that integrate a part of the {_rounded(workload.count)} variants. One thread where nothing else is said. "
+        "Whole process: from its start until the files are written.",
         "",
         f"Reference: heyoka with 80-bit numbers at tolerance 1e-18; SciPy DOP853 at 1e-13 differs by "
         f"{workload.distance.state:.1e} and {workload.distance.peak:.1e}.",

@@ -8,10 +8,10 @@ import numpy as np
 from .contestant import ContestantError
 from .nocdyn_sweep import Sweeper
 from .peers import heyoka_sweep, scipy_sweep
-from .variants import Errors, SweepContestant, errors_of, variants
+from .variants import Errors, Family, SweepContestant, errors_of
 
 TOLERANCES = 10.0 ** -np.arange(4.0, 12.01, 0.1)
-SAMPLE, SLOW_SAMPLE = 5000, 100  # variants whose errors are looked at; of contestants that do not integrate all
+SLOW_SAMPLE = 100  # most variants whose errors are looked at, of contestants that do not integrate all
 SECOND_SAMPLE = 10  # of the reference, computed a second time
 
 
@@ -36,24 +36,25 @@ class Rate:
 
 @dataclass
 class Throughput:
-    """A workload of variants of case 2."""
+    """A workload of variants of one machine."""
 
     name: str
     title: str
+    family: Family
     count: int  # of variants
+    sample: int  # most variants whose errors are looked at
     contestants: list[SweepContestant]
-    error_wanted: float
     sweepers: list[Sweeper]  # nocdyn's, all of whom are contestants too
-    counts: list[int]  # of variants for which the memory is looked at
+    counts: list[int] = field(default_factory=list)  # of variants for which the memory is looked at
     memory: dict[int, float] = field(default_factory=dict)  # of the first sweeper [MB]
     rates: list[Rate] = field(default_factory=list)
     failures: list[str] = field(default_factory=list)
     distance: Errors | None = None  # of the reference from a second one
 
     def measure(self, rounds: int) -> None:
-        parameters = variants(self.count)
-        exact = heyoka_sweep.accurate_results(parameters[:SAMPLE])
-        other = scipy_sweep.contestants(["DOP853"])[0].solve(1e-13, parameters[:SECOND_SAMPLE]).results
+        parameters = self.family.variants(self.count)
+        exact = heyoka_sweep.accurate_results(self.family, parameters[: self.sample])
+        other = scipy_sweep.contestants(self.family, ["DOP853"])[0].solve(1e-13, parameters[:SECOND_SAMPLE]).results
         self.distance = errors_of(other, exact[:SECOND_SAMPLE])
         for contestant in self.contestants:
             try:
@@ -70,7 +71,7 @@ class Throughput:
 
     def _chosen(self, contestant: SweepContestant, parameters: np.ndarray, exact: np.ndarray) -> Rate:
         count = round(contestant.share * self.count)
-        sample = min(count, SAMPLE if contestant.share == 1.0 else SLOW_SAMPLE, len(parameters))
+        sample = min(count, self.sample, self.sample if contestant.share == 1.0 else SLOW_SAMPLE)
 
         def errors_at(tolerance: float) -> Errors:
             return errors_of(contestant.solve(tolerance, parameters[:sample]).results, exact[:sample])
@@ -78,12 +79,12 @@ class Throughput:
         loose, tight = 0, len(TOLERANCES)  # bisection: tight enough is from `tight` on
         while loose < tight:
             middle = (loose + tight) // 2
-            if errors_at(float(TOLERANCES[middle])).are_below(self.error_wanted, contestant.has_peak):
+            if errors_at(float(TOLERANCES[middle])).are_below(self.family.wanted, contestant.has_peak):
                 tight = middle
             else:
                 loose = middle + 1
         if tight == len(TOLERANCES):
-            raise ContestantError(f"its errors are not below {self.error_wanted:.0e} at any tolerance")
+            raise ContestantError(f"its errors are not below {self.family.wanted} at any tolerance")
         tolerance = float(TOLERANCES[tight])
         return Rate(contestant, tolerance, errors_at(tolerance), count)
 

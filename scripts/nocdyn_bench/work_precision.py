@@ -7,33 +7,42 @@ import numpy as np
 
 from .contestant import Contestant
 from .problems import Case2
-from .references import Reference, case2_reference
+from .references import Reference, accurate_reference
 from .rounds import Point, measure_in_turns, try_out
+from .shipped import Shipped
 
 
 @dataclass
 class WorkPrecision:
-    """A workload of the paper's machine; `time_at` reads its points."""
+    """A workload of one run; `time_at` reads its points."""
 
     name: str
     title: str
-    problem: Case2
+    problem: Case2 | Shipped
     contestants: list[Contestant]
     errors_wanted: list[float]
     tolerances_wanted: list[float] = field(default_factory=list)
+    moments_wanted: list[float] = field(default_factory=list)  # errors relative to the largest; empty: absolute, as the others
     points: list[Point] = field(default_factory=list)
     failures: list[str] = field(default_factory=list)
     reference: Reference | None = None
 
     def measure(self, tolerances: list[float], rounds: int) -> None:
-        self.reference = case2_reference(self.problem)
+        self.reference = accurate_reference(self.problem)
         exact, moment = self.reference.states, self.problem.moment(self.reference.states)
+        unit = largest(moment) if self.moments_wanted else 1.0
 
         def judge(states: np.ndarray) -> dict[str, float]:
-            return {"states": largest(states - exact), "moment": largest(self.problem.moment(states) - moment)}
+            return {"states": largest(states - exact), "moment": largest(self.problem.moment(states) - moment) / unit}
 
         self.points, self.failures = try_out(self.contestants, [(tolerance, tolerance) for tolerance in tolerances], judge)
         measure_in_turns(self.points, rounds)
+
+    @property
+    def columns(self) -> list[tuple[str, float]]:
+        """Kinds and sizes of the errors whose times are told."""
+        moments = self.moments_wanted or self.errors_wanted
+        return [*(("states", error) for error in self.errors_wanted), *(("moment", error) for error in moments)]
 
     def points_of(self, contestant: Contestant) -> list[Point]:
         """From the loosest to the tightest tolerance."""

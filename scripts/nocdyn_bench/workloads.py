@@ -9,21 +9,50 @@ from pathlib import Path
 from . import whole_process
 from .chains import Scaling
 from .costs import Case, Costs, Sweeping, chunk_costs, step_costs
+from .example_sweeps import example_sweeps
 from .nocdyn_sweep import sweepers
 from .peers import heyoka, heyoka_sweep, numbalsoda, numbalsoda_sweep, scipy, scipy_sweep
 from .problems import Case2, Chain
 from .programs import Programs
+from .shipped import Shipped
 from .throughput import Throughput
+from .variants import CASE2, Errors, Family
 from .work_precision import WorkPrecision
 
 ROOT = Path(__file__).resolve().parents[2]
+EXAMPLES = ROOT / "input" / "examples"
 SCIPY_CASE = Path(__file__).with_name("scipy_case.py")
-CASE2 = ROOT / "input" / "paper" / "case2.nml"
+CASE2_INPUT = ROOT / "input" / "paper" / "case2.nml"
 REFERENCE_TOLERANCES = ("--set", "run.rtol=1e-13", "--set", "run.atol=1e-13")
 
 
 # Of W2: tolerances with which the errors are below 1e-6.
 SWEEP_CASES = [Case("taylor", 5.0e-7), Case("rk45", 7.0e-8)]
+
+EXPLICIT = ["rk45", "rk853", "taylor", "auto"]  # methods; one that cannot be used for a machine drops out with its reason
+SHIPPED_SAMPLE = 50  # variants of W5 and W6 with an accurate solution
+ENGINE = Family(
+    Shipped(EXAMPLES / "engine" / "engine.nml", "crank_8"),
+    ("coupling.rubber.stiffness", "coupling.rubber.damping", "coupling.oil.damping"),
+    ((1.5e4, 2.5e4), (30.0, 90.0), (8.0, 16.0)),
+    Errors(2e-5, 2e-5),
+    compared=22,
+    outputs=1251,
+)
+MILL = Family(
+    Shipped(EXAMPLES / "rolling_mill" / "rolling_mill.nml", "shaft"),
+    (
+        "coupling.shaft.stiffness",
+        "coupling.spindle.stiffness",
+        "coupling.shaft.damping",
+        "coupling.spindle.damping",
+        "coupling.spindle.gap",
+    ),
+    ((4.8e7, 7.2e7), (3.6e7, 5.4e7), (4e4, 6e4), (3.2e4, 4.8e4), (0.016, 0.024)),
+    Errors(1e-3, 1e-5),
+    compared=3,
+    outputs=301,
+)
 
 
 @dataclass(frozen=True)
@@ -59,7 +88,7 @@ def case2(bench: Bench) -> whole_process.Workload:
         folder = bench.scratch / "_".join(("nocdyn", *settings))
         options = [option for setting in settings for option in ("--set", f"run.{setting}")]
         return whole_process.Contestant(
-            label, [bench.nocdyn, "run", "--quiet", "--out", folder, *options, CASE2], folder / "trajectory.csv"
+            label, [bench.nocdyn, "run", "--quiet", "--out", folder, *options, CASE2_INPUT], folder / "trajectory.csv"
         )
 
     def scipy_process(method: str) -> whole_process.Contestant:
@@ -67,7 +96,7 @@ def case2(bench: Bench) -> whole_process.Workload:
         return whole_process.Contestant(f"SciPy {method}", [sys.executable, SCIPY_CASE, "--method", method, file], file)
 
     reference = bench.scratch / "reference"
-    subprocess.run([bench.nocdyn, "run", "--quiet", "--out", reference, *REFERENCE_TOLERANCES, CASE2], check=True)
+    subprocess.run([bench.nocdyn, "run", "--quiet", "--out", reference, *REFERENCE_TOLERANCES, CASE2_INPUT], check=True)
     return whole_process.Workload(
         "case2",
         "Paper, case 2, whole process",
@@ -105,22 +134,23 @@ def w1(bench: Bench) -> WorkPrecision:
 
 
 def w2(bench: Bench) -> Throughput:
-    own = sweepers(bench.nocdyn.parent, bench.scratch)
+    own = sweepers(bench.nocdyn.parent, bench.scratch, CASE2, ["taylor", "rk45"], most=2)
     count, memory = (10_000, [10_000]) if bench.is_quick else (100_000, [100_000, 1_000_000])
     return Throughput(
         "W2",
         "W2: variants of case 2, final state and largest elastic moment",
+        CASE2,
         count,
+        5000,
         [
             *(sweeper.contestant() for sweeper in own),
             bench.programs.handwritten_sweep(),
-            *heyoka_sweep.contestants(),
-            *numbalsoda_sweep.contestants(),
+            *heyoka_sweep.contestants(CASE2, 16, 256),  # the fastest of 8, 16, 32 ... 256
+            *numbalsoda_sweep.contestants(CASE2),
             *bench.programs.sundials_sweep(["erk5", "adams"]),
-            *scipy_sweep.contestants(["DOP853"] if bench.is_quick else ["DOP853", "LSODA", "RK45"]),
+            *scipy_sweep.contestants(CASE2, ["DOP853"] if bench.is_quick else ["DOP853", "LSODA", "RK45"]),
         ],
-        error_wanted=1e-6,
-        sweepers=own,
+        own,
         counts=memory,
     )
 
@@ -195,6 +225,65 @@ def w4(bench: Bench) -> WorkPrecision:
     )
 
 
+def shipped_run(bench: Bench, name: str, title: str, family: Family) -> WorkPrecision:
+    """One run of the machine."""
+    return WorkPrecision(
+        name,
+        f"{name}: {title}, {len(family.problem.times)} outputs, in process",
+        family.problem,
+        [
+            *bench.programs.nocdyn(family.problem, EXPLICIT),
+            *heyoka.contestants(family.problem),
+            *numbalsoda.contestants(family.problem, ["DOP853, dense", "LSODA"]),
+        ],
+        errors_wanted=[family.wanted.state],
+        moments_wanted=[family.wanted.peak],
+    )
+
+
+def shipped_sweep(bench: Bench, name: str, title: str, family: Family, count: int, stepped_lanes: int) -> Throughput:
+    own = sweepers(bench.nocdyn.parent, bench.scratch, family, EXPLICIT)
+    count = count // 4 if bench.is_quick else count
+    return Throughput(
+        f"{name}_sweep",
+        f"{name}_sweep: {count} variants of {title}, in one thread",
+        family,
+        count,
+        SHIPPED_SAMPLE,
+        [
+            *(sweeper.contestant() for sweeper in own),
+            *heyoka_sweep.contestants(family, 8, stepped_lanes),
+            *numbalsoda_sweep.contestants(family),
+        ],
+        own,
+    )
+
+
+def w5(bench: Bench) -> WorkPrecision:
+    return shipped_run(bench, "W5", "the six-cylinder engine", ENGINE)
+
+
+def w5_sweep(bench: Bench) -> Throughput:
+    return shipped_sweep(bench, "W5", "the six-cylinder engine", ENGINE, 256, stepped_lanes=16)
+
+
+def w6(bench: Bench) -> WorkPrecision:
+    return shipped_run(bench, "W6", "the rolling mill with its gap", MILL)
+
+
+def w6_sweep(bench: Bench) -> Throughput:
+    return shipped_sweep(bench, "W6", "the rolling mill with its gap", MILL, 500, stepped_lanes=64)
+
+
+def examples(bench: Bench) -> Costs:
+    files = sorted(EXAMPLES.glob("*/*.nml"))
+    return Costs(
+        "example_sweeps",
+        "What a sweep of each shipped example costs",
+        lambda rounds: example_sweeps(bench.nocdyn.parent, bench.scratch, files, bench.programs.methods(), rounds),
+    )
+
+
 WORKLOADS: dict[str, Callable[[Bench], Workload]] = {
     "start_up": start_up,
     "case2": case2,
@@ -203,6 +292,11 @@ WORKLOADS: dict[str, Callable[[Bench], Workload]] = {
     "W3": w3,
     "W3_stiff": w3_stiff,
     "W4": w4,
+    "W5": w5,
+    "W5_sweep": w5_sweep,
+    "W6": w6,
+    "W6_sweep": w6_sweep,
+    "example_sweeps": examples,
     "step_costs": steps,
     "chunk_costs": chunks,
 }

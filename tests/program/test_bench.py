@@ -1,5 +1,6 @@
 """What scripts/bench concludes from what it measures."""
 
+import itertools
 import subprocess
 import sys
 
@@ -8,7 +9,10 @@ import pytest
 from conftest import SOURCE
 
 sys.path.insert(0, str(SOURCE / "scripts"))
-from nocdyn_bench import costs, variants
+from nocdyn_bench import costs, example_sweeps, variants
+from nocdyn_bench.contestant import ContestantError
+from nocdyn_bench.nocdyn_sweep import random_design, write_input
+from nocdyn_bench.shipped import Shipped
 
 PROFILE = """\
 events: Ir
@@ -49,7 +53,9 @@ def test_the_errors_of_a_sweep_are_the_largest_of_states_and_relative_peaks():
     found = exact + np.array([[0, 0, 0, 1e-7, 1e-5], [0, -3e-7, 0, 0, 0]])
     errors = variants.errors_of(found, exact)
     assert (errors.state, errors.peak) == (pytest.approx(3e-7, rel=1e-6), pytest.approx(5e-8, rel=1e-6))
-    assert errors.are_below(1e-6) and not errors.are_below(2e-7)
+    assert errors.are_below(variants.Errors(1e-6, 1e-6))
+    assert not errors.are_below(variants.Errors(2e-7, 1e-6))
+    assert not errors.are_below(variants.Errors(1e-6, 2e-8))
 
 
 @pytest.mark.parametrize("column", range(5))
@@ -58,14 +64,101 @@ def test_a_variant_without_a_result_is_no_accurate_one(column):
     found = exact.copy()
     found[1, column] = np.nan
     errors = variants.errors_of(found, exact)
-    assert not errors.are_below(1e-6)
-    assert errors.are_below(1e-6, has_peak=False) == (column == 4)
+    assert not errors.are_below(variants.Errors(1e-6, 1e-6))
+    assert errors.are_below(variants.Errors(1e-6, 1e-6), has_peak=False) == (column == 4)
 
 
 def test_variants_fill_their_ranges():
-    found = variants.variants(1000)
-    for column, (low, high) in zip(found.T, variants.RANGES):
+    found = variants.CASE2.variants(1000)
+    for column, (low, high) in zip(found.T, variants.CASE2.ranges):
         assert low <= column.min() < low + 0.01 * (high - low) and high - 0.01 * (high - low) < column.max() <= high
+
+
+EXAMPLES = SOURCE / "input" / "examples"
+MILL = Shipped(EXAMPLES / "rolling_mill" / "rolling_mill.nml", "shaft")
+ENGINE = Shipped(EXAMPLES / "engine" / "engine.nml", "crank_8")
+
+
+def test_the_peers_have_the_numbers_of_the_input():
+    stiffness, damping, gap = MILL.numbers()[0].reshape(3, -1)
+    assert (stiffness.tolist(), damping.tolist(), gap.tolist()) == ([6e7, 4.5e7], [5e4, 4e4], [0.0, 0.02])
+    assert MILL.motor.tolist() == [[1.2e7, 1.9108e6, 0.0], [0.0, 0.0, 0.0], [0.0, 800.0, 0.0]]
+    assert [(body, points.shape) for body, points in MILL.tables] == [(2, (5, 2))]
+    assert [(body, harmonics.shape) for body, harmonics in ENGINE.orders] == [(body, (8, 3)) for body in range(3, 9)]
+    assert (len(ENGINE.times), ENGINE.watched) == (2501, (8, 9))
+
+
+def test_a_variant_has_other_numbers_in_its_place_only():
+    found = MILL.numbers(("coupling.spindle.gap", "coupling.shaft.stiffness"), np.array([[0.01, 5e7], [0.03, 7e7]]))
+    assert found.tolist() == [[5e7, 4.5e7, 5e4, 4e4, 0.0, 0.01], [7e7, 4.5e7, 5e4, 4e4, 0.0, 0.03]]
+    assert MILL.moments(np.array([0.1, -0.1]), found) == pytest.approx([5e6, -7e6])
+
+
+def test_a_machine_with_a_law_that_peers_do_not_know_is_refused():
+    with pytest.raises(ValueError, match=r"^torque_split\.nml: the peers do not know &body angle$"):
+        Shipped(EXAMPLES / "torque_split" / "torque_split.nml", "quill").numbers()
+
+
+@pytest.mark.parametrize("machine", [MILL, ENGINE], ids=lambda machine: machine.file.stem)
+def test_heyoka_integrates_the_machine_that_nocdyn_integrates(nocdyn, machine):
+    pytest.importorskip("heyoka")
+    peers = pytest.importorskip("nocdyn_bench.peers.heyoka")
+    states = peers.contestants(machine)[0].solve(1e-9, 1e-9, 1).states
+    nocdyn("run", machine.file, "--out", "out", "--quiet")
+    header, rows = nocdyn.table("out")
+    names = [name.partition(" [")[0] for name in header]
+    columns = [names.index(name) for name in machine.state_names]
+    assert states == pytest.approx(np.array(rows)[:, columns], abs=1e-5)  # they reach 2e-6
+
+
+@pytest.mark.parametrize("machine", [MILL, ENGINE], ids=lambda machine: machine.file.stem)
+def test_all_peers_have_the_same_right_hand_side(machine):
+    heyoka, sides = pytest.importorskip("heyoka"), pytest.importorskip("nocdyn_bench.peers.right_hand_sides")
+    from nocdyn_bench.peers.heyoka_models import Model
+
+    model, fill = Model(machine), sides.variant_derivative(machine).py_func
+    equations = heyoka.cfunc([side for _, side in model.equations], model.variables)
+    spread = np.repeat([5.0, 0.02], machine.bodies)  # of speeds and angles: all branches of the gap
+    for seed, (until, lines) in itertools.product(range(20), model.pieces):
+        states, found = machine.start + np.random.default_rng(seed).normal(0, spread), np.empty(machine.states)
+        fill(until - 1e-3, states, found, machine.numbers()[0])
+        pars = model.start_pars(np.zeros((1, 0)))[0]
+        pars[model.piece_pars] = lines
+        for gap in model.gaps:
+            indicators = gap.indicators(*model._halves(states), *gap.values)
+            pars[gap.par : gap.par + 3] = gap.law(indicators, *gap.values)
+        assert found == pytest.approx(equations(states, pars=pars, time=until - 1e-3), rel=1e-12, abs=1e-9)
+
+
+def test_every_example_has_a_sweep_whose_cost_can_be_measured(nocdyn):
+    files = sorted(EXAMPLES.glob("*/*.nml"))
+    assert len(files) >= 13
+    for file in files:
+        family = example_sweeps.family_of(file)
+        write_input(family, nocdyn.folder / "sweep.nml", random_design(family, 2))
+        outcome = nocdyn("check", "sweep.nml")
+        assert (outcome.returncode, outcome.stderr) == (0, ""), file
+
+
+def test_each_contestant_of_a_sweep_has_the_loosest_tolerance_that_is_good_enough(monkeypatch):
+    pytest.importorskip("heyoka")
+    throughput = pytest.importorskip("nocdyn_bench.throughput")
+
+    def solve(tolerance, parameters):
+        return variants.Found(0.5, 2.0 + np.full((len(parameters), 5), tolerance))
+
+    def refuse(tolerance, parameters):
+        raise ContestantError("'gas' has no Taylor series")
+
+    exact = variants.SweepContestant("exact", "", lambda _, parameters: solve(0.0, parameters))
+    monkeypatch.setattr(throughput.heyoka_sweep, "accurate_results", lambda _, parameters: solve(0.0, parameters).results)
+    monkeypatch.setattr(throughput.scipy_sweep, "contestants", lambda *_: [exact])
+    contestants = [variants.SweepContestant("a", "", solve), variants.SweepContestant("b", "", refuse)]
+    workload = throughput.Throughput("W", "", variants.CASE2, 20, 10, contestants, [])
+    workload.measure(1)
+    assert [(rate.contestant.label, rate.best) for rate in workload.rates] == [("a", 40.0)]
+    assert workload.rates[0].tolerance == pytest.approx(10**-6.1)
+    assert workload.failures == ["b fails: 'gas' has no Taylor series"]
 
 
 def test_what_compiled_peers_print_goes_to_the_log(tmp_path):

@@ -1,89 +1,78 @@
 """heyoka: Taylor series, compiled by LLVM for each system and tolerance."""
 
-import itertools
 import time
 
 import heyoka
 import numpy as np
 
 from ..contestant import Contestant, ContestantError, Run, Solve
-from ..problems import Case2, Chain, Problem
+from ..problems import Case2, Problem
+from ..shipped import Shipped
+from .heyoka_models import Model
 
-COMPACT_ABOVE = 20  # bodies: from there on, code that is compiled in reasonable time
+NEAR = 1e-9  # [s]: an output time that is the end of a piece
 
 
 def contestants(problem: Problem) -> list[Contestant]:
     """heyoka has one tolerance; it is given rtol."""
-    return [Contestant("heyoka", "compiled once, propagate_grid, high_accuracy off", _solve(problem))]
+    note = "compiled once, propagate_grid, high_accuracy off; gaps: terminal events, tables: piece by piece"
+    return [Contestant("heyoka", note if isinstance(problem, Shipped) else note.partition(";")[0], _solve(problem))]
 
 
-def accurate_states(problem: Case2) -> np.ndarray:
+def accurate_states(problem: Case2 | Shipped) -> np.ndarray:
     """With 80-bit numbers and their full accuracy, rounded to doubles."""
-    real = np.longdouble
-    integrator = _integrator(problem, real, real(1e-19))
-    grid = np.arange(len(problem.times)) * (real(10) / 1000)
-    integrator.state[:] = 0
-    return integrator.propagate_grid(grid)[-1].astype(float)
+    model = Model(problem, np.longdouble)
+    integrator = model.integrator(1e-19)
+    _start(model, integrator)
+    return _states(model, integrator, _grids(model))[0].astype(float)
 
 
 def _solve(problem: Problem) -> Solve:
-    integrators = {}
-    times = problem.times
+    model, integrators = Model(problem), {}
+    grids = _grids(model)
 
     def solve(rtol: float, atol: float, repetitions: int) -> Run:
         if rtol not in integrators:
-            integrators[rtol] = _integrator(problem, float, rtol)
+            integrators[rtol] = model.integrator(rtol)
         integrator = integrators[rtol]
         seconds = []
         for _ in range(repetitions):
-            integrator.time = 0.0
-            integrator.state[:] = 0.0
+            _start(model, integrator)
             began = time.perf_counter()
-            found = integrator.propagate_grid(times)
+            states, steps = _states(model, integrator, grids)
             seconds.append(time.perf_counter() - began)
-            if found[0] != heyoka.taylor_outcome.time_limit:
-                raise ContestantError(str(found[0]))
-        return Run(seconds, found[-1], steps=int(found[3]))
+        return Run(seconds, states, steps=steps)
 
     return solve
 
 
-def _integrator(problem: Problem, real: type, tolerance: float) -> "heyoka.taylor_adaptive":
-    equations = _case2(problem, real) if isinstance(problem, Case2) else _chain(problem)
-    is_compact = isinstance(problem, Chain) and problem.bodies > COMPACT_ABOVE
-    return heyoka.taylor_adaptive(
-        equations, np.zeros(problem.states, dtype=real), tol=tolerance, fp_type=real, compact_mode=is_compact
-    )
+def _start(model: Model, integrator: "heyoka.taylor_adaptive") -> None:
+    integrator.time, integrator.state[:] = model.real(0), model.problem.start
+    integrator.pars[:] = model.start_pars(np.zeros((1, 0)))[0]
 
 
-def _case2(problem: Case2, real: type) -> list:
-    omega_1, omega_2, phi_1, phi_2 = heyoka.make_vars("omega_1", "omega_2", "phi_1", "phi_2")
-    ratio2 = (real(2) / real(3)) ** 2
-    inertia_23 = real(problem.inertia_2) + ratio2 * real(problem.inertia_3)
-    twist = phi_2 - phi_1
-    moment = (real(problem.stiffness) + real(problem.cubic_stiffness) * twist * twist) * twist
-    motor = real(problem.motor_a) - (real(problem.motor_b) + real(problem.motor_c) * omega_1) * omega_1
-    excitation = real(problem.amplitude) * heyoka.sin(real(problem.frequency) * heyoka.time)
-    return [
-        (omega_1, (motor + excitation + moment) / real(problem.inertia_1)),
-        (omega_2, -(moment + ratio2 * real(problem.viscous) * omega_2) / inertia_23),
-        (phi_1, omega_1),
-        (phi_2, omega_2),
-    ]
+def _grids(model: Model) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Of each piece: its times, ends included; which of them are output times that no piece before it has."""
+    outputs = model.problem.times
+    times = np.arange(len(outputs)) * (model.real(outputs[-1]) / (len(outputs) - 1))
+    found, since = [], times[0]
+    for until, _ in model.pieces:
+        nearest = times[np.abs(times - until).argmin()]
+        until = nearest if abs(nearest - until) < NEAR else model.real(until)
+        grid = np.unique([since, *times[(since <= times) & (times <= until)], until])
+        found.append((grid, np.isin(grid, times) & ((grid > since) | (since == times[0]))))
+        since = until
+    return found
 
 
-def _chain(problem: Chain) -> list:
-    n = problem.bodies
-    variables = heyoka.make_vars(*(f"omega_{i}" for i in range(n)), *(f"phi_{i}" for i in range(n)))
-    omega, phi = variables[:n], variables[n:]
-    moments = []
-    for i in range(n - 1):
-        twist = phi[i + 1] - phi[i]
-        moments.append(
-            (problem.stiffness + problem.cubic_stiffness * twist * twist) * twist + problem.damping * (omega[i + 1] - omega[i])
-        )
-    rates = [after - before for before, after in itertools.pairwise(moments)]
-    equations = [(omega[0], problem.torque + moments[0])]
-    equations += list(zip(omega[1:-1], rates))
-    equations += [(omega[-1], -moments[-1] - problem.viscous * omega[-1])]
-    return equations + list(zip(phi, omega))
+def _states(model: Model, integrator: "heyoka.taylor_adaptive", grids: list) -> tuple[np.ndarray, int]:
+    """At the output times, and the number of steps."""
+    found, steps = [], 0
+    for (_, lines), (grid, is_output) in zip(model.pieces, grids):
+        integrator.pars[model.piece_pars] = lines
+        outcome, *_, taken, _, states = integrator.propagate_grid(grid)
+        if outcome != heyoka.taylor_outcome.time_limit:
+            raise ContestantError(str(outcome))
+        found.append(states[is_output])
+        steps += int(taken)
+    return np.concatenate(found), steps

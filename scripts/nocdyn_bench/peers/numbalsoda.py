@@ -37,7 +37,7 @@ def _solve(problem: Problem, method: str) -> Solve:
     def callback(t, y, dydt, data):
         fill(t, numba.carray(y, (states,)), numba.carray(dydt, (states,)))
 
-    address, start, times = callback.address, np.zeros(states), problem.times
+    address, start, times = callback.address, problem.start, problem.times
     span = times[[0, -1]]
 
     def integrate(rtol: float, atol: float) -> tuple[np.ndarray, bool, int | None]:

@@ -35,7 +35,7 @@ def _solve(problem: Problem, method: str) -> Solve:
     is_banded = isinstance(problem, Chain) and method == "LSODA"
     derivative = returning(problem, interleaved=is_banded)
     times = problem.times
-    start = np.zeros(problem.states)
+    start = problem.start
     options = {"lband": 2, "uband": 3} if is_banded else {}
     derivative(0.0, start)  # compiles
 
@@ -58,7 +58,7 @@ def _solve(problem: Problem, method: str) -> Solve:
 
 
 def _compiled_dop853(problem: Problem) -> Solve:
-    derivative, t_end, start = returning(problem), problem.times[-1], np.zeros(problem.states)
+    derivative, t_end, start = returning(problem), problem.times[-1], problem.start
     derivative(0.0, start)  # compiles
 
     def solve(rtol: float, atol: float, repetitions: int) -> Run:

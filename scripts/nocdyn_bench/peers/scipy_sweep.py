@@ -1,4 +1,4 @@
-"""SciPy on variants of case 2, right-hand side compiled by Numba, peaks as events."""
+"""SciPy on variants, right-hand side compiled by Numba, peaks as events."""
 
 import time
 
@@ -6,58 +6,57 @@ import numba
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from ..problems import Case2
-from ..variants import Found, SolveAll, SweepContestant
-from .right_hand_sides import CASE2_END, variant_derivative
+from ..variants import Family, Found, SolveAll, SweepContestant
+from .right_hand_sides import variant_derivative
 
 SHARE = 0.002  # of the variants
 
 
-def contestants(methods: list[str]) -> list[SweepContestant]:
+def contestants(family: Family, methods: list[str]) -> list[SweepContestant]:
     return [
         SweepContestant(
             f"SciPy {method}",
             "solve_ivp, the rate of the twist an event; right-hand side compiled by Numba",
-            _solve(method),
+            _solve(family, method),
             share=SHARE,
         )
         for method in methods
     ]
 
 
-def _solve(method: str) -> SolveAll:
-    fill, start = variant_derivative(Case2()), np.zeros(4)
+def _solve(family: Family, method: str) -> SolveAll:
+    problem = family.problem
+    fill, start, (first, second), bodies = variant_derivative(problem), problem.start, problem.watched, problem.states // 2
 
     @numba.njit
-    def derivative(t, y, viscous, cubic_stiffness):
+    def derivative(t, y, numbers):
         dydt = np.empty_like(y)
-        fill(t, y, dydt, viscous, cubic_stiffness)
+        fill(t, y, dydt, numbers)
         return dydt
 
-    def twist_rate(t, y, viscous, cubic_stiffness):
-        return y[1] - y[0]
+    def twist_rate(t, y, numbers):
+        return y[second] - y[first]
 
-    derivative(0.0, start, 100.0, 10.0)  # compiles
+    derivative(0.0, start, problem.numbers()[0])  # compiles
 
     def solve(tolerance: float, parameters: np.ndarray) -> Found:
-        found = np.full((len(parameters), 5), np.nan)
+        states, twists = np.full((len(parameters), problem.states), np.nan), np.full(len(parameters), np.nan)
         began = time.perf_counter()
-        for row, variant in zip(found, parameters):
+        for i, numbers in enumerate(family.numbers(parameters)):
             motion = solve_ivp(
                 derivative,
-                (0.0, CASE2_END),
+                (0.0, problem.t_end),
                 start,
                 method=method,
-                t_eval=[CASE2_END],
-                args=tuple(variant),
+                t_eval=[problem.t_end],
+                args=(numbers,),
                 events=twist_rate,
                 rtol=tolerance,
                 atol=tolerance,
             )
-            row[:4] = motion.y[:, -1]
-            states = np.vstack((motion.y_events[0], row[:4]))
-            largest = np.abs(states[:, 3] - states[:, 2]).max()
-            row[4] = (Case2.stiffness + variant[1] * largest**2) * largest
-        return Found(time.perf_counter() - began, found)
+            states[i] = motion.y[:, -1]
+            reached = np.array([*motion.y_events[0], states[i]])
+            twists[i] = np.abs(reached[:, bodies + second] - reached[:, bodies + first]).max()
+        return Found(time.perf_counter() - began, family.results(states, twists, parameters))
 
     return solve
