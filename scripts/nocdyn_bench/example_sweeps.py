@@ -7,7 +7,7 @@ import numpy as np
 from .contestant import ContestantError
 from .nocdyn_sweep import Sweeper
 from .shipped import Shipped
-from .tables import table
+from .tables import rounded, table
 from .variants import Errors, Family
 
 RTOL, ATOL_OF_RTOL = 1e-6, 1e-3  # the defaults of &run
@@ -62,7 +62,7 @@ def _row(folder: Path, scratch: Path, file: Path, methods: list[str], rounds: in
     best = max(timed, key=lambda method: rates[method])
     row = [f"`{file.stem}`", str(family.problem.bodies), f"`{family.targets[0]}`"]
     for label, method in (([], DEFAULT), ([f"`{best}`"], best)):
-        row += [*label, f"{rates[method]:.3g}", f"{errors[method]:.0e}"]
+        row += [*label, rounded(rates[method]), f"{errors[method]:.0e}"]
     return row
 
 

@@ -12,7 +12,7 @@ from . import targets
 from .chains import Scaling
 from .costs import Costs
 from .rounds import Point
-from .tables import table
+from .tables import rounded, table
 from .throughput import SLOW_SAMPLE, Rate, Throughput
 from .whole_process import Workload, largest_error
 from .work_precision import WorkPrecision
@@ -181,7 +181,8 @@ def _work_precision(workload: WorkPrecision) -> list[str]:
         *(f"tol {tolerance:.0e} (error)" for tolerance in workload.tolerances_wanted),
     ]
     rows = []
-    for contestant in workload.contestants:
+    measured = [contestant for contestant in workload.contestants if workload.points_of(contestant)]
+    for contestant in measured:
         row = [contestant.label, *(_milliseconds(workload.time_at(contestant, error, kind)) for kind, error in workload.columns)]
         for tolerance in workload.tolerances_wanted:
             point = workload.point_at(contestant, tolerance)
@@ -197,7 +198,7 @@ def _work_precision(workload: WorkPrecision) -> list[str]:
         "",
         f"Reference: {workload.reference.note}; they differ by {workload.reference.distance:.1e}.",
         "",
-        *_notes(workload.contestants, workload.failures),
+        *_notes(measured, workload.failures),
     ]
 
 
@@ -244,13 +245,13 @@ def _throughput(workload: Throughput) -> list[str]:
         rows.append(
             [
                 rate.contestant.label,
-                _rounded(rate.best),
+                rounded(rate.best),
                 *(f"{rate.best / rival.best:.3g}" for rival in rivals),
-                _rounded(whole) if whole else "-",
+                rounded(whole) if whole else "-",
                 f"{rate.tolerance:.1e}",
                 f"{rate.errors.state:.0e}",
                 f"{rate.errors.peak:.0e}" if rate.contestant.has_peak else "-",
-                _rounded(rate.variants),
+                rounded(rate.variants),
             ]
         )
     head = [
@@ -268,8 +269,8 @@ def _throughput(workload: Throughput) -> list[str]:
         "",
         "Each contestant has the loosest tolerance, in tenths of a decade, with which its errors are below "
         f"{workload.family.wanted}: the largest absolute one of {states[0]} to {states[-1]} at the end [rad, rad/s], and the "
-        f"largest relative one of the peak of {moment}, of the first {_rounded(workload.sample)} variants, at most {SLOW_SAMPLE} "
-        f"of those that integrate a part of the {_rounded(workload.count)} variants. One thread where nothing else is said. "
+        f"largest relative one of the peak of {moment}, of the first {rounded(workload.sample)} variants, at most {SLOW_SAMPLE} "
+        f"of those that integrate a part of the {rounded(workload.count)} variants. One thread where nothing else is said. "
         "Whole process: from its start until the files are written.",
         "",
         f"Reference: heyoka with 80-bit numbers at tolerance 1e-18; SciPy DOP853 at 1e-13 differs by "
@@ -281,14 +282,8 @@ def _throughput(workload: Throughput) -> list[str]:
 
 
 def _memory_lines(workload: Throughput) -> list[str]:
-    sizes = "; ".join(f"{_rounded(count)} variants {megabytes:.0f} MB" for count, megabytes in workload.memory.items())
+    sizes = "; ".join(f"{rounded(count)} variants {megabytes:.0f} MB" for count, megabytes in workload.memory.items())
     return [f"Largest memory of the process: {sizes}.", ""] if sizes else []
-
-
-def _rounded(number: float) -> str:
-    """Three digits, thousands apart."""
-    digits = max(0, math.floor(math.log10(number)) - 2)
-    return f"{round(number, -digits):,.0f}".replace(",", " ")
 
 
 def _rate(workload: Throughput, rate: Rate) -> dict:

@@ -56,7 +56,8 @@ def try_out(contestants: list[Contestant], tolerances: list[tuple[float, float]]
             if min(run.seconds) > contestant.slowest_point:
                 break
         if failures:
-            sentences.append(f"{contestant.label} fails at rtol {', '.join(failures)}: {next(iter(failures.values()))}")
+            where = f" at rtol {', '.join(failures)}" if len(failures) < len(tolerances) else ""
+            sentences.append(f"{contestant.label} fails{where}: {next(iter(failures.values()))}")
     return points, sentences
 
 

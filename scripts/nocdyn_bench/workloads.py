@@ -37,7 +37,7 @@ ENGINE = Family(
     ((1.5e4, 2.5e4), (30.0, 90.0), (8.0, 16.0)),
     Errors(2e-5, 2e-5),
     compared=22,
-    outputs=1251,
+    outputs=2501,
 )
 MILL = Family(
     Shipped(EXAMPLES / "rolling_mill" / "rolling_mill.nml", "shaft"),

@@ -3,14 +3,15 @@
 import itertools
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
 from conftest import SOURCE
 
 sys.path.insert(0, str(SOURCE / "scripts"))
-from nocdyn_bench import costs, example_sweeps, variants
-from nocdyn_bench.contestant import ContestantError
+from nocdyn_bench import costs, example_sweeps, rounds, variants
+from nocdyn_bench.contestant import Contestant, ContestantError, Run
 from nocdyn_bench.nocdyn_sweep import random_design, write_input
 from nocdyn_bench.shipped import Shipped
 
@@ -130,6 +131,21 @@ def test_all_peers_have_the_same_right_hand_side(machine):
         assert found == pytest.approx(equations(states, pars=pars, time=until - 1e-3), rel=1e-12, abs=1e-9)
 
 
+def test_a_contestant_that_fails_everywhere_or_somewhere_is_named_with_the_reason():
+    def refuse(rtol, atol, repetitions):
+        raise ContestantError("'gas' has no Taylor series")
+
+    def fail_loosely(rtol, atol, repetitions):
+        if rtol > 1e-4:
+            raise ContestantError("too large a step")
+        return Run([1.0], np.zeros((1, 2)))
+
+    contestants = [Contestant("a", "", refuse), Contestant("b", "", fail_loosely)]
+    points, sentences = rounds.try_out(contestants, [(1e-3, 1e-3), (1e-6, 1e-6)], lambda _: {})
+    assert [(point.contestant.label, point.rtol) for point in points] == [("b", 1e-6)]
+    assert sentences == ["a fails: 'gas' has no Taylor series", "b fails at rtol 1e-03: too large a step"]
+
+
 def test_every_example_has_a_sweep_whose_cost_can_be_measured(nocdyn):
     files = sorted(EXAMPLES.glob("*/*.nml"))
     assert len(files) >= 13
@@ -138,6 +154,23 @@ def test_every_example_has_a_sweep_whose_cost_can_be_measured(nocdyn):
         write_input(family, nocdyn.folder / "sweep.nml", random_design(family, 2))
         outcome = nocdyn("check", "sweep.nml")
         assert (outcome.returncode, outcome.stderr) == (0, ""), file
+
+
+def test_the_table_of_the_examples_has_rates_and_measured_errors_of_the_methods_that_can_be_used(nocdyn, monkeypatch):
+    for name in ("FEW", "LEAST", "MOST"):
+        monkeypatch.setattr(example_sweeps, name, 3)
+    files = [EXAMPLES / name / f"{name}.nml" for name in ("rolling_mill", "three_rotors")]
+    programs = Path(nocdyn.executable).parent
+    _, _, *rows, _, _ = example_sweeps.example_sweeps(programs, nocdyn.folder, files, ["auto", "taylor"], 1)
+    cells = [[cell.strip(" `") for cell in row.strip("|").split("|")] for row in rows]
+    assert [row[:3] for row in cells] == [
+        ["rolling_mill", "3", "coupling.shaft.stiffness"],
+        ["three_rotors", "3", "coupling.shaft.stiffness"],
+    ]
+    for row in cells:
+        assert row[5] in ("auto", "taylor")
+        assert all(0 < float(row[i]) < 1e-5 for i in (4, 7))
+        assert all(float(row[i].replace(" ", "")) > 1 for i in (3, 6))
 
 
 def test_each_contestant_of_a_sweep_has_the_loosest_tolerance_that_is_good_enough(monkeypatch):
