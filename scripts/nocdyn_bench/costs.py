@@ -15,8 +15,10 @@ from .tables import table
 VARIANTS = 16384  # integrated for one number
 FEW, MORE = 64, 192  # variants that are integrated while instructions are counted; the difference counts
 CHUNKS = (1, 4, 16, 64, 256, 1024, 4096)
-MESSAGES = 300
-CHUNK_SECONDS, MOST_AT_ONCE = 0.2, 8192  # what nocdyn aims at, src/analyse/sweep/engine/journal_scheduler.f90
+MESSAGES = 10000
+RANKS = (1, 2, 10, 55, 100, 1000, 10000)
+SIMULATED = ((1e10, 1e-5), (1e8, 1e-2))  # variants and the seconds of one
+SPREAD = 0.5  # of the time of variants from share to share
 
 
 @dataclass
@@ -87,10 +89,14 @@ class Sweeping:
         """Unfused additions and multiplications in a second, of a loop that does nothing else."""
         return max(_report([self.folder / "peak_flops"])["flops"] for _ in range(rounds))
 
-    def message(self, rounds: int, size: int) -> float:
-        """Seconds for the messages about one chunk whose results have so many bytes."""
-        command = [*MPIRUN, "-n", 2, self.folder / "mpi_message_costs", size, MESSAGES]
+    def message(self, rounds: int) -> float:
+        """Seconds for the messages about one share of the variants."""
+        command = [*MPIRUN, "-n", 2, self.folder / "mpi_message_costs", MESSAGES]
         return min(_report(command)["seconds"] for _ in range(rounds))
+
+    def hand_out(self, ranks: int, variants: float, seconds: float, journal: float, message: float) -> dict:
+        """What a simulation says of variants that take so many seconds."""
+        return _report([self.folder / "hand_out_costs", ranks, variants, seconds, journal, message, SPREAD])
 
 
 def _report(command: list) -> dict:
@@ -141,12 +147,11 @@ def step_costs(sweeping: Sweeping, plain: Path, cases: list[Case], rounds: int) 
     ]
 
 
-def chunk_costs(sweeping: Sweeping, case: Case, has_mpi: bool, rounds: int) -> list[str]:
+def chunk_costs(sweeping: Sweeping, case: Case, rounds: int) -> list[str]:
     costs = [sweeping.best(rounds, case, min(VARIANTS, 512 * chunk), chunk) for chunk in CHUNKS]
-    messages = [sweeping.message(rounds, cost.bytes) if has_mpi else None for cost in costs]
     fastest = max(cost.rate for cost in costs)
     rows = []
-    for cost, message in zip(costs, messages):
+    for cost in costs:
         own = 1e6 * (cost.compute - cost.variants / fastest) / cost.chunks
         rows.append(
             [
@@ -157,7 +162,6 @@ def chunk_costs(sweeping: Sweeping, case: Case, has_mpi: bool, rounds: int) -> l
                 f"{1e6 * cost.hand_out / cost.chunks:.2f}",
                 f"{1e6 * cost.journal / cost.chunks:.1f}",
                 str(cost.bytes),
-                f"{1e6 * message:.1f}" if has_mpi else "-",
             ]
         )
     head = [
@@ -168,34 +172,43 @@ def chunk_costs(sweeping: Sweeping, case: Case, has_mpi: bool, rounds: int) -> l
         "hand-out, us",
         "journal, us",
         "bytes",
-        "messages, us",
     ]
     return [
         *table(head, rows),
         "",
         f"`{case.method}`, {costs[0].lanes} lanes, one thread. Start and end: cost of filling the lanes at the "
         "start and of idle lanes at the end, compared with the fastest chunk. Hand-out: lock and scheduler. Journal: "
-        "packing, checksum, one write. Messages: request, answer, results and time between two ranks on this machine, without "
-        "the work of either.",
-        "",
-        scaling_out(costs[-1], messages[-1], fastest),
+        "packing, checksum, one write.",
     ]
 
 
-def scaling_out(cost: Cost, message: float | None, rate: float) -> str:
-    """What the largest chunk says of many workers."""
-    journal = cost.journal / cost.variants
-    text = (
-        f"The size of a chunk is chosen for {CHUNK_SECONDS} s of work, {CHUNK_SECONDS * rate:.0f} variants here, with a limit of "
-        f"{MOST_AT_ONCE}. A variant takes {1e6 * journal:.2g} us in the journal and {1e6 / rate:.3g} us for its integration"
-    )
-    if message is not None:
-        both = journal + message / cost.chunk
-        text += (
-            f", and {1e6 * message / cost.chunk:.2g} us in messages. Rank 0 does both for all others, and is busy "
-            f"with it at about {1 / (rate * both):.0f} ranks of one thread"
-        )
-    return text + ". With longer variants the limit grows in proportion."
+def hand_out_costs(sweeping: Sweeping, case: Case, rounds: int) -> list[str]:
+    """The hand-out to many ranks, simulated with the costs of this machine."""
+    cost = sweeping.best(rounds, case, VARIANTS, CHUNKS[-1])
+    journal, message = cost.journal / cost.variants, sweeping.message(rounds)
+    rows = []
+    for ranks in RANKS:
+        row = [f"{ranks:,}".replace(",", " ")]
+        for variants, seconds in SIMULATED:
+            found = sweeping.hand_out(ranks, variants, seconds, journal, message)
+            row += [f"{found['efficiency']:.1%}", f"{found['seconds']:.3g}", f"{found['busy']:.1%}"]
+        rows.append(row)
+    names = [f"{variants:.0e} variants of {_duration(seconds)}".replace("e+", "e") for variants, seconds in SIMULATED]
+    head = ["ranks", *(f"{name}{part}" for name in names for part in (": efficiency", ", time, s", ", rank 0 busy"))]
+    return [
+        *table(head, rows),
+        "",
+        "Efficiency: share of the time of all ranks, of one thread each, in which they integrate. A simulation of the hand-out "
+        "by the procedure of `nocdyn-mpi`, with what was measured here: "
+        f"{1e6 * message:.2g} us of rank 0 for a request, both messages included, and {1e6 * journal:.2g} us for a variant in "
+        f"the journal of its rank. The variants of one share take up to {SPREAD:.0%} more or less time than those of another. "
+        "The time "
+        "is that until the last rank ends, without the start of the ranks and the merge of the journals.",
+    ]
+
+
+def _duration(seconds: float) -> str:
+    return f"{1e6 * seconds:.0f} us" if seconds < 1e-3 else f"{1e3 * seconds:.0f} ms"
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from . import whole_process
 from .chains import Scaling
-from .costs import Case, Costs, Sweeping, chunk_costs, step_costs
+from .costs import Case, Costs, Sweeping, chunk_costs, hand_out_costs, step_costs
 from .example_sweeps import example_sweeps
 from .nocdyn_sweep import sweepers
 from .peers import heyoka, heyoka_sweep, numbalsoda, numbalsoda_sweep, scipy, scipy_sweep
@@ -163,10 +163,13 @@ def steps(bench: Bench) -> Costs:
 
 
 def chunks(bench: Bench) -> Costs:
-    sweeping, has_mpi = Sweeping(bench.programs.folder, bench.scratch), bench.programs.has("mpi_message_costs")
-    return Costs(
-        "chunk_costs", "Chunk costs in sweeps of case 2", lambda rounds: chunk_costs(sweeping, SWEEP_CASES[0], has_mpi, rounds)
-    )
+    sweeping = Sweeping(bench.programs.folder, bench.scratch)
+    return Costs("chunk_costs", "Chunk costs in sweeps of case 2", lambda rounds: chunk_costs(sweeping, SWEEP_CASES[0], rounds))
+
+
+def hand_out(bench: Bench) -> Costs:
+    sweeping = Sweeping(bench.programs.folder, bench.scratch)
+    return Costs("hand_out", "Hand-out to many ranks", lambda rounds: hand_out_costs(sweeping, SWEEP_CASES[0], rounds))
 
 
 def w3(bench: Bench) -> Scaling:
@@ -299,4 +302,5 @@ WORKLOADS: dict[str, Callable[[Bench], Workload]] = {
     "example_sweeps": examples,
     "step_costs": steps,
     "chunk_costs": chunks,
+    "hand_out": hand_out,
 }

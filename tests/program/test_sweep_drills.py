@@ -14,6 +14,7 @@ from sweep_inputs import MPI_ENVIRONMENT, MPI_PROGRAM, SWEEP, TWO_DISCS, limited
 pytestmark = needs_sweeps
 
 RANKS = 3
+RANK_JOURNALS = [f"sweep.rank-{rank}.journal" for rank in range(1, RANKS)]
 SHARDS = 2
 SAMPLES = 1000 if IS_SLOW else 6000
 LONG = ("--set", f"sweep.samples={SAMPLES}", "--set", "run.t_end=20")
@@ -103,7 +104,7 @@ def test_ranks_that_are_killed_together_lose_nothing_that_was_done(nocdyn, discs
         wait_until_it_computes(process, journal(nocdyn))
         kill_ranks(process)
         process.communicate(timeout=60)
-        assert process.returncode != 0 and nocdyn.files("out") == ["sweep.journal"]
+        assert process.returncode != 0 and nocdyn.files("out") == ["sweep.journal", *RANK_JOURNALS]
     assert_reuses(finish_on_ranks(nocdyn, discs, whole), SAMPLES)
 
 
@@ -120,11 +121,12 @@ def test_a_shard_that_is_killed_five_times_ends_as_one_that_is_not(nocdyn, discs
 
 @needs_mpi
 def test_a_full_disk_stops_three_ranks_that_can_be_gone_on_with(nocdyn, discs, whole):
-    process = start_ranks(nocdyn, "sweep", discs, "--out", "out", *LONG, limit=60)
+    process = start_ranks(nocdyn, "sweep", discs, "--out", "out", *LONG, limit=24)
     output, complaint = process.communicate(timeout=60)
     assert (process.returncode, output) == (3, "")
-    assert complaint.count("nocdyn: ") == 1 and "nocdyn: cannot write 'out/sweep.journal': File too large; when" in complaint
-    assert nocdyn.files("out") == ["sweep.journal"]
+    assert complaint.count("nocdyn: ") == 1
+    assert re.search(r"nocdyn: cannot write 'out/sweep\.(rank-[12]\.)?journal': File too large; when", complaint)
+    assert nocdyn.files("out") == ["sweep.journal", *RANK_JOURNALS]
     assert_reuses(finish_on_ranks(nocdyn, discs, whole), SAMPLES)
 
 
@@ -157,9 +159,11 @@ def damage(file):
 
 @needs_mpi
 def test_three_ranks_make_a_damaged_journal_good(nocdyn, discs, whole):
-    start_ranks(nocdyn, "sweep", discs, "--out", "out", *LONG, limit=60).communicate(timeout=60)
+    start_ranks(nocdyn, "sweep", discs, "--out", "out", *LONG, limit=24).communicate(timeout=60)
     damage(journal(nocdyn))
-    note = f"{discs}: note: out/sweep.journal has damaged entries; their variants are computed again\n"
+    damage(journal(nocdyn, RANK_JOURNALS[1]))
+    damaged = ("sweep.journal", RANK_JOURNALS[1])
+    note = "".join(f"{discs}: note: out/{name} has damaged entries; their variants are computed again\n" for name in damaged)
     assert_reuses(finish_on_ranks(nocdyn, discs, whole), SAMPLES, note)
 
 
@@ -169,3 +173,80 @@ def test_a_damaged_shard_is_told_and_made_good(nocdyn, discs, whole):
     damage(file)
     note = f"{discs}: note: out/{file.name} has damaged entries; their variants are computed again\n"
     assert_reuses(finish_shards(nocdyn, discs, whole), SAMPLES // SHARDS, note)
+
+
+def ranks_outcome(nocdyn, ranks, *words):
+    command = [*mpirun(ranks), "sweep", *words]
+    return subprocess.run(
+        command, cwd=nocdyn.folder, env=MPI_ENVIRONMENT, check=False, capture_output=True, text=True, timeout=60
+    )
+
+
+def held(nocdyn, discs, *words):
+    """How many variants the journals hold, as a sweep without --resume says."""
+    outcome = nocdyn("sweep", discs, "--out", "out", *LONG, *words)
+    assert outcome.returncode == 2
+    return re.fullmatch(
+        rf"nocdyn: (out/sweep\.journal.*) holds? +(\d+) of {SAMPLES} variants of an unfinished sweep; .*\n", outcome.stderr
+    ).groups()
+
+
+@needs_mpi
+@pytest.mark.parametrize("ranks", [0, 2, 5])
+def test_a_sweep_of_three_ranks_is_gone_on_with_by_any_number(nocdyn, discs, whole, ranks):
+    start_ranks(nocdyn, "sweep", discs, "--out", "out", *LONG, limit=24).communicate(timeout=60)
+    journals, number = held(nocdyn, discs)
+    assert journals == "out/sweep.journal and 2 of ranks" and 0 < int(number) < SAMPLES
+    words = (discs, "--out", "out", "--resume", *LONG)
+    outcome = ranks_outcome(nocdyn, ranks, *words) if ranks else nocdyn("sweep", *words)
+    assert (outcome.returncode, outcome.stderr) == (0, "")
+    assert outcome.stdout.startswith(f"{discs}: reusing {number} of {SAMPLES} variants from out/sweep.journal and 2 of ranks\n")
+    assert nocdyn.summary("out")["variants_computed"] == SAMPLES - int(number)
+    assert_ends_as(nocdyn, whole)
+
+
+@needs_mpi
+def test_journals_of_ranks_without_that_of_rank_0_are_gone_on_with(nocdyn, discs, whole):
+    start_ranks(nocdyn, "sweep", discs, "--out", "out", *LONG, limit=24).communicate(timeout=60)
+    journal(nocdyn).unlink()
+    assert 0 < int(held(nocdyn, discs)[1]) < SAMPLES
+    finish_on_ranks(nocdyn, discs, whole)
+
+
+@needs_mpi
+def test_journals_of_ranks_are_merged(nocdyn, discs, whole):
+    start_ranks(nocdyn, "sweep", discs, "--out", "out", *LONG, limit=24).communicate(timeout=60)
+    unfinished = nocdyn("merge", "out")
+    assert unfinished.returncode == 2 and unfinished.stderr.startswith("nocdyn: out/sweep.journal: unfinished, without variant")
+    assert unfinished.stderr.count("\n") == 1
+    # then the three journals fit on the disk, and the results do not
+    process = start_ranks(nocdyn, "sweep", discs, "--out", "out", "--resume", *LONG, limit=SAMPLES * 45 // 512)
+    assert "nocdyn: cannot write 'out/sweep.nc'" in process.communicate(timeout=60)[1]
+    assert nocdyn("merge", "out").returncode == 0
+    assert nocdyn.files("out") == ["input.nml", "summary.json", "sweep.journal", "sweep.nc", *RANK_JOURNALS]
+    assert (nocdyn.folder / "out/sweep.nc").read_bytes() == whole
+
+
+@needs_mpi
+def test_journals_of_ranks_and_of_shards_do_not_mix(nocdyn, discs):
+    start_ranks(nocdyn, "sweep", discs, "--out", "out", *LONG, limit=24).communicate(timeout=60)
+    journal(nocdyn).unlink()
+    outcome = nocdyn("sweep", discs, "--out", "out", *shard_words(1), *LONG)
+    assert outcome.returncode == 2
+    assert outcome.stderr.startswith("nocdyn: out holds the journal of a whole sweep, sweep.rank-1.journal; continue it with")
+
+
+@needs_mpi
+def test_a_rank_without_the_folder_of_rank_0_ends_the_job(nocdyn, discs):
+    (nocdyn.folder / "elsewhere").mkdir()
+    nocdyn.write("here/discs.nml", TWO_DISCS + SWEEP)
+    parts = [["-n", "1", "--wdir", nocdyn.folder / name, MPI_PROGRAM, "sweep", "discs.nml"] for name in ("here", "elsewhere")]
+    command = ["mpirun", *map(str, [*parts[0], ":", *parts[1]])]
+    outcome = subprocess.run(command, env=MPI_ENVIRONMENT, check=False, capture_output=True, text=True, timeout=60)
+    assert (outcome.returncode, outcome.stdout) == (3, "")
+    told = re.search(
+        r"nocdyn: results/discs: rank 1 does not find the sweep.journal of rank 0 there; "
+        r"the folder must be on a file system that all ranks share; .*\n",
+        outcome.stderr,
+    )
+    assert told and outcome.stderr.count("nocdyn: ") == 1

@@ -34,6 +34,10 @@ def journal(nocdyn, folder="out"):
     return nocdyn.folder / folder / "sweep.journal"
 
 
+def rank_journals(ranks):
+    return [f"sweep.rank-{rank}.journal" for rank in range(1, ranks)]
+
+
 def start(nocdyn, *words, ranks=0, **options):
     """A sweep that has begun to compute; with ranks, on as many."""
     if ranks:
@@ -362,7 +366,7 @@ def test_a_dead_rank_ends_the_job_and_leaves_the_journal(nocdyn, discs, ranks, r
     subprocess.run(["kill", "-9", victims[rank]], check=True)
     process.communicate(timeout=60)
     assert process.returncode != 0
-    assert nocdyn.files("out") == ["sweep.journal"]
+    assert nocdyn.files("out") == ["sweep.journal", *rank_journals(ranks)]
     assert nocdyn("sweep", discs, "--out", "out", "--resume", *LONG).returncode == 0
     assert nocdyn.summary("out")["variants_computed"] < SAMPLES
     assert nocdyn("sweep", discs, "--out", "whole", *LONG).returncode == 0
@@ -375,7 +379,7 @@ def test_an_interrupted_job_keeps_its_journal(nocdyn, discs):
     process.send_signal(signal.SIGINT)
     process.communicate(timeout=60)
     assert process.returncode != 0
-    assert nocdyn.files("out") == ["sweep.journal"]
+    assert nocdyn.files("out") == ["sweep.journal", *rank_journals(3)]
 
 
 @needs_mpi

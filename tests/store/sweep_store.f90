@@ -6,9 +6,10 @@ program sweep_store
   use, intrinsic :: iso_fortran_env, only: error_unit, output_unit
   use nocdyn_errors, only: error_t
   use nocdyn_order_statistics, only: find_order_statistics, order_statistics_t
+  use nocdyn_number_ranges, only: range_t
   use nocdyn_posix, only: ignore_file_size_signal
   use nocdyn_sweep_netcdf, only: write_sweep_netcdf
-  use nocdyn_sweep_journal, only: create_journal, journal_name, open_journal, sweep_journal_t
+  use nocdyn_sweep_journal, only: create_journal, journal_name, missing_variants, open_journal, sweep_journal_t
   use nocdyn_sweep_csv, only: write_sweep_csv
   use nocdyn_text, only: to_text
   use sample_sweeps, only: header_of, sample_chunk
@@ -68,17 +69,17 @@ contains
   !> Appends the variants that the journal lacks.
   subroutine compute()
     type(error_t), allocatable :: error
-    integer, allocatable :: first(:), count(:)
-    integer :: done, i, part
+    type(range_t), allocatable :: missing(:)
+    integer :: i, next, part
 
-    call journals(1)%missing(first, count)
-    do i = 1, size(first)
-      done = 0
-      do while (done < count(i))
-        part = min(chunk, count(i) - done)
-        call journals(1)%append(sample_chunk(first(i) + done, part), error)
+    call missing_variants(journals, journals(1)%header, missing)
+    do i = 1, size(missing)
+      next = missing(i)%first
+      do while (next <= missing(i)%last)
+        part = min(chunk, missing(i)%last - next + 1)
+        call journals(1)%append(sample_chunk(next, part), error)
         call stop_on(error)
-        done = done + part
+        next = next + part
       end do
     end do
   end subroutine compute

@@ -3,7 +3,7 @@ module nocdyn_mpi_command
   use mpi_f08, only: mpi_abort, mpi_comm_rank, mpi_comm_size, mpi_comm_world, mpi_query_thread, mpi_thread_serialized
   use nocdyn_arguments, only: arguments_t
   use nocdyn_console, only: report_error
-  use nocdyn_errors, only: error_t, exit_done, exit_input, raise
+  use nocdyn_errors, only: error_t, exit_done, exit_file, exit_input, raise
   use nocdyn_input, only: input_t
   use nocdyn_input_reader, only: read_input_text
   use nocdyn_input_sources, only: pack_sources, unpack_sources
@@ -14,10 +14,12 @@ module nocdyn_mpi_command
   use nocdyn_posix, only: catch_interrupts
   use nocdyn_sweep_job, only: start_job, finish_job, sweep_job_t
   use nocdyn_journal_scheduler, only: initialise_scheduler
-  use nocdyn_sweep_plan, only: make_plan, sweep_plan_t
+  use nocdyn_sweep_header, only: sweep_header_t
+  use nocdyn_sweep_journal, only: continue_journal, journal_name, rank_journal_name, sweep_journal_t
+  use nocdyn_sweep_plan, only: make_plan, new_sweep_header, sweep_plan_t
   use nocdyn_sweep, only: compute_variants, prepare_sweep, sweep_setup_t
   use nocdyn_sweep_threads, only: usable_threads, print_thread_note
-  use nocdyn_text, only: strings
+  use nocdyn_text, only: shown_path, strings, to_text
   implicit none (type, external)
   private
 
@@ -41,7 +43,7 @@ contains
     else if (rank == root) then
       call run_root(arguments, usable_threads(max(1, arguments%threads)), code)
     else
-      call run_worker(usable_threads(max(1, arguments%threads)), code)
+      call run_worker(rank, usable_threads(max(1, arguments%threads)), code)
     end if
   end subroutine mpi_command
 
@@ -59,7 +61,7 @@ contains
     end if
   end subroutine check_arguments
 
-  !> Rank 0: reads the input, computes like the other ranks, collects the results and writes them.
+  !> Rank 0: reads the input, hands out the variants, computes like the other ranks, and makes the results of all journals.
   subroutine run_root(arguments, threads, code)
     type(arguments_t), intent(in) :: arguments
     integer, intent(in) :: threads   !! of each rank
@@ -83,23 +85,27 @@ contains
     call broadcast_text(file)
     call broadcast_text(sources)
     call broadcast_text(job%plan%list_checksum)
+    call broadcast_text(job%folder)
     call mpi_comm_size(mpi_comm_world, ranks)
     scheduler%other_ranks = ranks - 1
-    call initialise_scheduler(scheduler, job%journals(1), job%progress, ranks * threads, job%setup%lanes)
+    call initialise_scheduler(scheduler, job%journals(1), threads, job%setup%lanes)
+    call scheduler%begin(job%variants, job%counts, job%progress)
     call compute_variants(job%plan, job%setup, threads, scheduler)
     call finish_job(job, scheduler, threads, ranks, code)
   end subroutine run_root
 
-  !> Other ranks: they compute with the input that rank 0 broadcasts. The file of a list they read themselves.
-  subroutine run_worker(threads, code)
-    integer, intent(in) :: threads
+  !> Other ranks: they compute with the input that rank 0 broadcasts and keep journals of their own. The file of a list they read
+  !> themselves.
+  subroutine run_worker(rank, threads, code)
+    integer, intent(in) :: rank, threads
     integer, intent(out) :: code
     type(input_t) :: input
     type(sweep_plan_t) :: plan
     type(sweep_setup_t) :: setup
+    type(sweep_journal_t), target :: journal
     type(mpi_worker_t) :: worker
     type(error_t), allocatable :: error
-    character(len=:), allocatable :: checksum, file, sources, text
+    character(len=:), allocatable :: checksum, file, folder, sources, text
 
     code = exit_done
     call broadcast_text(text)
@@ -107,6 +113,7 @@ contains
     call broadcast_text(file)
     call broadcast_text(sources)
     call broadcast_text(checksum)
+    call broadcast_text(folder)
     call read_input_text(text, file, strings([character(len=1) ::]), input, error)
     if (.not. allocated(error)) then
       call unpack_sources(sources, input)
@@ -120,7 +127,33 @@ contains
       call report_error(error, code)
       call mpi_abort(mpi_comm_world, code)
     end if
-    call compute_variants(plan, setup, threads, worker)
+    call open_rank_journal(rank, folder, new_sweep_header(plan, 1, 1), journal, worker%error)
+    if (allocated(worker%error)) then
+      worker%journal => journal
+      call worker%finalise()
+    else
+      call initialise_scheduler(worker, journal, threads, setup%lanes)
+      call compute_variants(plan, setup, threads, worker)
+    end if
   end subroutine run_worker
+
+  !> The journal of a rank above 0, beside that of rank 0.
+  subroutine open_rank_journal(rank, folder, header, journal, error)
+    integer, intent(in) :: rank
+    character(len=*), intent(in) :: folder
+    type(sweep_header_t), intent(in) :: header
+    type(sweep_journal_t), intent(out) :: journal
+    type(error_t), allocatable, intent(out) :: error
+    logical :: is_there
+
+    journal%header = header
+    inquire (file=folder // '/' // journal_name(1, 1), exist=is_there)
+    if (is_there) then
+      call continue_journal(folder, rank_journal_name(rank), header, journal, error)
+    else
+      call raise(error, exit_file, shown_path(folder) // ': rank ' // to_text(rank) // ' does not find the ' // &
+                 journal_name(1, 1) // ' of rank 0 there; the folder must be on a file system that all ranks share')
+    end if
+  end subroutine open_rank_journal
 
 end module nocdyn_mpi_command

@@ -1,11 +1,13 @@
-!> Scheduler of rank 0, which computes like the other ranks and serves their messages between its steps.
+!> Scheduler of rank 0, which computes like the other ranks and hands out variants to them between its steps.
 module nocdyn_mpi_root
   use, intrinsic :: iso_c_binding, only: c_int
-  use nocdyn_kinds, only: wp
-  use nocdyn_mpi_messages, only: probe_message, receive_results, receive_tag, send_assignment, send_tag, tag_done, tag_request, &
-    tag_results, tag_stop
-  use nocdyn_sweep_chunk, only: chunk_t
+  use, intrinsic :: iso_fortran_env, only: int64
+  use nocdyn_errors, only: error_t
+  use nocdyn_hand_out, only: hand_out_t
   use nocdyn_journal_scheduler, only: journal_scheduler_t
+  use nocdyn_mpi_messages, only: probe_message, receive_error, receive_report, report_t, send_assignment, send_tag, tag_done, &
+    tag_error, tag_request, tag_stop
+  use nocdyn_scheduler, only: sweep_counts_t, sweep_progress_t
   implicit none (type, external)
   private
 
@@ -20,14 +22,51 @@ module nocdyn_mpi_root
 
   type, extends(journal_scheduler_t), public :: mpi_root_t
     integer :: other_ranks = 0                       !! number of ranks besides this one
+    type(hand_out_t), private :: variants            !! of all ranks
     integer, private :: finished_ranks = 0           !! number of ranks that have sent their last message
-    logical, private :: has_stopped = .false.   !! whether the other ranks have been told to stop
+    logical, private :: has_stopped = .false.        !! whether the other ranks have been told to stop
   contains
-    procedure :: poll, finalise
-    procedure, private :: handle_message
+    procedure :: begin, refill_pool, poll, finalise
+    procedure, private :: handle_message, take
   end type mpi_root_t
 
 contains
+
+  !> Takes the variants of the whole sweep, for all ranks.
+  subroutine begin(self, variants, counts, progress)
+    class(mpi_root_t), intent(inout) :: self
+    type(hand_out_t), intent(in) :: variants     !! that are missing
+    type(sweep_counts_t), intent(in) :: counts   !! of the others
+    class(sweep_progress_t), target, intent(inout) :: progress
+
+    self%variants = variants
+    self%variants%lanes = self%pool%lanes
+    call self%variants%serve_ranks(1 + self%other_ranks, self%pool%workers)
+    self%counts = counts
+    self%progress => progress
+  end subroutine begin
+
+  !> A share for the threads of this rank.
+  subroutine refill_pool(self)
+    class(mpi_root_t), intent(inout) :: self
+    integer :: count, first
+
+    if (self%pool%variant_time > 0) self%variants%variant_time = self%pool%variant_time
+    call self%take(first, count)
+    if (count > 0) call self%pool%refill([int(first, int64)], [int(count, int64)])
+  end subroutine refill_pool
+
+  !> The share of a rank, none if the sweep is cancelled.
+  subroutine take(self, first, count)
+    class(mpi_root_t), intent(inout) :: self
+    integer, intent(out) :: first, count
+    integer(int64) :: variant
+
+    variant = 0
+    count = 0
+    if (.not. self%is_cancelled()) call self%variants%take(self%pool%workers, variant, count)
+    first = int(variant)
+  end subroutine take
 
   !> Shows the progress and answers all waiting messages. If the sweep is cancelled, tells the other ranks to stop.
   subroutine poll(self)
@@ -52,21 +91,26 @@ contains
   subroutine handle_message(self, rank, tag)
     class(mpi_root_t), intent(inout) :: self
     integer, intent(in) :: rank, tag
-    type(chunk_t) :: chunk
-    real(wp) :: seconds
+    type(error_t), allocatable :: error
+    type(report_t) :: report
     integer :: count, first
 
     select case (tag)
-    case (tag_request)
-      call receive_tag(rank, tag)
-      call self%next_chunk(first, count)
-      call send_assignment(rank, first, count)
-    case (tag_results)
-      call receive_results(rank, chunk, seconds)
-      call self%commit(chunk, seconds)
-    case (tag_done)
-      call receive_tag(rank, tag)
-      self%finished_ranks = self%finished_ranks + 1
+    case (tag_request, tag_done)
+      call receive_report(rank, tag, report)
+      call self%counts%add(report%counts)
+      if (report%variant_time > 0) self%variants%variant_time = report%variant_time
+      if (tag == tag_done) then
+        self%finished_ranks = self%finished_ranks + 1
+      else
+        call self%take(first, count)
+        call send_assignment(rank, first, count)
+      end if
+    case (tag_error)
+      call receive_error(rank, error)
+      if (allocated(self%error)) return
+      call move_alloc(error, self%error)
+      call self%fail()
     case default
       error stop 'nocdyn_mpi_root: rank 0 received a message with an unknown tag'
     end select

@@ -1,46 +1,43 @@
-!> Scheduler of the ranks above 0: it requests variants from rank 0 and sends it the results.
+!> Scheduler of the ranks above 0: it requests variants from rank 0 and appends the results to the journal of its rank.
 module nocdyn_mpi_worker
-  use nocdyn_scheduler, only: scheduler_t
-  use nocdyn_kinds, only: wp
-  use nocdyn_mpi_messages, only: probe_message, receive_assignment, receive_tag, root, send_results, send_tag, tag_done, &
-    tag_request, tag_stop, wait_for_message
-  use nocdyn_posix, only: is_interrupted
-  use nocdyn_sweep_chunk, only: chunk_t
+  use, intrinsic :: iso_fortran_env, only: int64
+  use nocdyn_journal_scheduler, only: journal_scheduler_t
+  use nocdyn_mpi_messages, only: probe_message, receive_assignment, receive_tag, report_t, root, send_error, send_report, &
+    tag_done, tag_request, tag_stop, wait_for_message
+  use nocdyn_scheduler, only: sweep_counts_t
   implicit none (type, external)
   private
 
-  type, extends(scheduler_t), public :: mpi_worker_t
+  type, extends(journal_scheduler_t), public :: mpi_worker_t
     logical, private :: is_exhausted = .false.   !! whether rank 0 has no more variants
     logical, private :: is_stopped = .false.     !! whether rank 0 has told this rank to stop
   contains
-    procedure :: next_chunk, submit, poll, finalise, is_cancelled
+    procedure :: refill_pool, poll, finalise, is_cancelled
+    procedure, private :: report
   end type mpi_worker_t
 
 contains
 
   !> Requests the next variants from rank 0.
-  subroutine next_chunk(self, first, count)
+  subroutine refill_pool(self)
     class(mpi_worker_t), intent(inout) :: self
-    integer, intent(out) :: first   !! variant
-    integer, intent(out) :: count   !! number of variants, 0: there are no more
+    integer :: count, first
 
-    first = 0
-    count = 0
     if (self%is_exhausted) return
-    if (self%is_cancelled()) return
-    call send_tag(root, tag_request)
+    call self%report(tag_request)
     call receive_assignment(first, count)
     self%is_exhausted = count == 0
-  end subroutine next_chunk
+    if (count > 0) call self%pool%refill([int(first, int64)], [int(count, int64)])
+  end subroutine refill_pool
 
-  !> Sends results to rank 0.
-  subroutine submit(self, chunk, seconds)
+  !> Tells rank 0 what has been done since the last time.
+  subroutine report(self, tag)
     class(mpi_worker_t), intent(inout) :: self
-    type(chunk_t), intent(in) :: chunk
-    real(wp), intent(in) :: seconds   !! to compute the chunk [s]
+    integer, intent(in) :: tag
 
-    call send_results(chunk, seconds)
-  end subroutine submit
+    call send_report(tag, report_t(self%counts, self%pool%variant_time))
+    self%counts = sweep_counts_t()
+  end subroutine report
 
   !> Receives a message to stop, if there is one.
   subroutine poll(self)
@@ -54,12 +51,14 @@ contains
     self%is_stopped = .true.
   end subroutine poll
 
-  !> Sends the last message and waits for that of rank 0. A message to stop may arrive before it.
+  !> Closes the journal, sends the last message and waits for that of rank 0. A message to stop may arrive before it.
   subroutine finalise(self)
     class(mpi_worker_t), intent(inout) :: self
     integer :: tag
 
-    call send_tag(root, tag_done)
+    call self%journal%file%close()
+    if (allocated(self%error)) call send_error(self%error)
+    call self%report(tag_done)
     do
       call wait_for_message(tag)
       call receive_tag(root, tag)
@@ -67,14 +66,15 @@ contains
     end do
   end subroutine finalise
 
-  !> After such a message, and after Ctrl-C.
-  function is_cancelled(self)
+  !> After such a message, after Ctrl-C, and when the journal cannot be written.
+  logical function is_cancelled(self)
     class(mpi_worker_t), intent(in) :: self
-    logical :: is_cancelled
+    logical :: is_stopped
 
     !$omp atomic read
-    is_cancelled = self%is_stopped
-    is_cancelled = is_cancelled .or. is_interrupted()
+    is_stopped = self%is_stopped
+    is_cancelled = self%journal_scheduler_t%is_cancelled()
+    is_cancelled = is_cancelled .or. is_stopped
   end function is_cancelled
 
 end module nocdyn_mpi_worker

@@ -88,6 +88,7 @@ contains
     do i = 1, size(names)
       call open_journal(folder, names(i)%text, journals(i), error)
       if (allocated(error)) return
+      call journals(i)%file%close()
     end do
   end subroutine open_journals
 

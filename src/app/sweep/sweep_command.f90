@@ -36,7 +36,8 @@ contains
     if (job%is_done) return
     threads = usable_threads(thread_count(arguments))
     if (.not. arguments%is_given('--quiet')) call print_thread_note(job%plan%input%shown_file(), thread_count(arguments))
-    call initialise_scheduler(scheduler, job%journals(1), job%progress, threads, job%setup%lanes)
+    call initialise_scheduler(scheduler, job%journals(1), threads, job%setup%lanes)
+    call scheduler%begin(job%variants, job%counts, job%progress)
     call compute_variants(job%plan, job%setup, threads, scheduler)
     call finish_job(job, scheduler, threads, 1, code)
   end subroutine sweep_command

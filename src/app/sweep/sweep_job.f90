@@ -8,19 +8,23 @@ module nocdyn_sweep_job
   use nocdyn_input_reader, only: read_input
   use nocdyn_diagnostics, only: diagnostics_t
   use nocdyn_kinds, only: wp
+  use nocdyn_number_ranges, only: range_t
   use nocdyn_result_folders, only: result_folder
   use nocdyn_run_files, only: check_variants
   use nocdyn_sweep, only: prepare_sweep, sweep_setup_t
   use nocdyn_sweep_header, only: sweep_netcdf_name, sweep_header_t
-  use nocdyn_sweep_journal, only: create_journal, journal_name, open_journal, sweep_journal_t
-  use nocdyn_journal_scheduler, only: journal_scheduler_t
+  use nocdyn_sweep_journal, only: continue_journal, create_journal, is_of_rank, journal_name, journal_names, missing_variants, &
+    open_journal, sweep_journal_t
+  use nocdyn_hand_out, only: hand_out_t
+  use nocdyn_journal_scheduler, only: journal_scheduler_t, schedule_missing
   use nocdyn_scheduler, only: sweep_counts_t, sweep_progress_t
   use nocdyn_sweep_plan, only: add_plan_diagnostics, make_plan, new_sweep_header, sweep_plan_t
-  use nocdyn_sweep_resumption, only: check_journal, check_results, refuse_other_journals
+  use nocdyn_sweep_resumption, only: check_journal, check_results, journals_text, refuse_other_journals, &
+    refuse_unfinished
   use nocdyn_sweep_results, only: print_results, write_results
   use nocdyn_sweep_summary, only: sweep_effort_t, sweep_summary_t
   use nocdyn_sweep_csv, only: sweep_csv_name
-  use nocdyn_text, only: rounded_text, shown_path, to_text
+  use nocdyn_text, only: append, rounded_text, shown_path, string_t, strings, to_text
   implicit none (type, external)
   private
 
@@ -39,7 +43,9 @@ module nocdyn_sweep_job
     type(sweep_plan_t) :: plan
     character(len=:), allocatable :: folder
     type(sweep_setup_t) :: setup
-    type(sweep_journal_t) :: journals(1)
+    type(sweep_journal_t), allocatable :: journals(:)   !! the first one is that of this process, the others are of ranks
+    type(hand_out_t) :: variants                        !! that no journal holds
+    type(sweep_counts_t) :: counts                      !! of the journals
     type(console_sweep_progress_t) :: progress
     logical :: is_done = .false.   !! whether there is nothing to compute or write
   end type sweep_job_t
@@ -84,19 +90,14 @@ contains
     type(sweep_job_t), intent(inout) :: job
     type(sweep_header_t), intent(in) :: header
     type(error_t), allocatable, intent(out) :: error
-    character(len=:), allocatable :: name
-    integer(int64) :: bytes
-    logical :: is_there
+    type(string_t), allocatable :: names(:)
+    real(wp) :: bytes
 
-    name = journal_name(max(1, job%arguments%shard), max(1, job%arguments%shards))
-    inquire (file=job%folder // '/' // name, exist=is_there, size=bytes)
-    call check_variants(job%plan, header%last - header%first + 1, job%arguments%is_given('--csv'), job%folder, &
-                        merge(real(bytes, wp), 0.0_wp, is_there), error)
+    call find_journals(job%folder, journal_name(max(1, job%arguments%shard), max(1, job%arguments%shards)), names, bytes)
+    call check_variants(job%plan, header%last - header%first + 1, job%arguments%is_given('--csv'), job%folder, bytes, error)
     if (allocated(error)) return
-    if (is_there .and. bytes > 0) then
-      call open_journal(job%folder, name, job%journals(1), error)
-      if (.not. allocated(error)) call check_journal(job%journals(1), header, job%arguments%is_given('--resume'), error)
-      if (.not. allocated(error)) call print_journal_state(job)
+    if (bytes > 0) then
+      call resume_journals(job, names, header, error)
     else
       if (job%arguments%is_given('--resume')) call check_finished_results(job, header, error)
       if (allocated(error) .or. job%is_done) return
@@ -106,9 +107,58 @@ contains
         call print_text(job%plan%input%shown_file() // ': ' // shown_path(job%folder) // ' holds nothing to resume; ' // &
                         'the sweep starts from the beginning')
       end if
-      call create_journal(job%folder, name, header, job%journals(1), error)
+      allocate (job%journals(1))
+      call create_journal(job%folder, names(1)%text, header, job%journals(1), error)
     end if
+    if (.not. allocated(error)) call schedule_missing(job%journals, job%variants, job%counts)
   end subroutine prepare_journal
+
+  !> The journals of this sweep, or of this shard, in a folder.
+  subroutine find_journals(folder, own, names, bytes)
+    character(len=*), intent(in) :: folder
+    character(len=*), intent(in) :: own                    !! journal of this process
+    type(string_t), allocatable, intent(out) :: names(:)   !! that one first, though it may not exist, then those of ranks
+    real(wp), intent(out) :: bytes                         !! of all of them
+    type(string_t), allocatable :: others(:)
+    integer(int64) :: size_of_file
+    integer :: i
+    logical :: is_there
+
+    allocate (names, source=strings([own]))
+    inquire (file=folder // '/' // own, exist=is_there, size=size_of_file)
+    bytes = merge(real(size_of_file, wp), 0.0_wp, is_there)
+    if (own /= journal_name(1, 1)) return
+    allocate (others, source=journal_names(folder))
+    do i = 1, size(others)
+      if (.not. is_of_rank(others(i)%text)) cycle
+      inquire (file=folder // '/' // others(i)%text, size=size_of_file)
+      if (size_of_file == 0) cycle
+      call append(names, others(i)%text)
+      bytes = bytes + real(size_of_file, wp)
+    end do
+  end subroutine find_journals
+
+  !> Opens the journals of a sweep to continue it. Those of ranks are closed again: their ranks append to them.
+  subroutine resume_journals(job, names, header, error)
+    type(sweep_job_t), intent(inout) :: job
+    type(string_t), intent(in) :: names(:)   !! that of this process first, which is created if it does not exist
+    type(sweep_header_t), intent(in) :: header
+    type(error_t), allocatable, intent(out) :: error
+    integer :: i
+
+    allocate (job%journals(size(names)))
+    do i = 1, size(names)
+      call continue_journal(job%folder, names(i)%text, header, job%journals(i), error)
+      if (.not. allocated(error)) call check_journal(job%journals(i), header, error)
+      if (allocated(error)) return
+      if (i > 1) call job%journals(i)%file%close()
+    end do
+    if (.not. job%arguments%is_given('--resume')) then
+      call refuse_unfinished(job%journals, error)
+    else if (.not. job%arguments%is_given('--quiet')) then
+      call print_journal_state(job)
+    end if
+  end subroutine resume_journals
 
   !> Without a journal to resume: sets `is_done` if the folder holds the results of this sweep.
   subroutine check_finished_results(job, header, error)
@@ -138,17 +188,17 @@ contains
   subroutine print_journal_state(job)
     type(sweep_job_t), intent(in) :: job
     character(len=:), allocatable :: file
+    integer :: i
 
-    if (job%arguments%is_given('--quiet')) return
     file = job%plan%input%shown_file()
-    associate (journal => job%journals(1))
-      if (journal%damaged_bytes > 0) then
-        call print_text(file // ': note: ' // shown_path(journal%file%path) // &
+    associate (journals => job%journals, header => job%journals(1)%header)
+      do i = 1, size(journals)
+        if (journals(i)%damaged_bytes == 0) cycle
+        call print_text(file // ': note: ' // shown_path(journals(i)%file%path) // &
                         ' has damaged entries; their variants are computed again')
-      end if
-      call print_text(file // ': reusing ' // to_text(journal%done + journal%refused + journal%failed) // ' of ' // &
-                      to_text(journal%header%last - journal%header%first + 1) // &
-                      ' variants from ' // shown_path(journal%file%path))
+      end do
+      call print_text(file // ': reusing ' // to_text(sum(journals%done + journals%refused + journals%failed)) // ' of ' // &
+                      to_text(header%last - header%first + 1) // ' variants from ' // journals_text(journals))
     end associate
   end subroutine print_journal_state
 
@@ -178,11 +228,8 @@ contains
         to_text(job%arguments%shard) // ' of ' // to_text(job%arguments%shards) // ' done, ' // &
         to_text(scheduler%counts%total) // ' variants; when all parts are done: nocdyn merge ' // job%folder)
     else
-      call write_results(job%plan, job%folder, job%journals, job%arguments, summary, error)
-      if (.not. allocated(error)) then
-        call job%journals(1)%file%remove()   ! before printing: if the reader of the output is gone, printing ends the program
-        call print_results(job%plan, job%folder, job%journals(1)%header, job%arguments, summary, code)
-      end if
+      if (ranks > 1) call gather_journals(job, error)
+      if (.not. allocated(error)) call make_results(job, summary, code, error)
     end if
     call job%journals(1)%file%close()
     if (.not. allocated(error)) return
@@ -190,6 +237,49 @@ contains
                                                  'command with --resume to continue'
     call report_error(error, code)
   end subroutine finish_job
+
+  !> Writes the results of all journals, removes these, and prints the results.
+  subroutine make_results(job, summary, code, error)
+    type(sweep_job_t), intent(inout) :: job
+    type(sweep_summary_t), intent(inout) :: summary   !! with the effort
+    integer, intent(inout) :: code
+    type(error_t), allocatable, intent(out) :: error
+    integer :: i
+
+    call write_results(job%plan, job%folder, job%journals, job%arguments, summary, error)
+    if (allocated(error)) return
+    do i = 1, size(job%journals)
+      call job%journals(i)%file%remove()   ! before printing: if the reader of the output is gone, printing ends the program
+    end do
+    call print_results(job%plan, job%folder, job%journals(1)%header, job%arguments, summary, code)
+  end subroutine make_results
+
+  !> Opens the journals that ranks have written. Those that rank 0 does not see are an error.
+  subroutine gather_journals(job, error)
+    type(sweep_job_t), intent(inout) :: job
+    type(error_t), allocatable, intent(out) :: error
+    type(sweep_header_t) :: header
+    type(string_t), allocatable :: names(:)
+    type(range_t), allocatable :: missing(:)
+    real(wp) :: bytes
+    integer :: i
+
+    header = job%journals(1)%header
+    call job%journals(1)%file%close()
+    deallocate (job%journals)
+    call find_journals(job%folder, journal_name(1, 1), names, bytes)
+    allocate (job%journals(size(names)))
+    do i = 1, size(names)
+      call open_journal(job%folder, names(i)%text, job%journals(i), error)
+      if (.not. allocated(error)) call check_journal(job%journals(i), header, error)
+      if (allocated(error)) return
+      if (i > 1) call job%journals(i)%file%close()
+    end do
+    call missing_variants(job%journals, header, missing)
+    if (size(missing) == 0) return
+    call raise(error, exit_file, shown_path(job%folder) // ': not all journals of the ranks are there; it must be on a file ' // &
+               'system that all of them share')
+  end subroutine gather_journals
 
   !> Shows the line if it is due.
   subroutine update(self, counts)

@@ -4,7 +4,7 @@ module nocdyn_journal_chunks
   use nocdyn_number_ranges, only: ascending_order, gaps, range_t
   use nocdyn_sweep_chunk, only: chunk_t
   use nocdyn_sweep_differences, only: header_difference
-  use nocdyn_sweep_journal, only: journal_name, sweep_journal_t
+  use nocdyn_sweep_journal, only: is_of_shard, journal_name, missing_variants, sweep_journal_t
   use nocdyn_text, only: shown_path, to_text
   implicit none (type, external)
   private
@@ -153,7 +153,7 @@ contains
     end do
   end subroutine check_headers
 
-  !> Refuses journals that lack variants of their shards, by their names.
+  !> Refuses shards, or a whole sweep, of which the journals lack variants, by the name of the first journal of each.
   subroutine check_wholeness(journals, error)
     type(sweep_journal_t), intent(in) :: journals(:)
     type(error_t), allocatable, intent(out) :: error
@@ -164,7 +164,8 @@ contains
     message = ''
     do i = 1, size(journals)
       associate (header => journals(i)%header)
-        call gaps(journals(i)%ranges(), range_t(header%first, header%last), open_ranges)
+        if (any(is_of_shard(journals(:i - 1), header))) cycle
+        call missing_variants(journals, header, open_ranges)
         if (size(open_ranges) == 0) cycle
         if (message /= '') message = message // new_line('a')
         message = message // shown_path(journals(i)%file%path) // ': unfinished, without ' // ranges_text(open_ranges) // &

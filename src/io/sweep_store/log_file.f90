@@ -27,17 +27,18 @@ module nocdyn_log_file
     character(len=:), allocatable :: path
     integer(int64) :: end = 0                      !! bytes up to the end of the last whole entry
     character(len=:), allocatable :: buffer        !! the entry that `read` found; its bytes follow those of the frame
-    type(checksum_table_t), private :: table
+    type(checksum_table_t), allocatable, private :: table
     integer(int64), private :: flushed = 0         !! count of the system clock at the last flush
     integer, private :: descriptor = -1
+    logical, private :: is_read_again = .false.    !! whether it was closed, and is open for reading
   contains
     procedure :: open => open_file
     procedure :: write => write_entry
     procedure :: read => read_entry
     procedure :: size => bytes_in_file
     procedure :: close => close_log_file
-    procedure :: create, cut, remove
-    procedure, private :: prepare, lock, read_start, flush_if_due, raise_write_error
+    procedure :: create, cut, is_open, remove
+    procedure, private :: prepare, make_room, lock, read_start, flush_if_due, raise_write_error
   end type log_file_t
 
 contains
@@ -89,10 +90,25 @@ contains
 
     self%path = folder // '/' // name
     if (folder == '.') self%path = name
-    allocate (character(len=initial_buffer) :: self%buffer)
-    call make_checksum_table(self%table)
+    call self%make_room()
     call system_clock(self%flushed)
   end subroutine prepare
+
+  !> Allocates what reading and writing need.
+  subroutine make_room(self)
+    class(log_file_t), intent(inout) :: self
+
+    allocate (character(len=initial_buffer) :: self%buffer)
+    allocate (self%table)
+    call make_checksum_table(self%table)
+  end subroutine make_room
+
+  !> Whether the file is open.
+  pure logical function is_open(self)
+    class(log_file_t), intent(in) :: self
+
+    is_open = self%descriptor >= 0
+  end function is_open
 
   subroutine lock(self, error)
     class(log_file_t), intent(in) :: self
@@ -173,7 +189,7 @@ contains
     self%flushed = now
   end subroutine flush_if_due
 
-  !> Reads the entry at `offset` into the buffer, frame included.
+  !> Reads the entry at `offset` into the buffer, frame included. A file that has been closed is opened again.
   subroutine read_entry(self, offset, tag, length, is_there, is_good)
     class(log_file_t), intent(inout) :: self
     integer(int64), intent(in) :: offset
@@ -186,6 +202,11 @@ contains
 
     is_good = .false.
     length = 0
+    if (.not. self%is_open()) then
+      self%descriptor = open_existing(self%path, .false.)
+      self%is_read_again = .true.
+      call self%make_room()
+    end if
     call read_at(self%descriptor, offset, self%buffer(:frame_bytes), is_there)
     if (.not. is_there) return
     call reader%take_integers(self%buffer(:frame_bytes), numbers)
@@ -222,13 +243,14 @@ contains
     call raise(error, exit_file, 'cannot write ' // quoted(shown_path(self%path)) // ': ' // reason)
   end subroutine raise_write_error
 
-  !> Closes the file.
+  !> Closes the file; entries of it can still be read. Thousands of closed files take little memory.
   subroutine close_log_file(self)
     class(log_file_t), intent(inout) :: self
     logical :: is_done
 
-    if (self%descriptor < 0) return
-    call sync_file(self%descriptor, is_done)
+    if (allocated(self%table)) deallocate (self%table, self%buffer)
+    if (.not. self%is_open()) return
+    if (.not. self%is_read_again) call sync_file(self%descriptor, is_done)
     call close_file(self%descriptor, is_done)
     self%descriptor = -1
   end subroutine close_log_file
@@ -238,8 +260,8 @@ contains
     class(log_file_t), intent(inout) :: self
     logical :: is_done
 
-    if (self%descriptor < 0) return
     call remove_file(self%path)
+    if (.not. self%is_open()) return
     call close_file(self%descriptor, is_done)
     self%descriptor = -1
   end subroutine remove

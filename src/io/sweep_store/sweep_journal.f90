@@ -12,8 +12,10 @@ module nocdyn_sweep_journal
   implicit none (type, external)
   private
 
-  public :: journal_name, journal_names, create_journal, open_journal
+  public :: journal_name, journal_names, rank_journal_name, is_of_rank, is_of_shard, missing_variants, create_journal, &
+    open_journal, continue_journal
 
+  character(len=*), parameter :: rank_beginning = 'sweep.rank-'
   integer(int32), parameter :: header_tag = int(z'64616568', int32), chunk_tag = int(z'6B6E6863', int32)   ! 'head', 'chnk'
 
   !> Where the entry of a chunk is, and its variants.
@@ -31,7 +33,7 @@ module nocdyn_sweep_journal
     type(log_file_t) :: file
     type(log_entry_t), allocatable, private :: index(:)
   contains
-    procedure :: append, ranges, missing, entry_of, read_entry
+    procedure :: append, ranges, entry_of, read_entry
     procedure, private :: add_entry, read_chunks
   end type sweep_journal_t
 
@@ -45,6 +47,21 @@ contains
     name = 'sweep.journal'
     if (shards > 1) name = 'sweep.' // to_text(shard) // '-of-' // to_text(shards) // '.journal'
   end function journal_name
+
+  !> The name of the file that a rank above 0 adds to the journal of the whole sweep.
+  function rank_journal_name(rank) result(name)
+    integer, intent(in) :: rank
+    character(len=:), allocatable :: name
+
+    name = rank_beginning // to_text(rank) // '.journal'
+  end function rank_journal_name
+
+  !> Whether a journal has such a name.
+  pure logical function is_of_rank(name)
+    character(len=*), intent(in) :: name
+
+    is_of_rank = index(name, rank_beginning) == 1
+  end function is_of_rank
 
   !> The names of all journals in a folder, sorted.
   function journal_names(folder) result(names)
@@ -106,6 +123,23 @@ contains
     end if
     if (allocated(error)) call journal%file%close()
   end subroutine open_journal
+
+  !> Opens a journal to append to it, or creates it if there is none or an empty one.
+  subroutine continue_journal(folder, name, header, journal, error)
+    character(len=*), intent(in) :: folder, name
+    type(sweep_header_t), intent(in) :: header   !! of the sweep of an existing journal
+    type(sweep_journal_t), intent(out) :: journal
+    type(error_t), allocatable, intent(out) :: error
+    integer(int64) :: bytes
+    logical :: is_there
+
+    inquire (file=folder // '/' // name, exist=is_there, size=bytes)
+    if (is_there .and. bytes > 0) then
+      call open_journal(folder, name, journal, error)
+    else
+      call create_journal(folder, name, header, journal, error)
+    end if
+  end subroutine continue_journal
 
   !> Finds the entries of chunks. A damaged one is ignored; the first bytes that are no entry end the journal.
   subroutine read_chunks(self)
@@ -182,16 +216,31 @@ contains
     ranges = [(range_t(self%index(i)%first, self%index(i)%first + self%index(i)%count - 1), i=1, self%entries)]
   end function ranges
 
-  !> The variants of this shard that the journal does not hold, as ascending ranges.
-  pure subroutine missing(self, first, count)
-    class(sweep_journal_t), intent(in) :: self
-    integer, allocatable, intent(out) :: first(:), count(:)   !! first variant and number of variants of each range
-    type(range_t), allocatable :: open_ranges(:)
+  !> The variants of a shard that none of its journals holds, as ascending ranges.
+  pure subroutine missing_variants(journals, shard, open_ranges)
+    type(sweep_journal_t), intent(in) :: journals(:)   !! of all shards
+    type(sweep_header_t), intent(in) :: shard
+    type(range_t), allocatable, intent(out) :: open_ranges(:)
+    type(range_t), allocatable :: held(:)
+    integer :: i, last
 
-    call gaps(self%ranges(), range_t(self%header%first, self%header%last), open_ranges)
-    first = open_ranges%first
-    count = open_ranges%last - open_ranges%first + 1
-  end subroutine missing
+    allocate (held(sum(journals%entries, mask=is_of_shard(journals, shard))))
+    last = 0
+    do i = 1, size(journals)
+      if (.not. is_of_shard(journals(i), shard)) cycle
+      held(last + 1:last + journals(i)%entries) = journals(i)%ranges()
+      last = last + journals(i)%entries
+    end do
+    call gaps(held, range_t(shard%first, shard%last), open_ranges)
+  end subroutine missing_variants
+
+  !> Whether a journal is of a shard: that of a whole sweep is the only one.
+  elemental logical function is_of_shard(journal, shard)
+    type(sweep_journal_t), intent(in) :: journal
+    type(sweep_header_t), intent(in) :: shard
+
+    is_of_shard = journal%header%first == shard%first .and. journal%header%last == shard%last
+  end function is_of_shard
 
   !> The number of the entry that holds a variant, 0 if there is none.
   pure integer function entry_of(self, variant) result(number)
@@ -210,14 +259,16 @@ contains
     type(chunk_t), intent(inout) :: chunk
     type(error_t), allocatable, intent(out) :: error
     integer :: length
-    logical :: is_good, is_there
+    logical :: is_good, is_there, was_open
 
+    was_open = self%file%is_open()
     call self%file%read(self%index(number)%offset, chunk_tag, length, is_there, is_good)
     if (is_good) then
       call unpack_chunk(self%file%buffer(frame_bytes + 1:frame_bytes + length), chunk)
     else
       call raise(error, exit_file, shown_path(self%file%path) // ': cannot be read: it is not as it was when it was opened')
     end if
+    if (.not. was_open) call self%file%close()
   end subroutine read_entry
 
 end module nocdyn_sweep_journal

@@ -24,7 +24,9 @@ module nocdyn_scheduler
     integer :: done = 0      !! without failures
     integer :: refused = 0
     integer :: failed = 0
-    integer :: new = 0       !! computed by this process and those that send it results, failures included
+    integer :: new = 0       !! computed by this process and the ranks that report to it, failures included
+  contains
+    procedure :: add
   end type sweep_counts_t
 
   !> Shows how far a sweep has come.
@@ -71,5 +73,18 @@ module nocdyn_scheduler
     end function is_cancelled_interface
 
   end interface
+
+contains
+
+  !> Adds what another process has computed.
+  pure subroutine add(self, other)
+    class(sweep_counts_t), intent(inout) :: self
+    type(sweep_counts_t), intent(in) :: other
+
+    self%done = self%done + other%done
+    self%refused = self%refused + other%refused
+    self%failed = self%failed + other%failed
+    self%new = self%new + other%new
+  end subroutine add
 
 end module nocdyn_scheduler
