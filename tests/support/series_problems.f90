@@ -2,6 +2,7 @@
 module nocdyn_series_problems
   use nocdyn_kinds, only: wp
   use nocdyn_oscillators, only: oscillators_t
+  use nocdyn_relaxation, only: relaxation_t
   use nocdyn_system, only: evaluation_ok, system_t
   use nocdyn_test_problems, only: duffing_t
   implicit none (type, external)
@@ -27,6 +28,14 @@ module nocdyn_series_problems
     procedure :: prepare_series => prepare_oscillators
     procedure :: series => oscillator_series
   end type oscillator_series_t
+
+  !> Van der Pol's oscillators of `relaxation`.
+  type, extends(relaxation_t), public :: relaxation_series_t
+  contains
+    procedure :: series_obstacle => relaxation_obstacle
+    procedure :: prepare_series => prepare_relaxation
+    procedure :: series => relaxation_series
+  end type relaxation_series_t
 
   !> u' = u^2, whose solution u = u0 / (1 - u0 t) has a pole at t = 1 / u0; beyond u = limit the evaluation returns `answer`.
   type, extends(system_t), public :: burst_t
@@ -129,6 +138,46 @@ contains
     allocate (problem%limit, source=limit)
     allocate (problem%answer, source=answer)
   end function burst_problem
+
+  subroutine relaxation_obstacle(self, obstacle)
+    class(relaxation_series_t), intent(in) :: self
+    character(len=:), allocatable, intent(out) :: obstacle
+
+    obstacle = ''
+  end subroutine relaxation_obstacle
+
+  subroutine prepare_relaxation(self, order)
+    class(relaxation_series_t), intent(inout) :: self
+    integer, intent(in) :: order
+
+    if (order < 2) error stop 'nocdyn_series_problems: the order must be at least 2'
+  end subroutine prepare_relaxation
+
+  subroutine relaxation_series(self, order, columns, t, y, status)
+    class(relaxation_series_t), intent(inout) :: self
+    integer, intent(in) :: order, columns
+    real(wp), intent(in) :: t(self%lanes)
+    real(wp), intent(inout) :: y(self%lanes, columns, 0:order)
+    integer, intent(inout) :: status(self%lanes)
+    real(wp) :: damping(0:order), product
+    integer :: j, k, lane
+
+    do lane = 1, self%lanes
+      do k = 0, order - 1
+        damping(k) = merge(1.0_wp, 0.0_wp, k == 0)
+        product = 0.0_wp
+        do j = 0, k
+          damping(k) = damping(k) - y(lane, 1, j) * y(lane, 1, k - j)
+        end do
+        do j = 0, k
+          product = product + damping(j) * y(lane, 2, k - j)
+        end do
+        y(lane, 1, k + 1) = y(lane, 2, k) / (k + 1)
+        y(lane, 2, k + 1) = (self%mu(lane) * product - y(lane, 1, k)) / (k + 1)
+      end do
+    end do
+    status = evaluation_ok
+  end subroutine relaxation_series
 
   subroutine burst_derivative(self, t, y, dydt, status)
     class(burst_t), intent(inout) :: self

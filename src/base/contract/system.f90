@@ -56,6 +56,8 @@ module nocdyn_system
     procedure :: series_obstacle
     procedure :: prepare_series
     procedure :: series
+    procedure :: evaluation_cost
+    procedure :: series_cost
     procedure :: start_lane
     procedure :: indicator_values
     procedure :: change_branch
@@ -192,6 +194,21 @@ contains
 
     error stop 'nocdyn_system: a system with a Taylor series overrides series'
   end subroutine series
+
+  !> The cost of an evaluation of f in a lane, in the unit of `nocdyn_step_costs`; the default is that of a chain of bodies.
+  pure real(wp) function evaluation_cost(self) result(cost)
+    class(system_t), intent(in) :: self
+
+    cost = 60.0_wp + 0.9_wp * self%states
+  end function evaluation_cost
+
+  !> The cost of a Taylor series in a lane, in the same unit.
+  pure real(wp) function series_cost(self, order) result(cost)
+    class(system_t), intent(in) :: self
+    integer, intent(in) :: order
+
+    cost = order * (250.0_wp + 0.1_wp * self%states)
+  end function series_cost
 
   !> Called where a lane starts, at (t, y): a system with switches chooses its branches here.
   subroutine start_lane(self, lane, t, y)

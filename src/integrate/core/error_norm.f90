@@ -4,6 +4,7 @@
 !> over some dozens of steps, so that an oscillation is as large where it passes through zero as elsewhere.
 module nocdyn_error_norm
   use nocdyn_kinds, only: wp
+  use nocdyn_masks, only: all_true, any_true
   use nocdyn_step_attempt, only: step_attempt_t
   use nocdyn_step_control, only: step_control_t
   use nocdyn_system, only: system_t
@@ -51,13 +52,17 @@ contains
 
   !> Sets `mean_square`, the mean of (error / (atol + rtol max(|y|, |y_new|)))^2 over the states, or over the quantities that the
   !> system measures. Each term replaces the error. Two estimates are combined as in DOP853: E5^2 / (E5 + 0.01 E3), where E5
-  !> and E3 are sums of such terms.
+  !> and E3 are sums of such terms. A lane whose step size is given has no error, and keeps the sizes that came with that.
   subroutine measure_error(control, system, attempt)
     type(step_control_t), intent(inout) :: control
     class(system_t), intent(in) :: system
     type(step_attempt_t), intent(inout) :: attempt
     integer :: lane
+    logical :: are_some_given
 
+    if (all_true(attempt%lanes, control%is_given)) return
+    are_some_given = any_true(attempt%lanes, control%is_given)
+    if (are_some_given) control%kept_size(:, :) = control%new_size
     if (attempt%has_low_order_estimate) call sum_errors(control, system, attempt, attempt%low_order_estimate, attempt%scratch)
     call sum_errors(control, system, attempt, attempt%error_estimate, control%mean_square)
     if (attempt%has_low_order_estimate) then
@@ -71,6 +76,12 @@ contains
     if (attempt%components > attempt%states) then
       call limit_by_quadratures(attempt, attempt%y, attempt%y_new, attempt%error_estimate, attempt%low_order_estimate, control)
     end if
+    if (.not. are_some_given) return
+    do lane = 1, attempt%lanes
+      if (.not. control%is_given(lane)) cycle
+      control%mean_square(lane) = 0.0_wp
+      control%new_size(lane, :) = control%kept_size(lane, :)
+    end do
   end subroutine measure_error
 
   !> The number of measured quantities.

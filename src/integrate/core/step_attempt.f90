@@ -38,6 +38,7 @@ module nocdyn_step_attempt
     real(wp), allocatable :: scratch(:)                 !! work space, [lanes]
     logical, allocatable :: implicit(:)                 !! whether an implicit method takes the lane's step
     integer, allocatable :: error_order(:)              !! of the method that takes the lane's step
+    integer, allocatable :: degree(:)                   !! of its dense output
     real(wp), allocatable :: max_growth(:)              !! of the step size, by that method
     integer, allocatable :: step_status(:)              !! attempt_... of each lane
     integer, allocatable :: component(:)                !! component that is not finite, 0 if there is none
@@ -71,8 +72,9 @@ contains
                 attempt%low_order_estimate(lanes, columns), attempt%slope(lanes, columns), source=0.0_wp)
       allocate (attempt%active(lanes), source=.true.)
       allocate (attempt%implicit(lanes), source=.false.)
-      allocate (attempt%error_order(lanes), attempt%step_status(lanes), attempt%component(lanes), attempt%rhs_status(lanes), &
-                attempt%evaluations(lanes), attempt%jacobians(lanes), attempt%factorisations(lanes), source=0)
+      allocate (attempt%error_order(lanes), attempt%degree(lanes), attempt%step_status(lanes), attempt%component(lanes), &
+                attempt%rhs_status(lanes), attempt%evaluations(lanes), attempt%jacobians(lanes), &
+                attempt%factorisations(lanes), source=0)
     end associate
   end subroutine allocate_step_attempt
 

@@ -26,11 +26,13 @@ module nocdyn_step_control
     real(wp), allocatable :: log_error(:)              !! logarithm to base 2 of the error norm of the last accepted step
     logical, allocatable :: was_rejected(:)            !! whether the last attempt was rejected
     logical, allocatable :: ends_at_t_end(:)           !! whether the present attempt ends on t_end
+    logical, allocatable :: is_given(:)                !! whether the method has chosen the step size: no error is estimated
     real(wp), allocatable :: mean_square(:)            !! square of the error norm of the present attempt, 1 at the tolerance
     real(wp), allocatable :: log_ratio(:), factor(:)   !! work space
     ! If the system measures errors in quantities of its own, [lanes, measures]:
     real(wp), allocatable :: size(:, :)                !! of the quantities at the starts of the steps, after `measure_start`
     real(wp), allocatable :: new_size(:, :)            !! at the ends
+    real(wp), allocatable :: kept_size(:, :)           !! work space
     real(wp), allocatable :: error(:, :)               !! of the quantities; after the test their terms of `mean_square`
   end type step_control_t
 
@@ -50,9 +52,10 @@ contains
     control%t_end = t_end
     control%longest = longest
     allocate (control%h(lanes), control%mean_square(lanes), control%log_ratio(lanes), control%factor(lanes), source=0.0_wp)
-    allocate (control%size(lanes, measures), control%new_size(lanes, measures), control%error(lanes, measures), source=0.0_wp)
+    allocate (control%size(lanes, measures), control%new_size(lanes, measures), control%kept_size(lanes, measures), &
+              control%error(lanes, measures), source=0.0_wp)
     allocate (control%log_error(lanes), source=min_log_error)
-    allocate (control%was_rejected(lanes), control%ends_at_t_end(lanes), source=.false.)
+    allocate (control%was_rejected(lanes), control%ends_at_t_end(lanes), control%is_given(lanes), source=.false.)
   end function step_control
 
   !> Clears the history of a lane.
@@ -125,8 +128,8 @@ contains
     t_new = merge(t_end, t + step, overshoot >= 0)
   end subroutine propose_one
 
-  !> The next step sizes of lanes after attempts of size h: PI control where the attempt was accepted, a shorter step where it was
-  !> rejected. All logarithms are to base 2.
+  !> The next step sizes of lanes after attempts of size h, unless they are given: PI control where the attempt was accepted, a
+  !> shorter step where it was rejected. All logarithms are to base 2.
   pure subroutine adapt_steps(control, lanes, accepted, rejected, error_order, max_growth, h)
     type(step_control_t), intent(inout) :: control
     integer, intent(in) :: lanes
@@ -136,10 +139,12 @@ contains
     real(wp), intent(in) :: h(lanes)   !! sizes of the attempts [s]
     integer :: lane
 
+    if (all_true(lanes, control%is_given)) return
     call find_step_factors(lanes, accepted, error_order, control%mean_square, control%log_error, control%log_ratio, &
                            control%factor)
     if (lanes > 1) then
-      if (all_true(lanes, accepted) .and. .not. any_true(lanes, control%was_rejected)) then
+      if (all_true(lanes, accepted) .and. .not. any_true(lanes, control%was_rejected) &
+          .and. .not. any_true(lanes, control%is_given)) then
         do lane = 1, lanes   ! the general case without a branch
           control%h(lane) = max(min_factor, min(safety * control%factor(lane), max_growth(lane))) * h(lane)
           control%log_error(lane) = max(control%log_ratio(lane), min_log_error)
@@ -148,6 +153,7 @@ contains
       end if
     end if
     do lane = 1, lanes
+      if (control%is_given(lane)) cycle
       if (accepted(lane) .or. rejected(lane)) call set_next_step(control, lane, accepted(lane), max_growth(lane), h(lane))
     end do
   end subroutine adapt_steps

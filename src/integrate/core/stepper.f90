@@ -8,14 +8,24 @@ module nocdyn_stepper
   implicit none (type, external)
   private
 
+  !> What an observer makes of every step.
+  type, public :: observation_t
+    integer :: tracked = 0             !! functions whose extremes are found
+    logical :: is_dense = .false.      !! whether the dense output is formed
+    logical :: wants_steps = .false.   !! whether the polynomials of all lanes are passed on, with the largest degree
+  end type observation_t
+
   type, abstract, public :: stepper_t
     integer :: order = 0                       !! of y_new
     integer :: error_order = 0                 !! the error estimate falls as h^(error_order + 1)
     integer :: degree = 0                      !! of the polynomials of the dense output
     real(wp) :: max_growth = 6.0_wp            !! largest ratio of a step size to the last one
     logical :: has_low_order_error = .false.   !! whether there are two error estimates
-    logical :: needs_series = .false.          !! whether the system must have a Taylor series
-    logical :: chooses_steps = .false.         !! whether `choose_steps` sets the step sizes; there is no error estimate then
+    integer :: degrees(3) = 0                  !! of the polynomials of each kind of its steps; 0: there are fewer kinds
+    integer :: series_order = 0                !! order of the Taylor series that the system must have; 0: it needs none
+    logical :: chooses_steps = .false.         !! whether `choose_steps` is called before every attempt
+    logical :: estimates_errors = .true.       !! whether there are error estimates, at least of some lanes
+    type(observation_t) :: observation         !! what the observer makes of the steps; set before `prepare`
     logical :: passes_series = .false.         !! whether `pass_steps` does not need the coefficients of `interpolate`
   contains
     procedure :: choose_steps
@@ -75,7 +85,7 @@ module nocdyn_stepper
 
 contains
 
-  !> Sets control%h of the active lanes that have been accepted since the last call.
+  !> Sets control%h of active lanes that have been accepted since the last call; control%is_given where no error is estimated.
   subroutine choose_steps(self, system, attempt, control)
     class(stepper_t), intent(inout) :: self
     class(system_t), intent(inout) :: system

@@ -13,9 +13,10 @@ module nocdyn_dense_output
   !> y(t + theta h) = sum over p = 0 to degree of c(:, p) theta^p.
   type, public :: dense_output_t
     integer :: lane = 0                         !! lane of the polynomials
+    integer :: degree = 0                       !! of the polynomials
     real(wp) :: t = 0.0_wp, h = 0.0_wp          !! start and size of its last step [s]
     real(wp), allocatable :: states(:, :)       !! results of `sample_batch`, [whole vectors of components, batch]
-    real(wp), allocatable, private :: c(:, :)   !! [whole vectors of components, 0:degree]
+    real(wp), allocatable, private :: c(:, :)   !! [whole vectors of components, 0:largest degree]
     real(wp), allocatable, private :: y(:)      !! [whole vectors of components]
   end type dense_output_t
 
@@ -25,27 +26,28 @@ contains
   subroutine allocate_dense_output(dense, components, degree)
     type(dense_output_t), intent(out) :: dense
     integer, intent(in) :: components
-    integer, intent(in) :: degree
+    integer, intent(in) :: degree   !! the largest
     integer :: length
 
     length = width * ((components + width - 1) / width)
     allocate (dense%c(length, 0:degree), dense%y(length), dense%states(length, batch), source=0.0_wp)
   end subroutine allocate_dense_output
 
-  !> Copies the polynomials of one lane of a block.
+  !> Copies the polynomials of one lane of a block, of the degree of its method.
   pure subroutine load_lane(dense, attempt, coefficients, lane)
     type(dense_output_t), intent(inout) :: dense
     type(step_attempt_t), intent(in) :: attempt
-    real(wp), contiguous, intent(in) :: coefficients(:, :, :)   !! of the powers 1 to degree, [lanes, padded columns, degree]
+    real(wp), contiguous, intent(in) :: coefficients(:, :, :)   !! from the power 1 on, [lanes, padded columns, degree]
     integer, intent(in) :: lane
     integer :: power
 
     dense%lane = lane
     dense%t = attempt%t(lane)
     dense%h = attempt%h(lane)
+    dense%degree = attempt%degree(lane)
     associate (n => attempt%components)
       dense%c(:n, 0) = attempt%y(lane, :n)
-      do power = 1, size(coefficients, 3)
+      do power = 1, dense%degree
         dense%c(:n, power) = coefficients(lane, :n, power)
       end do
     end associate
@@ -57,7 +59,7 @@ contains
     real(wp), intent(in) :: theta
     real(wp), contiguous, intent(inout) :: y(:)   !! [components]
 
-    call evaluate(size(dense%y), ubound(dense%c, 2), theta, dense%c, dense%y)
+    call evaluate(size(dense%y), dense%degree, theta, dense%c, dense%y)
     y(:) = dense%y(:size(y))
   end subroutine sample
 
@@ -66,7 +68,7 @@ contains
     type(dense_output_t), intent(inout) :: dense
     real(wp), intent(in) :: theta(batch)   !! 0 to 1
 
-    call evaluate_batch(size(dense%y), ubound(dense%c, 2), theta, dense%c, dense%states)
+    call evaluate_batch(size(dense%y), dense%degree, theta, dense%c, dense%states)
   end subroutine sample_batch
 
   !> Horner's scheme for several arguments x.

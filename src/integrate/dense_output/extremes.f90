@@ -19,35 +19,47 @@ module nocdyn_extremes
   real(wp), parameter :: overshoot = 0.25_wp   !! of the spread of the values: largest expected excess of the polynomial over them
   real(wp), parameter, public :: before_jump = 64.0_wp   !! spacings of the time between the last node and a jump
 
+  !> Where the functions are sampled in steps of a degree.
+  type :: rule_t
+    real(wp), allocatable :: nodes(:)          !! in the step, -1 to 1, [nodes]
+    real(wp), allocatable :: to_series(:, :)   !! matrix from values to coefficients of T_0, T_1, ...
+  end type rule_t
+
   type, public :: extremes_t
     type(ranges_t), allocatable :: ranges(:)               !! [lanes]
     logical, allocatable :: have_begun(:)                  !! whether a lane has come to the time from which they count, [lanes]
     real(wp), allocatable, private :: last(:, :)           !! values at the ends of the last steps, [functions, lanes]
-    real(wp), allocatable, private :: nodes(:)             !! in the step, -1 to 1, [nodes]
-    real(wp), allocatable, private :: to_series(:, :)      !! matrix from values to coefficients of T_0, T_1, ...
-    real(wp), allocatable, private :: values(:, :)         !! [functions, nodes]
+    type(rule_t), allocatable, private :: rules(:)         !! of the degrees of the steps, [largest degree]
+    real(wp), allocatable, private :: values(:, :)         !! [functions, most nodes]
     real(wp), allocatable, private :: y(:)                 !! [components]
   end type extremes_t
 
 contains
 
   !> Allocates the data of the tracked functions of an observer.
-  subroutine allocate_extremes(extremes, functions, degree, attempt)
+  subroutine allocate_extremes(extremes, functions, degrees, attempt)
     type(extremes_t), intent(out) :: extremes
     integer, intent(in) :: functions
-    integer, intent(in) :: degree   !! of the dense output
+    integer, intent(in) :: degrees(:)   !! of the dense output of each kind of steps; 0: there are fewer kinds
     type(step_attempt_t), intent(in) :: attempt
-    integer :: lane
+    integer :: i, lane
 
-    allocate (extremes%nodes(degree + 1), extremes%to_series(degree + 1, degree + 1))
-    call lobatto_nodes(degree, extremes%nodes, extremes%to_series)
+    allocate (extremes%rules(maxval(degrees)))
+    do i = 1, size(degrees)
+      if (degrees(i) == 0) cycle
+      associate (rule => extremes%rules(degrees(i)), nodes => degrees(i) + 1)
+        if (allocated(rule%nodes)) cycle
+        allocate (rule%nodes(nodes), rule%to_series(nodes, nodes))
+        call lobatto_nodes(degrees(i), rule%nodes, rule%to_series)
+      end associate
+    end do
     allocate (extremes%ranges(attempt%lanes))
     allocate (extremes%have_begun(attempt%lanes), source=.false.)
     do lane = 1, attempt%lanes
       call allocate_ranges(extremes%ranges(lane), functions)
     end do
-    allocate (extremes%last(functions, attempt%lanes), extremes%values(functions, degree + 1), extremes%y(attempt%components), &
-              source=0.0_wp)
+    allocate (extremes%last(functions, attempt%lanes), extremes%values(functions, maxval(degrees) + 1), &
+              extremes%y(attempt%components), source=0.0_wp)
   end subroutine allocate_extremes
 
   !> Allocates the ranges of some functions.
@@ -110,18 +122,20 @@ contains
     if (t_end <= observer%tracked_from) return
     t_start = max(dense%t, observer%tracked_from)
     if (.not. extremes%have_begun(dense%lane)) call begin(extremes, observer, dense, t_start)
-    last = size(extremes%nodes)
+    last = dense%degree + 1
     half = 0.5_wp * (t_end - t_start)
     middle = t_start + half
     extremes%values(:, 1) = extremes%last(:, dense%lane)
     do i = 2, last
-      t = middle + extremes%nodes(i) * half
+      t = middle + extremes%rules(dense%degree)%nodes(i) * half
       if (i == last .and. ends_at_crossing) t = max(t_start, t_end - before_jump * spacing(t_end))
       call sample(dense, min(1.0_wp, (t - dense%t) / dense%h), extremes%y)
       call observer%tracked_values(dense%lane, t, extremes%y, extremes%values(:, i))
     end do
     extremes%last(:, dense%lane) = extremes%values(:, last)
-    call widen_ranges(last, extremes%nodes, extremes%to_series, extremes%values, extremes%ranges(dense%lane), t_start, t_end)
+    associate (rule => extremes%rules(dense%degree))
+      call widen_ranges(last, rule%nodes, rule%to_series, extremes%values(:, :last), extremes%ranges(dense%lane), t_start, t_end)
+    end associate
   end subroutine update_extremes
 
   !> Sets the ranges of a lane to the values at a time in its last step.

@@ -22,9 +22,9 @@ module nocdyn_root_functions
 
   type, public :: root_functions_t
     logical :: of_system = .false.                      !! indicator functions of the system, else events of the observer
-    integer :: parts = least_parts                      !! number of parts of a step
+    integer :: parts = least_parts                      !! number of parts of the last step
     integer, allocatable :: side(:, :)                  !! sign of the last value, 0 after a zero; [lanes, functions]
-    real(wp), allocatable :: values(:, :)               !! at the ends of the parts of the last step; [functions, 0:parts]
+    real(wp), allocatable :: values(:, :)               !! at their ends; [functions, 0:most parts]
     real(wp), allocatable, private :: last(:, :)        !! values at the end of the last step; [functions, lanes]
     real(wp), allocatable, private :: g(:)
     real(wp), allocatable, private :: y(:)              !! state at which the functions are evaluated
@@ -44,11 +44,11 @@ contains
     type(root_functions_t), intent(out) :: roots
     integer, intent(in) :: functions
     logical, intent(in) :: of_system
-    integer, intent(in) :: degree   !! of the dense output
+    integer, intent(in) :: degree   !! the largest of the dense output
     type(step_attempt_t), intent(in) :: attempt
 
     roots%of_system = of_system
-    roots%parts = max(least_parts, degree / 2)
+    roots%parts = parts_of(degree)
     allocate (roots%side(attempt%lanes, functions), source=0)
     allocate (roots%values(functions, 0:roots%parts), roots%last(functions, attempt%lanes), roots%g(functions), &
               roots%y(attempt%components), source=0.0_wp)
@@ -80,12 +80,20 @@ contains
     real(wp), intent(in) :: theta_end              !! end of the step: 1, or less where it has been cut
     integer :: part
 
+    roots%parts = parts_of(dense%degree)
     roots%values(:, 0) = roots%last(:, dense%lane)
     do part = 1, roots%parts
       call evaluate(roots%of_system, system, observer, dense, part_end(roots, part, theta_end), roots%y, roots%values(:, part))
     end do
     roots%last(:, dense%lane) = roots%values(:, roots%parts)
   end subroutine scan_step
+
+  !> The number of parts of a step.
+  pure integer function parts_of(degree)
+    integer, intent(in) :: degree   !! of its dense output
+
+    parts_of = max(least_parts, degree / 2)
+  end function parts_of
 
   !> Theta at the end of a part of a step.
   pure real(wp) function part_end(roots, part, theta_end)

@@ -29,7 +29,7 @@ contains
     integer :: failed, lane, wanted
     logical :: is_plain   ! whether the steps of all lanes have only to be counted
 
-    if (.not. stepper%chooses_steps) call measure_error(integrator%control, system, integrator%attempt)
+    call measure_error(integrator%control, system, integrator%attempt)
     integrator%inspects = integrator%has_events .or. integrator%has_extremes .or. integrator%has_switches
     is_plain = .false.
     if (integrator%attempt%lanes > 1) is_plain = is_plain_step(integrator, solver_status)
@@ -43,18 +43,16 @@ contains
       call stepper%interpolate(system, integrator%attempt, integrator%wanted, integrator%coefficients)
       is_plain = is_plain .and. all_true(integrator%attempt%lanes, integrator%attempt%active)
     end if
-    failed = 0
     if (is_plain) then
+      failed = 0
       solver_status%accepted(:) = solver_status%accepted + 1
       solver_status%code(:) = merge(integration_done, solver_status%code, integrator%control%ends_at_t_end)
       integrator%inspects = count(integrator%next_time <= integrator%t_new) > 0   ! `any` does not vectorise
     else
       call finish_steps(integrator, solver_status, failed)
     end if
-    if (.not. stepper%chooses_steps) then
-      call adapt_steps(integrator%control, integrator%attempt%lanes, integrator%accepted, integrator%rejected, &
-                       integrator%attempt%error_order, integrator%attempt%max_growth, solver_status%h)
-    end if
+    call adapt_steps(integrator%control, integrator%attempt%lanes, integrator%accepted, integrator%rejected, &
+                     integrator%attempt%error_order, integrator%attempt%max_growth, solver_status%h)
     if (failed == 0) return
     do lane = 1, integrator%attempt%lanes
       if (integrator%running(lane) .and. .not. integrator%accepted(lane)) call handle_rejection(integrator, lane, solver_status)

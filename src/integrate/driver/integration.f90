@@ -3,7 +3,7 @@ module nocdyn_integration
   use nocdyn_after_step, only: change_branches, observe_steps, process_steps
   use nocdyn_ensemble, only: ensemble_t, initial_states, initial_states_t
   use nocdyn_error_test, only: test_errors
-  use nocdyn_errors, only: error_t, exit_input, raise
+  use nocdyn_errors, only: error_t
   use nocdyn_integration_settings, only: check_settings, integration_settings_t
   use nocdyn_kinds, only: wp
   use nocdyn_masks, only: any_differs, any_true
@@ -12,7 +12,6 @@ module nocdyn_integration
   use nocdyn_solver_status, only: allocate_solver_status, integration_interrupted, integration_running, solver_status_t
   use nocdyn_stepper, only: stepper_t
   use nocdyn_system, only: system_t
-  use nocdyn_text, only: quoted
   use nocdyn_time_stepping, only: advance_lanes, begin_attempts, fill_lanes, integrator_t, prepare_integrator, &
     release_lanes, shift_states
   implicit none (type, external)
@@ -51,19 +50,11 @@ contains
     type(solver_status_t), intent(out) :: solver_status            !! of the last variant in each lane
     type(error_t), allocatable, intent(out) :: error   !! allocated if a setting is refused
     class(stepper_t), allocatable :: stepper
-    character(len=:), allocatable :: obstacle
 
     call check_settings(settings, error)
     if (allocated(error)) return
-    call select_method(settings, stepper, error)
+    call select_method(settings, system, stepper, error)
     if (allocated(error)) return
-    if (stepper%needs_series) then
-      call system%series_obstacle(obstacle)
-      if (len(obstacle) > 0) then
-        call raise(error, exit_input, 'method ' // quoted(trim(settings%method)) // ' cannot be used: ' // obstacle)
-        return
-      end if
-    end if
     call integrate_with(stepper, system, settings, times, ensemble, observer, solver_status)
   end subroutine integrate_ensemble
 
@@ -83,7 +74,7 @@ contains
     if (.not. all(times(2:) > times(:size(times) - 1))) error stop 'nocdyn_integration: times must ascend'
     call system%prepare_integration(settings%rtol, settings%atol, times(size(times)))
     call allocate_solver_status(solver_status, system%lanes)
-    if (stepper%needs_series) call system%prepare_series(stepper%order)
+    if (stepper%series_order > 0) call system%prepare_series(stepper%series_order)
     call prepare_integrator(integrator, stepper, system, settings, times, observer)
     do
       call fill_lanes(integrator, stepper, system, ensemble, times, observer, solver_status)

@@ -8,6 +8,7 @@ module nocdyn_methods
   use nocdyn_rosenbrock_stepper, only: rosenbrock_stepper
   use nocdyn_rosenbrock_tables, only: rodas4, rodas5p
   use nocdyn_stepper, only: stepper_t
+  use nocdyn_system, only: system_t
   use nocdyn_taylor_stepper, only: taylor_stepper
   use nocdyn_near_words, only: nearest_word
   use nocdyn_text, only: joined, quoted, string_t, strings
@@ -22,17 +23,24 @@ module nocdyn_methods
 
 contains
 
-  !> The stepper of the method in the settings, one of `method_names`.
-  subroutine select_method(settings, stepper, error)
+  !> The stepper of the method in the settings, one of `method_names`, for a system.
+  subroutine select_method(settings, system, stepper, error)
     type(integration_settings_t), intent(in) :: settings
+    class(system_t), intent(in) :: system
     class(stepper_t), allocatable, intent(out) :: stepper
-    type(error_t), allocatable, intent(out) :: error   !! allocated if there is no such method
+    type(error_t), allocatable, intent(out) :: error   !! allocated if there is no such method, or if it is not for the system
+    character(len=:), allocatable :: obstacle
     type(string_t), allocatable :: names(:)
     integer :: i
 
     select case (settings%method)
     case ('auto')
-      allocate (stepper, source=auto_stepper(dormand_prince_8(), rodas5p()))
+      call system%series_obstacle(obstacle)
+      if (len(obstacle) > 0) then
+        allocate (stepper, source=auto_stepper(dormand_prince_8(), rodas5p()))
+      else
+        allocate (stepper, source=auto_stepper(dormand_prince_8(), rodas5p(), taylor_stepper(settings%rtol)))
+      end if
     case ('rk45')
       allocate (stepper, source=explicit_stepper(dormand_prince_5()))
     case ('rk853')
@@ -42,6 +50,8 @@ contains
     case ('rodas5p')
       allocate (stepper, source=rosenbrock_stepper(rodas5p()))
     case ('taylor')
+      call system%series_obstacle(obstacle)
+      if (len(obstacle) > 0) call raise(error, exit_input, "method 'taylor' cannot be used: " // obstacle)
       allocate (stepper, source=taylor_stepper(settings%rtol))
     case default
       allocate (names, source=strings(method_names))

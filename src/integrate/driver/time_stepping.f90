@@ -68,14 +68,19 @@ contains
     real(wp), intent(in) :: times(:)   !! output times [s], ascending
     class(observer_t), intent(in) :: observer
 
+    stepper%observation%tracked = observer%tracked
+    stepper%observation%wants_steps = observer%wants_steps
+    stepper%observation%is_dense = observer%tracked > 0 .or. observer%wants_steps .or. system%switches > 0
     call stepper%prepare(system)
     call allocate_step_attempt(integrator%attempt, system)
     integrator%attempt%t(:) = times(1)
     integrator%attempt%error_order(:) = stepper%error_order
     integrator%attempt%max_growth(:) = stepper%max_growth
+    integrator%attempt%degree(:) = stepper%degree
     integrator%attempt%has_low_order_estimate = stepper%has_low_order_error
     integrator%control = step_control(system%lanes, system%measures, settings%rtol, settings%atol, times(size(times)), &
                                       settings%longest_step)
+    integrator%control%is_given(:) = .not. stepper%estimates_errors
     integrator%first_step = settings%first_step
     integrator%max_steps = settings%max_steps
     call allocate_lanes(integrator, system%lanes, system%states + system%quadratures, stepper%degree, times(1))
@@ -88,7 +93,9 @@ contains
       call allocate_switching(integrator%switching, system, stepper%degree, integrator%attempt, times(size(times)) - times(1))
     end if
     integrator%has_extremes = observer%tracked > 0
-    if (integrator%has_extremes) call allocate_extremes(integrator%extremes, observer%tracked, stepper%degree, integrator%attempt)
+    if (integrator%has_extremes) then
+      call allocate_extremes(integrator%extremes, observer%tracked, stepper%degrees, integrator%attempt)
+    end if
     if (.not. allocated(observer%directions)) return
     integrator%has_events = size(observer%directions) > 0
     if (integrator%has_events) call allocate_events(integrator%events, observer, stepper%degree, integrator%attempt)
@@ -198,7 +205,7 @@ contains
         if (integrator%has_events) call start_root_functions(integrator%events%roots, system, observer, attempt, lane)
         if (integrator%has_extremes) call start_extremes(integrator%extremes, observer, attempt, lane)
       end do
-      if (integrator%first_step > 0 .or. stepper%chooses_steps) return
+      if (integrator%first_step > 0 .or. .not. stepper%estimates_errors) return
       call guess_first_steps(integrator%control, stepper%order, system, attempt)
     end associate
   end subroutine start_lanes

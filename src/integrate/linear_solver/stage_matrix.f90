@@ -24,6 +24,7 @@ module nocdyn_stage_matrix
     integer, allocatable, private :: pivots(:, :)       !! [states, lanes]
     real(wp), allocatable, private :: x(:)              !! right-hand side, then solution, of one lane
   contains
+    procedure :: operations
     procedure :: factor
     procedure :: solve
   end type stage_matrix_t
@@ -42,22 +43,37 @@ contains
     allocate (order(states), source=0)
     order(:) = reverse_cuthill_mckee(states, entries%row, entries%column)
     call half_bandwidths(order, entries, lower, upper)
-    if (is_band_cheaper(real(states, wp), real(lower, wp), real(upper, wp))) then
+    if (banded_operations(real(states, wp), real(lower, wp), real(upper, wp)) < dense_operations(real(states, wp))) then
       call allocate_banded(matrix, order, entries, lanes)
     else
       call allocate_dense(matrix, entries, lanes, states)
     end if
   end subroutine choose_stage_matrix
 
-  !> Whether a step takes fewer operations with a banded matrix. A dense one takes 2/3 n^3 for the factorisation, 2 n^2 for each
-  !> solution. In a band, row interchanges widen U to l + u diagonals: a column costs 2 l (l + u) in the factorisation and
-  !> 2 (2 l + u) in each solution.
-  elemental logical function is_band_cheaper(n, l, u)
+  !> Operations of a step with a banded matrix. Row interchanges widen U to l + u diagonals: a column costs 2 l (l + u) in the
+  !> factorisation and 2 (2 l + u) in each solution.
+  elemental real(wp) function banded_operations(n, l, u) result(operations)
     real(wp), intent(in) :: n, l, u   !! states, numbers of diagonals below and above the main one
 
-    is_band_cheaper = n * (2 * l * (l + u) + column_cost + solutions * (2 * (2 * l + u) + column_cost)) &
-                      < (2 * n / 3 + 2 * solutions) * n**2
-  end function is_band_cheaper
+    operations = n * (2 * l * (l + u) + column_cost + solutions * (2 * (2 * l + u) + column_cost))
+  end function banded_operations
+
+  !> The same with a dense one: 2/3 n^3 for the factorisation, 2 n^2 for each solution.
+  elemental real(wp) function dense_operations(n) result(operations)
+    real(wp), intent(in) :: n   !! states
+
+    operations = (2 * n / 3 + 2 * solutions) * n**2
+  end function dense_operations
+
+  !> Operations of a step of one lane.
+  pure real(wp) function operations(self)
+    class(stage_matrix_t), intent(in) :: self
+
+    associate (n => real(size(self%order), wp))
+      operations = dense_operations(n)
+      if (self%is_banded) operations = banded_operations(n, real(self%lower, wp), real(self%upper, wp))
+    end associate
+  end function operations
 
   !> Allocates dense matrices of every lane.
   pure subroutine allocate_dense(matrix, entries, lanes, states)

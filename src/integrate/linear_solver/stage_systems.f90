@@ -16,7 +16,7 @@ module nocdyn_stage_systems
   type, public :: stage_system_t
     real(wp), allocatable :: dfdt(:, :)                     !! [lanes, components]
     real(wp), allocatable :: dfdy(:, :)                     !! [lanes, positions]
-    type(stage_matrix_t), private :: matrix                 !! of the states, if there are any
+    type(stage_matrix_t) :: matrix                          !! of the states, if there are any
     type(entries_t), private :: quadratures                 !! entries of the Jacobian in the rows of quadratures
   end type stage_system_t
 

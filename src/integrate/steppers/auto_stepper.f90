@@ -1,45 +1,47 @@
-!> Automatic switching: explicit steps where they are stable, Rosenbrock steps where stability would limit the step size.
+!> Automatic choice between steps by a Taylor series, explicit and Rosenbrock steps: those that cost least
+!> (`nocdyn_method_choice`).
 !>
-!> Each lane switches by itself. A lane with explicit steps is stiff when |h lambda| of its accepted steps stays at the limit of
-!> the stability domain, as in Hairer's DOPRI5. A lane with implicit steps is no longer stiff when explicit steps of its size
-!> would have been stable for several steps.
+!> Each lane chooses by itself. A lane of a system without a series begins with explicit steps.
 module nocdyn_auto_stepper
   use nocdyn_explicit_stepper, only: explicit_stepper, explicit_stepper_t
   use nocdyn_explicit_tables, only: explicit_table_t
   use nocdyn_kinds, only: wp
+  use nocdyn_method_choice, only: begin_trial, break_even, by_series, by_stages, by_systems, choice_t, count_attempt, &
+    kind_data_t, kinds, note_stiffness, rate, restart_choice, settle, wants_trial
+  use nocdyn_mixed_attempt, only: allocate_mixed_attempt, begin_kinds, end_kinds, keep_lanes, mixed_attempt_t, select_lanes
   use nocdyn_rosenbrock_stepper, only: rosenbrock_stepper, rosenbrock_stepper_t
   use nocdyn_rosenbrock_tables, only: rosenbrock_table_t
   use nocdyn_stage_sums, only: padded_columns
-  use nocdyn_step_attempt, only: spread_steps, step_attempt_t
+  use nocdyn_step_attempt, only: step_attempt_t
+  use nocdyn_step_control, only: reset_control, step_control_t
   use nocdyn_stepper, only: stepper_t
   use nocdyn_system, only: system_t
+  use nocdyn_taylor_stepper, only: taylor_stepper_t
   implicit none (type, external)
   private
 
   public :: auto_stepper
 
-  integer, parameter :: max_stiff_steps = 15         !! accepted steps beyond the stability limit that make a lane stiff
-  integer, parameter :: nonstiff_steps = 6           !! successive steps within the limit that reset that count, or end stiffness
-  real(wp), parameter :: stability_margin = 0.8_wp   !! of the stability limit: below it explicit steps are stable
+  integer, parameter :: stride = 3   !! explicit steps for each estimate of the dominant eigenvalue
 
   type, extends(stepper_t), public :: auto_stepper_t
     private
+    type(taylor_stepper_t) :: by_series
     type(explicit_stepper_t) :: explicit
     type(rosenbrock_stepper_t) :: implicit
-    real(wp) :: stability_limit                     !! of |h lambda| of the explicit method, on the negative real axis
-    logical, allocatable :: is_implicit(:)          !! lanes that take Rosenbrock steps
-    integer, allocatable :: evidence(:)             !! steps of the lane that speak for the other kind
-    integer, allocatable :: nonstiff(:)             !! successive steps of an explicit lane that do not
-    real(wp), allocatable :: stiffness(:)           !! |h lambda| of the last attempt
+    type(kind_data_t) :: data
+    type(choice_t), allocatable :: choice(:)        !! [lanes]
+    integer, allocatable :: kind(:)                 !! of the last attempt of each lane
     logical, allocatable :: mask(:)
+    logical, allocatable :: expanded(:)             !! lanes of other kinds whose series is wanted
     logical, allocatable :: active(:)               !! lanes at the start of the attempt
     real(wp), allocatable :: h(:)
-    integer, allocatable :: step_status(:)
-    real(wp), allocatable :: y_new(:, :), error_estimate(:, :), low_order_estimate(:, :)   !! of the explicit lanes
+    type(mixed_attempt_t) :: mixed
     real(wp), allocatable :: coefficients(:, :, :)
   contains
     procedure :: prepare
     procedure :: start
+    procedure :: choose_steps
     procedure :: take_step
     procedure :: interpolate
     procedure :: accept
@@ -48,20 +50,29 @@ module nocdyn_auto_stepper
 
 contains
 
-  !> The stepper of an explicit and a Rosenbrock tableau.
-  pure function auto_stepper(explicit_table, rosenbrock_table) result(stepper)
+  !> The stepper of an explicit and a Rosenbrock tableau, and of a Taylor series for systems that have one.
+  pure function auto_stepper(explicit_table, rosenbrock_table, series) result(stepper)
     type(explicit_table_t), intent(in) :: explicit_table       !! whose last stage is f(t + h, y_new)
     type(rosenbrock_table_t), intent(in) :: rosenbrock_table
+    type(taylor_stepper_t), intent(in), optional :: series
     type(auto_stepper_t) :: stepper
 
     stepper%explicit = explicit_stepper(explicit_table)
     stepper%implicit = rosenbrock_stepper(rosenbrock_table)
-    stepper%stability_limit = explicit_table%stability_limit
+    stepper%data%has(:) = [present(series), .true., .true.]
+    stepper%data%limit(by_stages) = explicit_table%stability_limit
+    if (present(series)) then
+      stepper%by_series = series
+      stepper%series_order = series%series_order
+      stepper%data%limit(by_series) = series%stability_limit()
+    end if
     stepper%order = stepper%explicit%order
     stepper%error_order = stepper%explicit%error_order
-    stepper%degree = max(stepper%explicit%degree, stepper%implicit%degree)
+    stepper%degrees(:) = [stepper%by_series%degree, stepper%explicit%degree, stepper%implicit%degree]
+    stepper%degree = maxval(stepper%degrees)
     stepper%max_growth = stepper%explicit%max_growth
     stepper%has_low_order_error = stepper%explicit%has_low_order_error
+    stepper%chooses_steps = .true.
   end function auto_stepper
 
   subroutine prepare(self, system)
@@ -69,18 +80,24 @@ contains
     class(system_t), intent(in) :: system
     integer :: columns
 
+    self%by_series%observation = self%observation
+    self%explicit%observation = self%observation
+    self%implicit%observation = self%observation
+    if (self%data%has(by_series)) call self%by_series%prepare(system)
     call self%explicit%prepare(system)
     call self%implicit%prepare(system)
-    if (allocated(self%evidence)) deallocate (self%is_implicit, self%evidence, self%nonstiff, self%stiffness, self%mask, &
-                                              self%active, self%h, self%step_status, self%y_new, self%error_estimate, &
-                                              self%low_order_estimate, self%coefficients)
+    self%data%cost(by_stages) = self%explicit%cost(system)
+    self%data%cost(by_systems) = self%implicit%cost(system)
+    if (self%data%has(by_series)) self%data%cost(by_series) = self%by_series%cost(system)
+    if (allocated(self%choice)) deallocate (self%choice, self%kind, self%mask, self%expanded, self%active, self%h, &
+                                            self%coefficients)
     columns = padded_columns(system%lanes, system%states + system%quadratures)
     associate (lanes => system%lanes)
-      allocate (self%is_implicit(lanes), self%mask(lanes), self%active(lanes), source=.false.)
-      allocate (self%evidence(lanes), self%nonstiff(lanes), self%step_status(lanes), source=0)
-      allocate (self%stiffness(lanes), self%h(lanes), source=0.0_wp)
-      allocate (self%y_new(lanes, columns), self%error_estimate(lanes, columns), self%low_order_estimate(lanes, columns), &
-                source=0.0_wp)
+      allocate (self%choice(lanes))
+      allocate (self%kind(lanes), source=by_stages)
+      allocate (self%mask(lanes), self%expanded(lanes), self%active(lanes), source=.false.)
+      allocate (self%h(lanes), source=0.0_wp)
+      call allocate_mixed_attempt(self%mixed, lanes, columns)
       allocate (self%coefficients(lanes, columns, self%degree), source=0.0_wp)
     end associate
   end subroutine prepare
@@ -89,104 +106,221 @@ contains
     class(auto_stepper_t), intent(inout) :: self
     type(step_attempt_t), intent(inout) :: attempt
     logical, intent(in) :: starting(:)
+    integer :: lane
 
     call self%explicit%start(attempt, starting)
     call self%implicit%reset_spectra(starting)   ! its slopes and Jacobians are renewed when the lane switches
-    where (starting)
-      self%is_implicit = .false.
-      self%evidence = 0
-      self%nonstiff = 0
-    end where
+    if (self%data%has(by_series)) call self%by_series%start(attempt, starting)
+    do lane = 1, size(starting)
+      if (starting(lane)) call restart_choice(self%choice(lane), self%data, attempt%t(lane))
+    end do
   end subroutine start
+
+  !> Decides which kind of step each active lane takes next, and the step size where that is another kind than before.
+  subroutine choose_steps(self, system, attempt, control)
+    class(auto_stepper_t), intent(inout) :: self
+    class(system_t), intent(inout) :: system
+    type(step_attempt_t), intent(inout) :: attempt
+    type(step_control_t), intent(inout) :: control
+    integer :: lane
+
+    do lane = 1, attempt%lanes
+      self%expanded(lane) = .false.
+      if (.not. attempt%active(lane)) cycle
+      if (self%choice(lane)%was_tried) call judge_attempt(self, attempt, control, lane)
+      self%expanded(lane) = self%choice(lane)%kind /= by_series .and. wants_trial(self%choice(lane), self%data, by_series)
+    end do
+    if (self%data%has(by_series)) call expand_lanes(self, system, attempt, control)
+    do lane = 1, attempt%lanes
+      if (.not. attempt%active(lane)) cycle
+      call try_kind(self, attempt, control, lane, by_systems)
+      call try_kind(self, attempt, control, lane, by_stages)
+      self%choice(lane)%was_tried = .true.
+      self%choice(lane)%has_moved = .false.
+      control%is_given(lane) = self%choice(lane)%kind == by_series
+      if (control%is_given(lane)) control%mean_square(lane) = 0.0_wp
+    end do
+  end subroutine choose_steps
+
+  !> Draws the conclusions from the last attempt of a lane.
+  subroutine judge_attempt(self, attempt, control, lane)
+    type(auto_stepper_t), intent(inout) :: self
+    type(step_attempt_t), intent(in) :: attempt
+    type(step_control_t), intent(inout) :: control
+    integer, intent(in) :: lane
+    logical :: is_new   ! the estimate of the eigenvalue
+    logical :: is_over
+
+    associate (choice => self%choice(lane))
+      if (choice%kind == by_series .and. .not. choice%has_moved) call settle(choice, by_stages, by_series)
+      is_new = choice%kind == by_systems .or. modulo(choice%steps, stride) == 0
+      call count_attempt(choice, self%data, attempt%t(lane), min(control%h(lane), control%longest), is_over)
+      if (is_over) control%h(lane) = choice%h
+      if (choice%kind /= self%kind(lane)) call change_kind(self, control, lane)
+      if (choice%has_moved .and. choice%before == 0 .and. choice%kind /= by_series .and. is_new) then
+        call note_stiffness(choice, self%data, attempt%t(lane), control%h(lane))
+      end if
+    end associate
+  end subroutine judge_attempt
+
+  !> Prepares a lane for a kind of step that it did not take last.
+  subroutine change_kind(self, control, lane)
+    type(auto_stepper_t), intent(inout) :: self
+    type(step_control_t), intent(inout) :: control
+    integer, intent(in) :: lane
+
+    self%mask(:) = .false.
+    self%mask(lane) = .true.
+    select case (self%choice(lane)%kind)
+    case (by_series)
+      call self%by_series%accept(self%mask)
+    case (by_stages)
+      call self%explicit%invalidate_first_stage(self%mask)
+    case default
+      call self%implicit%accept(self%mask)
+      call self%implicit%reset_spectra(self%mask)
+    end select
+    self%kind(lane) = self%choice(lane)%kind
+    call reset_control(control, lane)
+  end subroutine change_kind
+
+  !> Computes the series of the lanes that step by them, and of those that want to know their step; the latter change to them
+  !> where they cost less, the former to explicit steps where the series cannot be used.
+  subroutine expand_lanes(self, system, attempt, control)
+    type(auto_stepper_t), intent(inout) :: self
+    class(system_t), intent(inout) :: system
+    type(step_attempt_t), intent(inout) :: attempt
+    type(step_control_t), intent(inout) :: control
+    real(wp) :: needed
+    integer :: lane
+
+    self%active(:) = attempt%active
+    self%h(:) = control%h
+    call self%by_series%accept(self%expanded)
+    attempt%active(:) = self%active .and. (self%choice%kind == by_series .or. self%expanded)
+    if (any(attempt%active)) call self%by_series%choose_steps(system, attempt, control)
+    attempt%active(:) = self%active
+    do lane = 1, attempt%lanes
+      if (.not. self%active(lane)) cycle
+      associate (choice => self%choice(lane), t => attempt%t(lane))
+        if (self%expanded(lane)) then
+          needed = break_even(choice, self%data, by_series, t, rate(choice, self%data, choice%kind, t, self%h(lane)))
+          if (self%by_series%plans_step(lane) .and. min(control%h(lane), control%longest) >= needed) then
+            call settle(choice, by_series, choice%kind)
+            self%kind(lane) = by_series
+            call reset_control(control, lane)
+          else
+            call settle(choice, choice%kind, by_series)
+            control%h(lane) = self%h(lane)
+          end if
+        else if (choice%kind == by_series .and. .not. self%by_series%plans_step(lane)) then
+          call settle(choice, by_stages, by_series)
+          control%h(lane) = self%h(lane)
+          call change_kind(self, control, lane)
+        end if
+      end associate
+    end do
+  end subroutine expand_lanes
+
+  !> Begins the trial of a kind in a lane, if it is time for one.
+  subroutine try_kind(self, attempt, control, lane, kind)
+    type(auto_stepper_t), intent(inout) :: self
+    type(step_attempt_t), intent(in) :: attempt
+    type(step_control_t), intent(inout) :: control
+    integer, intent(in) :: lane, kind
+    real(wp) :: h
+
+    associate (choice => self%choice(lane), t => attempt%t(lane))
+      if (kind == by_systems .and. choice%kind == by_series .and. choice%has_moved) then
+        choice%lambda = self%by_series%eigenvalue(lane)
+        call note_stiffness(choice, self%data, t, control%h(lane))
+      end if
+      if (.not. wants_trial(choice, self%data, kind)) return
+      h = min(control%h(lane), control%longest)
+      if (break_even(choice, self%data, kind, t, rate(choice, self%data, choice%kind, t, h)) &
+          > min(control%longest, control%t_end - t)) return
+      call begin_trial(choice, self%data, kind, t, h)
+      control%h(lane) = h
+      call change_kind(self, control, lane)
+    end associate
+  end subroutine try_kind
 
   subroutine take_step(self, system, attempt)
     class(auto_stepper_t), intent(inout) :: self
     class(system_t), intent(inout) :: system
     type(step_attempt_t), intent(inout) :: attempt
-    integer :: lane
+    integer :: kind, lane
 
+    self%kind(:) = self%choice%kind
+    self%active(:) = attempt%active
     do lane = 1, attempt%lanes
-      attempt%implicit(lane) = self%is_implicit(lane)
-      attempt%error_order(lane) = merge(self%implicit%error_order, self%explicit%error_order, self%is_implicit(lane))
-      attempt%max_growth(lane) = merge(self%implicit%max_growth, self%explicit%max_growth, self%is_implicit(lane))
+      call describe_kind(self, attempt, lane)
     end do
-    if (.not. any(self%is_implicit .and. attempt%active)) then
-      call self%explicit%take_step(system, attempt)
-    else if (all(self%is_implicit .or. .not. attempt%active)) then
-      call self%implicit%take_step(system, attempt)
-      if (attempt%has_low_order_estimate) attempt%low_order_estimate(:, :) = 0.0_wp
+    if (all(self%kind == self%kind(1) .or. .not. attempt%active)) then
+      kind = self%kind(maxloc(merge(1, 0, attempt%active), dim=1))
+      call take_steps_of_kind(self, system, attempt, kind)
     else
-      call attempt_both(self, system, attempt)
+      call attempt_all(self, system, attempt)
     end if
     do lane = 1, attempt%lanes
       if (.not. attempt%active(lane)) cycle
-      if (self%is_implicit(lane)) then
-        self%stiffness(lane) = self%implicit%stiffness(attempt, lane)
-      else
-        self%stiffness(lane) = self%explicit%stiffness(attempt, lane)
+      if (self%kind(lane) == by_systems) then
+        self%choice(lane)%lambda = self%implicit%stiffness(attempt, lane) / attempt%h(lane)
+      else if (self%kind(lane) == by_stages .and. modulo(self%choice(lane)%steps, stride) == 0) then
+        self%choice(lane)%lambda = self%explicit%stiffness(attempt, lane) / attempt%h(lane)
       end if
     end do
   end subroutine take_step
 
-  !> Attempts the steps of the explicit lanes, then those of the implicit lanes; the other lanes are not active meanwhile.
-  subroutine attempt_both(self, system, attempt)
-    class(auto_stepper_t), intent(inout) :: self
+  !> Tells the attempt of which kind the step of a lane is.
+  subroutine describe_kind(self, attempt, lane)
+    type(auto_stepper_t), intent(in) :: self
+    type(step_attempt_t), intent(inout) :: attempt
+    integer, intent(in) :: lane
+
+    associate (kind => self%kind(lane))
+      attempt%implicit(lane) = kind == by_systems
+      attempt%error_order(lane) = merge(self%implicit%error_order, self%explicit%error_order, kind == by_systems)
+      attempt%max_growth(lane) = merge(self%implicit%max_growth, self%explicit%max_growth, kind == by_systems)
+      attempt%degree(lane) = self%degrees(kind)
+    end associate
+  end subroutine describe_kind
+
+  !> Attempts the steps of the active lanes, which are of one kind.
+  subroutine take_steps_of_kind(self, system, attempt, kind)
+    type(auto_stepper_t), intent(inout) :: self
     class(system_t), intent(inout) :: system
     type(step_attempt_t), intent(inout) :: attempt
+    integer, intent(in) :: kind
 
-    self%active(:) = attempt%active
-    self%h(:) = attempt%h
-    call select_kind(self, attempt, .false.)
-    call self%explicit%take_step(system, attempt)
-    self%mask(:) = attempt%active
-    self%step_status(:) = attempt%step_status
-    self%y_new(:, :) = attempt%y_new
-    self%error_estimate(:, :) = attempt%error_estimate
-    self%low_order_estimate(:, :) = attempt%low_order_estimate
-    call select_kind(self, attempt, .true.)
-    call self%implicit%take_step(system, attempt)
-    call merge_kinds(self, attempt)
-  end subroutine attempt_both
+    select case (kind)
+    case (by_series)
+      call self%by_series%take_step(system, attempt)
+    case (by_stages)
+      call self%explicit%take_step(system, attempt)
+    case default
+      call self%implicit%take_step(system, attempt)
+      attempt%low_order_estimate(:, :) = 0.0_wp
+    end select
+  end subroutine take_steps_of_kind
 
-  !> Activates only the lanes of one kind.
-  subroutine select_kind(self, attempt, implicit)
-    type(auto_stepper_t), intent(in) :: self
+  !> Attempts the steps of one kind after the other; the other lanes are not active meanwhile.
+  subroutine attempt_all(self, system, attempt)
+    type(auto_stepper_t), intent(inout) :: self
+    class(system_t), intent(inout) :: system
     type(step_attempt_t), intent(inout) :: attempt
-    logical, intent(in) :: implicit
-    integer :: lane
+    integer :: kind
 
-    do lane = 1, attempt%lanes
-      attempt%active(lane) = self%active(lane) .and. (self%is_implicit(lane) .eqv. implicit)
-      attempt%h(lane) = merge(self%h(lane), 0.0_wp, attempt%active(lane))
+    call begin_kinds(self%mixed, attempt)
+    do kind = 1, kinds
+      self%mask(:) = self%kind == kind .and. self%active
+      if (.not. any(self%mask)) cycle
+      call select_lanes(self%mixed, attempt, self%mask)
+      call take_steps_of_kind(self, system, attempt, kind)
+      call keep_lanes(self%mixed, attempt, kind /= by_series, kind == by_stages)
     end do
-    call spread_steps(attempt)
-  end subroutine select_kind
-
-  !> Merges the results of the explicit lanes with those of the implicit lanes.
-  subroutine merge_kinds(self, attempt)
-    type(auto_stepper_t), intent(in) :: self
-    type(step_attempt_t), intent(inout) :: attempt
-    integer :: component, lane
-
-    do lane = 1, attempt%lanes
-      if (self%is_implicit(lane)) cycle
-      attempt%active(lane) = self%mask(lane)
-      attempt%step_status(lane) = self%step_status(lane)
-      attempt%h(lane) = merge(self%h(lane), 0.0_wp, self%mask(lane))
-    end do
-    call spread_steps(attempt)
-    do component = 1, attempt%components
-      do lane = 1, attempt%lanes
-        if (self%is_implicit(lane)) then
-          attempt%low_order_estimate(lane, component) = 0.0_wp
-        else
-          attempt%y_new(lane, component) = self%y_new(lane, component)
-          attempt%error_estimate(lane, component) = self%error_estimate(lane, component)
-          attempt%low_order_estimate(lane, component) = self%low_order_estimate(lane, component)
-        end if
-      end do
-    end do
-  end subroutine merge_kinds
+    call end_kinds(self%mixed, attempt)
+  end subroutine attempt_all
 
   subroutine interpolate(self, system, attempt, wanted, coefficients)
     class(auto_stepper_t), intent(inout) :: self
@@ -194,81 +328,67 @@ contains
     type(step_attempt_t), intent(inout) :: attempt
     logical, intent(in) :: wanted(:)
     real(wp), contiguous, intent(inout) :: coefficients(:, :, :)
-    integer :: lane, power
+    integer :: kind, lane
 
-    coefficients(:, :, self%explicit%degree + 1:) = 0.0_wp
-    if (.not. any(self%is_implicit)) then
-      call self%explicit%interpolate(system, attempt, wanted, coefficients(:, :, :self%explicit%degree))
-      return
-    end if
-    self%mask(:) = wanted .and. .not. self%is_implicit
-    if (any(self%mask)) call self%explicit%interpolate(system, attempt, self%mask, coefficients(:, :, :self%explicit%degree))
-    self%coefficients(:, :, self%implicit%degree + 1:) = 0.0_wp
-    self%mask(:) = wanted .and. self%is_implicit
-    if (.not. any(self%mask)) return
-    call self%implicit%interpolate(system, attempt, self%mask, self%coefficients(:, :, :self%implicit%degree))
-    do power = 1, self%degree
+    do kind = 1, kinds
+      self%mask(:) = wanted .and. self%kind == kind
+      if (.not. any(self%mask)) cycle
+      if (all(self%mask .or. .not. wanted)) then
+        call interpolate_kind(self, system, attempt, kind, coefficients)
+        return
+      end if
+      call interpolate_kind(self, system, attempt, kind, self%coefficients)
       do lane = 1, attempt%lanes
-        if (self%mask(lane)) coefficients(lane, :, power) = self%coefficients(lane, :, power)
+        if (self%mask(lane)) coefficients(lane, :, :) = self%coefficients(lane, :, :)
       end do
     end do
   end subroutine interpolate
 
+  !> Dense output of the lanes of one kind, in `mask`.
+  subroutine interpolate_kind(self, system, attempt, kind, coefficients)
+    type(auto_stepper_t), intent(inout) :: self
+    class(system_t), intent(inout) :: system
+    type(step_attempt_t), intent(inout) :: attempt
+    integer, intent(in) :: kind
+    real(wp), contiguous, intent(inout) :: coefficients(:, :, :)
+
+    associate (degree => self%degrees(kind))
+      coefficients(:, :, degree + 1:) = 0.0_wp
+      select case (kind)
+      case (by_series)
+        call self%by_series%interpolate(system, attempt, self%mask, coefficients(:, :, :degree))
+      case (by_stages)
+        call self%explicit%interpolate(system, attempt, self%mask, coefficients(:, :, :degree))
+      case default
+        call self%implicit%interpolate(system, attempt, self%mask, coefficients(:, :, :degree))
+      end select
+    end associate
+  end subroutine interpolate_kind
+
   subroutine accept(self, accepted)
     class(auto_stepper_t), intent(inout) :: self
     logical, intent(in) :: accepted(:)
-    integer :: lane
 
-    self%mask(:) = accepted .and. .not. self%is_implicit
+    self%choice%has_moved = self%choice%has_moved .or. accepted
+    self%mask(:) = accepted .and. self%kind == by_series
+    if (any(self%mask)) call self%by_series%accept(self%mask)
+    self%mask(:) = accepted .and. self%kind == by_stages
     if (any(self%mask)) call self%explicit%accept(self%mask)
-    self%mask(:) = accepted .and. self%is_implicit
+    self%mask(:) = accepted .and. self%kind == by_systems
     if (any(self%mask)) call self%implicit%accept(self%mask)
-    do lane = 1, size(accepted)
-      self%mask(lane) = .false.
-      if (accepted(lane)) call count_stiffness(self, lane, self%mask(lane))
-    end do
-    if (.not. any(self%mask)) return
-    self%is_implicit(:) = self%is_implicit .neqv. self%mask
-    call self%explicit%invalidate_first_stage(self%mask)
-    call self%implicit%accept(self%mask)
-    call self%implicit%reset_spectra(self%mask)
   end subroutine accept
 
-  !> Restarts lanes with the kind of method that they have; the counts of stiff steps are kept.
+  !> Restarts lanes with the kind of step that they have; what they know of the other kinds is kept.
   subroutine resume(self, attempt, resuming)
     class(auto_stepper_t), intent(inout) :: self
     type(step_attempt_t), intent(inout) :: attempt
     logical, intent(in) :: resuming(:)
 
-    self%mask(:) = resuming .and. .not. self%is_implicit
+    self%choice%crossings = self%choice%crossings + merge(1, 0, resuming)
+    self%mask(:) = resuming .and. self%kind == by_stages
     if (any(self%mask)) call self%explicit%start(attempt, self%mask)
-    self%mask(:) = resuming .and. self%is_implicit
+    self%mask(:) = resuming .and. self%kind == by_systems
     if (any(self%mask)) call self%implicit%start(attempt, self%mask)
   end subroutine resume
-
-  !> Counts whether an accepted step of a lane was stiff.
-  pure subroutine count_stiffness(self, lane, switches)
-    type(auto_stepper_t), intent(inout) :: self
-    integer, intent(in) :: lane
-    logical, intent(out) :: switches   !! whether the lane continues with the other kind
-
-    associate (evidence => self%evidence(lane), nonstiff => self%nonstiff(lane))
-      if (self%is_implicit(lane)) then
-        evidence = merge(evidence + 1, 0, self%stiffness(lane) < stability_margin * self%stability_limit)
-        switches = evidence >= nonstiff_steps
-      else if (self%stiffness(lane) > self%stability_limit) then
-        evidence = evidence + 1
-        nonstiff = 0
-        switches = evidence >= max_stiff_steps
-      else
-        nonstiff = nonstiff + 1
-        if (nonstiff >= nonstiff_steps) evidence = 0
-        switches = .false.
-      end if
-      if (.not. switches) return
-      evidence = 0
-      nonstiff = 0
-    end associate
-  end subroutine count_stiffness
 
 end module nocdyn_auto_stepper

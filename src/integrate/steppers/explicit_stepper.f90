@@ -7,6 +7,7 @@ module nocdyn_explicit_stepper
   use nocdyn_stages, only: allocate_stages, estimate_error, form_dense_output, set_tableau, share_storage, stage_state, &
     stages_t, update_state
   use nocdyn_step_attempt, only: count_evaluations, evaluate, evaluate_finite, evaluate_start, step_attempt_t
+  use nocdyn_step_costs, only: explicit_cost
   use nocdyn_stepper, only: stepper_t
   use nocdyn_system, only: system_t
   implicit none (type, external)
@@ -30,6 +31,7 @@ module nocdyn_explicit_stepper
     procedure :: accept
     procedure :: invalidate_first_stage
     procedure :: stiffness
+    procedure :: cost
   end type explicit_stepper_t
 
 contains
@@ -43,6 +45,7 @@ contains
     stepper%error_order = table%error_order
     stepper%max_growth = table%max_growth
     stepper%degree = size(table%dense, 2)
+    stepper%degrees(1) = stepper%degree
     stepper%first_same_as_last = table%first_same_as_last
     allocate (stepper%c, source=table%c)
     call set_tableau(stepper%stages, table%a, table%b, table%error, table%dense)
@@ -178,5 +181,15 @@ contains
     ratio = 0.0_wp
     if (states > 0) ratio = attempt%h(lane) * sqrt(slopes / states)
   end function stiffness
+
+  !> The cost of a step.
+  real(wp) function cost(self, system)
+    class(explicit_stepper_t), intent(in) :: self
+    class(system_t), intent(in) :: system
+    integer :: stages
+
+    stages = merge(self%stages%step - 1, self%stages%step, self%first_same_as_last)
+    cost = explicit_cost(system, self%observation, stages, self%stages%all - self%stages%step, self%degree)
+  end function cost
 
 end module nocdyn_explicit_stepper

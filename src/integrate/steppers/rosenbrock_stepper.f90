@@ -7,6 +7,7 @@ module nocdyn_rosenbrock_stepper
   use nocdyn_stage_systems, only: allocate_stage_system, factor, renew_jacobian, solve, stage_system_t
   use nocdyn_stages, only: allocate_stages, estimate_error, form_dense_output, set_tableau, stage_state, stages_t, update_state
   use nocdyn_step_attempt, only: count_evaluations, evaluate_finite, evaluate_start, step_attempt_t
+  use nocdyn_step_costs, only: implicit_cost
   use nocdyn_stepper, only: stepper_t
   use nocdyn_system, only: system_t
   implicit none (type, external)
@@ -39,6 +40,7 @@ module nocdyn_rosenbrock_stepper
     procedure :: accept
     procedure :: stiffness
     procedure :: reset_spectra
+    procedure :: cost
   end type rosenbrock_stepper_t
 
 contains
@@ -52,6 +54,7 @@ contains
     stepper%order = table%order
     stepper%error_order = table%error_order
     stepper%degree = size(table%dense, 2)
+    stepper%degrees(1) = stepper%degree
     stepper%gamma = table%gamma
     allocate (stepper%alpha, source=table%alpha)
     allocate (stepper%gamma_sum, source=table%gamma_sum)
@@ -205,5 +208,15 @@ contains
     call estimate_spectral_radius(self%spectrum, lane, self%stage_system%dfdy, ratio)
     ratio = attempt%h(lane) * ratio
   end function stiffness
+
+  !> The cost of a step, after `prepare`.
+  real(wp) function cost(self, system)
+    class(rosenbrock_stepper_t), intent(in) :: self
+    class(system_t), intent(in) :: system
+
+    cost = 0.0_wp
+    if (system%states > 0) cost = self%stage_system%matrix%operations()
+    cost = implicit_cost(system, self%observation, self%stages%step, cost, self%degree)
+  end function cost
 
 end module nocdyn_rosenbrock_stepper

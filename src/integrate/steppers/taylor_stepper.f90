@@ -12,10 +12,12 @@ module nocdyn_taylor_stepper
   use nocdyn_kinds, only: wp
   use nocdyn_masks, only: all_true, any_differs
   use nocdyn_observer, only: observer_t, step_block_t
-  use nocdyn_stage_sums, only: padded_columns, width
+  use nocdyn_series_sums, only: scale_series, sum_series
+  use nocdyn_stage_sums, only: padded_columns
   use nocdyn_step_attempt, only: attempt_not_finite, attempt_ok, attempt_recoverable, disable_lane, disable_non_finite_lanes, &
     step_attempt_t
   use nocdyn_step_control, only: any_too_small, smallest_step, step_control_t
+  use nocdyn_step_costs, only: taylor_cost
   use nocdyn_stepper, only: stepper_t
   use nocdyn_system, only: evaluation_ok, system_t
   use nocdyn_vector_functions, only: exp2s, log2s
@@ -28,14 +30,13 @@ module nocdyn_taylor_stepper
 
   real(wp), parameter :: quadrature_share = 0.2_wp   !! of the error allowed to a quadrature, for its last term
 
-  integer, parameter :: long = 32   !! numbers summed together in blocks of many lanes
-
   type, extends(stepper_t), public :: taylor_stepper_t
     private
     real(wp), allocatable :: series(:, :, :)   !! y_0, y_1, ... of each lane, [lanes, padded columns, 0:order]
     real(wp), allocatable :: previous(:, :)    !! y_(p - 1) in the quantities that the system measures, [lanes, measures]
     real(wp), allocatable :: last_norm(:)      !! norms of the last coefficients, then the step sizes, [lanes]
     real(wp), allocatable :: previous_norm(:)
+    real(wp), allocatable :: log_growth(:)     !! logarithm to base 2 of the ratio of these norms
     logical, allocatable :: moved(:)           !! lanes that need a new series
     integer, allocatable :: step_status(:)     !! attempt_... of the series of each lane
     integer, allocatable :: component(:)       !! component that caused the status, 0 if none did
@@ -48,6 +49,10 @@ module nocdyn_taylor_stepper
     procedure :: interpolate
     procedure :: accept
     procedure :: pass_steps
+    procedure :: plans_step
+    procedure :: eigenvalue
+    procedure :: stability_limit
+    procedure :: cost
   end type taylor_stepper_t
 
 contains
@@ -62,8 +67,10 @@ contains
     if (present(order)) stepper%order = order
     stepper%error_order = stepper%order
     stepper%degree = stepper%order
-    stepper%needs_series = .true.
+    stepper%degrees(1) = stepper%order
+    stepper%series_order = stepper%order
     stepper%chooses_steps = .true.
+    stepper%estimates_errors = .false.
     stepper%passes_series = .true.
   end function taylor_stepper
 
@@ -71,11 +78,12 @@ contains
     class(taylor_stepper_t), intent(inout) :: self
     class(system_t), intent(in) :: system
 
-    if (allocated(self%series)) deallocate (self%series, self%previous, self%last_norm, self%previous_norm, self%moved, &
-                                            self%step_status, self%component, self%infinite)
+    if (allocated(self%series)) deallocate (self%series, self%previous, self%last_norm, self%previous_norm, &
+                                            self%log_growth, self%moved, self%step_status, self%component, self%infinite)
     associate (lanes => system%lanes)
       allocate (self%series(lanes, padded_columns(lanes, system%states + system%quadratures), 0:self%order), source=0.0_wp)
-      allocate (self%previous(lanes, system%measures), self%last_norm(lanes), self%previous_norm(lanes), source=0.0_wp)
+      allocate (self%previous(lanes, system%measures), self%last_norm(lanes), self%previous_norm(lanes), &
+                self%log_growth(lanes), source=0.0_wp)
       allocate (self%moved(lanes), source=.true.)
       allocate (self%step_status(lanes), source=attempt_ok)
       allocate (self%component(lanes), self%infinite(lanes), source=0)
@@ -109,7 +117,7 @@ contains
                                                                                                               self%order - 1))
     if (.not. are_finite) call clear_infinities(self)
     call measure_norms(self, system, attempt, control)
-    call find_steps(attempt%lanes, self%order, self%last_norm, self%previous_norm)
+    call find_steps(attempt%lanes, self%order, self%last_norm, self%previous_norm, self%log_growth)
     if (attempt%components > attempt%states) call limit_by_quadratures(self, attempt, control)
     if (have_all_moved .and. are_finite .and. .not. any_differs(attempt%lanes, attempt%rhs_status, evaluation_ok)) then
       if (.not. any_too_small(attempt%lanes, attempt%t, self%last_norm)) then
@@ -226,9 +234,9 @@ contains
   end subroutine find_norms
 
   !> Replaces the norms `last_norm` by the step sizes that both norms allow.
-  pure subroutine find_steps(lanes, order, last_norm, previous_norm)
+  pure subroutine find_steps(lanes, order, last_norm, previous_norm, log_growth)
     integer, intent(in) :: lanes, order
-    real(wp), intent(inout) :: last_norm(lanes), previous_norm(lanes)
+    real(wp), intent(inout) :: last_norm(lanes), previous_norm(lanes), log_growth(lanes)
     real(wp) :: per_order, per_lower_order
     integer :: lane
 
@@ -237,6 +245,7 @@ contains
     call log2s(lanes, last_norm)
     call log2s(lanes, previous_norm)
     do lane = 1, lanes
+      log_growth(lane) = last_norm(lane) - previous_norm(lane)
       last_norm(lane) = min(per_order * last_norm(lane), per_lower_order * previous_norm(lane))
     end do
     call exp2s(lanes, last_norm)
@@ -279,48 +288,6 @@ contains
     if (.not. all_finite(attempt%length, attempt%y_new)) call disable_non_finite_lanes(attempt, attempt%y_new)
   end subroutine take_step
 
-  !> y = sum over k of h^k series(:, k).
-  pure subroutine sum_series(n, order, series, h_length, h, y)
-    integer, intent(in) :: n          !! whole vectors
-    integer, intent(in) :: order
-    integer, intent(in) :: h_length   !! n, or less if all vectors have the same h
-    real(wp), intent(in) :: series(n, 0:order), h(h_length)
-    real(wp), intent(inout) :: y(n)
-    real(wp) :: sum(width)
-    integer :: i, j, k
-
-    if (h_length == n .and. modulo(n, long) == 0) then
-      call sum_long_vectors(n, order, series, h, y)
-      return
-    end if
-    do i = 1, n, width
-      j = merge(i, 1, h_length == n)
-      sum = series(i:i + width - 1, order)
-      do k = order - 1, 0, -1
-        sum = series(i:i + width - 1, k) + h(j:j + width - 1) * sum
-      end do
-      y(i:i + width - 1) = sum
-    end do
-  end subroutine sum_series
-
-  !> The same for `long` numbers at a time, so that the processor does not wait for a sum.
-  pure subroutine sum_long_vectors(n, order, series, h, y)
-    integer, intent(in) :: n   !! a multiple of `long`
-    integer, intent(in) :: order
-    real(wp), intent(in) :: series(n, 0:order), h(n)
-    real(wp), intent(inout) :: y(n)
-    real(wp) :: sum(long)
-    integer :: i, k
-
-    do i = 1, n, long
-      sum = series(i:i + long - 1, order - 1) + h(i:i + long - 1) * series(i:i + long - 1, order)
-      do k = order - 2, 0, -1
-        sum = series(i:i + long - 1, k) + h(i:i + long - 1) * sum
-      end do
-      y(i:i + long - 1) = sum
-    end do
-  end subroutine sum_long_vectors
-
   !> Dense output: the series in powers of theta.
   subroutine interpolate(self, system, attempt, wanted, coefficients)
     class(taylor_stepper_t), intent(inout) :: self
@@ -331,26 +298,6 @@ contains
 
     call scale_series(attempt%length, self%order, self%series, attempt%h_length, attempt%h_spread, coefficients)
   end subroutine interpolate
-
-  !> c(:, k) = h^k series(:, k).
-  pure subroutine scale_series(n, order, series, h_length, h, c)
-    integer, intent(in) :: n          !! whole vectors
-    integer, intent(in) :: order
-    integer, intent(in) :: h_length   !! n, or less if all vectors have the same h
-    real(wp), intent(in) :: series(n, 0:order), h(h_length)
-    real(wp), intent(inout) :: c(n, order)
-    real(wp) :: power(width)
-    integer :: i, j, k
-
-    do i = 1, n, width
-      j = merge(i, 1, h_length == n)
-      power = 1.0_wp
-      do k = 1, order
-        power = power * h(j:j + width - 1)
-        c(i:i + width - 1, k) = power * series(i:i + width - 1, k)
-      end do
-    end do
-  end subroutine scale_series
 
   subroutine accept(self, accepted)
     class(taylor_stepper_t), intent(inout) :: self
@@ -370,5 +317,38 @@ contains
     steps%scale(:) = steps%h
     call observer%on_steps(steps, attempt%y, attempt%y_new, self%series(:, :, 1:))
   end subroutine pass_steps
+
+  !> Whether the series of a lane can be used, after `choose_steps`.
+  pure logical function plans_step(self, lane)
+    class(taylor_stepper_t), intent(in) :: self
+    integer, intent(in) :: lane
+
+    plans_step = self%step_status(lane) == attempt_ok .and. .not. self%moved(lane)
+  end function plans_step
+
+  !> The size of the dominant eigenvalue of the Jacobian, if the motion that belongs to it is in the last coefficients of the
+  !> series, a power iteration: y_k = A y_(k - 1) / k for a linear system.
+  pure real(wp) function eigenvalue(self, lane)
+    class(taylor_stepper_t), intent(in) :: self
+    integer, intent(in) :: lane
+    real(wp), parameter :: largest_exponent = 300.0_wp   ! keeps it finite
+
+    eigenvalue = self%order * 2.0_wp**min(self%log_growth(lane), largest_exponent)
+  end function eigenvalue
+
+  !> The limit of |h lambda| on the negative real axis, near that of the truncated exponential series for orders from 5 to 40.
+  pure real(wp) function stability_limit(self)
+    class(taylor_stepper_t), intent(in) :: self
+
+    stability_limit = 1.3_wp + 0.376_wp * self%order
+  end function stability_limit
+
+  !> The cost of a step.
+  real(wp) function cost(self, system)
+    class(taylor_stepper_t), intent(in) :: self
+    class(system_t), intent(in) :: system
+
+    cost = taylor_cost(system, self%observation, self%order)
+  end function cost
 
 end module nocdyn_taylor_stepper

@@ -106,7 +106,7 @@ contains
     end associate
     call choose_settings(input, formulation, settings, notes, error)
     if (.not. allocated(error)) call check_settings(settings, error)
-    if (.not. allocated(error)) call select_method(settings, stepper, error)
+    if (.not. allocated(error)) call select_method(settings, formulation, stepper, error)
     if (allocated(error)) then
       call move_alloc(error%message, message)
     else

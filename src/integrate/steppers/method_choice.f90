@@ -1,0 +1,190 @@
+!> Which kind of step a lane takes: by a Taylor series, explicit or implicit.
+!>
+!> The measure is the cost of a second of the motion: that of a step (`nocdyn_step_costs`), divided by the step size. Another kind
+!> is tried where it may cost less: with the step at which it would, from the state that the lane has reached. If its error
+!> estimate allows longer steps, the lane keeps it; if not, the lane goes on as before, and the next trial is made after twice as
+!> many steps. The step by a series is known without a trial, from the series alone.
+!>
+!> Implicit steps are tried where |h lambda| of the other kinds comes near the limit of their stability, and given up where that
+!> limit would allow steps that cost less. All depends on the lane alone.
+module nocdyn_method_choice
+  use nocdyn_kinds, only: wp
+  implicit none (type, external)
+  private
+
+  public :: restart_choice, count_attempt, wants_trial, begin_trial, break_even, note_stiffness, rate, settle
+
+  integer, parameter, public :: by_series = 1, by_stages = 2, by_systems = 3   !! kinds: Taylor, explicit, Rosenbrock
+  integer, parameter, public :: kinds = 3
+
+  integer, parameter :: first_period(kinds) = [2, 2, 4]   !! steps before the first trial of a kind
+  integer, parameter :: longest_period(kinds) = [256, 256, 64]   !! implicit steps are tried near the limit of stability only
+  integer, parameter :: forgiven(kinds) = [0, 0, 2]         !! attempts that may fail in a trial: implicit steps damp what is fast
+  integer, parameter :: successes = 2                       !! successive attempts that win a trial: an error estimate scatters
+  integer, parameter :: stiff_signs = 4                     !! signs of stiffness before implicit steps are tried
+  integer, parameter :: nonstiff_signs = 6                  !! of the opposite, before they are given up
+  real(wp), parameter :: margin = 0.95_wp                   !! a kind must cost less than this share to be worth a change
+  real(wp), parameter :: near_limit = 0.75_wp               !! share of the limit of stability where implicit steps may cost less
+  real(wp), parameter :: safe_share = 0.8_wp                !! share of that limit where the other kinds are stable
+
+  !> The limits of a problem, the same for all lanes.
+  type, public :: kind_data_t
+    logical :: has(kinds) = .false.       !! whether there are steps of a kind
+    real(wp) :: cost(kinds) = 1.0_wp      !! of a step
+    real(wp) :: limit(kinds) = 1.0_wp     !! of |h lambda| on the negative real axis; no limit of the implicit kind
+  end type kind_data_t
+
+  type, public :: choice_t
+    integer :: kind = by_stages           !! of the next step
+    integer :: before = 0                 !! during a trial: the kind that it is compared with; else 0
+    logical :: was_tried = .false.        !! an attempt has been made since the last decision
+    logical :: has_moved = .false.        !! and was accepted
+    integer :: failed = 0, succeeded = 0  !! attempts of a trial
+    real(wp) :: rate = 0.0_wp             !! cost of a second by the kind `before` [1/s]
+    real(wp) :: h = 0.0_wp                !! its step size [s]
+    real(wp) :: lambda = 0.0_wp           !! the last estimate of the dominant eigenvalue [1/s]
+    integer :: wait(kinds) = 0            !! accepted steps until a kind may be tried
+    integer :: period(kinds) = 0          !! `wait` after a trial that is lost
+    integer :: signs(kinds) = 0           !! successive signs that a kind may cost less
+    integer :: crossings = 0              !! steps that were cut
+    real(wp) :: t_start = 0.0_wp          !! where the lane started [s]
+    integer :: steps = 0                  !! accepted steps
+  end type choice_t
+
+contains
+
+  !> The choice of a lane that starts.
+  pure subroutine restart_choice(choice, data, t)
+    type(choice_t), intent(out) :: choice
+    type(kind_data_t), intent(in) :: data
+    real(wp), intent(in) :: t   !! [s]
+
+    choice%kind = merge(by_series, by_stages, data%has(by_series))
+    choice%wait(:) = first_period
+    choice%period(:) = first_period
+    choice%t_start = t
+  end subroutine restart_choice
+
+  !> The cost of a second with steps of size h. A step that is cut where the system changes its branch is half wasted.
+  pure real(wp) function rate(choice, data, kind, t, h)
+    type(choice_t), intent(in) :: choice
+    type(kind_data_t), intent(in) :: data
+    integer, intent(in) :: kind
+    real(wp), intent(in) :: t, h   !! present time, step size [s]
+
+    rate = data%cost(kind) * (1 / max(h, tiny(h)) + cuts(choice, t))
+  end function rate
+
+  !> Half the number of crossings in a second.
+  pure real(wp) function cuts(choice, t)
+    type(choice_t), intent(in) :: choice
+    real(wp), intent(in) :: t
+
+    cuts = 0.0_wp
+    if (choice%crossings > 0 .and. t > choice%t_start) cuts = 0.5_wp * choice%crossings / (t - choice%t_start)
+  end function cuts
+
+  !> The step size with which a kind would be worth a change, infinite if there is none.
+  pure real(wp) function break_even(choice, data, kind, t, rate)
+    type(choice_t), intent(in) :: choice
+    type(kind_data_t), intent(in) :: data
+    integer, intent(in) :: kind
+    real(wp), intent(in) :: t      !! [s]
+    real(wp), intent(in) :: rate   !! cost of a second by the present kind [1/s]
+    real(wp) :: frequency
+
+    break_even = huge(1.0_wp)
+    frequency = margin * rate / data%cost(kind) - cuts(choice, t)
+    if (frequency > 1 / break_even) break_even = 1 / frequency
+  end function break_even
+
+  !> Counts an attempt of the present kind, and decides about a trial.
+  pure subroutine count_attempt(choice, data, t, h, is_over)
+    type(choice_t), intent(inout) :: choice
+    type(kind_data_t), intent(in) :: data
+    real(wp), intent(in) :: t          !! time reached [s]
+    real(wp), intent(in) :: h          !! next step size of the present kind [s]
+    logical, intent(out) :: is_over    !! the trial is lost: the lane goes on with the kind before it
+
+    is_over = .false.
+    if (choice%has_moved) then
+      choice%steps = choice%steps + 1
+      choice%wait(:) = max(choice%wait - 1, 0)
+    end if
+    if (choice%before == 0) return
+    if (choice%has_moved .and. h >= break_even(choice, data, choice%kind, t, choice%rate)) then
+      choice%succeeded = choice%succeeded + 1
+      if (choice%succeeded >= successes) call settle(choice, choice%kind, choice%before)
+    else
+      choice%succeeded = 0
+      choice%failed = choice%failed + 1
+      is_over = choice%failed > forgiven(choice%kind)
+      if (.not. is_over) return
+      call settle(choice, choice%before, choice%kind)
+    end if
+  end subroutine count_attempt
+
+  !> Ends the comparison of two kinds.
+  pure subroutine settle(choice, winner, loser)
+    type(choice_t), intent(inout) :: choice
+    integer, value :: winner, loser   ! may be components of `choice`
+
+    choice%kind = winner
+    choice%before = 0
+    choice%period(loser) = min(2 * choice%period(loser), longest_period(loser))
+    choice%wait(loser) = choice%period(loser)
+    choice%signs(:) = 0
+  end subroutine settle
+
+  !> Counts the signs that implicit steps may cost less than the present ones, or one of the other kinds less than implicit ones.
+  pure subroutine note_stiffness(choice, data, t, h)
+    type(choice_t), intent(inout) :: choice
+    type(kind_data_t), intent(in) :: data
+    real(wp), intent(in) :: t, h   !! time reached, step size [s]
+    real(wp) :: needed
+    integer :: kind
+
+    if (choice%kind /= by_systems) then
+      choice%signs(by_systems) = merge(choice%signs(by_systems) + 1, 0, h * choice%lambda > near_limit * data%limit(choice%kind))
+      return
+    end if
+    do kind = by_series, by_stages
+      if (.not. data%has(kind)) cycle
+      needed = break_even(choice, data, kind, t, rate(choice, data, by_systems, t, h))
+      choice%signs(kind) = merge(choice%signs(kind) + 1, 0, min(needed, 1.0e100_wp) * choice%lambda &
+                                 < safe_share * data%limit(kind))
+    end do
+  end subroutine note_stiffness
+
+  !> Whether a kind should be tried now.
+  pure logical function wants_trial(choice, data, kind)
+    type(choice_t), intent(in) :: choice
+    type(kind_data_t), intent(in) :: data
+    integer, intent(in) :: kind
+
+    wants_trial = data%has(kind) .and. kind /= choice%kind .and. choice%before == 0 .and. choice%wait(kind) == 0
+    if (kind == by_systems) then
+      wants_trial = wants_trial .and. choice%signs(kind) >= stiff_signs
+    else if (choice%kind == by_systems) then
+      wants_trial = wants_trial .and. choice%signs(kind) >= nonstiff_signs
+    end if
+  end function wants_trial
+
+  !> Begins the trial of a kind, instead of steps of size h by the present one.
+  pure subroutine begin_trial(choice, data, kind, t, h)
+    type(choice_t), intent(inout) :: choice
+    type(kind_data_t), intent(in) :: data
+    integer, intent(in) :: kind
+    real(wp), intent(in) :: t        !! time reached [s]
+    real(wp), intent(inout) :: h     !! step size of the present kind, then of the trial [s]
+
+    choice%rate = rate(choice, data, choice%kind, t, h)
+    choice%h = h
+    choice%before = choice%kind
+    choice%kind = kind
+    choice%failed = 0
+    choice%succeeded = 0
+    h = break_even(choice, data, kind, t, choice%rate)
+  end subroutine begin_trial
+
+end module nocdyn_method_choice
