@@ -4,8 +4,8 @@
 !> Prints one JSON object with the seconds of one share.
 program mpi_message_costs
   use contest, only: seconds_now, whole_argument
-  use mpi_f08, only: mpi_comm_rank, mpi_comm_world, mpi_double_precision, mpi_finalize, mpi_init, mpi_integer, mpi_recv, mpi_send, &
-    mpi_status_ignore
+  use mpi_f08, only: mpi_comm_rank, mpi_comm_world, mpi_double_precision, mpi_finalize, mpi_init, mpi_integer, mpi_recv, &
+    mpi_send, mpi_status_ignore
   use nocdyn_kinds, only: wp
   implicit none (type, external)
 

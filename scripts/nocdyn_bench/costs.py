@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from .nocdyn_sweep import MPIRUN, write_sweep
-from .tables import table
+from .tables import rounded, table
 
 VARIANTS = 16384  # integrated for one number
 FEW, MORE = 64, 192  # variants that are integrated while instructions are counted; the difference counts
@@ -18,6 +18,7 @@ CHUNKS = (1, 4, 16, 64, 256, 1024, 4096)
 MESSAGES = 10000
 RANKS = (1, 2, 10, 55, 100, 1000, 10000)
 SIMULATED = ((1e10, 1e-5), (1e8, 1e-2))  # variants and the seconds of one
+ANSWER = 5e-6  # of rank 0 to a request over a network; what nocdyn counts on, src/analyse/sweep/engine/hand_out.f90
 SPREAD = 0.5  # of the time of variants from share to share
 
 
@@ -94,9 +95,9 @@ class Sweeping:
         command = [*MPIRUN, "-n", 2, self.folder / "mpi_message_costs", MESSAGES]
         return min(_report(command)["seconds"] for _ in range(rounds))
 
-    def hand_out(self, ranks: int, variants: float, seconds: float, journal: float, message: float) -> dict:
+    def hand_out(self, ranks: int, variants: float, seconds: float, journal: float, answer: float) -> dict:
         """What a simulation says of variants that take so many seconds."""
-        return _report([self.folder / "hand_out_costs", ranks, variants, seconds, journal, message, SPREAD])
+        return _report([self.folder / "hand_out_costs", ranks, variants, seconds, journal, answer, SPREAD])
 
 
 def _report(command: list) -> dict:
@@ -186,23 +187,21 @@ def hand_out_costs(sweeping: Sweeping, case: Case, rounds: int) -> list[str]:
     """The hand-out to many ranks, simulated with the costs of this machine."""
     cost = sweeping.best(rounds, case, VARIANTS, CHUNKS[-1])
     journal, message = cost.journal / cost.variants, sweeping.message(rounds)
+    answer = max(message, ANSWER)
     rows = []
-    for ranks in RANKS:
-        row = [f"{ranks:,}".replace(",", " ")]
-        for variants, seconds in SIMULATED:
-            found = sweeping.hand_out(ranks, variants, seconds, journal, message)
-            row += [f"{found['efficiency']:.1%}", f"{found['seconds']:.3g}", f"{found['busy']:.1%}"]
-        rows.append(row)
-    names = [f"{variants:.0e} variants of {_duration(seconds)}".replace("e+", "e") for variants, seconds in SIMULATED]
-    head = ["ranks", *(f"{name}{part}" for name in names for part in (": efficiency", ", time, s", ", rank 0 busy"))]
+    for variants, seconds in SIMULATED:
+        for ranks in RANKS:
+            found = sweeping.hand_out(ranks, variants, seconds, journal, answer)
+            sweep = [f"{variants:.0e}".replace("e+0", "e").replace("e+", "e"), _duration(seconds)]
+            rows.append([rounded(ranks), *sweep, f"{found['efficiency']:.1%}", rounded(found["seconds"]), f"{found['busy']:.1%}"])
+    head = ["ranks", "variants", "time of a variant", "efficiency", "time of the sweep, s", "rank 0 hands out"]
     return [
         *table(head, rows),
         "",
         "Efficiency: share of the time of all ranks, of one thread each, in which they integrate. A simulation of the hand-out "
-        "by the procedure of `nocdyn-mpi`, with what was measured here: "
-        f"{1e6 * message:.2g} us of rank 0 for a request, both messages included, and {1e6 * journal:.2g} us for a variant in "
-        f"the journal of its rank. The variants of one share take up to {SPREAD:.0%} more or less time than those of another. "
-        "The time "
+        f"by the procedure of `nocdyn-mpi`: a variant takes {1e6 * journal:.2g} us in the journal of its rank, as measured here, "
+        f"and a request {1e6 * answer:.2g} us of rank 0; between two ranks of this machine its messages take {1e6 * message:.2g} "
+        f"us. The variants of one share take up to {SPREAD:.0%} more or less time than those of another. The time "
         "is that until the last rank ends, without the start of the ranks and the merge of the journals.",
     ]
 

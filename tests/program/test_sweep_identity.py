@@ -43,7 +43,7 @@ def test_threads_do_not_show(whole, threads):
 
 
 @needs_mpi
-@pytest.mark.parametrize(("ranks", "threads"), [(1, 1), (2, 1), (3, 1), (2, 2)])
+@pytest.mark.parametrize(("ranks", "threads"), [(1, 1), (2, 1), (8, 1), (3, 2)])
 def test_ranks_do_not_show(whole, ranks, threads):
     for name, words in (("discs", MANY), ("mixed", ())):
         folder = f"{name}-{ranks}-ranks-{threads}"

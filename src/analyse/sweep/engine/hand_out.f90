@@ -1,7 +1,7 @@
 !> Hands out the variants of a sweep to workers in shares that shrink towards the end (guided self-scheduling).
 !>
 !> A process takes shares of the missing variants for its threads, from rank 0 if there are several, and hands them out to its
-!> threads in chunks. Both are handed out by the same law. bench/hand_out_costs.f90 simulates it for many ranks.
+!> threads in chunks. Both are handed out by the same law. tests/support/simulated_ranks.f90 simulates it for many ranks.
 module nocdyn_hand_out
   use, intrinsic :: iso_fortran_env, only: int64
   use nocdyn_kinds, only: wp
@@ -13,9 +13,9 @@ module nocdyn_hand_out
   real(wp), parameter, public :: chunk_seconds = 0.2_wp   !! for a chunk: long for a journal, short for a person who waits
   integer, parameter :: max_growth = 8                    ! of a share over the one before
 
-  ! Rank 0 answers a request in `answer_seconds`, its message included (measured: bench/hand_out_costs.f90, scripts/bench). It is
-  ! busy for a twentieth of the time with the requests of all ranks while their shares take `bulk` times as long as one answer to
-  ! each of them, and for a quarter of the time with those at the end.
+  ! An answer of rank 0 and its messages take less than `answer_seconds` (`scripts/bench hand_out`: 0.3 us without a network).
+  ! Rank 0 is busy for a twentieth of the time with the requests of all ranks while their shares take `bulk` times as long as one
+  ! answer to each of them, and for a quarter of the time with those at the end.
   real(wp), parameter :: answer_seconds = 5.0e-6_wp
   integer, parameter :: bulk = 20, least = 4
 
