@@ -5,8 +5,8 @@
 !> estimate allows longer steps, the lane keeps it; if not, the lane goes on as before, and the next trial is made after twice as
 !> many steps. The step by a series is known without a trial, from the series alone.
 !>
-!> Implicit steps are tried where |h lambda| of the other kinds comes near the limit of their stability, and given up where that
-!> limit would allow steps that cost less. All depends on the lane alone.
+!> Implicit steps are tried where |h lambda| of the other kinds comes near the limit of their stability, and seldom where
+!> it does not, for estimates can be too low. They are given up where that limit would allow steps that cost less. All depends on the lane alone.
 module nocdyn_method_choice
   use nocdyn_kinds, only: wp
   implicit none (type, external)
@@ -19,11 +19,13 @@ module nocdyn_method_choice
 
   integer, parameter :: first_period(kinds) = [2, 2, 4]   !! steps before the first trial of a kind
   integer, parameter :: longest_period(kinds) = [256, 256, 64]   !! implicit steps are tried near the limit of stability only
-  integer, parameter :: forgiven(kinds) = [0, 0, 2]         !! attempts that may fail in a trial: implicit steps damp what is fast
+  integer, parameter :: first_doubt = 64, last_doubt = 256  !! steps after which a weak sign is enough
+  integer, parameter :: forgiven = 2                        !! attempts that may fail then: implicit steps damp what is fast first
   integer, parameter :: successes = 2                       !! successive attempts that win a trial: an error estimate scatters
   integer, parameter :: stiff_signs = 4                     !! signs of stiffness before implicit steps are tried
   integer, parameter :: nonstiff_signs = 6                  !! of the opposite, before they are given up
   real(wp), parameter :: margin = 0.95_wp                   !! a kind must cost less than this share to be worth a change
+  real(wp), parameter :: weak_sign = 0.4_wp                 !! share of the limit of stability: the estimate may be too low
   real(wp), parameter :: near_limit = 0.75_wp               !! share of the limit of stability where implicit steps may cost less
   real(wp), parameter :: safe_share = 0.8_wp                !! share of that limit where the other kinds are stable
 
@@ -40,6 +42,10 @@ module nocdyn_method_choice
     logical :: was_tried = .false.        !! an attempt has been made since the last decision
     logical :: has_moved = .false.        !! and was accepted
     integer :: failed = 0, succeeded = 0  !! attempts of a trial
+    integer :: may_fail = 0               !! attempts that do not yet lose it
+    logical :: is_in_doubt = .false.      !! whether there has been a weak sign since the last trial of implicit steps
+    integer :: doubt = first_doubt        !! steps until implicit ones are tried because of that
+    integer :: next_doubt = first_doubt   !! the same after the next trial
     real(wp) :: rate = 0.0_wp             !! cost of a second by the kind `before` [1/s]
     real(wp) :: h = 0.0_wp                !! its step size [s]
     real(wp) :: lambda = 0.0_wp           !! the last estimate of the dominant eigenvalue [1/s]
@@ -110,6 +116,7 @@ contains
     if (choice%has_moved) then
       choice%steps = choice%steps + 1
       choice%wait(:) = max(choice%wait - 1, 0)
+      choice%doubt = max(choice%doubt - 1, 0)
     end if
     if (choice%before == 0) return
     if (choice%has_moved .and. h >= break_even(choice, data, choice%kind, t, choice%rate)) then
@@ -118,7 +125,7 @@ contains
     else
       choice%succeeded = 0
       choice%failed = choice%failed + 1
-      is_over = choice%failed > forgiven(choice%kind)
+      is_over = choice%failed > choice%may_fail
       if (.not. is_over) return
       call settle(choice, choice%before, choice%kind)
     end if
@@ -145,7 +152,10 @@ contains
     integer :: kind
 
     if (choice%kind /= by_systems) then
-      choice%signs(by_systems) = merge(choice%signs(by_systems) + 1, 0, h * choice%lambda > near_limit * data%limit(choice%kind))
+      associate (limit => data%limit(choice%kind), signs => choice%signs(by_systems))
+        signs = merge(signs + 1, 0, h * choice%lambda > near_limit * limit)
+        choice%is_in_doubt = choice%is_in_doubt .or. h * choice%lambda > weak_sign * limit
+      end associate
       return
     end if
     do kind = by_series, by_stages
@@ -164,7 +174,8 @@ contains
 
     wants_trial = data%has(kind) .and. kind /= choice%kind .and. choice%before == 0 .and. choice%wait(kind) == 0
     if (kind == by_systems) then
-      wants_trial = wants_trial .and. choice%signs(kind) >= stiff_signs
+      wants_trial = wants_trial .and. (choice%signs(kind) >= stiff_signs &
+                                     .or. (choice%is_in_doubt .and. choice%doubt == 0))
     else if (choice%kind == by_systems) then
       wants_trial = wants_trial .and. choice%signs(kind) >= nonstiff_signs
     end if
@@ -184,6 +195,13 @@ contains
     choice%kind = kind
     choice%failed = 0
     choice%succeeded = 0
+    choice%may_fail = 0
+    if (kind == by_systems) then
+      if (choice%signs(kind) >= stiff_signs) choice%may_fail = forgiven
+      choice%next_doubt = min(2 * choice%next_doubt, last_doubt)
+      choice%doubt = choice%next_doubt
+      choice%is_in_doubt = .false.
+    end if
     h = break_even(choice, data, kind, t, choice%rate)
   end subroutine begin_trial
 
