@@ -8,13 +8,6 @@ module nocdyn_stepper
   implicit none (type, external)
   private
 
-  !> What an observer makes of every step.
-  type, public :: observation_t
-    integer :: tracked = 0             !! functions whose extremes are found
-    logical :: is_dense = .false.      !! whether the dense output is formed
-    logical :: wants_steps = .false.   !! whether the polynomials of all lanes are passed on, with the largest degree
-  end type observation_t
-
   type, abstract, public :: stepper_t
     integer :: order = 0                       !! of y_new
     integer :: error_order = 0                 !! the error estimate falls as h^(error_order + 1)
@@ -25,7 +18,6 @@ module nocdyn_stepper
     integer :: series_order = 0                !! order of the Taylor series that the system must have; 0: it needs none
     logical :: chooses_steps = .false.         !! whether `choose_steps` is called before every attempt
     logical :: estimates_errors = .true.       !! whether there are error estimates, at least of some lanes
-    type(observation_t) :: observation         !! what the observer makes of the steps; set before `prepare`
     logical :: passes_series = .false.         !! whether `pass_steps` does not need the coefficients of `interpolate`
   contains
     procedure :: choose_steps

@@ -68,9 +68,6 @@ contains
     real(wp), intent(in) :: times(:)   !! output times [s], ascending
     class(observer_t), intent(in) :: observer
 
-    stepper%observation%tracked = observer%tracked
-    stepper%observation%wants_steps = observer%wants_steps
-    stepper%observation%is_dense = observer%tracked > 0 .or. observer%wants_steps .or. system%switches > 0
     call stepper%prepare(system)
     call allocate_step_attempt(integrator%attempt, system)
     integrator%attempt%t(:) = times(1)

@@ -80,9 +80,6 @@ contains
     class(system_t), intent(in) :: system
     integer :: columns
 
-    self%by_series%observation = self%observation
-    self%explicit%observation = self%observation
-    self%implicit%observation = self%observation
     if (self%data%has(by_series)) call self%by_series%prepare(system)
     call self%explicit%prepare(system)
     call self%implicit%prepare(system)
@@ -128,7 +125,8 @@ contains
       self%expanded(lane) = .false.
       if (.not. attempt%active(lane)) cycle
       if (self%choice(lane)%was_tried) call judge_attempt(self, attempt, control, lane)
-      self%expanded(lane) = self%choice(lane)%kind /= by_series .and. wants_trial(self%choice(lane), self%data, by_series)
+      self%expanded(lane) = self%choice(lane)%kind /= by_series .and. control%h(lane) < control%longest &
+                            .and. wants_trial(self%choice(lane), self%data, by_series)
     end do
     if (self%data%has(by_series)) call expand_lanes(self, system, attempt, control)
     do lane = 1, attempt%lanes
@@ -236,7 +234,8 @@ contains
         call note_stiffness(choice, self%data, t, control%h(lane))
       end if
       if (.not. wants_trial(choice, self%data, kind)) return
-      h = min(control%h(lane), control%longest)
+      h = control%h(lane)
+      if (h >= control%longest) return   ! no kind can take longer steps
       if (break_even(choice, self%data, kind, t, rate(choice, self%data, choice%kind, t, h)) &
           > min(control%longest, control%t_end - t)) return
       call begin_trial(choice, self%data, kind, t, h)

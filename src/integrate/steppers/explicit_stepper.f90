@@ -186,10 +186,8 @@ contains
   real(wp) function cost(self, system)
     class(explicit_stepper_t), intent(in) :: self
     class(system_t), intent(in) :: system
-    integer :: stages
 
-    stages = merge(self%stages%step - 1, self%stages%step, self%first_same_as_last)
-    cost = explicit_cost(system, self%observation, stages, self%stages%all - self%stages%step, self%degree)
+    cost = explicit_cost(system, merge(self%stages%all - 1, self%stages%all, self%first_same_as_last), self%degree)
   end function cost
 
 end module nocdyn_explicit_stepper

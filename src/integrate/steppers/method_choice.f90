@@ -5,8 +5,9 @@
 !> estimate allows longer steps, the lane keeps it; if not, the lane goes on as before, and the next trial is made after twice as
 !> many steps. The step by a series is known without a trial, from the series alone.
 !>
-!> Implicit steps are tried where |h lambda| of the other kinds comes near the limit of their stability, and seldom where
-!> it does not, for estimates can be too low. They are given up where that limit would allow steps that cost less. All depends on the lane alone.
+!> Implicit steps are tried where |h lambda| of the other kinds comes near the limit of their stability, and seldom where it does
+!> not, for estimates can be too low. They are given up where that limit would allow steps that cost less. All depends on the lane
+!> alone.
 module nocdyn_method_choice
   use nocdyn_kinds, only: wp
   implicit none (type, external)
@@ -14,7 +15,7 @@ module nocdyn_method_choice
 
   public :: restart_choice, count_attempt, wants_trial, begin_trial, break_even, note_stiffness, rate, settle
 
-  integer, parameter, public :: by_series = 1, by_stages = 2, by_systems = 3   !! kinds: Taylor, explicit, Rosenbrock
+  integer, parameter, public :: by_series = 1, by_stages = 2, by_systems = 3   !! Taylor, explicit, Rosenbrock steps
   integer, parameter, public :: kinds = 3
 
   integer, parameter :: first_period(kinds) = [2, 2, 4]   !! steps before the first trial of a kind

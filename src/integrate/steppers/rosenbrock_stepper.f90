@@ -216,7 +216,7 @@ contains
 
     cost = 0.0_wp
     if (system%states > 0) cost = self%stage_system%matrix%operations()
-    cost = implicit_cost(system, self%observation, self%stages%step, cost, self%degree)
+    cost = implicit_cost(system, self%stages%step, cost, self%degree)
   end function cost
 
 end module nocdyn_rosenbrock_stepper

@@ -348,7 +348,7 @@ contains
     class(taylor_stepper_t), intent(in) :: self
     class(system_t), intent(in) :: system
 
-    cost = taylor_cost(system, self%observation, self%order)
+    cost = taylor_cost(system, self%order)
   end function cost
 
 end module nocdyn_taylor_stepper
