@@ -277,8 +277,8 @@ contains
     type(step_attempt_t), intent(inout) :: attempt
     integer, intent(in) :: lane
 
-    associate (kind => self%kind(lane))
-      attempt%implicit(lane) = kind == by_systems
+    associate (kind => self%kind(lane), before => self%choice(lane)%before)
+      attempt%implicit(lane) = merge(before, kind, before > 0) == by_systems   ! a trial is no change of the method
       attempt%error_order(lane) = merge(self%implicit%error_order, self%explicit%error_order, kind == by_systems)
       attempt%max_growth(lane) = merge(self%implicit%max_growth, self%explicit%max_growth, kind == by_systems)
       attempt%degree(lane) = self%degrees(kind)
