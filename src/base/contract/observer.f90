@@ -19,7 +19,6 @@ module nocdyn_observer
     integer :: tracked = 0                  !! number of tracked functions
     real(wp) :: tracked_from = -huge(1.0_wp)   !! time from which their extremes are taken [s]
     logical :: wants_steps = .false.        !! whether `on_steps` is called
-    logical :: fills_blocks = .false.       !! whether blocks have many variants: their lanes should take steps of one kind
     logical :: takes_shifts = .false.       !! whether `on_shift` is overridden; a system shifts no states without
     integer :: first_read = 1               !! components whose polynomials `on_steps` reads; may change from variant to variant
     integer :: last_read = huge(0)

@@ -16,7 +16,6 @@ module nocdyn_stepper
     logical :: has_low_order_error = .false.   !! whether there are two error estimates
     integer :: degrees(3) = 0                  !! of the polynomials of each kind of its steps; 0: there are fewer kinds
     integer :: series_order = 0                !! order of the Taylor series that the system must have; 0: it needs none
-    logical :: fills_blocks = .false.          !! as that of the observer; set before `prepare`
     logical :: chooses_steps = .false.         !! whether `choose_steps` is called before every attempt
     logical :: estimates_errors = .true.       !! whether there are error estimates, at least of some lanes
     logical :: passes_series = .false.         !! whether `pass_steps` does not need the coefficients of `interpolate`

@@ -68,7 +68,6 @@ contains
     real(wp), intent(in) :: times(:)   !! output times [s], ascending
     class(observer_t), intent(in) :: observer
 
-    stepper%fills_blocks = observer%fills_blocks
     call stepper%prepare(system)
     call allocate_step_attempt(integrator%attempt, system)
     integrator%attempt%t(:) = times(1)

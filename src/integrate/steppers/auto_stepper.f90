@@ -80,8 +80,6 @@ contains
     class(system_t), intent(in) :: system
     integer :: columns
 
-    ! the lanes of a block with two kinds would wait for each other, and a series takes the least time there
-    self%data%has(by_stages) = .not. (self%fills_blocks .and. self%data%has(by_series))
     if (self%data%has(by_series)) call self%by_series%prepare(system)
     call self%explicit%prepare(system)
     call self%implicit%prepare(system)

@@ -1,5 +1,5 @@
 !> What a step of a method costs, from the size of the system alone, so that a choice between methods has the same outcome on
-!> every machine, whatever is recorded.
+!> every machine, in runs and sweeps, whatever is recorded.
 !>
 !> The numbers are the times of runs of one machine with `release`, in ns of the processor on which they were measured; only their
 !> ratios matter. docs/pages/integrators.md has the table. A run follows the extremes of about two columns for each state.

@@ -70,7 +70,6 @@ contains
     self%t_end = t_end
     self%wants_steps = .true.
     self%takes_shifts = .true.
-    self%fills_blocks = .true.
     call list_columns(block%machine, columns, labels)
     allocate (found, source=statistics)
     call find_columns(labels, found)
