@@ -1,7 +1,6 @@
 !> Scheduler of rank 0, which computes like the other ranks and hands out variants to them between its steps.
 module nocdyn_mpi_root
   use, intrinsic :: iso_c_binding, only: c_int
-  use, intrinsic :: iso_fortran_env, only: int64
   use nocdyn_errors, only: error_t
   use nocdyn_hand_out, only: hand_out_t
   use nocdyn_journal_scheduler, only: journal_scheduler_t
@@ -27,7 +26,7 @@ module nocdyn_mpi_root
     logical, private :: has_stopped = .false.        !! whether the other ranks have been told to stop
   contains
     procedure :: begin, refill_pool, poll, finalise
-    procedure, private :: handle_message, take
+    procedure, private :: handle_message
   end type mpi_root_t
 
 contains
@@ -52,21 +51,9 @@ contains
     integer :: count, first
 
     if (self%pool%variant_time > 0) self%variants%variant_time = self%pool%variant_time
-    call self%take(first, count)
-    if (count > 0) call self%pool%refill([int(first, int64)], [int(count, int64)])
+    call self%take_variants(self%variants, self%pool%workers, first, count)
+    call self%pool%refill(first, count)
   end subroutine refill_pool
-
-  !> The share of a rank, none if the sweep is cancelled.
-  subroutine take(self, first, count)
-    class(mpi_root_t), intent(inout) :: self
-    integer, intent(out) :: first, count
-    integer(int64) :: variant
-
-    variant = 0
-    count = 0
-    if (.not. self%is_cancelled()) call self%variants%take(self%pool%workers, variant, count)
-    first = int(variant)
-  end subroutine take
 
   !> Shows the progress and answers all waiting messages. If the sweep is cancelled, tells the other ranks to stop.
   subroutine poll(self)
@@ -103,7 +90,7 @@ contains
       if (tag == tag_done) then
         self%finished_ranks = self%finished_ranks + 1
       else
-        call self%take(first, count)
+        call self%take_variants(self%variants, self%pool%workers, first, count)
         call send_assignment(rank, first, count)
       end if
     case (tag_error)

@@ -1,6 +1,5 @@
 !> Scheduler of the ranks above 0: it requests variants from rank 0 and appends the results to the journal of its rank.
 module nocdyn_mpi_worker
-  use, intrinsic :: iso_fortran_env, only: int64
   use nocdyn_journal_scheduler, only: journal_scheduler_t
   use nocdyn_mpi_messages, only: probe_message, receive_assignment, receive_tag, report_t, root, send_error, send_report, &
     tag_done, tag_request, tag_stop, wait_for_message
@@ -27,7 +26,7 @@ contains
     call self%report(tag_request)
     call receive_assignment(first, count)
     self%is_exhausted = count == 0
-    if (count > 0) call self%pool%refill([int(first, int64)], [int(count, int64)])
+    call self%pool%refill(first, count)
   end subroutine refill_pool
 
   !> Tells rank 0 what has been done since the last time.

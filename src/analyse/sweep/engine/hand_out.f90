@@ -33,13 +33,15 @@ module nocdyn_hand_out
     integer, private :: range = 1                       !! index of the range that is handed out
     integer, private :: last_size = 0                   !! of a worker's share in the last one
   contains
-    procedure :: refill, take_over, serve_ranks, take
+    generic :: refill => refill_ranges, refill_range
+    procedure :: take_over, serve_ranks, take
+    procedure, private :: refill_ranges, refill_range
   end type hand_out_t
 
 contains
 
   !> Takes ranges in ascending order. Those before must have been handed out.
-  subroutine refill(self, first, count)
+  subroutine refill_ranges(self, first, count)
     class(hand_out_t), intent(inout) :: self
     integer(int64), intent(in) :: first(:), count(:)   !! first variant and number of variants of each range
 
@@ -48,7 +50,15 @@ contains
     self%count = count
     self%left = sum(count)
     self%range = 1
-  end subroutine refill
+  end subroutine refill_ranges
+
+  !> The same for the range that another hand-out has taken, which may have no variants.
+  subroutine refill_range(self, first, count)
+    class(hand_out_t), intent(inout) :: self
+    integer, intent(in) :: first, count
+
+    if (count > 0) call self%refill_ranges([int(first, int64)], [int(count, int64)])
+  end subroutine refill_range
 
   !> Takes the ranges of another one.
   subroutine take_over(self, other)

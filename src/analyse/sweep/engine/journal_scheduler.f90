@@ -26,7 +26,7 @@ module nocdyn_journal_scheduler
     type(error_t), allocatable :: error   !! a journal cannot be written: no more chunks are handed out
     logical, private :: has_failed = .false.     !! whether `error` is allocated; other threads read this
   contains
-    procedure :: begin, next_chunk, submit, refill_pool, poll, finalise, fail, is_cancelled, is_complete
+    procedure :: begin, next_chunk, take_variants, submit, refill_pool, poll, finalise, fail, is_cancelled, is_complete
   end type journal_scheduler_t
 
 contains
@@ -75,15 +75,27 @@ contains
   subroutine next_chunk(self, first, count)
     class(journal_scheduler_t), intent(inout) :: self
     integer, intent(out) :: first, count
+
+    if (self%pool%left == 0) then
+      if (.not. self%is_cancelled()) call self%refill_pool()
+    end if
+    call self%take_variants(self%pool, 1, first, count)
+  end subroutine next_chunk
+
+  !> The next variants of a hand-out for some workers, none if the sweep is cancelled.
+  subroutine take_variants(self, hand_out, workers, first, count)
+    class(journal_scheduler_t), intent(in) :: self
+    type(hand_out_t), intent(inout) :: hand_out   !! may be the pool
+    integer, intent(in) :: workers
+    integer, intent(out) :: first, count
     integer(int64) :: variant
 
     first = 0
     count = 0
     if (self%is_cancelled()) return
-    if (self%pool%left == 0) call self%refill_pool()
-    call self%pool%take(1, variant, count)
+    call hand_out%take(workers, variant, count)
     first = int(variant)
-  end subroutine next_chunk
+  end subroutine take_variants
 
   !> Gets more variants when all are handed out. There are none: the pool of a single process holds all from the start.
   subroutine refill_pool(self)
