@@ -138,27 +138,40 @@ contains
     end do
   end subroutine find_journals
 
-  !> Opens the journals of a sweep to continue it. Those of ranks are closed again: their ranks append to them.
+  !> Opens the journals of a sweep to continue it.
   subroutine resume_journals(job, names, header, error)
     type(sweep_job_t), intent(inout) :: job
     type(string_t), intent(in) :: names(:)   !! that of this process first, which is created if it does not exist
     type(sweep_header_t), intent(in) :: header
     type(error_t), allocatable, intent(out) :: error
-    integer :: i
 
     allocate (job%journals(size(names)))
-    do i = 1, size(names)
-      call continue_journal(job%folder, names(i)%text, header, job%journals(i), error)
-      if (.not. allocated(error)) call check_journal(job%journals(i), header, error)
-      if (allocated(error)) return
-      if (i > 1) call job%journals(i)%file%close()
-    end do
+    call continue_journal(job%folder, names(1)%text, header, job%journals(1), error)
+    if (.not. allocated(error)) call open_rank_journals(job, names, header, error)
+    if (allocated(error)) return
     if (.not. job%arguments%is_given('--resume')) then
       call refuse_unfinished(job%journals, error)
     else if (.not. job%arguments%is_given('--quiet')) then
       call print_journal_state(job)
     end if
   end subroutine resume_journals
+
+  !> Opens the journals of ranks, and closes them again: their ranks append to them. Those of another sweep are an error.
+  subroutine open_rank_journals(job, names, header, error)
+    type(sweep_job_t), intent(inout) :: job                !! with the journal of this process
+    type(string_t), intent(in) :: names(:)                 !! that one first
+    type(sweep_header_t), intent(in) :: header             !! of the sweep
+    type(error_t), allocatable, intent(out) :: error
+    integer :: i
+
+    call check_journal(job%journals(1), header, error)
+    do i = 2, size(names)
+      if (.not. allocated(error)) call open_journal(job%folder, names(i)%text, job%journals(i), error)
+      if (.not. allocated(error)) call check_journal(job%journals(i), header, error)
+      if (allocated(error)) return
+      call job%journals(i)%file%close()
+    end do
+  end subroutine open_rank_journals
 
   !> Without a journal to resume: sets `is_done` if the folder holds the results of this sweep.
   subroutine check_finished_results(job, header, error)
@@ -262,19 +275,15 @@ contains
     type(string_t), allocatable :: names(:)
     type(range_t), allocatable :: missing(:)
     real(wp) :: bytes
-    integer :: i
 
     header = job%journals(1)%header
     call job%journals(1)%file%close()
     deallocate (job%journals)
     call find_journals(job%folder, journal_name(1, 1), names, bytes)
     allocate (job%journals(size(names)))
-    do i = 1, size(names)
-      call open_journal(job%folder, names(i)%text, job%journals(i), error)
-      if (.not. allocated(error)) call check_journal(job%journals(i), header, error)
-      if (allocated(error)) return
-      if (i > 1) call job%journals(i)%file%close()
-    end do
+    call open_journal(job%folder, names(1)%text, job%journals(1), error)
+    if (.not. allocated(error)) call open_rank_journals(job, names, header, error)
+    if (allocated(error)) return
     call missing_variants(job%journals, header, missing)
     if (size(missing) == 0) return
     call raise(error, exit_file, shown_path(job%folder) // ': not all journals of the ranks are there; it must be on a file ' // &
