@@ -31,7 +31,6 @@ module nocdyn_auto_stepper
     type(rosenbrock_stepper_t) :: implicit
     type(kind_data_t) :: data
     type(choice_t), allocatable :: choice(:)        !! [lanes]
-    integer, allocatable :: kind(:)                 !! of the last attempt of each lane
     logical, allocatable :: mask(:)
     logical, allocatable :: expanded(:)             !! lanes of other kinds whose series is wanted
     logical, allocatable :: active(:)               !! lanes at the start of the attempt
@@ -86,12 +85,10 @@ contains
     self%data%cost(by_stages) = self%explicit%cost(system)
     self%data%cost(by_systems) = self%implicit%cost(system)
     if (self%data%has(by_series)) self%data%cost(by_series) = self%by_series%cost(system)
-    if (allocated(self%choice)) deallocate (self%choice, self%kind, self%mask, self%expanded, self%active, self%h, &
-                                            self%coefficients)
+    if (allocated(self%choice)) deallocate (self%choice, self%mask, self%expanded, self%active, self%h, self%coefficients)
     columns = padded_columns(system%lanes, system%states + system%quadratures)
     associate (lanes => system%lanes)
       allocate (self%choice(lanes))
-      allocate (self%kind(lanes), source=by_stages)
       allocate (self%mask(lanes), self%expanded(lanes), self%active(lanes), source=.false.)
       allocate (self%h(lanes), source=0.0_wp)
       call allocate_mixed_attempt(self%mixed, lanes, columns)
@@ -148,13 +145,15 @@ contains
     integer, intent(in) :: lane
     logical :: is_new   ! the estimate of the eigenvalue
     logical :: is_over
+    integer :: tried   ! the kind of the attempt
 
     associate (choice => self%choice(lane))
+      tried = choice%kind
       if (choice%kind == by_series .and. .not. choice%has_moved) call settle(choice, by_stages, by_series)
       is_new = choice%kind == by_systems .or. modulo(choice%steps, stride) == 0
       call count_attempt(choice, self%data, attempt%t(lane), min(control%h(lane), control%longest), is_over)
       if (is_over) control%h(lane) = choice%h
-      if (choice%kind /= self%kind(lane)) call change_kind(self, control, lane)
+      if (choice%kind /= tried) call change_kind(self, control, lane)
       if (choice%has_moved .and. choice%before == 0 .and. choice%kind /= by_series .and. is_new) then
         call note_stiffness(choice, self%data, attempt%t(lane), control%h(lane))
       end if
@@ -178,7 +177,6 @@ contains
       call self%implicit%accept(self%mask)
       call self%implicit%reset_spectra(self%mask)
     end select
-    self%kind(lane) = self%choice(lane)%kind
     call reset_control(control, lane)
   end subroutine change_kind
 
@@ -205,7 +203,6 @@ contains
           needed = break_even(choice, self%data, by_series, t, rate(choice, self%data, choice%kind, t, self%h(lane)))
           if (self%by_series%plans_step(lane) .and. min(control%h(lane), control%longest) >= needed) then
             call settle(choice, by_series, choice%kind)
-            self%kind(lane) = by_series
             call reset_control(control, lane)
           else
             call settle(choice, choice%kind, by_series)
@@ -250,22 +247,21 @@ contains
     type(step_attempt_t), intent(inout) :: attempt
     integer :: kind, lane
 
-    self%kind(:) = self%choice%kind
     self%active(:) = attempt%active
     do lane = 1, attempt%lanes
       call describe_kind(self, attempt, lane)
     end do
-    if (all(self%kind == self%kind(1) .or. .not. attempt%active)) then
-      kind = self%kind(maxloc(merge(1, 0, attempt%active), dim=1))
+    kind = self%choice(maxloc(merge(1, 0, attempt%active), dim=1))%kind
+    if (all(self%choice%kind == kind .or. .not. attempt%active)) then
       call take_steps_of_kind(self, system, attempt, kind)
     else
       call attempt_all(self, system, attempt)
     end if
     do lane = 1, attempt%lanes
       if (.not. attempt%active(lane)) cycle
-      if (self%kind(lane) == by_systems) then
+      if (self%choice(lane)%kind == by_systems) then
         self%choice(lane)%lambda = self%implicit%stiffness(attempt, lane) / attempt%h(lane)
-      else if (self%kind(lane) == by_stages .and. modulo(self%choice(lane)%steps, stride) == 0) then
+      else if (self%choice(lane)%kind == by_stages .and. modulo(self%choice(lane)%steps, stride) == 0) then
         self%choice(lane)%lambda = self%explicit%stiffness(attempt, lane) / attempt%h(lane)
       end if
     end do
@@ -277,7 +273,7 @@ contains
     type(step_attempt_t), intent(inout) :: attempt
     integer, intent(in) :: lane
 
-    associate (kind => self%kind(lane), before => self%choice(lane)%before)
+    associate (kind => self%choice(lane)%kind, before => self%choice(lane)%before)
       attempt%implicit(lane) = merge(before, kind, before > 0) == by_systems   ! a trial is no change of the method
       attempt%error_order(lane) = merge(self%implicit%error_order, self%explicit%error_order, kind == by_systems)
       attempt%max_growth(lane) = merge(self%implicit%max_growth, self%explicit%max_growth, kind == by_systems)
@@ -312,7 +308,7 @@ contains
 
     call begin_kinds(self%mixed, attempt)
     do kind = 1, kinds
-      self%mask(:) = self%kind == kind .and. self%active
+      self%mask(:) = self%choice%kind == kind .and. self%active
       if (.not. any(self%mask)) cycle
       call select_lanes(self%mixed, attempt, self%mask)
       call take_steps_of_kind(self, system, attempt, kind)
@@ -330,7 +326,7 @@ contains
     integer :: kind, lane
 
     do kind = 1, kinds
-      self%mask(:) = wanted .and. self%kind == kind
+      self%mask(:) = wanted .and. self%choice%kind == kind
       if (.not. any(self%mask)) cycle
       if (all(self%mask .or. .not. wanted)) then
         call interpolate_kind(self, system, attempt, kind, coefficients)
@@ -369,11 +365,11 @@ contains
     logical, intent(in) :: accepted(:)
 
     self%choice%has_moved = self%choice%has_moved .or. accepted
-    self%mask(:) = accepted .and. self%kind == by_series
+    self%mask(:) = accepted .and. self%choice%kind == by_series
     if (any(self%mask)) call self%by_series%accept(self%mask)
-    self%mask(:) = accepted .and. self%kind == by_stages
+    self%mask(:) = accepted .and. self%choice%kind == by_stages
     if (any(self%mask)) call self%explicit%accept(self%mask)
-    self%mask(:) = accepted .and. self%kind == by_systems
+    self%mask(:) = accepted .and. self%choice%kind == by_systems
     if (any(self%mask)) call self%implicit%accept(self%mask)
   end subroutine accept
 
@@ -384,9 +380,9 @@ contains
     logical, intent(in) :: resuming(:)
 
     self%choice%crossings = self%choice%crossings + merge(1, 0, resuming)
-    self%mask(:) = resuming .and. self%kind == by_stages
+    self%mask(:) = resuming .and. self%choice%kind == by_stages
     if (any(self%mask)) call self%explicit%start(attempt, self%mask)
-    self%mask(:) = resuming .and. self%kind == by_systems
+    self%mask(:) = resuming .and. self%choice%kind == by_systems
     if (any(self%mask)) call self%implicit%start(attempt, self%mask)
   end subroutine resume
 
