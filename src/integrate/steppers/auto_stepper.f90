@@ -6,8 +6,8 @@ module nocdyn_auto_stepper
   use nocdyn_explicit_stepper, only: explicit_stepper, explicit_stepper_t
   use nocdyn_explicit_tables, only: explicit_table_t
   use nocdyn_kinds, only: wp
-  use nocdyn_method_choice, only: begin_trial, break_even, by_series, by_stages, by_systems, choice_t, count_attempt, &
-    kind_data_t, kinds, note_stiffness, rate, restart_choice, settle, wants_trial
+  use nocdyn_method_choice, only: begin_trial, by_series, by_stages, by_systems, choice_t, count_attempt, kind_data_t, &
+    kinds, needed_step, note_stiffness, restart_choice, settle, wants_trial
   use nocdyn_mixed_attempt, only: allocate_mixed_attempt, begin_kinds, end_kinds, keep_lanes, mixed_attempt_t, select_lanes
   use nocdyn_rosenbrock_stepper, only: rosenbrock_stepper, rosenbrock_stepper_t
   use nocdyn_rosenbrock_tables, only: rosenbrock_table_t
@@ -200,7 +200,7 @@ contains
       if (.not. self%active(lane)) cycle
       associate (choice => self%choice(lane), t => attempt%t(lane))
         if (self%expanded(lane)) then
-          needed = break_even(choice, self%data, by_series, t, rate(choice, self%data, choice%kind, t, self%h(lane)))
+          needed = needed_step(choice, self%data, by_series, t, self%h(lane))
           if (self%by_series%plans_step(lane) .and. min(control%h(lane), control%longest) >= needed) then
             call settle(choice, by_series, choice%kind)
             call reset_control(control, lane)
@@ -233,8 +233,7 @@ contains
       if (.not. wants_trial(choice, self%data, kind)) return
       h = control%h(lane)
       if (h >= control%longest) return   ! no kind can take longer steps
-      if (break_even(choice, self%data, kind, t, rate(choice, self%data, choice%kind, t, h)) &
-          > min(control%longest, control%t_end - t)) return
+      if (needed_step(choice, self%data, kind, t, h) > min(control%longest, control%t_end - t)) return
       call begin_trial(choice, self%data, kind, t, h)
       control%h(lane) = h
       call change_kind(self, control, lane)

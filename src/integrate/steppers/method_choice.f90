@@ -13,7 +13,7 @@ module nocdyn_method_choice
   implicit none (type, external)
   private
 
-  public :: restart_choice, count_attempt, wants_trial, begin_trial, break_even, note_stiffness, rate, settle
+  public :: restart_choice, count_attempt, wants_trial, begin_trial, break_even, needed_step, note_stiffness, rate, settle
 
   integer, parameter, public :: by_series = 1, by_stages = 2, by_systems = 3   !! Taylor, explicit, Rosenbrock steps
   integer, parameter, public :: kinds = 3
@@ -105,6 +105,16 @@ contains
     if (frequency > 1 / break_even) break_even = 1 / frequency
   end function break_even
 
+  !> The same, instead of steps of size h by the present kind.
+  pure real(wp) function needed_step(choice, data, kind, t, h)
+    type(choice_t), intent(in) :: choice
+    type(kind_data_t), intent(in) :: data
+    integer, intent(in) :: kind
+    real(wp), intent(in) :: t, h   !! time reached, present step size [s]
+
+    needed_step = break_even(choice, data, kind, t, rate(choice, data, choice%kind, t, h))
+  end function needed_step
+
   !> Counts an attempt of the present kind, and decides about a trial.
   pure subroutine count_attempt(choice, data, t, h, is_over)
     type(choice_t), intent(inout) :: choice
@@ -161,7 +171,7 @@ contains
     end if
     do kind = by_series, by_stages
       if (.not. data%has(kind)) cycle
-      needed = break_even(choice, data, kind, t, rate(choice, data, by_systems, t, h))
+      needed = needed_step(choice, data, kind, t, h)
       choice%signs(kind) = merge(choice%signs(kind) + 1, 0, min(needed, 1.0e100_wp) * choice%lambda &
                                  < safe_share * data%limit(kind))
     end do
