@@ -170,9 +170,10 @@ def test_a_result_that_is_not_finite_is_a_failed_variant(nocdyn):
 
 @needs_sweeps
 def test_check_refuses_the_method_that_a_sweep_refuses(nocdyn):
-    nocdyn.write("m.nml", SPINNER + "&coupling name = 'c' bodies = 'ground', 'disc' gap = 1.0 stiffness = 10 /\n" + SWEEP)
-    nocdyn.write("variants.csv", "coupling.c.gap\n1\n")
-    outcomes = [nocdyn(command, "m.nml", "--set", "run.method=taylor") for command in ("check", "sweep", "run")]
+    nocdyn.write("m.nml", SPINNER + "&coupling name = 'c' bodies = 'ground', 'disc' stiffness = 10 /\n" + SWEEP)
+    nocdyn.write("variants.csv", "coupling.c.stiffness\n1\n")
+    refused = ("--set", "run.method=taylor", "--set", "run.formulation=paper")
+    outcomes = [nocdyn(command, "m.nml", *refused) for command in ("check", "sweep", "run")]
     assert [outcome.returncode for outcome in outcomes] == [2, 2, 2]
     assert outcomes[0].stderr == outcomes[1].stderr == outcomes[2].stderr
 

@@ -33,36 +33,19 @@ MANY_ARGUMENTS = {
         "constructor: what the analysis of the constraints has found, and the bodies that the user wants",
         "build_coordinates",
     ),
-    "src/model/elements/couplings/gap_couplings.f90": ("index and motion of a gap, and its moments", "contact_moments"),
-    "src/model/elements/excitations/excitations.f90": (KERNEL, "harmonic_series"),
     "src/model/elements/polynomial_laws.f90": (KERNEL, "moments"),
-    "src/model/formulations/kernels/lane_motion.f90": (
-        KERNEL,
-        "accelerate",
-        "find_moments",
-        "sum_angles",
-        "sum_moments",
-        "sum_speeds",
-    ),
-    "src/model/formulations/kernels/lane_series.f90": (KERNEL, "expand"),
-    "src/model/formulations/kernels/reduced_series.f90": (KERNEL, "begin_moments", "continue_moments", "expand"),
-    "src/model/formulations/kernels/series_strips.f90": (
-        KERNEL,
-        "accelerate",
-        "begin_strip",
-        "expand_strip",
-        "find_moments",
-        "gather_laws",
-    ),
+    "src/model/formulations/kernels/series_kernel.inc": (KERNEL, "accelerate", "begin_motion", "find_moments", "find_values"),
+    "src/model/laws/law_harmonics.inc": (KERNEL, "harmonic_sum"),
     "src/model/lanes/sparse_map.f90": (KERNEL, "pair_of_rows", "pair_on_lanes"),
 }
 
 # Longer procedures, by file, and why.
 LONG_PROCEDURES = {
-    "src/model/formulations/kernels/series_strips.f90": (
+    "src/model/laws/law_values.f90": ("a table: one case for each operation", "value_of"),
+    "src/model/laws/law_harmonics.inc": (
         "kernel: what a loop keeps in registers cannot be shared with another procedure",
-        "accelerate",
-        "expand_strip",
+        "advance",
+        "expand",
     ),
 }
 
@@ -73,7 +56,11 @@ ARGUMENTS_OF_THE_CONTRACT = {"t", "y", "dydt", "dfdy", "dfdt"}
 @functools.cache
 def sources(folder):
     """Path from the project's folder -> what the file holds."""
-    return {path.relative_to(SOURCE).as_posix(): read_source(path) for path in sorted((SOURCE / folder).rglob("*.f90"))}
+    return {
+        path.relative_to(SOURCE).as_posix(): read_source(path)
+        for path in sorted((SOURCE / folder).rglob("*"))
+        if path.suffix in (".f90", ".inc")
+    }
 
 
 def procedures(folder):

@@ -1,23 +1,23 @@
 !> Machines with elements of every kind, for the tests that compare formulations, Jacobians and lanes.
 module nocdyn_test_full_machines
-  use nocdyn_bank, only: append_bank, role_excitation
-  use nocdyn_couplings, only: coupling_common_t, new_table_couplings
+  use nocdyn_bank, only: append_bank
+  use nocdyn_couplings, only: coupling_common_t
   use nocdyn_curves, only: curve_t, extrapolation_constant, extrapolation_linear, interpolation_cubic, interpolation_linear, &
                            new_curve
   use nocdyn_dc_motors, only: new_dc_motors
   use nocdyn_gap_couplings, only: new_gap_couplings
-  use nocdyn_governors, only: governor_t
+  use nocdyn_governed_banks, only: governor_t
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
-  use nocdyn_motors, only: new_curve_motors
+  use nocdyn_motors, only: new_induction_motors, new_motors, new_table_motors
   use nocdyn_loads, only: new_nonlinear_loads
   use nocdyn_polynomial_couplings, only: new_polynomial_couplings
   use nocdyn_saturated_couplings, only: new_saturated_couplings
-  use nocdyn_table_laws, only: new_table_laws, over_time
+  use nocdyn_table_couplings, only: new_table_couplings
+  use nocdyn_table_excitations, only: new_table_excitations
   use nocdyn_test_machines, only: finish, numbered_names
   use nocdyn_test_random_machines, only: random_machine
   use nocdyn_timed_excitations, only: new_timed_excitations, shape_pulse, shape_ramp, shape_step
-  use nocdyn_torque_curves, only: induction_curve_t, quadratic_curve_t
   use nocdyn_wave_excitations, only: new_wave_excitations
   implicit none (type, external)
   private
@@ -99,33 +99,24 @@ contains
     integer, intent(in) :: bodies, variants(:)
     type(machine_t), intent(inout) :: machine
     type(governor_t) :: governor
-    type(induction_curve_t) :: induction
-    type(quadratic_curve_t) :: quadratic
     type(curve_t) :: table(size(variants), 1)
 
-    allocate (induction%breakdown_torque, source=lane_values(60.0_wp, variants, 1))
-    allocate (induction%breakdown_slip, source=lane_values(0.3_wp, variants, 1))
-    allocate (induction%synchronous_speed, source=lane_values(10.0_wp, variants, 1))
     table = curves([-4.0_wp, 0.0_wp, 1.0_wp, 4.0_wp], [50.0_wp, 60.0_wp, 40.0_wp, -30.0_wp], &
                    interpolation_linear, extrapolation_linear, variants, 1)
-    allocate (quadratic%a, source=lane_values(30.0_wp, variants, 1))
-    allocate (quadratic%b, source=lane_values(3.0_wp, variants, 1))
-    allocate (quadratic%c, source=lane_values(0.1_wp, variants, 1))
     allocate (governor%set_speed, source=lane_values(1.0_wp, variants, 1))
     allocate (governor%gain, source=lane_values(0.3_wp, variants, 1))
     allocate (governor%time, source=lane_values(0.4_wp, variants, 1))
     allocate (governor%start, source=lane_values(0.5_wp, variants, 1))
     associate (one => lane_values(1.0_wp, variants, 1))
       call append_bank(machine%banks, &
-                       new_curve_motors(numbered_names('induction', 1), [1], size(variants), induction))
+                       new_induction_motors(numbered_names('induction', 1), [1], 60.0_wp * one, 0.3_wp * one, 10.0_wp * one))
       call append_bank(machine%banks, &
-                       new_curve_motors(numbered_names('table', 1), [bodies], size(variants), curve=table))
+                       new_table_motors(numbered_names('table', 1), [bodies], table))
       call append_bank(machine%banks, &
-                       new_curve_motors(numbered_names('governed', 1), [2], size(variants), quadratic, governor=governor, &
-                                        drag=2.0_wp * one))
+                       new_motors(numbered_names('governed', 1), [2], 30.0_wp * one, 3.0_wp * one, 0.1_wp * one, governor, &
+                                  2.0_wp * one))
       call append_bank(machine%banks, &
-                       new_curve_motors(numbered_names('throttled', 1), [1], size(variants), curve=table, governor=governor, &
-                                        drag=0.0_wp * one))
+                       new_table_motors(numbered_names('throttled', 1), [1], table, governor, 0.0_wp * one))
       call append_bank(machine%banks, &
                        new_dc_motors(numbered_names('dc', 1), [2], 24.0_wp * one, 2.0_wp * one, 1.5_wp * one, &
                                      0.5_wp * one))
@@ -164,9 +155,9 @@ contains
                                              [shape_step, shape_ramp, shape_pulse], 12.0_wp * one, &
                                              0.35_wp * one, 0.2_wp * one))
       call append_bank(machine%banks, &
-                       new_table_laws(role_excitation, numbered_names('record', 1), [2], over_time, &
-                                      curves([0.1_wp, 0.3_wp, 0.6_wp], [0.0_wp, 20.0_wp, -10.0_wp], interpolation_linear, &
-                                             extrapolation_constant, variants, 1)))
+                       new_table_excitations(numbered_names('record', 1), [2], &
+                                             curves([0.1_wp, 0.3_wp, 0.6_wp], [0.0_wp, 20.0_wp, -10.0_wp], interpolation_linear, &
+                                                    extrapolation_constant, variants, 1)))
     end associate
   end subroutine add_excitations
 

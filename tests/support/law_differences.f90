@@ -40,21 +40,20 @@ contains
 
   !> Sets moments, derivatives, energies and rates of the elements from their angles, speeds, internal states and time.
   subroutine evaluate_all(bank, elements)
-    class(bank_t), intent(in) :: bank
+    class(bank_t), intent(inout) :: bank
     type(elements_t), intent(inout) :: elements
     type(polynomial_laws_t) :: laws
 
     laws = new_polynomial_laws(bank%lanes, size(bank%to))
-    call bank%polynomials(laws)
+    call bank%polynomials(1, bank%lanes, laws)
     call laws%evaluate(elements)
     call laws%differentiate(elements)
     call laws%evaluate_energies(elements)
-    call bank%evaluate(elements%time, elements%angle, elements%speed, elements%restoring, elements%applied)
-    if (bank%states > 0) then
-      call bank%evaluate_internal(elements%speed, elements%internal%value, elements%applied, elements%internal%rate)
-    end if
-    call bank%differentiate(elements)
-    call bank%evaluate_energies(elements)
+    call bank%evaluate(elements%time, elements%angle, elements%speed, elements%internal%value, elements%restoring, &
+                       elements%applied, elements%internal%rate)
+    if (.not. allocated(bank%law)) return
+    call bank%law%differentiate(1, 1, elements)
+    call bank%law%evaluate_energies(1, elements)
   end subroutine evaluate_all
 
   !> Sets the branches of all lanes of a bank to those that contain the states of its elements.
@@ -74,7 +73,7 @@ contains
 
   !> Distances of the lanes from the boundaries of their branches, [lanes, switches].
   function indicators_of(bank, elements) result(indicators)
-    class(bank_t), intent(in) :: bank
+    class(bank_t), intent(inout) :: bank
     type(elements_t), intent(in) :: elements
     real(wp) :: indicators(bank%lanes, size(bank%switch_element))
     integer :: k, l
@@ -82,8 +81,8 @@ contains
     do k = 1, size(bank%switch_element)
       associate (e => bank%switch_element(k))
         do l = 1, bank%lanes
-          indicators(l, k) = bank%indicator(k, l, elements%time(l), elements%angle(l, e), elements%speed(l, e), &
-                                      states_of(bank, elements, l, e))
+          call bank%indicator(k, l, [elements%time(l), elements%angle(l, e), elements%speed(l, e)], &
+                              states_of(bank, elements, l, e), indicators(l, k))
         end do
       end associate
     end do
@@ -100,7 +99,7 @@ contains
 
   !> Derivatives of the laws of a bank by its angles, its speeds, the time or an internal state.
   function difference_laws(bank, elements, variable, by) result(slopes)
-    class(bank_t), intent(in) :: bank
+    class(bank_t), intent(inout) :: bank
     type(elements_t), intent(in) :: elements
     integer, intent(in) :: variable   !! by_...
     real(wp), intent(in), optional :: by   !! step; absent: 0.1, in time 0.001

@@ -1,7 +1,7 @@
 !> The banks of couplings of an input: one for each form of the elastic moment that it has.
 module nocdyn_coupling_assembly
   use nocdyn_bank, only: append_bank, bank_slot_t
-  use nocdyn_couplings, only: coupling_common_t, new_couplings, new_table_couplings
+  use nocdyn_couplings, only: coupling_common_t, new_couplings
   use nocdyn_element_groups, only: element_groups_t
   use nocdyn_errors, only: error_t, exit_input, raise
   use nocdyn_gap_couplings, only: new_gap_couplings
@@ -9,6 +9,7 @@ module nocdyn_coupling_assembly
   use nocdyn_kinds, only: wp
   use nocdyn_polynomial_couplings, only: elastic_coefficients, new_polynomial_couplings
   use nocdyn_saturated_couplings, only: new_saturated_couplings
+  use nocdyn_table_couplings, only: new_table_couplings
   use nocdyn_text, only: to_text
   implicit none (type, external)
   private

@@ -1,16 +1,14 @@
 !> The banks of motors of an input: one for each form of their laws that it has.
 module nocdyn_motor_assembly
   use nocdyn_bank, only: append_bank, bank_slot_t
-  use nocdyn_curves, only: curve_t
   use nocdyn_dc_motors, only: new_dc_motors
   use nocdyn_element_groups, only: element_groups_t
   use nocdyn_errors, only: error_t, exit_input, raise
-  use nocdyn_governors, only: governor_t
+  use nocdyn_governed_banks, only: governor_t
   use nocdyn_input, only: group_t, input_t
   use nocdyn_kinds, only: wp
-  use nocdyn_motors, only: new_curve_motors, new_motors
+  use nocdyn_motors, only: new_induction_motors, new_motors, new_table_motors
   use nocdyn_text, only: to_text
-  use nocdyn_torque_curves, only: induction_curve_t, quadratic_curve_t, torque_curve_t
   implicit none (type, external)
   private
 
@@ -64,26 +62,31 @@ contains
     type(element_groups_t), intent(in) :: groups
     integer, intent(in) :: form
     type(bank_slot_t), allocatable, intent(inout) :: banks(:)
-    class(torque_curve_t), allocatable :: law
-    type(curve_t), allocatable :: curve(:, :)
     type(governor_t), allocatable :: governor
+    real(wp), allocatable :: drag(:, :)
     integer :: body(size(groups%indices))
 
     body = groups%bodies('body', 1)
+    if (modulo(form, 2) == 0) then
+      allocate (governor, source=governor_of(groups))
+      allocate (drag, source=drags(groups))
+    end if
     select case (form)
     case (quadratic)
       call append_bank(banks, new_motors(groups%names, body, standstill_torques(groups), groups%values('b') + drags(groups), &
                                          groups%values('c')))
-    case (inductive, inductive + 1)
-      if (form > inductive) allocate (governor, source=governor_of(groups))
+    case (quadratic + 1)
+      call append_bank(banks, new_motors(groups%names, body, standstill_torques(groups), groups%values('b'), groups%values('c'), &
+                                         governor, drag))
+    case (induction, induction + 1)
+      call append_bank(banks, new_induction_motors(groups%names, body, groups%values('breakdown_torque'), &
+                                                   groups%values('breakdown_slip'), groups%values('synchronous_speed'), &
+                                                   governor, drag))
+    case (table, table + 1)
+      call append_bank(banks, new_table_motors(groups%names, body, groups%curves('table_speed', 'table_torque'), governor, drag))
+    case default
       call append_bank(banks, new_dc_motors(groups%names, body, groups%values('voltage'), groups%values('resistance'), &
                                             groups%values('flux_constant'), groups%values('inductance'), governor))
-    case (induction, table)
-      call make_law(groups, form, law, curve)
-      call append_bank(banks, new_curve_motors(groups%names, body, groups%lanes, law, curve))
-    case default
-      call make_law(groups, form - 1, law, curve)
-      call append_bank(banks, new_curve_motors(groups%names, body, groups%lanes, law, curve, governor_of(groups), drags(groups)))
     end select
   end subroutine add_motor_form
 
@@ -95,31 +98,6 @@ contains
     allocate (governor%time, source=groups%values('governor_time'))
     allocate (governor%start, source=groups%values('governor_start'))
   end function governor_of
-
-  !> The torque at full throttle over the speed, either as a law or as tables; the other one is not allocated.
-  subroutine make_law(groups, form, law, curve)
-    type(element_groups_t), intent(in) :: groups
-    integer, intent(in) :: form   !! quadratic, induction or table
-    class(torque_curve_t), allocatable, intent(out) :: law
-    type(curve_t), allocatable, intent(out) :: curve(:, :)
-    type(induction_curve_t) :: kloss
-    type(quadratic_curve_t) :: parabola
-
-    select case (form)
-    case (quadratic)
-      allocate (parabola%a, source=standstill_torques(groups))
-      allocate (parabola%b, source=groups%values('b'))
-      allocate (parabola%c, source=groups%values('c'))
-      allocate (law, source=parabola)
-    case (induction)
-      allocate (kloss%breakdown_torque, source=groups%values('breakdown_torque'))
-      allocate (kloss%breakdown_slip, source=groups%values('breakdown_slip'))
-      allocate (kloss%synchronous_speed, source=groups%values('synchronous_speed'))
-      allocate (law, source=kloss)
-    case default
-      allocate (curve, source=groups%curves('table_speed', 'table_torque'))
-    end select
-  end subroutine make_law
 
   !> Torques at standstill [N m]: `a` of quadratic motors, `torque` of constant ones, k voltage / resistance of dc motors.
   function standstill_torques(groups) result(torques)

@@ -1,12 +1,12 @@
 !> The banks of loads and excitations of an input: one for each form of their laws that it has.
 module nocdyn_torque_assembly
-  use nocdyn_bank, only: append_bank, bank_slot_t, role_excitation
+  use nocdyn_bank, only: append_bank, bank_slot_t
   use nocdyn_element_groups, only: element_groups_t
   use nocdyn_excitations, only: new_excitations
   use nocdyn_input, only: group_t
   use nocdyn_kinds, only: wp
   use nocdyn_loads, only: new_loads, new_nonlinear_loads
-  use nocdyn_table_laws, only: new_table_laws, over_time
+  use nocdyn_table_excitations, only: new_table_excitations
   use nocdyn_timed_excitations, only: new_timed_excitations, shape_pulse, shape_ramp, shape_step
   use nocdyn_wave_excitations, only: new_wave_excitations
   implicit none (type, external)
@@ -83,8 +83,8 @@ contains
     case (waves)
       call add_waves(groups, body, banks)
     case (table)
-      call append_bank(banks, new_table_laws(role_excitation, groups%names, body, over_time, &
-                                             groups%curves('table_time', 'table_torque', extrapolation='constant')))
+      call append_bank(banks, new_table_excitations(groups%names, body, &
+                                                    groups%curves('table_time', 'table_torque', extrapolation='constant')))
     case default
       shape = shape_pulse
       do i = 1, size(body)

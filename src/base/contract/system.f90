@@ -41,6 +41,7 @@ module nocdyn_system
     integer :: switches = 0      !! indicator functions: a step ends where one of them falls through zero
     integer :: measures = 0      !! quantities in which `measure` measures errors; 0: errors are those of the states
     integer :: phases = 0        !! the last of these: angles whose speeds tell nothing about the step size
+    logical :: hides_bends = .false. !! whether a series of the solution may not show a bend of it, however near, as that of tanh
     logical :: may_shift = .false.   !! whether `find_far` is called after every step
   contains
     procedure(derivative_interface), deferred :: derivative

@@ -14,6 +14,12 @@ module nocdyn_curves
   integer, parameter, public :: extrapolation_linear = 1     !! with the slope at the end
   integer, parameter, public :: extrapolation_constant = 2   !! with the value at the end
 
+  !> Numbers of a segment.
+  integer, parameter, public :: segment_origin = 1, segment_value = 2, segment_slope = 3, segment_half_curvature = 4
+  integer, parameter, public :: segment_cubic = 5, segment_area = 6
+  integer, parameter, public :: segment_begin = 7, segment_end = 8   !! huge where there is none
+  integer, parameter, public :: segment_size = 9                     !! largest |x| of all points
+
   !> Segment s lies between points s and s + 1, segment 0 before the first point, segment `points` behind the last one. The
   !> polynomial of a segment may be evaluated anywhere.
   type, public :: curve_t
@@ -26,12 +32,7 @@ module nocdyn_curves
     procedure :: knots
     procedure :: is_same
     procedure :: segment
-    procedure :: inset
-    procedure :: distance_to_end
-    procedure :: value
-    procedure :: slope
-    procedure :: curvature
-    procedure :: integral
+    procedure :: segment_number
   end type curve_t
 
 contains
@@ -67,7 +68,7 @@ contains
     end if
     if (extrapolation == extrapolation_linear) self%coefficient(1, [0, n]) = slope([1, n])
     do i = 1, n - 1
-      self%area(i + 1) = self%integral(i, x(i + 1))
+      self%area(i + 1) = integral_to(self, i, x(i + 1))
     end do
   end function new_curve
 
@@ -153,71 +154,39 @@ contains
     end do
   end function segment
 
-  !> Distance of x from the nearer end of a segment, whose ends are shifted outwards: negative outside, in the unit of x.
-  pure function inset(self, segment, x, width)
+  !> A number of a segment, by its name. On the segment the curve is value + d (slope + d (half_curvature + d cubic)) with
+  !> d = x - origin; `area` is its integral from zero to the origin.
+  pure real(wp) function segment_number(self, segment, name) result(number)
     class(curve_t), intent(in) :: self
     integer, intent(in) :: segment   !! 0 to points
-    real(wp), intent(in) :: x        !! anywhere
-    real(wp), intent(in) :: width   !! shift of the ends, relative to the largest |x| of the points
-    real(wp) :: inset
+    integer, intent(in) :: name      !! segment_...
+    integer :: at_zero
 
-    inset = self%distance_to_end(segment, x)
-    if (segment > 0) inset = min(inset, x - self%knot(segment))
-    inset = inset + width * max(abs(self%knot(1)), abs(self%knot(size(self%knot))))
-  end function inset
-
-  !> Distance of x from the upper end of a segment, huge in the last one.
-  pure function distance_to_end(self, segment, x) result(distance)
-    class(curve_t), intent(in) :: self
-    integer, intent(in) :: segment   !! 0 to points
-    real(wp), intent(in) :: x        !! anywhere
-    real(wp) :: distance
-
-    distance = huge(distance)
-    if (segment < size(self%knot)) distance = self%knot(segment + 1) - x
-  end function distance_to_end
-
-  !> Value of the polynomial of a segment.
-  pure function value(self, segment, x)
-    class(curve_t), intent(in) :: self
-    integer, intent(in) :: segment   !! 0 to points
-    real(wp), intent(in) :: x        !! anywhere
-    real(wp) :: d, value
-
-    d = x - self%origin(segment)
-    associate (c => self%coefficient(:, segment))
-      value = c(1) + d * (c(2) + d * (c(3) + d * c(4)))
-    end associate
-  end function value
-
-  !> First derivative.
-  pure function slope(self, segment, x)
-    class(curve_t), intent(in) :: self
-    integer, intent(in) :: segment   !! 0 to points
-    real(wp), intent(in) :: x        !! anywhere
-    real(wp) :: d, slope
-
-    d = x - self%origin(segment)
-    associate (c => self%coefficient(:, segment))
-      slope = c(2) + d * (2.0_wp * c(3) + d * 3.0_wp * c(4))
-    end associate
-  end function slope
-
-  !> Second derivative.
-  pure function curvature(self, segment, x)
-    class(curve_t), intent(in) :: self
-    integer, intent(in) :: segment   !! 0 to points
-    real(wp), intent(in) :: x        !! anywhere
-    real(wp) :: curvature
-
-    associate (c => self%coefficient(:, segment))
-      curvature = 2.0_wp * c(3) + (x - self%origin(segment)) * 6.0_wp * c(4)
-    end associate
-  end function curvature
+    select case (name)
+    case (segment_origin)
+      number = self%origin(segment)
+    case (segment_value, segment_slope, segment_half_curvature, segment_cubic)
+      number = self%coefficient(name - segment_value, segment)
+    case (segment_area)
+      at_zero = self%segment(0.0_wp)
+      number = self%area(segment) - integral_to(self, at_zero, 0.0_wp)
+    case (segment_begin)
+      number = -huge(number)
+      if (segment > 0) number = self%knot(segment)
+    case (segment_end)
+      number = huge(number)
+      if (segment < size(self%knot)) number = self%knot(segment + 1)
+    case (segment_size)
+      number = max(abs(self%knot(1)), abs(self%knot(size(self%knot))))
+    case default
+      number = 0.0_wp
+      error stop 'nocdyn_curves: no such number of a segment'
+    end select
+  end function segment_number
 
   !> The integral from the first point to x.
-  pure function integral(self, segment, x)
-    class(curve_t), intent(in) :: self
+  pure function integral_to(self, segment, x) result(integral)
+    type(curve_t), intent(in) :: self
     integer, intent(in) :: segment   !! that contains x
     real(wp), intent(in) :: x
     real(wp) :: d, integral
@@ -226,6 +195,6 @@ contains
     associate (c => self%coefficient(:, segment))
       integral = self%area(segment) + d * (c(1) + d * (c(2) / 2.0_wp + d * (c(3) / 3.0_wp + d * c(4) / 4.0_wp)))
     end associate
-  end function integral
+  end function integral_to
 
 end module nocdyn_curves

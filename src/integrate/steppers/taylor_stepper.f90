@@ -2,7 +2,8 @@
 !>
 !> The last two coefficients limit the step size: h is the smaller of ||y_j||^(-1/j), j = p - 1 and p, where the norm is the
 !> largest |y_j| / (atol + rtol |y|) of the states, or of the quantities that the system measures. The terms h^j y_j are then
-!> within the tolerance, and there is no error test after a step. The last term of the quadratures is kept within theirs. With
+!> within the tolerance, and there is no error test after a step; `nocdyn_series_defects` tests the series of systems that have
+!> more than their series show. The last term of the quadratures is kept within theirs. With
 !> p = 1 - ln(tol) / 2 this is the step rho / e^2 of A. Jorba, M. Zou, A software package for the numerical integration of ODEs
 !> by means of high-order Taylor methods, Experimental Mathematics 14 (2005) 99-117. They assume that the work grows as p^2. Here
 !> it grows more slowly at small p, and the order is higher.
@@ -12,6 +13,7 @@ module nocdyn_taylor_stepper
   use nocdyn_kinds, only: wp
   use nocdyn_masks, only: all_true, any_differs
   use nocdyn_observer, only: observer_t, step_block_t
+  use nocdyn_series_defects, only: new_series_defects, series_defects_t
   use nocdyn_series_sums, only: scale_series, sum_series
   use nocdyn_stage_sums, only: padded_columns
   use nocdyn_step_attempt, only: attempt_not_finite, attempt_ok, attempt_recoverable, disable_lane, disable_non_finite_lanes, &
@@ -41,6 +43,8 @@ module nocdyn_taylor_stepper
     integer, allocatable :: step_status(:)     !! attempt_... of the series of each lane
     integer, allocatable :: component(:)       !! component that caused the status, 0 if none did
     integer, allocatable :: infinite(:)        !! first component whose new series is not finite, 0 if all are
+    logical, allocatable :: chosen(:)          !! lanes with new step sizes
+    type(series_defects_t) :: defects
   contains
     procedure :: choose_steps
     procedure :: prepare
@@ -79,12 +83,14 @@ contains
     class(system_t), intent(in) :: system
 
     if (allocated(self%series)) deallocate (self%series, self%previous, self%last_norm, self%previous_norm, &
-                                            self%log_growth, self%moved, self%step_status, self%component, self%infinite)
+                                            self%log_growth, self%moved, self%step_status, self%component, self%infinite, &
+                                            self%chosen)
     associate (lanes => system%lanes)
       allocate (self%series(lanes, padded_columns(lanes, system%states + system%quadratures), 0:self%order), source=0.0_wp)
       allocate (self%previous(lanes, system%measures), self%last_norm(lanes), self%previous_norm(lanes), &
                 self%log_growth(lanes), source=0.0_wp)
-      allocate (self%moved(lanes), source=.true.)
+      allocate (self%moved(lanes), self%chosen(lanes), source=.true.)
+      if (system%hides_bends) self%defects = new_series_defects(system, self%order, size(self%series, 2))
       allocate (self%step_status(lanes), source=attempt_ok)
       allocate (self%component(lanes), self%infinite(lanes), source=0)
     end associate
@@ -119,16 +125,30 @@ contains
     call measure_norms(self, system, attempt, control)
     call find_steps(attempt%lanes, self%order, self%last_norm, self%previous_norm, self%log_growth)
     if (attempt%components > attempt%states) call limit_by_quadratures(self, attempt, control)
+    self%chosen(:) = self%moved .and. attempt%active
     if (have_all_moved .and. are_finite .and. .not. any_differs(attempt%lanes, attempt%rhs_status, evaluation_ok)) then
       if (.not. any_too_small(attempt%lanes, attempt%t, self%last_norm)) then
         call take_all_steps(attempt%lanes, self%last_norm, self%moved, self%step_status, self%component, attempt%evaluations, &
                             control%h)
+        if (system%hides_bends) call shorten_steps(self, system, attempt, control)
         return
       end if
     end if
     call take_steps(self, attempt, control)
     attempt%rhs_status(:) = evaluation_ok
+    if (system%hides_bends) call shorten_steps(self, system, attempt, control)
   end subroutine choose_steps
+
+  !> Shortens new steps whose series do not show what happens in them.
+  subroutine shorten_steps(self, system, attempt, control)
+    type(taylor_stepper_t), intent(inout) :: self
+    class(system_t), intent(inout) :: system
+    type(step_attempt_t), intent(inout) :: attempt
+    type(step_control_t), intent(inout) :: control
+
+    self%chosen(:) = self%chosen .and. self%step_status == attempt_ok
+    call self%defects%shorten_steps(system, attempt, control, self%series, self%chosen)
+  end subroutine shorten_steps
 
   !> Sets the step sizes where all lanes have moved and have finite series.
   pure subroutine take_all_steps(lanes, steps, moved, step_status, component, evaluations, h)

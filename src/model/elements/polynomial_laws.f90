@@ -13,6 +13,10 @@ module nocdyn_polynomial_laws
 
   public :: new_polynomial_laws
 
+  !> Names of the coefficients.
+  integer, parameter, public :: coefficient_rest = 1, coefficient_linear = 2, coefficient_cubic = 3, coefficient_constant = 4
+  integer, parameter, public :: coefficient_by_speed = 5, coefficient_by_speed_squared = 6, coefficient_damping = 7
+
   !> The coefficients of all elements, shape [lanes, elements]; zero where a law has no such term.
   type, public :: polynomial_laws_t
     real(wp), allocatable :: rest(:, :)               !! [rad]
@@ -28,6 +32,7 @@ module nocdyn_polynomial_laws
     integer, allocatable, private :: first(:)         !! first element of each part, [parts + 1]
     logical, allocatable, private :: is_plain(:)      !! whether all elements of a part are plain springs; before part 1: true
   contains
+    procedure :: set
     procedure :: find_plain_parts
     procedure :: refresh_lane
     procedure :: list_parameters
@@ -51,6 +56,33 @@ contains
     allocate (self%first(elements + 1), source=1)
     allocate (self%is_plain(0:elements), source=.true.)
   end function new_polynomial_laws
+
+  !> Sets a coefficient of an element in one lane.
+  pure subroutine set(self, coefficient, lane, element, value)
+    class(polynomial_laws_t), intent(inout) :: self
+    integer, intent(in) :: coefficient   !! coefficient_...
+    integer, intent(in) :: lane, element
+    real(wp), intent(in) :: value        !! in the unit of the coefficient
+
+    select case (coefficient)
+    case (coefficient_rest)
+      self%rest(lane, element) = value
+    case (coefficient_linear)
+      self%linear(lane, element) = value
+    case (coefficient_cubic)
+      self%cubic(lane, element) = value
+    case (coefficient_constant)
+      self%constant(lane, element) = value
+    case (coefficient_by_speed)
+      self%by_speed(lane, element) = value
+    case (coefficient_by_speed_squared)
+      self%by_speed_squared(lane, element) = value
+    case (coefficient_damping)
+      self%damping(lane, element) = value
+    case default
+      error stop 'nocdyn_polynomial_laws: no such coefficient'
+    end select
+  end subroutine set
 
   !> Divides the elements into long runs of plain springs and the others. To be called when the coefficients are set.
   subroutine find_plain_parts(self)

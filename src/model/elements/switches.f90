@@ -60,16 +60,17 @@ contains
   end subroutine choose
 
   !> Distance of a lane from the nearest boundary of the present branch of a switch, negative beyond it.
-  pure real(wp) function indicator(self, banks, switch, lane, t, angle, speed, internal)
+  subroutine indicator(self, banks, switch, lane, motion, internal, distance)
     class(switches_t), intent(in) :: self
-    type(bank_slot_t), intent(in) :: banks(:)
+    type(bank_slot_t), intent(inout) :: banks(:)
     integer, intent(in) :: switch, lane   !! switch numbered in the machine
-    real(wp), intent(in) :: t, angle, speed   !! [s]; of the element of the switch [rad], [rad/s]
-    real(wp), intent(in) :: internal(:)       !! the internal states of all elements
+    real(wp), intent(in) :: motion(3)     !! t [s]; of the element of the switch u [rad], u' [rad/s]
+    real(wp), intent(in) :: internal(:)   !! the internal states of all elements
+    real(wp), intent(out) :: distance     !! in a unit of the law
 
-    indicator = banks(self%bank(switch))%bank%indicator(self%number(switch), lane, t, angle, speed, &
-                                                        internal(self%first_internal(switch):self%last_internal(switch)))
-  end function indicator
+    call banks(self%bank(switch))%bank%indicator(self%number(switch), lane, motion, &
+                                                 internal(self%first_internal(switch):self%last_internal(switch)), distance)
+  end subroutine indicator
 
   !> E.g. "edge of the gap of coupling 'mesh'".
   function name(self, banks, switch)

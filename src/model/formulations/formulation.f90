@@ -259,7 +259,8 @@ contains
     associate (switches => self%machine%switches)
       do switch = 1, self%switches
         call self%switch_motion(lane, switch, y, angle, speed)
-        g(switch) = switches%indicator(self%machine%banks, switch, lane, t, angle, speed, y(self%mechanical + 1:self%states))
+        call switches%indicator(self%machine%banks, switch, lane, [t, angle, speed], y(self%mechanical + 1:self%states), &
+                                g(switch))
       end do
     end associate
   end subroutine indicator_values

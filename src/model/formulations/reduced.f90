@@ -5,20 +5,15 @@
 !> u' = U q'. Their moments M give q'' = R M with R = (L_tau^T J L_tau)^-1 L_tau^T B, where the columns of B are
 !> the unit moments of the elements on their two bodies, and U = B^T L_tau.
 module nocdyn_reduced
-  use nocdyn_bank, only: role_names
   use nocdyn_coordinate_formulation, only: coordinate_formulation_t
   use nocdyn_kinds, only: wp
   use nocdyn_lane_parameters, only: lane_parameters_t
-  use nocdyn_lane_motion, only: lane_motion_t, motion_strip, new_lane_motion
-  use nocdyn_lane_series, only: lane_series_t, new_lane_series
-  use nocdyn_lane_terms, only: is_polynomial_or_external, lane_terms_t, new_lane_terms
+  use nocdyn_law_tape, only: op_tanh
   use nocdyn_machine, only: machine_t
   use nocdyn_reduced_jacobian, only: new_reduced_jacobian, reduced_jacobian_t
   use nocdyn_reduced_series, only: new_reduced_series, reduced_series_t
-  use nocdyn_series_strips, only: strip
   use nocdyn_sparse_map, only: new_sparse_map, sparse_map_t, transposed_order
   use nocdyn_system, only: pattern_t
-  use nocdyn_text, only: quoted
   implicit none (type, external)
   private
 
@@ -28,11 +23,7 @@ module nocdyn_reduced
     type(sparse_map_t), private :: accelerations            !! R
     integer, allocatable, private :: response_entry(:)      !! entry of `incidence` of each entry of R
     type(reduced_jacobian_t), private :: element_jacobian   !! R diag U
-    type(reduced_series_t), private :: series_kernel        !! Taylor recurrence of any machine, after `prepare_series`
-    ! For a block of several lanes without work integrals whose laws are polynomials or depend on the time alone:
-    type(lane_terms_t), allocatable, private :: terms          !! terms of its laws
-    type(lane_motion_t), allocatable, private :: lane_motion   !! accelerations of strips, if the lanes are whole strips
-    type(lane_series_t), allocatable, private :: lane_series   !! replaces `series_kernel`, if the lanes are whole strips
+    type(reduced_series_t), private :: series_kernel        !! Taylor recurrence, after `prepare_series`
     real(wp), allocatable, private :: moment(:, :)             !! M [N m], [lanes, elements], work space
   contains
     procedure :: formulate
@@ -75,14 +66,7 @@ contains
       self%element_jacobian = new_reduced_jacobian(freedoms, incidence, machine%with_work(:self%quadratures), &
                                                    machine%elements%internal)
       self%moment = 0.0_wp * self%zero_twist
-      if (allocated(self%terms)) deallocate (self%terms)
-      if (allocated(self%lane_motion)) deallocate (self%lane_motion)
-      if (machine%lanes > 1 .and. self%quadratures == 0 .and. is_polynomial_or_external(machine)) then
-        allocate (self%terms, source=new_lane_terms(machine))
-        if (modulo(machine%lanes, motion_strip) == 0) then
-          allocate (self%lane_motion, source=new_lane_motion(machine%lanes, size(machine%elements%to)))
-        end if
-      end if
+      if (machine%lanes > 1) call self%prepare_series(1)
     end associate
   end subroutine formulate
 
@@ -146,11 +130,8 @@ contains
     integer, intent(in) :: lane
 
     call self%reset_origin(lane)
-    call self%machine%laws%refresh_lane(lane)
+    call self%machine%refresh_lane(lane)
     call self%series_kernel%refresh_lane(lane, self%machine%laws, self%twists, self%accelerations)
-    if (.not. allocated(self%terms)) return
-    call self%terms%add_lane_terms(self%machine, lane)
-    if (allocated(self%lane_motion)) call self%lane_motion%invalidate(lane)
   end subroutine refresh_lane
 
   !> q'' = R M, and the derivatives of internal states and work integrals.
@@ -161,6 +142,10 @@ contains
     real(wp), intent(inout) :: dydt(self%lanes, self%states + self%quadratures)   !! its derivative
     integer, intent(inout) :: status(self%lanes)
 
+    if (self%lanes > 1) then
+      call self%series_kernel%derivative(self%machine, self%twists, self%accelerations, self%twist_at_origin, t, y, dydt)
+      return
+    end if
     call fill_derivative(self, self%lanes * self%machine%coordinates%freedoms, self%lanes * self%internal, self%quadratures, &
                          t, y, dydt)
   end subroutine derivative
@@ -176,14 +161,9 @@ contains
     real(wp), intent(inout) :: dydt(2 * n + internal + self%lanes * quadratures)   !! its derivative
     integer :: i
 
-    if (allocated(self%lane_motion)) then
-      call self%lane_motion%accelerate(self%machine, self%terms, self%twists, self%accelerations, self%twist_at_origin, t, y, &
-                                       y(n + 1), dydt)
-    else
-      call evaluate_at(self, n, internal, t, y)
-      call add(size(self%moment), self%machine%elements%restoring, self%machine%elements%applied, self%moment)
-      call self%accelerations%multiply(self%moment, dydt)
-    end if
+    call evaluate_at(self, n, internal, t, y)
+    call add(size(self%moment), self%machine%elements%restoring, self%machine%elements%applied, self%moment)
+    call self%accelerations%multiply(self%moment, dydt)
     do i = 1, n
       dydt(n + i) = y(i)
     end do
@@ -204,20 +184,12 @@ contains
     call self%machine%evaluate_elements(t)
   end subroutine evaluate_at
 
-  !> Sentence about the first element without a Taylor series; empty if every element has one.
+  !> There is none: every law has a series.
   subroutine series_obstacle(self, obstacle)
     class(reduced_t), intent(in) :: self
     character(len=:), allocatable, intent(out) :: obstacle
-    integer :: i
 
     obstacle = ''
-    do i = 1, size(self%machine%banks)
-      associate (bank => self%machine%banks(i)%bank)
-        if (size(bank%to) == 0 .or. bank%has_series()) cycle
-        obstacle = trim(role_names(bank%role)) // ' ' // quoted(bank%names(1)%text) // ' has no Taylor series'
-        return
-      end associate
-    end do
   end subroutine series_obstacle
 
   !> Allocates the recurrence for series up to an order.
@@ -225,12 +197,8 @@ contains
     class(reduced_t), intent(inout) :: self
     integer, intent(in) :: order
 
-    if (allocated(self%lane_series)) deallocate (self%lane_series)
-    if (allocated(self%terms) .and. modulo(self%lanes, strip) == 0) then
-      allocate (self%lane_series, source=new_lane_series(self%machine, self%twists, self%accelerations, order))
-    else
-      self%series_kernel = new_reduced_series(self%machine, self%twists, self%accelerations, self%has_energy_balance, order)
-    end if
+    self%series_kernel = new_reduced_series(self%machine, self%twists, self%accelerations, self%has_energy_balance, order)
+    self%hides_bends = self%machine%has_operation(op_tanh)
   end subroutine prepare_series
 
   !> Taylor coefficients of the solution through y(:, :, 0).
@@ -241,12 +209,7 @@ contains
     real(wp), intent(inout) :: y(self%lanes, columns, 0:order)   !! coefficients; number 0 is given
     integer, intent(inout) :: status(self%lanes)
 
-    if (allocated(self%lane_series)) then
-      call self%lane_series%expand(self%machine, self%terms, self%twists, self%accelerations, self%twist_at_origin, columns, t, y)
-    else
-      call self%series_kernel%expand(self%machine, self%twists, self%accelerations, self%twist_at_origin, &
-                              self%lanes * self%machine%coordinates%freedoms, self%lanes * columns, t, y)
-    end if
+    call self%series_kernel%expand(self%machine, self%twists, self%accelerations, self%twist_at_origin, columns, t, y)
   end subroutine series
 
   !> Copies an array of any shape, by address.

@@ -3,7 +3,7 @@ module nocdyn_machine
   use nocdyn_bank, only: bank_of, bank_slot_t, bank_t, name_length, role_names
   use nocdyn_constraints, only: constraints_t
   use nocdyn_coordinates, only: coordinates_t
-  use nocdyn_elements, only: elements_t, new_elements
+  use nocdyn_elements, only: elements_t, internal_states_t, new_elements
   use nocdyn_geared_groups, only: geared_group_t
   use nocdyn_kinds, only: wp
   use nocdyn_lane_parameters, only: lane_parameters_t
@@ -60,8 +60,9 @@ module nocdyn_machine
     procedure :: differentiate
     procedure :: differentiate_elements
     procedure :: evaluate_energies
-    procedure :: forcing_series
+    procedure :: refresh_lane
     procedure :: power
+    procedure :: has_operation
     procedure :: kinetic_energy
   end type machine_t
 
@@ -79,7 +80,6 @@ contains
         bank%first = total + 1
         bank%first_value = self%lanes * total + 1
         bank%first_internal = internal + 1
-        bank%first_internal_value = self%lanes * internal + 1
         total = bank%last()
         internal = internal + bank%states * size(bank%to)
       end associate
@@ -89,7 +89,8 @@ contains
                                  [(spread(self%banks(i)%bank%states, 1, size(self%banks(i)%bank%to)), i=1, size(self%banks))])
     self%laws = new_polynomial_laws(self%lanes, total)
     do i = 1, size(self%banks)
-      call self%banks(i)%bank%polynomials(self%laws)
+      call self%banks(i)%bank%polynomials(1, self%lanes, self%laws)
+      call self%banks(i)%bank%prepare_law(total)
     end do
     call self%laws%find_plain_parts()
     self%general_banks = pack([(i, i=1, size(self%banks))], [(self%banks(i)%bank%values > 0 .and. &
@@ -272,44 +273,46 @@ contains
 
     call self%laws%evaluate(self%elements)
     do i = 1, size(self%general_banks)
-      associate (bank => self%banks(self%general_banks(i))%bank, elements => self%elements)
-        call evaluate_bank(bank, size(elements%angle), t, elements%angle, elements%speed, elements%restoring, elements%applied)
-      end associate
-    end do
-    if (self%elements%internal%count == 0) return
-    do i = 1, size(self%internal_banks)
-      associate (bank => self%banks(self%internal_banks(i))%bank, elements => self%elements, internal => self%elements%internal)
-        call evaluate_internal_of_bank(bank, size(elements%angle), size(internal%value), elements%speed, internal%value, &
-                                    elements%applied, internal%rate)
+      associate (bank => self%banks(self%general_banks(i))%bank, elements => self%elements, internal => self%elements%internal)
+        call evaluate_bank(bank, size(elements%angle), t, elements%angle, elements%speed, internal, elements%restoring, &
+                           elements%applied)
       end associate
     end do
   end subroutine evaluate_elements
 
+  !> Whether the law of some bank has an operation.
+  pure logical function has_operation(self, operation)
+    class(machine_t), intent(in) :: self
+    integer, intent(in) :: operation   !! op_...
+    integer :: i, k
+
+    has_operation = .false.
+    do i = 1, size(self%general_banks)
+      associate (tape => self%banks(self%general_banks(i))%bank%law%law%tape)
+        has_operation = has_operation .or. any([(tape%node(k)%operation == operation, k=1, tape%count)])
+      end associate
+    end do
+  end function has_operation
+
   !> Calls the law of a bank with its part of all values. Only addresses are passed, no array descriptors.
-  subroutine evaluate_bank(bank, n, t, angle, speed, restoring, applied)
-    class(bank_t), intent(in) :: bank
+  subroutine evaluate_bank(bank, n, t, angle, speed, internal, restoring, applied)
+    class(bank_t), intent(inout) :: bank
     integer, intent(in) :: n                              !! lanes * elements of the machine
     real(wp), intent(in) :: t(bank%lanes)                 !! [s]
     real(wp), intent(in) :: angle(n), speed(n)            !! [rad], [rad/s]
+    type(internal_states_t), intent(inout) :: internal
     real(wp), intent(inout) :: restoring(n), applied(n)   !! [N m]
+    real(wp) :: no_rates(0)
 
-    associate (first => bank%first_value)
-      call bank%evaluate(t, angle(first), speed(first), restoring(first), applied(first))
+    associate (first => bank%first_value, state => bank%first_internal)
+      if (bank%states > 0) then
+        call bank%evaluate(t, angle(first), speed(first), internal%value(1, state), restoring(first), applied(first), &
+                           internal%rate(1, state))
+      else
+        call bank%evaluate(t, angle(first), speed(first), no_rates, restoring(first), applied(first), no_rates)
+      end if
     end associate
   end subroutine evaluate_bank
-
-  !> The same for the rates and torques of the internal states of a bank.
-  subroutine evaluate_internal_of_bank(bank, n, internal_values, speed, internal, applied, rate)
-    class(bank_t), intent(in) :: bank
-    integer, intent(in) :: n                                       !! lanes * elements of the machine
-    integer, intent(in) :: internal_values                         !! lanes * internal states of the machine
-    real(wp), intent(in) :: speed(n), internal(internal_values)    !! [rad/s], internal states
-    real(wp), intent(inout) :: applied(n), rate(internal_values)   !! [N m], derivatives of the internal states
-
-    associate (first => bank%first_value, first_internal => bank%first_internal_value)
-      call bank%evaluate_internal(speed(first), internal(first_internal), applied(first), rate(first_internal))
-    end associate
-  end subroutine evaluate_internal_of_bank
 
   !> Moments of all elements and their derivatives.
   subroutine differentiate(self, t, phi, omega)
@@ -332,7 +335,9 @@ contains
     self%elements%time(:) = t
     call self%laws%differentiate(self%elements)
     do i = 1, size(self%general_banks)
-      call self%banks(self%general_banks(i))%bank%differentiate(self%elements)
+      associate (bank => self%banks(self%general_banks(i))%bank)
+        call bank%law%differentiate(bank%first, bank%first_internal, self%elements)
+      end associate
     end do
   end subroutine differentiate_elements
 
@@ -343,24 +348,23 @@ contains
 
     call self%laws%evaluate_energies(self%elements)
     do i = 1, size(self%general_banks)
-      call self%banks(self%general_banks(i))%bank%evaluate_energies(self%elements)
+      associate (bank => self%banks(self%general_banks(i))%bank)
+        call bank%law%evaluate_energies(bank%first, self%elements)
+      end associate
     end do
   end subroutine evaluate_energies
 
-  !> Taylor coefficients 0 to `last` of the torques that depend on the time alone.
-  subroutine forcing_series(self, last, stride, t, applied)
-    class(machine_t), intent(in) :: self
-    integer, intent(in) :: last, stride                      !! number of the last coefficient; from column to column
-    real(wp), intent(in) :: t(self%lanes)                    !! [s]
-    real(wp), intent(inout) :: applied(stride, 0:last + 1)   !! [N m / s^k]; the last column leaves room for offsets
+  !> Computes what the laws keep of the parameters of a lane, after these have changed.
+  subroutine refresh_lane(self, lane)
+    class(machine_t), intent(inout) :: self
+    integer, intent(in) :: lane
     integer :: i
 
+    call self%laws%refresh_lane(lane)
     do i = 1, size(self%general_banks)
-      associate (bank => self%banks(self%general_banks(i))%bank)
-        call bank%forcing_series(last, stride, t, applied(bank%first_value, 0))
-      end associate
+      call self%banks(self%general_banks(i))%bank%refresh_lane(lane)
     end do
-  end subroutine forcing_series
+  end subroutine refresh_lane
 
   !> Powers of the elements `with_work` after `evaluate`, positive into the machine.
   subroutine power(self, watts)

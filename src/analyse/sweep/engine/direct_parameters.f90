@@ -191,7 +191,7 @@ contains
       call parameters%set_value(self%index(i), lane, in_si(values(self%target(i)), self%unit(self%target(i))))
     end do
     do i = 1, size(self%banks)
-      call block%machine%banks(self%banks(i))%bank%polynomials(block%machine%laws)
+      call block%machine%banks(self%banks(i))%bank%polynomials(lane, lane, block%machine%laws)
     end do
     is_set = .true.
     if (size(self%inertia_target) == 0) return

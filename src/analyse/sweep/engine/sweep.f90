@@ -7,7 +7,6 @@ module nocdyn_sweep
   use nocdyn_kinds, only: wp
   use nocdyn_run_settings, only: choose_settings
   use nocdyn_scheduler, only: scheduler_t
-  use nocdyn_series_strips, only: strip
   use nocdyn_statistics_observer, only: needs_work_integrals
   use nocdyn_sweep_block, only: new_sweep_block, sweep_block_t
   use nocdyn_sweep_chunk, only: chunk_t
@@ -22,7 +21,8 @@ module nocdyn_sweep
 
   ! Measured: chains of 10 rotors are fastest with 32 lanes, those of 100 with 8 to 32, those of 1000 with 4 to 8. No result
   ! depends on the number of lanes.
-  integer, parameter :: max_states = 250   ! the parameters of `strip` lanes fit into the second-level cache
+  integer, parameter :: max_states = 250   ! the parameters of `large_block` lanes fit into the second-level cache
+  integer, parameter :: large_block = 32
   integer, parameter :: small_block = 8    ! lanes of larger machines: a multiple of the vector length of any processor
 
   !> What all blocks of a sweep share.
@@ -45,7 +45,7 @@ contains
     setup%has_energy_balance = needs_work_integrals(plan%statistics)
     call new_own_formulation(plan%input, plan%machine, setup%has_energy_balance, formulation)
     call choose_settings(plan%input, formulation, settings, notes, error)
-    setup%lanes = merge(strip, small_block, formulation%states <= max_states)
+    setup%lanes = merge(large_block, small_block, formulation%states <= max_states)
   end subroutine prepare_sweep
 
   !> Computes the variants that `scheduler` hands out, by threads with a block of lanes each.

@@ -1,21 +1,21 @@
-!> Elastic couplings: the nonlinear spring of eqs. (2), (3), or a table, with viscous damping and a rest twist.
+!> Elastic couplings: the nonlinear spring of eqs. (2), (3) with viscous damping and a rest twist.
 !>
 !> Friction in parallel with the spring resists with friction tanh(u' / friction_speed), as a slipping clutch does. Damping and
 !> friction have one work integral.
 module nocdyn_couplings
-  use nocdyn_bank, only: quantity_t, role_coupling
-  use nocdyn_curves, only: curve_t
+  use nocdyn_bank, only: bank_t, quantity_t, role_coupling
   use nocdyn_elements, only: elements_t
   use nocdyn_kinds, only: wp
-  use nocdyn_lane_parameters, only: lane_parameters_t
-  use nocdyn_polynomial_laws, only: polynomial_laws_t
-  use nocdyn_table_laws, only: over_twist, table_laws_t
+  use nocdyn_law_expressions, only: angle_of, expression_t, node_of, operator(*), operator(-), operator(/), speed_of
+  use nocdyn_law_functions, only: tanh
+  use nocdyn_law_tape, only: law_tape_t
+  use nocdyn_polynomial_laws, only: coefficient_by_speed, coefficient_cubic, coefficient_damping, coefficient_linear, &
+    coefficient_rest
   use nocdyn_text, only: string_t
-  use nocdyn_vector_functions, only: tanh_of
   implicit none (type, external)
   private
 
-  public :: new_couplings, new_table_couplings
+  public :: new_couplings
 
   !> What couplings of every elastic law have in common. Parameters have the shape [lanes, couplings].
   type, public :: coupling_common_t
@@ -32,19 +32,15 @@ module nocdyn_couplings
     procedure :: new_common
   end interface coupling_common_t
 
-  !> M_el = -(K1 + k1 w^2) w on the second body, w = u - rest_twist, or that of a table; damping moment -d u'.
-  type, extends(table_laws_t), public :: couplings_t
-    real(wp), allocatable :: stiffness(:, :)         !! K1 [N m/rad], shape [lanes, couplings] as all parameters
-    real(wp), allocatable :: cubic_stiffness(:, :)   !! k1 [N m/rad3], of either sign
-    real(wp), allocatable :: damping(:, :)           !! d [N m s/rad]
-    real(wp), allocatable :: friction(:, :)          !! [N m]; not allocated: none
-    real(wp), allocatable :: friction_speed(:, :)    !! [rad/s]
+  !> M_el = -(K1 + k1 w^2) w on the second body, w = u - rest_twist; damping moment -d u'. Extensions have another elastic moment.
+  type, extends(bank_t), public :: couplings_t
+    logical :: has_friction = .false.
   contains
-    procedure :: list_parameters
-    procedure :: list_common
-    procedure :: polynomials
-    procedure :: evaluate
-    procedure :: differentiate
+    procedure :: set_common
+    procedure :: add_damping
+    procedure :: describe
+    procedure :: twist_from_rest
+    procedure :: friction
     procedure :: quantities
     procedure :: observe
   end type couplings_t
@@ -76,83 +72,79 @@ contains
   function new_couplings(common, stiffness, cubic_stiffness) result(bank)
     type(coupling_common_t), intent(in) :: common   !! names, bodies, damping, rest twists, friction
     real(wp), intent(in) :: stiffness(:, :)            !! K1 [N m/rad], shape [lanes, couplings]
-    real(wp), intent(in) :: cubic_stiffness(:, :)      !! k1 [N m/rad3]
+    real(wp), intent(in) :: cubic_stiffness(:, :)      !! k1 [N m/rad3], of either sign
     type(couplings_t) :: bank
+    integer :: e
+
+    call bank%set_common(common)
+    call bank%add_parameter('stiffness', stiffness)
+    call bank%add_parameter('cubic_stiffness', cubic_stiffness)
+    call bank%add_term('rest_twist', coefficient_rest, 1.0_wp)
+    call bank%add_term('stiffness', coefficient_linear, 1.0_wp)
+    call bank%add_term('cubic_stiffness', coefficient_cubic, 1.0_wp)
+    call bank%add_damping()
+    bank%is_polynomial = .not. bank%has_friction
+    bank%has_paper_law = bank%is_polynomial
+    bank%has_polynomial_potential = .true.
+    bank%elastic = pack([(e, e=1, size(common%to))], any(abs(stiffness) > 0.0_wp .or. abs(cubic_stiffness) > 0.0_wp, dim=1))
+    call bank%prepare_law()
+  end function new_couplings
+
+  !> Connects the bodies and sets what couplings of every elastic law have in common.
+  subroutine set_common(self, common)
+    class(couplings_t), intent(inout) :: self
+    type(coupling_common_t), intent(in) :: common   !! names, bodies, damping, rest twists, friction
     integer :: e
     logical :: is_dissipative(size(common%to))
 
-    call bank%connect(role_coupling, size(common%damping, 1), common%names, common%to, common%from)
-    bank%stiffness = stiffness
-    bank%cubic_stiffness = cubic_stiffness
-    bank%damping = common%damping
-    bank%rest_twist = common%rest_twist
+    call self%connect(role_coupling, size(common%damping, 1), common%names, common%to, common%from)
+    call self%add_parameter('damping', common%damping)
+    call self%add_parameter('rest_twist', common%rest_twist)
     is_dissipative = any(abs(common%damping) > 0.0_wp, dim=1)
-    if (allocated(common%friction)) then
-      bank%is_polynomial = .false.
-      bank%has_paper_law = .false.
-      allocate (bank%friction, source=common%friction)
-      allocate (bank%friction_speed, source=common%friction_speed)
+    self%has_friction = allocated(common%friction)
+    if (self%has_friction) then
+      call self%add_parameter('friction', common%friction)
+      call self%add_parameter('friction_speed', common%friction_speed)
       is_dissipative = is_dissipative .or. any(abs(common%friction) > 0.0_wp, dim=1)
     end if
-    bank%with_work = pack([(e, e=1, size(common%to))], is_dissipative)
-    bank%elastic = pack([(e, e=1, size(common%to))], any(abs(stiffness) > 0.0_wp .or. abs(cubic_stiffness) > 0.0_wp, dim=1))
-  end function new_couplings
+    self%with_work = pack([(e, e=1, size(common%to))], is_dissipative)
+    self%is_polynomial = .false.
+    self%has_polynomial_potential = .false.
+    self%has_paper_law = .false.
+  end subroutine set_common
 
-  !> Couplings with the elastic moment of a curve over the twist.
-  function new_table_couplings(common, curve) result(bank)
-    type(coupling_common_t), intent(in) :: common   !! names, bodies, damping, rest twists, friction
-    type(curve_t), intent(in) :: curve(:, :)   !! [N m] over [rad], shape [lanes, couplings]
-    type(couplings_t) :: bank
-    integer :: e
+  !> Adds the damping of eq. (5) to the polynomial part of the law.
+  subroutine add_damping(self)
+    class(couplings_t), intent(inout) :: self
 
-    bank = new_couplings(common, 0.0_wp * common%damping, 0.0_wp * common%damping)
-    call bank%set_curves(over_twist, curve)
-    bank%elastic = [(e, e=1, size(common%to))]
-  end function new_table_couplings
+    call self%add_term('damping', coefficient_by_speed, -1.0_wp)
+    call self%add_term('damping', coefficient_damping, 1.0_wp)
+  end subroutine add_damping
 
-  subroutine polynomials(self, laws)
+  subroutine describe(self, tape)
     class(couplings_t), intent(in) :: self
-    type(polynomial_laws_t), intent(inout) :: laws
+    type(law_tape_t), target, intent(inout) :: tape
 
-    associate (first => self%first, last => self%last())
-      laws%rest(:, first:last) = self%rest_twist
-      laws%linear(:, first:last) = self%stiffness
-      laws%cubic(:, first:last) = self%cubic_stiffness
-      laws%by_speed(:, first:last) = -self%damping
-      laws%damping(:, first:last) = self%damping
-    end associate
-  end subroutine polynomials
+    if (self%has_friction) tape%applied = node_of(self%friction(tape))
+  end subroutine describe
 
-  subroutine evaluate(self, time, angle, speed, restoring, applied)
+  !> w = u - rest_twist [rad].
+  function twist_from_rest(self, tape) result(w)
     class(couplings_t), intent(in) :: self
-    real(wp), intent(in) :: time(self%lanes), angle(self%values), speed(self%values)   !! t [s], u [rad], u' [rad/s]
-    real(wp), intent(inout) :: restoring(self%values), applied(self%values)   !! [N m]
+    type(law_tape_t), target, intent(inout) :: tape
+    type(expression_t) :: w
 
-    call self%table_laws_t%evaluate(time, angle, speed, restoring, applied)
-    if (allocated(self%friction)) call add_friction(self%values, self%friction, self%friction_speed, speed, applied)
-  end subroutine evaluate
+    w = angle_of(tape) - self%parameter(tape, 'rest_twist')
+  end function twist_from_rest
 
-  pure subroutine add_friction(n, friction, friction_speed, speed, applied)
-    integer, intent(in) :: n
-    real(wp), intent(in) :: friction(n), friction_speed(n), speed(n)
-    real(wp), intent(inout) :: applied(n)
-    integer :: i
-
-    do i = 1, n
-      applied(i) = applied(i) - friction(i) * tanh_of(speed(i) / friction_speed(i))
-    end do
-  end subroutine add_friction
-
-  subroutine differentiate(self, elements)
+  !> The moment of friction on the second body [N m].
+  function friction(self, tape)
     class(couplings_t), intent(in) :: self
-    type(elements_t), intent(inout) :: elements
+    type(law_tape_t), target, intent(inout) :: tape
+    type(expression_t) :: friction
 
-    call self%table_laws_t%differentiate(elements)
-    if (.not. allocated(self%friction)) return
-    associate (slope => elements%applied_speed(:, self%first:self%last()), speed => elements%speed(:, self%first:self%last()))
-      slope = slope - self%friction / self%friction_speed * (1.0_wp - tanh_of(speed / self%friction_speed)**2)
-    end associate
-  end subroutine differentiate
+    friction = -(self%parameter(tape, 'friction') * tanh(speed_of(tape) / self%parameter(tape, 'friction_speed')))
+  end function friction
 
   function quantities(self) result(columns)
     class(couplings_t), intent(in) :: self
@@ -160,8 +152,8 @@ contains
     integer :: e
 
     allocate (columns(4))
-    columns(twist) = quantity_t('twist', 'rad', [(e, e=1, size(self%to))])
-    columns(moment) = quantity_t('moment', 'N m', [(e, e=1, size(self%to))])
+    columns(twist) = quantity_t('twist', 'rad', [(e, e=1, self%count)])
+    columns(moment) = quantity_t('moment', 'N m', [(e, e=1, self%count)])
     columns(damping_moment) = quantity_t('damping', 'N m', self%with_work)
     columns(shaft_moment) = quantity_t('shaft', 'N m', self%with_work)
   end function quantities
@@ -186,28 +178,5 @@ contains
       values = 0.0_wp - (elements%restoring(lane, self%first:self%last()) + elements%applied(lane, self%first:self%last()))
     end select
   end subroutine observe
-
-  subroutine list_parameters(self, parameters)
-    class(couplings_t), target, intent(inout) :: self
-    type(lane_parameters_t), intent(inout) :: parameters
-
-    call parameters%add_key('stiffness', self%stiffness)
-    call parameters%add_key('cubic_stiffness', self%cubic_stiffness)
-    call self%list_common(parameters)
-  end subroutine list_parameters
-
-  !> Lists what couplings with another elastic moment have too.
-  subroutine list_common(self, parameters)
-    class(couplings_t), target, intent(inout) :: self
-    type(lane_parameters_t), intent(inout) :: parameters
-
-    call self%table_laws_t%list_parameters(parameters)
-    call parameters%add_key('damping', self%damping)
-    call parameters%add_key('rest_twist', self%rest_twist)
-    call parameters%add_structure(allocated(self%friction))
-    if (.not. allocated(self%friction)) return
-    call parameters%add_key('friction', self%friction)
-    call parameters%add_key('friction_speed', self%friction_speed)
-  end subroutine list_common
 
 end module nocdyn_couplings

@@ -1,24 +1,22 @@
 !> Couplings whose elastic moment is a polynomial of the twist, of any order.
 module nocdyn_polynomial_couplings
-  use nocdyn_couplings, only: coupling_common_t, couplings_t, new_couplings
-  use nocdyn_elements, only: elements_t
+  use nocdyn_bank, only: bank_t
+  use nocdyn_couplings, only: coupling_common_t, couplings_t
   use nocdyn_kinds, only: wp
-  use nocdyn_lane_parameters, only: lane_parameters_t
+  use nocdyn_law_expressions, only: expression_t, node_of, operator(*), operator(+), operator(-)
+  use nocdyn_law_functions, only: polynomial
+  use nocdyn_law_tape, only: law_tape_t
+  use nocdyn_text, only: to_text
   implicit none (type, external)
   private
 
-  public :: new_polynomial_couplings, elastic_coefficients
-  public :: elastic_moment, elastic_slope, elastic_curvature, elastic_energy
+  public :: new_polynomial_couplings, elastic_coefficients, add_coefficients, coefficients_of
 
   !> M_el = -(p_1 w + p_2 w^2 + ...) on the second body, w = u - rest_twist; eqs. (2), (3) are p_1 and p_3.
   type, extends(couplings_t), public :: polynomial_couplings_t
     integer :: order = 1
-    real(wp), allocatable :: coefficient(:, :, :)   !! p_k [N m/rad^k], shape [order, lanes, couplings]
   contains
-    procedure :: list_parameters
-    procedure :: evaluate
-    procedure :: differentiate
-    procedure :: evaluate_energies
+    procedure :: describe
   end type polynomial_couplings_t
 
 contains
@@ -30,13 +28,11 @@ contains
     type(polynomial_couplings_t) :: bank
     integer :: e
 
-    bank%couplings_t = new_couplings(common, 0.0_wp * common%damping, 0.0_wp * common%damping)
-    bank%is_polynomial = .false.
-    bank%has_polynomial_potential = .false.
-    bank%has_paper_law = .false.
-    bank%order = size(coefficient, 1)
-    allocate (bank%coefficient, source=coefficient)
+    call bank%set_common(common)
+    call bank%add_damping()
+    call add_coefficients(bank, coefficient, bank%order)
     bank%elastic = pack([(e, e=1, size(bank%to))], [(any(abs(coefficient(:, :, e)) > 0.0_wp), e=1, size(bank%to))])
+    call bank%prepare_law()
   end function new_polynomial_couplings
 
   !> p_1, p_2, ...: the sum of both stiffnesses and of further coefficients, of order 3 at least.
@@ -51,111 +47,48 @@ contains
     coefficient(3) = coefficient(3) + cubic_stiffness
   end function elastic_coefficients
 
-  subroutine evaluate(self, time, angle, speed, restoring, applied)
+  !> Adds the coefficients as parameters, without those of high order that are zero everywhere.
+  subroutine add_coefficients(bank, coefficient, order)
+    class(bank_t), intent(inout) :: bank
+    real(wp), intent(in) :: coefficient(:, :, :)   !! p_k [N m/rad^k], shape [order, lanes, couplings]
+    integer, intent(out) :: order                  !! of the last one that is left, at least 1
+    integer :: k
+
+    order = 1
+    do k = 2, size(coefficient, 1)
+      if (any(abs(coefficient(k, :, :)) > 0)) order = k
+    end do
+    do k = 1, order
+      call bank%add_parameter('coefficient ' // to_text(k), coefficient(k, :, :), is_key=.false.)
+    end do
+  end subroutine add_coefficients
+
+  !> p_1, p_2, ... as expressions.
+  function coefficients_of(bank, tape, order) result(p)
+    class(bank_t), intent(in) :: bank
+    type(law_tape_t), target, intent(inout) :: tape
+    integer, intent(in) :: order
+    type(expression_t) :: p(order)
+    integer :: k
+
+    do k = 1, order
+      p(k) = bank%parameter(tape, 'coefficient ' // to_text(k))
+    end do
+  end function coefficients_of
+
+  subroutine describe(self, tape)
     class(polynomial_couplings_t), intent(in) :: self
-    real(wp), intent(in) :: time(self%lanes), angle(self%values), speed(self%values)   !! t [s], u [rad], u' [rad/s]
-    real(wp), intent(inout) :: restoring(self%values), applied(self%values)   !! [N m]
-
-    call add_terms(self%values, self%order, self%coefficient, self%rest_twist, angle, restoring)
-    call self%couplings_t%evaluate(time, angle, speed, restoring, applied)
-  end subroutine evaluate
-
-  !> Adds -sum p_k w^k, w = angle - rest.
-  pure subroutine add_terms(n, order, coefficient, rest, angle, restoring)
-    integer, intent(in) :: n, order
-    real(wp), intent(in) :: coefficient(order, n), rest(n), angle(n)
-    real(wp), intent(inout) :: restoring(n)
-    integer :: i
-
-    do i = 1, n
-      restoring(i) = restoring(i) - elastic_moment(coefficient(:, i), angle(i) - rest(i))
-    end do
-  end subroutine add_terms
-
-  subroutine differentiate(self, elements)
-    class(polynomial_couplings_t), intent(in) :: self
-    type(elements_t), intent(inout) :: elements
-    real(wp) :: w
-    integer :: e, i, l
-
-    do e = 1, size(self%to)
-      i = self%first + e - 1
-      do l = 1, self%lanes
-        w = elements%angle(l, i) - self%rest_twist(l, e)
-        elements%restoring_angle(l, i) = elements%restoring_angle(l, i) - elastic_slope(self%coefficient(:, l, e), w)
-        elements%restoring_curvature(l, i) = elements%restoring_curvature(l, i) - elastic_curvature(self%coefficient(:, l, e), w)
-      end do
-    end do
-    call self%couplings_t%differentiate(elements)
-  end subroutine differentiate
-
-  subroutine evaluate_energies(self, elements)
-    class(polynomial_couplings_t), intent(in) :: self
-    type(elements_t), intent(inout) :: elements
-    real(wp) :: w
-    integer :: e, i, l
-
-    do e = 1, size(self%to)
-      i = self%first + e - 1
-      do l = 1, self%lanes
-        w = elements%angle(l, i) - self%rest_twist(l, e)
-        elements%stored(l, i) = elements%stored(l, i) + elastic_energy(self%coefficient(:, l, e), w)
-        elements%secant(l, i) = elements%secant(l, i) + self%coefficient(1, l, e) + elastic_moment(self%coefficient(2:, l, e), w)
-      end do
-    end do
-  end subroutine evaluate_energies
-
-  !> p_1 w + p_2 w^2 + ...
-  pure real(wp) function elastic_moment(p, w) result(moment)
-    real(wp), intent(in) :: p(:), w   !! [N m/rad^k], [rad]
+    type(law_tape_t), target, intent(inout) :: tape
+    type(expression_t) :: p(self%order), w
     integer :: k
 
-    moment = 0.0_wp
-    do k = size(p), 1, -1
-      moment = (moment + p(k)) * w
-    end do
-  end function elastic_moment
-
-  !> d/dw of sum p_k w^k.
-  pure real(wp) function elastic_slope(p, w) result(slope)
-    real(wp), intent(in) :: p(:), w   !! [N m/rad^k], [rad]
-    integer :: k
-
-    slope = 0.0_wp
-    do k = size(p), 1, -1
-      slope = slope * w + k * p(k)
-    end do
-  end function elastic_slope
-
-  !> d2/dw2 of sum p_k w^k.
-  pure real(wp) function elastic_curvature(p, w) result(curvature)
-    real(wp), intent(in) :: p(:), w   !! [N m/rad^k], [rad]
-    integer :: k
-
-    curvature = 0.0_wp
-    do k = size(p), 2, -1
-      curvature = curvature * w + k * (k - 1) * p(k)
-    end do
-  end function elastic_curvature
-
-  !> sum p_k w^(k+1) / (k + 1).
-  pure real(wp) function elastic_energy(p, w) result(energy)
-    real(wp), intent(in) :: p(:), w   !! [N m/rad^k], [rad]
-    integer :: k
-
-    energy = 0.0_wp
-    do k = size(p), 1, -1
-      energy = (energy + p(k) / (k + 1)) * w
-    end do
-    energy = energy * w
-  end function elastic_energy
-
-  subroutine list_parameters(self, parameters)
-    class(polynomial_couplings_t), target, intent(inout) :: self
-    type(lane_parameters_t), intent(inout) :: parameters
-
-    call self%list_common(parameters)
-    call parameters%add('coefficient', self%coefficient)
-  end subroutine list_parameters
+    call self%couplings_t%describe(tape)
+    w = self%twist_from_rest(tape)
+    p = coefficients_of(self, tape, self%order)
+    tape%restoring = node_of(-polynomial(p, w))
+    tape%stored = node_of(w * polynomial([((1.0_wp / (k + 1)) * p(k), k=1, self%order)], w))
+    tape%secant = node_of(p(1))
+    if (self%order > 1) tape%secant = node_of(p(1) + polynomial(p(2:), w))
+  end subroutine describe
 
 end module nocdyn_polynomial_couplings

@@ -1,31 +1,29 @@
 !> Excitations that are sums of sines of the time and of the angle u of their body: sum of A sin(f t + order u + phase).
 !>
-!> Engine orders have f = 0. A synchronous motor with p pole pairs pulsates during its start at twice the slip frequency:
-!> f = 2 omega_mains, order = -2 p.
+!> Engine orders have f = 0; those of one excitation that are whole multiples of one order follow from one sine and one cosine. A
+!> synchronous motor with p pole pairs pulsates during its start at twice the slip frequency: f = 2 omega_mains, order = -2 p.
 module nocdyn_wave_excitations
   use nocdyn_bank, only: bank_t, role_excitation
-  use nocdyn_elements, only: elements_t
   use nocdyn_kinds, only: wp
-  use nocdyn_lane_parameters, only: lane_parameters_t
+  use nocdyn_law_expressions, only: angle_of, expression_t, node_of, operator(*), operator(+), time_of
+  use nocdyn_law_functions, only: cos, harmonics, sin
+  use nocdyn_law_harmonics, only: most_terms
+  use nocdyn_law_tape, only: law_tape_t
   use nocdyn_text, only: string_t
-  use nocdyn_vector_functions, only: cosine_of, sine_of
   implicit none (type, external)
   private
 
   public :: new_wave_excitations
 
   type, extends(bank_t), public :: wave_excitations_t
-    integer, allocatable :: owner(:)           !! excitation of each term
-    real(wp), allocatable :: amplitude(:, :)   !! A [N m], shape [lanes, terms] as all that follow
-    real(wp), allocatable :: frequency(:, :)   !! f [rad/s]
-    real(wp), allocatable :: order(:, :)
-    real(wp), allocatable :: phase(:, :)       !! [rad]
+    integer, allocatable :: multiple(:, :)   !! of the base of the excitation, 0 for none: terms of each, [multiples, excitations]
+    integer, allocatable :: single(:, :)     !! the other terms of each, 0 for none, [most, excitations]
   contains
-    procedure :: list_parameters
-    procedure :: evaluate
-    procedure :: differentiate
+    procedure :: describe
     procedure :: to_mean_torque
   end type wave_excitations_t
+
+  real(wp), parameter :: same = 1.0e-12_wp           ! relative error of an order that counts as a multiple
 
 contains
 
@@ -37,66 +35,126 @@ contains
     real(wp), intent(in) :: amplitude(:, :), frequency(:, :)   !! [N m], [rad/s], shape [lanes, terms]
     real(wp), intent(in) :: order(:, :), phase(:, :)           !! [1], [rad], shape [lanes, terms]
     type(wave_excitations_t) :: bank
+    real(wp) :: base(size(body))
 
     bank%is_polynomial = .false.
     bank%has_paper_law = .false.
     call bank%connect(role_excitation, size(amplitude, 1), names, body)
-    allocate (bank%owner, source=owner)
-    allocate (bank%amplitude, source=amplitude)
-    allocate (bank%frequency, source=frequency)
-    allocate (bank%order, source=order)
-    allocate (bank%phase, source=phase)
+    call bank%add_parameter('amplitude', amplitude, element=owner)
+    call bank%add_parameter('frequency', frequency, is_key=.false., element=owner)
+    call bank%add_parameter('order', order, is_key=.false., element=owner)
+    call bank%add_parameter('phase', phase, element=owner)
+    call find_multiples(bank, owner, frequency, order, base)
+    call bank%add_parameter('base', spread(base, 1, bank%lanes), is_key=.false.)
+    call bank%prepare_law()
   end function new_wave_excitations
 
-  subroutine evaluate(self, time, angle, speed, restoring, applied)
-    class(wave_excitations_t), intent(in) :: self
-    real(wp), intent(in) :: time(self%lanes), angle(self%values), speed(self%values)   !! t [s], u [rad], u' [rad/s]
-    real(wp), intent(inout) :: restoring(self%values), applied(self%values)   !! [N m]
-    integer :: i, k, l
+  !> Finds the terms of each excitation that are multiples of one order, and the others.
+  subroutine find_multiples(bank, owner, frequency, order, base)
+    type(wave_excitations_t), intent(inout) :: bank
+    integer, intent(in) :: owner(:)                          !! excitation of each term
+    real(wp), intent(in) :: frequency(:, :), order(:, :)     !! [rad/s], [1], [lanes, terms]
+    real(wp), intent(out) :: base(:)                         !! order of which others are multiples, [excitations]
+    integer :: e, k, n
+    logical :: is_order(size(owner))
 
-    do k = 1, size(self%owner)
-      do l = 1, self%lanes
-        i = self%lanes * (self%owner(k) - 1) + l
-        applied(i) = applied(i) + self%amplitude(l, k) * sine_of(self%frequency(l, k) * time(l) + self%order(l, k) * angle(i) &
-                                                                 + self%phase(l, k))
+    allocate (bank%multiple(most_terms, size(base)), bank%single(size(owner), size(base)), source=0)
+    do e = 1, size(base)
+      is_order = owner == e .and. .not. any(abs(frequency) > 0, dim=1) .and. all(order > 0, dim=1)
+      base(e) = common_order(pack(order(1, :), is_order))
+      do k = 1, size(owner)
+        if (owner(k) /= e) cycle
+        n = 0
+        if (is_order(k)) n = nint(min(order(1, k) / base(e), real(most_terms + 1, wp)))
+        if (n > 0 .and. n <= most_terms .and. count(is_order) > 1) then
+          if (is_multiple(order(1, k), base(e)) .and. bank%multiple(n, e) == 0) then
+            bank%multiple(n, e) = k
+            cycle
+          end if
+        end if
+        bank%single(1 + count(bank%single(:, e) > 0), e) = k
       end do
     end do
-  end subroutine evaluate
+  end subroutine find_multiples
 
-  subroutine differentiate(self, elements)
-    class(wave_excitations_t), intent(in) :: self
-    type(elements_t), intent(inout) :: elements
-    real(wp) :: wave
-    integer :: i, k, l
+  !> The largest part of the lowest order of which all are multiples; the lowest one itself if there is none that is large.
+  pure real(wp) function common_order(orders) result(base)
+    real(wp), intent(in) :: orders(:)   !! positive
+    integer, parameter :: most_parts = 12
+    integer :: parts
 
-    do k = 1, size(self%owner)
-      i = self%first + self%owner(k) - 1
-      do l = 1, self%lanes
-        wave = self%amplitude(l, k) * cosine_of(self%frequency(l, k) * elements%time(l) &
-                                                + self%order(l, k) * elements%angle(l, i) + self%phase(l, k))
-        elements%applied_angle(l, i) = elements%applied_angle(l, i) + self%order(l, k) * wave
-        elements%applied_time(l, i) = elements%applied_time(l, i) + self%frequency(l, k) * wave
-      end do
+    base = 1.0_wp
+    if (size(orders) == 0) return
+    do parts = 1, most_parts
+      base = minval(orders) / parts
+      if (all(is_multiple(orders, base))) return
     end do
-  end subroutine differentiate
+    base = minval(orders)
+  end function common_order
+
+  elemental logical function is_multiple(order, base)
+    real(wp), intent(in) :: order, base
+
+    is_multiple = abs(order - base * anint(order / base)) <= same * order
+  end function is_multiple
+
+  subroutine describe(self, tape)
+    class(wave_excitations_t), intent(in) :: self
+    type(law_tape_t), target, intent(inout) :: tape
+    type(expression_t) :: torque
+    integer :: k, n
+    logical :: is_empty
+
+    is_empty = .not. any(self%multiple > 0)
+    if (.not. is_empty) torque = sum_of_multiples(self, tape, pack([(n, n=1, most_terms)], any(self%multiple > 0, dim=2)))
+    do k = 1, size(self%single, 1)
+      if (.not. any(self%single(k, :) > 0)) exit
+      if (is_empty) then
+        torque = wave(self, tape, self%single(k, :))
+      else
+        torque = torque + wave(self, tape, self%single(k, :))
+      end if
+      is_empty = .false.
+    end do
+    tape%applied = node_of(torque)
+  end subroutine describe
+
+  !> The terms that are multiples of the base.
+  function sum_of_multiples(self, tape, n) result(torque)
+    class(wave_excitations_t), intent(in) :: self
+    type(law_tape_t), target, intent(inout) :: tape
+    integer, intent(in) :: n(:)   !! the multiples that some excitation has
+    type(expression_t) :: a(size(n)), amplitude, b(size(n)), phase, torque
+    integer :: k
+
+    do k = 1, size(n)
+      amplitude = self%parameter(tape, 'amplitude', self%multiple(n(k), :))
+      phase = self%parameter(tape, 'phase', self%multiple(n(k), :))
+      a(k) = amplitude * cos(phase)
+      b(k) = amplitude * sin(phase)
+    end do
+    torque = harmonics(n, a, b, self%parameter(tape, 'base') * angle_of(tape))
+  end function sum_of_multiples
+
+  !> One term of each excitation, A sin(f t + order u + phase).
+  function wave(self, tape, columns) result(torque)
+    class(wave_excitations_t), intent(in) :: self
+    type(law_tape_t), target, intent(inout) :: tape
+    integer, intent(in) :: columns(:)   !! the term of each excitation, 0 for none
+    type(expression_t) :: torque
+
+    torque = self%parameter(tape, 'amplitude', columns) &
+             * sin(self%parameter(tape, 'frequency', columns) * time_of(tape) &
+                   + self%parameter(tape, 'order', columns) * angle_of(tape) + self%parameter(tape, 'phase', columns))
+  end function wave
 
   !> The mean of a sine is zero.
   subroutine to_mean_torque(self)
     class(wave_excitations_t), intent(inout) :: self
 
-    self%amplitude = 0.0_wp
-    self%frequency = 0.0_wp
+    self%parameters(self%number_of('amplitude'))%value = 0.0_wp
+    self%parameters(self%number_of('frequency'))%value = 0.0_wp
+    call self%prepare_law()
   end subroutine to_mean_torque
-
-  subroutine list_parameters(self, parameters)
-    class(wave_excitations_t), target, intent(inout) :: self
-    type(lane_parameters_t), intent(inout) :: parameters
-
-    call parameters%add_structure(self%owner)
-    call parameters%add_key('amplitude', self%amplitude, self%owner)
-    call parameters%add('frequency', self%frequency)
-    call parameters%add('order', self%order)
-    call parameters%add_key('phase', self%phase, self%owner)
-  end subroutine list_parameters
 
 end module nocdyn_wave_excitations

@@ -1,36 +1,27 @@
 !> Loads with the viscous resistance of eq. (5), M_r = -c omega, and those that resist with c omega + quadratic |omega| omega +
 !> constant tanh(omega / constant_speed) + table(omega): fans and propellers, Coulomb friction made smooth.
 module nocdyn_loads
-  use nocdyn_bank, only: role_load
+  use nocdyn_bank, only: bank_t, role_load
   use nocdyn_curves, only: curve_t
-  use nocdyn_elements, only: elements_t
+  use nocdyn_described_elements, only: boundary_width
   use nocdyn_kinds, only: wp
-  use nocdyn_lane_parameters, only: lane_parameters_t
-  use nocdyn_polynomial_laws, only: polynomial_laws_t
-  use nocdyn_table_laws, only: over_speed, table_laws_t
+  use nocdyn_law_expressions, only: expression_t, literal, node_of, operator(*), operator(+), operator(-), operator(/), &
+    pick, speed_of
+  use nocdyn_law_functions, only: add_guard, tanh
+  use nocdyn_law_tape, only: law_tape_t
+  use nocdyn_polynomial_laws, only: coefficient_by_speed, coefficient_damping
+  use nocdyn_tables, only: add_table, curve_value, guard_segment
   use nocdyn_text, only: string_t
-  use nocdyn_vector_functions, only: tanh_of
   implicit none (type, external)
   private
 
   public :: new_loads, new_nonlinear_loads
 
-  type, extends(table_laws_t), public :: loads_t
-    real(wp), allocatable :: viscous(:, :)   !! c [N m s/rad], shape [lanes, loads]
+  type, extends(bank_t), public :: loads_t
+    logical :: has_quadratic = .false.
   contains
-    procedure :: list_parameters => list_loads
-    procedure :: polynomials
+    procedure :: describe
   end type loads_t
-
-  type, extends(loads_t), public :: nonlinear_loads_t
-    real(wp), allocatable :: quadratic(:, :)        !! [N m s2/rad2], shape [lanes, loads] as all parameters
-    real(wp), allocatable :: constant(:, :)         !! [N m]
-    real(wp), allocatable :: constant_speed(:, :)   !! [rad/s], positive
-  contains
-    procedure :: list_parameters => list_nonlinear
-    procedure :: evaluate
-    procedure :: differentiate
-  end type nonlinear_loads_t
 
 contains
 
@@ -42,25 +33,10 @@ contains
     type(loads_t) :: bank
 
     call bank%connect(role_load, size(viscous, 1), names, body)
-    bank%viscous = viscous
+    call bank%add_parameter('viscous', viscous)
+    call bank%add_term('viscous', coefficient_by_speed, -1.0_wp)
+    call bank%add_term('viscous', coefficient_damping, 1.0_wp)   ! they are in C, eq. (22)
   end function new_loads
-
-  !> The coefficients c are in C, eq. (22).
-  subroutine polynomials(self, laws)
-    class(loads_t), intent(in) :: self
-    type(polynomial_laws_t), intent(inout) :: laws
-
-    laws%by_speed(:, self%first:self%last()) = -self%viscous
-    laws%damping(:, self%first:self%last()) = self%viscous
-  end subroutine polynomials
-
-  subroutine list_loads(self, parameters)
-    class(loads_t), target, intent(inout) :: self
-    type(lane_parameters_t), intent(inout) :: parameters
-
-    call self%table_laws_t%list_parameters(parameters)
-    call parameters%add_key('viscous', self%viscous)
-  end subroutine list_loads
 
   !> A bank of loads with all these terms, each on one body.
   function new_nonlinear_loads(names, body, viscous, quadratic, constant, constant_speed, curve) result(bank)
@@ -69,56 +45,42 @@ contains
     real(wp), intent(in) :: viscous(:, :), quadratic(:, :)         !! [N m s/rad], [N m s2/rad2], shape [lanes, loads]
     real(wp), intent(in) :: constant(:, :), constant_speed(:, :)   !! [N m], [rad/s], shape [lanes, loads]
     type(curve_t), intent(in), optional :: curve(:, :)   !! resisting torque [N m] over speed [rad/s], [lanes, loads]; absent: 0
-    type(nonlinear_loads_t) :: bank
+    type(loads_t) :: bank
+    integer :: e
 
-    bank%loads_t = new_loads(names, body, viscous)
+    bank = new_loads(names, body, viscous)
     bank%is_polynomial = .false.
     bank%has_paper_law = .false.
-    allocate (bank%quadratic, source=quadratic)
-    allocate (bank%constant, source=constant)
-    allocate (bank%constant_speed, source=constant_speed)
-    if (present(curve)) call bank%set_curves(over_speed, curve)
+    call bank%add_parameter('quadratic', quadratic)
+    call bank%add_parameter('constant', constant)
+    call bank%add_parameter('constant_speed', constant_speed)
+    if (present(curve)) call add_table(bank, curve)
+    bank%has_quadratic = any(abs(quadratic) > 0)
+    if (bank%has_quadratic) call bank%add_switches([('standstill', e=1, size(body))], 2)
+    call bank%prepare_law()
   end function new_nonlinear_loads
 
-  subroutine evaluate(self, time, angle, speed, restoring, applied)
-    class(nonlinear_loads_t), intent(in) :: self
-    real(wp), intent(in) :: time(self%lanes), angle(self%values), speed(self%values)   !! t [s], u [rad], u' [rad/s]
-    real(wp), intent(inout) :: restoring(self%values), applied(self%values)   !! [N m]
+  subroutine describe(self, tape)
+    class(loads_t), intent(in) :: self
+    type(law_tape_t), target, intent(inout) :: tape
+    type(expression_t) :: moment, speed, speed_scale
+    integer :: switch
 
-    call resist(self%values, self%quadratic, self%constant, self%constant_speed, speed, applied)
-    call self%loads_t%evaluate(time, angle, speed, restoring, applied)
-  end subroutine evaluate
-
-  pure subroutine resist(n, quadratic, constant, constant_speed, speed, applied)
-    integer, intent(in) :: n
-    real(wp), intent(in) :: quadratic(n), constant(n), constant_speed(n), speed(n)
-    real(wp), intent(inout) :: applied(n)
-    integer :: i
-
-    do i = 1, n
-      applied(i) = applied(i) - (quadratic(i) * abs(speed(i)) * speed(i) + constant(i) * tanh_of(speed(i) / constant_speed(i)))
-    end do
-  end subroutine resist
-
-  subroutine differentiate(self, elements)
-    class(nonlinear_loads_t), intent(in) :: self
-    type(elements_t), intent(inout) :: elements
-
-    associate (slope => elements%applied_speed(:, self%first:self%last()), speed => elements%speed(:, self%first:self%last()))
-      slope = slope - (2.0_wp * self%quadratic * abs(speed) &
-                       + self%constant / self%constant_speed * (1.0_wp - tanh_of(speed / self%constant_speed)**2))
-    end associate
-    call self%loads_t%differentiate(elements)
-  end subroutine differentiate
-
-  subroutine list_nonlinear(self, parameters)
-    class(nonlinear_loads_t), target, intent(inout) :: self
-    type(lane_parameters_t), intent(inout) :: parameters
-
-    call self%loads_t%list_parameters(parameters)
-    call parameters%add_key('quadratic', self%quadratic)
-    call parameters%add_key('constant', self%constant)
-    call parameters%add_key('constant_speed', self%constant_speed)
-  end subroutine list_nonlinear
+    speed = speed_of(tape)
+    speed_scale = self%parameter(tape, 'constant_speed')
+    moment = -(self%parameter(tape, 'constant') * tanh(speed / speed_scale))
+    if (allocated(self%curve)) then
+      moment = moment - curve_value(tape, speed)
+      call guard_segment(tape, speed)
+    end if
+    if (self%has_quadratic) then
+      switch = size(self%switch_element) / self%count
+      moment = moment - pick(switch, [literal(tape, 1.0_wp), literal(tape, -1.0_wp)]) * self%parameter(tape, 'quadratic') &
+               * (speed * speed)
+      call add_guard(switch, 1, speed, boundary_width * speed_scale)
+      call add_guard(switch, 2, -speed, boundary_width * speed_scale)
+    end if
+    tape%applied = node_of(moment)
+  end subroutine describe
 
 end module nocdyn_loads

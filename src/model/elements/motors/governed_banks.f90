@@ -1,59 +1,81 @@
-!> Banks of motors that a governor may throttle.
+!> Banks of motors that a PI governor may throttle: y = clip(z + gain (set_speed - omega)) between 0 and 1, z' = (y - z) / time.
+!>
+!> Between the limits z' = gain (set_speed - omega) / time, the integral of a PI controller. At a limit z tends to the limit.
+!> Stopping the integration there (clamping) would make the state slide along the limit when the governor leaves it.
+!> (K. J. Astrom, T. Hagglund, PID Controllers, 2nd ed. 1995, section 3.5: anti-windup by tracking, with the integral time.)
 module nocdyn_governed_banks
-  use nocdyn_bank, only: quantity_t
+  use nocdyn_bank, only: bank_t, quantity_t
+  use nocdyn_described_elements, only: boundary_width
   use nocdyn_elements, only: elements_t
-  use nocdyn_governors, only: governor_t
   use nocdyn_kinds, only: wp
-  use nocdyn_lane_parameters, only: lane_parameters_t
-  use nocdyn_table_laws, only: table_laws_t
+  use nocdyn_law_expressions, only: expression_t, literal, node_of, operator(*), operator(+), operator(-), operator(/), &
+    pick, speed_of, state_of
+  use nocdyn_law_functions, only: add_guard
+  use nocdyn_law_tape, only: law_tape_t
   implicit none (type, external)
   private
 
-  !> The integral of a governor is the last internal state of its motor. The switches of the governors follow those of the tables.
-  type, extends(table_laws_t), public :: governed_bank_t
-    type(governor_t), allocatable :: governor   !! of all motors; not allocated: none
+  !> The governors of the motors of a bank, shape [lanes, motors].
+  type, public :: governor_t
+    real(wp), allocatable :: set_speed(:, :)   !! [rad/s]
+    real(wp), allocatable :: gain(:, :)        !! [s/rad], not zero
+    real(wp), allocatable :: time(:, :)        !! integral time [s], positive
+    real(wp), allocatable :: start(:, :)       !! throttle y at the start, 0 to 1
+  end type governor_t
+
+  !> The integral z of a governor is the last internal state of its motor. The switches of the governors are the last ones.
+  type, extends(bank_t), public :: governed_bank_t
+    logical :: has_governor = .false.
   contains
     procedure :: add_governor
-    procedure :: first_governor
     procedure :: throttle
-    procedure :: list_parameters
     procedure :: start_internal
     procedure :: steady_internal
     procedure :: knees
-    procedure :: choose
-    procedure :: indicator
     procedure :: quantities
     procedure :: observe
   end type governed_bank_t
 
+  integer, parameter :: governing = 1, closed = 2, open = 3   ! the branches
+
 contains
 
-  !> Gives every motor a governor, with an internal state and a switch; after `connect` and `set_curves`.
+  !> Gives every motor a governor, with an internal state and a switch; after `connect` and `add_table`.
   subroutine add_governor(self, governor)
     class(governed_bank_t), intent(inout) :: self
     type(governor_t), intent(in) :: governor   !! of all motors
     integer :: e
 
-    allocate (self%governor, source=governor)
+    self%has_governor = .true.
     self%states = self%states + 1
     self%internal_values = self%states * self%values
-    call self%add_switches([('limit of the governor', e=1, size(self%to))])
+    call self%add_parameter('governor_speed', governor%set_speed, is_key=.false.)
+    call self%add_parameter('governor_gain', governor%gain, is_key=.false.)
+    call self%add_parameter('governor_time', governor%time)
+    call self%add_parameter('governor_start', governor%start, is_key=.false.)
+    call self%add_switches([('limit of the governor', e=1, self%count)], open)
   end subroutine add_governor
 
-  !> Number of switches before those of the governors.
-  pure integer function first_governor(self)
+  !> Throttle y of the motors; sets the rate of the integrals and guards the limits.
+  function throttle(self, tape) result(y)
     class(governed_bank_t), intent(in) :: self
+    type(law_tape_t), target, intent(inout) :: tape
+    type(expression_t) :: y
+    type(expression_t) :: free, none, one, shift, z
+    integer :: switch
 
-    first_governor = size(self%switch_element) - merge(size(self%to), 0, allocated(self%governor))
-  end function first_governor
-
-  !> Throttle y on the present branch.
-  pure real(wp) function throttle(self, lane, motor, integral, speed)
-    class(governed_bank_t), intent(in) :: self
-    integer, intent(in) :: lane, motor
-    real(wp), intent(in) :: integral, speed   !! z of the governor, speed of the motor [rad/s]
-
-    throttle = self%governor%throttle(lane, motor, self%branch(lane, self%first_governor() + motor), integral, speed)
+    switch = size(self%switch_element) / self%count
+    none = literal(tape, 0.0_wp)
+    one = literal(tape, 1.0_wp)
+    shift = literal(tape, boundary_width)
+    z = state_of(tape, self%states)
+    free = z + self%parameter(tape, 'governor_gain') * (self%parameter(tape, 'governor_speed') - speed_of(tape))
+    y = pick(switch, [none, none, one]) + pick(switch, [one, none, none]) * free
+    tape%rate(self%states) = node_of((y - z) / self%parameter(tape, 'governor_time'))
+    call add_guard(switch, governing, free, shift)
+    call add_guard(switch, governing, 1.0_wp - free, shift)
+    call add_guard(switch, closed, -free, shift)
+    call add_guard(switch, open, free - 1.0_wp, shift)
   end function throttle
 
   !> The integrals with which the throttles have their values at the start; other states start at 0.
@@ -64,28 +86,33 @@ contains
     integer :: e, l
 
     internal = 0.0_wp
-    if (.not. allocated(self%governor)) return
-    do e = 1, size(self%to)
-      do l = 1, self%lanes
-        associate (governor => self%governor)
+    if (.not. self%has_governor) return
+    associate (set_speed => self%parameters(self%number_of('governor_speed'))%value, &
+               gain => self%parameters(self%number_of('governor_gain'))%value, &
+               start => self%parameters(self%number_of('governor_start'))%value)
+      do e = 1, self%count
+        do l = 1, self%lanes
           internal(self%lanes * (self%states * e - 1) + l) = &
-            governor%start(l, e) - governor%gain(l, e) * (governor%set_speed(l, e) - speed(self%lanes * (e - 1) + l))
-        end associate
+            start(l, e) - gain(l, e) * (set_speed(l, e) - speed(self%lanes * (e - 1) + l))
+        end do
       end do
-    end do
+    end associate
   end subroutine start_internal
 
-  !> The integral of a governor at rest is its throttle.
+  !> The integral of a governor at rest is its throttle; at the set speed, where any is steady, the open one.
   subroutine steady_internal(self, speed, internal)
     class(governed_bank_t), intent(in) :: self
     real(wp), intent(in) :: speed(:)         !! u' [rad/s], [motors]
     real(wp), intent(inout) :: internal(:)   !! [states * motors]
     integer :: e
 
-    if (.not. allocated(self%governor)) return
-    do e = 1, size(self%to)
-      internal(self%states * e) = self%governor%steady_throttle(e, speed(e))
-    end do
+    if (.not. self%has_governor) return
+    associate (set_speed => self%parameters(self%number_of('governor_speed'))%value, &
+               gain => self%parameters(self%number_of('governor_gain'))%value)
+      do e = 1, self%count
+        internal(self%states * e) = merge(1.0_wp, 0.0_wp, gain(1, e) * (set_speed(1, e) - speed(e)) >= 0.0_wp)
+      end do
+    end associate
   end subroutine steady_internal
 
   !> The points of a table, and the speed that a governor keeps.
@@ -94,39 +121,13 @@ contains
     integer, intent(in) :: element   !! numbered within the bank
     real(wp), allocatable :: speeds(:)
 
-    speeds = self%table_laws_t%knees(element)
-    if (allocated(self%governor)) speeds = [speeds, self%governor%set_speed(1, element)]
+    allocate (speeds(0))
+    if (allocated(self%curve)) speeds = self%curve(1, element)%knots()
+    if (.not. self%has_governor) return
+    associate (set_speed => self%parameters(self%number_of('governor_speed'))%value)
+      speeds = [speeds, set_speed(1, element)]
+    end associate
   end function knees
-
-  subroutine choose(self, switch, lane, t, angle, speed, internal)
-    class(governed_bank_t), intent(inout) :: self
-    integer, intent(in) :: switch, lane   !! switch numbered within the bank
-    real(wp), intent(in) :: t, angle, speed   !! t [s], u [rad], u' [rad/s]
-    real(wp), intent(in) :: internal(:)   !! internal states of the element
-
-    associate (motor => switch - self%first_governor())
-      if (motor > 0) then
-        self%branch(lane, switch) = self%governor%branch(lane, motor, internal(self%states), speed)
-      else
-        call self%table_laws_t%choose(switch, lane, t, angle, speed, internal)
-      end if
-    end associate
-  end subroutine choose
-
-  pure real(wp) function indicator(self, switch, lane, t, angle, speed, internal)
-    class(governed_bank_t), intent(in) :: self
-    integer, intent(in) :: switch, lane   !! switch numbered within the bank
-    real(wp), intent(in) :: t, angle, speed   !! t [s], u [rad], u' [rad/s]
-    real(wp), intent(in) :: internal(:)   !! internal states of the element
-
-    associate (motor => switch - self%first_governor())
-      if (motor > 0) then
-        indicator = self%governor%indicator(lane, motor, self%branch(lane, switch), internal(self%states), speed)
-      else
-        indicator = self%table_laws_t%indicator(switch, lane, t, angle, speed, internal)
-      end if
-    end associate
-  end function indicator
 
   !> Torque, armature current where that is a state, and throttle where there is a governor.
   function quantities(self) result(columns)
@@ -135,9 +136,9 @@ contains
     integer :: e
 
     allocate (columns(1 + self%states))
-    columns(1) = quantity_t('torque', 'N m', [(e, e=1, size(self%to))])
+    columns(1) = quantity_t('torque', 'N m', [(e, e=1, self%count)])
     if (self%states > 0) columns(2) = quantity_t('current', 'A', columns(1)%elements)
-    if (allocated(self%governor)) columns(1 + self%states) = quantity_t('throttle', '1', columns(1)%elements)
+    if (self%has_governor) columns(1 + self%states) = quantity_t('throttle', '1', columns(1)%elements)
   end function quantities
 
   pure subroutine observe(self, elements, quantity, lane, values)
@@ -152,18 +153,11 @@ contains
     do e = 1, size(values)
       s = self%first_internal + self%states * e - 1   ! the last state
       if (quantity == 2) values(e) = elements%internal%value(lane, s + 1 - self%states)
-      if (quantity == 1 + self%states .and. allocated(self%governor)) then
-        values(e) = self%throttle(lane, e, elements%internal%value(lane, s), elements%speed(lane, self%first + e - 1))
+      if (quantity == 1 + self%states .and. self%has_governor) then   ! y = z + time z'
+        values(e) = elements%internal%value(lane, s) &
+                    + self%parameters(self%number_of('governor_time'))%value(lane, e) * elements%internal%rate(lane, s)
       end if
     end do
   end subroutine observe
-
-  subroutine list_parameters(self, parameters)
-    class(governed_bank_t), target, intent(inout) :: self
-    type(lane_parameters_t), intent(inout) :: parameters
-
-    call self%table_laws_t%list_parameters(parameters)
-    if (allocated(self%governor)) call self%governor%list_parameters(parameters)
-  end subroutine list_parameters
 
 end module nocdyn_governed_banks

@@ -1,196 +1,200 @@
-!> Motors whose torque is a function of their speed: eq. (20), another law, or a table. A governor may throttle them.
+!> Motors whose torque is a function of their speed: eq. (20), Kloss' formula, or a table. A governor may throttle them.
 module nocdyn_motors
   use nocdyn_bank, only: role_motor
   use nocdyn_curves, only: curve_t
-  use nocdyn_elements, only: elements_t
-  use nocdyn_governed_banks, only: governed_bank_t
-  use nocdyn_governors, only: governor_t
+  use nocdyn_governed_banks, only: governed_bank_t, governor_t
   use nocdyn_kinds, only: wp
-  use nocdyn_lane_parameters, only: lane_parameters_t
-  use nocdyn_polynomial_laws, only: polynomial_laws_t
-  use nocdyn_table_laws, only: over_speed
+  use nocdyn_law_expressions, only: expression_t, node_of, operator(*), operator(+), operator(-), operator(/), speed_of
+  use nocdyn_law_tape, only: law_tape_t
+  use nocdyn_polynomial_laws, only: coefficient_by_speed, coefficient_by_speed_squared, coefficient_constant
+  use nocdyn_tables, only: add_table, curve_value, guard_segment
   use nocdyn_text, only: string_t
-  use nocdyn_torque_curves, only: quadratic_curve_t, torque_curve_t
   implicit none (type, external)
   private
 
-  public :: new_motors, new_curve_motors
+  public :: new_motors, new_table_motors, new_induction_motors
 
-  !> M = law(omega), or that of tables; with a governor of the throttle y, M = y law(omega) - drag omega.
-  type, extends(governed_bank_t), public :: motors_t
-    class(torque_curve_t), allocatable :: law   !! of all motors; not allocated: they have tables
-    real(wp), allocatable :: drag(:, :)         !! not throttled [N m s/rad], shape [lanes, motors]; allocated with a governor
+  !> M = law(omega), with a governor of the throttle y M = y law(omega) - drag omega.
+  type, abstract, extends(governed_bank_t) :: speed_motors_t
   contains
-    procedure :: list_parameters
-    procedure :: polynomials
-    procedure :: evaluate
-    procedure :: evaluate_internal
-    procedure :: differentiate
-    procedure :: torque
-    procedure :: slope
-    procedure :: knees
+    procedure :: describe
+    procedure(torque_interface), deferred :: torque
+  end type speed_motors_t
+
+  abstract interface
+    !> The torque at full throttle [N m].
+    function torque_interface(self, tape) result(torque)
+      import :: expression_t, law_tape_t, speed_motors_t
+      class(speed_motors_t), intent(in) :: self
+      type(law_tape_t), target, intent(inout) :: tape
+      type(expression_t) :: torque
+    end function torque_interface
+  end interface
+
+  !> Eq. (20): A - B omega - C omega^2.
+  type, extends(speed_motors_t), public :: motors_t
+  contains
+    procedure :: torque => quadratic_torque
+    procedure :: knees => quadratic_knees
   end type motors_t
+
+  !> The curve of a table.
+  type, extends(speed_motors_t), public :: table_motors_t
+  contains
+    procedure :: torque => table_torque
+  end type table_motors_t
+
+  !> Kloss' formula 2 T_k / (s / s_k + s_k / s) with the slip s = 1 - omega / synchronous_speed, as 2 T_k s s_k / (s^2 + s_k^2).
+  type, extends(speed_motors_t), public :: induction_motors_t
+  contains
+    procedure :: torque => induction_torque
+    procedure :: knees => induction_knees
+  end type induction_motors_t
 
 contains
 
-  !> A bank of motors without governors, each on one body, with a quadratic torque-speed curve, eq. (20): M_m = A - B omega -
-  !> C omega^2.
-  function new_motors(names, body, a, b, c) result(bank)
+  !> A bank of motors, each on one body, with a quadratic torque-speed curve.
+  function new_motors(names, body, a, b, c, governor, drag) result(bank)
     type(string_t), intent(in) :: names(:)
     integer, intent(in) :: body(:)
     real(wp), intent(in) :: a(:, :), b(:, :), c(:, :)   !! [N m], [N m s/rad], [N m s2/rad2], shape [lanes, motors]
-    type(motors_t) :: bank
-    type(quadratic_curve_t) :: law
-
-    allocate (law%a, source=a)
-    allocate (law%b, source=b)
-    allocate (law%c, source=c)
-    bank = new_curve_motors(names, body, size(a, 1), law)
-    bank%is_polynomial = .true.
-    bank%has_paper_law = .true.
-  end function new_motors
-
-  !> A bank of motors, each on one body, either with a law or with tables.
-  function new_curve_motors(names, body, lanes, law, curve, governor, drag) result(bank)
-    type(string_t), intent(in) :: names(:)
-    integer, intent(in) :: body(:), lanes
-    class(torque_curve_t), intent(in), optional :: law    !! of all motors
-    type(curve_t), intent(in), optional :: curve(:, :)    !! [N m] over [rad/s], shape [lanes, motors]
     type(governor_t), intent(in), optional :: governor    !! of all motors; no motor has one if absent
     real(wp), intent(in), optional :: drag(:, :)          !! [N m s/rad], shape [lanes, motors]; present with `governor`
     type(motors_t) :: bank
 
-    if (present(law) .eqv. present(curve)) error stop 'nocdyn_motors: motors have either a law or tables'
+    call bank%connect(role_motor, size(a, 1), names, body)
+    call bank%add_parameter('a', a)
+    call bank%add_parameter('b', b)
+    call bank%add_parameter('c', c)
+    if (present(governor)) call govern(bank, governor, drag)
+    bank%is_polynomial = .not. bank%has_governor
+    if (bank%is_polynomial) then
+      call bank%add_term('a', coefficient_constant, 1.0_wp)
+      call bank%add_term('b', coefficient_by_speed, -1.0_wp)
+      call bank%add_term('c', coefficient_by_speed_squared, -1.0_wp)
+    end if
+    bank%has_paper_law = bank%is_polynomial
+    call bank%prepare_law()
+  end function new_motors
+
+  !> A bank of motors, each on one body, with tables.
+  function new_table_motors(names, body, curve, governor, drag) result(bank)
+    type(string_t), intent(in) :: names(:)
+    integer, intent(in) :: body(:)
+    type(curve_t), intent(in) :: curve(:, :)              !! [N m] over [rad/s], shape [lanes, motors]
+    type(governor_t), intent(in), optional :: governor    !! of all motors; no motor has one if absent
+    real(wp), intent(in), optional :: drag(:, :)          !! [N m s/rad], shape [lanes, motors]; present with `governor`
+    type(table_motors_t) :: bank
+
+    call bank%connect(role_motor, size(curve, 1), names, body)
     bank%is_polynomial = .false.
     bank%has_paper_law = .false.
-    call bank%connect(role_motor, lanes, names, body)
-    if (present(law)) allocate (bank%law, source=law)
-    if (present(curve)) call bank%set_curves(over_speed, curve)
-    if (.not. present(governor)) return
+    call add_table(bank, curve)
+    if (present(governor)) call govern(bank, governor, drag)
+    call bank%prepare_law()
+  end function new_table_motors
+
+  !> A bank of induction motors, each on one body.
+  function new_induction_motors(names, body, breakdown_torque, breakdown_slip, synchronous_speed, governor, drag) result(bank)
+    type(string_t), intent(in) :: names(:)
+    integer, intent(in) :: body(:)
+    real(wp), intent(in) :: breakdown_torque(:, :)    !! T_k [N m], shape [lanes, motors] as all that follow
+    real(wp), intent(in) :: breakdown_slip(:, :)      !! s_k, positive
+    real(wp), intent(in) :: synchronous_speed(:, :)   !! [rad/s], not zero
+    type(governor_t), intent(in), optional :: governor    !! of all motors; no motor has one if absent
+    real(wp), intent(in), optional :: drag(:, :)          !! [N m s/rad], shape [lanes, motors]; present with `governor`
+    type(induction_motors_t) :: bank
+
+    call bank%connect(role_motor, size(breakdown_slip, 1), names, body)
+    bank%is_polynomial = .false.
+    bank%has_paper_law = .false.
+    call bank%add_parameter('breakdown_torque', breakdown_torque)
+    call bank%add_parameter('breakdown_slip', breakdown_slip)
+    call bank%add_parameter('synchronous_speed', synchronous_speed)
+    if (present(governor)) call govern(bank, governor, drag)
+    call bank%prepare_law()
+  end function new_induction_motors
+
+  subroutine govern(bank, governor, drag)
+    class(speed_motors_t), intent(inout) :: bank
+    type(governor_t), intent(in) :: governor   !! of all motors
+    real(wp), intent(in) :: drag(:, :)         !! not throttled [N m s/rad], shape [lanes, motors]
+
     allocate (bank%internal_names, source=[character(len=24) :: 'governor integral'])
     call bank%add_governor(governor)
-    allocate (bank%drag, source=drag)
-  end function new_curve_motors
+    call bank%add_parameter('drag', drag, is_key=.false.)
+    call bank%add_term('drag', coefficient_by_speed, -1.0_wp)
+  end subroutine govern
 
-  subroutine polynomials(self, laws)
-    class(motors_t), intent(in) :: self
-    type(polynomial_laws_t), intent(inout) :: laws
+  subroutine describe(self, tape)
+    class(speed_motors_t), intent(in) :: self
+    type(law_tape_t), target, intent(inout) :: tape
 
-    associate (first => self%first, last => self%last())
-      if (allocated(self%drag)) laws%by_speed(:, first:last) = -self%drag
-      if (.not. self%is_polynomial) return
-      select type (law => self%law)
-      type is (quadratic_curve_t)
-        laws%constant(:, first:last) = law%a
-        laws%by_speed(:, first:last) = -law%b
-        laws%by_speed_squared(:, first:last) = -law%c
-      end select
-    end associate
-  end subroutine polynomials
-
-  !> Torque of a motor at full throttle [N m].
-  pure real(wp) function torque(self, lane, motor, speed)
-    class(motors_t), intent(in) :: self
-    integer, intent(in) :: lane, motor
-    real(wp), intent(in) :: speed   !! [rad/s]
-
-    if (allocated(self%law)) then
-      torque = self%law%torque(lane, motor, speed)
+    if (self%has_governor) then
+      tape%applied = node_of(self%throttle(tape) * self%torque(tape))
     else
-      torque = self%curve(lane, motor)%value(self%branch(lane, motor), speed)
+      tape%applied = node_of(self%torque(tape))
     end if
-  end function torque
+  end subroutine describe
 
-  !> Derivative of `torque` by the speed [N m s/rad].
-  pure real(wp) function slope(self, lane, motor, speed)
+  function quadratic_torque(self, tape) result(torque)
     class(motors_t), intent(in) :: self
-    integer, intent(in) :: lane, motor
-    real(wp), intent(in) :: speed   !! [rad/s]
+    type(law_tape_t), target, intent(inout) :: tape
+    type(expression_t) :: torque
 
-    if (allocated(self%law)) then
-      slope = self%law%slope(lane, motor, speed)
-    else
-      slope = self%curve(lane, motor)%slope(self%branch(lane, motor), speed)
-    end if
-  end function slope
+    torque = self%parameter(tape, 'a') - (self%parameter(tape, 'b') + self%parameter(tape, 'c') * speed_of(tape)) * speed_of(tape)
+  end function quadratic_torque
 
-  !> Adds nothing for motors with governors: their torque depends on the throttle, by an internal state.
-  subroutine evaluate(self, time, angle, speed, restoring, applied)
-    class(motors_t), intent(in) :: self
-    real(wp), intent(in) :: time(self%lanes), angle(self%values), speed(self%values)   !! t [s], u [rad], u' [rad/s]
-    real(wp), intent(inout) :: restoring(self%values), applied(self%values)   !! [N m]
-    integer :: e, i, l
+  function table_torque(self, tape) result(torque)
+    class(table_motors_t), intent(in) :: self
+    type(law_tape_t), target, intent(inout) :: tape
+    type(expression_t) :: torque
 
-    if (self%is_polynomial .or. allocated(self%governor)) return
-    i = 0
-    do e = 1, size(self%to)
-      do l = 1, self%lanes
-        i = i + 1
-        applied(i) = applied(i) + self%torque(l, e, speed(i))
-      end do
-    end do
-  end subroutine evaluate
+    if (.not. allocated(self%curve)) error stop 'nocdyn_motors: there are no tables'
+    torque = curve_value(tape, speed_of(tape))
+    call guard_segment(tape, speed_of(tape))
+  end function table_torque
 
-  subroutine evaluate_internal(self, speed, internal, applied, rate)
-    class(motors_t), intent(in) :: self
-    real(wp), intent(in) :: speed(self%values)   !! u' [rad/s]
-    real(wp), intent(in) :: internal(self%internal_values)   !! [lanes, states, motors]
-    real(wp), intent(inout) :: applied(self%values)   !! [N m]
-    real(wp), intent(inout) :: rate(self%internal_values)   !! [lanes, states, motors]
-    real(wp) :: throttle
-    integer :: e, i, l
+  function induction_torque(self, tape) result(torque)
+    class(induction_motors_t), intent(in) :: self
+    type(law_tape_t), target, intent(inout) :: tape
+    type(expression_t) :: slip, s_k, torque
 
-    i = 0
-    do e = 1, size(self%to)
-      do l = 1, self%lanes
-        i = i + 1
-        throttle = self%throttle(l, e, internal(i), speed(i))
-        applied(i) = applied(i) + throttle * self%torque(l, e, speed(i))
-        rate(i) = self%governor%rate(l, e, throttle, internal(i))
-      end do
-    end do
-  end subroutine evaluate_internal
+    s_k = self%parameter(tape, 'breakdown_slip')
+    slip = 1.0_wp - speed_of(tape) / self%parameter(tape, 'synchronous_speed')
+    torque = 2.0_wp * self%parameter(tape, 'breakdown_torque') * s_k * slip / (slip * slip + s_k * s_k)
+  end function induction_torque
 
-  subroutine differentiate(self, elements)
-    class(motors_t), intent(in) :: self
-    type(elements_t), intent(inout) :: elements
-    real(wp) :: by_integral, by_speed, slope, torque
-    integer :: e, i, l, s
-
-    if (self%is_polynomial) return
-    do e = 1, size(self%to)
-      i = self%first + e - 1
-      s = self%first_internal + e - 1
-      do l = 1, self%lanes
-        slope = self%slope(l, e, elements%speed(l, i))
-        if (allocated(self%governor)) then
-          call self%governor%slopes(l, e, self%branch(l, self%first_governor() + e), by_integral, by_speed, &
-                                    elements%internal%rate_internal(l, 1, s), elements%internal%rate_speed(l, s))
-          torque = self%torque(l, e, elements%speed(l, i))
-          slope = self%throttle(l, e, elements%internal%value(l, s), elements%speed(l, i)) * slope + by_speed * torque
-          elements%internal%applied(l, s) = by_integral * torque
-        end if
-        elements%applied_speed(l, i) = elements%applied_speed(l, i) + slope
-      end do
-    end do
-  end subroutine differentiate
-
-  function knees(self, element) result(speeds)
+  !> The vertex, and the speeds without torque, where a, b and c are of sizes that belong together.
+  function quadratic_knees(self, element) result(speeds)
     class(motors_t), intent(in) :: self
     integer, intent(in) :: element   !! numbered within the bank
     real(wp), allocatable :: speeds(:)
+    real(wp), parameter :: together = 1.0e-20_wp   ! ratio of coefficients below which one is no part of the law
+    real(wp) :: a, b, c, discriminant
 
     speeds = self%governed_bank_t%knees(element)
-    if (allocated(self%law)) speeds = [speeds, self%law%knees(element)]
-  end function knees
+    a = self%parameters(self%number_of('a'))%value(1, element)
+    b = self%parameters(self%number_of('b'))%value(1, element)
+    c = self%parameters(self%number_of('c'))%value(1, element)
+    discriminant = b**2 + 4.0_wp * a * c
+    if (abs(c) > together * max(abs(a), abs(b))) then
+      speeds = [speeds, -0.5_wp / c * [b, b - sqrt(max(discriminant, 0.0_wp)), b + sqrt(max(discriminant, 0.0_wp))]]
+    else if (abs(b) > together * abs(a)) then
+      speeds = [speeds, a / b]
+    end if
+  end function quadratic_knees
 
-  subroutine list_parameters(self, parameters)
-    class(motors_t), target, intent(inout) :: self
-    type(lane_parameters_t), intent(inout) :: parameters
+  !> The synchronous speed, and those of the largest torque as a motor and as a generator.
+  function induction_knees(self, element) result(speeds)
+    class(induction_motors_t), intent(in) :: self
+    integer, intent(in) :: element   !! numbered within the bank
+    real(wp), allocatable :: speeds(:)
 
-    call self%governed_bank_t%list_parameters(parameters)
-    if (allocated(self%law)) call self%law%list_parameters(parameters)
-    if (allocated(self%drag)) call parameters%add('drag', self%drag)
-  end subroutine list_parameters
+    associate (synchronous => self%parameters(self%number_of('synchronous_speed'))%value(1, element), &
+               slip => self%parameters(self%number_of('breakdown_slip'))%value(1, element))
+      speeds = [self%governed_bank_t%knees(element), synchronous * (1.0_wp + slip * [-1.0_wp, 0.0_wp, 1.0_wp])]
+    end associate
+  end function induction_knees
 
 end module nocdyn_motors

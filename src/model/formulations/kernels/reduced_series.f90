@@ -1,49 +1,57 @@
 !> Taylor series of the motion of a machine in the reduced formulation, by recurrence from one coefficient to the next.
 !>
 !> From the coefficients of q' up to number k, those of the elements are u'_k = U q'_k and u_k = u'_(k-1) / k. Their laws give
-!> the moments M_k, and (k + 1) q'_(k+1) = R M_k. Products in the laws are sums over pairs of coefficients,
-!> (f g)_k = sum of f_j g_(k-j). The sums start in the middle, with pairs that were computed long ago, and end with
-!> the newest coefficients, so that the processor does not wait for these.
+!> the moments M_k, and (k + 1) q'_(k+1) = R M_k.
 !>
-!> Arrays are padded with zeros to whole vectors, so that every value goes through the same operations wherever it stands.
-!> All procedures of the recurrence are in this module, so that compilers inline them into its loop.
+!> The numbers of the elements stand in groups of w, [w, 0:order, groups]: those of some lanes of one element, or in a block
+!> of one lane those of some elements. A strip of lanes goes through all coefficients before the next strip starts.
 module nocdyn_reduced_series
   use nocdyn_kinds, only: wp
+  use nocdyn_laws, only: narrow, strip_lanes, wide
   use nocdyn_machine, only: machine_t
+  use nocdyn_narrow_series, only: narrow_accelerate => accelerate, narrow_begin_motion => begin_motion, &
+    narrow_find_moments => find_moments, narrow_find_values => find_values, narrow_multiply_group => multiply_group
   use nocdyn_polynomial_laws, only: polynomial_laws_t
-  use nocdyn_series_laws, only: new_series_laws, series_laws_t, width
+  use nocdyn_series_banks, only: new_series_banks, series_banks_t
+  use nocdyn_series_maps, only: new_series_map, series_map_t
+  use nocdyn_series_terms, only: by_speed, by_speed_squared, constant, cubic, has_angle, has_applied, has_cubic, &
+    has_forcing, has_square, linear, parameters, rest
   use nocdyn_sparse_map, only: sparse_map_t
+  use nocdyn_wide_series, only: wide_accelerate => accelerate, wide_begin_motion => begin_motion, &
+    wide_find_moments => find_moments, wide_find_values => find_values, wide_multiply_group => multiply_group
   implicit none (type, external)
   private
 
   public :: new_reduced_series
 
-  integer, parameter :: max_dense_entries = 256   ! entries of a matrix up to which multiplying its zeros is faster
-
   !> Column k of an array holds the coefficients number k: the k-th derivatives over k factorial.
   type, public :: reduced_series_t
     private
-    integer :: order = 0   !! order of the series of the state
-    integer :: lanes = 1
-    logical :: has_energy_balance = .false.   !! whether the powers of the elements `machine%with_work` are integrated
-    integer :: stride = 0                     !! lanes * elements, rounded up to whole vectors, at least one
-    logical :: is_dense = .false.             !! whether U and R are dense matrices
-    ! [stride, 0:order]; banks write with offsets, for which the last column leaves room
-    real(wp), allocatable :: angle(:, :)       !! u - rest
-    real(wp), allocatable :: speed(:, :)       !! u'
-    real(wp), allocatable :: restoring(:, :)   !! as in `elements_t`
-    real(wp), allocatable :: applied(:, :)
-    real(wp), allocatable :: external(:, :)    !! part of `applied` that depends on the time alone
-    real(wp), allocatable :: moment(:)         !! present coefficients of the whole moments, [stride]
-    real(wp), allocatable :: acceleration(:)   !! present coefficients of q'', [lanes * freedoms in whole vectors]
-    real(wp), allocatable :: inverse(:)        !! 1 / k, [order]
-    type(series_laws_t) :: laws
-    real(wp), allocatable :: twists(:, :)      !! U, [stride, freedoms], if dense
-    real(wp), allocatable :: responses(:, :)   !! R, [freedoms in whole vectors, elements], if dense
-    integer, allocatable :: series_banks(:)    !! banks whose laws are neither polynomials nor dependent on the time alone
-    real(wp), allocatable :: square(:, :)      !! (u - rest)^2 in the `cubic_vectors` of the laws
+    integer :: order = 0                        !! of the series of the state
+    integer :: last = 0                         !! coefficient of the moments that will be asked for
+    integer :: lanes = 1, elements = 0, freedoms = 0
+    integer :: components = 0                   !! of the state
+    integer :: strip = 1                        !! lanes of a strip
+    integer :: w = narrow                        !! numbers of a group
+    integer :: groups = 0                       !! of the elements in a strip
+    logical :: has_energy_balance = .false.     !! whether the powers of the elements `machine%with_work` are integrated
+    type(series_map_t) :: twists, accelerations !! U, R
+    real(wp), allocatable :: law(:, :, :, :)    !! polynomial laws, [w, groups, parameters, strips]
+    integer, allocatable :: terms(:)            !! has_... of `nocdyn_series_terms`, [groups]
+    type(series_banks_t) :: banks               !! those with laws that are not polynomial
+    real(wp), allocatable :: motion(:, :, :, :) !! u - rest and u', [w, 0:order, groups, 2]
+    real(wp), allocatable :: square(:, :, :)    !! (u - rest)^2, the same
+    real(wp), allocatable :: restoring(:, :), applied(:, :)   !! present coefficients, as in `elements_t`, [w, groups]
+    real(wp), allocatable :: moment(:, :)       !! their sum
+    real(wp), allocatable :: powers(:, :, :)    !! series of the applied moments, for the work integrals, [w, 0:order, groups]
+    real(wp), allocatable :: rates(:)           !! present coefficients of q', [strip, freedoms], in whole groups
+    real(wp), allocatable :: coordinates(:)     !! q, the same
+    real(wp), allocatable :: acceleration(:)    !! present coefficients of q'', with one lane
+    real(wp), allocatable :: origin(:, :)       !! u where q = 0 [rad], [w, groups]
+    real(wp), allocatable :: angles(:), speeds(:)   !! u and u' of the elements of one lane [rad], [rad/s]
   contains
     procedure :: expand
+    procedure :: derivative
     procedure :: refresh_lane
   end type reduced_series_t
 
@@ -51,30 +59,49 @@ contains
 
   !> Work space for series up to an order.
   function new_reduced_series(machine, twists, accelerations, with_energy_balance, order) result(self)
-    type(machine_t), intent(in) :: machine
+    type(machine_t), intent(inout) :: machine         !! its banks get work space too
     type(sparse_map_t), intent(in) :: twists          !! U
     type(sparse_map_t), intent(in) :: accelerations   !! R
     logical, intent(in) :: with_energy_balance        !! whether the powers of the elements `machine%with_work` are integrated
     integer, intent(in) :: order
     type(reduced_series_t) :: self
-    integer :: b, k
+    integer :: lane
 
     self%order = order
     self%lanes = machine%lanes
+    self%elements = size(machine%elements%to)
+    self%freedoms = machine%coordinates%freedoms
+    self%strip = strip_lanes(machine%lanes, self%elements)
+    self%w = max(self%strip, narrow)
+    self%groups = max((self%strip * self%elements + self%w - 1) / self%w, 1)
     self%has_energy_balance = with_energy_balance .and. size(machine%with_work) > 0
-    self%stride = whole_vectors(max(size(machine%laws%rest), 1))
-    allocate (self%angle(self%stride, 0:order), source=0.0_wp)
-    allocate (self%speed, self%restoring, self%applied, self%external, self%square, source=self%angle)
-    allocate (self%acceleration(whole_vectors(machine%lanes * machine%coordinates%freedoms)), source=0.0_wp)
-    allocate (self%inverse(order))
-    self%inverse(:) = [(1.0_wp / k, k=1, order)]
-    self%series_banks = pack(machine%general_banks, [(.not. machine%banks(machine%general_banks(b))%bank%is_time_only, &
-                                                   b=1, size(machine%general_banks))])
-    self%laws = new_series_laws(self%stride, machine%laws)
-    allocate (self%moment(self%stride), source=0.0_wp)
-    self%external(:, 0) = self%laws%constant
-    call form_dense_maps(self, twists, accelerations, machine%coordinates%freedoms, size(machine%elements%to))
+    self%components = 2 * self%freedoms + machine%elements%internal%count
+    if (self%has_energy_balance) self%components = self%components + size(machine%with_work)
+    self%twists = new_series_map(twists, self%lanes, self%strip, self%elements, self%freedoms)
+    self%accelerations = new_series_map(accelerations, self%lanes, self%strip, self%freedoms, self%elements)
+    allocate (self%law(self%w, self%groups, parameters, (machine%lanes + self%strip - 1) / self%strip), source=0.0_wp)
+    allocate (self%terms(self%groups), source=merge(has_applied, 0, self%has_energy_balance))
+    call allocate_work(self)
+    self%banks = new_series_banks(machine, order, self%strip, self%groups)
+    where (self%banks%has_angle) self%terms = ior(self%terms, has_angle)
+    where (self%banks%has_forcing) self%terms = ior(self%terms, has_forcing)
+    do lane = 1, machine%lanes
+      call copy_laws(self, lane, machine%laws)
+    end do
   end function new_reduced_series
+
+  subroutine allocate_work(self)
+    type(reduced_series_t), intent(inout) :: self
+
+    associate (length => self%w * ((self%strip * self%freedoms + self%w - 1) / self%w))
+      allocate (self%motion(self%w, 0:self%order, self%groups, 2), self%square(self%w, 0:self%order, self%groups), source=0.0_wp)
+      allocate (self%restoring(self%w, self%groups), self%applied(self%w, self%groups), source=0.0_wp)
+      allocate (self%moment(self%w, self%groups), self%origin(self%w, self%groups), source=0.0_wp)
+      if (self%has_energy_balance) allocate (self%powers(self%w, 0:self%order, self%groups), source=0.0_wp)
+      allocate (self%rates(length), self%coordinates(length), self%acceleration(length), source=0.0_wp)
+      allocate (self%angles(self%elements), self%speeds(self%elements), source=0.0_wp)
+    end associate
+  end subroutine allocate_work
 
   !> Updates everything that depends on the parameters of a lane.
   subroutine refresh_lane(self, lane, laws, twists, accelerations)
@@ -84,293 +111,279 @@ contains
     type(sparse_map_t), intent(in) :: twists, accelerations   !! U, R
 
     if (self%order == 0) return
-    call self%laws%refresh_lane(lane, laws)
-    self%external(:, 0) = self%laws%constant
-    if (self%is_dense) call form_matrices(self, twists, accelerations)
+    call copy_laws(self, lane, laws)
+    call self%twists%refresh_lane(lane, twists)
+    call self%accelerations%refresh_lane(lane, accelerations)
   end subroutine refresh_lane
 
-  !> Forms the dense matrices of U and R, if they are small.
-  subroutine form_dense_maps(self, twists, accelerations, freedoms, elements)
+  !> Copies the polynomial laws of a lane; those of the last one to the lanes of its strip beyond it, too.
+  subroutine copy_laws(self, lane, laws)
     type(reduced_series_t), intent(inout) :: self
-    type(sparse_map_t), intent(in) :: twists, accelerations   !! U, R
-    integer, intent(in) :: freedoms, elements
+    integer, intent(in) :: lane
+    type(polynomial_laws_t), intent(in) :: laws
+    integer :: e, first, g, last, slot
 
-    self%is_dense = self%lanes == 1 .and. max(self%stride * freedoms, size(self%acceleration) * elements) <= max_dense_entries
-    if (.not. self%is_dense) return
-    allocate (self%twists(self%stride, freedoms), self%responses(size(self%acceleration), elements), source=0.0_wp)
-    call form_matrices(self, twists, accelerations)
-  end subroutine form_dense_maps
-
-  !> Fills the dense matrices.
-  subroutine form_matrices(self, twists, accelerations)
-    type(reduced_series_t), intent(inout) :: self
-    type(sparse_map_t), intent(in) :: twists, accelerations   !! U, R
-    integer :: i
-
-    do i = 1, size(self%twists, 2)
-      call twists%multiply(unit(size(self%twists, 2), i), self%twists(:, i))
+    first = modulo(lane - 1, self%strip) + 1
+    last = first
+    if (lane == self%lanes) last = self%strip
+    do e = 1, self%elements
+      do slot = self%strip * (e - 1) + first, self%strip * (e - 1) + last
+        g = (slot - 1) / self%w + 1
+        associate (law => self%law(modulo(slot - 1, self%w) + 1, g, :, (lane - 1) / self%strip + 1))
+          law(linear) = laws%linear(lane, e)
+          law(constant) = laws%constant(lane, e)
+          law(by_speed) = laws%by_speed(lane, e)
+          law(cubic) = laws%cubic(lane, e)
+          law(by_speed_squared) = laws%by_speed_squared(lane, e)
+          law(rest) = laws%rest(lane, e)
+        end associate
+        self%terms(g) = ior(self%terms(g), terms_of(laws, lane, e))
+      end do
     end do
-    do i = 1, size(self%responses, 2)
-      call accelerations%multiply(unit(size(self%responses, 2), i), self%responses(:, i))
-    end do
-  end subroutine form_matrices
+  end subroutine copy_laws
 
-  !> A number of values, rounded up to whole vectors.
-  pure integer function whole_vectors(numbers)
-    integer, intent(in) :: numbers
+  !> The terms that the law of an element has in one lane.
+  pure integer function terms_of(laws, lane, element) result(terms)
+    type(polynomial_laws_t), intent(in) :: laws
+    integer, intent(in) :: lane, element
 
-    whole_vectors = width * ((numbers + width - 1) / width)
-  end function whole_vectors
+    terms = 0
+    if (abs(laws%linear(lane, element)) > 0) terms = has_angle
+    if (abs(laws%cubic(lane, element)) > 0) terms = has_angle + has_cubic
+    if (abs(laws%constant(lane, element)) > 0 .or. abs(laws%by_speed(lane, element)) > 0) terms = terms + has_applied
+    if (abs(laws%by_speed_squared(lane, element)) > 0) terms = terms + has_square
+  end function terms_of
 
-  !> The unit vector number i of length n.
-  pure function unit(n, i) result(vector)
-    integer, intent(in) :: n, i
-    real(wp) :: vector(n)
-
-    vector = 0.0_wp
-    vector(i) = 1.0_wp
-  end function unit
-
-  !> Computes the coefficients number 1 to `order` of q', q and the work integrals, which follow one another in y.
-  subroutine expand(self, machine, twists, accelerations, start_twist, n, length, t, y)
+  !> Computes the coefficients number 1 to `order` of q', q, the internal states and the work integrals, which follow one another.
+  subroutine expand(self, machine, twists, accelerations, twist_at_origin, columns, t, y)
     class(reduced_series_t), intent(inout) :: self
-    type(machine_t), intent(in) :: machine
-    type(sparse_map_t), intent(in) :: twists, accelerations   !! U, R
-    integer, intent(in) :: n                                  !! lanes * freedoms
-    integer, intent(in) :: length                             !! length of a column of y
-    real(wp), contiguous, intent(in) :: start_twist(:, :)     !! [rad], [lanes, elements]
-    real(wp), intent(in) :: t(self%lanes)                     !! [s]
-    real(wp), intent(inout) :: y(length, 0:self%order)        !! coefficients; number 0 is given
-    integer :: k
+    type(machine_t), intent(inout) :: machine
+    type(sparse_map_t), intent(in) :: twists, accelerations     !! U, R
+    real(wp), contiguous, intent(in) :: twist_at_origin(:, :)   !! [rad], [lanes, elements]
+    integer, intent(in) :: columns                              !! components of the state, and padding
+    real(wp), intent(in) :: t(self%lanes)                       !! [s]
+    real(wp), intent(inout) :: y(self%lanes, columns, 0:self%order)   !! coefficients; number 0 is given
+    integer :: k, strip
 
-    call machine%forcing_series(self%order - 1, self%stride, t, self%external)
-    call twists%multiply_pair(start_twist, y(n + 1, 0), y(1, 0), self%angle, self%speed)
-    do k = 0, self%order - 1
-      if (k > 0) call element_speeds(self, twists, n, y(1, k), self%speed(1, k))
-      call find_moments(self, machine, k, t)
-      call accelerate(self, accelerations)
-      call integrate_coordinates(n, self%inverse(k + 1), self%acceleration, y(1, k), y(1, k + 1))
-      if (self%has_energy_balance) call integrate_powers(self, machine, k, y(2 * n + 1, k + 1))
+    self%last = self%order - 1
+    do strip = 1, size(self%law, 4)
+      call begin(self, machine, twists, strip, twist_at_origin, columns, t, y)
+      do k = 0, self%order - 1
+        call advance(self, machine, twists, accelerations, strip, k, columns, y(1, 1, k + 1))
+      end do
     end do
   end subroutine expand
 
-  !> Computes u'_k = U q'_k.
-  subroutine element_speeds(self, twists, n, q, u)
-    type(reduced_series_t), intent(in) :: self
-    type(sparse_map_t), intent(in) :: twists    !! U
-    integer, intent(in) :: n                    !! lanes * freedoms
-    real(wp), intent(in) :: q(n)                !! q'_k
-    real(wp), intent(inout) :: u(self%stride)   !! u'_k
+  !> The derivative of the state, to the same bits as that of `machine%evaluate_elements`; with several lanes.
+  subroutine derivative(self, machine, twists, accelerations, twist_at_origin, t, y, dydt)
+    class(reduced_series_t), intent(inout) :: self
+    type(machine_t), intent(inout) :: machine
+    type(sparse_map_t), intent(in) :: twists, accelerations     !! U, R
+    real(wp), contiguous, intent(in) :: twist_at_origin(:, :)   !! [rad], [lanes, elements]
+    real(wp), intent(in) :: t(self%lanes)                       !! [s]
+    real(wp), intent(in) :: y(self%lanes, self%components)
+    real(wp), intent(inout) :: dydt(self%lanes, self%components)
+    integer :: strip
 
-    if (self%is_dense) then
-      call multiply(self%stride, n, self%twists, q, u)
-    else
-      call twists%multiply(q, u)
-    end if
-  end subroutine element_speeds
+    self%last = 0
+    do strip = 1, size(self%law, 4)
+      call begin(self, machine, twists, strip, twist_at_origin, self%components, t, y)
+      call advance(self, machine, twists, accelerations, strip, 0, self%components, dydt)
+    end do
+  end subroutine derivative
 
-  !> Computes u_k and the moments number k.
-  subroutine find_moments(self, machine, k, t)
+  !> Coefficients k + 1 of the state in a strip, from those of the motion up to number k.
+  subroutine advance(self, machine, twists, accelerations, strip, k, columns, y)
     type(reduced_series_t), intent(inout) :: self
-    type(machine_t), intent(in) :: machine
-    integer, intent(in) :: k
-    real(wp), intent(in) :: t(self%lanes)   !! [s]
+    type(machine_t), intent(inout) :: machine
+    type(sparse_map_t), intent(in) :: twists, accelerations   !! U, R
+    integer, intent(in) :: strip, k, columns
+    real(wp), intent(inout) :: y(self%lanes, columns)         !! coefficients k + 1 of the state
 
     if (k == 0) then
-      call begin_moments(self%stride, self%laws%rest, self%laws%linear, self%laws%by_speed, self%external, self%angle, &
-                         self%speed, self%restoring, self%applied)
+      call find_values(self, strip)
     else
-      call continue_moments(self%stride, k, self%inverse(k), self%laws%linear, self%laws%by_speed, self%external, self%speed, &
-                            self%angle, self%restoring, self%applied)
+      if (self%lanes == 1) call self%twists%multiply(twists, self%order, k, self%rates, self%motion(1, 0, 1, 2))
+      call find_moments(self, strip, k)
     end if
-    if (size(self%laws%cubic_vectors) > 0) then
-      call add_cubes(self%stride, k, self%laws%cubic_vectors, self%laws%cubic, self%angle, self%square, self%restoring)
+    call self%banks%add(machine, strip, k, self%motion, self%restoring, self%applied)
+    if (self%has_energy_balance) self%powers(:, k, :) = self%applied
+    call add(size(self%moment), self%restoring, self%applied, self%moment)
+    call integrate(self, accelerations, strip, k, columns, y)
+    if (machine%elements%internal%count > 0) call self%banks%integrate(machine, strip, k, y(1, 2 * self%freedoms + 1))
+    if (self%has_energy_balance) call integrate_powers(self, machine, strip, k, columns, y)
+  end subroutine advance
+
+  !> Coefficients 0 of the elements of a strip.
+  subroutine begin(self, machine, twists, strip, twist_at_origin, columns, t, y)
+    type(reduced_series_t), intent(inout) :: self
+    type(machine_t), intent(inout) :: machine
+    type(sparse_map_t), intent(in) :: twists                    !! U
+    integer, intent(in) :: strip, columns
+    real(wp), intent(in) :: twist_at_origin(self%lanes, self%elements)   !! [rad]
+    real(wp), intent(in) :: t(self%lanes)                       !! [s]
+    real(wp), intent(in) :: y(self%lanes, columns)              !! state
+
+    associate (f => self%freedoms)
+      call gather(self, strip, f, y, self%rates)
+      if (self%lanes == 1) then
+        call begin_one_lane(self, twists, twist_at_origin, y(1, f + 1))
+      else
+        associate (before => self%strip * (strip - 1))
+          if (before + self%strip <= self%lanes) then
+            call begin_lanes(self, strip, self%lanes, y(before + 1, f + 1), twist_at_origin(before + 1, 1))
+          else
+            call gather(self, strip, f, y(1, f + 1), self%coordinates)
+            call gather(self, strip, self%elements, twist_at_origin, self%origin)
+            call begin_lanes(self, strip, self%strip, self%coordinates, self%origin)
+          end if
+        end associate
+      end if
+    end associate
+    call self%banks%begin(machine, strip, self%last, t, y(1, min(2 * self%freedoms + 1, columns)))
+  end subroutine begin
+
+  !> Angles from rest and speeds of the elements of several lanes.
+  subroutine begin_lanes(self, strip, stride, q, origin)
+    type(reduced_series_t), intent(inout) :: self
+    integer, intent(in) :: strip, stride
+    real(wp), intent(in) :: q(stride, self%freedoms), origin(stride, self%elements)   !! coordinates; u where they are zero [rad]
+
+    associate (map => self%twists)
+      if (self%w == narrow) then
+        call narrow_begin_motion(self%order, self%elements, self%terms, map%first, map%column, map%coefficient(1, 1, strip), &
+                                 stride, q, origin, self%rates, self%law(1, 1, rest, strip), self%motion(1, 0, 1, 1), &
+                                 self%motion(1, 0, 1, 2))
+      else
+        call wide_begin_motion(self%order, self%elements, self%terms, map%first, map%column, map%coefficient(1, 1, strip), &
+                               stride, q, origin, self%rates, self%law(1, 1, rest, strip), self%motion(1, 0, 1, 1), &
+                               self%motion(1, 0, 1, 2))
+      end if
+    end associate
+  end subroutine begin_lanes
+
+  !> Angles from rest and speeds of the elements of one lane.
+  subroutine begin_one_lane(self, twists, twist_at_origin, q)
+    type(reduced_series_t), intent(inout) :: self
+    type(sparse_map_t), intent(in) :: twists                   !! U
+    real(wp), intent(in) :: twist_at_origin(self%elements)     !! [rad]
+    real(wp), intent(in) :: q(self%freedoms)                   !! coordinates
+    integer :: g, last, n
+
+    call twists%multiply_pair(twist_at_origin, q, self%rates, self%angles, self%speeds)
+    do g = 1, self%groups
+      last = min(narrow * g, self%elements)
+      n = last - narrow * (g - 1)
+      self%motion(:n, 0, g, 1) = self%angles(last - n + 1:last) - self%law(:n, g, rest, 1)
+      self%motion(:n, 0, g, 2) = self%speeds(last - n + 1:last)
+    end do
+  end subroutine begin_one_lane
+
+  !> Copies components of the state of a strip; the last lane to those beyond it, too.
+  pure subroutine gather(self, strip, n, y, x)
+    type(reduced_series_t), intent(in) :: self
+    integer, intent(in) :: strip, n
+    real(wp), intent(in) :: y(self%lanes, n)            !! components of the state
+    real(wp), intent(inout) :: x(self%strip, n)         !! of the strip
+    integer :: before, c, taken
+
+    before = self%strip * (strip - 1)
+    taken = min(self%strip, self%lanes - before)
+    do c = 1, n
+      x(:taken, c) = y(before + 1:before + taken, c)
+      x(taken + 1:, c) = y(self%lanes, c)
+    end do
+  end subroutine gather
+
+  !> Moments of polynomial laws at the start, and their part that follows from the time alone.
+  subroutine find_values(self, strip)
+    type(reduced_series_t), intent(inout) :: self
+    integer, intent(in) :: strip
+
+    if (self%w == narrow) then
+      call narrow_find_values(self%order, self%groups, self%terms, self%law(1, 1, 1, strip), self%banks%forcing, &
+                              self%motion(1, 0, 1, 2), self%motion(1, 0, 1, 1), self%square, self%restoring, self%applied)
+    else
+      call wide_find_values(self%order, self%groups, self%terms, self%law(1, 1, 1, strip), self%banks%forcing, &
+                            self%motion(1, 0, 1, 2), self%motion(1, 0, 1, 1), self%square, self%restoring, self%applied)
     end if
-    if (size(self%laws%square_vectors) > 0) then
-      call add_squares(self%stride, k, self%laws%square_vectors, self%laws%by_speed_squared, self%speed, self%applied)
-    end if
-    if (size(self%series_banks) > 0) call add_banks(self, machine, k, t)
-    call add(self%stride, self%restoring(1, k), self%applied(1, k), self%moment)
+  end subroutine find_values
+
+  !> Coefficients k > 0 of the motion of the elements, and of these moments.
+  subroutine find_moments(self, strip, k)
+    type(reduced_series_t), intent(inout) :: self
+    integer, intent(in) :: strip, k
+
+    associate (map => self%twists)
+      if (self%w == narrow) then
+        call narrow_find_moments(self%order, self%groups, k, self%terms, self%law(1, 1, 1, strip), self%banks%forcing, &
+                                 map%mapped, map%first, map%column, map%coefficient(1, 1, strip), self%rates, &
+                                 self%motion(1, 0, 1, 2), self%motion(1, 0, 1, 1), self%square, self%restoring, self%applied)
+      else
+        call wide_find_moments(self%order, self%groups, k, self%terms, self%law(1, 1, 1, strip), self%banks%forcing, &
+                               map%mapped, map%first, map%column, map%coefficient(1, 1, strip), self%rates, &
+                               self%motion(1, 0, 1, 2), self%motion(1, 0, 1, 1), self%square, self%restoring, self%applied)
+      end if
+    end associate
   end subroutine find_moments
 
-  !> Computes q''_k = R M_k.
-  subroutine accelerate(self, accelerations)
-    type(reduced_series_t), intent(inout) :: self
-    type(sparse_map_t), intent(in) :: accelerations   !! R
-
-    if (self%is_dense) then
-      call multiply(size(self%acceleration), size(self%responses, 2), self%responses, self%moment, self%acceleration)
-    else
-      call accelerations%multiply(self%moment, self%acceleration)
-    end if
-  end subroutine accelerate
-
-  !> Adds the moments of the banks in `series_banks`.
-  subroutine add_banks(self, machine, k, t)
-    type(reduced_series_t), intent(inout) :: self
-    type(machine_t), intent(in) :: machine
-    integer, intent(in) :: k
-    real(wp), intent(in) :: t(self%lanes)   !! [s]
-    integer :: i
-
-    do i = 1, size(self%series_banks)
-      associate (bank => machine%banks(self%series_banks(i))%bank)
-        associate (first => bank%first_value)
-          call bank%series(k, self%stride, t, self%angle(first, 0), self%speed(first, 0), self%restoring(first, 0), &
-                           self%applied(first, 0))
-        end associate
-      end associate
-    end do
-  end subroutine add_banks
-
-  !> Moments at the start of the step, without the terms of higher degree.
-  pure subroutine begin_moments(n, rest, linear, by_speed, external, angle, speed, restoring, applied)
-    integer, intent(in) :: n                                                        !! stride
-    real(wp), intent(in), dimension(n) :: rest, linear, by_speed, external, speed   !! laws, time-only torques, u'
-    real(wp), intent(inout) :: angle(n)                                             !! u; on return u - rest
-    real(wp), intent(inout) :: restoring(n), applied(n)                             !! moments number 0
-
-    angle = angle - rest
-    restoring = -linear * angle
-    applied = external + by_speed * speed
-  end subroutine begin_moments
-
-  !> u = matrix x, with all zeros of the matrix.
-  pure subroutine multiply(rows, columns, matrix, x, u)
-    integer, intent(in) :: rows   !! whole vectors
-    integer, intent(in) :: columns
-    real(wp), intent(in) :: matrix(rows, columns), x(columns)   !! padded with zeros to whole vectors
-    real(wp), intent(inout) :: u(rows)
-    real(wp) :: sum(width)
-    integer :: c, i
-
-    do i = 1, rows, width
-      sum = 0.0_wp
-      do c = 1, columns
-        sum = sum + matrix(i:i + width - 1, c) * x(c)
-      end do
-      u(i:i + width - 1) = sum
-    end do
-  end subroutine multiply
-
-  !> Computes u_k and the moments number k, without the terms of higher degree.
-  pure subroutine continue_moments(n, k, inverse, linear, by_speed, external, speed, angle, restoring, applied)
-    integer, intent(in) :: n, k
-    real(wp), intent(in) :: inverse                                                   !! 1 / k
-    real(wp), intent(in) :: linear(n), by_speed(n), external(n, 0:k), speed(n, 0:k)   !! laws, time-only torques, u'
-    real(wp), intent(inout) :: angle(n, 0:k), restoring(n, 0:k), applied(n, 0:k)      !! column k is set
-    integer :: i
-
-    do i = 1, n, width
-      associate (j => i + width - 1)
-        angle(i:j, k) = inverse * speed(i:j, k - 1)
-        restoring(i:j, k) = -linear(i:j) * angle(i:j, k)
-        applied(i:j, k) = external(i:j, k) + by_speed(i:j) * speed(i:j, k)
-      end associate
-    end do
-  end subroutine continue_moments
-
-  !> Adds -cubic (u - rest)^3. The square counts each pair of different coefficients once and doubles it.
-  pure subroutine add_cubes(n, k, vectors, cubic, w, w2, restoring)
-    integer, intent(in) :: n, k                                !! stride, number of the coefficients
-    integer, intent(in) :: vectors(:)                          !! first values of the vectors with cubic terms
-    real(wp), intent(in) :: cubic(n), w(n, 0:k)                !! w = u - rest
-    real(wp), intent(inout) :: w2(n, 0:k), restoring(n, 0:k)   !! w2 = w^2
-    real(wp) :: sum(width)
-    integer :: i, j, s
-
-    do s = 1, size(vectors)
-      i = vectors(s)
-      sum = 0.0_wp
-      do j = (k + 1) / 2 - 1, 0, -1
-        sum = sum + w(i:i + width - 1, j) * w(i:i + width - 1, k - j)
-      end do
-      sum = sum + sum
-      if (modulo(k, 2) == 0) sum = sum + w(i:i + width - 1, k / 2) * w(i:i + width - 1, k / 2)
-      w2(i:i + width - 1, k) = sum
-      sum = 0.0_wp
-      if (modulo(k, 2) == 0) sum = w(i:i + width - 1, k / 2) * w2(i:i + width - 1, k / 2)
-      do j = (k + 1) / 2 - 1, 0, -1
-        sum = sum + (w(i:i + width - 1, j) * w2(i:i + width - 1, k - j) + w(i:i + width - 1, k - j) * w2(i:i + width - 1, j))
-      end do
-      restoring(i:i + width - 1, k) = restoring(i:i + width - 1, k) - cubic(i:i + width - 1) * sum
-    end do
-  end subroutine add_cubes
-
-  !> Adds by_speed_squared u'^2.
-  pure subroutine add_squares(n, k, vectors, by_speed_squared, speed, applied)
-    integer, intent(in) :: n, k                                  !! stride, number of the coefficients
-    integer, intent(in) :: vectors(:)                            !! first values of the vectors with quadratic terms
-    real(wp), intent(in) :: by_speed_squared(n), speed(n, 0:k)   !! law, u'
-    real(wp), intent(inout) :: applied(n, 0:k)                   !! column k is changed
-    real(wp) :: sum(width)
-    integer :: i, j, s
-
-    do s = 1, size(vectors)
-      i = vectors(s)
-      sum = 0.0_wp
-      do j = (k + 1) / 2 - 1, 0, -1
-        sum = sum + speed(i:i + width - 1, j) * speed(i:i + width - 1, k - j)
-      end do
-      sum = sum + sum
-      if (modulo(k, 2) == 0) sum = sum + speed(i:i + width - 1, k / 2) * speed(i:i + width - 1, k / 2)
-      applied(i:i + width - 1, k) = applied(i:i + width - 1, k) + by_speed_squared(i:i + width - 1) * sum
-    end do
-  end subroutine add_squares
-
-  !> Sum of restoring and applied moments.
-  pure subroutine add(n, restoring, applied, moment)
+  pure subroutine add(n, x, y, sum)
     integer, intent(in) :: n
-    real(wp), intent(in) :: restoring(n), applied(n)   !! [N m]
-    real(wp), intent(inout) :: moment(n)               !! [N m]
-    integer :: i
+    real(wp), intent(in) :: x(n), y(n)   !! [N m]
+    real(wp), intent(inout) :: sum(n)    !! the same
 
-    do i = 1, n, width
-      moment(i:i + width - 1) = restoring(i:i + width - 1) + applied(i:i + width - 1)
-    end do
+    sum = x + y
   end subroutine add
 
-  !> Computes the next coefficients of q' from those of q'', and of q from those of q'.
-  pure subroutine integrate_coordinates(n, inverse, acceleration, speed, y)
-    integer, intent(in) :: n                                     !! lanes * freedoms
-    real(wp), intent(in) :: inverse, acceleration(n), speed(n)   !! inverse = 1 / (k + 1)
-    real(wp), intent(inout) :: y(n, 2)                           !! next coefficients of q' and q
-    integer :: i
+  !> Coefficients k + 1 of q' and q, from the moments and q' number k.
+  subroutine integrate(self, accelerations, strip, k, columns, y)
+    type(reduced_series_t), intent(inout) :: self
+    type(sparse_map_t), intent(in) :: accelerations   !! R
+    integer, intent(in) :: strip, k, columns
+    real(wp), intent(inout) :: y(self%lanes, columns)   !! coefficients k + 1 of the state
+    real(wp) :: inverse
 
-    if (n < width) then
-      !GCC$ novector
-      do i = 1, n
-        y(i, 1) = inverse * acceleration(i)
-        y(i, 2) = inverse * speed(i)
-      end do
-    else
-      do i = 1, n
-        y(i, 1) = inverse * acceleration(i)
-        y(i, 2) = inverse * speed(i)
-      end do
-    end if
-  end subroutine integrate_coordinates
+    inverse = 1.0_wp / (k + 1)
+    associate (f => self%freedoms, map => self%accelerations, first => self%strip * (strip - 1) + 1)
+      if (self%lanes == 1) then
+        call map%multiply(accelerations, 0, 0, self%moment, self%acceleration)
+        y(1, f + 1:2 * f) = inverse * self%rates(:f)
+        y(1, :f) = inverse * self%acceleration(:f)
+        self%rates(:f) = y(1, :f)
+      else if (self%w == narrow) then
+        call narrow_accelerate(f, map%first, map%column, map%coefficient(1, 1, strip), inverse, self%moment, self%rates, &
+                               min(self%strip, self%lanes + 1 - first), self%lanes, y(first, 1))
+      else
+        call wide_accelerate(f, map%first, map%column, map%coefficient(1, 1, strip), inverse, self%moment, self%rates, &
+                             min(self%strip, self%lanes + 1 - first), self%lanes, y(first, 1))
+      end if
+    end associate
+  end subroutine integrate
 
-  !> Computes the next coefficients of the work integrals; the powers are `applied` times the speed.
-  subroutine integrate_powers(self, machine, k, work)
+  !> Coefficients k + 1 of the work integrals; the powers are `applied` times the speed.
+  subroutine integrate_powers(self, machine, strip, k, columns, y)
     type(reduced_series_t), intent(in) :: self
     type(machine_t), intent(in) :: machine
-    integer, intent(in) :: k
-    real(wp), intent(inout) :: work(self%lanes, size(machine%with_work))   !! coefficients number k + 1
-    integer :: a, before, j, l
+    integer, intent(in) :: strip, k, columns
+    real(wp), intent(inout) :: y(self%lanes, columns)   !! coefficients k + 1 of the state
+    real(wp) :: power(wide)
+    integer :: a, before, first, g, i, slot
 
+    before = 2 * self%freedoms + machine%elements%internal%count
+    first = self%strip * (strip - 1)
+    g = 0
     do a = 1, size(machine%with_work)
-      before = (machine%with_work(a) - 1) * self%lanes
-      do l = 1, self%lanes
-        work(l, a) = 0.0_wp
-      end do
-      do j = 0, k
-        do l = 1, self%lanes
-          work(l, a) = work(l, a) + self%applied(before + l, j) * self%speed(before + l, k - j)
-        end do
-      end do
-      do l = 1, self%lanes
-        work(l, a) = self%inverse(k + 1) * work(l, a)
+      slot = self%strip * (machine%with_work(a) - 1)
+      if (g /= slot / self%w + 1) then
+        g = slot / self%w + 1
+        if (self%w == narrow) then
+          call narrow_multiply_group(k, self%powers(1, 0, g), self%motion(1, 0, g, 2), power)
+        else
+          call wide_multiply_group(k, self%powers(1, 0, g), self%motion(1, 0, g, 2), power)
+        end if
+      end if
+      do i = 1, min(self%strip, self%lanes - first)
+        y(first + i, before + a) = (1.0_wp / (k + 1)) * power(modulo(slot, self%w) + i)
       end do
     end do
   end subroutine integrate_powers

@@ -1,0 +1,50 @@
+!> Couplings with the elastic moment of a table over the twist.
+module nocdyn_table_couplings
+  use nocdyn_couplings, only: coupling_common_t, couplings_t
+  use nocdyn_curves, only: curve_t
+  use nocdyn_law_expressions, only: expression_t, node_of, operator(-)
+  use nocdyn_law_functions, only: ratio
+  use nocdyn_law_tape, only: law_tape_t
+  use nocdyn_tables, only: add_table, curve_integral, curve_value, guard_segment
+  implicit none (type, external)
+  private
+
+  public :: new_table_couplings
+
+  !> M_el = -curve(u - rest_twist) on the second body.
+  type, extends(couplings_t), public :: table_couplings_t
+  contains
+    procedure :: describe
+  end type table_couplings_t
+
+contains
+
+  !> Couplings with the elastic moment of a curve over the twist.
+  function new_table_couplings(common, curve) result(bank)
+    type(coupling_common_t), intent(in) :: common   !! names, bodies, damping, rest twists, friction
+    type(curve_t), intent(in) :: curve(:, :)   !! [N m] over [rad], shape [lanes, couplings]
+    type(table_couplings_t) :: bank
+    integer :: e
+
+    call bank%set_common(common)
+    call bank%add_damping()
+    call add_table(bank, curve)
+    bank%elastic = [(e, e=1, size(common%to))]
+    call bank%prepare_law()
+  end function new_table_couplings
+
+  subroutine describe(self, tape)
+    class(table_couplings_t), intent(in) :: self
+    type(law_tape_t), target, intent(inout) :: tape
+    type(expression_t) :: moment, w
+
+    call self%couplings_t%describe(tape)
+    w = self%twist_from_rest(tape)
+    moment = curve_value(tape, w)
+    tape%restoring = node_of(-moment)
+    tape%stored = node_of(curve_integral(tape, w))
+    tape%secant = node_of(ratio(moment, w))
+    call guard_segment(tape, w)
+  end subroutine describe
+
+end module nocdyn_table_couplings

@@ -1,0 +1,342 @@
+!> Elements with the same form of law: their parameters, the law, and its branches.
+!>
+!> The polynomial part of the law is given as multiples of parameters, which one loop evaluates for all elements of a machine
+!> (`polynomial_laws_t`); the rest is written once, as formulas in `describe`, from which moments, rates, derivatives, energies,
+!> Taylor series and the choice of branches follow (`element_law_t`).
+!>
+!> An element may have *internal states*, for instance the integral of a governor or an armature current. Their rates depend
+!> on the speed of the element and on its internal states only. All elements have the same number of them.
+!>
+!> A law with kinks or jumps has *branches*: on each branch it is one smooth formula that may be evaluated anywhere. A branch
+!> selects constants of the formulas (`pick`), or a segment of a curve; guards, which tell where a branch holds, contain no picks.
+!> Only `choose` changes a branch. The branches divide the plane of the law's variables, so the branch follows from the state and
+!> a law has no memory. Every boundary of a branch is shifted outwards by `boundary_width`, relative to the scale of the law: a
+!> lane that has just crossed it is well inside its new branch.
+module nocdyn_described_elements
+  use nocdyn_curves, only: curve_t
+  use nocdyn_element_laws, only: element_law_t, new_element_law
+  use nocdyn_kinds, only: wp
+  use nocdyn_lane_parameters, only: lane_parameters_t
+  use nocdyn_law_expressions, only: expression_t, parameter_of
+  use nocdyn_law_tape, only: law_tape_t, new_law_tape
+  use nocdyn_laws, only: law_parameter_t, strip_lanes
+  use nocdyn_polynomial_laws, only: polynomial_laws_t
+  implicit none (type, external)
+  private
+
+  public :: time_reached
+
+  real(wp), parameter, public :: boundary_width = 1.0e-10_wp   !! shift of branch boundaries, relative to the scale of a law
+
+  !> A coefficient of the polynomial part of a law: a multiple of a parameter.
+  type, public :: polynomial_term_t
+    integer :: parameter = 0      !! its number
+    integer :: coefficient = 0    !! coefficient_... of `nocdyn_polynomial_laws`
+    real(wp) :: factor = 1.0_wp
+  end type polynomial_term_t
+
+  type, public :: described_elements_t
+    integer :: lanes = 1
+    integer :: count = 0                          !! elements
+    integer :: first = 1                          !! number of the first one in the machine
+    integer :: values = 0                         !! lanes * elements
+    logical :: is_polynomial = .true.             !! whether `polynomials` gives the whole law
+    integer :: states = 0                         !! internal states of each element
+    integer :: internal_values = 0                !! lanes * states * elements
+    integer, allocatable :: switch_element(:)     !! element of each switch
+    character(len=24), allocatable :: switch_names(:)   !! of the boundaries, e.g. 'edge of the gap', [switches]
+    integer, allocatable :: choices(:)            !! branches of each switch, 0 where they are the segments of `curve`, [switches]
+    integer, allocatable :: branch(:, :)          !! present branch of each switch, 1 or more, or a segment; [lanes, switches]
+    type(law_parameter_t), allocatable :: parameters(:)
+    type(polynomial_term_t), allocatable :: terms(:)   !! of the polynomial part of the law
+    type(curve_t), allocatable :: curve(:, :)     !! of the first switch of each element, [lanes, elements]
+    type(element_law_t), allocatable :: law       !! the part that is not polynomial
+  contains
+    procedure :: polynomials
+    procedure :: describe
+    procedure :: set_size
+    procedure :: add_parameter
+    procedure :: values_of
+    procedure :: add_term
+    procedure :: number_of
+    procedure :: parameter
+    procedure :: add_switches
+    procedure :: prepare_law
+    procedure :: refresh_lane
+    procedure :: evaluate
+    procedure :: choose
+    procedure :: indicator
+    procedure :: list_parameters
+  end type described_elements_t
+
+contains
+
+  !> Sets the numbers of lanes and elements, which have no parameters yet.
+  subroutine set_size(self, lanes, count)
+    class(described_elements_t), intent(inout) :: self
+    integer, intent(in) :: lanes, count
+
+    self%lanes = lanes
+    self%count = count
+    self%values = lanes * count
+    self%internal_values = lanes * self%states * count
+    allocate (self%parameters(0), self%terms(0))
+    allocate (self%switch_element(0), self%switch_names(0), self%choices(0), self%branch(lanes, 0))
+  end subroutine set_size
+
+  !> The time to compare with the times at which a law changes: later by some roundings, by which a step may end too early.
+  pure function time_reached(t)
+    real(wp), intent(in) :: t   !! [s]
+    real(wp) :: time_reached    !! [s]
+
+    time_reached = t + 8.0_wp * spacing(t)
+  end function time_reached
+
+  !> Adds an array of parameters, one column for each element unless `element` says otherwise.
+  subroutine add_parameter(self, name, value, is_key, element)
+    class(described_elements_t), intent(inout) :: self
+    character(len=*), intent(in) :: name
+    real(wp), intent(in) :: value(:, :)          !! in the unit of the key, [lanes, columns]
+    logical, intent(in), optional :: is_key      !! whether these are the values of the key with this name; absent: they are
+    integer, intent(in), optional :: element(:)  !! of each column, numbered within the bank
+    type(law_parameter_t), allocatable :: longer(:)
+    integer :: e, n
+
+    n = size(self%parameters)
+    allocate (longer(n + 1))
+    longer(:n) = self%parameters
+    longer(n + 1)%name = name
+    longer(n + 1)%is_key = .true.
+    if (present(is_key)) longer(n + 1)%is_key = is_key
+    allocate (longer(n + 1)%value, source=value)
+    allocate (longer(n + 1)%element(size(value, 2)))
+    longer(n + 1)%element(:) = [(e, e=1, size(value, 2))]
+    if (present(element)) longer(n + 1)%element(:) = element
+    call move_alloc(longer, self%parameters)
+  end subroutine add_parameter
+
+  !> Number of a parameter; 0 if there is none.
+  pure integer function number_of(self, name)
+    class(described_elements_t), intent(in) :: self
+    character(len=*), intent(in) :: name
+
+    do number_of = size(self%parameters), 1, -1
+      if (self%parameters(number_of)%name == name) return
+    end do
+  end function number_of
+
+  !> The values of a parameter, [lanes, columns].
+  pure function values_of(self, name) result(values)
+    class(described_elements_t), intent(in) :: self
+    character(len=*), intent(in) :: name
+    real(wp), allocatable :: values(:, :)
+
+    allocate (values, source=self%parameters(self%number_of(name))%value)
+  end function values_of
+
+  !> Adds a coefficient of the polynomial part of the law.
+  subroutine add_term(self, parameter, coefficient, factor)
+    class(described_elements_t), intent(inout) :: self
+    character(len=*), intent(in) :: parameter   !! its name
+    integer, intent(in) :: coefficient          !! coefficient_...
+    real(wp), intent(in) :: factor              !! by which the parameter is multiplied
+
+    self%terms = [self%terms, polynomial_term_t(self%number_of(parameter), coefficient, factor)]
+  end subroutine add_term
+
+  !> A parameter in the formulas of a law: of each element its own column, or that of a list.
+  function parameter(self, tape, name, columns)
+    class(described_elements_t), intent(in) :: self
+    type(law_tape_t), target, intent(inout) :: tape
+    character(len=*), intent(in) :: name
+    integer, intent(in), optional :: columns(:)   !! of each element, 0 for the value zero
+    type(expression_t) :: parameter
+    integer :: e
+
+    if (present(columns)) then
+      parameter = parameter_of(tape, number_of(self, name), columns)
+    else
+      parameter = parameter_of(tape, number_of(self, name), [(e, e=1, self%count)])
+    end if
+  end function parameter
+
+  !> Gives every element one more switch, which is on its first branch until `choose` sets it.
+  subroutine add_switches(self, names, choices)
+    class(described_elements_t), intent(inout) :: self
+    character(len=*), intent(in) :: names(:)   !! of the boundaries, [elements]
+    integer, intent(in) :: choices             !! number of branches, 0 if they are the segments of `curve`
+    integer :: e
+
+    self%switch_names = [character(len=len(self%switch_names)) :: self%switch_names, names]
+    self%switch_element = [self%switch_element, (e, e=1, self%count)]
+    self%choices = [self%choices, spread(choices, 1, self%count)]
+    deallocate (self%branch)
+    allocate (self%branch(self%lanes, size(self%switch_element)), source=1)
+  end subroutine add_switches
+
+  !> Records the law and computes its constants. Every constructor of a bank that overrides `describe` calls it at the end.
+  subroutine prepare_law(self, elements)
+    class(described_elements_t), intent(inout) :: self
+    integer, intent(in), optional :: elements   !! of the machine; absent: those of the bank
+    type(law_tape_t), target :: tape
+    integer :: all_elements, lane
+
+    if (allocated(self%law)) deallocate (self%law)
+    if (self%is_polynomial .or. self%values == 0) return
+    tape = new_law_tape(self%states)
+    call self%describe(tape)
+    all_elements = self%count
+    if (present(elements)) all_elements = elements
+    allocate (self%law, source=new_element_law(tape, self%lanes, self%count, self%states, &
+                                               strip_lanes(self%lanes, all_elements)))
+    do lane = 1, self%lanes
+      call self%refresh_lane(lane)
+    end do
+  end subroutine prepare_law
+
+  !> Computes the constants of the law again, after a change of the parameters of a lane.
+  subroutine refresh_lane(self, lane)
+    class(described_elements_t), intent(inout) :: self
+    integer, intent(in) :: lane
+    integer :: e
+
+    if (.not. allocated(self%law)) return
+    do e = 1, self%count
+      call refresh_element(self, lane, e, .false.)
+    end do
+  end subroutine refresh_lane
+
+  subroutine refresh_element(self, lane, element, is_branch_only)
+    class(described_elements_t), intent(inout) :: self
+    integer, intent(in) :: lane, element
+    logical, intent(in) :: is_branch_only   !! whether the parameters are as before
+
+    associate (branch => self%branch(lane, element::self%count), law => self%law)
+      if (allocated(self%curve)) then
+        call law%refresh(lane, element, self%parameters, branch, is_branch_only, self%curve(lane, element))
+      else
+        call law%refresh(lane, element, self%parameters, branch, is_branch_only)
+      end if
+    end associate
+  end subroutine refresh_element
+
+  !> Lists the parameter arrays of its elements, and the operations of its law.
+  subroutine list_parameters(self, parameters)
+    class(described_elements_t), target, intent(inout) :: self
+    type(lane_parameters_t), intent(inout) :: parameters
+    integer :: i
+
+    do i = 1, size(self%parameters)
+      associate (one => self%parameters(i))
+        if (one%is_key) then
+          call parameters%add_key(trim(one%name), one%value, one%element)
+        else
+          call parameters%add(one%name, one%value)
+        end if
+      end associate
+    end do
+    if (allocated(self%curve)) call parameters%add_curves(self%curve)
+    if (.not. allocated(self%law)) return
+    associate (node => self%law%law%tape%node, count => self%law%law%tape%count)
+      call parameters%add_structure([(node(i)%operation, i=1, count)], [(node(i)%a, i=1, count)], [(node(i)%b, i=1, count)], &
+                                    self%law%law%tape%list)
+    end associate
+  end subroutine list_parameters
+
+  !> Sets the coefficients of its elements among those of the machine, which are zero before, in some lanes.
+  pure subroutine polynomials(self, first_lane, last_lane, laws)
+    class(described_elements_t), intent(in) :: self
+    integer, intent(in) :: first_lane, last_lane
+    type(polynomial_laws_t), intent(inout) :: laws   !! of the machine
+    integer :: e, i, l
+
+    do i = 1, size(self%terms)
+      associate (term => self%terms(i))
+        do e = 1, self%count
+          do l = first_lane, last_lane
+            call laws%set(term%coefficient, l, self%first - 1 + e, term%factor * self%parameters(term%parameter)%value(l, e))
+          end do
+        end do
+      end associate
+    end do
+  end subroutine polynomials
+
+  !> Writes the part of the law that is not polynomial as formulas: sets `restoring`, `applied`, `stored`, `rate` of the list and
+  !> the guards of its branches. By default there is none.
+  subroutine describe(self, tape)
+    class(described_elements_t), intent(in) :: self
+    type(law_tape_t), target, intent(inout) :: tape
+
+    if (tape%count > 0 .or. self%values > 0) then
+      error stop 'nocdyn_described_elements: elements that are not polynomial override describe'
+    end if
+  end subroutine describe
+
+  !> Adds the part of the law that is not polynomial to the moments of the elements, and sets the rates of the internal
+  !> states. All arrays but `time` are flat: the lanes of its first element, then those of its second, and so on.
+  subroutine evaluate(self, time, angle, speed, internal, restoring, applied, rate)
+    class(described_elements_t), intent(inout) :: self
+    real(wp), intent(in) :: time(self%lanes)                                  !! t [s]
+    real(wp), intent(in) :: angle(self%values), speed(self%values)            !! u [rad], u' [rad/s]
+    real(wp), intent(in) :: internal(self%internal_values)                    !! [lanes, states, elements]
+    real(wp), intent(inout) :: restoring(self%values), applied(self%values)   !! [N m]
+    real(wp), intent(inout) :: rate(self%internal_values)                     !! of the internal states
+
+    if (allocated(self%law)) call self%law%evaluate(time, angle, speed, internal, restoring, applied, rate)
+  end subroutine evaluate
+
+  !> Sets the branch of a switch in one lane to the one that contains the state.
+  subroutine choose(self, switch, lane, t, angle, speed, internal)
+    class(described_elements_t), intent(inout) :: self
+    integer, intent(in) :: switch          !! numbered within the bank
+    integer, intent(in) :: lane
+    real(wp), intent(in) :: t              !! [s]
+    real(wp), intent(in) :: angle, speed   !! u [rad], u' [rad/s] of the switching element
+    real(wp), intent(in) :: internal(:)    !! its internal states
+    real(wp) :: best, inside
+    integer :: before, i, slot
+
+    associate (branch => self%branch(lane, switch), e => self%switch_element(switch), law => self%law)
+      before = branch
+      slot = law%law%slot(lane, e)
+      call law%compute_guards(slot, [time_reached(t), angle, speed], internal)
+      if (self%choices(switch) == 0) then
+        branch = self%curve(lane, e)%segment(law%numbers%curve_argument(slot))
+      else
+        best = -huge(best)
+        do i = 1, self%choices(switch)
+          inside = law%numbers%lowest_guard(slot, number_in_element(self, switch), i, .false.)
+          if (inside <= best) cycle
+          best = inside
+          branch = i
+          if (best > 0) exit
+        end do
+      end if
+      if (branch /= before) call refresh_element(self, lane, e, .true.)
+    end associate
+  end subroutine choose
+
+  !> Number of a switch among those of its element.
+  pure integer function number_in_element(self, switch)
+    class(described_elements_t), intent(in) :: self
+    integer, intent(in) :: switch   !! numbered within the bank
+
+    number_in_element = (switch - 1) / self%count + 1
+  end function number_in_element
+
+  !> Distance of a lane from the nearest boundary of its present branch, in a unit of the law: continuous, negative beyond.
+  subroutine indicator(self, switch, lane, motion, internal, distance)
+    class(described_elements_t), intent(inout) :: self
+    integer, intent(in) :: switch          !! numbered within the bank
+    integer, intent(in) :: lane
+    real(wp), intent(in) :: motion(3)      !! t [s], u [rad], u' [rad/s] of the switching element
+    real(wp), intent(in) :: internal(:)    !! its internal states
+    real(wp), intent(out) :: distance
+
+    associate (law => self%law, slot => self%law%law%slot(lane, self%switch_element(switch)))
+      call law%compute_guards(slot, motion, internal)
+      distance = law%numbers%lowest_guard(slot, number_in_element(self, switch), self%branch(lane, switch), .true.)
+    end associate
+  end subroutine indicator
+
+end module nocdyn_described_elements

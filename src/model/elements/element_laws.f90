@@ -1,0 +1,287 @@
+!> Evaluates the law of the elements of a bank: moments, rates of internal states, derivatives, energies, guards of branches.
+!>
+!> All of it follows from one list of operations by Taylor arithmetic: the values are the coefficients 0; the derivatives by an
+!> input are the coefficients 1 where that input has the coefficient 1 and all others have none. The values of a few elements of
+!> one lane are computed number by number.
+module nocdyn_element_laws
+  use nocdyn_elements, only: elements_t, internal_states_t
+  use nocdyn_kinds, only: wp
+  use nocdyn_law_numbers, only: law_numbers_t, new_law_numbers
+  use nocdyn_law_strips, only: fill, load, load_lanes, unload
+  use nocdyn_law_tape, only: law_tape_t, op_angle, op_speed, op_state, op_time
+  use nocdyn_law_walk, only: walk
+  use nocdyn_law_work, only: law_work_t, new_law_work
+  use nocdyn_curves, only: curve_t
+  use nocdyn_laws, only: law_parameter_t, law_t, new_law
+  implicit none (type, external)
+  private
+
+  public :: new_element_law
+
+  type, public :: element_law_t
+    type(law_t) :: law
+    integer :: states = 0                       !! internal states of each element
+    integer :: angle = 0, speed = 0, time = 0   !! nodes of the inputs, 0 where the law does not read them
+    integer, allocatable :: state(:)            !! the same for internal states, [states]
+    type(law_work_t) :: values                  !! of the moments and rates
+    type(law_work_t) :: series                  !! the same with the coefficients of a series
+    type(law_work_t), private :: tangents       !! the same with two coefficients more
+    type(law_work_t), private :: energies
+    type(law_numbers_t) :: numbers              !! the guards, and all values if there are few elements
+  contains
+    procedure :: refresh
+    procedure :: evaluate
+    procedure :: differentiate
+    procedure :: evaluate_energies
+    procedure :: compute_guards
+    procedure :: prepare_series
+  end type element_law_t
+
+contains
+
+  !> The law with a list, for a block; its constants are not yet set.
+  function new_element_law(tape, lanes, elements, states, strip) result(self)
+    type(law_tape_t), intent(in) :: tape
+    integer, intent(in) :: lanes, elements
+    integer, intent(in) :: states   !! of each element
+    integer, intent(in) :: strip    !! lanes of a strip: 1 of a block of one lane, else whole groups
+    type(element_law_t) :: self
+    integer :: i
+
+    self%law = new_law(tape, lanes, elements, strip)
+    self%states = states
+    allocate (self%state(states), source=0)
+    self%angle = tape%input(op_angle)
+    self%speed = tape%input(op_speed)
+    self%time = tape%input(op_time)
+    self%state(:) = [(tape%input(op_state, i), i=1, states)]
+    associate (w => self%law%w, groups => self%law%groups)
+      self%values = new_law_work(tape, tape%needed(motion(tape), .false.), 0, w, groups)
+      self%tangents = new_law_work(tape, tape%needed(motion(tape), .true.), 2, w, groups)
+      self%energies = new_law_work(tape, tape%needed([tape%stored, tape%secant, tape%damping], .false.), 0, w, groups)
+    end associate
+    self%numbers = new_law_numbers(self%law, motion(tape))
+  end function new_element_law
+
+  !> The nodes of moments and rates.
+  pure function motion(tape) result(nodes)
+    type(law_tape_t), intent(in) :: tape
+    integer, allocatable :: nodes(:)
+
+    nodes = [tape%restoring, tape%applied, tape%rate]
+  end function motion
+
+  !> Computes the constants of an element in one lane, after a change of its parameters, or of a branch alone.
+  subroutine refresh(self, lane, element, parameters, branch, is_branch_only, curve)
+    class(element_law_t), intent(inout) :: self
+    integer, intent(in) :: lane, element
+    type(law_parameter_t), intent(in) :: parameters(:)
+    integer, intent(in) :: branch(:)                !! as in `law_t`
+    logical, intent(in) :: is_branch_only
+    type(curve_t), intent(in), optional :: curve    !! of the element, on the segment branch(1)
+
+    call self%law%refresh(lane, element, parameters, branch, is_branch_only, curve)
+    if (self%numbers%is_small) call self%numbers%set_constants(element, self%law, element)
+  end subroutine refresh
+
+  !> Adds the moments, and sets the rates of the internal states.
+  subroutine evaluate(self, time, angle, speed, internal, restoring, applied, rate)
+    class(element_law_t), intent(inout) :: self
+    real(wp), intent(in) :: time(self%law%lanes)   !! t [s]
+    real(wp), intent(in), dimension(self%law%lanes, self%law%elements) :: angle, speed   !! u [rad], u' [rad/s]
+    real(wp), intent(in) :: internal(self%law%lanes, self%states, self%law%elements)     !! internal states
+    real(wp), intent(inout), dimension(self%law%lanes, self%law%elements) :: restoring, applied   !! [N m]
+    real(wp), intent(inout) :: rate(self%law%lanes, self%states, self%law%elements)      !! of the internal states
+    integer :: i, strip
+
+    if (self%numbers%is_small) then
+      call self%numbers%evaluate(time, angle, speed, internal, restoring, applied, rate)
+      return
+    end if
+    rate = 0.0_wp
+    associate (law => self%law, tape => self%law%tape, values => self%values)
+      do strip = 1, law%strips
+        call load_inputs(self, values, strip, time, angle, speed, internal)
+        call walk(law, values, 0, law%groups * (strip - 1) + 1)
+        call unload(law, values, tape%restoring, 0, strip, 1, 1, restoring)
+        call unload(law, values, tape%applied, 0, strip, 1, 1, applied)
+        do i = 1, self%states
+          call unload(law, values, tape%rate(i), 0, strip, self%states, i, rate)
+        end do
+      end do
+    end associate
+  end subroutine evaluate
+
+  !> Sets the coefficients 0 of the inputs of a strip.
+  subroutine load_inputs(self, work, strip, time, angle, speed, internal)
+    class(element_law_t), intent(in) :: self
+    type(law_work_t), intent(inout) :: work
+    integer, intent(in) :: strip
+    real(wp), intent(in) :: time(self%law%lanes)   !! t [s]
+    real(wp), intent(in), dimension(self%law%lanes, self%law%elements) :: angle, speed   !! u [rad], u' [rad/s]
+    real(wp), intent(in) :: internal(self%law%lanes, self%states, self%law%elements)     !! internal states
+    integer :: i
+
+    call load(self%law, work, self%angle, 0, strip, 1, 1, angle)
+    call load(self%law, work, self%speed, 0, strip, 1, 1, speed)
+    call load_lanes(self%law, work, self%time, 0, strip, time)
+    do i = 1, self%states
+      call load(self%law, work, self%state(i), 0, strip, self%states, i, internal)
+    end do
+  end subroutine load_inputs
+
+  !> Adds the derivatives of the moments, and sets those of the internal states.
+  subroutine differentiate(self, first, first_internal, elements)
+    class(element_law_t), intent(inout) :: self
+    integer, intent(in) :: first, first_internal   !! first element and internal state of the bank in the machine
+    type(elements_t), intent(inout) :: elements
+    real(wp) :: none(0)
+    integer :: strip
+
+    if (self%states > 0) then
+      call clear_internal(first_internal, first_internal + self%states * self%law%elements - 1, elements%internal)
+    end if
+    associate (law => self%law, work => self%tangents, to => elements, z => elements%internal)
+      do strip = 1, law%strips
+        if (self%states > 0) then
+          call load_inputs(self, work, strip, to%time, to%angle(1, first), to%speed(1, first), z%value(1, first_internal))
+        else
+          call load_inputs(self, work, strip, to%time, to%angle(1, first), to%speed(1, first), none)
+        end if
+        call walk(law, work, 0, law%groups * (strip - 1) + 1)
+        call differentiate_by_motion(self, strip, first, first_internal, elements)
+        call differentiate_by_states(self, strip, first_internal, z)
+      end do
+    end associate
+  end subroutine differentiate
+
+  !> Derivatives by the angle, the speed and the time in a strip, after `walk` for the values.
+  subroutine differentiate_by_motion(self, strip, first, first_internal, to)
+    class(element_law_t), intent(inout) :: self
+    integer, intent(in) :: strip, first, first_internal
+    type(elements_t), intent(inout) :: to
+    integer :: i
+
+    associate (law => self%law, tape => self%law%tape, work => self%tangents)
+      if (self%angle > 0) then
+        call turn(self, strip, self%angle, 2)
+        call unload(law, work, tape%restoring, 1, strip, 1, 1, to%restoring_angle(1, first))
+        call unload(law, work, tape%applied, 1, strip, 1, 1, to%applied_angle(1, first))
+        do i = 1, 2   ! twice the second coefficient
+          call unload(law, work, tape%restoring, 2, strip, 1, 1, to%restoring_curvature(1, first))
+        end do
+      end if
+      if (self%speed > 0) then
+        call turn(self, strip, self%speed, 1)
+        call unload(law, work, tape%applied, 1, strip, 1, 1, to%applied_speed(1, first))
+        do i = 1, self%states
+          call unload(law, work, tape%rate(i), 1, strip, self%states, i, to%internal%rate_speed(1, first_internal))
+        end do
+      end if
+      if (self%time > 0) then
+        call turn(self, strip, self%time, 1)
+        call unload(law, work, tape%applied, 1, strip, 1, 1, to%applied_time(1, first))
+      end if
+    end associate
+  end subroutine differentiate_by_motion
+
+  pure subroutine clear_internal(first, last, internal)
+    integer, intent(in) :: first, last
+    type(internal_states_t), intent(inout) :: internal
+
+    internal%applied(:, first:last) = 0.0_wp
+    internal%rate_speed(:, first:last) = 0.0_wp
+    internal%rate_internal(:, :, first:last) = 0.0_wp
+  end subroutine clear_internal
+
+  !> Derivatives by the internal states in a strip, after `walk` for the values.
+  subroutine differentiate_by_states(self, strip, first, internal)
+    class(element_law_t), intent(inout) :: self
+    integer, intent(in) :: strip
+    integer, intent(in) :: first   !! internal state of the bank in the machine
+    type(internal_states_t), intent(inout) :: internal
+    integer :: i, j, members
+
+    members = size(internal%rate_internal, 2)
+    associate (law => self%law, tape => self%law%tape, work => self%tangents)
+      do j = 1, self%states
+        if (self%state(j) == 0) cycle
+        call turn(self, strip, self%state(j), 1)
+        call unload(law, work, tape%applied, 1, strip, self%states, j, internal%applied(1, first))
+        do i = 1, self%states
+          call unload(law, work, tape%rate(i), 1, strip, members * self%states, members * (i - 1) + j, &
+                      internal%rate_internal(1, 1, first))
+        end do
+      end do
+    end associate
+  end subroutine differentiate_by_states
+
+  !> Computes the coefficients 1 to `last` where one input grows with the rate 1 and the others stay.
+  subroutine turn(self, strip, input, last)
+    type(element_law_t), intent(inout) :: self
+    integer, intent(in) :: strip
+    integer, intent(in) :: input   !! its node
+    integer, intent(in) :: last
+    integer :: i, k
+
+    call fill(self%tangents, self%angle, 1, 0.0_wp)
+    call fill(self%tangents, self%speed, 1, 0.0_wp)
+    call fill(self%tangents, self%time, 1, 0.0_wp)
+    do i = 1, self%states
+      call fill(self%tangents, self%state(i), 1, 0.0_wp)
+    end do
+    call fill(self%tangents, input, 1, 1.0_wp)
+    do k = 1, last
+      call walk(self%law, self%tangents, k, self%law%groups * (strip - 1) + 1)
+    end do
+  end subroutine turn
+
+  !> Adds the energies of the restoring moments, their secant stiffnesses and viscous dampings.
+  subroutine evaluate_energies(self, first, elements)
+    class(element_law_t), intent(inout) :: self
+    integer, intent(in) :: first   !! element of the bank in the machine
+    type(elements_t), intent(inout) :: elements
+    integer :: strip
+
+    associate (law => self%law, tape => self%law%tape, work => self%energies, to => elements)
+      if (tape%stored == 0) return
+      if (self%numbers%is_small) then
+        call self%numbers%evaluate_energies(to%angle(1, first), to%stored(1, first), to%secant(1, first), to%damping(1, first))
+        return
+      end if
+      do strip = 1, law%strips
+        call load(law, work, self%angle, 0, strip, 1, 1, to%angle(1, first))
+        call walk(law, work, 0, law%groups * (strip - 1) + 1)
+        call unload(law, work, tape%stored, 0, strip, 1, 1, to%stored(1, first))
+        call unload(law, work, tape%secant, 0, strip, 1, 1, to%secant(1, first))
+        call unload(law, work, tape%damping, 0, strip, 1, 1, to%damping(1, first))
+      end do
+    end associate
+  end subroutine evaluate_energies
+
+  !> Computes the guards of the branches, and the argument of the curve, of one slot.
+  subroutine compute_guards(self, slot, motion, internal)
+    class(element_law_t), intent(inout) :: self
+    integer, intent(in) :: slot           !! counted through all strips
+    real(wp), intent(in) :: motion(3)     !! t [s], u [rad], u' [rad/s]
+    real(wp), intent(in) :: internal(:)   !! internal states
+
+    if (self%numbers%is_small) then
+      call self%numbers%compute_guards(slot, motion, internal)
+    else
+      call self%numbers%set_constants(1, self%law, slot)
+      call self%numbers%compute_guards(1, motion, internal)
+    end if
+  end subroutine compute_guards
+
+  !> Allocates work space for Taylor series.
+  subroutine prepare_series(self, order)
+    class(element_law_t), intent(inout) :: self
+    integer, intent(in) :: order   !! of the moments
+
+    associate (tape => self%law%tape)
+      self%series = new_law_work(tape, tape%needed(motion(tape), .true.), order, self%law%w, self%law%groups)
+    end associate
+  end subroutine prepare_series
+
+end module nocdyn_element_laws

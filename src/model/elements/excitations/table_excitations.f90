@@ -1,0 +1,44 @@
+!> Excitations with a table over the time.
+module nocdyn_table_excitations
+  use nocdyn_bank, only: bank_t, role_excitation
+  use nocdyn_curves, only: curve_t
+  use nocdyn_law_expressions, only: node_of, time_of
+  use nocdyn_law_tape, only: law_tape_t
+  use nocdyn_tables, only: add_table, curve_value, guard_segment
+  use nocdyn_text, only: string_t
+  implicit none (type, external)
+  private
+
+  public :: new_table_excitations
+
+  type, extends(bank_t), public :: table_excitations_t
+  contains
+    procedure :: describe
+  end type table_excitations_t
+
+contains
+
+  !> A bank of excitations, each on one body.
+  function new_table_excitations(names, body, curve) result(bank)
+    type(string_t), intent(in) :: names(:)
+    integer, intent(in) :: body(:)
+    type(curve_t), intent(in) :: curve(:, :)   !! [N m] over [s], shape [lanes, excitations]
+    type(table_excitations_t) :: bank
+
+    call bank%connect(role_excitation, size(curve, 1), names, body)
+    bank%is_polynomial = .false.
+    bank%has_paper_law = .false.
+    call add_table(bank, curve)
+    call bank%prepare_law()
+  end function new_table_excitations
+
+  subroutine describe(self, tape)
+    class(table_excitations_t), intent(in) :: self
+    type(law_tape_t), target, intent(inout) :: tape
+
+    if (.not. allocated(self%curve)) error stop 'nocdyn_table_excitations: there are no tables'
+    tape%applied = node_of(curve_value(tape, time_of(tape)))
+    call guard_segment(tape, time_of(tape), is_time=.true.)
+  end subroutine describe
+
+end module nocdyn_table_excitations

@@ -1,0 +1,281 @@
+!> Coefficients of the moments and internal states of the banks whose laws are not polynomial, by the lists of their laws.
+!>
+!> The slots of a bank are consecutive slots of all elements; those beyond its last one are copies of that. The moments of some
+!> banks follow from the time alone: their series do not wait for that of the motion, and are computed at the start of a step.
+module nocdyn_series_banks
+  use nocdyn_bank, only: bank_t
+  use nocdyn_kinds, only: wp
+  use nocdyn_law_strips, only: fill, load, load_lanes
+  use nocdyn_law_walk, only: walk
+  use nocdyn_law_work, only: law_work_t
+  use nocdyn_laws, only: narrow
+  use nocdyn_machine, only: machine_t
+  implicit none (type, external)
+  private
+
+  public :: new_series_banks
+
+  type, public :: series_banks_t
+    integer, private :: order = 0               !! of the series
+    integer, allocatable, private :: moved(:)   !! banks whose moments follow from the motion
+    integer, allocatable, private :: timed(:)   !! banks whose moments follow from the time alone
+    logical, allocatable :: has_angle(:)        !! whether some law reads the angle, [groups of all elements]
+    logical, allocatable :: has_forcing(:)      !! whether some moment follows from the time alone, [groups]
+    real(wp), allocatable :: forcing(:, :, :)   !! series of these moments [N m], [w, 0:order, groups], or no groups
+  contains
+    procedure :: begin
+    procedure :: add
+    procedure :: integrate
+  end type series_banks_t
+
+contains
+
+  !> Work space for series up to an order.
+  function new_series_banks(machine, order, strip, groups) result(self)
+    type(machine_t), intent(inout) :: machine   !! its banks get work space too
+    integer, intent(in) :: order
+    integer, intent(in) :: strip, groups        !! lanes of a strip, groups of all elements in it
+    type(series_banks_t) :: self
+    integer :: i, w
+    logical, allocatable :: timed(:)
+
+    self%order = order
+    w = max(strip, narrow)
+    allocate (self%has_angle(groups), self%has_forcing(groups), source=.false.)
+    associate (numbers => machine%general_banks)
+      allocate (timed(size(numbers)))
+      do i = 1, size(numbers)
+        associate (bank => machine%banks(numbers(i))%bank)
+          call bank%law%prepare_series(order)
+          timed(i) = is_timed(bank)
+          associate (first => strip * (bank%first - 1) / w + 1, last => (strip * bank%last() - 1) / w + 1)
+            self%has_forcing(first:last) = self%has_forcing(first:last) .or. timed(i)
+            self%has_angle(first:last) = self%has_angle(first:last) .or. bank%law%angle > 0
+          end associate
+        end associate
+      end do
+      self%timed = pack(numbers, timed)
+      self%moved = pack(numbers, .not. timed)
+    end associate
+    allocate (self%forcing(w, 0:order, merge(groups, 0, any(timed))), source=0.0_wp)
+  end function new_series_banks
+
+  !> What the banks need besides the motion at the start of a step, in a strip. Moments will be asked for up to number `last`.
+  subroutine begin(self, machine, strip, last, t, internal)
+    class(series_banks_t), intent(inout) :: self
+    type(machine_t), intent(inout) :: machine
+    integer, intent(in) :: strip, last
+    real(wp), intent(in) :: t(machine%lanes)             !! [s]
+    real(wp), intent(in) :: internal(machine%lanes, machine%elements%internal%count)   !! states of the elements
+    integer :: i
+
+    do i = 1, size(self%moved)
+      associate (bank => machine%banks(self%moved(i))%bank)
+        if (bank%states > 0) then
+          call begin_bank(bank, strip, t, internal(1, bank%first_internal))
+        else
+          call begin_bank(bank, strip, t, internal)
+        end if
+      end associate
+    end do
+    if (machine%lanes == 1) self%forcing = 0.0_wp
+    do i = 1, size(self%timed)
+      associate (bank => machine%banks(self%timed(i))%bank)
+        call begin_bank(bank, strip, t, internal)
+        call set_forcing(bank, strip, last, self%order, size(self%forcing, 3), self%forcing)
+      end associate
+    end do
+  end subroutine begin
+
+  !> Adds the coefficients k of the moments that follow from the motion.
+  subroutine add(self, machine, strip, k, motion, restoring, applied)
+    class(series_banks_t), intent(in) :: self
+    type(machine_t), intent(inout) :: machine
+    integer, intent(in) :: strip, k
+    real(wp), contiguous, intent(in) :: motion(:, 0:, :, :)   !! angles [rad] and speeds [rad/s], [w, 0:order, groups, 2]
+    real(wp), contiguous, intent(inout) :: restoring(:, :), applied(:, :)   !! [N m], [w, groups]
+    integer :: i
+
+    do i = 1, size(self%moved)
+      call add_bank(machine%banks(self%moved(i))%bank, strip, self%order, size(restoring, 2), k, motion, restoring, applied)
+    end do
+  end subroutine add
+
+  !> Coefficients k + 1 of the internal states.
+  subroutine integrate(self, machine, strip, k, internal)
+    class(series_banks_t), intent(in) :: self
+    type(machine_t), intent(inout) :: machine
+    integer, intent(in) :: strip, k
+    real(wp), intent(inout) :: internal(machine%lanes, machine%elements%internal%count)   !! states of the elements
+    integer :: i
+
+    do i = 1, size(self%moved)
+      associate (bank => machine%banks(self%moved(i))%bank)
+        if (bank%states > 0) call internal_coefficients(bank, strip, k, internal(1, bank%first_internal))
+      end associate
+    end do
+  end subroutine integrate
+
+  !> Whether the moments of a bank follow from the time alone.
+  pure logical function is_timed(bank)
+    class(bank_t), intent(in) :: bank
+
+    is_timed = .false.
+    if (bank%states > 0 .or. bank%law%law%tape%restoring > 0) return
+    associate (law => bank%law%law%tape%node(bank%law%law%tape%applied))
+      is_timed = .not. (law%has_angle .or. law%has_speed)
+    end associate
+  end function is_timed
+
+  !> Sets the time and the internal states at the start of a step.
+  subroutine begin_bank(bank, strip, t, internal)
+    class(bank_t), intent(inout) :: bank
+    integer, intent(in) :: strip
+    real(wp), intent(in) :: t(bank%lanes)                       !! [s]
+    real(wp), intent(in) :: internal(bank%internal_values)      !! [lanes, states, elements]
+    integer :: i
+
+    associate (law => bank%law)
+      call load_lanes(law%law, law%series, law%time, 0, strip, t)
+      if (law%series%order > 0) call fill(law%series, law%time, 1, 1.0_wp)
+      do i = 1, bank%states
+        call load(law%law, law%series, law%state(i), 0, strip, bank%states, i, internal)
+      end do
+    end associate
+  end subroutine begin_bank
+
+  !> Sets the series of the moments of a bank that follow from the time alone, after `begin_bank`, up to number `last`.
+  subroutine set_forcing(bank, strip, last, order, groups, forcing)
+    class(bank_t), intent(inout) :: bank
+    integer, intent(in) :: strip, last, order, groups
+    real(wp), intent(inout) :: forcing(bank%law%law%w, 0:order, groups)   !! of all elements [N m]; zero before, of one lane
+    integer :: at, g, k, slot
+
+    associate (law => bank%law%law, work => bank%law%series)
+      do k = 0, last
+        call walk(law, work, k, law%groups * (strip - 1) + 1)
+      end do
+      if (law%strip == 1) then
+        do slot = bank%first - 1, bank%last() - 1
+          associate (x => forcing(modulo(slot, law%w) + 1, :, slot / law%w + 1), i => slot - bank%first + 1)
+            do k = 0, last
+              x(k + 1) = work%pool(work%address(law%tape%applied, k, i / law%w + 1) + modulo(i, law%w))
+            end do
+          end associate
+        end do
+        return
+      end if
+      do g = 1, law%groups
+        at = work%address(law%tape%applied, 0, g)
+        call copy(law%w * (last + 1), work%pool(at), forcing(1, 0, bank%first - 1 + g))
+      end do
+    end associate
+  end subroutine set_forcing
+
+  pure subroutine copy(n, x, y)
+    integer, intent(in) :: n
+    real(wp), intent(in) :: x(n)
+    real(wp), intent(inout) :: y(n)
+
+    y = x
+  end subroutine copy
+
+  !> Adds the coefficients k of the moments, from those of the motion up to number k.
+  subroutine add_bank(bank, strip, order, groups, k, motion, restoring, applied)
+    class(bank_t), intent(inout) :: bank
+    integer, intent(in) :: strip, order, groups, k
+    real(wp), intent(in) :: motion(bank%law%law%w, 0:order, groups, 2)      !! angles and speeds of all elements [rad], [rad/s]
+    real(wp), intent(inout), dimension(bank%law%law%w, groups) :: restoring, applied   !! moments of all elements [N m]
+    integer :: before, slots
+
+    associate (law => bank%law, work => bank%law%series, tape => bank%law%law%tape)
+      before = law%law%strip * (bank%first - 1)
+      slots = law%law%strip * law%law%elements
+      call feed(work, law%angle, k, before, slots, motion(:, :, :, 1))
+      call feed(work, law%speed, k, before, slots, motion(:, :, :, 2))
+      call walk(law%law, work, k, law%law%groups * (strip - 1) + 1)
+      call drain(work, tape%restoring, k, before, slots, groups, restoring)
+      call drain(work, tape%applied, k, before, slots, groups, applied)
+    end associate
+  end subroutine add_bank
+
+  !> Sets coefficient k of an input.
+  pure subroutine feed(work, node, k, before, slots, x)
+    type(law_work_t), intent(inout) :: work
+    integer, intent(in) :: node            !! of the list; if it is 0, nothing is set
+    integer, intent(in) :: k
+    integer, intent(in) :: before, slots   !! slots before those of the bank, slots of the bank
+    real(wp), contiguous, intent(in) :: x(:, 0:, :)   !! [w, 0:order, groups], in the unit of the input
+    integer :: at, g, i, slot
+
+    if (node == 0) return
+    if (work%first(node) == 0) return
+    do g = 1, work%groups
+      at = work%address(node, k, g) - 1
+      if (modulo(before, work%w) == 0 .and. work%w * g <= slots) then
+        work%pool(at + 1:at + work%w) = x(:, k, before / work%w + g)
+        cycle
+      end if
+      do i = 1, work%w
+        slot = before + min(work%w * (g - 1) + i, slots) - 1
+        work%pool(at + i) = x(modulo(slot, work%w) + 1, k, slot / work%w + 1)
+      end do
+    end do
+  end subroutine feed
+
+  !> Adds coefficient k of a result.
+  pure subroutine drain(work, node, k, before, slots, groups, x)
+    type(law_work_t), intent(in) :: work
+    integer, intent(in) :: node                    !! of the list; if it is 0, nothing is added
+    integer, intent(in) :: k, before, slots
+    integer, intent(in) :: groups                  !! of all elements
+    real(wp), intent(inout) :: x(work%w, groups)   !! of all elements, in the unit of the result
+    integer :: at, g, i, slot
+
+    if (node == 0) return
+    do g = 1, work%groups
+      at = work%address(node, k, g) - 1
+      if (modulo(before, work%w) == 0 .and. work%w * g <= slots) then
+        x(:, before / work%w + g) = x(:, before / work%w + g) + work%pool(at + 1:at + work%w)
+        cycle
+      end if
+      do i = 1, min(work%w, slots - work%w * (g - 1))
+        slot = before + work%w * (g - 1) + i - 1
+        associate (value => x(modulo(slot, work%w) + 1, slot / work%w + 1))
+          value = value + work%pool(at + i)
+        end associate
+      end do
+    end do
+  end subroutine drain
+
+  !> Computes coefficient k + 1 of the internal states from coefficient k of their rates.
+  subroutine internal_coefficients(bank, strip, k, internal)
+    class(bank_t), intent(inout) :: bank
+    integer, intent(in) :: strip, k
+    real(wp), intent(inout) :: internal(bank%lanes, bank%states, bank%count)   !! [lanes, states, elements]
+    integer :: e, i, lane, slot, state
+    real(wp) :: inverse
+
+    inverse = 1.0_wp / (k + 1)
+    associate (law => bank%law, work => bank%law%series)
+      do i = 1, bank%states
+        state = law%state(i)
+        do slot = 0, work%w * work%groups - 1
+          associate (at => work%w * (k + (work%order + 1) * (slot / work%w)) + modulo(slot, work%w))
+            if (k < work%order .and. state > 0) then
+              work%pool(work%first(state) + at + work%w) = inverse * work%pool(work%first(law%law%tape%rate(i)) + at)
+            end if
+          end associate
+        end do
+        do e = 1, law%law%elements
+          do lane = law%law%strip * (strip - 1) + 1, min(law%law%strip * strip, bank%lanes)
+            slot = law%law%strip * (e - 1) + lane - law%law%strip * (strip - 1) - 1
+            internal(lane, i, e) = inverse * work%pool(work%first(law%law%tape%rate(i)) + modulo(slot, work%w) &
+                                                       + work%w * (k + (work%order + 1) * (slot / work%w)))
+          end do
+        end do
+      end do
+    end associate
+  end subroutine internal_coefficients
+
+end module nocdyn_series_banks

@@ -1,0 +1,201 @@
+!> The law of the elements of a bank, and its values, derivatives and Taylor series on a block of lanes.
+!>
+!> The lanes of a block are divided into strips. The slots of a strip are the elements of its first lane to last lane, lanes
+!> first: slot (e - 1) strip + l; a block of one lane is one strip whose slots are the elements. Slots beyond the last lane or
+!> element are copies of the last one, so that they do what others do.
+module nocdyn_laws
+  use nocdyn_curves, only: curve_t
+  use nocdyn_kinds, only: wp
+  use nocdyn_law_tape, only: law_node_t, law_tape_t, op_harmonics, op_literal, op_parameter, op_pick, op_sech_squared, op_segment
+  use nocdyn_law_values, only: value_of
+  implicit none (type, external)
+  private
+
+  public :: new_law, strip_lanes
+
+  integer, parameter, public :: narrow = 8, wide = 32   !! numbers of a group
+
+  !> One array of parameters of a bank.
+  type, public :: law_parameter_t
+    character(len=24) :: name
+    logical :: is_key = .false.            !! whether it holds the values of the key with this name as they are
+    integer, allocatable :: element(:)     !! of each column, numbered in the bank
+    real(wp), allocatable :: value(:, :)   !! in the unit of the key, [lanes, columns]
+  end type law_parameter_t
+
+  type, public :: law_t
+    type(law_tape_t) :: tape
+    integer :: lanes = 1, elements = 0
+    integer :: strip = 1                   !! lanes of a strip, whole groups if there are several
+    integer :: strips = 1
+    integer :: w = narrow                   !! numbers of a group: the lanes of a strip, or some elements of one lane
+    integer :: groups = 0                  !! of a strip
+    integer, allocatable :: constants(:)   !! nodes that are constants, ascending
+    integer, allocatable :: column(:)      !! of each constant in `constant`, [nodes]
+    integer, allocatable :: stack(:)       !! where the coefficients of harmonics begin in `stacked`, [nodes]
+    real(wp), allocatable :: constant(:, :)   !! values of the constants, [slots of all strips, constants]
+    real(wp), allocatable :: stacked(:)    !! coefficients of harmonics, [w, terms, groups of all strips] each
+  contains
+    procedure :: slot
+    procedure :: copies
+    procedure :: refresh
+  end type law_t
+
+contains
+
+  !> Lanes of a strip: many in small machines, which share the work of a step; few in large ones, whose numbers stay in the cache.
+  pure integer function strip_lanes(lanes, elements) result(strip)
+    integer, intent(in) :: lanes      !! of the block
+    integer, intent(in) :: elements   !! of the machine
+    integer, parameter :: small = 8   ! elements of a small machine
+
+    strip = 1
+    if (lanes == 1) return
+    strip = narrow
+    if (elements <= small .and. lanes > narrow) strip = wide
+  end function strip_lanes
+
+  !> The law with a list, for a block.
+  function new_law(tape, lanes, elements, strip) result(self)
+    type(law_tape_t), intent(in) :: tape
+    integer, intent(in) :: lanes, elements
+    integer, intent(in) :: strip   !! lanes of a strip: 1 of a block of one lane, else whole groups
+    type(law_t) :: self
+    integer :: i, next
+
+    self%tape = tape
+    self%lanes = lanes
+    self%elements = elements
+    self%strip = strip
+    self%strips = (lanes + strip - 1) / strip
+    self%w = max(strip, narrow)
+    self%groups = (strip * elements + self%w - 1) / self%w
+    self%constants = tape%constants()
+    allocate (self%column(tape%count), self%stack(tape%count), source=0)
+    self%column(self%constants) = [(i, i=1, size(self%constants))]
+    allocate (self%constant(self%w * self%groups * self%strips, size(self%constants)), source=0.0_wp)
+    next = 1
+    do i = 1, tape%count
+      if (tape%node(i)%operation /= op_harmonics) cycle
+      self%stack(i) = next
+      next = next + self%w * self%groups * self%strips * 2 * terms_of(tape%node(i))
+    end do
+    allocate (self%stacked(next - 1), source=0.0_wp)
+  end function new_law
+
+  !> Number of terms of harmonics.
+  pure integer function terms_of(node)
+    type(law_node_t), intent(in) :: node
+
+    terms_of = (node%last - node%first + 1) / 3
+  end function terms_of
+
+  !> The slot of an element in one lane, counted through all strips.
+  pure integer function slot(self, lane, element)
+    class(law_t), intent(in) :: self
+    integer, intent(in) :: lane, element
+
+    associate (before => (lane - 1) / self%strip)
+      slot = before * self%w * self%groups + (element - 1) * self%strip + lane - before * self%strip
+    end associate
+  end function slot
+
+  !> How many slots after that of an element in one lane are copies of it.
+  pure integer function copies(self, lane, element)
+    class(law_t), intent(in) :: self
+    integer, intent(in) :: lane, element
+
+    copies = 0
+    if (self%strip == 1) then
+      if (element == self%elements) copies = self%w * self%groups - self%elements
+    else
+      if (lane == self%lanes) copies = self%strips * self%strip - self%lanes
+    end if
+  end function copies
+
+  !> Computes the constants of an element in one lane, after a change of its parameters, or of a branch alone.
+  subroutine refresh(self, lane, element, parameters, branch, is_branch_only, curve)
+    class(law_t), intent(inout) :: self
+    integer, intent(in) :: lane, element
+    type(law_parameter_t), intent(in) :: parameters(:)
+    integer, intent(in) :: branch(:)                !! of the switches of the element, 1 to the number of choices
+    logical, intent(in) :: is_branch_only           !! whether the parameters are as before
+    type(curve_t), intent(in), optional :: curve    !! of the element, on the segment branch(1)
+    integer :: at, copies, i
+
+    at = self%slot(lane, element)
+    copies = self%copies(lane, element)
+    do i = 1, size(self%constants)
+      associate (node => self%tape%node(self%constants(i)), constant => self%constant(at, i))
+        if (is_branch_only .and. .not. node%has_branch) cycle
+        select case (node%operation)
+        case (op_literal)
+          constant = node%value
+        case (op_parameter)
+          constant = parameter_value(self%tape, node, parameters, lane, element)
+        case (op_pick)
+          constant = self%constant(at, self%column(self%tape%list(node%first - 1 + branch(node%a))))
+        case (op_segment)
+          constant = curve%segment_number(branch(1), node%a)
+        case default
+          constant = constant_of(self, self%constants(i), at)
+        end select
+        self%constant(at + 1:at + copies, i) = constant
+      end associate
+    end do
+    if (is_branch_only) return
+    do i = at, at + copies
+      call stack_harmonics(self, i)
+    end do
+  end subroutine refresh
+
+  !> Value of a parameter.
+  pure real(wp) function parameter_value(tape, node, parameters, lane, element) result(value)
+    type(law_tape_t), intent(in) :: tape
+    type(law_node_t), intent(in) :: node
+    type(law_parameter_t), intent(in) :: parameters(:)
+    integer, intent(in) :: lane, element
+
+    value = 0.0_wp
+    associate (column => tape%list(node%first - 1 + element))
+      if (column > 0) value = parameters(node%a)%value(lane, column)
+    end associate
+  end function parameter_value
+
+  !> A constant computed from others of its slot.
+  pure real(wp) function constant_of(self, number, at) result(value)
+    type(law_t), intent(in) :: self
+    integer, intent(in) :: number, at   !! node, slot
+    real(wp) :: x, y
+    integer :: a
+
+    associate (node => self%tape%node(number))
+      a = merge(number - 1, node%a, node%operation == op_sech_squared)
+      x = self%constant(at, self%column(a))
+      y = 0.0_wp
+      if (node%b > 0) y = self%constant(at, self%column(node%b))
+      value = value_of(node%operation, x, y)
+    end associate
+  end function constant_of
+
+  !> Copies the coefficients of harmonics in a slot to where they follow one another.
+  pure subroutine stack_harmonics(self, at)
+    type(law_t), intent(inout) :: self
+    integer, intent(in) :: at   !! slot
+    integer :: i, k, next
+
+    do i = 1, self%tape%count
+      if (self%stack(i) == 0) cycle
+      associate (node => self%tape%node(i))
+        associate (terms => terms_of(node), group => (at - 1) / self%w)
+          next = self%stack(i) + self%w * 2 * terms * group + at - 1 - self%w * group
+          do k = node%first + terms, node%last
+            self%stacked(next) = self%constant(at, self%column(self%tape%list(k)))
+            next = next + self%w
+          end do
+        end associate
+      end associate
+    end do
+  end subroutine stack_harmonics
+
+end module nocdyn_laws
