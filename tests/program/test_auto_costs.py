@@ -1,9 +1,11 @@
 """The method auto costs at most 1.3 times as much as the best single method, counted in steps, on the shipped machines."""
 
+import csv
 import math
 
 import pytest
 from conftest import SOURCE
+from sweep_inputs import needs_sweeps
 
 LARGEST = 1.3
 SLOW = {"engine", "chain_200"}  # seconds in a debug build
@@ -57,3 +59,22 @@ def test_auto_is_worth_being_the_default(nocdyn, path, tolerances):
     single = {method: counts_of(nocdyn, path, method, tolerances) for method in METHODS}
     best = min(attempts_of(summary) * cost_of_step(method, summary) for method, summary in single.items() if summary)
     assert cost_of_auto(counts_of(nocdyn, path, "auto", tolerances), single["taylor"] is not None) <= LARGEST * best
+
+
+@needs_sweeps
+def test_auto_does_not_slow_down_a_sweep_by_trials(nocdyn):
+    """A trial of one variant makes all of its block wait."""
+    engine = (SOURCE / "input/examples/engine/engine.nml").read_text(encoding="utf-8")
+    groups = (
+        "&sweep design = 'random' samples = 8 /\n&vary target = 'coupling.rubber.stiffness' low = 1.5e4 high = 2.5e4 /\n"
+        "&record quantity = 'moment_crank_8' statistic = 'max_abs' /\n"
+    )
+    nocdyn.write("sweep.nml", engine + groups)
+    steps = {}
+    for method in ("taylor", "auto"):
+        settings = (f"run.method={method}", "run.rtol=2e-5", "run.atol=2e-5", "run.t_end=0.1")
+        options = [word for setting in settings for word in ("--set", setting)]
+        assert nocdyn("sweep", "sweep.nml", "--out", "out", "--csv", "-q", *options).returncode == 0
+        with open(nocdyn.folder / "out/sweep.csv", newline="", encoding="utf-8") as table:
+            steps[method] = sum(int(row["steps"]) for row in csv.DictReader(table))
+    assert steps["auto"] <= 1.05 * steps["taylor"]

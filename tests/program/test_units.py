@@ -18,7 +18,7 @@ MACHINE = """\
 &load       name = 'air'   body = 'fan' {table} table_torque = 0, 20, 80 /
 &excitation name = 'shaker' body = 'fan' amplitude = 5.0 {frequency} {phase} /
 &excitation name = 'strokes' body = 'rotor' kind = 'orders' orders = 1, 2 amplitudes = 5.0, 3.0 {phases} /
-&run        t_end = 0.1 /
+&run        t_end = 0.1  method = 'rk853' /
 &output     points = 11 /
 """
 FIELD = {

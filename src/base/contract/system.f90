@@ -42,6 +42,7 @@ module nocdyn_system
     integer :: measures = 0      !! quantities in which `measure` measures errors; 0: errors are those of the states
     integer :: phases = 0        !! the last of these: angles whose speeds tell nothing about the step size
     logical :: hides_bends = .false. !! whether a series of the solution may not show a bend of it, however near, as that of tanh
+    logical :: is_shared = .false.   !! whether its lanes are variants, which share vectors and are looked at little: other costs
     logical :: may_shift = .false.   !! whether `find_far` is called after every step
   contains
     procedure(derivative_interface), deferred :: derivative

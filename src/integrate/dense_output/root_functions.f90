@@ -3,7 +3,7 @@
 !> The functions are evaluated at the ends of a few equal parts of every step. A change of sign between two of them is a bracket,
 !> in which the root is found to the last bits of the time.
 module nocdyn_root_functions
-  use nocdyn_dense_output, only: dense_output_t, sample
+  use nocdyn_dense_output, only: batch, dense_output_t, sample, sample_batch
   use nocdyn_finite, only: is_finite
   use nocdyn_kinds, only: wp
   use nocdyn_observer, only: observer_t
@@ -78,12 +78,18 @@ contains
     class(observer_t), intent(inout) :: observer
     type(dense_output_t), intent(inout) :: dense   !! of the lane
     real(wp), intent(in) :: theta_end              !! end of the step: 1, or less where it has been cut
-    integer :: part
+    integer :: i, part
+    real(wp) :: theta(batch)
 
     roots%parts = parts_of(dense%degree)
     roots%values(:, 0) = roots%last(:, dense%lane)
-    do part = 1, roots%parts
-      call evaluate(roots%of_system, system, observer, dense, part_end(roots, part, theta_end), roots%y, roots%values(:, part))
+    do part = 0, roots%parts - 1, batch
+      theta(:) = [(part_end(roots, min(part + i, roots%parts), theta_end), i=1, batch)]
+      call sample_batch(dense, theta)
+      do i = 1, min(batch, roots%parts - part)
+        call evaluate_at(roots%of_system, system, observer, dense, theta(i), dense%states(:size(roots%y), i), &
+                         roots%values(:, part + i))
+      end do
     end do
     roots%last(:, dense%lane) = roots%values(:, roots%parts)
   end subroutine scan_step
@@ -136,12 +142,25 @@ contains
     real(wp), contiguous, intent(inout) :: g(:)   !! [functions]
 
     call sample(dense, theta, y)
+    call evaluate_at(of_system, system, observer, dense, theta, y, g)
+  end subroutine evaluate
+
+  !> The same where the state is known.
+  subroutine evaluate_at(of_system, system, observer, dense, theta, y, g)
+    logical, intent(in) :: of_system
+    class(system_t), intent(inout) :: system
+    class(observer_t), intent(inout) :: observer
+    type(dense_output_t), intent(in) :: dense
+    real(wp), intent(in) :: theta
+    real(wp), contiguous, intent(in) :: y(:)      !! state there
+    real(wp), contiguous, intent(inout) :: g(:)   !! [functions]
+
     if (of_system) then
       call system%indicator_values(dense%lane, dense%t + theta * dense%h, y, g)
     else
       call observer%event_values(dense%lane, dense%t + theta * dense%h, y, g)
     end if
-  end subroutine evaluate
+  end subroutine evaluate_at
 
   !> The root of one function in a bracket, to the spacing of the times there: the theta where the function is zero, or the end
   !> of the last bracket, just beyond the change of sign. T. R. Chandrupatla, Adv. Eng. Software 28 (1997) 145-149.

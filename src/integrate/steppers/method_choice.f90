@@ -19,6 +19,7 @@ module nocdyn_method_choice
   integer, parameter, public :: kinds = 3
 
   integer, parameter :: first_period(kinds) = [2, 2, 4]   !! steps before the first trial of a kind
+  integer, parameter, public :: shared_period(kinds) = [2, 128, 64]   !! the same of variants: all wait for the trial of one
   integer, parameter :: longest_period(kinds) = [256, 256, 64]   !! implicit steps are tried near the limit of stability only
   integer, parameter :: first_doubt = 64, last_doubt = 256  !! steps after which a weak sign is enough
   integer, parameter :: forgiven = 2                        !! attempts that may fail then: implicit steps damp what is fast first
@@ -34,6 +35,7 @@ module nocdyn_method_choice
   type, public :: kind_data_t
     logical :: has(kinds) = .false.       !! whether there are steps of a kind
     real(wp) :: cost(kinds) = 1.0_wp      !! of a step
+    integer :: first_period(kinds) = first_period   !! steps before the first trial of a kind
     real(wp) :: limit(kinds) = 1.0_wp     !! of |h lambda| on the negative real axis; no limit of the implicit kind
   end type kind_data_t
 
@@ -67,8 +69,8 @@ contains
     real(wp), intent(in) :: t   !! [s]
 
     choice%kind = merge(by_series, by_stages, data%has(by_series))
-    choice%wait(:) = first_period
-    choice%period(:) = first_period
+    choice%wait(:) = data%first_period
+    choice%period(:) = data%first_period
     choice%t_start = t
   end subroutine restart_choice
 

@@ -352,8 +352,11 @@ contains
     class(taylor_stepper_t), intent(in) :: self
     integer, intent(in) :: lane
     real(wp), parameter :: largest_exponent = 300.0_wp   ! keeps it finite
+    real(wp) :: growth(1)
 
-    eigenvalue = self%order * 2.0_wp**min(self%log_growth(lane), largest_exponent)
+    growth = min(self%log_growth(lane), largest_exponent)
+    call exp2s(1, growth)
+    eigenvalue = self%order * growth(1)
   end function eigenvalue
 
   !> The limit of |h lambda| on the negative real axis, near that of the truncated exponential series for orders from 5 to 40.

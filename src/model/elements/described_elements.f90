@@ -181,12 +181,15 @@ contains
     type(law_tape_t), target :: tape
     integer :: all_elements, lane
 
-    if (allocated(self%law)) deallocate (self%law)
+    all_elements = self%count
+    if (present(elements)) all_elements = elements
+    if (allocated(self%law)) then
+      if (present(elements) .and. self%law%law%strip == strip_lanes(self%lanes, all_elements)) return
+      deallocate (self%law)
+    end if
     if (self%is_polynomial .or. self%values == 0) return
     tape = new_law_tape(self%states)
     call self%describe(tape)
-    all_elements = self%count
-    if (present(elements)) all_elements = elements
     allocate (self%law, source=new_element_law(tape, self%lanes, self%count, self%states, &
                                                strip_lanes(self%lanes, all_elements)))
     do lane = 1, self%lanes
@@ -293,19 +296,21 @@ contains
     real(wp), intent(in) :: t              !! [s]
     real(wp), intent(in) :: angle, speed   !! u [rad], u' [rad/s] of the switching element
     real(wp), intent(in) :: internal(:)    !! its internal states
-    real(wp) :: best, inside
+    real(wp) :: best, inside, motion(3)
     integer :: before, i, slot
 
-    associate (branch => self%branch(lane, switch), e => self%switch_element(switch), law => self%law)
+    if (.not. self%law%is_ready) call self%law%make_ready()
+    associate (branch => self%branch(lane, switch), e => self%switch_element(switch), numbers => self%law%numbers)
       before = branch
-      slot = law%law%slot(lane, e)
-      call law%compute_guards(slot, [time_reached(t), angle, speed], internal)
+      slot = self%law%law%slot(lane, e)
+      motion = [time_reached(t), angle, speed]
       if (self%choices(switch) == 0) then
-        branch = self%curve(lane, e)%segment(law%numbers%curve_argument(slot))
+        call numbers%curve_argument(slot, motion, internal, inside)
+        branch = self%curve(lane, e)%segment(inside)
       else
         best = -huge(best)
         do i = 1, self%choices(switch)
-          inside = law%numbers%lowest_guard(slot, number_in_element(self, switch), i, .false.)
+          call numbers%lowest_guard(slot, number_in_element(self, switch), i, motion, internal, .false., inside)
           if (inside <= best) cycle
           best = inside
           branch = i
@@ -333,10 +338,9 @@ contains
     real(wp), intent(in) :: internal(:)    !! its internal states
     real(wp), intent(out) :: distance
 
-    associate (law => self%law, slot => self%law%law%slot(lane, self%switch_element(switch)))
-      call law%compute_guards(slot, motion, internal)
-      distance = law%numbers%lowest_guard(slot, number_in_element(self, switch), self%branch(lane, switch), .true.)
-    end associate
+    if (.not. self%law%is_ready) call self%law%make_ready()
+    call self%law%numbers%lowest_guard(self%law%law%slot(lane, self%switch_element(switch)), number_in_element(self, switch), &
+                                       self%branch(lane, switch), motion, internal, .true., distance)
   end subroutine indicator
 
 end module nocdyn_described_elements

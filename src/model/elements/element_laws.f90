@@ -27,13 +27,14 @@ module nocdyn_element_laws
     type(law_work_t) :: series                  !! the same with the coefficients of a series
     type(law_work_t), private :: tangents       !! the same with two coefficients more
     type(law_work_t), private :: energies
+    logical :: is_ready = .false.               !! whether there is work space for values and guards
     type(law_numbers_t) :: numbers              !! the guards, and all values if there are few elements
   contains
     procedure :: refresh
     procedure :: evaluate
     procedure :: differentiate
     procedure :: evaluate_energies
-    procedure :: compute_guards
+    procedure :: make_ready
     procedure :: prepare_series
   end type element_law_t
 
@@ -55,13 +56,24 @@ contains
     self%speed = tape%input(op_speed)
     self%time = tape%input(op_time)
     self%state(:) = [(tape%input(op_state, i), i=1, states)]
-    associate (w => self%law%w, groups => self%law%groups)
+  end function new_element_law
+
+  !> Allocates the work space for values and guards when they are first asked for: most machines of a sweep are only looked at.
+  subroutine make_ready(self)
+    class(element_law_t), intent(inout) :: self
+    integer :: slot
+
+    self%is_ready = .true.
+    associate (tape => self%law%tape, w => self%law%w, groups => self%law%groups)
       self%values = new_law_work(tape, tape%needed(motion(tape), .false.), 0, w, groups)
       self%tangents = new_law_work(tape, tape%needed(motion(tape), .true.), 2, w, groups)
       self%energies = new_law_work(tape, tape%needed([tape%stored, tape%secant, tape%damping], .false.), 0, w, groups)
+      self%numbers = new_law_numbers(self%law, motion(tape))
     end associate
-    self%numbers = new_law_numbers(self%law, motion(tape))
-  end function new_element_law
+    do slot = 1, size(self%law%constant, 1)
+      call self%numbers%set_constants(self%law, slot)
+    end do
+  end subroutine make_ready
 
   !> The nodes of moments and rates.
   pure function motion(tape) result(nodes)
@@ -81,7 +93,7 @@ contains
     type(curve_t), intent(in), optional :: curve    !! of the element, on the segment branch(1)
 
     call self%law%refresh(lane, element, parameters, branch, is_branch_only, curve)
-    if (self%numbers%is_small) call self%numbers%set_constants(element, self%law, element)
+    if (self%is_ready) call self%numbers%set_constants(self%law, self%law%slot(lane, element))
   end subroutine refresh
 
   !> Adds the moments, and sets the rates of the internal states.
@@ -94,6 +106,7 @@ contains
     real(wp), intent(inout) :: rate(self%law%lanes, self%states, self%law%elements)      !! of the internal states
     integer :: i, strip
 
+    if (.not. self%is_ready) call make_ready(self)
     if (self%numbers%is_small) then
       call self%numbers%evaluate(time, angle, speed, internal, restoring, applied, rate)
       return
@@ -138,6 +151,7 @@ contains
     real(wp) :: none(0)
     integer :: strip
 
+    if (.not. self%is_ready) call make_ready(self)
     if (self%states > 0) then
       call clear_internal(first_internal, first_internal + self%states * self%law%elements - 1, elements%internal)
     end if
@@ -245,6 +259,7 @@ contains
 
     associate (law => self%law, tape => self%law%tape, work => self%energies, to => elements)
       if (tape%stored == 0) return
+      if (.not. self%is_ready) call make_ready(self)
       if (self%numbers%is_small) then
         call self%numbers%evaluate_energies(to%angle(1, first), to%stored(1, first), to%secant(1, first), to%damping(1, first))
         return
@@ -258,21 +273,6 @@ contains
       end do
     end associate
   end subroutine evaluate_energies
-
-  !> Computes the guards of the branches, and the argument of the curve, of one slot.
-  subroutine compute_guards(self, slot, motion, internal)
-    class(element_law_t), intent(inout) :: self
-    integer, intent(in) :: slot           !! counted through all strips
-    real(wp), intent(in) :: motion(3)     !! t [s], u [rad], u' [rad/s]
-    real(wp), intent(in) :: internal(:)   !! internal states
-
-    if (self%numbers%is_small) then
-      call self%numbers%compute_guards(slot, motion, internal)
-    else
-      call self%numbers%set_constants(1, self%law, slot)
-      call self%numbers%compute_guards(1, motion, internal)
-    end if
-  end subroutine compute_guards
 
   !> Allocates work space for Taylor series.
   subroutine prepare_series(self, order)

@@ -2,7 +2,7 @@
 !> which take longer in groups.
 module nocdyn_law_numbers
   use nocdyn_kinds, only: wp
-  use nocdyn_law_tape, only: op_angle, op_speed, op_state, op_time
+  use nocdyn_law_tape, only: law_tape_t, op_angle, op_speed, op_state, op_time
   use nocdyn_law_values, only: law_program_t, new_law_program
   use nocdyn_laws, only: law_t
   implicit none (type, external)
@@ -12,22 +12,28 @@ module nocdyn_law_numbers
 
   integer, parameter :: few = 4   ! elements whose values are computed number by number
 
+  !> The guards of a branch of a switch.
+  type, private :: guards_t
+    integer :: count = 0
+    integer, allocatable :: guard(:), shift(:)   !! nodes, as in `law_tape_t`, [count]
+    type(law_program_t) :: program
+  end type guards_t
+
   type, public :: law_numbers_t
     logical :: is_small = .false.              !! whether all values are computed so
-    real(wp), allocatable, private :: x(:, :)  !! values of all nodes, [0:nodes, elements]; of one element if not `is_small`
-    integer, private :: nodes = 0
+    real(wp), allocatable, private :: x(:, :)  !! values of all nodes, [0:nodes, slots]
+    integer, private :: nodes = 0, elements = 0
     integer, private :: angle = 0, speed = 0, time = 0   !! nodes of the inputs, 0 where the law does not read them
     integer, allocatable, private :: state(:)            !! the same for internal states
     integer, private :: restoring = 0, applied = 0       !! nodes of the results, 0 for none, as in `law_tape_t`
     integer, private :: stored = 0, secant = 0, damping = 0, argument = 0
     integer, allocatable, private :: rate(:)
-    integer, allocatable, private :: guard(:), switch(:), branch(:), shift(:)
-    type(law_program_t), private :: motion, energy, guards
+    type(law_program_t), private :: motion, energy, curve
+    type(guards_t), allocatable, private :: guards(:, :)   !! [branches, switches of an element]
   contains
     procedure :: set_constants
     procedure :: evaluate
     procedure :: evaluate_energies
-    procedure :: compute_guards
     procedure :: lowest_guard
     procedure :: curve_argument
   end type law_numbers_t
@@ -39,7 +45,7 @@ contains
     type(law_t), intent(in) :: law
     integer, intent(in) :: motion(:)   !! nodes of moments and rates
     type(law_numbers_t) :: self
-    integer :: i
+    integer :: i, slots
 
     associate (tape => law%tape)
       self%nodes = tape%count
@@ -54,27 +60,50 @@ contains
       self%damping = tape%damping
       self%argument = tape%argument
       allocate (self%rate, source=tape%rate)
-      allocate (self%guard, source=tape%guard)
-      allocate (self%switch, source=tape%guarded_switch)
-      allocate (self%branch, source=tape%guarded_branch)
-      allocate (self%shift, source=tape%guard_shift)
       self%motion = new_law_program(tape, motion)
       self%energy = new_law_program(tape, [tape%stored, tape%secant, tape%damping])
-      self%guards = new_law_program(tape, [tape%guard, tape%argument])
+      self%curve = new_law_program(tape, [tape%argument])
       self%is_small = law%lanes == 1 .and. law%elements <= few .and. .not. self%motion%has_harmonics()
-      allocate (self%x(0:tape%count, merge(law%elements, 1, self%is_small)), source=0.0_wp)
+      slots = 0
+      if (self%is_small) slots = law%elements
+      if (size(tape%guard) > 0) slots = size(law%constant, 1)
+      allocate (self%x(0:tape%count, slots), source=0.0_wp)
+      self%elements = law%elements
+      call find_guards(self, tape)
     end associate
   end function new_law_numbers
 
-  !> Copies the constants of a slot of the law to an element.
-  pure subroutine set_constants(self, element, law, slot)
+  !> The guards of each branch that is named; other branches, in the last column, have those of all branches.
+  pure subroutine find_guards(self, tape)
+    type(law_numbers_t), intent(inout) :: self
+    type(law_tape_t), intent(in) :: tape
+    integer :: branch, i, switch
+    logical :: is_of(size(tape%guard))
+
+    allocate (self%guards(maxval([0, tape%guarded_branch]) + 1, maxval([0, tape%guarded_switch])))
+    do switch = 1, size(self%guards, 2)
+      do branch = 1, size(self%guards, 1)
+        is_of = tape%guarded_switch == switch .and. (tape%guarded_branch == 0 .or. tape%guarded_branch == branch)
+        associate (guards => self%guards(branch, switch))
+          guards%count = count(is_of)
+          allocate (guards%guard, source=pack(tape%guard, is_of))
+          allocate (guards%shift, source=pack(tape%guard_shift, is_of))
+          guards%program = new_law_program(tape, [(guards%guard(i), i=1, guards%count)])
+        end associate
+      end do
+    end do
+  end subroutine find_guards
+
+  !> Copies the constants of a slot of the law.
+  pure subroutine set_constants(self, law, slot)
     class(law_numbers_t), intent(inout) :: self
     type(law_t), intent(in) :: law
-    integer, intent(in) :: element, slot
+    integer, intent(in) :: slot   !! counted through all strips
     integer :: i
 
+    if (slot > size(self%x, 2)) return
     do i = 1, size(law%constants)
-      self%x(law%constants(i), element) = law%constant(slot, i)
+      self%x(law%constants(i), slot) = law%constant(slot, i)
     end do
   end subroutine set_constants
 
@@ -82,13 +111,13 @@ contains
   pure subroutine evaluate(self, time, angle, speed, internal, restoring, applied, rate)
     class(law_numbers_t), intent(inout) :: self
     real(wp), intent(in) :: time(1)   !! t [s]
-    real(wp), intent(in), dimension(size(self%x, 2)) :: angle, speed            !! u [rad], u' [rad/s]
-    real(wp), intent(in) :: internal(size(self%state), size(self%x, 2))         !! internal states
-    real(wp), intent(inout), dimension(size(self%x, 2)) :: restoring, applied   !! [N m]
-    real(wp), intent(inout) :: rate(size(self%state), size(self%x, 2))          !! of the internal states
+    real(wp), intent(in), dimension(self%elements) :: angle, speed            !! u [rad], u' [rad/s]
+    real(wp), intent(in) :: internal(size(self%state), self%elements)         !! internal states
+    real(wp), intent(inout), dimension(self%elements) :: restoring, applied   !! [N m]
+    real(wp), intent(inout) :: rate(size(self%state), self%elements)          !! of the internal states
     integer :: e, i
 
-    do e = 1, size(self%x, 2)
+    do e = 1, self%elements
       call set_inputs(self, e, [time(1), angle(e), speed(e)], internal(:, e))
       call self%motion%compute(self%nodes, self%x(:, e))
       restoring(e) = restoring(e) + self%x(self%restoring, e)
@@ -122,12 +151,12 @@ contains
   !> Adds the energies of the restoring moments of all elements, their secant stiffnesses and viscous dampings.
   pure subroutine evaluate_energies(self, angle, stored, secant, damping)
     class(law_numbers_t), intent(inout) :: self
-    real(wp), intent(in), dimension(size(self%x, 2)) :: angle                       !! u [rad]
-    real(wp), intent(inout), dimension(size(self%x, 2)) :: stored, secant, damping  !! [J], [N m/rad], [N m s/rad]
+    real(wp), intent(in), dimension(self%elements) :: angle                       !! u [rad]
+    real(wp), intent(inout), dimension(self%elements) :: stored, secant, damping  !! [J], [N m/rad], [N m s/rad]
     integer :: e
 
     associate (x => self%x)
-      do e = 1, size(x, 2)
+      do e = 1, self%elements
         x(self%angle, e) = angle(e)
         x(0, e) = 0.0_wp
         call self%energy%compute(self%nodes, x(:, e))
@@ -138,43 +167,43 @@ contains
     end associate
   end subroutine evaluate_energies
 
-  !> Computes the guards of the branches, and the argument of the curve, of an element.
-  pure subroutine compute_guards(self, element, motion, internal)
+  !> The lowest guard of a branch of a switch: positive inside the branch.
+  pure subroutine lowest_guard(self, slot, switch, branch, motion, internal, with_shift, lowest)
     class(law_numbers_t), intent(inout) :: self
-    integer, intent(in) :: element
-    real(wp), intent(in) :: motion(3)     !! t [s], u [rad], u' [rad/s]
-    real(wp), intent(in) :: internal(:)   !! internal states
-
-    call set_inputs(self, element, motion, internal)
-    call self%guards%compute(self%nodes, self%x(:, element))
-  end subroutine compute_guards
-
-  !> The lowest guard of a branch of a switch, after `compute_guards`: positive inside the branch.
-  pure real(wp) function lowest_guard(self, element, switch, branch, with_shift) result(lowest)
-    class(law_numbers_t), intent(in) :: self
-    integer, intent(in) :: element
+    integer, intent(in) :: slot              !! counted through all strips
     integer, intent(in) :: switch, branch    !! of the element
+    real(wp), intent(in) :: motion(3)        !! t [s], u [rad], u' [rad/s]
+    real(wp), intent(in) :: internal(:)      !! internal states
     logical, intent(in) :: with_shift        !! whether the boundaries are shifted outwards
+    real(wp), intent(out) :: lowest          !! in the unit of the guards
     real(wp) :: distance
     integer :: column, i
 
     lowest = huge(lowest)
-    column = min(element, size(self%x, 2))
-    do i = 1, size(self%guard)
-      if (self%switch(i) /= switch) cycle
-      if (self%branch(i) /= 0 .and. self%branch(i) /= branch) cycle
-      distance = self%x(self%guard(i), column)
-      if (with_shift) distance = distance + self%x(self%shift(i), column)
-      lowest = min(lowest, distance)
-    end do
-  end function lowest_guard
+    column = size(self%guards, 1)
+    if (branch > 0) column = min(branch, column)
+    call set_inputs(self, slot, motion, internal)
+    associate (guards => self%guards(column, switch), x => self%x)
+      call guards%program%compute(self%nodes, x(:, slot))
+      do i = 1, guards%count
+        distance = x(guards%guard(i), slot)
+        if (with_shift) distance = distance + x(guards%shift(i), slot)
+        lowest = min(lowest, distance)
+      end do
+    end associate
+  end subroutine lowest_guard
 
-  !> The argument of the curve of an element, after `compute_guards`.
-  pure real(wp) function curve_argument(self, element)
-    class(law_numbers_t), intent(in) :: self
-    integer, intent(in) :: element
+  !> The argument of the curve of a slot.
+  pure subroutine curve_argument(self, slot, motion, internal, argument)
+    class(law_numbers_t), intent(inout) :: self
+    integer, intent(in) :: slot              !! counted through all strips
+    real(wp), intent(in) :: motion(3)        !! t [s], u [rad], u' [rad/s]
+    real(wp), intent(in) :: internal(:)      !! internal states
+    real(wp), intent(out) :: argument        !! in the unit of the curve
 
-    curve_argument = self%x(self%argument, min(element, size(self%x, 2)))
-  end function curve_argument
+    call set_inputs(self, slot, motion, internal)
+    call self%curve%compute(self%nodes, self%x(:, slot))
+    argument = self%x(self%argument, slot)
+  end subroutine curve_argument
 
 end module nocdyn_law_numbers

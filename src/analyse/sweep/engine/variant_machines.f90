@@ -107,6 +107,7 @@ contains
     type(reduced_t), pointer, intent(in) :: block
 
     call block%formulate(self%has_energy_balance, as_block=.true.)
+    block%is_shared = .true.
     call block%list_parameters(self%parameters)
     self%block => block
     self%formulation => block
