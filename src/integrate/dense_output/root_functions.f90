@@ -63,11 +63,7 @@ contains
     integer, intent(in) :: lane
 
     roots%y(:) = attempt%y(lane, :attempt%components)
-    if (roots%of_system) then
-      call system%indicator_values(lane, attempt%t(lane), roots%y, roots%last(:, lane))
-    else
-      call observer%event_values(lane, attempt%t(lane), roots%y, roots%last(:, lane))
-    end if
+    call evaluate_at(roots%of_system, system, observer, lane, attempt%t(lane), roots%y, roots%last(:, lane))
     roots%side(lane, :) = sign_of(roots%last(:, lane))
   end subroutine start_root_functions
 
@@ -87,8 +83,8 @@ contains
       theta(:) = [(part_end(roots, min(part + i, roots%parts), theta_end), i=1, batch)]
       call sample_batch(dense, theta)
       do i = 1, min(batch, roots%parts - part)
-        call evaluate_at(roots%of_system, system, observer, dense, theta(i), dense%states(:size(roots%y), i), &
-                         roots%values(:, part + i))
+        call evaluate_at(roots%of_system, system, observer, dense%lane, dense%t + theta(i) * dense%h, &
+                         dense%states(:size(roots%y), i), roots%values(:, part + i))
       end do
     end do
     roots%last(:, dense%lane) = roots%values(:, roots%parts)
@@ -142,23 +138,23 @@ contains
     real(wp), contiguous, intent(inout) :: g(:)   !! [functions]
 
     call sample(dense, theta, y)
-    call evaluate_at(of_system, system, observer, dense, theta, y, g)
+    call evaluate_at(of_system, system, observer, dense%lane, dense%t + theta * dense%h, y, g)
   end subroutine evaluate
 
   !> The same where the state is known.
-  subroutine evaluate_at(of_system, system, observer, dense, theta, y, g)
+  subroutine evaluate_at(of_system, system, observer, lane, t, y, g)
     logical, intent(in) :: of_system
     class(system_t), intent(inout) :: system
     class(observer_t), intent(inout) :: observer
-    type(dense_output_t), intent(in) :: dense
-    real(wp), intent(in) :: theta
+    integer, intent(in) :: lane
+    real(wp), intent(in) :: t                     !! [s]
     real(wp), contiguous, intent(in) :: y(:)      !! state there
     real(wp), contiguous, intent(inout) :: g(:)   !! [functions]
 
     if (of_system) then
-      call system%indicator_values(dense%lane, dense%t + theta * dense%h, y, g)
+      call system%indicator_values(lane, t, y, g)
     else
-      call observer%event_values(dense%lane, dense%t + theta * dense%h, y, g)
+      call observer%event_values(lane, t, y, g)
     end if
   end subroutine evaluate_at
 

@@ -5,6 +5,7 @@
 !> step is shortened until the error to which the defect adds up is within the tolerance.
 module nocdyn_series_defects
   use nocdyn_kinds, only: wp
+  use nocdyn_series_sums, only: sum_series
   use nocdyn_step_attempt, only: step_attempt_t
   use nocdyn_step_control, only: smallest_step, step_control_t
   use nocdyn_system, only: evaluation_ok, system_t
@@ -84,7 +85,8 @@ contains
     do c = 1, self%columns
       self%h(:, c) = time * control%h
     end do
-    call sum_with_slope(attempt%lanes * self%columns, self%order, series, self%h, self%y, self%slope)
+    call sum_series(attempt%lanes * self%columns, self%order, series, attempt%lanes * self%columns, self%h, self%y)
+    call sum_slopes(attempt%lanes * self%columns, self%order, series, self%h, self%slope)
     self%t(:) = attempt%t + time * control%h
     attempt%uncounted = attempt%uncounted + 1
     call system%derivative(self%t, self%y, self%rate, self%status)
@@ -101,21 +103,18 @@ contains
     end if
   end subroutine test
 
-  !> y = sum over k of h^k series(:, k), and its derivative by h.
-  pure subroutine sum_with_slope(n, order, series, h, y, slope)
+  !> The derivative by h of the sum over k of h^k series(:, k).
+  pure subroutine sum_slopes(n, order, series, h, slope)
     integer, intent(in) :: n, order
     real(wp), intent(in) :: series(n, 0:order), h(n)
-    real(wp), intent(inout) :: y(n), slope(n)
+    real(wp), intent(inout) :: slope(n)
     integer :: k
 
-    y = series(:, order)
     slope = order * series(:, order)
     do k = order - 1, 1, -1
-      y = series(:, k) + h * y
       slope = k * series(:, k) + h * slope
     end do
-    y = series(:, 0) + h * y
-  end subroutine sum_with_slope
+  end subroutine sum_slopes
 
   !> Adds the lanes with an error that is too large, or no number.
   pure subroutine compare(lanes, states, control, allowed, sizes, errors, is_wrong)

@@ -125,7 +125,7 @@ contains
     call measure_norms(self, system, attempt, control)
     call find_steps(attempt%lanes, self%order, self%last_norm, self%previous_norm, self%log_growth)
     if (attempt%components > attempt%states) call limit_by_quadratures(self, attempt, control)
-    self%chosen(:) = self%moved .and. attempt%active
+    if (system%hides_bends) self%chosen(:) = self%moved .and. attempt%active
     if (have_all_moved .and. are_finite .and. .not. any_differs(attempt%lanes, attempt%rhs_status, evaluation_ok)) then
       if (.not. any_too_small(attempt%lanes, attempt%t, self%last_norm)) then
         call take_all_steps(attempt%lanes, self%last_norm, self%moved, self%step_status, self%component, attempt%evaluations, &

@@ -281,6 +281,7 @@ contains
 
     associate (tape => self%law%tape)
       self%series = new_law_work(tape, tape%needed(motion(tape), .true.), order, self%law%w, self%law%groups)
+      if (order > 0) call fill(self%series, self%time, 1, 1.0_wp)   ! the time grows evenly
     end associate
   end subroutine prepare_series
 

@@ -134,7 +134,6 @@ contains
     integer, intent(in) :: element
     real(wp), intent(in) :: motion(3)     !! t [s], u [rad], u' [rad/s]
     real(wp), intent(in) :: internal(:)   !! internal states
-
     integer :: i
 
     associate (x => self%x)

@@ -5,7 +5,7 @@
 module nocdyn_series_banks
   use nocdyn_bank, only: bank_t
   use nocdyn_kinds, only: wp
-  use nocdyn_law_strips, only: fill, load, load_lanes
+  use nocdyn_law_strips, only: load, load_lanes
   use nocdyn_law_walk, only: walk
   use nocdyn_law_work, only: law_work_t
   use nocdyn_laws, only: narrow
@@ -78,7 +78,6 @@ contains
         end if
       end associate
     end do
-    if (machine%lanes == 1) self%forcing = 0.0_wp
     do i = 1, size(self%timed)
       associate (bank => machine%banks(self%timed(i))%bank)
         call begin_bank(bank, strip, t, internal)
@@ -137,7 +136,6 @@ contains
 
     associate (law => bank%law)
       call load_lanes(law%law, law%series, law%time, 0, strip, t)
-      if (law%series%order > 0) call fill(law%series, law%time, 1, 1.0_wp)
       do i = 1, bank%states
         call load(law%law, law%series, law%state(i), 0, strip, bank%states, i, internal)
       end do
@@ -148,7 +146,7 @@ contains
   subroutine set_forcing(bank, strip, last, order, groups, forcing)
     class(bank_t), intent(inout) :: bank
     integer, intent(in) :: strip, last, order, groups
-    real(wp), intent(inout) :: forcing(bank%law%law%w, 0:order, groups)   !! of all elements [N m]; zero before, of one lane
+    real(wp), intent(inout) :: forcing(bank%law%law%w, 0:order, groups)   !! of all elements [N m]
     integer :: at, g, k, slot
 
     associate (law => bank%law%law, work => bank%law%series)

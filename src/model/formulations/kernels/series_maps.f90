@@ -18,7 +18,7 @@ module nocdyn_series_maps
     integer :: mapped = 0                              !! rows, with several lanes
     integer, allocatable :: first(:), column(:)        !! of the rows, [mapped + 1]; of the entries
     real(wp), allocatable :: coefficient(:, :, :)      !! [strip, entries, strips], with several lanes
-    integer, private :: lanes = 1, rows = 0, columns = 0
+    integer, private :: lanes = 1, columns = 0
     integer, private :: strip = 1                      !! lanes of a strip, in whole groups if there are several lanes
     logical, private :: is_dense = .false.
     real(wp), private, allocatable :: matrix(:, :, :)  !! [narrow, columns, groups of rows], if dense
@@ -39,7 +39,6 @@ contains
 
     self%lanes = lanes
     self%strip = strip
-    self%rows = rows
     self%columns = columns
     if (lanes > 1) then
       self%mapped = rows
