@@ -1,6 +1,6 @@
 !> Every matrix and vector of the paper for a machine at its start, labelled with equation numbers.
 module nocdyn_matrix_report
-  use nocdyn_bank, only: role_coupling, role_excitation, role_load, role_motor, role_names
+  use nocdyn_bank, only: role_coupling, role_excitation, role_motor, role_names
   use nocdyn_complement, only: coordinate_selector, extended_constraint
   use nocdyn_errors, only: error_t, exit_failed, raise
   use nocdyn_finite, only: is_finite
@@ -8,10 +8,8 @@ module nocdyn_matrix_report
   use nocdyn_lapack_lu, only: lu_factor, lu_solve
   use nocdyn_machine, only: machine_t
   use nocdyn_machine_report, only: coordinate_names
-  use nocdyn_paper_matrices, only: append_zeros, constrained_inertia, constrained_matrix, constrained_vector, &
-                                   damping_matrix, elastic_moments, elastic_rates, extend_by_unit, extend_by_zero, &
-                                   inertia_matrix, stack, stiffness_2, stiffness_3, stiffness_matrix, tangent_matrix, &
-                                   torque_vector, unit_matrix
+  use nocdyn_paper_matrices, only: constrained_vector, elastic_moments, elastic_rates, inertia_matrices_t, new_paper_matrices, &
+                                   paper_matrices_t, torque_vector, unit_matrix
   use nocdyn_text, only: append, joined, rounded_text, string_t, to_text
   use nocdyn_text_buffer, only: text_buffer_t
   implicit none (type, external)
@@ -21,16 +19,15 @@ module nocdyn_matrix_report
 
   integer, parameter :: digits = 7   ! significant digits printed
 
-  !> Quantities that later equations take from earlier ones: of n bodies, then of the first-order systems.
+  !> The matrices, and the report that they are written to.
   type :: equations_t
     type(machine_t) :: machine
+    type(inertia_matrices_t) :: inertias
+    type(paper_matrices_t) :: matrices
+    real(wp), allocatable :: complement(:, :)     !! L_tau
+    real(wp), allocatable :: excitation(:), motor(:), rest(:)   !! Q_0, Q_m, the term of Q from rest twists
     type(text_buffer_t) :: report
     type(error_t), allocatable :: error   !! on the first matrix that has no finite numbers
-    integer :: n = 0
-    real(wp), allocatable :: constraint(:, :), complement(:, :)                        !! L_lambda, L_tau
-    real(wp), allocatable :: inertia(:, :), damping(:, :), stiffness(:, :)             !! J, C, K; then J_1, C_1, K_1; ...
-    real(wp), allocatable :: excitation(:), motor(:), torque(:)                        !! Q_0, Q_m, Q; then with index 1, ...
-    real(wp), allocatable :: tangent(:, :), moments(:)                                 !! K_4, F
   contains
     procedure :: put_matrix, put_vector
   end type equations_t
@@ -46,8 +43,8 @@ contains
     type(equations_t) :: equations
 
     equations%machine = machine
-    equations%n = machine%bodies
     call set_start_state(equations%machine, t_start)
+    call assemble(equations)
     call equations%report%append_line('Bodies 1 to ' // to_text(machine%bodies) // ': ' // joined(machine%names, ', '))
     call equations%report%append_line('Coordinates: ' // joined(coordinate_names(machine), ', '))
     call equations%report%append_line('At the start: t = ' // rounded_text(t_start, digits) // ' s')
@@ -112,48 +109,48 @@ contains
     call machine%evaluate_energies()
   end subroutine set_start_state
 
+  !> Forms all matrices.
+  subroutine assemble(equations)
+    type(equations_t), intent(inout) :: equations
+
+    associate (machine => equations%machine)
+      allocate (equations%complement, source=machine%coordinates%complement(1))
+      call equations%inertias%assemble(machine, 1, equations%complement)
+      equations%matrices = new_paper_matrices(machine%bodies)
+      call equations%matrices%assemble(machine, 1, equations%complement)
+      allocate (equations%excitation(machine%bodies), equations%motor(machine%bodies), equations%rest(machine%bodies))
+      call torque_vector(machine, 1, role_excitation, equations%excitation)
+      call torque_vector(machine, 1, role_motor, equations%motor)
+      call torque_vector(machine, 1, role_coupling, equations%rest)
+    end associate
+  end subroutine assemble
+
   !> The bodies before the constraints: eqs. (13)-(22).
   subroutine report_free_bodies(equations)
     type(equations_t), intent(inout) :: equations
-    real(wp), allocatable :: rest(:)
 
-    associate (n => equations%n, machine => equations%machine)
-      allocate (equations%inertia(n, n), equations%damping(n, n), equations%stiffness(n, n), equations%tangent(n, n))
-      allocate (equations%excitation(n), equations%motor(n), equations%torque(n), equations%moments(n), rest(n))
-      call inertia_matrix(machine, 1, equations%inertia)
-      call equations%put_matrix('(13) J [kg m2]', equations%inertia)
-      call equations%put_vector('(15) omega [rad/s]', machine%start_speed(1, :))
-      call torque_vector(machine, 1, role_excitation, equations%excitation)
-      call equations%put_vector('(17) Q_0, excitations [N m]', equations%excitation)
-      call torque_vector(machine, 1, role_motor, equations%motor)
-      call equations%put_vector('(18), (20) Q_m, motors [N m]', equations%motor)
-      call torque_vector(machine, 1, role_coupling, rest)
-      call equations%put_vector('K12 * rest twist of the couplings, a further term of Q [N m]', rest)
-      call torque_vector(machine, 1, role_load, equations%torque)
-      equations%torque = equations%torque + equations%excitation + equations%motor + rest
-      call equations%put_vector('(16) Q [N m]', equations%torque)
-      call equations%put_vector('(19) phi [rad]', machine%start_angle(1, :))
-      call stiffness_matrix(machine, 1, equations%stiffness)
-      call equations%put_matrix('(21) K, secant stiffness [N m/rad]', equations%stiffness)
-      call damping_matrix(machine, 1, equations%damping)
-      call equations%put_matrix('(22) C [N m s/rad]', equations%damping)
-    end associate
+    call equations%put_matrix('(13) J [kg m2]', equations%inertias%inertia)
+    call equations%put_vector('(15) omega [rad/s]', equations%machine%start_speed(1, :))
+    call equations%put_vector('(17) Q_0, excitations [N m]', equations%excitation)
+    call equations%put_vector('(18), (20) Q_m, motors [N m]', equations%motor)
+    call equations%put_vector('K12 * rest twist of the couplings, a further term of Q [N m]', equations%rest)
+    call equations%put_vector('(16) Q [N m]', equations%matrices%torque)
+    call equations%put_vector('(19) phi [rad]', equations%machine%start_angle(1, :))
+    call equations%put_matrix('(21) K, secant stiffness [N m/rad]', equations%matrices%stiffness)
+    call equations%put_matrix('(22) C [N m s/rad]', equations%matrices%damping)
   end subroutine report_free_bodies
 
   !> L_lambda and the complement that follows from it: eqs. (23), (31), (73)-(83).
   subroutine report_constraints(equations)
     type(equations_t), intent(inout) :: equations
     real(wp) :: coordinate_speed(equations%machine%coordinates%freedoms)
-    integer :: b, g
 
-    associate (machine => equations%machine, coordinates => equations%machine%coordinates)
-      allocate (equations%constraint, source=machine%constraints%block(1, &
-                [(machine%groups(g)%kept, g=1, size(machine%groups))], [(b, b=1, machine%bodies)]))
-      allocate (equations%complement, source=coordinates%complement(1))
-      call equations%put_matrix('(23), (74) L_lambda, independent rows', equations%constraint)
+    associate (machine => equations%machine, coordinates => equations%machine%coordinates, &
+               constraint => equations%inertias%constraint)
+      call equations%put_matrix('(23), (74) L_lambda, independent rows', constraint)
       call coordinates%project(1, machine%inertia(1, :), machine%start_speed(1, :), coordinate_speed)
       call equations%put_vector("(77) q' [rad/s]", coordinate_speed)
-      call equations%put_matrix('(78) L_lambda^ext', extended_constraint(equations%constraint, coordinates%body))
+      call equations%put_matrix('(78) L_lambda^ext', extended_constraint(constraint, coordinates%body))
       call equations%put_matrix('(79) l_lambda', coordinate_selector(machine%bodies, coordinates%freedoms))
       call equations%put_matrix('(31), (81)-(83) L_tau', equations%complement)
     end associate
@@ -162,109 +159,72 @@ contains
   !> The projected system: eqs. (24)-(30).
   subroutine report_projection(equations)
     type(equations_t), intent(inout) :: equations
-    real(wp) :: matrix(equations%n, equations%n)
+    real(wp) :: projected(equations%machine%bodies)
 
-    call constrained_inertia(equations%complement, equations%inertia, equations%constraint, matrix)
-    equations%inertia = matrix
-    call equations%put_matrix('(25) J_1', matrix)
-    call project(equations%complement, equations%excitation)
-    call project(equations%complement, equations%motor)
-    call project(equations%complement, equations%torque)
-    call equations%put_vector('(26) Q_1', equations%torque)
-    call equations%put_vector('(27) Q_0^1', equations%excitation)
-    call equations%put_vector('(28) Q_m^1', equations%motor)
-    call constrained_matrix(equations%complement, equations%damping, matrix)
-    equations%damping = matrix
-    call equations%put_matrix('(29) C_1', matrix)
-    call constrained_matrix(equations%complement, equations%stiffness, matrix)
-    equations%stiffness = matrix
-    call equations%put_matrix('(30) K_1', matrix)
+    call equations%put_matrix('(25) J_1', equations%inertias%inertia_1)
+    call equations%put_vector('(26) Q_1', equations%matrices%torque_1)
+    call constrained_vector(equations%complement, equations%excitation, projected)
+    call equations%put_vector('(27) Q_0^1', projected)
+    call constrained_vector(equations%complement, equations%motor, projected)
+    call equations%put_vector('(28) Q_m^1', projected)
+    call equations%put_matrix('(29) C_1', equations%matrices%damping_1)
+    call equations%put_matrix('(30) K_1', equations%matrices%stiffness_1)
   end subroutine report_projection
-
-  subroutine project(complement, vector)
-    real(wp), intent(in) :: complement(:, :)
-    real(wp), intent(inout) :: vector(:)
-    real(wp) :: projected(size(vector))
-
-    call constrained_vector(complement, vector, projected)
-    vector = projected
-  end subroutine project
 
   !> The system of first order for alpha = [omega; phi]: eqs. (34)-(42).
   subroutine report_first_order(equations)
     type(equations_t), intent(inout) :: equations
-    real(wp), dimension(2 * equations%n, 2 * equations%n) :: inertia, damping, stiffness
-    real(wp) :: block(equations%n, equations%n), torque(2 * equations%n), alpha(2 * equations%n)
+    real(wp) :: block(equations%machine%bodies, equations%machine%bodies)
 
-    call extend_by_unit(equations%inertia, inertia)
-    call equations%put_matrix('(35) J_2', inertia)
+    call equations%put_matrix('(35) J_2', equations%inertias%inertia_2)
     call unit_matrix(block)
     call equations%put_matrix('(36) I', block)
     block = 0.0_wp
     call equations%put_matrix('(37) 0', block)
-    call extend_by_zero(equations%damping, damping)
-    call equations%put_matrix('(38) C_2', damping)
-    call stiffness_2(equations%stiffness, stiffness)
-    call equations%put_matrix('(39) K_2', stiffness)
-    call append_zeros(equations%torque, torque)
-    call equations%put_vector('(40) Q_2', torque)
-    call stack(equations%machine%start_speed(1, :), equations%machine%start_angle(1, :), alpha)
-    call equations%put_vector('(42) alpha', alpha)
-    equations%inertia = inertia
-    equations%damping = damping
-    equations%stiffness = stiffness
-    equations%torque = torque
+    call equations%put_matrix('(38) C_2', equations%matrices%damping_2)
+    call equations%put_matrix('(39) K_2', equations%matrices%stiffness_2)
+    call equations%put_vector('(40) Q_2', equations%matrices%torque_2)
+    call equations%put_vector('(42) alpha', [equations%machine%start_speed(1, :), equations%machine%start_angle(1, :)])
   end subroutine report_first_order
 
   !> The generalised system for beta = [omega; phi; F] and its solution: eqs. (43)-(72).
   subroutine report_moments_as_states(equations)
     type(equations_t), intent(inout) :: equations
-    real(wp), dimension(3 * equations%n, 3 * equations%n) :: inertia, damping, stiffness
-    real(wp), dimension(3 * equations%n) :: torque, beta
-    real(wp) :: alpha(2 * equations%n)
+    real(wp) :: moments(equations%machine%bodies)
 
-    call extend_by_unit(equations%inertia, inertia)
-    call equations%put_matrix('(44) J_3', inertia)
-    call elastic_moments(equations%machine, 1, equations%moments)
-    call equations%put_vector('(48)-(51) F, elastic moments on the bodies [N m]', equations%moments)
-    call stack(equations%machine%start_speed(1, :), equations%machine%start_angle(1, :), alpha)
-    call stack(alpha, equations%moments, beta)
-    call equations%put_vector('(46) beta', beta)
-    call append_zeros(equations%torque, torque)
-    call equations%put_vector('(58), (59) Q_3', torque)
-    call extend_by_zero(equations%damping, damping)
-    call equations%put_matrix('(60) C_3', damping)
-    call tangent_matrix(equations%machine, 1, equations%tangent)
-    call stiffness_3(equations%stiffness, equations%tangent, stiffness)
-    call equations%put_matrix('(61) K_3', stiffness)
-    call equations%put_matrix('(62)-(72) K_4, tangent stiffness [N m/rad]', equations%tangent)
-    stiffness = stiffness + damping
-    call report_derivatives(equations, inertia, torque + matmul(stiffness, beta))
+    associate (machine => equations%machine, matrices => equations%matrices)
+      call equations%put_matrix('(44) J_3', equations%inertias%inertia_3)
+      call elastic_moments(machine, 1, moments)
+      call equations%put_vector('(48)-(51) F, elastic moments on the bodies [N m]', moments)
+      matrices%beta(:) = [machine%start_speed(1, :), machine%start_angle(1, :), moments]
+      call equations%put_vector('(46) beta', matrices%beta)
+      call equations%put_vector('(58), (59) Q_3', matrices%torque_3)
+      call equations%put_matrix('(60) C_3', matrices%damping_3)
+      call equations%put_matrix('(61) K_3', matrices%stiffness_3)
+      call equations%put_matrix('(62)-(72) K_4, tangent stiffness [N m/rad]', matrices%tangent)
+    end associate
+    call report_derivatives(equations)
   end subroutine report_moments_as_states
 
   !> beta' from eq. (43), and its parts: eqs. (14), (33), (41), (45), (47).
-  subroutine report_derivatives(equations, inertia, right_hand_side)
+  subroutine report_derivatives(equations)
     type(equations_t), intent(inout) :: equations
-    real(wp), intent(in) :: inertia(:, :)         !! J_3
-    real(wp), intent(in) :: right_hand_side(:)    !! Q_3 + C_3 beta + K_3 beta
-    real(wp), allocatable :: factors(:, :)   ! too large for a stack
-    real(wp) :: slope(size(right_hand_side)), rates(equations%n)
-    integer :: pivots(size(right_hand_side))
+    real(wp) :: rates(equations%machine%bodies)
+    integer :: pivots(3 * equations%machine%bodies)
     logical :: is_singular
 
-    allocate (factors, source=inertia)
-    slope = right_hand_side
-    call lu_factor(factors, pivots, is_singular)
+    call lu_factor(equations%inertias%inertia_3, pivots, is_singular)
     if (is_singular) then
       call raise(equations%error, exit_failed, '(44) J_3 is singular by rounding: the inertias differ too much')
       return
     end if
-    call lu_solve(factors, pivots, slope)
-    associate (n => equations%n)
+    associate (n => equations%machine%bodies, slope => equations%matrices%beta, matrices => equations%matrices)
+      slope = matrices%torque_3 + matmul(matrices%stiffness_3 + matrices%damping_3, slope)
+      call lu_solve(equations%inertias%inertia_3, pivots, slope)
       call equations%put_vector("(14) omega' [rad/s2]", slope(:n))
       call equations%put_vector("(33) phi' = omega [rad/s]", slope(n + 1:2 * n))
       call equations%put_vector("(41) alpha'", slope(:2 * n))
-      call elastic_rates(equations%tangent, equations%machine%start_speed(1, :), rates)
+      call elastic_rates(matrices%tangent, equations%machine%start_speed(1, :), rates)
       call equations%put_vector("(47), (52)-(57) F' = K_4 omega [N m/s]", rates)
       call equations%put_vector("(45) beta'", slope)
     end associate

@@ -270,7 +270,7 @@ contains
       machine%elements%speed(1, :) = 0.0_wp
       machine%elements%speed(1, self%inelastic) = speed
       call machine%settle_internal()
-      call machine%choose_element_branches(self%t(1))
+      call machine%choose_branches(self%t)
       call machine%evaluate_elements(self%t)
       moments = machine%elements%restoring(1, self%inelastic) + machine%elements%applied(1, self%inelastic)
     end associate
@@ -288,7 +288,7 @@ contains
     self%residual = 0.0_wp
     self%scale = 0.0_wp
     associate (machine => self%formulation%machine, r => self%motions%freedoms())
-      call machine%choose_element_branches(self%t(1))
+      call machine%choose_branches(self%t)
       call machine%evaluate_elements(self%t)
       do i = 1, size(self%inelastic)
         e = self%inelastic(i)

@@ -1,31 +1,18 @@
 !> The paper's formulation, eq. (43): J_3 beta' = Q_3 + C_3 beta + K_3 beta with beta = [omega; phi; F], as written.
 module nocdyn_paper
   use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
-  use nocdyn_bank, only: role_coupling, role_excitation, role_load, role_motor
   use nocdyn_body_formulation, only: body_formulation_t, jacobian_of_bodies, observe_bodies, start_of_bodies
   use nocdyn_element_sets, only: coupling_elements
   use nocdyn_incidence, only: add_coefficient, add_moment
   use nocdyn_kinds, only: wp
   use nocdyn_lapack, only: pseudo_inverse
-  use nocdyn_lapack_lu, only: lu_factor, lu_solve
+  use nocdyn_lapack_lu, only: lu_factor
   use nocdyn_machine, only: machine_t
-  use nocdyn_paper_matrices, only: append_zeros, constrained_inertia, constrained_matrix, constrained_vector, &
-                                   damping_matrix, elastic_moments, extend_by_unit, extend_by_zero, inertia_matrix, &
-                                   stiffness_2, stiffness_3, stiffness_matrix, tangent_matrix, torque_vector
+  use nocdyn_paper_matrices, only: elastic_moments, inertia_matrices_t, new_paper_matrices, paper_matrices_t, tangent_matrix
   implicit none (type, external)
   private
 
   public :: new_paper
-
-  !> Work space for the matrices of one lane with n bodies; index 1 has size n, index 2 has 2n, index 3 has 3n.
-  type :: matrices_t
-    real(wp), allocatable :: stiffness(:, :), stiffness_1(:, :), stiffness_2(:, :), stiffness_3(:, :)   !! K, K_1, K_2, K_3
-    real(wp), allocatable :: damping(:, :), damping_1(:, :), damping_2(:, :), damping_3(:, :)           !! C, C_1, C_2, C_3
-    real(wp), allocatable :: torque(:), torque_1(:), torque_2(:), torque_3(:)                           !! Q, Q_1, Q_2, Q_3
-    real(wp), allocatable :: term(:)         !! one term of Q
-    real(wp), allocatable :: tangent(:, :)   !! K_4
-    real(wp), allocatable :: beta(:)         !! [omega; phi; F], then its derivative
-  end type matrices_t
 
   !> A machine in the paper's formulation, with the factors of J_3.
   type, extends(body_formulation_t), public :: paper_t
@@ -34,7 +21,8 @@ module nocdyn_paper
     integer, allocatable, private :: pivots(:, :)              !! [3n, lanes]
     integer, allocatable, private :: couplings(:)              !! elements of the role coupling
     real(wp), allocatable, private :: moment_of_bodies(:, :)   !! coupling moments from body moments, [couplings, n]
-    type(matrices_t), private :: work
+    real(wp), allocatable, private :: term(:)                  !! moments on the bodies [N m], [n], work space
+    type(paper_matrices_t), private :: work
   contains
     procedure :: derivative
     procedure :: jacobian
@@ -50,41 +38,26 @@ contains
     type(machine_t), intent(in) :: machine
     logical, intent(in) :: with_energy_balance   !! whether the powers of the elements `machine%with_work` are integrated
     type(paper_t) :: self
-    integer :: b, g, l, n
+    type(inertia_matrices_t) :: inertia
+    integer :: l, n
     logical :: is_singular
-    real(wp) :: inertia(machine%bodies, machine%bodies), inertia_of_1(machine%bodies, machine%bodies)
-    real(wp) :: inertia_of_2(2 * machine%bodies, 2 * machine%bodies)
 
     n = machine%bodies
     call self%set_machine('paper', machine, 3 * n, with_energy_balance)
-    call allocate_matrices(n, self%work)
+    self%work = new_paper_matrices(n)
+    allocate (self%term(n), source=0.0_wp)
     allocate (self%complement(n, machine%coordinates%freedoms, machine%lanes))
     allocate (self%factors(3 * n, 3 * n, machine%lanes), self%pivots(3 * n, machine%lanes))
     do l = 1, machine%lanes
       self%complement(:, :, l) = machine%coordinates%complement(l)
-      call inertia_matrix(machine, l, inertia)
-      call constrained_inertia(self%complement(:, :, l), inertia, &
-                               machine%constraints%block(l, [(machine%groups(g)%kept, g=1, size(machine%groups))], &
-                                                         [(b, b=1, n)]), inertia_of_1)
-      call extend_by_unit(inertia_of_1, inertia_of_2)
-      call extend_by_unit(inertia_of_2, self%factors(:, :, l))
+      call inertia%assemble(machine, l, self%complement(:, :, l))
+      self%factors(:, :, l) = inertia%inertia_3
       call lu_factor(self%factors(:, :, l), self%pivots(:, l), is_singular)
       if (is_singular) self%factors(:, :, l) = ieee_value(1.0_wp, ieee_quiet_nan)   ! by rounding: the integration does not start
     end do
     allocate (self%couplings, source=coupling_elements(machine))
     self%moment_of_bodies = pseudo_inverse(coupling_incidence(machine, self%couplings), 1.0e-10_wp)
   end function new_paper
-
-  !> Allocates the work space.
-  subroutine allocate_matrices(n, work)
-    integer, intent(in) :: n   !! bodies
-    type(matrices_t), intent(inout) :: work
-
-    allocate (work%stiffness(n, n), work%damping(n, n), work%torque(n), work%term(n), work%tangent(n, n))
-    allocate (work%stiffness_1(n, n), work%damping_1(n, n), work%torque_1(n))
-    allocate (work%stiffness_2(2 * n, 2 * n), work%damping_2(2 * n, 2 * n), work%torque_2(2 * n))
-    allocate (work%stiffness_3(3 * n, 3 * n), work%damping_3(3 * n, 3 * n), work%torque_3(3 * n), work%beta(3 * n))
-  end subroutine allocate_matrices
 
   !> Matrix that gives the moments on the bodies from the restoring moments of the couplings, [n, couplings].
   function coupling_incidence(machine, couplings) result(incidence)
@@ -140,56 +113,14 @@ contains
     call self%machine%evaluate_energies()
     call self%machine%differentiate_elements(t)
     do l = 1, self%lanes
-      call assemble(self%machine, l, self%complement(:, :, l), self%work)
+      call self%work%assemble(self%machine, l, self%complement(:, :, l))
       self%work%beta(:) = y(l, :3 * n)
-      call solve_generalised_system(self%factors(:, :, l), self%pivots(:, l), self%work)
+      call self%work%solve(self%factors(:, :, l), self%pivots(:, l))
       dydt(l, :3 * n) = self%work%beta
     end do
     if (self%internal > 0) dydt(:, self%mechanical + 1:self%states) = self%machine%elements%internal%rate
     if (self%quadratures > 0) call self%machine%power(dydt(:, self%states + 1:))
   end subroutine derivative
-
-  !> The matrices of eqs. (16)-(72) of one lane, up to those of eq. (43).
-  subroutine assemble(machine, lane, complement, work)
-    type(machine_t), intent(in) :: machine
-    integer, intent(in) :: lane
-    real(wp), intent(in) :: complement(:, :)   !! L_tau, [n, freedoms]
-    type(matrices_t), intent(inout) :: work
-    integer, parameter :: roles(4) = [role_coupling, role_load, role_motor, role_excitation]
-    integer :: i
-
-    work%torque(:) = 0.0_wp
-    do i = 1, size(roles)
-      call torque_vector(machine, lane, roles(i), work%term)
-      work%torque(:) = work%torque + work%term
-    end do
-    call stiffness_matrix(machine, lane, work%stiffness)
-    call damping_matrix(machine, lane, work%damping)
-    call tangent_matrix(machine, lane, work%tangent)
-    call constrained_vector(complement, work%torque, work%torque_1)
-    call constrained_matrix(complement, work%damping, work%damping_1)
-    call constrained_matrix(complement, work%stiffness, work%stiffness_1)
-    call append_zeros(work%torque_1, work%torque_2)
-    call extend_by_zero(work%damping_1, work%damping_2)
-    call stiffness_2(work%stiffness_1, work%stiffness_2)
-    call append_zeros(work%torque_2, work%torque_3)
-    call extend_by_zero(work%damping_2, work%damping_3)
-    call stiffness_3(work%stiffness_2, work%tangent, work%stiffness_3)
-  end subroutine assemble
-
-  !> Eq. (43): replaces beta by its derivative.
-  subroutine solve_generalised_system(factors, pivots, work)
-    real(wp), contiguous, intent(in) :: factors(:, :)   !! LU factors of J_3, [3n, 3n]
-    integer, contiguous, intent(in) :: pivots(:)        !! [3n]
-    type(matrices_t), intent(inout) :: work
-    integer :: j
-
-    do j = 1, size(work%beta)
-      work%torque_3(:) = work%torque_3 + (work%damping_3(:, j) + work%stiffness_3(:, j)) * work%beta(j)
-    end do
-    work%beta(:) = work%torque_3
-    call lu_solve(factors, pivots, work%beta)
-  end subroutine solve_generalised_system
 
   !> The Jacobian of the bodies and the rows of F' = K_4 omega.
   subroutine jacobian(self, t, y, dfdy, dfdt, status)
@@ -239,11 +170,11 @@ contains
     n = self%machine%bodies
     call observe_bodies(self, t, y)
     do l = 1, self%lanes
-      call elastic_moments(self%machine, l, self%work%term)
+      call elastic_moments(self%machine, l, self%term)
       do i = 1, size(self%couplings)
         associate (moment => self%machine%elements%restoring(l, self%couplings(i)))
           do b = 1, n
-            moment = moment + self%moment_of_bodies(i, b) * (y(l, 2 * n + b) - self%work%term(b))
+            moment = moment + self%moment_of_bodies(i, b) * (y(l, 2 * n + b) - self%term(b))
           end do
         end associate
       end do
@@ -256,8 +187,8 @@ contains
     integer, intent(in) :: lane
     real(wp), intent(out) :: lambda(:)   !! [rows]
 
-    self%work%term(:) = self%machine%inertia(lane, :) * self%slope(lane, :self%machine%bodies) - self%torque(lane, 1:)
-    call self%machine%coordinates%reactions_of_imbalances(lane, self%work%term, lambda)
+    self%term(:) = self%machine%inertia(lane, :) * self%slope(lane, :self%machine%bodies) - self%torque(lane, 1:)
+    call self%machine%coordinates%reactions_of_imbalances(lane, self%term, lambda)
   end subroutine reactions
 
 end module nocdyn_paper

@@ -4,18 +4,115 @@
 !> called. The parts of a law beyond -K12 u - c u' (the rest twist of a coupling, the torque of a motor) are terms of Q. Every
 !> procedure overwrites its last argument and allocates nothing.
 module nocdyn_paper_matrices
+  use nocdyn_bank, only: role_coupling, role_excitation, role_load, role_motor
   use nocdyn_incidence, only: add_coefficients, add_moment
   use nocdyn_kinds, only: wp
+  use nocdyn_lapack_lu, only: lu_solve
   use nocdyn_machine, only: machine_t
   implicit none (type, external)
   private
 
+  public :: new_paper_matrices
   public :: inertia_matrix, torque_vector, stiffness_matrix, damping_matrix, tangent_matrix, elastic_moments
   public :: constrained_inertia, constrained_matrix, constrained_vector
   public :: stiffness_2, stiffness_3, extend_by_unit, extend_by_zero, append_zeros
-  public :: unit_matrix, stack, elastic_rates
+  public :: unit_matrix, elastic_rates
+
+  !> The inertias of one lane with n bodies; index 1 has size n, index 2 has 2n, index 3 has 3n.
+  type, public :: inertia_matrices_t
+    real(wp), allocatable :: inertia(:, :), inertia_1(:, :), inertia_2(:, :), inertia_3(:, :)   !! J, J_1, J_2, J_3
+    real(wp), allocatable :: constraint(:, :)                                                   !! L_lambda, independent rows
+  contains
+    procedure :: assemble => assemble_inertia
+  end type inertia_matrices_t
+
+  !> The other matrices of eq. (43), and those from which they are made.
+  type, public :: paper_matrices_t
+    real(wp), allocatable :: stiffness(:, :), stiffness_1(:, :), stiffness_2(:, :), stiffness_3(:, :)   !! K, K_1, K_2, K_3
+    real(wp), allocatable :: damping(:, :), damping_1(:, :), damping_2(:, :), damping_3(:, :)           !! C, C_1, C_2, C_3
+    real(wp), allocatable :: torque(:), torque_1(:), torque_2(:), torque_3(:)                           !! Q, Q_1, Q_2, Q_3
+    real(wp), allocatable :: tangent(:, :)   !! K_4
+    real(wp), allocatable :: beta(:)         !! [omega; phi; F], then its derivative
+    real(wp), allocatable, private :: term(:)   !! one term of Q, work space
+  contains
+    procedure :: assemble
+    procedure :: solve
+  end type paper_matrices_t
 
 contains
+
+  !> Matrices of n bodies, not yet set.
+  type(paper_matrices_t) function new_paper_matrices(n) result(self)
+    integer, intent(in) :: n
+
+    allocate (self%stiffness(n, n), self%damping(n, n), self%torque(n), self%term(n), self%tangent(n, n))
+    allocate (self%stiffness_1(n, n), self%damping_1(n, n), self%torque_1(n))
+    allocate (self%stiffness_2(2 * n, 2 * n), self%damping_2(2 * n, 2 * n), self%torque_2(2 * n))
+    allocate (self%stiffness_3(3 * n, 3 * n), self%damping_3(3 * n, 3 * n), self%torque_3(3 * n), self%beta(3 * n))
+  end function new_paper_matrices
+
+  !> J_1 to J_3, eqs. (13), (25), (35), (44), of one lane.
+  subroutine assemble_inertia(self, machine, lane, complement)
+    class(inertia_matrices_t), intent(inout) :: self
+    type(machine_t), intent(in) :: machine
+    integer, intent(in) :: lane
+    real(wp), intent(in) :: complement(:, :)   !! L_tau, [n, freedoms]
+    integer :: b, g
+
+    if (.not. allocated(self%inertia)) then
+      associate (n => machine%bodies)
+        allocate (self%inertia(n, n), self%inertia_1(n, n), self%inertia_2(2 * n, 2 * n), self%inertia_3(3 * n, 3 * n))
+      end associate
+    end if
+    self%constraint = machine%constraints%block(lane, [(machine%groups(g)%kept, g=1, size(machine%groups))], &
+                                                [(b, b=1, machine%bodies)])
+    call inertia_matrix(machine, lane, self%inertia)
+    call constrained_inertia(complement, self%inertia, self%constraint, self%inertia_1)
+    call extend_by_unit(self%inertia_1, self%inertia_2)
+    call extend_by_unit(self%inertia_2, self%inertia_3)
+  end subroutine assemble_inertia
+
+  !> The matrices of eqs. (16)-(72) of one lane, up to those of eq. (43).
+  subroutine assemble(self, machine, lane, complement)
+    class(paper_matrices_t), intent(inout) :: self
+    type(machine_t), intent(in) :: machine
+    integer, intent(in) :: lane
+    real(wp), intent(in) :: complement(:, :)   !! L_tau, [n, freedoms]
+    integer, parameter :: roles(4) = [role_coupling, role_load, role_motor, role_excitation]
+    integer :: i
+
+    self%torque(:) = 0.0_wp
+    do i = 1, size(roles)
+      call torque_vector(machine, lane, roles(i), self%term)
+      self%torque(:) = self%torque + self%term
+    end do
+    call stiffness_matrix(machine, lane, self%stiffness)
+    call damping_matrix(machine, lane, self%damping)
+    call tangent_matrix(machine, lane, self%tangent)
+    call constrained_vector(complement, self%torque, self%torque_1)
+    call constrained_matrix(complement, self%damping, self%damping_1)
+    call constrained_matrix(complement, self%stiffness, self%stiffness_1)
+    call append_zeros(self%torque_1, self%torque_2)
+    call extend_by_zero(self%damping_1, self%damping_2)
+    call stiffness_2(self%stiffness_1, self%stiffness_2)
+    call append_zeros(self%torque_2, self%torque_3)
+    call extend_by_zero(self%damping_2, self%damping_3)
+    call stiffness_3(self%stiffness_2, self%tangent, self%stiffness_3)
+  end subroutine assemble
+
+  !> Eq. (43): replaces beta by its derivative.
+  subroutine solve(self, factors, pivots)
+    class(paper_matrices_t), intent(inout) :: self
+    real(wp), contiguous, intent(in) :: factors(:, :)   !! LU factors of J_3, [3n, 3n]
+    integer, contiguous, intent(in) :: pivots(:)        !! [3n]
+    integer :: j
+
+    do j = 1, size(self%beta)
+      self%torque_3(:) = self%torque_3 + (self%damping_3(:, j) + self%stiffness_3(:, j)) * self%beta(j)
+    end do
+    self%beta(:) = self%torque_3
+    call lu_solve(factors, pivots, self%beta)
+  end subroutine solve
 
   !> J of eq. (13), [n, n].
   subroutine inertia_matrix(machine, lane, inertia)
@@ -157,16 +254,6 @@ contains
       matrix(i, i) = 1.0_wp
     end do
   end subroutine unit_matrix
-
-  !> alpha = [omega; phi] of eq. (42), alpha' = [omega'; phi'] of eq. (41), [2n]; beta = [alpha; F] of eq. (46),
-  !> beta' = [alpha'; F'] of eq. (45), [3n]. With phi' = omega, eqs. (32), (33).
-  subroutine stack(upper, lower, vector)
-    real(wp), intent(in) :: upper(:), lower(:)   !! omega, phi; or alpha, F
-    real(wp), intent(inout) :: vector(:)         !! [upper + lower]
-
-    vector(:size(upper)) = upper
-    vector(size(upper) + 1:) = lower
-  end subroutine stack
 
   !> diag(block, I): J_2 = diag(J_1, I) of eq. (35), [2n, 2n], and J_3 = diag(J_2, I) of eq. (44), [3n, 3n].
   pure subroutine extend_by_unit(block, matrix)

@@ -53,7 +53,6 @@ module nocdyn_machine
     procedure :: start_internal
     procedure :: internal_name
     procedure :: choose_branches
-    procedure :: choose_element_branches
     procedure :: settle_internal
     procedure :: evaluate
     procedure :: evaluate_elements
@@ -209,24 +208,6 @@ contains
       end do
     end associate
   end subroutine choose_branches
-
-  !> Chooses the branches from the angles, speeds and internal states in `elements`.
-  subroutine choose_element_branches(self, t)
-    class(machine_t), intent(inout) :: self
-    real(wp), intent(in) :: t   !! [s]
-    integer :: k, lane
-
-    associate (switches => self%switches, elements => self%elements)
-      do k = 1, switches%count
-        associate (e => switches%element(k))
-          do lane = 1, self%lanes
-            call switches%choose(self%banks, k, lane, t, elements%angle(lane, e), elements%speed(lane, e), &
-                                 elements%internal%value(lane, :))
-          end do
-        end associate
-      end do
-    end associate
-  end subroutine choose_element_branches
 
   !> Replaces the internal states in the first lane of `elements` by those that do not change at the speeds there.
   subroutine settle_internal(self)
