@@ -1,6 +1,6 @@
 !> From an input to a machine and its formulation: bodies, banks, constraints and coordinates.
 module nocdyn_assembly
-  use nocdyn_complement, only: complement_natural, complement_negated, complement_scaled
+  use nocdyn_complement, only: complement_names
   use nocdyn_constraint_analysis, only: analyse_constraints
   use nocdyn_constraint_assembly, only: assemble_constraints, constraint_groups
   use nocdyn_coordinates, only: build_coordinates
@@ -118,7 +118,7 @@ contains
         call refuse_massless_motion(input, machine, error)
         if (allocated(error)) return
         call build_coordinates(machine%constraints, machine%names, machine%trains, machine%groups, machine%inertia, wanted, &
-                               complement_choice(run%text('complement')), machine%coordinates, error)
+                               findloc(complement_names == run%text('complement'), .true., dim=1), machine%coordinates, error)
       end if
       if (.not. allocated(error)) call fit_start_speeds(machine, given_speeds(input), run%text('start') == 'projected', &
                                                            offending_row, error)
@@ -168,21 +168,5 @@ contains
       error stop 'nocdyn_assembly: the schema allows an unknown formulation'
     end select
   end subroutine new_formulation
-
-  !> The constant complement_... of a word of the key `complement`.
-  pure integer function complement_choice(word)
-    character(len=*), intent(in) :: word
-
-    select case (word)
-    case ('natural')
-      complement_choice = complement_natural
-    case ('scaled')
-      complement_choice = complement_scaled
-    case ('negated')
-      complement_choice = complement_negated
-    case default
-      error stop 'nocdyn_assembly: the schema allows an unknown complement'
-    end select
-  end function complement_choice
 
 end module nocdyn_assembly

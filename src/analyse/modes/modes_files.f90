@@ -23,7 +23,7 @@ contains
     type(modes_report_t), intent(in) :: self
     character(len=:), allocatable :: text
     type(text_buffer_t) :: table
-    integer :: i, number
+    integer :: i
 
     call table%append('mode,kind,frequency [Hz],undamped_frequency [Hz],damping_ratio,time_constant [s],' // &
                       'real [1/s],imaginary [rad/s]')
@@ -32,10 +32,8 @@ contains
     call put_names('kinetic_', self%machine%names, ' [1]')
     call put_names('potential_', self%elastic_names, ' [1]')
     call table%append(new_line('a'))
-    number = 0
     do i = 1, size(self%modes)
-      if (self%modes(i)%kind == mode_oscillating) number = number + 1
-      call put_row(self%modes(i), number, i <= self%shapes, table)
+      call put_row(self%modes(i), count(self%modes(:i)%kind == mode_oscillating), i <= self%shapes, table)
     end do
     text = table%text()
 
@@ -100,7 +98,7 @@ contains
     type(modes_report_t), intent(in) :: self
     character(len=:), allocatable :: text
     type(json_t) :: json
-    integer :: i, number
+    integer :: i
 
     call json%open_report(input%file, input%title())
     call json%put('about', self%point)
@@ -108,10 +106,8 @@ contains
     call json%put('notes', self%notes)
     call put_drivetrain(json, self)
     call json%open_list('modes')
-    number = 0
     do i = 1, size(self%modes)
-      if (self%modes(i)%kind == mode_oscillating) number = number + 1
-      call put_mode(json, self, i, number)
+      call put_mode(json, self, i)
     end do
     call json%close_list()
     call json%close()
@@ -153,15 +149,14 @@ contains
     call json%close_list()
   end subroutine put_drivetrain
 
-  subroutine put_mode(json, self, i, number)
+  subroutine put_mode(json, self, i)
     type(json_t), intent(inout) :: json
     type(modes_report_t), intent(in) :: self
-    integer, intent(in) :: i        !! index of the mode
-    integer, intent(in) :: number   !! among the oscillating ones
+    integer, intent(in) :: i   !! index of the mode
 
     associate (mode => self%modes(i))
       call json%open()
-      if (mode%kind == mode_oscillating) call json%put('mode', number)
+      if (mode%kind == mode_oscillating) call json%put('mode', count(self%modes(:i)%kind == mode_oscillating))
       call json%put('kind', trim(kind_names(mode%kind)))
       if (mode%kind == mode_internal) call json%put('state', self%machine%internal_name(mode%internal))
       call json%put('frequency_Hz', mode%frequency())

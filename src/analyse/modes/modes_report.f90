@@ -1,6 +1,6 @@
 !> The printed report on the modes of a machine.
 module nocdyn_modes_report
-  use nocdyn_energy_balance, only: element_names
+  use nocdyn_element_sets, only: element_names
   use nocdyn_errors, only: error_t, exit_failed, raise
   use nocdyn_finite, only: is_finite
   use nocdyn_kinds, only: wp
@@ -94,7 +94,7 @@ contains
     call put_real(self, mode_rigid, report)
     call put_real(self, mode_overdamped, report)
     call put_real(self, mode_diverging, report)
-    call put_internal(self, report)
+    call put_real(self, mode_internal, report)
     if (count(self%modes%kind == mode_oscillating) <= max_shapes .and. self%machine%bodies <= max_shapes) then
       call put_shapes(self, report)
     end if
@@ -153,28 +153,16 @@ contains
     shown = min(size(chosen), max_modes)
     do i = 1, shown
       associate (mode => self%modes(chosen(i)))
-        call report%append_line('  ' // trim(kind_names(kind)) // ': ' // rate_text(mode) // '; kinetic energy in ' // &
-                                shares_text(mode%kinetic, self%machine%names))
+        if (kind == mode_internal) then
+          call report%append_line('  ' // self%machine%internal_name(mode%internal) // ': ' // rate_text(mode))
+        else
+          call report%append_line('  ' // trim(kind_names(kind)) // ': ' // rate_text(mode) // '; kinetic energy in ' // &
+                                  shares_text(mode%kinetic, self%machine%names))
+        end if
       end associate
     end do
     if (shown < size(chosen)) call report%append_line('  (' // to_text(size(chosen) - shown) // ' more in modes.csv)')
   end subroutine put_real
-
-  !> Appends a line for every mode of an internal state.
-  subroutine put_internal(self, report)
-    type(modes_report_t), intent(in) :: self
-    type(text_buffer_t), intent(inout) :: report
-    integer, allocatable :: chosen(:)
-    integer :: i
-
-    allocate (chosen, source=modes_of(self, mode_internal))
-    do i = 1, min(size(chosen), max_modes)
-      associate (mode => self%modes(chosen(i)))
-        call report%append_line('  ' // self%machine%internal_name(mode%internal) // ': ' // rate_text(mode))
-      end associate
-    end do
-    if (size(chosen) > max_modes) call report%append_line('  (' // to_text(size(chosen) - max_modes) // ' more in modes.csv)')
-  end subroutine put_internal
 
   !> The modes of one kind.
   pure function modes_of(self, kind) result(chosen)

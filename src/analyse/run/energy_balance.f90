@@ -10,7 +10,7 @@ module nocdyn_energy_balance
   implicit none (type, external)
   private
 
-  public :: work_element_names, element_names, put_energy_balance, append_energy_balance
+  public :: work_element_names, put_energy_balance, append_energy_balance
 
   integer, parameter :: max_lines = 5   ! of each list
 
@@ -43,19 +43,6 @@ contains
       end associate
     end do
   end function work_element_names
-
-  !> The names of some elements of a machine.
-  function element_names(machine, elements) result(names)
-    type(machine_t), intent(in) :: machine
-    integer, intent(in) :: elements(:)   !! their numbers
-    type(string_t), allocatable :: names(:)
-    integer :: i
-
-    allocate (names(size(elements)))
-    do i = 1, size(elements)
-      names(i)%text = machine%element_name(elements(i))
-    end do
-  end function element_names
 
   !> The energy balance error [J]: the increase of the stored energies, less the works.
   pure real(wp) function residual(self)

@@ -1,6 +1,7 @@
 !> The rows of trajectory.csv: all columns of a machine of one lane at a time and state.
 module nocdyn_trajectory_table
-  use nocdyn_energy_balance, only: element_names, energy_balance_t, work_element_names
+  use nocdyn_element_sets, only: element_names
+  use nocdyn_energy_balance, only: energy_balance_t, work_element_names
   use nocdyn_formulation, only: formulation_t
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t

@@ -3,6 +3,7 @@ module nocdyn_equilibrium
   use nocdyn_balance_search, only: search_balance
   use nocdyn_balance_texts, only: describe_speeds, explain_no_balance, list_moving_bodies
   use nocdyn_block_solutions, only: block_solutions_t
+  use nocdyn_element_sets, only: element_names
   use nocdyn_errors, only: error_t, exit_failed, raise
   use nocdyn_formulation, only: formulation_t
   use nocdyn_kinds, only: wp
@@ -135,7 +136,6 @@ contains
     real(wp), intent(in) :: z(:)       !! the solution, [unknowns]
     type(string_t), allocatable, intent(inout) :: notes(:)
     integer, allocatable :: undetermined(:)
-    type(string_t), allocatable :: names(:)
     character(len=:), allocatable :: bodies, speeds
     integer :: i
 
@@ -148,12 +148,8 @@ contains
     end do
     allocate (undetermined, source=undetermined_elements(balance))
     if (size(undetermined) == 0) return
-    allocate (names(size(undetermined)))
-    do i = 1, size(undetermined)
-      names(i)%text = balance%formulation%machine%element_name(undetermined(i))
-    end do
     call append_new(notes, 'inside an open gap, or where a law is level, any twist is steady: of ' // &
-                           joined(names, ', ', most_names) // &
+                           joined(element_names(balance%formulation%machine, undetermined), ', ', most_names) // &
                            ' one near the start is kept')
   end subroutine add_range_notes
 

@@ -10,6 +10,7 @@ module nocdyn_complement
   integer, parameter, public :: complement_natural = 1   !! eq. (81)
   integer, parameter, public :: complement_scaled = 2    !! eq. (82) of section 6
   integer, parameter, public :: complement_negated = 3   !! eq. (83) of section 6
+  character(len=*), parameter, public :: complement_names(3) = [character(len=7) :: 'natural', 'scaled', 'negated']
 
 contains
 

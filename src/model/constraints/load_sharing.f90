@@ -38,25 +38,26 @@ contains
     type(geared_group_t), intent(in) :: groups(:)
     integer, intent(in) :: rows, lanes
     type(load_sharing_t) :: self
+    type(redundancy_t), allocatable :: redundancies(:)
     integer :: parent(rows), block_of(rows)   ! union-find over the rows
-    integer, allocatable :: redundant(:)
     integer :: g, i, j, k, r, root
 
     parent = [(r, r=1, rows)]
     block_of = 0
     k = 0
-    allocate (redundant, source=[(groups(g)%redundancies%row, g=1, size(groups))])
+    allocate (redundancies(sum([(size(groups(g)%redundancies), g=1, size(groups))])))
+    i = 0
     do g = 1, size(groups)
-      do i = 1, size(groups(g)%redundancies)
-        associate (redundancy => groups(g)%redundancies(i))
-          do j = 1, size(redundancy%repeats)
-            call join_components(redundancy%row, redundancy%repeats(j), parent)
-          end do
-        end associate
+      redundancies(i + 1:i + size(groups(g)%redundancies)) = groups(g)%redundancies
+      i = i + size(groups(g)%redundancies)
+    end do
+    do i = 1, size(redundancies)
+      do j = 1, size(redundancies(i)%repeats)
+        call join_components(redundancies(i)%row, redundancies(i)%repeats(j), parent)
       end do
     end do
-    do i = 1, size(redundant)
-      call find_root(parent, redundant(i), root)
+    do i = 1, size(redundancies)
+      call find_root(parent, redundancies(i)%row, root)
       if (block_of(root) > 0) cycle
       k = k + 1
       block_of(root) = k
@@ -67,40 +68,29 @@ contains
       call find_root(parent, r, root)
       block_of(r) = block_of(root)
     end do
-    call fill_blocks(groups, block_of, lanes, self%blocks)
+    call fill_blocks(redundancies, block_of, lanes, self%blocks)
   end function new_load_sharing
 
   !> Assigns rows and redundancies to the blocks.
-  subroutine fill_blocks(groups, block_of, lanes, blocks)
-    type(geared_group_t), intent(in) :: groups(:)
+  subroutine fill_blocks(redundancies, block_of, lanes, blocks)
+    type(redundancy_t), intent(in) :: redundancies(:)
     integer, intent(in) :: block_of(:)   !! block of each row, 0: none
     integer, intent(in) :: lanes
     type(load_sharing_block_t), intent(inout) :: blocks(:)
     integer, allocatable :: rows(:), order(:)
-    integer :: first(size(blocks) + 1), g, i, k, next(size(blocks))
+    integer :: first(size(blocks) + 1), first_redundant(size(blocks) + 1), i, k, redundant(size(redundancies))
 
     rows = pack([(i, i=1, size(block_of))], block_of > 0)
     allocate (order(size(rows)))
     call transposed_order(block_of(rows), size(blocks), order, first)
-    next = 0
-    do g = 1, size(groups)
-      do i = 1, size(groups(g)%redundancies)
-        k = block_of(groups(g)%redundancies(i)%row)
-        next(k) = next(k) + 1
-      end do
-    end do
+    call transposed_order(block_of(redundancies%row), size(blocks), redundant, first_redundant)
     do k = 1, size(blocks)
       blocks(k)%rows = rows(order(first(k):first(k + 1) - 1))
-      allocate (blocks(k)%redundancies(next(k)))
-      allocate (blocks(k)%null_vectors(size(blocks(k)%rows), next(k), lanes), source=0.0_wp)
-    end do
-    next = 0
-    do g = 1, size(groups)
-      do i = 1, size(groups(g)%redundancies)
-        k = block_of(groups(g)%redundancies(i)%row)
-        next(k) = next(k) + 1
-        blocks(k)%redundancies(next(k)) = groups(g)%redundancies(i)
+      allocate (blocks(k)%redundancies(first_redundant(k + 1) - first_redundant(k)))
+      do i = 1, size(blocks(k)%redundancies)
+        blocks(k)%redundancies(i) = redundancies(redundant(first_redundant(k) - 1 + i))
       end do
+      allocate (blocks(k)%null_vectors(size(blocks(k)%rows), size(blocks(k)%redundancies), lanes), source=0.0_wp)
     end do
   end subroutine fill_blocks
 

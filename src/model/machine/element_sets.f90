@@ -2,10 +2,11 @@
 module nocdyn_element_sets
   use nocdyn_bank, only: role_coupling
   use nocdyn_machine, only: machine_t
+  use nocdyn_text, only: string_t
   implicit none (type, external)
   private
 
-  public :: has_springs_only, coupling_elements
+  public :: has_springs_only, coupling_elements, element_names
 
 contains
 
@@ -31,5 +32,18 @@ contains
       end associate
     end do
   end function coupling_elements
+
+  !> The names of some elements of a machine.
+  function element_names(machine, elements) result(names)
+    type(machine_t), intent(in) :: machine
+    integer, intent(in) :: elements(:)   !! their numbers
+    type(string_t), allocatable :: names(:)
+    integer :: i
+
+    allocate (names(size(elements)))
+    do i = 1, size(elements)
+      names(i)%text = machine%element_name(elements(i))
+    end do
+  end function element_names
 
 end module nocdyn_element_sets

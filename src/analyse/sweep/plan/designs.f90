@@ -28,56 +28,29 @@ module nocdyn_designs
     integer :: count = 1                                   !! values of a grid, at least 1
   end type factor_t
 
-  type, abstract, public :: design_t
-    integer :: variants   !! numbered from 1
-    integer :: varied     !! number of factors
+  type, public :: design_t
+    integer :: variants = 0   !! numbered from 1
+    integer :: varied = 0     !! number of factors
+    character(len=6), private :: word = 'list'                       !! 'grid', 'random', 'latin', 'sobol', 'list'
+    integer, private :: seed = 0
+    type(factor_t), allocatable, private :: factors(:)               !! of a grid
+    type(distribution_t), allocatable, private :: distributions(:)   !! of random values, [varied]
+    type(permutation_t), allocatable, private :: strata(:)           !! if latin, [varied]
+    type(sobol_points_t), private :: points                          !! if sobol
+    real(wp), allocatable, private :: list(:, :)                     !! of a list, [varied, variants]
   contains
-    procedure(values_interface), deferred :: values
+    procedure :: values
   end type design_t
-
-  abstract interface
-    !> The values of the factors in a variant.
-    pure subroutine values_interface(self, variant, x)
-      import :: design_t, wp
-      class(design_t), intent(in) :: self
-      integer, intent(in) :: variant   !! 1 to `variants`
-      real(wp), intent(out) :: x(:)    !! [varied]
-    end subroutine values_interface
-  end interface
-
-  type, extends(design_t), public :: grid_design_t
-    private
-    type(factor_t), allocatable :: factors(:)
-  contains
-    procedure :: values => grid_values
-  end type grid_design_t
-
-  type, extends(design_t), public :: sampled_design_t
-    private
-    character(len=6) :: design                              !! 'random', 'latin', 'sobol'
-    integer :: seed
-    type(distribution_t), allocatable :: distributions(:)   !! [varied]
-    type(permutation_t), allocatable :: strata(:)           !! if latin, [varied]
-    type(sobol_points_t) :: points                          !! if sobol
-  contains
-    procedure :: values => sampled_values
-  end type sampled_design_t
-
-  type, extends(design_t), public :: list_design_t
-    private
-    real(wp), allocatable :: list(:, :)   !! [varied, variants]
-  contains
-    procedure :: values => list_values
-  end type list_design_t
 
 contains
 
   !> All combinations of `count` equidistant values from `low` to `high` of each factor (`low` alone if `count` is 1). The last
   !> factor varies fastest. The distributions do not matter.
-  type(grid_design_t) function grid_design(factors) result(design)
+  type(design_t) function grid_design(factors) result(design)
     type(factor_t), intent(in) :: factors(:)   !! with `grid_size` at most `max_variants`
 
     if (grid_size(factors) > max_variants) error stop 'nocdyn_designs: the grid has too many variants'
+    design%word = 'grid'
     design%variants = int(grid_size(factors))
     design%varied = size(factors)
     allocate (design%factors, source=factors)
@@ -94,15 +67,34 @@ contains
     end do
   end function grid_size
 
-  pure subroutine grid_values(self, variant, x)
-    class(grid_design_t), intent(in) :: self
+  !> The values of the factors in a variant.
+  pure subroutine values(self, variant, x)
+    class(design_t), intent(in) :: self
+    integer, intent(in) :: variant   !! 1 to `variants`
+    real(wp), intent(out) :: x(:)    !! [varied]
+    integer :: i
+
+    select case (self%word)
+    case ('grid')
+      call grid_values(self%factors, variant, x)
+    case ('list')
+      x = self%list(:, variant)
+    case default
+      do i = 1, self%varied
+        x(i) = self%distributions(i)%quantile(probability(self, variant, i))
+      end do
+    end select
+  end subroutine values
+
+  pure subroutine grid_values(factors, variant, x)
+    type(factor_t), intent(in) :: factors(:)
     integer, intent(in) :: variant
     real(wp), intent(out) :: x(:)
     integer :: i, rest, step
 
     rest = variant - 1
-    do i = self%varied, 1, -1
-      associate (factor => self%factors(i))
+    do i = size(factors), 1, -1
+      associate (factor => factors(i))
         step = modulo(rest, factor%count)
         rest = rest / factor%count
         if (step == 0) then
@@ -122,7 +114,7 @@ contains
   !> - latin: a Latin hypercube (M. D. McKay, R. J. Beckman, W. J. Conover, Technometrics 21 (1979) 239-245): the range of each
   !>   factor is divided into as many equally probable strata as there are samples, with one random value in each stratum.
   !> - sobol: Sobol points from the first one on; a seed other than 0 shifts all of them.
-  type(sampled_design_t) function sampled_design(word, factors, samples, seed) result(design)
+  type(design_t) function sampled_design(word, factors, samples, seed) result(design)
     character(len=*), intent(in) :: word       !! 'random', 'latin', 'sobol'
     type(factor_t), intent(in) :: factors(:)   !! at most `max_dimensions` if sobol
     integer, intent(in) :: samples             !! at least 1
@@ -131,7 +123,7 @@ contains
 
     design%variants = samples
     design%varied = size(factors)
-    design%design = word
+    design%word = word
     design%seed = seed
     allocate (design%distributions(size(factors)), design%strata(merge(size(factors), 0, word == 'latin')))
     do i = 1, size(factors)
@@ -141,45 +133,32 @@ contains
     if (word == 'sobol') design%points = sobol_points(size(factors), seed)
   end function sampled_design
 
-  pure subroutine sampled_values(self, variant, x)
-    class(sampled_design_t), intent(in) :: self
-    integer, intent(in) :: variant
-    real(wp), intent(out) :: x(:)
-    real(wp) :: probability
-    integer :: i
+  !> The probability of values below that of a factor in a variant.
+  pure real(wp) function probability(design, variant, i)
+    type(design_t), intent(in) :: design
+    integer, intent(in) :: variant, i   !! `i` is the number of the factor
 
-    do i = 1, self%varied
-      select case (self%design)
-      case ('random')
-        probability = random_number_at(self%seed, stream_values, i, variant)
-      case ('latin')
-        probability = (self%strata(i)%image(variant - 1) + &
-                       min(random_number_at(self%seed, stream_offsets, i, variant), last_offset)) / self%variants
-      case ('sobol')
-        probability = self%points%coordinate(variant - 1, i)
-      case default
-        error stop 'nocdyn_designs: there is no such design'
-      end select
-      x(i) = self%distributions(i)%quantile(probability)
-    end do
-  end subroutine sampled_values
+    select case (design%word)
+    case ('random')
+      probability = random_number_at(design%seed, stream_values, i, variant)
+    case ('latin')
+      probability = (design%strata(i)%image(variant - 1) + &
+                     min(random_number_at(design%seed, stream_offsets, i, variant), last_offset)) / design%variants
+    case ('sobol')
+      probability = design%points%coordinate(variant - 1, i)
+    case default
+      error stop 'nocdyn_designs: there is no such design'
+    end select
+  end function probability
 
   !> A list of values.
-  type(list_design_t) function list_design(values) result(design)
+  type(design_t) function list_design(values) result(design)
     real(wp), intent(in) :: values(:, :)   !! [varied, variants]
 
     design%varied = size(values, 1)
     design%variants = size(values, 2)
     allocate (design%list, source=values)
   end function list_design
-
-  pure subroutine list_values(self, variant, x)
-    class(list_design_t), intent(in) :: self
-    integer, intent(in) :: variant
-    real(wp), intent(out) :: x(:)
-
-    x = self%list(:, variant)
-  end subroutine list_values
 
   !> The probability of the range from `low` to `high` without truncation. No value can be drawn if it is 0.
   pure real(wp) function probability_between(factor)

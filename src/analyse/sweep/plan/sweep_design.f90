@@ -25,7 +25,7 @@ contains
     type(input_t), intent(in) :: input
     integer, intent(in) :: sweep   !! index of &sweep
     type(target_t), allocatable, intent(out) :: targets(:)
-    class(design_t), allocatable, intent(out) :: design
+    type(design_t), allocatable, intent(out) :: design
     character(len=:), allocatable, intent(out) :: list_checksum   !! of the bytes of the file of a list, '' if there is none
     type(diagnostics_t), intent(inout) :: diagnostics
     type(factor_t), allocatable :: factors(:)
@@ -55,7 +55,7 @@ contains
   subroutine make_design(group, factors, design)
     type(group_t), intent(in) :: group   !! &sweep
     type(factor_t), intent(in) :: factors(:)
-    class(design_t), allocatable, intent(out) :: design
+    type(design_t), allocatable, intent(out) :: design
 
     if (group%text('design') == 'grid') then
       allocate (design, source=grid_design(factors))

@@ -30,7 +30,7 @@ module nocdyn_sweep_plan
   type, public :: sweep_plan_t
     type(input_t) :: input                            !! of the base machine and the sweep
     type(machine_t) :: machine                        !! the base machine, one lane
-    class(design_t), allocatable :: design
+    type(design_t), allocatable :: design
     type(target_t), allocatable :: targets(:)         !! of the factors of the design
     type(statistic_t), allocatable :: statistics(:)
     integer, allocatable :: trajectories(:)           !! variants whose trajectories are written, ascending
