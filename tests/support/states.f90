@@ -134,7 +134,9 @@ contains
     real(wp), contiguous, intent(in) :: t(:)
     real(wp), contiguous, intent(in) :: phi(:, 0:), omega(:, 0:)
 
-    call machine%differentiate(t, phi, omega)
+    call machine%elements%gather(phi, omega)
+    call machine%evaluate_elements(t)
+    call machine%differentiate_elements(t)
     call machine%evaluate_energies()
   end subroutine bring_to
 

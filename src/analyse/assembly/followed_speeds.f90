@@ -63,28 +63,17 @@ contains
     end associate
   end subroutine follow_speeds
 
-  !> The rows of the complement of some bodies, [bodies, coordinates of the group].
+  !> The rows of the complement of a group, whose bodies have an entry for each of its coordinates, [bodies, coordinates].
   function rows_of(machine, bodies) result(rows)
     type(machine_t), intent(in) :: machine
-    integer, intent(in) :: bodies(:)   !! of a group
+    integer, intent(in) :: bodies(:)
     real(wp), allocatable :: rows(:, :)
-    integer :: column(machine%coordinates%freedoms), columns, i, k
+    integer :: i
 
-    associate (map => machine%coordinates)
-      column = 0
-      columns = 0
+    associate (first => machine%coordinates%first)
+      allocate (rows(size(bodies), first(bodies(1) + 1) - first(bodies(1))))
       do i = 1, size(bodies)
-        do k = map%first(bodies(i)), map%first(bodies(i) + 1) - 1
-          if (column(map%coordinate(k)) > 0) cycle
-          columns = columns + 1
-          column(map%coordinate(k)) = columns
-        end do
-      end do
-      allocate (rows(size(bodies), columns), source=0.0_wp)
-      do i = 1, size(bodies)
-        do k = map%first(bodies(i)), map%first(bodies(i) + 1) - 1
-          rows(i, column(map%coordinate(k))) = map%ratio(1, k)
-        end do
+        rows(i, :) = machine%coordinates%ratio(1, first(bodies(i)):first(bodies(i) + 1) - 1)
       end do
     end associate
   end function rows_of

@@ -6,7 +6,7 @@ module nocdyn_output_units
   implicit none (type, external)
   private
 
-  public :: match_column, output_units, turn_labels
+  public :: match_column, output_units, turn_labels, unit_of
 
 contains
 

@@ -105,7 +105,8 @@ contains
     machine%elements%internal%value = machine%start_internal()
     call machine%elements%gather(phi, omega)
     call machine%choose_branches([t_start])
-    call machine%differentiate([t_start], phi, omega)
+    call machine%evaluate_elements([t_start])
+    call machine%differentiate_elements([t_start])
     call machine%evaluate_energies()
   end subroutine set_start_state
 

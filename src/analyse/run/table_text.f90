@@ -1,6 +1,7 @@
 !> Tables as they are printed: labels on the left, numbers in right-justified cells.
 module nocdyn_table_text
   use nocdyn_kinds, only: wp
+  use nocdyn_output_units, only: unit_of
   use nocdyn_text, only: rounded_text, string_t, to_text
   use nocdyn_text_buffer, only: text_buffer_t
   implicit none (type, external)
@@ -93,15 +94,6 @@ contains
       is_left = is_left .and. .not. is_of_unit
     end do
   end subroutine clear_rounding
-
-  !> "[N m]" of "moment_shaft [N m]"; '' of a label without a unit.
-  pure function unit_of(label) result(unit)
-    character(len=*), intent(in) :: label
-    character(len=:), allocatable :: unit
-
-    unit = label(len(label) + 1:)
-    if (index(label, ' [') > 0) unit = label(index(label, ' [', back=.true.) + 1:)
-  end function unit_of
 
   function number_cell(value) result(text)
     real(wp), intent(in) :: value

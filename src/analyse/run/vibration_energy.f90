@@ -36,9 +36,9 @@ contains
     associate (coordinates => machine%coordinates)
       motions = new_rigid_motions(coordinates%freedoms, new_element_coordinates(machine%elements, coordinates), &
                                   machine%elastic())
-      allocate (self%motion(machine%bodies, motions%freedoms()), source=0.0_wp)
-      do m = 1, motions%freedoms()
-        speeds = motions%speeds([(merge(1.0_wp, 0.0_wp, k == m), k=1, motions%freedoms())])
+      allocate (self%motion(machine%bodies, size(motions%free)), source=0.0_wp)
+      do m = 1, size(motions%free)
+        speeds = motions%speeds([(merge(1.0_wp, 0.0_wp, k == m), k=1, size(motions%free))])
         do b = 1, machine%bodies
           do k = coordinates%first(b), coordinates%first(b + 1) - 1
             self%motion(b, m) = self%motion(b, m) + coordinates%ratio(1, k) * speeds(coordinates%coordinate(k))
@@ -46,7 +46,7 @@ contains
         end do
       end do
     end associate
-    allocate (momentum, source=transpose(self%motion) * spread(machine%inertia(1, :), 1, motions%freedoms()))
+    allocate (momentum, source=transpose(self%motion) * spread(machine%inertia(1, :), 1, size(motions%free)))
     call solve_positive_definite(matmul(momentum, self%motion), momentum, self%momentum, is_indefinite)
     allocate (self%speed(machine%bodies))
     if (is_indefinite) deallocate (self%motion)   ! by rounding: no energy is known

@@ -29,7 +29,7 @@ contains
 
   !> Finds the solutions of every block.
   subroutine search_balance(balance, blocks)
-    type(torque_balance_t), intent(inout) :: balance
+    type(torque_balance_t), target, intent(inout) :: balance
     type(block_solutions_t), allocatable, intent(out) :: blocks(:)
     type(eliminated_balance_t) :: reduced
     integer :: block_of(balance%unknowns()), i, k, member
@@ -44,57 +44,55 @@ contains
       allocate (blocks(k)%values(size(blocks(k)%members), 0), blocks(k)%is_range(0))
       call new_eliminated_balance(balance, blocks(k)%members, reduced)
       if (size(reduced%speeds) > 0) then
-        call scan_along(balance, reduced, blocks(k))
+        call scan_along(reduced, blocks(k))
       else
         call balance%settle(reduced%z)
         call add_if_balanced(balance, reduced%z, .false., blocks(k))
       end if
-      if (.not. blocks(k)%is_complete) call search_from_starts(balance, reduced, blocks(k))
+      if (.not. blocks(k)%is_complete) call search_from_starts(reduced, blocks(k))
     end do
   end subroutine search_balance
 
   !> Scans a speed; if others are not determined by it, upwards and downwards, and the others likewise, as they follow from where
   !> they have been.
-  subroutine scan_along(balance, reduced, block)
-    type(torque_balance_t), intent(inout) :: balance
+  subroutine scan_along(reduced, block)
     type(eliminated_balance_t), intent(inout) :: reduced
     type(block_solutions_t), intent(inout) :: block
     integer, parameter :: most_choices = 4
     type(eliminated_balance_t) :: other
     integer :: choice
 
-    call scan(balance, reduced, .false., block)
+    call scan(reduced, .false., block)
     block%is_complete = reduced%choices == 1
     if (block%is_complete) return
-    call scan(balance, reduced, .true., block)
+    call scan(reduced, .true., block)
     do choice = 2, min(most_choices, reduced%choices)
-      call new_eliminated_balance(balance, block%members, other, choice)
-      call scan(balance, other, .false., block)
-      call scan(balance, other, .true., block)
+      call new_eliminated_balance(reduced%balance, block%members, other, choice)
+      call scan(other, .false., block)
+      call scan(other, .true., block)
     end do
   end subroutine scan_along
 
   !> Finds all values of the speed that is set at which the torque changes its sign.
-  subroutine scan(balance, reduced, is_downwards, block)
-    type(torque_balance_t), intent(inout) :: balance
+  subroutine scan(reduced, is_downwards, block)
     type(eliminated_balance_t), intent(inout) :: reduced
     logical, intent(in) :: is_downwards   !! whether it begins at the highest speed
     type(block_solutions_t), intent(inout) :: block
     integer, parameter :: points_alone = 100, points = 25   ! per decade; of a speed alone, or with others to be found
     type(scan_t) :: found
-    real(wp) :: start, unit(balance%motions%freedoms())
+    real(wp) :: start, unit(size(reduced%balance%motions%free))
     integer :: i, k
 
     start = dot_product(reduced%row, reduced%z(reduced%speeds))
     unit = 0.0_wp
     unit(reduced%speeds) = reduced%basis(:, 1)
     allocate (found%grid, source=new_speed_grid(merge(points_alone, points, size(unit(reduced%speeds)) == 1), &
-                                                1.0_wp / maxval(abs(balance%body_speeds(unit))), reduced%knees))
+                                                1.0_wp / maxval(abs(reduced%balance%body_speeds(unit))), reduced%knees))
     allocate (found%torque(size(found%grid)), found%is_balanced(size(found%grid)))
     allocate (found%speeds(size(reduced%speeds), size(found%grid)))
     do k = 1, size(found%grid)
       i = merge(size(found%grid) + 1 - k, k, is_downwards)
-      call reduced%solve(balance, found%grid(i))
+      call reduced%solve(found%grid(i))
       found%torque(i) = reduced%torque
       found%is_balanced(i) = reduced%is_balanced
       found%speeds(:, i) = reduced%z(reduced%speeds)
@@ -104,7 +102,7 @@ contains
     do i = 1, merge(1, size(found%grid), block%is_unloaded)
       if (.not. found%is_balanced(i)) cycle
       reduced%z(reduced%speeds) = found%speeds(:, i)
-      call search_interval(balance, reduced, found, i, start, block)
+      call search_interval(reduced, found, i, start, block)
     end do
     block%is_range = block%is_range .and. .not. block%is_unloaded
   end subroutine scan
@@ -126,8 +124,7 @@ contains
   end subroutine find_least
 
   !> Finds the solutions between a point of the grid and the next, and near a minimum at the point.
-  subroutine search_interval(balance, reduced, found, i, start, block)
-    type(torque_balance_t), intent(inout) :: balance
+  subroutine search_interval(reduced, found, i, start, block)
     type(eliminated_balance_t), intent(inout) :: reduced
     type(scan_t), intent(in) :: found
     integer, intent(in) :: i          !! point of the grid
@@ -137,25 +134,24 @@ contains
 
     associate (grid => found%grid, torque => found%torque)
       if (abs(torque(i)) <= 0.0_wp) then
-        call add_range(balance, reduced, found, i, start, block)
+        call add_range(reduced, found, i, start, block)
       else if (i < size(grid)) then
         if (.not. found%is_balanced(i + 1)) return
         if (abs(torque(i + 1)) > 0.0_wp .and. .not. have_same_sign(torque(i), torque(i + 1))) then
-          call solve_bracketed(balance, reduced, grid(i:i + 1), torque(i:i + 1), block)
+          call solve_bracketed(reduced, grid(i:i + 1), torque(i:i + 1), block)
         else if (i > 1) then
           if (.not. (found%is_balanced(i - 1) .and. is_local_minimum(torque(max(1, i - 1):i + 1)))) return
-          call minimise_torque(balance, reduced, grid(i - 1), grid(i + 1), middle, top)
+          call minimise_torque(reduced, grid(i - 1), grid(i + 1), middle, top)
           if (have_same_sign(top, torque(i))) return
-          call solve_bracketed(balance, reduced, [grid(i - 1), middle], [torque(i - 1), top], block)
-          call solve_bracketed(balance, reduced, [middle, grid(i + 1)], [top, torque(i + 1)], block)
+          call solve_bracketed(reduced, [grid(i - 1), middle], [torque(i - 1), top], block)
+          call solve_bracketed(reduced, [middle, grid(i + 1)], [top, torque(i + 1)], block)
         end if
       end if
     end associate
   end subroutine search_interval
 
   !> Adds a point of the grid at which the torques balance, or, of a range that begins there, the speed nearest to `start`.
-  subroutine add_range(balance, reduced, found, i, start, block)
-    type(torque_balance_t), intent(inout) :: balance
+  subroutine add_range(reduced, found, i, start, block)
     type(eliminated_balance_t), intent(inout) :: reduced
     type(scan_t), intent(in) :: found
     integer, intent(in) :: i        !! point of the grid
@@ -167,8 +163,8 @@ contains
       if (any(is_zero(max(1, i - 1):i - 1))) return
       last = i - 1 + findloc([is_zero(i + 1:), .false.], .false., dim=1)
     end associate
-    call reduced%solve(balance, max(found%grid(i), min(start, found%grid(last))))
-    call add_if_balanced(balance, reduced%z, last > i, block)
+    call reduced%solve(max(found%grid(i), min(start, found%grid(last))))
+    call add_if_balanced(reduced%balance, reduced%z, last > i, block)
   end subroutine add_range
 
   !> Whether the middle one of three torques of equal sign is the smallest.
@@ -180,8 +176,7 @@ contains
   end function is_local_minimum
 
   !> Smallest torque between two speeds, by golden sections, until its sign changes or the interval is very small.
-  subroutine minimise_torque(balance, reduced, left, right, middle, torque)
-    type(torque_balance_t), intent(inout) :: balance
+  subroutine minimise_torque(reduced, left, right, middle, torque)
     type(eliminated_balance_t), intent(inout) :: reduced
     real(wp), intent(in) :: left, right       !! [rad/s]
     real(wp), intent(out) :: middle, torque   !! speed [rad/s] and torque [N m] there
@@ -192,19 +187,19 @@ contains
 
     a = left
     b = right
-    sign_outside = sign(1.0_wp, imbalance(balance, reduced, left))
+    sign_outside = sign(1.0_wp, imbalance(reduced, left))
     inside = [b - golden * (b - a), a + golden * (b - a)]
-    value = [(imbalance(balance, reduced, inside(i)), i=1, 2)]
+    value = [(imbalance(reduced, inside(i)), i=1, 2)]
     do i = 1, sections
       if (any(value * sign_outside <= 0.0_wp)) exit
       if (abs(value(1)) < abs(value(2))) then
         b = inside(2)
         inside = [b - golden * (b - a), inside(1)]
-        value = [imbalance(balance, reduced, inside(1)), value(1)]
+        value = [imbalance(reduced, inside(1)), value(1)]
       else
         a = inside(1)
         inside = [inside(2), a + golden * (b - a)]
-        value = [value(2), imbalance(balance, reduced, inside(2))]
+        value = [value(2), imbalance(reduced, inside(2))]
       end if
     end do
     i = merge(1, 2, value(1) * sign_outside < value(2) * sign_outside)
@@ -213,19 +208,17 @@ contains
   end subroutine minimise_torque
 
   !> Torque left over at a speed [N m].
-  real(wp) function imbalance(balance, reduced, speed) result(torque)
-    type(torque_balance_t), intent(inout) :: balance
+  real(wp) function imbalance(reduced, speed) result(torque)
     type(eliminated_balance_t), intent(inout) :: reduced
     real(wp), intent(in) :: speed   !! [rad/s]
 
-    call reduced%solve(balance, speed)
+    call reduced%solve(speed)
     torque = reduced%torque
   end function imbalance
 
   !> Adds the root between two speeds with torques of different sign. At a jump of the torque, as at the speed of a governor, the
   !> internal states are between those on its sides.
-  subroutine solve_bracketed(balance, reduced, speeds, torques, block)
-    type(torque_balance_t), intent(inout) :: balance
+  subroutine solve_bracketed(reduced, speeds, torques, block)
     type(eliminated_balance_t), intent(inout) :: reduced
     real(wp), intent(in) :: speeds(2), torques(2)   !! [rad/s], [N m]
     type(block_solutions_t), intent(inout) :: block
@@ -235,16 +228,16 @@ contains
     bracket = new_bracket(speeds, torques)
     do while (.not. bracket%is_narrow())
       x = bracket%next()
-      call bracket%narrow(x, imbalance(balance, reduced, x))
+      call bracket%narrow(x, imbalance(reduced, x))
     end do
-    call reduced%solve(balance, bracket%x(1))
+    call reduced%solve(bracket%x(1))
     z = reduced%z
     if (abs(bracket%value(1)) > 0.0_wp) then
-      call reduced%solve(balance, bracket%x(2))
+      call reduced%solve(bracket%x(2))
       share = bracket%value(1) / (bracket%value(1) - bracket%value(2))
       z = z + share * (reduced%z - z)
     end if
-    call add_if_balanced(balance, z, .false., block)
+    call add_if_balanced(reduced%balance, z, .false., block)
   end subroutine solve_bracketed
 
   !> Adds a solution, unless it is none: where a law jumps over zero.

@@ -17,15 +17,14 @@ contains
 
   !> Newton's method from the start of the machine and from combinations of speeds, and the motion from the start. The speeds of
   !> elements whose torques rise are combined, and the others follow.
-  subroutine search_from_starts(balance, reduced, block)
-    type(torque_balance_t), intent(inout) :: balance
+  subroutine search_from_starts(reduced, block)
     type(eliminated_balance_t), intent(inout) :: reduced
     type(block_solutions_t), intent(inout) :: block
     integer, parameter :: most_starts = 400
-    real(wp) :: point(balance%unknowns()), speeds(size(reduced%speeds)), start(balance%unknowns())
+    real(wp) :: point(reduced%balance%unknowns()), speeds(size(reduced%speeds)), start(reduced%balance%unknowns())
     integer :: counts(size(speeds)), digits(size(speeds)), i, k
 
-    start = balance%start()
+    start = reduced%balance%start()
     counts = [(size(candidates(reduced, k)), k=1, size(speeds))]
     block%starts = nint(min(real(most_starts, wp), product(real(counts, wp))))
     do i = 1, block%starts
@@ -38,15 +37,15 @@ contains
       end do
       reduced%z = start
       reduced%z(reduced%speeds) = matmul(reduced%basis, speeds)
-      call reduced%solve(balance, speeds(1), holds_rising=.true.)
+      call reduced%solve(speeds(1), holds_rising=.true.)
       point = reduced%z
-      call newton(balance, point, block)
+      call newton(reduced%balance, point, block)
     end do
     point = start
-    call newton(balance, point, block)
+    call newton(reduced%balance, point, block)
     point = start
-    call follow_motion(balance, point, block)
-    call newton(balance, point, block)
+    call follow_motion(reduced%balance, point, block)
+    call newton(reduced%balance, point, block)
   end subroutine search_from_starts
 
   !> Speeds to begin with for a column of the basis [rad/s]: rest, those at which laws bend, and between them; one for others.
@@ -109,7 +108,7 @@ contains
         z(members) = z(members) + factor * step
         if (all(abs(step) <= tiny_step * abs(z(members)))) exit
       end do
-      if (any(abs(z(members)) > highest .and. members <= balance%motions%freedoms())) return
+      if (any(abs(z(members)) > highest .and. members <= size(balance%motions%free))) return
       if (is_nearly_balanced(balance, members, z)) call block%add_or_join(balance, z)
       call balance%evaluate(z)
       if (abs(balance%residual(members(1))) < abs(block%least_torque)) then

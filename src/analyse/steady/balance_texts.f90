@@ -60,7 +60,7 @@ contains
     type(torque_balance_t), intent(in) :: balance
     integer, intent(in) :: members(:)   !! unknowns; those that are internal states are ignored
     character(len=:), allocatable, intent(out) :: text
-    real(wp) :: unit(balance%motions%freedoms())
+    real(wp) :: unit(size(balance%motions%free))
     logical :: moves(balance%formulation%machine%bodies)
     integer, allocatable :: bodies(:)
     integer :: b, i
@@ -88,7 +88,7 @@ contains
     integer :: i
 
     text = ''
-    freedoms = pack(members, members <= balance%motions%freedoms())
+    freedoms = pack(members, members <= size(balance%motions%free))
     do i = 1, min(size(freedoms), most_names)
       if (i > 1) text = text // ', '
       text = text // rounded_text(z(freedoms(i)), digits) // ' rad/s of ' // &

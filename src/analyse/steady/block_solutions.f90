@@ -100,7 +100,7 @@ contains
     do i = 1, size(members)
       changes(i) = sum(abs(slopes(members(i), members) * z(members)))
     end do
-    tolerance = spacings * changes + near * merge(balance%scale(members), changes, members <= balance%motions%freedoms())
+    tolerance = spacings * changes + near * merge(balance%scale(members), changes, members <= size(balance%motions%free))
     is_nearly_balanced = all(abs(balance%residual(members)) <= tolerance)
   end function is_nearly_balanced
 

@@ -27,6 +27,7 @@ module nocdyn_eliminated_balance
 
   !> The balance of one block of unknowns.
   type, public :: eliminated_balance_t
+    type(torque_balance_t), pointer :: balance => null()   !! of the machine
     integer, allocatable :: speeds(:)      !! unknowns that are speeds of rigid motions
     real(wp), allocatable :: row(:)        !! the speed that is set = sum of row * speeds, [speeds]
     real(wp), allocatable :: basis(:, :)   !! speeds = basis (the speed that is set, the others), [speeds, speeds]
@@ -46,7 +47,7 @@ contains
 
   !> The balance of a block of unknowns.
   subroutine new_eliminated_balance(balance, members, self, choice)
-    type(torque_balance_t), intent(inout) :: balance
+    type(torque_balance_t), target, intent(inout) :: balance
     integer, intent(in) :: members(:)   !! unknowns of the block
     type(eliminated_balance_t), intent(out) :: self
     integer, intent(in), optional :: choice   !! number of the speed to be set, 1 to `choices`; absent: 1
@@ -56,7 +57,8 @@ contains
     integer, allocatable :: choices(:)
     integer :: e, i
 
-    self%speeds = pack(members, members <= balance%motions%freedoms())
+    self%balance => balance
+    self%speeds = pack(members, members <= size(balance%motions%free))
     allocate (self%z, source=balance%start())
     allocate (self%knees(0), self%basis(size(self%speeds), size(self%speeds)))
     allocate (self%row(size(self%speeds)), source=0.0_wp)
@@ -77,7 +79,7 @@ contains
     do e = 1, size(elements)
       self%knees = [self%knees, knees_along(self, element_knees(balance, elements(e)), rows(e, :))]
     end do
-    call collect_rising(self, balance, pack(elements, rises), rows(pack([(e, e=1, size(rises))], rises), :))
+    call collect_rising(self, pack(elements, rises), rows(pack([(e, e=1, size(rises))], rises), :))
   end subroutine new_eliminated_balance
 
   !> The elements with rising torques that have speeds of their own.
@@ -95,9 +97,8 @@ contains
   end subroutine find_choices
 
   !> Collects the speeds of the elements whose torques rise, in which the solutions may be several.
-  subroutine collect_rising(self, balance, elements, rows)
+  subroutine collect_rising(self, elements, rows)
     type(eliminated_balance_t), intent(inout) :: self
-    type(torque_balance_t), intent(in) :: balance
     integer, intent(in) :: elements(:)   !! those whose torques rise, numbered among the inelastic ones
     real(wp), intent(in) :: rows(:, :)   !! their speeds by those of the block, [elements, speeds]
     real(wp) :: ratios(size(self%speeds))
@@ -109,7 +110,7 @@ contains
       do e = 1, size(elements)
         ratios = matmul(rows(e, :), self%basis)
         if (count(abs(ratios) > 0.0_wp) /= 1 .or. abs(ratios(k)) <= 0.0_wp) cycle
-        self%rising(k)%knees = [self%rising(k)%knees, element_knees(balance, elements(e)) / ratios(k)]
+        self%rising(k)%knees = [self%rising(k)%knees, element_knees(self%balance, elements(e)) / ratios(k)]
       end do
     end do
   end subroutine collect_rising
@@ -120,7 +121,7 @@ contains
     integer, intent(in) :: speeds(:)                       !! unknowns
     integer, allocatable, intent(out) :: elements(:)       !! numbered among the inelastic ones
     real(wp), allocatable, intent(out) :: rows(:, :)       !! their speeds by those of the block, [elements, speeds]
-    integer :: column_of(balance%motions%freedoms())
+    integer :: column_of(size(balance%motions%free))
     integer :: e, i, k
 
     column_of = 0
@@ -227,9 +228,8 @@ contains
   end function is_parallel
 
   !> Sets the first speed and finds the others, from those of the last call.
-  subroutine solve(self, balance, speed, holds_rising)
+  subroutine solve(self, speed, holds_rising)
     class(eliminated_balance_t), intent(inout) :: self
-    type(torque_balance_t), intent(inout) :: balance
     real(wp), intent(in) :: speed   !! to be set [rad/s]
     logical, intent(in), optional :: holds_rising   !! whether other speeds with rising torques stay; absent: .false.
     integer, parameter :: most_cycles = 20
@@ -247,34 +247,32 @@ contains
     do number = 1, most_cycles
       do k = 2, size(self%speeds)
         if (holds .and. size(self%rising(k)%knees) > 0) cycle
-        call balance_along(self, balance, self%basis(:, k))
+        call balance_along(self, self%basis(:, k))
         if (.not. self%is_balanced) exit
       end do
-      self%torque = self%torque_along(balance, self%basis(:, 1))
+      self%torque = self%torque_along(self%basis(:, 1))
       if (size(self%speeds) <= 2 .or. holds .or. .not. self%is_balanced) return
-      if (others_balance(self, balance, tight)) return
-      call balance_along(self, balance, newton_direction(self, balance))
+      if (others_balance(self, tight)) return
+      call balance_along(self, newton_direction(self))
     end do
-    self%is_balanced = others_balance(self, balance, loose)
+    self%is_balanced = others_balance(self, loose)
   end subroutine solve
 
   !> Torque along a motion of the block at the unknowns [N m]; zero if it is rounding.
-  real(wp) function torque_along(self, balance, direction) result(torque)
+  real(wp) function torque_along(self, direction) result(torque)
     class(eliminated_balance_t), intent(inout) :: self
-    type(torque_balance_t), intent(inout) :: balance
     real(wp), intent(in) :: direction(:)   !! [speeds]
 
-    call balance%settle(self%z)
-    call balance%evaluate(self%z)
-    torque = dot_product(direction, balance%residual(self%speeds))
-    if (abs(torque) <= rounding * dot_product(abs(direction), balance%scale(self%speeds))) torque = 0.0_wp
+    call self%balance%settle(self%z)
+    call self%balance%evaluate(self%z)
+    torque = dot_product(direction, self%balance%residual(self%speeds))
+    if (abs(torque) <= rounding * dot_product(abs(direction), self%balance%scale(self%speeds))) torque = 0.0_wp
   end function torque_along
 
   !> Moves the speeds along a motion to where no torque is left over along it. There need be no such place. Again
   !> after a move that was so long that the place has its rounding.
-  subroutine balance_along(self, balance, direction)
+  subroutine balance_along(self, direction)
     type(eliminated_balance_t), intent(inout) :: self
-    type(torque_balance_t), intent(inout) :: balance
     real(wp), intent(in) :: direction(:)   !! [speeds]
     real(wp) :: origin(size(direction)), unit, x
     integer, parameter :: most_passes = 3
@@ -286,12 +284,12 @@ contains
     do pass = 1, most_passes
       if (.not. self%is_balanced) return
       origin = self%z(self%speeds)
-      call enclose(self, balance, origin, direction, bracket)
+      call enclose(self, origin, direction, bracket)
       if (.not. self%is_balanced) return
       do while (.not. bracket%is_narrow())
         x = bracket%next()
         self%z(self%speeds) = origin + x * direction
-        call bracket%narrow(x, self%torque_along(balance, direction))
+        call bracket%narrow(x, self%torque_along(direction))
         if (abs(bracket%x(2) - bracket%x(1)) * unit <= spacing(largest(self%z(self%speeds), direction))) exit
       end do
       self%z(self%speeds) = origin + bracket%root() * direction
@@ -309,16 +307,15 @@ contains
 
   !> Encloses the place where the torque along a motion vanishes, in the direction of this torque, as it falls; or, if it may
   !> rise, in the other one.
-  subroutine enclose(self, balance, origin, direction, bracket)
+  subroutine enclose(self, origin, direction, bracket)
     type(eliminated_balance_t), intent(inout) :: self
-    type(torque_balance_t), intent(inout) :: balance
     real(wp), intent(in) :: origin(:), direction(:)   !! speeds [rad/s], the motion, [speeds]
     type(bracket_t), intent(out) :: bracket
     real(wp), parameter :: highest = 1.0e9_wp, growth = 8.0_wp   ! rad/s
     real(wp) :: first_step, step, torque(2), way(2)
     integer :: trial
 
-    torque(1) = self%torque_along(balance, direction)
+    torque(1) = self%torque_along(direction)
     first_step = max(0.3_wp * self%reach, 1.0e-8_wp * maxval(abs(origin)), 1.0e-9_wp) / maxval(abs(direction))
     do trial = 1, merge(1, 2, self%choices == 1)
       way = 0.0_wp
@@ -327,7 +324,7 @@ contains
       do while (have_same_sign(torque(1), torque(2)) .and. abs(way(2)) * maxval(abs(direction)) < highest)
         way = [way(2), way(2) + step]
         self%z(self%speeds) = origin + way(2) * direction
-        torque(2) = self%torque_along(balance, direction)
+        torque(2) = self%torque_along(direction)
         step = growth * step
       end do
       if (.not. have_same_sign(torque(1), torque(2))) exit
@@ -336,7 +333,7 @@ contains
     if (self%is_balanced) then
       ! between the last two steps the torque changes its sign; at the first of them it is nearer to zero than at the origin
       self%z(self%speeds) = origin + way(1) * direction
-      if (abs(way(1)) > 0.0_wp) torque(1) = self%torque_along(balance, direction)
+      if (abs(way(1)) > 0.0_wp) torque(1) = self%torque_along(direction)
       bracket = new_bracket(way, torque)
     else
       self%z(self%speeds) = origin
@@ -344,29 +341,29 @@ contains
   end subroutine enclose
 
   !> Whether the torques along all speeds but the first balance, after `torque_along`.
-  logical function others_balance(self, balance, tolerance)
+  logical function others_balance(self, tolerance)
     type(eliminated_balance_t), intent(in) :: self
-    type(torque_balance_t), intent(in) :: balance
     real(wp), intent(in) :: tolerance   !! share of the terms
     integer :: k
 
-    others_balance = all([(abs(dot_product(self%basis(:, k), balance%residual(self%speeds))) <= &
-                           tolerance * dot_product(abs(self%basis(:, k)), balance%scale(self%speeds)), k=2, size(self%speeds))])
+    associate (balance => self%balance, s => self%speeds)
+      others_balance = all([(abs(dot_product(self%basis(:, k), balance%residual(s))) <= &
+                             tolerance * dot_product(abs(self%basis(:, k)), balance%scale(s)), k=2, size(s))])
+    end associate
   end function others_balance
 
   !> Newton's step of the speeds that follow, after `torque_along`.
-  function newton_direction(self, balance) result(direction)
+  function newton_direction(self) result(direction)
     type(eliminated_balance_t), intent(in) :: self
-    type(torque_balance_t), intent(inout) :: balance
     real(wp) :: direction(size(self%speeds))
     real(wp), parameter :: singular = 1.0e-13_wp
     real(wp) :: slopes(size(self%z), size(self%z)), torques(size(self%speeds) - 1)
     real(wp), allocatable :: hessian(:, :)
     integer :: i
 
-    call balance%differentiate(slopes)
-    associate (others => self%basis(:, 2:), s => self%speeds, x => [(i, i=balance%motions%freedoms() + 1, size(self%z))])
-      torques = matmul(balance%residual(s), others)
+    call self%balance%differentiate(slopes)
+    associate (others => self%basis(:, 2:), s => self%speeds, x => [(i, i=size(self%balance%motions%free) + 1, size(self%z))])
+      torques = matmul(self%balance%residual(s), others)
       allocate (hessian, source=slopes(s, s))
       if (size(x) > 0) hessian = hessian - matmul(slopes(s, x), matmul(pseudo_inverse(slopes(x, x), singular), slopes(x, s)))
       hessian = matmul(transpose(others), matmul(hessian, others))

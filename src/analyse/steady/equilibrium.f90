@@ -43,7 +43,7 @@ contains
     type(equilibrium_t), allocatable, intent(out) :: equilibria(:)
     type(string_t), allocatable, intent(out) :: notes(:)   !! remarks for the report
     type(error_t), allocatable, intent(out) :: error       !! if no steady state was found
-    type(torque_balance_t) :: balance
+    type(torque_balance_t), target :: balance
     type(block_solutions_t), allocatable :: blocks(:)
     character(len=:), allocatable :: text
     integer :: i

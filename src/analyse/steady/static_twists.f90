@@ -104,7 +104,7 @@ contains
     type(rigid_motions_t), intent(in) :: motions
     integer, intent(in) :: element
     real(wp), parameter :: rounding = 1.0e-10_wp   ! as a share of the terms
-    real(wp) :: rate(motions%freedoms()), scale(motions%freedoms())
+    real(wp) :: rate(size(motions%free)), scale(size(motions%free))
     integer :: i, k
 
     rate = 0.0_wp
@@ -147,7 +147,7 @@ contains
     type(twist_problem_t), intent(out) :: self
     type(error_t), allocatable, intent(out) :: error   !! if the band is too large
     type(entries_t) :: entries
-    integer :: number(balance%coordinates), order(balance%coordinates - balance%motions%freedoms())
+    integer :: number(balance%coordinates), order(balance%coordinates - size(balance%motions%free))
     integer :: c, upper
 
     number = 1

@@ -71,7 +71,7 @@ contains
   !> Computes G = U N of the inelastic elements.
   subroutine gather_ratios(self)
     type(torque_balance_t), intent(inout) :: self
-    real(wp) :: row(self%motions%freedoms())
+    real(wp) :: row(size(self%motions%free))
     integer, allocatable :: touched(:)
     integer :: i, k, next
 
@@ -103,7 +103,7 @@ contains
   pure integer function unknowns(self)
     class(torque_balance_t), intent(in) :: self
 
-    unknowns = self%motions%freedoms() + self%internal
+    unknowns = size(self%motions%free) + self%internal
   end function unknowns
 
   !> The unknowns at the start of the machine: rigid motions with the angular momenta of the start speeds, [unknowns].
@@ -113,15 +113,15 @@ contains
     real(wp), allocatable :: y(:, :)
 
     allocate (y, source=self%formulation%start())
-    z(:self%motions%freedoms()) = mean_motion(self, y(1, :self%coordinates))
-    z(self%motions%freedoms() + 1:) = y(1, 2 * self%coordinates + 1:self%formulation%states)
+    z(:size(self%motions%free)) = mean_motion(self, y(1, :self%coordinates))
+    z(size(self%motions%free) + 1:) = y(1, 2 * self%coordinates + 1:self%formulation%states)
   end function start
 
   !> Solves N^T M N s = N^T M q' by conjugate gradients; the matrix is well conditioned and is not formed.
   function mean_motion(self, q_rate) result(s)
     class(torque_balance_t), intent(in) :: self
     real(wp), intent(in) :: q_rate(:)   !! [rad/s], [coordinates]
-    real(wp) :: s(self%motions%freedoms())
+    real(wp) :: s(size(self%motions%free))
     real(wp), dimension(size(s)) :: direction, image, rest
     real(wp) :: norm, old_norm, scale
     integer :: i
@@ -149,7 +149,7 @@ contains
     class(torque_balance_t), intent(in) :: self
     integer, intent(in) :: members(:)   !! unknowns
     real(wp) :: matrix(size(members), size(members))
-    real(wp) :: column(self%unknowns()), unit(self%motions%freedoms())
+    real(wp) :: column(self%unknowns()), unit(size(self%motions%free))
     integer :: k
 
     do k = 1, size(members)
@@ -212,7 +212,7 @@ contains
     class(torque_balance_t), intent(inout) :: self
     real(wp), intent(in) :: z(:)   !! [unknowns]
 
-    associate (f => self%coordinates, s => z(:self%motions%freedoms()))
+    associate (f => self%coordinates, s => z(:size(self%motions%free)))
       self%y(1, :f) = self%motions%speeds(s)
       self%y(1, f + 1:2 * f) = 0.0_wp
       self%y(1, 2 * f + 1:) = z(size(s) + 1:)
@@ -244,7 +244,7 @@ contains
         end do
         elements%speed(1, self%inelastic(i)) = speed
       end do
-      elements%internal%value(1, :) = z(self%motions%freedoms() + 1:)
+      elements%internal%value(1, :) = z(size(self%motions%free) + 1:)
     end associate
   end subroutine set_elements
 
@@ -256,7 +256,7 @@ contains
     if (self%internal == 0) return
     call set_elements(self, z)
     call self%formulation%machine%settle_internal()
-    z(self%motions%freedoms() + 1:) = self%formulation%machine%elements%internal%value(1, :)
+    z(size(self%motions%free) + 1:) = self%formulation%machine%elements%internal%value(1, :)
   end subroutine settle
 
   !> Moments of the inelastic elements that all have one speed, with internal states that do not change [N m], [inelastic].
@@ -287,7 +287,7 @@ contains
     call set_elements(self, z)
     self%residual = 0.0_wp
     self%scale = 0.0_wp
-    associate (machine => self%formulation%machine, r => self%motions%freedoms())
+    associate (machine => self%formulation%machine, r => size(self%motions%free))
       call machine%choose_branches(self%t)
       call machine%evaluate_elements(self%t)
       do i = 1, size(self%inelastic)
@@ -331,7 +331,7 @@ contains
     real(wp), intent(inout) :: matrix(:, :)   !! [unknowns, unknowns]
     integer :: column, i, k, m, x
 
-    associate (states => self%formulation%machine%elements%internal, r => self%motions%freedoms())
+    associate (states => self%formulation%machine%elements%internal, r => size(self%motions%free))
       do x = 1, self%internal
         do m = 1, states%members(x)
           column = r + states%first(x) + m - 1
@@ -358,7 +358,7 @@ contains
         call join_components(self%freedom(self%first(i)), self%freedom(k), block_of)
       end do
     end do
-    associate (states => self%formulation%machine%elements%internal, r => self%motions%freedoms())
+    associate (states => self%formulation%machine%elements%internal, r => size(self%motions%free))
       do x = 1, self%internal
         call join_components(r + states%first(x), r + x, block_of)
         i = findloc(self%inelastic, states%element(x), dim=1)

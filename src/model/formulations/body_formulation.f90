@@ -174,8 +174,9 @@ contains
     integer :: b, l, n
 
     n = self%machine%bodies
-    call self%set_state(y)
-    call self%machine%differentiate(t, self%phi, self%omega)
+    call self%gather(y)
+    call self%machine%evaluate_elements(t)
+    call self%machine%differentiate_elements(t)
     dfdy = 0.0_wp
     dfdt = 0.0_wp
     do l = 1, self%lanes

@@ -60,7 +60,7 @@ contains
       has_offset = any(abs(self%zero_twist) > 0, dim=1)
       has_offset(self%origin%turning) = .true.
       self%twists = twist_map(incidence, has_offset, without_bands=is_block)
-      self%may_shift = self%origin%motions%freedoms() > 0
+      self%may_shift = size(self%origin%motions%free) > 0
       allocate (couplings, source=coupling_elements(machine))
       turning = incidence%selected(couplings, with_ratio_only=.true.)
       call self%set_norm(new_error_measures(couplings, turning%first, turning%coordinate, turning%ratio, &
@@ -79,7 +79,7 @@ contains
     call self%twists%list_parameters(parameters)
     call self%switching%list_parameters(parameters)
     call self%origin%list_parameters(parameters)
-    call self%list_norm(parameters)
+    call self%norm%list_parameters(parameters)
   end subroutine list_coordinates
 
   !> Start speeds and angles of the coordinates and start values of the internal states; the work integrals are zero.

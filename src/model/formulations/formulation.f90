@@ -2,7 +2,6 @@
 module nocdyn_formulation
   use nocdyn_error_measures, only: error_measures_t
   use nocdyn_kinds, only: wp
-  use nocdyn_lane_parameters, only: lane_parameters_t
   use nocdyn_machine, only: machine_t
   use nocdyn_system, only: system_t
   use nocdyn_text, only: quoted
@@ -21,7 +20,7 @@ module nocdyn_formulation
     real(wp), allocatable :: phi(:, :)       !! angles [rad] after `set_state`, [lanes, 0:bodies], body 0 is the ground
     real(wp), allocatable :: omega(:, :)     !! speeds [rad/s] after `set_state`, [lanes, 0:bodies]
     real(wp), allocatable :: zero_twist(:, :)   !! twists where the angles in the state are zero [rad], [lanes, elements]
-    type(error_measures_t), private :: norm     !! quantities in which errors are measured
+    type(error_measures_t) :: norm              !! quantities in which errors are measured
     real(wp), allocatable :: torque(:, :)    !! torques of the elements on the bodies [N m] after `observe`, [lanes, 0:bodies]
   contains
     procedure(start_interface), deferred :: start
@@ -30,7 +29,6 @@ module nocdyn_formulation
     procedure(motion_interface), deferred :: switch_motion
     procedure :: allocate_state
     procedure :: set_norm
-    procedure :: list_norm
     procedure :: gather
     procedure :: move_origin
     procedure :: reset_origin
@@ -190,14 +188,6 @@ contains
     self%measures = norm%count
     self%phases = size(norm%free)
   end subroutine set_norm
-
-  !> Registers their arrays that may differ from variant to variant.
-  subroutine list_norm(self, parameters)
-    class(formulation_t), target, intent(inout) :: self
-    type(lane_parameters_t), intent(inout) :: parameters
-
-    call self%norm%list_parameters(parameters)
-  end subroutine list_norm
 
   !> The sizes of the measured quantities, and an error of the state in them.
   subroutine measure(self, columns, y, error, sizes, errors)

@@ -52,8 +52,8 @@ contains
     integer :: e
 
     self%motions = new_rigid_motions(freedoms, incidence, elastic)
-    allocate (self%q(lanes, freedoms), self%angle(lanes, self%motions%freedoms()), source=0.0_wp)
-    allocate (self%turn(self%motions%freedoms()), source=0.0_wp)
+    allocate (self%q(lanes, freedoms), self%angle(lanes, size(self%motions%free)), source=0.0_wp)
+    allocate (self%turn(size(self%motions%free)), source=0.0_wp)
     allocate (self%unit(lanes), source=1.0_wp)
     allocate (self%elastic, source=elastic)
     self%has_springs_only = has_springs_only

@@ -56,7 +56,6 @@ module nocdyn_machine
     procedure :: settle_internal
     procedure :: evaluate
     procedure :: evaluate_elements
-    procedure :: differentiate
     procedure :: differentiate_elements
     procedure :: evaluate_energies
     procedure :: refresh_lane
@@ -294,18 +293,6 @@ contains
       end if
     end associate
   end subroutine evaluate_bank
-
-  !> Moments of all elements and their derivatives.
-  subroutine differentiate(self, t, phi, omega)
-    class(machine_t), intent(inout) :: self
-    real(wp), contiguous, intent(in) :: t(:)           !! [s], [lanes]
-    real(wp), contiguous, intent(in) :: phi(:, 0:)     !! angles [rad], [lanes, 0:bodies], body 0 is the ground
-    real(wp), contiguous, intent(in) :: omega(:, 0:)   !! speeds [rad/s], [lanes, 0:bodies]
-
-    call self%elements%gather(phi, omega)
-    call self%evaluate_elements(t)
-    call self%differentiate_elements(t)
-  end subroutine differentiate
 
   !> Derivatives of the moments, after `evaluate_elements`.
   subroutine differentiate_elements(self, t)

@@ -24,7 +24,7 @@ module nocdyn_rigid_motions
     integer, allocatable :: freedom(:)   !! rigid motion, [entries]
     real(wp), allocatable :: ratio(:)    !! [entries]
   contains
-    procedure :: freedoms, combine, speeds, project_torques
+    procedure :: combine, speeds, project_torques
   end type rigid_motions_t
 
   !> A sparse row during the elimination.
@@ -172,13 +172,6 @@ contains
       self%ratio(self%first(c):self%first(c + 1) - 1) = definition(c)%ratio
     end do
   end subroutine express_by_free
-
-  !> Number of independent rigid motions.
-  pure integer function freedoms(self)
-    class(rigid_motions_t), intent(in) :: self
-
-    freedoms = size(self%free)
-  end function freedoms
 
   !> Speeds q' of all coordinates, [coordinates].
   pure function speeds(self, s) result(q_rate)

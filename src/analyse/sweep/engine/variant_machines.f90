@@ -19,7 +19,7 @@ module nocdyn_variant_machines
   implicit none (type, external)
   private
 
-  public :: new_own_formulation, new_variant_machines
+  public :: new_variant_machines
 
   integer, parameter, public :: variant_set = 0               !! its parameters are in the lane
   integer, parameter, public :: variant_refused = 1           !! there is no such machine
@@ -79,7 +79,8 @@ contains
       call share_block(self, block)
       if (is_typical) call self%direct%accept(typical)
     else
-      call new_own_formulation(self%input, block%machine, with_energy_balance, formulation)
+      call new_formulation(self%input%groups(self%input%position('run'))%text('formulation'), block%machine, formulation, &
+                           with_energy_balance)
       allocate (self%formulation, source=formulation)
       deallocate (block)
     end if
@@ -140,16 +141,6 @@ contains
     if (message == '') call assemble_machine(input, machine, error, lanes)
     if (allocated(error)) call move_alloc(error%message, message)
   end subroutine assemble_variant
-
-  !> The formulation that an input asks for.
-  subroutine new_own_formulation(input, machine, with_energy_balance, formulation)
-    type(input_t), intent(in) :: input
-    type(machine_t), intent(in) :: machine
-    logical, intent(in) :: with_energy_balance   !! whether the work integrals are among the states
-    class(formulation_t), allocatable, intent(out) :: formulation
-
-    call new_formulation(input%groups(input%position('run'))%text('formulation'), machine, formulation, with_energy_balance)
-  end subroutine new_own_formulation
 
   !> Sets a variant in a lane.
   subroutine set_variant(self, values, lane, y, status, message)
@@ -220,7 +211,8 @@ contains
     type(machine_t) :: machine
 
     call assemble_variant(self%input, self%targets, values, machine, message)
-    if (message == '') call new_own_formulation(self%input, machine, self%has_energy_balance, formulation)
+    if (message == '') call new_formulation(self%input%groups(self%input%position('run'))%text('formulation'), machine, &
+                                            formulation, self%has_energy_balance)
   end subroutine own_formulation
 
   !> Frees the block.
