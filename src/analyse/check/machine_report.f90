@@ -176,15 +176,15 @@ contains
   function counted_constraints(machine) result(text)
     type(machine_t), intent(in) :: machine
     character(len=:), allocatable :: text
-    integer :: number
+    character(len=*), parameter :: kinds(3) = [character(len=13) :: 'planetary', 'differential', 'constraint']
+    character(len=*), parameter :: names(3) = [character(len=13) :: 'planetary set', 'differential', 'constraint']
+    integer :: i, number
 
     text = ', ' // counted(constraint_count(machine, 'gear'), 'gear', 'gears')
-    number = constraint_count(machine, 'planetary')
-    if (number > 0) text = text // ', ' // counted(number, 'planetary set', 'planetary sets')
-    number = constraint_count(machine, 'differential')
-    if (number > 0) text = text // ', ' // counted(number, 'differential', 'differentials')
-    number = constraint_count(machine, 'constraint')
-    if (number > 0) text = text // ', ' // counted(number, 'constraint', 'constraints')
+    do i = 1, size(kinds)
+      number = constraint_count(machine, trim(kinds(i)))
+      if (number > 0) text = text // ', ' // counted(number, trim(names(i)), trim(names(i)) // 's')
+    end do
   end function counted_constraints
 
   !> The number of constraint rows of one kind.

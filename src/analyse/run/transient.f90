@@ -111,7 +111,9 @@ contains
       call append(summary%notes, notes(i)%text)
     end do
     call start_observer(observer, input, formulation, times, error)
-    if (.not. allocated(error)) call start_output(observer, output, size(times), error)
+    if (allocated(error)) return
+    observer%output => output
+    call output%start(selected(observer%table%labels, observer%chosen), size(times), error)
     if (allocated(error)) return
     allocate (summary%labels, source=observer%table%labels)
     allocate (summary%chosen, source=observer%chosen)
@@ -161,20 +163,8 @@ contains
     observer%tracked = size(observer%row)
     call start_extremes(observer%extremes, size(observer%row), observer%tracked_from)
     call choose_columns(input, observer%table%labels, observer%chosen, error)
+    if (.not. allocated(error)) allocate (observer%written(size(observer%chosen)))
   end subroutine start_observer
-
-  subroutine start_output(observer, output, rows, error)
-    type(run_observer_t), intent(inout) :: observer
-    class(run_output_t), target, intent(inout) :: output
-    integer, intent(in) :: rows                        !! their number
-    type(error_t), allocatable, intent(out) :: error   !! of the output
-    type(string_t), allocatable :: labels(:)
-
-    observer%output => output
-    allocate (observer%written(size(observer%chosen)))
-    allocate (labels, source=selected(observer%table%labels, observer%chosen))
-    call output%start(labels, rows, error)
-  end subroutine start_output
 
   !> Integrates. An integration that does not reach the end is an error that says why.
   subroutine solve(formulation, settings, times, observer, summary, error)

@@ -229,7 +229,8 @@ contains
     real(wp) :: rounding
 
     balance%y(1, size(q) + 1:2 * size(q)) = q
-    call balance%evaluate_state()
+    call balance%formulation%start_lane(1, balance%t(1), reshape(balance%y, [size(balance%y)]))
+    call balance%formulation%derivative(balance%t, balance%y, balance%rate, balance%status)
     call balance%formulation%machine%differentiate_elements(balance%t)
     call balance%formulation%machine%evaluate_energies()
     self%torque = self%external_torque

@@ -33,10 +33,10 @@ module nocdyn_torque_balance
     integer, allocatable :: freedom(:)              !! rigid motion, [entries]
     real(wp), allocatable :: ratio(:)               !! G, [entries]
     real(wp), allocatable :: y(:, :)   !! state after `set_state`, [1, states]
-    real(wp), allocatable, private :: rate(:, :)
+    real(wp), allocatable :: rate(:, :)
     real(wp), allocatable, private :: start_twist(:)   !! [rad], [elements]
   contains
-    procedure :: unknowns, start, set_state, settle, moments_at, inertia, evaluate, evaluate_state, differentiate
+    procedure :: unknowns, start, set_state, settle, moments_at, inertia, evaluate, differentiate
     procedure :: blocks, body_speeds
   end type torque_balance_t
 
@@ -218,14 +218,6 @@ contains
       self%y(1, 2 * f + 1:) = z(size(s) + 1:)
     end associate
   end subroutine set_state
-
-  !> Evaluates the elements at the state y.
-  subroutine evaluate_state(self)
-    class(torque_balance_t), intent(inout) :: self
-
-    call self%formulation%start_lane(1, self%t(1), reshape(self%y, [size(self%y)]))
-    call self%formulation%derivative(self%t, self%y, self%rate, self%status)
-  end subroutine evaluate_state
 
   !> Gives the elements the speeds and internal states of the unknowns, at the start angles.
   subroutine set_elements(self, z)

@@ -165,22 +165,12 @@ contains
     is_locked = locked_trains(relations, elimination)
     rows = locking_rows(constraints, trains, relations, elimination, findloc(is_locked, .true., dim=1))
     rows = pack(rows, rows /= offending_row)
-    call explain_lock(selected(constraints%names, rows), reason)
+    reason = ', as no other body in it turns'
+    if (size(rows) > 0) reason = ': together with ' // joined(selected(constraints%names, rows), ', ', most_names) // &
+                                 ' it leaves no speed but 0'
     call raise(error, exit_input, 'locks ' // joined(selected(body_names, bodies_of(trains, is_locked)), ', ', most_names) // &
                reason)
   end subroutine raise_lock
-
-  !> The other rows that cause the lock, as text.
-  subroutine explain_lock(names, text)
-    type(string_t), intent(in) :: names(:)
-    character(len=:), allocatable, intent(out) :: text
-
-    if (size(names) == 0) then
-      text = ', as no other body in it turns'
-    else
-      text = ': together with ' // joined(names, ', ', most_names) // ' it leaves no speed but 0'
-    end if
-  end subroutine explain_lock
 
   !> The elimination of some relations only.
   function partial_elimination(relations, chosen) result(elimination)

@@ -149,8 +149,11 @@ contains
       call find_motion(relations, groups(g)%elimination, local, size(groups(g)%trains), lane, found)
       factor = complement_factor(choice, found%log_determinant + pair_determinant(constraints, trains, groups(g)%bodies, lane), &
                                  size(groups(g)%kept))
-      call fill_ratios(groups(g)%bodies, local(trains%train(groups(g)%bodies)), ratio(groups(g)%bodies), &
-                       factor * found%motion, lane, self)
+      do k = 1, size(groups(g)%bodies)
+        associate (b => groups(g)%bodies(k))
+          self%ratio(lane, self%first(b):self%first(b + 1) - 1) = ratio(b) * (factor * found%motion(local(trains%train(b)), :))
+        end associate
+      end do
       call self%update_inertia(trains, groups(g), inertia, lane, is_indefinite)
       if (is_indefinite) then
         offending_group = g
@@ -177,22 +180,6 @@ contains
       log_determinant = log_determinant + log(abs(own))
     end do
   end function pair_determinant
-
-  !> Sets L_tau of a group.
-  subroutine fill_ratios(bodies, train, ratio, motion, lane, self)
-    integer, intent(in) :: bodies(:)       !! of the group
-    integer, intent(in) :: train(:)        !! number of the train of each body within the group
-    real(wp), intent(in) :: ratio(:)       !! of each body to the root of its train
-    real(wp), intent(in) :: motion(:, :)   !! L_tau of the roots, [trains, coordinates of the group]
-    integer, intent(in) :: lane
-    type(coordinates_t), intent(inout) :: self
-    integer :: i, k
-
-    do i = 1, size(bodies)
-      k = self%first(bodies(i))
-      self%ratio(lane, k:k + size(motion, 2) - 1) = ratio(i) * motion(train(i), :)
-    end do
-  end subroutine fill_ratios
 
   !> Computes the responses of a group from its ratios and new inertias, by its mass matrix L_tau^T J L_tau.
   subroutine update_inertia(self, trains, group, inertia, lane, is_indefinite)

@@ -145,8 +145,14 @@ contains
     integer, intent(in) :: columns
     real(wp), intent(in) :: y(self%lanes, columns)   !! [lanes, states], at least
     logical, intent(inout) :: is_far(self%lanes)
+    integer :: m
 
-    call self%origin%find_far(self%lanes, columns, self%machine%coordinates%freedoms, y, is_far)
+    is_far = .false.
+    associate (free => self%origin%motions%free, before => self%machine%coordinates%freedoms)
+      do m = 1, size(free)
+        is_far = is_far .or. abs(y(:, before + free(m))) > self%origin%unit
+      end do
+    end associate
   end subroutine find_far
 
   !> Puts the coordinates of a lane back near the origin, and moves the origin instead.

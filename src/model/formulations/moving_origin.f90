@@ -26,11 +26,10 @@ module nocdyn_moving_origin
     real(wp), allocatable, private :: ratio(:, :)         !! as in `motions`, of each lane, [lanes, entries]
     real(wp), allocatable, private :: angle(:, :)         !! origin of the rigid motions [rad], [lanes, motions]
     real(wp), allocatable, private :: turn(:)             !! part of a shift along each rigid motion [rad], work space, [motions]
-    real(wp), allocatable, private :: unit(:)             !! angle from which a rigid motion is put back [rad], [lanes]
+    real(wp), allocatable :: unit(:)                      !! angle from which a rigid motion is put back [rad], [lanes]
     integer, allocatable, private :: elastic(:)           !! elements that must not be twisted
     logical, private :: has_springs_only = .true.         !! whether the laws of these are polynomials
   contains
-    procedure :: find_far
     procedure :: find_shift
     procedure :: move
     procedure :: start_lane
@@ -62,21 +61,6 @@ contains
     is_turning(elastic) = .false.
     self%turning = pack([(e, e=1, size(is_turning))], is_turning)
   end function new_moving_origin
-
-  !> Finds the lanes in which a rigid motion is far from the origin.
-  pure subroutine find_far(self, lanes, columns, before, y, is_far)
-    class(moving_origin_t), intent(in) :: self
-    integer, intent(in) :: lanes, columns
-    integer, intent(in) :: before                !! columns before the angles of the coordinates
-    real(wp), intent(in) :: y(lanes, columns)    !! angles [rad]
-    logical, intent(inout) :: is_far(lanes)
-    integer :: m
-
-    is_far = .false.
-    do m = 1, size(self%motions%free)
-      is_far = is_far .or. abs(y(:, before + self%motions%free(m))) > self%unit
-    end do
-  end subroutine find_far
 
   !> The shift of the coordinates of a lane that brings its rigid motions back near the origin [rad], [coordinates].
   pure subroutine find_shift(self, lane, q, shift)

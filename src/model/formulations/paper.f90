@@ -39,6 +39,7 @@ contains
     logical, intent(in) :: with_energy_balance   !! whether the powers of the elements `machine%with_work` are integrated
     type(paper_t) :: self
     type(inertia_matrices_t) :: inertia
+    real(wp), allocatable :: incidence(:, :)   ! moments on the bodies from those of the couplings
     integer :: l, n
     logical :: is_singular
 
@@ -56,21 +57,14 @@ contains
       if (is_singular) self%factors(:, :, l) = ieee_value(1.0_wp, ieee_quiet_nan)   ! by rounding: the integration does not start
     end do
     allocate (self%couplings, source=coupling_elements(machine))
-    self%moment_of_bodies = pseudo_inverse(coupling_incidence(machine, self%couplings), 1.0e-10_wp)
-  end function new_paper
-
-  !> Matrix that gives the moments on the bodies from the restoring moments of the couplings, [n, couplings].
-  function coupling_incidence(machine, couplings) result(incidence)
-    type(machine_t), intent(in) :: machine
-    integer, intent(in) :: couplings(:)   !! numbers of the elements
-    real(wp) :: incidence(machine%bodies, size(couplings))
-    integer :: i
-
-    incidence = 0.0_wp
-    do i = 1, size(couplings)
-      call add_moment(machine%elements%from(couplings(i)), machine%elements%to(couplings(i)), 1.0_wp, incidence(:, i))
+    allocate (incidence(n, size(self%couplings)), source=0.0_wp)
+    do l = 1, size(self%couplings)
+      associate (elements => machine%elements, e => self%couplings(l))
+        call add_moment(elements%from(e), elements%to(e), 1.0_wp, incidence(:, l))
+      end associate
     end do
-  end function coupling_incidence
+    self%moment_of_bodies = pseudo_inverse(incidence, 1.0e-10_wp)
+  end function new_paper
 
   !> beta at the start. F are the elastic moments at the start angles, eqs. (48)-(51).
   function start(self) result(y)

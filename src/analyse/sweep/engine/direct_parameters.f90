@@ -57,8 +57,10 @@ contains
     self%are_direct = .not. allocated(machine%steady_internal)   ! the start follows from all values
     if (.not. self%are_direct) return
     do i = 1, size(targets)
-      if (input%groups(targets(i)%group)%kind == 'body') then
-        call add_inertia(self, i, input, targets(i), machine)
+      if (input%groups(targets(i)%group)%kind == 'body') then   ! an inertia, unless the start speeds were projected with it
+        self%are_direct = key_of(input, targets(i)) == 'inertia' .and. .not. allocated(machine%start_impulse)
+        self%inertia_target = [self%inertia_target, i]
+        self%body = [self%body, findloc(input%groups_named('body'), targets(i)%group, dim=1)]
       else
         call add_element_value(self, i, input, targets(i), machine, parameters)
       end if
@@ -68,19 +70,6 @@ contains
                        [(any([(any(machine%groups(g)%bodies == self%body(i)), i=1, size(self%body))]), g=1, &
                          size(machine%groups))])
   end function new_direct_parameters
-
-  !> An inertia, unless the start speeds were projected with it.
-  subroutine add_inertia(self, number, input, target, machine)
-    type(direct_parameters_t), intent(inout) :: self
-    integer, intent(in) :: number   !! of the target
-    type(input_t), intent(in) :: input
-    type(target_t), intent(in) :: target
-    type(machine_t), intent(in) :: machine
-
-    self%are_direct = key_of(input, target) == 'inertia' .and. .not. allocated(machine%start_impulse)
-    self%inertia_target = [self%inertia_target, number]
-    self%body = [self%body, findloc(input%groups_named('body'), target%group, dim=1)]
-  end subroutine add_inertia
 
   !> A value of an element, if its bank declares where it stands.
   subroutine add_element_value(self, number, input, target, machine, parameters)
