@@ -1,4 +1,5 @@
-!> Every matrix and vector of the paper for a machine at its start, labelled with equation numbers.
+!> Every matrix and vector of the paper for a machine at its start, labelled with equation numbers: those of
+!> `nocdyn_paper_matrices`, and alpha, eqs. (41), (42), and beta, eqs. (45), (46), with phi' = omega, eqs. (32), (33).
 module nocdyn_matrix_report
   use nocdyn_bank, only: role_coupling, role_excitation, role_motor, role_names
   use nocdyn_complement, only: coordinate_selector, extended_constraint
