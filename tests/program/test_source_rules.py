@@ -18,8 +18,8 @@ KERNEL = "kernel"
 
 # Procedures with more arguments, by file, and why.
 MANY_ARGUMENTS = {
-    "src/analyse/sweep/statistics/linear_statistics.f90": (KERNEL, "bound_excess", "look_inside"),
-    "src/analyse/sweep/statistics/step_strips.f90": (KERNEL, "add_integrals", "add_pair", "cut_step", "expand", "set_pair"),
+    "src/analyse/sweep/statistics/linear_statistics.f90": (KERNEL, "bound_excess"),
+    "src/analyse/sweep/statistics/step_strips.f90": (KERNEL, "add_integrals", "add_pair", "expand", "set_pair"),
     "src/base/numerics/sparse_products.f90": (
         KERNEL,
         "multiply_lanes",

@@ -1,33 +1,56 @@
-!> Polynomials on [-1, 1]: as sums of Chebyshev polynomials c_1 T_0 + c_2 T_1 + ..., which are well-conditioned at any degree,
-!> and by their values at the Chebyshev-Lobatto nodes.
+!> Extremes of polynomials on [-1, 1], which are given by their values at the Chebyshev-Lobatto nodes; none is missed.
+!>
+!> A polynomial is a sum c_0 T_0 + c_1 T_1 + ... of Chebyshev polynomials, which is well-conditioned at any degree, and so are its
+!> slope and its curvature. As |T_k| <= 1, the coefficients bound all three. A part of the interval in which the polynomial may be
+!> too large, and in which these bounds do not show that it is monotonic, convex or concave, is halved.
 module nocdyn_chebyshev
   use nocdyn_kinds, only: wp
   implicit none (type, external)
   private
 
-  public :: lobatto_nodes, find_maximum, differentiate, series_value
+  public :: new_interpolation, raise_to_maximum, find_last_exit, time_at
 
-  integer, parameter, public :: max_nodes = 40   !! and coefficients
-  integer, parameter :: max_newton_steps = 60     !! bisection alone would need as many
+  integer, parameter, public :: max_degree = 39
+  integer, parameter :: max_halvings = 52           !! of [-1, 1], until no number is left inside a part
+  integer, parameter :: max_parts = 1000            ! far more than are needed to resolve a polynomial
+  integer, parameter :: max_newton_steps = 60       ! bisection alone would need as many
+  integer, parameter :: rows = 8                    ! of the matrix that are multiplied together
+  real(wp), parameter :: last_change = 1.0e-4_wp    ! of Newton's method: the error of x is its square, that of the maximum less
+  real(wp), parameter :: least_half = 1.0e-8_wp     ! length of a part: its middle is a maximum to rounding
+  real(wp), parameter :: lebesgue_constant = 4.0_wp   ! bound on the ratio of a polynomial to its values at up to 40 nodes
+
+  !> Interpolation at the nodes of one degree.
+  type, public :: interpolation_t
+    integer :: degree = 0
+    real(wp), allocatable :: nodes(:)                !! -cos(pi i / degree), ascending, [0:degree]
+    real(wp), allocatable, private :: series(:, :)   !! from values to coefficients and zeros, [whole vectors, 0:degree]
+  end type interpolation_t
+
+  !> Parts of [-1, 1] that are left to be searched; the last one is next.
+  type :: parts_t
+    integer :: count = 0
+    real(wp) :: middle(max_halvings + 2), half(max_halvings + 2)   !! middles and half lengths
+  end type parts_t
 
 contains
 
-  !> The nodes -cos(pi i / degree), and the matrix from values there to coefficients.
-  pure subroutine lobatto_nodes(degree, nodes, to_series)
-    integer, intent(in) :: degree
-    real(wp), intent(out) :: nodes(0:degree)   !! ascending, -1 to 1
-    real(wp), intent(out) :: to_series(0:degree, 0:degree)   !! [coefficients, places]
+  !> The nodes of a degree.
+  pure type(interpolation_t) function new_interpolation(degree) result(self)
+    integer, intent(in) :: degree   !! 1 to `max_degree`
     real(wp), parameter :: pi = acos(-1.0_wp)
     integer :: i, k
 
-    if (degree >= max_nodes) error stop 'nocdyn_chebyshev: a polynomial has too many coefficients'
+    if (degree > max_degree) error stop 'nocdyn_chebyshev: a polynomial has too many coefficients'
+    self%degree = degree
+    allocate (self%nodes(0:degree))
+    allocate (self%series(0:rows * (degree / rows + 1) - 1, 0:degree), source=0.0_wp)
     do i = 0, degree
-      nodes(i) = -cos(pi * i / degree)
+      self%nodes(i) = -cos(pi * i / degree)
       do k = 0, degree
-        to_series(k, i) = 2 * end_weight(i, degree) * end_weight(k, degree) / degree * cos(pi * k * (degree - i) / degree)
+        self%series(k, i) = 2 * end_weight(i, degree) * end_weight(k, degree) / degree * cos(pi * k * (degree - i) / degree)
       end do
     end do
-  end subroutine lobatto_nodes
+  end function new_interpolation
 
   !> The weight of a term in interpolation at Chebyshev-Lobatto nodes: 1/2 for the first and last one, else 1.
   pure real(wp) function end_weight(i, last)
@@ -36,78 +59,246 @@ contains
     end_weight = merge(0.5_wp, 1.0_wp, i == 0 .or. i == last)
   end function end_weight
 
-  !> The largest value of the polynomial through `values` and its argument, by Newton's method on the derivative, safeguarded by
-  !> bisection, between the neighbours of the largest value.
-  pure subroutine find_maximum(n, nodes, to_series, values, node, peak)
-    integer, intent(in) :: n
-    real(wp), intent(in) :: nodes(n), to_series(n, n), values(n)   !! of `lobatto_nodes`, and the values there
-    real(wp), intent(out) :: node, peak   !! argument, -1 to 1, and value of the maximum
-    real(wp), dimension(max_nodes) :: c, slopes, curvatures   ! coefficients of the polynomial and of its derivatives
-    real(wp) :: below, above, candidate, slope, curvature
-    integer :: i, step
+  !> Raises `highest` to the largest value of a polynomial, if that is larger.
+  pure subroutine raise_to_maximum(rule, values, highest, position, found)
+    type(interpolation_t), intent(in) :: rule
+    real(wp), intent(in) :: values(0:rule%degree)   !! at the nodes
+    real(wp), intent(inout) :: highest              !! largest value so far
+    real(wp), intent(out) :: position               !! of the maximum, -1 to 1
+    logical, intent(out) :: found                   !! whether `highest` has been raised
+    real(wp), dimension(0:max_degree) :: whole, part_values, c, slopes, bends
+    real(wp) :: middle, half, rounding, sizes, x
+    type(parts_t) :: parts
+    logical :: has_none, has_one
+    integer :: bottom, part, top
 
-    i = maxloc(values, dim=1)
-    node = nodes(i)
-    peak = values(i)
-    c(:n) = 0.0_wp
-    do step = 1, n
-      c(:n) = c(:n) + to_series(:, step) * values(step)
+    call find_range(rule%degree, values, top, bottom)
+    position = rule%nodes(top)
+    found = values(top) > highest
+    if (found) highest = values(top)
+    if (0.5_wp * ((1 - lebesgue_constant) * values(bottom) + (1 + lebesgue_constant) * values(top)) <= highest) return
+    call find_series(rule, values, whole)
+    call add_part(parts, 0.0_wp, 1.0_wp)
+    do part = 1, max_parts
+      if (parts%count == 0) exit
+      call take_part(rule, values, whole, parts, middle, half, part_values, c)
+      sizes = sum(abs(c(:rule%degree)))
+      rounding = 8 * rule%degree * max(epsilon(sizes) * sizes, tiny(sizes))
+      if (.not. c(0) - abs(c(0)) + sizes - rounding > highest) cycle
+      call differentiate(rule%degree, c, slopes)
+      call differentiate(rule%degree, slopes, bends)
+      call count_maxima(rule%degree, slopes, bends, has_none, has_one)
+      if (has_none) cycle
+      x = 0.0_wp
+      if (has_one) call find_turn(rule, part_values, slopes, bends, x)
+      call raise(middle + half * x, value(rule%degree, c, x), highest, position, found)
+      if (has_one .or. half <= least_half) cycle
+      call add_part(parts, middle + 0.5_wp * half, 0.5_wp * half)
+      call add_part(parts, middle - 0.5_wp * half, 0.5_wp * half)
     end do
-    call differentiate(n, c, slopes)
-    below = nodes(max(i - 1, 1))
-    above = nodes(min(i + 1, n))
-    if (series_value(n, slopes, below) <= 0 .or. series_value(n, slopes, above) >= 0) return
-    call differentiate(n, slopes, curvatures)
-    candidate = node
-    do step = 1, max_newton_steps
-      slope = series_value(n, slopes, candidate)
-      curvature = series_value(n, curvatures, candidate)
-      if (slope > 0) then
-        below = candidate
-      else
-        above = candidate
-      end if
-      candidate = 0.5_wp * (below + above)
-      if (curvature < 0) then
-        if (abs(slope) < -curvature * (above - below)) candidate = min(above, max(below, node - slope / curvature))
-      end if
-      if (abs(candidate - node) <= epsilon(node)) exit
-      node = candidate
-    end do
-    peak = max(peak, series_value(n, c, node))
-  end subroutine find_maximum
+  end subroutine raise_to_maximum
 
-  !> The coefficients of the derivative of a sum of Chebyshev polynomials: d_(k-1) = d_(k+1) + 2 k c_k, with d_0 halved.
-  pure subroutine differentiate(n, c, d)
+  !> The nodes of the largest and of the smallest value.
+  pure subroutine find_range(n, values, top, bottom)
     integer, intent(in) :: n
-    real(wp), intent(in) :: c(n)   !! of T_0 to T_(n-1)
-    real(wp), intent(inout) :: d(n)   !! of the derivative; the last one is 0
-    real(wp) :: after(max_nodes + 2)
+    real(wp), intent(in) :: values(0:n)
+    integer, intent(out) :: top, bottom
+    integer :: i
+
+    top = 0
+    bottom = 0
+    do i = 1, n
+      if (values(i) > values(top)) top = i
+      if (values(i) < values(bottom)) bottom = i
+    end do
+  end subroutine find_range
+
+  !> Raises `highest` to a value of which x is the argument.
+  pure subroutine raise(x, x_value, highest, position, found)
+    real(wp), intent(in) :: x, x_value
+    real(wp), intent(inout) :: highest, position
+    logical, intent(inout) :: found
+
+    if (.not. x_value > highest) return
+    highest = x_value
+    position = x
+    found = .true.
+  end subroutine raise
+
+  !> The last position at which |p| > tolerance.
+  pure subroutine find_last_exit(rule, values, tolerance, position, found)
+    type(interpolation_t), intent(in) :: rule
+    real(wp), intent(in) :: values(0:rule%degree)   !! of p at the nodes
+    real(wp), intent(in) :: tolerance
+    real(wp), intent(out) :: position               !! -1 to 1
+    logical, intent(out) :: found                   !! whether there is one
+    real(wp), dimension(0:max_degree) :: whole, part, c
+    real(wp) :: middle, half
+    type(parts_t) :: parts
+
+    found = .false.
+    position = -1.0_wp
+    if (lebesgue_constant * maxval(abs(values)) <= tolerance) return
+    call find_series(rule, values, whole)
+    call add_part(parts, 0.0_wp, 1.0_wp)
+    do while (parts%count > 0)
+      call take_part(rule, values, whole, parts, middle, half, part, c)
+      if (.not. sum(abs(c(:rule%degree))) > tolerance) cycle
+      position = middle + half
+      found = abs(sum(c(:rule%degree))) > tolerance .or. half <= epsilon(half)
+      if (found) return
+      call add_part(parts, middle - 0.5_wp * half, 0.5_wp * half)
+      call add_part(parts, middle + 0.5_wp * half, 0.5_wp * half)
+    end do
+  end subroutine find_last_exit
+
+  pure subroutine add_part(parts, middle, half)
+    type(parts_t), intent(inout) :: parts
+    real(wp), intent(in) :: middle, half
+
+    parts%count = parts%count + 1
+    parts%middle(parts%count) = middle
+    parts%half(parts%count) = half
+  end subroutine add_part
+
+  !> Takes the next part off the list: its middle, its half length, and the polynomial in it.
+  pure subroutine take_part(rule, whole_values, whole, parts, middle, half, values, c)
+    type(interpolation_t), intent(in) :: rule
+    real(wp), intent(in) :: whole_values(0:rule%degree), whole(0:max_degree)   !! of the whole polynomial: values, coefficients
+    type(parts_t), intent(inout) :: parts
+    real(wp), intent(out) :: middle, half
+    real(wp), intent(out) :: values(0:max_degree), c(0:max_degree)
+    integer :: i
+
+    middle = parts%middle(parts%count)
+    half = parts%half(parts%count)
+    parts%count = parts%count - 1
+    if (half >= 1) then
+      values(:rule%degree) = whole_values
+      c(:rule%degree) = whole(:rule%degree)
+      return
+    end if
+    do i = 0, rule%degree
+      values(i) = value(rule%degree, whole, middle + half * rule%nodes(i))
+    end do
+    call find_series(rule, values, c)
+  end subroutine take_part
+
+  !> The coefficients from the values at the nodes.
+  pure subroutine find_series(rule, values, c)
+    type(interpolation_t), intent(in) :: rule
+    real(wp), intent(in) :: values(0:rule%degree)
+    real(wp), intent(out) :: c(0:max_degree)
+    real(wp) :: sum(rows)
+    integer :: i, k
+
+    do k = 0, rule%degree, rows
+      sum = 0.0_wp
+      do i = 0, rule%degree
+        sum = sum + rule%series(k:k + rows - 1, i) * values(i)
+      end do
+      c(k:k + rows - 1) = sum
+    end do
+  end subroutine find_series
+
+  !> Whether bounds show that there is no maximum between the ends, or one.
+  pure subroutine count_maxima(n, slopes, bends, has_none, has_one)
+    integer, intent(in) :: n
+    real(wp), intent(in) :: slopes(0:n), bends(0:n)   !! coefficients of the derivatives
+    logical, intent(out) :: has_none, has_one
+    real(wp) :: end_slopes(2), change, difference
     integer :: k
 
-    after(:n + 2) = 0.0_wp
-    do k = n - 1, 1, -1
-      after(k) = after(k + 2) + 2 * k * c(k + 1)
+    change = 0.0_wp
+    difference = 0.0_wp
+    end_slopes = slopes(0)
+    do k = 1, n
+      change = change + abs(slopes(k))
+      difference = difference + abs(bends(k))
+      end_slopes(1) = slopes(k) - end_slopes(1)
+      end_slopes(2) = slopes(k) + end_slopes(2)
     end do
-    d = after(:n)
-    d(1) = 0.5_wp * d(1)
+    if (modulo(n, 2) == 1) end_slopes(1) = -end_slopes(1)
+    has_one = -bends(0) > difference
+    has_none = abs(slopes(0)) >= change .or. bends(0) >= difference
+    if (has_one) has_none = has_none .or. end_slopes(1) <= 0 .or. end_slopes(2) >= 0
+  end subroutine count_maxima
+
+  !> The single root of the slope of a concave polynomial, by Newton's method, with bisection as safeguard. It starts from a
+  !> parabola through the largest value and those next to it.
+  pure subroutine find_turn(rule, values, slopes, bends, x)
+    type(interpolation_t), intent(in) :: rule
+    real(wp), intent(in) :: values(0:rule%degree)   !! at the nodes
+    real(wp), intent(in) :: slopes(0:rule%degree), bends(0:rule%degree)   !! coefficients of the derivatives
+    real(wp), intent(out) :: x
+    real(wp) :: above, below, change, slope
+    integer :: i, step
+
+    i = max(1, min(rule%degree - 1, maxloc(values, dim=1) - 1))
+    below = rule%nodes(i - 1)
+    above = rule%nodes(i + 1)
+    change = values(i - 1) - 2 * values(i) + values(i + 1)
+    x = rule%nodes(i)
+    if (change < 0) x = max(below, min(above, x + 0.25_wp * (values(i - 1) - values(i + 1)) / change * (above - below)))
+    do step = 1, max_newton_steps
+      slope = value(rule%degree - 1, slopes, x)
+      if (slope > 0) then
+        below = x
+      else
+        above = x
+      end if
+      change = -slope / value(rule%degree - 2, bends, x)
+      x = x + change
+      if (abs(change) <= last_change) exit
+      if (x <= below .or. x >= above) x = 0.5_wp * (below + above)
+    end do
+  end subroutine find_turn
+
+  !> The coefficients of the derivative: d_(k-1) = d_(k+1) + 2 k c_k, with d_0 halved.
+  pure subroutine differentiate(n, c, d)
+    integer, intent(in) :: n
+    real(wp), intent(in) :: c(0:n)
+    real(wp), intent(out) :: d(0:max_degree)
+    real(wp) :: after, factor, last
+    integer :: k
+
+    d(n) = 0.0_wp
+    after = 0.0_wp
+    last = 0.0_wp
+    factor = 2 * n
+    do k = n, 1, -1
+      d(k - 1) = after + factor * c(k)
+      after = last
+      last = d(k - 1)
+      factor = factor - 2
+    end do
+    d(0) = 0.5_wp * d(0)
   end subroutine differentiate
 
-  !> The sum of Chebyshev polynomials at x, by Clenshaw's recurrence.
-  pure real(wp) function series_value(n, c, x)
+  !> The value at x, by Clenshaw's recurrence.
+  pure real(wp) function value(n, c, x)
     integer, intent(in) :: n
-    real(wp), intent(in) :: c(n), x   !! coefficients of T_0 to T_(n-1), and the argument, -1 to 1
+    real(wp), intent(in) :: c(0:n), x
     real(wp) :: last, last_but_one, next
     integer :: k
 
     last = 0.0_wp
     last_but_one = 0.0_wp
-    do k = n, 2, -1
-      next = c(k) + 2 * x * last - last_but_one
+    do k = n, 1, -1
+      next = 2 * x * last + (c(k) - last_but_one)
       last_but_one = last
       last = next
     end do
-    series_value = c(1) + x * last - last_but_one
-  end function series_value
+    value = c(0) + x * last - last_but_one
+  end function value
+
+  !> The time at a position, t_end for 1 exactly.
+  pure real(wp) function time_at(position, t_start, t_end)
+    real(wp), intent(in) :: position         !! -1 to 1
+    real(wp), intent(in) :: t_start, t_end   !! times of -1 and 1, any unit
+
+    time_at = t_start + 0.5_wp * (1 + position) * (t_end - t_start)
+    if (position >= 1) time_at = t_end
+  end function time_at
 
 end module nocdyn_chebyshev

@@ -1,11 +1,10 @@
 !> Extremes in continuous time of functions of the solution, such as moments and reactions.
 !>
 !> In every step each function is replaced by the polynomial through its values at Chebyshev-Lobatto nodes, as many as the dense
-!> output has coefficients: a linear function of the state is represented exactly. The maximum of the polynomial is found to
-!> machine precision wherever it can exceed the extremes so far. In sweeps, the extremes of quantities that are linear in
-!> the state come from their coefficients, without samples (`nocdyn_bernstein`).
+!> output has coefficients: a linear function of the state is represented exactly. The extremes of the polynomial are found to
+!> machine precision wherever it can exceed those so far.
 module nocdyn_extremes
-  use nocdyn_chebyshev, only: find_maximum, lobatto_nodes, max_nodes
+  use nocdyn_chebyshev, only: interpolation_t, max_degree, new_interpolation, raise_to_maximum, time_at
   use nocdyn_dense_output, only: dense_output_t, sample
   use nocdyn_kinds, only: wp
   use nocdyn_observer, only: observer_t, ranges_t
@@ -14,22 +13,14 @@ module nocdyn_extremes
   private
 
   public :: allocate_extremes, start_extremes, restart_extremes, update_extremes
-  public :: allocate_ranges, start_ranges, widen_ranges
 
-  real(wp), parameter :: overshoot = 0.25_wp   !! of the spread of the values: largest expected excess of the polynomial over them
   real(wp), parameter, public :: before_jump = 64.0_wp   !! spacings of the time between the last node and a jump
-
-  !> Where the functions are sampled in steps of a degree.
-  type :: rule_t
-    real(wp), allocatable :: nodes(:)          !! in the step, -1 to 1, [nodes]
-    real(wp), allocatable :: to_series(:, :)   !! matrix from values to coefficients of T_0, T_1, ...
-  end type rule_t
 
   type, public :: extremes_t
     type(ranges_t), allocatable :: ranges(:)               !! [lanes]
     logical, allocatable :: have_begun(:)                  !! whether a lane has come to the time from which they count, [lanes]
     real(wp), allocatable, private :: last(:, :)           !! values at the ends of the last steps, [functions, lanes]
-    type(rule_t), allocatable, private :: rules(:)         !! of the degrees of the steps, [largest degree]
+    type(interpolation_t), allocatable, private :: rules(:)   !! of the degrees of the steps, [largest degree]
     real(wp), allocatable, private :: values(:, :)         !! [functions, most nodes]
     real(wp), allocatable, private :: y(:)                 !! [components]
   end type extremes_t
@@ -47,29 +38,19 @@ contains
     allocate (extremes%rules(maxval(degrees)))
     do i = 1, size(degrees)
       if (degrees(i) == 0) cycle
-      associate (rule => extremes%rules(degrees(i)), nodes => degrees(i) + 1)
-        if (allocated(rule%nodes)) cycle
-        allocate (rule%nodes(nodes), rule%to_series(nodes, nodes))
-        call lobatto_nodes(degrees(i), rule%nodes, rule%to_series)
-      end associate
+      extremes%rules(degrees(i)) = new_interpolation(degrees(i))
     end do
     allocate (extremes%ranges(attempt%lanes))
     allocate (extremes%have_begun(attempt%lanes), source=.false.)
     do lane = 1, attempt%lanes
-      call allocate_ranges(extremes%ranges(lane), functions)
+      associate (ranges => extremes%ranges(lane))
+        allocate (ranges%lowest(functions), ranges%lowest_time(functions), ranges%highest(functions), &
+                  ranges%highest_time(functions), source=0.0_wp)
+      end associate
     end do
     allocate (extremes%last(functions, attempt%lanes), extremes%values(functions, maxval(degrees) + 1), &
               extremes%y(attempt%components), source=0.0_wp)
   end subroutine allocate_extremes
-
-  !> Allocates the ranges of some functions.
-  pure subroutine allocate_ranges(ranges, functions)
-    type(ranges_t), intent(out) :: ranges
-    integer, intent(in) :: functions
-
-    allocate (ranges%lowest(functions), ranges%lowest_time(functions), ranges%highest(functions), &
-              ranges%highest_time(functions), source=0.0_wp)
-  end subroutine allocate_ranges
 
   !> Sets the ranges of a lane at its start, if they count from there.
   subroutine start_extremes(extremes, observer, attempt, lane)
@@ -127,15 +108,13 @@ contains
     middle = t_start + half
     extremes%values(:, 1) = extremes%last(:, dense%lane)
     do i = 2, last
-      t = middle + extremes%rules(dense%degree)%nodes(i) * half
+      t = middle + extremes%rules(dense%degree)%nodes(i - 1) * half
       if (i == last .and. ends_at_crossing) t = max(t_start, t_end - before_jump * spacing(t_end))
       call sample(dense, min(1.0_wp, (t - dense%t) / dense%h), extremes%y)
       call observer%tracked_values(dense%lane, t, extremes%y, extremes%values(:, i))
     end do
     extremes%last(:, dense%lane) = extremes%values(:, last)
-    associate (rule => extremes%rules(dense%degree))
-      call widen_ranges(last, rule%nodes, rule%to_series, extremes%values(:, :last), extremes%ranges(dense%lane), t_start, t_end)
-    end associate
+    call widen_ranges(extremes%rules(dense%degree), extremes%values(:, :last), extremes%ranges(dense%lane), t_start, t_end)
   end subroutine update_extremes
 
   !> Sets the ranges of a lane to the values at a time in its last step.
@@ -151,47 +130,26 @@ contains
     extremes%have_begun(dense%lane) = .true.
   end subroutine begin
 
-  !> Widens the ranges by the maxima and minima of the polynomials through `values_of`, over the times from t_start to t_end.
-  pure subroutine widen_ranges(n, nodes, to_series, values_of, ranges, t_start, t_end)
-    integer, intent(in) :: n   !! number of nodes
-    real(wp), intent(in) :: nodes(n), to_series(n, n)   !! of `lobatto_nodes`
+  !> Widens the ranges by the extremes of the polynomials through `values_of`, over the times from t_start to t_end.
+  pure subroutine widen_ranges(rule, values_of, ranges, t_start, t_end)
+    type(interpolation_t), intent(in) :: rule
     real(wp), contiguous, intent(in) :: values_of(:, :)   !! [functions, nodes]
     type(ranges_t), intent(inout) :: ranges
     real(wp), intent(in) :: t_start, t_end   !! [s]
-    real(wp) :: values(max_nodes), lowest, highest, indicator
+    real(wp) :: values(0:max_degree), extreme, position
     integer :: function
+    logical :: found
 
     do function = 1, size(values_of, 1)
-      values(:n) = values_of(function, :)
-      lowest = minval(values(:n))
-      highest = maxval(values(:n))
-      indicator = overshoot * (highest - lowest)
-      if (highest + indicator > ranges%highest(function)) then
-        call raise(n, nodes, to_series, values, t_start, t_end, ranges%highest(function), ranges%highest_time(function))
-      end if
-      if (lowest - indicator < ranges%lowest(function)) then
-        values(:n) = -values(:n)
-        ranges%lowest(function) = -ranges%lowest(function)
-        call raise(n, nodes, to_series, values, t_start, t_end, ranges%lowest(function), ranges%lowest_time(function))
-        ranges%lowest(function) = -ranges%lowest(function)
-      end if
+      values(:rule%degree) = values_of(function, :)
+      call raise_to_maximum(rule, values, ranges%highest(function), position, found)
+      if (found) ranges%highest_time(function) = time_at(position, t_start, t_end)
+      values(:rule%degree) = -values(:rule%degree)
+      extreme = -ranges%lowest(function)
+      call raise_to_maximum(rule, values, extreme, position, found)
+      ranges%lowest(function) = -extreme
+      if (found) ranges%lowest_time(function) = time_at(position, t_start, t_end)
     end do
   end subroutine widen_ranges
-
-  !> Raises `highest` to the largest value of the polynomial through `values`, if that is larger.
-  pure subroutine raise(n, nodes, to_series, values, t_start, t_end, highest, time)
-    integer, intent(in) :: n
-    real(wp), intent(in) :: nodes(n), to_series(n, n)
-    real(wp), intent(in) :: values(max_nodes)
-    real(wp), intent(in) :: t_start, t_end
-    real(wp), intent(inout) :: highest, time
-    real(wp) :: node, peak
-
-    call find_maximum(n, nodes, to_series, values, node, peak)
-    if (peak <= highest) return
-    highest = peak
-    time = t_start + 0.5_wp * (1 + node) * (t_end - t_start)
-    if (node >= 1) time = t_end
-  end subroutine raise
 
 end module nocdyn_extremes

@@ -5,6 +5,7 @@
 !> where x is the twist minus that at rest.
 module nocdyn_linear_columns
   use nocdyn_bank, only: quantity_t
+  use nocdyn_column_statistics, only: width
   use nocdyn_coordinates, only: coordinates_t
   use nocdyn_formulation, only: formulation_t
   use nocdyn_kinds, only: wp
@@ -16,16 +17,12 @@ module nocdyn_linear_columns
 
   public :: is_linear, has_law, new_linear_columns, strip_of, lane_in_strip
 
-  integer, parameter, public :: width = 8   !! lanes of a strip, which are evaluated together
-
   type, public :: linear_columns_t
     integer :: count = 0
     integer, allocatable :: first(:)          !! entry of each column, [count + 1]; the number of its entries is even
     integer, allocatable :: component(:)      !! of the state, which the factor multiplies, [entries]
     real(wp), allocatable :: factor(:, :, :)  !! [width, entries, strips of lanes]
-    real(wp), allocatable :: offset(:, :, :)  !! shape [width, columns, strips], as the next two
-    real(wp), allocatable :: linear(:, :, :)  !! 1 if the column is x itself
-    real(wp), allocatable :: cubic(:, :, :)
+    real(wp), allocatable :: offset(:, :, :)  !! [width, columns, strips]
     integer, allocatable, private :: ratio(:)       !! entry of the coordinates, 0 if it only completes a pair; [entries]
     logical, allocatable, private :: is_minus(:)    !! whether the factor is the negative of that ratio, [entries]
     logical, allocatable, private :: is_speed(:)    !! [columns]
@@ -33,7 +30,7 @@ module nocdyn_linear_columns
     logical, allocatable, private :: has_law(:)     !! whether it is a moment; [columns]
     integer, allocatable, private :: from(:), to(:) !! bodies of the angle or twist, 0 is the ground; [columns]
   contains
-    procedure :: copy_lane, is_increasing, argument, law
+    procedure :: copy_lane, find_laws, argument
   end type linear_columns_t
 
 contains
@@ -90,9 +87,7 @@ contains
       call set_column(self, i, block%machine, columns(i))
       call add_entries(self, i, block%machine%coordinates)
     end do
-    allocate (self%factor(width, size(self%component), strips), self%offset(width, self%count, strips), &
-              self%cubic(width, self%count, strips), source=0.0_wp)
-    allocate (self%linear(width, self%count, strips), source=1.0_wp)
+    allocate (self%factor(width, size(self%component), strips), self%offset(width, self%count, strips), source=0.0_wp)
   end function new_linear_columns
 
   subroutine set_column(self, number, machine, column)
@@ -154,14 +149,26 @@ contains
             cycle
           end if
           offset = block%twist_at_zero(lane, self%element(i))
-          if (.not. self%has_law(i)) cycle
-          offset = offset - machine%laws%rest(lane, self%element(i))
-          self%linear(at, i, strip) = machine%laws%linear(lane, self%element(i))
-          self%cubic(at, i, strip) = machine%laws%cubic(lane, self%element(i))
+          if (self%has_law(i)) offset = offset - machine%laws%rest(lane, self%element(i))
         end associate
       end do
     end associate
   end subroutine copy_lane
+
+  !> Sets the coefficients of the moments of a lane; those of other columns remain.
+  pure subroutine find_laws(self, machine, lane, linear, cubic)
+    class(linear_columns_t), intent(in) :: self
+    type(machine_t), intent(in) :: machine
+    integer, intent(in) :: lane
+    real(wp), intent(inout) :: linear(:, :), cubic(:, :)   !! [lanes, columns]
+    integer :: i
+
+    do i = 1, self%count
+      if (.not. self%has_law(i)) cycle
+      linear(lane, i) = machine%laws%linear(lane, self%element(i))
+      cubic(lane, i) = machine%laws%cubic(lane, self%element(i))
+    end do
+  end subroutine find_laws
 
   !> The number of the strip in which a lane is.
   elemental integer function strip_of(lane)
@@ -177,17 +184,6 @@ contains
     lane_in_strip = modulo(lane - 1, width) + 1
   end function lane_in_strip
 
-  !> Whether a column increases with x.
-  pure logical function is_increasing(self, number, lane)
-    class(linear_columns_t), intent(in) :: self
-    integer, intent(in) :: number, lane
-
-    associate (linear => self%linear(lane_in_strip(lane), number, strip_of(lane)), &
-               cubic => self%cubic(lane_in_strip(lane), number, strip_of(lane)))
-      is_increasing = min(linear, cubic) >= 0 .and. max(linear, cubic) > 0
-    end associate
-  end function is_increasing
-
   !> x at a state of a lane.
   pure real(wp) function argument(self, number, lane, y) result(x)
     class(linear_columns_t), intent(in) :: self
@@ -202,16 +198,5 @@ contains
       end do
     end associate
   end function argument
-
-  !> The value of the column at x.
-  pure real(wp) function law(self, number, lane, x)
-    class(linear_columns_t), intent(in) :: self
-    integer, intent(in) :: number, lane
-    real(wp), intent(in) :: x
-
-    associate (at => lane_in_strip(lane), strip => strip_of(lane))
-      law = (self%linear(at, number, strip) + self%cubic(at, number, strip) * x * x) * x
-    end associate
-  end function law
 
 end module nocdyn_linear_columns

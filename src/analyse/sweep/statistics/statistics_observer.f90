@@ -4,12 +4,12 @@ module nocdyn_statistics_observer
   use nocdyn_formulation, only: formulation_t
   use nocdyn_kinds, only: wp
   use nocdyn_lane_parameters, only: lane_parameters_t
-  use nocdyn_linear_columns, only: has_law, is_linear, linear_columns_t, new_linear_columns
+  use nocdyn_linear_columns, only: has_law, is_linear
   use nocdyn_linear_statistics, only: linear_statistics_t, new_linear_statistics
   use nocdyn_reduced, only: reduced_t
   use nocdyn_sampled_statistics, only: new_sampled_statistics, sampled_statistics_t
-  use nocdyn_statistics, only: find_columns, is_torque, statistic_final, statistic_max, statistic_max_abs, statistic_min, &
-    statistic_settling_time, statistic_t, statistic_time_of_max, value_of_zero_column
+  use nocdyn_statistics, only: find_columns, is_torque, statistic_settling_time, statistic_t, statistic_time_of_max, &
+    value_of_zero_column
   use nocdyn_observer, only: observer_t, step_block_t
   use nocdyn_text, only: string_t
   use nocdyn_trajectory_columns, only: column_t, column_work_in, energy_labels, list_columns
@@ -21,25 +21,19 @@ module nocdyn_statistics_observer
   !> The requested times must be, or contain, the start and the end of the variants. After the first `start_lane` the observer
   !> must stay where it is.
   !>
-  !> A statistic is computed by `linear` if its column allows it, else by `sampled`. An extremum of an elastic moment is computed
-  !> by `fallback` in the lanes where the moment does not increase with the twist. A torque that the machine of the block does not
-  !> have is 0 at all times.
+  !> A statistic is computed by `linear` if its column allows it, else by `sampled`. A torque that the machine of the block does
+  !> not have is 0 at all times.
   type, extends(observer_t), public :: statistics_observer_t
     character(len=:), allocatable :: missing                  !! the first quantity without a column that is no torque, or ''
     class(formulation_t), pointer, private :: block => null()
     real(wp), private :: t_start = 0.0_wp, t_end = 0.0_wp     !! of every variant [s]
     type(lane_parameters_t), private :: parameters            !! of the block; none if its lanes cannot change them
     type(linear_statistics_t), private :: linear
-    type(sampled_statistics_t), private :: sampled, fallback
+    type(sampled_statistics_t), private :: sampled
     integer, allocatable, private :: linear_index(:)          !! of each statistic in `linear`, or 0; [statistics]
     integer, allocatable, private :: sampled_index(:)         !! in `sampled`, or 0
-    integer, allocatable, private :: fallback_index(:)        !! in `fallback`, or 0
     real(wp), allocatable, private :: default_value(:)        !! where a statistic has no column, [statistics]
     logical, private :: uses_sampled = .false.                !! whether `sampled` has statistics
-    logical, private :: uses_fallback = .false.               !! whether some lane needs `fallback` now
-    integer, private :: first_component = 1, last_component = huge(1)   !! of the state, that `linear` reads inside steps
-    logical, allocatable, private :: all_lanes(:)             !! true
-    logical, allocatable, private :: needs_fallback(:)        !! [lanes]
     logical, allocatable, private :: is_complete(:)           !! lanes that have reached the end
   contains
     procedure :: start_lane, results, on_output, on_steps, on_shift
@@ -79,47 +73,38 @@ contains
     end do
     allocate (self%default_value, source=value_of_zero_column(found))
     call distribute(self, found, columns)
-    allocate (self%all_lanes(block%lanes), source=.true.)
-    allocate (self%needs_fallback(block%lanes), self%is_complete(block%lanes), source=.false.)
+    allocate (self%is_complete(block%lanes), source=.false.)
     select type (block)
     class is (reduced_t)
       call block%list_parameters(self%parameters)
     end select
   end function new_statistics_observer
 
-  !> Chooses how each statistic is computed; finds the components of the state that linear columns read inside the steps.
+  !> Chooses how each statistic is computed. The time of the largest moment is not that of the largest twist in a coupling that
+  !> softens.
   subroutine distribute(self, statistics, columns)
     type(statistics_observer_t), intent(inout) :: self
     type(statistic_t), intent(in) :: statistics(:)
     type(column_t), intent(in) :: columns(:)   !! of the trajectory table
-    type(linear_columns_t) :: read_inside   ! those with statistics of the steps
-    logical, dimension(size(statistics)) :: has_fallback, is_of_linear, is_of_steps
+    logical, dimension(size(statistics)) :: is_of_linear, is_of_sampled
     integer :: i
 
-    has_fallback = .false.
     is_of_linear = .false.
     do i = 1, size(statistics)
       if (statistics(i)%column == 0 .or. statistics(i)%kind == statistic_settling_time) cycle
-      associate (column => columns(statistics(i)%column), kind => statistics(i)%kind)
+      associate (column => columns(statistics(i)%column))
         is_of_linear(i) = is_linear(self%block, column)
-        has_fallback(i) = has_law(self%block%machine, column) .and. is_of_linear(i) .and. &
-                          any(kind == [statistic_max, statistic_min, statistic_max_abs, statistic_time_of_max])
+        if (statistics(i)%kind /= statistic_time_of_max) cycle
+        if (has_law(self%block%machine, column)) is_of_linear(i) = .false.
       end associate
     end do
-    associate (is_of_sampled => statistics%column > 0 .and. .not. is_of_linear)
-      self%uses_sampled = any(is_of_sampled)
-      allocate (self%linear_index, source=indices_among(is_of_linear))
-      allocate (self%sampled_index, source=indices_among(is_of_sampled))
-      allocate (self%fallback_index, source=indices_among(has_fallback))
-      self%linear = new_linear_statistics(self%block, columns, pack(statistics, is_of_linear), self%t_start, self%t_end)
-      self%sampled = new_sampled_statistics(self%block, columns, pack(statistics, is_of_sampled), self%t_end)
-      self%fallback = new_sampled_statistics(self%block, columns, pack(statistics, has_fallback), self%t_end)
-    end associate
-    is_of_steps = is_of_linear .and. statistics%kind /= statistic_final
-    read_inside = new_linear_columns(self%block, columns(pack([(statistics(i)%column, i=1, size(statistics))], is_of_steps)))
-    if (size(read_inside%component) == 0) return
-    self%first_component = minval(read_inside%component)
-    self%last_component = maxval(read_inside%component)
+    is_of_sampled = statistics%column > 0 .and. .not. is_of_linear
+    self%uses_sampled = any(is_of_sampled)
+    allocate (self%linear_index, source=indices_among(is_of_linear))
+    allocate (self%sampled_index, source=indices_among(is_of_sampled))
+    self%linear = new_linear_statistics(self%block, columns, pack(statistics, is_of_linear), self%t_start, self%t_end)
+    self%sampled = new_sampled_statistics(self%block, columns, pack(statistics, is_of_sampled), self%t_start, self%t_end)
+    if (.not. self%uses_sampled) call self%linear%read_components(self%first_read, self%last_read)
   end subroutine distribute
 
   !> Numbers the true elements of a mask from 1 on; 0 for the others.
@@ -136,25 +121,11 @@ contains
     class(statistics_observer_t), target, intent(inout) :: self
     integer, intent(in) :: lane
     real(wp), contiguous, intent(in) :: y(:)   !! the start, [states + quadratures]
-    integer :: i
 
     self%is_complete(lane) = .false.
-    self%needs_fallback(lane) = .false.
     call self%block%reset_origin(lane)
     call self%linear%start_lane(self%block, lane, y)
-    do i = 1, size(self%fallback_index)
-      if (self%fallback_index(i) == 0) cycle
-      if (.not. self%linear%is_increasing(self%linear_index(i), lane)) self%needs_fallback(lane) = .true.
-    end do
-    self%uses_fallback = any(self%needs_fallback)
-    self%first_read = 1
-    self%last_read = huge(1)
-    if (.not. (self%uses_sampled .or. self%uses_fallback)) then
-      self%first_read = self%first_component
-      self%last_read = self%last_component
-    end if
     if (self%uses_sampled) call start_sampled(self, self%sampled, lane, y)
-    if (self%needs_fallback(lane)) call start_sampled(self, self%fallback, lane, y)
   end subroutine start_lane
 
   subroutine start_sampled(self, sampled, lane, y)
@@ -177,17 +148,9 @@ contains
     values(:) = ieee_value(1.0_wp, ieee_quiet_nan)
     if (.not. self%is_complete(lane)) return
     do i = 1, size(values)
-      associate (linear => self%linear_index(i), sampled => self%sampled_index(i), fallback => self%fallback_index(i))
-        if (sampled > 0) then
-          values(i) = self%sampled%value(sampled, lane)
-        else if (linear == 0) then
-          values(i) = self%default_value(i)
-        else if (fallback == 0 .or. self%linear%is_increasing(linear, lane)) then
-          values(i) = self%linear%value(linear, lane)
-        else
-          values(i) = self%fallback%value(fallback, lane)
-        end if
-      end associate
+      values(i) = self%default_value(i)
+      if (self%linear_index(i) > 0) values(i) = self%linear%value(self%linear_index(i), lane)
+      if (self%sampled_index(i) > 0) values(i) = self%sampled%value(self%sampled_index(i), lane)
     end do
   end subroutine results
 
@@ -212,7 +175,6 @@ contains
 
     call self%linear%columns%copy_lane(self%block, lane)
     if (self%uses_sampled) call self%sampled%recorded%move_origin(lane, shift)
-    if (self%needs_fallback(lane)) call self%fallback%recorded%move_origin(lane, shift)
   end subroutine on_shift
 
   subroutine on_steps(self, steps, y, y_new, c)
@@ -221,8 +183,7 @@ contains
     real(wp), contiguous, intent(in) :: y(:, :), y_new(:, :), c(:, :, :)
 
     call self%linear%add_steps(steps, y, y_new, c)
-    if (self%uses_sampled) call self%sampled%add_steps(steps, self%all_lanes, y, c)
-    if (self%uses_fallback) call self%fallback%add_steps(steps, self%needs_fallback, y, c)
+    if (self%uses_sampled) call self%sampled%add_steps(steps, y, c)
   end subroutine on_steps
 
 end module nocdyn_statistics_observer

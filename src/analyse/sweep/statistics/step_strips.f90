@@ -1,12 +1,12 @@
 !> A linear function x of the state in the last steps of a strip of lanes: a polynomial in each, in vector loops over the lanes.
 module nocdyn_step_strips
-  use nocdyn_bernstein, only: max_degree, shift_origin
+  use nocdyn_chebyshev, only: max_degree
   use nocdyn_kinds, only: wp
-  use nocdyn_linear_columns, only: width
+  use nocdyn_column_statistics, only: width
   implicit none (type, external)
   private
 
-  public :: fill_chord_gaps, expand, exclude_monotonic, cut_step, add_integrals
+  public :: fill_chord_gaps, expand, exclude_monotonic, values_at, add_integrals
 
   !> The last steps of the lanes of a strip, and x in them.
   type, public :: strip_t
@@ -136,41 +136,40 @@ contains
     end do
   end subroutine exclude_monotonic
 
-  !> The coefficients of x in the part of a step after `from` and before its end, as a polynomial of s from 0 to 1 in that part.
-  pure subroutine cut_step(strip, i, from, t, h, theta_end, degree, c, t_start)
+  !> x of one lane at the nodes of the part of its step between two values of scale s.
+  pure subroutine values_at(strip, i, degree, nodes, begin, end, values)
     type(strip_t), intent(in) :: strip
     integer, intent(in) :: i
-    real(wp), intent(in) :: from
-    real(wp), intent(in) :: t, h, theta_end   !! start [s], size [s], end relative to the size
     integer, intent(in) :: degree
-    real(wp), intent(inout) :: c(0:degree)
-    real(wp), intent(out) :: t_start
-    real(wp) :: power
+    real(wp), intent(in) :: nodes(degree + 1)   !! -1 to 1
+    real(wp), intent(in) :: begin, end
+    real(wp), intent(out) :: values(degree + 1)
+    real(wp) :: s(max_degree + 1)
     integer :: p
 
-    c(0) = strip%x_start(i)
-    power = 1.0_wp
-    do p = 1, degree
-      power = power * strip%scale(i)
-      c(p) = power * strip%c(i, p)
+    s(:degree + 1) = begin + (0.5_wp * (end - begin)) * (1 + nodes)
+    values = strip%c(i, degree)
+    do p = degree - 1, 1, -1
+      values = strip%c(i, p) + s(:degree + 1) * values
     end do
-    t_start = max(t, from)
-    if (t_start <= t .and. theta_end >= 1) return
-    call shift_origin(degree, c, (t_start - t) / h, theta_end)
-  end subroutine cut_step
+    values = strip%x_start(i) + s(:degree + 1) * values
+  end subroutine values_at
 
-  !> Adds the integrals of a column and of its square by a Gauss rule with as many nodes as x has coefficients: it is exact for x
-  !> and for its square.
-  pure subroutine add_integrals(strip, degree, nodes, weights, duration, linear, cubic, integral, square)
+  !> Adds the integrals of a column and of its square over parts of the steps, by a Gauss rule with as many nodes as x has
+  !> coefficients: it is exact for x and for its square.
+  pure subroutine add_integrals(strip, degree, nodes, weights, begin, end, duration, linear, cubic, integral, square)
     type(strip_t), intent(in) :: strip
     integer, intent(in) :: degree
-    real(wp), intent(in) :: nodes(degree + 1), weights(degree + 1), duration(width), linear(width), cubic(width)
+    real(wp), intent(in) :: nodes(degree + 1), weights(degree + 1)   !! -1 to 1
+    real(wp), intent(in) :: begin(width), end(width)                 !! of the parts: scale s
+    real(wp), intent(in) :: duration(width)                          !! of the parts [s]
+    real(wp), intent(in) :: linear(width), cubic(width)
     real(wp), intent(inout) :: integral(width), square(width)
     real(wp) :: s(width), x(width)
     integer :: node, p
 
     do node = 1, degree + 1
-      s = strip%scale * nodes(node)
+      s = begin + (0.5_wp * (1 + nodes(node))) * (end - begin)
       x = strip%c(:, degree)
       do p = degree - 1, 1, -1
         x = strip%c(:, p) + s * x
