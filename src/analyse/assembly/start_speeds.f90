@@ -32,14 +32,20 @@ contains
     integer, intent(out) :: offending_row   !! first violated row, 0 if there is no error
     type(error_t), allocatable, intent(out) :: error
     real(wp) :: nearest(machine%bodies)
-    integer, allocatable :: violated(:)
+    integer, allocatable :: groups(:), violated(:)
     character(len=:), allocatable :: message
+    integer :: g
+    logical :: is_consistent
 
     offending_row = 0
     allocate (violated, source=violated_rows(machine))
     if (size(violated) == 0) return
     if (.not. may_project) then
-      call follow_in_groups(machine, is_given, violated)
+      groups = violated_groups(machine, violated)
+      do g = 1, size(groups)
+        call follow_speeds(machine, groups(g), is_given, is_consistent)
+      end do
+      violated = violated_rows(machine)
       if (size(violated) == 0) return
     end if
     nearest = nearest_speeds(machine, violated)
@@ -52,65 +58,51 @@ contains
     end if
   end subroutine fit_start_speeds
 
-  !> The rows that the start speeds violate.
   function violated_rows(machine) result(rows)
     type(machine_t), intent(in) :: machine
     integer, allocatable :: rows(:)
+    real(wp) :: residual, scale
+    logical :: is_violated(machine%constraints%rows())
     integer :: row
 
-    rows = pack([(row, row=1, machine%constraints%rows())], [(is_violated(machine, row), row=1, machine%constraints%rows())])
+    do row = 1, size(is_violated)
+      call machine%constraints%residual(1, row, machine%start_speed(1, :), residual, scale)
+      is_violated(row) = abs(residual) > speed_tolerance * scale
+    end do
+    rows = pack([(row, row=1, size(is_violated))], is_violated)
   end function violated_rows
 
-  !> Lets the start speeds that are not given follow from the others, in the groups with violated rows.
-  subroutine follow_in_groups(machine, is_given, violated)
-    type(machine_t), intent(inout) :: machine
-    logical, intent(in) :: is_given(:)   !! [bodies]
-    integer, allocatable, intent(inout) :: violated(:)   !! rows; those that stay violated after the call
-    integer :: g, i
-    logical :: is_consistent, is_row_violated(machine%constraints%rows())
+  !> The groups with violated rows.
+  function violated_groups(machine, violated) result(groups)
+    type(machine_t), intent(in) :: machine
+    integer, intent(in) :: violated(:)   !! rows
+    integer, allocatable :: groups(:)
+    logical :: is_row_violated(machine%constraints%rows())
+    integer :: g
 
     is_row_violated = .false.
     is_row_violated(violated) = .true.
-    do g = 1, size(machine%groups)
-      if (any([(is_row_violated(machine%groups(g)%rows(i)), i=1, size(machine%groups(g)%rows))])) then
-        call follow_speeds(machine, g, is_given, is_consistent)
-      end if
-    end do
-    violated = violated_rows(machine)
-  end subroutine follow_in_groups
-
-  !> Whether the start speeds violate a row.
-  logical function is_violated(machine, row)
-    type(machine_t), intent(in) :: machine
-    integer, intent(in) :: row
-    real(wp) :: residual, scale
-
-    call machine%constraints%residual(1, row, machine%start_speed(1, :), residual, scale)
-    is_violated = abs(residual) > speed_tolerance * scale
-  end function is_violated
+    groups = pack([(g, g=1, size(machine%groups))], &
+                  [(any(is_row_violated(machine%groups(g)%rows)), g=1, size(machine%groups))])
+  end function violated_groups
 
   !> The start speeds, projected in the groups of the violated rows [rad/s].
   function nearest_speeds(machine, violated) result(omega)
     type(machine_t), intent(in) :: machine
     integer, intent(in) :: violated(:)   !! rows
     real(wp) :: omega(machine%bodies)
-    real(wp) :: speed(machine%coordinates%freedoms)
-    integer :: b, g, i, k
-    logical :: is_row_violated(machine%constraints%rows())
+    real(wp) :: speed(machine%coordinates%freedoms), projected(machine%bodies)
+    integer, allocatable :: groups(:)
+    integer :: g
 
     omega = machine%start_speed(1, :)
     call machine%coordinates%project(1, machine%inertia(1, :), omega, speed)
-    is_row_violated = .false.
-    is_row_violated(violated) = .true.
-    do g = 1, size(machine%groups)
-      if (.not. any(is_row_violated(machine%groups(g)%rows))) cycle
-      do i = 1, size(machine%groups(g)%bodies)
-        b = machine%groups(g)%bodies(i)
-        omega(b) = 0.0_wp
-        do k = machine%coordinates%first(b), machine%coordinates%first(b + 1) - 1
-          omega(b) = omega(b) + machine%coordinates%ratio(1, k) * speed(machine%coordinates%coordinate(k))
-        end do
-      end do
+    projected = machine%coordinates%body_speeds(1, speed)
+    groups = violated_groups(machine, violated)
+    do g = 1, size(groups)
+      associate (bodies => machine%groups(groups(g))%bodies)
+        omega(bodies) = projected(bodies)
+      end associate
     end do
   end function nearest_speeds
 

@@ -42,7 +42,6 @@ contains
     end do
   end function machine_notes
 
-  !> Appends a sentence for every redundant constraint.
   subroutine add_redundancy_notes(machine, notes)
     type(machine_t), intent(in) :: machine
     type(string_t), allocatable, intent(inout) :: notes(:)
@@ -196,7 +195,6 @@ contains
     number = count([(machine%constraints%kinds(row)%text == kind, row=1, machine%constraints%rows())])
   end function constraint_count
 
-  !> Appends the groups of bodies that are geared together.
   subroutine put_groups(report, machine)
     type(text_buffer_t), intent(inout) :: report
     type(machine_t), intent(in) :: machine

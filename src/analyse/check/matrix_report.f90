@@ -111,7 +111,6 @@ contains
     call machine%evaluate_energies()
   end subroutine set_start_state
 
-  !> Forms all matrices.
   subroutine assemble(equations)
     type(equations_t), intent(inout) :: equations
 

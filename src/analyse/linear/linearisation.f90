@@ -67,7 +67,6 @@ contains
     if (formulation%states > 2 * size(self%natural)) call add_internal(formulation, pattern, slopes(1, :), self)
   end subroutine linearise
 
-  !> Refuses stiffnesses and dampings that are not finite.
   subroutine refuse_not_finite(machine, stiffness, error)
     type(machine_t), intent(in) :: machine   !! differentiated
     real(wp), intent(in) :: stiffness(:)     !! of all elements [N m/rad]
@@ -82,7 +81,6 @@ contains
     end do
   end subroutine refuse_not_finite
 
-  !> Computes the undamped modes.
   subroutine find_modes(formulation, incidence, self, error)
     class(formulation_t), intent(in) :: formulation
     type(element_coordinates_t), intent(in) :: incidence

@@ -154,16 +154,9 @@ contains
     class(formulation_t), intent(in) :: formulation
     complex(wp), intent(in) :: speeds(:)   !! of the coordinates
     type(mode_t), intent(inout) :: mode
-    integer :: b, k
 
-    associate (map => formulation%machine%coordinates, bodies => formulation%machine%bodies)
-      allocate (mode%shape(bodies), mode%kinetic(bodies))
-      do b = 1, bodies
-        mode%shape(b) = 0.0_wp
-        do k = map%first(b), map%first(b + 1) - 1
-          mode%shape(b) = mode%shape(b) + map%ratio(1, k) * speeds(map%coordinate(k))
-        end do
-      end do
+    associate (map => formulation%machine%coordinates)
+      mode%shape = cmplx(map%body_speeds(1, real(speeds, wp)), map%body_speeds(1, aimag(speeds)), wp)
     end associate
     call clear_rounding(mode%shape)
     mode%kinetic = formulation%machine%inertia(1, :) * abs(mode%shape)**2

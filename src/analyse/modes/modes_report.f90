@@ -101,7 +101,6 @@ contains
     text = report%text()
   end function modes_text
 
-  !> Appends a line for every oscillating mode.
   subroutine put_oscillations(self, has_rpm, report)
     type(modes_report_t), intent(in) :: self
     logical, intent(in) :: has_rpm
@@ -164,7 +163,6 @@ contains
     if (shown < size(chosen)) call report%append_line('  (' // to_text(size(chosen) - shown) // ' more in modes.csv)')
   end subroutine put_real
 
-  !> The modes of one kind.
   pure function modes_of(self, kind) result(chosen)
     type(modes_report_t), intent(in) :: self
     integer, intent(in) :: kind

@@ -37,7 +37,6 @@ contains
     text = report%text()
   end function summary_table
 
-  !> Appends the lines of the columns.
   subroutine append_columns(report, summary, most)
     type(text_buffer_t), intent(inout) :: report
     type(run_summary_t), intent(in) :: summary

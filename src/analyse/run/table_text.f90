@@ -67,7 +67,6 @@ contains
     end if
   end subroutine append_table
 
-  !> The width of the asterisks of a column.
   pure integer function mark_width(is_marked)
     logical, intent(in) :: is_marked(:)   !! [rows]
 

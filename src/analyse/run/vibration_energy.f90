@@ -28,22 +28,18 @@ contains
   type(vibration_t) function new_vibration(machine) result(self)
     type(machine_t), intent(in) :: machine
     type(rigid_motions_t) :: motions
-    real(wp), allocatable :: speeds(:), momentum(:, :)
+    real(wp), allocatable :: momentum(:, :)
     logical :: is_indefinite
-    integer :: b, k, m
+    integer :: k, m
 
     if (size(machine%elastic()) == 0) return
     associate (coordinates => machine%coordinates)
       motions = new_rigid_motions(coordinates%freedoms, new_element_coordinates(machine%elements, coordinates), &
                                   machine%elastic())
-      allocate (self%motion(machine%bodies, size(motions%free)), source=0.0_wp)
+      allocate (self%motion(machine%bodies, size(motions%free)))
       do m = 1, size(motions%free)
-        speeds = motions%speeds([(merge(1.0_wp, 0.0_wp, k == m), k=1, size(motions%free))])
-        do b = 1, machine%bodies
-          do k = coordinates%first(b), coordinates%first(b + 1) - 1
-            self%motion(b, m) = self%motion(b, m) + coordinates%ratio(1, k) * speeds(coordinates%coordinate(k))
-          end do
-        end do
+        self%motion(:, m) = coordinates%body_speeds(1, motions%speeds([(merge(1.0_wp, 0.0_wp, k == m), &
+                                                                        k=1, size(motions%free))]))
       end do
     end associate
     allocate (momentum, source=transpose(self%motion) * spread(machine%inertia(1, :), 1, size(motions%free)))

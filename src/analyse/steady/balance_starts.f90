@@ -86,7 +86,7 @@ contains
     type(block_solutions_t), intent(inout) :: block
     integer, parameter :: most_steps = 100
     real(wp), parameter :: tiny_step = 1.0e-13_wp, highest = 1.0e7_wp   ! relative; a speed [rad/s]
-    real(wp) :: slopes(size(z), size(z)), step(size(block%members)), weight(size(block%members)), before, factor
+    real(wp) :: slopes(size(z), size(z)), step(size(block%members)), weight(size(block%members)), ahead(size(z)), before, factor
     integer :: i
 
     associate (members => block%members)
@@ -100,12 +100,14 @@ contains
                        weight * balance%residual(members))
         factor = 1.0_wp
         do while (factor > 1.0e-6_wp)
-          call balance%evaluate(moved(z, members, factor * step))
+          ahead = z
+          ahead(members) = z(members) + factor * step
+          call balance%evaluate(ahead)
           if (norm2(weight * balance%residual(members)) < (1.0_wp - 1.0e-4_wp * factor) * before) exit
           factor = 0.5_wp * factor
         end do
         if (factor <= 1.0e-6_wp) exit
-        z(members) = z(members) + factor * step
+        z = ahead
         if (all(abs(step) <= tiny_step * abs(z(members)))) exit
       end do
       if (any(abs(z(members)) > highest .and. members <= size(balance%motions%free))) return
@@ -167,15 +169,5 @@ contains
       if (is_solved .or. any(abs(ahead(members)) > highest)) exit
     end do
   end subroutine solve_step
-
-  !> The unknowns after a step of some of them.
-  pure function moved(z, members, step)
-    real(wp), intent(in) :: z(:), step(:)   !! [unknowns], [members]
-    integer, intent(in) :: members(:)       !! unknowns of the block
-    real(wp) :: moved(size(z))
-
-    moved = z
-    moved(members) = moved(members) + step
-  end function moved
 
 end module nocdyn_balance_starts

@@ -170,19 +170,15 @@ contains
     class(torque_balance_t), intent(in) :: self
     real(wp), intent(in) :: v(:)   !! [coordinates]
     real(wp) :: torque(size(v))
-    real(wp) :: momentum
+    real(wp) :: momentum(self%formulation%machine%bodies)
     integer :: b, k
 
     torque = 0.0_wp
     associate (machine => self%formulation%machine, map => self%formulation%machine%coordinates)
+      momentum = map%body_speeds(1, v) * machine%inertia(1, :)
       do b = 1, machine%bodies
-        momentum = 0.0_wp
         do k = map%first(b), map%first(b + 1) - 1
-          momentum = momentum + map%ratio(1, k) * v(map%coordinate(k))
-        end do
-        momentum = momentum * machine%inertia(1, b)
-        do k = map%first(b), map%first(b + 1) - 1
-          torque(map%coordinate(k)) = torque(map%coordinate(k)) + map%ratio(1, k) * momentum
+          torque(map%coordinate(k)) = torque(map%coordinate(k)) + map%ratio(1, k) * momentum(b)
         end do
       end do
     end associate
@@ -193,18 +189,8 @@ contains
     class(torque_balance_t), intent(in) :: self
     real(wp), intent(in) :: s(:)   !! speeds of the rigid motions [rad/s], [freedoms]
     real(wp) :: omega(self%formulation%machine%bodies)
-    real(wp) :: v(self%coordinates)
-    integer :: b, k
 
-    v = self%motions%speeds(s)
-    associate (map => self%formulation%machine%coordinates)
-      do b = 1, size(omega)
-        omega(b) = 0.0_wp
-        do k = map%first(b), map%first(b + 1) - 1
-          omega(b) = omega(b) + map%ratio(1, k) * v(map%coordinate(k))
-        end do
-      end do
-    end associate
+    omega = self%formulation%machine%coordinates%body_speeds(1, self%motions%speeds(s))
   end function body_speeds
 
   !> Sets the state y from the unknowns, at the start angles.

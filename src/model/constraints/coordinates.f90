@@ -37,6 +37,7 @@ module nocdyn_coordinates
   contains
     procedure :: update_inertia
     procedure :: complement
+    procedure :: body_speeds
     procedure :: mobility
     procedure :: project
     procedure :: reactions_of_torques
@@ -81,7 +82,6 @@ contains
     allocate (self%imbalance(size(inertia, 2)), self%acceleration(self%freedoms))
   end subroutine build_coordinates
 
-  !> Numbers the coordinates.
   subroutine number_coordinates(groups, wanted, self, coordinate_of)
     type(geared_group_t), intent(in) :: groups(:)
     integer, intent(in) :: wanted(:)   !! as in `build_coordinates`
@@ -235,6 +235,22 @@ contains
       end do
     end do
   end function complement
+
+  !> L_tau q': the speeds of the bodies [rad/s], [bodies].
+  pure function body_speeds(self, lane, speed) result(omega)
+    class(coordinates_t), intent(in) :: self
+    integer, intent(in) :: lane
+    real(wp), intent(in) :: speed(:)   !! q' [rad/s], [freedoms]
+    real(wp) :: omega(size(self%first) - 1)
+    integer :: b, k
+
+    omega = 0.0_wp
+    do b = 1, size(omega)
+      do k = self%first(b), self%first(b + 1) - 1
+        omega(b) = omega(b) + self%ratio(lane, k) * speed(self%coordinate(k))
+      end do
+    end do
+  end function body_speeds
 
   !> L_tau (L_tau^T J L_tau)^-1 L_tau^T: the matrix from torques T to accelerations omega' [1/(kg m2)], [bodies, bodies].
   pure function mobility(self, lane) result(matrix)

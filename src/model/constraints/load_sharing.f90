@@ -71,7 +71,6 @@ contains
     call fill_blocks(redundancies, block_of, lanes, self%blocks)
   end function new_load_sharing
 
-  !> Assigns rows and redundancies to the blocks.
   subroutine fill_blocks(redundancies, block_of, lanes, blocks)
     type(redundancy_t), intent(in) :: redundancies(:)
     integer, intent(in) :: block_of(:)   !! block of each row, 0: none

@@ -66,7 +66,6 @@ contains
     call list_pairs(constraints, trains, self)
   end function new_reaction_solver
 
-  !> Lists the groups with relations.
   subroutine list_groups(groups, lanes, self)
     type(geared_group_t), intent(in) :: groups(:)
     integer, intent(in) :: lanes

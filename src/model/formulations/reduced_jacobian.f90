@@ -115,7 +115,6 @@ contains
     end do
   end subroutine form_products
 
-  !> Appends the positions of the internal states.
   subroutine append_internal(freedoms, incidence, with_work, internal, self)
     integer, intent(in) :: freedoms
     type(element_coordinates_t), intent(in) :: incidence
@@ -149,7 +148,6 @@ contains
     self%pattern%column = [self%pattern%column, added%column]
   end subroutine append_internal
 
-  !> Appends a position.
   subroutine add_position(row, column, pattern, next)
     integer, intent(in) :: row, column
     type(pattern_t), intent(inout) :: pattern
@@ -192,7 +190,6 @@ contains
     if (elements%internal%count > 0) call fill_internal(self, elements, at, dfdy)
   end subroutine fill
 
-  !> Computes the values that come from internal states.
   subroutine fill_internal(self, elements, before, dfdy)
     class(reduced_jacobian_t), intent(in) :: self
     type(elements_t), intent(in) :: elements

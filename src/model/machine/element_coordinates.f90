@@ -148,7 +148,6 @@ contains
     end do
   end function entry_elements
 
-  !> Number of coordinates of a body.
   pure integer function body_entries(coordinates, body)
     type(coordinates_t), intent(in) :: coordinates
     integer, intent(in) :: body   !! 0 = ground, which has none
@@ -182,7 +181,6 @@ contains
     end do
   end subroutine add_body
 
-  !> Sorts the entries of an element by their coordinates.
   pure subroutine sort_entries(self, begin, end)
     type(element_coordinates_t), intent(inout) :: self
     integer, intent(in) :: begin, end   !! first and last entry of the element

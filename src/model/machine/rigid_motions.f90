@@ -131,7 +131,6 @@ contains
     end associate
   end function significant
 
-  !> Removes all entries of a row.
   pure subroutine clear(row)
     type(row_t), intent(inout) :: row
 
@@ -139,7 +138,6 @@ contains
     row%used = 0
   end subroutine clear
 
-  !> Expresses every coordinate by the free ones.
   pure subroutine express_by_free(definition, row, self)
     type(linear_combination_t), intent(inout) :: definition(:)
     type(row_t), intent(inout) :: row

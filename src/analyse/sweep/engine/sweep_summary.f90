@@ -57,7 +57,6 @@ contains
     text = json%text()
   end function sweep_json
 
-  !> The design and the units of the targets.
   subroutine put_design(json, header)
     type(json_t), intent(inout) :: json
     type(sweep_header_t), intent(in) :: header

@@ -81,7 +81,6 @@ contains
     end do
   end subroutine restrict_statistics
 
-  !> Adds the statistics of one &record.
   subroutine add_statistics(input, record, labels, span, statistics, diagnostics)
     type(input_t), intent(in) :: input
     integer, intent(in) :: record   !! index of the &record

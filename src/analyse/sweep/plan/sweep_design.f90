@@ -144,7 +144,6 @@ contains
     end do
   end subroutine refuse_overrides
 
-  !> Reads the targets and factors of all &vary.
   subroutine read_varied(input, sweep, varied, targets, factors, diagnostics)
     type(input_t), intent(in) :: input
     integer, intent(in) :: sweep, varied(:)
