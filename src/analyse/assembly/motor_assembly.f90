@@ -68,7 +68,11 @@ contains
 
     body = groups%bodies('body', 1)
     if (modulo(form, 2) == 0) then
-      allocate (governor, source=governor_of(groups))
+      allocate (governor)
+      allocate (governor%set_speed, source=groups%values('governor_speed'))
+      allocate (governor%gain, source=groups%values('governor_gain'))
+      allocate (governor%time, source=groups%values('governor_time'))
+      allocate (governor%start, source=groups%values('governor_start'))
       allocate (drag, source=drags(groups))
     end if
     select case (form)
@@ -89,15 +93,6 @@ contains
                                             groups%values('flux_constant'), groups%values('inductance'), governor))
     end select
   end subroutine add_motor_form
-
-  type(governor_t) function governor_of(groups) result(governor)
-    type(element_groups_t), intent(in) :: groups
-
-    allocate (governor%set_speed, source=groups%values('governor_speed'))
-    allocate (governor%gain, source=groups%values('governor_gain'))
-    allocate (governor%time, source=groups%values('governor_time'))
-    allocate (governor%start, source=groups%values('governor_start'))
-  end function governor_of
 
   !> Torques at standstill [N m]: `a` of quadratic motors, `torque` of constant ones, k voltage / resistance of dc motors.
   function standstill_torques(groups) result(torques)

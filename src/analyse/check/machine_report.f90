@@ -269,12 +269,11 @@ contains
   pure real(wp) function own_ratio(machine, body) result(ratio)
     type(machine_t), intent(in) :: machine
     integer, intent(in) :: body
-    integer :: entry
 
-    ratio = 0.0_wp
-    do entry = machine%coordinates%first(body), machine%coordinates%first(body + 1) - 1
-      if (machine%coordinates%body(machine%coordinates%coordinate(entry)) == body) ratio = machine%coordinates%ratio(1, entry)
-    end do
+    associate (map => machine%coordinates, first => machine%coordinates%first(body), &
+               last => machine%coordinates%first(body + 1) - 1)
+      ratio = sum(map%ratio(1, first:last), mask=map%body(map%coordinate(first:last)) == body)
+    end associate
   end function own_ratio
 
 end module nocdyn_machine_report

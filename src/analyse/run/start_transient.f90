@@ -39,11 +39,12 @@ contains
     real(wp), intent(in) :: sizes(:)                               !! largest magnitudes of the columns
     real(wp), intent(in) :: lowest_time(:), highest_time(:)        !! of their extremes [s]
     type(start_transient_t), intent(out) :: transient
+    character(len=*), parameter :: swinging(5) = [character(len=8) :: 'twist', 'moment', 'damping', 'shaft', 'reaction']
     logical :: is_moment(size(labels)), swings(size(labels))
     integer :: i
 
     is_moment = [(quantity_of(labels(i)%text) == 'moment', i=1, size(labels))]
-    swings = [(swings_with_couplings(labels(i)), i=1, size(labels))]
+    swings = [(any(swinging == quantity_of(labels(i)%text)), i=1, size(labels))]
     transient%until = transient_end(machine, span(1), span(2), maxval(sizes, mask=is_moment))
     allocate (transient%has_lowest, source=swings .and. lowest_time > span(1) .and. lowest_time <= transient%until)
     allocate (transient%has_highest, source=swings .and. highest_time > span(1) .and. highest_time <= transient%until)
@@ -110,13 +111,5 @@ contains
       end do
     end associate
   end function moments_of_modes
-
-  !> Whether a column swings with the couplings: twists, moments and reactions do.
-  pure logical function swings_with_couplings(label)
-    type(string_t), intent(in) :: label
-
-    swings_with_couplings = any(quantity_of(label%text) == &
-                                [character(len=8) :: 'twist', 'moment', 'damping', 'shaft', 'reaction'])
-  end function swings_with_couplings
 
 end module nocdyn_start_transient

@@ -105,10 +105,8 @@ contains
     class(constraints_t), intent(in) :: self
     integer, intent(in) :: rows(:)
     type(constraints_t) :: some
-    integer, allocatable :: entry(:)
-    integer :: first(size(rows) + 1), i, k
+    integer :: entry(sum(self%first(rows + 1) - self%first(rows))), first(size(rows) + 1), i, k
 
-    allocate (entry(sum(self%first(rows + 1) - self%first(rows))))
     first(1) = 1
     do i = 1, size(rows)
       first(i + 1) = first(i) + self%entries(rows(i))
