@@ -110,11 +110,12 @@ contains
   subroutine project_start(nearest, machine)
     real(wp), intent(in) :: nearest(:)   !! [bodies] [rad/s]
     type(machine_t), intent(inout) :: machine
-    real(wp) :: lambda(machine%constraints%rows()), change(machine%bodies)
+    real(wp) :: lambda(machine%constraints%rows()), change(machine%bodies), imbalance(machine%bodies)
     integer :: row
 
     change = nearest - machine%start_speed(1, :)
-    call machine%coordinates%reactions_of_imbalances(1, machine%inertia(1, :) * change, lambda)
+    imbalance = machine%inertia(1, :) * change
+    call machine%coordinates%reactions%find_reactions(1, imbalance, lambda)
     allocate (machine%start_impulse)
     machine%start_impulse%row = pack([(row, row=1, size(lambda))], abs(lambda) > least_impulse * maxval(abs(lambda)))
     machine%start_impulse%impulse = lambda(machine%start_impulse%row)

@@ -9,21 +9,13 @@ module nocdyn_machine_report
   implicit none (type, external)
   private
 
-  public :: coordinate_names, machine_report, machine_notes, constraint_count
+  public :: machine_report, machine_notes, constraint_count
 
   integer, parameter :: max_names = 12    ! in a line
   integer, parameter :: max_lines = 40    ! of one sort in a report
   integer, parameter :: max_notes = 12    ! of one sort
 
 contains
-
-  !> The names of the independent bodies in the order of the coordinates.
-  function coordinate_names(machine) result(names)
-    type(machine_t), intent(in) :: machine
-    type(string_t), allocatable :: names(:)
-
-    allocate (names, source=selected(machine%names, machine%coordinates%body))
-  end function coordinate_names
 
   !> Notes on redundant constraints, on the start (speeds projected onto the constraints or rounded, a steady state), and on
   !> bodies that nothing moves.
@@ -143,7 +135,7 @@ contains
     end do
     call put_line(report, counted(machine%coordinates%freedoms, 'degree', 'degrees') // ' of freedom')
     call put_groups(report, machine)
-    call put_line(report, 'coordinates: ' // joined(coordinate_names(machine), ', ', max_lines))
+    call put_line(report, 'coordinates: ' // joined(selected(machine%names, machine%coordinates%body), ', ', max_lines))
     call put_relations(report, machine)
     allocate (notes, source=machine_notes(machine))
     do i = 1, size(notes)

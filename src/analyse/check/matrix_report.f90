@@ -8,10 +8,9 @@ module nocdyn_matrix_report
   use nocdyn_kinds, only: wp
   use nocdyn_lapack_lu, only: lu_factor, lu_solve
   use nocdyn_machine, only: machine_t
-  use nocdyn_machine_report, only: coordinate_names
   use nocdyn_paper_matrices, only: constrained_vector, elastic_moments, elastic_rates, inertia_matrices_t, new_paper_matrices, &
                                    paper_matrices_t, torque_vector, unit_matrix
-  use nocdyn_text, only: append, joined, rounded_text, string_t, to_text
+  use nocdyn_text, only: append, joined, rounded_text, selected, string_t, to_text
   use nocdyn_text_buffer, only: text_buffer_t
   implicit none (type, external)
   private
@@ -47,7 +46,7 @@ contains
     call set_start_state(equations%machine, t_start)
     call assemble(equations)
     call equations%report%append_line('Bodies 1 to ' // to_text(machine%bodies) // ': ' // joined(machine%names, ', '))
-    call equations%report%append_line('Coordinates: ' // joined(coordinate_names(machine), ', '))
+    call equations%report%append_line('Coordinates: ' // joined(selected(machine%names, machine%coordinates%body), ', '))
     call equations%report%append_line('At the start: t = ' // rounded_text(t_start, digits) // ' s')
     call report_other_laws(equations)
     call report_free_bodies(equations)

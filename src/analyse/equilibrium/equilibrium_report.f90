@@ -10,7 +10,6 @@ module nocdyn_equilibrium_report
   use nocdyn_json, only: json_t
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
-  use nocdyn_machine_report, only: coordinate_names
   use nocdyn_reduced, only: new_reduced
   use nocdyn_table_text, only: append_table, cell, cell_digits, clear_rounding, padded, rounding
   use nocdyn_text, only: rounded_text, selected, string_t, to_text
@@ -51,7 +50,9 @@ contains
 
     allocate (self%equilibria, source=equilibria)
     allocate (self%notes, source=notes)
-    allocate (self%coordinates, source=coordinate_names(formulation%machine))
+    associate (machine => formulation%machine)
+      allocate (self%coordinates, source=selected(machine%names, machine%coordinates%body))
+    end associate
     table = new_trajectory_table(new_reduced(formulation%machine, .true.), t_infinity, wanted)
     reported = steady_columns(table, formulation%machine)
     allocate (self%labels, source=selected(table%labels, reported))

@@ -106,7 +106,8 @@ contains
     class(recorded_columns_t), intent(inout) :: self
     integer, intent(in) :: lane
 
-    if (self%have_elastic) self%start_energy(lane) = self%kinetic_energy(lane) + elastic_energy(self, lane)
+    if (self%have_elastic) self%start_energy(lane) = self%kinetic_energy(lane) + &
+                                                     sum(self%formulation%machine%elements%stored(lane, :))
   end subroutine start_lane
 
   !> Takes a shift of the state of a lane.
@@ -178,7 +179,7 @@ contains
 
     associate (energies => self%energies)
       energies(column_kinetic) = self%kinetic_energy(lane)
-      if (self%have_elastic) energies(column_elastic) = elastic_energy(self, lane)
+      if (self%have_elastic) energies(column_elastic) = sum(self%formulation%machine%elements%stored(lane, :))
       if (.not. self%have_works) return
       energies(column_work_in) = work(self%works_in, self%formulation%states, lane, y)
       energies(column_work_out) = work(self%works_out, self%formulation%states, lane, y)
@@ -195,14 +196,6 @@ contains
 
     kinetic_energy = self%formulation%machine%kinetic_energy(lane, self%formulation%omega(lane, 1:))
   end function kinetic_energy
-
-  !> The potential energy of a lane [J].
-  pure real(wp) function elastic_energy(self, lane)
-    type(recorded_columns_t), intent(in) :: self
-    integer, intent(in) :: lane
-
-    elastic_energy = sum(self%formulation%machine%elements%stored(lane, :))
-  end function elastic_energy
 
   !> The sum of some work integrals of a lane, positive into the machine [J].
   pure real(wp) function work(works, states, lane, y)

@@ -7,7 +7,7 @@ module nocdyn_run_summary
   use nocdyn_json, only: json_t
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
-  use nocdyn_machine_report, only: coordinate_names, constraint_count, machine_notes
+  use nocdyn_machine_report, only: constraint_count, machine_notes
   use nocdyn_solver_status, only: max_switch_times, solver_status_t
   use nocdyn_run_settings, only: put_settings
   use nocdyn_observer, only: ranges_t
@@ -138,7 +138,7 @@ contains
     summary%gears = constraint_count(machine, 'gear')
     summary%constraints = machine%constraints%rows()
     summary%freedoms = machine%coordinates%freedoms
-    allocate (summary%coordinates, source=coordinate_names(machine))
+    allocate (summary%coordinates, source=selected(machine%names, machine%coordinates%body))
     allocate (summary%notes, source=machine_notes(machine))
   end subroutine describe_machine
 

@@ -45,7 +45,9 @@ contains
     call table%columns%observe(table%t, table%y)
     call table%columns%start_lane(1)
     table%start_kinetic = table%columns%kinetic_energy(1)
-    allocate (table%start_stored, source=stored_energies(table%columns%formulation%machine))
+    associate (machine => table%columns%formulation%machine)
+      table%start_stored = machine%elements%stored(1, machine%elastic())
+    end associate
   end function new_trajectory_table
 
   !> The row of the table at a time and state.
@@ -80,20 +82,10 @@ contains
       allocate (balance%work, source=y(formulation%states + 1:))
       allocate (balance%elastic_elements, source=element_names(machine, machine%elastic()))
       allocate (balance%stored_start, source=self%start_stored)
-      allocate (balance%stored_end, source=stored_energies(machine))
+      balance%stored_end = machine%elements%stored(1, machine%elastic())
     end associate
     balance%kinetic_start = self%start_kinetic
     balance%kinetic_end = self%columns%kinetic_energy(1)
   end subroutine find_energy_balance
-
-  !> The energies of the elastic elements [J], after `evaluate_energies` of the machine.
-  pure function stored_energies(machine) result(energies)
-    type(machine_t), intent(in) :: machine
-    real(wp), allocatable :: energies(:)
-    integer, allocatable :: elastic(:)
-
-    allocate (elastic, source=machine%elastic())
-    energies = machine%elements%stored(1, elastic)
-  end function stored_energies
 
 end module nocdyn_trajectory_table

@@ -41,7 +41,6 @@ module nocdyn_coordinates
     procedure :: mobility
     procedure :: project
     procedure :: reactions_of_torques
-    procedure :: reactions_of_imbalances
     procedure :: list_parameters
   end type coordinates_t
 
@@ -310,17 +309,6 @@ contains
     end do
     call self%reactions%find_reactions(lane, self%imbalance, lambda)
   end subroutine reactions_of_torques
-
-  !> Reactions of all rows from eq. (12), L_lambda^T lambda = J omega' - T, with given accelerations.
-  pure subroutine reactions_of_imbalances(self, lane, imbalance, lambda)
-    class(coordinates_t), intent(inout) :: self
-    integer, intent(in) :: lane
-    real(wp), intent(in) :: imbalance(:)   !! J omega' - T [N m], [bodies]
-    real(wp), intent(inout) :: lambda(:)   !! [rows]
-
-    self%imbalance(:) = imbalance
-    call self%reactions%find_reactions(lane, self%imbalance, lambda)
-  end subroutine reactions_of_imbalances
 
   !> Registers the arrays whose values may differ from variant to variant.
   subroutine list_parameters(self, parameters)

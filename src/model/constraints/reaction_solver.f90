@@ -144,7 +144,7 @@ contains
     end do
   end subroutine find_null_vectors
 
-  !> Reactions of all rows that balance moments on the bodies.
+  !> Reactions of all rows that balance moments on the bodies, eq. (12): L_lambda^T lambda = J omega' - T.
   pure subroutine find_reactions(self, lane, moment, lambda)
     class(reaction_solver_t), intent(inout) :: self
     integer, intent(in) :: lane
@@ -213,7 +213,9 @@ contains
     call parameters%add('reactions: other', self%other)
     do g = 1, size(self%groups)
       call parameters%add_structure(self%groups(g)%bodies)
-      call self%groups(g)%elimination%list_structure(parameters)
+      associate (order => self%groups(g)%elimination)
+        call parameters%add_structure(order%free, order%relation, order%train, order%core, order%core_trains)
+      end associate
       call parameters%add_blocks('reactions: dual', self%groups(g)%dual)
     end do
     call self%load_sharing%list_parameters(parameters)

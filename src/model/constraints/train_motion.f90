@@ -5,7 +5,6 @@
 module nocdyn_train_motion
   use nocdyn_complement, only: natural_complement
   use nocdyn_kinds, only: wp
-  use nocdyn_lane_parameters, only: lane_parameters_t
   use nocdyn_train_relations, only: train_relations_t
   implicit none (type, external)
   private
@@ -21,7 +20,6 @@ module nocdyn_train_motion
     integer, allocatable :: core_trains(:)   !! all trains in the core
   contains
     procedure :: has_relations
-    procedure :: list_structure
   end type elimination_t
 
   !> The motion of the trains of a group in one lane.
@@ -119,13 +117,5 @@ contains
 
     has_relations = size(self%relation) + size(self%core) > 0
   end function has_relations
-
-  !> Registers the integers on which the layout depends.
-  subroutine list_structure(self, parameters)
-    class(elimination_t), intent(in) :: self
-    type(lane_parameters_t), intent(inout) :: parameters
-
-    call parameters%add_structure(self%free, self%relation, self%train, self%core, self%core_trains)
-  end subroutine list_structure
 
 end module nocdyn_train_motion

@@ -182,7 +182,7 @@ contains
     real(wp), intent(out) :: lambda(:)   !! [rows]
 
     self%term(:) = self%machine%inertia(lane, :) * self%slope(lane, :self%machine%bodies) - self%torque(lane, 1:)
-    call self%machine%coordinates%reactions_of_imbalances(lane, self%term, lambda)
+    call self%machine%coordinates%reactions%find_reactions(lane, self%term, lambda)
   end subroutine reactions
 
 end module nocdyn_paper
