@@ -125,18 +125,10 @@ contains
     self%is_complete(lane) = .false.
     call self%block%reset_origin(lane)
     call self%linear%start_lane(self%block, lane, y)
-    if (self%uses_sampled) call start_sampled(self, self%sampled, lane, y)
+    if (.not. self%uses_sampled) return
+    if (self%parameters%arrays > 0) call self%sampled%recorded%copy_lane(lane, self%parameters)
+    call self%sampled%start_lane(lane, self%t_start, y)
   end subroutine start_lane
-
-  subroutine start_sampled(self, sampled, lane, y)
-    type(statistics_observer_t), intent(in) :: self
-    type(sampled_statistics_t), target, intent(inout) :: sampled
-    integer, intent(in) :: lane
-    real(wp), contiguous, intent(in) :: y(:)
-
-    if (self%parameters%arrays > 0) call sampled%recorded%copy_lane(lane, self%parameters)
-    call sampled%start_lane(lane, self%t_start, y)
-  end subroutine start_sampled
 
   !> The statistics of the last variant in a lane; NaN if it has not reached its end.
   subroutine results(self, lane, values)
