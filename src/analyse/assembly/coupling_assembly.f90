@@ -113,7 +113,8 @@ contains
     case (polynomial)
       call append_bank(banks, new_polynomial_couplings(shared, all_coefficients(groups)))
     case (gap)
-      call append_bank(banks, new_gap_couplings(shared, all_coefficients(groups), groups%values('gap')))
+      call append_bank(banks, new_gap_couplings(shared, all_coefficients(groups), groups%values('gap'), &
+                                                  groups%values('stiffness')))
     case (saturated)
       call append_bank(banks, new_saturated_couplings(shared, groups%values('stiffness'), groups%values('saturation')))
     case default

@@ -2,11 +2,11 @@
 module nocdyn_law_functions
   use nocdyn_law_expressions, only: add_list, apply, expression_t, node_of, operator(*), operator(+)
   use nocdyn_law_tape, only: law_node_t, op_cosine, op_exponential, op_harmonics, op_larger, op_log_cosh, op_ratio, &
-    op_sech_squared, op_sine, op_square_root, op_tanh
+    op_sech_squared, op_sine, op_size, op_square_root, op_tanh
   implicit none (type, external)
   private
 
-  public :: sin, cos, tanh, exp, sqrt, log_cosh, larger, ratio, polynomial, harmonics, add_guard
+  public :: sin, cos, tanh, exp, sqrt, log_cosh, larger, ratio, size_of, polynomial, harmonics, add_guard
 
   interface sin
     procedure :: sine_of
@@ -88,6 +88,14 @@ contains
 
     value = apply(x%tape, op_ratio, node_of(x), node_of(y))
   end function ratio
+
+  !> |c| of a constant c.
+  function size_of(c) result(value)
+    type(expression_t), intent(in) :: c
+    type(expression_t) :: value
+
+    value = apply(c%tape, op_size, c%node)
+  end function size_of
 
   !> Adds a function that is positive inside a branch of a switch. The boundary where it is zero is shifted outwards.
   subroutine add_guard(switch, branch, value, shift)

@@ -10,7 +10,7 @@ module nocdyn_gap_couplings
   use nocdyn_kinds, only: wp
   use nocdyn_law_expressions, only: expression_t, literal, node_of, operator(*), operator(+), operator(-), pick, &
     speed_of
-  use nocdyn_law_functions, only: add_guard, larger, polynomial, ratio
+  use nocdyn_law_functions, only: add_guard, larger, polynomial, ratio, size_of
   use nocdyn_law_tape, only: law_tape_t
   use nocdyn_polynomial_couplings, only: add_coefficients, coefficients_of
   implicit none (type, external)
@@ -35,24 +35,20 @@ contains
 
   !> Couplings with play, the elastic moment being sum p_k x^k of the penetration x. The damping is that in contact, the rest
   !> twist is at the middle of the gap, the friction acts in the gap and in contact.
-  function new_gap_couplings(common, coefficient, gap) result(bank)
+  function new_gap_couplings(common, coefficient, gap, stiffness) result(bank)
     type(coupling_common_t), intent(in) :: common   !! names, bodies, damping, rest twists, friction
     real(wp), intent(in) :: coefficient(:, :, :)       !! p_k [N m/rad^k], shape [order, lanes, couplings], some not zero
     real(wp), intent(in) :: gap(:, :)                  !! [rad], positive, shape [lanes, couplings]
+    real(wp), intent(in), optional :: stiffness(:, :)  !! of the key, [N m/rad]; p_1 is this where there are no others
     type(gap_couplings_t) :: bank
-    real(wp) :: scale(size(gap, 1), size(gap, 2))   ! stiffness that converts a penetration to a moment
-    integer :: e, k, l
+    integer :: e
 
     call bank%set_common(common)
-    call add_coefficients(bank, coefficient, bank%order)
-    do e = 1, size(bank%to)
-      do l = 1, size(gap, 1)
-        scale(l, e) = sum([(abs(coefficient(k, l, e)) * gap(l, e)**(k - 1), k=1, size(coefficient, 1))])
-      end do
-    end do
-    if (any(gap <= 0) .or. any(scale <= 0)) error stop 'nocdyn_gap_couplings: gaps have widths and edges stiffness'
-    call bank%add_parameter('gap', gap, is_key=.false.)
-    call bank%add_parameter('scale', scale, is_key=.false.)
+    call add_coefficients(bank, coefficient, bank%order, stiffness)
+    if (any(gap <= 0) .or. .not. all(any(abs(coefficient) > 0, dim=1))) then
+      error stop 'nocdyn_gap_couplings: gaps have widths and edges stiffness'
+    end if
+    call bank%add_parameter('gap', gap)
     bank%with_work = pack([(e, e=1, size(bank%to))], [(any(bank%with_work == e) .or. can_pull(coefficient(:, :, e)), &
                                                   e=1, size(bank%to))])
     bank%elastic = [(e, e=1, size(bank%to))]
@@ -107,16 +103,19 @@ contains
     picked = pick(1, choices)
   end function by_branch
 
-  !> The depth of the penetration of an edge as a moment, the elastic and the viscous moment, positive where they push the bodies
+  !> The depth of the penetration of an edge as a moment, by the stiffness sum |p_k| gap^(k - 1), the elastic and the viscous moment, positive where they push the bodies
   !> apart, decide on the branch.
   subroutine guard_branches(self, tape, w, half, p)
     class(gap_couplings_t), intent(in) :: self
     type(law_tape_t), target, intent(inout) :: tape
     type(expression_t), intent(in) :: w, half, p(:)
     type(expression_t) :: depth, elastic, scale, shift, viscous
-    integer :: beyond, side
+    integer :: beyond, k, side
 
-    scale = self%parameter(tape, 'scale')
+    scale = size_of(p(self%order))
+    do k = self%order - 1, 1, -1
+      scale = size_of(p(k)) + 2.0_wp * half * scale
+    end do
     shift = (boundary_width * 2.0_wp) * half * scale
     do side = 1, -1, -2
       beyond = merge(0, separating - free, side > 0)

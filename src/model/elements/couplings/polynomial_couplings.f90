@@ -12,6 +12,8 @@ module nocdyn_polynomial_couplings
 
   public :: new_polynomial_couplings, elastic_coefficients, add_coefficients, coefficients_of
 
+  character(len=*), parameter :: first_name = 'stiffness'   ! the parameter p_1, and the key that may give it alone
+
   !> M_el = -(p_1 w + p_2 w^2 + ...) on the second body, w = u - rest_twist; eqs. (2), (3) are p_1 and p_3.
   type, extends(couplings_t), public :: polynomial_couplings_t
     integer :: order = 1
@@ -48,17 +50,22 @@ contains
   end function elastic_coefficients
 
   !> Adds the coefficients as parameters, without those of high order that are zero everywhere.
-  subroutine add_coefficients(bank, coefficient, order)
+  subroutine add_coefficients(bank, coefficient, order, stiffness)
     class(bank_t), intent(inout) :: bank
     real(wp), intent(in) :: coefficient(:, :, :)   !! p_k [N m/rad^k], shape [order, lanes, couplings]
     integer, intent(out) :: order                  !! of the last one that is left, at least 1
+    real(wp), intent(in), optional :: stiffness(:, :)   !! of the key, shape [lanes, couplings]; p_1 where there are no others
+    logical :: is_key
     integer :: k
 
     order = 1
     do k = 2, size(coefficient, 1)
       if (any(abs(coefficient(k, :, :)) > 0)) order = k
     end do
-    do k = 1, order
+    is_key = .false.
+    if (order == 1 .and. present(stiffness)) is_key = .not. any(abs(coefficient(1, :, :) - stiffness) > 0)
+    call bank%add_parameter(first_name, coefficient(1, :, :), is_key)
+    do k = 2, order
       call bank%add_parameter('coefficient ' // to_text(k), coefficient(k, :, :), is_key=.false.)
     end do
   end subroutine add_coefficients
@@ -71,7 +78,8 @@ contains
     type(expression_t) :: p(order)
     integer :: k
 
-    do k = 1, order
+    p(1) = bank%parameter(tape, first_name)
+    do k = 2, order
       p(k) = bank%parameter(tape, 'coefficient ' // to_text(k))
     end do
   end function coefficients_of
