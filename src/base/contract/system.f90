@@ -44,6 +44,7 @@ module nocdyn_system
     logical :: hides_bends = .false. !! whether a series of the solution may not show a bend of it, however near, as that of tanh
     logical :: is_shared = .false.   !! whether its lanes are variants, which share vectors and are looked at little: other costs
     logical :: may_shift = .false.   !! whether `find_far` is called after every step
+    logical :: has_block_indicators = .false.   !! whether `block_indicators` is overridden; else lanes are looked at one by one
   contains
     procedure(derivative_interface), deferred :: derivative
     procedure(jacobian_interface), deferred :: jacobian
@@ -62,6 +63,7 @@ module nocdyn_system
     procedure :: series_cost
     procedure :: start_lane
     procedure :: indicator_values
+    procedure :: block_indicators
     procedure :: change_branch
     procedure :: switch_name
   end type system_t
@@ -230,6 +232,17 @@ contains
 
     error stop 'nocdyn_system: a system with switches overrides indicator_values'
   end subroutine indicator_values
+
+  !> The indicator functions of all lanes, with the same bits as `indicator_values`.
+  subroutine block_indicators(self, columns, t, y, g)
+    class(system_t), intent(inout) :: self
+    integer, intent(in) :: columns   !! at least `states`
+    real(wp), intent(in) :: t(self%lanes)
+    real(wp), intent(in) :: y(self%lanes, columns)
+    real(wp), intent(inout) :: g(self%lanes, self%switches)
+
+    error stop 'nocdyn_system: a system with block indicators overrides block_indicators'
+  end subroutine block_indicators
 
   !> A lane changes to the branch on the other side of an indicator's zero. The indicator must be zero or positive there
   !> afterwards. A boundary that is moved outwards a little, so that it is positive, prevents that rounding crosses back.

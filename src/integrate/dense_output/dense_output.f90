@@ -6,8 +6,9 @@ module nocdyn_dense_output
   implicit none (type, external)
   private
 
-  public :: allocate_dense_output, load_lane, sample, sample_batch
+  public :: allocate_dense_output, load_lane, sample, sample_batch, sample_lanes
 
+  integer, parameter, public :: strip = 8   !! lanes that are sampled together
   integer, parameter, public :: batch = 8   !! values of theta evaluated together: their sums are independent
 
   !> y(t + theta h) = sum over p = 0 to degree of c(:, p) theta^p.
@@ -70,6 +71,41 @@ contains
 
     call evaluate_batch(size(dense%y), dense%degree, theta, dense%c, dense%states)
   end subroutine sample_batch
+
+  !> The states of the lanes of a block at t + theta h for several theta of each, with the same bits as `sample`. Lanes that have
+  !> taken no step stay where they are.
+  pure subroutine sample_lanes(lanes, columns, degree, start, c, taken, theta, y)
+    integer, intent(in) :: lanes     !! at least `strip`
+    integer, intent(in) :: columns   !! padded
+    integer, intent(in) :: degree    !! of the polynomials
+    real(wp), intent(in) :: start(lanes, columns), c(lanes, columns, degree)   !! coefficients from the powers 0 and 1 on
+    logical, intent(in) :: taken(lanes)
+    real(wp), intent(in) :: theta(lanes, batch)   !! 0 to 1
+    real(wp), intent(inout) :: y(lanes, columns, batch)
+    real(wp) :: add(strip), sum(strip, batch), x(strip, batch)
+    logical :: moves(strip)
+    integer :: b, column, first, next, p
+
+    do next = 1, lanes, strip
+      first = min(next, lanes - strip + 1)
+      moves = taken(first:first + strip - 1)
+      x = theta(first:first + strip - 1, :)
+      do column = 1, columns
+        sum = 0.0_wp
+        do p = degree, 0, -1
+          if (p > 0) then
+            add = merge(c(first:first + strip - 1, column, p), 0.0_wp, moves)
+          else
+            add = start(first:first + strip - 1, column)
+          end if
+          do b = 1, batch
+            sum(:, b) = add + x(:, b) * sum(:, b)
+          end do
+        end do
+        y(first:first + strip - 1, column, :) = sum
+      end do
+    end do
+  end subroutine sample_lanes
 
   !> Horner's scheme for several arguments x.
   pure subroutine evaluate_batch(n, degree, x, c, y)

@@ -12,8 +12,8 @@ module nocdyn_root_functions
   implicit none (type, external)
   private
 
-  public :: allocate_root_functions, start_root_functions, scan_step, evaluate, part_end, part_bracket, find_root, &
-    find_grazing, sign_of
+  public :: allocate_root_functions, start_root_functions, set_start, scan_step, evaluate, parts_of, part_end, part_bracket, &
+    find_root, find_grazing, sign_of
 
   integer, parameter :: least_parts = 4   !! of a step; more for dense output of higher degree, whose steps are longer
   integer, parameter :: max_grazing_steps = 10
@@ -67,6 +67,16 @@ contains
     roots%side(lane, :) = sign_of(roots%last(:, lane))
   end subroutine start_root_functions
 
+  !> The same where the values are known.
+  pure subroutine set_start(roots, lane, g)
+    type(root_functions_t), intent(inout) :: roots
+    integer, intent(in) :: lane
+    real(wp), intent(in) :: g(:)   !! [functions]
+
+    roots%last(:, lane) = g
+    roots%side(lane, :) = sign_of(g)
+  end subroutine set_start
+
   !> Evaluates the functions at the ends of the parts of a lane's last step.
   subroutine scan_step(roots, system, observer, dense, theta_end)
     type(root_functions_t), intent(inout) :: roots
@@ -91,7 +101,7 @@ contains
   end subroutine scan_step
 
   !> The number of parts of a step.
-  pure integer function parts_of(degree)
+  elemental integer function parts_of(degree)
     integer, intent(in) :: degree   !! of its dense output
 
     parts_of = max(least_parts, degree / 2)

@@ -1,18 +1,19 @@
 !> Switching of branches. Steps end where an indicator function falls through zero; there the system changes its branch.
 module nocdyn_switching
+  use nocdyn_block_scan, only: allocate_block_scan, block_scan_t, scan_block
   use nocdyn_dense_output, only: dense_output_t
   use nocdyn_finite, only: is_finite
   use nocdyn_kinds, only: wp
   use nocdyn_observer, only: observer_t
   use nocdyn_root_functions, only: allocate_root_functions, bracket_t, evaluate, find_grazing, find_root, part_bracket, &
-    part_end, root_functions_t, scan_step, sign_of, start_root_functions
+    part_end, root_functions_t, scan_step, set_start, sign_of
   use nocdyn_solver_status, only: count_crossing, integration_chattering, solver_status_t
   use nocdyn_step_attempt, only: step_attempt_t
   use nocdyn_system, only: system_t
   implicit none (type, external)
   private
 
-  public :: allocate_switching, start_switching, find_crossing, cross_boundaries
+  public :: allocate_switching, start_switching, scan_for_crossings, may_cross, find_crossing, cross_boundaries
 
   integer, parameter :: max_repeats = 100   ! crossings of one boundary without progress in time; more are chattering
   real(wp), parameter :: negligible = 1.0e-10_wp          ! of the duration: a shorter time between crossings is no progress
@@ -24,6 +25,7 @@ module nocdyn_switching
     real(wp), allocatable, private :: last_time(:)         !! of the last crossing of each lane [s]
     integer, allocatable, private :: repeats(:, :)         !! crossings since the lane made progress, [lanes, functions]
     type(root_functions_t), private :: roots
+    type(block_scan_t), private :: scan
     real(wp), allocatable, private :: g(:)   !! indicators where a lane crosses, or at the first crossing so far
     real(wp), allocatable, private :: y(:)
   end type switching_t
@@ -44,21 +46,41 @@ contains
     allocate (switching%repeats(attempt%lanes, system%switches), source=0)
     allocate (switching%g(system%switches), switching%y(attempt%components), source=0.0_wp)
     call allocate_root_functions(switching%roots, system%switches, .true., degree, attempt)
+    call allocate_block_scan(switching%scan, system, degree, attempt)
   end subroutine allocate_switching
 
   !> Starts a lane on the branches that the system has chosen; branches that do not hold there change at once.
-  subroutine start_switching(switching, system, observer, attempt, lane, solver_status)
+  subroutine start_switching(switching, system, attempt, lane, solver_status)
     type(switching_t), intent(inout) :: switching
     class(system_t), intent(inout) :: system
-    class(observer_t), intent(inout) :: observer
     type(step_attempt_t), intent(in) :: attempt
     integer, intent(in) :: lane
     type(solver_status_t), intent(inout) :: solver_status
 
     switching%last_time(lane) = no_time
     switching%pending(lane) = 0
-    call cross_boundaries(switching, system, observer, attempt, lane, solver_status)
+    call cross_boundaries(switching, system, attempt, lane, solver_status)
   end subroutine start_switching
+
+  !> Looks at the last steps of all lanes at once, if the system can; before `may_cross` and `find_crossing`.
+  subroutine scan_for_crossings(switching, system, attempt, coefficients, taken)
+    type(switching_t), intent(inout) :: switching
+    class(system_t), intent(inout) :: system
+    type(step_attempt_t), intent(in) :: attempt
+    real(wp), contiguous, intent(in) :: coefficients(:, :, :)   !! of the dense output, [lanes, padded columns, degree]
+    logical, intent(in) :: taken(:)                             !! whether the lane has taken a step, [lanes]
+
+    if (switching%scan%is_used) call scan_block(switching%scan, system, attempt, coefficients, taken, switching%roots%side)
+  end subroutine scan_for_crossings
+
+  !> Whether a lane may have crossed a boundary in its last step.
+  pure logical function may_cross(switching, lane)
+    type(switching_t), intent(in) :: switching
+    integer, intent(in) :: lane
+
+    may_cross = .true.
+    if (switching%scan%is_used) may_cross = switching%scan%is_near(lane)
+  end function may_cross
 
   !> Finds the first crossing in the last step of a lane: the theta where an indicator falls through zero. An indicator that is
   !> zero at the start and then negative crosses at the start.
@@ -72,7 +94,11 @@ contains
 
     theta = 1.0_wp
     switching%pending(dense%lane) = 0
-    call scan_step(switching%roots, system, observer, dense, 1.0_wp)
+    if (switching%scan%is_used) then
+      call take_scan(switching%scan, dense%lane, switching%roots)
+    else
+      call scan_step(switching%roots, system, observer, dense, 1.0_wp)
+    end if
     do part = 1, switching%roots%parts
       do function = 1, size(switching%g)
         associate (side => switching%roots%side(dense%lane, function), g => switching%roots%values(function, part))
@@ -89,7 +115,21 @@ contains
       if (switching%pending(dense%lane) > 0) exit
     end do
     call find_grazing_crossings(switching, system, observer, dense, theta)
+    if (switching%scan%is_used) switching%scan%g(dense%lane, :, 0) = switching%roots%values(:, switching%roots%parts)
   end subroutine find_crossing
+
+  !> Takes the values of one lane.
+  pure subroutine take_scan(scan, lane, roots)
+    type(block_scan_t), intent(in) :: scan
+    integer, intent(in) :: lane
+    type(root_functions_t), intent(inout) :: roots
+    integer :: part
+
+    roots%parts = scan%parts(lane)
+    do part = 0, roots%parts
+      roots%values(:, part) = scan%g(lane, :, part)
+    end do
+  end subroutine take_scan
 
   !> Replaces the crossing at theta by that of one indicator in a bracket, if that is earlier. Of many indicators with a crossing
   !> in one part of a step, most are still positive at the first crossing so far, so that few roots have to be found.
@@ -167,10 +207,9 @@ contains
 
   !> Changes the branch at the pending boundary, then at all other boundaries that the lane has reached or passed, until there are
   !> none. Ends the lane with `integration_chattering` if that does not end.
-  subroutine cross_boundaries(switching, system, observer, attempt, lane, solver_status)
+  subroutine cross_boundaries(switching, system, attempt, lane, solver_status)
     type(switching_t), intent(inout) :: switching
     class(system_t), intent(inout) :: system
-    class(observer_t), intent(inout) :: observer
     type(step_attempt_t), intent(in) :: attempt
     integer, intent(in) :: lane
     type(solver_status_t), intent(inout) :: solver_status
@@ -194,7 +233,8 @@ contains
     end do
     if (crossed) solver_status%code(lane) = integration_chattering
     switching%pending(lane) = 0
-    call start_root_functions(switching%roots, system, observer, attempt, lane)
+    call set_start(switching%roots, lane, switching%g)
+    if (switching%scan%is_used) switching%scan%g(lane, :, 0) = switching%g
   end subroutine cross_boundaries
 
   !> Changes the branches of all indicators that are not above a limit.

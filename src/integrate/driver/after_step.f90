@@ -10,7 +10,7 @@ module nocdyn_after_step
     solver_status_t
   use nocdyn_step_control, only: resume_control
   use nocdyn_stepper, only: stepper_t
-  use nocdyn_switching, only: cross_boundaries, find_crossing
+  use nocdyn_switching, only: cross_boundaries, find_crossing, may_cross, scan_for_crossings
   use nocdyn_system, only: system_t
   use nocdyn_time_stepping, only: evaluate_starts, integrator_t
   implicit none (type, external)
@@ -28,16 +28,24 @@ contains
     real(wp), contiguous, intent(in) :: times(:)   !! output times [s]
     class(observer_t), intent(inout) :: observer
     type(solver_status_t), intent(inout) :: solver_status
+    logical :: crosses   ! whether the lane may cross a boundary
     integer :: lane
 
     associate (steps => integrator%steps)
       steps%theta_end(:) = 1.0_wp
       steps%crosses(:) = .false.
       if (.not. integrator%inspects) return
+      if (integrator%has_switches .and. count(integrator%accepted) > 0) then
+        call scan_for_crossings(integrator%switching, system, integrator%attempt, integrator%coefficients, integrator%accepted)
+      end if
       do lane = 1, integrator%attempt%lanes
         if (.not. integrator%accepted(lane)) cycle
-        if (integrator%inspected(lane)) call load_lane(integrator%dense, integrator%attempt, integrator%coefficients, lane)
-        if (integrator%has_switches) then
+        crosses = .false.
+        if (integrator%has_switches) crosses = may_cross(integrator%switching, lane)
+        if (crosses .or. is_sampled(integrator, lane)) then
+          call load_lane(integrator%dense, integrator%attempt, integrator%coefficients, lane)
+        end if
+        if (crosses) then
           call end_at_crossing(integrator, system, observer, lane, solver_status, steps%theta_end(lane))
           steps%crosses(lane) = integrator%switching%pending(lane) > 0
         end if
@@ -53,6 +61,15 @@ contains
       end do
     end associate
   end subroutine process_steps
+
+  !> Whether the dense output of a lane is sampled for anything but its crossings.
+  pure logical function is_sampled(integrator, lane)
+    type(integrator_t), intent(in) :: integrator
+    integer, intent(in) :: lane
+
+    is_sampled = integrator%has_events .or. integrator%has_extremes .or. &
+                 integrator%next_time(lane) < integrator%t_new(lane)
+  end function is_sampled
 
   !> Passes the steps of the whole block to an observer that wants them, after `process_steps`.
   subroutine observe_steps(integrator, stepper, observer)
@@ -173,7 +190,7 @@ contains
         starting(lane) = integrator%accepted(lane) .and. solver_status%code(lane) == integration_running &
                          .and. integrator%switching%pending(lane) > 0
         if (.not. starting(lane)) cycle
-        call cross_boundaries(integrator%switching, system, observer, attempt, lane, solver_status)
+        call cross_boundaries(integrator%switching, system, attempt, lane, solver_status)
         call resume_control(integrator%control, lane, solver_status%h(lane))
       end do
       if (.not. any(starting)) return

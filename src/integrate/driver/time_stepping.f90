@@ -188,7 +188,7 @@ contains
         if (.not. integrator%starting(lane)) cycle
         integrator%sample(:) = attempt%y(lane, :attempt%components)
         call system%start_lane(lane, attempt%t(lane), integrator%sample)
-        if (integrator%has_switches) call start_switching(integrator%switching, system, observer, attempt, lane, solver_status)
+        if (integrator%has_switches) call start_switching(integrator%switching, system, attempt, lane, solver_status)
       end do
       call evaluate_starts(integrator, system, solver_status)
       call measure_start(integrator%control, system, attempt, integrator%starting)

@@ -66,6 +66,7 @@ module nocdyn_described_elements
     procedure :: evaluate
     procedure :: choose
     procedure :: indicator
+    procedure :: block_indicators
     procedure :: list_parameters
   end type described_elements_t
 
@@ -342,5 +343,16 @@ contains
     call self%law%numbers%lowest_guard(self%law%law%slot(lane, self%switch_element(switch)), number_in_element(self, switch), &
                                        self%branch(lane, switch), motion, internal, .true., distance)
   end subroutine indicator
+
+  !> The same for all switches and the lanes of a block.
+  subroutine block_indicators(self, time, angle, speed, internal, distance)
+    class(described_elements_t), intent(inout) :: self
+    real(wp), intent(in) :: time(self%lanes)                         !! t [s]
+    real(wp), intent(in) :: angle(self%values), speed(self%values)   !! u [rad], u' [rad/s], [lanes, elements]
+    real(wp), intent(in) :: internal(self%internal_values)           !! [lanes, states, elements]
+    real(wp), intent(inout) :: distance(:, :)                        !! [lanes, switches]
+
+    call self%law%lowest_guards(self%branch, time, angle, speed, internal, distance)
+  end subroutine block_indicators
 
 end module nocdyn_described_elements

@@ -27,6 +27,7 @@ module nocdyn_element_laws
     type(law_work_t) :: series                  !! the same with the coefficients of a series
     type(law_work_t), private :: tangents       !! the same with two coefficients more
     type(law_work_t), private :: energies
+    type(law_work_t), private :: guards
     logical :: is_ready = .false.               !! whether there is work space for values and guards
     type(law_numbers_t) :: numbers              !! the guards, and all values if there are few elements
   contains
@@ -34,6 +35,7 @@ module nocdyn_element_laws
     procedure :: evaluate
     procedure :: differentiate
     procedure :: evaluate_energies
+    procedure :: lowest_guards
     procedure :: make_ready
     procedure :: prepare_series
   end type element_law_t
@@ -68,6 +70,9 @@ contains
       self%values = new_law_work(tape, tape%needed(motion(tape), .false.), 0, w, groups)
       self%tangents = new_law_work(tape, tape%needed(motion(tape), .true.), 2, w, groups)
       self%energies = new_law_work(tape, tape%needed([tape%stored, tape%secant, tape%damping], .false.), 0, w, groups)
+      if (self%law%strip > 1 .and. size(tape%guard) > 0) then
+        self%guards = new_law_work(tape, tape%needed(tape%guard, .false.), 0, w, groups)
+      end if
       self%numbers = new_law_numbers(self%law, motion(tape))
     end associate
     do slot = 1, size(self%law%constant, 1)
@@ -273,6 +278,49 @@ contains
       end do
     end associate
   end subroutine evaluate_energies
+
+  !> The lowest guards of the present branches of the switches in a block of lanes: positive inside the branches.
+  subroutine lowest_guards(self, branch, time, angle, speed, internal, g)
+    class(element_law_t), intent(inout) :: self
+    integer, intent(in) :: branch(:, :)                                                  !! [lanes, switches]
+    real(wp), intent(in) :: time(self%law%lanes)                                         !! t [s]
+    real(wp), intent(in), dimension(self%law%lanes, self%law%elements) :: angle, speed   !! u [rad], u' [rad/s]
+    real(wp), intent(in) :: internal(self%law%lanes, self%states, self%law%elements)     !! internal states
+    real(wp), intent(inout) :: g(:, :)   !! in the unit of the guards, [lanes, switches]
+    integer :: e, first, i, last, strip, switch
+
+    if (.not. self%is_ready) call make_ready(self)
+    g = huge(g)
+    associate (law => self%law, tape => self%law%tape, work => self%guards)
+      do strip = 1, law%strips
+        first = law%strip * (strip - 1) + 1
+        last = min(law%strip * strip, law%lanes)
+        call load_inputs(self, work, strip, time, angle, speed, internal)
+        call walk(law, work, 0, law%groups * (strip - 1) + 1)
+        do i = 1, size(tape%guard)
+          do e = 1, law%elements
+            switch = (tape%guarded_switch(i) - 1) * law%elements + e
+            call keep_lower(last - first + 1, tape%guarded_branch(i), branch(first:last, switch), &
+                            work%pool(work%address(tape%guard(i), 0, e)), &
+                            law%constant(law%slot(first, e), law%column(tape%guard_shift(i))), g(first:last, switch))
+          end do
+        end do
+      end do
+    end associate
+  end subroutine lowest_guards
+
+  !> Lowers g to a guard, with its boundary shifted outwards, where a branch is the present one.
+  pure subroutine keep_lower(lanes, branch, present_branch, guard, shift, g)
+    integer, intent(in) :: lanes, branch   !! 0: all branches
+    integer, intent(in) :: present_branch(lanes)
+    real(wp), intent(in) :: guard(lanes), shift(lanes)
+    real(wp), intent(inout) :: g(lanes)
+    integer :: l
+
+    do l = 1, lanes
+      g(l) = merge(min(g(l), guard(l) + shift(l)), g(l), branch == 0 .or. present_branch(l) == branch)
+    end do
+  end subroutine keep_lower
 
   !> Allocates work space for Taylor series.
   subroutine prepare_series(self, order)

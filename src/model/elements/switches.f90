@@ -18,6 +18,7 @@ module nocdyn_switches
   contains
     procedure :: choose
     procedure :: indicator
+    procedure :: block_indicators
     procedure :: name
   end type switches_t
 
@@ -71,6 +72,30 @@ contains
     call banks(self%bank(switch))%bank%indicator(self%number(switch), lane, motion, &
                                                  internal(self%first_internal(switch):self%last_internal(switch)), distance)
   end subroutine indicator
+
+  !> The same for all switches and the lanes of a block.
+  subroutine block_indicators(self, banks, time, angle, speed, internal, distance)
+    class(switches_t), intent(in) :: self
+    type(bank_slot_t), intent(inout) :: banks(:)
+    real(wp), intent(in) :: time(:)                   !! t [s], [lanes]
+    real(wp), contiguous, intent(in) :: angle(:, :), speed(:, :)  !! of the elements of the switches [rad], [rad/s], [lanes, switches]
+    real(wp), contiguous, intent(in) :: internal(:, :)            !! [lanes, states of all elements]
+    real(wp), intent(inout) :: distance(:, :)         !! in units of the laws, [lanes, switches]
+    integer :: first, i
+
+    first = 1
+    do i = 1, size(banks)
+      associate (bank => banks(i)%bank)
+        associate (last => first + size(bank%switch_element) - 1)
+          if (last < first) cycle
+          call bank%block_indicators(time, angle(:, first:first + bank%count - 1), speed(:, first:first + bank%count - 1), &
+                                     internal(:, bank%first_internal:bank%first_internal + bank%states * bank%count - 1), &
+                                     distance(:, first:last))
+          first = last + 1
+        end associate
+      end associate
+    end do
+  end subroutine block_indicators
 
   !> E.g. "edge of the gap of coupling 'mesh'".
   function name(self, banks, switch)

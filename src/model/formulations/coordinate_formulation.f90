@@ -21,6 +21,7 @@ module nocdyn_coordinate_formulation
     type(element_coordinates_t) :: incidence             !! entries of which U is made
     type(element_coordinates_t) :: switching             !! entries of the elements that switch
     type(moving_origin_t), private :: origin
+    real(wp), allocatable, private :: switch_angle(:, :), switch_speed(:, :)   !! of the elements that switch, [lanes, switches]
   contains
     procedure :: set_coordinates
     procedure :: list_coordinates
@@ -36,6 +37,7 @@ module nocdyn_coordinate_formulation
     procedure :: angle_at_zero
     procedure :: twist_at_zero
     procedure :: switch_motion
+    procedure :: block_indicators
     procedure :: reactions
   end type coordinate_formulation_t
 
@@ -61,6 +63,9 @@ contains
       has_offset(self%origin%turning) = .true.
       self%twists = twist_map(incidence, has_offset, without_bands=is_block)
       self%may_shift = size(self%origin%motions%free) > 0
+      self%has_block_indicators = machine%lanes > 1
+      allocate (self%switch_angle(machine%lanes, machine%switches%count), source=0.0_wp)
+      allocate (self%switch_speed(machine%lanes, machine%switches%count), source=0.0_wp)
       allocate (couplings, source=coupling_elements(machine))
       turning = incidence%selected(couplings, with_ratio_only=.true.)
       call self%set_norm(new_error_measures(couplings, turning%first, turning%coordinate, turning%ratio, &
@@ -241,6 +246,30 @@ contains
       end do
     end associate
   end subroutine switch_motion
+
+  subroutine block_indicators(self, columns, t, y, g)
+    class(coordinate_formulation_t), intent(inout) :: self
+    integer, intent(in) :: columns
+    real(wp), intent(in) :: t(self%lanes)                         !! [s]
+    real(wp), intent(in) :: y(self%lanes, columns)
+    real(wp), intent(inout) :: g(self%lanes, self%switches)
+    integer :: k, l, switch
+
+    associate (switches => self%machine%switches, angle => self%switch_angle, speed => self%switch_speed, &
+               entries => self%switching, f => self%machine%coordinates%freedoms)
+      do switch = 1, self%switches
+        angle(:, switch) = self%twist_at_origin(:, switches%element(switch))
+        speed(:, switch) = 0.0_wp
+        do k = entries%first(switch), entries%first(switch + 1) - 1
+          do l = 1, self%lanes
+            angle(l, switch) = angle(l, switch) + entries%ratio(l, k) * y(l, f + entries%coordinate(k))
+            speed(l, switch) = speed(l, switch) + entries%ratio(l, k) * y(l, entries%coordinate(k))
+          end do
+        end do
+      end do
+      call switches%block_indicators(self%machine%banks, t, angle, speed, y(:, self%mechanical + 1:self%states), g)
+    end associate
+  end subroutine block_indicators
 
   !> Reactions from the torques of the last `observe`.
   subroutine reactions(self, lane, lambda)
