@@ -63,6 +63,7 @@ module nocdyn_system
     procedure :: series_cost
     procedure :: start_lane
     procedure :: indicator_values
+    procedure :: set_indicator
     procedure :: block_indicators
     procedure :: change_branch
     procedure :: switch_name
@@ -232,6 +233,17 @@ contains
 
     error stop 'nocdyn_system: a system with switches overrides indicator_values'
   end subroutine indicator_values
+
+  !> Sets one indicator function of a lane; by default all are evaluated.
+  subroutine set_indicator(self, which, lane, t, y, g)
+    class(system_t), intent(inout) :: self
+    integer, intent(in) :: which, lane            !! index of the indicator function; lane
+    real(wp), intent(in) :: t
+    real(wp), contiguous, intent(in) :: y(:)      !! [states + quadratures]
+    real(wp), contiguous, intent(inout) :: g(:)   !! [switches], of which g(which) is set at least
+
+    call self%indicator_values(lane, t, y, g)
+  end subroutine set_indicator
 
   !> The indicator functions of all lanes, with the same bits as `indicator_values`.
   subroutine block_indicators(self, columns, t, y, g)

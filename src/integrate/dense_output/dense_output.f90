@@ -8,6 +8,7 @@ module nocdyn_dense_output
 
   public :: allocate_dense_output, load_lane, sample, sample_batch, sample_lanes
 
+  integer, parameter :: long = 4 * width     ! numbers whose sums do not wait for one another
   integer, parameter, public :: strip = 8   !! lanes that are sampled together
   integer, parameter, public :: batch = 8   !! values of theta evaluated together: their sums are independent
 
@@ -137,6 +138,7 @@ contains
     real(wp), intent(in) :: x
     real(wp), intent(in) :: c(n, 0:degree)
     real(wp), intent(inout) :: y(n)
+    real(wp) :: sum(long)
     integer :: i, p
 
     select case (degree)
@@ -160,9 +162,19 @@ contains
         end associate
       end do
     case default
-      y(:) = c(:, degree)
-      do p = degree - 1, 0, -1
-        y(:) = c(:, p) + x * y
+      do i = 1, n - long + 1, long
+        sum = c(i:i + long - 1, degree)
+        do p = degree - 1, 0, -1
+          sum = c(i:i + long - 1, p) + x * sum
+        end do
+        y(i:i + long - 1) = sum
+      end do
+      do i = i, n, width
+        sum(:width) = c(i:i + width - 1, degree)
+        do p = degree - 1, 0, -1
+          sum(:width) = c(i:i + width - 1, p) + x * sum(:width)
+        end do
+        y(i:i + width - 1) = sum(:width)
       end do
     end select
   end subroutine evaluate

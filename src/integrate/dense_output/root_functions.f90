@@ -26,7 +26,7 @@ module nocdyn_root_functions
     integer, allocatable :: side(:, :)                  !! sign of the last value, 0 after a zero; [lanes, functions]
     real(wp), allocatable :: values(:, :)               !! at their ends; [functions, 0:most parts]
     real(wp), allocatable, private :: last(:, :)        !! values at the end of the last step; [functions, lanes]
-    real(wp), allocatable, private :: g(:)
+    real(wp), allocatable :: g(:)                       !! values at one theta
     real(wp), allocatable, private :: y(:)              !! state at which the functions are evaluated
   end type root_functions_t
 
@@ -137,21 +137,26 @@ contains
     if (is_finite(g)) sign_of = merge(1, 0, g > 0) - merge(1, 0, g < 0)
   end function sign_of
 
-  !> Evaluates the functions at theta.
-  subroutine evaluate(of_system, system, observer, dense, theta, y, g)
-    logical, intent(in) :: of_system
+  !> Evaluates one function at theta: sets its element of `g`.
+  subroutine evaluate(roots, system, observer, dense, function, theta)
+    type(root_functions_t), intent(inout) :: roots
     class(system_t), intent(inout) :: system
     class(observer_t), intent(inout) :: observer
     type(dense_output_t), intent(inout) :: dense
+    integer, intent(in) :: function
     real(wp), intent(in) :: theta
-    real(wp), contiguous, intent(inout) :: y(:)   !! state there
-    real(wp), contiguous, intent(inout) :: g(:)   !! [functions]
 
-    call sample(dense, theta, y)
-    call evaluate_at(of_system, system, observer, dense%lane, dense%t + theta * dense%h, y, g)
+    call sample(dense, theta, roots%y)
+    associate (t => dense%t + theta * dense%h)
+      if (roots%of_system) then
+        call system%set_indicator(function, dense%lane, t, roots%y, roots%g)
+      else
+        call observer%event_values(dense%lane, t, roots%y, roots%g)
+      end if
+    end associate
   end subroutine evaluate
 
-  !> The same where the state is known.
+  !> Evaluates the functions at a state.
   subroutine evaluate_at(of_system, system, observer, lane, t, y, g)
     logical, intent(in) :: of_system
     class(system_t), intent(inout) :: system
@@ -185,10 +190,13 @@ contains
     b = bracket%before
     ga = bracket%g_after
     gb = bracket%g_before
-    fraction = 0.5_wp
+    fraction = ga / (ga - gb)
+    if (.not. is_finite(fraction)) fraction = 0.5_wp
+    least = min(0.5_wp, tolerance / abs(b - a))
+    fraction = min(1 - least, max(least, fraction))
     do while (abs(ga) > 0 .and. abs(b - a) > 2 * tolerance)
       x = a + fraction * (b - a)
-      call evaluate(roots%of_system, system, observer, dense, x, roots%y, roots%g)
+      call evaluate(roots, system, observer, dense, bracket%function, x)
       if (sign_of(roots%g(bracket%function)) == sign_of(ga)) then
         c = a
         gc = ga
@@ -240,7 +248,7 @@ contains
     do step = 1, max_grazing_steps
       call guess_minimum(x, g, lowest, is_promising)
       if (.not. is_promising) return
-      call evaluate(roots%of_system, system, observer, dense, lowest, roots%y, roots%g)
+      call evaluate(roots, system, observer, dense, function, lowest)
       if (.not. is_finite(roots%g(function))) return
       left = merge(2, 1, lowest > x(2))
       found = roots%g(function) <= 0

@@ -26,7 +26,7 @@ module nocdyn_switching
     integer, allocatable, private :: repeats(:, :)         !! crossings since the lane made progress, [lanes, functions]
     type(root_functions_t), private :: roots
     type(block_scan_t), private :: scan
-    real(wp), allocatable, private :: g(:)   !! indicators where a lane crosses, or at the first crossing so far
+    real(wp), allocatable, private :: g(:)   !! indicators where a lane crosses
     real(wp), allocatable, private :: y(:)
   end type switching_t
 
@@ -146,17 +146,19 @@ contains
     bracket = whole
     if (switching%pending(dense%lane) > 0) then
       if (theta <= bracket%before) return
-      if (theta < bracket%after .and. is_finite(switching%g(bracket%function))) then
-        if (switching%g(bracket%function) > 0) return
-        bracket%after = theta
-        bracket%g_after = switching%g(bracket%function)
+      if (theta < bracket%after) then
+        call evaluate(switching%roots, system, observer, dense, bracket%function, theta)
+        associate (g => switching%roots%g(bracket%function))
+          if (is_finite(g)) then
+            if (g > 0) return
+            bracket%after = theta
+            bracket%g_after = g
+          end if
+        end associate
       end if
     end if
     call find_root(switching%roots, system, observer, dense, bracket, root)
     call keep_first(switching, dense%lane, bracket%function, root, theta)
-    if (switching%pending(dense%lane) == bracket%function) then
-      call evaluate(.true., system, observer, dense, theta, switching%y, switching%g)
-    end if
   end subroutine find_earlier_crossing
 
   !> The same for crossings from which an indicator returns before the end of a part, as at a grazing contact.

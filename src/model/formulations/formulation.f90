@@ -41,6 +41,7 @@ module nocdyn_formulation
     procedure :: refresh_lane
     procedure :: start_lane
     procedure :: indicator_values
+    procedure :: set_indicator
     procedure :: change_branch
     procedure :: switch_name
   end type formulation_t
@@ -243,17 +244,27 @@ contains
     real(wp), intent(in) :: t                     !! [s]
     real(wp), contiguous, intent(in) :: y(:)      !! state, [states + quadratures]
     real(wp), contiguous, intent(inout) :: g(:)   !! [switches]
-    real(wp) :: angle, speed
     integer :: switch
 
-    associate (switches => self%machine%switches)
-      do switch = 1, self%switches
-        call self%switch_motion(lane, switch, y, angle, speed)
-        call switches%indicator(self%machine%banks, switch, lane, [t, angle, speed], y(self%mechanical + 1:self%states), &
-                                g(switch))
-      end do
-    end associate
+    do switch = 1, self%switches
+      call self%set_indicator(switch, lane, t, y, g)
+    end do
   end subroutine indicator_values
+
+  !> One of them.
+  subroutine set_indicator(self, which, lane, t, y, g)
+    class(formulation_t), intent(inout) :: self
+    integer, intent(in) :: which, lane            !! switch, 1 to `switches`; lane
+    real(wp), intent(in) :: t                     !! [s]
+    real(wp), contiguous, intent(in) :: y(:)      !! state, [states + quadratures]
+    real(wp), contiguous, intent(inout) :: g(:)   !! [switches]
+    real(wp) :: angle, speed
+
+    associate (switches => self%machine%switches)
+      call self%switch_motion(lane, which, y, angle, speed)
+      call switches%indicator(self%machine%banks, which, lane, [t, angle, speed], y(self%mechanical + 1:self%states), g(which))
+    end associate
+  end subroutine set_indicator
 
   !> Puts one lane on the branch to which its state belongs, after it has crossed a boundary. Boundaries are shifted outwards,
   !> so that the state is inside the new branch.
