@@ -7,7 +7,7 @@ module nocdyn_auto_stepper
   use nocdyn_explicit_tables, only: explicit_table_t
   use nocdyn_kinds, only: wp
   use nocdyn_method_choice, only: begin_trial, by_series, by_stages, by_systems, choice_t, count_attempt, kind_data_t, &
-    kinds, needed_step, note_stiffness, restart_choice, settle, shared_period, wants_trial
+    kinds, longest_shared_period, needed_step, note_stiffness, restart_choice, settle, shared_period, wants_trial
   use nocdyn_mixed_attempt, only: allocate_mixed_attempt, begin_kinds, end_kinds, keep_lanes, mixed_attempt_t, select_lanes
   use nocdyn_rosenbrock_stepper, only: rosenbrock_stepper, rosenbrock_stepper_t
   use nocdyn_rosenbrock_tables, only: rosenbrock_table_t
@@ -84,7 +84,11 @@ contains
     call self%implicit%prepare(system)
     self%data%cost(by_stages) = self%explicit%cost(system)
     self%data%cost(by_systems) = self%implicit%cost(system)
-    if (system%is_shared) self%data%first_period(:) = shared_period
+    if (system%is_shared) then
+      self%data%first_period(:) = shared_period
+      self%data%longest_period(:) = longest_shared_period
+    end if
+    self%data%tries(by_stages) = .not. (system%is_shared .and. self%data%has(by_series))
     if (self%data%has(by_series)) self%data%cost(by_series) = self%by_series%cost(system)
     if (allocated(self%choice)) deallocate (self%choice, self%mask, self%expanded, self%active, self%h, self%coefficients)
     columns = padded_columns(system%lanes, system%states + system%quadratures)

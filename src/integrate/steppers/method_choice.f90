@@ -20,7 +20,8 @@ module nocdyn_method_choice
 
   integer, parameter :: first_period(kinds) = [2, 2, 4]   !! steps before the first trial of a kind
   integer, parameter, public :: shared_period(kinds) = [2, 128, 64]   !! the same of variants: all wait for the trial of one
-  integer, parameter :: longest_period(kinds) = [256, 256, 64]   !! implicit steps are tried near the limit of stability only
+  integer, parameter :: longest_period(kinds) = [256, 256, 64]   ! implicit steps are tried near the limit of stability only
+  integer, parameter, public :: longest_shared_period(kinds) = [256, 256, 1024]
   integer, parameter :: first_doubt = 64, last_doubt = 256  !! steps after which a weak sign is enough
   integer, parameter :: forgiven = 2                        !! attempts that may fail then: implicit steps damp what is fast first
   integer, parameter :: successes = 2                       !! successive attempts that win a trial: an error estimate scatters
@@ -34,8 +35,10 @@ module nocdyn_method_choice
   !> The limits of a problem, the same for all lanes.
   type, public :: kind_data_t
     logical :: has(kinds) = .false.       !! whether there are steps of a kind
+    logical :: tries(kinds) = .true.      !! whether a kind is tried, and not only taken where no other can be
     real(wp) :: cost(kinds) = 1.0_wp      !! of a step
-    integer :: first_period(kinds) = first_period   !! steps before the first trial of a kind
+    integer :: first_period(kinds) = first_period       !! steps before the first trial of a kind
+    integer :: longest_period(kinds) = longest_period   !! the same after many trials that were lost
     real(wp) :: limit(kinds) = 1.0_wp     !! of |h lambda| on the negative real axis; no limit of the implicit kind
   end type kind_data_t
 
@@ -54,6 +57,7 @@ module nocdyn_method_choice
     real(wp) :: lambda = 0.0_wp           !! the last estimate of the dominant eigenvalue [1/s]
     integer :: wait(kinds) = 0            !! accepted steps until a kind may be tried
     integer :: period(kinds) = 0          !! `wait` after a trial that is lost
+    integer :: longest(kinds) = 0         !! limit of that
     integer :: signs(kinds) = 0           !! successive signs that a kind may cost less
     integer :: crossings = 0              !! steps that were cut
     real(wp) :: t_start = 0.0_wp          !! where the lane started [s]
@@ -71,6 +75,7 @@ contains
     choice%kind = merge(by_series, by_stages, data%has(by_series))
     choice%wait(:) = data%first_period
     choice%period(:) = data%first_period
+    choice%longest(:) = data%longest_period
     choice%t_start = t
   end subroutine restart_choice
 
@@ -151,7 +156,7 @@ contains
 
     choice%kind = winner
     choice%before = 0
-    choice%period(loser) = min(2 * choice%period(loser), longest_period(loser))
+    choice%period(loser) = min(2 * choice%period(loser), choice%longest(loser))
     choice%wait(loser) = choice%period(loser)
     choice%signs(:) = 0
   end subroutine settle
@@ -185,7 +190,8 @@ contains
     type(kind_data_t), intent(in) :: data
     integer, intent(in) :: kind
 
-    wants_trial = data%has(kind) .and. kind /= choice%kind .and. choice%before == 0 .and. choice%wait(kind) == 0
+    wants_trial = data%has(kind) .and. data%tries(kind) .and. kind /= choice%kind .and. choice%before == 0 &
+                  .and. choice%wait(kind) == 0
     if (kind == by_systems) then
       wants_trial = wants_trial .and. (choice%signs(kind) >= stiff_signs &
                                      .or. (choice%is_in_doubt .and. choice%doubt == 0))
