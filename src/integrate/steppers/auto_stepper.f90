@@ -6,8 +6,8 @@ module nocdyn_auto_stepper
   use nocdyn_explicit_stepper, only: explicit_stepper, explicit_stepper_t
   use nocdyn_explicit_tables, only: explicit_table_t
   use nocdyn_kinds, only: wp
-  use nocdyn_method_choice, only: begin_trial, by_series, by_stages, by_systems, choice_t, count_attempt, kind_data_t, &
-    kinds, longest_shared_period, needed_step, note_stiffness, restart_choice, settle, shared_period, wants_trial
+  use nocdyn_method_choice, only: begin_trial, by_series, by_stages, by_systems, choice_t, count_attempt, goes_on, &
+    kind_data_t, kinds, longest_shared_period, needed_step, note_stiffness, restart_choice, settle, shared_period, wants_trial
   use nocdyn_mixed_attempt, only: allocate_mixed_attempt, begin_kinds, end_kinds, keep_lanes, mixed_attempt_t, select_lanes
   use nocdyn_rosenbrock_stepper, only: rosenbrock_stepper, rosenbrock_stepper_t
   use nocdyn_rosenbrock_tables, only: rosenbrock_table_t
@@ -35,6 +35,7 @@ module nocdyn_auto_stepper
     logical, allocatable :: expanded(:)             !! lanes of other kinds whose series is wanted
     logical, allocatable :: active(:)               !! lanes at the start of the attempt
     real(wp), allocatable :: h(:)
+    real(wp), allocatable :: lambda(:)              !! dominant eigenvalues by the series [1/s]
     type(mixed_attempt_t) :: mixed
     real(wp), allocatable :: coefficients(:, :, :)
   contains
@@ -90,12 +91,13 @@ contains
     end if
     self%data%tries(by_stages) = .not. (system%is_shared .and. self%data%has(by_series))
     if (self%data%has(by_series)) self%data%cost(by_series) = self%by_series%cost(system)
-    if (allocated(self%choice)) deallocate (self%choice, self%mask, self%expanded, self%active, self%h, self%coefficients)
+    if (allocated(self%choice)) deallocate (self%choice, self%mask, self%expanded, self%active, self%h, self%lambda, &
+                                            self%coefficients)
     columns = padded_columns(system%lanes, system%states + system%quadratures)
     associate (lanes => system%lanes)
       allocate (self%choice(lanes))
       allocate (self%mask(lanes), self%expanded(lanes), self%active(lanes), source=.false.)
-      allocate (self%h(lanes), source=0.0_wp)
+      allocate (self%h(lanes), self%lambda(lanes), source=0.0_wp)
       call allocate_mixed_attempt(self%mixed, lanes, columns)
       allocate (self%coefficients(lanes, columns, self%degree), source=0.0_wp)
     end associate
@@ -127,14 +129,16 @@ contains
       self%expanded(lane) = .false.
       if (.not. attempt%active(lane)) cycle
       if (self%choice(lane)%was_tried) call judge_attempt(self, attempt, control, lane)
-      self%expanded(lane) = self%choice(lane)%kind /= by_series .and. control%h(lane) < control%longest &
-                            .and. wants_trial(self%choice(lane), self%data, by_series)
+      if (self%choice(lane)%kind == by_series .or. control%h(lane) >= control%longest) cycle
+      self%expanded(lane) = wants_trial(self%choice(lane), self%data, by_series)
     end do
-    if (self%data%has(by_series)) call expand_lanes(self, system, attempt, control)
+    if (self%data%has(by_series)) then
+      call expand_lanes(self, system, attempt, control)
+      call self%by_series%find_eigenvalues(self%lambda)
+    end if
     do lane = 1, attempt%lanes
       if (.not. attempt%active(lane)) cycle
-      call try_kind(self, attempt, control, lane, by_systems)
-      call try_kind(self, attempt, control, lane, by_stages)
+      call try_kinds(self, attempt, control, lane)
       self%choice(lane)%was_tried = .true.
       self%choice(lane)%has_moved = .false.
       control%is_given(lane) = self%choice(lane)%kind == by_series
@@ -222,7 +226,28 @@ contains
     end do
   end subroutine expand_lanes
 
-  !> Begins the trial of a kind in a lane, if it is time for one.
+  !> Begins a trial in a lane, if it is time for one.
+  subroutine try_kinds(self, attempt, control, lane)
+    type(auto_stepper_t), intent(inout) :: self
+    type(step_attempt_t), intent(in) :: attempt
+    type(step_control_t), intent(inout) :: control
+    integer, intent(in) :: lane
+
+    associate (choice => self%choice(lane))
+      if (choice%kind == by_series) then
+        choice%lambda = self%lambda(lane)
+        if (goes_on(choice, self%data, control%h(lane))) then
+          choice%signs(by_systems) = 0
+          return
+        end if
+        if (choice%has_moved) call note_stiffness(choice, self%data, attempt%t(lane), control%h(lane))
+      end if
+    end associate
+    call try_kind(self, attempt, control, lane, by_systems)
+    call try_kind(self, attempt, control, lane, by_stages)
+  end subroutine try_kinds
+
+  !> The same for one kind.
   subroutine try_kind(self, attempt, control, lane, kind)
     type(auto_stepper_t), intent(inout) :: self
     type(step_attempt_t), intent(in) :: attempt
@@ -231,10 +256,6 @@ contains
     real(wp) :: h
 
     associate (choice => self%choice(lane), t => attempt%t(lane))
-      if (kind == by_systems .and. choice%kind == by_series .and. choice%has_moved) then
-        choice%lambda = self%by_series%eigenvalue(lane)
-        call note_stiffness(choice, self%data, t, control%h(lane))
-      end if
       if (.not. wants_trial(choice, self%data, kind)) return
       h = control%h(lane)
       if (h >= control%longest) return   ! no kind can take longer steps

@@ -13,7 +13,7 @@ module nocdyn_method_choice
   implicit none (type, external)
   private
 
-  public :: restart_choice, count_attempt, wants_trial, begin_trial, break_even, needed_step, note_stiffness, rate, settle
+  public :: restart_choice, count_attempt, wants_trial, goes_on, begin_trial, break_even, needed_step, note_stiffness, rate, settle
 
   integer, parameter, public :: by_series = 1, by_stages = 2, by_systems = 3   !! Taylor, explicit, Rosenbrock steps
   integer, parameter, public :: kinds = 3
@@ -199,6 +199,18 @@ contains
       wants_trial = wants_trial .and. choice%signs(kind) >= nonstiff_signs
     end if
   end function wants_trial
+
+  !> Whether a lane that steps by series has no sign of stiffness in this step, and no trial to make.
+  pure logical function goes_on(choice, data, h)
+    type(choice_t), intent(in) :: choice
+    type(kind_data_t), intent(in) :: data
+    real(wp), intent(in) :: h   !! step size [s]
+
+    goes_on = .false.
+    if (choice%before > 0 .or. .not. choice%has_moved .or. h * choice%lambda > weak_sign * data%limit(by_series)) return
+    if (choice%is_in_doubt .and. choice%doubt == 0) return
+    goes_on = choice%wait(by_stages) > 0 .or. .not. data%tries(by_stages)
+  end function goes_on
 
   !> Begins the trial of a kind, instead of steps of size h by the present one.
   pure subroutine begin_trial(choice, data, kind, t, h)

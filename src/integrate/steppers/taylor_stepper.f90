@@ -54,7 +54,7 @@ module nocdyn_taylor_stepper
     procedure :: accept
     procedure :: pass_steps
     procedure :: plans_step
-    procedure :: eigenvalue
+    procedure :: find_eigenvalues
     procedure :: stability_limit
     procedure :: cost
   end type taylor_stepper_t
@@ -346,18 +346,17 @@ contains
     plans_step = self%step_status(lane) == attempt_ok .and. .not. self%moved(lane)
   end function plans_step
 
-  !> The size of the dominant eigenvalue of the Jacobian, if the motion that belongs to it is in the last coefficients of the
+  !> The sizes of the dominant eigenvalues of the Jacobian, if the motion that belongs to them is in the last coefficients of the
   !> series, a power iteration: y_k = A y_(k - 1) / k for a linear system.
-  pure real(wp) function eigenvalue(self, lane)
+  pure subroutine find_eigenvalues(self, sizes)
     class(taylor_stepper_t), intent(in) :: self
-    integer, intent(in) :: lane
+    real(wp), contiguous, intent(inout) :: sizes(:)   !! [1/s], [lanes]
     real(wp), parameter :: largest_exponent = 300.0_wp   ! keeps it finite
-    real(wp) :: growth(1)
 
-    growth = min(self%log_growth(lane), largest_exponent)
-    call exp2s(1, growth)
-    eigenvalue = self%order * growth(1)
-  end function eigenvalue
+    sizes(:) = min(self%log_growth, largest_exponent)
+    call exp2s(size(sizes), sizes)
+    sizes(:) = self%order * sizes
+  end subroutine find_eigenvalues
 
   !> The limit of |h lambda| on the negative real axis, near that of the truncated exponential series for orders from 5 to 40.
   pure real(wp) function stability_limit(self)
