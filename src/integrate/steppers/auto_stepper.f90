@@ -6,8 +6,9 @@ module nocdyn_auto_stepper
   use nocdyn_explicit_stepper, only: explicit_stepper, explicit_stepper_t
   use nocdyn_explicit_tables, only: explicit_table_t
   use nocdyn_kinds, only: wp
-  use nocdyn_method_choice, only: begin_trial, by_series, by_stages, by_systems, choice_t, count_attempt, goes_on, &
-    kind_data_t, kinds, longest_shared_period, needed_step, note_stiffness, restart_choice, settle, shared_period, wants_trial
+  use nocdyn_method_choice, only: begin_calm, begin_trial, by_series, by_stages, by_systems, calm_t, choice_t, count_attempt, &
+    end_calm, go_on, kind_data_t, kinds, longest_shared_period, needed_step, note_stiffness, restart_choice, settle, &
+    shared_period, wants_trial
   use nocdyn_mixed_attempt, only: allocate_mixed_attempt, begin_kinds, end_kinds, keep_lanes, mixed_attempt_t, select_lanes
   use nocdyn_rosenbrock_stepper, only: rosenbrock_stepper, rosenbrock_stepper_t
   use nocdyn_rosenbrock_tables, only: rosenbrock_table_t
@@ -34,6 +35,10 @@ module nocdyn_auto_stepper
     logical, allocatable :: mask(:)
     logical, allocatable :: expanded(:)             !! lanes of other kinds whose series is wanted
     logical, allocatable :: active(:)               !! lanes at the start of the attempt
+    logical, allocatable :: was_tried(:)            !! an attempt has been made since the last decision
+    logical, allocatable :: has_moved(:)            !! and was accepted
+    logical :: are_calm = .false.                   !! all active lanes step by series, and have nothing to decide
+    type(calm_t) :: calm
     real(wp), allocatable :: h(:)
     real(wp), allocatable :: lambda(:)              !! dominant eigenvalues by the series [1/s]
     type(mixed_attempt_t) :: mixed
@@ -92,11 +97,16 @@ contains
     self%data%tries(by_stages) = .not. (system%is_shared .and. self%data%has(by_series))
     if (self%data%has(by_series)) self%data%cost(by_series) = self%by_series%cost(system)
     if (allocated(self%choice)) deallocate (self%choice, self%mask, self%expanded, self%active, self%h, self%lambda, &
-                                            self%coefficients)
+                                            self%was_tried, self%has_moved, self%calm%steps, &
+                                            self%calm%uncounted, self%calm%signs, self%calm%is_in_doubt, &
+                                            self%calm%waits, self%coefficients)
     columns = padded_columns(system%lanes, system%states + system%quadratures)
     associate (lanes => system%lanes)
       allocate (self%choice(lanes))
       allocate (self%mask(lanes), self%expanded(lanes), self%active(lanes), source=.false.)
+      allocate (self%was_tried(lanes), self%has_moved(lanes), source=.false.)
+      allocate (self%calm%steps(lanes), self%calm%uncounted(lanes), self%calm%signs(lanes), source=0)
+      allocate (self%calm%is_in_doubt(lanes), self%calm%waits(lanes), source=.false.)
       allocate (self%h(lanes), self%lambda(lanes), source=0.0_wp)
       call allocate_mixed_attempt(self%mixed, lanes, columns)
       allocate (self%coefficients(lanes, columns, self%degree), source=0.0_wp)
@@ -113,7 +123,12 @@ contains
     call self%implicit%reset_spectra(starting)   ! its slopes and Jacobians are renewed when the lane switches
     if (self%data%has(by_series)) call self%by_series%start(attempt, starting)
     do lane = 1, size(starting)
-      if (starting(lane)) call restart_choice(self%choice(lane), self%data, attempt%t(lane))
+      if (.not. starting(lane)) cycle
+      call restart_choice(self%choice(lane), self%data, attempt%t(lane))
+      call describe_kind(self, attempt, lane)
+      self%was_tried(lane) = .false.
+      self%has_moved(lane) = .false.
+      call begin_calm(self%calm, lane, self%choice(lane), self%data)
     end do
   end subroutine start
 
@@ -125,10 +140,13 @@ contains
     type(step_control_t), intent(inout) :: control
     integer :: lane
 
+    call choose_calm_steps(self, system, attempt, control)
+    if (self%are_calm) return
     do lane = 1, attempt%lanes
+      call end_calm(self%calm, lane, self%choice(lane))
       self%expanded(lane) = .false.
       if (.not. attempt%active(lane)) cycle
-      if (self%choice(lane)%was_tried) call judge_attempt(self, attempt, control, lane)
+      if (self%was_tried(lane)) call judge_attempt(self, attempt, control, lane)
       if (self%choice(lane)%kind == by_series .or. control%h(lane) >= control%longest) cycle
       self%expanded(lane) = wants_trial(self%choice(lane), self%data, by_series)
     end do
@@ -139,12 +157,47 @@ contains
     do lane = 1, attempt%lanes
       if (.not. attempt%active(lane)) cycle
       call try_kinds(self, attempt, control, lane)
-      self%choice(lane)%was_tried = .true.
-      self%choice(lane)%has_moved = .false.
+      self%was_tried(lane) = .true.
+      self%has_moved(lane) = .false.
+      call begin_calm(self%calm, lane, self%choice(lane), self%data)
       control%is_given(lane) = self%choice(lane)%kind == by_series
       if (control%is_given(lane)) control%mean_square(lane) = 0.0_wp
     end do
   end subroutine choose_steps
+
+  !> The same as `choose_steps` if no lane has anything to decide: all go on by series. Else does nothing that is done again.
+  subroutine choose_calm_steps(self, system, attempt, control)
+    class(auto_stepper_t), intent(inout) :: self
+    class(system_t), intent(inout) :: system
+    type(step_attempt_t), intent(inout) :: attempt
+    type(step_control_t), intent(inout) :: control
+    logical :: are_calm
+    integer :: lane
+
+    are_calm = self%data%has(by_series)
+    do lane = 1, attempt%lanes
+      are_calm = are_calm .and. (.not. attempt%active(lane) .or. (self%calm%uncounted(lane) + 1 < self%calm%steps(lane) &
+                                                              .and. (self%has_moved(lane) .or. .not. self%was_tried(lane))))
+    end do
+    self%are_calm = .false.
+    if (.not. are_calm) return
+    self%h(:) = control%h
+    call self%by_series%choose_steps(system, attempt, control)
+    call self%by_series%find_eigenvalues(self%lambda)
+    do lane = 1, attempt%lanes
+      if (.not. attempt%active(lane)) cycle
+      if (self%by_series%plans_step(lane)) cycle
+      are_calm = .false.
+      control%h(lane) = self%h(lane)
+    end do
+    call go_on(self%calm, self%data, attempt%lanes, attempt%active, self%has_moved, control%h, self%lambda, are_calm)
+    self%are_calm = are_calm
+    if (.not. are_calm) return
+    self%was_tried(:) = self%was_tried .or. attempt%active
+    self%has_moved(:) = self%has_moved .and. .not. attempt%active
+    control%is_given(:) = control%is_given .or. attempt%active
+    control%mean_square(:) = merge(0.0_wp, control%mean_square, attempt%active)
+  end subroutine choose_calm_steps
 
   !> Draws the conclusions from the last attempt of a lane.
   subroutine judge_attempt(self, attempt, control, lane)
@@ -158,12 +211,13 @@ contains
 
     associate (choice => self%choice(lane))
       tried = choice%kind
-      if (choice%kind == by_series .and. .not. choice%has_moved) call settle(choice, by_stages, by_series)
+      if (choice%kind == by_series .and. .not. self%has_moved(lane)) call settle(choice, by_stages, by_series)
       is_new = choice%kind == by_systems .or. modulo(choice%steps, stride) == 0
-      call count_attempt(choice, self%data, attempt%t(lane), min(control%h(lane), control%longest), is_over)
+      call count_attempt(choice, self%data, self%has_moved(lane), attempt%t(lane), min(control%h(lane), control%longest), &
+                         is_over)
       if (is_over) control%h(lane) = choice%h
       if (choice%kind /= tried) call change_kind(self, control, lane)
-      if (choice%has_moved .and. choice%before == 0 .and. choice%kind /= by_series .and. is_new) then
+      if (self%has_moved(lane) .and. choice%before == 0 .and. choice%kind /= by_series .and. is_new) then
         call note_stiffness(choice, self%data, attempt%t(lane), control%h(lane))
       end if
     end associate
@@ -236,11 +290,7 @@ contains
     associate (choice => self%choice(lane))
       if (choice%kind == by_series) then
         choice%lambda = self%lambda(lane)
-        if (goes_on(choice, self%data, control%h(lane))) then
-          choice%signs(by_systems) = 0
-          return
-        end if
-        if (choice%has_moved) call note_stiffness(choice, self%data, attempt%t(lane), control%h(lane))
+        if (self%has_moved(lane)) call note_stiffness(choice, self%data, attempt%t(lane), control%h(lane))
       end if
     end associate
     call try_kind(self, attempt, control, lane, by_systems)
@@ -272,6 +322,10 @@ contains
     type(step_attempt_t), intent(inout) :: attempt
     integer :: kind, lane
 
+    if (self%are_calm) then
+      call self%by_series%take_step(system, attempt)
+      return
+    end if
     self%active(:) = attempt%active
     do lane = 1, attempt%lanes
       call describe_kind(self, attempt, lane)
@@ -389,7 +443,11 @@ contains
     class(auto_stepper_t), intent(inout) :: self
     logical, intent(in) :: accepted(:)
 
-    self%choice%has_moved = self%choice%has_moved .or. accepted
+    self%has_moved(:) = self%has_moved .or. accepted
+    if (self%are_calm) then
+      call self%by_series%accept(accepted)
+      return
+    end if
     self%mask(:) = accepted .and. self%choice%kind == by_series
     if (any(self%mask)) call self%by_series%accept(self%mask)
     self%mask(:) = accepted .and. self%choice%kind == by_stages

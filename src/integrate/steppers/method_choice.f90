@@ -13,7 +13,8 @@ module nocdyn_method_choice
   implicit none (type, external)
   private
 
-  public :: restart_choice, count_attempt, wants_trial, goes_on, begin_trial, break_even, needed_step, note_stiffness, rate, settle
+  public :: restart_choice, count_steps, count_attempt, wants_trial, begin_calm, end_calm, go_on, begin_trial, &
+    break_even, needed_step, note_stiffness, rate, settle
 
   integer, parameter, public :: by_series = 1, by_stages = 2, by_systems = 3   !! Taylor, explicit, Rosenbrock steps
   integer, parameter, public :: kinds = 3
@@ -45,8 +46,6 @@ module nocdyn_method_choice
   type, public :: choice_t
     integer :: kind = by_stages           !! of the next step
     integer :: before = 0                 !! during a trial: the kind that it is compared with; else 0
-    logical :: was_tried = .false.        !! an attempt has been made since the last decision
-    logical :: has_moved = .false.        !! and was accepted
     integer :: failed = 0, succeeded = 0  !! attempts of a trial
     integer :: may_fail = 0               !! attempts that do not yet lose it
     logical :: is_in_doubt = .false.      !! whether there has been a weak sign since the last trial of implicit steps
@@ -63,6 +62,15 @@ module nocdyn_method_choice
     real(wp) :: t_start = 0.0_wp          !! where the lane started [s]
     integer :: steps = 0                  !! accepted steps
   end type choice_t
+
+  !> What is counted of lanes that step by series while they have nothing to decide; [lanes].
+  type, public :: calm_t
+    integer, allocatable :: steps(:)          !! accepted steps for which that is so, unless they show signs of stiffness
+    integer, allocatable :: uncounted(:)      !! of these, those that have been made
+    integer, allocatable :: signs(:)          !! as in `choice_t`, of implicit steps
+    logical, allocatable :: is_in_doubt(:)
+    logical, allocatable :: waits(:)          !! whether signs lead to nothing yet
+  end type calm_t
 
 contains
 
@@ -122,22 +130,29 @@ contains
     needed_step = break_even(choice, data, kind, t, rate(choice, data, choice%kind, t, h))
   end function needed_step
 
+  !> Counts accepted steps.
+  elemental subroutine count_steps(choice, steps)
+    type(choice_t), intent(inout) :: choice
+    integer, intent(in) :: steps
+
+    choice%steps = choice%steps + steps
+    choice%wait(:) = max(choice%wait - steps, 0)
+    choice%doubt = max(choice%doubt - steps, 0)
+  end subroutine count_steps
+
   !> Counts an attempt of the present kind, and decides about a trial.
-  pure subroutine count_attempt(choice, data, t, h, is_over)
+  pure subroutine count_attempt(choice, data, has_moved, t, h, is_over)
     type(choice_t), intent(inout) :: choice
     type(kind_data_t), intent(in) :: data
+    logical, intent(in) :: has_moved   !! whether it was accepted
     real(wp), intent(in) :: t          !! time reached [s]
     real(wp), intent(in) :: h          !! next step size of the present kind [s]
     logical, intent(out) :: is_over    !! the trial is lost: the lane goes on with the kind before it
 
     is_over = .false.
-    if (choice%has_moved) then
-      choice%steps = choice%steps + 1
-      choice%wait(:) = max(choice%wait - 1, 0)
-      choice%doubt = max(choice%doubt - 1, 0)
-    end if
+    if (has_moved) call count_steps(choice, 1)
     if (choice%before == 0) return
-    if (choice%has_moved .and. h >= break_even(choice, data, choice%kind, t, choice%rate)) then
+    if (has_moved .and. h >= break_even(choice, data, choice%kind, t, choice%rate)) then
       choice%succeeded = choice%succeeded + 1
       if (choice%succeeded >= successes) call settle(choice, choice%kind, choice%before)
     else
@@ -200,17 +215,69 @@ contains
     end if
   end function wants_trial
 
-  !> Whether a lane that steps by series has no sign of stiffness in this step, and no trial to make.
-  pure logical function goes_on(choice, data, h)
+  !> Takes what is counted of a lane, after a decision.
+  pure subroutine begin_calm(calm, lane, choice, data)
+    type(calm_t), intent(inout) :: calm
+    integer, intent(in) :: lane
     type(choice_t), intent(in) :: choice
     type(kind_data_t), intent(in) :: data
-    real(wp), intent(in) :: h   !! step size [s]
 
-    goes_on = .false.
-    if (choice%before > 0 .or. .not. choice%has_moved .or. h * choice%lambda > weak_sign * data%limit(by_series)) return
-    if (choice%is_in_doubt .and. choice%doubt == 0) return
-    goes_on = choice%wait(by_stages) > 0 .or. .not. data%tries(by_stages)
-  end function goes_on
+    calm%uncounted(lane) = 0
+    calm%signs(lane) = choice%signs(by_systems)
+    calm%is_in_doubt(lane) = choice%is_in_doubt
+    calm%waits(lane) = choice%wait(by_systems) > 0
+    associate (steps => calm%steps(lane))
+      steps = 0
+      if (choice%kind /= by_series .or. choice%before > 0) return
+      steps = huge(steps)
+      if (calm%waits(lane)) then
+        steps = choice%wait(by_systems)
+      else if (choice%is_in_doubt) then
+        steps = choice%doubt
+      end if
+      if (data%tries(by_stages)) steps = min(steps, choice%wait(by_stages))
+    end associate
+  end subroutine begin_calm
+
+  !> Gives it back, before a decision.
+  pure subroutine end_calm(calm, lane, choice)
+    type(calm_t), intent(inout) :: calm
+    integer, intent(in) :: lane
+    type(choice_t), intent(inout) :: choice
+
+    if (calm%uncounted(lane) == 0) return
+    call count_steps(choice, calm%uncounted(lane))
+    choice%signs(by_systems) = calm%signs(lane)
+    choice%is_in_doubt = calm%is_in_doubt(lane)
+    calm%uncounted(lane) = 0
+  end subroutine end_calm
+
+  !> Whether the last steps and the next ones leave all active lanes without anything to decide; if so, counts the last ones.
+  pure subroutine go_on(calm, data, lanes, active, has_moved, h, lambda, is_calm)
+    type(calm_t), intent(inout) :: calm
+    type(kind_data_t), intent(in) :: data
+    integer, intent(in) :: lanes
+    logical, intent(in) :: active(lanes), has_moved(lanes)   !! whether a lane takes part; whether its last step was accepted
+    real(wp), intent(in) :: h(lanes), lambda(lanes)          !! next step size [s], dominant eigenvalue [1/s]
+    logical, intent(inout) :: is_calm
+    real(wp) :: near, weak
+    integer :: lane
+
+    near = near_limit * data%limit(by_series)
+    weak = weak_sign * data%limit(by_series)
+    do lane = 1, lanes
+      is_calm = is_calm .and. (.not. active(lane) .or. calm%waits(lane) &
+                               .or. (merge(calm%signs(lane) + 1, 0, h(lane) * lambda(lane) > near) < stiff_signs &
+                                     .and. (calm%is_in_doubt(lane) .or. .not. h(lane) * lambda(lane) > weak)))
+    end do
+    if (.not. is_calm) return
+    do lane = 1, lanes
+      if (.not. (active(lane) .and. has_moved(lane))) cycle
+      calm%uncounted(lane) = calm%uncounted(lane) + 1
+      calm%signs(lane) = merge(calm%signs(lane) + 1, 0, h(lane) * lambda(lane) > near)
+      calm%is_in_doubt(lane) = calm%is_in_doubt(lane) .or. h(lane) * lambda(lane) > weak
+    end do
+  end subroutine go_on
 
   !> Begins the trial of a kind, instead of steps of size h by the present one.
   pure subroutine begin_trial(choice, data, kind, t, h)
