@@ -3,19 +3,18 @@
 !>
 !> Each lane chooses by itself. A lane of a system without a series begins with explicit steps.
 module nocdyn_auto_stepper
-  use nocdyn_explicit_stepper, only: explicit_stepper, explicit_stepper_t
+  use nocdyn_calm_lanes, only: allocate_calm_lanes, begin_calm, calm_lanes_t, end_calm, go_on, may_go_on
+  use nocdyn_explicit_stepper, only: explicit_stepper
   use nocdyn_explicit_tables, only: explicit_table_t
   use nocdyn_kinds, only: wp
-  use nocdyn_method_choice, only: begin_calm, begin_trial, by_series, by_stages, by_systems, calm_t, choice_t, count_attempt, &
-    end_calm, go_on, kind_data_t, kinds, longest_shared_period, needed_step, note_stiffness, restart_choice, settle, &
-    shared_period, wants_trial
-  use nocdyn_mixed_attempt, only: allocate_mixed_attempt, begin_kinds, end_kinds, keep_lanes, mixed_attempt_t, select_lanes
-  use nocdyn_rosenbrock_stepper, only: rosenbrock_stepper, rosenbrock_stepper_t
+  use nocdyn_method_choice, only: begin_trial, by_series, by_stages, by_systems, choice_t, count_attempt, kind_data_t, &
+    longest_shared_period, needed_step, note_stiffness, restart_choice, settle, shared_period, wants_trial
+  use nocdyn_rosenbrock_stepper, only: rosenbrock_stepper
   use nocdyn_rosenbrock_tables, only: rosenbrock_table_t
-  use nocdyn_stage_sums, only: padded_columns
   use nocdyn_step_attempt, only: step_attempt_t
   use nocdyn_step_control, only: reset_control, step_control_t
   use nocdyn_stepper, only: stepper_t
+  use nocdyn_stepper_kinds, only: stepper_kinds_t
   use nocdyn_system, only: system_t
   use nocdyn_taylor_stepper, only: taylor_stepper_t
   implicit none (type, external)
@@ -27,22 +26,17 @@ module nocdyn_auto_stepper
 
   type, extends(stepper_t), public :: auto_stepper_t
     private
-    type(taylor_stepper_t) :: by_series
-    type(explicit_stepper_t) :: explicit
-    type(rosenbrock_stepper_t) :: implicit
+    type(stepper_kinds_t) :: steppers
     type(kind_data_t) :: data
-    type(choice_t), allocatable :: choice(:)        !! [lanes]
-    logical, allocatable :: mask(:)
-    logical, allocatable :: expanded(:)             !! lanes of other kinds whose series is wanted
-    logical, allocatable :: active(:)               !! lanes at the start of the attempt
-    logical, allocatable :: was_tried(:)            !! an attempt has been made since the last decision
-    logical, allocatable :: has_moved(:)            !! and was accepted
-    logical :: are_calm = .false.                   !! all active lanes step by series, and have nothing to decide
-    type(calm_t) :: calm
-    real(wp), allocatable :: h(:)
-    real(wp), allocatable :: lambda(:)              !! dominant eigenvalues by the series [1/s]
-    type(mixed_attempt_t) :: mixed
-    real(wp), allocatable :: coefficients(:, :, :)
+    type(choice_t), allocatable :: choice(:)   !! [lanes]
+    type(calm_lanes_t) :: calm
+    logical :: are_calm = .false.              !! all active lanes step by series, and have nothing to decide
+    logical, allocatable :: expanded(:)        !! lanes of other kinds whose series is wanted
+    logical, allocatable :: active(:)          !! lanes at the start of the attempt
+    logical, allocatable :: was_tried(:)       !! an attempt has been made since the last decision
+    logical, allocatable :: has_moved(:)       !! and was accepted
+    real(wp), allocatable :: h(:)              !! step sizes before those of new series [s]
+    real(wp), allocatable :: lambda(:)         !! dominant eigenvalues by the series [1/s]
   contains
     procedure :: prepare
     procedure :: start
@@ -62,54 +56,47 @@ contains
     type(taylor_stepper_t), intent(in), optional :: series
     type(auto_stepper_t) :: stepper
 
-    stepper%explicit = explicit_stepper(explicit_table)
-    stepper%implicit = rosenbrock_stepper(rosenbrock_table)
-    stepper%data%has(:) = [present(series), .true., .true.]
-    stepper%data%limit(by_stages) = explicit_table%stability_limit
-    if (present(series)) then
-      stepper%by_series = series
-      stepper%series_order = series%series_order
-      stepper%data%limit(by_series) = series%stability_limit()
-    end if
-    stepper%order = stepper%explicit%order
-    stepper%error_order = stepper%explicit%error_order
-    stepper%degrees(:) = [stepper%by_series%degree, stepper%explicit%degree, stepper%implicit%degree]
-    stepper%degree = maxval(stepper%degrees)
-    stepper%max_growth = stepper%explicit%max_growth
-    stepper%has_low_order_error = stepper%explicit%has_low_order_error
-    stepper%chooses_steps = .true.
+    associate (steppers => stepper%steppers, data => stepper%data)
+      steppers%explicit = explicit_stepper(explicit_table)
+      steppers%implicit = rosenbrock_stepper(rosenbrock_table)
+      steppers%has_series = present(series)
+      data%has(:) = [present(series), .true., .true.]
+      data%limit(by_stages) = explicit_table%stability_limit
+      if (present(series)) then
+        steppers%series = series
+        stepper%series_order = series%series_order
+        data%limit(by_series) = series%stability_limit()
+      end if
+      stepper%order = steppers%explicit%order
+      stepper%error_order = steppers%explicit%error_order
+      stepper%degrees(:) = [steppers%series%degree, steppers%explicit%degree, steppers%implicit%degree]
+      stepper%degree = maxval(stepper%degrees)
+      stepper%max_growth = steppers%explicit%max_growth
+      stepper%has_low_order_error = steppers%explicit%has_low_order_error
+      stepper%chooses_steps = .true.
+    end associate
   end function auto_stepper
 
   subroutine prepare(self, system)
     class(auto_stepper_t), intent(inout) :: self
     class(system_t), intent(in) :: system
-    integer :: columns
 
-    if (self%data%has(by_series)) call self%by_series%prepare(system)
-    call self%explicit%prepare(system)
-    call self%implicit%prepare(system)
-    self%data%cost(by_stages) = self%explicit%cost(system)
-    self%data%cost(by_systems) = self%implicit%cost(system)
-    if (system%is_shared) then
-      self%data%first_period(:) = shared_period
-      self%data%longest_period(:) = longest_shared_period
-    end if
-    self%data%tries(by_stages) = .not. (system%is_shared .and. self%data%has(by_series))
-    if (self%data%has(by_series)) self%data%cost(by_series) = self%by_series%cost(system)
-    if (allocated(self%choice)) deallocate (self%choice, self%mask, self%expanded, self%active, self%h, self%lambda, &
-                                            self%was_tried, self%has_moved, self%calm%steps, &
-                                            self%calm%uncounted, self%calm%signs, self%calm%is_in_doubt, &
-                                            self%calm%waits, self%coefficients)
-    columns = padded_columns(system%lanes, system%states + system%quadratures)
-    associate (lanes => system%lanes)
+    call self%steppers%prepare(system)
+    associate (data => self%data, steppers => self%steppers, lanes => system%lanes)
+      data%cost(by_stages) = steppers%explicit%cost(system)
+      data%cost(by_systems) = steppers%implicit%cost(system)
+      if (data%has(by_series)) data%cost(by_series) = steppers%series%cost(system)
+      if (system%is_shared) then
+        data%first_period(:) = shared_period
+        data%longest_period(:) = longest_shared_period
+      end if
+      data%tries(by_stages) = .not. (system%is_shared .and. data%has(by_series))
+      if (allocated(self%choice)) deallocate (self%choice, self%expanded, self%active, self%was_tried, self%has_moved, self%h, &
+                                              self%lambda)
       allocate (self%choice(lanes))
-      allocate (self%mask(lanes), self%expanded(lanes), self%active(lanes), source=.false.)
-      allocate (self%was_tried(lanes), self%has_moved(lanes), source=.false.)
-      allocate (self%calm%steps(lanes), self%calm%uncounted(lanes), self%calm%signs(lanes), source=0)
-      allocate (self%calm%is_in_doubt(lanes), self%calm%waits(lanes), source=.false.)
+      allocate (self%expanded(lanes), self%active(lanes), self%was_tried(lanes), self%has_moved(lanes), source=.false.)
       allocate (self%h(lanes), self%lambda(lanes), source=0.0_wp)
-      call allocate_mixed_attempt(self%mixed, lanes, columns)
-      allocate (self%coefficients(lanes, columns, self%degree), source=0.0_wp)
+      call allocate_calm_lanes(self%calm, lanes)
     end associate
   end subroutine prepare
 
@@ -119,9 +106,7 @@ contains
     logical, intent(in) :: starting(:)
     integer :: lane
 
-    call self%explicit%start(attempt, starting)
-    call self%implicit%reset_spectra(starting)   ! its slopes and Jacobians are renewed when the lane switches
-    if (self%data%has(by_series)) call self%by_series%start(attempt, starting)
+    call self%steppers%start(attempt, starting)
     do lane = 1, size(starting)
       if (.not. starting(lane)) cycle
       call restart_choice(self%choice(lane), self%data, attempt%t(lane))
@@ -152,7 +137,7 @@ contains
     end do
     if (self%data%has(by_series)) then
       call expand_lanes(self, system, attempt, control)
-      call self%by_series%find_eigenvalues(self%lambda)
+      call self%steppers%series%find_eigenvalues(self%lambda)
     end if
     do lane = 1, attempt%lanes
       if (.not. attempt%active(lane)) cycle
@@ -175,18 +160,15 @@ contains
     integer :: lane
 
     are_calm = self%data%has(by_series)
-    do lane = 1, attempt%lanes
-      are_calm = are_calm .and. (.not. attempt%active(lane) .or. (self%calm%uncounted(lane) + 1 < self%calm%steps(lane) &
-                                                              .and. (self%has_moved(lane) .or. .not. self%was_tried(lane))))
-    end do
+    if (are_calm) are_calm = may_go_on(self%calm, attempt%lanes, attempt%active, self%was_tried, self%has_moved)
     self%are_calm = .false.
     if (.not. are_calm) return
     self%h(:) = control%h
-    call self%by_series%choose_steps(system, attempt, control)
-    call self%by_series%find_eigenvalues(self%lambda)
+    call self%steppers%series%choose_steps(system, attempt, control)
+    call self%steppers%series%find_eigenvalues(self%lambda)
     do lane = 1, attempt%lanes
       if (.not. attempt%active(lane)) cycle
-      if (self%by_series%plans_step(lane)) cycle
+      if (self%steppers%series%plans_step(lane)) cycle
       are_calm = .false.
       control%h(lane) = self%h(lane)
     end do
@@ -229,17 +211,7 @@ contains
     type(step_control_t), intent(inout) :: control
     integer, intent(in) :: lane
 
-    self%mask(:) = .false.
-    self%mask(lane) = .true.
-    select case (self%choice(lane)%kind)
-    case (by_series)
-      call self%by_series%accept(self%mask)
-    case (by_stages)
-      call self%explicit%invalidate_first_stage(self%mask)
-    case default
-      call self%implicit%accept(self%mask)
-      call self%implicit%reset_spectra(self%mask)
-    end select
+    call self%steppers%change_kind(lane, self%choice(lane)%kind)
     call reset_control(control, lane)
   end subroutine change_kind
 
@@ -255,23 +227,23 @@ contains
 
     self%active(:) = attempt%active
     self%h(:) = control%h
-    call self%by_series%accept(self%expanded)
+    call self%steppers%series%accept(self%expanded)
     attempt%active(:) = self%active .and. (self%choice%kind == by_series .or. self%expanded)
-    if (any(attempt%active)) call self%by_series%choose_steps(system, attempt, control)
+    if (any(attempt%active)) call self%steppers%series%choose_steps(system, attempt, control)
     attempt%active(:) = self%active
     do lane = 1, attempt%lanes
       if (.not. self%active(lane)) cycle
       associate (choice => self%choice(lane), t => attempt%t(lane))
         if (self%expanded(lane)) then
           needed = needed_step(choice, self%data, by_series, t, self%h(lane))
-          if (self%by_series%plans_step(lane) .and. min(control%h(lane), control%longest) >= needed) then
+          if (self%steppers%series%plans_step(lane) .and. min(control%h(lane), control%longest) >= needed) then
             call settle(choice, by_series, choice%kind)
             call reset_control(control, lane)
           else
             call settle(choice, choice%kind, by_series)
             control%h(lane) = self%h(lane)
           end if
-        else if (choice%kind == by_series .and. .not. self%by_series%plans_step(lane)) then
+        else if (choice%kind == by_series .and. .not. self%steppers%series%plans_step(lane)) then
           call settle(choice, by_stages, by_series)
           control%h(lane) = self%h(lane)
           call change_kind(self, control, lane)
@@ -320,81 +292,39 @@ contains
     class(auto_stepper_t), intent(inout) :: self
     class(system_t), intent(inout) :: system
     type(step_attempt_t), intent(inout) :: attempt
-    integer :: kind, lane
+    integer :: lane
 
     if (self%are_calm) then
-      call self%by_series%take_step(system, attempt)
+      call self%steppers%series%take_step(system, attempt)
       return
     end if
-    self%active(:) = attempt%active
     do lane = 1, attempt%lanes
       call describe_kind(self, attempt, lane)
     end do
-    kind = self%choice(maxloc(merge(1, 0, attempt%active), dim=1))%kind
-    if (all(self%choice%kind == kind .or. .not. attempt%active)) then
-      call take_steps_of_kind(self, system, attempt, kind)
-    else
-      call attempt_all(self, system, attempt)
-    end if
+    call self%steppers%take_steps(system, attempt)
     do lane = 1, attempt%lanes
       if (.not. attempt%active(lane)) cycle
-      if (self%choice(lane)%kind == by_systems) then
-        self%choice(lane)%lambda = self%implicit%stiffness(attempt, lane) / attempt%h(lane)
-      else if (self%choice(lane)%kind == by_stages .and. modulo(self%choice(lane)%steps, stride) == 0) then
-        self%choice(lane)%lambda = self%explicit%stiffness(attempt, lane) / attempt%h(lane)
-      end if
+      associate (choice => self%choice(lane))
+        if (choice%kind == by_systems) then
+          choice%lambda = self%steppers%implicit%stiffness(attempt, lane) / attempt%h(lane)
+        else if (choice%kind == by_stages .and. modulo(choice%steps, stride) == 0) then
+          choice%lambda = self%steppers%explicit%stiffness(attempt, lane) / attempt%h(lane)
+        end if
+      end associate
     end do
   end subroutine take_step
 
   !> Tells the attempt of which kind the step of a lane is.
   subroutine describe_kind(self, attempt, lane)
-    type(auto_stepper_t), intent(in) :: self
+    type(auto_stepper_t), intent(inout) :: self
     type(step_attempt_t), intent(inout) :: attempt
     integer, intent(in) :: lane
 
     associate (kind => self%choice(lane)%kind, before => self%choice(lane)%before)
       attempt%implicit(lane) = merge(before, kind, before > 0) == by_systems   ! a trial is no change of the method
-      attempt%error_order(lane) = merge(self%implicit%error_order, self%explicit%error_order, kind == by_systems)
-      attempt%max_growth(lane) = merge(self%implicit%max_growth, self%explicit%max_growth, kind == by_systems)
-      attempt%degree(lane) = self%degrees(kind)
+      call self%steppers%set_kind(attempt, lane, kind)
     end associate
   end subroutine describe_kind
-
-  !> Attempts the steps of the active lanes, which are of one kind.
-  subroutine take_steps_of_kind(self, system, attempt, kind)
-    type(auto_stepper_t), intent(inout) :: self
-    class(system_t), intent(inout) :: system
-    type(step_attempt_t), intent(inout) :: attempt
-    integer, intent(in) :: kind
-
-    select case (kind)
-    case (by_series)
-      call self%by_series%take_step(system, attempt)
-    case (by_stages)
-      call self%explicit%take_step(system, attempt)
-    case default
-      call self%implicit%take_step(system, attempt)
-      attempt%low_order_estimate(:, :) = 0.0_wp
-    end select
-  end subroutine take_steps_of_kind
-
-  !> Attempts the steps of one kind after the other; the other lanes are not active meanwhile.
-  subroutine attempt_all(self, system, attempt)
-    type(auto_stepper_t), intent(inout) :: self
-    class(system_t), intent(inout) :: system
-    type(step_attempt_t), intent(inout) :: attempt
-    integer :: kind
-
-    call begin_kinds(self%mixed, attempt)
-    do kind = 1, kinds
-      self%mask(:) = self%choice%kind == kind .and. self%active
-      if (.not. any(self%mask)) cycle
-      call select_lanes(self%mixed, attempt, self%mask)
-      call take_steps_of_kind(self, system, attempt, kind)
-      call keep_lanes(self%mixed, attempt, kind /= by_series, kind == by_stages)
-    end do
-    call end_kinds(self%mixed, attempt)
-  end subroutine attempt_all
 
   subroutine interpolate(self, system, attempt, wanted, coefficients)
     class(auto_stepper_t), intent(inout) :: self
@@ -402,42 +332,9 @@ contains
     type(step_attempt_t), intent(inout) :: attempt
     logical, intent(in) :: wanted(:)
     real(wp), contiguous, intent(inout) :: coefficients(:, :, :)
-    integer :: kind, lane
 
-    do kind = 1, kinds
-      self%mask(:) = wanted .and. self%choice%kind == kind
-      if (.not. any(self%mask)) cycle
-      if (all(self%mask .or. .not. wanted)) then
-        call interpolate_kind(self, system, attempt, kind, coefficients)
-        return
-      end if
-      call interpolate_kind(self, system, attempt, kind, self%coefficients)
-      do lane = 1, attempt%lanes
-        if (self%mask(lane)) coefficients(lane, :, :) = self%coefficients(lane, :, :)
-      end do
-    end do
+    call self%steppers%interpolate(system, attempt, wanted, coefficients)
   end subroutine interpolate
-
-  !> Dense output of the lanes of one kind, in `mask`.
-  subroutine interpolate_kind(self, system, attempt, kind, coefficients)
-    type(auto_stepper_t), intent(inout) :: self
-    class(system_t), intent(inout) :: system
-    type(step_attempt_t), intent(inout) :: attempt
-    integer, intent(in) :: kind
-    real(wp), contiguous, intent(inout) :: coefficients(:, :, :)
-
-    associate (degree => self%degrees(kind))
-      coefficients(:, :, degree + 1:) = 0.0_wp
-      select case (kind)
-      case (by_series)
-        call self%by_series%interpolate(system, attempt, self%mask, coefficients(:, :, :degree))
-      case (by_stages)
-        call self%explicit%interpolate(system, attempt, self%mask, coefficients(:, :, :degree))
-      case default
-        call self%implicit%interpolate(system, attempt, self%mask, coefficients(:, :, :degree))
-      end select
-    end associate
-  end subroutine interpolate_kind
 
   subroutine accept(self, accepted)
     class(auto_stepper_t), intent(inout) :: self
@@ -445,15 +342,10 @@ contains
 
     self%has_moved(:) = self%has_moved .or. accepted
     if (self%are_calm) then
-      call self%by_series%accept(accepted)
+      call self%steppers%series%accept(accepted)
       return
     end if
-    self%mask(:) = accepted .and. self%choice%kind == by_series
-    if (any(self%mask)) call self%by_series%accept(self%mask)
-    self%mask(:) = accepted .and. self%choice%kind == by_stages
-    if (any(self%mask)) call self%explicit%accept(self%mask)
-    self%mask(:) = accepted .and. self%choice%kind == by_systems
-    if (any(self%mask)) call self%implicit%accept(self%mask)
+    call self%steppers%accept(accepted)
   end subroutine accept
 
   !> Restarts lanes with the kind of step that they have; what they know of the other kinds is kept.
@@ -463,10 +355,7 @@ contains
     logical, intent(in) :: resuming(:)
 
     self%choice%crossings = self%choice%crossings + merge(1, 0, resuming)
-    self%mask(:) = resuming .and. self%choice%kind == by_stages
-    if (any(self%mask)) call self%explicit%start(attempt, self%mask)
-    self%mask(:) = resuming .and. self%choice%kind == by_systems
-    if (any(self%mask)) call self%implicit%start(attempt, self%mask)
+    call self%steppers%resume(attempt, resuming)
   end subroutine resume
 
 end module nocdyn_auto_stepper

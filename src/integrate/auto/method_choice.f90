@@ -13,8 +13,8 @@ module nocdyn_method_choice
   implicit none (type, external)
   private
 
-  public :: restart_choice, count_steps, count_attempt, wants_trial, begin_calm, end_calm, go_on, begin_trial, &
-    break_even, needed_step, note_stiffness, rate, settle
+  public :: restart_choice, count_steps, count_attempt, wants_trial, begin_trial, break_even, &
+    needed_step, note_stiffness, rate, settle
 
   integer, parameter, public :: by_series = 1, by_stages = 2, by_systems = 3   !! Taylor, explicit, Rosenbrock steps
   integer, parameter, public :: kinds = 3
@@ -26,11 +26,11 @@ module nocdyn_method_choice
   integer, parameter :: first_doubt = 64, last_doubt = 256  !! steps after which a weak sign is enough
   integer, parameter :: forgiven = 2                        !! attempts that may fail then: implicit steps damp what is fast first
   integer, parameter :: successes = 2                       !! successive attempts that win a trial: an error estimate scatters
-  integer, parameter :: stiff_signs = 4                     !! signs of stiffness before implicit steps are tried
+  integer, parameter, public :: stiff_signs = 4                     !! signs of stiffness before implicit steps are tried
   integer, parameter :: nonstiff_signs = 6                  !! of the opposite, before they are given up
   real(wp), parameter :: margin = 0.95_wp                   !! a kind must cost less than this share to be worth a change
-  real(wp), parameter :: weak_sign = 0.4_wp                 !! share of the limit of stability: the estimate may be too low
-  real(wp), parameter :: near_limit = 0.75_wp               !! share of the limit of stability where implicit steps may cost less
+  real(wp), parameter, public :: weak_sign = 0.4_wp                 !! share of the limit of stability: the estimate may be too low
+  real(wp), parameter, public :: near_limit = 0.75_wp               !! share of the limit of stability where implicit steps may cost less
   real(wp), parameter :: safe_share = 0.8_wp                !! share of that limit where the other kinds are stable
 
   !> The limits of a problem, the same for all lanes.
@@ -62,15 +62,6 @@ module nocdyn_method_choice
     real(wp) :: t_start = 0.0_wp          !! where the lane started [s]
     integer :: steps = 0                  !! accepted steps
   end type choice_t
-
-  !> What is counted of lanes that step by series while they have nothing to decide; [lanes].
-  type, public :: calm_t
-    integer, allocatable :: steps(:)          !! accepted steps for which that is so, unless they show signs of stiffness
-    integer, allocatable :: uncounted(:)      !! of these, those that have been made
-    integer, allocatable :: signs(:)          !! as in `choice_t`, of implicit steps
-    logical, allocatable :: is_in_doubt(:)
-    logical, allocatable :: waits(:)          !! whether signs lead to nothing yet
-  end type calm_t
 
 contains
 
@@ -214,70 +205,6 @@ contains
       wants_trial = wants_trial .and. choice%signs(kind) >= nonstiff_signs
     end if
   end function wants_trial
-
-  !> Takes what is counted of a lane, after a decision.
-  pure subroutine begin_calm(calm, lane, choice, data)
-    type(calm_t), intent(inout) :: calm
-    integer, intent(in) :: lane
-    type(choice_t), intent(in) :: choice
-    type(kind_data_t), intent(in) :: data
-
-    calm%uncounted(lane) = 0
-    calm%signs(lane) = choice%signs(by_systems)
-    calm%is_in_doubt(lane) = choice%is_in_doubt
-    calm%waits(lane) = choice%wait(by_systems) > 0
-    associate (steps => calm%steps(lane))
-      steps = 0
-      if (choice%kind /= by_series .or. choice%before > 0) return
-      steps = huge(steps)
-      if (calm%waits(lane)) then
-        steps = choice%wait(by_systems)
-      else if (choice%is_in_doubt) then
-        steps = choice%doubt
-      end if
-      if (data%tries(by_stages)) steps = min(steps, choice%wait(by_stages))
-    end associate
-  end subroutine begin_calm
-
-  !> Gives it back, before a decision.
-  pure subroutine end_calm(calm, lane, choice)
-    type(calm_t), intent(inout) :: calm
-    integer, intent(in) :: lane
-    type(choice_t), intent(inout) :: choice
-
-    if (calm%uncounted(lane) == 0) return
-    call count_steps(choice, calm%uncounted(lane))
-    choice%signs(by_systems) = calm%signs(lane)
-    choice%is_in_doubt = calm%is_in_doubt(lane)
-    calm%uncounted(lane) = 0
-  end subroutine end_calm
-
-  !> Whether the last steps and the next ones leave all active lanes without anything to decide; if so, counts the last ones.
-  pure subroutine go_on(calm, data, lanes, active, has_moved, h, lambda, is_calm)
-    type(calm_t), intent(inout) :: calm
-    type(kind_data_t), intent(in) :: data
-    integer, intent(in) :: lanes
-    logical, intent(in) :: active(lanes), has_moved(lanes)   !! whether a lane takes part; whether its last step was accepted
-    real(wp), intent(in) :: h(lanes), lambda(lanes)          !! next step size [s], dominant eigenvalue [1/s]
-    logical, intent(inout) :: is_calm
-    real(wp) :: near, weak
-    integer :: lane
-
-    near = near_limit * data%limit(by_series)
-    weak = weak_sign * data%limit(by_series)
-    do lane = 1, lanes
-      is_calm = is_calm .and. (.not. active(lane) .or. calm%waits(lane) &
-                               .or. (merge(calm%signs(lane) + 1, 0, h(lane) * lambda(lane) > near) < stiff_signs &
-                                     .and. (calm%is_in_doubt(lane) .or. .not. h(lane) * lambda(lane) > weak)))
-    end do
-    if (.not. is_calm) return
-    do lane = 1, lanes
-      if (.not. (active(lane) .and. has_moved(lane))) cycle
-      calm%uncounted(lane) = calm%uncounted(lane) + 1
-      calm%signs(lane) = merge(calm%signs(lane) + 1, 0, h(lane) * lambda(lane) > near)
-      calm%is_in_doubt(lane) = calm%is_in_doubt(lane) .or. h(lane) * lambda(lane) > weak
-    end do
-  end subroutine go_on
 
   !> Begins the trial of a kind, instead of steps of size h by the present one.
   pure subroutine begin_trial(choice, data, kind, t, h)
