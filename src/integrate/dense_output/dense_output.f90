@@ -132,7 +132,7 @@ contains
     end do
   end subroutine evaluate_batch
 
-  !> Horner's scheme, written out for the degrees of the methods so that the innermost loop is over the components.
+  !> Horner's scheme.
   pure subroutine evaluate(n, degree, x, c, y)
     integer, intent(in) :: n, degree
     real(wp), intent(in) :: x
@@ -141,42 +141,20 @@ contains
     real(wp) :: sum(long)
     integer :: i, p
 
-    select case (degree)
-    case (3)
-      do i = 1, n, width
-        associate (j => i + width - 1)
-          y(i:j) = c(i:j, 0) + x * (c(i:j, 1) + x * (c(i:j, 2) + x * c(i:j, 3)))
-        end associate
+    do i = 1, n - long + 1, long
+      sum = c(i:i + long - 1, degree)
+      do p = degree - 1, 0, -1
+        sum = c(i:i + long - 1, p) + x * sum
       end do
-    case (4)
-      do i = 1, n, width
-        associate (j => i + width - 1)
-          y(i:j) = c(i:j, 0) + x * (c(i:j, 1) + x * (c(i:j, 2) + x * (c(i:j, 3) + x * c(i:j, 4))))
-        end associate
+      y(i:i + long - 1) = sum
+    end do
+    do i = i, n, width
+      sum(:width) = c(i:i + width - 1, degree)
+      do p = degree - 1, 0, -1
+        sum(:width) = c(i:i + width - 1, p) + x * sum(:width)
       end do
-    case (7)
-      do i = 1, n, width
-        associate (j => i + width - 1)
-          y(i:j) = c(i:j, 0) + x * (c(i:j, 1) + x * (c(i:j, 2) + x * (c(i:j, 3) + x * (c(i:j, 4) + x * (c(i:j, 5) &
-                                    + x * (c(i:j, 6) + x * c(i:j, 7)))))))
-        end associate
-      end do
-    case default
-      do i = 1, n - long + 1, long
-        sum = c(i:i + long - 1, degree)
-        do p = degree - 1, 0, -1
-          sum = c(i:i + long - 1, p) + x * sum
-        end do
-        y(i:i + long - 1) = sum
-      end do
-      do i = i, n, width
-        sum(:width) = c(i:i + width - 1, degree)
-        do p = degree - 1, 0, -1
-          sum(:width) = c(i:i + width - 1, p) + x * sum(:width)
-        end do
-        y(i:i + width - 1) = sum(:width)
-      end do
-    end select
+      y(i:i + width - 1) = sum(:width)
+    end do
   end subroutine evaluate
 
 end module nocdyn_dense_output

@@ -12,7 +12,7 @@ module nocdyn_root_functions
   implicit none (type, external)
   private
 
-  public :: allocate_root_functions, start_root_functions, set_start, scan_step, evaluate, parts_of, part_end, part_bracket, &
+  public :: allocate_root_functions, start_root_functions, set_start, scan_step, parts_of, part_end, part_bracket, &
     find_root, find_grazing, sign_of
 
   integer, parameter :: least_parts = 4   !! of a step; more for dense output of higher degree, whose steps are longer

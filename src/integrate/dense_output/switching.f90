@@ -1,11 +1,11 @@
 !> Switching of branches. Steps end where an indicator function falls through zero; there the system changes its branch.
 module nocdyn_switching
   use nocdyn_block_scan, only: allocate_block_scan, block_scan_t, scan_block
-  use nocdyn_dense_output, only: dense_output_t
+  use nocdyn_dense_output, only: dense_output_t, sample
   use nocdyn_finite, only: is_finite
   use nocdyn_kinds, only: wp
   use nocdyn_observer, only: observer_t
-  use nocdyn_root_functions, only: allocate_root_functions, bracket_t, evaluate, find_grazing, find_root, part_bracket, &
+  use nocdyn_root_functions, only: allocate_root_functions, bracket_t, find_grazing, find_root, part_bracket, &
     part_end, root_functions_t, scan_step, set_start, sign_of
   use nocdyn_solver_status, only: count_crossing, integration_chattering, solver_status_t
   use nocdyn_step_attempt, only: step_attempt_t
@@ -26,7 +26,8 @@ module nocdyn_switching
     integer, allocatable, private :: repeats(:, :)         !! crossings since the lane made progress, [lanes, functions]
     type(root_functions_t), private :: roots
     type(block_scan_t), private :: scan
-    real(wp), allocatable, private :: g(:)   !! indicators where a lane crosses
+    real(wp), allocatable, private :: g(:)   !! indicators where a lane crosses, or at the first crossing so far
+    real(wp), private :: known = -1.0_wp     !! theta of that crossing, -1 while they are not known there
     real(wp), allocatable, private :: y(:)
   end type switching_t
 
@@ -93,6 +94,7 @@ contains
     integer :: function, part
 
     theta = 1.0_wp
+    switching%known = -1.0_wp
     switching%pending(dense%lane) = 0
     if (switching%scan%is_used) then
       call take_scan(switching%scan, dense%lane, switching%roots)
@@ -147,8 +149,8 @@ contains
     if (switching%pending(dense%lane) > 0) then
       if (theta <= bracket%before) return
       if (theta < bracket%after) then
-        call evaluate(switching%roots, system, observer, dense, bracket%function, theta)
-        associate (g => switching%roots%g(bracket%function))
+        call find_indicators(switching, system, dense, theta)
+        associate (g => switching%g(bracket%function))
           if (is_finite(g)) then
             if (g > 0) return
             bracket%after = theta
@@ -160,6 +162,19 @@ contains
     call find_root(switching%roots, system, observer, dense, bracket, root)
     call keep_first(switching, dense%lane, bracket%function, root, theta)
   end subroutine find_earlier_crossing
+
+  !> The indicators at the first crossing so far, evaluated once.
+  subroutine find_indicators(switching, system, dense, theta)
+    type(switching_t), intent(inout) :: switching
+    class(system_t), intent(inout) :: system
+    type(dense_output_t), intent(inout) :: dense
+    real(wp), intent(in) :: theta
+
+    if (.not. abs(switching%known - theta) > 0) return
+    switching%known = theta
+    call sample(dense, theta, switching%y)
+    call system%indicator_values(dense%lane, dense%t + theta * dense%h, switching%y, switching%g)
+  end subroutine find_indicators
 
   !> The same for crossings from which an indicator returns before the end of a part, as at a grazing contact.
   subroutine find_grazing_crossings(switching, system, observer, dense, theta)

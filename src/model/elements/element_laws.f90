@@ -311,7 +311,7 @@ contains
 
   !> Lowers g to a guard, with its boundary shifted outwards, where a branch is the present one.
   pure subroutine keep_lower(lanes, branch, present_branch, guard, shift, g)
-    integer, intent(in) :: lanes, branch   !! 0: all branches
+    integer, intent(in) :: lanes, branch   !! branch of the guard, 0 for all
     integer, intent(in) :: present_branch(lanes)
     real(wp), intent(in) :: guard(lanes), shift(lanes)
     real(wp), intent(inout) :: g(lanes)

@@ -64,6 +64,7 @@ contains
       self%twists = twist_map(incidence, has_offset, without_bands=is_block)
       self%may_shift = size(self%origin%motions%free) > 0
       self%has_block_indicators = machine%lanes > 1
+      if (allocated(self%switch_angle)) deallocate (self%switch_angle, self%switch_speed)
       allocate (self%switch_angle(machine%lanes, machine%switches%count), source=0.0_wp)
       allocate (self%switch_speed(machine%lanes, machine%switches%count), source=0.0_wp)
       allocate (couplings, source=coupling_elements(machine))

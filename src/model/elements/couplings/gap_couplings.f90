@@ -48,7 +48,7 @@ contains
     if (any(gap <= 0) .or. .not. all(any(abs(coefficient) > 0, dim=1))) then
       error stop 'nocdyn_gap_couplings: gaps have widths and edges stiffness'
     end if
-    call bank%add_parameter('gap', gap)
+    call bank%add_parameter('gap', gap, is_key=bank%order == 1)   ! the powers of others are looked at in assembly
     bank%with_work = pack([(e, e=1, size(bank%to))], [(any(bank%with_work == e) .or. can_pull(coefficient(:, :, e)), &
                                                   e=1, size(bank%to))])
     bank%elastic = [(e, e=1, size(bank%to))]
