@@ -41,7 +41,7 @@ contains
     allocate (violated, source=violated_rows(machine))
     if (size(violated) == 0) return
     if (.not. may_project) then
-      groups = violated_groups(machine, violated)
+      allocate (groups, source=violated_groups(machine, violated))
       do g = 1, size(groups)
         call follow_speeds(machine, groups(g), is_given, is_consistent)
       end do

@@ -65,14 +65,15 @@ contains
         call system%block_indicators(columns, scan%t, scan%y(:, :, i), scan%g(:, :, part + i))
       end do
     end do
-    call find_near(attempt%lanes, size(side, 2), parts, side, scan%g, scan%is_near)
+    call find_near(attempt%lanes, size(side, 2), parts, taken, side, scan%g, scan%is_near)
     call keep_ends(scan, parts, taken)
   end subroutine scan_block
 
   !> Finds the lanes that may cross a boundary: all others have positive indicators, none of which is at the lowest point of a
   !> parabola between two parts.
-  pure subroutine find_near(lanes, functions, parts, side, g, is_near)
+  pure subroutine find_near(lanes, functions, parts, taken, side, g, is_near)
     integer, intent(in) :: lanes, functions, parts
+    logical, intent(in) :: taken(lanes)
     integer, intent(in) :: side(lanes, functions)
     real(wp), intent(in) :: g(lanes, functions, 0:parts)
     logical, intent(inout) :: is_near(lanes)
@@ -91,7 +92,7 @@ contains
       do part = 1, parts - 1
         do l = 1, lanes
           associate (before => g(l, function, part - 1), middle => g(l, function, part), after => g(l, function, part + 1))
-            is_near(l) = is_near(l) .or. abs(after - before) < 2 * ((after - middle) - (middle - before))
+            if (taken(l)) is_near(l) = is_near(l) .or. abs(after - before) < 2 * ((after - middle) - (middle - before))
           end associate
         end do
       end do
