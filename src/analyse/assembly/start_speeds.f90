@@ -98,7 +98,7 @@ contains
     omega = machine%start_speed(1, :)
     call machine%coordinates%project(1, machine%inertia(1, :), omega, speed)
     projected = machine%coordinates%body_speeds(1, speed)
-    groups = violated_groups(machine, violated)
+    allocate (groups, source=violated_groups(machine, violated))
     do g = 1, size(groups)
       associate (bodies => machine%groups(groups(g))%bodies)
         omega(bodies) = projected(bodies)
