@@ -22,15 +22,15 @@ module nocdyn_method_choice
   integer, parameter :: first_period(kinds) = [2, 2, 4]   !! steps before the first trial of a kind
   integer, parameter, public :: shared_period(kinds) = [2, 128, 64]   !! the same of variants: all wait for the trial of one
   integer, parameter :: longest_period(kinds) = [256, 256, 64]   ! implicit steps are tried near the limit of stability only
-  integer, parameter, public :: longest_shared_period(kinds) = [256, 256, 1024]
+  integer, parameter, public :: longest_shared_period(kinds) = [256, 256, 1024]   !! the same of variants
   integer, parameter :: first_doubt = 64, last_doubt = 256  !! steps after which a weak sign is enough
   integer, parameter :: forgiven = 2                        !! attempts that may fail then: implicit steps damp what is fast first
   integer, parameter :: successes = 2                       !! successive attempts that win a trial: an error estimate scatters
-  integer, parameter, public :: stiff_signs = 4                     !! signs of stiffness before implicit steps are tried
+  integer, parameter, public :: stiff_signs = 4   !! signs of stiffness before implicit steps are tried
   integer, parameter :: nonstiff_signs = 6                  !! of the opposite, before they are given up
   real(wp), parameter :: margin = 0.95_wp                   !! a kind must cost less than this share to be worth a change
-  real(wp), parameter, public :: weak_sign = 0.4_wp                 !! share of the limit of stability: the estimate may be too low
-  real(wp), parameter, public :: near_limit = 0.75_wp               !! share of the limit of stability where implicit steps may cost less
+  real(wp), parameter, public :: weak_sign = 0.4_wp     !! share of the limit of stability: the estimate may be too low
+  real(wp), parameter, public :: near_limit = 0.75_wp   !! share of the limit of stability where implicit steps may cost less
   real(wp), parameter :: safe_share = 0.8_wp                !! share of that limit where the other kinds are stable
 
   !> The limits of a problem, the same for all lanes.

@@ -78,7 +78,8 @@ contains
     class(switches_t), intent(in) :: self
     type(bank_slot_t), intent(inout) :: banks(:)
     real(wp), intent(in) :: time(:)                   !! t [s], [lanes]
-    real(wp), contiguous, intent(in) :: angle(:, :), speed(:, :)  !! of the elements of the switches [rad], [rad/s], [lanes, switches]
+    !> of the elements of the switches [rad], [rad/s], [lanes, switches]
+    real(wp), contiguous, intent(in) :: angle(:, :), speed(:, :)
     real(wp), contiguous, intent(in) :: internal(:, :)            !! [lanes, states of all elements]
     real(wp), intent(inout) :: distance(:, :)         !! in units of the laws, [lanes, switches]
     integer :: first, i

@@ -103,8 +103,8 @@ contains
     picked = pick(1, choices)
   end function by_branch
 
-  !> The depth of the penetration of an edge as a moment, by the stiffness sum |p_k| gap^(k - 1), the elastic and the viscous moment, positive where they push the bodies
-  !> apart, decide on the branch.
+  !> The depth of the penetration of an edge as a moment, by the stiffness sum |p_k| gap^(k - 1), the elastic and the viscous
+  !> moment, positive where they push the bodies apart, decide on the branch.
   subroutine guard_branches(self, tape, w, half, p)
     class(gap_couplings_t), intent(in) :: self
     type(law_tape_t), target, intent(inout) :: tape
