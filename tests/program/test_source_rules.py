@@ -35,14 +35,14 @@ MANY_ARGUMENTS = {
     ),
     "src/model/elements/polynomial_laws.f90": (KERNEL, "moments"),
     "src/model/formulations/kernels/series_kernel.inc": (KERNEL, "accelerate", "begin_motion", "find_moments", "find_values"),
-    "src/model/laws/law_harmonics.inc": (KERNEL, "harmonic_sum"),
+    "src/base/laws/law_harmonics.inc": (KERNEL, "harmonic_sum"),
     "src/model/lanes/sparse_map.f90": (KERNEL, "pair_of_rows", "pair_on_lanes"),
 }
 
 # Longer procedures, by file, and why.
 LONG_PROCEDURES = {
-    "src/model/laws/law_values.f90": ("a table: one case for each operation", "value_of"),
-    "src/model/laws/law_harmonics.inc": (
+    "src/base/laws/law_values.f90": ("a table: one case for each operation", "value_of"),
+    "src/base/laws/law_harmonics.inc": (
         "kernel: what a loop keeps in registers cannot be shared with another procedure",
         "advance",
         "expand",
