@@ -347,9 +347,7 @@ contains
     associate (f => self%freedoms, map => self%accelerations, first => self%strip * (strip - 1) + 1)
       if (self%lanes == 1) then
         call map%multiply(accelerations, 0, 0, self%moment, self%acceleration)
-        y(1, f + 1:2 * f) = inverse * self%rates(:f)
-        y(1, :f) = inverse * self%acceleration(:f)
-        self%rates(:f) = y(1, :f)
+        call integrate_one_lane(f, inverse, self%acceleration, self%rates, y)
       else if (self%w == narrow) then
         call narrow_accelerate(f, map%first, map%column, map%coefficient(1, 1, strip), inverse, self%moment, self%rates, &
                                min(self%strip, self%lanes + 1 - first), self%lanes, y(first, 1))
@@ -359,6 +357,23 @@ contains
       end if
     end associate
   end subroutine integrate
+
+  pure subroutine integrate_one_lane(freedoms, inverse, acceleration, rates, y)
+    integer, intent(in) :: freedoms
+    real(wp), intent(in) :: inverse                   !! 1 / (k + 1)
+    real(wp), intent(in) :: acceleration(freedoms)    !! q'', number k
+    real(wp), intent(inout) :: rates(freedoms)        !! q'_k, on return q'_(k+1)
+    real(wp), intent(inout) :: y(2 * freedoms)        !! coefficients k + 1
+    real(wp) :: rate
+    integer :: c
+
+    do c = 1, freedoms
+      rate = inverse * acceleration(c)
+      y(freedoms + c) = inverse * rates(c)
+      y(c) = rate
+      rates(c) = rate
+    end do
+  end subroutine integrate_one_lane
 
   !> Coefficients k + 1 of the work integrals; the powers are `applied` times the speed.
   subroutine integrate_powers(self, machine, strip, k, columns, y)
