@@ -342,12 +342,17 @@ contains
     integer, intent(in) :: strip, k, columns
     real(wp), intent(inout) :: y(self%lanes, columns)   !! coefficients k + 1 of the state
     real(wp) :: inverse
+    integer :: c
 
     inverse = 1.0_wp / (k + 1)
     associate (f => self%freedoms, map => self%accelerations, first => self%strip * (strip - 1) + 1)
       if (self%lanes == 1) then
         call map%multiply(accelerations, 0, 0, self%moment, self%acceleration)
-        call integrate_one_lane(f, inverse, self%acceleration, self%rates, y)
+        do c = 1, f
+          y(1, f + c) = inverse * self%rates(c)
+          self%rates(c) = inverse * self%acceleration(c)
+          y(1, c) = self%rates(c)
+        end do
       else if (self%w == narrow) then
         call narrow_accelerate(f, map%first, map%column, map%coefficient(1, 1, strip), inverse, self%moment, self%rates, &
                                min(self%strip, self%lanes + 1 - first), self%lanes, y(first, 1))
@@ -357,23 +362,6 @@ contains
       end if
     end associate
   end subroutine integrate
-
-  pure subroutine integrate_one_lane(freedoms, inverse, acceleration, rates, y)
-    integer, intent(in) :: freedoms
-    real(wp), intent(in) :: inverse                   !! 1 / (k + 1)
-    real(wp), intent(in) :: acceleration(freedoms)    !! q'', number k
-    real(wp), intent(inout) :: rates(freedoms)        !! q'_k, on return q'_(k+1)
-    real(wp), intent(inout) :: y(2 * freedoms)        !! coefficients k + 1
-    real(wp) :: rate
-    integer :: c
-
-    do c = 1, freedoms
-      rate = inverse * acceleration(c)
-      y(freedoms + c) = inverse * rates(c)
-      y(c) = rate
-      rates(c) = rate
-    end do
-  end subroutine integrate_one_lane
 
   !> Coefficients k + 1 of the work integrals; the powers are `applied` times the speed.
   subroutine integrate_powers(self, machine, strip, k, columns, y)
