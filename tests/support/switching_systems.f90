@@ -18,6 +18,7 @@ module nocdyn_switching_systems
     procedure :: jacobian => play_jacobian
     procedure :: start_lane => play_enter
     procedure :: indicator_values => play_values
+    procedure :: block_indicators => play_block_values
     procedure :: change_branch => play_cross
     procedure :: switch_name => play_name
   end type play_t
@@ -160,6 +161,22 @@ contains
       g(:) = g + overlap * edge
     end associate
   end subroutine play_values
+
+  subroutine play_block_values(self, columns, t, y, g)
+    class(play_t), intent(inout) :: self
+    integer, intent(in) :: columns
+    real(wp), intent(in) :: t(self%lanes)
+    real(wp), intent(in) :: y(self%lanes, columns)
+    real(wp), intent(inout) :: g(self%lanes, self%switches)
+    real(wp) :: one_g(2), one_y(3)
+    integer :: lane
+
+    do lane = 1, self%lanes
+      one_y = y(lane, :3)
+      call self%indicator_values(lane, t(lane), one_y, one_g)
+      g(lane, :) = one_g
+    end do
+  end subroutine play_block_values
 
   subroutine play_cross(self, lane, which, t, y)
     class(play_t), intent(inout) :: self
