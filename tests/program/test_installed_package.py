@@ -28,21 +28,50 @@ def test_the_installed_program_runs(prefix):
     assert run(prefix / "bin/nocdyn", "--version").startswith("nocdyn ")
 
 
-def test_another_project_finds_the_package_and_integrates_with_it(prefix, tmp_path):
+@pytest.fixture(scope="module")
+def consumer(prefix, tmp_path_factory):
+    """The folder of the programs of another project."""
+    build = tmp_path_factory.mktemp("consumer")
     compiler = os.environ.get("FC", "gfortran")
     run(
         "cmake",
         "-S",
         SOURCE / "tests/package",
         "-B",
-        tmp_path,
+        build,
         f"-DCMAKE_PREFIX_PATH={prefix}",
         f"-DCMAKE_Fortran_COMPILER={compiler}",
     )
-    run("cmake", "--build", tmp_path)
-    rows, *speeds = run(tmp_path / "spin_up", CASE_1).split()
+    run("cmake", "--build", build)
+    return build
+
+
+def test_another_project_finds_the_package_and_integrates_with_it(consumer):
+    rows, *speeds = run(consumer / "spin_up", CASE_1).split()
     assert rows == "3"
     assert list(map(float, speeds)) == pytest.approx(SPEEDS, rel=ACCURACY)
+
+
+@pytest.mark.parametrize(
+    ("mistake", "rule"),
+    [
+        ("states", "there is at least one state"),
+        ("lanes", "there is at least one lane"),
+        ("quadratures", "the number of quadratures is not negative"),
+        ("equation", "every component has an equation"),
+        ("kink", "a function in the formulas is not smooth, or is for elements of machines"),
+        ("lane", "there is no such lane"),
+        ("parameters", "the number of parameters stays the same"),
+    ],
+)
+def test_wrong_formulas_end_with_the_rule(consumer, mistake, rule):
+    outcome = subprocess.run([consumer / "wrong_formulas", mistake], check=False, capture_output=True, text=True)
+    assert outcome.returncode != 0
+    assert f"nocdyn_formula_system: {rule}" in outcome.stderr
+
+
+def test_formulas_without_a_mistake_are_accepted(consumer):
+    run(consumer / "wrong_formulas", "none")
 
 
 def test_the_installed_package_can_be_moved(prefix, tmp_path):
@@ -69,6 +98,7 @@ def test_a_version_that_does_not_fit_is_refused(prefix, tmp_path):
     project = (SOURCE / "tests/package/CMakeLists.txt").read_text().replace("nocdyn 0.1", "nocdyn 99")
     (tmp_path / "CMakeLists.txt").write_text(project)
     (tmp_path / "spin_up.f90").write_text("end\n")
+    (tmp_path / "wrong_formulas.f90").write_text("end\n")
     words = ["cmake", "-S", tmp_path, "-B", tmp_path / "build", f"-DCMAKE_PREFIX_PATH={prefix}"]
     outcome = subprocess.run(words, check=False, capture_output=True, text=True)
     assert outcome.returncode != 0

@@ -276,17 +276,19 @@ contains
     quotient = number_times(x, apply(y%tape, op_reciprocal, y%node))
   end function number_over
 
-  !> x^n by products.
+  !> x^n by products; for n < 0, the reciprocal of x^(-n).
   function power_of(x, n) result(power)
-    type(expression_t), intent(in) :: x
-    integer, intent(in) :: n   !! at least 1
+    type(expression_t), intent(in) :: x   !! not zero if n < 0
+    integer, intent(in) :: n
     type(expression_t) :: power
     integer :: i
 
     power = x
-    do i = 2, n
+    if (n == 0) power = literal(x%tape, 1.0_wp)
+    do i = 2, abs(n)
       power = product_of(power, x)
     end do
+    if (n < 0) power = apply(x%tape, op_reciprocal, power%node)
   end function power_of
 
 end module nocdyn_law_expressions

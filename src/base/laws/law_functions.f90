@@ -1,12 +1,12 @@
 !> Functions in the formulas of laws.
 module nocdyn_law_functions
   use nocdyn_law_expressions, only: add_list, apply, expression_t, node_of, operator(*), operator(+)
-  use nocdyn_law_tape, only: law_node_t, op_cosine, op_exponential, op_harmonics, op_larger, op_log_cosh, op_ratio, &
-    op_sech_squared, op_sine, op_size, op_square_root, op_tanh
+  use nocdyn_law_tape, only: law_node_t, op_cosine, op_exponential, op_harmonics, op_larger, op_log_cosh, op_logarithm, &
+    op_ratio, op_sech_squared, op_sine, op_size, op_square_root, op_tanh
   implicit none (type, external)
   private
 
-  public :: sin, cos, tanh, exp, sqrt, log_cosh, larger, ratio, size_of, polynomial, harmonics, add_guard
+  public :: sin, cos, tanh, exp, log, sqrt, log_cosh, larger, ratio, size_of, polynomial, harmonics, add_guard
 
   interface sin
     procedure :: sine_of
@@ -20,6 +20,9 @@ module nocdyn_law_functions
   interface exp
     procedure :: exponential_of
   end interface exp
+  interface log
+    procedure :: logarithm_of
+  end interface log
   interface sqrt
     procedure :: root_of
   end interface sqrt
@@ -56,6 +59,14 @@ contains
 
     exponential = apply(x%tape, op_exponential, x%node)
   end function exponential_of
+
+  !> Natural logarithm.
+  function logarithm_of(x) result(logarithm)
+    type(expression_t), intent(in) :: x   !! positive
+    type(expression_t) :: logarithm
+
+    logarithm = apply(x%tape, op_logarithm, x%node)
+  end function logarithm_of
 
   function root_of(x) result(root)
     type(expression_t), intent(in) :: x   !! positive

@@ -22,8 +22,10 @@ module nocdyn_law_tape
   integer, parameter, public :: op_square_root = 22, op_log_cosh = 23
   ! ... the sum of a(n) sin(n x) + b(n) cos(n x) over whole numbers n; ...
   integer, parameter, public :: op_harmonics = 24
+  ! ... the natural logarithm; a variable to the power of a constant; ...
+  integer, parameter, public :: op_logarithm = 25, op_power = 26
   ! ... and values without a series: the larger of two, a quotient that is 0 where the divisor is 0, and the size of a constant.
-  integer, parameter, public :: op_larger = 25, op_ratio = 26, op_size = 27
+  integer, parameter, public :: op_larger = 27, op_ratio = 28, op_size = 29
 
   public :: new_law_tape
 

@@ -3,8 +3,8 @@
 module nocdyn_law_values
   use nocdyn_kinds, only: wp
   use nocdyn_law_tape, only: law_tape_t, op_add, op_cosine, op_exponential, op_fixed, op_harmonics, op_larger, op_log_cosh, &
-    op_multiply, op_ratio, op_reciprocal, op_scale, op_sech_squared, op_shift, op_sine, op_size, op_square_root, op_subtract, &
-    op_tanh, op_wave
+    op_logarithm, op_multiply, op_power, op_ratio, op_reciprocal, op_scale, op_sech_squared, op_shift, op_sine, op_size, &
+    op_square_root, op_subtract, op_tanh, op_wave
   use nocdyn_vector_functions, only: cosine_of, exp_of, log_cosh_of, sine_of, tanh_of
   implicit none (type, external)
   private
@@ -95,6 +95,10 @@ contains
       value = sqrt(x)
     case (op_log_cosh)
       value = log_cosh_of(x)
+    case (op_logarithm)
+      value = log(x)
+    case (op_power)
+      value = x**y
     case (op_larger)
       value = max(x, y)
     case (op_size)
