@@ -16,7 +16,7 @@ from sweep_inputs import MPI_ENVIRONMENT, MPI_PROGRAM, SWEEP, TWO_DISCS, limited
 pytestmark = needs_sweeps
 
 # variants that take this sweep about a second of one thread
-SAMPLES = 1000 if IS_SLOW else 10000
+SAMPLES = 1000 if IS_SLOW else 40000
 LONG = ("--set", f"sweep.samples={SAMPLES}", "--set", "run.t_end=20")
 ENDLESS = ("--set", "sweep.samples=100000000", "--set", "run.t_end=20")
 INTERRUPTED = (
