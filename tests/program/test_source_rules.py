@@ -41,7 +41,6 @@ MANY_ARGUMENTS = {
 
 # Longer procedures, by file, and why.
 LONG_PROCEDURES = {
-    "src/base/laws/law_values.f90": ("a table: one case for each operation", "value_of"),
     "src/base/laws/law_harmonics.inc": (
         "kernel: what a loop keeps in registers cannot be shared with another procedure",
         "advance",

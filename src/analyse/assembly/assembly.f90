@@ -22,7 +22,7 @@ module nocdyn_assembly
   implicit none (type, external)
   private
 
-  public :: assemble_machine, new_formulation
+  public :: assemble_machine, new_asked_formulation, new_formulation
 
   integer, parameter :: most_names = 12   ! in a message
 
@@ -146,6 +146,16 @@ contains
                joined(selected(machine%names, bodies), ', ', most_names) // ' can turn while every body with an inertia ' // &
                'stands still; allowed: > 0 [kg m2], or 0 where a body with an inertia is geared to it')
   end subroutine refuse_massless_motion
+
+  !> The formulation that an input asks for.
+  subroutine new_asked_formulation(input, machine, formulation, with_energy_balance)
+    type(input_t), intent(in) :: input
+    type(machine_t), intent(in) :: machine
+    class(formulation_t), allocatable, intent(out) :: formulation
+    logical, intent(in), optional :: with_energy_balance   !! as in `new_formulation`
+
+    call new_formulation(input%groups(input%position('run'))%text('formulation'), machine, formulation, with_energy_balance)
+  end subroutine new_asked_formulation
 
   !> The equations of motion of a machine, a system for an integrator.
   subroutine new_formulation(word, machine, formulation, with_energy_balance)

@@ -1,7 +1,7 @@
 !> The motion of a machine over time: integrates an input, hands out the rows of its trajectory, and makes a summary.
 module nocdyn_transient
   use, intrinsic :: iso_fortran_env, only: int64
-  use nocdyn_assembly, only: assemble_machine, new_formulation
+  use nocdyn_assembly, only: assemble_machine, new_asked_formulation
   use nocdyn_column_names, only: choose_columns
   use nocdyn_errors, only: error_t, exit_failed, raise
   use nocdyn_finite, only: is_finite
@@ -139,7 +139,7 @@ contains
     call assemble_machine(input, machine, error)
     if (.not. allocated(error)) call check_size(input, machine, error)
     if (allocated(error)) return
-    call new_formulation(input%groups(input%position('run'))%text('formulation'), machine, formulation)
+    call new_asked_formulation(input, machine, formulation)
     call choose_settings(input, formulation, settings, notes, error)
   end subroutine build_formulation
 

@@ -193,7 +193,7 @@ contains
 
     associate (choice => self%choice(lane))
       tried = choice%kind
-      if (choice%kind == by_series .and. .not. self%has_moved(lane)) call settle(choice, by_stages, by_series)
+      if (choice%kind == by_series .and. .not. self%has_moved(lane)) call settle(choice, self%data, by_stages, by_series)
       is_new = choice%kind == by_systems .or. modulo(choice%steps, stride) == 0
       call count_attempt(choice, self%data, self%has_moved(lane), attempt%t(lane), min(control%h(lane), control%longest), &
                          is_over)
@@ -237,14 +237,14 @@ contains
         if (self%expanded(lane)) then
           needed = needed_step(choice, self%data, by_series, t, self%h(lane))
           if (self%steppers%series%plans_step(lane) .and. min(control%h(lane), control%longest) >= needed) then
-            call settle(choice, by_series, choice%kind)
+            call settle(choice, self%data, by_series, choice%kind)
             call reset_control(control, lane)
           else
-            call settle(choice, choice%kind, by_series)
+            call settle(choice, self%data, choice%kind, by_series)
             control%h(lane) = self%h(lane)
           end if
         else if (choice%kind == by_series .and. .not. self%steppers%series%plans_step(lane)) then
-          call settle(choice, by_stages, by_series)
+          call settle(choice, self%data, by_stages, by_series)
           control%h(lane) = self%h(lane)
           call change_kind(self, control, lane)
         end if

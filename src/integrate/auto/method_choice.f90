@@ -56,7 +56,6 @@ module nocdyn_method_choice
     real(wp) :: lambda = 0.0_wp           !! the last estimate of the dominant eigenvalue [1/s]
     integer :: wait(kinds) = 0            !! accepted steps until a kind may be tried
     integer :: period(kinds) = 0          !! `wait` after a trial that is lost
-    integer :: longest(kinds) = 0         !! limit of that
     integer :: signs(kinds) = 0           !! successive signs that a kind may cost less
     integer :: crossings = 0              !! steps that were cut
     real(wp) :: t_start = 0.0_wp          !! where the lane started [s]
@@ -74,7 +73,6 @@ contains
     choice%kind = merge(by_series, by_stages, data%has(by_series))
     choice%wait(:) = data%first_period
     choice%period(:) = data%first_period
-    choice%longest(:) = data%longest_period
     choice%t_start = t
   end subroutine restart_choice
 
@@ -145,24 +143,25 @@ contains
     if (choice%before == 0) return
     if (has_moved .and. h >= break_even(choice, data, choice%kind, t, choice%rate)) then
       choice%succeeded = choice%succeeded + 1
-      if (choice%succeeded >= successes) call settle(choice, choice%kind, choice%before)
+      if (choice%succeeded >= successes) call settle(choice, data, choice%kind, choice%before)
     else
       choice%succeeded = 0
       choice%failed = choice%failed + 1
       is_over = choice%failed > choice%may_fail
       if (.not. is_over) return
-      call settle(choice, choice%before, choice%kind)
+      call settle(choice, data, choice%before, choice%kind)
     end if
   end subroutine count_attempt
 
   !> Ends the comparison of two kinds.
-  pure subroutine settle(choice, winner, loser)
+  pure subroutine settle(choice, data, winner, loser)
     type(choice_t), intent(inout) :: choice
+    type(kind_data_t), intent(in) :: data
     integer, value :: winner, loser   ! may be components of `choice`
 
     choice%kind = winner
     choice%before = 0
-    choice%period(loser) = min(2 * choice%period(loser), choice%longest(loser))
+    choice%period(loser) = min(2 * choice%period(loser), data%longest_period(loser))
     choice%wait(loser) = choice%period(loser)
     choice%signs(:) = 0
   end subroutine settle

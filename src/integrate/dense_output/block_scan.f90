@@ -10,7 +10,7 @@ module nocdyn_block_scan
   implicit none (type, external)
   private
 
-  public :: allocate_block_scan, scan_block
+  public :: allocate_block_scan, scan_block, has_minimum
 
   type, public :: block_scan_t
     logical :: is_used = .false.               !! whether the system evaluates its indicators for blocks
@@ -92,12 +92,19 @@ contains
       do part = 1, parts - 1
         do l = 1, lanes
           associate (before => g(l, function, part - 1), middle => g(l, function, part), after => g(l, function, part + 1))
-            if (taken(l)) is_near(l) = is_near(l) .or. abs(after - before) < 2 * ((after - middle) - (middle - before))
+            if (taken(l)) is_near(l) = is_near(l) .or. has_minimum(before, middle, after)
           end associate
         end do
       end do
     end do
   end subroutine find_near
+
+  !> Whether the parabola through three equidistant values has its minimum between them.
+  pure logical function has_minimum(before, middle, after)
+    real(wp), intent(in) :: before, middle, after
+
+    has_minimum = abs(after - before) < 2 * ((after - middle) - (middle - before))
+  end function has_minimum
 
   !> The ends of the steps of lanes that cross nothing are the starts of their next ones.
   pure subroutine keep_ends(scan, parts, taken)

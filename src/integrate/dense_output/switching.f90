@@ -1,6 +1,6 @@
 !> Switching of branches. Steps end where an indicator function falls through zero; there the system changes its branch.
 module nocdyn_switching
-  use nocdyn_block_scan, only: allocate_block_scan, block_scan_t, scan_block
+  use nocdyn_block_scan, only: allocate_block_scan, block_scan_t, has_minimum, scan_block
   use nocdyn_dense_output, only: dense_output_t, sample
   use nocdyn_finite, only: is_finite
   use nocdyn_kinds, only: wp
@@ -202,12 +202,12 @@ contains
     end do
   end subroutine find_grazing_crossings
 
-  !> Whether the parabola through three equidistant positive values has its minimum between them.
+  !> Whether three values are positive, and their parabola has its minimum between them.
   pure logical function may_graze(before, middle, after)
     real(wp), intent(in) :: before, middle, after
 
     may_graze = min(sign_of(before), sign_of(middle), sign_of(after)) > 0
-    if (may_graze) may_graze = abs(after - before) < 2 * ((after - middle) - (middle - before))
+    if (may_graze) may_graze = has_minimum(before, middle, after)
   end function may_graze
 
   !> Replaces the crossing at theta by one at `root`, if that is earlier.

@@ -4,7 +4,7 @@ module nocdyn_after_step
   use nocdyn_events, only: find_events
   use nocdyn_extremes, only: restart_extremes, update_extremes
   use nocdyn_kinds, only: wp
-  use nocdyn_masks, only: all_true
+  use nocdyn_masks, only: all_true, any_true
   use nocdyn_observer, only: observer_t
   use nocdyn_solver_status, only: integration_done, integration_running, integration_stopped, integration_too_many_steps, &
     solver_status_t
@@ -35,7 +35,7 @@ contains
       steps%theta_end(:) = 1.0_wp
       steps%crosses(:) = .false.
       if (.not. integrator%inspects) return
-      if (integrator%has_switches .and. count(integrator%accepted) > 0) then
+      if (integrator%has_switches .and. any_true(integrator%attempt%lanes, integrator%accepted)) then
         call scan_for_crossings(integrator%switching, system, integrator%attempt, integrator%coefficients, integrator%accepted)
       end if
       do lane = 1, integrator%attempt%lanes

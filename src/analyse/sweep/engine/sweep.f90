@@ -1,7 +1,7 @@
 !> The threads of a sweep: each takes chunks of variants from a scheduler until none are left. What their blocks share.
 module nocdyn_sweep
   use, intrinsic :: iso_fortran_env, only: int64
-  use nocdyn_assembly, only: new_formulation
+  use nocdyn_assembly, only: new_asked_formulation
   use nocdyn_errors, only: error_t
   use nocdyn_formulation, only: formulation_t
   use nocdyn_integration_settings, only: integration_settings_t
@@ -43,8 +43,7 @@ contains
     type(string_t), allocatable :: notes(:)
 
     setup%has_energy_balance = needs_work_integrals(plan%statistics)
-    call new_formulation(plan%input%groups(plan%input%position('run'))%text('formulation'), plan%machine, formulation, &
-                         setup%has_energy_balance)
+    call new_asked_formulation(plan%input, plan%machine, formulation, setup%has_energy_balance)
     call choose_settings(plan%input, formulation, settings, notes, error)
     setup%lanes = merge(large_block, small_block, formulation%states <= max_states)
   end subroutine prepare_sweep

@@ -5,7 +5,7 @@
 !> the structure of the block, its parameters are copied into the lane. If not, the variant needs a block of its own: a friction
 !> that is 0 in the block and not in the variant is an example, and other values of &run are another.
 module nocdyn_variant_machines
-  use nocdyn_assembly, only: assemble_machine, new_formulation
+  use nocdyn_assembly, only: assemble_machine, new_asked_formulation
   use nocdyn_direct_parameters, only: direct_parameters_t, new_direct_parameters
   use nocdyn_errors, only: error_t
   use nocdyn_formulation, only: formulation_t
@@ -79,8 +79,7 @@ contains
       call share_block(self, block)
       if (is_typical) call self%direct%accept(typical)
     else
-      call new_formulation(self%input%groups(self%input%position('run'))%text('formulation'), block%machine, formulation, &
-                           with_energy_balance)
+      call new_asked_formulation(self%input, block%machine, formulation, with_energy_balance)
       allocate (self%formulation, source=formulation)
       deallocate (block)
     end if
@@ -211,8 +210,7 @@ contains
     type(machine_t) :: machine
 
     call assemble_variant(self%input, self%targets, values, machine, message)
-    if (message == '') call new_formulation(self%input%groups(self%input%position('run'))%text('formulation'), machine, &
-                                            formulation, self%has_energy_balance)
+    if (message == '') call new_asked_formulation(self%input, machine, formulation, self%has_energy_balance)
   end subroutine own_formulation
 
   !> Frees the block.
