@@ -17,7 +17,8 @@ RANKS = 3
 RANK_JOURNALS = [f"sweep.rank-{rank}.journal" for rank in range(1, RANKS)]
 SHARDS = 2
 SAMPLES = 2000 if IS_SLOW else 6000
-LONG = ("--set", f"sweep.samples={SAMPLES}", "--set", "run.t_end=20")
+T_END = 20 if IS_SLOW else 200
+LONG = ("--set", f"sweep.samples={SAMPLES}", "--set", f"run.t_end={T_END}")
 
 
 @pytest.fixture

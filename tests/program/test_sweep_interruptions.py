@@ -16,8 +16,9 @@ from sweep_inputs import MPI_ENVIRONMENT, MPI_PROGRAM, SWEEP, TWO_DISCS, limited
 pytestmark = needs_sweeps
 
 # variants that take this sweep about a second of one thread
-SAMPLES = 1000 if IS_SLOW else 40000
-LONG = ("--set", f"sweep.samples={SAMPLES}", "--set", "run.t_end=20")
+SAMPLES = 3000 if IS_SLOW else 40000
+T_END = 20 if IS_SLOW else 200
+LONG = ("--set", f"sweep.samples={SAMPLES}", "--set", f"run.t_end={T_END}")
 ENDLESS = ("--set", "sweep.samples=100000000", "--set", "run.t_end=20")
 INTERRUPTED = (
     r"nocdyn: .*discs\.nml: interrupted with (\d+) of 100000000 variants done; "
