@@ -28,6 +28,16 @@ module nocdyn_bank
     integer, allocatable :: elements(:)  !! elements that have a column, numbered within the bank
   end type quantity_t
 
+  !> One harmonic of the torque of an element that turns steadily: amplitude sin(frequency t + order phi + phase), with the angle
+  !> phi of `body`.
+  type, public :: harmonic_t
+    real(wp) :: amplitude = 0.0_wp   !! at this speed [N m]
+    real(wp) :: frequency = 0.0_wp   !! [rad/s]
+    real(wp) :: order = 0.0_wp       !! oscillations per turn of the body
+    real(wp) :: phase = 0.0_wp       !! at t = 0 and phi = 0 [rad]
+    integer :: body = 0
+  end type harmonic_t
+
   type, abstract, extends(described_elements_t), public :: bank_t
     type(string_t), allocatable :: names(:)       !! of the elements
     integer, allocatable :: from(:)               !! body of each element, 0 = ground
@@ -40,8 +50,12 @@ module nocdyn_bank
     logical :: has_paper_law = .true.             !! whether its law is that of eqs. (3), (5), (17) or (20)
     character(len=24), allocatable :: internal_names(:)   !! e.g. 'armature current', [states]
     integer :: first_internal = 1                 !! number of the first internal state of `first` in the machine
+    real(wp), allocatable :: loss_factor(:)       !! k (1 + i loss_factor) is the stiffness at a frequency; not allocated: 0 of all
+    real(wp), allocatable :: loss_damping(:)      !! part of the damping that replaces it over the time [N m s/rad]; with it
+    real(wp), allocatable :: section_modulus(:)   !! stress = moment / section_modulus [m3], 0: unknown; not allocated: 0 of all
   contains
     procedure :: to_mean_torque
+    procedure :: list_harmonics
     procedure :: start_internal
     procedure :: steady_internal
     procedure :: knees
@@ -126,6 +140,17 @@ contains
   subroutine to_mean_torque(self)
     class(bank_t), intent(inout) :: self
   end subroutine to_mean_torque
+
+  !> The harmonics of the torque of an element in the first lane, which turns with a constant speed; `to_mean_torque` removes
+  !> them. By default there are none.
+  subroutine list_harmonics(self, element, speed, list)
+    class(bank_t), intent(in) :: self
+    integer, intent(in) :: element   !! numbered within the bank
+    real(wp), intent(in) :: speed    !! u' [rad/s]
+    type(harmonic_t), allocatable, intent(out) :: list(:)
+
+    allocate (list(0))
+  end subroutine list_harmonics
 
   !> The internal states at the start, 0 by default.
   subroutine start_internal(self, speed, internal)

@@ -1,6 +1,6 @@
 !> Harmonic excitations, eq. (17): M_0 sin(omega_p t + phase).
 module nocdyn_excitations
-  use nocdyn_bank, only: bank_t, role_excitation
+  use nocdyn_bank, only: bank_t, harmonic_t, role_excitation
   use nocdyn_kinds, only: wp
   use nocdyn_law_expressions, only: node_of, operator(*), operator(+), time_of
   use nocdyn_law_functions, only: sin
@@ -15,6 +15,7 @@ module nocdyn_excitations
   contains
     procedure :: describe
     procedure :: to_mean_torque
+    procedure :: list_harmonics
   end type excitations_t
 
 contains
@@ -50,5 +51,20 @@ contains
     self%parameters(self%number_of('frequency'))%value = 0.0_wp
     call self%prepare_law()
   end subroutine to_mean_torque
+
+  !> One harmonic, unless the frequency is 0.
+  subroutine list_harmonics(self, element, speed, list)
+    class(excitations_t), intent(in) :: self
+    integer, intent(in) :: element   !! numbered within the bank
+    real(wp), intent(in) :: speed    !! u' [rad/s]
+    type(harmonic_t), allocatable, intent(out) :: list(:)
+    real(wp), dimension(self%lanes, self%count) :: amplitude, frequency, phase
+
+    amplitude = self%values_of('amplitude')
+    frequency = self%values_of('frequency')
+    phase = self%values_of('phase')
+    allocate (list(merge(1, 0, frequency(1, element) > 0)))
+    list(:) = harmonic_t(amplitude(1, element), frequency(1, element), 0.0_wp, phase(1, element), self%to(element))
+  end subroutine list_harmonics
 
 end module nocdyn_excitations

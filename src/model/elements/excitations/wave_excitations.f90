@@ -3,7 +3,7 @@
 !> Engine orders have f = 0; those of one excitation that are whole multiples of one order follow from one sine and one cosine. A
 !> synchronous motor with p pole pairs pulsates during its start at twice the slip frequency: f = 2 omega_mains, order = -2 p.
 module nocdyn_wave_excitations
-  use nocdyn_bank, only: bank_t, role_excitation
+  use nocdyn_bank, only: bank_t, harmonic_t, role_excitation
   use nocdyn_kinds, only: wp
   use nocdyn_law_expressions, only: angle_of, expression_t, node_of, operator(*), operator(+), time_of
   use nocdyn_law_functions, only: cos, harmonics, sin
@@ -21,6 +21,7 @@ module nocdyn_wave_excitations
   contains
     procedure :: describe
     procedure :: to_mean_torque
+    procedure :: list_harmonics
   end type wave_excitations_t
 
   real(wp), parameter :: same = 1.0e-12_wp           ! relative error of an order that counts as a multiple
@@ -156,5 +157,25 @@ contains
     self%parameters(self%number_of('frequency'))%value = 0.0_wp
     call self%prepare_law()
   end subroutine to_mean_torque
+
+  !> One harmonic of each term.
+  subroutine list_harmonics(self, element, speed, list)
+    class(wave_excitations_t), intent(in) :: self
+    integer, intent(in) :: element   !! numbered within the bank
+    real(wp), intent(in) :: speed    !! u' [rad/s]
+    type(harmonic_t), allocatable, intent(out) :: list(:)
+    integer :: i, k
+    integer, allocatable :: terms(:)
+
+    associate (amplitude => self%parameters(self%number_of('amplitude')), phase => self%parameters(self%number_of('phase')), &
+               frequency => self%parameters(self%number_of('frequency')), order => self%parameters(self%number_of('order')))
+      terms = pack([(k, k=1, size(amplitude%element))], amplitude%element == element)
+      allocate (list(size(terms)))
+      do i = 1, size(terms)
+        list(i) = harmonic_t(amplitude%value(1, terms(i)), frequency%value(1, terms(i)), order%value(1, terms(i)), &
+                             phase%value(1, terms(i)), self%to(element))
+      end do
+    end associate
+  end subroutine list_harmonics
 
 end module nocdyn_wave_excitations
