@@ -16,7 +16,8 @@ module nocdyn_coupling_assembly
 
   public :: coupling_form, add_coupling_form, check_couplings
 
-  integer, parameter :: cubic = 1, slipping = 2, polynomial = 3, gap = 4, saturated = 5, table = 6   ! forms
+  integer, parameter :: cubic = 1, slipping = 2, polynomial = 3, gap = 4, saturated = 5, table = 6   ! elastic forms
+  integer, parameter :: elastic_forms = 6   ! the same with relative damping follow
 
 contains
 
@@ -31,7 +32,9 @@ contains
     allocate (indices, source=input%groups_named('coupling'))
     do i = 1, size(indices)
       associate (group => input%groups(indices(i)))
-        select case (coupling_form(group))
+        call check_relative_damping(input, indices(i), error)
+        if (allocated(error)) return
+        select case (elastic_form(group))
         case (gap)
           call find_gap_obstacle(coefficients_of(group), group%number('gap'), obstacle)
           if (obstacle == '') cycle
@@ -71,8 +74,38 @@ contains
     end if
   end subroutine find_gap_obstacle
 
-  !> Form of the elastic moment of a group &coupling.
+  !> Refuses damping over the time in proportion to a stiffness that is not given.
+  subroutine check_relative_damping(input, index, error)
+    type(input_t), intent(in) :: input
+    integer, intent(in) :: index   !! of the group
+    type(error_t), allocatable, intent(out) :: error
+
+    associate (group => input%groups(index))
+      if (.not. group%has_value('damping_frequency') .or. group%number('stiffness', absent=0.0_wp) > 0) return
+      call raise(error, exit_input, input%location(index, 'damping_frequency') // ': damping_frequency needs stiffness > 0 ' // &
+                 '[N m/rad], in proportion to which relative damping acts over the time')
+    end associate
+  end subroutine check_relative_damping
+
+  !> The loss factor psi / (2 pi) = 1 / M of a group &coupling; 0 without relative damping.
+  pure real(wp) function loss_factor_of(group) result(factor)
+    type(group_t), intent(in) :: group
+    real(wp), parameter :: turn = 2.0_wp * acos(-1.0_wp)
+
+    factor = group%number('relative_damping', absent=0.0_wp) / turn
+    if (group%has_value('magnifier')) factor = 1.0_wp / group%number('magnifier')
+  end function loss_factor_of
+
+  !> Form of the law of a group &coupling.
   pure integer function coupling_form(group)
+    type(group_t), intent(in) :: group
+
+    coupling_form = elastic_form(group)
+    if (loss_factor_of(group) > 0) coupling_form = coupling_form + elastic_forms
+  end function coupling_form
+
+  !> Form of the elastic moment.
+  pure integer function elastic_form(group) result(coupling_form)
     type(group_t), intent(in) :: group
 
     if (group%has_value('table_twist')) then
@@ -88,7 +121,7 @@ contains
     else
       coupling_form = cubic
     end if
-  end function coupling_form
+  end function elastic_form
 
   !> p_1, p_2, ... [N m/rad^k] of a group &coupling.
   pure function coefficients_of(group) result(coefficients)
@@ -105,9 +138,11 @@ contains
     integer, intent(in) :: form
     type(bank_slot_t), allocatable, intent(inout) :: banks(:)
     type(coupling_common_t) :: shared
+    real(wp), allocatable :: damping(:, :)
+    integer :: i
 
     shared = common_of(groups)
-    select case (form)
+    select case (modulo(form - 1, elastic_forms) + 1)
     case (cubic, slipping)
       call append_bank(banks, new_couplings(shared, groups%values('stiffness'), groups%values('cubic_stiffness')))
     case (polynomial)
@@ -120,18 +155,61 @@ contains
     case default
       call append_bank(banks, new_table_couplings(shared, groups%curves('table_twist', 'table_moment')))
     end select
+    if (form <= elastic_forms) return
+    associate (bank => banks(size(banks))%bank)
+      bank%loss_factor = [(loss_factor_of(groups%input%groups(groups%indices(i))), i=1, size(groups%indices))]
+      damping = loss_damping(groups)
+      bank%loss_damping = damping(1, :)
+      bank%parameters%is_key = .false.   ! the damping depends on the stiffness
+    end associate
   end subroutine add_coupling_form
+
+  !> The viscous damping that has the loss of relative damping at `damping_frequency` [N m s/rad], [lanes, couplings].
+  function loss_damping(groups) result(damping)
+    type(element_groups_t), intent(in) :: groups
+    real(wp) :: damping(groups%lanes, size(groups%indices))
+    integer :: i
+
+    damping = 0.0_wp
+    do i = 1, size(groups%indices)
+      associate (group => groups%input%groups(groups%indices(i)))
+        if (group%has_value('damping_frequency')) &
+          damping(:, i) = loss_factor_of(group) * group%number('stiffness') / group%number('damping_frequency')
+      end associate
+    end do
+  end function loss_damping
+
+  !> Section moduli against torsion pi (D^4 - d^4) / (16 D) [m3], 0 where the diameter is unknown, [lanes, couplings].
+  function section_moduli(groups) result(modulus)
+    type(element_groups_t), intent(in) :: groups
+    real(wp) :: modulus(groups%lanes, size(groups%indices))
+    real(wp), parameter :: pi = acos(-1.0_wp)
+    integer :: i
+
+    modulus = groups%values('section_modulus')
+    do i = 1, size(groups%indices)
+      associate (group => groups%input%groups(groups%indices(i)))
+        if (group%has_value('diameter')) then
+          associate (outer => group%number('diameter'), inner => group%number('bore', absent=0.0_wp))
+            modulus(:, i) = pi / 16.0_wp * (outer**4 - inner**4) / outer
+          end associate
+        end if
+      end associate
+    end do
+  end function section_moduli
 
   !> What the constructors of all forms take.
   type(coupling_common_t) function common_of(groups) result(common)
     type(element_groups_t), intent(in) :: groups
-    real(wp) :: friction(groups%lanes, size(groups%indices))
+    real(wp), dimension(groups%lanes, size(groups%indices)) :: friction, modulus
 
     allocate (common%names, source=groups%names)
     allocate (common%from, source=groups%bodies('bodies', 1))
     allocate (common%to, source=groups%bodies('bodies', 2))
-    allocate (common%damping, source=groups%values('damping'))
+    allocate (common%damping, source=groups%values('damping') + loss_damping(groups))
     allocate (common%rest_twist, source=groups%values('rest_twist'))
+    modulus = section_moduli(groups)
+    if (any(modulus > 0)) allocate (common%section_modulus, source=modulus)
     friction = groups%values('friction')
     if (.not. any(friction > 0)) return
     allocate (common%friction, source=friction)

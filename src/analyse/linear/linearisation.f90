@@ -20,7 +20,7 @@ module nocdyn_linearisation
   implicit none (type, external)
   private
 
-  public :: linearise
+  public :: linearise, mass_matrix, undamped_modes
 
   !> A mode is rigid if its natural frequency is below these shares of the highest one: the rounding of singular
   !> values and of eigenvalues, which are squares.
@@ -61,7 +61,7 @@ contains
       self%stiffness = -(elements%restoring_angle(1, :) + elements%applied_angle(1, :))
     end associate
     call refuse_not_finite(formulation%machine, self%stiffness, error)
-    if (.not. allocated(error)) call find_modes(formulation, incidence, self, error)
+    if (.not. allocated(error)) call undamped_modes(formulation%machine, incidence, self, error)
     if (allocated(error)) return
     call assemble(formulation, self)
     if (formulation%states > 2 * size(self%natural)) call add_internal(formulation, pattern, slopes(1, :), self)
@@ -81,18 +81,19 @@ contains
     end do
   end subroutine refuse_not_finite
 
-  subroutine find_modes(formulation, incidence, self, error)
-    class(formulation_t), intent(in) :: formulation
-    type(element_coordinates_t), intent(in) :: incidence
+  !> The undamped modes for the stiffnesses `self%stiffness`: `shapes`, `twists`, `natural` and `flexible`.
+  subroutine undamped_modes(machine, incidence, self, error)
+    type(machine_t), intent(in) :: machine
+    type(element_coordinates_t), intent(in) :: incidence   !! of its elements
     type(linearisation_t), intent(inout) :: self
-    type(error_t), allocatable, intent(out) :: error
+    type(error_t), allocatable, intent(out) :: error   !! if LAPACK does not converge
     real(wp), allocatable :: factor(:, :), flexibility(:, :)
     logical :: has_failed
     integer :: e, i
 
-    associate (f => formulation%machine%coordinates%freedoms, elastic => pack([(e, e=1, size(self%stiffness))], &
+    associate (f => machine%coordinates%freedoms, elastic => pack([(e, e=1, size(self%stiffness))], &
                                                                               abs(self%stiffness) > 0.0_wp))
-      factor = mass_matrix(formulation)
+      factor = mass_matrix(machine)
       call cholesky_factor(factor, has_failed)
       if (has_failed) then
         call raise(error, exit_failed, 'rounding makes the mass matrix of this machine singular: its inertias differ too much')
@@ -118,7 +119,7 @@ contains
         self%twists(e, :) = self%twists(e, :) + incidence%ratio(1, i) * self%shapes(incidence%coordinate(i), :)
       end do
     end do
-  end subroutine find_modes
+  end subroutine undamped_modes
 
   !> Natural frequencies, ascending, and orthonormal modes of B^T diag(sign of k) B.
   subroutine solve_undamped(b, stiffness, self, has_failed)
@@ -147,18 +148,18 @@ contains
   end subroutine solve_undamped
 
   !> L_tau^T J L_tau [kg m2], [coordinates, coordinates].
-  function mass_matrix(formulation) result(mass)
-    class(formulation_t), intent(in) :: formulation
+  function mass_matrix(machine) result(mass)
+    type(machine_t), intent(in) :: machine
     real(wp), allocatable :: mass(:, :)
     integer :: b, i, k
 
-    associate (map => formulation%machine%coordinates)
+    associate (map => machine%coordinates)
       allocate (mass(map%freedoms, map%freedoms), source=0.0_wp)
-      do b = 1, formulation%machine%bodies
+      do b = 1, machine%bodies
         do i = map%first(b), map%first(b + 1) - 1
           do k = map%first(b), map%first(b + 1) - 1
             associate (entry => mass(map%coordinate(k), map%coordinate(i)))
-              entry = entry + map%ratio(1, k) * formulation%machine%inertia(1, b) * map%ratio(1, i)
+              entry = entry + map%ratio(1, k) * machine%inertia(1, b) * map%ratio(1, i)
             end associate
           end do
         end do
@@ -220,7 +221,7 @@ contains
         end if
       end associate
     end do
-    self%matrix(:n, before + 1:) = matmul(transpose(self%shapes), matmul(mass_matrix(formulation), by_state))
+    self%matrix(:n, before + 1:) = matmul(transpose(self%shapes), matmul(mass_matrix(formulation%machine), by_state))
     self%matrix(before + 1:, :n) = matmul(by_speed, self%shapes)
     do i = 1, size(self%flexible)
       associate (mode => self%flexible(i))

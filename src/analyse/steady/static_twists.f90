@@ -41,11 +41,13 @@ module nocdyn_static_twists
 contains
 
   !> Finds the angles q of the coordinates; free coordinates stay. `balance` is evaluated at the speeds of the steady state.
-  subroutine find_twists(balance, q, is_found, error)
+  subroutine find_twists(balance, q, is_found, error, weight, torque)
     type(torque_balance_t), intent(inout) :: balance
     real(wp), intent(inout) :: q(:)   !! start, then solution [rad], [coordinates]
     logical, intent(out) :: is_found
     type(error_t), allocatable, intent(out) :: error   !! if the stiffness matrix is too large
+    real(wp), intent(in), optional :: weight(:)        !! factors on the moments of the inelastic elements, [elements]; absent: 1
+    real(wp), intent(in), optional :: torque(:)        !! more torques on the coordinates [N m], [coordinates]; absent: none
     integer, parameter :: most_steps = 500
     real(wp), parameter :: stalled = 1.0e3_wp   ! residuals up to this many tolerances are rounding if they stop falling
     type(twist_problem_t) :: self
@@ -57,6 +59,7 @@ contains
     is_found = .false.
     call set_up(balance, self, error)
     if (allocated(error)) return
+    call find_external(balance, self, weight, torque)
     call evaluate_angles(balance, q, self)
     damping = 0.0_wp
     last_excess = huge(1.0_wp)
@@ -169,8 +172,6 @@ contains
     allocate (self%band(3 * self%width + 1, size(self%unknown)), self%diagonal_scale(size(self%unknown)), source=0.0_wp)
     allocate (self%external_torque(size(number)), self%torque(size(number)), source=0.0_wp)
     allocate (self%external_scale, self%tolerance, source=self%external_torque)
-    call find_external(balance, self)
-    if (size(self%external_torque) > 0) self%floor = max(0.01_wp * epsilon(1.0_wp) * maxval(self%external_scale), tiny(1.0_wp))
   end subroutine set_up
 
   !> Pairs of coordinates that an elastic element couples.
@@ -200,9 +201,10 @@ contains
   end function joined_coordinates
 
   !> Computes the torques of the inelastic elements, and the part of the elastic ones that does not depend on the twist.
-  subroutine find_external(balance, self)
+  subroutine find_external(balance, self, weight, torque)
     type(torque_balance_t), intent(in) :: balance
     type(twist_problem_t), intent(inout) :: self
+    real(wp), intent(in), optional :: weight(:), torque(:)   !! as in `find_twists`
     real(wp) :: moment
     integer :: e, k
 
@@ -210,6 +212,7 @@ contains
       do e = 1, size(balance%is_elastic)
         moment = elements%applied(1, e)
         if (.not. balance%is_elastic(e)) moment = moment + elements%restoring(1, e)
+        if (present(weight)) moment = weight(e) * moment
         do k = incidence%first(e), incidence%first(e + 1) - 1
           associate (c => incidence%coordinate(k))
             self%external_torque(c) = self%external_torque(c) + incidence%ratio(1, k) * moment
@@ -218,6 +221,11 @@ contains
         end do
       end do
     end associate
+    if (present(torque)) then
+      self%external_torque = self%external_torque + torque
+      self%external_scale = self%external_scale + abs(torque)
+    end if
+    if (size(self%external_torque) > 0) self%floor = max(0.01_wp * epsilon(1.0_wp) * maxval(self%external_scale), tiny(1.0_wp))
   end subroutine find_external
 
   !> Evaluates the elements at the angles q: residual torques and energy.

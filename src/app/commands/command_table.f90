@@ -7,6 +7,7 @@ module nocdyn_command_table
   use nocdyn_matrices_command, only: matrices_command
   use nocdyn_modes_command, only: modes_command
   use nocdyn_new_command, only: new_command
+  use nocdyn_response_command, only: response_command
   use nocdyn_run_command, only: run_command
   implicit none (type, external)
   private
@@ -58,6 +59,8 @@ contains
       '  --at rest          at the start angles, with zero speeds and mean torques' // nl // &
       '  --at TIME          at a time of the run [s], which is integrated up to there' // nl // &
       '  --out DIR          write modes.csv and modes.json to DIR, with several files to DIR/<name of the file>', modes_command)
+    call add_command(commands, 'response', 'FILE...', '--out --set', &
+      'forced response by orders over the speed', 'x', response_command)
     call add_command(commands, 'matrices', 'FILE', '--set', 'print the matrices of the method for a machine', &
       'Prints every matrix and vector of the method for the machine at its start, with its equation number.', matrices_command)
   end subroutine list_analyses

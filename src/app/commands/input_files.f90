@@ -9,13 +9,19 @@ module nocdyn_input_files
   use nocdyn_input_reader, only: read_input
   use nocdyn_machine, only: machine_t
   use nocdyn_output_times, only: check_output_times
-  use nocdyn_result_folders, only: out_folder, refuse_shared_folders
+  use nocdyn_result_folders, only: out_folder, refuse_shared_folders, result_folder
   use nocdyn_sweep_plan, only: add_plan_diagnostics
   use nocdyn_text, only: string_t
   implicit none (type, external)
   private
 
   public :: analyse_files
+
+  !> An input file that has been read.
+  type :: reading_t
+    type(input_t) :: input
+    type(error_t), allocatable :: error
+  end type reading_t
 
   abstract interface
 
@@ -34,35 +40,51 @@ module nocdyn_input_files
 contains
 
   !> Analyses every file of the command line. Files with errors do not stop the others.
-  subroutine analyse_files(arguments, analyse, code)
+  subroutine analyse_files(arguments, analyse, code, always_writes)
     type(arguments_t), intent(in) :: arguments
     procedure(analysis_interface) :: analyse
     integer, intent(out) :: code   !! the highest exit code of all files
-    type(input_t) :: input
-    type(machine_t) :: machine
-    type(diagnostics_t) :: diagnostics
+    logical, intent(in), optional :: always_writes   !! whether there are files without --out too, in the folder of a run
+    type(reading_t), allocatable :: readings(:)
     type(string_t), allocatable :: folders(:)
+    type(machine_t) :: machine
     type(error_t), allocatable :: error
     integer :: i
 
     code = exit_done
-    allocate (folders(size(arguments%operands)))
-    do i = 1, size(folders)
-      folders(i)%text = out_folder(arguments, arguments%operands(i)%text)
+    allocate (readings(size(arguments%operands)), folders(size(arguments%operands)))
+    do i = 1, size(readings)
+      call read_one(arguments, i, readings(i), folders(i)%text, always_writes)
     end do
     call refuse_shared_folders(arguments%operands, folders, error)
     if (allocated(error)) then
       call report_error(error, code)
       return
     end if
-    do i = 1, size(folders)
-      call read_input(arguments%operands(i)%text, arguments%overrides, input, error, diagnostics)
-      if (allocated(error)) call add_plan_diagnostics(input, diagnostics, error)   ! with those of the machine
-      if (.not. allocated(error)) call check_output_times(input, error)
-      if (.not. allocated(error)) call assemble_machine(input, machine, error)
-      if (.not. allocated(error)) call analyse(arguments, input, machine, folders(i)%text, error)
-      if (allocated(error)) call report_error(error, code)
+    do i = 1, size(readings)
+      associate (reading => readings(i))
+        if (.not. allocated(reading%error)) call assemble_machine(reading%input, machine, reading%error)
+        if (.not. allocated(reading%error)) call analyse(arguments, reading%input, machine, folders(i)%text, reading%error)
+        if (allocated(reading%error)) call report_error(reading%error, code)
+      end associate
     end do
   end subroutine analyse_files
+
+  !> Reads and checks a file, and finds the folder of its results.
+  subroutine read_one(arguments, number, reading, folder, always_writes)
+    type(arguments_t), intent(in) :: arguments
+    integer, intent(in) :: number   !! of the file
+    type(reading_t), intent(inout) :: reading
+    character(len=:), allocatable, intent(out) :: folder
+    logical, intent(in), optional :: always_writes   !! as in `analyse_files`
+    type(diagnostics_t) :: diagnostics
+
+    folder = out_folder(arguments, arguments%operands(number)%text)
+    call read_input(arguments%operands(number)%text, arguments%overrides, reading%input, reading%error, diagnostics)
+    if (allocated(reading%error)) call add_plan_diagnostics(reading%input, diagnostics, reading%error)   ! with those of the machine
+    if (.not. allocated(reading%error)) call check_output_times(reading%input, reading%error)
+    if (allocated(reading%error) .or. .not. present(always_writes)) return
+    if (always_writes) folder = result_folder(arguments, reading%input)
+  end subroutine read_one
 
 end module nocdyn_input_files

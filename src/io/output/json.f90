@@ -21,8 +21,8 @@ module nocdyn_json
     procedure :: open_report
     procedure :: close => close_object
     procedure :: open_list, close_list, text
-    generic :: put => put_text, put_texts, put_number, put_numbers, put_integer, put_integers, put_members
-    procedure, private :: put_text, put_texts, put_number, put_numbers, put_integer, put_integers, put_members
+    generic :: put => put_text, put_texts, put_number, put_numbers, put_flag, put_integer, put_integers, put_members
+    procedure, private :: put_text, put_texts, put_number, put_numbers, put_flag, put_integer, put_integers, put_members
     procedure, private :: begin_member, begin_item, end_level
   end type json_t
 
@@ -174,6 +174,16 @@ contains
     text = 'null'
     if (ieee_is_finite(value)) text = to_text(value)
   end function number_text
+
+  !> A logical value.
+  subroutine put_flag(self, key, value)
+    class(json_t), intent(inout) :: self
+    character(len=*), intent(in) :: key
+    logical, intent(in) :: value
+
+    call self%begin_member(key)
+    call self%buffer%append(trim(merge('true ', 'false', value)))
+  end subroutine put_flag
 
   !> A whole number.
   subroutine put_integer(self, key, value)

@@ -6,6 +6,7 @@ module nocdyn_schema
   use nocdyn_kinds, only: wp
   use nocdyn_schema_constraints, only: constraint_examples, constraint_groups, constraint_keys, constraint_relations
   use nocdyn_schema_couplings, only: coupling_examples, coupling_keys, coupling_relations
+  use nocdyn_schema_response, only: response_examples, response_groups, response_keys, response_relations
   use nocdyn_schema_rules, only: a_body, a_file, a_flag, a_folder, a_name, a_number, a_selector, a_text, a_word, alias_t, &
     allowed_t, an_integer, any_number, any_times, anything, at_least_once, at_most_once, at_most_one, body_or_ground, &
     exactly_once, example_t, from_2, group_rule_t, key_rule_t, kind_rule_t, less_than, not_negative, positive, relation_rule_t, &
@@ -38,7 +39,7 @@ module nocdyn_schema
     group_rule_t('excitation', any_times,     'torque',   'A torque on a body, by a law of time or of its angle.'), &
     group_rule_t('run',        exactly_once,  '',         'What is computed, and how.'), &
     group_rule_t('output',     at_most_once,  '',         'What is written, in which form, and where.'), &
-    sweep_groups]
+    response_groups, sweep_groups]
 
   type(key_rule_t), parameter :: frame_keys(*) = [ &
     key_rule_t('case',       'title',           a_text,         1, '',            "''",        anything, &
@@ -89,12 +90,12 @@ module nocdyn_schema
   type(kind_rule_t), parameter, public :: kind_rules(*) = [torque_kinds, sweep_kinds]
 
   type(key_rule_t), parameter, public :: key_rules(*) = &
-    [frame_keys, coupling_keys, constraint_keys, motor_keys, load_keys, excitation_keys, sweep_keys]
+    [frame_keys, coupling_keys, constraint_keys, motor_keys, load_keys, excitation_keys, response_keys, sweep_keys]
 
   type(relation_rule_t), parameter, public :: relation_rules(*) = [ &
     relation_rule_t('run', less_than, 't_start', 't_end'), &
     relation_rule_t('output', at_most_one, 'interval', 'points'), &
-    coupling_relations, constraint_relations, torque_relations, sweep_relations]
+    coupling_relations, constraint_relations, torque_relations, response_relations, sweep_relations]
 
   type(alias_t), parameter, public :: aliases(*) = sweep_aliases
 
@@ -105,7 +106,7 @@ module nocdyn_schema
     example_t('body',       "name = 'machine'  inertia = 5.0"), &
     example_t('run',        "t_end = 10.0  method = 'rk45'  rtol = 1.0e-9  atol = 1.0e-9"), &
     example_t('output',     'interval = 0.01'), &
-    coupling_examples, constraint_examples, torque_examples, sweep_examples]
+    coupling_examples, constraint_examples, torque_examples, response_examples, sweep_examples]
 
   ! One value for each row of `group_rules`. The rows of `key_rules` of a group are consecutive.
   integer :: rule   ! index of the lists below

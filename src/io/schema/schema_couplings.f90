@@ -1,8 +1,8 @@
 !> Rows of the schema: the keys of &coupling and the relations between them.
 module nocdyn_schema_couplings
   use nocdyn_schema_rules, only: a_file, a_name, a_number, a_word, any_number, anything, at_most_one, body_or_ground, &
-    equal_lengths, example_t, extrapolations, interpolations, key_rule_t, not_negative, positive, relation_rule_t, required, &
-    requires, unset
+    equal_lengths, example_t, extrapolations, interpolations, key_rule_t, less_than, not_negative, positive, relation_rule_t, &
+    required, requires, unset
   implicit none (type, external)
   private
 
@@ -21,6 +21,18 @@ module nocdyn_schema_couplings
       'p_1, p_2, ...: p_k w^k, w = twist - rest_twist, are added to the elastic moment', fewest=1), &
     key_rule_t('coupling',   'damping',         a_number,       1, 'N m s/rad',   '0',         not_negative, &
       'moment per rate of twist; with a gap only in contact, at most as large as the elastic moment'), &
+    key_rule_t('coupling',   'relative_damping', a_number,      1, '',            unset,       not_negative, &
+      'psi of data sheets: energy lost in a cycle by the largest elastic energy; at every frequency'), &
+    key_rule_t('coupling',   'magnifier',       a_number,       1, '',            unset,       positive, &
+      'M of data sheets, 2 pi / psi, in place of relative_damping'), &
+    key_rule_t('coupling',   'damping_frequency', a_number,     1, 'rad/s',       unset,       positive, &
+      'frequency at which a viscous damping stands for relative_damping over the time (run, sweep)'), &
+    key_rule_t('coupling',   'section_modulus', a_number,       1, 'm3',          unset,       positive, &
+      'section modulus against torsion of the weakest section: stress = moment / section_modulus'), &
+    key_rule_t('coupling',   'diameter',        a_number,       1, 'm',           unset,       positive, &
+      'diameter of a round section, in place of section_modulus'), &
+    key_rule_t('coupling',   'bore',            a_number,       1, 'm',           unset,       not_negative, &
+      'diameter of its bore; 0 if not given'), &
     key_rule_t('coupling',   'rest_twist',      a_number,       1, 'rad',         '0',         anything, &
       'twist without elastic moment'), &
     key_rule_t('coupling',   'gap',             a_number,       1, 'rad',         '0',         not_negative, &
@@ -50,6 +62,11 @@ module nocdyn_schema_couplings
     relation_rule_t('coupling', requires, 'gap', 'stiffness cubic_stiffness polynomial'), &
     relation_rule_t('coupling', requires, 'saturation', 'stiffness'), &
     relation_rule_t('coupling', requires, 'friction_speed', 'friction'), &
+    relation_rule_t('coupling', at_most_one, 'relative_damping', 'magnifier'), &
+    relation_rule_t('coupling', requires, 'damping_frequency', 'relative_damping magnifier'), &
+    relation_rule_t('coupling', at_most_one, 'section_modulus', 'diameter bore'), &
+    relation_rule_t('coupling', requires, 'bore', 'diameter'), &
+    relation_rule_t('coupling', less_than, 'bore', 'diameter'), &
     relation_rule_t('coupling', requires, 'interpolation extrapolation', 'table_twist table_file'), &
     relation_rule_t('coupling', equal_lengths, 'table_twist table_moment', 'table_file')]
 

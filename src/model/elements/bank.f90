@@ -52,10 +52,10 @@ module nocdyn_bank
     integer :: first_internal = 1                 !! number of the first internal state of `first` in the machine
     real(wp), allocatable :: loss_factor(:)       !! k (1 + i loss_factor) is the stiffness at a frequency; not allocated: 0 of all
     real(wp), allocatable :: loss_damping(:)      !! part of the damping that replaces it over the time [N m s/rad]; with it
-    real(wp), allocatable :: section_modulus(:)   !! stress = moment / section_modulus [m3], 0: unknown; not allocated: 0 of all
   contains
     procedure :: to_mean_torque
     procedure :: list_harmonics
+    procedure :: hold_speed
     procedure :: start_internal
     procedure :: steady_internal
     procedure :: knees
@@ -151,6 +151,12 @@ contains
 
     allocate (list(0))
   end subroutine list_harmonics
+
+  !> Prepares the elements for speeds that something outside of the machine holds: governors leave their throttles open. By
+  !> default there is nothing to do.
+  subroutine hold_speed(self)
+    class(bank_t), intent(inout) :: self
+  end subroutine hold_speed
 
   !> The internal states at the start, 0 by default.
   subroutine start_internal(self, speed, internal)

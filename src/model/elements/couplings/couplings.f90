@@ -25,6 +25,7 @@ module nocdyn_couplings
     real(wp), allocatable :: rest_twist(:, :)       !! [rad]
     real(wp), allocatable :: friction(:, :)         !! [N m]; not allocated: none
     real(wp), allocatable :: friction_speed(:, :)   !! [rad/s], positive
+    real(wp), allocatable :: section_modulus(:, :)  !! shear stress = moment / section_modulus [m3], 0: unknown; not allocated: of all
   end type coupling_common_t
 
   ! gfortran 12 loses components of a structure constructor's value that is an argument
@@ -45,7 +46,7 @@ module nocdyn_couplings
     procedure :: observe
   end type couplings_t
 
-  integer, parameter :: twist = 1, moment = 2, damping_moment = 3, shaft_moment = 4   ! the order of `quantities`
+  integer, parameter :: twist = 1, moment = 2, damping_moment = 3, shaft_moment = 4, stress = 5   ! the order of `quantities`
 
 contains
 
@@ -107,6 +108,7 @@ contains
       call self%add_parameter('friction_speed', common%friction_speed)
       is_dissipative = is_dissipative .or. any(abs(common%friction) > 0.0_wp, dim=1)
     end if
+    if (allocated(common%section_modulus)) call self%add_parameter('section_modulus', common%section_modulus, is_key=.false.)
     self%with_work = pack([(e, e=1, size(common%to))], is_dissipative)
     self%is_polynomial = .false.
     self%has_polynomial_potential = .false.
@@ -151,19 +153,23 @@ contains
     type(quantity_t), allocatable :: columns(:)
     integer :: e
 
-    allocate (columns(4))
+    allocate (columns(merge(5, 4, self%number_of('section_modulus') > 0)))
     columns(twist) = quantity_t('twist', 'rad', [(e, e=1, self%count)])
     columns(moment) = quantity_t('moment', 'N m', [(e, e=1, self%count)])
     columns(damping_moment) = quantity_t('damping', 'N m', self%with_work)
     columns(shaft_moment) = quantity_t('shaft', 'N m', self%with_work)
+    if (size(columns) < stress) return
+    associate (modulus => self%parameters(self%number_of('section_modulus'))%value)
+      columns(stress) = quantity_t('stress', 'Pa', pack(columns(twist)%elements, any(modulus > 0, dim=1)))
+    end associate
   end function quantities
 
   !> Twist [rad], and the moments on the first body [N m]: the elastic one, F1 of the paper, that of damping and friction, and
-  !> both together, the moment in the shaft.
+  !> both together, the moment in the shaft; its shear stress [Pa].
   pure subroutine observe(self, elements, quantity, lane, values)
     class(couplings_t), intent(in) :: self
     type(elements_t), intent(in) :: elements
-    integer, intent(in) :: quantity   !! twist, moment, damping_moment or shaft_moment
+    integer, intent(in) :: quantity   !! twist, moment, damping_moment, shaft_moment or stress
     integer, intent(in) :: lane
     real(wp), intent(out) :: values(:)   !! [elements of the bank]
 
@@ -176,6 +182,10 @@ contains
       values = 0.0_wp - elements%applied(lane, self%first:self%last())
     case default
       values = 0.0_wp - (elements%restoring(lane, self%first:self%last()) + elements%applied(lane, self%first:self%last()))
+      if (quantity /= stress) return
+      associate (modulus => self%parameters(self%number_of('section_modulus'))%value(lane, :))
+        values = values / merge(modulus, 1.0_wp, modulus > 0)
+      end associate
     end select
   end subroutine observe
 

@@ -70,7 +70,7 @@ contains
                resistance => self%parameters(self%number_of('resistance'))%value, &
                flux_constant => self%parameters(self%number_of('flux_constant'))%value)
       do e = 1, self%count
-        if (self%has_governor) throttle = internal(self%states * e)
+        if (self%has_governor) throttle = min(1.0_wp, internal(self%states * e))
         internal(self%states * (e - 1) + 1) = (throttle * voltage(1, e) - flux_constant(1, e) * speed(e)) / resistance(1, e)
       end do
     end associate

@@ -26,9 +26,11 @@ module nocdyn_governed_banks
   !> The integral z of a governor is the last internal state of its motor. The switches of the governors are the last ones.
   type, extends(bank_t), public :: governed_bank_t
     logical :: has_governor = .false.
+    logical, private :: is_held = .false.   !! whether the throttles stay open at every speed, after `hold_speed`
   contains
     procedure :: add_governor
     procedure :: throttle
+    procedure :: hold_speed
     procedure :: start_internal
     procedure :: steady_internal
     procedure :: knees
@@ -99,6 +101,13 @@ contains
     end associate
   end subroutine start_internal
 
+  !> Opens the throttles, whatever the speed is.
+  subroutine hold_speed(self)
+    class(governed_bank_t), intent(inout) :: self
+
+    self%is_held = .true.
+  end subroutine hold_speed
+
   !> The integral of a governor at rest is its throttle; at the set speed, where any is steady, the open one.
   subroutine steady_internal(self, speed, internal)
     class(governed_bank_t), intent(in) :: self
@@ -110,7 +119,11 @@ contains
     associate (set_speed => self%parameters(self%number_of('governor_speed'))%value, &
                gain => self%parameters(self%number_of('governor_gain'))%value)
       do e = 1, self%count
-        internal(self%states * e) = merge(1.0_wp, 0.0_wp, gain(1, e) * (set_speed(1, e) - speed(e)) >= 0.0_wp)
+        if (self%is_held) then   ! beyond the limit, where the throttle does not depend on the speed
+          internal(self%states * e) = 2.0_wp + abs(gain(1, e) * (set_speed(1, e) - speed(e)))
+        else
+          internal(self%states * e) = merge(1.0_wp, 0.0_wp, gain(1, e) * (set_speed(1, e) - speed(e)) >= 0.0_wp)
+        end if
       end do
     end associate
   end subroutine steady_internal

@@ -1,0 +1,162 @@
+!> Critical speeds, where a line of excitation has a natural frequency, and the peaks of a response between the speeds of its grid.
+!>
+!> The speeds at which the lines cross the undamped natural frequencies are added to the speeds, so that no narrow peak is missed. Then
+!> every maximum of an amplitude is refined: near a resonance 1 / |amplitude|^2 is a parabola over the speed, whose vertex is the next
+!> speed.
+module nocdyn_critical_speeds
+  use nocdyn_errors, only: error_t
+  use nocdyn_forced_response, only: forced_response_t, response_point_t
+  use nocdyn_kinds, only: wp
+  use nocdyn_lapack, only: sort_ascending
+  use nocdyn_speed_modes, only: speed_modes_t
+  implicit none (type, external)
+  private
+
+  public :: find_crossings, refine_peaks
+
+  real(wp), parameter, public :: undamped = 1.0e-9_wp   !! a mode with a smaller damping ratio has no finite response
+
+  !> Where a line crosses a mode.
+  type, public :: crossing_t
+    integer :: mode = 0
+    integer :: line = 0
+    real(wp) :: speed = 0.0_wp        !! of the reference body [rad/s]
+    real(wp) :: frequency = 0.0_wp    !! [rad/s]
+    real(wp) :: damping_ratio = 0.0_wp
+  end type crossing_t
+
+contains
+
+  !> All crossings between the lowest and the highest speed, by modes and lines.
+  subroutine find_crossings(response, modes, crossings)
+    type(forced_response_t), intent(in) :: response
+    type(speed_modes_t), intent(in) :: modes   !! at the points of the response
+    type(crossing_t), allocatable, intent(out) :: crossings(:)
+    integer :: i, l, m
+    real(wp) :: after, before, share
+
+    allocate (crossings(0))
+    associate (points => response%points)
+      do m = 1, modes%modes
+        do l = 1, size(response%lines)
+          do i = 1, size(points) - 1
+            before = points(i)%frequency(l) - modes%natural(m, i)
+            after = points(i + 1)%frequency(l) - modes%natural(m, i + 1)
+            if (before * after > 0 .or. abs(after) <= 0 .and. i < size(points) - 1) cycle
+            if (abs(before - after) <= 0) cycle
+            share = before / (before - after)
+            crossings = [crossings, crossing_t(m, l, &
+              between(points(i)%state%speed, points(i + 1)%state%speed, share), &
+              between(modes%natural(m, i), modes%natural(m, i + 1), share), &
+              between(modes%damping_ratio(m, i), modes%damping_ratio(m, i + 1), share))]
+          end do
+        end do
+      end do
+    end associate
+  end subroutine find_crossings
+
+  pure real(wp) function between(first, second, share)
+    real(wp), intent(in) :: first, second
+    real(wp), intent(in) :: share   !! 0 to 1
+
+    between = first + share * (second - first)
+  end function between
+
+  !> Adds speeds to a response until the maxima of all amplitudes are found.
+  subroutine refine_peaks(response, crossings, error, failed_speed)
+    type(forced_response_t), intent(inout) :: response
+    type(crossing_t), intent(in) :: crossings(:)
+    type(error_t), allocatable, intent(out) :: error
+    real(wp), intent(out) :: failed_speed   !! as in `add_points`
+    integer, parameter :: most_rounds = 12
+    real(wp), allocatable :: speeds(:)
+    integer :: round
+
+    failed_speed = 0.0_wp
+    speeds = pack(crossings%speed, crossings%damping_ratio > undamped)
+    call keep_new(response, speeds)
+    do round = 1, most_rounds
+      if (size(speeds) == 0) return
+      call response%add_points(speeds, .false., error, failed_speed)
+      if (allocated(error)) return
+      call find_vertices(response, crossings, speeds)
+    end do
+  end subroutine refine_peaks
+
+  !> Sorts speeds, and drops those that the response has.
+  subroutine keep_new(response, speeds)
+    type(forced_response_t), intent(in) :: response
+    real(wp), allocatable, intent(inout) :: speeds(:)   !! [rad/s]
+    real(wp), parameter :: same = 1.0e-12_wp
+    real(wp) :: known(size(response%points))
+    logical :: is_new(size(speeds))
+    integer :: i
+
+    call sort_ascending(speeds)
+    if (response%points(1)%state%speed < 0) speeds = speeds(size(speeds):1:-1)
+    known = [(response%points(i)%state%speed, i=1, size(known))]
+    do i = 1, size(speeds)
+      is_new(i) = .not. any(abs(known - speeds(i)) <= same * abs(speeds(i)))
+      if (i > 1) is_new(i) = is_new(i) .and. abs(speeds(i) - speeds(i - 1)) > same * abs(speeds(i))
+    end do
+    speeds = pack(speeds, is_new)
+  end subroutine keep_new
+
+  !> The vertices of the parabolas through the maxima and their neighbours, where they promise a higher peak.
+  subroutine find_vertices(response, crossings, speeds)
+    type(forced_response_t), intent(in) :: response
+    type(crossing_t), intent(in) :: crossings(:)
+    real(wp), allocatable, intent(out) :: speeds(:)
+    integer :: i, l, q
+    real(wp) :: amplitude(size(response%points))
+
+    allocate (speeds(0))
+    associate (points => response%points)
+      do l = 1, size(response%lines)
+        do q = 1, size(response%quantities)
+          amplitude = [(abs(points(i)%quantity(l, q)), i=1, size(points))]
+          do i = 2, size(points) - 1
+            if (amplitude(i) < max(amplitude(i - 1), amplitude(i + 1)) .or. .not. amplitude(i) > 0) cycle
+            if (has_undamped(crossings, l, points(i - 1)%state%speed, points(i + 1)%state%speed)) cycle
+            call add_vertex(points(i - 1:i + 1), amplitude(i - 1:i + 1), speeds)
+          end do
+        end do
+      end do
+    end associate
+    call keep_new(response, speeds)
+  end subroutine find_vertices
+
+  !> Whether a mode without damping is crossed between two speeds.
+  pure logical function has_undamped(crossings, line, first, last)
+    type(crossing_t), intent(in) :: crossings(:)
+    integer, intent(in) :: line
+    real(wp), intent(in) :: first, last   !! [rad/s]
+
+    has_undamped = any(crossings%line == line .and. crossings%damping_ratio <= undamped .and. &
+                       crossings%speed >= min(first, last) .and. crossings%speed <= max(first, last))
+  end function has_undamped
+
+  !> Adds the vertex of a maximum, unless it is so near that the peak grows by rounding only, or another speed is there.
+  subroutine add_vertex(points, amplitude, speeds)
+    type(response_point_t), intent(in) :: points(3)
+    real(wp), intent(in) :: amplitude(3)   !! the second one is the largest
+    real(wp), allocatable, intent(inout) :: speeds(:)
+    real(wp), parameter :: accuracy = 1.0e-7_wp   ! relative, of a peak
+    real(wp), parameter :: narrow = 1.0e-12_wp    ! relative distance of speeds
+    real(wp) :: bend, distance, gain, slope, vertex, x(3), y(3)
+
+    x = [points(1)%state%speed, points(2)%state%speed, points(3)%state%speed]
+    x = x - points(2)%state%speed
+    y = min(amplitude(2) / max(amplitude, tiny(1.0_wp)), 1.0e6_wp)**2   ! 1 at the maximum
+    bend = ((y(3) - 1.0_wp) / x(3) - (y(1) - 1.0_wp) / x(1)) / (x(3) - x(1))
+    slope = (y(3) - 1.0_wp) / x(3) - bend * x(3)
+    if (.not. bend > 0) return
+    vertex = -0.5_wp * slope / bend
+    gain = 0.25_wp * slope**2 / bend   ! y falls by so much
+    if (gain <= accuracy .or. abs(vertex) <= narrow * abs(points(2)%state%speed)) return
+    distance = sqrt(accuracy / bend)
+    if (any(abs(speeds - (points(2)%state%speed + vertex)) <= distance)) return
+    speeds = [speeds, points(2)%state%speed + vertex]
+  end subroutine add_vertex
+
+end module nocdyn_critical_speeds

@@ -1,0 +1,126 @@
+!> The lines of excitation of a machine: the frequencies at which its excitations act, and their moments.
+!>
+!> A line is an order, whose frequency grows with the speed, or a fixed frequency. Excitations of the same frequency are one line:
+!> their moments have phases to each other, by the angles of the bodies to which their orders refer.
+module nocdyn_excitation_lines
+  use nocdyn_bank, only: harmonic_t
+  use nocdyn_held_speeds, only: held_state_t
+  use nocdyn_kinds, only: wp
+  use nocdyn_machine, only: machine_t
+  implicit none (type, external)
+  private
+
+  public :: new_lines, line_order
+
+  !> One line.
+  type, public :: line_t
+    real(wp) :: order = 0.0_wp       !! oscillations per turn of the reference body, at the first speed
+    logical :: is_order = .true.     !! whether its frequency is proportional to the speed; else a fixed frequency is in it
+    integer, allocatable :: source(:)     !! harmonics, numbered over all elements
+  end type line_t
+
+  !> A harmonic of an element.
+  type, public :: source_t
+    integer :: element = 0
+    real(wp) :: frequency = 0.0_wp      !! Omega at this speed [rad/s]
+    complex(wp) :: moment = 0.0_wp      !! moment exp(i Omega t) on `to` [N m]
+  end type source_t
+
+  real(wp), parameter :: same = 1.0e-9_wp   ! relative difference of equal frequencies
+
+  public :: list_sources
+
+contains
+
+  !> The harmonics of all elements at a steady state.
+  subroutine list_sources(machine, state, sources)
+    type(machine_t), intent(in) :: machine      !! with its periodic torques
+    type(held_state_t), intent(in) :: state
+    type(source_t), allocatable, intent(out) :: sources(:)
+    type(harmonic_t), allocatable :: list(:)
+    integer :: b, e, i, n
+    real(wp) :: speed
+
+    allocate (sources(0))
+    do b = 1, size(machine%banks)
+      associate (bank => machine%banks(b)%bank)
+        do e = 1, size(bank%to)
+          speed = 0.0_wp
+          if (bank%to(e) > 0) speed = state%omega(bank%to(e))
+          if (bank%from(e) > 0) speed = speed - state%omega(bank%from(e))
+          call bank%list_harmonics(e, speed, list)
+          n = size(sources)
+          sources = [sources, (source_t(element=bank%first + e - 1), i=1, size(list))]
+          do i = 1, size(list)
+            call set_source(list(i), state, sources(n + i))
+          end do
+        end do
+      end associate
+    end do
+  end subroutine list_sources
+
+  !> amplitude sin(frequency t + order phi + phase) with phi = phi_0 + omega t, as the real part of moment exp(i Omega t), Omega > 0.
+  pure subroutine set_source(harmonic, state, source)
+    type(harmonic_t), intent(in) :: harmonic
+    type(held_state_t), intent(in) :: state
+    type(source_t), intent(inout) :: source
+    complex(wp), parameter :: i = (0.0_wp, 1.0_wp)
+
+    source%frequency = harmonic%frequency + harmonic%order * state%omega(harmonic%body)
+    source%moment = -i * harmonic%amplitude * exp(i * (harmonic%order * state%phi(harmonic%body) + harmonic%phase))
+    if (source%frequency >= 0) return
+    source%frequency = -source%frequency
+    source%moment = conjg(source%moment)
+  end subroutine set_source
+
+  !> The lines of sources at the lowest and the highest speed, ascending by frequency. Harmonics of frequency zero are left out.
+  subroutine new_lines(low, high, low_speed, high_speed, lines)
+    type(source_t), intent(in) :: low(:), high(:)       !! the same harmonics at both speeds
+    real(wp), intent(in) :: low_speed, high_speed       !! of the reference body [rad/s]
+    type(line_t), allocatable, intent(out) :: lines(:)
+    integer :: first, k, line_of(size(low)), least, n
+    logical :: is_left(size(low))
+
+    n = 0
+    line_of = 0
+    is_left = low%frequency > 0
+    do while (any(is_left))
+      n = n + 1
+      first = findloc(is_left, .true., dim=1)
+      where (is_left .and. is_same(low%frequency, low(first)%frequency) .and. is_same(high%frequency, high(first)%frequency))
+        line_of = n
+        is_left = .false.
+      end where
+    end do
+    allocate (lines(n))
+    is_left = line_of > 0
+    do k = 1, n
+      least = minloc(low%frequency, dim=1, mask=is_left)
+      first = line_of(least)
+      lines(k)%source = pack([(least, least=1, size(low))], line_of == first)
+      is_left = is_left .and. line_of /= first
+      associate (source => lines(k)%source(1))
+        lines(k)%order = low(source)%frequency / abs(low_speed)
+        lines(k)%is_order = is_same(lines(k)%order, high(source)%frequency / abs(high_speed))
+      end associate
+    end do
+  end subroutine new_lines
+
+  elemental logical function is_same(a, b)
+    real(wp), intent(in) :: a, b
+
+    is_same = abs(a - b) <= same * max(abs(a), abs(b))
+  end function is_same
+
+  !> The line of an order of the reference body, 0 if there is none.
+  pure integer function line_order(lines, order) result(line)
+    type(line_t), intent(in) :: lines(:)
+    real(wp), intent(in) :: order
+    real(wp), parameter :: typed = 1.0e-5_wp   ! ratios of gears have more digits than one types
+
+    do line = size(lines), 1, -1
+      if (lines(line)%is_order .and. abs(lines(line)%order - order) <= typed * order) return
+    end do
+  end function line_order
+
+end module nocdyn_excitation_lines

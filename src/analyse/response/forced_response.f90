@@ -1,0 +1,335 @@
+!> The forced response of a machine at held speeds: for every line of excitation the complex moments and angles, and their
+!> synthesis.
+!>
+!> At each speed the machine is linearised about its steady state. One complex band matrix is factored for each speed and line. The
+!> speeds are independent of each other and are divided among threads.
+module nocdyn_forced_response
+  use nocdyn_dynamic_stiffness, only: band_work_t, dynamic_stiffness_t, new_band_work, new_dynamic_stiffness
+  use nocdyn_errors, only: error_t, exit_input, raise
+  use nocdyn_excitation_lines, only: line_t, list_sources, new_lines, source_t
+  use nocdyn_held_speeds, only: held_speeds_t, held_state_t, new_held_speeds
+  use nocdyn_kinds, only: wp
+  use nocdyn_lapack_complex, only: complex_solve
+  use nocdyn_machine, only: machine_t
+  use nocdyn_response_quantities, only: list_quantities, response_quantity_t
+  use nocdyn_synthesis, only: new_synthesis, synthesis_t
+  use nocdyn_text, only: to_text
+  implicit none (type, external)
+  private
+
+  public :: new_forced_response
+
+  real(wp), parameter :: most_values = 4.0e7_wp   ! of all speeds: 0.6 GB
+
+  !> The response at one speed. Amplitudes are those of amplitude exp(i Omega t), where the angle of the reference body is zero at
+  !> t = 0 and its orders are sines of its angle.
+  type, public :: response_point_t
+    logical :: is_of_grid = .true.                 !! whether it is one of the speeds that were asked for
+    type(held_state_t) :: state
+    type(source_t), allocatable :: sources(:)
+    real(wp), allocatable :: frequency(:)          !! Omega [rad/s], [lines]
+    complex(wp), allocatable :: quantity(:, :)     !! [lines, quantities]
+    complex(wp), allocatable :: angle(:, :)        !! [rad], [lines, bodies]
+    real(wp), allocatable :: heat(:)               !! mean power lost by the oscillations [W], [elements]
+    real(wp), allocatable :: mean(:)               !! [quantities]
+    real(wp), allocatable :: lowest(:), highest(:) !! of the oscillations of all lines, without the mean, [quantities]
+  contains
+    procedure :: half_range, peak
+  end type response_point_t
+
+  type, public :: forced_response_t
+    type(machine_t) :: machine
+    type(held_speeds_t) :: held
+    type(dynamic_stiffness_t) :: matrix
+    type(line_t), allocatable :: lines(:)
+    type(response_quantity_t), allocatable :: quantities(:)
+    type(synthesis_t) :: synthesis
+    type(response_point_t), allocatable :: points(:)   !! ascending by the size of the speed
+    real(wp), allocatable :: loss_factor(:)            !! [elements]
+    real(wp), allocatable :: loss_damping(:)           !! damping that stands for it over the time [N m s/rad], [elements]
+  contains
+    procedure :: add_points, complex_stiffness
+  end type forced_response_t
+
+  !> Work space of one thread.
+  type :: work_t
+    type(band_work_t) :: band
+    complex(wp), allocatable :: stiffness(:), moment(:)   !! [elements]
+  end type work_t
+
+contains
+
+  !> Prepares the response of a machine: its lines at the lowest and the highest speed, its quantities.
+  subroutine new_forced_response(machine, reference, speeds, self, error)
+    type(machine_t), intent(in) :: machine   !! one lane, with its periodic torques
+    integer, intent(in) :: reference         !! body
+    real(wp), intent(in) :: speeds(2)        !! the lowest and the highest one [rad/s]
+    type(forced_response_t), intent(out) :: self
+    type(error_t), allocatable, intent(out) :: error   !! a message of a steady state begins with its speed
+    type(held_state_t) :: high, low
+    type(source_t), allocatable :: of_high(:), of_low(:)
+
+    self%machine = machine
+    call new_held_speeds(machine, reference, self%held, error)
+    if (.not. allocated(error)) call new_dynamic_stiffness(machine, self%held%balance%incidence, self%matrix, error)
+    if (allocated(error)) return
+    call gather_losses(self)
+    call self%held%hold(speeds(2), high, error)
+    if (.not. allocated(error)) call self%held%hold(speeds(1), low, error)
+    if (allocated(error)) return
+    call list_sources(machine, low, of_low)
+    call list_sources(machine, high, of_high)
+    call new_lines(of_low, of_high, speeds(1), speeds(2), self%lines)
+    call list_quantities(machine, reference, self%quantities)
+    allocate (self%points(0))
+  end subroutine new_forced_response
+
+  !> Collects the loss factors of the banks.
+  subroutine gather_losses(self)
+    type(forced_response_t), intent(inout) :: self
+    integer :: b
+
+    allocate (self%loss_factor(size(self%machine%elements%to)), self%loss_damping(size(self%machine%elements%to)), source=0.0_wp)
+    do b = 1, size(self%machine%banks)
+      associate (bank => self%machine%banks(b)%bank)
+        if (.not. allocated(bank%loss_factor)) cycle
+        self%loss_factor(bank%first:bank%last()) = bank%loss_factor
+        self%loss_damping(bank%first:bank%last()) = bank%loss_damping
+      end associate
+    end do
+  end subroutine gather_losses
+
+  !> Computes the response at more speeds, and puts it between the others.
+  subroutine add_points(self, speeds, are_of_grid, error, failed_speed)
+    class(forced_response_t), intent(inout) :: self
+    real(wp), intent(in) :: speeds(:)        !! of the reference body [rad/s]
+    logical, intent(in) :: are_of_grid
+    type(error_t), allocatable, intent(out) :: error
+    real(wp), intent(out) :: failed_speed    !! at which there is no steady state; set with `error`
+    type(response_point_t), allocatable :: new(:)
+    integer :: i
+
+    failed_speed = 0.0_wp
+    associate (values => real(size(self%lines), wp) * (size(self%quantities) + self%machine%bodies) &
+                         * (size(self%points) + size(speeds)))
+      if (values > most_values) then
+        call raise(error, exit_input, 'the response of all lines at all speeds is ' // to_text(nint(values / 1.0e6_wp)) // &
+                   ' million numbers; at most ' // to_text(nint(most_values / 1.0e6_wp)) // ' million are allowed: fewer ' // &
+                   'speeds or orders')
+        failed_speed = speeds(1)
+        return
+      end if
+    end associate
+    allocate (new(size(speeds)))
+    do i = 1, size(speeds)
+      failed_speed = speeds(i)
+      new(i)%is_of_grid = are_of_grid
+      call self%held%hold(speeds(i), new(i)%state, error)
+      if (allocated(error)) return
+      call list_sources(self%machine, new(i)%state, new(i)%sources)
+    end do
+    call solve_points(self, new)
+    call merge_points(self, new)
+  end subroutine add_points
+
+  !> Solves at all points, by threads.
+  subroutine solve_points(self, points)
+    type(forced_response_t), intent(in) :: self
+    type(response_point_t), intent(inout) :: points(:)
+    type(work_t) :: work
+    integer :: i
+
+    !$omp parallel private(work)
+    work%band = new_band_work(self%matrix)
+    allocate (work%stiffness(size(self%loss_factor)), work%moment(size(self%loss_factor)))
+    !$omp do schedule(dynamic, 4)
+    do i = 1, size(points)
+      call solve_point(self, points(i), work)
+    end do
+    !$omp end do
+    deallocate (work%stiffness, work%moment)
+    !$omp end parallel
+  end subroutine solve_points
+
+  !> Half the difference of the largest and the smallest value of a quantity.
+  elemental real(wp) function half_range(self, quantity)
+    class(response_point_t), intent(in) :: self
+    integer, intent(in) :: quantity
+
+    half_range = 0.5_wp * (self%highest(quantity) - self%lowest(quantity))
+  end function half_range
+
+  !> The largest magnitude of a quantity, its mean included.
+  elemental real(wp) function peak(self, quantity)
+    class(response_point_t), intent(in) :: self
+    integer, intent(in) :: quantity
+
+    peak = max(abs(self%mean(quantity) + self%highest(quantity)), abs(self%mean(quantity) + self%lowest(quantity)))
+  end function peak
+
+  !> Solves for every line at one speed.
+  pure subroutine solve_point(self, point, work)
+    type(forced_response_t), intent(in) :: self
+    type(response_point_t), intent(inout) :: point
+    type(work_t), intent(inout) :: work
+    integer :: l, q
+
+    associate (lines => size(self%lines), quantities => size(self%quantities), mean => point%state%mean)
+      allocate (point%frequency(lines), point%quantity(lines, quantities), point%angle(lines, self%machine%bodies))
+      allocate (point%heat(size(self%loss_factor)), source=0.0_wp)
+      allocate (point%mean(quantities), point%lowest(quantities), point%highest(quantities))
+      do l = 1, lines
+        point%frequency(l) = point%sources(self%lines(l)%source(1))%frequency
+        call solve_line(self, l, point, work)
+      end do
+      do q = 1, quantities
+        associate (one => self%quantities(q))
+          point%mean(q) = sum(one%weight * mean(one%element)) + one%by_held_torque * point%state%torque
+        end associate
+        call self%synthesis%extremes(point%quantity(:, q), point%lowest(q), point%highest(q))
+      end do
+    end associate
+  end subroutine solve_point
+
+  !> Moments, angles and heat of one line.
+  pure subroutine solve_line(self, l, point, work)
+    type(forced_response_t), intent(in) :: self
+    integer, intent(in) :: l
+    type(response_point_t), intent(inout) :: point
+    type(work_t), intent(inout) :: work
+    real(wp), parameter :: beside = 1.0e-9_wp   ! an undamped resonance, where there is no response
+    complex(wp) :: twist
+    integer :: e, i, q
+    logical :: singular
+
+    associate (frequency => point%frequency(l), sources => point%sources, line => self%lines(l))
+      do e = 1, size(work%stiffness)
+        work%stiffness(e) = self%complex_stiffness(point%state, e, frequency)
+      end do
+      call self%matrix%factor(frequency, work%stiffness, work%band, singular)
+      if (singular) call self%matrix%factor(frequency * (1.0_wp + beside), work%stiffness, work%band, singular)
+      work%band%x(:) = (0.0_wp, 0.0_wp)
+      do i = 1, size(line%source)
+        call self%matrix%add_forces(sources(line%source(i))%element, sources(line%source(i))%moment, work%band)
+      end do
+      call self%matrix%solve(work%band)
+      do e = 1, size(work%stiffness)
+        twist = self%matrix%twist(e, work%band)
+        work%moment(e) = -work%stiffness(e) * twist
+        point%heat(e) = point%heat(e) + 0.5_wp * frequency * aimag(work%stiffness(e)) * (real(twist, wp)**2 + aimag(twist)**2)
+      end do
+      do i = 1, size(line%source)
+        associate (source => sources(line%source(i)))
+          work%moment(source%element) = work%moment(source%element) + source%moment
+        end associate
+      end do
+      do q = 1, size(self%quantities)
+        point%quantity(l, q) = self%quantities(q)%total(work%moment)
+      end do
+      call set_angles(self, work, point%angle(l, :))
+    end associate
+  end subroutine solve_line
+
+  !> The angles of the bodies.
+  pure subroutine set_angles(self, work, angle)
+    type(forced_response_t), intent(in) :: self
+    type(work_t), intent(in) :: work
+    complex(wp), intent(out) :: angle(:)   !! [rad], [bodies]
+    integer :: b, k
+
+    associate (map => self%machine%coordinates)
+      do b = 1, size(angle)
+        angle(b) = (0.0_wp, 0.0_wp)
+        do k = map%first(b), map%first(b + 1) - 1
+          angle(b) = angle(b) + map%ratio(1, k) * work%band%x(self%matrix%position(map%coordinate(k)))
+        end do
+      end do
+    end associate
+  end subroutine set_angles
+
+  !> The complex stiffness of an element at a frequency: k (1 + i eta) + i Omega c, and the delay of its internal states [N m/rad].
+  pure complex(wp) function complex_stiffness(self, state, element, frequency)
+    class(forced_response_t), intent(in) :: self
+    type(held_state_t), intent(in) :: state
+    integer, intent(in) :: element
+    real(wp), intent(in) :: frequency   !! Omega [rad/s]
+
+    complex_stiffness = cmplx(state%stiffness(element), &
+                              state%stiffness(element) * self%loss_factor(element) &
+                              + frequency * (state%damping(element) - self%loss_damping(element)), wp)
+    if (size(state%by_internal) > 0) then
+      complex_stiffness = complex_stiffness - internal_moment(self, state, element, frequency)
+    end if
+  end function complex_stiffness
+
+  !> The moment of the internal states z of an element that twists by exp(i Omega t): i Omega z = A z + b i Omega.
+  pure complex(wp) function internal_moment(self, state, element, frequency) result(moment)
+    class(forced_response_t), intent(in) :: self
+    type(held_state_t), intent(in) :: state
+    integer, intent(in) :: element
+    real(wp), intent(in) :: frequency   !! Omega [rad/s]
+    complex(wp), allocatable :: matrix(:, :), z(:)
+    integer :: first, i, n
+
+    moment = (0.0_wp, 0.0_wp)
+    associate (internal => self%machine%elements%internal)
+      first = findloc(internal%element, element, dim=1)
+      if (first == 0) return
+      n = internal%members(first)
+      allocate (matrix(n, n), z(n))
+      do i = 1, n
+        matrix(i, :) = -state%rate_internal(:n, first + i - 1)
+        matrix(i, i) = matrix(i, i) + cmplx(0.0_wp, frequency, wp)
+        z(i) = cmplx(0.0_wp, frequency * state%rate_speed(first + i - 1), wp)
+      end do
+      call complex_solve(matrix, z)
+      moment = sum(state%by_internal(first:first + n - 1) * z)
+    end associate
+  end function internal_moment
+
+  !> Merges two lists of points in the order of their speeds.
+  subroutine merge_points(self, new)
+    type(forced_response_t), intent(inout) :: self
+    type(response_point_t), intent(inout) :: new(:)   !! ascending by the size of the speed; moved
+    type(response_point_t), allocatable :: all(:)
+    integer :: i, k, n
+
+    allocate (all(size(self%points) + size(new)))
+    i = 1
+    k = 1
+    do n = 1, size(all)
+      if (k > size(new)) then
+        call move_point(self%points(i), all(n))
+        i = i + 1
+      else if (i > size(self%points)) then
+        call move_point(new(k), all(n))
+        k = k + 1
+      else if (abs(self%points(i)%state%speed) <= abs(new(k)%state%speed)) then
+        call move_point(self%points(i), all(n))
+        i = i + 1
+      else
+        call move_point(new(k), all(n))
+        k = k + 1
+      end if
+    end do
+    call move_alloc(all, self%points)
+  end subroutine merge_points
+
+  !> Moves the arrays of a point.
+  subroutine move_point(from, to)
+    type(response_point_t), intent(inout) :: from
+    type(response_point_t), intent(out) :: to
+
+    to%is_of_grid = from%is_of_grid
+    to%state = from%state
+    call move_alloc(from%sources, to%sources)
+    call move_alloc(from%frequency, to%frequency)
+    call move_alloc(from%quantity, to%quantity)
+    call move_alloc(from%angle, to%angle)
+    call move_alloc(from%heat, to%heat)
+    call move_alloc(from%mean, to%mean)
+    call move_alloc(from%lowest, to%lowest)
+    call move_alloc(from%highest, to%highest)
+  end subroutine move_point
+
+end module nocdyn_forced_response

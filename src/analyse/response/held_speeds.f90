@@ -1,0 +1,320 @@
+!> Steady states of a machine whose speed is held, and the machine linearised there.
+!>
+!> Mean torques at an arbitrary speed of the reference body need not balance. The drive is what holds the speed: the torques of all
+!> motors are multiplied by one factor if they drive at that speed, as by a throttle, and governors leave their throttles open.
+!> If there are no such motors, a torque on the reference body holds the speed.
+module nocdyn_held_speeds
+  use nocdyn_bank, only: role_excitation, role_motor
+  use nocdyn_equilibrium, only: t_infinity
+  use nocdyn_errors, only: error_t, exit_failed, exit_input, raise
+  use nocdyn_finite, only: is_finite
+  use nocdyn_formulation, only: formulation_t
+  use nocdyn_kinds, only: wp
+  use nocdyn_lapack_lu, only: lu_factor, lu_solve
+  use nocdyn_machine, only: machine_t
+  use nocdyn_reduced, only: reduced_t
+  use nocdyn_static_twists, only: find_twists
+  use nocdyn_text, only: quoted
+  use nocdyn_torque_balance, only: set_up_balance, torque_balance_t
+  implicit none (type, external)
+  private
+
+  public :: new_held_speeds
+
+  !> The machine linearised about a steady state. Moments act on `to` and, with the other sign, on `from`.
+  type, public :: held_state_t
+    real(wp) :: speed = 0.0_wp    !! of the reference body [rad/s]
+    real(wp) :: factor = 0.0_wp   !! on the torques of the motors that holds the speed; 0 if a torque does
+    real(wp) :: torque = 0.0_wp   !! on the reference body that holds the speed [N m]; 0 if the motors do
+    real(wp), allocatable :: omega(:)       !! speeds of the bodies [rad/s], [bodies]
+    real(wp), allocatable :: phi(:)         !! angles of the bodies when that of the reference body is zero [rad], [bodies]
+    real(wp), allocatable :: mean(:)        !! moments of the elements [N m], [elements] as all that follow
+    real(wp), allocatable :: stiffness(:)   !! minus the derivatives of the moments by the twists [N m/rad]
+    real(wp), allocatable :: damping(:)     !! minus the derivatives by the rates of twist [N m s/rad]
+    real(wp), allocatable :: by_internal(:)        !! derivatives of the moments by internal states, [internal states]
+    real(wp), allocatable :: rate_speed(:)         !! derivatives of their rates by the speed of the element, the same
+    real(wp), allocatable :: rate_internal(:, :)   !! derivatives of the rates by the states of the element, [members, the same]
+  end type held_state_t
+
+  !> The steady states of one machine over the speed, each found from the one before.
+  type, public :: held_speeds_t
+    type(torque_balance_t) :: balance        !! of the machine with mean torques
+    integer :: reference = 0                 !! body whose speed is held
+    integer, allocatable, private :: sources(:)      !! elements whose torques are multiplied, numbered in `balance%inelastic`
+    real(wp), allocatable, private :: ratio(:)       !! speed of the reference body by the rigid motions, [freedoms]
+    real(wp), allocatable, private :: z(:)           !! last rigid motions and internal states
+    real(wp), allocatable, private :: q(:)           !! last angles of the coordinates [rad]
+    real(wp), private :: last_speed = 0.0_wp         !! of these
+    logical, private :: motors_hold = .false.        !! whether the motors hold the speed, else a torque
+  contains
+    procedure :: hold
+  end type held_speeds_t
+
+contains
+
+  !> Prepares the search. A reference body that cannot turn steadily is refused.
+  subroutine new_held_speeds(machine, reference, self, error)
+    type(machine_t), intent(in) :: machine   !! one lane
+    integer, intent(in) :: reference         !! body
+    type(held_speeds_t), intent(out) :: self
+    type(error_t), allocatable, intent(out) :: error
+    class(formulation_t), allocatable :: formulation
+    type(reduced_t), allocatable :: reduced
+    real(wp), allocatable :: one(:), omega(:)
+    integer :: i
+
+    allocate (reduced)
+    reduced%machine = machine
+    call reduced%machine%to_mean_torque()
+    do i = 1, size(machine%banks)
+      call reduced%machine%banks(i)%bank%hold_speed()
+    end do
+    call reduced%formulate(.false., .false.)
+    call move_alloc(reduced, formulation)
+    call set_up_balance(formulation, t_infinity, self%balance)
+    self%reference = reference
+    associate (freedoms => size(self%balance%motions%free))
+      allocate (self%ratio(freedoms), one(freedoms), omega(machine%bodies))
+      do i = 1, freedoms
+        one = 0.0_wp
+        one(i) = 1.0_wp
+        omega = self%balance%body_speeds(one)
+        self%ratio(i) = omega(reference)
+      end do
+      if (.not. any(abs(self%ratio) > 0)) then
+        call raise(error, exit_input, quoted(machine%names(reference)%text) // ' is held by elastic couplings: it has no ' // &
+                   'steady speed but 0; allowed: a body that can turn on')
+        return
+      end if
+      self%z = self%balance%start()
+    end associate
+    allocate (self%q(self%balance%coordinates), source=0.0_wp)
+    self%sources = sources_of(self%balance)
+    one = self%z(:size(one))
+    self%last_speed = sum(self%ratio * one)
+  end subroutine new_held_speeds
+
+  !> The elements that drive: motors; if there are none, excitations, whose means are those of engines.
+  function sources_of(balance) result(sources)
+    type(torque_balance_t), intent(in) :: balance
+    integer, allocatable :: sources(:)
+    integer :: b, i, role
+    logical :: is_source(size(balance%inelastic))
+
+    do role = role_motor, role_excitation
+      is_source = .false.
+      do b = 1, size(balance%formulation%machine%banks)
+        associate (bank => balance%formulation%machine%banks(b)%bank)
+          if (bank%role == role) is_source = is_source .or. (balance%inelastic >= bank%first .and. balance%inelastic <= bank%last())
+        end associate
+      end do
+      sources = pack([(i, i=1, size(is_source))], is_source)
+      if (size(sources) > 0) return
+    end do
+  end function sources_of
+
+  !> Finds the steady state at a speed of the reference body, and linearises the machine there.
+  subroutine hold(self, speed, state, error)
+    class(held_speeds_t), intent(inout) :: self
+    real(wp), intent(in) :: speed   !! [rad/s], not zero
+    type(held_state_t), intent(out) :: state
+    type(error_t), allocatable, intent(out) :: error   !! without the speed, which the caller knows
+    real(wp) :: z(size(self%z)), held
+    logical :: is_found
+
+    is_found = .false.
+    self%motors_hold = size(self%sources) > 0
+    call balance_speeds(self, speed, z, held, is_found)
+    if (is_found .and. self%motors_hold) then
+      is_found = held >= 0 .and. source_power(self) > 0
+      self%motors_hold = is_found
+      if (.not. is_found) call balance_speeds(self, speed, z, held, is_found)
+    end if
+    if (.not. is_found) then
+      call raise(error, exit_failed, 'the speeds of the machine were not found: no torques of the drive balance the others')
+      return
+    end if
+    state%speed = speed
+    if (self%motors_hold) state%factor = held
+    if (.not. self%motors_hold) state%torque = held
+    call find_state(self, z, state, error)
+    if (allocated(error)) return
+    self%z = z
+    self%last_speed = speed
+  end subroutine hold
+
+  !> Power of the elements that drive, after `evaluate` of the balance [W].
+  pure real(wp) function source_power(self)
+    type(held_speeds_t), intent(in) :: self
+
+    associate (elements => self%balance%formulation%machine%elements, e => self%balance%inelastic(self%sources))
+      source_power = sum((elements%restoring(1, e) + elements%applied(1, e)) * elements%speed(1, e))
+    end associate
+  end function source_power
+
+  !> Solves for the speeds of the rigid motions and for the factor or torque that holds the speed, by Newton's method with
+  !> differences in place of derivatives. With one rigid motion the first step is exact.
+  subroutine balance_speeds(self, speed, z, held, is_found)
+    type(held_speeds_t), intent(inout) :: self
+    real(wp), intent(in) :: speed   !! [rad/s]
+    real(wp), intent(out) :: z(:)   !! rigid motions and internal states
+    real(wp), intent(out) :: held   !! factor or torque [N m]
+    logical, intent(out) :: is_found
+    integer, parameter :: most_steps = 50
+    real(wp), parameter :: tolerance = 1.0e-12_wp, difference = 1.0e-6_wp
+    real(wp), dimension(size(self%ratio)) :: residual, scale, shifted, sources, step
+    real(wp) :: matrix(size(self%ratio), size(self%ratio)), size_of_s
+    integer :: i, k, pivot, pivots(size(self%ratio))
+    logical :: is_last, is_singular
+
+    associate (r => size(self%ratio), ratio => self%ratio)
+      pivot = maxloc(abs(ratio), dim=1)
+      z = self%z
+      if (abs(self%last_speed) > 0) z(:r) = z(:r) * (speed / self%last_speed)
+      call impose()
+      held = 0.0_wp
+      is_last = .false.
+      do i = 1, most_steps
+        call residuals(self, z, residual, sources, scale)
+        matrix(:, pivot) = sources
+        size_of_s = max(maxval(abs(z(:r))), abs(speed))
+        do k = 1, r
+          if (k == pivot) cycle
+          call shift(k, difference * size_of_s)
+          call residuals(self, z, shifted, step, scale)
+          matrix(:, k) = (shifted + held * step - residual - held * sources) / (difference * size_of_s)
+          call shift(k, -difference * size_of_s)
+        end do
+        if (r > 1) call residuals(self, z, residual, sources, scale)
+        step = -(residual + held * sources)
+        is_found = all(abs(step) <= tolerance * (scale + abs(held * sources))) .and. i > 1
+        if (is_found) return
+        call lu_factor(matrix, pivots, is_singular)
+        if (is_singular) then
+          is_found = all(abs(residual) <= tolerance * scale)   ! nothing drives and nothing brakes
+          return
+        end if
+        call lu_solve(matrix, pivots, step)
+        held = held + step(pivot)
+        if (r == 1) then
+          is_found = is_finite(held)
+          return
+        end if
+        do k = 1, r
+          if (k /= pivot) z(k) = z(k) + step(k)
+        end do
+        call impose()
+        if (.not. all(is_finite([z, held]))) return
+      end do
+    end associate
+
+  contains
+
+    !> Gives the reference body its speed.
+    subroutine impose()
+      integer :: j
+
+      associate (r => size(self%ratio))
+        z(pivot) = (speed - sum([(self%ratio(j) * z(j), j=1, r)], mask=[(j /= pivot, j=1, r)])) / self%ratio(pivot)
+      end associate
+    end subroutine impose
+
+    subroutine shift(motion, change)
+      integer, intent(in) :: motion
+      real(wp), intent(in) :: change
+
+      z(motion) = z(motion) + change
+      call impose()
+    end subroutine shift
+
+  end subroutine balance_speeds
+
+  !> Torques along the rigid motions without what holds the speed, the torques per unit of that, and the sums of their terms.
+  subroutine residuals(self, z, residual, sources, scale)
+    type(held_speeds_t), intent(inout) :: self
+    real(wp), intent(inout) :: z(:)   !! rigid motions and internal states, which settle
+    real(wp), intent(out) :: residual(:), sources(:), scale(:)
+    integer :: i, k
+
+    call self%balance%settle(z)
+    call self%balance%evaluate(z)
+    residual = self%balance%residual(:size(residual))
+    scale = self%balance%scale(:size(residual))
+    sources = self%ratio
+    if (.not. self%motors_hold) return
+    sources = 0.0_wp
+    associate (balance => self%balance, elements => self%balance%formulation%machine%elements)
+      do i = 1, size(self%sources)
+        associate (e => balance%inelastic(self%sources(i)))
+          do k = balance%first(self%sources(i)), balance%first(self%sources(i) + 1) - 1
+            sources(balance%freedom(k)) = sources(balance%freedom(k)) &
+                                          + balance%ratio(k) * (elements%restoring(1, e) + elements%applied(1, e))
+          end do
+        end associate
+      end do
+    end associate
+    residual = residual - sources
+  end subroutine residuals
+
+  !> Finds the twists, and linearises.
+  subroutine find_state(self, z, state, error)
+    type(held_speeds_t), intent(inout) :: self
+    real(wp), intent(inout) :: z(:)
+    type(held_state_t), intent(inout) :: state
+    type(error_t), allocatable, intent(out) :: error
+    real(wp) :: extra(self%balance%coordinates), weight(size(self%balance%is_elastic))
+    integer :: k
+    logical :: is_found
+
+    weight = 1.0_wp
+    if (self%motors_hold) weight(self%balance%inelastic(self%sources)) = state%factor
+    extra = 0.0_wp
+    associate (map => self%balance%formulation%machine%coordinates)
+      do k = map%first(self%reference), map%first(self%reference + 1) - 1
+        extra(map%coordinate(k)) = map%ratio(1, k) * state%torque
+      end do
+    end associate
+    call self%balance%evaluate(z)
+    call find_twists(self%balance, self%q, is_found, error, weight, extra)
+    if (.not. allocated(error) .and. .not. is_found) then
+      call raise(error, exit_failed, 'the torques balance, but no twists of the couplings were found that carry them')
+    end if
+    if (allocated(error)) return
+    call linearise(self, z, weight, state, error)
+  end subroutine find_state
+
+  subroutine linearise(self, z, weight, state, error)
+    type(held_speeds_t), intent(inout) :: self
+    real(wp), intent(in) :: z(:), weight(:)
+    type(held_state_t), intent(inout) :: state
+    type(error_t), allocatable, intent(out) :: error
+    integer :: e
+
+    call self%balance%set_state(z)
+    associate (balance => self%balance, formulation => self%balance%formulation)
+      balance%y(1, balance%coordinates + 1:2 * balance%coordinates) = self%q
+      call formulation%gather(balance%y)
+      call formulation%machine%choose_branches(balance%t)
+      call formulation%machine%evaluate_elements(balance%t)
+      call formulation%machine%differentiate_elements(balance%t)
+      state%omega = formulation%omega(1, 1:)
+      state%phi = formulation%phi(1, 1:)
+      state%phi = state%phi - state%omega * (state%phi(self%reference) / state%omega(self%reference))
+    end associate
+    associate (elements => self%balance%formulation%machine%elements)
+      state%mean = weight * (elements%restoring(1, :) + elements%applied(1, :))
+      state%stiffness = -weight * (elements%restoring_angle(1, :) + elements%applied_angle(1, :))
+      state%damping = -weight * elements%applied_speed(1, :)
+      state%by_internal = weight(elements%internal%element) * elements%internal%applied(1, :)
+      state%rate_speed = elements%internal%rate_speed(1, :)
+      state%rate_internal = elements%internal%rate_internal(1, :, :)
+    end associate
+    do e = 1, size(weight)
+      if (is_finite(state%mean(e)) .and. is_finite(state%stiffness(e)) .and. is_finite(state%damping(e))) cycle
+      call raise(error, exit_failed, 'the moment, stiffness or damping of ' // &
+                 quoted(self%balance%formulation%machine%element_name(e)) // ' is not a finite number')
+      return
+    end do
+  end subroutine linearise
+
+end module nocdyn_held_speeds

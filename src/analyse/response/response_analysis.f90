@@ -1,0 +1,159 @@
+!> The forced response that &response of an input asks for, with its modes, critical speeds and peaks.
+module nocdyn_response_analysis
+  use nocdyn_critical_speeds, only: crossing_t, find_crossings, refine_peaks
+  use nocdyn_errors, only: error_t, exit_failed, exit_input, raise
+  use nocdyn_excitation_lines, only: line_order, line_t
+  use nocdyn_forced_response, only: forced_response_t, new_forced_response
+  use nocdyn_input, only: input_t
+  use nocdyn_kinds, only: wp
+  use nocdyn_machine, only: machine_t
+  use nocdyn_response_limits, only: read_limits, response_limit_t
+  use nocdyn_response_settings, only: read_response_settings, response_settings_t
+  use nocdyn_speed_modes, only: new_speed_modes, speed_modes_t
+  use nocdyn_synthesis, only: new_synthesis
+  use nocdyn_text, only: append, quoted, rounded_text, string_t, to_text
+  use nocdyn_units, only: from_si, unit_rpm
+  implicit none (type, external)
+  private
+
+  public :: analyse_response, speed_text
+
+  integer, parameter :: most_modes = 600   ! coordinates of a machine whose modes are computed
+
+  type, public :: response_analysis_t
+    type(response_settings_t) :: settings
+    character(len=:), allocatable :: body_name       !! of the body whose speed is held
+    type(forced_response_t) :: response
+    type(speed_modes_t) :: modes                     !! at the speeds of the grid
+    type(crossing_t), allocatable :: crossings(:)
+    type(response_limit_t), allocatable :: limits(:)
+    type(string_t), allocatable :: notes(:)
+  end type response_analysis_t
+
+contains
+
+  !> Computes the response.
+  subroutine analyse_response(input, machine, self, error)
+    type(input_t), intent(in) :: input
+    type(machine_t), intent(in) :: machine   !! one lane
+    type(response_analysis_t), intent(out) :: self
+    type(error_t), allocatable, intent(out) :: error
+    real(wp) :: failed_speed
+
+    allocate (self%notes(0), self%crossings(0))
+    call read_response_settings(input, machine, self%settings, error)
+    if (allocated(error)) return
+    self%body_name = machine%names(self%settings%body)%text
+    associate (speeds => self%settings%speeds)
+      failed_speed = speeds(1)
+      call new_forced_response(machine, self%settings%body, [speeds(1), speeds(size(speeds))], self%response, error)
+      if (.not. allocated(error)) call choose_lines(input, self%settings, self%response%lines, error)
+      if (.not. allocated(error)) call read_limits(input, self%response%quantities, self%limits, error)
+      if (.not. allocated(error)) then
+        self%response%synthesis = new_synthesis(self%response%lines%order)
+        call self%response%add_points(speeds, .true., error, failed_speed)
+      end if
+    end associate
+    if (.not. allocated(error)) call find_peaks(self, error, failed_speed)
+    if (.not. allocated(error)) return
+    if (error%code == exit_failed) error%message = input%location(self%settings%group, 'speed') // ': at ' // &
+      speed_text(failed_speed) // ': ' // error%message
+    if (error%code == exit_input .and. index(error%message, input%shown_file()) /= 1) then
+      error%message = input%location(self%settings%group) // ': ' // error%message
+    end if
+  end subroutine analyse_response
+
+  !> "1200 rpm (125.664 rad/s)".
+  function speed_text(speed) result(text)
+    real(wp), intent(in) :: speed   !! [rad/s]
+    character(len=:), allocatable :: text
+
+    text = rounded_text(from_si(speed, unit_rpm), 6) // ' rpm (' // rounded_text(speed, 6) // ' rad/s)'
+  end function speed_text
+
+  !> Leaves only the lines of the orders that the input names.
+  subroutine choose_lines(input, settings, lines, error)
+    type(input_t), intent(in) :: input
+    type(response_settings_t), intent(in) :: settings
+    type(line_t), allocatable, intent(inout) :: lines(:)
+    type(error_t), allocatable, intent(out) :: error
+    integer :: chosen(size(settings%orders)), i
+    character(len=:), allocatable :: known
+
+    if (size(lines) == 0) then
+      call raise(error, exit_input, input%location(settings%group) // ': nothing excites this machine; required: an &engine, ' // &
+                 "or an &excitation of kind 'orders' or 'harmonic' (with a frequency)")
+      return
+    end if
+    do i = 1, size(chosen)
+      chosen(i) = line_order(lines, settings%orders(i))
+      if (chosen(i) > 0) cycle
+      call list_orders(lines, known)
+      call raise(error, exit_input, input%location(settings%group, 'orders') // ': no excitation has the order ' // &
+                 to_text(settings%orders(i)) // ' of ' // quoted(input%groups(settings%group)%text('body')) // &
+                 '; the orders of the excitations are ' // known)
+      return
+    end do
+    if (size(chosen) > 0) lines = lines(chosen)
+  end subroutine choose_lines
+
+  !> "0.5, 1, 1.5".
+  subroutine list_orders(lines, text)
+    type(line_t), intent(in) :: lines(:)
+    character(len=:), allocatable, intent(out) :: text
+    integer :: i
+
+    text = ''
+    do i = 1, size(lines)
+      if (.not. lines(i)%is_order) cycle
+      if (text /= '') text = text // ', '
+      text = text // rounded_text(lines(i)%order, 8)
+    end do
+    if (text == '') text = 'none'
+  end subroutine list_orders
+
+  !> Finds modes, critical speeds and peaks between the speeds of the grid.
+  subroutine find_peaks(self, error, failed_speed)
+    type(response_analysis_t), intent(inout) :: self
+    type(error_t), allocatable, intent(out) :: error
+    real(wp), intent(inout) :: failed_speed
+    integer :: i
+
+    if (self%response%matrix%coordinates > most_modes) then
+      call append(self%notes, 'this machine has ' // to_text(self%response%matrix%coordinates) // ' degrees of freedom: ' // &
+                              'natural frequencies are not computed for more than ' // to_text(most_modes) // &
+                              ', and peaks are sought from the speeds of the grid')
+    else
+      call new_speed_modes(self%response, self%modes, error)
+      if (allocated(error)) return
+      do i = 1, size(self%response%points)
+        failed_speed = self%response%points(i)%state%speed
+        call refuse_unstable(self%modes%natural(:, i), self%modes%damping_ratio(:, i), error)
+        if (allocated(error)) return
+      end do
+      call find_crossings(self%response, self%modes, self%crossings)
+    end if
+    call refine_peaks(self%response, self%crossings, error, failed_speed)
+  end subroutine find_peaks
+
+  !> Refuses steady states that do not stay.
+  subroutine refuse_unstable(natural, damping_ratio, error)
+    real(wp), intent(in) :: natural(:), damping_ratio(:)   !! of one speed
+    type(error_t), allocatable, intent(out) :: error
+    real(wp), parameter :: rounding = 1.0e-12_wp
+    integer :: m
+
+    do m = 1, size(natural)
+      if (natural(m) < 0) then
+        call raise(error, exit_failed, 'the steady state is unstable: a stiffness is negative there, and a motion grows ' // &
+                   'e-fold in ' // rounded_text(-1.0_wp / natural(m), 4) // ' s')
+      else if (damping_ratio(m) < -rounding) then
+        call raise(error, exit_failed, 'the steady state is unstable: an oscillation with ' // &
+                   rounded_text(natural(m) / (2.0_wp * acos(-1.0_wp)), 6) // ' Hz has the negative damping ratio ' // &
+                   rounded_text(damping_ratio(m), 4) // ', for a torque grows with the speed')
+      end if
+      if (allocated(error)) return
+    end do
+  end subroutine refuse_unstable
+
+end module nocdyn_response_analysis

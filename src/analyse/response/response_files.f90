@@ -1,0 +1,295 @@
+!> The files of a forced response: response.csv, response_orders.csv and response.json.
+module nocdyn_response_files
+  use nocdyn_csv, only: write_header, write_row
+  use nocdyn_forced_response, only: response_point_t
+  use nocdyn_input, only: input_t
+  use nocdyn_json, only: json_t
+  use nocdyn_kinds, only: wp
+  use nocdyn_output_file, only: output_file_t
+  use nocdyn_output_units, only: turn_labels
+  use nocdyn_response_analysis, only: response_analysis_t
+  use nocdyn_response_limits, only: no_limit
+  use nocdyn_response_quantities, only: quantity_moment
+  use nocdyn_response_summary, only: critical_t, response_summary_t, worst_ratio
+  use nocdyn_text, only: append, string_t
+  use nocdyn_units, only: from_si
+  implicit none (type, external)
+  private
+
+  public :: put_response_csv, put_orders_csv, response_json
+
+  real(wp), parameter :: degree = acos(-1.0_wp) / 180.0_wp, turn = 2.0_wp * acos(-1.0_wp)
+
+contains
+
+  !> Writes response.csv: a row for every speed with means, half ranges, peaks, stresses, limits and heat.
+  subroutine put_response_csv(analysis, wanted, file)
+    type(response_analysis_t), intent(in) :: analysis
+    integer, intent(in) :: wanted(:)   !! units of speeds: indices of `units`
+    type(output_file_t), intent(inout) :: file
+    type(string_t), allocatable :: labels(:)
+    integer, allocatable :: unit(:)
+    real(wp), allocatable :: row(:)
+    integer :: i
+
+    call list_labels(analysis, labels)
+    allocate (unit(size(labels)), row(size(labels)))
+    call turn_labels(labels, wanted, unit)
+    call write_header(file, labels)
+    do i = 1, size(analysis%response%points)
+      call fill_row(analysis, analysis%response%points(i), row)
+      call write_row(file, from_si(row, unit))
+    end do
+  end subroutine put_response_csv
+
+  !> The columns of response.csv.
+  subroutine list_labels(analysis, labels)
+    type(response_analysis_t), intent(in) :: analysis
+    type(string_t), allocatable, intent(out) :: labels(:)
+    integer :: k, q
+
+    allocate (labels(0))
+    associate (quantities => analysis%response%quantities)
+      call append(labels, 'omega_' // analysis%body_name // ' [rad/s]')
+      call append(labels, 'drive [1]')
+      call append(labels, 'drive_torque [N m]')
+      do q = 1, size(quantities)
+        associate (one => quantities(q))
+          call append(labels, 'mean_' // one%label // ' [' // one%unit // ']')
+          call append(labels, 'half_range_' // one%label // ' [' // one%unit // ']')
+          call append(labels, 'peak_' // one%label // ' [' // one%unit // ']')
+          if (one%section_modulus > 0) call append(labels, 'half_range_stress_' // one%name // ' [Pa]')
+          if (one%kind == quantity_moment) call append(labels, 'heat_' // one%name // ' [W]')
+          if (any(analysis%limits%quantity == q)) call append(labels, 'ratio_' // one%label // ' [1]')
+        end associate
+      end do
+      do k = 1, size(analysis%limits)
+        associate (one => quantities(analysis%limits(k)%quantity))
+          if (any(analysis%limits(:k - 1)%quantity == analysis%limits(k)%quantity)) cycle
+          if (has_continuous(analysis, one%label)) call append(labels, 'limit_' // one%label // ' [' // one%unit // ']')
+          if (has_transient(analysis, one%label)) call append(labels, 'transient_limit_' // one%label // ' [' // one%unit // ']')
+        end associate
+      end do
+    end associate
+  end subroutine list_labels
+
+  !> Whether some limit of a quantity bounds its half range.
+  logical function has_continuous(analysis, label)
+    type(response_analysis_t), intent(in) :: analysis
+    character(len=*), intent(in) :: label
+    integer :: k
+
+    has_continuous = .false.
+    do k = 1, size(analysis%limits)
+      if (analysis%response%quantities(analysis%limits(k)%quantity)%label /= label) cycle
+      has_continuous = has_continuous .or. analysis%limits(k)%continuous_limit(analysis%settings%speeds(1)) < no_limit
+    end do
+  end function has_continuous
+
+  !> Whether some limit of a quantity holds while a speed is passed.
+  logical function has_transient(analysis, label)
+    type(response_analysis_t), intent(in) :: analysis
+    character(len=*), intent(in) :: label
+    integer :: k
+
+    has_transient = .false.
+    do k = 1, size(analysis%limits)
+      if (analysis%response%quantities(analysis%limits(k)%quantity)%label /= label) cycle
+      has_transient = has_transient .or. analysis%limits(k)%transient_limit(analysis%settings%speeds(1)) < no_limit
+    end do
+  end function has_transient
+
+  !> The row of one speed.
+  subroutine fill_row(analysis, point, row)
+    type(response_analysis_t), intent(in) :: analysis
+    type(response_point_t), intent(in) :: point
+    real(wp), intent(out) :: row(:)
+    integer :: k, n, q
+
+    row(:3) = [point%state%speed, point%state%factor, point%state%torque]
+    n = 3
+    associate (quantities => analysis%response%quantities, limits => analysis%limits, speed => point%state%speed)
+      do q = 1, size(quantities)
+        row(n + 1:n + 3) = [point%mean(q), point%half_range(q), point%peak(q)]
+        n = n + 3
+        if (quantities(q)%section_modulus > 0) call put(point%half_range(q) / quantities(q)%section_modulus)
+        if (quantities(q)%kind == quantity_moment) call put(sum(point%heat(quantities(q)%element)))
+        if (any(limits%quantity == q)) call put(worst_ratio(limits, point, q))
+      end do
+      do k = 1, size(limits)
+        if (any(limits(:k - 1)%quantity == limits(k)%quantity)) cycle
+        if (has_continuous(analysis, quantities(limits(k)%quantity)%label)) &
+          call put(minval(limits%continuous_limit(speed), mask=limits%quantity == limits(k)%quantity))
+        if (has_transient(analysis, quantities(limits(k)%quantity)%label)) &
+          call put(minval(limits%transient_limit(speed), mask=limits%quantity == limits(k)%quantity))
+      end do
+    end associate
+
+  contains
+
+    subroutine put(value)
+      real(wp), intent(in) :: value
+
+      n = n + 1
+      row(n) = value
+    end subroutine put
+
+  end subroutine fill_row
+
+  !> Writes response_orders.csv: a row for every speed and line with amplitudes and phases.
+  subroutine put_orders_csv(analysis, wanted, file)
+    type(response_analysis_t), intent(in) :: analysis
+    integer, intent(in) :: wanted(:)   !! units of speeds and angles: indices of `units`
+    type(output_file_t), intent(inout) :: file
+    type(string_t), allocatable :: labels(:)
+    integer, allocatable :: unit(:)
+    real(wp), allocatable :: row(:)
+    integer :: b, i, l, n, q
+
+    associate (response => analysis%response)
+      allocate (labels(0))
+      call append(labels, 'omega_' // analysis%body_name // ' [rad/s]')
+      call append(labels, 'order [1]')
+      call append(labels, 'frequency [Hz]')
+      do q = 1, size(response%quantities)
+        call append(labels, response%quantities(q)%label // ' [' // response%quantities(q)%unit // ']')
+        call append(labels, 'phase_' // response%quantities(q)%label // ' [deg]')
+      end do
+      do b = 1, response%machine%bodies
+        call append(labels, 'phi_' // response%machine%names(b)%text // ' [rad]')
+        call append(labels, 'phase_phi_' // response%machine%names(b)%text // ' [deg]')
+        call append(labels, 'omega_' // response%machine%names(b)%text // '_amplitude [rad/s]')
+      end do
+      allocate (unit(size(labels)), row(size(labels)))
+      call turn_labels(labels, wanted, unit)
+      call write_header(file, labels)
+      do i = 1, size(response%points)
+        associate (point => response%points(i))
+          do l = 1, size(response%lines)
+            row(:3) = [point%state%speed, point%frequency(l) / abs(point%state%speed), point%frequency(l) / turn]
+            n = 3 + 2 * size(response%quantities)
+            row(4:n:2) = abs(point%quantity(l, :))
+            row(5:n:2) = phase(point%quantity(l, :))
+            row(n + 1::3) = abs(point%angle(l, :))
+            row(n + 2::3) = phase(point%angle(l, :))
+            row(n + 3::3) = point%frequency(l) * row(n + 1::3)
+            call write_row(file, from_si(row, unit))
+          end do
+        end associate
+      end do
+    end associate
+  end subroutine put_orders_csv
+
+  !> The lead of an oscillation before cos(Omega t) [deg].
+  elemental real(wp) function phase(amplitude)
+    complex(wp), intent(in) :: amplitude
+
+    phase = 0.0_wp
+    if (abs(amplitude) > 0) phase = atan2(aimag(amplitude), real(amplitude, wp)) / degree
+  end function phase
+
+  !> The text of response.json.
+  function response_json(input, analysis, summary) result(text)
+    type(input_t), intent(in) :: input
+    type(response_analysis_t), intent(in) :: analysis
+    type(response_summary_t), intent(in) :: summary
+    character(len=:), allocatable :: text
+    type(json_t) :: json
+    integer :: i
+
+    call json%open_report(input%file, input%title())
+    call json%put('limits_exceeded', summary%limits_exceeded)
+    call json%put('notes', analysis%notes)
+    call json%put('body', analysis%body_name)
+    call json%put('speed_rad_s', [analysis%settings%speeds(1), analysis%settings%speeds(size(analysis%settings%speeds))])
+    if (size(analysis%settings%operating) > 0) then
+      call json%put('operating_rad_s', analysis%settings%operating)
+      call json%put('margin', analysis%settings%margin)
+    end if
+    call json%put('orders', analysis%response%lines%order)
+    call json%open_list('critical_speeds')
+    do i = 1, size(summary%criticals)
+      call put_critical(json, analysis, summary%criticals(i))
+    end do
+    call json%close_list()
+    call put_largest(json, analysis, summary)
+    call put_barred(json, input, analysis, summary)
+    call json%close()
+    text = json%text()
+  end function response_json
+
+  subroutine put_critical(json, analysis, critical)
+    type(json_t), intent(inout) :: json
+    type(response_analysis_t), intent(in) :: analysis
+    type(critical_t), intent(in) :: critical
+
+    call json%open()
+    call json%put('mode', critical%crossing%mode)
+    call json%put('order', analysis%response%lines(critical%crossing%line)%order)
+    call json%put('speed_rad_s', critical%crossing%speed)
+    call json%put('frequency_Hz', critical%crossing%frequency / turn)
+    call json%put('damping_ratio', critical%crossing%damping_ratio)
+    if (critical%quantity > 0) then
+      call json%put('coupling', analysis%response%quantities(critical%quantity)%name)
+      if (.not. critical%is_unbounded) then
+        call json%put('peak_speed_rad_s', critical%speed)
+        call json%put('moment_N_m', critical%amplitude)
+        call json%put('half_range_N_m', critical%half_range)
+        if (critical%ratio > 0) call json%put('ratio_to_limit', critical%ratio)
+      end if
+    end if
+    if (size(analysis%settings%operating) > 0) call json%put('distance_to_operation', critical%margin)
+    call json%close()
+  end subroutine put_critical
+
+  subroutine put_largest(json, analysis, summary)
+    type(json_t), intent(inout) :: json
+    type(response_analysis_t), intent(in) :: analysis
+    type(response_summary_t), intent(in) :: summary
+    integer :: q
+
+    call json%open_list('largest')
+    do q = 1, size(summary%largest)
+      associate (largest => summary%largest(q), points => analysis%response%points, one => analysis%response%quantities(q))
+        call json%open()
+        call json%put('quantity', one%label)
+        call json%put('unit', one%unit)
+        call json%put('half_range', largest%half_range)
+        call json%put('half_range_speed_rad_s', points(largest%half_point)%state%speed)
+        call json%put('half_range_by_order', abs(points(largest%half_point)%quantity(:, q)))
+        if (one%section_modulus > 0) call json%put('half_range_stress_Pa', largest%half_range / one%section_modulus)
+        call json%put('peak', largest%peak)
+        call json%put('peak_speed_rad_s', points(largest%peak_point)%state%speed)
+        if (largest%ratio_point > 0) then
+          call json%put('ratio_to_limit', largest%ratio)
+          call json%put('ratio_speed_rad_s', points(largest%ratio_point)%state%speed)
+        end if
+        call json%close()
+      end associate
+    end do
+    call json%close_list()
+  end subroutine put_largest
+
+  subroutine put_barred(json, input, analysis, summary)
+    type(json_t), intent(inout) :: json
+    type(input_t), intent(in) :: input
+    type(response_analysis_t), intent(in) :: analysis
+    type(response_summary_t), intent(in) :: summary
+    integer :: i
+
+    call json%open_list('barred_speed_ranges')
+    do i = 1, size(summary%barred)
+      associate (range => summary%barred(i), limit => analysis%limits(summary%barred(i)%limit))
+        call json%open()
+        call json%put('quantity', analysis%response%quantities(limit%quantity)%label)
+        call json%put('limit_at', input%location(limit%group))
+        call json%put('from_rad_s', range%from)
+        call json%put('to_rad_s', range%to)
+        call json%put('can_be_passed', range%can_be_passed)
+        call json%close()
+      end associate
+    end do
+    call json%close_list()
+  end subroutine put_barred
+
+end module nocdyn_response_files

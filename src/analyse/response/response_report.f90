@@ -1,0 +1,248 @@
+!> The printed report of a forced response: critical speeds, the largest synthesis of every coupling, barred ranges.
+module nocdyn_response_report
+  use nocdyn_forced_response, only: response_point_t
+  use nocdyn_kinds, only: wp
+  use nocdyn_response_analysis, only: response_analysis_t
+  use nocdyn_response_summary, only: critical_t, response_summary_t
+  use nocdyn_table_text, only: cell, padded, text_width
+  use nocdyn_text, only: counted, rounded_text, to_text
+  use nocdyn_text_buffer, only: text_buffer_t
+  use nocdyn_units, only: from_si, unit_rpm
+  implicit none (type, external)
+  private
+
+  public :: response_text
+
+  integer, parameter :: most_criticals = 40, most_quantities = 60   ! that are printed; all are in response.json
+  integer, parameter :: most_orders = 3                             ! of a half range that are named
+  real(wp), parameter :: turn = 2.0_wp * acos(-1.0_wp), mega = 1.0e6_wp
+
+contains
+
+  !> All tables.
+  function response_text(file, analysis, summary) result(text)
+    character(len=*), intent(in) :: file
+    type(response_analysis_t), intent(in) :: analysis
+    type(response_summary_t), intent(in) :: summary
+    character(len=:), allocatable :: text
+    type(text_buffer_t) :: report
+    integer :: i
+
+    do i = 1, size(analysis%notes)
+      call report%append_line(file // ': note: ' // analysis%notes(i)%text)
+    end do
+    associate (speeds => analysis%settings%speeds)
+      call report%append_line(file // ': forced response from ' // rpm(speeds(1)) // ' to ' // rpm(speeds(size(speeds))) // &
+                              ' rpm of ' // analysis%body_name // ', ' // counted(size(analysis%response%lines), 'order', 'orders'))
+    end associate
+    call put_criticals(analysis, summary, report)
+    call put_largest(analysis, summary, report)
+    call put_barred(analysis, summary, report)
+    text = report%text()
+  end function response_text
+
+  function rpm(speed) result(text)
+    real(wp), intent(in) :: speed   !! [rad/s]
+    character(len=:), allocatable :: text
+
+    text = rounded_text(from_si(speed, unit_rpm), 6)
+  end function rpm
+
+  !> Mode by order.
+  subroutine put_criticals(analysis, summary, report)
+    type(response_analysis_t), intent(in) :: analysis
+    type(response_summary_t), intent(in) :: summary
+    type(text_buffer_t), intent(inout) :: report
+    character(len=:), allocatable :: line
+    integer :: i, q, width
+    logical :: has_ratio, has_stress
+
+    if (size(summary%criticals) == 0) then
+      call report%append_line('  no order meets a natural frequency in this range')
+      return
+    end if
+    width = maxval([8, (text_width(coupling_name(analysis, summary%criticals(i))), i=1, size(summary%criticals))])
+    has_ratio = any(summary%criticals%ratio > 0)
+    has_stress = .false.
+    do i = 1, size(summary%criticals)
+      q = summary%criticals(i)%quantity
+      if (q > 0) has_stress = has_stress .or. analysis%response%quantities(q)%section_modulus > 0
+    end do
+    line = '  mode  frequency [Hz]   order  critical [rpm]  damping ratio  ' // padded('coupling', width) // &
+           cell('moment [N m]') // cell('at [rpm]')
+    if (has_stress) line = line // cell('stress [MPa]')
+    if (has_ratio) line = line // cell('of limit')
+    if (size(analysis%settings%operating) > 0) line = line // '  distance to operation'
+    call report%append_line(line)
+    do i = 1, min(size(summary%criticals), most_criticals)
+      call put_critical(analysis, summary%criticals(i), width, has_stress, has_ratio, report)
+    end do
+    if (size(summary%criticals) > most_criticals) then
+      call report%append_line('  (' // to_text(size(summary%criticals) - most_criticals) // ' more in response.json)')
+    end if
+  end subroutine put_criticals
+
+  function coupling_name(analysis, critical) result(name)
+    type(response_analysis_t), intent(in) :: analysis
+    type(critical_t), intent(in) :: critical
+    character(len=:), allocatable :: name
+
+    name = ''
+    if (critical%quantity > 0) name = analysis%response%quantities(critical%quantity)%name
+  end function coupling_name
+
+  subroutine put_critical(analysis, critical, width, has_stress, has_ratio, report)
+    type(response_analysis_t), intent(in) :: analysis
+    type(critical_t), intent(in) :: critical
+    integer, intent(in) :: width   !! of the names
+    logical, intent(in) :: has_stress, has_ratio
+    type(text_buffer_t), intent(inout) :: report
+    character(len=:), allocatable :: line
+    real(wp) :: modulus
+
+    line = right(to_text(critical%crossing%mode), 6) // right(rounded_text(critical%crossing%frequency / turn, 7), 16) // &
+           right(rounded_text(analysis%response%lines(critical%crossing%line)%order, 5), 8) // &
+           right(rpm(critical%crossing%speed), 16) // right(rounded_text(critical%crossing%damping_ratio, 3), 15) // &
+           '  ' // padded(coupling_name(analysis, critical), width)
+    if (critical%quantity == 0) then
+      call report%append_line(line)
+      return
+    end if
+    modulus = analysis%response%quantities(critical%quantity)%section_modulus
+    if (critical%is_unbounded) then
+      line = line // cell('unbounded') // cell('')
+    else
+      line = line // cell(rounded_text(critical%amplitude, 5)) // cell(rpm(critical%speed))
+    end if
+    if (has_stress) then
+      if (modulus > 0 .and. .not. critical%is_unbounded) then
+        line = line // cell(rounded_text(critical%amplitude / modulus / mega, 4))
+      else
+        line = line // cell('')
+      end if
+    end if
+    if (has_ratio) line = line // cell(ratio_text(critical%ratio))
+    if (size(analysis%settings%operating) > 0) line = line // '  ' // margin_text(critical)
+    call report%append_line(trim(line))
+  end subroutine put_critical
+
+  function ratio_text(ratio) result(text)
+    real(wp), intent(in) :: ratio
+    character(len=:), allocatable :: text
+
+    text = ''
+    if (ratio > 0) text = rounded_text(100.0_wp * ratio, 3) // ' %'
+  end function ratio_text
+
+  !> "12 %", "in operation".
+  function margin_text(critical) result(text)
+    type(critical_t), intent(in) :: critical
+    character(len=:), allocatable :: text
+
+    if (critical%margin <= 0) then
+      text = 'in operation'
+    else
+      text = rounded_text(100.0_wp * critical%margin, 3) // ' %'
+      if (critical%is_too_near) text = text // ', too near'
+    end if
+  end function margin_text
+
+  pure function right(text, width)
+    character(len=*), intent(in) :: text
+    integer, intent(in) :: width
+    character(len=:), allocatable :: right
+
+    right = repeat(' ', max(0, width - len(text))) // text
+  end function right
+
+  !> Per quantity the largest half range with its speed and orders.
+  subroutine put_largest(analysis, summary, report)
+    type(response_analysis_t), intent(in) :: analysis
+    type(response_summary_t), intent(in) :: summary
+    type(text_buffer_t), intent(inout) :: report
+    character(len=:), allocatable :: line
+    integer :: q, shown, width
+    logical :: has_ratio, has_stress
+
+    associate (quantities => analysis%response%quantities)
+      shown = min(size(quantities), most_quantities)
+      if (shown == 0) return
+      width = maxval([(text_width(quantities(q)%label // ' [' // quantities(q)%unit // ']'), q=1, shown)])
+      has_ratio = any(summary%largest%ratio > 0)
+      has_stress = any(quantities%section_modulus > 0)
+      line = '  ' // padded('largest', width) // cell('half range') // cell('at [rpm]') // cell('peak') // cell('at [rpm]')
+      if (has_stress) line = line // cell('stress [MPa]')
+      if (has_ratio) line = line // cell('of limit') // cell('at [rpm]')
+      call report%append_line(line // '  orders in the half range')
+      do q = 1, shown
+        associate (largest => summary%largest(q), points => analysis%response%points)
+          line = '  ' // padded(quantities(q)%label // ' [' // quantities(q)%unit // ']', width) // &
+                 cell(rounded_text(largest%half_range, 5)) // cell(rpm(points(largest%half_point)%state%speed)) // &
+                 cell(rounded_text(largest%peak, 5)) // cell(rpm(points(largest%peak_point)%state%speed))
+          if (has_stress) then
+            if (quantities(q)%section_modulus > 0) then
+              line = line // cell(rounded_text(largest%half_range / quantities(q)%section_modulus / mega, 4))
+            else
+              line = line // cell('')
+            end if
+          end if
+          if (has_ratio .and. largest%ratio_point > 0) then
+            line = line // cell(ratio_text(largest%ratio)) // cell(rpm(points(largest%ratio_point)%state%speed))
+          else if (has_ratio) then
+            line = line // cell('') // cell('')
+          end if
+          call report%append_line(line // '  ' // orders_text(analysis, points(largest%half_point), q))
+        end associate
+      end do
+      if (shown < size(quantities)) then
+        call report%append_line('  (' // to_text(size(quantities) - shown) // ' more in response.json)')
+      end if
+    end associate
+  end subroutine put_largest
+
+  !> The orders with the largest amplitudes at a speed: "3 (420), 4.5 (96)".
+  function orders_text(analysis, point, quantity) result(text)
+    type(response_analysis_t), intent(in) :: analysis
+    type(response_point_t), intent(in) :: point
+    integer, intent(in) :: quantity
+    character(len=:), allocatable :: text
+    real(wp), parameter :: smallest = 0.02_wp   ! of the largest amplitude
+    real(wp) :: left(size(point%frequency))
+    integer :: k, l
+
+    left = abs(point%quantity(:, quantity))
+    text = ''
+    do k = 1, min(most_orders, size(left))
+      l = maxloc(left, dim=1)
+      if (left(l) <= smallest * maxval(abs(point%quantity(:, quantity)))) exit
+      if (k > 1) text = text // ', '
+      text = text // rounded_text(point%frequency(l) / abs(point%state%speed), 5) // ' (' // rounded_text(left(l), 4) // ')'
+      left(l) = -1.0_wp
+    end do
+  end function orders_text
+
+  !> Ranges of speeds in which limits are exceeded.
+  subroutine put_barred(analysis, summary, report)
+    type(response_analysis_t), intent(in) :: analysis
+    type(response_summary_t), intent(in) :: summary
+    type(text_buffer_t), intent(inout) :: report
+    character(len=:), allocatable :: line
+    integer :: i, q
+
+    do i = 1, size(summary%barred)
+      associate (range => summary%barred(i))
+        line = '  barred by ' // analysis%response%quantities(analysis%limits(range%limit)%quantity)%name // ': ' // &
+               rpm(range%from) // ' to ' // rpm(range%to) // ' rpm'
+        if (.not. range%can_be_passed) line = line // '; the limit for passing through is exceeded too'
+        call report%append_line(line)
+      end associate
+    end do
+    do q = 1, size(summary%largest)
+      if (summary%largest(q)%ratio <= 1.0_wp) cycle
+      if (any(analysis%limits(summary%barred%limit)%quantity == q)) cycle
+      call report%append_line('  ' // analysis%response%quantities(q)%name // ' exceeds its limit of the peak')
+    end do
+    if (size(analysis%limits) > 0 .and. .not. summary%limits_exceeded) call report%append_line('  all limits are kept')
+  end subroutine put_barred
+
+end module nocdyn_response_report

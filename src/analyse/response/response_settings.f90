@@ -1,0 +1,80 @@
+!> What &response asks for: body, speeds, orders, speeds in operation.
+module nocdyn_response_settings
+  use nocdyn_element_groups, only: bodies_of, new_body_index
+  use nocdyn_errors, only: error_t, exit_input, raise
+  use nocdyn_input, only: input_t
+  use nocdyn_kinds, only: wp
+  use nocdyn_machine, only: machine_t
+  use nocdyn_text, only: to_text
+  implicit none (type, external)
+  private
+
+  public :: read_response_settings
+
+  type, public :: response_settings_t
+    integer :: group = 0                        !! &response in the input
+    integer :: body = 0                         !! whose speed is held
+    real(wp), allocatable :: speeds(:)          !! of the grid, from `speed(1)` to `speed(2)` [rad/s]
+    real(wp), allocatable :: orders(:)          !! oscillations per turn of the body; empty: those of the excitations
+    real(wp), allocatable :: operating(:)       !! lowest and highest speed in operation [rad/s]; empty: unknown
+    real(wp) :: margin = 0.0_wp                 !! as a share of the speed
+  end type response_settings_t
+
+contains
+
+  !> Reads &response.
+  subroutine read_response_settings(input, machine, settings, error)
+    type(input_t), intent(in) :: input
+    type(machine_t), intent(in) :: machine
+    type(response_settings_t), intent(out) :: settings
+    type(error_t), allocatable, intent(out) :: error
+    integer, allocatable :: bodies(:), groups(:)
+    real(wp), allocatable :: range(:)
+    integer :: count, i
+
+    allocate (groups, source=input%groups_named('response'))
+    if (.not. is_in_file(input, groups)) then
+      call raise(error, exit_input, input%shown_file() // ': there is no group &response; required: for instance ' // &
+                 "&response body = '" // machine%names(1)%text // "' speed_rpm = 100, 2000 /")
+      return
+    end if
+    settings%group = groups(1)
+    associate (group => input%groups(groups(1)))
+      bodies = bodies_of(group, 'body', new_body_index(machine%names))
+      settings%body = bodies(1)
+      settings%orders = group%numbers('orders')
+      settings%operating = group%numbers('operating')
+      settings%margin = group%number('margin', absent=0.0_wp)
+      count = group%whole_number('count')
+      range = group%numbers('speed')
+    end associate
+    call check_range(input, settings%group, 'speed', range, error)
+    if (.not. allocated(error)) call check_range(input, settings%group, 'operating', settings%operating, error)
+    if (allocated(error)) return
+    settings%speeds = [(range(1) + (range(2) - range(1)) * (real(i, wp) / (count - 1)), i=0, count - 1)]
+    settings%speeds(count) = range(2)
+  end subroutine read_response_settings
+
+  pure logical function is_in_file(input, groups)
+    type(input_t), intent(in) :: input
+    integer, intent(in) :: groups(:)
+
+    is_in_file = size(groups) > 0
+    if (is_in_file) is_in_file = input%groups(groups(1))%ordinal > 0
+  end function is_in_file
+
+  !> Two speeds are the lowest and the highest one, in the same direction.
+  subroutine check_range(input, group, key, range, error)
+    type(input_t), intent(in) :: input
+    integer, intent(in) :: group
+    character(len=*), intent(in) :: key
+    real(wp), intent(in) :: range(:)   !! [rad/s], or empty
+    type(error_t), allocatable, intent(out) :: error
+
+    if (size(range) == 0) return
+    if (range(1) * range(2) > 0 .and. abs(range(1)) < abs(range(2))) return
+    call raise(error, exit_input, input%location(group, key) // ': ' // key // ' = ' // to_text(range(1)) // ', ' // &
+               to_text(range(2)) // ' rad/s; allowed: first the lower, then the higher speed, both in one direction')
+  end subroutine check_range
+
+end module nocdyn_response_settings

@@ -1,0 +1,229 @@
+!> What one looks for in a forced response: critical speeds with their peaks, the largest synthesis of every coupling, ranges of
+!> speeds that its limits bar.
+module nocdyn_response_summary
+  use nocdyn_critical_speeds, only: crossing_t, undamped
+  use nocdyn_forced_response, only: forced_response_t, response_point_t
+  use nocdyn_kinds, only: wp
+  use nocdyn_response_analysis, only: response_analysis_t
+  use nocdyn_response_limits, only: no_limit, response_limit_t
+  use nocdyn_response_quantities, only: quantity_moment
+  implicit none (type, external)
+  private
+
+  public :: summarise_response, worst_ratio
+
+  !> A critical speed with the peak of the coupling that has most of the mode's potential energy.
+  type, public :: critical_t
+    type(crossing_t) :: crossing
+    integer :: quantity = 0            !! the coupling, 0 if there is none
+    real(wp) :: speed = 0.0_wp         !! of its peak; the critical speed itself if there is no peak near it [rad/s]
+    real(wp) :: amplitude = 0.0_wp     !! at this speed, of the line alone [N m]
+    real(wp) :: half_range = 0.0_wp    !! at this speed, of all lines [N m]
+    real(wp) :: ratio = 0.0_wp         !! of the response of this quantity to its limits there, 0 without limits
+    logical :: is_unbounded = .false.  !! without damping there is no finite response
+    real(wp) :: margin = 0.0_wp        !! distance to the speeds in operation as a share of the nearest of them; 0 inside
+    logical :: is_too_near = .false.   !! whether this is less than the margin that is asked for
+  end type critical_t
+
+  !> Where a quantity has its largest half range and its largest peak.
+  type, public :: largest_t
+    integer :: half_point = 0, peak_point = 0   !! points of the response
+    real(wp) :: half_range = 0.0_wp             !! [unit of the quantity]
+    real(wp) :: peak = 0.0_wp                   !! largest magnitude, with the mean
+    real(wp) :: ratio = 0.0_wp                  !! largest ratio to the limits, 0 without limits
+    integer :: ratio_point = 0
+  end type largest_t
+
+  !> Speeds at which a limit for continuous operation is exceeded.
+  type, public :: barred_range_t
+    integer :: limit = 0
+    real(wp) :: from = 0.0_wp, to = 0.0_wp      !! [rad/s]
+    logical :: can_be_passed = .true.           !! whether the limit for passing them quickly is kept
+  end type barred_range_t
+
+  type, public :: response_summary_t
+    type(critical_t), allocatable :: criticals(:)
+    type(largest_t), allocatable :: largest(:)          !! [quantities]
+    type(barred_range_t), allocatable :: barred(:)
+    logical :: limits_exceeded = .false.
+  end type response_summary_t
+
+contains
+
+  !> Sums up a response.
+  type(response_summary_t) function summarise_response(analysis) result(self)
+    type(response_analysis_t), intent(in) :: analysis
+    integer :: i
+
+    allocate (self%criticals(size(analysis%crossings)), self%largest(size(analysis%response%quantities)), self%barred(0))
+    do i = 1, size(self%criticals)
+      self%criticals(i)%crossing = analysis%crossings(i)
+      call find_peak(analysis, self%criticals(i))
+      call find_margin(analysis, self%criticals(i))
+    end do
+    call find_largest(analysis, self%largest)
+    do i = 1, size(analysis%limits)
+      call find_barred(analysis%response%points, analysis%limits(i), i, self%barred)
+    end do
+    self%limits_exceeded = any(self%largest%ratio > 1.0_wp)
+  end function summarise_response
+
+  !> Follows the amplitude of a line uphill from its crossing with a mode.
+  subroutine find_peak(analysis, critical)
+    type(response_analysis_t), intent(in) :: analysis
+    type(critical_t), intent(inout) :: critical
+    real(wp), parameter :: near = 0.02_wp   ! of the critical speed, without damping
+    integer :: i, start
+    real(wp) :: speed(size(analysis%response%points))
+
+    critical%quantity = main_coupling(analysis, critical%crossing%mode)
+    critical%speed = critical%crossing%speed
+    critical%is_unbounded = critical%crossing%damping_ratio <= undamped
+    if (critical%quantity == 0 .or. critical%is_unbounded) return
+    associate (points => analysis%response%points, line => critical%crossing%line, q => critical%quantity)
+      speed = [(points(i)%state%speed, i=1, size(points))]
+      start = minloc(abs(speed - critical%speed), dim=1)
+      i = start
+      do
+        if (i > 1) then
+          if (abs(points(i - 1)%quantity(line, q)) > abs(points(i)%quantity(line, q))) then
+            i = i - 1
+            cycle
+          end if
+        end if
+        if (i == size(points)) exit
+        if (abs(points(i + 1)%quantity(line, q)) <= abs(points(i)%quantity(line, q))) exit
+        i = i + 1
+      end do
+      if (i == 1 .or. i == size(points) .or. abs(speed(i) - critical%speed) > &
+          (near + 3.0_wp * critical%crossing%damping_ratio) * abs(critical%speed)) i = start
+      critical%speed = speed(i)
+      critical%amplitude = abs(points(i)%quantity(line, q))
+      critical%half_range = points(i)%half_range(q)
+      critical%ratio = worst_ratio(analysis%limits, points(i), q)
+    end associate
+  end subroutine find_peak
+
+  !> The coupling with most of the potential energy of a mode, 0 if no coupling has any.
+  integer function main_coupling(analysis, mode) result(coupling)
+    type(response_analysis_t), intent(in) :: analysis
+    integer, intent(in) :: mode
+    integer :: e, q
+    real(wp) :: energy, most
+
+    coupling = 0
+    most = 0.0_wp
+    do q = 1, size(analysis%response%quantities)
+      if (analysis%response%quantities(q)%kind /= quantity_moment) cycle
+      e = analysis%response%quantities(q)%element(1)
+      energy = abs(analysis%response%points(1)%state%stiffness(e)) * analysis%modes%twists(e, mode)**2
+      if (energy <= most) cycle
+      coupling = q
+      most = energy
+    end do
+  end function main_coupling
+
+  !> Distance of a critical speed to the speeds in operation.
+  pure subroutine find_margin(analysis, critical)
+    type(response_analysis_t), intent(in) :: analysis
+    type(critical_t), intent(inout) :: critical
+    real(wp) :: speed
+
+    associate (operating => abs(analysis%settings%operating))
+      if (size(operating) == 0) return
+      speed = abs(critical%crossing%speed)
+      critical%margin = max(0.0_wp, (operating(1) - speed) / operating(1), (speed - operating(2)) / operating(2))
+      critical%is_too_near = critical%margin < analysis%settings%margin .or. critical%margin <= 0
+    end associate
+  end subroutine find_margin
+
+  !> The largest half range, peak and ratio of every quantity.
+  subroutine find_largest(analysis, largest)
+    type(response_analysis_t), intent(in) :: analysis
+    type(largest_t), intent(inout) :: largest(:)
+    integer :: i, q
+    real(wp) :: half_range, peak, ratio
+
+    do i = 1, size(analysis%response%points)
+      associate (point => analysis%response%points(i))
+        do q = 1, size(largest)
+          half_range = point%half_range(q)
+          peak = point%peak(q)
+          if (half_range > largest(q)%half_range .or. i == 1) then
+            largest(q)%half_range = half_range
+            largest(q)%half_point = i
+          end if
+          if (peak > largest(q)%peak .or. i == 1) then
+            largest(q)%peak = peak
+            largest(q)%peak_point = i
+          end if
+          ratio = worst_ratio(analysis%limits, point, q)
+          if (ratio > largest(q)%ratio) then
+            largest(q)%ratio = ratio
+            largest(q)%ratio_point = i
+          end if
+        end do
+      end associate
+    end do
+  end subroutine find_largest
+
+  !> The largest ratio of a quantity to its limits for continuous operation at a speed, 0 without limits.
+  pure real(wp) function worst_ratio(limits, point, quantity) result(ratio)
+    type(response_limit_t), intent(in) :: limits(:)
+    type(response_point_t), intent(in) :: point
+    integer, intent(in) :: quantity
+    integer :: k
+
+    ratio = 0.0_wp
+    do k = 1, size(limits)
+      if (limits(k)%quantity /= quantity) cycle
+      ratio = max(ratio, limits(k)%ratio(point%state%speed, point%half_range(quantity), &
+                                         point%peak(quantity)))
+    end do
+  end function worst_ratio
+
+  !> The ranges of speeds in which the half range exceeds the limit for continuous operation; their ends are interpolated.
+  subroutine find_barred(points, limit, number, barred)
+    type(response_point_t), intent(in) :: points(:)
+    type(response_limit_t), intent(in) :: limit
+    integer, intent(in) :: number
+    type(barred_range_t), allocatable, intent(inout) :: barred(:)
+    real(wp) :: excess(size(points)), half_range(size(points)), speed(size(points))
+    type(barred_range_t) :: range
+    integer :: i
+
+    do i = 1, size(points)
+      speed(i) = points(i)%state%speed
+      half_range(i) = points(i)%half_range(limit%quantity)
+    end do
+    excess = half_range / limit%continuous_limit(speed) - 1.0_wp
+    range%limit = number
+    i = 1
+    do while (i <= size(points))
+      if (excess(i) > 0) then
+        range%from = edge(speed, excess, i, i - 1)
+        range%can_be_passed = .true.
+        do
+          range%can_be_passed = range%can_be_passed .and. half_range(i) <= limit%transient_limit(speed(i))
+          range%to = edge(speed, excess, i, i + 1)
+          i = i + 1
+          if (i > size(points)) exit
+          if (excess(i) <= 0) exit
+        end do
+        barred = [barred, range]
+      end if
+      i = i + 1
+    end do
+  end subroutine find_barred
+
+  !> The speed between two points at which a limit is reached; that of the first one if there is no other point [rad/s].
+  pure real(wp) function edge(speed, excess, inside, outside)
+    real(wp), intent(in) :: speed(:), excess(:)   !! [points]
+    integer, intent(in) :: inside, outside        !! the point outside may be none
+
+    edge = speed(inside)
+    if (outside < 1 .or. outside > size(speed)) return
+    edge = edge + (speed(outside) - speed(inside)) * excess(inside) / (excess(inside) - excess(outside))
+  end function edge
+
+end module nocdyn_response_summary

@@ -1,0 +1,79 @@
+!> nocdyn response: forced response by orders over the speed.
+module nocdyn_response_command
+  use nocdyn_arguments, only: arguments_t
+  use nocdyn_console, only: print_text
+  use nocdyn_errors, only: error_t
+  use nocdyn_input, only: input_t
+  use nocdyn_input_files, only: analyse_files
+  use nocdyn_machine, only: machine_t
+  use nocdyn_output_file, only: output_file_t
+  use nocdyn_output_units, only: output_units
+  use nocdyn_response_analysis, only: analyse_response, response_analysis_t
+  use nocdyn_response_files, only: put_orders_csv, put_response_csv, response_json
+  use nocdyn_response_report, only: response_text
+  use nocdyn_response_summary, only: response_summary_t, summarise_response
+  use nocdyn_text, only: shown_path
+  implicit none (type, external)
+  private
+
+  public :: response_command
+
+  character(len=*), parameter :: table_name = 'response.csv', orders_name = 'response_orders.csv', report_name = 'response.json'
+
+contains
+
+  !> Computes the response of every file, prints its tables and writes its files.
+  subroutine response_command(arguments, code)
+    type(arguments_t), intent(in) :: arguments
+    integer, intent(out) :: code   !! the highest exit code of all files
+
+    call analyse_files(arguments, analyse_one, code, always_writes=.true.)
+  end subroutine response_command
+
+  subroutine analyse_one(arguments, input, machine, folder, error)
+    type(arguments_t), intent(in) :: arguments
+    type(input_t), intent(in) :: input
+    type(machine_t), intent(in) :: machine
+    character(len=*), intent(in) :: folder
+    type(error_t), allocatable, intent(out) :: error
+    type(response_analysis_t) :: analysis
+    type(response_summary_t) :: summary
+
+    call analyse_response(input, machine, analysis, error)
+    if (allocated(error)) return
+    summary = summarise_response(analysis)
+    call write_files(input, analysis, summary, folder, error)
+    if (allocated(error)) return
+    call print_text(response_text(input%shown_file(), analysis, summary))
+    call print_text(input%shown_file() // ': ' // shown_path(folder) // ' has ' // table_name // ', ' // orders_name // ' and ' // &
+                    report_name)
+  end subroutine analyse_one
+
+  !> Writes all files aside before any takes its name.
+  subroutine write_files(input, analysis, summary, folder, error)
+    type(input_t), intent(in) :: input
+    type(response_analysis_t), intent(in) :: analysis
+    type(response_summary_t), intent(in) :: summary
+    character(len=*), intent(in) :: folder
+    type(error_t), allocatable, intent(out) :: error
+    type(output_file_t) :: orders, report, table
+
+    call table%open(folder, table_name)
+    call put_response_csv(analysis, output_units(input), table)
+    call orders%open(folder, orders_name)
+    call put_orders_csv(analysis, output_units(input), orders)
+    call report%open(folder, report_name)
+    call report%put(response_json(input, analysis, summary))
+    call table%complete(table_name, error)
+    if (.not. allocated(error)) call orders%complete(orders_name, error)
+    if (.not. allocated(error)) call report%complete(report_name, error)
+    if (.not. allocated(error)) call table%finish(table_name, error)
+    if (.not. allocated(error)) call orders%finish(orders_name, error)
+    if (.not. allocated(error)) call report%finish(report_name, error)
+    if (.not. allocated(error)) return
+    call table%discard()
+    call orders%discard()
+    call report%discard()
+  end subroutine write_files
+
+end module nocdyn_response_command

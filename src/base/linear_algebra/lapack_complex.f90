@@ -1,0 +1,78 @@
+!> Complex linear systems, banded or dense, by LAPACK.
+!>
+!> The band has the form of `nocdyn_lapack_lu`: element (i, j) is band(lower + upper + 1 + i - j, j).
+module nocdyn_lapack_complex
+  use nocdyn_kinds, only: wp
+  implicit none (type, external)
+  private
+
+  public :: complex_band_factor, complex_band_solve, complex_solve
+
+  interface
+    pure subroutine zgbtrf(m, n, kl, ku, ab, ldab, ipiv, info)
+      import :: wp
+      integer, intent(in) :: m, n, kl, ku, ldab
+      complex(wp), intent(inout) :: ab(ldab, n)
+      integer, intent(out) :: ipiv(n)
+      integer, intent(out) :: info
+    end subroutine zgbtrf
+
+    pure subroutine zgbtrs(trans, n, kl, ku, nrhs, ab, ldab, ipiv, b, ldb, info)
+      import :: wp
+      character, intent(in) :: trans
+      integer, intent(in) :: n, kl, ku, nrhs, ldab, ldb
+      complex(wp), intent(in) :: ab(ldab, n)
+      integer, intent(in) :: ipiv(n)
+      complex(wp), intent(inout) :: b(ldb, nrhs)
+      integer, intent(out) :: info
+    end subroutine zgbtrs
+
+    pure subroutine zgesv(n, nrhs, a, lda, ipiv, b, ldb, info)
+      import :: wp
+      integer, intent(in) :: n, nrhs, lda, ldb
+      complex(wp), intent(inout) :: a(lda, n), b(ldb, nrhs)
+      integer, intent(out) :: ipiv(n)
+      integer, intent(out) :: info
+    end subroutine zgesv
+  end interface
+
+contains
+
+  !> Factors P A = L U of a band matrix with row interchanges (ZGBTRF).
+  pure subroutine complex_band_factor(lower, upper, band, pivots, singular)
+    integer, intent(in) :: lower, upper                    !! numbers of diagonals below and above the main one
+    complex(wp), contiguous, intent(inout) :: band(:, :)   !! A, on return L and U; shape [2 lower + upper + 1, n], n > 0
+    integer, contiguous, intent(inout) :: pivots(:)        !! row interchanges, shape [n]
+    logical, intent(out) :: singular                       !! a pivot is exactly zero: the factors cannot be used
+    integer :: info, n
+
+    n = size(band, 2)
+    call zgbtrf(n, n, lower, upper, band, size(band, 1), pivots, info)
+    if (info < 0) error stop 'nocdyn_lapack_complex: zgbtrf refused an argument'
+    singular = info > 0
+  end subroutine complex_band_factor
+
+  !> Solves A x = b with the factors of `complex_band_factor` (ZGBTRS).
+  pure subroutine complex_band_solve(lower, upper, factors, pivots, x)
+    integer, intent(in) :: lower, upper                     !! numbers of diagonals below and above the main one
+    complex(wp), contiguous, intent(in) :: factors(:, :)    !! of `complex_band_factor`
+    integer, contiguous, intent(in) :: pivots(:)            !! of `complex_band_factor`
+    complex(wp), contiguous, intent(inout) :: x(:)          !! b, on return x; shape [n]
+    integer :: info, n
+
+    n = size(factors, 2)
+    call zgbtrs('N', n, lower, upper, 1, factors, size(factors, 1), pivots, x, n, info)
+    if (info /= 0) error stop 'nocdyn_lapack_complex: zgbtrs refused an argument'
+  end subroutine complex_band_solve
+
+  !> Solves A x = b (ZGESV).
+  pure subroutine complex_solve(matrix, x)
+    complex(wp), contiguous, intent(inout) :: matrix(:, :)   !! A, not singular, [n, n]; overwritten
+    complex(wp), contiguous, intent(inout) :: x(:)           !! b, on return x; [n]
+    integer :: info, pivots(size(x))
+
+    call zgesv(size(x), 1, matrix, size(x), pivots, x, size(x), info)
+    if (info < 0) error stop 'nocdyn_lapack_complex: zgesv refused an argument'
+  end subroutine complex_solve
+
+end module nocdyn_lapack_complex

@@ -1,0 +1,63 @@
+!> Rows of the schema: the groups &response and &limit with their keys.
+module nocdyn_schema_response
+  use nocdyn_kinds, only: wp
+  use nocdyn_schema_rules, only: a_body, a_number, a_text, a_word, allowed_t, an_integer, any_number, any_times, anything, &
+    at_most_once, example_t, group_rule_t, key_rule_t, not_negative, not_zero, positive, relation_rule_t, required, requires, unset
+  implicit none (type, external)
+  private
+
+  type(allowed_t), parameter :: speed_counts = allowed_t(low=2.0_wp, high=1.0e6_wp)
+  type(allowed_t), parameter :: rules = allowed_t(words='iacs_m68')
+  type(allowed_t), parameter :: strengths = allowed_t(low=4.0e8_wp, high=8.0e8_wp)
+  type(allowed_t), parameter :: factors = allowed_t(low=0.1_wp, high=1.5_wp)
+  type(allowed_t), parameter :: margins = allowed_t(low=0.0_wp, high=0.9_wp)
+
+  type(group_rule_t), parameter, public :: response_groups(*) = [ &
+    group_rule_t('response', at_most_once, '', "Speeds and orders of 'nocdyn response' and 'nocdyn campbell'."), &
+    group_rule_t('limit',    any_times,    '', 'Limits of the moment or of the stress of a coupling.')]
+
+  type(key_rule_t), parameter, public :: response_keys(*) = [ &
+    key_rule_t('response',   'body',            a_body,         1, '',            required,    anything, &
+      'the body whose speed is held, and to whose turns orders refer'), &
+    key_rule_t('response',   'speed',           a_number,       2, 'rad/s',       required,    not_zero, &
+      'lowest and highest speed of this body'), &
+    key_rule_t('response',   'count',           an_integer,     1, '',            '201',       speed_counts, &
+      'number of speeds from the lowest to the highest; peaks between them are found'), &
+    key_rule_t('response',   'orders',          a_number,       any_number, '',   unset,       positive, &
+      'oscillations per turn of the body; those of the excitations if not given', fewest=1), &
+    key_rule_t('response',   'operating',       a_number,       2, 'rad/s',       unset,       not_zero, &
+      'lowest and highest speed in operation'), &
+    key_rule_t('response',   'margin',          a_number,       1, '',            '0.1',       margins, &
+      'a critical speed so near to the speeds in operation, as a share of it, is reported'), &
+    key_rule_t('limit',      'coupling',        a_text,         1, '',            required,    anything, &
+      'name of the coupling'), &
+    key_rule_t('limit',      'vibratory_moment', a_number,      1, 'N m',         unset,       positive, &
+      'half range of the moment in continuous operation'), &
+    key_rule_t('limit',      'moment',          a_number,       1, 'N m',         unset,       positive, &
+      'largest magnitude of the moment, its mean included'), &
+    key_rule_t('limit',      'stress',          a_number,       1, 'Pa',          unset,       positive, &
+      'half range of the shear stress in continuous operation'), &
+    key_rule_t('limit',      'stress_transient', a_number,      1, 'Pa',          unset,       positive, &
+      'half range of the shear stress at speeds that are passed through quickly'), &
+    key_rule_t('limit',      'rule',            a_word,         1, '',            unset,       rules, &
+      'stresses by a rule: iacs_m68 is IACS Unified Requirement M68 for propulsion shafts'), &
+    key_rule_t('limit',      'tensile_strength', a_number,      1, 'Pa',          unset,       strengths, &
+      'specified minimum tensile strength sigma_B, for the rule'), &
+    key_rule_t('limit',      'c_k',             a_number,       1, '',            '1',         factors, &
+      'factor of the shape of the shaft in the rule: 1 with integral flanges, 0.6 with keyways, ...'), &
+    key_rule_t('limit',      'diameter',        a_number,       1, 'm',           unset,       positive, &
+      'outer diameter in the rule; that of the coupling if not given'), &
+    key_rule_t('limit',      'rated_speed',     a_number,       1, 'rad/s',       unset,       not_zero, &
+      'rated speed of the body of &response, for the rule')]
+
+  type(relation_rule_t), parameter, public :: response_relations(*) = [ &
+    relation_rule_t('response', requires, 'margin', 'operating'), &
+    relation_rule_t('limit', requires, 'rule', 'tensile_strength'), &
+    relation_rule_t('limit', requires, 'rule', 'rated_speed'), &
+    relation_rule_t('limit', requires, 'tensile_strength rated_speed c_k diameter', 'rule')]
+
+  type(example_t), parameter, public :: response_examples(*) = [ &
+    example_t('response', "body = 'motor'  speed_rpm = 50, 600  operating_rpm = 300, 400", .false.), &
+    example_t('limit', "coupling = 'coupling'  vibratory_moment = 40.0  moment = 200.0", .false.)]
+
+end module nocdyn_schema_response
