@@ -8,17 +8,15 @@ module nocdyn_response_analysis
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
   use nocdyn_response_limits, only: read_limits, response_limit_t
-  use nocdyn_response_settings, only: read_response_settings, response_settings_t
-  use nocdyn_speed_modes, only: new_speed_modes, speed_modes_t
+  use nocdyn_response_settings, only: place_error, read_response_settings, response_settings_t
+  use nocdyn_speed_modes, only: most_coordinates, new_speed_modes, speed_modes_t
   use nocdyn_synthesis, only: new_synthesis
   use nocdyn_text, only: append, quoted, rounded_text, string_t, to_text
-  use nocdyn_units, only: from_si, unit_rpm
   implicit none (type, external)
   private
 
-  public :: analyse_response, speed_text
+  public :: analyse_response
 
-  integer, parameter :: most_modes = 600   ! coordinates of a machine whose modes are computed
 
   type, public :: response_analysis_t
     type(response_settings_t) :: settings
@@ -46,7 +44,7 @@ contains
     self%body_name = machine%names(self%settings%body)%text
     associate (speeds => self%settings%speeds)
       failed_speed = speeds(1)
-      call new_forced_response(machine, self%settings%body, [speeds(1), speeds(size(speeds))], self%response, error)
+      call new_forced_response(machine, self%settings%body, speeds, self%response, error)
       if (.not. allocated(error)) call choose_lines(input, self%settings, self%response%lines, error)
       if (.not. allocated(error)) call read_limits(input, self%response%quantities, self%limits, error)
       if (.not. allocated(error)) then
@@ -55,21 +53,8 @@ contains
       end if
     end associate
     if (.not. allocated(error)) call find_peaks(self, error, failed_speed)
-    if (.not. allocated(error)) return
-    if (error%code == exit_failed) error%message = input%location(self%settings%group, 'speed') // ': at ' // &
-      speed_text(failed_speed) // ': ' // error%message
-    if (error%code == exit_input .and. index(error%message, input%shown_file()) /= 1) then
-      error%message = input%location(self%settings%group) // ': ' // error%message
-    end if
+    if (allocated(error)) call place_error(input, self%settings, failed_speed, error)
   end subroutine analyse_response
-
-  !> "1200 rpm (125.664 rad/s)".
-  function speed_text(speed) result(text)
-    real(wp), intent(in) :: speed   !! [rad/s]
-    character(len=:), allocatable :: text
-
-    text = rounded_text(from_si(speed, unit_rpm), 6) // ' rpm (' // rounded_text(speed, 6) // ' rad/s)'
-  end function speed_text
 
   !> Leaves only the lines of the orders that the input names.
   subroutine choose_lines(input, settings, lines, error)
@@ -119,9 +104,9 @@ contains
     real(wp), intent(inout) :: failed_speed
     integer :: i
 
-    if (self%response%matrix%coordinates > most_modes) then
+    if (self%response%matrix%coordinates > most_coordinates) then
       call append(self%notes, 'this machine has ' // to_text(self%response%matrix%coordinates) // ' degrees of freedom: ' // &
-                              'natural frequencies are not computed for more than ' // to_text(most_modes) // &
+                              'natural frequencies are not computed for more than ' // to_text(most_coordinates) // &
                               ', and peaks are sought from the speeds of the grid')
     else
       call new_speed_modes(self%response, self%modes, error)
@@ -131,7 +116,7 @@ contains
         call refuse_unstable(self%modes%natural(:, i), self%modes%damping_ratio(:, i), error)
         if (allocated(error)) return
       end do
-      call find_crossings(self%response, self%modes, self%crossings)
+      call find_crossings(self%response%speeds(), self%response%frequencies(), self%modes, self%crossings)
     end if
     call refine_peaks(self%response, self%crossings, error, failed_speed)
   end subroutine find_peaks

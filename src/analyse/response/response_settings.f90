@@ -1,15 +1,16 @@
 !> What &response asks for: body, speeds, orders, speeds in operation.
 module nocdyn_response_settings
   use nocdyn_element_groups, only: bodies_of, new_body_index
-  use nocdyn_errors, only: error_t, exit_input, raise
+  use nocdyn_errors, only: error_t, exit_failed, exit_input, raise
   use nocdyn_input, only: input_t
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
-  use nocdyn_text, only: to_text
+  use nocdyn_text, only: rounded_text, to_text
+  use nocdyn_units, only: from_si, unit_rpm
   implicit none (type, external)
   private
 
-  public :: read_response_settings
+  public :: operating_distance, place_error, read_response_settings
 
   type, public :: response_settings_t
     integer :: group = 0                        !! &response in the input
@@ -76,5 +77,37 @@ contains
     call raise(error, exit_input, input%location(group, key) // ': ' // key // ' = ' // to_text(range(1)) // ', ' // &
                to_text(range(2)) // ' rad/s; allowed: first the lower, then the higher speed, both in one direction')
   end subroutine check_range
+
+  !> Distance of a critical speed to the speeds in operation, as a share of the nearer one.
+  pure subroutine operating_distance(settings, speed, distance, is_too_near)
+    type(response_settings_t), intent(in) :: settings
+    real(wp), intent(in) :: speed          !! [rad/s]
+    real(wp), intent(out) :: distance      !! 0 between the speeds in operation, and if there are none
+    logical, intent(out) :: is_too_near    !! whether it is between them, or nearer than the margin
+
+    distance = 0.0_wp
+    is_too_near = .false.
+    associate (operating => abs(settings%operating))
+      if (size(operating) == 0) return
+      distance = max(0.0_wp, (operating(1) - abs(speed)) / operating(1), (abs(speed) - operating(2)) / operating(2))
+    end associate
+    is_too_near = distance < settings%margin .or. distance <= 0
+  end subroutine operating_distance
+
+  !> Begins a message with the place in the input and, where a computation failed, with the speed.
+  subroutine place_error(input, settings, speed, error)
+    type(input_t), intent(in) :: input
+    type(response_settings_t), intent(in) :: settings
+    real(wp), intent(in) :: speed   !! at which it failed [rad/s]
+    type(error_t), intent(inout) :: error
+
+    if (index(error%message, input%shown_file()) == 1 .or. index(error%message, '--set ') == 1) return
+    if (error%code == exit_failed) then
+      error%message = input%location(settings%group, 'speed') // ': at ' // rounded_text(from_si(speed, unit_rpm), 6) // &
+                      ' rpm (' // rounded_text(speed, 6) // ' rad/s): ' // error%message
+    else
+      error%message = input%location(settings%group) // ': ' // error%message
+    end if
+  end subroutine place_error
 
 end module nocdyn_response_settings

@@ -7,6 +7,7 @@ module nocdyn_response_summary
   use nocdyn_response_analysis, only: response_analysis_t
   use nocdyn_response_limits, only: no_limit, response_limit_t
   use nocdyn_response_quantities, only: quantity_moment
+  use nocdyn_response_settings, only: operating_distance
   implicit none (type, external)
   private
 
@@ -59,7 +60,9 @@ contains
     do i = 1, size(self%criticals)
       self%criticals(i)%crossing = analysis%crossings(i)
       call find_peak(analysis, self%criticals(i))
-      call find_margin(analysis, self%criticals(i))
+      associate (critical => self%criticals(i))
+        call operating_distance(analysis%settings, critical%crossing%speed, critical%margin, critical%is_too_near)
+      end associate
     end do
     call find_largest(analysis, self%largest)
     do i = 1, size(analysis%limits)
@@ -122,20 +125,6 @@ contains
       most = energy
     end do
   end function main_coupling
-
-  !> Distance of a critical speed to the speeds in operation.
-  pure subroutine find_margin(analysis, critical)
-    type(response_analysis_t), intent(in) :: analysis
-    type(critical_t), intent(inout) :: critical
-    real(wp) :: speed
-
-    associate (operating => abs(analysis%settings%operating))
-      if (size(operating) == 0) return
-      speed = abs(critical%crossing%speed)
-      critical%margin = max(0.0_wp, (operating(1) - speed) / operating(1), (speed - operating(2)) / operating(2))
-      critical%is_too_near = critical%margin < analysis%settings%margin .or. critical%margin <= 0
-    end associate
-  end subroutine find_margin
 
   !> The largest half range, peak and ratio of every quantity.
   subroutine find_largest(analysis, largest)

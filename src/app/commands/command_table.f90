@@ -1,5 +1,6 @@
 !> The table of commands. A new command is a row here and a module with its procedure.
 module nocdyn_command_table
+  use nocdyn_campbell_command, only: campbell_command
   use nocdyn_check_command, only: check_command
   use nocdyn_commands, only: add_command, command_t
   use nocdyn_companion_command, only: companion_command
@@ -59,8 +60,26 @@ contains
       '  --at rest          at the start angles, with zero speeds and mean torques' // nl // &
       '  --at TIME          at a time of the run [s], which is integrated up to there' // nl // &
       '  --out DIR          write modes.csv and modes.json to DIR, with several files to DIR/<name of the file>', modes_command)
-    call add_command(commands, 'response', 'FILE...', '--out --set', &
-      'forced response by orders over the speed', 'x', response_command)
+    call add_command(commands, 'response', 'FILE...', '--out --set --quiet', &
+      'forced response by orders over a range of speeds, critical speeds, limits', &
+      'Computes by &response what the orders of the excitations do at every speed: the steady state at the speed,' // nl // &
+      'which the motors hold, and the oscillations about it, of each order and of all together. Prints the' // nl // &
+      'critical speeds, the largest moments and the speeds that &limit bars, and writes response.csv,' // nl // &
+      'response_orders.csv and response.json.' // nl // nl // &
+      '  --out DIR          write to DIR, with several files to DIR/<name of the file>;' // nl // &
+      '                     default: &output directory, else results/<name of the file>' // nl // &
+      '  --set PATH=VALUE   override a key: response.count=501' // nl // &
+      '  --quiet            print nothing but errors' // nl // nl // &
+      'A limit that is exceeded is no error: response.json says limits_exceeded.', response_command)
+    call add_command(commands, 'campbell', 'FILE...', '--out --set --quiet', &
+      'natural frequencies over a range of speeds, and where the orders meet them', &
+      'Follows the natural frequencies of the machine, linearised about its steady states, over the speeds of' // nl // &
+      '&response, and finds the speeds at which its orders, or those of the excitations, meet them. Writes' // nl // &
+      'campbell.csv and campbell.json.' // nl // nl // &
+      '  --out DIR          write to DIR, with several files to DIR/<name of the file>;' // nl // &
+      '                     default: &output directory, else results/<name of the file>' // nl // &
+      '  --set PATH=VALUE   override a key: response.count=501' // nl // &
+      '  --quiet            print nothing but errors', campbell_command)
     call add_command(commands, 'matrices', 'FILE', '--set', 'print the matrices of the method for a machine', &
       'Prints every matrix and vector of the method for the machine at its start, with its equation number.', matrices_command)
   end subroutine list_analyses

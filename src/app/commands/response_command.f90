@@ -43,7 +43,7 @@ contains
     if (allocated(error)) return
     summary = summarise_response(analysis)
     call write_files(input, analysis, summary, folder, error)
-    if (allocated(error)) return
+    if (allocated(error) .or. arguments%is_given('--quiet')) return
     call print_text(response_text(input%shown_file(), analysis, summary))
     call print_text(input%shown_file() // ': ' // shown_path(folder) // ' has ' // table_name // ', ' // orders_name // ' and ' // &
                     report_name)

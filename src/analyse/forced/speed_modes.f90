@@ -12,11 +12,14 @@ module nocdyn_speed_modes
 
   public :: new_speed_modes
 
+  integer, parameter, public :: most_coordinates = 600   !! of a machine whose modes are computed at every speed
+
   !> The modes with elastic energy, in the order of their frequencies at the first speed.
   type, public :: speed_modes_t
     integer :: modes = 0
     real(wp), allocatable :: natural(:, :)         !! natural frequencies, negative of diverging modes [rad/s], [modes, points]
     real(wp), allocatable :: damping_ratio(:, :)   !! of light damping at these frequencies, [modes, points]
+    real(wp), allocatable :: shape(:, :)           !! angles of the bodies at the first point, the largest 1, [bodies, modes]
     real(wp), allocatable :: twists(:, :)          !! of all elements with unit modal mass at the first point, [elements, modes]
     logical :: is_constant = .true.                !! whether all points have the same modes
   end type speed_modes_t
@@ -48,6 +51,7 @@ contains
           self%modes = size(branch)
           allocate (self%natural(self%modes, size(points)), self%damping_ratio(self%modes, size(points)))
           self%twists = linear%twists(:, branch)
+          call set_shapes(response, linear, branch, self%shape)
           mass = mass_matrix(response%machine)
         else if (.not. self%is_constant) then
           call follow(mass, before, linear, branch)
@@ -59,15 +63,33 @@ contains
     end associate
   end subroutine new_speed_modes
 
+  !> The motion of the bodies in each mode.
+  subroutine set_shapes(response, linear, branch, shape)
+    type(forced_response_t), intent(in) :: response
+    type(linearisation_t), intent(in) :: linear
+    integer, intent(in) :: branch(:)
+    real(wp), allocatable, intent(out) :: shape(:, :)   !! [bodies, modes]
+    integer :: m
+
+    allocate (shape(response%machine%bodies, size(branch)))
+    do m = 1, size(branch)
+      shape(:, m) = response%machine%coordinates%body_speeds(1, linear%shapes(:, branch(m)))
+      associate (largest => shape(maxloc(abs(shape(:, m)), dim=1), m))
+        if (abs(largest) > 0) shape(:, m) = shape(:, m) / largest
+      end associate
+    end do
+  end subroutine set_shapes
+
   !> Goes on from the modes at one speed to those at the next one.
   subroutine follow(mass, before, linear, branch)
     real(wp), intent(in) :: mass(:, :)
     type(linearisation_t), intent(in) :: before, linear
     integer, intent(inout) :: branch(:)
-    real(wp) :: likeness(size(linear%natural), size(branch))
+    real(wp) :: likeness(size(linear%natural), size(branch)), shapes(size(linear%natural), size(branch))
     integer :: best(2), k
 
-    likeness = matmul(transpose(linear%shapes), matmul(mass, before%shapes(:, branch)))**2
+    shapes = before%shapes(:, branch)
+    likeness = matmul(transpose(linear%shapes), matmul(mass, shapes))**2
     do k = 1, size(branch)
       best = maxloc(likeness)
       branch(best(2)) = best(1)

@@ -48,7 +48,7 @@ module nocdyn_forced_response
     real(wp), allocatable :: loss_factor(:)            !! [elements]
     real(wp), allocatable :: loss_damping(:)           !! damping that stands for it over the time [N m s/rad], [elements]
   contains
-    procedure :: add_points, complex_stiffness
+    procedure :: add_points, complex_stiffness, speeds, frequencies
   end type forced_response_t
 
   !> Work space of one thread.
@@ -63,7 +63,7 @@ contains
   subroutine new_forced_response(machine, reference, speeds, self, error)
     type(machine_t), intent(in) :: machine   !! one lane, with its periodic torques
     integer, intent(in) :: reference         !! body
-    real(wp), intent(in) :: speeds(2)        !! the lowest and the highest one [rad/s]
+    real(wp), intent(in) :: speeds(:)        !! from the lowest to the highest one [rad/s]
     type(forced_response_t), intent(out) :: self
     type(error_t), allocatable, intent(out) :: error   !! a message of a steady state begins with its speed
     type(held_state_t) :: high, low
@@ -74,12 +74,12 @@ contains
     if (.not. allocated(error)) call new_dynamic_stiffness(machine, self%held%balance%incidence, self%matrix, error)
     if (allocated(error)) return
     call gather_losses(self)
-    call self%held%hold(speeds(2), high, error)
+    call self%held%hold(speeds(size(speeds)), high, error)
     if (.not. allocated(error)) call self%held%hold(speeds(1), low, error)
     if (allocated(error)) return
     call list_sources(machine, low, of_low)
     call list_sources(machine, high, of_high)
-    call new_lines(of_low, of_high, speeds(1), speeds(2), self%lines)
+    call new_lines(of_low, of_high, speeds(1), speeds(size(speeds)), self%lines)
     call list_quantities(machine, reference, self%quantities)
     allocate (self%points(0))
   end subroutine new_forced_response
@@ -286,6 +286,28 @@ contains
       moment = sum(state%by_internal(first:first + n - 1) * z)
     end associate
   end function internal_moment
+
+  !> Speeds of the reference body at all points [rad/s].
+  pure function speeds(self)
+    class(forced_response_t), intent(in) :: self
+    real(wp) :: speeds(size(self%points))
+    integer :: i
+
+    do i = 1, size(speeds)
+      speeds(i) = self%points(i)%state%speed
+    end do
+  end function speeds
+
+  !> Frequencies of the lines at all points [rad/s], [lines, points].
+  pure function frequencies(self)
+    class(forced_response_t), intent(in) :: self
+    real(wp) :: frequencies(size(self%lines), size(self%points))
+    integer :: i
+
+    do i = 1, size(self%points)
+      frequencies(:, i) = self%points(i)%frequency
+    end do
+  end function frequencies
 
   !> Merges two lists of points in the order of their speeds.
   subroutine merge_points(self, new)

@@ -154,9 +154,8 @@ contains
     type(periodic_t), intent(in) :: part
     complex(wp), intent(in) :: amplitude(:)
     real(wp), intent(in) :: start, sign
-    complex(wp), parameter :: i = (0.0_wp, 1.0_wp)
     integer, parameter :: steps = 8
-    complex(wp) :: term
+    complex(wp) :: power(0:maxval(part%multiple)), term
     real(wp) :: angle, first, second, value
     integer :: k, n
 
@@ -166,8 +165,14 @@ contains
       value = 0.0_wp
       first = 0.0_wp
       second = 0.0_wp
+      power(0) = sign
+      power(1) = cmplx(cos(angle), sin(angle), wp)
+      do k = 2, ubound(power, 1)
+        power(k) = power(k - 1) * power(1)
+      end do
+      power(1:) = sign * power(1:)
       do k = 1, size(part%line)
-        term = sign * amplitude(part%line(k)) * exp(i * part%multiple(k) * angle)
+        term = amplitude(part%line(k)) * power(part%multiple(k))
         value = value + real(term, wp)
         first = first - part%multiple(k) * aimag(term)
         second = second - part%multiple(k)**2 * real(term, wp)

@@ -28,31 +28,29 @@ module nocdyn_critical_speeds
 contains
 
   !> All crossings between the lowest and the highest speed, by modes and lines.
-  subroutine find_crossings(response, modes, crossings)
-    type(forced_response_t), intent(in) :: response
-    type(speed_modes_t), intent(in) :: modes   !! at the points of the response
+  subroutine find_crossings(speed, frequency, modes, crossings)
+    real(wp), intent(in) :: speed(:)            !! of the reference body [rad/s], [points]
+    real(wp), intent(in) :: frequency(:, :)     !! of the lines [rad/s], [lines, points]
+    type(speed_modes_t), intent(in) :: modes    !! at the points
     type(crossing_t), allocatable, intent(out) :: crossings(:)
     integer :: i, l, m
     real(wp) :: after, before, share
 
     allocate (crossings(0))
-    associate (points => response%points)
-      do m = 1, modes%modes
-        do l = 1, size(response%lines)
-          do i = 1, size(points) - 1
-            before = points(i)%frequency(l) - modes%natural(m, i)
-            after = points(i + 1)%frequency(l) - modes%natural(m, i + 1)
-            if (before * after > 0 .or. abs(after) <= 0 .and. i < size(points) - 1) cycle
-            if (abs(before - after) <= 0) cycle
-            share = before / (before - after)
-            crossings = [crossings, crossing_t(m, l, &
-              between(points(i)%state%speed, points(i + 1)%state%speed, share), &
-              between(modes%natural(m, i), modes%natural(m, i + 1), share), &
-              between(modes%damping_ratio(m, i), modes%damping_ratio(m, i + 1), share))]
-          end do
+    do m = 1, modes%modes
+      do l = 1, size(frequency, 1)
+        do i = 1, size(speed) - 1
+          before = frequency(l, i) - modes%natural(m, i)
+          after = frequency(l, i + 1) - modes%natural(m, i + 1)
+          if (before * after > 0 .or. (abs(after) <= 0 .and. i < size(speed) - 1)) cycle
+          if (abs(before - after) <= 0) cycle
+          share = before / (before - after)
+          crossings = [crossings, crossing_t(m, l, between(speed(i), speed(i + 1), share), &
+                                             between(modes%natural(m, i), modes%natural(m, i + 1), share), &
+                                             between(modes%damping_ratio(m, i), modes%damping_ratio(m, i + 1), share))]
         end do
       end do
-    end associate
+    end do
   end subroutine find_crossings
 
   pure real(wp) function between(first, second, share)
@@ -108,13 +106,13 @@ contains
     type(crossing_t), intent(in) :: crossings(:)
     real(wp), allocatable, intent(out) :: speeds(:)
     integer :: i, l, q
-    real(wp) :: amplitude(size(response%points))
+    real(wp) :: amplitude(size(response%points))   ! its square
 
     allocate (speeds(0))
     associate (points => response%points)
       do l = 1, size(response%lines)
         do q = 1, size(response%quantities)
-          amplitude = [(abs(points(i)%quantity(l, q)), i=1, size(points))]
+          amplitude = [(real(points(i)%quantity(l, q), wp)**2 + aimag(points(i)%quantity(l, q))**2, i=1, size(points))]
           do i = 2, size(points) - 1
             if (amplitude(i) < max(amplitude(i - 1), amplitude(i + 1)) .or. .not. amplitude(i) > 0) cycle
             if (has_undamped(crossings, l, points(i - 1)%state%speed, points(i + 1)%state%speed)) cycle
@@ -139,7 +137,7 @@ contains
   !> Adds the vertex of a maximum, unless it is so near that the peak grows by rounding only, or another speed is there.
   subroutine add_vertex(points, amplitude, speeds)
     type(response_point_t), intent(in) :: points(3)
-    real(wp), intent(in) :: amplitude(3)   !! the second one is the largest
+    real(wp), intent(in) :: amplitude(3)   !! squares of the amplitudes, the second one is the largest
     real(wp), allocatable, intent(inout) :: speeds(:)
     real(wp), parameter :: accuracy = 1.0e-7_wp   ! relative, of a peak
     real(wp), parameter :: narrow = 1.0e-12_wp    ! relative distance of speeds
@@ -147,7 +145,7 @@ contains
 
     x = [points(1)%state%speed, points(2)%state%speed, points(3)%state%speed]
     x = x - points(2)%state%speed
-    y = min(amplitude(2) / max(amplitude, tiny(1.0_wp)), 1.0e6_wp)**2   ! 1 at the maximum
+    y = min(amplitude(2) / max(amplitude, tiny(1.0_wp)), 1.0e12_wp)   ! 1 at the maximum
     bend = ((y(3) - 1.0_wp) / x(3) - (y(1) - 1.0_wp) / x(1)) / (x(3) - x(1))
     slope = (y(3) - 1.0_wp) / x(3) - bend * x(3)
     if (.not. bend > 0) return

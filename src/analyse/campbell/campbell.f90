@@ -1,0 +1,128 @@
+!> Natural frequencies over the speed, the lines of excitation, and where they meet: what Campbell's diagram shows.
+!>
+!> The machine is linearised about its steady state at every speed, so that frequencies move with the load. Modes are followed by
+!> their shapes.
+module nocdyn_campbell
+  use nocdyn_critical_speeds, only: crossing_t, find_crossings
+  use nocdyn_errors, only: error_t, exit_input, raise
+  use nocdyn_excitation_lines, only: line_t
+  use nocdyn_forced_response, only: forced_response_t, new_forced_response
+  use nocdyn_input, only: input_t
+  use nocdyn_kinds, only: wp
+  use nocdyn_lapack, only: sort_ascending
+  use nocdyn_machine, only: machine_t
+  use nocdyn_response_settings, only: operating_distance, place_error, read_response_settings, response_settings_t
+  use nocdyn_speed_modes, only: most_coordinates, new_speed_modes, speed_modes_t
+  use nocdyn_text, only: to_text
+  implicit none (type, external)
+  private
+
+  public :: analyse_campbell
+
+  type, public :: campbell_t
+    type(response_settings_t) :: settings
+    type(forced_response_t) :: response              !! steady states and lines; its moments are not used
+    type(speed_modes_t) :: modes
+    real(wp), allocatable :: speed(:)                !! of the reference body [rad/s], [points]
+    logical, allocatable :: is_of_grid(:)            !! [points]
+    real(wp), allocatable :: order(:)                !! oscillations per turn, at the lowest speed, [lines]
+    logical, allocatable :: is_order(:)              !! whether the frequency grows with the speed, [lines]
+    real(wp), allocatable :: frequency(:, :)         !! [rad/s], [lines, points]
+    type(crossing_t), allocatable :: crossings(:)
+    real(wp), allocatable :: distance(:)             !! of each crossing to the speeds in operation, as a share; 0 inside
+    logical, allocatable :: is_too_near(:)           !! whether it is within the margin
+  end type campbell_t
+
+contains
+
+  !> Computes the diagram of an input.
+  subroutine analyse_campbell(input, machine, self, error)
+    type(input_t), intent(in) :: input
+    type(machine_t), intent(in) :: machine   !! one lane
+    type(campbell_t), intent(out) :: self
+    type(error_t), allocatable, intent(out) :: error
+    real(wp) :: failed_speed
+    integer :: i
+
+    call read_response_settings(input, machine, self%settings, error)
+    if (allocated(error)) return
+    failed_speed = self%settings%speeds(1)
+    call new_forced_response(machine, self%settings%body, self%settings%speeds, self%response, error)
+    if (.not. allocated(error)) call choose_lines(self, error)
+    if (.not. allocated(error)) call self%response%add_points(self%settings%speeds, .true., error, failed_speed)
+    if (.not. allocated(error)) call follow_modes(self, error, failed_speed)
+    if (allocated(error)) then
+      call place_error(input, self%settings, failed_speed, error)
+      return
+    end if
+    allocate (self%distance(size(self%crossings)), self%is_too_near(size(self%crossings)))
+    do i = 1, size(self%crossings)
+      call operating_distance(self%settings, self%crossings(i)%speed, self%distance(i), self%is_too_near(i))
+    end do
+  end subroutine analyse_campbell
+
+  !> The orders that the input names, excited or not; else the lines of the excitations.
+  subroutine choose_lines(self, error)
+    type(campbell_t), intent(inout) :: self
+    type(error_t), allocatable, intent(out) :: error
+    type(line_t) :: none(0)
+
+    if (self%response%matrix%coordinates > most_coordinates) then
+      call raise(error, exit_input, 'this machine has ' // to_text(self%response%matrix%coordinates) // &
+                 ' degrees of freedom; natural frequencies are computed for at most ' // to_text(most_coordinates))
+      return
+    end if
+    if (size(self%settings%orders) > 0) then
+      self%response%lines = none
+      self%order = self%settings%orders
+      allocate (self%is_order(size(self%order)), source=.true.)
+    else
+      self%order = self%response%lines%order
+      self%is_order = self%response%lines%is_order
+    end if
+  end subroutine choose_lines
+
+  !> Finds the modes at all speeds and the crossings. Where modes move with the speed, the crossings become speeds of their own,
+  !> until they stay.
+  subroutine follow_modes(self, error, failed_speed)
+    type(campbell_t), intent(inout) :: self
+    type(error_t), allocatable, intent(out) :: error
+    real(wp), intent(out) :: failed_speed
+    integer, parameter :: rounds = 3
+    real(wp), allocatable :: more(:)
+    integer :: round
+
+    failed_speed = self%settings%speeds(1)
+    do round = 1, rounds
+      call new_speed_modes(self%response, self%modes, error)
+      if (allocated(error)) return
+      call set_frequencies(self)
+      call find_crossings(self%speed, self%frequency, self%modes, self%crossings)
+      if (self%modes%is_constant .or. round == rounds .or. size(self%crossings) == 0) return
+      more = self%crossings%speed
+      call sort_ascending(more)
+      if (self%speed(1) < 0) more = more(size(more):1:-1)
+      call self%response%add_points(more, .false., error, failed_speed)
+      if (allocated(error)) return
+    end do
+  end subroutine follow_modes
+
+  !> Sets the arrays over all points.
+  subroutine set_frequencies(self)
+    type(campbell_t), intent(inout) :: self
+    integer :: l
+
+    self%speed = self%response%speeds()
+    self%is_of_grid = self%response%points%is_of_grid
+    if (size(self%response%lines) > 0) then
+      self%frequency = self%response%frequencies()
+    else
+      if (allocated(self%frequency)) deallocate (self%frequency)
+      allocate (self%frequency(size(self%order), size(self%speed)))
+      do l = 1, size(self%order)
+        self%frequency(l, :) = self%order(l) * abs(self%speed)
+      end do
+    end if
+  end subroutine set_frequencies
+
+end module nocdyn_campbell

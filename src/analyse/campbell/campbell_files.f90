@@ -1,0 +1,123 @@
+!> The files of Campbell's diagram: campbell.csv and campbell.json.
+module nocdyn_campbell_files
+  use nocdyn_campbell, only: campbell_t
+  use nocdyn_csv, only: write_header, write_row
+  use nocdyn_input, only: input_t
+  use nocdyn_json, only: json_t
+  use nocdyn_kinds, only: wp
+  use nocdyn_output_file, only: output_file_t
+  use nocdyn_output_units, only: turn_labels
+  use nocdyn_text, only: append, rounded_text, string_t, to_text
+  use nocdyn_units, only: from_si, unit_hz
+  implicit none (type, external)
+  private
+
+  public :: put_campbell_csv, campbell_json
+
+contains
+
+  !> Writes campbell.csv: a row for every speed with natural frequencies, damping ratios and frequencies of the lines.
+  subroutine put_campbell_csv(self, body, wanted, file)
+    type(campbell_t), intent(in) :: self
+    character(len=*), intent(in) :: body   !! whose speed is held
+    integer, intent(in) :: wanted(:)       !! units of speeds: indices of `units`
+    type(output_file_t), intent(inout) :: file
+    type(string_t), allocatable :: labels(:)
+    integer, allocatable :: unit(:)
+    real(wp), allocatable :: row(:)
+    integer :: i, l, m
+
+    allocate (labels(0))
+    call append(labels, 'omega_' // body // ' [rad/s]')
+    do m = 1, self%modes%modes
+      call append(labels, 'frequency_' // to_text(m) // ' [Hz]')
+    end do
+    do m = 1, self%modes%modes
+      call append(labels, 'damping_ratio_' // to_text(m) // ' [1]')
+    end do
+    do l = 1, size(self%order)
+      call append(labels, line_name(self, l) // ' [Hz]')
+    end do
+    allocate (unit(size(labels)), row(size(labels)))
+    call turn_labels(labels, wanted, unit)
+    call write_header(file, labels)
+    do i = 1, size(self%speed)
+      row(1) = self%speed(i)
+      row(2:self%modes%modes + 1) = from_si(self%modes%natural(:, i), unit_hz)
+      row(self%modes%modes + 2:2 * self%modes%modes + 1) = self%modes%damping_ratio(:, i)
+      row(2 * self%modes%modes + 2:) = from_si(self%frequency(:, i), unit_hz)
+      call write_row(file, from_si(row, unit))
+    end do
+  end subroutine put_campbell_csv
+
+  !> "order_2.5"; a line with a fixed frequency has its number.
+  function line_name(self, line) result(name)
+    type(campbell_t), intent(in) :: self
+    integer, intent(in) :: line
+    character(len=:), allocatable :: name
+
+    name = 'line_' // to_text(line)
+    if (self%is_order(line)) name = 'order_' // rounded_text(self%order(line), 8)
+  end function line_name
+
+  !> The text of campbell.json.
+  function campbell_json(input, body, self) result(text)
+    type(input_t), intent(in) :: input
+    character(len=*), intent(in) :: body
+    type(campbell_t), intent(in) :: self
+    character(len=:), allocatable :: text
+    type(json_t) :: json
+    integer :: i
+
+    call json%open_report(input%file, input%title())
+    call json%put('body', body)
+    call json%put('speed_rad_s', [self%speed(1), self%speed(size(self%speed))])
+    if (size(self%settings%operating) > 0) then
+      call json%put('operating_rad_s', self%settings%operating)
+      call json%put('margin', self%settings%margin)
+    end if
+    call json%put('bodies', self%response%machine%names)
+    call json%open_list('modes')
+    do i = 1, self%modes%modes
+      call put_mode(json, self, i)
+    end do
+    call json%close_list()
+    call json%open_list('crossings')
+    do i = 1, size(self%crossings)
+      associate (crossing => self%crossings(i))
+        call json%open()
+        call json%put('mode', crossing%mode)
+        if (self%is_order(crossing%line)) then
+          call json%put('order', self%order(crossing%line))
+        else
+          call json%put('line', crossing%line)
+        end if
+        call json%put('speed_rad_s', crossing%speed)
+        call json%put('frequency_Hz', from_si(crossing%frequency, unit_hz))
+        call json%put('damping_ratio', crossing%damping_ratio)
+        if (size(self%settings%operating) > 0) then
+          call json%put('distance_to_operation', self%distance(i))
+          call json%put('is_too_near', self%is_too_near(i))
+        end if
+        call json%close()
+      end associate
+    end do
+    call json%close_list()
+    call json%close()
+    text = json%text()
+  end function campbell_json
+
+  !> Frequencies at both ends of the range, and the shape at the lowest speed.
+  subroutine put_mode(json, self, mode)
+    type(json_t), intent(inout) :: json
+    type(campbell_t), intent(in) :: self
+    integer, intent(in) :: mode
+
+    call json%open()
+    call json%put('mode', mode)
+    call json%put('frequency_Hz', from_si([self%modes%natural(mode, 1), self%modes%natural(mode, size(self%speed))], unit_hz))
+    call json%put('shape', self%modes%shape(:, mode))
+    call json%close()
+  end subroutine put_mode
+
+end module nocdyn_campbell_files

@@ -1,0 +1,90 @@
+!> The printed report of Campbell's diagram: modes and critical speeds.
+module nocdyn_campbell_report
+  use nocdyn_campbell, only: campbell_t
+  use nocdyn_kinds, only: wp
+  use nocdyn_table_text, only: cell
+  use nocdyn_text, only: counted, rounded_text, to_text
+  use nocdyn_text_buffer, only: text_buffer_t
+  use nocdyn_units, only: from_si, unit_hz, unit_rpm
+  implicit none (type, external)
+  private
+
+  public :: campbell_text
+
+  integer, parameter :: most_modes = 20, most_crossings = 60   ! that are printed; all are in campbell.json
+
+contains
+
+  !> All tables.
+  function campbell_text(file, body, self) result(text)
+    character(len=*), intent(in) :: file, body
+    type(campbell_t), intent(in) :: self
+    character(len=:), allocatable :: text
+    type(text_buffer_t) :: report
+    integer :: last, m
+
+    last = size(self%speed)
+    call report%append_line(file // ': natural frequencies from ' // rpm(self%speed(1)) // ' to ' // rpm(self%speed(last)) // &
+                            ' rpm of ' // body // ', ' // counted(size(self%order), 'order', 'orders'))
+    call report%append_line('  mode' // cell(rpm(self%speed(1)) // ' rpm') // cell(rpm(self%speed(last)) // ' rpm') // &
+                            cell('lowest [Hz]') // cell('highest [Hz]') // cell('damping ratio'))
+    do m = 1, min(self%modes%modes, most_modes)
+      associate (natural => from_si(self%modes%natural(m, :), unit_hz))
+        call report%append_line('  ' // repeat(' ', 4 - len(to_text(m))) // to_text(m) // cell(natural(1)) // &
+                                cell(natural(last)) // cell(minval(natural)) // cell(maxval(natural)) // &
+                                cell(rounded_text(self%modes%damping_ratio(m, last), 3)))
+      end associate
+    end do
+    if (self%modes%modes > most_modes) then
+      call report%append_line('  (' // to_text(self%modes%modes - most_modes) // ' more in campbell.csv)')
+    end if
+    call put_crossings(self, report)
+    text = report%text()
+  end function campbell_text
+
+  function rpm(speed) result(text)
+    real(wp), intent(in) :: speed   !! [rad/s]
+    character(len=:), allocatable :: text
+
+    text = rounded_text(from_si(speed, unit_rpm), 6)
+  end function rpm
+
+  subroutine put_crossings(self, report)
+    type(campbell_t), intent(in) :: self
+    type(text_buffer_t), intent(inout) :: report
+    character(len=:), allocatable :: line
+    integer :: i
+
+    if (size(self%crossings) == 0) then
+      call report%append_line('  no order meets a natural frequency in this range')
+      return
+    end if
+    line = '  mode' // cell('order') // cell('critical [rpm]') // cell('frequency [Hz]')
+    if (size(self%settings%operating) > 0) line = line // '  distance to operation'
+    call report%append_line(line)
+    do i = 1, min(size(self%crossings), most_crossings)
+      associate (crossing => self%crossings(i))
+        line = '  ' // repeat(' ', 4 - len(to_text(crossing%mode))) // to_text(crossing%mode)
+        if (self%is_order(crossing%line)) then
+          line = line // cell(rounded_text(self%order(crossing%line), 6))
+        else
+          line = line // cell('fixed')
+        end if
+        line = line // cell(rpm(crossing%speed)) // cell(from_si(crossing%frequency, unit_hz))
+        if (size(self%settings%operating) > 0) then
+          if (self%distance(i) <= 0) then
+            line = line // '  in operation'
+          else
+            line = line // '  ' // rounded_text(100.0_wp * self%distance(i), 3) // ' %'
+            if (self%is_too_near(i)) line = line // ', too near'
+          end if
+        end if
+        call report%append_line(line)
+      end associate
+    end do
+    if (size(self%crossings) > most_crossings) then
+      call report%append_line('  (' // to_text(size(self%crossings) - most_crossings) // ' more in campbell.json)')
+    end if
+  end subroutine put_crossings
+
+end module nocdyn_campbell_report
