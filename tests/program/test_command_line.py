@@ -18,7 +18,8 @@ def one_line(text):
         (
             ["rnu", "x.nml"],
             "'rnu' is not a command; did you mean 'run'? "
-            "allowed: 'run', 'check', 'equilibrium', 'modes', 'matrices', 'sweep', 'merge', 'new', 'help'",
+            "allowed: 'run', 'check', 'equilibrium', 'modes', 'response', 'campbell', "
+            "'matrices', 'sweep', 'merge', 'new', 'help'",
         ),
         (["simulate"], "'simulate' is not a command"),
         (["x" * 3000], "'" + "x" * 80 + " ...' is not a command; allowed: "),
@@ -42,15 +43,15 @@ def one_line(text):
         (["run", CASE_1, "--set"], "--set needs a value: --set PATH=VALUE\n"),
         (["run", CASE_1, "--out", "a", "--out", "b"], "--out is given twice"),
         (["run", CASE_1, "--quiet=yes"], "--quiet takes no value"),
-        (["check", CASE_1, "--out", "a"], "--out is an option of nocdyn run, equilibrium, modes and sweep"),
+        (["check", CASE_1, "--out", "a"], "--out is an option of nocdyn run, equilibrium, modes, response, campbell and sweep"),
         (["modes", CASE_1, "--at"], "--at needs a value: --at equilibrium|rest|TIME\n"),
         (["modes", CASE_1, "--at", "rest", "--at=0"], "--at is given twice"),
         (["equilibrium", CASE_1, "--at", "rest"], "--at is an option of nocdyn modes"),
-        (["modes", CASE_1, "--quiet"], "--quiet is an option of nocdyn run, sweep and merge"),
-        (["check", CASE_1, "--quiet"], "--quiet is an option of nocdyn run, sweep and merge"),
+        (["modes", CASE_1, "--quiet"], "--quiet is an option of nocdyn run, response, campbell, sweep and merge"),
+        (["check", CASE_1, "--quiet"], "--quiet is an option of nocdyn run, response, campbell, sweep and merge"),
         (
             ["new", "a.nml", "--set", "run.t_end=1"],
-            "--set is an option of nocdyn run, check, equilibrium, modes, matrices and sweep",
+            "--set is an option of nocdyn run, check, equilibrium, modes, response, campbell, matrices and sweep",
         ),
         (["--version", "now"], "--version takes no arguments"),
         (["help", "gear"], "'gear' is a group of the input: nocdyn help input gear"),
@@ -58,7 +59,8 @@ def one_line(text):
         (
             ["help", "simulate"],
             "there is no help on 'simulate'; "
-            "try 'run', 'check', 'equilibrium', 'modes', 'matrices', 'sweep', 'merge', 'new', 'help' or 'input'",
+            "try 'run', 'check', 'equilibrium', 'modes', 'response', 'campbell', "
+            "'matrices', 'sweep', 'merge', 'new', 'help' or 'input'",
         ),
         (["help", "input", "boddy"], "there is no group 'boddy'; did you mean 'body'?"),
     ],

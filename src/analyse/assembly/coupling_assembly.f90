@@ -173,8 +173,8 @@ contains
     damping = 0.0_wp
     do i = 1, size(groups%indices)
       associate (group => groups%input%groups(groups%indices(i)))
-        if (group%has_value('damping_frequency')) &
-          damping(:, i) = loss_factor_of(group) * group%number('stiffness') / group%number('damping_frequency')
+        if (.not. group%has_value('damping_frequency')) cycle
+        damping(:, i) = loss_factor_of(group) * group%number('stiffness') / group%number('damping_frequency')
       end associate
     end do
   end function loss_damping

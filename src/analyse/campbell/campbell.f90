@@ -48,6 +48,7 @@ contains
     if (allocated(error)) return
     failed_speed = self%settings%speeds(1)
     call new_forced_response(machine, self%settings%body, self%settings%speeds, self%response, error)
+    self%response%has_oscillations = .false.
     if (.not. allocated(error)) call choose_lines(self, error)
     if (.not. allocated(error)) call self%response%add_points(self%settings%speeds, .true., error, failed_speed)
     if (.not. allocated(error)) call follow_modes(self, error, failed_speed)

@@ -84,28 +84,36 @@ contains
     call json%close_list()
     call json%open_list('crossings')
     do i = 1, size(self%crossings)
-      associate (crossing => self%crossings(i))
-        call json%open()
-        call json%put('mode', crossing%mode)
-        if (self%is_order(crossing%line)) then
-          call json%put('order', self%order(crossing%line))
-        else
-          call json%put('line', crossing%line)
-        end if
-        call json%put('speed_rad_s', crossing%speed)
-        call json%put('frequency_Hz', from_si(crossing%frequency, unit_hz))
-        call json%put('damping_ratio', crossing%damping_ratio)
-        if (size(self%settings%operating) > 0) then
-          call json%put('distance_to_operation', self%distance(i))
-          call json%put('is_too_near', self%is_too_near(i))
-        end if
-        call json%close()
-      end associate
+      call put_crossing(json, self, i)
     end do
     call json%close_list()
     call json%close()
     text = json%text()
   end function campbell_json
+
+  subroutine put_crossing(json, self, i)
+    type(json_t), intent(inout) :: json
+    type(campbell_t), intent(in) :: self
+    integer, intent(in) :: i   !! number of the crossing
+
+    associate (crossing => self%crossings(i))
+      call json%open()
+      call json%put('mode', crossing%mode)
+      if (self%is_order(crossing%line)) then
+        call json%put('order', self%order(crossing%line))
+      else
+        call json%put('line', crossing%line)
+      end if
+      call json%put('speed_rad_s', crossing%speed)
+      call json%put('frequency_Hz', from_si(crossing%frequency, unit_hz))
+      call json%put('damping_ratio', crossing%damping_ratio)
+      if (size(self%settings%operating) > 0) then
+        call json%put('distance_to_operation', self%distance(i))
+        call json%put('is_too_near', self%is_too_near(i))
+      end if
+      call json%close()
+    end associate
+  end subroutine put_crossing
 
   !> Frequencies at both ends of the range, and the shape at the lowest speed.
   subroutine put_mode(json, self, mode)

@@ -1,8 +1,9 @@
-!> Critical speeds, where a line of excitation has a natural frequency, and the peaks of a response between the speeds of its grid.
+!> Critical speeds, where a line of excitation has a natural frequency, and the peaks of a response between the speeds of its
+!> grid.
 !>
-!> The speeds at which the lines cross the undamped natural frequencies are added to the speeds, so that no narrow peak is missed. Then
-!> every maximum of an amplitude is refined: near a resonance 1 / |amplitude|^2 is a parabola over the speed, whose vertex is the next
-!> speed.
+!> The speeds at which the lines cross the undamped natural frequencies are added to the speeds, so that no narrow peak is
+!> missed. Then every maximum of an amplitude is refined: near a resonance 1 / |amplitude|^2 is a parabola over the speed, whose
+!> vertex is the next speed.
 module nocdyn_critical_speeds
   use nocdyn_errors, only: error_t
   use nocdyn_forced_response, only: forced_response_t, response_point_t
@@ -12,7 +13,7 @@ module nocdyn_critical_speeds
   implicit none (type, external)
   private
 
-  public :: find_crossings, refine_peaks
+  public :: find_crossings, keep_new, refine_peaks
 
   real(wp), parameter, public :: undamped = 1.0e-9_wp   !! a mode with a smaller damping ratio has no finite response
 
@@ -68,10 +69,10 @@ contains
     real(wp), intent(out) :: failed_speed   !! as in `add_points`
     integer, parameter :: most_rounds = 12
     real(wp), allocatable :: speeds(:)
-    integer :: round
+    integer :: i, round
 
     failed_speed = 0.0_wp
-    speeds = pack(crossings%speed, crossings%damping_ratio > undamped)
+    speeds = pack([(crossings(i)%speed, i=1, size(crossings))], [(crossings(i)%damping_ratio > undamped, i=1, size(crossings))])
     call keep_new(response, speeds)
     do round = 1, most_rounds
       if (size(speeds) == 0) return

@@ -16,6 +16,7 @@ module nocdyn_excitation_lines
   type, public :: line_t
     real(wp) :: order = 0.0_wp       !! oscillations per turn of the reference body, at the first speed
     logical :: is_order = .true.     !! whether its frequency is proportional to the speed; else a fixed frequency is in it
+    integer :: family = 0            !! frequencies of one family keep their ratios at all speeds
     integer, allocatable :: source(:)     !! harmonics, numbered over all elements
   end type line_t
 
@@ -59,7 +60,8 @@ contains
     end do
   end subroutine list_sources
 
-  !> amplitude sin(frequency t + order phi + phase) with phi = phi_0 + omega t, as the real part of moment exp(i Omega t), Omega > 0.
+  !> amplitude sin(frequency t + order phi + phase) with phi = phi_0 + omega t, as the real part of moment exp(i Omega t), Omega
+  !> > 0.
   pure subroutine set_source(harmonic, state, source)
     type(harmonic_t), intent(in) :: harmonic
     type(held_state_t), intent(in) :: state
@@ -102,6 +104,9 @@ contains
       associate (source => lines(k)%source(1))
         lines(k)%order = low(source)%frequency / abs(low_speed)
         lines(k)%is_order = is_same(lines(k)%order, high(source)%frequency / abs(high_speed))
+        lines(k)%family = k
+        if (lines(k)%is_order) lines(k)%family = -1
+        if (is_same(low(source)%frequency, high(source)%frequency)) lines(k)%family = -2
       end associate
     end do
   end subroutine new_lines

@@ -1,8 +1,8 @@
 !> The forced response of a machine at held speeds: for every line of excitation the complex moments and angles, and their
 !> synthesis.
 !>
-!> At each speed the machine is linearised about its steady state. One complex band matrix is factored for each speed and line. The
-!> speeds are independent of each other and are divided among threads.
+!> At each speed the machine is linearised about its steady state. One complex band matrix is factored for each speed and line.
+!> The speeds are independent of each other and are divided among threads.
 module nocdyn_forced_response
   use nocdyn_dynamic_stiffness, only: band_work_t, dynamic_stiffness_t, new_band_work, new_dynamic_stiffness
   use nocdyn_errors, only: error_t, exit_input, raise
@@ -44,6 +44,7 @@ module nocdyn_forced_response
     type(line_t), allocatable :: lines(:)
     type(response_quantity_t), allocatable :: quantities(:)
     type(synthesis_t) :: synthesis
+    logical :: has_oscillations = .true.               !! whether these are computed, beside the steady states and frequencies
     type(response_point_t), allocatable :: points(:)   !! ascending by the size of the speed
     real(wp), allocatable :: loss_factor(:)            !! [elements]
     real(wp), allocatable :: loss_damping(:)           !! damping that stands for it over the time [N m s/rad], [elements]
@@ -175,11 +176,15 @@ contains
     integer :: l, q
 
     associate (lines => size(self%lines), quantities => size(self%quantities), mean => point%state%mean)
-      allocate (point%frequency(lines), point%quantity(lines, quantities), point%angle(lines, self%machine%bodies))
+      allocate (point%frequency(lines))
+      do l = 1, lines
+        point%frequency(l) = point%sources(self%lines(l)%source(1))%frequency
+      end do
+      if (.not. self%has_oscillations) return
+      allocate (point%quantity(lines, quantities), point%angle(lines, self%machine%bodies))
       allocate (point%heat(size(self%loss_factor)), source=0.0_wp)
       allocate (point%mean(quantities), point%lowest(quantities), point%highest(quantities))
       do l = 1, lines
-        point%frequency(l) = point%sources(self%lines(l)%source(1))%frequency
         call solve_line(self, l, point, work)
       end do
       do q = 1, quantities
@@ -247,7 +252,8 @@ contains
     end associate
   end subroutine set_angles
 
-  !> The complex stiffness of an element at a frequency: k (1 + i eta) + i Omega c, and the delay of its internal states [N m/rad].
+  !> The complex stiffness of an element at a frequency: k (1 + i eta) + i Omega c, and the delay of its internal states [N
+  !> m/rad].
   pure complex(wp) function complex_stiffness(self, state, element, frequency)
     class(forced_response_t), intent(in) :: self
     type(held_state_t), intent(in) :: state

@@ -1,8 +1,8 @@
 !> Steady states of a machine whose speed is held, and the machine linearised there.
 !>
-!> Mean torques at an arbitrary speed of the reference body need not balance. The drive is what holds the speed: the torques of all
-!> motors are multiplied by one factor if they drive at that speed, as by a throttle, and governors leave their throttles open.
-!> If there are no such motors, a torque on the reference body holds the speed.
+!> Mean torques at an arbitrary speed of the reference body need not balance. The drive is what holds the speed: the torques of
+!> all motors are multiplied by one factor if they drive at that speed, as by a throttle, and governors leave their throttles
+!> open. If there are no such motors, a torque on the reference body holds the speed.
 module nocdyn_held_speeds
   use nocdyn_bank, only: role_excitation, role_motor
   use nocdyn_equilibrium, only: t_infinity
@@ -105,7 +105,8 @@ contains
       is_source = .false.
       do b = 1, size(balance%formulation%machine%banks)
         associate (bank => balance%formulation%machine%banks(b)%bank)
-          if (bank%role == role) is_source = is_source .or. (balance%inelastic >= bank%first .and. balance%inelastic <= bank%last())
+          if (bank%role /= role) cycle
+          is_source = is_source .or. (balance%inelastic >= bank%first .and. balance%inelastic <= bank%last())
         end associate
       end do
       sources = pack([(i, i=1, size(is_source))], is_source)
@@ -122,14 +123,12 @@ contains
     real(wp) :: z(size(self%z)), held
     logical :: is_found
 
-    is_found = .false.
     self%motors_hold = size(self%sources) > 0
-    call balance_speeds(self, speed, z, held, is_found)
-    if (is_found .and. self%motors_hold) then
-      is_found = held >= 0 .and. source_power(self) > 0
-      self%motors_hold = is_found
-      if (.not. is_found) call balance_speeds(self, speed, z, held, is_found)
+    if (self%motors_hold) then
+      call balance_speeds(self, speed, z, held, is_found)
+      self%motors_hold = is_found .and. held >= 0 .and. source_power(self) > 0
     end if
+    if (.not. self%motors_hold) call balance_speeds(self, speed, z, held, is_found)
     if (.not. is_found) then
       call raise(error, exit_failed, 'the speeds of the machine were not found: no torques of the drive balance the others')
       return
@@ -161,73 +160,80 @@ contains
     real(wp), intent(out) :: held   !! factor or torque [N m]
     logical, intent(out) :: is_found
     integer, parameter :: most_steps = 50
-    real(wp), parameter :: tolerance = 1.0e-12_wp, difference = 1.0e-6_wp
-    real(wp), dimension(size(self%ratio)) :: residual, scale, shifted, sources, step
-    real(wp) :: matrix(size(self%ratio), size(self%ratio)), size_of_s
-    integer :: i, k, pivot, pivots(size(self%ratio))
-    logical :: is_last, is_singular
+    real(wp), parameter :: tolerance = 1.0e-12_wp
+    real(wp), dimension(size(self%ratio)) :: scale, step
+    real(wp) :: matrix(size(self%ratio), size(self%ratio))
+    integer :: i, pivot, pivots(size(self%ratio))
+    logical :: is_singular
 
-    associate (r => size(self%ratio), ratio => self%ratio)
-      pivot = maxloc(abs(ratio), dim=1)
+    associate (r => size(self%ratio))
+      pivot = maxloc(abs(self%ratio), dim=1)
       z = self%z
       if (abs(self%last_speed) > 0) z(:r) = z(:r) * (speed / self%last_speed)
-      call impose()
+      call impose(self, pivot, speed, z)
       held = 0.0_wp
-      is_last = .false.
       do i = 1, most_steps
-        call residuals(self, z, residual, sources, scale)
-        matrix(:, pivot) = sources
-        size_of_s = max(maxval(abs(z(:r))), abs(speed))
-        do k = 1, r
-          if (k == pivot) cycle
-          call shift(k, difference * size_of_s)
-          call residuals(self, z, shifted, step, scale)
-          matrix(:, k) = (shifted + held * step - residual - held * sources) / (difference * size_of_s)
-          call shift(k, -difference * size_of_s)
-        end do
-        if (r > 1) call residuals(self, z, residual, sources, scale)
-        step = -(residual + held * sources)
-        is_found = all(abs(step) <= tolerance * (scale + abs(held * sources))) .and. i > 1
+        call differentiate(self, pivot, speed, held, z, matrix, step, scale)
+        is_found = i > 1 .and. all(abs(step) <= tolerance * scale)
         if (is_found) return
+        is_found = all(abs(step) <= tolerance * scale)   ! nothing drives and nothing brakes, if the matrix is singular
         call lu_factor(matrix, pivots, is_singular)
-        if (is_singular) then
-          is_found = all(abs(residual) <= tolerance * scale)   ! nothing drives and nothing brakes
-          return
-        end if
+        if (is_singular) return
         call lu_solve(matrix, pivots, step)
         held = held + step(pivot)
-        if (r == 1) then
-          is_found = is_finite(held)
-          return
-        end if
-        do k = 1, r
-          if (k /= pivot) z(k) = z(k) + step(k)
-        end do
-        call impose()
+        is_found = r == 1 .and. is_finite(held)
+        if (r == 1) return
+        step(pivot) = 0.0_wp
+        z(:r) = z(:r) + step
+        call impose(self, pivot, speed, z)
         if (.not. all(is_finite([z, held]))) return
       end do
     end associate
-
-  contains
-
-    !> Gives the reference body its speed.
-    subroutine impose()
-      integer :: j
-
-      associate (r => size(self%ratio))
-        z(pivot) = (speed - sum([(self%ratio(j) * z(j), j=1, r)], mask=[(j /= pivot, j=1, r)])) / self%ratio(pivot)
-      end associate
-    end subroutine impose
-
-    subroutine shift(motion, change)
-      integer, intent(in) :: motion
-      real(wp), intent(in) :: change
-
-      z(motion) = z(motion) + change
-      call impose()
-    end subroutine shift
-
   end subroutine balance_speeds
+
+  !> Gives the reference body its speed by one of the rigid motions.
+  pure subroutine impose(self, pivot, speed, z)
+    type(held_speeds_t), intent(in) :: self
+    integer, intent(in) :: pivot       !! the rigid motion
+    real(wp), intent(in) :: speed      !! [rad/s]
+    real(wp), intent(inout) :: z(:)
+
+    associate (r => size(self%ratio))
+      z(pivot) = z(pivot) + (speed - sum(self%ratio * z(:r))) / self%ratio(pivot)
+    end associate
+  end subroutine impose
+
+  !> The torques that are missing for the balance, and their derivatives by the rigid motions, and in the column `pivot` by what
+  !> holds the speed.
+  subroutine differentiate(self, pivot, speed, held, z, matrix, missing, scale)
+    type(held_speeds_t), intent(inout) :: self
+    integer, intent(in) :: pivot           !! the rigid motion that follows from the others
+    real(wp), intent(in) :: speed          !! [rad/s]
+    real(wp), intent(in) :: held           !! factor or torque [N m]
+    real(wp), intent(inout) :: z(:)        !! rigid motions, and internal states, which settle
+    real(wp), intent(out) :: matrix(:, :)  !! [rigid motions, rigid motions]
+    real(wp), intent(out) :: missing(:)    !! [N m], [rigid motions]
+    real(wp), intent(out) :: scale(:)      !! sums of the absolute terms of `missing`
+    real(wp), parameter :: difference = 1.0e-6_wp   ! relative
+    real(wp), dimension(size(missing)) :: residual, shifted, sources
+    real(wp) :: change, moved(size(z))
+    integer :: k
+
+    change = difference * max(maxval(abs(z(:size(missing)))), abs(speed))
+    call residuals(self, z, residual, sources, scale)
+    missing = -(residual + held * sources)
+    scale = scale + abs(held * sources)
+    matrix(:, pivot) = sources
+    do k = 1, size(missing)
+      if (k == pivot) cycle
+      moved = z
+      moved(k) = moved(k) + change
+      call impose(self, pivot, speed, moved)
+      call residuals(self, moved, shifted, sources, residual)
+      matrix(:, k) = (shifted + held * sources + missing) / change
+    end do
+    if (size(missing) > 1) call residuals(self, z, residual, sources, shifted)   ! the state of the elements is that of z
+  end subroutine differentiate
 
   !> Torques along the rigid motions without what holds the speed, the torques per unit of that, and the sums of their terms.
   subroutine residuals(self, z, residual, sources, scale)

@@ -1,7 +1,7 @@
 !> The undamped modes of a machine over its speed, followed by their shapes.
 !>
-!> The tangent stiffnesses depend on the speed with the load. From one speed to the next a mode goes on as the one whose shape is most
-!> like it: the squares of phi_i^T M phi_j, with shapes of unit modal mass, are compared (modal assurance criterion).
+!> The tangent stiffnesses depend on the speed with the load. From one speed to the next a mode goes on as the one whose shape is
+!> most like it: the squares of phi_i^T M phi_j, with shapes of unit modal mass, are compared (modal assurance criterion).
 module nocdyn_speed_modes
   use nocdyn_errors, only: error_t
   use nocdyn_forced_response, only: forced_response_t, response_point_t
@@ -42,8 +42,7 @@ contains
           if (any(abs(points(i)%state%stiffness - points(i - 1)%state%stiffness) > 0)) self%is_constant = .false.
         end if
         if (i == 1 .or. .not. self%is_constant) then
-          linear%stiffness = points(i)%state%stiffness
-          call undamped_modes(response%machine, response%matrix%incidence, linear, error)
+          call undamped_modes(response%machine, response%matrix%incidence, points(i)%state%stiffness, linear, error)
           if (allocated(error)) return
         end if
         if (i == 1) then

@@ -1,7 +1,7 @@
 !> The largest and the smallest value of a sum of oscillations: the synthesis of orders in time.
 !>
-!> Frequencies with whole ratios are one periodic function, whose extremes are found on one period. Functions whose frequencies have
-!> no whole ratios reach any combination of their values at some time, so that their extremes add up.
+!> Frequencies with whole ratios are one periodic function, whose extremes are found on one period. Functions whose frequencies
+!> have no whole ratios reach any combination of their values at some time, so that their extremes add up.
 module nocdyn_synthesis
   use nocdyn_kinds, only: wp
   implicit none (type, external)
@@ -31,8 +31,9 @@ module nocdyn_synthesis
 contains
 
   !> Groups oscillations by their frequencies.
-  type(synthesis_t) function new_synthesis(frequency) result(self)
+  type(synthesis_t) function new_synthesis(frequency, family) result(self)
     real(wp), intent(in) :: frequency(:)   !! in any unit, positive, [lines]
+    integer, intent(in) :: family(:)       !! only frequencies of one family have whole ratios, [lines]
     integer :: k
     logical :: is_left(size(frequency))
     type(periodic_t) :: part
@@ -40,7 +41,7 @@ contains
     allocate (self%parts(0))
     is_left = .true.
     do while (any(is_left))
-      call collect(frequency, is_left, part)
+      call collect(frequency, is_left .and. family == family(findloc(is_left, .true., dim=1)), part)
       part%samples = max(16, samples_per_period * maxval(part%multiple))
       allocate (part%cosine(part%samples, size(part%line)), part%sine(part%samples, size(part%line)))
       do k = 1, size(part%line)

@@ -47,7 +47,7 @@ contains
     type(error_t), allocatable, intent(out) :: error   !! if a number is not finite, or LAPACK does not converge
     type(element_coordinates_t) :: incidence
     type(pattern_t) :: pattern
-    real(wp), allocatable :: slopes(:, :)
+    real(wp), allocatable :: slopes(:, :), stiffness(:)
     real(wp) :: dfdt(1, formulation%states)
     integer :: status(1)
 
@@ -58,10 +58,10 @@ contains
     call formulation%jacobian([t], y, slopes, dfdt, status)
     incidence = new_element_coordinates(formulation%machine%elements, formulation%machine%coordinates)
     associate (elements => formulation%machine%elements)
-      self%stiffness = -(elements%restoring_angle(1, :) + elements%applied_angle(1, :))
+      stiffness = -(elements%restoring_angle(1, :) + elements%applied_angle(1, :))
     end associate
-    call refuse_not_finite(formulation%machine, self%stiffness, error)
-    if (.not. allocated(error)) call undamped_modes(formulation%machine, incidence, self, error)
+    call refuse_not_finite(formulation%machine, stiffness, error)
+    if (.not. allocated(error)) call undamped_modes(formulation%machine, incidence, stiffness, self, error)
     if (allocated(error)) return
     call assemble(formulation, self)
     if (formulation%states > 2 * size(self%natural)) call add_internal(formulation, pattern, slopes(1, :), self)
@@ -81,16 +81,18 @@ contains
     end do
   end subroutine refuse_not_finite
 
-  !> The undamped modes for the stiffnesses `self%stiffness`: `shapes`, `twists`, `natural` and `flexible`.
-  subroutine undamped_modes(machine, incidence, self, error)
+  !> The undamped modes of a machine: all of `self` but `matrix`.
+  subroutine undamped_modes(machine, incidence, stiffness, self, error)
     type(machine_t), intent(in) :: machine
     type(element_coordinates_t), intent(in) :: incidence   !! of its elements
-    type(linearisation_t), intent(inout) :: self
+    real(wp), intent(in) :: stiffness(:)                   !! of all elements [N m/rad]
+    type(linearisation_t), intent(out) :: self
     type(error_t), allocatable, intent(out) :: error   !! if LAPACK does not converge
     real(wp), allocatable :: factor(:, :), flexibility(:, :)
     logical :: has_failed
     integer :: e, i
 
+    self%stiffness = stiffness
     associate (f => machine%coordinates%freedoms, elastic => pack([(e, e=1, size(self%stiffness))], &
                                                                               abs(self%stiffness) > 0.0_wp))
       factor = mass_matrix(machine)

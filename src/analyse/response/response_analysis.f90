@@ -6,6 +6,7 @@ module nocdyn_response_analysis
   use nocdyn_forced_response, only: forced_response_t, new_forced_response
   use nocdyn_input, only: input_t
   use nocdyn_kinds, only: wp
+  use nocdyn_limit_edges, only: refine_edges
   use nocdyn_machine, only: machine_t
   use nocdyn_response_limits, only: read_limits, response_limit_t
   use nocdyn_response_settings, only: place_error, read_response_settings, response_settings_t
@@ -48,13 +49,26 @@ contains
       if (.not. allocated(error)) call choose_lines(input, self%settings, self%response%lines, error)
       if (.not. allocated(error)) call read_limits(input, self%response%quantities, self%limits, error)
       if (.not. allocated(error)) then
-        self%response%synthesis = new_synthesis(self%response%lines%order)
+        call prepare_synthesis(self%response)
         call self%response%add_points(speeds, .true., error, failed_speed)
       end if
     end associate
     if (.not. allocated(error)) call find_peaks(self, error, failed_speed)
     if (allocated(error)) call place_error(input, self%settings, failed_speed, error)
   end subroutine analyse_response
+
+  !> Groups the lines by their frequencies.
+  subroutine prepare_synthesis(response)
+    type(forced_response_t), intent(inout) :: response
+    integer :: family(size(response%lines)), l
+    real(wp) :: order(size(response%lines))
+
+    do l = 1, size(response%lines)
+      order(l) = response%lines(l)%order
+      family(l) = response%lines(l)%family
+    end do
+    response%synthesis = new_synthesis(order, family)
+  end subroutine prepare_synthesis
 
   !> Leaves only the lines of the orders that the input names.
   subroutine choose_lines(input, settings, lines, error)
@@ -66,7 +80,7 @@ contains
     character(len=:), allocatable :: known
 
     if (size(lines) == 0) then
-      call raise(error, exit_input, input%location(settings%group) // ': nothing excites this machine; required: an &engine, ' // &
+      call raise(error, exit_input, input%location(settings%group) // ': nothing excites this machine; required: an &engine ' // &
                  "or an &excitation of kind 'orders' or 'harmonic' (with a frequency)")
       return
     end if
@@ -119,6 +133,7 @@ contains
       call find_crossings(self%response%speeds(), self%response%frequencies(), self%modes, self%crossings)
     end if
     call refine_peaks(self%response, self%crossings, error, failed_speed)
+    if (.not. allocated(error)) call refine_edges(self%response, self%limits, error, failed_speed)
   end subroutine find_peaks
 
   !> Refuses steady states that do not stay.

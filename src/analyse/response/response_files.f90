@@ -118,10 +118,12 @@ contains
       end do
       do k = 1, size(limits)
         if (any(limits(:k - 1)%quantity == limits(k)%quantity)) cycle
-        if (has_continuous(analysis, quantities(limits(k)%quantity)%label)) &
+        if (has_continuous(analysis, quantities(limits(k)%quantity)%label)) then
           call put(minval(limits%continuous_limit(speed), mask=limits%quantity == limits(k)%quantity))
-        if (has_transient(analysis, quantities(limits(k)%quantity)%label)) &
+        end if
+        if (has_transient(analysis, quantities(limits(k)%quantity)%label)) then
           call put(minval(limits%transient_limit(speed), mask=limits%quantity == limits(k)%quantity))
+        end if
       end do
     end associate
 
@@ -144,22 +146,10 @@ contains
     type(string_t), allocatable :: labels(:)
     integer, allocatable :: unit(:)
     real(wp), allocatable :: row(:)
-    integer :: b, i, l, n, q
+    integer :: i, l, n
 
     associate (response => analysis%response)
-      allocate (labels(0))
-      call append(labels, 'omega_' // analysis%body_name // ' [rad/s]')
-      call append(labels, 'order [1]')
-      call append(labels, 'frequency [Hz]')
-      do q = 1, size(response%quantities)
-        call append(labels, response%quantities(q)%label // ' [' // response%quantities(q)%unit // ']')
-        call append(labels, 'phase_' // response%quantities(q)%label // ' [deg]')
-      end do
-      do b = 1, response%machine%bodies
-        call append(labels, 'phi_' // response%machine%names(b)%text // ' [rad]')
-        call append(labels, 'phase_phi_' // response%machine%names(b)%text // ' [deg]')
-        call append(labels, 'omega_' // response%machine%names(b)%text // '_amplitude [rad/s]')
-      end do
+      call list_order_labels(analysis, labels)
       allocate (unit(size(labels)), row(size(labels)))
       call turn_labels(labels, wanted, unit)
       call write_header(file, labels)
@@ -179,6 +169,29 @@ contains
       end do
     end associate
   end subroutine put_orders_csv
+
+  !> The columns of response_orders.csv.
+  subroutine list_order_labels(analysis, labels)
+    type(response_analysis_t), intent(in) :: analysis
+    type(string_t), allocatable, intent(out) :: labels(:)
+    integer :: b, q
+
+    allocate (labels(0))
+    call append(labels, 'omega_' // analysis%body_name // ' [rad/s]')
+    call append(labels, 'order [1]')
+    call append(labels, 'frequency [Hz]')
+    associate (response => analysis%response)
+      do q = 1, size(response%quantities)
+        call append(labels, response%quantities(q)%label // ' [' // response%quantities(q)%unit // ']')
+        call append(labels, 'phase_' // response%quantities(q)%label // ' [deg]')
+      end do
+      do b = 1, response%machine%bodies
+        call append(labels, 'phi_' // response%machine%names(b)%text // ' [rad]')
+        call append(labels, 'phase_phi_' // response%machine%names(b)%text // ' [deg]')
+        call append(labels, 'omega_amplitude_' // response%machine%names(b)%text // ' [rad/s]')
+      end do
+    end associate
+  end subroutine list_order_labels
 
   !> The lead of an oscillation before cos(Omega t) [deg].
   elemental real(wp) function phase(amplitude)
@@ -206,7 +219,7 @@ contains
       call json%put('operating_rad_s', analysis%settings%operating)
       call json%put('margin', analysis%settings%margin)
     end if
-    call json%put('orders', analysis%response%lines%order)
+    call json%put('orders', [(analysis%response%lines(i)%order, i=1, size(analysis%response%lines))])
     call json%open_list('critical_speeds')
     do i = 1, size(summary%criticals)
       call put_critical(json, analysis, summary%criticals(i))

@@ -87,8 +87,8 @@ contains
       limit%diameter = group%number('diameter', absent=diameter_of(input, quantities(limit%quantity)%name))
       limit%rated = abs(group%number('rated_speed'))
       if (limit%diameter > 0) return
-      call raise(error, exit_input, input%location(index, 'rule') // ': the rule iacs_m68 needs a diameter [m], of &limit or ' // &
-                 'of &coupling ' // quoted(quantities(limit%quantity)%name))
+      call raise(error, exit_input, input%location(index, 'rule') // ': the rule iacs_m68 needs a diameter [m], of &limit ' // &
+                 'or of &coupling ' // quoted(quantities(limit%quantity)%name))
     end associate
   end subroutine read_limit
 

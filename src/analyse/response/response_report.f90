@@ -33,7 +33,8 @@ contains
     end do
     associate (speeds => analysis%settings%speeds)
       call report%append_line(file // ': forced response from ' // rpm(speeds(1)) // ' to ' // rpm(speeds(size(speeds))) // &
-                              ' rpm of ' // analysis%body_name // ', ' // counted(size(analysis%response%lines), 'order', 'orders'))
+                              ' rpm of ' // analysis%body_name // ', ' // &
+                              counted(size(analysis%response%lines), 'order', 'orders'))
     end associate
     call put_criticals(analysis, summary, report)
     call put_largest(analysis, summary, report)
@@ -162,43 +163,47 @@ contains
     type(text_buffer_t), intent(inout) :: report
     character(len=:), allocatable :: line
     integer :: q, shown, width
-    logical :: has_ratio, has_stress
 
     associate (quantities => analysis%response%quantities)
       shown = min(size(quantities), most_quantities)
       if (shown == 0) return
       width = maxval([(text_width(quantities(q)%label // ' [' // quantities(q)%unit // ']'), q=1, shown)])
-      has_ratio = any(summary%largest%ratio > 0)
-      has_stress = any(quantities%section_modulus > 0)
       line = '  ' // padded('largest', width) // cell('half range') // cell('at [rpm]') // cell('peak') // cell('at [rpm]')
-      if (has_stress) line = line // cell('stress [MPa]')
-      if (has_ratio) line = line // cell('of limit') // cell('at [rpm]')
+      if (any(quantities%section_modulus > 0)) line = line // cell('stress [MPa]')
+      if (any(summary%largest%ratio > 0)) line = line // cell('of limit') // cell('at [rpm]')
       call report%append_line(line // '  orders in the half range')
       do q = 1, shown
-        associate (largest => summary%largest(q), points => analysis%response%points)
-          line = '  ' // padded(quantities(q)%label // ' [' // quantities(q)%unit // ']', width) // &
-                 cell(rounded_text(largest%half_range, 5)) // cell(rpm(points(largest%half_point)%state%speed)) // &
-                 cell(rounded_text(largest%peak, 5)) // cell(rpm(points(largest%peak_point)%state%speed))
-          if (has_stress) then
-            if (quantities(q)%section_modulus > 0) then
-              line = line // cell(rounded_text(largest%half_range / quantities(q)%section_modulus / mega, 4))
-            else
-              line = line // cell('')
-            end if
-          end if
-          if (has_ratio .and. largest%ratio_point > 0) then
-            line = line // cell(ratio_text(largest%ratio)) // cell(rpm(points(largest%ratio_point)%state%speed))
-          else if (has_ratio) then
-            line = line // cell('') // cell('')
-          end if
-          call report%append_line(line // '  ' // orders_text(analysis, points(largest%half_point), q))
-        end associate
+        call put_largest_of(analysis, summary, q, width, report)
       end do
       if (shown < size(quantities)) then
         call report%append_line('  (' // to_text(size(quantities) - shown) // ' more in response.json)')
       end if
     end associate
   end subroutine put_largest
+
+  subroutine put_largest_of(analysis, summary, q, width, report)
+    type(response_analysis_t), intent(in) :: analysis
+    type(response_summary_t), intent(in) :: summary
+    integer, intent(in) :: q       !! quantity
+    integer, intent(in) :: width   !! of the labels
+    type(text_buffer_t), intent(inout) :: report
+    character(len=:), allocatable :: line, stress
+
+    associate (largest => summary%largest(q), points => analysis%response%points, one => analysis%response%quantities(q))
+      line = '  ' // padded(one%label // ' [' // one%unit // ']', width) // &
+             cell(rounded_text(largest%half_range, 5)) // cell(rpm(points(largest%half_point)%state%speed)) // &
+             cell(rounded_text(largest%peak, 5)) // cell(rpm(points(largest%peak_point)%state%speed))
+      stress = ''
+      if (one%section_modulus > 0) stress = rounded_text(largest%half_range / one%section_modulus / mega, 4)
+      if (any(analysis%response%quantities%section_modulus > 0)) line = line // cell(stress)
+      if (largest%ratio_point > 0) then
+        line = line // cell(ratio_text(largest%ratio)) // cell(rpm(points(largest%ratio_point)%state%speed))
+      else if (any(summary%largest%ratio > 0)) then
+        line = line // cell('') // cell('')
+      end if
+      call report%append_line(line // '  ' // orders_text(analysis, points(largest%half_point), q))
+    end associate
+  end subroutine put_largest_of
 
   !> The orders with the largest amplitudes at a speed: "3 (420), 4.5 (96)".
   function orders_text(analysis, point, quantity) result(text)

@@ -51,15 +51,13 @@ contains
     integer, parameter :: most_steps = 500
     real(wp), parameter :: stalled = 1.0e3_wp   ! residuals up to this many tolerances are rounding if they stop falling
     type(twist_problem_t) :: self
-    real(wp) :: damping, new_q(size(q)), step(size(q))
-    real(wp) :: energy, excess, last_excess
+    real(wp) :: damping, energy, excess, last_excess, new_q(size(q)), step(size(q))
     integer :: i
     logical :: is_singular
 
     is_found = .false.
-    call set_up(balance, self, error)
+    call set_up(balance, weight, torque, self, error)
     if (allocated(error)) return
-    call find_external(balance, self, weight, torque)
     call evaluate_angles(balance, q, self)
     damping = 0.0_wp
     last_excess = huge(1.0_wp)
@@ -76,12 +74,11 @@ contains
         q = new_q
         damping = merge(0.0_wp, 0.1_wp * damping, damping < 1.0e-8_wp)
         is_found = all(abs(step) <= 4 * spacing(abs(q)))
-        if (is_found) exit
       else
         call evaluate_angles(balance, q, self)
         damping = max(10.0_wp * damping, 1.0e-6_wp)
       end if
-      if (damping > 1.0e12_wp .or. maxval(abs(q)) > max_twist) exit
+      if (is_found .or. damping > 1.0e12_wp .or. maxval(abs(q)) > max_twist) exit
     end do
   end subroutine find_twists
 
@@ -145,8 +142,9 @@ contains
   end function lowers_energy
 
   !> Sets the order of the coordinates and the torques of the other elements.
-  subroutine set_up(balance, self, error)
+  subroutine set_up(balance, weight, torque, self, error)
     type(torque_balance_t), intent(in) :: balance
+    real(wp), intent(in), optional :: weight(:), torque(:)   !! as in `find_twists`
     type(twist_problem_t), intent(out) :: self
     type(error_t), allocatable, intent(out) :: error   !! if the band is too large
     type(entries_t) :: entries
@@ -172,6 +170,7 @@ contains
     allocate (self%band(3 * self%width + 1, size(self%unknown)), self%diagonal_scale(size(self%unknown)), source=0.0_wp)
     allocate (self%external_torque(size(number)), self%torque(size(number)), source=0.0_wp)
     allocate (self%external_scale, self%tolerance, source=self%external_torque)
+    call find_external(balance, self, weight, torque)
   end subroutine set_up
 
   !> Pairs of coordinates that an elastic element couples.

@@ -60,6 +60,14 @@ contains
       '  --at rest          at the start angles, with zero speeds and mean torques' // nl // &
       '  --at TIME          at a time of the run [s], which is integrated up to there' // nl // &
       '  --out DIR          write modes.csv and modes.json to DIR, with several files to DIR/<name of the file>', modes_command)
+    call list_torsional_analyses(commands)
+    call add_command(commands, 'matrices', 'FILE', '--set', 'print the matrices of the method for a machine', &
+      'Prints every matrix and vector of the method for the machine at its start, with its equation number.', matrices_command)
+  end subroutine list_analyses
+
+  subroutine list_torsional_analyses(commands)
+    type(command_t), allocatable, intent(inout) :: commands(:)
+
     call add_command(commands, 'response', 'FILE...', '--out --set --quiet', &
       'forced response by orders over a range of speeds, critical speeds, limits', &
       'Computes by &response what the orders of the excitations do at every speed: the steady state at the speed,' // nl // &
@@ -80,9 +88,7 @@ contains
       '                     default: &output directory, else results/<name of the file>' // nl // &
       '  --set PATH=VALUE   override a key: response.count=501' // nl // &
       '  --quiet            print nothing but errors', campbell_command)
-    call add_command(commands, 'matrices', 'FILE', '--set', 'print the matrices of the method for a machine', &
-      'Prints every matrix and vector of the method for the machine at its start, with its equation number.', matrices_command)
-  end subroutine list_analyses
+  end subroutine list_torsional_analyses
 
   subroutine list_sweeps(commands)
     type(command_t), allocatable, intent(inout) :: commands(:)

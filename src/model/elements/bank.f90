@@ -50,7 +50,7 @@ module nocdyn_bank
     logical :: has_paper_law = .true.             !! whether its law is that of eqs. (3), (5), (17) or (20)
     character(len=24), allocatable :: internal_names(:)   !! e.g. 'armature current', [states]
     integer :: first_internal = 1                 !! number of the first internal state of `first` in the machine
-    real(wp), allocatable :: loss_factor(:)       !! k (1 + i loss_factor) is the stiffness at a frequency; not allocated: 0 of all
+    real(wp), allocatable :: loss_factor(:)       !! k (1 + i loss_factor) is the stiffness at a frequency; not allocated: 0
     real(wp), allocatable :: loss_damping(:)      !! part of the damping that replaces it over the time [N m s/rad]; with it
   contains
     procedure :: to_mean_torque

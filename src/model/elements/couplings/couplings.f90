@@ -25,7 +25,7 @@ module nocdyn_couplings
     real(wp), allocatable :: rest_twist(:, :)       !! [rad]
     real(wp), allocatable :: friction(:, :)         !! [N m]; not allocated: none
     real(wp), allocatable :: friction_speed(:, :)   !! [rad/s], positive
-    real(wp), allocatable :: section_modulus(:, :)  !! shear stress = moment / section_modulus [m3], 0: unknown; not allocated: of all
+    real(wp), allocatable :: section_modulus(:, :)  !! stress = moment / section_modulus [m3], 0: unknown; not allocated: all
   end type coupling_common_t
 
   ! gfortran 12 loses components of a structure constructor's value that is an argument

@@ -45,8 +45,8 @@ contains
     call write_files(input, analysis, summary, folder, error)
     if (allocated(error) .or. arguments%is_given('--quiet')) return
     call print_text(response_text(input%shown_file(), analysis, summary))
-    call print_text(input%shown_file() // ': ' // shown_path(folder) // ' has ' // table_name // ', ' // orders_name // ' and ' // &
-                    report_name)
+    call print_text(input%shown_file() // ': ' // shown_path(folder) // ' has ' // table_name // ', ' // orders_name // &
+                    ' and ' // report_name)
   end subroutine analyse_one
 
   !> Writes all files aside before any takes its name.

@@ -2,7 +2,7 @@
 module nocdyn_schema_response
   use nocdyn_kinds, only: wp
   use nocdyn_schema_rules, only: a_body, a_number, a_text, a_word, allowed_t, an_integer, any_number, any_times, anything, &
-    at_most_once, example_t, group_rule_t, key_rule_t, not_negative, not_zero, positive, relation_rule_t, required, requires, unset
+    at_most_once, example_t, group_rule_t, key_rule_t, not_zero, positive, relation_rule_t, required, requires, unset
   implicit none (type, external)
   private
 

@@ -81,7 +81,7 @@ contains
 
     folder = out_folder(arguments, arguments%operands(number)%text)
     call read_input(arguments%operands(number)%text, arguments%overrides, reading%input, reading%error, diagnostics)
-    if (allocated(reading%error)) call add_plan_diagnostics(reading%input, diagnostics, reading%error)   ! with those of the machine
+    if (allocated(reading%error)) call add_plan_diagnostics(reading%input, diagnostics, reading%error)
     if (.not. allocated(reading%error)) call check_output_times(reading%input, reading%error)
     if (allocated(reading%error) .or. .not. present(always_writes)) return
     if (always_writes) folder = result_folder(arguments, reading%input)

@@ -1,0 +1,321 @@
+"""nocdyn response and nocdyn campbell: against transients, closed forms and published numbers; what is refused."""
+
+import cmath
+import json
+from math import log, pi, radians, sqrt
+
+import pytest
+
+# E. J. Gunter, W. J. Chen: Introduction to Dynamics of Rotor-Bearing Systems, 2001, example 8.1: frequencies [cycles/min] and the
+# largest moment of the propeller shaft [N m] for 10 % of the propeller's torque at order 5.
+TURBINES = """\
+&body name = 'propeller' inertia = 277252.92 /
+&body name = 'bull' inertia = 93321.48 /
+&body name = 'hp_pinion' inertia = 0 /
+&body name = 'hp_wheel' inertia = 3076.4454 /
+&body name = 'hp_driver' inertia = 0 /
+&body name = 'hp_turbine' inertia = 29.510376 /
+&body name = 'lp_pinion' inertia = 0 /
+&body name = 'lp_wheel' inertia = 1449.5334 /
+&body name = 'lp_driver' inertia = 0 /
+&body name = 'lp_turbine' inertia = 1704.8682 /
+&coupling name = 'line_shaft' bodies = 'bull', 'propeller' stiffness = 9.332148e7 relative_damping = 0.05001415 /
+&coupling name = 'hp_quill' bodies = 'hp_pinion', 'hp_wheel' stiffness = 2.7307266e6 relative_damping = 0.05001415 /
+&coupling name = 'hp_shaft' bodies = 'hp_driver', 'hp_turbine' stiffness = 1.6110948e6 relative_damping = 0.05001415 /
+&coupling name = 'lp_quill' bodies = 'lp_pinion', 'lp_wheel' stiffness = 2.30411412e7 relative_damping = 0.05001415 /
+&coupling name = 'lp_shaft' bodies = 'lp_driver', 'lp_turbine' stiffness = 3.4470198e6 relative_damping = 0.05001415 /
+&gear name = 'hp_second' bodies = 'bull', 'hp_pinion' radii = 1.88188, 0.2 /
+&gear name = 'hp_first' bodies = 'hp_wheel', 'hp_driver' radii = 0.782365, 0.094094 /
+&gear name = 'lp_second' bodies = 'bull', 'lp_pinion' radii = 1.88188, 0.2 /
+&gear name = 'lp_first' bodies = 'lp_wheel', 'lp_driver' radii = 0.400424, 0.094094 /
+&motor name = 'steam' body = 'hp_turbine' kind = 'constant' torque = 6281 /
+&load name = 'water' body = 'propeller' viscous = 436102.8 /
+&load name = 'hp_blades' body = 'hp_turbine' viscous = 4.82853924 /
+&load name = 'lp_blades' body = 'lp_turbine' viscous = 12.2888346 /
+&excitation name = 'blades' body = 'propeller' kind = 'orders' orders = 5 amplitudes = 4.41e4 /
+&run t_end = 1 /
+&response body = 'propeller' speed_rpm = 20, 60 count = 41 operating_rpm = 38, 45 /
+"""
+TURBINE_FREQUENCIES = [177.711, 220.176, 1282.58, 2496.87, 2883.38]
+TURBINE_PEAK, PUBLISHED = 4.72e5, 0.02
+
+# A geared train in balance at SPEED of its first body, with the small moment of a shaker.
+SPEED, AMPLITUDE = 41.226108832735, 0.01
+TRAIN = f"""\
+&body name = 'a' inertia = 2.0 speed = {SPEED} /
+&body name = 'b' inertia = 1.0 /
+&body name = 'p' inertia = 0.5 /
+&body name = 'w' inertia = 3.0 /
+&body name = 'f' inertia = 4.0 /
+&coupling name = 'c1' bodies = 'a', 'b' stiffness = 4000 damping = 60 /
+&coupling name = 'c2' bodies = 'b', 'p' stiffness = 7000 damping = 50 /
+&coupling name = 'c3' bodies = 'w', 'f' stiffness = 9000 cubic_stiffness = 2e4 damping = 200 /
+&gear name = 'g' bodies = 'p', 'w' radii = 0.1, 0.25 /
+&motor name = 'm' body = 'a' a = 300 b = 2 c = 0 /
+&load name = 'l' body = 'f' quadratic = 2.0 /
+&output interval = 0.005 /
+"""
+RUN = "&run t_end = {} start = 'equilibrium' rtol = 1e-11 atol = 1e-13 method = 'rk853' /\n"
+AT_SPEED = f"&response body = 'a' speed = {0.9 * SPEED!r}, {1.1 * SPEED!r} count = 3 /\n"
+
+
+def analysis(nocdyn, command, text, *options):
+    """The content of its JSON file."""
+    outcome = nocdyn(command, nocdyn.write("machine.nml", text), "--out", "out", *options)
+    assert (outcome.returncode, outcome.stderr) == (0, ""), outcome.stderr
+    return json.loads((nocdyn.folder / f"out/{command}.json").read_text())
+
+
+def columns(nocdyn, name, folder="out"):
+    header, rows = nocdyn.table(folder, name)
+    return {label.split(" [")[0]: list(values) for label, values in zip(header, zip(*rows), strict=True)}
+
+
+def refusal(nocdyn, command, text):
+    outcome = nocdyn(command, nocdyn.write("machine.nml", text), "--out", "out")
+    assert not (nocdyn.folder / "out").exists()
+    return outcome.returncode, outcome.stderr
+
+
+def test_marine_turbines_have_the_published_frequencies_and_peak(nocdyn):
+    content = analysis(nocdyn, "campbell", TURBINES)
+    frequencies = [60 * mode["frequency_Hz"][0] for mode in content["modes"]]
+    assert frequencies == pytest.approx(TURBINE_FREQUENCIES, rel=5e-6)
+    content = analysis(nocdyn, "response", TURBINES)
+    shaft = content["largest"][0]
+    assert shaft["quantity"] == "moment_line_shaft"
+    assert shaft["half_range"] == pytest.approx(TURBINE_PEAK, rel=PUBLISHED)
+    assert 30 / pi * shaft["half_range_speed_rad_s"] == pytest.approx(35.6, abs=0.2)
+
+
+def line_fit(times, values, frequency):
+    """Amplitude of exp(i frequency t) in equidistant values, with a window that suppresses everything else."""
+    count = len(values)
+    mean = sum(values) / count
+    window = [1 - 1.93 * cmath.cos(x).real + 1.29 * cmath.cos(2 * x).real - 0.388 * cmath.cos(3 * x).real
+              + 0.028 * cmath.cos(4 * x).real for x in (2 * pi * k / count for k in range(count))]  # fmt: skip
+    total = sum(w * (v - mean) * cmath.exp(-1j * frequency * t) for w, v, t in zip(window, values, times, strict=True))
+    return 2 * total / sum(window)
+
+
+def test_response_to_a_harmonic_is_the_settled_transient(nocdyn):
+    """Amplitudes and phases of moments, reaction and speed about a loaded state with a nonlinear coupling."""
+    frequency = 60.0
+    machine = TRAIN + f"&excitation name = 'x' body = 'b' amplitude = {AMPLITUDE} frequency = {frequency} phase = 0.3 /\n"
+    outcome = nocdyn("run", nocdyn.write("run.nml", machine + RUN.format(16)), "--out", "run")
+    assert outcome.returncode == 0, outcome.stderr
+    motion = columns(nocdyn, "trajectory.csv", "run")
+    analysis(nocdyn, "response", machine + RUN.format(1) + AT_SPEED)
+    response, table = columns(nocdyn, "response_orders.csv"), columns(nocdyn, "response.csv")
+    assert table["drive"][1] == pytest.approx(1, abs=1e-9)
+    first = next(i for i, t in enumerate(motion["t"]) if t > 10)
+    for column, label in (("shaft_c1", "moment_c1"), ("shaft_c2", "moment_c2"), ("shaft_c3", "moment_c3"),
+                          ("reaction_g", "reaction_g"), ("phi_f", "phi_f")):  # fmt: skip
+        values = motion[column][first:]
+        if column == "phi_f":
+            values = [v / (1j * frequency) for v in motion["omega_f"][first:]]
+        settled = line_fit(motion["t"][first:], values, frequency)
+        found = response[label][1] * cmath.exp(1j * radians(response["phase_" + label][1]))
+        assert abs(found - settled) < 1e-6 * abs(settled), column
+        if label.startswith("moment"):
+            mean = sum(motion[column][first:]) / len(motion[column][first:])
+            assert table["mean_" + label][1] == pytest.approx(mean, rel=1e-5)
+
+
+def test_response_to_orders_is_the_settled_transient(nocdyn):
+    """Orders of two bodies that a gear joins: their phases follow the angles of both."""
+    amplitudes = [1e-2 * AMPLITUDE, 4e-3 * AMPLITUDE, 1e-2 * AMPLITUDE]
+    machine = TRAIN + (
+        f"&excitation name = 'x' body = 'b' kind = 'orders' orders = 1.5, 3 amplitudes = {amplitudes[0]}, {amplitudes[1]}\n"
+        f"  phases = 0.3, 1.1 /\n&excitation name = 'y' body = 'f' kind = 'orders' orders = 5 amplitudes = {amplitudes[2]} /\n"
+    )
+    outcome = nocdyn("run", nocdyn.write("run.nml", machine + RUN.format(20)), "--out", "run")
+    assert outcome.returncode == 0, outcome.stderr
+    motion = columns(nocdyn, "trajectory.csv", "run")
+    content = analysis(nocdyn, "response", machine + RUN.format(1) + AT_SPEED)
+    assert content["orders"] == pytest.approx([1.5, 2.0, 3.0])
+    response = columns(nocdyn, "response_orders.csv")
+    first = next(i for i, t in enumerate(motion["t"]) if t > 10)
+    times = motion["t"][first:]
+    speed = (motion["phi_a"][-1] - motion["phi_a"][first]) / (times[-1] - times[0])
+    start = motion["phi_a"][first] - speed * times[0]
+    for line, order in enumerate(content["orders"]):
+        for column, label in (("shaft_c1", "moment_c1"), ("shaft_c3", "moment_c3"), ("reaction_g", "reaction_g")):
+            settled = line_fit(times, motion[column][first:], order * speed) * cmath.exp(-1j * order * start)
+            found = response[label][3 + line] * cmath.exp(1j * radians(response["phase_" + label][3 + line]))
+            assert abs(found - settled) < 1e-5 * abs(settled), (column, order)
+
+
+# Two discs J_1, J_2 between which a shaft with the loss factor eta transmits the moment k (1 + i eta) u, shaken on the first one.
+J_1, J_2, STIFFNESS, LOSS, SHAKER = 3.0, 2.0, 5.0e4, 0.02, 7.0
+DISCS = f"""\
+&body name = 'one' inertia = {J_1} /
+&body name = 'two' inertia = {J_2} /
+&coupling name = 'shaft' bodies = 'one', 'two' stiffness = {STIFFNESS} magnifier = {1 / LOSS} diameter = 0.1 bore = 0.04 /
+&excitation name = 'x' body = 'one' kind = 'orders' orders = 2 amplitudes = {SHAKER} /
+&run t_end = 1 /
+&response body = 'one' speed_rpm = 300, 1500 count = 13 /
+"""
+NATURAL = sqrt(STIFFNESS * (1 / J_1 + 1 / J_2))
+
+
+def disc_moment(speed):
+    twist = SHAKER / J_1 / (NATURAL**2 * (1 + 1j * LOSS) - (2 * speed) ** 2)
+    return abs(STIFFNESS * (1 + 1j * LOSS) * twist)
+
+
+def test_two_discs_with_hysteretic_damping_have_the_closed_form(nocdyn):
+    content = analysis(nocdyn, "response", DISCS)
+    table = columns(nocdyn, "response.csv")
+    for speed, moment in zip(table["omega_one"], table["half_range_moment_shaft"], strict=True):
+        assert moment == pytest.approx(disc_moment(speed), rel=1e-10)
+    assert content["critical_speeds"][0]["speed_rad_s"] == pytest.approx(NATURAL / 2, rel=1e-12)
+    assert content["critical_speeds"][0]["damping_ratio"] == pytest.approx(LOSS / 2, rel=1e-12)
+    shaft = content["largest"][0]
+    assert shaft["half_range"] == pytest.approx(disc_moment(NATURAL / 2), rel=1e-6)  # a peak between the speeds of the grid
+    modulus = pi / 16 * (0.1**4 - 0.04**4) / 0.1
+    assert shaft["half_range_stress_Pa"] == pytest.approx(shaft["half_range"] / modulus, rel=1e-12)
+    heat = max(table["heat_shaft"])  # force times rate of twist of the loss
+    peak = table["heat_shaft"].index(heat)
+    twist = table["half_range_moment_shaft"][peak] / abs(STIFFNESS * (1 + 1j * LOSS))
+    assert heat == pytest.approx(0.5 * 2 * table["omega_one"][peak] * STIFFNESS * LOSS * twist**2, rel=1e-10)
+
+
+def test_limits_bar_the_speeds_where_the_closed_form_exceeds_them(nocdyn):
+    limit = 40.0
+    content = analysis(nocdyn, "response", DISCS + f"&limit coupling = 'shaft' vibratory_moment = {limit} /\n")
+    assert content["limits_exceeded"]
+    (barred,) = content["barred_speed_ranges"]
+    assert barred["can_be_passed"]
+    for end in ("from_rad_s", "to_rad_s"):
+        assert disc_moment(barred[end]) == pytest.approx(limit, rel=1e-4)
+    assert content["largest"][0]["ratio_to_limit"] == pytest.approx(disc_moment(NATURAL / 2) / limit, rel=1e-6)
+    content = analysis(nocdyn, "response", DISCS + "&limit coupling = 'shaft' vibratory_moment = 1e4 moment = 1e4 /\n")
+    assert not content["limits_exceeded"]
+    assert content["barred_speed_ranges"] == []
+
+
+def test_iacs_rule_has_its_formula(nocdyn):
+    """UR M68: tau_C = (sigma_B + 160) / 18 c_K c_D (3 - 2 lambda^2), or 1.38 from lambda = 0.9 on."""
+    c_k, strength, rated, diameter = 0.8, 600, 1200, 100
+    limit = (
+        f"&limit coupling = 'shaft' rule = 'iacs_m68' tensile_strength = {strength}e6 c_k = {c_k} rated_speed_rpm = {rated} /\n"
+    )
+    analysis(nocdyn, "response", DISCS + limit)
+    table = columns(nocdyn, "response.csv")
+    modulus = pi / 16 * (0.1**4 - 0.04**4) / 0.1
+    for speed, found, passing in zip(
+        table["omega_one"], table["limit_moment_shaft"], table["transient_limit_moment_shaft"], strict=True
+    ):
+        share = speed * 30 / pi / rated
+        shape = 3 - 2 * share**2 if share < 0.9 else 1.38
+        stress = (strength + 160) / 18 * c_k * (0.35 + 0.93 * diameter**-0.2) * shape
+        assert found == pytest.approx(1e6 * stress * modulus, rel=1e-12)
+        assert passing == pytest.approx(1.7 * found / sqrt(c_k), rel=1e-12)
+
+
+def test_half_range_is_that_of_the_sum_over_time(nocdyn):
+    orders, phases = [1, 2.5, 4], [20, -75, 140]
+    text = DISCS.replace("orders = 2 amplitudes = 7.0", "orders = 1, 2.5, 4 amplitudes = 7, 5, 6 phases_deg = 20, -75, 140")
+    analysis(nocdyn, "response", text)
+    response, table = columns(nocdyn, "response_orders.csv"), columns(nocdyn, "response.csv")
+    assert len(phases) == len(orders)
+    for row in (0, len(table["omega_one"]) // 2):
+        terms = [
+            response["moment_shaft"][3 * row + k] * cmath.exp(1j * radians(response["phase_moment_shaft"][3 * row + k]))
+            for k in range(3)
+        ]
+        count = 40000  # samples of two turns
+        values = [
+            sum((a * cmath.exp(1j * n * 4 * pi * i / count)).real for a, n in zip(terms, orders, strict=True))
+            for i in range(count)
+        ]
+        assert table["half_range_moment_shaft"][row] == pytest.approx((max(values) - min(values)) / 2, rel=1e-6)
+
+
+def test_frequencies_of_a_loaded_cubic_coupling_move_with_the_speed(nocdyn):
+    """K = k + 3 k3 w^2 with k w + k3 w^3 = the torque of a fan, c omega^2."""
+    k, k3, fan = 100.0, 10.0, 0.05
+    text = f"""\
+&body name = 'motor' inertia = 2 /
+&body name = 'fan' inertia = 3 /
+&coupling name = 'shaft' bodies = 'motor', 'fan' stiffness = {k} cubic_stiffness = {k3} damping = 0.1 /
+&motor name = 'm' body = 'motor' kind = 'constant' torque = 10 /
+&load name = 'l' body = 'fan' quadratic = {fan} /
+&run t_end = 1 /
+&response body = 'motor' speed = 10, 60 count = 26 orders = 0.5 /
+"""
+
+    def natural(speed):
+        twist = 1.0
+        for _ in range(50):
+            twist -= (k * twist + k3 * twist**3 - fan * speed**2) / (k + 3 * k3 * twist**2)
+        return sqrt((k + 3 * k3 * twist**2) * (1 / 2 + 1 / 3))
+
+    content = analysis(nocdyn, "campbell", text)
+    table = columns(nocdyn, "campbell.csv")
+    for speed, frequency in zip(table["omega_motor"], table["frequency_1"], strict=True):
+        assert 2 * pi * frequency == pytest.approx(natural(speed), rel=1e-9)
+    for crossing in content["crossings"]:
+        assert 0.5 * crossing["speed_rad_s"] == pytest.approx(natural(crossing["speed_rad_s"]), rel=1e-6)
+    assert len(content["crossings"]) == 1
+
+
+SHAKEN = "&excitation name = 'x' body = 'one' kind = 'orders' orders = 2 amplitudes = 7.0 /"
+HELD = "&coupling name = 'g' bodies = 'ground', 'two' stiffness = 1 /\n&run"
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("&response body = 'one' speed_rpm = 300, 1500 count = 13 /", "", "machine.nml: there is no group &response; required"),
+        ("speed_rpm = 300, 1500", "speed = 90, 30", "machine.nml:6: &response: speed = 90, 30 rad/s; allowed: first the lower"),
+        ("speed_rpm = 300, 1500", "speed = -10, 30", "both in one direction"),
+        ("count = 13", "orders = 3", "no excitation has the order 3 of 'one'; the orders of the excitations are 2"),
+        (SHAKEN, "", "nothing excites this machine"),
+        ("13 /", "13 /\n&limit coupling = 'shift' moment = 1 /", "there is no coupling 'shift'; did you mean 'shaft'?"),
+        ("magnifier = 50.0", "magnifier = 50 relative_damping = 0.1", "relative_damping"),
+        ("diameter = 0.1 bore = 0.04", "diameter = 0.04 bore = 0.1", "bore"),
+        (
+            "diameter = 0.1 bore = 0.04 /",
+            "/\n&limit coupling = 'shaft' stress = 1e7 /",
+            "stress limits a stress, but 'shaft' has",
+        ),
+        ("&run", HELD, "'one' is held by elastic couplings: it has no steady speed but 0"),
+    ],
+)
+def test_responses_that_cannot_be_are_refused(nocdyn, old, new, message):
+    assert old in DISCS
+    text = DISCS.replace(old, new)
+    code, error = refusal(nocdyn, "response", text)
+    assert message in error
+    assert code == 2
+
+
+def test_unstable_steady_states_are_refused_with_their_speed(nocdyn):
+    falling = "&load name = 'l' body = 'one' table_speed = 0, 10, 1000 table_torque = 0, 10, 9 extrapolation = 'constant' /\n"
+    text = DISCS.replace("magnifier = 50.0", "damping = 1e-6").replace("&run", falling + "&run")
+    code, error = refusal(nocdyn, "response", text)
+    assert "machine.nml:7: &response: at 300 rpm (31.4159 rad/s): the steady state is unstable: an oscillation with" in error
+    assert code == 1
+
+
+def test_undamped_resonance_is_called_unbounded(nocdyn):
+    outcome = nocdyn("response", nocdyn.write("machine.nml", DISCS.replace("magnifier = 50.0", "")), "--out", "out")
+    assert outcome.returncode == 0, outcome.stderr
+    assert "unbounded" in outcome.stdout
+    content = json.loads((nocdyn.folder / "out/response.json").read_text())
+    assert "moment_N_m" not in content["critical_speeds"][0]
+    assert log(content["largest"][0]["half_range"]) < log(1e6)
+
+
+def test_a_chain_of_bodies_needs_no_dense_matrix(nocdyn):
+    count = 3000
+    text = "".join(f"&body name = 'b{i}' inertia = 1 /\n" for i in range(count))
+    text += "".join(
+        f"&coupling name = 'c{i}' bodies = 'b{i}', 'b{i + 1}' stiffness = 1e6 damping = 10 /\n" for i in range(count - 1)
+    )
+    text += "&excitation name = 'x' body = 'b0' kind = 'orders' orders = 1 amplitudes = 1 /\n&run t_end = 1 /\n"
+    text += "&response body = 'b0' speed = 10, 20 count = 10 /\n"
+    content = analysis(nocdyn, "response", text)
+    assert "natural frequencies are not computed for more than 600" in content["notes"][0]
