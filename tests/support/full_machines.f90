@@ -1,10 +1,11 @@
 !> Machines with elements of every kind, for the tests that compare formulations, Jacobians and lanes.
 module nocdyn_test_full_machines
   use nocdyn_bank, only: append_bank
-  use nocdyn_couplings, only: coupling_common_t
+  use nocdyn_couplings, only: coupling_common_t, new_couplings
   use nocdyn_curves, only: curve_t, extrapolation_constant, extrapolation_linear, interpolation_cubic, interpolation_linear, &
                            new_curve
   use nocdyn_dc_motors, only: new_dc_motors
+  use nocdyn_element_rows, only: element_rows_t, new_element_rows
   use nocdyn_gap_couplings, only: new_gap_couplings
   use nocdyn_governed_banks, only: governor_t
   use nocdyn_kinds, only: wp
@@ -16,6 +17,7 @@ module nocdyn_test_full_machines
   use nocdyn_table_couplings, only: new_table_couplings
   use nocdyn_table_excitations, only: new_table_excitations
   use nocdyn_test_machines, only: finish, numbered_names
+  use nocdyn_test_random, only: random_stream, random_stream_t
   use nocdyn_test_random_machines, only: random_machine
   use nocdyn_timed_excitations, only: new_timed_excitations, shape_pulse, shape_ramp, shape_step
   use nocdyn_wave_excitations, only: new_wave_excitations
@@ -37,6 +39,7 @@ contains
 
     machine = random_machine(seed, bodies, variants, wanted, choice)
     call add_couplings(bodies, variants, machine)
+    call add_rows(seed, bodies, variants, machine)
     call add_motors(bodies, variants, machine)
     call add_loads(bodies, variants, machine)
     call add_excitations(bodies, variants, machine)
@@ -94,6 +97,29 @@ contains
                                            curves(twist, moment, interpolation_cubic, extrapolation_linear, variants, 2)))
     end associate
   end subroutine add_couplings
+
+  !> Couplings along random rows of several bodies and the ground, smooth ones and ones with a gap.
+  subroutine add_rows(seed, bodies, variants, machine)
+    integer, intent(in) :: seed, bodies, variants(:)
+    type(machine_t), intent(inout) :: machine
+    type(element_rows_t) :: rows
+    type(random_stream_t) :: numbers
+    real(wp) :: cubic(size(variants), 3)
+    integer :: b
+
+    numbers = random_stream(7 * seed)
+    rows = new_element_rows([1, bodies + 1, bodies + 4, bodies + 6], [(b, b=1, bodies), 1, 0, bodies, 2, 1], &
+                            [(numbers%number(-1.5_wp, 1.5_wp), b=1, bodies + 5)])
+    cubic = lane_values(6.0_wp, variants, 3)
+    associate (one => lane_values(1.0_wp, variants, 3))
+      call append_bank(machine%banks, &
+                       new_couplings(coupling_common_t(numbered_names('mesh', 3), rows, 0.8_wp * one, 0.1_wp * one), &
+                                     40.0_wp * one, cubic))
+      call append_bank(machine%banks, &
+                       new_gap_couplings(coupling_common_t(numbered_names('play', 3), rows, 0.5_wp * one, 0.0_wp * one), &
+                                         spread(30.0_wp * one, 1, 1), 0.2_wp * one))
+    end associate
+  end subroutine add_rows
 
   subroutine add_motors(bodies, variants, machine)
     integer, intent(in) :: bodies, variants(:)

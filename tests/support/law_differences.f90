@@ -35,7 +35,7 @@ contains
     type(elements_t) :: elements
     integer :: e
 
-    elements = new_elements(bank%lanes, bank%from, bank%to, [(bank%states, e=1, size(bank%to))])
+    elements = new_elements(bank%lanes, bank%rows, [(bank%states, e=1, bank%count)])
   end function elements_of
 
   !> Sets moments, derivatives, energies and rates of the elements from their angles, speeds, internal states and time.
@@ -44,7 +44,7 @@ contains
     type(elements_t), intent(inout) :: elements
     type(polynomial_laws_t) :: laws
 
-    laws = new_polynomial_laws(bank%lanes, size(bank%to))
+    laws = new_polynomial_laws(bank%lanes, bank%count)
     call bank%polynomials(1, bank%lanes, laws)
     call laws%evaluate(elements)
     call laws%differentiate(elements)

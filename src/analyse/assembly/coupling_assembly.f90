@@ -3,6 +3,7 @@ module nocdyn_coupling_assembly
   use nocdyn_bank, only: append_bank, bank_slot_t
   use nocdyn_couplings, only: coupling_common_t, new_couplings
   use nocdyn_element_groups, only: element_groups_t
+  use nocdyn_element_rows, only: rows_between
   use nocdyn_errors, only: error_t, exit_input, raise
   use nocdyn_gap_couplings, only: new_gap_couplings
   use nocdyn_input, only: group_t, input_t
@@ -199,21 +200,20 @@ contains
   end function section_moduli
 
   !> What the constructors of all forms take.
-  type(coupling_common_t) function common_of(groups) result(common)
+  type(coupling_common_t) function common_of(groups) result(shared)
     type(element_groups_t), intent(in) :: groups
     real(wp), dimension(groups%lanes, size(groups%indices)) :: friction, modulus
 
-    allocate (common%names, source=groups%names)
-    allocate (common%from, source=groups%bodies('bodies', 1))
-    allocate (common%to, source=groups%bodies('bodies', 2))
-    allocate (common%damping, source=groups%values('damping') + loss_damping(groups))
-    allocate (common%rest_twist, source=groups%values('rest_twist'))
+    allocate (shared%names, source=groups%names)
+    shared%rows = rows_between(groups%bodies('bodies', 1), groups%bodies('bodies', 2))
+    allocate (shared%damping, source=groups%values('damping') + loss_damping(groups))
+    allocate (shared%rest_twist, source=groups%values('rest_twist'))
     modulus = section_moduli(groups)
-    if (any(modulus > 0)) allocate (common%section_modulus, source=modulus)
+    if (any(modulus > 0)) allocate (shared%section_modulus, source=modulus)
     friction = groups%values('friction')
     if (.not. any(friction > 0)) return
-    allocate (common%friction, source=friction)
-    allocate (common%friction_speed, source=groups%values('friction_speed', absent=1.0_wp))
+    allocate (shared%friction, source=friction)
+    allocate (shared%friction_speed, source=groups%values('friction_speed', absent=1.0_wp))
   end function common_of
 
   !> p_1, p_2, ... of all couplings, [order, lanes, couplings].

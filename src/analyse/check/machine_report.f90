@@ -99,8 +99,7 @@ contains
 
     is_loose = .true.
     is_loose(0) = .false.   ! the ground
-    is_loose(machine%elements%from) = .false.
-    is_loose(machine%elements%to) = .false.
+    is_loose(machine%elements%rows%body) = .false.
     is_loose(machine%constraints%body) = .false.
     associate (loose => pack([(b, b=1, machine%bodies)], is_loose(1:)))
       if (size(loose) == 0) return
@@ -152,7 +151,7 @@ contains
 
     elements_of = 0
     do i = 1, size(machine%banks)
-      if (machine%banks(i)%bank%role == role) elements_of = elements_of + size(machine%banks(i)%bank%to)
+      if (machine%banks(i)%bank%role == role) elements_of = elements_of + machine%banks(i)%bank%count
     end do
   end function elements_of
 

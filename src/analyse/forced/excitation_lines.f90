@@ -39,16 +39,17 @@ contains
     type(held_state_t), intent(in) :: state
     type(source_t), allocatable, intent(out) :: sources(:)
     type(harmonic_t), allocatable :: list(:)
-    integer :: b, e, i, n
+    integer :: b, e, i, k, n
     real(wp) :: speed
 
     allocate (sources(0))
     do b = 1, size(machine%banks)
       associate (bank => machine%banks(b)%bank)
-        do e = 1, size(bank%to)
+        do e = 1, bank%count
           speed = 0.0_wp
-          if (bank%to(e) > 0) speed = state%omega(bank%to(e))
-          if (bank%from(e) > 0) speed = speed - state%omega(bank%from(e))
+          do k = bank%rows%first(e), bank%rows%first(e + 1) - 1
+            if (bank%rows%body(k) > 0) speed = speed + bank%rows%coefficient(k) * state%omega(bank%rows%body(k))
+          end do
           call bank%list_harmonics(e, speed, list)
           n = size(sources)
           sources = [sources, (source_t(element=bank%first + e - 1), i=1, size(list))]

@@ -90,7 +90,7 @@ contains
     type(forced_response_t), intent(inout) :: self
     integer :: b
 
-    allocate (self%loss_factor(size(self%machine%elements%to)), self%loss_damping(size(self%machine%elements%to)), source=0.0_wp)
+    allocate (self%loss_factor(self%machine%elements%count), self%loss_damping(self%machine%elements%count), source=0.0_wp)
     do b = 1, size(self%machine%banks)
       associate (bank => self%machine%banks(b)%bank)
         if (.not. allocated(bank%loss_factor)) cycle

@@ -41,7 +41,7 @@ contains
     do b = 1, size(machine%banks)
       associate (bank => machine%banks(b)%bank)
         if (bank%role /= role_coupling) cycle
-        do e = 1, size(bank%to)
+        do e = 1, bank%count
           n = n + 1
           call set_quantity(quantity_moment, bank%names(e)%text, 'moment_', 'N m', one)
           one%element = [bank%first + e - 1]
@@ -74,7 +74,7 @@ contains
 
     count_of = machine%constraints%rows()
     do b = 1, size(machine%banks)
-      if (machine%banks(b)%bank%role == role_coupling) count_of = count_of + size(machine%banks(b)%bank%to)
+      if (machine%banks(b)%bank%role == role_coupling) count_of = count_of + machine%banks(b)%bank%count
     end do
   end function count_of
 
@@ -93,10 +93,9 @@ contains
       call set_quantity(quantity_reaction, machine%constraints%names(r)%text, 'reaction_', machine%constraints%units(r)%text, &
                         quantities(r))
     end do
-    do e = 1, size(machine%elements%to)
+    do e = 1, machine%elements%count
       torque = 0.0_wp
-      torque(machine%elements%to(e)) = 1.0_wp
-      torque(machine%elements%from(e)) = torque(machine%elements%from(e)) - 1.0_wp
+      call machine%elements%rows%add_moment(e, 1.0_wp, torque(1:))
       call coordinates%reactions_of_torques(1, torque(1:), lambda)
       do r = 1, size(quantities)
         if (.not. abs(lambda(r)) > 0) cycle

@@ -128,7 +128,9 @@ contains
       e = self%elastic(i)
       call json%open()
       call json%put('name', self%elastic_names(i)%text)
-      call json%put('bodies', [self%machine%elements%from(e), self%machine%elements%to(e)])
+      associate (rows => self%machine%elements%rows)
+        call json%put('bodies', rows%body(rows%first(e):rows%first(e + 1) - 1))
+      end associate
       call json%put('stiffness_N_m_rad', self%stiffness(i))
       call json%close()
     end do

@@ -55,7 +55,7 @@ contains
     self%have_elastic = any(columns%kind == column_elastic .or. columns%kind == column_residual)
     self%have_works = any(columns%kind >= column_work_in)
     associate (banks => formulation%machine%banks)
-      allocate (self%values(maxval([(size(banks(i)%bank%to), i=1, size(banks))])), source=0.0_wp)
+      allocate (self%values(maxval([(banks(i)%bank%count, i=1, size(banks))])), source=0.0_wp)
       allocate (is_source, source=[(spread(banks(i)%bank%is_source(), 1, size(banks(i)%bank%with_work)), i=1, size(banks))])
     end associate
     allocate (self%works_in, source=pack([(i, i=1, size(is_source))], is_source))
@@ -154,7 +154,7 @@ contains
           case (column_element)
             if (segment%has_new_values) then
               call machine%banks(segment%bank)%bank%observe(machine%elements, segment%quantity, lane, &
-                                                            self%values(:size(machine%banks(segment%bank)%bank%to)))
+                                                            self%values(:machine%banks(segment%bank)%bank%count))
             end if
             row(first:last) = self%values(i:j)
           case (column_reaction)

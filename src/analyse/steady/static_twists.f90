@@ -242,12 +242,13 @@ contains
     call balance%formulation%machine%evaluate_energies()
     self%torque = self%external_torque
     self%tolerance = self%floor + balanced * self%external_scale
-    associate (elements => balance%formulation%machine%elements, incidence => balance%incidence, phi => balance%formulation%phi)
+    associate (elements => balance%formulation%machine%elements, incidence => balance%incidence, phi => balance%formulation%phi, &
+               rows => balance%formulation%machine%elements%rows)
       self%energy = sum(elements%stored(1, balance%elastic)) - sum(self%external_torque * q)
       do i = 1, size(balance%elastic)
         e = balance%elastic(i)
         rounding = balanced * abs(elements%restoring(1, e)) + angle_rounding * abs(elements%restoring_angle(1, e)) &
-                   * (abs(phi(1, elements%to(e))) + abs(phi(1, elements%from(e))))
+                   * sum([(abs(rows%coefficient(k) * phi(1, rows%body(k))), k=rows%first(e), rows%first(e + 1) - 1)])
         do k = incidence%first(e), incidence%first(e + 1) - 1
           c = incidence%coordinate(k)
           self%torque(c) = self%torque(c) + incidence%ratio(1, k) * elements%restoring(1, e)

@@ -55,7 +55,7 @@ contains
       self%internal = self%formulation%states - 2 * self%coordinates
       self%incidence = new_element_coordinates(machine%elements, machine%coordinates)
       self%elastic = machine%elastic()
-      allocate (self%is_elastic(size(machine%elements%to)), source=.false.)
+      allocate (self%is_elastic(machine%elements%count), source=.false.)
       self%is_elastic(self%elastic) = .true.
       self%inelastic = pack([(e, e=1, size(self%is_elastic))], .not. self%is_elastic)
       self%motions = new_rigid_motions(self%coordinates, self%incidence, self%elastic)

@@ -5,6 +5,7 @@
 !> (`described_elements_t`).
 module nocdyn_bank
   use nocdyn_described_elements, only: described_elements_t
+  use nocdyn_element_rows, only: element_rows_t, rows_between
   use nocdyn_elements, only: elements_t
   use nocdyn_kinds, only: wp
   use nocdyn_lane_parameters, only: lane_parameters_t
@@ -40,8 +41,7 @@ module nocdyn_bank
 
   type, abstract, extends(described_elements_t), public :: bank_t
     type(string_t), allocatable :: names(:)       !! of the elements
-    integer, allocatable :: from(:)               !! body of each element, 0 = ground
-    integer, allocatable :: to(:)                 !! body of each element, 0 = ground; M acts on it, -M on `from`
+    type(element_rows_t) :: rows                  !! bodies of the elements; M acts on them by the coefficients
     integer, allocatable :: with_work(:)          !! elements whose work is integrated, numbered within the bank
     integer, allocatable :: elastic(:)            !! elements that can have a restoring moment, numbered within the bank
     integer :: role = role_coupling               !! role_...: term of eq. (12) to which the bank belongs
@@ -59,7 +59,8 @@ module nocdyn_bank
     procedure :: start_internal
     procedure :: steady_internal
     procedure :: knees
-    procedure :: connect
+    generic :: connect => connect_bodies, connect_rows
+    procedure, private :: connect_bodies, connect_rows
     procedure :: list_structure
     procedure :: last
     procedure :: is_source
@@ -90,25 +91,33 @@ contains
     call move_alloc(longer, banks)
   end subroutine append_bank
 
-  !> Sets the connectivity. Every constructor calls it, after setting `states` where its elements have internal states.
-  subroutine connect(self, role, lanes, names, to, from)
+  !> Elements that act on one body each.
+  subroutine connect_bodies(self, role, lanes, names, body)
     class(bank_t), intent(inout) :: self
     integer, intent(in) :: role                 !! role_...
     integer, intent(in) :: lanes
     type(string_t), intent(in) :: names(:)      !! [elements]
-    integer, intent(in) :: to(:)                !! bodies, 0 = ground, [elements]
-    integer, intent(in), optional :: from(:)    !! the same; absent: 0
+    integer, intent(in) :: body(:)              !! [elements]
+
+    call self%connect(role, lanes, names, rows_between(0 * body, body))
+  end subroutine connect_bodies
+
+  !> Sets the connectivity. Every constructor calls it, after setting `states` where its elements have internal states.
+  subroutine connect_rows(self, role, lanes, names, rows)
+    class(bank_t), intent(inout) :: self
+    integer, intent(in) :: role                 !! role_...
+    integer, intent(in) :: lanes
+    type(string_t), intent(in) :: names(:)      !! [elements]
+    type(element_rows_t), intent(in) :: rows    !! of the elements
     integer :: e
 
-    call self%set_size(lanes, size(to))
+    call self%set_size(lanes, rows%count())
     self%role = role
     self%names = names
-    self%from = 0 * to
-    if (present(from)) self%from = from
-    self%to = to
-    self%with_work = [(e, e=1, size(to))]
-    self%elastic = [(e, e=1, merge(size(to), 0, role == role_coupling))]
-  end subroutine connect
+    self%rows = rows
+    self%with_work = [(e, e=1, self%count)]
+    self%elastic = [(e, e=1, merge(self%count, 0, role == role_coupling))]
+  end subroutine connect_rows
 
   !> Adds to the structure of a list which elements the bank has, and of what kind they are.
   subroutine list_structure(self, parameters)
@@ -118,14 +127,15 @@ contains
     call parameters%add_structure([self%role, self%first, self%states])
     call parameters%add_structure(self%is_polynomial)
     call parameters%add_structure(self%names)
-    call parameters%add_structure(self%from, self%to, self%with_work, self%switch_element)
+    call parameters%add_structure(self%rows%first, self%rows%body, self%with_work, self%switch_element)
+    call parameters%add_structure(transfer(self%rows%coefficient, [integer ::]))
   end subroutine list_structure
 
   !> Number of its last element in the machine.
   pure integer function last(self)
     class(bank_t), intent(in) :: self
 
-    last = self%first + size(self%to) - 1
+    last = self%first + self%count - 1
   end function last
 
   !> Whether the work of the elements counts as work put in, not as work taken out.
@@ -195,7 +205,7 @@ contains
     allocate (columns(1))
     columns(1)%name = 'torque'
     columns(1)%unit = 'N m'
-    columns(1)%elements = [(e, e=1, size(self%to))]
+    columns(1)%elements = [(e, e=1, self%count)]
   end function quantities
 
   !> Values of one quantity of all elements of the bank, after `evaluate`.

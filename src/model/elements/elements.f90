@@ -1,6 +1,7 @@
 !> The elements of a machine, numbered consecutively over all banks: the bodies they join, and their values and internal states
 !> on a block of lanes.
 module nocdyn_elements
+  use nocdyn_element_rows, only: element_rows_t
   use nocdyn_kinds, only: wp
   implicit none (type, external)
   private
@@ -21,10 +22,11 @@ module nocdyn_elements
     real(wp), allocatable :: rate_internal(:, :, :)   !! derivatives of the rate by the element's states, [lanes, members, states]
   end type internal_states_t
 
-  !> Every element acts between two bodies along its relative angle u = phi_to - phi_from. Its moment
-  !> M(t, u, u') = restoring + applied acts on `to`, and -M on `from`. Body 0 is the ground.
+  !> Every element acts along a row: u = sum of coefficient * phi(body). Its moment M(t, u, u') = restoring + applied acts on
+  !> these bodies as coefficient * M.
   type, public :: elements_t
-    integer, allocatable :: from(:), to(:)         !! bodies, [elements]
+    integer :: count = 0
+    type(element_rows_t) :: rows                   !! bodies and their coefficients
     real(wp), allocatable :: time(:)               !! t of the derivatives [s], [lanes]
     real(wp), allocatable :: angle(:, :)           !! u [rad], shape [lanes, elements] as all that follow
     real(wp), allocatable :: speed(:, :)           !! u' [rad/s]
@@ -49,17 +51,17 @@ module nocdyn_elements
 
 contains
 
-  !> Elements between the given bodies, at rest and without moments.
-  function new_elements(lanes, from, to, internal) result(self)
+  !> Elements along the given rows, at rest and without moments.
+  function new_elements(lanes, rows, internal) result(self)
     integer, intent(in) :: lanes
-    integer, intent(in) :: from(:), to(:)   !! bodies, 0 = ground, [elements]
+    type(element_rows_t), intent(in) :: rows
     integer, intent(in) :: internal(:)      !! internal states of each element, [elements]
     type(elements_t) :: self
 
-    allocate (self%from, source=from)
-    allocate (self%to, source=to)
+    self%count = rows%count()
+    self%rows = rows
     allocate (self%time(lanes), source=0.0_wp)
-    allocate (self%angle(lanes, size(to)), source=0.0_wp)
+    allocate (self%angle(lanes, self%count), source=0.0_wp)
     allocate (self%speed, self%restoring, self%applied, source=self%angle)
     allocate (self%restoring_angle, self%restoring_curvature, source=self%angle)
     allocate (self%applied_angle, self%applied_speed, self%applied_time, source=self%angle)
@@ -93,14 +95,9 @@ contains
     class(elements_t), intent(inout) :: self
     real(wp), contiguous, intent(in) :: phi(:, 0:)     !! [lanes, ground and bodies] [rad]
     real(wp), contiguous, intent(in) :: omega(:, 0:)   !! [lanes, ground and bodies] [rad/s]
-    integer :: e, l
 
-    do e = 1, size(self%to)
-      do l = 1, size(self%time)
-        self%angle(l, e) = phi(l, self%to(e)) - phi(l, self%from(e))
-        self%speed(l, e) = omega(l, self%to(e)) - omega(l, self%from(e))
-      end do
-    end do
+    call self%rows%combine(size(self%time), ubound(phi, 2), phi, self%angle)
+    call self%rows%combine(size(self%time), ubound(omega, 2), omega, self%speed)
   end subroutine gather
 
   !> Sums the moments of the elements on the bodies and on the ground.
@@ -108,16 +105,19 @@ contains
     class(elements_t), intent(in) :: self
     real(wp), contiguous, intent(inout) :: torque(:, 0:)   !! [lanes, ground and bodies] [N m]
     real(wp) :: moment
-    integer :: e, l
+    integer :: e, k, l
 
     torque(:, :) = 0.0_wp
-    do e = 1, size(self%to)
-      do l = 1, size(self%time)
-        moment = self%restoring(l, e) + self%applied(l, e)
-        torque(l, self%to(e)) = torque(l, self%to(e)) + moment
-        torque(l, self%from(e)) = torque(l, self%from(e)) - moment
+    associate (rows => self%rows)
+      do e = 1, self%count
+        do k = rows%first(e), rows%first(e + 1) - 1
+          do l = 1, size(self%time)
+            moment = self%restoring(l, e) + self%applied(l, e)
+            torque(l, rows%body(k)) = torque(l, rows%body(k)) + rows%coefficient(k) * moment
+          end do
+        end do
       end do
-    end do
+    end associate
   end subroutine scatter
 
 end module nocdyn_elements

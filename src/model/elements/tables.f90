@@ -22,7 +22,7 @@ contains
     integer :: e
 
     allocate (bank%curve, source=curve)
-    call bank%add_switches([('point in the table', e=1, size(bank%to))], 0)
+    call bank%add_switches([('point in the table', e=1, bank%count)], 0)
   end subroutine add_table
 
   !> The curve of the element at x, on its present segment.

@@ -4,7 +4,6 @@ module nocdyn_body_formulation
   use nocdyn_element_sets, only: coupling_elements
   use nocdyn_error_measures, only: error_measures_t, new_error_measures
   use nocdyn_formulation, only: formulation_t
-  use nocdyn_incidence, only: add_coefficients, add_moment
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
   use nocdyn_rigid_motions, only: new_rigid_motions, rigid_motions_t
@@ -58,7 +57,7 @@ contains
     do l = 1, self%lanes
       self%mobility(:, :, l) = machine%coordinates%mobility(l)
     end do
-    allocate (self%zero_twist(self%lanes, size(machine%elements%to)), source=0.0_wp)
+    allocate (self%zero_twist(self%lanes, machine%elements%count), source=0.0_wp)
     call self%set_norm(measures_of_bodies(machine, self%states))
   end subroutine set_machine
 
@@ -69,24 +68,25 @@ contains
     type(error_measures_t) :: norm
     type(rigid_motions_t) :: motions
     integer, allocatable :: body(:), couplings(:), first(:)
-    real(wp), allocatable :: sign(:)
-    integer :: i
+    real(wp), allocatable :: coefficient(:)
+    integer :: i, k
 
     motions = new_rigid_motions(machine%coordinates%freedoms, &
                                 new_element_coordinates(machine%elements, machine%coordinates), machine%elastic())
     allocate (couplings, source=coupling_elements(machine))
-    allocate (body(0), sign(0))
+    allocate (body(0), coefficient(0))
     allocate (first(size(couplings) + 1), source=1)
     do i = 1, size(couplings)
-      associate (from => machine%elements%from(couplings(i)), to => machine%elements%to(couplings(i)))
-        if (to > 0) body = [body, to]
-        if (to > 0) sign = [sign, 1.0_wp]
-        if (from > 0) body = [body, from]
-        if (from > 0) sign = [sign, -1.0_wp]
+      associate (rows => machine%elements%rows)
+        do k = rows%first(couplings(i) + 1) - 1, rows%first(couplings(i)), -1
+          if (rows%body(k) == 0) cycle
+          body = [body, rows%body(k)]
+          coefficient = [coefficient, rows%coefficient(k)]
+        end do
       end associate
       first(i + 1) = size(body) + 1
     end do
-    norm = new_error_measures(couplings, first, body, spread(sign, 1, machine%lanes), &
+    norm = new_error_measures(couplings, first, body, spread(coefficient, 1, machine%lanes), &
                               machine%coordinates%body(motions%free), machine%bodies, states, without_bands=.true.)
   end function measures_of_bodies
 
@@ -133,19 +133,17 @@ contains
     integer, intent(in) :: lane, switch
     real(wp), contiguous, intent(in) :: y(:)   !! state, [states + quadratures]
     real(wp), intent(out) :: angle, speed      !! [rad], [rad/s]
+    integer :: k
 
     angle = 0.0_wp
     speed = 0.0_wp
     associate (n => self%machine%bodies, e => self%machine%switches%element(switch))
-      associate (from => self%machine%elements%from(e), to => self%machine%elements%to(e))
-        if (to > 0) then
-          angle = y(n + to)
-          speed = y(to)
-        end if
-        if (from > 0) then
-          angle = angle - y(n + from)
-          speed = speed - y(from)
-        end if
+      associate (rows => self%machine%elements%rows)
+        do k = rows%first(e), rows%first(e + 1) - 1
+          if (rows%body(k) == 0) cycle
+          angle = angle + rows%coefficient(k) * y(n + rows%body(k))
+          speed = speed + rows%coefficient(k) * y(rows%body(k))
+        end do
       end associate
     end associate
   end subroutine switch_motion
@@ -202,11 +200,11 @@ contains
     self%by_speed(:, :) = 0.0_wp
     self%by_time(:) = 0.0_wp
     associate (elements => self%machine%elements)
-      call add_coefficients(elements%from, elements%to, -1.0_wp, elements%restoring_angle(lane, :), self%by_angle)
-      call add_coefficients(elements%from, elements%to, -1.0_wp, elements%applied_angle(lane, :), self%by_angle)
-      call add_coefficients(elements%from, elements%to, -1.0_wp, elements%applied_speed(lane, :), self%by_speed)
-      do e = 1, size(elements%to)
-        call add_moment(elements%from(e), elements%to(e), elements%applied_time(lane, e), self%by_time)
+      call elements%rows%add_coefficients(-1.0_wp, elements%restoring_angle(lane, :), self%by_angle)
+      call elements%rows%add_coefficients(-1.0_wp, elements%applied_angle(lane, :), self%by_angle)
+      call elements%rows%add_coefficients(-1.0_wp, elements%applied_speed(lane, :), self%by_speed)
+      do e = 1, elements%count
+        call elements%rows%add_moment(e, elements%applied_time(lane, e), self%by_time)
       end do
     end associate
   end subroutine differentiate_torques
@@ -223,9 +221,9 @@ contains
     associate (elements => self%machine%elements)
       do k = 1, self%quadratures
         e = self%machine%with_work(k)
-        call add_moment(elements%from(e), elements%to(e), elements%applied(lane, e) &
+        call elements%rows%add_moment(e, elements%applied(lane, e) &
                         + elements%speed(lane, e) * elements%applied_speed(lane, e), dfdy(self%states + k, :n))
-        call add_moment(elements%from(e), elements%to(e), elements%speed(lane, e) * elements%applied_angle(lane, e), &
+        call elements%rows%add_moment(e, elements%speed(lane, e) * elements%applied_angle(lane, e), &
                         dfdy(self%states + k, n + 1:2 * n))
         dfdt(self%states + k) = elements%applied_time(lane, e) * elements%speed(lane, e)
       end do
@@ -244,9 +242,9 @@ contains
       do s = 1, self%internal
         e = internal%element(s)
         self%by_state(:) = 0.0_wp
-        call add_moment(elements%from(e), elements%to(e), internal%applied(lane, s), self%by_state)
+        call elements%rows%add_moment(e, internal%applied(lane, s), self%by_state)
         call multiply(self%mobility(:, :, lane), self%by_state, dfdy(:n, self%mechanical + s))
-        call add_moment(elements%from(e), elements%to(e), internal%rate_speed(lane, s), dfdy(self%mechanical + s, :n))
+        call elements%rows%add_moment(e, internal%rate_speed(lane, s), dfdy(self%mechanical + s, :n))
         do i = 1, internal%members(s)
           dfdy(self%mechanical + s, self%mechanical + internal%first(s) + i - 1) = internal%rate_internal(lane, i, s)
         end do

@@ -50,7 +50,7 @@ contains
     logical, intent(in) :: is_block              !! whether a single lane gets the layout of a block
     type(element_coordinates_t) :: turning   ! entries of the couplings
     integer, allocatable :: couplings(:)
-    logical :: has_offset(size(self%machine%elements%to))
+    logical :: has_offset(self%machine%elements%count)
 
     call self%allocate_state(self%machine%coordinates%body, 2 * self%machine%coordinates%freedoms, with_energy_balance)
     self%incidence = new_element_coordinates(self%machine%elements, self%machine%coordinates)

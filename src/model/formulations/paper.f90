@@ -3,7 +3,6 @@ module nocdyn_paper
   use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
   use nocdyn_body_formulation, only: body_formulation_t, jacobian_of_bodies, observe_bodies, start_of_bodies
   use nocdyn_element_sets, only: coupling_elements
-  use nocdyn_incidence, only: add_coefficient, add_moment
   use nocdyn_kinds, only: wp
   use nocdyn_lapack, only: pseudo_inverse
   use nocdyn_lapack_lu, only: lu_factor
@@ -60,7 +59,7 @@ contains
     allocate (incidence(n, size(self%couplings)), source=0.0_wp)
     do l = 1, size(self%couplings)
       associate (elements => machine%elements, e => self%couplings(l))
-        call add_moment(elements%from(e), elements%to(e), 1.0_wp, incidence(:, l))
+        call elements%rows%add_moment(e, 1.0_wp, incidence(:, l))
       end associate
     end do
     self%moment_of_bodies = pseudo_inverse(incidence, 1.0e-10_wp)
@@ -142,9 +141,8 @@ contains
         call tangent_matrix(self%machine, l, self%work%tangent)
         dfdy(l, 2 * n + 1:3 * n, :n) = self%work%tangent
         self%work%tangent(:, :) = 0.0_wp
-        do e = 1, size(elements%to)
-          call add_coefficient(elements%from(e), elements%to(e), -elements%restoring_curvature(l, e) * elements%speed(l, e), &
-                               self%work%tangent)
+        do e = 1, elements%count
+          call elements%rows%add_coefficient(e, -elements%restoring_curvature(l, e) * elements%speed(l, e), self%work%tangent)
         end do
         dfdy(l, 2 * n + 1:3 * n, n + 1:2 * n) = self%work%tangent
       end do

@@ -5,7 +5,6 @@
 !> procedure overwrites its last argument and allocates nothing.
 module nocdyn_paper_matrices
   use nocdyn_bank, only: role_coupling, role_excitation, role_load, role_motor
-  use nocdyn_incidence, only: add_coefficients, add_moment
   use nocdyn_kinds, only: wp
   use nocdyn_lapack_lu, only: lu_solve
   use nocdyn_machine, only: machine_t
@@ -141,9 +140,9 @@ contains
       associate (bank => machine%banks(i)%bank, elements => machine%elements)
         if (bank%role /= role) cycle
         do e = bank%first, bank%last()
-          call add_moment(elements%from(e), elements%to(e), &
-                          (elements%restoring(lane, e) + elements%secant(lane, e) * elements%angle(lane, e)) &
-                          + (elements%applied(lane, e) + elements%damping(lane, e) * elements%speed(lane, e)), torque)
+          call elements%rows%add_moment(e, (elements%restoring(lane, e) + elements%secant(lane, e) * elements%angle(lane, e)) &
+                                        + (elements%applied(lane, e) + elements%damping(lane, e) * elements%speed(lane, e)), &
+                                        torque)
         end do
       end associate
     end do
@@ -156,7 +155,7 @@ contains
     real(wp), intent(inout) :: stiffness(:, :)   !! K [N m/rad]
 
     stiffness = 0.0_wp
-    call add_coefficients(machine%elements%from, machine%elements%to, 1.0_wp, machine%elements%secant(lane, :), stiffness)
+    call machine%elements%rows%add_coefficients(1.0_wp, machine%elements%secant(lane, :), stiffness)
   end subroutine stiffness_matrix
 
   !> C of eq. (22) from viscous loads and the damping of couplings, [n, n].
@@ -166,7 +165,7 @@ contains
     real(wp), intent(inout) :: damping(:, :)   !! C [N m s/rad]
 
     damping = 0.0_wp
-    call add_coefficients(machine%elements%from, machine%elements%to, 1.0_wp, machine%elements%damping(lane, :), damping)
+    call machine%elements%rows%add_coefficients(1.0_wp, machine%elements%damping(lane, :), damping)
   end subroutine damping_matrix
 
   !> K_4 of eqs. (62)-(72) from the tangent stiffnesses K1 + 3 k1 w^2, [n, n]; the derivative of the elastic moments is
@@ -177,7 +176,7 @@ contains
     real(wp), intent(inout) :: tangent(:, :)   !! K_4 [N m/rad]
 
     tangent = 0.0_wp
-    call add_coefficients(machine%elements%from, machine%elements%to, -1.0_wp, machine%elements%restoring_angle(lane, :), tangent)
+    call machine%elements%rows%add_coefficients(-1.0_wp, machine%elements%restoring_angle(lane, :), tangent)
   end subroutine tangent_matrix
 
   !> F of eqs. (48)-(51): the elastic moment on each body [N m], [n].
@@ -189,8 +188,8 @@ contains
 
     moments = 0.0_wp
     associate (elements => machine%elements)
-      do e = 1, size(elements%to)
-        call add_moment(elements%from(e), elements%to(e), elements%restoring(lane, e), moments)
+      do e = 1, elements%count
+        call elements%rows%add_moment(e, elements%restoring(lane, e), moments)
       end do
     end associate
   end subroutine elastic_moments

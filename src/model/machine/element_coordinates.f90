@@ -10,13 +10,13 @@ module nocdyn_element_coordinates
 
   public :: new_element_coordinates, twist_map
 
-  !> Element e has the entries first(e) to first(e + 1) - 1, one for each coordinate of its two bodies, in ascending order.
+  !> Element e has the entries first(e) to first(e + 1) - 1, one for each coordinate of its bodies, in ascending order.
   !> Its speed is the sum of ratio * q'(coordinate), and its moment M adds response * M to q''(coordinate).
   type, public :: element_coordinates_t
     integer, allocatable :: first(:)          !! first entry of each element, [elements + 1]
     integer, allocatable :: coordinate(:)     !! [entries]
-    real(wp), allocatable :: ratio(:, :)      !! difference of the rows of L_tau of `to` and `from`, [lanes, entries]
-    real(wp), allocatable :: response(:, :)   !! the same difference of ((L_tau^T J L_tau)^-1 L_tau^T)^T, [lanes, entries]
+    real(wp), allocatable :: ratio(:, :)      !! sum of coefficient * row of L_tau over its bodies, [lanes, entries]
+    real(wp), allocatable :: response(:, :)   !! the same sum of ((L_tau^T J L_tau)^-1 L_tau^T)^T, [lanes, entries]
     integer, allocatable, private :: source(:)   !! by `selected`: number that each entry has among all, [entries]
   contains
     procedure :: selected
@@ -29,27 +29,29 @@ module nocdyn_element_coordinates
 
 contains
 
-  !> The entries of all elements. A coordinate that both bodies of an element have is one entry.
+  !> The entries of all elements. A coordinate that several bodies of an element have is one entry.
   function new_element_coordinates(elements, coordinates) result(self)
     type(elements_t), intent(in) :: elements
     type(coordinates_t), intent(in) :: coordinates
     type(element_coordinates_t) :: self
     integer :: entry_of(coordinates%freedoms)   ! entry of each coordinate in the present element, if not below its first one
-    integer :: e, entries
+    integer :: e, entries, k
 
     entries = 0
-    do e = 1, size(elements%to)
-      entries = entries + body_entries(coordinates, elements%to(e)) + body_entries(coordinates, elements%from(e))
+    do k = 1, size(elements%rows%body)
+      entries = entries + body_entries(coordinates, elements%rows%body(k))
     end do
-    allocate (self%first(size(elements%to) + 1), self%coordinate(entries))
+    allocate (self%first(elements%count + 1), self%coordinate(entries))
     allocate (self%ratio(size(elements%time), entries), source=0.0_wp)
     allocate (self%response, source=self%ratio)
     entry_of = 0
     self%first(1) = 1
-    do e = 1, size(elements%to)
+    do e = 1, elements%count
       self%first(e + 1) = self%first(e)
-      call add_body(coordinates, elements%to(e), 1.0_wp, self%first(e), self%first(e + 1), entry_of, self)
-      call add_body(coordinates, elements%from(e), -1.0_wp, self%first(e), self%first(e + 1), entry_of, self)
+      do k = elements%rows%first(e), elements%rows%first(e + 1) - 1
+        call add_body(coordinates, elements%rows%body(k), elements%rows%coefficient(k), self%first(e), self%first(e + 1), &
+                      entry_of, self)
+      end do
       call sort_entries(self, self%first(e), self%first(e + 1) - 1)
     end do
     entries = self%first(size(self%first)) - 1
@@ -90,20 +92,21 @@ contains
     integer, intent(in) :: lane
     type(elements_t), intent(in) :: elements
     type(coordinates_t), intent(in) :: coordinates
-    integer :: e
+    integer :: e, k
 
-    do e = 1, size(elements%to)
+    do e = 1, elements%count
       self%response(lane, self%first(e):self%first(e + 1) - 1) = 0.0_wp
-      call add_response(coordinates, elements%to(e), 1.0_wp, lane, self%first(e), self)
-      call add_response(coordinates, elements%from(e), -1.0_wp, lane, self%first(e), self)
+      do k = elements%rows%first(e), elements%rows%first(e + 1) - 1
+        call add_response(coordinates, elements%rows%body(k), elements%rows%coefficient(k), lane, self%first(e), self)
+      end do
     end do
   end subroutine refresh_responses
 
   !> Adds the response of one body to those of an element in one lane.
-  pure subroutine add_response(coordinates, body, sign, lane, begin, self)
+  pure subroutine add_response(coordinates, body, coefficient, lane, begin, self)
     type(coordinates_t), intent(in) :: coordinates
     integer, intent(in) :: body    !! 0 = ground, which has none
-    real(wp), intent(in) :: sign   !! 1 for `to`, -1 for `from`
+    real(wp), intent(in) :: coefficient   !! of the body in the row of the element
     integer, intent(in) :: lane
     integer, intent(in) :: begin   !! first entry of the element
     type(element_coordinates_t), intent(inout) :: self
@@ -115,7 +118,7 @@ contains
       do while (self%coordinate(k) /= coordinates%coordinate(of_body))
         k = k + 1
       end do
-      self%response(lane, k) = self%response(lane, k) + sign * coordinates%response(lane, of_body)
+      self%response(lane, k) = self%response(lane, k) + coefficient * coordinates%response(lane, of_body)
     end do
   end subroutine add_response
 
@@ -157,10 +160,10 @@ contains
   end function body_entries
 
   !> Adds the coordinates of a body to the entries of an element.
-  pure subroutine add_body(coordinates, body, sign, begin, next, entry_of, self)
+  pure subroutine add_body(coordinates, body, coefficient, begin, next, entry_of, self)
     type(coordinates_t), intent(in) :: coordinates
     integer, intent(in) :: body             !! 0 = ground, which has none
-    real(wp), intent(in) :: sign            !! 1 for `to`, -1 for `from`
+    real(wp), intent(in) :: coefficient     !! of the body in the row of the element
     integer, intent(in) :: begin            !! first entry of the element
     integer, intent(inout) :: next          !! next free entry
     integer, intent(inout) :: entry_of(:)   !! entry of each coordinate, [freedoms]; below `begin`: not in this element yet
@@ -175,8 +178,8 @@ contains
           self%coordinate(next) = c
           next = next + 1
         end if
-        self%ratio(:, entry_of(c)) = self%ratio(:, entry_of(c)) + sign * coordinates%ratio(:, of_body)
-        self%response(:, entry_of(c)) = self%response(:, entry_of(c)) + sign * coordinates%response(:, of_body)
+        self%ratio(:, entry_of(c)) = self%ratio(:, entry_of(c)) + coefficient * coordinates%ratio(:, of_body)
+        self%response(:, entry_of(c)) = self%response(:, entry_of(c)) + coefficient * coordinates%response(:, of_body)
       end associate
     end do
   end subroutine add_body

@@ -15,7 +15,7 @@ contains
     type(machine_t), intent(in) :: machine
     integer :: i
 
-    has_springs_only = all([(machine%banks(i)%bank%has_polynomial_potential .or. size(machine%banks(i)%bank%to) == 0, &
+    has_springs_only = all([(machine%banks(i)%bank%has_polynomial_potential .or. machine%banks(i)%bank%count == 0, &
                              i=1, size(machine%banks))])
   end function has_springs_only
 

@@ -3,6 +3,7 @@ module nocdyn_machine
   use nocdyn_bank, only: bank_of, bank_slot_t, bank_t, name_length, role_names
   use nocdyn_constraints, only: constraints_t
   use nocdyn_coordinates, only: coordinates_t
+  use nocdyn_element_rows, only: element_rows_t, joined_rows, rows_between
   use nocdyn_elements, only: elements_t, internal_states_t, new_elements
   use nocdyn_geared_groups, only: geared_group_t
   use nocdyn_kinds, only: wp
@@ -69,22 +70,24 @@ contains
   !> Numbers the elements of all banks consecutively, and collects their laws and switches. Call it once all banks are set.
   subroutine number_elements(self)
     class(machine_t), intent(inout) :: self
+    type(element_rows_t) :: rows
     integer :: i, internal, total
 
     total = 0
     internal = 0
+    rows = rows_between([integer ::], [integer ::])
     do i = 1, size(self%banks)
       associate (bank => self%banks(i)%bank)
         bank%first = total + 1
         bank%first_value = self%lanes * total + 1
         bank%first_internal = internal + 1
         total = bank%last()
-        internal = internal + bank%states * size(bank%to)
+        rows = joined_rows(rows, bank%rows)
+        internal = internal + bank%states * bank%count
       end associate
     end do
-    self%elements = new_elements(self%lanes, [(self%banks(i)%bank%from, i=1, size(self%banks))], &
-                                 [(self%banks(i)%bank%to, i=1, size(self%banks))], &
-                                 [(spread(self%banks(i)%bank%states, 1, size(self%banks(i)%bank%to)), i=1, size(self%banks))])
+    self%elements = new_elements(self%lanes, rows, &
+                                 [(spread(self%banks(i)%bank%states, 1, self%banks(i)%bank%count), i=1, size(self%banks))])
     self%laws = new_polynomial_laws(self%lanes, total)
     do i = 1, size(self%banks)
       call self%banks(i)%bank%polynomials(1, self%lanes, self%laws)
@@ -144,19 +147,19 @@ contains
   !> Twists of the elements at the start [rad], [lanes, elements].
   pure function start_twist(self) result(twist)
     class(machine_t), intent(in) :: self
-    real(wp) :: twist(self%lanes, size(self%elements%to))
+    real(wp) :: twist(self%lanes, self%elements%count)
     real(wp) :: angle(self%lanes, 0:self%bodies)
 
     angle(:, 0) = 0.0_wp
     angle(:, 1:) = self%start_angle
-    twist = angle(:, self%elements%to) - angle(:, self%elements%from)
+    call self%elements%rows%combine(self%lanes, self%bodies, angle, twist)
   end function start_twist
 
   !> Internal states at the start, [lanes, internal states].
   function start_internal(self) result(internal)
     class(machine_t), intent(in) :: self
     real(wp), allocatable :: internal(:, :)
-    real(wp) :: omega(self%lanes, 0:self%bodies)
+    real(wp) :: omega(self%lanes, 0:self%bodies), speed(self%lanes, self%elements%count)
     integer :: i
 
     if (allocated(self%steady_internal)) allocate (internal, source=self%steady_internal)
@@ -166,8 +169,9 @@ contains
     omega(:, 1:) = self%start_speed
     do i = 1, size(self%internal_banks)
       associate (bank => self%banks(self%internal_banks(i))%bank)
-        call bank%start_internal(omega(:, bank%to) - omega(:, bank%from), &
-                              internal(:, bank%first_internal:bank%first_internal + bank%states * size(bank%to) - 1))
+        call bank%rows%combine(self%lanes, self%bodies, omega, speed(:, :bank%count))
+        call bank%start_internal(speed(:, :bank%count), &
+                              internal(:, bank%first_internal:bank%first_internal + bank%states * bank%count - 1))
       end associate
     end do
   end function start_internal
@@ -182,7 +186,7 @@ contains
     do i = 1, size(self%internal_banks)
       associate (bank => self%banks(self%internal_banks(i))%bank)
         associate (offset => index - bank%first_internal)
-          if (offset >= bank%states * size(bank%to)) cycle
+          if (offset >= bank%states * bank%count) cycle
           name = trim(bank%internal_names(1 + modulo(offset, bank%states))) // ' of ' // trim(role_names(bank%role)) // ' ' // &
                  quoted(bank%names(1 + offset / bank%states)%text)
           return
@@ -216,7 +220,7 @@ contains
     do i = 1, size(self%internal_banks)
       associate (bank => self%banks(self%internal_banks(i))%bank, elements => self%elements)
         call bank%steady_internal(elements%speed(1, bank%first:bank%last()), elements%internal%value(1, &
-                                  bank%first_internal:bank%first_internal + bank%states * size(bank%to) - 1))
+                                  bank%first_internal:bank%first_internal + bank%states * bank%count - 1))
       end associate
     end do
   end subroutine settle_internal

@@ -24,11 +24,11 @@ module nocdyn_linear_columns
     real(wp), allocatable :: factor(:, :, :)  !! [width, entries, strips of lanes]
     real(wp), allocatable :: offset(:, :, :)  !! [width, columns, strips]
     integer, allocatable, private :: ratio(:)       !! entry of the coordinates, 0 if it only completes a pair; [entries]
-    logical, allocatable, private :: is_minus(:)    !! whether the factor is the negative of that ratio, [entries]
+    real(wp), allocatable, private :: coefficient(:)   !! the factor is this multiple of that ratio, [entries]
     logical, allocatable, private :: is_speed(:)    !! [columns]
     integer, allocatable, private :: element(:)     !! whose twist or moment the column is, 0 if it is none; [columns]
     logical, allocatable, private :: has_law(:)     !! whether it is a moment; [columns]
-    integer, allocatable, private :: from(:), to(:) !! bodies of the angle or twist, 0 is the ground; [columns]
+    integer, allocatable, private :: body(:)        !! whose angle or speed the column is; [columns]
   contains
     procedure :: copy_lane, find_laws, argument
   end type linear_columns_t
@@ -79,13 +79,13 @@ contains
     self%count = size(columns)
     strips = strip_of(block%lanes)
     allocate (self%first(self%count + 1), source=1)
-    allocate (self%component(0), self%ratio(0), self%is_minus(0))
+    allocate (self%component(0), self%ratio(0), self%coefficient(0))
     allocate (self%is_speed, source=columns%kind == column_speed)
     allocate (self%has_law(self%count), source=.false.)
-    allocate (self%element(self%count), self%from(self%count), self%to(self%count), source=0)
+    allocate (self%element(self%count), self%body(self%count), source=0)
     do i = 1, self%count
       call set_column(self, i, block%machine, columns(i))
-      call add_entries(self, i, block%machine%coordinates)
+      call add_entries(self, i, block%machine)
     end do
     allocate (self%factor(width, size(self%component), strips), self%offset(width, self%count, strips), source=0.0_wp)
   end function new_linear_columns
@@ -96,36 +96,50 @@ contains
     type(machine_t), intent(in) :: machine
     type(column_t), intent(in) :: column
 
-    self%to(number) = column%index
+    self%body(number) = column%index
     if (column%kind /= column_element) return
     self%element(number) = machine%banks(column%bank)%bank%first - 1 + column%index
-    self%to(number) = machine%elements%to(self%element(number))
-    self%from(number) = machine%elements%from(self%element(number))
     self%has_law(number) = has_law(machine, column)
   end subroutine set_column
 
-  subroutine add_entries(self, number, coordinates)
+  subroutine add_entries(self, number, machine)
     type(linear_columns_t), intent(inout) :: self
     integer, intent(in) :: number
-    type(coordinates_t), intent(in) :: coordinates
-    integer :: bodies(2), i, k
+    type(machine_t), intent(in) :: machine
+    integer :: k
 
-    bodies = [self%to(number), self%from(number)]
-    do i = 1, 2
-      if (bodies(i) == 0) cycle
-      do k = coordinates%first(bodies(i)), coordinates%first(bodies(i) + 1) - 1
-        self%ratio = [self%ratio, k]
-        self%is_minus = [self%is_minus, i == 2]
-        self%component = [self%component, coordinates%coordinate(k) + merge(0, coordinates%freedoms, self%is_speed(number))]
-      end do
-    end do
+    if (self%element(number) == 0) then
+      call add_body(self, number, machine%coordinates, self%body(number), 1.0_wp)
+    else
+      associate (rows => machine%elements%rows, e => self%element(number))
+        do k = rows%first(e + 1) - 1, rows%first(e), -1
+          call add_body(self, number, machine%coordinates, rows%body(k), rows%coefficient(k))
+        end do
+      end associate
+    end if
     if (modulo(size(self%ratio), 2) == 1) then
       self%ratio = [self%ratio, 0]
-      self%is_minus = [self%is_minus, .false.]
+      self%coefficient = [self%coefficient, 0.0_wp]
       self%component = [self%component, self%component(size(self%component))]
     end if
     self%first(number + 1) = size(self%ratio) + 1
   end subroutine add_entries
+
+  subroutine add_body(self, number, coordinates, body, coefficient)
+    type(linear_columns_t), intent(inout) :: self
+    integer, intent(in) :: number
+    type(coordinates_t), intent(in) :: coordinates
+    integer, intent(in) :: body              !! 0 = ground, which has no coordinates
+    real(wp), intent(in) :: coefficient
+    integer :: k
+
+    if (body == 0) return
+    do k = coordinates%first(body), coordinates%first(body + 1) - 1
+      self%ratio = [self%ratio, k]
+      self%coefficient = [self%coefficient, coefficient]
+      self%component = [self%component, coordinates%coordinate(k) + merge(0, coordinates%freedoms, self%is_speed(number))]
+    end do
+  end subroutine add_body
 
   !> Copies the parameters of a lane of the block.
   pure subroutine copy_lane(self, block, lane)
@@ -138,14 +152,14 @@ contains
       do k = 1, size(self%ratio)
         if (self%ratio(k) == 0) cycle
         associate (ratio => machine%coordinates%ratio(lane, self%ratio(k)))
-          self%factor(at, k, strip) = merge(-ratio, ratio, self%is_minus(k))
+          self%factor(at, k, strip) = self%coefficient(k) * ratio
         end associate
       end do
       do i = 1, self%count
         if (self%is_speed(i)) cycle
         associate (offset => self%offset(at, i, strip))
           if (self%element(i) == 0) then
-            offset = block%angle_at_zero(lane, self%to(i))
+            offset = block%angle_at_zero(lane, self%body(i))
             cycle
           end if
           offset = block%twist_at_zero(lane, self%element(i))

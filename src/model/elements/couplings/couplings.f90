@@ -4,6 +4,7 @@
 !> friction have one work integral.
 module nocdyn_couplings
   use nocdyn_bank, only: bank_t, quantity_t, role_coupling
+  use nocdyn_element_rows, only: element_rows_t, rows_between
   use nocdyn_elements, only: elements_t
   use nocdyn_kinds, only: wp
   use nocdyn_law_expressions, only: angle_of, expression_t, node_of, operator(*), operator(-), operator(/), speed_of
@@ -20,7 +21,7 @@ module nocdyn_couplings
   !> What couplings of every elastic law have in common. Parameters have the shape [lanes, couplings].
   type, public :: coupling_common_t
     type(string_t), allocatable :: names(:)
-    integer, allocatable :: from(:), to(:)          !! bodies, 0 = ground
+    type(element_rows_t) :: rows                    !! bodies
     real(wp), allocatable :: damping(:, :)          !! [N m s/rad]
     real(wp), allocatable :: rest_twist(:, :)       !! [rad]
     real(wp), allocatable :: friction(:, :)         !! [N m]; not allocated: none
@@ -30,7 +31,7 @@ module nocdyn_couplings
 
   ! gfortran 12 loses components of a structure constructor's value that is an argument
   interface coupling_common_t
-    procedure :: new_common
+    procedure :: new_common, common_of_rows
   end interface coupling_common_t
 
   !> M_el = -(K1 + k1 w^2) w on the second body, w = u - rest_twist; damping moment -d u'. Extensions have another elastic moment.
@@ -50,24 +51,37 @@ module nocdyn_couplings
 
 contains
 
-  function new_common(names, from, to, damping, rest_twist, friction, friction_speed) result(common)
+  !> Couplings between two bodies each.
+  function new_common(names, from, to, damping, rest_twist, friction, friction_speed) result(shared)
     type(string_t), intent(in) :: names(:)
     integer, intent(in) :: from(:), to(:)                    !! bodies, 0 = ground
     real(wp), intent(in) :: damping(:, :)                    !! [N m s/rad], shape [lanes, couplings] as all that follow
     real(wp), intent(in) :: rest_twist(:, :)                 !! [rad]
     real(wp), intent(in), optional :: friction(:, :)         !! [N m]; absent: none
     real(wp), intent(in), optional :: friction_speed(:, :)   !! [rad/s], positive; present with `friction`
-    type(coupling_common_t) :: common
+    type(coupling_common_t) :: shared
 
-    allocate (common%names, source=names)
-    allocate (common%from, source=from)
-    allocate (common%to, source=to)
-    allocate (common%damping, source=damping)
-    allocate (common%rest_twist, source=rest_twist)
-    if (.not. present(friction)) return
-    allocate (common%friction, source=friction)
-    allocate (common%friction_speed, source=friction_speed)
+    shared = common_of_rows(names, rows_between(from, to), damping, rest_twist, friction, friction_speed)
   end function new_common
+
+  !> Couplings along any rows.
+  function common_of_rows(names, rows, damping, rest_twist, friction, friction_speed) result(shared)
+    type(string_t), intent(in) :: names(:)
+    type(element_rows_t), intent(in) :: rows
+    real(wp), intent(in) :: damping(:, :)                    !! [N m s/rad], shape [lanes, couplings] as all that follow
+    real(wp), intent(in) :: rest_twist(:, :)                 !! [rad]
+    real(wp), intent(in), optional :: friction(:, :)         !! [N m]; absent: none
+    real(wp), intent(in), optional :: friction_speed(:, :)   !! [rad/s], positive; present with `friction`
+    type(coupling_common_t) :: shared
+
+    allocate (shared%names, source=names)
+    shared%rows = rows
+    allocate (shared%damping, source=damping)
+    allocate (shared%rest_twist, source=rest_twist)
+    if (.not. present(friction)) return
+    allocate (shared%friction, source=friction)
+    allocate (shared%friction_speed, source=friction_speed)
+  end function common_of_rows
 
   !> Couplings by eq. (3). Those without damping and friction in all lanes have no work integral.
   function new_couplings(common, stiffness, cubic_stiffness) result(bank)
@@ -87,7 +101,7 @@ contains
     bank%is_polynomial = .not. bank%has_friction
     bank%has_paper_law = bank%is_polynomial
     bank%has_polynomial_potential = .true.
-    bank%elastic = pack([(e, e=1, size(common%to))], any(abs(stiffness) > 0.0_wp .or. abs(cubic_stiffness) > 0.0_wp, dim=1))
+    bank%elastic = pack([(e, e=1, bank%count)], any(abs(stiffness) > 0.0_wp .or. abs(cubic_stiffness) > 0.0_wp, dim=1))
     call bank%prepare_law()
   end function new_couplings
 
@@ -96,9 +110,9 @@ contains
     class(couplings_t), intent(inout) :: self
     type(coupling_common_t), intent(in) :: common   !! names, bodies, damping, rest twists, friction
     integer :: e
-    logical :: is_dissipative(size(common%to))
+    logical :: is_dissipative(size(common%damping, 2))
 
-    call self%connect(role_coupling, size(common%damping, 1), common%names, common%to, common%from)
+    call self%connect(role_coupling, size(common%damping, 1), common%names, common%rows)
     call self%add_parameter('damping', common%damping)
     call self%add_parameter('rest_twist', common%rest_twist)
     is_dissipative = any(abs(common%damping) > 0.0_wp, dim=1)
@@ -109,7 +123,7 @@ contains
       is_dissipative = is_dissipative .or. any(abs(common%friction) > 0.0_wp, dim=1)
     end if
     if (allocated(common%section_modulus)) call self%add_parameter('section_modulus', common%section_modulus, is_key=.false.)
-    self%with_work = pack([(e, e=1, size(common%to))], is_dissipative)
+    self%with_work = pack([(e, e=1, self%count)], is_dissipative)
     self%is_polynomial = .false.
     self%has_polynomial_potential = .false.
     self%has_paper_law = .false.

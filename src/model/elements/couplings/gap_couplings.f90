@@ -49,10 +49,10 @@ contains
       error stop 'nocdyn_gap_couplings: gaps have widths and edges stiffness'
     end if
     call bank%add_parameter('gap', gap, is_key=bank%order == 1)   ! the powers of others are looked at in assembly
-    bank%with_work = pack([(e, e=1, size(bank%to))], [(any(bank%with_work == e) .or. can_pull(coefficient(:, :, e)), &
-                                                  e=1, size(bank%to))])
-    bank%elastic = [(e, e=1, size(bank%to))]
-    call bank%add_switches([('edge of the gap', e=1, size(bank%to))], branches)
+    bank%with_work = pack([(e, e=1, bank%count)], [(any(bank%with_work == e) .or. can_pull(coefficient(:, :, e)), &
+                                                  e=1, bank%count)])
+    bank%elastic = [(e, e=1, bank%count)]
+    call bank%add_switches([('edge of the gap', e=1, bank%count)], branches)
     call bank%prepare_law()
   end function new_gap_couplings
 

@@ -33,7 +33,7 @@ contains
     call bank%set_common(common)
     call bank%add_damping()
     call add_coefficients(bank, coefficient, bank%order)
-    bank%elastic = pack([(e, e=1, size(bank%to))], [(any(abs(coefficient(:, :, e)) > 0.0_wp), e=1, size(bank%to))])
+    bank%elastic = pack([(e, e=1, bank%count)], [(any(abs(coefficient(:, :, e)) > 0.0_wp), e=1, bank%count)])
     call bank%prepare_law()
   end function new_polynomial_couplings
 

@@ -29,7 +29,7 @@ contains
     call bank%add_damping()
     call bank%add_parameter('stiffness', stiffness)
     call bank%add_parameter('saturation', saturation)
-    bank%elastic = [(e, e=1, size(bank%to))]
+    bank%elastic = [(e, e=1, bank%count)]
     call bank%prepare_law()
   end function new_saturated_couplings
 

@@ -29,7 +29,7 @@ contains
     call bank%set_common(common)
     call bank%add_damping()
     call add_table(bank, curve)
-    bank%elastic = [(e, e=1, size(common%to))]
+    bank%elastic = [(e, e=1, bank%count)]
     call bank%prepare_law()
   end function new_table_couplings
 

@@ -64,7 +64,7 @@ contains
     frequency = self%values_of('frequency')
     phase = self%values_of('phase')
     allocate (list(merge(1, 0, frequency(1, element) > 0)))
-    list(:) = harmonic_t(amplitude(1, element), frequency(1, element), 0.0_wp, phase(1, element), self%to(element))
+    list(:) = harmonic_t(amplitude(1, element), frequency(1, element), 0.0_wp, phase(1, element), self%rows%last_body(element))
   end subroutine list_harmonics
 
 end module nocdyn_excitations

@@ -173,7 +173,7 @@ contains
       allocate (list(size(terms)))
       do i = 1, size(terms)
         list(i) = harmonic_t(amplitude%value(1, terms(i)), frequency%value(1, terms(i)), order%value(1, terms(i)), &
-                             phase%value(1, terms(i)), self%to(element))
+                             phase%value(1, terms(i)), self%rows%last_body(element))
       end do
     end associate
   end subroutine list_harmonics

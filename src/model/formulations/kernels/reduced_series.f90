@@ -69,7 +69,7 @@ contains
 
     self%order = order
     self%lanes = machine%lanes
-    self%elements = size(machine%elements%to)
+    self%elements = machine%elements%count
     self%freedoms = machine%coordinates%freedoms
     self%strip = strip_lanes(machine%lanes, self%elements)
     self%w = max(self%strip, narrow)
