@@ -15,7 +15,8 @@ KNOWN = {
     "coupling": {"name", "bodies", "stiffness", "damping", "gap"},
     "motor": {"name", "body", "kind", "torque", "a", "b", "c"},
     "load": {"name", "body", "viscous"},
-    "excitation": {"name", "body", "kind", "orders", "amplitudes", "phases", "table_file"},
+    "excitation": {"name", "body", "kind", "table_file"},
+    "engine": {"name", "cylinders", "stroke", "firing_deg", "orders", "amplitudes"},
     "run": {"t_end", "method", "rtol", "atol"},
     "output": {"interval"},
 }
@@ -131,9 +132,12 @@ class Shipped:
     @property
     def orders(self) -> list[tuple[int, np.ndarray]]:
         """Body; order, amplitude [N m] and phase [rad] of each harmonic of its angle."""
-        keys = ("orders", "amplitudes", "phases")
-        shakes = [group for group in self.of("excitation") if group["kind"] == "orders"]
-        return [(self.body(group["body"]), np.array([group[key] for key in keys], dtype=float).T) for group in shakes]
+        found = []
+        for engine in self.of("engine"):
+            orders, amplitudes = (np.array(engine[key], dtype=float) for key in ("orders", "amplitudes"))
+            for body, firing in zip(engine["cylinders"], np.radians(engine["firing_deg"])):
+                found.append((self.body(body), np.array([orders, amplitudes, -orders * firing]).T))
+        return found
 
     @property
     def tables(self) -> list[tuple[int, np.ndarray]]:

@@ -25,7 +25,12 @@ UNITS = {"_rpm": np.pi / 30, "_hz": 2 * np.pi, "_deg": np.pi / 180}
 
 def in_si(group):
     """A group with the keys in rad/s and rad of those in other units beside them."""
-    si = {key.removesuffix(end): value * one for end, one in UNITS.items() for key, value in group.items() if key.endswith(end)}
+    si = {
+        key.removesuffix(end): np.multiply(value, one)
+        for end, one in UNITS.items()
+        for key, value in group.items()
+        if key.endswith(end)
+    }
     return group | si
 
 
@@ -491,8 +496,9 @@ def engine():
     chain = [m.coupling["oil"], *(m.coupling[f"crank_{i}"] for i in range(1, 9)), m.coupling["rubber"]]
     stiffness = np.array([group.get("stiffness", 0.0) for group in chain])
     damping = np.array([group["damping"] for group in chain])
-    shakes = [m.excitation[f"gas_{i}"] for i in range(1, 7)]
-    lists = [np.array([group[key] for group in shakes]) for key in ("orders", "amplitudes", "phases")]
+    diesel = m.engine["diesel"]
+    orders, amplitudes = np.array(diesel["orders"]), np.array(diesel["amplitudes"])
+    firing = diesel["firing"][:, None]
     n = len(names)
 
     def rate(t, y, *_):
@@ -500,7 +506,7 @@ def engine():
         torque = np.zeros(n)
         torque[:-1] += moment
         torque[1:] -= moment
-        torque[cylinders] += np.sum(lists[1] * np.sin(lists[0] * y[cylinders][:, None] + lists[2]), axis=1)
+        torque[cylinders] += np.sin(orders * (y[cylinders][:, None] - firing)) @ amplitudes
         torque[names.index("flywheel")] += m.motor["gas"]["torque"]
         torque[-1] -= m.load["grid"]["viscous"] * y[-1]
         return np.concatenate([y[n:], torque / inertia])

@@ -21,6 +21,10 @@ def unit_of(key):
     return next((unit for unit in UNITS if key.endswith(unit)), "")
 
 
+def in_si(value, unit):
+    return [one * unit for one in value] if isinstance(value, list) else value * unit
+
+
 def names(path):
     return path.stem
 
@@ -73,7 +77,7 @@ def test_f90nml_reads_the_same_values(nocdyn, path):
         values.pop("table_file", None)
         # in place of a number in a unit of the field stands that in SI
         values = {
-            key.removesuffix(unit_of(key)): value * UNITS[unit_of(key)] for key, value in values.items() if unit_of(key)
+            key.removesuffix(unit_of(key)): in_si(value, UNITS[unit_of(key)]) for key, value in values.items() if unit_of(key)
         } | {key: value for key, value in values.items() if not unit_of(key)}
         assert values == {key: all_values[key] for key in values}
 

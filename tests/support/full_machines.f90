@@ -11,7 +11,9 @@ module nocdyn_test_full_machines
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
   use nocdyn_motors, only: new_induction_motors, new_motors, new_table_motors
+  use nocdyn_load_shares, only: new_load_shares, shared_load_t
   use nocdyn_loads, only: new_nonlinear_loads
+  use nocdyn_order_excitations, only: new_order_excitations, order_torque_t
   use nocdyn_polynomial_couplings, only: new_polynomial_couplings
   use nocdyn_saturated_couplings, only: new_saturated_couplings
   use nocdyn_table_couplings, only: new_table_couplings
@@ -171,6 +173,8 @@ contains
     integer, intent(in) :: bodies, variants(:)
     type(machine_t), intent(inout) :: machine
 
+    call append_bank(machine%banks, new_order_excitations(numbered_names('cylinder', 2), [1, bodies], cylinders(variants)))
+    call add_shares(bodies, variants, machine)
     associate (one => lane_values(1.0_wp, variants, 3))
       call append_bank(machine%banks, &
                        new_wave_excitations(numbered_names('gas', 2), [1, bodies], [1, 1, 2], 9.0_wp * one, &
@@ -186,5 +190,45 @@ contains
                                                     extrapolation_constant, variants, 1)))
     end associate
   end subroutine add_excitations
+
+  !> Two cylinders, of which one follows the speed at more points, [lanes, cylinders].
+  function cylinders(variants) result(torque)
+    integer, intent(in) :: variants(:)
+    type(order_torque_t), allocatable :: torque(:, :)
+    integer :: c, l
+
+    allocate (torque(size(variants), 2))
+    do c = 1, 2
+      do l = 1, size(variants)
+        associate (one => torque(l, c), factor => 1.0_wp + 0.03_wp * variants(l))
+          one%order = [0.5_wp, 1.0_wp, 2.25_wp]
+          one%speed = [-1.0_wp, 0.5_wp, 2.0_wp] * factor
+          if (c == 2) one%speed = one%speed(:2)
+          one%mean = [5.0_wp, 7.0_wp, 4.0_wp]
+          one%mean = one%mean(:size(one%speed)) * factor
+          one%sine = spread(one%mean, 1, 3)
+          one%cosine = -0.5_wp * one%sine
+          one%square_order = [1.0_wp, 2.0_wp]
+          one%square_sine = [0.2_wp, -0.5_wp] * factor
+          one%square_cosine = [0.1_wp, 0.0_wp]
+        end associate
+      end do
+    end do
+  end function cylinders
+
+  subroutine add_shares(bodies, variants, machine)
+    integer, intent(in) :: bodies, variants(:)
+    type(machine_t), intent(inout) :: machine
+    type(shared_load_t) :: load
+
+    associate (one => lane_values(1.0_wp, variants, 2))
+      load%viscous = 2.0_wp * one
+      load%quadratic = 0.5_wp * one
+      load%constant = one
+      load%constant_speed = 0.7_wp * one
+      call append_bank(machine%banks, new_load_shares(numbered_names('blades', 2), [bodies, 1], [1, 2], 0.1_wp * one, &
+                                                      5.0_wp * one, one, load))
+    end associate
+  end subroutine add_shares
 
 end module nocdyn_test_full_machines

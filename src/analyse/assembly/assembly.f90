@@ -6,6 +6,7 @@ module nocdyn_assembly
   use nocdyn_coordinates, only: build_coordinates
   use nocdyn_coupling_assembly, only: add_coupling_form, check_couplings, coupling_form
   use nocdyn_element_groups, only: add_banks, bodies_of, body_index_t, element_groups_t, new_body_index, new_element_groups
+  use nocdyn_engine_checks, only: check_engines, check_orders
   use nocdyn_errors, only: error_t, exit_input, raise
   use nocdyn_formulation, only: formulation_t
   use nocdyn_input, only: input_t
@@ -18,7 +19,7 @@ module nocdyn_assembly
   use nocdyn_start_speeds, only: fit_start_speeds
   use nocdyn_steady_start, only: start_steadily
   use nocdyn_text, only: joined, selected
-  use nocdyn_torque_assembly, only: add_excitation_form, add_load_form, excitation_form, load_form
+  use nocdyn_torque_assembly, only: add_engines, add_excitation_form, add_load_form, excitation_form, load_form
   implicit none (type, external)
   private
 
@@ -51,6 +52,8 @@ contains
     call assemble_constraints(input, body_index, machine%lanes, machine%constraints, error)
     if (.not. allocated(error)) call check_couplings(input, error)
     if (.not. allocated(error)) call check_motors(input, error)
+    if (.not. allocated(error)) call check_engines(input, error)
+    if (.not. allocated(error)) call check_orders(input, error)
     if (allocated(error)) return
     allocate (machine%banks(0))
     associate (n => machine%lanes)
@@ -58,6 +61,7 @@ contains
       call add_banks(new_element_groups(input, 'motor', n, body_index), motor_form, add_motor_form, machine%banks)
       call add_banks(new_element_groups(input, 'load', n, body_index), load_form, add_load_form, machine%banks)
       call add_banks(new_element_groups(input, 'excitation', n, body_index), excitation_form, add_excitation_form, machine%banks)
+      call add_engines(new_element_groups(input, 'engine', n, body_index), machine%banks)
     end associate
     call machine%number_elements()
     call analyse_machine_constraints(input, body_index, machine, error)

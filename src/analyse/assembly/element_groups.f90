@@ -28,7 +28,7 @@ module nocdyn_element_groups
     type(input_t), pointer :: input => null()
     type(body_index_t), pointer, private :: body_index => null()
   contains
-    procedure :: values, curves, bodies
+    procedure :: values, curves, bodies, listed_bodies
   end type element_groups_t
 
   abstract interface
@@ -149,6 +149,16 @@ contains
       bodies(i) = named(which)
     end do
   end function bodies
+
+  !> All bodies that one group names under a key.
+  function listed_bodies(self, key, group) result(bodies)
+    class(element_groups_t), intent(in) :: self
+    character(len=*), intent(in) :: key   !! of names of bodies
+    integer, intent(in) :: group          !! 1 or more
+    integer, allocatable :: bodies(:)
+
+    bodies = bodies_of(self%input%groups(self%indices(group)), key, self%body_index)
+  end function listed_bodies
 
   !> The table of each group, [lanes, groups].
   function curves(self, x, y, extrapolation)

@@ -1,21 +1,28 @@
 !> The banks of loads and excitations of an input: one for each form of their laws that it has.
 module nocdyn_torque_assembly
   use nocdyn_bank, only: append_bank, bank_slot_t
+  use nocdyn_cylinder_torques, only: cylinder_torques
   use nocdyn_element_groups, only: element_groups_t
   use nocdyn_excitations, only: new_excitations
+  use nocdyn_harmonic_tables, only: table_torque
   use nocdyn_input, only: group_t
   use nocdyn_kinds, only: wp
+  use nocdyn_load_shares, only: new_load_shares, shared_load_t
   use nocdyn_loads, only: new_loads, new_nonlinear_loads
+  use nocdyn_order_excitations, only: new_order_excitations, order_torque_t
+  use nocdyn_shared_loads, only: find_shared_load
   use nocdyn_table_excitations, only: new_table_excitations
   use nocdyn_timed_excitations, only: new_timed_excitations, shape_pulse, shape_ramp, shape_step
+  use nocdyn_text, only: string_t, to_text
   use nocdyn_wave_excitations, only: new_wave_excitations
   implicit none (type, external)
   private
 
-  public :: load_form, add_load_form, excitation_form, add_excitation_form
+  public :: load_form, add_load_form, excitation_form, add_excitation_form, add_engines
 
   integer, parameter :: viscous = 1, nonlinear = 2, table = 3     ! forms of loads
-  integer, parameter :: harmonic = 1, waves = 2, timed = 4        ! forms of excitations, and `table`
+  ! forms of excitations, and `table`
+  integer, parameter :: harmonic = 1, waves = 2, timed = 4, orders = 5, shares = 6
 
 contains
 
@@ -61,6 +68,8 @@ contains
       excitation_form = harmonic
     case ('orders', 'startup')
       excitation_form = waves
+      if (group%has_value('speeds')) excitation_form = orders
+      if (group%has_value('share_of_load')) excitation_form = shares
     case ('table')
       excitation_form = table
     case default
@@ -82,6 +91,10 @@ contains
                                               groups%values('phase')))
     case (waves)
       call add_waves(groups, body, banks)
+    case (orders)
+      call append_bank(banks, new_order_excitations(groups%names, body, in_lanes(torques(groups), groups%lanes)))
+    case (shares)
+      call add_shares(groups, body, banks)
     case (table)
       call append_bank(banks, new_table_excitations(groups%names, body, &
                                                     groups%curves('table_time', 'table_torque', extrapolation='constant')))
@@ -128,5 +141,83 @@ contains
                                                    spread(frequency, 1, lanes), spread(order, 1, lanes), spread(phase, 1, lanes)))
     end associate
   end subroutine add_waves
+
+  !> The torque of each group with orders at several speeds.
+  function torques(groups)
+    type(element_groups_t), intent(in) :: groups
+    type(order_torque_t), allocatable :: torques(:)
+    integer :: i
+
+    allocate (torques(size(groups%indices)))
+    do i = 1, size(torques)
+      torques(i) = table_torque(groups%input%groups(groups%indices(i)), 'amplitudes', 'phases')
+    end do
+  end function torques
+
+  !> The same torques in every lane.
+  function in_lanes(torque, lanes) result(all_torques)
+    type(order_torque_t), intent(in) :: torque(:)
+    integer, intent(in) :: lanes
+    type(order_torque_t), allocatable :: all_torques(:, :)   !! [lanes, torques]
+    integer :: i, lane
+
+    allocate (all_torques(lanes, size(torque)))   ! gfortran 12: `spread` copies the pointers to allocatable components
+    do i = 1, size(torque)
+      do lane = 1, lanes
+        all_torques(lane, i) = torque(i)
+      end do
+    end do
+  end function in_lanes
+
+  !> Adds banks of shares of loads, one for each: their loads may have switches that those of others do not have.
+  subroutine add_shares(groups, body, banks)
+    type(element_groups_t), intent(in) :: groups
+    integer, intent(in) :: body(:)
+    type(bank_slot_t), allocatable, intent(inout) :: banks(:)
+    type(element_groups_t) :: loads
+    type(shared_load_t), allocatable :: load
+    character(len=:), allocatable :: text
+    integer :: i, index
+
+    do i = 1, size(body)
+      call find_shared_load(groups%input, groups%indices(i), index, text)
+      if (index == 0) error stop 'nocdyn_torque_assembly: the load of an excitation was not checked'
+      loads = groups
+      loads%indices = [index]
+      allocate (load)
+      load%viscous = loads%values('viscous')
+      load%quadratic = loads%values('quadratic')
+      load%constant = loads%values('constant')
+      load%constant_speed = loads%values('constant_speed', absent=1.0_wp)
+      if (groups%input%groups(index)%has_value('table_speed')) load%curve = loads%curves('table_speed', 'table_torque')
+      associate (group => groups%input%groups(groups%indices(i)), lanes => groups%lanes)
+        associate (orders => group%numbers('orders'))
+          call append_bank(banks, new_load_shares(groups%names(i:i), body(i:i), spread(1, 1, size(orders)), &
+                                                  spread(group%numbers('share_of_load'), 1, lanes), spread(orders, 1, lanes), &
+                                                  spread(group%numbers('phases'), 1, lanes), load))
+        end associate
+      end associate
+      deallocate (load)
+    end do
+  end subroutine add_shares
+
+  !> Adds the banks of engines: their cylinders are the elements.
+  subroutine add_engines(groups, banks)
+    type(element_groups_t), intent(in) :: groups
+    type(bank_slot_t), allocatable, intent(inout) :: banks(:)
+    type(order_torque_t), allocatable :: torque(:)
+    type(string_t), allocatable :: names(:)
+    integer :: c, i
+
+    do i = 1, size(groups%indices)
+      torque = cylinder_torques(groups%input%groups(groups%indices(i)))
+      allocate (names(size(torque)))
+      do c = 1, size(torque)
+        names(c)%text = groups%names(i)%text // '_' // to_text(c)
+      end do
+      call append_bank(banks, new_order_excitations(names, groups%listed_bodies('cylinders', i), in_lanes(torque, groups%lanes)))
+      deallocate (names)
+    end do
+  end subroutine add_engines
 
 end module nocdyn_torque_assembly

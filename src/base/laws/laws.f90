@@ -143,9 +143,8 @@ contains
         self%constant(at + 1:at + copies, i) = constant
       end associate
     end do
-    if (is_branch_only) return
     do i = at, at + copies
-      call stack_harmonics(self, i)
+      call stack_harmonics(self, i, is_branch_only)
     end do
   end subroutine refresh
 
@@ -179,9 +178,10 @@ contains
   end function constant_of
 
   !> Copies the coefficients of harmonics in a slot to where they follow one another.
-  pure subroutine stack_harmonics(self, at)
+  pure subroutine stack_harmonics(self, at, is_branch_only)
     type(law_t), intent(inout) :: self
-    integer, intent(in) :: at   !! slot
+    integer, intent(in) :: at                 !! slot
+    logical, intent(in) :: is_branch_only     !! whether only coefficients that depend on a branch have changed
     integer :: i, k, next
 
     do i = 1, self%tape%count
@@ -190,7 +190,9 @@ contains
         associate (terms => terms_of(node), group => (at - 1) / self%w)
           next = self%stack(i) + self%w * 2 * terms * group + at - 1 - self%w * group
           do k = node%first + terms, node%last
-            self%stacked(next) = self%constant(at, self%column(self%tape%list(k)))
+            if (.not. is_branch_only .or. self%tape%node(self%tape%list(k))%has_branch) then
+              self%stacked(next) = self%constant(at, self%column(self%tape%list(k)))
+            end if
             next = next + self%w
           end do
         end associate

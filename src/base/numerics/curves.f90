@@ -33,6 +33,7 @@ module nocdyn_curves
     procedure :: is_same
     procedure :: segment
     procedure :: segment_number
+    procedure :: value
   end type curve_t
 
 contains
@@ -183,6 +184,18 @@ contains
       error stop 'nocdyn_curves: no such number of a segment'
     end select
   end function segment_number
+
+  !> The curve at x.
+  pure real(wp) function value(self, x)
+    class(curve_t), intent(in) :: self
+    real(wp), intent(in) :: x
+    integer :: s
+
+    s = self%segment(x)
+    associate (d => x - self%origin(s), c => self%coefficient(:, s))
+      value = c(1) + d * (c(2) + d * (c(3) + d * c(4)))
+    end associate
+  end function value
 
   !> The integral from the first point to x.
   pure function integral_to(self, segment, x) result(integral)

@@ -8,6 +8,7 @@ program read_namelists
   integer, parameter :: most_numbers = 16     ! in a list
   real(wp), parameter :: not_given = -huge(1.0_wp)
   real(wp), parameter :: hertz = 2.0_wp * acos(-1.0_wp)   ! [rad/s]
+  real(wp), parameter :: degree = hertz / 360.0_wp        ! [rad]
   character(len=256) :: file
   integer :: unit
 
@@ -23,6 +24,7 @@ program read_namelists
   call read_motors()
   call read_loads()
   call read_excitations()
+  call read_engines()
   call read_run()
   call read_output()
   call read_sweep()
@@ -226,10 +228,10 @@ contains
   subroutine read_excitations()
     character(len=64) :: name, body, kind, interpolation
     real(wp) :: amplitude, frequency, frequency_hz, phase, time, duration
-    real(wp), dimension(most_numbers) :: orders, amplitudes, phases, table_time, table_torque
+    real(wp), dimension(most_numbers) :: orders, amplitudes, phases, share_of_load, speeds, table_time, table_torque
     integer :: pole_pairs, status
     namelist /excitation/ name, body, kind, amplitude, frequency, frequency_hz, phase, orders, amplitudes, phases, table_time, &
-      table_torque, interpolation, time, duration, pole_pairs
+      table_torque, interpolation, time, duration, pole_pairs, share_of_load, speeds
 
     rewind (unit)
     do
@@ -241,6 +243,8 @@ contains
       orders = not_given
       amplitudes = not_given
       phases = 0.0_wp
+      share_of_load = not_given
+      speeds = not_given
       table_time = not_given
       table_torque = not_given
       interpolation = 'linear'
@@ -252,9 +256,39 @@ contains
       if (status /= 0) error stop 'excitation'
       if (frequency_hz > not_given) frequency = frequency_hz * hertz
       print '(*(g0, 1x))', 'excitation', trim(name), trim(body), trim(kind), amplitude, frequency, phase, orders, amplitudes, &
-        phases, table_time, table_torque, trim(interpolation), time, duration, pole_pairs
+        phases, share_of_load, speeds, table_time, table_torque, trim(interpolation), time, duration, pole_pairs
     end do
   end subroutine read_excitations
+
+  subroutine read_engines()
+    character(len=64) :: name, cylinders(most_numbers)
+    real(wp), dimension(most_numbers) :: amplitudes, firing, firing_deg, orders, phases
+    real(wp) :: crank_radius, mean_torque, reciprocating_mass, rod_length
+    integer :: i, misfire, status, stroke
+    namelist /engine/ name, cylinders, stroke, firing, firing_deg, orders, amplitudes, phases, mean_torque, misfire, &
+      crank_radius, reciprocating_mass, rod_length
+
+    rewind (unit)
+    do
+      cylinders = ''
+      firing_deg = not_given
+      firing = not_given
+      orders = not_given
+      amplitudes = not_given
+      phases = 0.0_wp
+      mean_torque = 0.0_wp
+      misfire = 0
+      crank_radius = not_given
+      reciprocating_mass = not_given
+      rod_length = not_given
+      read (unit, nml=engine, iostat=status)
+      if (is_iostat_end(status)) exit
+      if (status /= 0) error stop 'engine'
+      where (firing_deg > not_given) firing = firing_deg * degree
+      print '(*(g0, 1x))', 'engine', trim(name), (trim(cylinders(i)), i=1, most_numbers), stroke, firing, orders, amplitudes, &
+        phases, mean_torque, misfire, crank_radius, reciprocating_mass, rod_length
+    end do
+  end subroutine read_engines
 
   subroutine read_run()
     real(wp) :: t_start, t_end, rtol, atol

@@ -83,6 +83,7 @@ contains
     integer :: b, e
 
     self%are_direct = .false.
+    if (is_shared(input, target)) return
     associate (group => input%groups(target%group))
       do b = 1, size(machine%banks)
         associate (bank => machine%banks(b)%bank)
@@ -100,6 +101,20 @@ contains
       end do
     end associate
   end subroutine add_element_value
+
+  !> Whether excitations have a share of the target's load: they hold its parameters too.
+  pure logical function is_shared(input, target)
+    type(input_t), intent(in) :: input
+    type(target_t), intent(in) :: target
+    integer :: g
+
+    is_shared = .false.
+    if (input%groups(target%group)%kind /= 'load') return
+    do g = 1, size(input%groups)
+      if (input%groups(g)%kind /= 'excitation') cycle
+      is_shared = is_shared .or. input%groups(g)%has_value('share_of_load')
+    end do
+  end function is_shared
 
   pure function key_of(input, target) result(key)
     type(input_t), intent(in) :: input

@@ -7,7 +7,7 @@ module nocdyn_group_checks
   use nocdyn_kinds, only: wp
   use nocdyn_schema, only: first_key, key_name, key_rules
   use nocdyn_schema_relations, only: relation_t, relations_t
-  use nocdyn_schema_rules, only: a_body, body_or_ground, equal_lengths, less_than, unset
+  use nocdyn_schema_rules, only: a_body, body_or_ground, columns, equal_lengths, less_than, unset
   use nocdyn_schema_text, only: number_text
   use nocdyn_schema_units, only: name_in_unit
   use nocdyn_text, only: counted, quoted, string_t, to_text
@@ -26,7 +26,7 @@ contains
     type(group_t), intent(in) :: group
     type(diagnostics_t), intent(inout) :: diagnostics
     character(len=:), allocatable :: message
-    integer :: i
+    integer :: i, k
 
     do i = 1, size(group%values)
       if (key_rules(raw%keys(i)%rule)%ascends) call check_ascending(raw, group, i, diagnostics)
@@ -36,6 +36,13 @@ contains
         select case (relation%form)
         case (equal_lengths)
           call check_lengths(raw, group, relation%first, diagnostics)
+        case (columns)
+          call check_lengths(raw, group, relation%first, diagnostics)
+          do k = 2, size(relation%second)
+            if (group%values(relation%second(k))%has_any()) then
+              call check_lengths(raw, group, [relation%first(1), relation%second(k)], diagnostics)
+            end if
+          end do
         case (less_than)
           message = less_than_message(group, relation)
           if (message /= '') call raw%report([relation%first, relation%second], message, diagnostics)
@@ -126,7 +133,8 @@ contains
             call raw%report(lists([first, i]), key%name() // ' has ' // counted(value%count(), 'value', 'values') // ' and ' // &
                             first_key%name() // ' has ' // counted(first_value%count(), 'value', 'values') // &
                             '; needed: as many of each', diagnostics)
-          else if (key_rules(key%rule)%default == unset .and. .not. (key%may_be_missing .or. key%is_given())) then
+          else if (key_rules(key%rule)%default == unset .and. &
+                   .not. (key%may_be_missing .or. key%is_excluded .or. key%is_given())) then
             call raw%report(lists([first]), key%name() // ' is missing; needed: ' // &
                             counted(first_value%count(), 'value', 'values') // ', one for each of ' // &
                             first_key%name(), diagnostics)
@@ -174,7 +182,9 @@ contains
 
     counts = 0
     do key = 1, size(counts)
-      if (any(key_rules(raw%keys(key)%rule)%value_type == [a_body, body_or_ground])) counts(key) = group%values(key)%count()
+      associate (rule => key_rules(raw%keys(key)%rule))
+        if (any(rule%value_type == [a_body, body_or_ground]) .and. .not. rule%may_repeat) counts(key) = group%values(key)%count()
+      end associate
     end do
     allocate (names(sum(counts)), owner(sum(counts)))
     n = 0

@@ -7,11 +7,12 @@ module nocdyn_group_reader
   use nocdyn_key_relations, only: apply_relations
   use nocdyn_namelist, only: assignment_t, namelist_group_t, namelist_t
   use nocdyn_raw_group, only: new_raw_group, raw_group_t
-  use nocdyn_schema, only: group_rules, is_single, key_rules
+  use nocdyn_schema, only: first_key, group_rules, has_word, is_single, key_rules
   use nocdyn_schema_relations, only: relations_t
-  use nocdyn_schema_rules, only: a_name, equal_lengths
+  use nocdyn_schema_rules, only: a_name, columns, equal_lengths
   use nocdyn_schema_text, only: key_suggestion, similar_keys
   use nocdyn_schema_units, only: find_key, name_in_unit
+  use nocdyn_table_columns, only: read_table_columns
   use nocdyn_table_file, only: read_table_file
   use nocdyn_text, only: lower_case, shortened, string_t
   use nocdyn_text_file, only: path_in
@@ -50,8 +51,13 @@ contains
     end do
     do i = 1, size(relations%list)
       associate (relation => relations%list(i))
-        if (relation%form /= equal_lengths .or. size(relation%second) == 0) cycle
-        call read_table(folder, relation%second(1), relation%first, raw, group, diagnostics)
+        if (all(relation%form /= [equal_lengths, columns]) .or. size(relation%second) == 0) cycle
+        if (.not. belongs(group, relations%selector, relation%first(1))) cycle
+        if (relation%form == equal_lengths) then
+          call read_table(folder, relation%second(1), relation%first, raw, group, diagnostics)
+        else
+          call read_table_columns(folder, relation, raw, group, diagnostics)
+        end if
       end associate
     end do
     call check_group(raw, relations, group, diagnostics)
@@ -166,6 +172,19 @@ contains
       if (message /= '') call diagnostics%add(no_line, 0, message, i)
     end do
   end subroutine take_overrides
+
+  !> Whether a key is one of the kind of its group.
+  pure logical function belongs(group, selector, position)
+    type(group_t), intent(in) :: group
+    integer, intent(in) :: selector, position   !! positions of the selector key, 0: none, and of the key
+
+    belongs = .true.
+    associate (rule => key_rules(first_key(group%rule) + position - 1))
+      if (selector == 0 .or. rule%only_if == '') return
+      belongs = allocated(group%values(selector)%texts)
+      if (belongs) belongs = has_word(rule%only_if, group%values(selector)%texts(1)%text)
+    end associate
+  end function belongs
 
   !> Replaces the file of a table by its two columns.
   subroutine read_table(folder, file, lists, raw, group, diagnostics)

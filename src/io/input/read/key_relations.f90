@@ -7,7 +7,7 @@ module nocdyn_key_relations
   use nocdyn_raw_group, only: raw_group_t, raw_key_t
   use nocdyn_schema, only: has_word, key_rules, words_of
   use nocdyn_schema_relations, only: relation_t, relations_t
-  use nocdyn_schema_rules, only: any_number, at_most_one, equal_lengths, exactly_one, required, requires, unset
+  use nocdyn_schema_rules, only: any_number, at_most_one, columns, equal_lengths, exactly_one, required, requires, unset
   use nocdyn_schema_text, only: listed_keys, only_if_text
   use nocdyn_text, only: append, joined, lower_case, string_t
   implicit none (type, external)
@@ -32,7 +32,7 @@ contains
           call choose(group, relation, diagnostics)
         case (requires)
           call check_requirement(group, relation%first, relation%second, diagnostics)
-        case (equal_lengths)
+        case (equal_lengths, columns)
           call lengthen_defaults(group, relation%first)
         case default   ! of values, which are checked after their conversion
         end select
@@ -154,6 +154,7 @@ contains
       if (any(group%keys([relation%first, relation%second])%is_excluded)) return
       call group%report([integer ::], listed_keys(group%rule, [relation%first(1), relation%second(1)], ' or ') // &
                         ' is missing; one of them is needed', diagnostics)
+      group%keys([relation%first, relation%second])%may_be_missing = .true.   ! it is reported
     end if
   end subroutine choose
 

@@ -6,6 +6,7 @@ module nocdyn_schema
   use nocdyn_kinds, only: wp
   use nocdyn_schema_constraints, only: constraint_examples, constraint_groups, constraint_keys, constraint_relations
   use nocdyn_schema_couplings, only: coupling_examples, coupling_keys, coupling_relations
+  use nocdyn_schema_engines, only: engine_examples, engine_groups, engine_keys, engine_relations
   use nocdyn_schema_response, only: response_examples, response_groups, response_keys, response_relations
   use nocdyn_schema_rules, only: a_body, a_file, a_flag, a_folder, a_name, a_number, a_selector, a_text, a_word, alias_t, &
     allowed_t, an_integer, any_number, any_times, anything, at_least_once, at_most_once, at_most_one, body_or_ground, &
@@ -37,6 +38,7 @@ module nocdyn_schema
     group_rule_t('motor',      any_times,     'torque',   'A driving torque on a body, by a law of its speed.'), &
     group_rule_t('load',       any_times,     'torque',   'A resisting torque on a body: the sum of the terms that are given.'), &
     group_rule_t('excitation', any_times,     'torque',   'A torque on a body, by a law of time or of its angle.'), &
+    engine_groups, &
     group_rule_t('run',        exactly_once,  '',         'What is computed, and how.'), &
     group_rule_t('output',     at_most_once,  '',         'What is written, in which form, and where.'), &
     response_groups, sweep_groups]
@@ -90,12 +92,12 @@ module nocdyn_schema
   type(kind_rule_t), parameter, public :: kind_rules(*) = [torque_kinds, sweep_kinds]
 
   type(key_rule_t), parameter, public :: key_rules(*) = &
-    [frame_keys, coupling_keys, constraint_keys, motor_keys, load_keys, excitation_keys, response_keys, sweep_keys]
+    [frame_keys, coupling_keys, constraint_keys, motor_keys, load_keys, excitation_keys, engine_keys, response_keys, sweep_keys]
 
   type(relation_rule_t), parameter, public :: relation_rules(*) = [ &
     relation_rule_t('run', less_than, 't_start', 't_end'), &
     relation_rule_t('output', at_most_one, 'interval', 'points'), &
-    coupling_relations, constraint_relations, torque_relations, response_relations, sweep_relations]
+    coupling_relations, constraint_relations, torque_relations, engine_relations, response_relations, sweep_relations]
 
   type(alias_t), parameter, public :: aliases(*) = sweep_aliases
 
@@ -106,7 +108,7 @@ module nocdyn_schema
     example_t('body',       "name = 'machine'  inertia = 5.0"), &
     example_t('run',        "t_end = 10.0  method = 'rk45'  rtol = 1.0e-9  atol = 1.0e-9"), &
     example_t('output',     'interval = 0.01'), &
-    coupling_examples, constraint_examples, torque_examples, response_examples, sweep_examples]
+    coupling_examples, constraint_examples, torque_examples, engine_examples, response_examples, sweep_examples]
 
   ! One value for each row of `group_rules`. The rows of `key_rules` of a group are consecutive.
   integer :: rule   ! index of the lists below

@@ -31,6 +31,7 @@ module nocdyn_schema_rules
   integer, parameter, public :: requires = 3       !! `first` has values and defaults only beside one of `second`, but for a 0
   integer, parameter, public :: equal_lengths = 4  !! of the lists `first`; `second`: a file with two of them as columns, or ''
   integer, parameter, public :: less_than = 5      !! the number `first` is less than the number `second`
+  integer, parameter, public :: columns = 6        !! as equal_lengths; `second`: a file that names its columns, other lists
 
   integer, parameter, public :: any_number = 0   !! as `count`: a list of any length, possibly empty
   character(len=*), parameter, public :: required = '<required>', unset = '<unset>'   !! in place of a default
@@ -75,6 +76,7 @@ module nocdyn_schema_rules
     integer :: fewest = 0                   !! least number of values of a list that is given
     character(len=12) :: required_if = ''   !! the kind with which this key must be given
     logical :: ascends = .false.            !! each value of the list is greater than the one before
+    logical :: may_repeat = .false.         !! the list may name a body more than once
     logical :: follows = .false.            !! if not given, it may follow from other groups, and the default is not written
   end type key_rule_t
 
@@ -82,7 +84,7 @@ module nocdyn_schema_rules
   type, public :: relation_rule_t
     character(len=12) :: group
     integer :: form                          !! `exactly_one` ... `less_than`
-    character(len=64) :: first, second       !! keys, separated by blanks
+    character(len=80) :: first, second       !! keys, separated by blanks
     character(len=18) :: equal_if_one = ''   !! `less_than`: the numbers may be equal if this key is 1
   end type relation_rule_t
 

@@ -1,8 +1,8 @@
 !> Rows of the schema: the keys of &motor, &load and &excitation and the relations between them.
 module nocdyn_schema_torques
-  use nocdyn_schema_rules, only: a_body, a_file, a_name, a_number, a_selector, a_word, an_integer, any_number, anything, &
-    at_most_one, equal_lengths, exactly_one, example_t, extrapolations, from_0_to_1, from_1, interpolations, key_rule_t, &
-    kind_rule_t, not_negative, not_zero, positive, relation_rule_t, required, requires, unset
+  use nocdyn_schema_rules, only: a_body, a_file, a_name, a_number, a_selector, a_text, a_word, an_integer, any_number, &
+    anything, at_most_one, columns, equal_lengths, exactly_one, example_t, extrapolations, from_0_to_1, from_1, &
+    interpolations, key_rule_t, kind_rule_t, not_negative, not_zero, positive, relation_rule_t, required, requires, unset
   implicit none (type, external)
   private
 
@@ -107,18 +107,24 @@ module nocdyn_schema_torques
       'angular frequency; that of the mains for a start-up', 'harmonic startup'), &
     key_rule_t('excitation', 'phase',           a_number,       1, 'rad',         '0',         anything, &
       'phase at t = 0', 'harmonic startup'), &
-    key_rule_t('excitation', 'orders',          a_number,       any_number, '',   required,    positive, &
+    key_rule_t('excitation', 'orders',          a_number,       any_number, '',   unset,       positive, &
       'oscillations per turn of the body, e.g. 0.5, 1, 1.5 of a four-stroke engine', 'orders', 1), &
-    key_rule_t('excitation', 'amplitudes',      a_number,       any_number, 'N m', required,   anything, &
+    key_rule_t('excitation', 'amplitudes',      a_number,       any_number, 'N m', unset,      anything, &
       'largest torque of each order', 'orders', 1), &
     key_rule_t('excitation', 'phases',          a_number,       any_number, 'rad', '0',        anything, &
       'phase of each order at phi = 0', 'orders', 1), &
+    key_rule_t('excitation', 'speeds',          a_number,       any_number, 'rad/s', unset,    anything, &
+      'speed at which each row of orders, amplitudes and phases holds', 'orders', 1), &
+    key_rule_t('excitation', 'share_of_load',   a_number,       any_number, '',   unset,       anything, &
+      'amplitude of each order as a share of the torque of a load at its present speed', 'orders', 1), &
+    key_rule_t('excitation', 'load',            a_text,         1, '',            unset,       anything, &
+      'name of that load, if the body has several', 'orders'), &
     key_rule_t('excitation', 'table_time',      a_number,       any_number, 's',  unset,       anything, &
       'times of the points of a table, ascending', 'table', fewest=2, ascends=.true.), &
     key_rule_t('excitation', 'table_torque',    a_number,       any_number, 'N m', unset,      anything, &
       'torque at these times', 'table', fewest=2), &
     key_rule_t('excitation', 'table_file',      a_file,         1, '',            unset,       anything, &
-      'file with the table: two columns, time [s] and torque [N m]', 'table'), &
+      'two columns, time [s] and torque [N m]; orders: order, amplitude, phase_deg, speed_rpm', 'table orders'), &
     key_rule_t('excitation', 'interpolation',   a_word,         1, '',            linear,      interpolations, &
       'between the points: straight lines, or the monotone cubic of Fritsch and Butland', 'table'), &
     key_rule_t('excitation', 'time',            a_number,       1, 's',           required,    anything, &
@@ -131,6 +137,11 @@ module nocdyn_schema_torques
   type(relation_rule_t), parameter, public :: torque_relations(*) = [ &
     relation_rule_t('motor', exactly_one, 'table_speed table_torque', 'table_file'), &
     relation_rule_t('load', at_most_one, 'table_speed table_torque', 'table_file'), &
+    relation_rule_t('excitation', exactly_one, 'orders', 'table_file'), &
+    relation_rule_t('excitation', at_most_one, 'table_file', 'amplitudes phases speeds share_of_load'), &
+    relation_rule_t('excitation', exactly_one, 'amplitudes', 'share_of_load'), &
+    relation_rule_t('excitation', at_most_one, 'share_of_load', 'speeds'), &
+    relation_rule_t('excitation', requires, 'load', 'share_of_load'), &
     relation_rule_t('excitation', exactly_one, 'table_time table_torque', 'table_file'), &
     relation_rule_t('motor', requires, 'governor_speed', 'governor_gain'), &
     relation_rule_t('motor', requires, 'governor_speed', 'governor_time'), &
@@ -140,7 +151,8 @@ module nocdyn_schema_torques
     relation_rule_t('motor', equal_lengths, 'table_speed table_torque', 'table_file'), &
     relation_rule_t('load', equal_lengths, 'table_speed table_torque', 'table_file'), &
     relation_rule_t('excitation', equal_lengths, 'table_time table_torque', 'table_file'), &
-    relation_rule_t('excitation', equal_lengths, 'orders amplitudes phases', '')]
+    relation_rule_t('excitation', columns, 'orders amplitudes phases', 'table_file speeds'), &
+    relation_rule_t('excitation', equal_lengths, 'orders share_of_load', '')]
 
   type(example_t), parameter, public :: torque_examples(*) = [ &
     example_t('motor',      "name = 'drive'    body = 'motor'    a = 200.0  b = 10.0  c = 1.0"), &

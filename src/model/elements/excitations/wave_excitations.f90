@@ -7,8 +7,8 @@ module nocdyn_wave_excitations
   use nocdyn_kinds, only: wp
   use nocdyn_law_expressions, only: angle_of, expression_t, node_of, operator(*), operator(+), time_of
   use nocdyn_law_functions, only: cos, harmonics, sin
-  use nocdyn_law_harmonics, only: most_terms
   use nocdyn_law_tape, only: law_tape_t
+  use nocdyn_order_terms, only: new_order_terms, order_terms_t
   use nocdyn_text, only: string_t
   implicit none (type, external)
   private
@@ -16,15 +16,13 @@ module nocdyn_wave_excitations
   public :: new_wave_excitations
 
   type, extends(bank_t), public :: wave_excitations_t
-    integer, allocatable :: multiple(:, :)   !! of the base of the excitation, 0 for none: terms of each, [multiples, excitations]
-    integer, allocatable :: single(:, :)     !! the other terms of each, 0 for none, [most, excitations]
+    type(order_terms_t) :: sorted
   contains
+    procedure :: sum_of_waves
     procedure :: describe
     procedure :: to_mean_torque
     procedure :: list_harmonics
   end type wave_excitations_t
-
-  real(wp), parameter :: same = 1.0e-12_wp           ! relative error of an order that counts as a multiple
 
 contains
 
@@ -36,7 +34,6 @@ contains
     real(wp), intent(in) :: amplitude(:, :), frequency(:, :)   !! [N m], [rad/s], shape [lanes, terms]
     real(wp), intent(in) :: order(:, :), phase(:, :)           !! [1], [rad], shape [lanes, terms]
     type(wave_excitations_t) :: bank
-    real(wp) :: base(size(body))
 
     bank%is_polynomial = .false.
     bank%has_paper_law = .false.
@@ -45,80 +42,38 @@ contains
     call bank%add_parameter('frequency', frequency, is_key=.false., element=owner)
     call bank%add_parameter('order', order, is_key=.false., element=owner)
     call bank%add_parameter('phase', phase, element=owner)
-    call find_multiples(bank, owner, frequency, order, base)
-    call bank%add_parameter('base', spread(base, 1, bank%lanes), is_key=.false.)
+    bank%sorted = new_order_terms(size(body), owner, order(1, :), &
+                                 .not. any(abs(frequency) > 0, dim=1) .and. all(order > 0, dim=1))
+    call bank%add_parameter('base', spread(bank%sorted%base, 1, bank%lanes), is_key=.false.)
     call bank%prepare_law()
   end function new_wave_excitations
-
-  !> Finds the terms of each excitation that are multiples of one order, and the others.
-  subroutine find_multiples(bank, owner, frequency, order, base)
-    type(wave_excitations_t), intent(inout) :: bank
-    integer, intent(in) :: owner(:)                          !! excitation of each term
-    real(wp), intent(in) :: frequency(:, :), order(:, :)     !! [rad/s], [1], [lanes, terms]
-    real(wp), intent(out) :: base(:)                         !! order of which others are multiples, [excitations]
-    integer :: e, k, n
-    logical :: is_order(size(owner))
-
-    allocate (bank%multiple(most_terms, size(base)), bank%single(size(owner), size(base)), source=0)
-    do e = 1, size(base)
-      is_order = owner == e .and. .not. any(abs(frequency) > 0, dim=1) .and. all(order > 0, dim=1)
-      base(e) = common_order(pack(order(1, :), is_order))
-      do k = 1, size(owner)
-        if (owner(k) /= e) cycle
-        n = 0
-        if (is_order(k)) n = nint(min(order(1, k) / base(e), real(most_terms + 1, wp)))
-        if (n > 0 .and. n <= most_terms .and. count(is_order) > 1) then
-          if (is_multiple(order(1, k), base(e)) .and. bank%multiple(n, e) == 0) then
-            bank%multiple(n, e) = k
-            cycle
-          end if
-        end if
-        bank%single(1 + count(bank%single(:, e) > 0), e) = k
-      end do
-    end do
-  end subroutine find_multiples
-
-  !> The largest part of the lowest order of which all are multiples; the lowest one itself if there is none that is large.
-  pure real(wp) function common_order(orders) result(base)
-    real(wp), intent(in) :: orders(:)   !! positive
-    integer, parameter :: most_parts = 12
-    integer :: parts
-
-    base = 1.0_wp
-    if (size(orders) == 0) return
-    do parts = 1, most_parts
-      base = minval(orders) / parts
-      if (all(is_multiple(orders, base))) return
-    end do
-    base = minval(orders)
-  end function common_order
-
-  elemental logical function is_multiple(order, base)
-    real(wp), intent(in) :: order, base
-
-    is_multiple = abs(order - base * anint(order / base)) <= same * order
-  end function is_multiple
 
   subroutine describe(self, tape)
     class(wave_excitations_t), intent(in) :: self
     type(law_tape_t), target, intent(inout) :: tape
+
+    tape%applied = node_of(self%sum_of_waves(tape))
+  end subroutine describe
+
+  !> The sum of all terms.
+  function sum_of_waves(self, tape) result(torque)
+    class(wave_excitations_t), intent(in) :: self
+    type(law_tape_t), target, intent(inout) :: tape
     type(expression_t) :: torque
-    integer :: k, n
+    integer :: k
     logical :: is_empty
 
-    is_empty = .not. any(self%multiple > 0)
-    if (.not. is_empty) torque = sum_of_multiples(self, tape, pack([(n, n=1, most_terms)], any(self%multiple > 0, dim=2)))
-    do k = 1, size(self%single, 1)
-      if (.not. any(self%single(k, :) > 0)) exit
+    is_empty = size(self%sorted%multiples) == 0
+    if (.not. is_empty) torque = sum_of_multiples(self, tape, self%sorted%multiples)
+    do k = 1, size(self%sorted%single, 1)
       if (is_empty) then
-        torque = wave(self, tape, self%single(k, :))
+        torque = wave(self, tape, self%sorted%single(k, :))
       else
-        torque = torque + wave(self, tape, self%single(k, :))
+        torque = torque + wave(self, tape, self%sorted%single(k, :))
       end if
       is_empty = .false.
     end do
-    tape%applied = node_of(torque)
-  end subroutine describe
+  end function sum_of_waves
 
   !> The terms that are multiples of the base.
   function sum_of_multiples(self, tape, n) result(torque)
@@ -129,8 +84,8 @@ contains
     integer :: k
 
     do k = 1, size(n)
-      amplitude = self%parameter(tape, 'amplitude', self%multiple(n(k), :))
-      phase = self%parameter(tape, 'phase', self%multiple(n(k), :))
+      amplitude = self%parameter(tape, 'amplitude', self%sorted%multiple(n(k), :))
+      phase = self%parameter(tape, 'phase', self%sorted%multiple(n(k), :))
       a(k) = amplitude * cos(phase)
       b(k) = amplitude * sin(phase)
     end do

@@ -15,7 +15,7 @@ module nocdyn_loads
   implicit none (type, external)
   private
 
-  public :: new_loads, new_nonlinear_loads
+  public :: new_loads, new_nonlinear_loads, resistance
 
   type, extends(bank_t), public :: loads_t
     logical :: has_quadratic = .false.
@@ -63,24 +63,32 @@ contains
   subroutine describe(self, tape)
     class(loads_t), intent(in) :: self
     type(law_tape_t), target, intent(inout) :: tape
+
+    tape%applied = node_of(resistance(self, self%has_quadratic, tape))
+  end subroutine describe
+
+  !> The moment that resists, without its viscous part: a formula of a bank with the parameters and switches of such loads.
+  function resistance(bank, has_quadratic, tape) result(moment)
+    class(bank_t), intent(in) :: bank
+    logical, intent(in) :: has_quadratic   !! whether its last switch is that of `quadratic`
+    type(law_tape_t), target, intent(inout) :: tape
     type(expression_t) :: moment, speed, speed_scale
     integer :: switch
 
     speed = speed_of(tape)
-    speed_scale = self%parameter(tape, 'constant_speed')
-    moment = -(self%parameter(tape, 'constant') * tanh(speed / speed_scale))
-    if (allocated(self%curve)) then
+    speed_scale = bank%parameter(tape, 'constant_speed')
+    moment = -(bank%parameter(tape, 'constant') * tanh(speed / speed_scale))
+    if (allocated(bank%curve)) then
       moment = moment - curve_value(tape, speed)
       call guard_segment(tape, speed)
     end if
-    if (self%has_quadratic) then
-      switch = size(self%switch_element) / self%count
-      moment = moment - pick(switch, [literal(tape, 1.0_wp), literal(tape, -1.0_wp)]) * self%parameter(tape, 'quadratic') &
+    if (has_quadratic) then
+      switch = size(bank%switch_element) / bank%count
+      moment = moment - pick(switch, [literal(tape, 1.0_wp), literal(tape, -1.0_wp)]) * bank%parameter(tape, 'quadratic') &
                * (speed * speed)
       call add_guard(switch, 1, speed, boundary_width * speed_scale)
       call add_guard(switch, 2, -speed, boundary_width * speed_scale)
     end if
-    tape%applied = node_of(moment)
-  end subroutine describe
+  end function resistance
 
 end module nocdyn_loads

@@ -1,0 +1,143 @@
+!> The torques of the cylinders of an engine, from the keys of its group.
+module nocdyn_cylinder_torques
+  use nocdyn_harmonic_tables, only: table_torque
+  use nocdyn_input, only: group_t
+  use nocdyn_kinds, only: wp
+  use nocdyn_order_excitations, only: order_torque_t
+  use nocdyn_slider_cranks, only: gas_harmonics, inertia_harmonics, slider_crank_t
+  implicit none (type, external)
+  private
+
+  public :: cylinder_torques, cycle_of
+
+  real(wp), parameter :: pi = acos(-1.0_wp)
+
+contains
+
+  !> The torque of each cylinder of a group &engine without mistakes.
+  function cylinder_torques(group) result(torque)
+    type(group_t), intent(in) :: group
+    type(order_torque_t), allocatable :: torque(:)   !! [cylinders]
+    type(order_torque_t) :: fired, missed            ! of a cylinder that fires at phi = 0, and of one that does not fire
+    real(wp), allocatable :: factor(:), firing(:)
+    integer :: c
+
+    firing = group%numbers('firing')
+    factor = factors(group)
+    if (group%has_value('pressures')) then
+      fired = gas_torque(group, 'pressures')
+      missed = gas_torque(group, 'misfire_pressures')
+    else
+      fired = table_torque(group, 'amplitudes', 'phases')
+      missed = table_torque(group, 'misfire_amplitudes', 'misfire_phases')
+      fired%mean = fired%mean + group%number('mean_torque', absent=0.0_wp) / size(firing)
+    end if
+    call add_inertia(group, fired)
+    call add_inertia(group, missed)
+    allocate (torque(size(firing)))
+    do c = 1, size(firing)
+      torque(c) = turned(fired, factor(c), firing(c))
+      if (c == group%whole_number('misfire')) torque(c) = turned(missed, 1.0_wp, firing(c))
+    end do
+  end function cylinder_torques
+
+  !> Angle of the crank in a cycle [rad].
+  pure real(wp) function cycle_of(group)
+    type(group_t), intent(in) :: group   !! &engine
+
+    cycle_of = pi * group%whole_number('stroke')
+  end function cycle_of
+
+  !> 1 + the scatter of each cylinder. One value stands for + and - in turn, in the order in which the cylinders fire.
+  pure function factors(group)
+    type(group_t), intent(in) :: group
+    real(wp), allocatable :: factors(:)   !! [cylinders]
+    real(wp), allocatable :: firing(:), scatter(:)
+    integer :: c
+
+    firing = group%numbers('firing')
+    scatter = group%numbers('cylinder_scatter')
+    if (size(scatter) == 0) then
+      factors = spread(1.0_wp, 1, size(firing))
+    else if (size(scatter) == 1) then
+      factors = [(1.0_wp + merge(scatter(1), -scatter(1), modulo(fired_before(c), 2) == 0), c=1, size(firing))]
+    else
+      factors = 1.0_wp + scatter
+    end if
+  contains
+    !> How many cylinders fire before a cylinder.
+    pure integer function fired_before(c)
+      integer, intent(in) :: c
+
+      fired_before = count(firing < firing(c)) + count(.not. abs(firing(:c - 1) - firing(c)) > 0)
+    end function fired_before
+  end function factors
+
+  !> The torque of a cylinder by its pressure; 0 if there are no values.
+  function gas_torque(group, pressures) result(torque)
+    type(group_t), intent(in) :: group
+    character(len=*), intent(in) :: pressures   !! key of the pressures
+    type(order_torque_t) :: torque
+    real(wp), allocatable :: angle(:), pressure(:)
+    real(wp) :: cycle
+    integer :: k, last
+
+    cycle = cycle_of(group)
+    associate (n => int(group%number('harmonics_up_to') * cycle / (2.0_wp * pi) + 1.0e-9_wp))
+      torque%order = [(k * 2.0_wp * pi / cycle, k=1, n)]
+      allocate (torque%speed(1), torque%mean(1), torque%sine(n, 1), torque%cosine(n, 1), source=0.0_wp)
+    end associate
+    allocate (torque%square_order(0), torque%square_sine(0), torque%square_cosine(0))
+    pressure = group%numbers(pressures)
+    if (size(pressure) == 0) return
+    angle = group%numbers('crank_angles')
+    last = size(angle)
+    if (angle(last) - angle(1) > cycle - 0.5_wp * (angle(last) - angle(last - 1))) then   ! the first point again
+      pressure(1) = 0.5_wp * (pressure(1) + pressure(last))
+      last = last - 1
+    end if
+    call gas_harmonics(slider_crank(group), cycle, angle(:last), pressure(:last) - group%number('crankcase_pressure'), &
+                       torque%mean(1), torque%sine(:, 1), torque%cosine(:, 1))
+  end function gas_torque
+
+  type(slider_crank_t) function slider_crank(group)
+    type(group_t), intent(in) :: group
+
+    slider_crank = slider_crank_t(group%number('bore', absent=0.0_wp), group%number('crank_radius'), group%number('rod_length'))
+  end function slider_crank
+
+  !> Sets the harmonics of the inertia torque, if the engine has a reciprocating mass.
+  subroutine add_inertia(group, torque)
+    type(group_t), intent(in) :: group
+    type(order_torque_t), intent(inout) :: torque
+
+    if (.not. group%has_value('reciprocating_mass')) return
+    torque%square_order = [1.0_wp, 2.0_wp, 3.0_wp, 4.0_wp]
+    torque%square_sine = inertia_harmonics(slider_crank(group), group%number('reciprocating_mass'))
+    torque%square_cosine = 0.0_wp * torque%square_sine
+  end subroutine add_inertia
+
+  !> The torque of a cylinder that fires at another angle, its gas torque times a factor.
+  pure function turned(torque, factor, firing) result(other)
+    type(order_torque_t), intent(in) :: torque
+    real(wp), intent(in) :: factor, firing   !! [1], [rad]
+    type(order_torque_t) :: other
+    integer :: k
+
+    other = torque
+    other%mean = factor * torque%mean
+    do k = 1, size(torque%order)
+      associate (angle => torque%order(k) * firing)
+        other%sine(k, :) = factor * (torque%sine(k, :) * cos(angle) + torque%cosine(k, :) * sin(angle))
+        other%cosine(k, :) = factor * (torque%cosine(k, :) * cos(angle) - torque%sine(k, :) * sin(angle))
+      end associate
+    end do
+    do k = 1, size(torque%square_order)
+      associate (angle => torque%square_order(k) * firing)
+        other%square_sine(k) = torque%square_sine(k) * cos(angle) + torque%square_cosine(k) * sin(angle)
+        other%square_cosine(k) = torque%square_cosine(k) * cos(angle) - torque%square_sine(k) * sin(angle)
+      end associate
+    end do
+  end function turned
+
+end module nocdyn_cylinder_torques

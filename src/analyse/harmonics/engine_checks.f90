@@ -1,0 +1,194 @@
+!> Mistakes in the values of &engine, and of &excitation with orders, that the schema does not know.
+module nocdyn_engine_checks
+  use nocdyn_cylinder_torques, only: cycle_of
+  use nocdyn_errors, only: error_t, exit_input, raise
+  use nocdyn_harmonic_tables, only: distinct, find_table_obstacle
+  use nocdyn_input, only: group_t, input_t
+  use nocdyn_kinds, only: wp
+  use nocdyn_shared_loads, only: find_shared_load
+  use nocdyn_text, only: counted, quoted, to_text
+  implicit none (type, external)
+  private
+
+  public :: check_engines, check_orders
+
+  real(wp), parameter :: pi = acos(-1.0_wp), degree = pi / 180.0_wp
+  real(wp), parameter :: rounding = 1.0e-9_wp   ! relative, of angles and orders
+
+contains
+
+  !> Refuses engines of which something does not fit: firing angles, orders, pressures, loads, numbers of cylinders.
+  subroutine check_engines(input, error)
+    type(input_t), intent(in) :: input
+    type(error_t), allocatable, intent(out) :: error   !! names file, line, group and key
+    integer, allocatable :: indices(:)
+    character(len=:), allocatable :: key, text
+    integer :: i
+
+    allocate (indices, source=input%groups_named('engine'))
+    do i = 1, size(indices)
+      associate (group => input%groups(indices(i)))
+        call check_cylinders(group, key, text)
+        if (text == '') call check_cycle(group, key, text)
+        if (text == '' .and. group%has_value('orders')) call find_table_obstacle(group, key, text)
+        if (text == '') call check_loads(group, key, text)
+        if (text == '' .and. group%has_value('pressures')) call check_pressures(group, key, text)
+        if (text == '') call check_names(input, group, key, text)
+      end associate
+      if (text == '') cycle
+      call raise(error, exit_input, input%location(indices(i), key) // ': ' // text)
+      return
+    end do
+  end subroutine check_engines
+
+  !> Lists and numbers of cylinders, and whether there is a torque.
+  subroutine check_cylinders(group, key, text)
+    type(group_t), intent(in) :: group
+    character(len=:), allocatable, intent(out) :: key, text   !! text: what is wrong, ''
+    integer :: cylinders
+
+    text = ''
+    cylinders = size(group%texts('cylinders'))
+    key = 'stroke'
+    if (all(group%whole_number('stroke') /= [2, 4])) then
+      text = 'stroke = ' // to_text(group%whole_number('stroke')) // '; allowed: 2 or 4'
+      return
+    end if
+    key = 'misfire'
+    if (group%whole_number('misfire') > cylinders) then
+      text = 'misfire = ' // to_text(group%whole_number('misfire')) // '; allowed: 0 to ' // to_text(cylinders) // &
+             ', the number of a cylinder'
+      return
+    end if
+    key = 'cylinder_scatter'
+    associate (values => size(group%numbers('cylinder_scatter')))
+      if (all(values /= [0, 1, cylinders])) then
+        text = 'cylinder_scatter has ' // counted(values, 'value', 'values') // '; needed: 1 or ' // to_text(cylinders)
+        return
+      end if
+    end associate
+    key = 'name'
+    if (group%has_value('orders') .or. group%has_value('pressures') .or. group%has_value('reciprocating_mass')) return
+    if (abs(group%number('mean_torque', absent=0.0_wp)) > 0) return
+    text = 'it has no torque; needed: orders, table_file, pressures, pressure_file, reciprocating_mass or mean_torque'
+  end subroutine check_cylinders
+
+  !> Firing angles and orders fit the cycle.
+  subroutine check_cycle(group, key, text)
+    type(group_t), intent(in) :: group
+    character(len=:), allocatable, intent(out) :: key, text   !! text: what is wrong, ''
+    real(wp), allocatable :: firing(:), orders(:)
+    integer :: i
+
+    text = ''
+    key = 'firing'
+    firing = group%numbers('firing')
+    do i = 1, size(firing)
+      if (firing(i) <= cycle_of(group) * (1.0_wp + rounding)) cycle
+      text = 'firing_deg(' // to_text(i) // ') = ' // to_text(firing(i) / degree) // ' is out of range; allowed: 0 to ' // &
+             to_text(nint(cycle_of(group) / degree)) // ' with stroke = ' // to_text(group%whole_number('stroke'))
+      return
+    end do
+    key = 'orders'
+    orders = group%numbers('orders')
+    do i = 1, size(orders)
+      associate (cycles => orders(i) * cycle_of(group) / (2.0_wp * pi))
+        if (abs(cycles - anint(cycles)) <= rounding * cycles) cycle
+      end associate
+      text = 'orders(' // to_text(i) // ') = ' // to_text(orders(i)) // ' is no order of its cycle; allowed: multiples of ' // &
+             to_text(2.0_wp * pi / cycle_of(group)) // ' with stroke = ' // to_text(group%whole_number('stroke'))
+      return
+    end do
+    key = 'mean_torque'
+    if (group%is_given('mean_torque') .and. any(.not. orders > 0)) text = &
+      'mean_torque and the order 0 are both given; allowed: one of them'
+  end subroutine check_cycle
+
+  !> `load_share` is among the loads.
+  subroutine check_loads(group, key, text)
+    type(group_t), intent(in) :: group
+    character(len=:), allocatable, intent(out) :: key, text   !! text: what is wrong, ''
+    real(wp), allocatable :: loads(:)
+    character(len=:), allocatable :: range
+
+    text = ''
+    key = 'load_share'
+    loads = distinct(group%numbers('loads'))
+    if (size(loads) > 0) range = to_text(loads(1)) // ' to ' // to_text(loads(size(loads))) // ', the loads of the rows'
+    if (size(loads) == 0) then
+      if (group%has_value('load_share')) text = 'load_share needs loads, or a column load in the file'
+    else if (.not. group%has_value('load_share')) then
+      key = 'loads'
+      if (size(loads) > 1) text = 'load_share is missing; needed: the load of the engine, ' // range
+    else if (group%number('load_share') < loads(1) .or. group%number('load_share') > loads(size(loads))) then
+      text = 'load_share = ' // to_text(group%number('load_share')) // ' is out of range; allowed: ' // range
+    end if
+  end subroutine check_loads
+
+  !> The crank angles are those of one cycle.
+  subroutine check_pressures(group, key, text)
+    type(group_t), intent(in) :: group
+    character(len=:), allocatable, intent(out) :: key, text   !! text: what is wrong, ''
+    real(wp), allocatable :: angle(:)
+    real(wp) :: step
+
+    text = ''
+    key = 'crank_angles'
+    angle = group%numbers('crank_angles')
+    associate (n => size(angle), cycle => cycle_of(group))
+      step = maxval(angle(2:) - angle(:n - 1))
+      associate (span => angle(n) - angle(1))
+        if (span <= cycle * (1.0_wp + rounding) .and. span + step >= cycle * (1.0_wp - rounding)) return
+        text = 'the crank angles from ' // to_text(angle(1) / degree) // ' to ' // to_text(angle(n) / degree) // &
+               ' deg are not those of one cycle; needed: ' // to_text(nint(cycle / degree)) // &
+               ' deg with stroke = ' // to_text(group%whole_number('stroke'))
+      end associate
+    end associate
+  end subroutine check_pressures
+
+  !> No torque has the name of a cylinder.
+  subroutine check_names(input, group, key, text)
+    type(input_t), intent(in) :: input
+    type(group_t), intent(in) :: group
+    character(len=:), allocatable, intent(out) :: key, text   !! text: what is wrong, ''
+    integer :: c, g
+
+    text = ''
+    key = 'name'
+    do g = 1, size(input%groups)
+      associate (other => input%groups(g))
+        if (all(other%kind /= [character(len=10) :: 'motor', 'load', 'excitation', 'engine'])) cycle
+        if (index(other%name, group%name // '_') /= 1) cycle
+        do c = 1, size(group%texts('cylinders'))
+          if (other%name == group%name // '_' // to_text(c)) text = 'the name ' // quoted(other%name) // &
+            ' of its cylinder ' // to_text(c) // ' is taken by &' // other%kind
+        end do
+      end associate
+    end do
+  end subroutine check_names
+
+  !> Refuses orders of &excitation with rows that do not fit together, or without their load.
+  subroutine check_orders(input, error)
+    type(input_t), intent(in) :: input
+    type(error_t), allocatable, intent(out) :: error   !! names file, line, group and key
+    integer, allocatable :: indices(:)
+    character(len=:), allocatable :: key, text
+    integer :: i, load
+
+    allocate (indices, source=input%groups_named('excitation', 'orders'))
+    do i = 1, size(indices)
+      associate (group => input%groups(indices(i)))
+        text = ''
+        if (group%has_value('speeds')) call find_table_obstacle(group, key, text)
+        if (group%has_value('share_of_load')) then
+          key = 'share_of_load'
+          call find_shared_load(input, indices(i), load, text)
+        end if
+      end associate
+      if (text == '') cycle
+      call raise(error, exit_input, input%location(indices(i), key) // ': ' // text)
+      return
+    end do
+  end subroutine check_orders
+
+end module nocdyn_engine_checks

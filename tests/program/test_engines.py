@@ -1,0 +1,229 @@
+"""Engines and orders from the input file to the results: files, refusals, sweeps."""
+
+import csv
+from math import cos, pi, radians, sin
+
+import pytest
+
+MACHINE = """&body name = 'crank' inertia = 1.0e9 speed = 100.0 /
+{}
+&run t_end = 0.1 rtol = 1e-10 atol = 1e-10 /
+&output points = 11 /
+"""
+FIRST = (
+    "&engine name = 'e' stroke = 4 cylinders = 'crank', 'crank' firing_deg = 0, 360 "
+    "orders = 0.5, 1 amplitudes = 100, 80 phases_deg = 30, 60 {} /"
+)
+PRESSURES = (
+    "&engine name = 'e' stroke = 2 cylinders = 'crank' firing_deg = 90 pressure_file = 'p.csv' "
+    "bore = 0.2 crank_radius = 0.1 rod_length = 0.4 {} /"
+)
+LABEL = "nocdyn: machine.nml:2: &engine 'e': "
+
+
+def run(nocdyn, engine, *words):
+    nocdyn.write("machine.nml", MACHINE.format(engine))
+    outcome = nocdyn("run", "machine.nml", "--out", "out", *words)
+    assert outcome.returncode == 0, outcome.stderr
+    header, rows = nocdyn.table("out")
+    return dict(zip(header, zip(*rows)))
+
+
+def refusal(nocdyn, engine):
+    nocdyn.write("machine.nml", MACHINE.format(engine))
+    outcome = nocdyn("check", "machine.nml")
+    assert outcome.returncode == 2
+    return outcome.stderr
+
+
+def test_each_cylinder_has_its_harmonics_after_it_fires(nocdyn):
+    table = run(nocdyn, FIRST.format("mean_torque = 20"))
+    for name, firing in (("torque_e_1 [N m]", 0.0), ("torque_e_2 [N m]", 2 * pi)):
+        expected = [
+            10 + 100 * sin(0.5 * (phi - firing) + radians(30)) + 80 * sin(phi - firing + radians(60))
+            for phi in table["phi_crank [rad]"]
+        ]
+        assert list(table[name]) == pytest.approx(expected, abs=1e-9)
+
+
+def test_a_table_file_says_the_same_as_lists(nocdyn):
+    nocdyn.write("t.csv", "phase_deg, order, amplitude\n30, 0.5, 100\n60, 1, 80\n0, 0, 10\n")
+    inline = run(nocdyn, FIRST.format("mean_torque = 20"))
+    engine = "&engine name = 'e' stroke = 4 cylinders = 'crank', 'crank' firing_deg = 0, 360 table_file = 't.csv' /"
+    assert run(nocdyn, engine) == inline
+    assert nocdyn("run", "out/input.nml", "--out", "again").returncode == 0
+    assert nocdyn.table("again") == nocdyn.table("out")
+
+
+def test_amplitudes_follow_the_speed(nocdyn):
+    rows = "1, 10, 90, 50\n1, 30, 90, 150\n2, 4, 0, 50\n2, 8, 90, 150\n"
+    nocdyn.write("t.csv", "order, amplitude, phase_deg, speed\n" + rows)
+    table = run(nocdyn, "&excitation name = 'x' body = 'crank' kind = 'orders' table_file = 't.csv' /")
+    expected = [20 * cos(phi) + 2 * sin(2 * phi) + 4 * cos(2 * phi) for phi in table["phi_crank [rad]"]]
+    assert list(table["torque_x [N m]"]) == pytest.approx(expected, abs=1e-5)  # the speed changes by 1e-8
+
+
+def test_blades_have_a_share_of_the_load(nocdyn):
+    load = "&load name = 'water' body = 'crank' quadratic = 0.02 /"
+    blades = (
+        "&excitation name = 'x' body = 'crank' kind = 'orders' orders = 4, 8 phases_deg = 0, 90 share_of_load = 0.1, 0.05 {} /"
+    )
+    table = run(nocdyn, load + blades.format(""))
+    expected = [
+        -load * (0.1 * sin(4 * phi) + 0.05 * cos(8 * phi))
+        for load, phi in zip(table["torque_water [N m]"], table["phi_crank [rad]"])
+    ]
+    assert list(table["torque_x [N m]"]) == pytest.approx(expected, abs=1e-9)
+    other = "&load name = 'air' body = 'crank' viscous = 1 /"
+    assert run(nocdyn, load + other + blades.format("load = 'water'"))["torque_x [N m]"] == pytest.approx(expected, abs=1e-4)
+    where = "nocdyn: machine.nml:2: &excitation 'x': "
+    assert refusal(nocdyn, blades.format("")) == where + "share_of_load needs a &load on 'crank'\n"
+    assert "share_of_load needs load, the name of one of the loads on 'crank': 'water', 'air'\n" in refusal(
+        nocdyn, load + other + blades.format("")
+    )
+    assert "load = 'watr' is no &load on 'crank'; there: 'water'\n" in refusal(nocdyn, load + blades.format("load = 'watr'"))
+
+
+def pressure_rows(low, high, step=2):
+    return "".join(f"{angle}, {1e5 + 1e4 * cos(radians(angle))}\n" for angle in range(low, high + 1, step))
+
+
+def test_pressure_turns_the_crank(nocdyn):
+    nocdyn.write("p.csv", "crank_angle_deg, pressure\n" + pressure_rows(-180, 180))
+    table = run(nocdyn, PRESSURES.format("crankcase_pressure = 1e5"))
+    for phi, torque in zip(table["phi_crank [rad]"], table["torque_e_1 [N m]"]):
+        theta = phi - pi / 2
+        lever = 0.1 * sin(theta) * (1 + 0.25 * cos(theta) / (1 - (0.25 * sin(theta)) ** 2) ** 0.5)
+        assert torque == pytest.approx(1e4 * cos(theta) * 0.01 * pi * lever, abs=2e-2)  # the curve between the points
+
+
+@pytest.mark.parametrize(
+    "engine, complaint",
+    [
+        (
+            FIRST.format("").replace("firing_deg = 0, 360", "firing_deg = 0, 721"),
+            "firing_deg(2) = 721 is out of range; allowed: 0 to 720 with stroke = 4",
+        ),
+        (
+            FIRST.format("").replace("firing_deg = 0, 360", "firing_deg = 0"),
+            "firing_deg has 1 value and cylinders has 2 values; needed: as many of each",
+        ),
+        (
+            FIRST.format("").replace("stroke = 4", "stroke = 2"),
+            "orders(1) = 0.5 is no order of its cycle; allowed: multiples of 1 with stroke = 2",
+        ),
+        (FIRST.format("").replace("stroke = 4", "stroke = 3"), "stroke = 3; allowed: 2 or 4"),
+        (FIRST.format("").replace("orders = 0.5", "orders = -0.5"), "orders(1) = -0.5 is out of range; allowed: >= 0"),
+        (FIRST.format("").replace("orders = 0.5", "orders = 1"), "order 1 has 2 rows; needed: one"),
+        (
+            FIRST.format("mean_torque = 9").replace("0.5, 1 ", "0, 1 ").replace("30, 60", "0, 0"),
+            "mean_torque and the order 0 are both given; allowed: one of them",
+        ),
+        (
+            FIRST.format("").replace("0.5, 1 ", "0, 1 "),
+            "orders(1) = 0 is a mean, and phases(1) = 0.5235987755982988; needed: the phase 0",
+        ),
+        (FIRST.format("misfire = 3"), "misfire = 3; allowed: 0 to 2, the number of a cylinder"),
+        (FIRST.format("cylinder_scatter = 0.1, 0, 0"), "cylinder_scatter has 3 values; needed: 1 or 2"),
+        (
+            FIRST.format("loads = 0.5, 1").replace("orders = 0.5", "orders = 1"),
+            "load_share is missing; needed: the load of the engine, 0.5 to 1, the loads of the rows",
+        ),
+        (FIRST.format("load_share = 1"), "load_share needs loads or table_file"),
+        (FIRST.format("speeds = 10, 20"), "order 1 has 0 rows at the speed 10 rad/s; needed: one at each speed"),
+        (FIRST.format("reciprocating_mass = 2"), "reciprocating_mass needs crank_radius"),
+        (
+            FIRST.format("reciprocating_mass = 2 crank_radius = 0.5 rod_length = 0.4"),
+            "rod_length = 0.4 is out of range; allowed: > crank_radius = 0.5",
+        ),
+        (FIRST.format("pressure_file = 'p.csv'"), "orders and pressure_file are both given; allowed: one of them"),
+        (
+            "&engine name = 'e' stroke = 4 cylinders = 'crank' firing_deg = 0 /",
+            "it has no torque; needed: orders, table_file, pressures, pressure_file, reciprocating_mass or mean_torque",
+        ),
+        (
+            FIRST.format("").replace("'crank', 'crank'", "'crank', 'cranc'"),
+            "cylinders: there is no &body 'cranc'; did you mean 'crank'?",
+        ),
+        (
+            "&engine name = 'e' stroke = 4 cylinders = 'crank' firing_deg = 0 mean_torque = 1 / &load name = 'e_1' body = 'crank' /",
+            "the name 'e_1' of its cylinder 1 is taken by &load",
+        ),
+    ],
+)
+def test_engines_that_do_not_fit_are_refused(nocdyn, engine, complaint):
+    assert LABEL + complaint in refusal(nocdyn, engine)
+
+
+@pytest.mark.parametrize(
+    "text, complaint",
+    [
+        ("order, phase_deg\n1, 2\n", "t.csv:1: there is no column amplitude; needed: order, amplitude, phase_deg"),
+        (
+            "order, amplitude, phase_deg, power\n1, 2, 3, 4\n",
+            "t.csv:1: 'power' is no column; allowed: order, amplitude, phase_deg, speed_rpm, load, misfire_amplitude, misfire_phase_deg",
+        ),
+        ("order, amplitude, phase_deg, phase\n1, 2, 3, 4\n", "t.csv:1: the column 'phase' is given twice"),
+        ("order, amplitude, phase_deg\n1, 2, 3\n-1, 2, 3\n", "t.csv: order = -1 in row 2 is out of range; allowed: >= 0"),
+        ("order, amplitude, phase_deg\n1, 2\n", "t.csv:2: 2 columns in '1, 2'; needed: 3, separated by blanks or a comma"),
+    ],
+)
+def test_files_of_harmonics_that_do_not_fit_are_refused(nocdyn, text, complaint):
+    nocdyn.write("t.csv", text)
+    engine = "&engine name = 'e' stroke = 4 cylinders = 'crank' firing_deg = 0 table_file = 't.csv' /"
+    assert LABEL + "table_file: " + complaint in refusal(nocdyn, engine)
+
+
+def test_a_file_of_harmonics_that_is_not_there_is_refused(nocdyn):
+    nocdyn.write(
+        "machine.nml", MACHINE.format("&engine name = 'e' stroke = 4 cylinders = 'crank' firing_deg = 0 table_file = 'no.csv' /")
+    )
+    outcome = nocdyn("check", "machine.nml")
+    assert outcome.returncode == 3
+    assert "table_file: no.csv: cannot be read: there is no such file" in outcome.stderr
+
+
+@pytest.mark.parametrize(
+    "rows, complaint",
+    [
+        (pressure_rows(0, 300), "the crank angles from 0 to 300 deg are not those of one cycle; needed: 360 deg with stroke = 2"),
+        (pressure_rows(0, 720), "the crank angles from 0 to 720 deg are not those of one cycle; needed: 360 deg with stroke = 2"),
+        (pressure_rows(0, 8), "pressure_file: p.csv: crank_angle_deg has 5 rows; needed: at least 8"),
+        (
+            "0, 1\n0, 2\n" + pressure_rows(10, 360),
+            "pressure_file: p.csv: crank_angle_deg = 0 in row 2 is not greater than that in the row before",
+        ),
+    ],
+)
+def test_pressures_that_are_not_one_cycle_are_refused(nocdyn, rows, complaint):
+    nocdyn.write("p.csv", "crank_angle_deg, pressure\n" + rows)
+    assert LABEL + complaint in refusal(nocdyn, PRESSURES.format(""))
+
+
+SWEEP = """&sweep design = 'grid' /
+&vary target = 'engine.e.{}' low = {} high = {} count = 3 /
+&record quantity = 'torque_e_1' statistic = 'final' /
+"""
+
+
+@pytest.mark.parametrize(
+    "key, low, high",
+    [
+        ("amplitudes(2)", 80, 120),
+        ("firing_deg(1)", 0, 180),
+        ("misfire", 0, 2),
+        ("reciprocating_mass", 0, 5),
+        ("mean_torque", 0, 50),
+    ],
+)
+def test_keys_of_engines_vary_in_sweeps(nocdyn, key, low, high):
+    engine = FIRST.format("reciprocating_mass = 2 crank_radius = 0.1 rod_length = 0.4")
+    nocdyn.write("machine.nml", MACHINE.format(engine) + SWEEP.format(key, low, high))
+    outcome = nocdyn("sweep", "machine.nml", "--out", "sweep", "--csv")
+    assert outcome.returncode == 0, outcome.stderr
+    with open(nocdyn.folder / "sweep/sweep.csv", newline="", encoding="utf-8") as file:
+        found = [next(float(value) for key, value in row.items() if "torque_e_1" in key) for row in csv.DictReader(file)]
+    assert len(set(found)) > 1
+    for value, final in zip((low, (low + high) / 2, high), found):
+        table = run(nocdyn, engine, "--set", f"engine.e.{key}={value:g}")
+        assert table["torque_e_1 [N m]"][-1] == pytest.approx(final, abs=1e-9)
