@@ -146,7 +146,7 @@ def test_pressure_turns_the_crank(nocdyn):
             "cylinders: there is no &body 'cranc'; did you mean 'crank'?",
         ),
         (
-            "&engine name = 'e' stroke = 4 cylinders = 'crank' firing_deg = 0 mean_torque = 1 / &load name = 'e_1' body = 'crank' /",
+            "&engine name = 'e' stroke = 4 cylinders = 'crank' firing_deg = 0 mean_torque = 1 / &load name='e_1' body='crank' /",
             "the name 'e_1' of its cylinder 1 is taken by &load",
         ),
     ],
@@ -161,7 +161,8 @@ def test_engines_that_do_not_fit_are_refused(nocdyn, engine, complaint):
         ("order, phase_deg\n1, 2\n", "t.csv:1: there is no column amplitude; needed: order, amplitude, phase_deg"),
         (
             "order, amplitude, phase_deg, power\n1, 2, 3, 4\n",
-            "t.csv:1: 'power' is no column; allowed: order, amplitude, phase_deg, speed_rpm, load, misfire_amplitude, misfire_phase_deg",
+            "t.csv:1: 'power' is no column; allowed: order, amplitude, phase_deg, speed_rpm, load, "
+            "misfire_amplitude, misfire_phase_deg",
         ),
         ("order, amplitude, phase_deg, phase\n1, 2, 3, 4\n", "t.csv:1: the column 'phase' is given twice"),
         ("order, amplitude, phase_deg\n1, 2, 3\n-1, 2, 3\n", "t.csv: order = -1 in row 2 is out of range; allowed: >= 0"),
