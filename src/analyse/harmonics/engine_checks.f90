@@ -44,7 +44,7 @@ contains
   !> Lists and numbers of cylinders, and whether there is a torque.
   subroutine check_cylinders(group, key, text)
     type(group_t), intent(in) :: group
-    character(len=:), allocatable, intent(out) :: key, text   !! text: what is wrong, ''
+    character(len=:), allocatable, intent(out) :: key, text   !! which key is wrong, and what about it, '' if nothing
     integer :: cylinders
 
     text = ''
@@ -76,7 +76,7 @@ contains
   !> Firing angles and orders fit the cycle.
   subroutine check_cycle(group, key, text)
     type(group_t), intent(in) :: group
-    character(len=:), allocatable, intent(out) :: key, text   !! text: what is wrong, ''
+    character(len=:), allocatable, intent(out) :: key, text   !! which key is wrong, and what about it, '' if nothing
     real(wp), allocatable :: firing(:), orders(:)
     integer :: i
 
@@ -107,7 +107,7 @@ contains
   !> `load_share` is among the loads.
   subroutine check_loads(group, key, text)
     type(group_t), intent(in) :: group
-    character(len=:), allocatable, intent(out) :: key, text   !! text: what is wrong, ''
+    character(len=:), allocatable, intent(out) :: key, text   !! which key is wrong, and what about it, '' if nothing
     real(wp), allocatable :: loads(:)
     character(len=:), allocatable :: range
 
@@ -128,7 +128,7 @@ contains
   !> The crank angles are those of one cycle.
   subroutine check_pressures(group, key, text)
     type(group_t), intent(in) :: group
-    character(len=:), allocatable, intent(out) :: key, text   !! text: what is wrong, ''
+    character(len=:), allocatable, intent(out) :: key, text   !! which key is wrong, and what about it, '' if nothing
     real(wp), allocatable :: angle(:)
     real(wp) :: step
 
@@ -150,7 +150,7 @@ contains
   subroutine check_names(input, group, key, text)
     type(input_t), intent(in) :: input
     type(group_t), intent(in) :: group
-    character(len=:), allocatable, intent(out) :: key, text   !! text: what is wrong, ''
+    character(len=:), allocatable, intent(out) :: key, text   !! which key is wrong, and what about it, '' if nothing
     integer :: c, g
 
     text = ''

@@ -14,7 +14,7 @@ contains
   !> What is wrong with the rows of a group, '' if nothing is.
   pure subroutine find_table_obstacle(group, key, text)
     type(group_t), intent(in) :: group                       !! &engine or &excitation, with orders
-    character(len=:), allocatable, intent(out) :: key, text   !! key: that the message is about
+    character(len=:), allocatable, intent(out) :: key, text   !! which key is wrong, and what about it, '' if nothing
     real(wp), allocatable :: load(:), order(:), phase(:), speed(:), loads(:), orders(:), speeds(:)
     integer :: i, j, k, n
 

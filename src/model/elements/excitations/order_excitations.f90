@@ -290,7 +290,7 @@ contains
     pure type(harmonic_t) function harmonic(order, sine, cosine)
       real(wp), intent(in) :: order, sine, cosine
 
-      harmonic = harmonic_t(hypot(sine, cosine), 0.0_wp, order, atan2(cosine, sine), self%to(element))
+      harmonic = harmonic_t(hypot(sine, cosine), 0.0_wp, order, atan2(cosine, sine), self%rows%last_body(element))
     end function harmonic
   end subroutine list_harmonics
 
