@@ -120,7 +120,7 @@ contains
   pure subroutine find_column(name, rules, list, unit)
     character(len=*), intent(in) :: name
     type(key_rule_t), intent(in) :: rules(:)   !! of the lists
-    integer, intent(out) :: list               !! 0: there is none
+    integer, intent(out) :: list               !! 0 if there is none
     integer, intent(out) :: unit               !! index of `units`, 0: that of the schema
 
     do list = 1, size(rules)
