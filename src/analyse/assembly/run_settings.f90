@@ -15,7 +15,7 @@ module nocdyn_run_settings
   implicit none (type, external)
   private
 
-  public :: check_method, check_size, choose_settings, put_settings
+  public :: check_method, check_size, choose_settings, find_lossy_element, put_settings
 
   integer, parameter :: largest_matrix = 6000   ! rows; 0.3 GB each, and there are several
 
@@ -69,6 +69,11 @@ contains
     integer :: lower, rows, upper   ! half-bandwidths; stored rows of the factors, with the fill-in of pivoting
 
     allocate (notes(0))
+    call find_lossy_element(input, formulation%machine, obstacle)
+    if (obstacle /= '') then
+      call raise(error, exit_input, obstacle)
+      return
+    end if
     associate (run => input%groups(input%position('run')))
       settings%method = run%text('method')
       settings%rtol = run%number('rtol')
@@ -95,6 +100,31 @@ contains
       call raise(error, exit_input, place // ' needs ' // obstacle // "; method = 'rk853' needs none")
     end if
   end subroutine choose_settings
+
+  !> The message on an element whose relative damping has no frequency at which a viscous one stands for it over the time; '' if
+  !> there is none.
+  subroutine find_lossy_element(input, machine, text)
+    type(input_t), intent(in) :: input
+    type(machine_t), intent(in) :: machine
+    character(len=:), allocatable, intent(out) :: text
+    integer :: b, e, g
+
+    text = ''
+    do b = 1, size(machine%banks)
+      associate (bank => machine%banks(b)%bank)
+        if (.not. allocated(bank%loss_factor)) cycle
+        e = findloc(bank%loss_factor > 0 .and. .not. bank%loss_damping > 0, .true., dim=1)
+        if (e == 0) cycle
+        do g = 1, size(input%groups)
+          if (input%groups(g)%name /= bank%names(e)%text) cycle
+          if (input%groups(g)%kind /= 'coupling' .and. input%groups(g)%kind /= 'shaft') cycle
+          text = input%location(g) // ': its relative damping has no meaning over the time; required: damping_frequency ' // &
+                 '[rad/s], at which a viscous damping stands for it'
+          return
+        end do
+      end associate
+    end do
+  end subroutine find_lossy_element
 
   !> Writes the keys of &run that describe the integration, with their values.
   subroutine put_settings(json, run)

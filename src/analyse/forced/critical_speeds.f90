@@ -106,16 +106,23 @@ contains
     type(forced_response_t), intent(in) :: response
     type(crossing_t), intent(in) :: crossings(:)
     real(wp), allocatable, intent(out) :: speeds(:)
+    real(wp), parameter :: counts = 1.0e-4_wp   ! of the largest amplitude of all lines: smaller ones are left as they are
     integer :: i, l, q
     real(wp) :: amplitude(size(response%points))   ! its square
+    real(wp) :: smallest
 
     allocate (speeds(0))
     associate (points => response%points)
-      do l = 1, size(response%lines)
-        do q = 1, size(response%quantities)
+      do q = 1, size(response%quantities)
+        smallest = 0.0_wp
+        do i = 1, size(points)
+          smallest = max(smallest, maxval(real(points(i)%quantity(:, q), wp)**2 + aimag(points(i)%quantity(:, q))**2))
+        end do
+        smallest = smallest * counts**2
+        do l = 1, size(response%lines)
           amplitude = [(real(points(i)%quantity(l, q), wp)**2 + aimag(points(i)%quantity(l, q))**2, i=1, size(points))]
           do i = 2, size(points) - 1
-            if (amplitude(i) < max(amplitude(i - 1), amplitude(i + 1)) .or. .not. amplitude(i) > 0) cycle
+            if (amplitude(i) < max(amplitude(i - 1), amplitude(i + 1)) .or. .not. amplitude(i) > smallest) cycle
             if (has_undamped(crossings, l, points(i - 1)%state%speed, points(i + 1)%state%speed)) cycle
             call add_vertex(points(i - 1:i + 1), amplitude(i - 1:i + 1), speeds)
           end do
@@ -140,7 +147,7 @@ contains
     type(response_point_t), intent(in) :: points(3)
     real(wp), intent(in) :: amplitude(3)   !! squares of the amplitudes, the second one is the largest
     real(wp), allocatable, intent(inout) :: speeds(:)
-    real(wp), parameter :: accuracy = 1.0e-7_wp   ! relative, of a peak
+    real(wp), parameter :: accuracy = 1.0e-6_wp   ! relative, of the square of a peak
     real(wp), parameter :: narrow = 1.0e-12_wp    ! relative distance of speeds
     real(wp) :: bend, distance, gain, slope, vertex, x(3), y(3)
 

@@ -3,7 +3,7 @@
 !> A line is an order, whose frequency grows with the speed, or a fixed frequency. Excitations of the same frequency are one line:
 !> their moments have phases to each other, by the angles of the bodies to which their orders refer.
 module nocdyn_excitation_lines
-  use nocdyn_bank, only: harmonic_t
+  use nocdyn_bank, only: harmonic_t, role_load
   use nocdyn_held_speeds, only: held_state_t
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
@@ -39,26 +39,35 @@ contains
     type(held_state_t), intent(in) :: state
     type(source_t), allocatable, intent(out) :: sources(:)
     type(harmonic_t), allocatable :: list(:)
+    type(source_t), allocatable :: longer(:)
     integer :: b, e, i, k, n
     real(wp) :: speed
 
-    allocate (sources(0))
+    n = 0
+    allocate (sources(64))
     do b = 1, size(machine%banks)
       associate (bank => machine%banks(b)%bank)
+        if (bank%role == role_load) cycle
         do e = 1, bank%count
           speed = 0.0_wp
           do k = bank%rows%first(e), bank%rows%first(e + 1) - 1
             if (bank%rows%body(k) > 0) speed = speed + bank%rows%coefficient(k) * state%omega(bank%rows%body(k))
           end do
           call bank%list_harmonics(e, speed, list)
-          n = size(sources)
-          sources = [sources, (source_t(element=bank%first + e - 1), i=1, size(list))]
+          if (n + size(list) > size(sources)) then
+            allocate (longer(2 * (n + size(list))))
+            longer(:n) = sources(:n)
+            call move_alloc(longer, sources)
+          end if
           do i = 1, size(list)
+            sources(n + i)%element = bank%first + e - 1
             call set_source(list(i), state, sources(n + i))
           end do
+          n = n + size(list)
         end do
       end associate
     end do
+    sources = sources(:n)
   end subroutine list_sources
 
   !> amplitude sin(frequency t + order phi + phase) with phi = phi_0 + omega t, as the real part of moment exp(i Omega t), Omega

@@ -16,6 +16,7 @@ module nocdyn_held_speeds
   use nocdyn_static_twists, only: find_twists
   use nocdyn_text, only: quoted
   use nocdyn_torque_balance, only: set_up_balance, torque_balance_t
+  use nocdyn_twist_solver, only: new_twist_solver, twist_solver_t
   implicit none (type, external)
   private
 
@@ -44,6 +45,7 @@ module nocdyn_held_speeds
     real(wp), allocatable, private :: ratio(:)       !! speed of the reference body by the rigid motions, [freedoms]
     real(wp), allocatable, private :: z(:)           !! last rigid motions and internal states
     real(wp), allocatable, private :: q(:)           !! last angles of the coordinates [rad]
+    type(twist_solver_t), private :: twists
     real(wp), private :: last_speed = 0.0_wp         !! of these
     logical, private :: motors_hold = .false.        !! whether the motors hold the speed, else a torque
   contains
@@ -72,6 +74,8 @@ contains
     call reduced%formulate(.false., .false.)
     call move_alloc(reduced, formulation)
     call set_up_balance(formulation, t_infinity, self%balance)
+    call leave_out_silent(self%balance)
+    self%twists = new_twist_solver(self%balance)
     self%reference = reference
     associate (freedoms => size(self%balance%motions%free))
       allocate (self%ratio(freedoms), one(freedoms), omega(machine%bodies))
@@ -93,6 +97,32 @@ contains
     one = self%z(:size(one))
     self%last_speed = sum(self%ratio * one)
   end subroutine new_held_speeds
+
+  !> Leaves out the excitations without a mean torque, whose laws take most of the time.
+  subroutine leave_out_silent(balance)
+    type(torque_balance_t), intent(inout) :: balance
+    real(wp), parameter :: somewhere = 0.7_wp
+    integer :: i
+    logical :: is_needed(size(balance%formulation%machine%general_banks))
+
+    associate (machine => balance%formulation%machine, elements => balance%formulation%machine%elements)
+      elements%angle = somewhere
+      elements%speed = somewhere
+      call machine%evaluate_elements(balance%t)
+      call machine%differentiate_elements(balance%t)
+      do i = 1, size(is_needed)
+        associate (bank => machine%banks(machine%general_banks(i))%bank)
+          is_needed(i) = bank%role /= role_excitation .or. &
+                         any(abs(elements%applied(1, bank%first:bank%last())) > 0 .or. &
+                             abs(elements%applied_angle(1, bank%first:bank%last())) > 0 .or. &
+                             abs(elements%applied_speed(1, bank%first:bank%last())) > 0)
+        end associate
+      end do
+      machine%general_banks = pack(machine%general_banks, is_needed)
+      elements%angle = 0.0_wp
+      elements%speed = 0.0_wp
+    end associate
+  end subroutine leave_out_silent
 
   !> The elements that drive: motors; if there are none, excitations, whose means are those of engines.
   function sources_of(balance) result(sources)
@@ -268,7 +298,7 @@ contains
     real(wp), intent(inout) :: z(:)
     type(held_state_t), intent(inout) :: state
     type(error_t), allocatable, intent(out) :: error
-    real(wp) :: extra(self%balance%coordinates), weight(size(self%balance%is_elastic))
+    real(wp) :: extra(self%balance%coordinates), q(self%balance%coordinates), weight(size(self%balance%is_elastic))
     integer :: k
     logical :: is_found
 
@@ -281,7 +311,14 @@ contains
       end do
     end associate
     call self%balance%evaluate(z)
-    call find_twists(self%balance, self%q, is_found, error, weight, extra)
+    q = self%q
+    call self%twists%solve(self%balance, weight, extra, q, is_found)
+    if (is_found) then
+      self%q(:) = q
+    else
+      call self%balance%evaluate(z)
+      call find_twists(self%balance, self%q, is_found, error, weight, extra)
+    end if
     if (.not. allocated(error) .and. .not. is_found) then
       call raise(error, exit_failed, 'the torques balance, but no twists of the couplings were found that carry them')
     end if

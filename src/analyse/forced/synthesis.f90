@@ -17,8 +17,8 @@ module nocdyn_synthesis
   type :: periodic_t
     integer, allocatable :: line(:)         !! [lines]
     integer, allocatable :: multiple(:)     !! [lines]
-    integer :: samples = 0
-    real(wp), allocatable :: cosine(:, :)   !! of multiple * angle, [samples, lines]
+    integer :: samples = 0                  !! of a period, an even number
+    real(wp), allocatable :: cosine(:, :)   !! of multiple * angle, in the first half of the period, [samples / 2, lines]
     real(wp), allocatable :: sine(:, :)
   end type periodic_t
 
@@ -34,8 +34,9 @@ contains
   type(synthesis_t) function new_synthesis(frequency, family) result(self)
     real(wp), intent(in) :: frequency(:)   !! in any unit, positive, [lines]
     integer, intent(in) :: family(:)       !! only frequencies of one family have whole ratios, [lines]
-    integer :: k
+    integer :: i, k
     logical :: is_left(size(frequency))
+    real(wp) :: angle
     type(periodic_t) :: part
 
     allocate (self%parts(0))
@@ -43,22 +44,18 @@ contains
     do while (any(is_left))
       call collect(frequency, is_left .and. family == family(findloc(is_left, .true., dim=1)), part)
       part%samples = max(16, samples_per_period * maxval(part%multiple))
-      allocate (part%cosine(part%samples, size(part%line)), part%sine(part%samples, size(part%line)))
+      allocate (part%cosine(part%samples / 2, size(part%line)), part%sine(part%samples / 2, size(part%line)))
       do k = 1, size(part%line)
-        part%cosine(:, k) = cos(2.0_wp * pi * modulo(part%multiple(k) * turns(part%samples), part%samples) / part%samples)
-        part%sine(:, k) = sin(2.0_wp * pi * modulo(part%multiple(k) * turns(part%samples), part%samples) / part%samples)
+        do i = 1, part%samples / 2
+          angle = 2.0_wp * pi * modulo(part%multiple(k) * (i - 1), part%samples) / part%samples
+          part%cosine(i, k) = cos(angle)
+          part%sine(i, k) = sin(angle)
+        end do
       end do
       self%parts = [self%parts, part]
       is_left(part%line) = .false.
     end do
   end function new_synthesis
-
-  pure function turns(samples)
-    integer, intent(in) :: samples
-    integer :: turns(samples), i
-
-    turns = [(i - 1, i=1, samples)]
-  end function turns
 
   !> The remaining lines that have whole ratios with the first one.
   subroutine collect(frequency, is_left, part)
@@ -112,18 +109,29 @@ contains
     type(periodic_t), intent(in) :: part
     complex(wp), intent(in) :: amplitude(:)
     real(wp), intent(out) :: low, high
-    real(wp) :: value(part%samples)
-    integer :: k
+    real(wp) :: half(part%samples / 2, 0:1)
+    real(wp) :: value(0:part%samples + 1)   ! one more at each end
+    integer :: i, k, parity
+    real(wp) :: imaginary, real_part
 
     if (size(part%line) == 1) then
       high = abs(amplitude(part%line(1)))
       low = -high
       return
     end if
-    value = 0.0_wp
+    half = 0.0_wp   ! of the even and of the odd multiples, which change their sign from one half to the other
     do k = 1, size(part%line)
-      value = value + real(amplitude(part%line(k)), wp) * part%cosine(:, k) - aimag(amplitude(part%line(k))) * part%sine(:, k)
+      real_part = real(amplitude(part%line(k)), wp)
+      imaginary = aimag(amplitude(part%line(k)))
+      parity = modulo(part%multiple(k), 2)
+      do i = 1, size(half, 1)
+        half(i, parity) = half(i, parity) + (real_part * part%cosine(i, k) - imaginary * part%sine(i, k))
+      end do
     end do
+    value(1:size(half, 1)) = half(:, 0) + half(:, 1)
+    value(size(half, 1) + 1:part%samples) = half(:, 0) - half(:, 1)
+    value(0) = value(part%samples)
+    value(part%samples + 1) = value(1)
     high = refined(part, amplitude, value, 1.0_wp)
     low = -refined(part, amplitude, value, -1.0_wp)
   end subroutine periodic_extremes
@@ -132,21 +140,28 @@ contains
   pure real(wp) function refined(part, amplitude, value, sign)
     type(periodic_t), intent(in) :: part
     complex(wp), intent(in) :: amplitude(:)
-    real(wp), intent(in) :: value(:)   !! samples
+    real(wp), intent(in) :: value(0:)  !! samples, [0 to samples + 1]
     real(wp), intent(in) :: sign       !! 1 or -1
-    real(wp) :: bend, highest, threshold
-    integer :: after, before, i
+    real(wp) :: bend, highest, slope, threshold, top(part%samples)
+    integer :: i
+    logical :: is_top(part%samples)
 
-    highest = maxval(sign * value)
-    refined = highest
-    ! between samples the function rises by at most half the second derivative times the square of half a spacing
-    bend = sum(abs(amplitude(part%line)) * part%multiple**2)
-    threshold = highest - 0.5_wp * bend * (pi / part%samples)**2
+    ! the vertices of the parabolas through the maxima among the samples
     do i = 1, part%samples
-      if (sign * value(i) < threshold) cycle
-      before = modulo(i - 2, part%samples) + 1
-      after = modulo(i, part%samples) + 1
-      if (sign * value(i) < sign * value(before) .or. sign * value(i) < sign * value(after)) cycle
+      associate (before => sign * value(i - 1), here => sign * value(i), after => sign * value(i + 1))
+        is_top(i) = here >= before .and. here >= after
+        slope = 0.5_wp * (after - before)
+        bend = 2.0_wp * here - before - after
+        top(i) = here
+        if (is_top(i) .and. bend > 0) top(i) = here + 0.5_wp * slope**2 / bend
+      end associate
+    end do
+    highest = maxval(top, mask=is_top)
+    ! the error of a parabola, at six samples of the shortest period, is a small part of its height above the samples
+    threshold = highest - 0.1_wp * sum(abs(amplitude(part%line)) * part%multiple**2) * (pi / part%samples)**2
+    refined = maxval(sign * value)
+    do i = 1, part%samples
+      if (.not. is_top(i) .or. top(i) < threshold) cycle
       refined = max(refined, climbed(part, amplitude, 2.0_wp * pi * (i - 1) / part%samples, sign))
     end do
   end function refined
@@ -156,6 +171,7 @@ contains
     complex(wp), intent(in) :: amplitude(:)
     real(wp), intent(in) :: start, sign
     integer, parameter :: steps = 8
+    real(wp), parameter :: accurate = 1.0e-6_wp   ! of the angle; the error of the value is its square
     complex(wp) :: power(0:maxval(part%multiple)), term
     real(wp) :: angle, first, second, value
     integer :: k, n
@@ -181,6 +197,7 @@ contains
       if (value <= climbed) return
       climbed = value
       if (.not. second < 0) return
+      if (abs(first) <= accurate * abs(second)) return
       angle = angle - max(-pi / part%samples, min(pi / part%samples, first / second))
     end do
   end function climbed

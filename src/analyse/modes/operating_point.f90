@@ -9,7 +9,7 @@ module nocdyn_operating_point
   use nocdyn_literals, only: literal_ok, read_real
   use nocdyn_machine, only: machine_t
   use nocdyn_reduced, only: new_reduced
-  use nocdyn_run_settings, only: choose_settings
+  use nocdyn_run_settings, only: choose_settings, find_lossy_element
   use nocdyn_solve, only: solve
   use nocdyn_text, only: append, string_t, to_text
   implicit none (type, external)
@@ -38,6 +38,7 @@ contains
     type(operating_point_t), intent(out) :: point
     type(error_t), allocatable, intent(out) :: error
     type(group_t) :: run
+    character(len=:), allocatable :: lossy
     real(wp) :: time
     integer :: status
 
@@ -65,6 +66,10 @@ contains
         call use_time(input, machine, time, point, error)
       end if
     end select
+    if (allocated(error)) return
+    call find_lossy_element(input, machine, lossy)
+    if (lossy /= '') call append(point%notes, 'relative damping without damping_frequency is no part of these modes; ' // &
+                                              'nocdyn campbell has it')
   end subroutine find_operating_point
 
   !> Takes the steady state that is nearest to the start, a stable one if there is one.

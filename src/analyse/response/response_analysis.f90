@@ -1,5 +1,6 @@
 !> The forced response that &response of an input asks for, with its modes, critical speeds and peaks.
 module nocdyn_response_analysis
+  use, intrinsic :: iso_fortran_env, only: int64
   use nocdyn_critical_speeds, only: crossing_t, find_crossings, refine_peaks
   use nocdyn_errors, only: error_t, exit_failed, exit_input, raise
   use nocdyn_excitation_lines, only: line_order, line_t
@@ -27,6 +28,7 @@ module nocdyn_response_analysis
     type(crossing_t), allocatable :: crossings(:)
     type(response_limit_t), allocatable :: limits(:)
     type(string_t), allocatable :: notes(:)
+    real(wp) :: wall_time = 0.0_wp                   !! of the computation, without reading and writing files [s]
   end type response_analysis_t
 
 contains
@@ -37,8 +39,10 @@ contains
     type(machine_t), intent(in) :: machine   !! one lane
     type(response_analysis_t), intent(out) :: self
     type(error_t), allocatable, intent(out) :: error
+    integer(int64) :: began, ended, rate
     real(wp) :: failed_speed
 
+    call system_clock(began, rate)
     allocate (self%notes(0), self%crossings(0))
     call read_response_settings(input, machine, self%settings, error)
     if (allocated(error)) return
@@ -55,6 +59,8 @@ contains
     end associate
     if (.not. allocated(error)) call find_peaks(self, error, failed_speed)
     if (allocated(error)) call place_error(input, self%settings, failed_speed, error)
+    call system_clock(ended)
+    self%wall_time = real(ended - began, wp) / real(rate, wp)
   end subroutine analyse_response
 
   !> Groups the lines by their frequencies.

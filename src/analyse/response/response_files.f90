@@ -1,5 +1,6 @@
 !> The files of a forced response: response.csv, response_orders.csv and response.json.
 module nocdyn_response_files
+  use nocdyn_column_labels, only: column_labels_t
   use nocdyn_csv, only: write_header, write_row
   use nocdyn_forced_response, only: response_point_t
   use nocdyn_input, only: input_t
@@ -11,7 +12,7 @@ module nocdyn_response_files
   use nocdyn_response_limits, only: no_limit
   use nocdyn_response_quantities, only: quantity_moment
   use nocdyn_response_summary, only: critical_t, response_summary_t, worst_ratio
-  use nocdyn_text, only: append, string_t
+  use nocdyn_text, only: string_t
   use nocdyn_units, only: from_si
   implicit none (type, external)
   private
@@ -46,31 +47,32 @@ contains
   subroutine list_labels(analysis, labels)
     type(response_analysis_t), intent(in) :: analysis
     type(string_t), allocatable, intent(out) :: labels(:)
+    type(column_labels_t) :: list
     integer :: k, q
 
-    allocate (labels(0))
     associate (quantities => analysis%response%quantities)
-      call append(labels, 'omega_' // analysis%body_name // ' [rad/s]')
-      call append(labels, 'drive [1]')
-      call append(labels, 'drive_torque [N m]')
+      call list%add('omega_' // analysis%body_name // ' [rad/s]')
+      call list%add('drive [1]')
+      call list%add('drive_torque [N m]')
       do q = 1, size(quantities)
         associate (one => quantities(q))
-          call append(labels, 'mean_' // one%label // ' [' // one%unit // ']')
-          call append(labels, 'half_range_' // one%label // ' [' // one%unit // ']')
-          call append(labels, 'peak_' // one%label // ' [' // one%unit // ']')
-          if (one%section_modulus > 0) call append(labels, 'half_range_stress_' // one%name // ' [Pa]')
-          if (one%kind == quantity_moment) call append(labels, 'heat_' // one%name // ' [W]')
-          if (any(analysis%limits%quantity == q)) call append(labels, 'ratio_' // one%label // ' [1]')
+          call list%add('mean_' // one%label // ' [' // one%unit // ']')
+          call list%add('half_range_' // one%label // ' [' // one%unit // ']')
+          call list%add('peak_' // one%label // ' [' // one%unit // ']')
+          if (one%section_modulus > 0) call list%add('half_range_stress_' // one%name // ' [Pa]')
+          if (one%kind == quantity_moment) call list%add('heat_' // one%name // ' [W]')
+          if (any(analysis%limits%quantity == q)) call list%add('ratio_' // one%label // ' [1]')
         end associate
       end do
       do k = 1, size(analysis%limits)
         associate (one => quantities(analysis%limits(k)%quantity))
           if (any(analysis%limits(:k - 1)%quantity == analysis%limits(k)%quantity)) cycle
-          if (has_continuous(analysis, one%label)) call append(labels, 'limit_' // one%label // ' [' // one%unit // ']')
-          if (has_transient(analysis, one%label)) call append(labels, 'transient_limit_' // one%label // ' [' // one%unit // ']')
+          if (has_continuous(analysis, one%label)) call list%add('limit_' // one%label // ' [' // one%unit // ']')
+          if (has_transient(analysis, one%label)) call list%add('transient_limit_' // one%label // ' [' // one%unit // ']')
         end associate
       end do
     end associate
+    call list%take(labels)
   end subroutine list_labels
 
   !> Whether some limit of a quantity bounds its half range.
@@ -174,23 +176,24 @@ contains
   subroutine list_order_labels(analysis, labels)
     type(response_analysis_t), intent(in) :: analysis
     type(string_t), allocatable, intent(out) :: labels(:)
+    type(column_labels_t) :: list
     integer :: b, q
 
-    allocate (labels(0))
-    call append(labels, 'omega_' // analysis%body_name // ' [rad/s]')
-    call append(labels, 'order [1]')
-    call append(labels, 'frequency [Hz]')
+    call list%add('omega_' // analysis%body_name // ' [rad/s]')
+    call list%add('order [1]')
+    call list%add('frequency [Hz]')
     associate (response => analysis%response)
       do q = 1, size(response%quantities)
-        call append(labels, response%quantities(q)%label // ' [' // response%quantities(q)%unit // ']')
-        call append(labels, 'phase_' // response%quantities(q)%label // ' [deg]')
+        call list%add(response%quantities(q)%label // ' [' // response%quantities(q)%unit // ']')
+        call list%add('phase_' // response%quantities(q)%label // ' [deg]')
       end do
       do b = 1, response%machine%bodies
-        call append(labels, 'phi_' // response%machine%names(b)%text // ' [rad]')
-        call append(labels, 'phase_phi_' // response%machine%names(b)%text // ' [deg]')
-        call append(labels, 'omega_amplitude_' // response%machine%names(b)%text // ' [rad/s]')
+        call list%add('phi_' // response%machine%names(b)%text // ' [rad]')
+        call list%add('phase_phi_' // response%machine%names(b)%text // ' [deg]')
+        call list%add('omega_amplitude_' // response%machine%names(b)%text // ' [rad/s]')
       end do
     end associate
+    call list%take(labels)
   end subroutine list_order_labels
 
   !> The lead of an oscillation before cos(Omega t) [deg].
@@ -212,6 +215,7 @@ contains
 
     call json%open_report(input%file, input%title())
     call json%put('limits_exceeded', summary%limits_exceeded)
+    call json%put('wall_time_s', analysis%wall_time)
     call json%put('notes', analysis%notes)
     call json%put('body', analysis%body_name)
     call json%put('speed_rad_s', [analysis%settings%speeds(1), analysis%settings%speeds(size(analysis%settings%speeds))])

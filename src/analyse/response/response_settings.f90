@@ -5,12 +5,14 @@ module nocdyn_response_settings
   use nocdyn_input, only: input_t
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
+  use nocdyn_response_limits, only: read_limits, response_limit_t
+  use nocdyn_response_quantities, only: list_quantities, response_quantity_t
   use nocdyn_text, only: rounded_text, to_text
   use nocdyn_units, only: from_si, unit_rpm
   implicit none (type, external)
   private
 
-  public :: operating_distance, place_error, read_response_settings
+  public :: check_response, operating_distance, place_error, read_response_settings
 
   type, public :: response_settings_t
     integer :: group = 0                        !! &response in the input
@@ -55,6 +57,29 @@ contains
     settings%speeds = [(range(1) + (range(2) - range(1)) * (real(i, wp) / (count - 1)), i=0, count - 1)]
     settings%speeds(count) = range(2)
   end subroutine read_response_settings
+
+  !> Checks &response and &limit, if there are any.
+  subroutine check_response(input, machine, text, error)
+    type(input_t), intent(in) :: input
+    type(machine_t), intent(in) :: machine
+    character(len=:), allocatable, intent(out) :: text   !! a line of a report, after a line feed; '' without &response
+    type(error_t), allocatable, intent(out) :: error
+    type(response_settings_t) :: settings
+    type(response_quantity_t), allocatable :: quantities(:)
+    type(response_limit_t), allocatable :: limits(:)
+
+    text = ''
+    if (.not. is_in_file(input, input%groups_named('response'))) return
+    call read_response_settings(input, machine, settings, error)
+    if (allocated(error)) return
+    call list_quantities(machine, settings%body, quantities)
+    call read_limits(input, quantities, limits, error)
+    associate (speeds => settings%speeds)
+      text = new_line('a') // '  response: ' // to_text(size(speeds)) // ' speeds of ' // machine%names(settings%body)%text // &
+             ' from ' // rounded_text(from_si(speeds(1), unit_rpm), 6) // ' to ' // &
+             rounded_text(from_si(speeds(size(speeds)), unit_rpm), 6) // ' rpm'
+    end associate
+  end subroutine check_response
 
   pure logical function is_in_file(input, groups)
     type(input_t), intent(in) :: input

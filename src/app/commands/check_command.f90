@@ -14,7 +14,8 @@ module nocdyn_check_command
   use nocdyn_output_times, only: output_note, row_count
   use nocdyn_result_folders, only: result_folder
   use nocdyn_run_files, only: check_rows, check_variants, trajectory_bytes, wants_netcdf
-  use nocdyn_run_settings, only: check_method
+  use nocdyn_response_settings, only: check_response
+  use nocdyn_run_settings, only: check_method, find_lossy_element
   use nocdyn_sweep_plan, only: has_sweep, make_plan, sweep_plan_t
   use nocdyn_table_text, only: append_table
   use nocdyn_text, only: selected, string_t
@@ -44,14 +45,19 @@ contains
     character(len=*), intent(in) :: folder
     type(error_t), allocatable, intent(out) :: error
     type(sweep_plan_t) :: plan
-    character(len=:), allocatable :: sizes
+    character(len=:), allocatable :: note, response, sizes
     real(wp) :: bytes
     integer :: columns
 
-    call check_method(input, machine, error)
+    call check_response(input, machine, response, error)
+    if (allocated(error)) return
+    call find_lossy_element(input, machine, note)
+    if (response == '') note = ''   ! check_method refuses what has a meaning for a response only
+    if (note == '') call check_method(input, machine, error)
     if (.not. allocated(error)) call count_columns(input, machine, columns, error)
     if (allocated(error)) return
-    sizes = ''
+    sizes = response
+    if (note /= '') sizes = sizes // new_line('a') // '  note: nocdyn run refuses it: ' // note
     if (output_note(input) /= '') sizes = new_line('a') // '  note: ' // output_note(input)
     if (has_sweep(input)) then
       call make_plan(input, plan, error)
