@@ -8,6 +8,7 @@ module nocdyn_run_summary
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
   use nocdyn_machine_report, only: constraint_count, machine_notes
+  use nocdyn_run_limits, only: put_run_limits, run_limit_t
   use nocdyn_solver_status, only: max_switch_times, solver_status_t
   use nocdyn_run_settings, only: put_settings
   use nocdyn_observer, only: ranges_t
@@ -55,6 +56,7 @@ module nocdyn_run_summary
     character(len=:), allocatable :: method         !! of integration
     type(solver_status_t) :: solver_status
     type(energy_balance_t), allocatable :: energy_balance  !! from the start to the last row; not allocated if there are no rows
+    type(run_limit_t), allocatable :: limits(:)     !! by &limit; not allocated before the first row
     real(wp) :: wall_time = 0.0_wp                  !! of integration and writing of the trajectory [s]
   end type run_summary_t
 
@@ -177,6 +179,7 @@ contains
     call json%open_report(input%file, input%title(), summary%status, summary%message)
     call put_machine(json, summary)
     call put_settings(json, input%single('run'))
+    if (allocated(summary%limits)) call put_run_limits(json, summary%limits)
     call put_counts(json, summary)
     call put_method(json, summary)
     if (allocated(summary%energy_balance)) call put_energy_balance(json, summary%energy_balance)

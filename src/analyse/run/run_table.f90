@@ -4,6 +4,7 @@ module nocdyn_run_table
   use nocdyn_energy_balance, only: append_energy_balance
   use nocdyn_input, only: input_t
   use nocdyn_kinds, only: wp
+  use nocdyn_run_limits, only: run_limits_text
   use nocdyn_run_summary, only: run_summary_t
   use nocdyn_table_text, only: append_table, clear_rounding
   use nocdyn_text, only: counted, rounded_text, selected, string_t, to_text
@@ -34,6 +35,7 @@ contains
     if (input%title() /= '') call report%append_line(input%title())
     call append_columns(report, summary, left)
     call report%append(text)
+    if (allocated(summary%limits)) call report%append(run_limits_text(summary%limits))
     text = report%text()
   end function summary_table
 

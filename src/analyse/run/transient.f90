@@ -14,6 +14,7 @@ module nocdyn_transient
   use nocdyn_missed_states, only: note_missed_state
   use nocdyn_output_times, only: check_output_times, output_note, output_times
   use nocdyn_output_units, only: output_units
+  use nocdyn_run_limits, only: check_run_limits
   use nocdyn_run_settings, only: check_size, choose_settings
   use nocdyn_run_summary, only: check_energy_balance, check_extremes, describe_machine, extremes_t, run_summary_t, &
     start_extremes, update_extremes, widen_extremes
@@ -119,7 +120,10 @@ contains
     allocate (summary%chosen, source=observer%chosen)
     summary%t_start = times(1)
     call solve(formulation, settings, times, observer, summary, error)
-    if (summary%has_run) call complete_summary(observer, error, summary)
+    if (summary%has_run) then
+      call complete_summary(observer, error, summary)
+      call check_run_limits(input, summary%labels, summary%extremes%lowest, summary%extremes%highest, summary%limits)
+    end if
     if (.not. summary%has_run .or. allocated(error) .or. allocated(formulation%machine%steady_internal)) return
     associate (last => observer%table%columns%formulation)
       call last%set_state(reshape(observer%last_state, [1, size(observer%last_state)]))

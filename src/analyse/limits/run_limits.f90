@@ -1,0 +1,95 @@
+!> The limits of moments, by &limit, in a run: the largest magnitudes of the columns against `moment`.
+!>
+!> Limits of half ranges and stresses are those of a steady oscillation; `nocdyn response` compares with them.
+module nocdyn_run_limits
+  use nocdyn_input, only: input_t
+  use nocdyn_json, only: json_t
+  use nocdyn_kinds, only: wp
+  use nocdyn_text, only: rounded_text, string_t
+  implicit none (type, external)
+  private
+
+  public :: check_run_limits, put_run_limits, run_limits_text
+
+  !> A limit and the largest magnitude of its column.
+  type, public :: run_limit_t
+    character(len=:), allocatable :: coupling, column
+    real(wp) :: limit = 0.0_wp, largest = 0.0_wp   !! [N m]
+  end type run_limit_t
+
+contains
+
+  !> Compares the columns of a run with the limits of its input.
+  subroutine check_run_limits(input, labels, lowest, highest, limits)
+    type(input_t), intent(in) :: input
+    type(string_t), intent(in) :: labels(:)               !! of the columns
+    real(wp), intent(in) :: lowest(:), highest(:)         !! [columns]
+    type(run_limit_t), allocatable, intent(out) :: limits(:)
+    integer, allocatable :: groups(:)
+    integer :: column, i, n
+
+    allocate (groups, source=input%groups_named('limit'))
+    allocate (limits(count([(input%groups(groups(i))%has_value('moment'), i=1, size(groups))])))
+    n = 0
+    do i = 1, size(groups)
+      associate (group => input%groups(groups(i)))
+        if (.not. group%has_value('moment')) cycle
+        n = n + 1
+        limits(n)%coupling = group%text('coupling')
+        limits(n)%limit = group%number('moment')
+        column = column_of(labels, 'shaft_' // limits(n)%coupling // ' [N m]')   ! with damping
+        if (column == 0) column = column_of(labels, 'moment_' // limits(n)%coupling // ' [N m]')
+        limits(n)%column = ''
+        if (column == 0) cycle
+        limits(n)%column = labels(column)%text
+        limits(n)%largest = max(abs(lowest(column)), abs(highest(column)))
+      end associate
+    end do
+  end subroutine check_run_limits
+
+  pure integer function column_of(labels, label) result(column)
+    type(string_t), intent(in) :: labels(:)
+    character(len=*), intent(in) :: label
+
+    do column = size(labels), 1, -1
+      if (labels(column)%text == label) return
+    end do
+  end function column_of
+
+  !> Writes whether a limit is exceeded, and all ratios; nothing without limits.
+  subroutine put_run_limits(json, limits)
+    type(json_t), intent(inout) :: json
+    type(run_limit_t), intent(in) :: limits(:)
+    integer :: i
+
+    if (size(limits) == 0) return
+    call json%put('limits_exceeded', any(limits%largest > limits%limit))
+    call json%open_list('limits')
+    do i = 1, size(limits)
+      call json%open()
+      call json%put('coupling', limits(i)%coupling)
+      call json%put('column', limits(i)%column)
+      call json%put('moment_N_m', limits(i)%limit)
+      call json%put('largest_N_m', limits(i)%largest)
+      call json%put('ratio', limits(i)%largest / limits(i)%limit)
+      call json%close()
+    end do
+    call json%close_list()
+  end subroutine put_run_limits
+
+  !> A line for every limit that is exceeded, each with a line feed; '' if all are kept.
+  function run_limits_text(limits) result(text)
+    type(run_limit_t), intent(in) :: limits(:)
+    character(len=:), allocatable :: text
+    integer :: i
+
+    text = ''
+    do i = 1, size(limits)
+      if (limits(i)%largest <= limits(i)%limit) cycle
+      text = text // 'limit exceeded: ' // limits(i)%column // ' has reached ' // rounded_text(limits(i)%largest, 6) // ', ' // &
+             rounded_text(100.0_wp * limits(i)%largest / limits(i)%limit, 3) // ' % of ' // rounded_text(limits(i)%limit, 6) // &
+             new_line('a')
+    end do
+  end function run_limits_text
+
+end module nocdyn_run_limits
