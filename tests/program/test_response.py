@@ -300,6 +300,42 @@ def test_unstable_steady_states_are_refused_with_their_speed(nocdyn):
     assert code == 1
 
 
+def test_relative_damping_needs_a_frequency_over_the_time(nocdyn):
+    """A run refuses it; with damping_frequency it is viscous, and the response at this frequency stays."""
+    code, error = refusal(nocdyn, "run", DISCS)
+    assert "machine.nml:3: &coupling 'shaft': its relative damping has no meaning over the time; required: damping_freq" in error
+    assert code == 2
+    outcome = nocdyn("check", nocdyn.folder / "machine.nml")
+    assert "note: nocdyn run refuses it: " in outcome.stdout
+    assert "response: 13 speeds of one from 300 to 1500 rpm" in outcome.stdout
+    assert (outcome.returncode, outcome.stderr) == (0, "")
+    assert "nocdyn campbell has it" in nocdyn("modes", nocdyn.folder / "machine.nml").stdout
+    viscous = DISCS.replace("magnifier = 50.0", f"magnifier = 50.0 damping_frequency = {NATURAL!r}")
+    content = analysis(nocdyn, "response", viscous)
+    assert content["largest"][0]["half_range"] == pytest.approx(disc_moment(NATURAL / 2), rel=1e-6)
+    outcome = nocdyn("modes", nocdyn.write("viscous.nml", viscous), "--out", "modes")
+    (mode,) = (m for m in json.loads((nocdyn.folder / "modes/modes.json").read_text())["modes"] if m["kind"] == "oscillating")
+    assert mode["damping_ratio"] == pytest.approx(LOSS / 2, rel=1e-9)
+
+
+def test_a_run_compares_its_moments_with_their_limits(nocdyn):
+    text = (
+        DISCS.replace("magnifier = 50.0", "damping = 1").replace("3.0 /", "3.0 speed = 5 /")
+        + "&limit coupling = 'shaft' moment = {} /\n"
+    )
+    outcome = nocdyn("run", nocdyn.write("machine.nml", text.format(0.5)), "--out", "out")
+    summary = nocdyn.summary("out")
+    assert summary["limits_exceeded"]
+    (limit,) = summary["limits"]
+    column = summary["columns"]["shaft_shaft [N m]"]
+    assert limit["column"] == "shaft_shaft [N m]"
+    assert limit["largest_N_m"] == max(abs(column["min"]), abs(column["max"]))
+    assert f"limit exceeded: shaft_shaft [N m] has reached {limit['largest_N_m']:.6g}"[:50] in outcome.stdout
+    outcome = nocdyn("run", nocdyn.write("machine.nml", text.format(1e6)), "--out", "out")
+    assert not nocdyn.summary("out")["limits_exceeded"]
+    assert "limit exceeded" not in outcome.stdout
+
+
 def test_undamped_resonance_is_called_unbounded(nocdyn):
     outcome = nocdyn("response", nocdyn.write("machine.nml", DISCS.replace("magnifier = 50.0", "")), "--out", "out")
     assert outcome.returncode == 0, outcome.stderr

@@ -70,16 +70,9 @@ contains
 
     allocate (notes(0))
     call find_lossy_element(input, formulation%machine, obstacle)
-    if (obstacle /= '') then
-      call raise(error, exit_input, obstacle)
-      return
-    end if
-    associate (run => input%groups(input%position('run')))
-      settings%method = run%text('method')
-      settings%rtol = run%number('rtol')
-      settings%atol = run%number('atol')
-      settings%max_steps = run%whole_number('max_steps')
-    end associate
+    if (obstacle /= '') call raise(error, exit_input, obstacle)
+    if (allocated(error)) return
+    call read_settings(input%groups(input%position('run')), settings)
     place = input%location(input%position('run'), 'method') // ': method = ' // quoted(trim(settings%method))
     if (settings%method == 'taylor') then
       call formulation%series_obstacle(obstacle)
@@ -100,6 +93,16 @@ contains
       call raise(error, exit_input, place // ' needs ' // obstacle // "; method = 'rk853' needs none")
     end if
   end subroutine choose_settings
+
+  subroutine read_settings(run, settings)
+    type(group_t), intent(in) :: run
+    type(integration_settings_t), intent(inout) :: settings
+
+    settings%method = run%text('method')
+    settings%rtol = run%number('rtol')
+    settings%atol = run%number('atol')
+    settings%max_steps = run%whole_number('max_steps')
+  end subroutine read_settings
 
   !> The message on an element whose relative damping has no frequency at which a viscous one stands for it over the time; '' if
   !> there is none.

@@ -62,7 +62,6 @@ contains
     type(error_t), allocatable, intent(out) :: error
     class(formulation_t), allocatable :: formulation
     type(reduced_t), allocatable :: reduced
-    real(wp), allocatable :: one(:), omega(:)
     integer :: i
 
     allocate (reduced)
@@ -77,26 +76,34 @@ contains
     call leave_out_silent(self%balance)
     self%twists = new_twist_solver(self%balance)
     self%reference = reference
-    associate (freedoms => size(self%balance%motions%free))
-      allocate (self%ratio(freedoms), one(freedoms), omega(machine%bodies))
-      do i = 1, freedoms
-        one = 0.0_wp
-        one(i) = 1.0_wp
-        omega = self%balance%body_speeds(one)
-        self%ratio(i) = omega(reference)
-      end do
-      if (.not. any(abs(self%ratio) > 0)) then
-        call raise(error, exit_input, quoted(machine%names(reference)%text) // ' is held by elastic couplings: it has no ' // &
-                   'steady speed but 0; allowed: a body that can turn on')
-        return
-      end if
-      self%z = self%balance%start()
-    end associate
+    allocate (self%ratio(size(self%balance%motions%free)))
+    call find_ratios(self%balance, reference, self%ratio)
+    if (.not. any(abs(self%ratio) > 0)) then
+      call raise(error, exit_input, quoted(machine%names(reference)%text) // ' is held by elastic couplings: it has no ' // &
+                 'steady speed but 0; allowed: a body that can turn on')
+      return
+    end if
+    self%z = self%balance%start()
     allocate (self%q(self%balance%coordinates), source=0.0_wp)
     self%sources = sources_of(self%balance)
-    one = self%z(:size(one))
-    self%last_speed = sum(self%ratio * one)
+    self%last_speed = sum(self%ratio * self%z(:size(self%ratio)))
   end subroutine new_held_speeds
+
+  !> The speed of a body in each rigid motion.
+  subroutine find_ratios(balance, body, ratio)
+    type(torque_balance_t), intent(in) :: balance
+    integer, intent(in) :: body
+    real(wp), intent(out) :: ratio(:)   !! [rigid motions]
+    real(wp) :: omega(balance%formulation%machine%bodies), one(size(ratio))
+    integer :: i
+
+    do i = 1, size(ratio)
+      one = 0.0_wp
+      one(i) = 1.0_wp
+      omega = balance%body_speeds(one)
+      ratio(i) = omega(body)
+    end do
+  end subroutine find_ratios
 
   !> Leaves out the excitations without a mean torque, whose laws take most of the time.
   subroutine leave_out_silent(balance)

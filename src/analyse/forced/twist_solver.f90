@@ -1,8 +1,8 @@
 !> Static twists of a machine at one speed after the other, by Newton's method from those of the speed before.
 !>
-!> The stiffness matrix of the coordinates is banded; the coordinates that the rigid motions leave free are held, for no force is left
-!> on them. Where every stiffness is as before, its factors serve again: a linear machine is factored once. Where Newton's method does
-!> not converge, or a stiffness is not positive, `find_twists` has to search.
+!> The stiffness matrix of the coordinates is banded; the coordinates that the rigid motions leave free are held, for no force is
+!> left on them. Where every stiffness is as before, its factors serve again: a linear machine is factored once. Where Newton's
+!> method does not converge, or a stiffness is not positive, `find_twists` has to search.
 module nocdyn_twist_solver
   use nocdyn_kinds, only: wp
   use nocdyn_lapack_lu, only: band_factor, band_solve

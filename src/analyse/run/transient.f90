@@ -120,10 +120,7 @@ contains
     allocate (summary%chosen, source=observer%chosen)
     summary%t_start = times(1)
     call solve(formulation, settings, times, observer, summary, error)
-    if (summary%has_run) then
-      call complete_summary(observer, error, summary)
-      call check_run_limits(input, summary%labels, summary%extremes%lowest, summary%extremes%highest, summary%limits)
-    end if
+    if (summary%has_run) call complete_summary(input, observer, error, summary)
     if (.not. summary%has_run .or. allocated(error) .or. allocated(formulation%machine%steady_internal)) return
     associate (last => observer%table%columns%formulation)
       call last%set_state(reshape(observer%last_state, [1, size(observer%last_state)]))
@@ -197,12 +194,14 @@ contains
     end if
   end subroutine solve
 
-  subroutine complete_summary(observer, error, summary)
+  subroutine complete_summary(input, observer, error, summary)
+    type(input_t), intent(in) :: input
     type(run_observer_t), intent(inout) :: observer
     type(error_t), allocatable, intent(inout) :: error   !! of the integration, or that a number of the summary is not finite
     type(run_summary_t), intent(inout) :: summary
 
     summary%extremes = observer%extremes
+    call check_run_limits(input, summary%labels, summary%extremes%lowest, summary%extremes%highest, summary%limits)
     if (.not. allocated(error)) call check_extremes(summary%extremes, summary%labels, error)
     call check_energy_balance(summary%extremes, observer%vibration%largest, summary%notes)
     if (summary%extremes%rows > 0) then
