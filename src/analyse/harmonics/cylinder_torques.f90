@@ -22,8 +22,8 @@ contains
     real(wp), allocatable :: factor(:), firing(:)
     integer :: c
 
-    firing = group%numbers('firing')
-    factor = factors(group)
+    allocate (firing, source=group%numbers('firing'))
+    allocate (factor, source=factors(group))
     if (group%has_value('pressures')) then
       fired = gas_torque(group, 'pressures')
       missed = gas_torque(group, 'misfire_pressures')
@@ -55,8 +55,8 @@ contains
     real(wp), allocatable :: firing(:), scatter(:)
     integer :: c
 
-    firing = group%numbers('firing')
-    scatter = group%numbers('cylinder_scatter')
+    allocate (firing, source=group%numbers('firing'))
+    allocate (scatter, source=group%numbers('cylinder_scatter'))
     if (size(scatter) == 0) then
       factors = spread(1.0_wp, 1, size(firing))
     else if (size(scatter) == 1) then
@@ -84,13 +84,14 @@ contains
 
     cycle = cycle_of(group)
     associate (n => int(group%number('harmonics_up_to') * cycle / (2.0_wp * pi) + 1.0e-9_wp))
-      torque%order = [(k * 2.0_wp * pi / cycle, k=1, n)]
+      allocate (torque%order(n))
+      torque%order(:) = [(k * 2.0_wp * pi / cycle, k=1, n)]
       allocate (torque%speed(1), torque%mean(1), torque%sine(n, 1), torque%cosine(n, 1), source=0.0_wp)
     end associate
     allocate (torque%square_order(0), torque%square_sine(0), torque%square_cosine(0))
-    pressure = group%numbers(pressures)
+    allocate (pressure, source=group%numbers(pressures))
     if (size(pressure) == 0) return
-    angle = group%numbers('crank_angles')
+    allocate (angle, source=group%numbers('crank_angles'))
     last = size(angle)
     if (angle(last) - angle(1) > cycle - 0.5_wp * (angle(last) - angle(last - 1))) then   ! the first point again
       pressure(1) = 0.5_wp * (pressure(1) + pressure(last))

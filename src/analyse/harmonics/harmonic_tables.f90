@@ -21,10 +21,10 @@ contains
     key = 'orders'
     text = ''
     call take_rows(group, order, speed, load)
-    phase = group%numbers('phases')
-    orders = distinct(order)
-    speeds = distinct(speed)
-    loads = distinct(load)
+    allocate (phase, source=group%numbers('phases'))
+    allocate (orders, source=distinct(order))
+    allocate (speeds, source=distinct(speed))
+    allocate (loads, source=distinct(load))
     do i = 1, size(order)
       if (order(i) > 0 .or. i > size(phase)) cycle
       if (abs(phase(i)) > 0) text = 'orders(' // to_text(i) // ') = 0 is a mean, and phases(' // to_text(i) // &
