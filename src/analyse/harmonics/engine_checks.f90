@@ -82,7 +82,7 @@ contains
 
     text = ''
     key = 'firing'
-    firing = group%numbers('firing')
+    allocate (firing, source=group%numbers('firing'))
     do i = 1, size(firing)
       if (firing(i) <= cycle_of(group) * (1.0_wp + rounding)) cycle
       text = 'firing_deg(' // to_text(i) // ') = ' // to_text(firing(i) / degree) // ' is out of range; allowed: 0 to ' // &
@@ -90,7 +90,7 @@ contains
       return
     end do
     key = 'orders'
-    orders = group%numbers('orders')
+    allocate (orders, source=group%numbers('orders'))
     do i = 1, size(orders)
       associate (cycles => orders(i) * cycle_of(group) / (2.0_wp * pi))
         if (abs(cycles - anint(cycles)) <= rounding * cycles) cycle
@@ -113,7 +113,7 @@ contains
 
     text = ''
     key = 'load_share'
-    loads = distinct(group%numbers('loads'))
+    allocate (loads, source=distinct(group%numbers('loads')))
     if (size(loads) > 0) range = to_text(loads(1)) // ' to ' // to_text(loads(size(loads))) // ', the loads of the rows'
     if (size(loads) == 0) then
       if (group%has_value('load_share')) text = 'load_share needs loads, or a column load in the file'
@@ -134,7 +134,7 @@ contains
 
     text = ''
     key = 'crank_angles'
-    angle = group%numbers('crank_angles')
+    allocate (angle, source=group%numbers('crank_angles'))
     associate (n => size(angle), cycle => cycle_of(group))
       step = maxval(angle(2:) - angle(:n - 1))
       associate (span => angle(n) - angle(1))
