@@ -175,6 +175,16 @@ def test_files_of_harmonics_that_do_not_fit_are_refused(nocdyn, text, complaint)
     assert LABEL + "table_file: " + complaint in refusal(nocdyn, engine)
 
 
+def test_tables_beyond_all_engines_are_refused(nocdyn):
+    nocdyn.write("t.csv", "order, amplitude, phase_deg\n" + "".join(f"{i}, 1, 0\n" for i in range(201)))
+    engine = "&engine name = 'e' stroke = 4 cylinders = 'crank' firing_deg = 0 table_file = 't.csv' /"
+    assert "201 orders at 1 speed; allowed: at most 200 orders, and 5000 orders times speeds" in refusal(nocdyn, engine)
+    nocdyn.write("t.csv", "order, amplitude, phase_deg\n" + "1, 1, 0\n" * 20001)
+    assert "20001 rows of orders; allowed: at most 20000" in refusal(nocdyn, engine)
+    many = "&engine name = 'e' stroke = 4 cylinders = 101*'crank' firing_deg = 101*0 mean_torque = 1 /"
+    assert "101 cylinders; allowed: at most 100" in refusal(nocdyn, many)
+
+
 def test_a_file_of_harmonics_that_is_not_there_is_refused(nocdyn):
     nocdyn.write(
         "machine.nml", MACHINE.format("&engine name = 'e' stroke = 4 cylinders = 'crank' firing_deg = 0 table_file = 'no.csv' /")
@@ -202,9 +212,22 @@ def test_pressures_that_are_not_one_cycle_are_refused(nocdyn, rows, complaint):
 
 
 SWEEP = """&sweep design = 'grid' /
-&vary target = 'engine.e.{}' low = {} high = {} count = 3 /
+&vary target = '{}' low = {} high = {} count = 3 /
 &record quantity = 'torque_e_1' statistic = 'final' /
 """
+
+
+def final_torques(nocdyn, machine, target, low, high):
+    """Of the first torque at three values of a number, after a comparison with single runs."""
+    nocdyn.write("machine.nml", MACHINE.format(machine) + SWEEP.format(target, low, high))
+    outcome = nocdyn("sweep", "machine.nml", "--out", "sweep", "--csv")
+    assert outcome.returncode == 0, outcome.stderr
+    with open(nocdyn.folder / "sweep/sweep.csv", newline="", encoding="utf-8") as file:
+        found = [next(float(value) for key, value in row.items() if "torque_e_1" in key) for row in csv.DictReader(file)]
+    for value, final in zip((low, (low + high) / 2, high), found):
+        table = run(nocdyn, machine, "--set", f"{target}={value:g}")
+        assert table["torque_e_1 [N m]"][-1] == pytest.approx(final, abs=1e-9)
+    return found
 
 
 @pytest.mark.parametrize(
@@ -219,12 +242,12 @@ SWEEP = """&sweep design = 'grid' /
 )
 def test_keys_of_engines_vary_in_sweeps(nocdyn, key, low, high):
     engine = FIRST.format("reciprocating_mass = 2 crank_radius = 0.1 rod_length = 0.4")
-    nocdyn.write("machine.nml", MACHINE.format(engine) + SWEEP.format(key, low, high))
-    outcome = nocdyn("sweep", "machine.nml", "--out", "sweep", "--csv")
-    assert outcome.returncode == 0, outcome.stderr
-    with open(nocdyn.folder / "sweep/sweep.csv", newline="", encoding="utf-8") as file:
-        found = [next(float(value) for key, value in row.items() if "torque_e_1" in key) for row in csv.DictReader(file)]
-    assert len(set(found)) > 1
-    for value, final in zip((low, (low + high) / 2, high), found):
-        table = run(nocdyn, engine, "--set", f"engine.e.{key}={value:g}")
-        assert table["torque_e_1 [N m]"][-1] == pytest.approx(final, abs=1e-9)
+    assert len(set(final_torques(nocdyn, engine, f"engine.e.{key}", low, high))) > 1
+
+
+def test_the_share_of_a_load_follows_it_in_sweeps(nocdyn):
+    load = "&load name = 'water' body = 'crank' quadratic = 0.02 /\n"
+    blades = "&excitation name = 'e_1' body = 'crank' kind = 'orders' orders = 4 share_of_load = 0.1 /"
+    first, second, third = final_torques(nocdyn, load + blades, "load.water.quadratic", 0.01, 0.03)
+    assert second == pytest.approx(2 * first, rel=1e-6)
+    assert third == pytest.approx(3 * first, rel=1e-6)

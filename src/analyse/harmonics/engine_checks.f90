@@ -14,6 +14,7 @@ module nocdyn_engine_checks
 
   real(wp), parameter :: pi = acos(-1.0_wp), degree = pi / 180.0_wp
   real(wp), parameter :: rounding = 1.0e-9_wp   ! relative, of angles and orders
+  integer, parameter :: most_cylinders = 100
 
 contains
 
@@ -49,6 +50,11 @@ contains
 
     text = ''
     cylinders = size(group%texts('cylinders'))
+    key = 'cylinders'
+    if (cylinders > most_cylinders) then
+      text = to_text(cylinders) // ' cylinders; allowed: at most ' // to_text(most_cylinders)
+      return
+    end if
     key = 'stroke'
     if (all(group%whole_number('stroke') /= [2, 4])) then
       text = 'stroke = ' // to_text(group%whole_number('stroke')) // '; allowed: 2 or 4'

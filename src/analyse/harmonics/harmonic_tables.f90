@@ -3,11 +3,14 @@ module nocdyn_harmonic_tables
   use nocdyn_input, only: group_t
   use nocdyn_kinds, only: wp
   use nocdyn_order_excitations, only: order_torque_t
-  use nocdyn_text, only: to_text
+  use nocdyn_text, only: counted, to_text
   implicit none (type, external)
   private
 
   public :: find_table_obstacle, table_torque, distinct
+
+  ! More than any table of an engine has: the law of a cylinder has a formula for each order and segment between speeds.
+  integer, parameter :: most_rows = 20000, most_orders = 200, most_numbers = 5000
 
 contains
 
@@ -15,21 +18,41 @@ contains
   pure subroutine find_table_obstacle(group, key, text)
     type(group_t), intent(in) :: group                       !! &engine or &excitation, with orders
     character(len=:), allocatable, intent(out) :: key, text   !! which key is wrong, and what about it, '' if nothing
-    real(wp), allocatable :: load(:), order(:), phase(:), speed(:), loads(:), orders(:), speeds(:)
-    integer :: i, j, k, n
+    real(wp), allocatable :: load(:), order(:), phase(:), speed(:)
+    integer :: i
 
     key = 'orders'
     text = ''
     call take_rows(group, order, speed, load)
+    if (size(order) > most_rows) then
+      text = to_text(size(order)) // ' rows of orders; allowed: at most ' // to_text(most_rows)
+      return
+    end if
     allocate (phase, source=group%numbers('phases'))
-    allocate (orders, source=distinct(order))
-    allocate (speeds, source=distinct(speed))
-    allocate (loads, source=distinct(load))
     do i = 1, size(order)
       if (order(i) > 0 .or. i > size(phase)) cycle
       if (abs(phase(i)) > 0) text = 'orders(' // to_text(i) // ') = 0 is a mean, and phases(' // to_text(i) // &
                                     ') = ' // to_text(phase(i)) // '; needed: the phase 0'
     end do
+    if (text == '') call find_gap(order, speed, load, text)
+  end subroutine find_table_obstacle
+
+  !> Which order does not have one row at each speed and load, '' if all have.
+  pure subroutine find_gap(order, speed, load, text)
+    real(wp), intent(in) :: order(:), speed(:), load(:)   !! of the rows
+    character(len=:), allocatable, intent(out) :: text
+    real(wp), allocatable :: loads(:), orders(:), speeds(:)
+    integer :: i, j, k, n
+
+    text = ''
+    allocate (orders, source=distinct(order))
+    allocate (speeds, source=distinct(speed))
+    allocate (loads, source=distinct(load))
+    if (size(orders) > most_orders .or. size(orders) > most_numbers / size(speeds)) then
+      text = to_text(size(orders)) // ' orders at ' // counted(size(speeds), 'speed', 'speeds') // '; allowed: at most ' // &
+             to_text(most_orders) // ' orders, and ' // to_text(most_numbers) // ' orders times speeds'
+      return
+    end if
     do k = 1, size(loads)
       do j = 1, size(speeds)
         do i = 1, size(orders)
@@ -50,7 +73,7 @@ contains
         end do
       end do
     end do
-  end subroutine find_table_obstacle
+  end subroutine find_gap
 
   !> Order, speed and load of each row; 0 where all rows hold for all speeds or loads.
   pure subroutine take_rows(group, order, speed, load)

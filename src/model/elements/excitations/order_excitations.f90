@@ -84,11 +84,13 @@ contains
     integer, intent(in) :: owner(:)                    !! excitation of each harmonic, ascending
     type(order_torque_t), intent(in) :: torque(:, :)   !! [lanes, excitations]
     real(wp) :: value(bank%lanes, size(owner))
-    integer :: k, lane
+    integer :: i, k, lane
 
+    i = 0
     do k = 1, size(owner)
+      i = 1 + merge(i, 0, any(owner(max(1, k - 1):k - 1) == owner(k)))
       do lane = 1, bank%lanes
-        value(lane, k:k) = numbers_of(torque(lane, owner(k)), name, count(owner(:k) == owner(k)))
+        value(lane, k:k) = numbers_of(torque(lane, owner(k)), name, i)
       end do
     end do
     call bank%add_parameter(name, value, is_key=.false., element=owner)
@@ -102,12 +104,14 @@ contains
     integer, intent(in) :: owner(:)                    !! excitation of each harmonic, ascending
     type(order_torque_t), intent(in) :: torque(:, :)   !! [lanes, excitations]
     real(wp), dimension(bank%lanes, size(owner), bank%segments) :: slope, start
-    integer :: k, lane, s
+    integer :: i, k, lane, s
 
+    i = 0
     do k = 1, size(owner)
+      i = 1 + merge(i, 0, any(owner(max(1, k - 1):k - 1) == owner(k)))   ! its number among those of the excitation
       do lane = 1, bank%lanes
         associate (one => torque(lane, owner(k)))
-          call divide(one%speed, numbers_of(one, name, count(owner(:k) == owner(k))), start(lane, k, :), slope(lane, k, :))
+          call divide(one%speed, numbers_of(one, name, i), start(lane, k, :), slope(lane, k, :))
         end associate
       end do
     end do

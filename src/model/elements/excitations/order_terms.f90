@@ -27,16 +27,18 @@ contains
     logical, intent(in) :: is_order(:)        !! whether a term is a sine of the angle alone with a positive order, [terms]
     type(order_terms_t) :: self
     integer :: e, k, n, others(excitations)
+    logical :: has_several
 
     allocate (self%base(excitations))
     allocate (self%multiple(most_terms, excitations), self%single(size(owner), excitations), source=0)
     others = 0
     do e = 1, excitations
       self%base(e) = common_order(pack(order, owner == e .and. is_order))
+      has_several = count(owner == e .and. is_order) > 1
       do k = 1, size(owner)
         if (owner(k) /= e) cycle
         n = 0
-        if (is_order(k) .and. count(owner == e .and. is_order) > 1) n = multiple_of(order(k), self%base(e))
+        if (is_order(k) .and. has_several) n = multiple_of(order(k), self%base(e))
         if (n > 0) then
           if (self%multiple(n, e) == 0) then
             self%multiple(n, e) = k
