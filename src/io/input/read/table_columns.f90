@@ -92,8 +92,8 @@ contains
     integer :: c, i, unit
     logical :: is_set(size(relation%first) + size(relation%second) - 1)
 
-    lists = [relation%first, relation%second(2:)]
-    keys = lists + first_key(group%rule) - 1
+    allocate (lists, source=[relation%first, relation%second(2:)])
+    allocate (keys, source=lists + first_key(group%rule) - 1)
     is_set = .false.
     do c = 1, size(names)
       call find_column(names(c)%text, key_rules(keys), i, unit)
