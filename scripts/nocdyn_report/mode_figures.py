@@ -1,4 +1,4 @@
-"""Draws the modes that 'nocdyn modes --out' wrote: shapes along the train, and where their energies are."""
+"""Draws the modes that 'nocdyn modes --out' wrote: the drivetrain, the shapes along it, and where their energies are."""
 
 import argparse
 import json
@@ -14,13 +14,13 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from .results import ResultsError
-from .style import COLOURS, REFERENCE, WIDTH, add_format_option, add_title, plain, save, saved
+from .style import COLOURS, WIDTH, add_format_option, add_title, plain, save, saved
+from .train_drawing import EDGE, MOST_NAMES, ROW, draw_shape, draw_train
+from .train_layout import GROUND, Train, lay_out
 
-MOST_NAMES = 24  # bodies that are named on the axis
 MOST_LETTERS = 24  # of names that stand side by side under the narrower axes
 MOST_MODES = 6  # of a figure
-SHAPE, KINETIC, POTENTIAL = COLOURS[0], COLOURS[0], COLOURS[1]
-STRETCH = 0.06  # room above and below the largest motion
+KINETIC, POTENTIAL = COLOURS[0], COLOURS[1]
 
 
 @dataclass(frozen=True)
@@ -41,10 +41,13 @@ class Modes:
         """Those that are drawn; of large machines the file has the shapes of the first modes only."""
         return [mode for mode in self.content["modes"] if mode["kind"] == "oscillating" and "shape" in mode]
 
-    def joints(self, kind: str) -> list[dict]:
-        """Couplings or gears between two bodies, with the places of these."""
-        joints = [joint | {"places": [body - 1 for body in joint["bodies"]]} for joint in self.content[kind]]
-        return [joint for joint in joints if min(joint["places"]) >= 0]
+    def pairs(self, kind: str) -> list[list[int]]:
+        """The bodies of couplings or gears, from 0 on, GROUND for the ground."""
+        return [[body - 1 if body else GROUND for body in joint["bodies"]] for joint in self.content[kind]]
+
+    @property
+    def train(self) -> Train:
+        return lay_out(len(self.bodies), self.pairs("couplings"), self.pairs("gears"))
 
 
 def read_modes(folder: Path) -> Modes:
@@ -64,52 +67,27 @@ def read_modes(folder: Path) -> Modes:
 
 
 def draw_modes(modes: Modes, chosen: list[dict]) -> Figure:
-    """A row for every mode: its shape, and the shares of bodies and couplings in its energies."""
+    """The drivetrain on top; below it a row for every mode: its shape, and the shares of bodies and couplings in its energies."""
+    train = modes.train
+    height = 0.35 + ROW * (1 + max(train.row) - min(train.row))
     figure, grid = pyplot.subplots(
-        len(chosen), 2, squeeze=False, sharex="col", figsize=(1.5 * WIDTH, 1.9 * len(chosen) + 1.6), width_ratios=(3, 2)
+        len(chosen) + 1,
+        2,
+        squeeze=False,
+        sharex="col",
+        figsize=(1.5 * WIDTH, 1.9 * len(chosen) + height + 1.6),
+        width_ratios=(3, 2),
+        height_ratios=(height, *[1.9] * len(chosen)),
     )
-    for (shape, energy), mode in zip(grid, chosen):
-        _draw_shape(shape, modes, mode)
+    draw_train(grid[0, 0], modes, train)
+    grid[0, 1].set_axis_off()
+    for (shape, energy), mode in zip(grid[1:], chosen):
+        draw_shape(shape, modes, train, mode)
         _draw_energy(energy, modes, mode)
-    _name_bodies(grid[-1, 0], modes)
+    grid[-1, 0].set_xlim(-EDGE, max(train.place) + EDGE)
     _name_bodies(grid[-1, 1], modes)
-    grid[0, 1].legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
+    grid[0, 1].legend(*grid[1, 1].get_legend_handles_labels(), loc="lower left", ncols=2)
     return figure
-
-
-def _draw_shape(axes: Axes, modes: Modes, mode: dict) -> None:
-    """What moves in phase with the largest motion; what does not shows by its amplitude, an open circle."""
-    amplitude = np.array(mode["shape"])
-    motion = amplitude * np.cos(np.radians(mode["phase_deg"]))
-    few = len(motion) <= MOST_NAMES
-    axes.axhline(0.0, color="0.5", linewidth=0.6)
-    for coupling in modes.joints("couplings"):
-        axes.plot(coupling["places"], motion[coupling["places"]], color=SHAPE, linewidth=1.3)
-    for gear in modes.joints("gears"):
-        axes.plot(gear["places"], motion[gear["places"]], **REFERENCE)
-        if few:
-            axes.annotate(
-                f"1 : {gear['ratio']:.3g}",
-                (np.mean(gear["places"]), np.mean(motion[gear["places"]])),
-                fontsize=8,
-                color="0.35",
-                ha="center",
-                va="center",
-                bbox={"facecolor": "white", "edgecolor": "none", "pad": 1},
-            )
-    places = np.arange(len(motion))
-    if few:
-        axes.vlines(places, 0.0, motion, color=SHAPE, linewidth=4, alpha=0.35)
-        axes.plot(places, motion, "o", color=SHAPE, markersize=4)
-        lagging = amplitude - np.abs(motion) > 0.02
-        axes.plot(places[lagging], np.copysign(amplitude, motion)[lagging], "o", color=SHAPE, markersize=5, fillstyle="none")
-    axes.set_ylim(-1 - STRETCH, 1 + STRETCH)
-    damping = mode["damping_ratio"]
-    axes.set_title(
-        f"mode {mode['mode']}: {mode['frequency_Hz']:.5g} Hz, damping ratio {damping:.3g}"
-        + (", unstable" if damping < 0 else ""),
-        loc="left",
-    )
 
 
 def _draw_energy(axes: Axes, modes: Modes, mode: dict) -> None:

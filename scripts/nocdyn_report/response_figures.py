@@ -1,0 +1,278 @@
+"""Draws forced responses over the speed: the half range of every moment and reaction, its orders, limits, barred speed ranges."""
+
+import argparse
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+from matplotlib import pyplot
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+
+from .response_marks import BARRED, draw_barred, mark_criticals
+from .results import ResultsError
+from .speed_panels import (
+    DANGER,
+    Figures,
+    Labels,
+    arguments_of,
+    draw_folders,
+    figure_parser,
+    finite,
+    height_of,
+    shade_operation,
+    share_of,
+    speed_label,
+    window_of,
+)
+from .speed_results import Quantity, Response, read_response
+from .style import COLOURS, PIXELS, WIDTH, add_title, plain
+from .thinning import thin
+
+MOST_PANELS = 6  # of a figure
+WIDE = 11.5  # width of a figure of two columns [in]
+PANEL = 2.75  # height of a panel [in]
+AXES_SHARE = 0.84  # of a panel that its axes have, about
+NAMED = 4  # orders of a panel
+SMALLEST = 0.02  # of the largest half range that a named order has
+FAR = 2.5  # times what is drawn: limits above are not in the picture
+HEADROOM = 1.22  # for the names of critical speeds
+MOST_OF = 0.75  # of the half range that an order has whose name stands above it
+SPOTS = 25  # along a curve where its name may stand
+DECADES = 1e-4  # lowest value of a logarithmic axis, of the largest one
+ORDER_COLOURS = (*COLOURS[:6], "#7F3C8D")
+DASHES = ("-", (0, (5, 1.5)), (0, (1.5, 1.2)), (0, (5, 1.2, 1.2, 1.2)))
+SYNTHESIS = {"color": "black", "linewidth": 1.6}
+OTHERS = {"color": "0.72", "linewidth": 0.6}
+PEAK = {"color": "0.35", "linewidth": 1.1, "linestyle": (0, (4, 1.5))}
+MEAN = {"color": "0.35", "linewidth": 1.1, "linestyle": (0, (1, 1.2))}
+LIMIT = {"color": DANGER, "linewidth": 1.4}
+TRANSIENT = {"color": DANGER, "linewidth": 1.4, "linestyle": (0, (5, 2))}
+
+
+@dataclass(frozen=True)
+class Look:
+    """What the user chose."""
+
+    window: tuple[float, float]  # [rpm]
+    orders: Sequence[float] = ()  # that are named; none: the largest
+    with_peak: bool = False
+    is_logarithmic: bool = False
+
+
+def named_lines(response: Response, quantity: Quantity, look: Look) -> list[int]:
+    """Places of the lines that are named, the largest first."""
+    if quantity.orders is None or len(response.lines) == 1:
+        return []
+    inside = (response.speed >= look.window[0]) & (response.speed <= look.window[1])
+    largest = np.nan_to_num(quantity.orders[inside]).max(axis=0)
+    if look.orders:
+        return [place for place, line in enumerate(response.lines) if line.is_order and line.value in look.orders]
+    ranked = np.argsort(-largest, kind="stable")[:NAMED]
+    return [int(place) for place in ranked if largest[place] > SMALLEST * np.nan_to_num(quantity.half_range[inside]).max()]
+
+
+def _has_orders(response: Response, quantity: Quantity) -> bool:
+    """Whether there are curves beside that of all orders."""
+    return quantity.orders is not None and len(response.lines) > 1
+
+
+def styles_of(response: Response, quantities: Sequence[Quantity], look: Look) -> dict[int, dict]:
+    """The same line for the same order in all panels, the first colours for those that are named most often."""
+    counts: dict[int, int] = {}
+    for quantity in quantities:
+        for place in named_lines(response, quantity, look):
+            counts[place] = counts.get(place, 0) + 1
+    ranked = sorted(counts, key=lambda place: (-counts[place], place))
+    count = len(ORDER_COLOURS)
+    return {
+        place: {"color": ORDER_COLOURS[rank % count], "linestyle": DASHES[rank // count % len(DASHES)], "linewidth": 1.1}
+        for rank, place in enumerate(ranked)
+    }
+
+
+def draw_quantity(axes: Axes, response: Response, quantity: Quantity, look: Look, styles: dict[int, dict]) -> None:
+    """One panel, without the texts inside, whose places follow from its final scales."""
+    named = named_lines(response, quantity, look)
+    for place in range(len(response.lines) if _has_orders(response, quantity) else 0):
+        style = {**styles[place], "zorder": 3} if place in named else {**OTHERS, "zorder": 2}
+        axes.plot(*thin(response.speed, quantity.orders[:, place], PIXELS), **style)
+    axes.plot(*thin(response.speed, quantity.half_range, PIXELS), zorder=4, **SYNTHESIS)
+    if look.with_peak:
+        for values, style in ((quantity.peak, PEAK), (quantity.mean, MEAN)):
+            if values is not None:
+                axes.plot(*thin(response.speed, np.abs(values), PIXELS), zorder=3, **style)
+    axes.set_xlim(look.window)
+    far = _set_scale(axes, response, quantity, look)
+    for values, style in ((quantity.limit, LIMIT), (quantity.transient_limit, TRANSIENT)):
+        if values is not None:
+            axes.plot(*thin(response.speed, values, PIXELS), zorder=5, **style)
+    title = plain(quantity.element) + (f"   (limit, from {far:.4g} {quantity.unit} on, is above)" if far else "")
+    bars = [barred for barred in response.barred if barred.quantity == quantity.label]
+    axes.set_title(title, loc="left", pad=16 if bars else 6)
+    axes.set_ylabel(f"{quantity.kind} [{quantity.unit}]")
+    if quantity.stress:
+        _add_stress(axes, quantity.stress)
+
+
+def _set_scale(axes: Axes, response: Response, quantity: Quantity, look: Look) -> float:
+    """Room for what is drawn and for limits that are not far above; the smallest limit, if that is far above, else 0."""
+    inside = (response.speed >= look.window[0]) & (response.speed <= look.window[1])
+    drawn = [quantity.half_range] + [quantity.peak] * (look.with_peak and quantity.peak is not None)
+    values = np.concatenate([one[inside] for one in drawn])
+    top = max(np.nanmax(values[np.isfinite(values)], initial=0.0), 1e-300)
+    limits = [one[inside].min() for one in (quantity.limit, quantity.transient_limit) if one is not None]
+    near = [limit for limit in limits if limit <= FAR * top]
+    largest = max([top, *near])
+    if look.is_logarithmic:
+        axes.set_yscale("log")
+        axes.set_ylim(DECADES * largest, largest * DECADES ** -(HEADROOM - 1))
+    else:
+        axes.set_ylim(0.0, HEADROOM * largest)
+    return 0.0 if near or not limits else min(limits)
+
+
+def _add_stress(axes: Axes, stress: float) -> None:
+    mega = 1e-6 * stress
+    scale = axes.secondary_yaxis("right", functions=(lambda moment: moment * mega, lambda value: value / mega))
+    scale.set_ylabel("stress [MPa]")
+    scale.spines["right"].set_visible(True)
+
+
+def name_orders(labels: Labels, response: Response, quantity: Quantity, look: Look, styles: dict[int, dict]) -> None:
+    """Names of orders at their peaks, or where there is room on the curve, and not on the curve of all orders if possible."""
+    axes = labels.axes
+    inside = np.flatnonzero((response.speed >= look.window[0]) & (response.speed <= look.window[1]))
+    labels.avoid(share_of(axes, response.speed[inside]), height_of(axes, quantity.half_range[inside]))
+    for place in named_lines(response, quantity, look):
+        values = np.nan_to_num(quantity.orders[inside, place])
+        peaks = np.flatnonzero((values[1:-1] >= values[:-2]) & (values[1:-1] > values[2:])) + 1
+        peaks = np.concatenate(([values.argmax()], peaks[np.argsort(-values[peaks], kind="stable")][:3]))
+        along = np.linspace(0, len(inside) - 1, SPOTS).round().astype(int)
+        along = along[np.argsort(-values[along], kind="stable")]
+        large = peaks[values[peaks] > MOST_OF * quantity.half_range[inside[peaks]]]  # stand above the peak of all orders
+        spots = inside[np.concatenate((large, peaks, along))]
+        x = share_of(axes, response.speed[spots])
+        y = height_of(axes, quantity.orders[spots, place])
+        y[: len(large)] = [labels.top_of_curve(spot) for spot in x[: len(large)]]
+        labels.put_nearby(response.lines[place].name, list(zip(x, np.minimum(y, 0.93))), styles[place]["color"])
+
+
+def draw_page(response: Response, page: Sequence[Quantity], look: Look, styles: dict[int, dict]) -> Figure:
+    across = 1 if len(page) == 1 else 2
+    down = -(-len(page) // across)
+    width, height = (WIDTH, 1.5 * PANEL) if across == 1 else (WIDE, PANEL)
+    figure, grid = pyplot.subplots(down, across, squeeze=False, figsize=(width, height * down + 1.6))
+    shades: list[Patch] = []
+    for axes, quantity in zip(grid.flat, map(Quantity.in_short, page)):
+        shades = shade_operation(axes, response.operation)
+        draw_quantity(axes, response, quantity, look, styles)
+        labels = Labels(axes, (AXES_SHARE * width / across - (0.6 if quantity.stress else 0.0), AXES_SHARE * height - 0.3))
+        draw_barred(axes, labels, [one for one in response.barred if one.quantity == quantity.label])
+        mark_criticals(labels, response, quantity)
+        name_orders(labels, response, quantity, look, styles)
+    for axes in grid.flat[len(page) :]:
+        axes.set_visible(False)
+    for axes in grid.flat[max(len(page) - across, 0) : len(page)]:
+        axes.set_xlabel(plain(speed_label(response.body)))
+    figure.legend(
+        handles=_legend(response, page, look, shades), loc="outside lower center", ncols=3 if across == 1 else 4, fontsize=8.5
+    )
+    add_title(figure, response.title, "forced response: half range over the speed")
+    return figure
+
+
+def _legend(response: Response, page: Sequence[Quantity], look: Look, shades: list[Patch]) -> list[Artist]:
+    only = f"half range: {'order ' * response.lines[0].is_order}{response.lines[0].name}"
+    together = only if len(response.lines) == 1 else "half range of all orders together"
+    handles: list[Artist] = [Line2D([], [], label=together, **SYNTHESIS)]
+    if any(_has_orders(response, quantity) for quantity in page):
+        handles.append(Line2D([], [], color=ORDER_COLOURS[0], label="orders, named by number"))
+        if any(len(named_lines(response, quantity, look)) < len(response.lines) for quantity in page):
+            handles.append(Line2D([], [], label="other orders", **OTHERS))
+    if look.with_peak:
+        handles += [Line2D([], [], label="largest magnitude", **PEAK), Line2D([], [], label="magnitude of the mean", **MEAN)]
+    if any(quantity.limit is not None for quantity in page):
+        handles.append(Line2D([], [], label="limit in continuous operation", **LIMIT))
+    if any(quantity.transient_limit is not None for quantity in page):
+        handles.append(Line2D([], [], label="limit while passing through", **TRANSIENT))
+    labels = {quantity.label for quantity in page}
+    bars = [one for one in response.barred if one.quantity in labels]
+    if bars:
+        handles.append(Patch(facecolor=BARRED[True], label="barred speeds"))
+    if not all(one.can_be_passed for one in bars):
+        handles.append(Patch(facecolor=BARRED[False], label="not to be passed through"))
+    if response.criticals:
+        handles.append(Line2D([], [], color="0.35", marker=7, linestyle="", markersize=4, label="critical: mode/order"))
+    return handles + shades
+
+
+def chosen(response: Response, patterns: Sequence[str] | None) -> list[Quantity]:
+    """The quantities that patterns name; '*' stands for any text, '?' for a character."""
+    if not patterns:
+        return response.quantities
+    labels: set[str] = set()
+    for pattern in patterns:
+        expression = re.compile(re.escape(pattern).replace(r"\*", ".*").replace(r"\?", "."), re.IGNORECASE | re.DOTALL)
+        found = {one.label for one in response.quantities if expression.fullmatch(one.label)}
+        if not found:
+            there = ", ".join(one.label for one in response.quantities[:8])
+            raise ResultsError(f"{response.folder}: no quantity matches '{pattern}'; there are: {there}")
+        labels |= found
+    return [one for one in response.quantities if one.label in labels]
+
+
+def figures_of(folder: Path, arguments: argparse.Namespace) -> Figures:
+    """A figure, or several, for each kind of quantity."""
+    response = read_response(folder)
+    orders = [line.value for line in response.lines if line.is_order]
+    for order in arguments.orders or ():
+        if order not in orders:
+            raise ResultsError(f"{folder}: no order {order:g}; there are: {', '.join(f'{one:g}' for one in orders)}")
+    look = Look(window_of(folder, response.speed, arguments), arguments.orders or (), arguments.peak, arguments.log)
+    quantities = chosen(response, arguments.columns)
+    styles = styles_of(response, quantities, look)
+    kinds: dict[tuple[str, str], list[Quantity]] = {}
+    for quantity in quantities:
+        kinds.setdefault((quantity.kind, quantity.unit), []).append(quantity)
+    pages: dict[str, int] = {}
+    for (kind, _), members in kinds.items():
+        for first in range(0, len(members), MOST_PANELS):
+            pages[kind] = pages.get(kind, 0) + 1
+            name = kind if pages[kind] == 1 else f"{kind}_{pages[kind]}"
+            yield name, draw_page(response, members[first : first + MOST_PANELS], look, styles)
+
+
+def main() -> None:
+    parser = figure_parser("scripts/plot_response", "response", __doc__)
+    parser.usage = (
+        "%(prog)s RESULTS ... [--columns PATTERN ...] [--orders ORDER ...] [--peak] [--log] [--from RPM] [--to RPM] "
+        "[--format KINDS] [--out DIR]"
+    )
+    parser.add_argument(
+        "--columns",
+        nargs="+",
+        metavar="PATTERN",
+        help="draws these quantities only, e.g. 'moment_*' reaction_pinion; '*' stands for any text, '?' for a character",
+    )
+    parser.add_argument(
+        "--orders",
+        nargs="+",
+        type=finite,
+        metavar="ORDER",
+        help=f"names these orders instead of the {NAMED} largest of each panel",
+    )
+    parser.add_argument("--peak", action="store_true", help="also the mean and the largest magnitude, the mean included")
+    parser.add_argument("--log", action="store_true", help="logarithmic moments")
+    arguments = arguments_of(parser)
+    draw_folders(parser.prog, arguments, partial(figures_of, arguments=arguments))
+
+
+if __name__ == "__main__":
+    main()

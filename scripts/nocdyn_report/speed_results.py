@@ -1,0 +1,292 @@
+"""The results of `nocdyn response` and `nocdyn campbell`, read from their folders."""
+
+import json
+import math
+import re
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from .results import RPM
+from .trajectory_files import ResultsError, labels_of, read_columns
+
+SPEED = re.compile(r"omega_(?P<body>.+) \[(?P<unit>rad/s|rpm|Hz)\]")
+HALF_RANGE = re.compile(r"half_range_(?P<label>.+) \[(?P<unit>[^]]+)\]")
+FREQUENCY = re.compile(r"frequency_(?P<mode>\d+) \[Hz\]")
+LINE = re.compile(r"(?P<kind>order|line)_(?P<name>.+) \[Hz\]")
+STRESS = "Pa"
+FIXED = 1e-9  # relative range of a frequency that does not change with the speed
+
+
+def rpm(speed: float) -> float:
+    """A speed in rad/s in rpm."""
+    return speed * RPM["rad/s"]
+
+
+@dataclass(frozen=True)
+class Line:
+    """An excitation: oscillations per turn of the body, or a frequency [Hz] that is the same at all speeds."""
+
+    value: float
+    is_order: bool
+
+    @property
+    def name(self) -> str:
+        return f"{self.value:.6g}" if self.is_order else f"{self.value:.5g} Hz"
+
+
+@dataclass(frozen=True)
+class Operation:
+    """The speeds in operation [rpm], from the slower to the faster one, and the margin around them, a share of each."""
+
+    slow: float
+    fast: float
+    margin: float
+
+    @property
+    def spans(self) -> list[tuple[float, float, bool]]:
+        """From, to, and whether that is a margin."""
+        ends = [self.slow * (1 - self.margin), self.slow, self.fast, self.fast * (1 + self.margin)]
+        parts = zip(ends, ends[1:], (True, False, True))
+        return [(min(a, b), max(a, b), is_margin) for a, b, is_margin in parts if a != b]
+
+
+@dataclass(frozen=True)
+class Critical:
+    """A speed [rpm] at which a line meets a natural frequency [Hz]; the distance to operation is a share, NaN without one."""
+
+    mode: int
+    line: Line
+    speed: float
+    frequency: float
+    distance: float
+    is_too_near: bool
+
+    @property
+    def name(self) -> str:
+        """As 'II/4.5': mode and order."""
+        return f"{roman(self.mode)}/{self.line.name}"
+
+
+@dataclass(frozen=True)
+class Barred:
+    """A range of speeds [rpm] in which a limit is exceeded."""
+
+    quantity: str
+    start: float
+    end: float
+    can_be_passed: bool
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """A moment, force or reaction over the speed; what the file does not have is None."""
+
+    label: str
+    unit: str
+    half_range: np.ndarray  # [points]
+    mean: np.ndarray | None
+    peak: np.ndarray | None
+    limit: np.ndarray | None
+    transient_limit: np.ndarray | None
+    orders: np.ndarray | None  # amplitudes, [points, lines]
+    stress: float | None  # per unit of the quantity [Pa]
+
+    @property
+    def kind(self) -> str:
+        return self.label.split("_", 1)[0]
+
+    @property
+    def element(self) -> str:
+        return self.label.split("_", 1)[-1]
+
+    def in_short(self) -> "Quantity":
+        """In kN m or MN m, if the numbers are large."""
+        largest = np.nanmax(self.half_range, initial=0.0)
+        factor, prefix = next(((f, p) for f, p in ((1e6, "M"), (1e3, "k")) if 1e1 * f <= largest < np.inf), (1.0, ""))
+        names = ("half_range", "mean", "peak", "limit", "transient_limit", "orders")
+        scaled = {name: getattr(self, name) / factor for name in names if getattr(self, name) is not None}
+        return replace(self, unit=prefix + self.unit, stress=self.stress and self.stress * factor, **scaled)
+
+
+@dataclass(frozen=True)
+class Response:
+    folder: Path
+    title: str
+    body: str
+    speed: np.ndarray  # rising [rpm]
+    lines: list[Line]
+    quantities: list[Quantity]
+    criticals: list[Critical]
+    barred: list[Barred]
+    operation: Operation | None
+
+
+@dataclass(frozen=True)
+class Campbell:
+    folder: Path
+    title: str
+    body: str
+    speed: np.ndarray  # rising [rpm]
+    modes: dict[int, np.ndarray]  # natural frequencies [Hz]
+    lines: list[tuple[Line, np.ndarray]]  # and their frequencies [Hz]
+    crossings: list[Critical]
+    operation: Operation | None
+
+
+def roman(number: int) -> str:
+    """As torsional analyses count the modes."""
+    text = ""
+    for value, letters in ((100, "C"), (90, "XC"), (50, "L"), (40, "XL"), (10, "X"), (9, "IX"), (5, "V"), (4, "IV"), (1, "I")):
+        text += letters * (number // value)
+        number %= value
+    return text
+
+
+def read_response(folder: Path) -> Response:
+    report = _read_report(folder, "response", ("response.csv", "response_orders.csv"), ("body", "critical_speeds"))
+    table, speed, rising = _read_table(folder / "response.csv")
+    file = folder / "response_orders.csv"
+    order_table, order_speed, _ = _read_table(file, rises=False)
+    missing = [label for label in ("order [1]", "frequency [Hz]") if label not in order_table]
+    if missing:
+        raise ResultsError(f"{file}: not the orders of a response: there is no column '{missing[0]}'")
+    count = len(order_table) // len(table)
+    if count == 0 or len(order_table) != count * len(table) or (speed != order_speed.reshape(-1, count).T).any():
+        raise ResultsError(f"{file}: its speeds are not those of response.csv; both must be of the same run")
+    shape = (len(table), count)
+    orders, frequencies = (order_table[label].to_numpy().reshape(shape) for label in ("order [1]", "frequency [Hz]"))
+    matches = [match for label in table if (match := HALF_RANGE.fullmatch(label))]
+    quantities = [_quantity(table, order_table, match, shape, rising) for match in matches if not _is_stress(match, table)]
+    if not quantities:
+        raise ResultsError(f"{folder / 'response.csv'}: nothing to draw: there is no column 'half_range_...'")
+    operation = _operation(report)
+    lines = [_line(*line) for line in zip(orders.T, frequencies.T)]
+    return Response(
+        folder,
+        _title(report, folder),
+        report["body"],
+        speed[rising],
+        lines,
+        quantities,
+        [_critical(entry, operation) for entry in report["critical_speeds"]],
+        [_barred(entry) for entry in report.get("barred_speed_ranges", [])],
+        operation,
+    )
+
+
+def read_campbell(folder: Path) -> Campbell:
+    report = _read_report(folder, "campbell", ("campbell.csv",), ("body", "crossings"))
+    table, speed, rising = _read_table(folder / "campbell.csv")
+    modes = {int(match["mode"]): label for label in table if (match := FREQUENCY.fullmatch(label))}
+    if not modes:
+        raise ResultsError(f"{folder / 'campbell.csv'}: nothing to draw: there is no column 'frequency_1 [Hz]'")
+    lines = []
+    for label in table:
+        if match := LINE.fullmatch(label):
+            frequency = table[label].to_numpy()
+            is_order = match["kind"] == "order"
+            lines.append((Line(float(match["name"]) if is_order else frequency[0], is_order), frequency[rising]))
+    operation = _operation(report)
+    return Campbell(
+        folder,
+        _title(report, folder),
+        report["body"],
+        speed[rising],
+        {mode: table[label].to_numpy()[rising] for mode, label in modes.items()},
+        lines,
+        [_critical(entry, operation) for entry in report["crossings"]],
+        operation,
+    )
+
+
+def _read_report(folder: Path, command: str, tables: tuple[str, ...], keys: tuple[str, ...]) -> dict:
+    """COMMAND.json, if all files of the command are there."""
+    if not folder.is_dir():
+        raise ResultsError(f"{folder}: there is no such results folder")
+    for name in (*tables, f"{command}.json"):
+        if not (folder / name).is_file():
+            raise ResultsError(f"{folder}: no {name} here; 'nocdyn {command} FILE --out {folder}' writes it")
+    file = folder / f"{command}.json"
+    try:
+        report = json.loads(file.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise ResultsError(f"{file}: cannot be read: {error}") from None
+    if not isinstance(report, dict) or not set(keys) <= report.keys():
+        raise ResultsError(f"{file}: this is no {command}.json of nocdyn")
+    return report
+
+
+def _read_table(file: Path, rises: bool = True) -> tuple[pd.DataFrame, np.ndarray, np.ndarray]:
+    """A table whose first column is a speed, that in rpm, and the order of rows in which it rises."""
+    labels = labels_of(file)
+    match = SPEED.fullmatch(labels[0]) if labels else None
+    if match is None:
+        raise ResultsError(f"{file}: the first column must be a speed, as 'omega_motor [rad/s]'")
+    table = read_columns(file, labels)
+    if len(table) < 2 and rises:
+        raise ResultsError(f"{file}: nothing to draw: the table has {len(table)} row(s)")
+    speed = table[labels[0]].to_numpy() * RPM.get(match["unit"], 1.0)
+    return table, speed, np.argsort(speed, kind="stable")
+
+
+def _is_stress(match: re.Match, table: pd.DataFrame) -> bool:
+    """Whether a column is the stress of a moment, which is drawn as its second scale."""
+    moment = match["label"].replace("stress_", "half_range_moment_", 1)
+    return match["unit"] == STRESS and f"{moment} [N m]" in table
+
+
+def _quantity(table: pd.DataFrame, orders: pd.DataFrame, match: re.Match, shape: tuple[int, int], rising: np.ndarray) -> Quantity:
+    column = f"{match['label']} [{match['unit']}]"
+
+    def values(prefix: str) -> np.ndarray | None:
+        return table[f"{prefix}_{column}"].to_numpy()[rising] if f"{prefix}_{column}" in table else None
+
+    half_range = values("half_range")
+    stresses = f"half_range_stress_{match['label'].removeprefix('moment_')} [{STRESS}]"
+    stress = None
+    if stresses in table and match["label"].startswith("moment_") and half_range.max() > 0:
+        stress = table[stresses].max() / half_range.max()
+    return Quantity(
+        match["label"],
+        match["unit"],
+        half_range,
+        values("mean"),
+        values("peak"),
+        values("limit"),
+        values("transient_limit"),
+        orders[column].to_numpy().reshape(shape)[rising] if column in orders else None,
+        stress,
+    )
+
+
+def _line(orders: np.ndarray, frequencies: np.ndarray) -> Line:
+    is_fixed = np.ptp(frequencies) <= FIXED * frequencies.max() and np.ptp(orders) > FIXED * orders.max()
+    return Line(frequencies[0], False) if is_fixed else Line(orders[0], True)
+
+
+def _critical(entry: dict, operation: Operation | None) -> Critical:
+    distance = entry.get("distance_to_operation", math.nan)
+    line = Line(entry["order"], True) if "order" in entry else Line(entry["frequency_Hz"], False)
+    near = operation is not None and distance < operation.margin
+    return Critical(
+        entry["mode"], line, rpm(entry["speed_rad_s"]), entry["frequency_Hz"], distance, entry.get("is_too_near", near)
+    )
+
+
+def _barred(entry: dict) -> Barred:
+    start, end = sorted((rpm(entry["from_rad_s"]), rpm(entry["to_rad_s"])))
+    return Barred(entry["quantity"], start, end, entry["can_be_passed"])
+
+
+def _operation(report: dict) -> Operation | None:
+    if "operating_rad_s" not in report:
+        return None
+    slow, fast = sorted(map(rpm, report["operating_rad_s"]), key=abs)
+    return Operation(slow, fast, report.get("margin", 0.0))
+
+
+def _title(report: dict, folder: Path) -> str:
+    return report.get("title") or Path(report.get("input") or folder.resolve()).name
