@@ -53,6 +53,7 @@ OTHERS = {"color": "0.72", "linewidth": 0.6}
 PEAK = {"color": "0.35", "linewidth": 1.1, "linestyle": (0, (4, 1.5))}
 MEAN = {"color": "0.35", "linewidth": 1.1, "linestyle": (0, (1, 1.2))}
 LIMIT = {"color": DANGER, "linewidth": 1.4}
+PEAK_LIMIT = {"color": DANGER, "linewidth": 1.4, "linestyle": (0, (1.2, 1.2))}
 TRANSIENT = {"color": DANGER, "linewidth": 1.4, "linestyle": (0, (5, 2))}
 
 
@@ -110,9 +111,8 @@ def draw_quantity(axes: Axes, response: Response, quantity: Quantity, look: Look
                 axes.plot(*thin(response.speed, np.abs(values), PIXELS), zorder=3, **style)
     axes.set_xlim(look.window)
     far = _set_scale(axes, response, quantity, look)
-    for values, style in ((quantity.limit, LIMIT), (quantity.transient_limit, TRANSIENT)):
-        if values is not None:
-            axes.plot(*thin(response.speed, values, PIXELS), zorder=5, **style)
+    for values, style in _limits(quantity, look):
+        axes.plot(*thin(response.speed, values, PIXELS), zorder=5, **style)
     title = plain(quantity.element) + (f"   (limit, from {far:.4g} {quantity.unit} on, is above)" if far else "")
     bars = [barred for barred in response.barred if barred.quantity == quantity.label]
     axes.set_title(title, loc="left", pad=16 if bars else 6)
@@ -121,13 +121,20 @@ def draw_quantity(axes: Axes, response: Response, quantity: Quantity, look: Look
         _add_stress(axes, quantity.stress)
 
 
+def _limits(quantity: Quantity, look: Look) -> list[tuple[np.ndarray, dict]]:
+    """Curves and their styles; that of the largest magnitude where this is drawn too."""
+    limits = [(quantity.limit, LIMIT), (quantity.transient_limit, TRANSIENT)]
+    limits += [(quantity.peak_limit, PEAK_LIMIT)] * look.with_peak
+    return [(values, style) for values, style in limits if values is not None]
+
+
 def _set_scale(axes: Axes, response: Response, quantity: Quantity, look: Look) -> float:
     """Room for what is drawn and for limits that are not far above; the smallest limit, if that is far above, else 0."""
     inside = (response.speed >= look.window[0]) & (response.speed <= look.window[1])
     drawn = [quantity.half_range] + [quantity.peak] * (look.with_peak and quantity.peak is not None)
     values = np.concatenate([one[inside] for one in drawn])
     top = max(np.nanmax(values[np.isfinite(values)], initial=0.0), 1e-300)
-    limits = [one[inside].min() for one in (quantity.limit, quantity.transient_limit) if one is not None]
+    limits = [values[inside].min() for values, _ in _limits(quantity, look)]
     near = [limit for limit in limits if limit <= FAR * top]
     largest = max([top, *near])
     if look.is_logarithmic:
@@ -202,6 +209,8 @@ def _legend(response: Response, page: Sequence[Quantity], look: Look, shades: li
         handles.append(Line2D([], [], label="limit in continuous operation", **LIMIT))
     if any(quantity.transient_limit is not None for quantity in page):
         handles.append(Line2D([], [], label="limit while passing through", **TRANSIENT))
+    if look.with_peak and any(quantity.peak_limit is not None for quantity in page):
+        handles.append(Line2D([], [], label="limit of the magnitude", **PEAK_LIMIT))
     labels = {quantity.label for quantity in page}
     bars = [one for one in response.barred if one.quantity in labels]
     if bars:

@@ -91,6 +91,7 @@ class Quantity:
     peak: np.ndarray | None
     limit: np.ndarray | None
     transient_limit: np.ndarray | None
+    peak_limit: np.ndarray | None
     orders: np.ndarray | None  # amplitudes, [points, lines]
     stress: float | None  # per unit of the quantity [Pa]
 
@@ -106,7 +107,7 @@ class Quantity:
         """In kN m or MN m, if the numbers are large."""
         largest = np.nanmax(self.half_range, initial=0.0)
         factor, prefix = next(((f, p) for f, p in ((1e6, "M"), (1e3, "k")) if 1e1 * f <= largest < np.inf), (1.0, ""))
-        names = ("half_range", "mean", "peak", "limit", "transient_limit", "orders")
+        names = ("half_range", "mean", "peak", "limit", "transient_limit", "peak_limit", "orders")
         scaled = {name: getattr(self, name) / factor for name in names if getattr(self, name) is not None}
         return replace(self, unit=prefix + self.unit, stress=self.stress and self.stress * factor, **scaled)
 
@@ -257,6 +258,7 @@ def _quantity(table: pd.DataFrame, orders: pd.DataFrame, match: re.Match, shape:
         values("peak"),
         values("limit"),
         values("transient_limit"),
+        values("peak_limit"),
         orders[column].to_numpy().reshape(shape)[rising] if column in orders else None,
         stress,
     )

@@ -71,6 +71,7 @@ def response(folder, elements=1, unit="rpm", **changes):
         orders |= {f"{name} [{one}]": amplitudes.ravel(), f"phase_{name} [deg]": 0.0 * amplitudes.ravel()}
     table |= {"half_range_stress_s1 [Pa]": 2e4 * half_range, "half_range_stress_shaft_end [Pa]": 3e4 * half_range}
     table |= {"limit_moment_s1 [N m]": 500.0 - 0.1 * speed, "transient_limit_moment_s1 [N m]": 900.0 - 0.1 * speed}
+    table["peak_limit_moment_s1 [N m]"] = 1600.0 + 0.0 * speed
     write(folder, "response.csv", table)
     write(folder, "response_orders.csv", orders)
     return write(folder, "response.json", report(**changes))
@@ -158,6 +159,7 @@ def test_the_stress_of_a_moment_is_a_second_scale_and_another_one_a_panel(tmp_pa
 def test_means_and_largest_magnitudes_are_drawn_if_asked_for(tmp_path):
     axes = panels_of(response(tmp_path / "r"), "--peak")["s1"]
     line_of(axes, SPEEDS)  # the mean is negative
+    assert line_of(axes, 1600.0 + 0.0 * SPEEDS).get_color() == speed_panels.DANGER
     line_of(axes, SPEEDS + sum(amplitude(order, SPEEDS) for order in ORDERS))
     assert axes.get_ylim()[1] > 1200.0
 
@@ -345,7 +347,7 @@ MACHINE = """\
 &load name = 'l' body = 'fan' quadratic = 0.5 /
 &excitation name = 'x' body = 'fan' kind = 'orders' orders = 2, 3 amplitudes = 10, 5 /
 &excitation name = 'y' body = 'motor' amplitude = 3 frequency_hz = 20 /
-&limit coupling = 'fast' vibratory_moment = 40 /
+&limit coupling = 'fast' vibratory_moment = 40 moment = 90 /
 &run t_end = 1 /
 &response body = 'motor' speed_rpm = -20, -900 count = 81 operating_rpm = -300, -400 /
 """
@@ -361,7 +363,7 @@ def test_what_the_program_writes_is_drawn(tmp_path, monkeypatch):
     assert (np.diff(found.speed) >= 0).all() and found.speed[[0, -1]] == pytest.approx([-900.0, -20.0])
     assert [line.name for line in found.lines] == [line.name for line, _ in diagram.lines] and "20 Hz" in found.lines[-1].name
     assert [quantity.label for quantity in found.quantities] == ["moment_fast", "moment_slow", "reaction_g"]
-    assert found.quantities[0].limit == pytest.approx(40.0)
+    assert found.quantities[0].limit == pytest.approx(40.0) and found.quantities[0].peak_limit == pytest.approx(90.0)
     assert found.quantities[0].stress == pytest.approx(16.0 / (math.pi * 0.03**3))
     assert found.operation.spans == [
         (pytest.approx(-300.0), pytest.approx(-270.0), True),

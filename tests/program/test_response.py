@@ -193,6 +193,8 @@ def test_limits_bar_the_speeds_where_the_closed_form_exceeds_them(nocdyn):
     content = analysis(nocdyn, "response", DISCS + "&limit coupling = 'shaft' vibratory_moment = 1e4 moment = 1e4 /\n")
     assert not content["limits_exceeded"]
     assert content["barred_speed_ranges"] == []
+    table = columns(nocdyn, "response.csv")
+    assert set(table["limit_moment_shaft"]) == set(table["peak_limit_moment_shaft"]) == {1e4}
 
 
 def test_iacs_rule_has_its_formula(nocdyn):

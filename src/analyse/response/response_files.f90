@@ -9,7 +9,7 @@ module nocdyn_response_files
   use nocdyn_output_file, only: output_file_t
   use nocdyn_output_units, only: turn_labels
   use nocdyn_response_analysis, only: response_analysis_t
-  use nocdyn_response_limits, only: no_limit
+  use nocdyn_response_limits, only: no_limit, response_limit_t
   use nocdyn_response_quantities, only: quantity_moment
   use nocdyn_response_summary, only: critical_t, response_summary_t, worst_ratio
   use nocdyn_text, only: string_t
@@ -69,6 +69,9 @@ contains
           if (any(analysis%limits(:k - 1)%quantity == analysis%limits(k)%quantity)) cycle
           if (has_continuous(analysis, one%label)) call list%add('limit_' // one%label // ' [' // one%unit // ']')
           if (has_transient(analysis, one%label)) call list%add('transient_limit_' // one%label // ' [' // one%unit // ']')
+          if (has_peak(analysis%limits, analysis%limits(k)%quantity)) then
+            call list%add('peak_limit_' // one%label // ' [' // one%unit // ']')
+          end if
         end associate
       end do
     end associate
@@ -101,6 +104,14 @@ contains
     end do
   end function has_transient
 
+  !> Whether some limit bounds the largest magnitude of a quantity.
+  pure logical function has_peak(limits, quantity)
+    type(response_limit_t), intent(in) :: limits(:)
+    integer, intent(in) :: quantity
+
+    has_peak = any(limits%quantity == quantity .and. limits%peak_limit() < no_limit)
+  end function has_peak
+
   !> The row of one speed.
   subroutine fill_row(analysis, point, row)
     type(response_analysis_t), intent(in) :: analysis
@@ -125,6 +136,9 @@ contains
         end if
         if (has_transient(analysis, quantities(limits(k)%quantity)%label)) then
           call put(minval(limits%transient_limit(speed), mask=limits%quantity == limits(k)%quantity))
+        end if
+        if (has_peak(limits, limits(k)%quantity)) then
+          call put(minval(limits%peak_limit(), mask=limits%quantity == limits(k)%quantity))
         end if
       end do
     end associate
