@@ -17,10 +17,11 @@ from .results import ResultsError
 from .style import COLOURS, WIDTH, add_format_option, add_title, plain, save, saved
 from .train_drawing import EDGE, MOST_NAMES, ROW, draw_shape, draw_train
 from .train_layout import GROUND, Train, lay_out
+from .trajectory_files import labels_of
 
 MOST_LETTERS = 24  # of names that stand side by side under the narrower axes
 MOST_MODES = 6  # of a figure
-KINETIC, POTENTIAL = COLOURS[0], COLOURS[1]
+KINETIC, POTENTIAL, OF_SHAFTS = COLOURS[0], COLOURS[1], COLOURS[5]
 
 
 @dataclass(frozen=True)
@@ -44,6 +45,15 @@ class Modes:
     def pairs(self, kind: str) -> list[list[int]]:
         """The bodies of couplings or gears, from 0 on, GROUND for the ground."""
         return [[body - 1 if body else GROUND for body in joint["bodies"]] for joint in self.content[kind]]
+
+    @property
+    def shafts_with_inertia(self) -> list[int]:
+        """Which couplings have shares in the kinetic energy, after the bodies, by the columns of modes.csv."""
+        file = self.folder / "modes.csv"
+        parts = [label for label in labels_of(file) if label.startswith("kinetic_")] if file.is_file() else []
+        names = [coupling["name"] for coupling in self.content["couplings"]]
+        shafts = [label.removeprefix("kinetic_").rsplit(" [", 1)[0] for label in parts[len(self.bodies) :]]
+        return [names.index(shaft) for shaft in shafts if shaft in names]
 
     @property
     def train(self) -> Train:
@@ -86,16 +96,27 @@ def draw_modes(modes: Modes, chosen: list[dict]) -> Figure:
         _draw_energy(energy, modes, mode)
     grid[-1, 0].set_xlim(-EDGE, max(train.place) + EDGE)
     _name_bodies(grid[-1, 1], modes)
-    grid[0, 1].legend(*grid[1, 1].get_legend_handles_labels(), loc="lower left", ncols=2)
+    grid[0, 1].legend(*grid[1, 1].get_legend_handles_labels(), loc="lower left", ncols=3, fontsize=8.5, columnspacing=1.2)
     return figure
 
 
 def _draw_energy(axes: Axes, modes: Modes, mode: dict) -> None:
     """Kinetic energy of the bodies upwards, potential energy of the couplings downwards, between their bodies."""
-    bodies = np.arange(len(modes.bodies))
-    ends = [[body - 1 for body in coupling["bodies"] if body > 0] for coupling in modes.content["couplings"]]
-    places = np.array([np.mean(places) for places in ends])
-    axes.bar(bodies, 100 * np.array(mode["kinetic_share"]), width=0.8, color=KINETIC, label="kinetic energy\nin bodies [%]")
+    count = len(modes.bodies)
+    ends = [[body for body in pair if body != GROUND] for pair in modes.pairs("couplings")]
+    places = np.array([np.mean(bodies) for bodies in ends])
+    kinetic = 100 * np.array(mode["kinetic_share"])
+    axes.bar(np.arange(count), kinetic[:count], width=0.8, color=KINETIC, label="kinetic energy\nin bodies [%]")
+    if shafts := modes.shafts_with_inertia:
+        axes.bar(
+            places[shafts],
+            kinetic[count : count + len(shafts)],
+            width=0.4,
+            color=OF_SHAFTS,
+            edgecolor=KINETIC,
+            linewidth=0.6,
+            label="kinetic energy\nin shafts [%]",
+        )
     axes.bar(
         places, -100 * np.array(mode["potential_share"]), width=0.5, color=POTENTIAL, label="potential energy\nin couplings [%]"
     )

@@ -42,8 +42,9 @@ AXES_SHARE = 0.84  # of a panel that its axes have, about
 NAMED = 4  # orders of a panel
 SMALLEST = 0.02  # of the largest half range that a named order has
 FAR = 2.5  # times what is drawn: limits above are not in the picture
-HEADROOM = 1.22  # for the names of critical speeds
-MOST_OF = 0.75  # of the half range that an order has whose name stands above it
+HEADROOM = 1.3  # for the names of critical speeds
+MOST_OF, AT_END = 0.5, 0.9  # of the half range that an order has whose name stands above it; at the ends of the speeds
+MOST_PEAKS = 3  # of a curve that may bear its name
 SPOTS = 25  # along a curve where its name may stand
 DECADES = 1e-4  # lowest value of a logarithmic axis, of the largest one
 ORDER_COLOURS = (*COLOURS[:6], "#7F3C8D")
@@ -154,21 +155,31 @@ def _add_stress(axes: Axes, stress: float) -> None:
 
 def name_orders(labels: Labels, response: Response, quantity: Quantity, look: Look, styles: dict[int, dict]) -> None:
     """Names of orders at their peaks, or where there is room on the curve, and not on the curve of all orders if possible."""
-    axes = labels.axes
     inside = np.flatnonzero((response.speed >= look.window[0]) & (response.speed <= look.window[1]))
-    labels.avoid(share_of(axes, response.speed[inside]), height_of(axes, quantity.half_range[inside]))
+    x = share_of(labels.axes, response.speed[inside])
+    half_range = quantity.half_range[inside]
+    labels.avoid(x, height_of(labels.axes, half_range))
     for place in named_lines(response, quantity, look):
         values = np.nan_to_num(quantity.orders[inside, place])
-        peaks = np.flatnonzero((values[1:-1] >= values[:-2]) & (values[1:-1] > values[2:])) + 1
-        peaks = np.concatenate(([values.argmax()], peaks[np.argsort(-values[peaks], kind="stable")][:3]))
+        y = np.minimum(height_of(labels.axes, values), 0.93)
+        spots, beside = [], []
+        for peak in _peaks(values):
+            share = values[peak] / half_range[peak]
+            spots.append((x[peak], y[peak]))
+            if share > (AT_END if peak in (0, len(inside) - 1) else MOST_OF):
+                top = labels.top_of_curve(x[peak])
+                spots.append((x[peak], top))
+                beside += labels.beside(x[peak], top) if share > AT_END else []
         along = np.linspace(0, len(inside) - 1, SPOTS).round().astype(int)
-        along = along[np.argsort(-values[along], kind="stable")]
-        large = peaks[values[peaks] > MOST_OF * quantity.half_range[inside[peaks]]]  # stand above the peak of all orders
-        spots = inside[np.concatenate((large, peaks, along))]
-        x = share_of(axes, response.speed[spots])
-        y = height_of(axes, quantity.orders[spots, place])
-        y[: len(large)] = [labels.top_of_curve(spot) for spot in x[: len(large)]]
-        labels.put_nearby(response.lines[place].name, list(zip(x, np.minimum(y, 0.93))), styles[place]["color"])
+        spots += beside + [(x[one], y[one]) for one in along[np.argsort(-values[along], kind="stable")]]
+        labels.put_nearby(response.lines[place].name, spots, styles[place]["color"])
+
+
+def _peaks(values: np.ndarray) -> list[int]:
+    """Where the largest value is, and the largest of the other peaks."""
+    peaks = np.flatnonzero((values[1:-1] >= values[:-2]) & (values[1:-1] > values[2:])) + 1
+    largest = [int(peak) for peak in peaks[np.argsort(-values[peaks], kind="stable")][:MOST_PEAKS]]
+    return list(dict.fromkeys([int(values.argmax()), *largest]))
 
 
 def draw_page(response: Response, page: Sequence[Quantity], look: Look, styles: dict[int, dict]) -> Figure:

@@ -47,6 +47,10 @@ class Labels:
         near = np.abs(self.curve[0] - x * self.size[0]) < NEAR
         return float(self.curve[1][near].max() / self.size[1])
 
+    def beside(self, x: float, y: float) -> list[tuple[float, float]]:
+        """Places right and left of a peak."""
+        return [(x + side * NEAR / self.size[0], y - 2 * NEAR / 3 / self.size[1]) for side in (1, -1)]
+
     def is_crossed(self, x: float, y: float, width: float, height: float) -> bool:
         """Whether the curve passes through the box around a point."""
         x, y = x * self.size[0], y * self.size[1]

@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from figure_files import NOCDYN, SCRIPTS, assert_figures, call, refusal
-from nocdyn_report import campbell_figures, response_figures, speed_panels, style
+from nocdyn_report import campbell_figures, mode_figures, response_figures, speed_panels, style
 from nocdyn_report.speed_results import Operation, read_campbell, read_response, roman
 from nocdyn_report.train_layout import GROUND, lay_out
 
@@ -413,6 +413,20 @@ def test_a_branch_of_a_shaft_has_a_row_of_its_own():
 def test_trains_of_single_wheels_go_on_along_the_train():
     train = lay_out(4, [(0, 1)], [(1, 2), (2, 3)])
     assert train.place == [0, 1, 1, 2] and train.row[2] != train.row[3]
+
+
+def test_shafts_with_inertia_have_their_shares_of_the_kinetic_energy(tmp_path):
+    """modes.json has them after those of the bodies, modes.csv their names."""
+    mode = {"mode": 1, "kind": "oscillating", "frequency_Hz": 3.0, "damping_ratio": 0.1, "shape": [1.0, 0.5]}
+    mode |= {"phase_deg": [0, 180], "kinetic_share": [0.5, 0.3, 0.2], "potential_share": [0.25, 0.75]}
+    couplings = [{"name": "rubber", "bodies": [1, 2]}, {"name": "tail", "bodies": [2, 0]}]
+    content = {"title": "", "input": "a.nml", "about": "rest", "bodies": ["a", "b"], "couplings": couplings, "gears": []}
+    write(tmp_path, "modes.json", content | {"modes": [mode]})
+    write(tmp_path, "modes.csv", "mode,kinetic_a [1],kinetic_b [1],kinetic_tail [1],potential_rubber [1],potential_tail [1]\n")
+    modes = mode_figures.read_modes(tmp_path)
+    assert modes.shafts_with_inertia == [1]
+    energy = mode_figures.draw_modes(modes, modes.oscillating).axes[3]
+    assert sorted(round(bar.get_height()) for bar in energy.patches) == [-75, -25, 20, 30, 50]
 
 
 @pytest.mark.parametrize("seed", range(20))

@@ -59,8 +59,8 @@ contains
           call list%add('mean_' // one%label // ' [' // one%unit // ']')
           call list%add('half_range_' // one%label // ' [' // one%unit // ']')
           call list%add('peak_' // one%label // ' [' // one%unit // ']')
-          if (one%section_modulus > 0) call list%add('half_range_stress_' // one%name // ' [Pa]')
-          if (one%kind == quantity_moment) call list%add('heat_' // one%name // ' [W]')
+          if (one%section_modulus > 0) call list%add('half_range_stress_' // element_of(one%label) // ' [Pa]')
+          if (one%kind == quantity_moment) call list%add('heat_' // element_of(one%label) // ' [W]')
           if (any(analysis%limits%quantity == q)) call list%add('ratio_' // one%label // ' [1]')
         end associate
       end do
@@ -77,6 +77,14 @@ contains
     end associate
     call list%take(labels)
   end subroutine list_labels
+
+  !> A label without the word for the quantity before it: 'tail_2' of 'moment_tail_2'.
+  pure function element_of(label) result(name)
+    character(len=*), intent(in) :: label
+    character(len=:), allocatable :: name
+
+    name = label(index(label, '_') + 1:)
+  end function element_of
 
   !> Whether some limit of a quantity bounds its half range.
   logical function has_continuous(analysis, label)
