@@ -163,7 +163,6 @@ def read_response(folder: Path) -> Response:
     quantities = [_quantity(table, order_table, match, shape, rising) for match in matches if not _is_stress(match, table)]
     if not quantities:
         raise ResultsError(f"{folder / 'response.csv'}: nothing to draw: there is no column 'half_range_...'")
-    operation = _operation(report)
     lines = [_line(*line) for line in zip(orders.T, frequencies.T)]
     return Response(
         folder,
@@ -172,9 +171,9 @@ def read_response(folder: Path) -> Response:
         speed[rising],
         lines,
         quantities,
-        [_critical(entry, operation) for entry in report["critical_speeds"]],
+        [_critical(entry) for entry in report["critical_speeds"]],
         [_barred(entry) for entry in report.get("barred_speed_ranges", [])],
-        operation,
+        _operation(report),
     )
 
 
@@ -190,7 +189,6 @@ def read_campbell(folder: Path) -> Campbell:
             frequency = table[label].to_numpy()
             is_order = match["kind"] == "order"
             lines.append((Line(float(match["name"]) if is_order else frequency[0], is_order), frequency[rising]))
-    operation = _operation(report)
     return Campbell(
         folder,
         _title(report, folder),
@@ -198,8 +196,8 @@ def read_campbell(folder: Path) -> Campbell:
         speed[rising],
         {mode: table[label].to_numpy()[rising] for mode, label in modes.items()},
         lines,
-        [_critical(entry, operation) for entry in report["crossings"]],
-        operation,
+        [_critical(entry) for entry in report["crossings"]],
+        _operation(report),
     )
 
 
@@ -269,13 +267,11 @@ def _line(orders: np.ndarray, frequencies: np.ndarray) -> Line:
     return Line(frequencies[0], False) if is_fixed else Line(orders[0], True)
 
 
-def _critical(entry: dict, operation: Operation | None) -> Critical:
+def _critical(entry: dict) -> Critical:
     distance = entry.get("distance_to_operation", math.nan)
     line = Line(entry["order"], True) if "order" in entry else Line(entry["frequency_Hz"], False)
-    near = operation is not None and distance < operation.margin
-    return Critical(
-        entry["mode"], line, rpm(entry["speed_rad_s"]), entry["frequency_Hz"], distance, entry.get("is_too_near", near)
-    )
+    speed = rpm(entry["speed_rad_s"])
+    return Critical(entry["mode"], line, speed, entry["frequency_Hz"], distance, entry.get("is_too_near", False))
 
 
 def _barred(entry: dict) -> Barred:
