@@ -16,6 +16,7 @@ module nocdyn_assembly
   use nocdyn_multiplier, only: new_multiplier
   use nocdyn_paper, only: new_paper
   use nocdyn_reduced, only: new_reduced
+  use nocdyn_shaft_assembly, only: add_shafts, check_shafts, new_shaft_set, shaft_set_t
   use nocdyn_start_speeds, only: fit_start_speeds
   use nocdyn_steady_start, only: start_steadily
   use nocdyn_text, only: joined, selected
@@ -39,6 +40,7 @@ contains
     integer, intent(in), optional :: lanes   !! 1 if absent
     type(body_index_t), target :: body_index
     type(element_groups_t) :: bodies
+    type(shaft_set_t) :: shafts
 
     if (present(lanes)) machine%lanes = lanes
     bodies = new_element_groups(input, 'body', machine%lanes)
@@ -51,6 +53,7 @@ contains
     body_index = new_body_index(machine%names)
     call assemble_constraints(input, body_index, machine%lanes, machine%constraints, error)
     if (.not. allocated(error)) call check_couplings(input, error)
+    if (.not. allocated(error)) call check_shafts(input, error)
     if (.not. allocated(error)) call check_motors(input, error)
     if (.not. allocated(error)) call check_engines(input, error)
     if (.not. allocated(error)) call check_orders(input, error)
@@ -63,9 +66,13 @@ contains
       call add_banks(new_element_groups(input, 'excitation', n, body_index), excitation_form, add_excitation_form, machine%banks)
       call add_engines(new_element_groups(input, 'engine', n, body_index), machine%banks)
     end associate
+    call new_shaft_set(input, body_index, shafts)
+    call add_shafts(shafts, machine)
     call machine%number_elements()
     call analyse_machine_constraints(input, body_index, machine, error)
-    if (.not. allocated(error)) call start_machine(input, machine, error)
+    if (allocated(error)) return
+    call shafts%place_nodes(machine)
+    call start_machine(input, machine, error)
   end subroutine assemble_machine
 
   !> Starts a machine in its steady state, if the input wants it.
@@ -84,7 +91,7 @@ contains
         machine%start_angle(:, :) = spread(single%start_angle(1, :), 1, machine%lanes)
         allocate (machine%steady_internal, source=spread(single%steady_internal(1, :), 1, machine%lanes))
       else
-        call start_steadily(machine, given_speeds(input), run%number('t_start'), error)
+        call start_steadily(machine, given_speeds(input, machine%nodes), run%number('t_start'), error)
         if (allocated(error)) error%message = input%location(input%position('run'), 'start') // ": start = 'equilibrium': " // &
           error%message // "; start = 'given' starts with the speeds of the bodies"
       end if
@@ -92,14 +99,15 @@ contains
   end subroutine start_machine
 
   !> Whether the input gives the start speed of a body, [bodies].
-  function given_speeds(input) result(is_given)
+  function given_speeds(input, nodes) result(is_given)
     type(input_t), intent(in) :: input
+    integer, intent(in) :: nodes   !! bodies that the input does not name
     logical, allocatable :: is_given(:)
     integer, allocatable :: bodies(:)
     integer :: b
 
     allocate (bodies, source=input%groups_named('body'))
-    allocate (is_given(size(bodies)))
+    allocate (is_given(size(bodies) + nodes), source=.false.)
     do b = 1, size(bodies)
       is_given(b) = input%groups(bodies(b))%is_given('speed')
     end do
@@ -124,8 +132,8 @@ contains
         call build_coordinates(machine%constraints, machine%names, machine%trains, machine%groups, machine%inertia, wanted, &
                                findloc(complement_names == run%text('complement'), .true., dim=1), machine%coordinates, error)
       end if
-      if (.not. allocated(error)) call fit_start_speeds(machine, given_speeds(input), run%text('start') == 'projected', &
-                                                           offending_row, error)
+      if (.not. allocated(error)) call fit_start_speeds(machine, given_speeds(input, machine%nodes), &
+                                                        run%text('start') == 'projected', offending_row, error)
     end associate
     if (.not. allocated(error)) return
     if (offending_row > 0) then

@@ -76,7 +76,9 @@ contains
       call json%put('operating_rad_s', self%settings%operating)
       call json%put('margin', self%settings%margin)
     end if
-    call json%put('bodies', self%response%machine%names)
+    associate (machine => self%response%machine)
+      call json%put('bodies', machine%names(:machine%bodies - machine%nodes))
+    end associate
     call json%open_list('modes')
     do i = 1, self%modes%modes
       call put_mode(json, self, i)
@@ -124,7 +126,7 @@ contains
     call json%open()
     call json%put('mode', mode)
     call json%put('frequency_Hz', from_si([self%modes%natural(mode, 1), self%modes%natural(mode, size(self%speed))], unit_hz))
-    call json%put('shape', self%modes%shape(:, mode))
+    call json%put('shape', self%modes%shape(:size(self%modes%shape, 1) - self%response%machine%nodes, mode))
     call json%close()
   end subroutine put_mode
 

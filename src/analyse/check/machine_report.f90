@@ -9,7 +9,7 @@ module nocdyn_machine_report
   implicit none (type, external)
   private
 
-  public :: machine_report, machine_notes, constraint_count
+  public :: named_coordinates, machine_report, machine_notes, constraint_count
 
   integer, parameter :: max_names = 12    ! in a line
   integer, parameter :: max_lines = 40    ! of one sort in a report
@@ -127,14 +127,14 @@ contains
     integer, parameter :: roles(4) = [role_coupling, role_motor, role_load, role_excitation]
     integer :: i
 
-    call report%append(file // ': ' // counted(machine%bodies, 'body', 'bodies') // counted_constraints(machine))
+    call report%append(file // ': ' // counted(machine%bodies - machine%nodes, 'body', 'bodies') // counted_constraints(machine))
     do i = 1, size(roles)
       call report%append(', ' // counted(elements_of(machine, roles(i)), trim(role_names(roles(i))), &
                                          trim(role_names(roles(i))) // 's'))
     end do
     call put_line(report, counted(machine%coordinates%freedoms, 'degree', 'degrees') // ' of freedom')
     call put_groups(report, machine)
-    call put_line(report, 'coordinates: ' // joined(selected(machine%names, machine%coordinates%body), ', ', max_lines))
+    call put_line(report, 'coordinates: ' // joined(selected(machine%names, named_coordinates(machine)), ', ', max_lines))
     call put_relations(report, machine)
     allocate (notes, source=machine_notes(machine))
     do i = 1, size(notes)
@@ -142,6 +142,16 @@ contains
     end do
     text = report%text()
   end function machine_report
+
+  !> The bodies of the input that are coordinates.
+  pure function named_coordinates(machine) result(bodies)
+    type(machine_t), intent(in) :: machine
+    integer, allocatable :: bodies(:)
+
+    associate (all => machine%coordinates%body)
+      allocate (bodies, source=pack(all, all <= machine%bodies - machine%nodes))
+    end associate
+  end function named_coordinates
 
   !> The number of elements of one role.
   pure integer function elements_of(machine, role)
@@ -151,7 +161,7 @@ contains
 
     elements_of = 0
     do i = 1, size(machine%banks)
-      if (machine%banks(i)%bank%role == role) elements_of = elements_of + machine%banks(i)%bank%count
+      if (machine%banks(i)%bank%role == role) elements_of = elements_of + machine%banks(i)%bank%named_count()
     end do
   end function elements_of
 

@@ -9,6 +9,7 @@ module nocdyn_equilibrium_report
   use nocdyn_input, only: input_t
   use nocdyn_json, only: json_t
   use nocdyn_kinds, only: wp
+  use nocdyn_machine_report, only: named_coordinates
   use nocdyn_machine, only: machine_t
   use nocdyn_reduced, only: new_reduced
   use nocdyn_table_text, only: append_table, cell, cell_digits, clear_rounding, padded, rounding
@@ -51,7 +52,7 @@ contains
     allocate (self%equilibria, source=equilibria)
     allocate (self%notes, source=notes)
     associate (machine => formulation%machine)
-      allocate (self%coordinates, source=selected(machine%names, machine%coordinates%body))
+      allocate (self%coordinates, source=selected(machine%names, named_coordinates(machine)))
     end associate
     table = new_trajectory_table(new_reduced(formulation%machine, .true.), t_infinity, wanted)
     reported = steady_columns(table, formulation%machine)
@@ -94,7 +95,7 @@ contains
     logical :: is_steady(size(table%labels))
     integer :: b, c, e
 
-    is_steady = .true.
+    is_steady = [(index(table%labels(c)%text, '] [') == 0, c=1, size(is_steady))]   ! not those of nodes inside of shafts
     is_steady(:1 + machine%bodies) = .false.
     is_steady(size(is_steady) - trailing + 1:) = .false.
     do b = 1, size(machine%banks)

@@ -1,9 +1,10 @@
 !> The quantities of a forced response: moments of couplings and reactions of gears, as sums of the moments of elements.
 module nocdyn_response_quantities
-  use nocdyn_bank, only: role_coupling
+  use nocdyn_bank, only: bank_t, role_coupling
   use nocdyn_coordinates, only: coordinates_t
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
+  use nocdyn_shafts, only: shafts_t
   implicit none (type, external)
   private
 
@@ -41,6 +42,10 @@ contains
     do b = 1, size(machine%banks)
       associate (bank => machine%banks(b)%bank)
         if (bank%role /= role_coupling) cycle
+        if (bank%has_parts) then
+          call list_shafts(bank, n, quantities)
+          cycle
+        end if
         do e = 1, bank%count
           n = n + 1
           call set_quantity(quantity_moment, bank%names(e)%text, 'moment_', 'N m', one)
@@ -54,6 +59,33 @@ contains
     end do
     call list_reactions(machine, reference, quantities(n + 1:))
   end subroutine list_quantities
+
+  !> The moments at both ends of every shaft.
+  subroutine list_shafts(bank, n, quantities)
+    class(bank_t), intent(in) :: bank
+    integer, intent(inout) :: n   !! number of the last quantity
+    type(response_quantity_t), intent(inout) :: quantities(:)
+    real(wp), allocatable :: modulus(:)
+    integer :: e, s, side
+
+    select type (bank)
+    type is (shafts_t)
+      do s = 1, size(bank%shafts)
+        allocate (modulus, source=bank%section_moduli(s, 1))
+        associate (shaft => bank%shafts(s))
+          do side = 1, 2
+            n = n + 1
+            call set_quantity(quantity_moment, bank%names(shaft%first)%text, 'moment_', 'N m', quantities(n))
+            quantities(n)%label = quantities(n)%label // merge('_1', '_2', side == 1)
+            quantities(n)%element = [(bank%first + e - 1, e=shaft%first, shaft%last)]
+            quantities(n)%weight = -shaft%moments(merge(1, size(modulus), side == 1), :)
+            quantities(n)%section_modulus = modulus(merge(1, size(modulus), side == 1))
+          end do
+        end associate
+        deallocate (modulus)
+      end do
+    end select
+  end subroutine list_shafts
 
   !> A quantity without terms. (gfortran 12 loses texts of a structure constructor.)
   subroutine set_quantity(kind, name, prefix, unit, quantity)
@@ -74,7 +106,8 @@ contains
 
     count_of = machine%constraints%rows()
     do b = 1, size(machine%banks)
-      if (machine%banks(b)%bank%role == role_coupling) count_of = count_of + machine%banks(b)%bank%count
+      if (machine%banks(b)%bank%role == role_coupling) count_of = count_of + machine%banks(b)%bank%named_count() &
+                                                             * merge(2, 1, machine%banks(b)%bank%has_parts)
     end do
   end function count_of
 

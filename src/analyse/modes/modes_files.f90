@@ -27,9 +27,9 @@ contains
 
     call table%append('mode,kind,frequency [Hz],undamped_frequency [Hz],damping_ratio,time_constant [s],' // &
                       'real [1/s],imaginary [rad/s]')
-    call put_names('shape_', self%machine%names, ' [1]')
-    call put_names('phase_', self%machine%names, ' [deg]')
-    call put_names('kinetic_', self%machine%names, ' [1]')
+    call put_names('shape_', self%body_names, ' [1]')
+    call put_names('phase_', self%body_names, ' [deg]')
+    call put_names('kinetic_', self%kinetic_names, ' [1]')
     call put_names('potential_', self%elastic_names, ' [1]')
     call table%append(new_line('a'))
     do i = 1, size(self%modes)
@@ -69,7 +69,7 @@ contains
       call put_values(mode%kinetic, table)
       call put_values(mode%potential, table)
     else
-      call table%append(repeat(',', 3 * size(mode%shape) + size(mode%potential)))
+      call table%append(repeat(',', 2 * size(mode%shape) + size(mode%kinetic) + size(mode%potential)))
     end if
     call table%append(new_line('a'))
   end subroutine put_row
@@ -118,19 +118,16 @@ contains
   subroutine put_drivetrain(json, self)
     type(json_t), intent(inout) :: json
     type(modes_report_t), intent(in) :: self
-    integer :: e, i
+    integer :: i
 
-    call json%put('bodies', self%machine%names)
-    call json%put('inertia_kg_m2', self%machine%inertia(1, :))
-    call json%put('speed_rad_s', self%omega)
+    call json%put('bodies', self%body_names)
+    call json%put('inertia_kg_m2', self%machine%inertia(1, :size(self%body_names)))
+    call json%put('speed_rad_s', self%omega(:size(self%body_names)))
     call json%open_list('couplings')
-    do i = 1, size(self%elastic)
-      e = self%elastic(i)
+    do i = 1, size(self%elastic_names)
       call json%open()
       call json%put('name', self%elastic_names(i)%text)
-      associate (rows => self%machine%elements%rows)
-        call json%put('bodies', rows%body(rows%first(e):rows%first(e + 1) - 1))
-      end associate
+      call json%put('bodies', bodies_of(self, i))
       call json%put('stiffness_N_m_rad', self%stiffness(i))
       call json%close()
     end do
@@ -150,6 +147,26 @@ contains
     end associate
     call json%close_list()
   end subroutine put_drivetrain
+
+  !> The bodies of the input that a coupling or shaft joins. The slices of a shaft are numbered from its second end.
+  function bodies_of(self, number) result(bodies)
+    type(modes_report_t), intent(in) :: self
+    integer, intent(in) :: number   !! of the coupling or shaft
+    integer, allocatable :: bodies(:)
+    integer :: e, i, k
+
+    allocate (bodies(0))
+    associate (rows => self%machine%elements%rows)
+      do i = size(self%elastic), 1, -1
+        if (self%whole(i) /= number) cycle
+        e = self%elastic(i)
+        do k = rows%first(e), rows%first(e + 1) - 1
+          if (rows%body(k) > size(self%body_names) .or. any(bodies == rows%body(k))) cycle
+          bodies = [bodies, rows%body(k)]
+        end do
+      end do
+    end associate
+  end function bodies_of
 
   subroutine put_mode(json, self, i)
     type(json_t), intent(inout) :: json

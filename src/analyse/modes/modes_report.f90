@@ -1,6 +1,6 @@
 !> The printed report on the modes of a machine.
 module nocdyn_modes_report
-  use nocdyn_element_sets, only: element_names
+  use nocdyn_element_sets, only: element_names, whole_names, whole_sums, wholes
   use nocdyn_errors, only: error_t, exit_failed, raise
   use nocdyn_finite, only: is_finite
   use nocdyn_kinds, only: wp
@@ -29,9 +29,12 @@ module nocdyn_modes_report
     type(machine_t) :: machine
     type(mode_t), allocatable :: modes(:)
     integer :: shapes = 0                         !! number of modes, from the first, whose shapes and shares are in the files
-    integer, allocatable :: elastic(:)            !! elements whose potential energies are reported
-    type(string_t), allocatable :: elastic_names(:)
-    real(wp), allocatable :: stiffness(:)         !! tangent stiffness of `elastic` [N m/rad]
+    type(string_t), allocatable :: body_names(:)      !! of the bodies of the input
+    type(string_t), allocatable :: kinetic_names(:)   !! of the parts of the kinetic energy: these, and shafts with nodes
+    integer, allocatable :: elastic(:)            !! elements with potential energies
+    integer, allocatable :: whole(:)              !! number, from 1, of the coupling or shaft of which each is a part
+    type(string_t), allocatable :: elastic_names(:)   !! of couplings and shafts
+    real(wp), allocatable :: stiffness(:)         !! tangent stiffness of these [N m/rad]
     real(wp), allocatable :: omega(:)             !! speeds of the bodies at the operating point [rad/s]
     real(wp) :: t = 0.0_wp
     character(len=:), allocatable :: point        !! about which the machine is linearised
@@ -52,7 +55,6 @@ contains
     if (allocated(error)) return
     self%machine = point%formulation%machine
     allocate (self%elastic, source=self%machine%elastic())
-    allocate (self%elastic_names, source=element_names(self%machine, self%elastic))
     call find_modes(point%formulation, linear, self%elastic, self%modes, error)
     if (allocated(error)) return
     do i = 1, size(self%modes)
@@ -66,16 +68,44 @@ contains
     end do
     call point%formulation%set_state(point%y)
     allocate (self%omega, source=point%formulation%omega(1, 1:))
-    self%stiffness = linear%stiffness(self%elastic)
+    call join_parts(linear%stiffness(self%elastic), self)
     self%t = point%t
     self%point = point%text
     allocate (self%notes, source=point%notes)
-    self%shapes = min(size(self%modes), max_values / (3 * self%machine%bodies + size(self%elastic)))
+    self%shapes = min(size(self%modes), max_values / (3 * size(self%kinetic_names) + size(self%elastic_names)))
     if (self%shapes < size(self%modes)) then
       call append(self%notes, 'of the ' // to_text(size(self%modes)) // ' modes, modes.csv and modes.json have the ' // &
                               'shapes and energies of the first ' // to_text(self%shapes))
     end if
   end subroutine new_modes_report
+
+  !> Adds up the energies of the nodes and of the slices of each shaft.
+  subroutine join_parts(stiffness, self)
+    real(wp), intent(in) :: stiffness(:)   !! of the elastic elements [N m/rad]
+    type(modes_report_t), intent(inout) :: self
+    type(string_t), allocatable :: elements(:), nodes(:)
+    integer :: i, named
+
+    allocate (elements, source=element_names(self%machine, self%elastic))
+    self%whole = wholes(elements)
+    allocate (self%elastic_names, source=whole_names(elements))
+    self%stiffness = stiffness   ! slices are in series
+    if (size(self%elastic_names) < size(elements)) self%stiffness = 1.0_wp / whole_sums(elements, 1.0_wp / stiffness)
+    named = self%machine%bodies - self%machine%nodes
+    allocate (nodes, source=self%machine%names(named + 1:))
+    do i = 1, size(nodes)
+      nodes(i)%text = nodes(i)%text(:index(nodes(i)%text, '[', back=.true.) - 1)
+    end do
+    allocate (self%body_names, source=self%machine%names(:named))
+    allocate (self%kinetic_names, source=[self%body_names, whole_names(nodes)])
+    do i = 1, size(self%modes)
+      associate (mode => self%modes(i))
+        mode%shape = mode%shape(:named)
+        mode%kinetic = [mode%kinetic(:named), whole_sums(nodes, mode%kinetic(named + 1:))]
+        mode%potential = whole_sums(elements, mode%potential)
+      end associate
+    end do
+  end subroutine join_parts
 
   !> Tables of the modes, and of the shapes of small machines.
   function modes_text(file, self, wanted) result(text)
@@ -95,7 +125,7 @@ contains
     call put_real(self, mode_overdamped, report)
     call put_real(self, mode_diverging, report)
     call put_real(self, mode_internal, report)
-    if (count(self%modes%kind == mode_oscillating) <= max_shapes .and. self%machine%bodies <= max_shapes) then
+    if (count(self%modes%kind == mode_oscillating) <= max_shapes .and. size(self%body_names) <= max_shapes) then
       call put_shapes(self, report)
     end if
     text = report%text()
@@ -114,7 +144,7 @@ contains
     if (size(chosen) == 0) return
     shown = min(size(chosen), max_modes)
     width = maxval([len('kinetic energy in'), &
-                    (text_width(shares_text(self%modes(chosen(i))%kinetic, self%machine%names)), i=1, shown)])
+                    (text_width(shares_text(self%modes(chosen(i))%kinetic, self%kinetic_names)), i=1, shown)])
     rpm = ''
     if (has_rpm) rpm = cell('[rpm]')
     call report%append_line('  mode' // cell('frequency [Hz]') // rpm // cell('undamped [Hz]') // cell('damping ratio') // &
@@ -124,7 +154,7 @@ contains
         if (has_rpm) rpm = cell(from_si(in_si(mode%frequency(), unit_hz), unit_rpm))
         call report%append_line(repeat(' ', number_width - len(to_text(i))) // to_text(i) // cell(mode%frequency()) // rpm // &
                                 cell(mode%undamped) // cell(mode%damping_ratio()) // time_cell(mode) // '  ' // &
-                                padded(shares_text(mode%kinetic, self%machine%names), width) // '  ' // &
+                                padded(shares_text(mode%kinetic, self%kinetic_names), width) // '  ' // &
                                 shares_text(mode%potential, self%elastic_names) // &
                                 trim(merge(', unstable', '          ', mode%is_unstable())))
       end associate
@@ -156,7 +186,7 @@ contains
           call report%append_line('  ' // self%machine%internal_name(mode%internal) // ': ' // rate_text(mode))
         else
           call report%append_line('  ' // trim(kind_names(kind)) // ': ' // rate_text(mode) // '; kinetic energy in ' // &
-                                  shares_text(mode%kinetic, self%machine%names))
+                                  shares_text(mode%kinetic, self%kinetic_names))
         end if
       end associate
     end do
@@ -221,7 +251,7 @@ contains
     integer :: b, first, i, last, width
 
     allocate (chosen, source=modes_of(self, mode_oscillating))
-    width = max(len('shape of mode'), maxval([(text_width(self%machine%names(b)%text), b=1, self%machine%bodies)]))
+    width = max(len('shape of mode'), maxval([(text_width(self%body_names(b)%text), b=1, size(self%body_names))]))
     do first = 1, size(chosen), shapes_per_row
       last = min(first + shapes_per_row - 1, size(chosen))
       line = '  ' // padded('shape of mode', width)
@@ -229,8 +259,8 @@ contains
         line = line // cell(to_text(i))
       end do
       call report%append_line(line)
-      do b = 1, self%machine%bodies
-        line = '  ' // padded(self%machine%names(b)%text, width)
+      do b = 1, size(self%body_names)
+        line = '  ' // padded(self%body_names(b)%text, width)
         do i = first, last
           line = line // cell(rounded_text(real(self%modes(chosen(i))%shape(b), wp), 5))
         end do

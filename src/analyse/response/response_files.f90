@@ -170,9 +170,10 @@ contains
     type(string_t), allocatable :: labels(:)
     integer, allocatable :: unit(:)
     real(wp), allocatable :: row(:)
-    integer :: i, l, n
+    integer :: i, l, n, named
 
     associate (response => analysis%response)
+      named = response%machine%bodies - response%machine%nodes
       call list_order_labels(analysis, labels)
       allocate (unit(size(labels)), row(size(labels)))
       call turn_labels(labels, wanted, unit)
@@ -184,8 +185,8 @@ contains
             n = 3 + 2 * size(response%quantities)
             row(4:n:2) = abs(point%quantity(l, :))
             row(5:n:2) = phase(point%quantity(l, :))
-            row(n + 1::3) = abs(point%angle(l, :))
-            row(n + 2::3) = phase(point%angle(l, :))
+            row(n + 1::3) = abs(point%angle(l, :named))
+            row(n + 2::3) = phase(point%angle(l, :named))
             row(n + 3::3) = point%frequency(l) * row(n + 1::3)
             call write_row(file, from_si(row, unit))
           end do
@@ -209,7 +210,7 @@ contains
         call list%add(response%quantities(q)%label // ' [' // response%quantities(q)%unit // ']')
         call list%add('phase_' // response%quantities(q)%label // ' [deg]')
       end do
-      do b = 1, response%machine%bodies
+      do b = 1, response%machine%bodies - response%machine%nodes
         call list%add('phi_' // response%machine%names(b)%text // ' [rad]')
         call list%add('phase_phi_' // response%machine%names(b)%text // ' [deg]')
         call list%add('omega_amplitude_' // response%machine%names(b)%text // ' [rad/s]')

@@ -31,12 +31,13 @@ contains
 
     output = input%position('output')
     allocate (patterns, source=input%groups(output)%texts('columns'))
-    is_chosen = size(patterns) == 0
+    is_chosen = size(patterns) == 0 .and. .not. [(is_of_node(labels(c)%text), c=1, size(labels))]
     is_chosen(1) = .true.
     do i = 1, size(patterns)
       pattern = trim(adjustl(patterns(i)%text))
       is_found = .false.
       do c = 1, size(labels)
+        if (is_of_node(labels(c)%text) .and. index(pattern, '[') == 0) cycle
         if (.not. (matches(pattern, labels(c)%text) .or. matches(pattern, without_unit(labels(c)%text)))) cycle
         is_chosen(c) = .true.
         is_found = .true.
@@ -48,6 +49,13 @@ contains
     allocate (chosen, source=pack([(c, c=1, size(labels))], is_chosen))
   end subroutine choose_columns
 
+  !> Whether a column is that of a node inside of a shaft, which only patterns with a bracket choose.
+  elemental logical function is_of_node(label)
+    character(len=*), intent(in) :: label
+
+    is_of_node = index(label, '] [') > 0
+  end function is_of_node
+
   !> The number of the columns that &output asks for.
   subroutine count_columns(input, machine, count, error)
     type(input_t), intent(in) :: input
@@ -58,7 +66,7 @@ contains
     type(string_t), allocatable :: labels(:)
     integer, allocatable :: chosen(:), units(:)
 
-    count = column_count(machine)
+    count = column_count(machine) - 2 * machine%nodes
     if (.not. input%groups(input%position('output'))%has_value('columns')) return
     call list_columns(machine, columns, labels)
     allocate (units(size(labels)))

@@ -7,7 +7,7 @@ module nocdyn_run_summary
   use nocdyn_json, only: json_t
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
-  use nocdyn_machine_report, only: constraint_count, machine_notes
+  use nocdyn_machine_report, only: constraint_count, machine_notes, named_coordinates
   use nocdyn_run_limits, only: put_run_limits, run_limit_t
   use nocdyn_solver_status, only: max_switch_times, solver_status_t
   use nocdyn_run_settings, only: put_settings
@@ -136,11 +136,11 @@ contains
     type(machine_t), intent(in) :: machine
     type(run_summary_t), intent(inout) :: summary
 
-    summary%bodies = machine%bodies
+    summary%bodies = machine%bodies - machine%nodes
     summary%gears = constraint_count(machine, 'gear')
     summary%constraints = machine%constraints%rows()
     summary%freedoms = machine%coordinates%freedoms
-    allocate (summary%coordinates, source=selected(machine%names, machine%coordinates%body))
+    allocate (summary%coordinates, source=selected(machine%names, named_coordinates(machine)))
     allocate (summary%notes, source=machine_notes(machine))
   end subroutine describe_machine
 

@@ -58,7 +58,8 @@ contains
         do e = 1, size(quantities(q)%elements)
           associate (element => quantities(q)%elements(e), names => machine%banks(bank)%bank%names)
             call add_column(columns, labels, count, column_t(column_element, bank, q, element), &
-                            trim(quantities(q)%name) // '_' // names(element)%text // ' [' // trim(quantities(q)%unit) // ']')
+                            trim(quantities(q)%name) // '_' // names(element)%text // trim(quantities(q)%suffix) // ' [' // &
+                            trim(quantities(q)%unit) // ']')
           end associate
         end do
       end do

@@ -1,6 +1,6 @@
 !> The rows of trajectory.csv: all columns of a machine of one lane at a time and state.
 module nocdyn_trajectory_table
-  use nocdyn_element_sets, only: element_names
+  use nocdyn_element_sets, only: element_names, whole_names, whole_sums
   use nocdyn_energy_balance, only: energy_balance_t, work_element_names
   use nocdyn_formulation, only: formulation_t
   use nocdyn_kinds, only: wp
@@ -73,16 +73,20 @@ contains
     real(wp), intent(in) :: t                  !! [s]
     real(wp), contiguous, intent(in) :: y(:)   !! [states + quadratures]
     type(energy_balance_t), intent(out) :: balance
+    type(string_t), allocatable :: names(:)
 
     self%t(1) = t
     self%y(1, :) = y
     call self%columns%observe(self%t, self%y)
     associate (formulation => self%columns%formulation, machine => self%columns%formulation%machine)
-      allocate (balance%work_elements, source=work_element_names(machine))
-      allocate (balance%work, source=y(formulation%states + 1:))
-      allocate (balance%elastic_elements, source=element_names(machine, machine%elastic()))
-      allocate (balance%stored_start, source=self%start_stored)
-      balance%stored_end = machine%elements%stored(1, machine%elastic())
+      allocate (names, source=work_element_names(machine))
+      allocate (balance%work_elements, source=whole_names(names))
+      allocate (balance%work, source=whole_sums(names, y(formulation%states + 1:)))
+      deallocate (names)
+      allocate (names, source=element_names(machine, machine%elastic()))
+      allocate (balance%elastic_elements, source=whole_names(names))
+      allocate (balance%stored_start, source=whole_sums(names, self%start_stored))
+      allocate (balance%stored_end, source=whole_sums(names, machine%elements%stored(1, machine%elastic())))
     end associate
     balance%kinetic_start = self%start_kinetic
     balance%kinetic_end = self%columns%kinetic_energy(1)

@@ -91,7 +91,8 @@ contains
     real(wp), allocatable :: speeds(:)   ! [rad/s]
     integer :: b
 
-    allocate (moving, source=pack([(b, b=1, machine%bodies)], abs(machine%start_speed(1, :)) > 0))
+    allocate (moving, source=pack([(b, b=1, machine%bodies - machine%nodes)], &
+                                abs(machine%start_speed(1, :machine%bodies - machine%nodes)) > 0))
     given = given_speeds(input)
     allocate (speeds, source=[machine%start_speed(1, moving), given%speeds])
     allocate (labels(size(speeds)))

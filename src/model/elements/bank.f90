@@ -27,6 +27,7 @@ module nocdyn_bank
     character(len=16) :: name            !! first part of the column's name, e.g. 'torque'
     character(len=8) :: unit             !! e.g. 'N m'
     integer, allocatable :: elements(:)  !! elements that have a column, numbered within the bank
+    character(len=8) :: suffix = ''      !! last part of the column's name
   end type quantity_t
 
   !> One harmonic of the torque of an element that turns steadily: amplitude sin(frequency t + order phi + phase), with the angle
@@ -48,6 +49,7 @@ module nocdyn_bank
     integer :: first_value = 1                    !! index of lane 1 of `first` in the flat arrays of the machine
     logical :: has_polynomial_potential = .true.  !! whether `polynomials` gives its whole restoring moment
     logical :: has_paper_law = .true.             !! whether its law is that of eqs. (3), (5), (17) or (20)
+    logical :: has_parts = .false.                !! whether consecutive elements of one name are parts of one element
     character(len=24), allocatable :: internal_names(:)   !! e.g. 'armature current', [states]
     integer :: first_internal = 1                 !! number of the first internal state of `first` in the machine
     real(wp), allocatable :: loss_factor(:)       !! k (1 + i loss_factor) is the stiffness at a frequency; not allocated: 0
@@ -63,6 +65,7 @@ module nocdyn_bank
     procedure, private :: connect_bodies, connect_rows
     procedure :: list_structure
     procedure :: last
+    procedure :: named_count
     procedure :: is_source
     procedure :: quantities
     procedure :: observe
@@ -137,6 +140,18 @@ contains
 
     last = self%first + self%count - 1
   end function last
+
+  !> The number of elements with a name of their own.
+  pure integer function named_count(self)
+    class(bank_t), intent(in) :: self
+    integer :: e
+
+    named_count = self%count
+    if (.not. self%has_parts) return
+    do e = 2, self%count
+      if (self%names(e)%text == self%names(e - 1)%text) named_count = named_count - 1
+    end do
+  end function named_count
 
   !> Whether the work of the elements counts as work put in, not as work taken out.
   pure logical function is_source(self)

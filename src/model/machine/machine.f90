@@ -26,6 +26,7 @@ module nocdyn_machine
   type, public :: machine_t
     integer :: lanes = 1
     integer :: bodies = 0
+    integer :: nodes = 0                                  !! the last bodies: nodes inside of shafts
     type(string_t), allocatable :: names(:)               !! names of the bodies
     real(wp), allocatable :: inertia(:, :)                !! J [kg m2], shape [lanes, bodies]
     real(wp), allocatable :: start_angle(:, :)            !! [rad], [lanes, bodies]

@@ -46,7 +46,8 @@ contains
     type(target_t), intent(in) :: targets(:)
     type(machine_t), intent(in) :: machine
     type(lane_parameters_t), intent(in) :: parameters   !! of the block
-    integer :: g, i
+    logical :: has_parts   ! whether inertias may be sums
+    integer :: b, g, i
 
     allocate (self%target(0), self%index(0), self%banks(0), self%inertia_target(0), self%body(0))
     allocate (self%signs(size(targets), 0))
@@ -56,9 +57,10 @@ contains
     allocate (self%highest(size(targets)), source=-huge(1.0_wp))
     self%are_direct = .not. allocated(machine%steady_internal)   ! the start follows from all values
     if (.not. self%are_direct) return
+    has_parts = any([(machine%banks(b)%bank%has_parts, b=1, size(machine%banks))])
     do i = 1, size(targets)
       if (input%groups(targets(i)%group)%kind == 'body') then   ! an inertia, unless the start speeds were projected with it
-        self%are_direct = key_of(input, targets(i)) == 'inertia' .and. .not. allocated(machine%start_impulse)
+        self%are_direct = key_of(input, targets(i)) == 'inertia' .and. .not. (allocated(machine%start_impulse) .or. has_parts)
         self%inertia_target = [self%inertia_target, i]
         self%body = [self%body, findloc(input%groups_named('body'), targets(i)%group, dim=1)]
       else

@@ -66,6 +66,7 @@ contains
 
     is_quantity = .false.
     if (column%kind /= column_element) return
+    if (machine%banks(column%bank)%bank%has_parts) return
     quantities = machine%banks(column%bank)%bank%quantities()
     is_quantity = quantities(column%quantity)%name == name
   end function is_quantity

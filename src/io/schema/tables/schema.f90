@@ -12,6 +12,7 @@ module nocdyn_schema
     allowed_t, an_integer, any_number, any_times, anything, at_least_once, at_most_once, at_most_one, body_or_ground, &
     exactly_once, example_t, from_2, group_rule_t, key_rule_t, kind_rule_t, less_than, not_negative, positive, relation_rule_t, &
     required, unset
+  use nocdyn_schema_shafts, only: shaft_examples, shaft_groups, shaft_keys, shaft_relations
   use nocdyn_schema_sweep, only: sweep_aliases, sweep_examples, sweep_groups, sweep_keys, sweep_kinds, sweep_relations
   use nocdyn_schema_torques, only: excitation_keys, load_keys, motor_keys, torque_examples, torque_kinds, torque_relations
   use nocdyn_text, only: append, string_t
@@ -34,7 +35,7 @@ module nocdyn_schema
     group_rule_t('case',       at_most_once,  '',         'What the file is about.'), &
     group_rule_t('body',       at_least_once, 'body',     'A rigid body that turns about its axis.'), &
     group_rule_t('coupling',   any_times,     'coupling', 'An elastic coupling of two bodies, or of a body and the ground.'), &
-    constraint_groups, &
+    shaft_groups, constraint_groups, &
     group_rule_t('motor',      any_times,     'torque',   'A driving torque on a body, by a law of its speed.'), &
     group_rule_t('load',       any_times,     'torque',   'A resisting torque on a body: the sum of the terms that are given.'), &
     group_rule_t('excitation', any_times,     'torque',   'A torque on a body, by a law of time or of its angle.'), &
@@ -92,12 +93,14 @@ module nocdyn_schema
   type(kind_rule_t), parameter, public :: kind_rules(*) = [torque_kinds, sweep_kinds]
 
   type(key_rule_t), parameter, public :: key_rules(*) = &
-    [frame_keys, coupling_keys, constraint_keys, motor_keys, load_keys, excitation_keys, engine_keys, response_keys, sweep_keys]
+    [frame_keys, coupling_keys, shaft_keys, constraint_keys, motor_keys, load_keys, excitation_keys, engine_keys, &
+     response_keys, sweep_keys]
 
   type(relation_rule_t), parameter, public :: relation_rules(*) = [ &
     relation_rule_t('run', less_than, 't_start', 't_end'), &
     relation_rule_t('output', at_most_one, 'interval', 'points'), &
-    coupling_relations, constraint_relations, torque_relations, engine_relations, response_relations, sweep_relations]
+    coupling_relations, shaft_relations, constraint_relations, torque_relations, engine_relations, response_relations, &
+    sweep_relations]
 
   type(alias_t), parameter, public :: aliases(*) = sweep_aliases
 
@@ -108,7 +111,8 @@ module nocdyn_schema
     example_t('body',       "name = 'machine'  inertia = 5.0"), &
     example_t('run',        "t_end = 10.0  method = 'rk45'  rtol = 1.0e-9  atol = 1.0e-9"), &
     example_t('output',     'interval = 0.01'), &
-    coupling_examples, constraint_examples, torque_examples, engine_examples, response_examples, sweep_examples]
+    coupling_examples, shaft_examples, constraint_examples, torque_examples, engine_examples, response_examples, &
+    sweep_examples]
 
   ! One value for each row of `group_rules`. The rows of `key_rules` of a group are consecutive.
   integer :: rule   ! index of the lists below

@@ -1,0 +1,139 @@
+!> Elastic shafts: uniform segments of spectral elements (`nocdyn_spectral_elements`), whose internal nodes are bodies.
+!>
+!> Each Gauss point of a segment is an element of the bank, a slice: its angle is the twist of the part of the shaft that it stands
+!> for, and its moment that of the shaft there. Between the Gauss points of a segment the moment is a polynomial.
+module nocdyn_shafts
+  use nocdyn_bank, only: quantity_t
+  use nocdyn_couplings, only: coupling_common_t, couplings_t
+  use nocdyn_elements, only: elements_t
+  use nocdyn_kinds, only: wp
+  use nocdyn_polynomial_laws, only: coefficient_linear, coefficient_rest
+  implicit none (type, external)
+  private
+
+  public :: new_shafts
+
+  !> The slices of a shaft, and its moments at points along it, from end to end, two at every step of the diameter. Slices are
+  !> numbered within the bank, and points over all of its shafts.
+  type, public :: shaft_t
+    integer :: first = 1, last = 0               !! slices
+    integer :: first_point = 1, last_point = 0
+    integer, allocatable :: ends(:)              !! its two bodies, 0 = ground
+    real(wp), allocatable :: moments(:, :)       !! moments at the points from those of the slices, [points, slices]
+  end type shaft_t
+
+  type, extends(couplings_t), public :: shafts_t
+    type(shaft_t), allocatable :: shafts(:)
+  contains
+    procedure :: quantities
+    procedure :: observe
+    procedure :: positions, section_moduli
+  end type shafts_t
+
+  ! the order of `quantities`
+  integer, parameter :: twist = 1, moment_1 = 2, moment_2 = 3, largest_moment = 4, stress = 5
+
+contains
+
+  !> A bank of shafts. All slices of a shaft have its name.
+  function new_shafts(common, stiffness, shafts, position, section_modulus) result(bank)
+    type(coupling_common_t), intent(in) :: common      !! names, rows, damping, rest twists of the slices
+    real(wp), intent(in) :: stiffness(:, :)            !! [N m/rad], [lanes, slices]
+    type(shaft_t), intent(in) :: shafts(:)
+    real(wp), intent(in) :: position(:, :)             !! of the points from the first end [m], [lanes, points]
+    real(wp), intent(in) :: section_modulus(:, :)      !! against torsion [m3], [lanes, points]
+    type(shafts_t) :: bank
+    integer, allocatable :: owner(:)
+    integer :: s
+
+    call bank%set_common(common)
+    allocate (bank%shafts, source=shafts)
+    allocate (owner, source=[(spread(shafts(s)%first, 1, shafts(s)%last_point - shafts(s)%first_point + 1), s=1, size(shafts))])
+    call bank%add_parameter('slice_stiffness', stiffness, is_key=.false.)
+    call bank%add_parameter('position', position, is_key=.false., element=owner)
+    call bank%add_parameter('shaft_modulus', section_modulus, is_key=.false., element=owner)
+    call bank%add_term('rest_twist', coefficient_rest, 1.0_wp)
+    call bank%add_term('slice_stiffness', coefficient_linear, 1.0_wp)
+    call bank%add_damping()
+    bank%is_polynomial = .true.
+    bank%has_polynomial_potential = .true.
+    bank%has_paper_law = .true.
+    bank%has_parts = .true.
+    call bank%prepare_law()
+  end function new_shafts
+
+  !> Twist of each shaft, its moments at both ends, and the largest moment and stress along it.
+  function quantities(self) result(columns)
+    class(shafts_t), intent(in) :: self
+    type(quantity_t), allocatable :: columns(:)
+    integer :: q
+
+    allocate (columns(stress))
+    do q = 1, stress
+      columns(q)%name = 'moment'
+      columns(q)%unit = 'N m'
+      columns(q)%elements = self%shafts%first
+    end do
+    columns(twist)%name = 'twist'
+    columns(twist)%unit = 'rad'
+    columns(moment_1)%suffix = '_1'
+    columns(moment_2)%suffix = '_2'
+    columns(largest_moment)%suffix = '_max'
+    columns(stress)%name = 'stress'
+    columns(stress)%unit = 'Pa'
+  end function quantities
+
+  !> The twist of the second end against the first one [rad], the moment in the shaft [N m], elastic and of its damping, positive
+  !> with the twist, and the shear stress at the surface [Pa]. The values of a shaft are those of its first slice.
+  pure subroutine observe(self, elements, quantity, lane, values)
+    class(shafts_t), intent(in) :: self
+    type(elements_t), intent(in) :: elements
+    integer, intent(in) :: quantity   !! twist ... stress
+    integer, intent(in) :: lane
+    real(wp), intent(out) :: values(:)   !! [elements of the bank]
+    real(wp) :: found, moment
+    integer :: p, s
+
+    values = 0.0_wp
+    do s = 1, size(self%shafts)
+      associate (shaft => self%shafts(s), value => values(self%shafts(s)%first), offset => self%first - 1)
+        if (quantity == twist) then
+          value = sum(elements%angle(lane, offset + shaft%first:offset + shaft%last))
+          cycle
+        end if
+        do p = 1, size(shaft%moments, 1)
+          if (quantity == moment_1 .and. p > 1 .or. quantity == moment_2 .and. p < size(shaft%moments, 1)) cycle
+          moment = 0.0_wp - sum(shaft%moments(p, :) * (elements%restoring(lane, offset + shaft%first:offset + shaft%last) &
+                                                       + elements%applied(lane, offset + shaft%first:offset + shaft%last)))
+          found = moment
+          if (quantity == stress) found = moment / self%parameters(self%number_of('shaft_modulus')) &
+                                                   %value(lane, shaft%first_point + p - 1)
+          if (abs(found) > abs(value)) value = found
+        end do
+      end associate
+    end do
+  end subroutine observe
+
+  !> Distances of the points of a shaft from its first end [m], [points].
+  pure function positions(self, shaft, lane)
+    class(shafts_t), intent(in) :: self
+    integer, intent(in) :: shaft, lane
+    real(wp) :: positions(self%shafts(shaft)%last_point - self%shafts(shaft)%first_point + 1)
+
+    associate (one => self%shafts(shaft))
+      positions = self%parameters(self%number_of('position'))%value(lane, one%first_point:one%last_point)
+    end associate
+  end function positions
+
+  !> Section moduli against torsion at the points of a shaft [m3], [points].
+  pure function section_moduli(self, shaft, lane)
+    class(shafts_t), intent(in) :: self
+    integer, intent(in) :: shaft, lane
+    real(wp) :: section_moduli(self%shafts(shaft)%last_point - self%shafts(shaft)%first_point + 1)
+
+    associate (one => self%shafts(shaft))
+      section_moduli = self%parameters(self%number_of('shaft_modulus'))%value(lane, one%first_point:one%last_point)
+    end associate
+  end function section_moduli
+
+end module nocdyn_shafts
