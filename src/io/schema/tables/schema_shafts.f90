@@ -43,6 +43,6 @@ module nocdyn_schema_shafts
 
   type(example_t), parameter, public :: shaft_examples(*) = [ &
     example_t('shaft', "name = 'line'  bodies = 'motor', 'machine'|" // &
-      "lengths = 2.0, 3.0  diameters = 0.4, 0.35  shear_modulus = 8.0e10  density = 7850", .false.)]
+      'lengths = 2.0, 3.0  diameters = 0.4, 0.35  shear_modulus = 8.0e10  density = 7850', .false.)]
 
 end module nocdyn_schema_shafts

@@ -1,7 +1,7 @@
 !> Elastic shafts: uniform segments of spectral elements (`nocdyn_spectral_elements`), whose internal nodes are bodies.
 !>
-!> Each Gauss point of a segment is an element of the bank, a slice: its angle is the twist of the part of the shaft that it stands
-!> for, and its moment that of the shaft there. Between the Gauss points of a segment the moment is a polynomial.
+!> Each Gauss point of a segment is an element of the bank, a slice: its angle is the twist of the part of the shaft that it
+!> stands for, and its moment that of the shaft there. Between the Gauss points of a segment the moment is a polynomial.
 module nocdyn_shafts
   use nocdyn_bank, only: quantity_t
   use nocdyn_couplings, only: coupling_common_t, couplings_t

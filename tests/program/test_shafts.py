@@ -1,0 +1,173 @@
+"""Shafts from their dimensions: frequencies of the continuum, moments and stresses, nodes, refusals."""
+
+import csv
+import json
+from math import cos, pi, sin, sqrt
+
+import pytest
+
+EXACT = 1e-8  # relative error of the frequencies that are asked for
+STATIC = 1e-9
+
+LONG = """&body name = 'a' inertia = 200.0 /
+&body name = 'b' inertia = 10.0 /
+&shaft name = 'line' bodies = 'a', 'b' lengths = 800.0 diameters = 0.78 bores = 0.65 shear_modulus = 75e9 density = 8000 {} /
+&run t_end = 1.0 /
+"""
+LONG_FREQUENCIES = [1.9103322936, 3.8206647591, 5.7309975684, 7.6413308930]
+
+MACHINE = """&body name = 'a' inertia = {j1} angle = 0.01 speed = 0.3 /
+&body name = 'b' inertia = {j2} speed = -0.1 /
+&shaft name = 'line' bodies = {bodies} lengths = {lengths} diameters = {diameters} bores = {bores} shear_modulus = 8e10
+       density = {density} {more} /
+&run t_end = {t_end} rtol = 1e-10 atol = 1e-11 /
+&output points = 11 {columns} /
+"""
+STEPPED = {"lengths": [3.0, 0.7, 5.0], "diameters": [0.3, 0.45, 0.25], "bores": [0.0, 0.1, 0.2]}
+
+
+def machine(j1=20.0, j2=3.0, bodies="'a', 'b'", density=7850, more="", t_end=0.05, columns="", segments=STEPPED):
+    lists = {key: ", ".join(map(str, values)) for key, values in segments.items()}
+    return MACHINE.format(j1=j1, j2=j2, bodies=bodies, density=density, more=more, t_end=t_end, columns=columns, **lists)
+
+
+def stiffnesses(segments):
+    rows = zip(segments["lengths"], segments["diameters"], segments["bores"])
+    return [8e10 * pi / 32 * (outer**4 - inner**4) / length for length, outer, inner in rows]
+
+
+def modes_of(nocdyn, text, *options):
+    outcome = nocdyn("modes", nocdyn.write("machine.nml", text), "--out", "out", *options)
+    assert (outcome.returncode, outcome.stderr) == (0, "")
+    content = json.loads((nocdyn.folder / "out/modes.json").read_text())
+    return [mode["frequency_Hz"] for mode in content["modes"] if mode["kind"] == "oscillating"]
+
+
+def run(nocdyn, text, *words):
+    outcome = nocdyn("run", nocdyn.write("machine.nml", text), "--out", "out", *words)
+    assert outcome.returncode == 0, outcome.stderr
+    header, rows = nocdyn.table("out")
+    return dict(zip(header, zip(*rows)))
+
+
+def moment_left_over(frequency, segments, j1, j2):
+    """What an oscillation of the first disc leaves over at the second one, by transfer matrices of the continuum."""
+    omega, wave_speed = 2 * pi * frequency, sqrt(8e10 / 7850)
+    angle, moment = 1.0, -(omega**2) * j1
+    for length, k in zip(segments["lengths"], stiffnesses(segments)):
+        b = omega * length / wave_speed
+        angle, moment = cos(b) * angle + sin(b) / (k * b) * moment, -k * b * sin(b) * angle + cos(b) * moment
+    return moment - omega**2 * j2 * angle
+
+
+def test_a_long_shaft_has_the_frequencies_of_the_continuum(nocdyn):
+    frequencies = modes_of(nocdyn, LONG.format(""))
+    assert frequencies[:4] == pytest.approx(LONG_FREQUENCIES, rel=1e-9)
+    assert len(frequencies) <= 25  # one more than there are internal nodes
+
+
+@pytest.mark.parametrize(("j1", "j2"), [(20.0, 3.0), (0.0, 0.5), (1000.0, 900.0)])
+@pytest.mark.parametrize("segments", [STEPPED, {"lengths": [4.0], "diameters": [0.2], "bores": [0.1]}])
+def test_frequencies_are_roots_of_the_transfer_matrices(nocdyn, segments, j1, j2):
+    frequencies = modes_of(nocdyn, machine(j1=j1, j2=j2, segments=segments))
+    for frequency in frequencies[:4]:
+        below, above = (moment_left_over(frequency * (1 + side * EXACT), segments, j1, j2) for side in (-1, 1))
+        assert below * above < 0
+
+
+def test_a_stub_costs_no_nodes(nocdyn):
+    stub = "&body name = 'c' inertia = 5.0 /\n&shaft name = 'stub' bodies = 'b', 'c' lengths = 0.1 diameters = 0.5 "
+    stub += "shear_modulus = 75e9 density = 8000 /\n"
+    assert len(modes_of(nocdyn, LONG.format("") + stub)) == len(modes_of(nocdyn, LONG.format(""))) + 1
+
+
+def test_nodes_can_be_given(nocdyn):
+    assert len(modes_of(nocdyn, LONG.format("nodes = 24"))) == 25
+
+
+def test_orders_of_a_response_ask_for_nodes(nocdyn):
+    response = "&response body = 'a' speed_rpm = 30, 60 orders = {} /\n"
+    few, many = (len(modes_of(nocdyn, LONG.format("") + response.format(order))) for order in (1, 24))
+    assert few < 12 < 24 < many
+    exact = modes_of(nocdyn, LONG.format("nodes = 90"))
+    found = modes_of(nocdyn, LONG.format("") + response.format(24))
+    wanted = [f for f in exact if f < 24]
+    assert found[: len(wanted)] == pytest.approx(wanted, rel=EXACT)
+
+
+def test_a_massless_shaft_is_a_coupling(nocdyn):
+    k = 1 / sum(1 / each for each in stiffnesses(STEPPED))
+    frequency = sqrt(k * (1 / 20 + 1 / 3)) / (2 * pi)
+    assert modes_of(nocdyn, machine(density=0)) == pytest.approx([frequency], rel=1e-12)
+
+
+def test_a_steady_moment_gives_twist_and_the_largest_stress(nocdyn):
+    text = machine(bodies="'a', 'b'", more="damping_ratio = 0.01 damping_frequency_hz = 50") + (
+        "&coupling name = 'wall' bodies = 'ground', 'a' stiffness = 1e6 /\n"
+        "&motor name = 'jack' body = 'b' kind = 'constant' torque = 700.0 /\n"
+    )
+    table = run(nocdyn, text, "--set", "run.start=equilibrium")
+    for name in ("moment_line_1 [N m]", "moment_line_2 [N m]", "moment_line_max [N m]"):
+        assert table[name] == pytest.approx([700.0] * 11, rel=STATIC)
+    assert table["twist_line [rad]"][-1] == pytest.approx(700 * sum(1 / k for k in stiffnesses(STEPPED)), rel=STATIC)
+    modulus = pi / 16 * (0.25**4 - 0.2**4) / 0.25
+    assert table["stress_line [Pa]"][-1] == pytest.approx(700 / modulus, rel=STATIC)
+
+
+@pytest.mark.parametrize("formulation", ["paper", "multiplier"])
+def test_formulations_agree_and_keep_the_energy(nocdyn, formulation):
+    text = machine(t_end=0.02)
+    table = run(nocdyn, text)
+    other = run(nocdyn, text, "--set", f"run.formulation={formulation}")
+    for name, values in table.items():
+        scale = max(map(abs, values)) + 1e-3
+        if name != "energy_residual [J]":
+            assert other[name] == pytest.approx(values, abs=1e-6 * scale), name
+    stored = [k + e for k, e in zip(table["kinetic_energy [J]"], table["elastic_energy [J]"])]
+    assert stored == pytest.approx([stored[0]] * 11, rel=1e-7)
+
+
+def test_nodes_have_columns_on_request_only(nocdyn):
+    assert not any("line[" in name for name in run(nocdyn, machine(), "--set", "output.columns=phi_*"))
+    table = run(nocdyn, machine(), "--set", "output.columns=phi_line[*]")
+    assert list(table)[:2] == ["t [s]", "phi_line[1] [rad]"]
+    assert 0 > table["phi_line[1] [rad]"][0] - 0.01 > table["phi_line[2] [rad]"][0] - 0.01  # on a static twist at the start
+
+
+def test_a_sweep_of_a_dimension_is_its_variants_alone(nocdyn):
+    sweep = "&sweep design = 'grid' /\n&vary target = 'shaft.line.shear_modulus' low = 7.5e10 high = 8.5e10 count = 3 /\n"
+    sweep += "&record quantity = 'moment_line_max' statistic = 'max' /\n"
+    outcome = nocdyn("sweep", nocdyn.write("sweep.nml", machine() + sweep), "--out", "all", "--csv")
+    assert outcome.returncode == 0, outcome.stderr
+    with open(nocdyn.folder / "all/sweep.csv") as file:
+        rows = list(csv.DictReader(line for line in file if not line.startswith("#")))
+    for row in rows:
+        modulus = next(value for name, value in row.items() if "shear_modulus" in name)
+        run(nocdyn, machine(), "--set", f"shaft.line.shear_modulus={modulus}")
+        summary = json.loads((nocdyn.folder / "out/summary.json").read_text())
+        largest = next(float(value) for name, value in row.items() if "moment_line_max" in name)
+        assert largest == pytest.approx(summary["columns"]["moment_line_max [N m]"]["max"], rel=1e-6)
+
+
+REFUSALS = [
+    ("diameters = 0.3, 0.4", "lengths = 3.0", "lengths has 1 value"),
+    ("diameters = 0.3 bores = 0.3", "lengths = 3.0", "bores(1) = 0.3 m is not less than diameters(1) = 0.3 m"),
+    ("diameters = 0.3, 0.3, 0.3 nodes = 1", "lengths = 3.0, 1.0, 1.0", "nodes = 1 is out of range; allowed: from 2"),
+    ("diameters = 0.3 nodes = 2000", "lengths = 3.0", "nodes"),
+    ("diameters = 0.3 damping_frequency_hz = 3", "lengths = 3.0", "damping_frequency"),
+]
+
+
+@pytest.mark.parametrize(("keys", "lengths", "words"), REFUSALS)
+def test_bad_dimensions_are_refused(nocdyn, keys, lengths, words):
+    shaft = f"&shaft name = 's' bodies = 'a', 'ground' {lengths} {keys} shear_modulus = 8e10 density = 7850 /\n"
+    text = "&body name = 'a' inertia = 1.0 /\n" + shaft + "&run t_end = 1.0 /\n"
+    outcome = nocdyn("check", nocdyn.write("bad.nml", text))
+    assert outcome.returncode == 2
+    assert "bad.nml:2: &shaft 's': " in outcome.stderr and words in outcome.stderr
+
+
+def test_a_shaft_without_stiffness_is_refused(nocdyn):
+    outcome = nocdyn("check", nocdyn.write("bad.nml", LONG.format("").replace("75e9", "0.0")))
+    assert outcome.returncode == 2
+    assert "bad.nml:3: &shaft 'line': shear_modulus = 0" in outcome.stderr
