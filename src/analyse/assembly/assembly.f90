@@ -39,17 +39,10 @@ contains
     type(error_t), allocatable, intent(out) :: error
     integer, intent(in), optional :: lanes   !! 1 if absent
     type(body_index_t), target :: body_index
-    type(element_groups_t) :: bodies
     type(shaft_set_t) :: shafts
 
     if (present(lanes)) machine%lanes = lanes
-    bodies = new_element_groups(input, 'body', machine%lanes)
-    machine%bodies = size(bodies%names)
-    machine%names = bodies%names
-    machine%inertia = bodies%values('inertia')
-    machine%start_angle = bodies%values('angle')
-    machine%start_speed = bodies%values('speed')
-    allocate (machine%start_notes(0))
+    call set_bodies(input, machine)
     body_index = new_body_index(machine%names)
     call assemble_constraints(input, body_index, machine%lanes, machine%constraints, error)
     if (.not. allocated(error)) call check_couplings(input, error)
@@ -74,6 +67,20 @@ contains
     call shafts%place_nodes(machine)
     call start_machine(input, machine, error)
   end subroutine assemble_machine
+
+  subroutine set_bodies(input, machine)
+    type(input_t), target, intent(in) :: input
+    type(machine_t), intent(inout) :: machine
+    type(element_groups_t) :: bodies
+
+    bodies = new_element_groups(input, 'body', machine%lanes)
+    machine%bodies = size(bodies%names)
+    machine%names = bodies%names
+    machine%inertia = bodies%values('inertia')
+    machine%start_angle = bodies%values('angle')
+    machine%start_speed = bodies%values('speed')
+    allocate (machine%start_notes(0))
+  end subroutine set_bodies
 
   !> Starts a machine in its steady state, if the input wants it.
   recursive subroutine start_machine(input, machine, error)

@@ -63,7 +63,7 @@ contains
   !> The sums over the parts of each number of `wholes`.
   pure function whole_sums(names, values) result(sums)
     type(string_t), intent(in) :: names(:)
-    real(wp), intent(in) :: values(:)
+    real(wp), intent(in) :: values(:)        !! in any unit, [elements]
     real(wp), allocatable :: sums(:)
     integer :: i, whole(size(names))
 
