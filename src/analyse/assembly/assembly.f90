@@ -12,6 +12,7 @@ module nocdyn_assembly
   use nocdyn_input, only: input_t
   use nocdyn_machine, only: machine_t
   use nocdyn_massless_motion, only: massless_bodies
+  use nocdyn_mesh_assembly, only: add_mesh_form, mesh_form
   use nocdyn_motor_assembly, only: add_motor_form, check_motors, motor_form
   use nocdyn_multiplier, only: new_multiplier
   use nocdyn_paper, only: new_paper
@@ -54,6 +55,7 @@ contains
     allocate (machine%banks(0))
     associate (n => machine%lanes)
       call add_banks(new_element_groups(input, 'coupling', n, body_index), coupling_form, add_coupling_form, machine%banks)
+      call add_banks(new_element_groups(input, 'mesh', n, body_index), mesh_form, add_mesh_form, machine%banks)
       call add_banks(new_element_groups(input, 'motor', n, body_index), motor_form, add_motor_form, machine%banks)
       call add_banks(new_element_groups(input, 'load', n, body_index), load_form, add_load_form, machine%banks)
       call add_banks(new_element_groups(input, 'excitation', n, body_index), excitation_form, add_excitation_form, machine%banks)

@@ -2,6 +2,7 @@
 module nocdyn_response_quantities
   use nocdyn_bank, only: bank_t, role_coupling
   use nocdyn_coordinates, only: coordinates_t
+  use nocdyn_couplings, only: couplings_t
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
   use nocdyn_shafts, only: shafts_t
@@ -51,6 +52,11 @@ contains
           call set_quantity(quantity_moment, bank%names(e)%text, 'moment_', 'N m', one)
           one%element = [bank%first + e - 1]
           one%weight = [-1.0_wp]
+          if (is_mesh(bank)) then
+            call set_quantity(quantity_moment, bank%names(e)%text, 'force_', 'N', one)
+            one%element = [bank%first + e - 1]
+            one%weight = [1.0_wp]
+          end if
           modulus = bank%number_of('section_modulus')
           if (modulus > 0) one%section_modulus = bank%parameters(modulus)%value(1, e)
           quantities(n) = one
@@ -59,6 +65,17 @@ contains
     end do
     call list_reactions(machine, reference, quantities(n + 1:))
   end subroutine list_quantities
+
+  !> Whether the elements of a bank are meshes of teeth.
+  pure logical function is_mesh(bank)
+    class(bank_t), intent(in) :: bank
+
+    is_mesh = .false.
+    select type (bank)
+    class is (couplings_t)
+      is_mesh = bank%is_mesh
+    end select
+  end function is_mesh
 
   !> The moments at both ends of every shaft.
   subroutine list_shafts(bank, n, quantities)

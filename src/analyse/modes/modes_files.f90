@@ -1,5 +1,7 @@
 !> The files on the modes of a machine: modes.csv and modes.json.
 module nocdyn_modes_files
+  use nocdyn_bank, only: bank_of
+  use nocdyn_couplings, only: couplings_t
   use nocdyn_equilibrium, only: t_infinity
   use nocdyn_input, only: input_t
   use nocdyn_json, only: json_t
@@ -128,7 +130,7 @@ contains
       call json%open()
       call json%put('name', self%elastic_names(i)%text)
       call json%put('bodies', bodies_of(self, i))
-      call json%put('stiffness_N_m_rad', self%stiffness(i))
+      call json%put(stiffness_key(self, i), self%stiffness(i))
       call json%close()
     end do
     call json%close_list()
@@ -147,6 +149,21 @@ contains
     end associate
     call json%close_list()
   end subroutine put_drivetrain
+
+  !> The unit of the stiffness of a coupling, shaft or mesh.
+  function stiffness_key(self, number) result(key)
+    type(modes_report_t), intent(in) :: self
+    integer, intent(in) :: number   !! of the coupling, shaft or mesh
+    character(len=:), allocatable :: key
+
+    key = 'stiffness_N_m_rad'
+    associate (banks => self%machine%banks, element => self%elastic(findloc(self%whole, number, dim=1)))
+      select type (bank => banks(bank_of(banks, element))%bank)
+      class is (couplings_t)
+        if (bank%is_mesh) key = 'stiffness_N_m'
+      end select
+    end associate
+  end function stiffness_key
 
   !> The bodies of the input that a coupling or shaft joins. The slices of a shaft are numbered from its second end.
   function bodies_of(self, number) result(bodies)

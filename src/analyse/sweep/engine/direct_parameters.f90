@@ -5,7 +5,7 @@
 !> depend on it, so that only the responses to moments follow. A variant is written into a lane if every target is
 !> direct and one with the same signs of all values has been assembled and had the structure of the block.
 module nocdyn_direct_parameters
-  use nocdyn_bank, only: role_names
+  use nocdyn_bank, only: role_coupling, role_names
   use nocdyn_input, only: input_t
   use nocdyn_kinds, only: wp
   use nocdyn_lane_parameters, only: lane_parameters_t, parameter_index_t
@@ -89,10 +89,10 @@ contains
     associate (group => input%groups(target%group))
       do b = 1, size(machine%banks)
         associate (bank => machine%banks(b)%bank)
-          if (role_names(bank%role) /= group%kind) cycle
+          if (role_names(bank%role) /= group%kind .and. .not. (bank%role == role_coupling .and. group%kind == 'mesh')) cycle
           do e = 1, size(bank%names)
             if (bank%names(e)%text /= group%name) cycle
-            index = parameters%index_of_key(trim(key_of(input, target)), bank%first - 1 + e)
+            index = parameters%index_of_key(trim(parameter_of(key_of(input, target))), bank%first - 1 + e)
             if (index%array == 0) cycle
             self%are_direct = .true.
             self%target = [self%target, number]
@@ -117,6 +117,15 @@ contains
       is_shared = is_shared .or. input%groups(g)%has_value('share_of_load')
     end do
   end function is_shared
+
+  !> The name of the parameter that holds the values of a key: the backlash of a mesh is the gap of its law.
+  pure function parameter_of(key) result(name)
+    character(len=*), intent(in) :: key
+    character(len=len(key)) :: name
+
+    name = key
+    if (key == 'backlash') name = 'gap'
+  end function parameter_of
 
   pure function key_of(input, target) result(key)
     type(input_t), intent(in) :: input

@@ -26,6 +26,7 @@ module nocdyn_couplings
     real(wp), allocatable :: rest_twist(:, :)       !! [rad]
     real(wp), allocatable :: friction(:, :)         !! [N m]; not allocated: none
     real(wp), allocatable :: friction_speed(:, :)   !! [rad/s], positive
+    logical :: is_mesh = .false.                    !! whether the rows are radii: angles are deformations [m], moments forces [N]
     real(wp), allocatable :: section_modulus(:, :)  !! stress = moment / section_modulus [m3], 0: unknown; not allocated: all
   end type coupling_common_t
 
@@ -37,6 +38,7 @@ module nocdyn_couplings
   !> M_el = -(K1 + k1 w^2) w on the second body, w = u - rest_twist; damping moment -d u'. Extensions have another elastic moment.
   type, extends(bank_t), public :: couplings_t
     logical :: has_friction = .false.
+    logical :: is_mesh = .false.   !! as in `coupling_common_t`
   contains
     procedure :: set_common
     procedure :: add_damping
@@ -47,6 +49,7 @@ module nocdyn_couplings
     procedure :: observe
   end type couplings_t
 
+  integer, parameter :: tooth_force = 2   ! of a mesh, after the deformation
   integer, parameter :: twist = 1, moment = 2, damping_moment = 3, shaft_moment = 4, stress = 5   ! the order of `quantities`
 
 contains
@@ -117,6 +120,7 @@ contains
     call self%add_parameter('rest_twist', common%rest_twist)
     is_dissipative = any(abs(common%damping) > 0.0_wp, dim=1)
     self%has_friction = allocated(common%friction)
+    self%is_mesh = common%is_mesh
     if (self%has_friction) then
       call self%add_parameter('friction', common%friction)
       call self%add_parameter('friction_speed', common%friction_speed)
@@ -167,6 +171,12 @@ contains
     type(quantity_t), allocatable :: columns(:)
     integer :: e
 
+    if (self%is_mesh) then
+      allocate (columns(2))
+      columns(twist) = quantity_t('deformation', 'm', [(e, e=1, self%count)])
+      columns(tooth_force) = quantity_t('force', 'N', [(e, e=1, self%count)])
+      return
+    end if
     allocate (columns(merge(5, 4, self%number_of('section_modulus') > 0)))
     columns(twist) = quantity_t('twist', 'rad', [(e, e=1, self%count)])
     columns(moment) = quantity_t('moment', 'N m', [(e, e=1, self%count)])
@@ -179,7 +189,8 @@ contains
   end function quantities
 
   !> Twist [rad], and the moments on the first body [N m]: the elastic one, F1 of the paper, that of damping and friction, and
-  !> both together, the moment in the shaft; its shear stress [Pa].
+  !> both together, the moment in the shaft; its shear stress [Pa]. Of a mesh the deformation [m] and the force [N], whose product
+  !> with the radius of a wheel is the torque on it.
   pure subroutine observe(self, elements, quantity, lane, values)
     class(couplings_t), intent(in) :: self
     type(elements_t), intent(in) :: elements
@@ -187,6 +198,10 @@ contains
     integer, intent(in) :: lane
     real(wp), intent(out) :: values(:)   !! [elements of the bank]
 
+    if (self%is_mesh .and. quantity == tooth_force) then
+      values = elements%restoring(lane, self%first:self%last()) + elements%applied(lane, self%first:self%last())
+      return
+    end if
     select case (quantity)
     case (twist)
       values = elements%angle(lane, self%first:self%last())
