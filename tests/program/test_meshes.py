@@ -89,6 +89,8 @@ REFUSALS = [
 
 @pytest.mark.parametrize(("keys", "words"), REFUSALS)
 def test_bad_meshes_are_refused(nocdyn, keys, words):
-    outcome = nocdyn("check", nocdyn.write("bad.nml", MACHINE.format(joint=f"&mesh name = 't' bodies = 'p', 'w' {keys} /", speed=0)))
+    outcome = nocdyn(
+        "check", nocdyn.write("bad.nml", MACHINE.format(joint=f"&mesh name = 't' bodies = 'p', 'w' {keys} /", speed=0))
+    )
     assert outcome.returncode == 2
     assert "bad.nml:5: &mesh 't': " in outcome.stderr and words in outcome.stderr

@@ -24,7 +24,7 @@ module nocdyn_schema_meshes
     key_rule_t('mesh',       'stiffness',       a_number,       1, 'N/m',         required,    positive, &
       'mean stiffness of the mesh along the line of action'), &
     key_rule_t('mesh',       'damping',         a_number,       1, 'N s/m',       '0',         not_negative, &
-      'force per rate of deformation; with backlash in contact only, at most as large as the elastic one'), &
+      'force per rate of deformation; with backlash in contact only, at most the elastic force'), &
     key_rule_t('mesh',       'backlash',        a_number,       1, 'm',           '0',         not_negative, &
       'play between both flanks along the line of action; no force inside')]
 
